@@ -1,0 +1,1 @@
+"""The only readers of exports: raw stamps, values and quality out."""

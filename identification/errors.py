@@ -1,0 +1,30 @@
+"""What may fail, said once.
+
+Every error that reaches a user says what was seen, what was expected and what to do about it.
+"""
+
+
+class TriageError(Exception):
+    """Base of all errors that this project raises on purpose."""
+
+
+class InputError(TriageError):
+    """An export, a loops.csv or an option cannot be used as it is.
+
+    Parameters
+    ----------
+    seen : str
+        What was found, with file, tag, column and row where they are known.
+    expected : str
+        What would have been usable.
+    remedy : str
+        What the user can do.
+    """
+
+    def __init__(self, seen: str, expected: str, remedy: str) -> None:
+        self.seen, self.expected, self.remedy = seen, expected, remedy
+        super().__init__(f"{seen}; expected {expected}; {remedy}")
+
+
+class NotAssessedError(TriageError):
+    """A question cannot be answered from this record; the text says what it needs and what it has."""

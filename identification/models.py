@@ -1,0 +1,106 @@
+"""What a loop is made of: process, valve, controller, and the estimate of a number.
+
+Units inside the project: seconds, percent of PV span, percent of OP span. Gains are % PV per % OP.
+Signs: P and I act on e = SP - PV; kp > 0 means that OP falls when PV rises.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """A number with its 90 % interval, both in the same unit.
+
+    `value` is the point estimate, `low` and `high` the interval's ends.
+    """
+
+    value: float
+    low: float
+    high: float
+    unit: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Fopdt:
+    """First order plus dead time, K exp(-L s)/(T s + 1).
+
+    gain [% PV / % OP], time_constant_s [s] > 0, dead_time_s [s] >= 0.
+    """
+
+    gain: float
+    time_constant_s: float
+    dead_time_s: float
+
+    @property
+    def slope(self) -> float:
+        """Gain over time constant [% PV / (% OP s)]: the integrator that the process is at high frequency."""
+        return self.gain / self.time_constant_s
+
+
+@dataclass(frozen=True, slots=True)
+class Integrator:
+    """Integrating process, k exp(-L s)/s. slope [% PV / (% OP s)], dead_time_s [s] >= 0."""
+
+    slope: float
+    dead_time_s: float
+
+
+Process = Fopdt | Integrator
+
+
+@dataclass(frozen=True, slots=True)
+class Backlash:
+    """Play of full width `width` [% OP] (d of the describing function is half of it)."""
+
+    width: float
+
+
+@dataclass(frozen=True, slots=True)
+class Stiction:
+    """Two-parameter stick-slip: stickband S [% OP] on reversal, slip jump J [% OP] when it lets go.
+
+    S is the whole of the travel that OP needs after a reversal before the stem moves (deadband plus
+    stickband); 0 <= J <= S in what is met in plants, J = 0 being backlash (Choudhury, Thornhill, Shah 2005).
+    """
+
+    stickband: float
+    slip_jump: float
+
+
+Valve = Backlash | Stiction | None
+
+
+class Form(StrEnum):
+    """Form of the controller's law."""
+
+    IDEAL = "ideal"
+    SERIES = "series"
+    PARALLEL = "parallel"
+
+
+@dataclass(frozen=True, slots=True)
+class Pid:
+    """A PID controller in percent of spans and seconds, ideal form.
+
+    kp [% OP / % PV] (negative: direct acting), ti_s [s] (inf: no integral), td_s [s], scan_s [s] the
+    period at which it computes (0: continuous), op_lo and op_hi [% OP] its output limits.
+    """
+
+    kp: float
+    ti_s: float
+    td_s: float = 0.0
+    scan_s: float = 1.0
+    op_lo: float = 0.0
+    op_hi: float = 100.0
+
+
+@dataclass(frozen=True, slots=True)
+class Loop:
+    """A closed loop: controller -> valve -> process."""
+
+    process: Process
+    controller: Pid
+    valve: Valve = None

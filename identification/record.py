@@ -1,0 +1,92 @@
+"""One loop's trends on one clock: the type that plants deliver and that the simulator returns."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+
+def _no_masks() -> Mapping[str, Mask]:
+    return MappingProxyType({})
+
+
+@dataclass(frozen=True, slots=True)
+class LoopRecord:
+    """SP, PV and OP of one loop on a uniform clock.
+
+    Parameters
+    ----------
+    tag : str
+        The loop's name.
+    start_s : float
+        Time of the first sample [s since 1970-01-01 UTC].
+    dt_s : float
+        Sample interval [s].
+    sp, pv : ndarray of shape (n,)
+        Set point and process value [% of PV span].
+    op : ndarray of shape (n,)
+        Controller output [% of OP span].
+    bad : ndarray of bool, shape (n,)
+        True where a sample must not be used (gap, bad quality). Values there are filled, never NaN.
+    position : ndarray of shape (n,) or None
+        Stem position [% of OP span] where recorded.
+    sp_estimated : bool
+        True where no SP was recorded and one was estimated from PV.
+    masks : mapping of str to ndarray of bool, shape (n,)
+        True where the named thing happens: gap, stale, compressed, quantized, saturated, manual.
+    """
+
+    tag: str
+    start_s: float
+    dt_s: float
+    sp: Floats
+    pv: Floats
+    op: Floats
+    bad: Mask
+    position: Floats | None = None
+    sp_estimated: bool = False
+    masks: Mapping[str, Mask] = field(default_factory=_no_masks)
+
+    def __len__(self) -> int:
+        return self.pv.size
+
+    @property
+    def error(self) -> Floats:
+        """Control error e = SP - PV [% of span], shape (n,)."""
+        return self.sp - self.pv
+
+    @property
+    def time_s(self) -> Floats:
+        """Seconds since the first sample, shape (n,)."""
+        return np.arange(self.pv.size) * self.dt_s
+
+    @property
+    def duration_s(self) -> float:
+        """Length of the record [s]."""
+        return self.pv.size * self.dt_s
+
+    def mask(self, name: str) -> Mask:
+        """The named mask, all False where it was never set; shape (n,)."""
+        found = self.masks.get(name)
+        return np.zeros(self.pv.size, dtype=bool) if found is None else found
+
+    def span(self, first: int, last: int) -> LoopRecord:
+        """The record of samples first (included) to last (excluded)."""
+        cut = slice(max(first, 0), last)
+        return replace(
+            self,
+            start_s=self.start_s + max(first, 0) * self.dt_s,
+            sp=self.sp[cut],
+            pv=self.pv[cut],
+            op=self.op[cut],
+            bad=self.bad[cut],
+            position=None if self.position is None else self.position[cut],
+            masks=MappingProxyType({k: v[cut] for k, v in self.masks.items()}),
+        )

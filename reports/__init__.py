@@ -1,0 +1,1 @@
+"""Pages in, text out: HTML, Markdown and charts. Imports none of the other packages."""
