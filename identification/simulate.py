@@ -86,7 +86,7 @@ def open_loop(process: Process, valve: Valve, op: Floats, dt_s: float, start: fl
     Returns
     -------
     ndarray of shape (n,)
-        Deviation of PV [% PV] from its first value; the process is at rest with the stem at its first position.
+        Deviation of PV [% PV] from its first value; the process rests with the stem at its first position.
     """
     stem = stem_position(op, valve, start)
     d = discretize(process, dt_s)

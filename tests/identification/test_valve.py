@@ -40,7 +40,7 @@ def test_equal_stickband_and_jump_is_a_relay():
     """S = J = 2d under a sine of amplitude 2d is a relay of height d switching at d (the study's Eq. 2)."""
     d = 1.0
     op = 2 * d * np.sin(np.linspace(0, 8 * np.pi, 4001))
-    stem = stick_slip(op, 2 * d, 2 * d, start=0.0)[1000:]
+    stem = stick_slip(op, 2 * d, 2 * d, start=-d)[1000:]
     assert set(np.round(np.sign(stem))) == {-1.0, 1.0}
     assert np.abs(np.abs(stem) - d).max() < 0.01
 
