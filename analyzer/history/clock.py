@@ -1,0 +1,141 @@
+"""Which columns of a table hold the time, how it is written there, and its seconds."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+import pyarrow.compute as pc
+from numpy.typing import NDArray
+
+from analyzer.history import stamps, zone
+
+TICKS_PER_S = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
+EXCEL_ORIGIN_S = -25569 * 86400.0
+
+
+@dataclass(frozen=True, slots=True)
+class Scale:
+    """How a number means a time: second = number * unit_s + origin_s, on a local clock or on UTC."""
+
+    name: str
+    low: float
+    high: float
+    unit_s: float
+    origin_s: float = 0.0
+    local: bool = False
+
+
+SCALES = (
+    Scale("seconds since the start", 0, 2e4, 1.0),
+    Scale("Excel days", 2e4, 8e4, 86400.0, EXCEL_ORIGIN_S, local=True),
+    Scale("seconds since 1970", 1e8, 4e9, 1.0),
+    Scale("millions of Excel days", 2e10, 8e10, 0.0864, EXCEL_ORIGIN_S, local=True),
+    Scale("milliseconds since 1970", 1e11, 4e12, 1e-3),
+    Scale("microseconds since 1970", 1e14, 4e15, 1e-6),
+    Scale("nanoseconds since 1970", 1e17, 4e18, 1e-9),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Clock:
+    """The time columns of one table.
+
+    Parameters
+    ----------
+    columns : tuple of int
+        One column, or a column of dates and one of times of day.
+    scale : Scale or None
+        Meaning of numbers.
+    day_first : bool or None
+        Order of day and month; None while undecided (then month first).
+    why : str
+        What decided the order, for the notes.
+    date_format, timezone : str or None
+        As in `ReadOptions`.
+    """
+
+    columns: tuple[int, ...]
+    scale: Scale | None = None
+    day_first: bool | None = None
+    why: str = ""
+    date_format: str | None = None
+    timezone: str | None = None
+
+    def seconds(self, arrays: Sequence[pa.Array]) -> tuple[NDArray[np.float64], bool]:
+        """Seconds since 1970-01-01 on the file's clock, NaN where unreadable; True where that is local."""
+        column = arrays[0] if len(arrays) == 1 else joined(arrays)
+        if pa.types.is_date(column.type):
+            column = pc.cast(column, pa.timestamp("s"))
+        if pa.types.is_timestamp(column.type):
+            return _from_timestamps(column), column.type.tz is None
+        if self.scale is not None and not is_text(column.type):
+            return _from_numbers(column, self.scale), self.scale.local
+        return self._from_texts(as_text(column))
+
+    def utc(self, second: NDArray[np.float64], local: bool) -> tuple[NDArray[np.float64], Counter[str]]:
+        """Seconds of UTC from seconds of the file's clock, in the order of the file."""
+        if not local or self.timezone is None:
+            return second, Counter()
+        return zone.to_utc(second, self.timezone)
+
+    def _from_texts(self, texts: pa.Array) -> tuple[NDArray[np.float64], bool]:
+        if self.date_format is not None:
+            return _formatted(texts, self.date_format)
+        parts = stamps.fields(texts)
+        if parts is None:
+            return np.full(len(texts), np.nan), True
+        return stamps.seconds(parts, bool(self.day_first)), not parts.zoned
+
+
+def scale_of(column: pa.Array) -> Scale | None:
+    """How the numbers of a column mean a time, by their size; None where they mean none."""
+    number = pc.cast(column, pa.float64(), safe=False).drop_null().to_numpy()
+    if len(number) == 0:
+        return None
+    middle = float(np.median(number))
+    return next((scale for scale in SCALES if scale.low <= middle < scale.high), None)
+
+
+def is_text(kind: pa.DataType) -> bool:
+    """True for the types that hold text."""
+    plain_text = pa.types.is_string(kind) or pa.types.is_large_string(kind) or pa.types.is_string_view(kind)
+    return plain_text or (pa.types.is_dictionary(kind) and is_text(kind.value_type))
+
+
+def as_text(column: pa.Array) -> pa.Array:
+    """The column as plain strings."""
+    return pc.cast(column, pa.string())
+
+
+def joined(arrays: Sequence[pa.Array]) -> pa.Array:
+    """A column of dates and a column of times of day as one column of text."""
+    return pc.binary_join_element_wise(*(_trimmed_midnight(as_text(array)) for array in arrays), " ")
+
+
+def _trimmed_midnight(texts: pa.Array) -> pa.Array:
+    return pc.replace_substring_regex(texts, r"[ T]0?0:00:00(?:\.0+)?$", "")
+
+
+def _from_timestamps(column: pa.Array) -> NDArray[np.float64]:
+    ticks = column.view(pa.int64()).to_numpy(zero_copy_only=False)
+    return ticks / TICKS_PER_S[column.type.unit]
+
+
+def _from_numbers(column: pa.Array, scale: Scale) -> NDArray[np.float64]:
+    number = pc.cast(column, pa.float64(), safe=False).to_numpy(zero_copy_only=False)
+    digits = 3 if scale.local else 6
+    return np.round(number * scale.unit_s + scale.origin_s, digits)
+
+
+def _formatted(texts: pa.Array, date_format: str) -> tuple[NDArray[np.float64], bool]:
+    zoned = "%z" in date_format
+    written = pd.Series(texts.to_pylist(), dtype=object)
+    index = pd.to_datetime(written, format=date_format, errors="coerce", utc=zoned)
+    naive = index.dt.tz_localize(None) if zoned else index
+    ticks = naive.to_numpy().astype("datetime64[us]")
+    return np.where(np.isnat(ticks), np.nan, ticks.astype(np.int64) / TICKS_PER_S["us"]), not zoned

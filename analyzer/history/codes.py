@@ -1,0 +1,121 @@
+"""Quality codes of historians: which scheme a column follows, and which samples are not good.
+
+OPC DA: the low byte is 192 and above where good, 64 to 127 uncertain, below 64 bad. OPC UA: the two highest
+of 32 bits are 00 good, 01 uncertain, 10 bad. Confidence (0 to 100): good from 50. Uncertain samples are not
+used.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from enum import StrEnum
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+import pyarrow.compute as pc
+from numpy.typing import NDArray
+
+from analyzer.history.names import plain
+
+GOOD_TEXTS = frozenset(
+    {"good", "g", "ok", "valid", "true", "gut", "normal", "good quality", "non-cascade", "cascade"}
+)
+DA_GOOD, UA_UNCERTAIN, CONFIDENCE_GOOD, CONFIDENCE_FULL = 192, 0x40000000, 50, 100
+INTERPOLATED = 0x00020000  # flag of OPC historical access beside the DA code in the low byte
+FLAGGED_INTERPOLATED = "samples are flagged as interpolated, not recorded"
+
+
+class Scheme(StrEnum):
+    """How the codes of one quality column are meant."""
+
+    TEXT = "texts such as Good and Bad"
+    DA = "OPC DA codes, 192 and above good"
+    UA = "codes with 0 good"
+    CONFIDENCE = "confidence in percent, good from 50"
+
+
+def scheme_of(name: str, codes: pa.Array) -> Scheme:
+    """Decide by the column's name and all the codes that occur in it."""
+    number = _numbers(codes)
+    known = number[np.isfinite(number)].astype(np.int64)
+    if 2 * len(known) < len(codes) - codes.null_count:
+        return Scheme.TEXT
+    if "confidence" in plain(name):
+        return Scheme.CONFIDENCE
+    small = known[(known >= 0) & (known < UA_UNCERTAIN)]
+    if (known < 0).any() or (known >= UA_UNCERTAIN).any():
+        return Scheme.UA
+    if ((small & 0xFF) >= DA_GOOD).any():
+        return Scheme.DA
+    return Scheme.CONFIDENCE if len(known) and known.max() == CONFIDENCE_FULL else Scheme.UA
+
+
+def not_good(
+    codes: pa.Array, scheme: Scheme, good: tuple[str, ...] | None
+) -> tuple[NDArray[np.bool_], Counter[str]]:
+    """Samples that the historian does not call good, and how often each such code was met.
+
+    Parameters
+    ----------
+    codes : pyarrow.Array, shape (n,)
+        Numbers or texts; a blank is bad.
+    good : tuple of str or None
+        Codes or texts that count as good whatever the scheme says.
+    """
+    encoded = codes if pa.types.is_dictionary(codes.type) else pc.dictionary_encode(codes)
+    place = pc.fill_null(encoded.indices, len(encoded.dictionary)).to_numpy(zero_copy_only=False)
+    kinds = pa.concat_arrays([encoded.dictionary, pa.nulls(1, encoded.dictionary.type)])
+    bad = ~_good(kinds, scheme) if good is None else ~_listed(kinds, good)
+    count = np.bincount(place, minlength=len(kinds))
+    names = kinds.to_pylist()
+    found = Counter(
+        {f"samples have quality '{names[i]}', taken as bad": int(count[i]) for i in np.flatnonzero(bad)}
+    )
+    found[FLAGGED_INTERPOLATED] = int(count[_interpolated(kinds, scheme)].sum())
+    return bad[place], +found
+
+
+def _sentence(code: pa.Scalar) -> str:
+    return (
+        f"samples have quality '{code.as_py()}', taken as bad" if code.is_valid else "samples have no quality"
+    )
+
+
+def _numbers(codes: pa.Array) -> NDArray[np.float64]:
+    if pa.types.is_dictionary(codes.type):
+        codes = codes.dictionary_decode()
+    return pd.to_numeric(pd.Series(codes.to_pylist(), dtype=object), errors="coerce").to_numpy(
+        dtype=np.float64
+    )
+
+
+def _good(kinds: pa.Array, scheme: Scheme) -> NDArray[np.bool_]:
+    if scheme is Scheme.TEXT:
+        return np.array([_good_text(str(text)) for text in kinds.to_pylist()])
+    number = _numbers(kinds)
+    code = np.nan_to_num(number, nan=-1).astype(np.int64)
+    if scheme is Scheme.CONFIDENCE:
+        return code >= CONFIDENCE_GOOD
+    if scheme is Scheme.DA:
+        return (code >= 0) & ((code & 0xC0) == DA_GOOD)
+    return np.isfinite(number) & ((code & 0xFFFFFFFF) < UA_UNCERTAIN) & ~((code > 0) & (code < 0x100))
+
+
+def _good_text(text: str) -> bool:
+    return text.strip().lower() in GOOD_TEXTS or text.strip().lower().startswith("good")
+
+
+def _listed(kinds: pa.Array, good: tuple[str, ...]) -> NDArray[np.bool_]:
+    wanted = {_canonical(code) for code in good}
+    return np.array([_canonical(code) in wanted for code in kinds.to_pylist()])
+
+
+def _canonical(code: object) -> str:
+    text = str(code).strip().lower()
+    return text.removesuffix(".0")
+
+
+def _interpolated(kinds: pa.Array, scheme: Scheme) -> NDArray[np.bool_]:
+    code = np.nan_to_num(_numbers(kinds), nan=0).astype(np.int64)
+    return (scheme is Scheme.DA) & (code > 0) & ((code & INTERPOLATED) != 0)

@@ -1,0 +1,127 @@
+"""Exports: one or many files of one historian, read a few tags at a time.
+
+export = open_export([Path("export.parquet")])
+series = export.read(["FIC101.PV", "FIC101.OP"])["FIC101.PV"]
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+from pathlib import Path
+
+from analyzer.history.dialects import source_of
+from analyzer.history.files import export_files, is_parquet
+from analyzer.history.options import ReadOptions
+from analyzer.history.parquet import open_parquet
+from analyzer.history.raw import settle
+from analyzer.history.series import Series
+from analyzer.history.sniff import open_sheet
+from analyzer.history.table import Source, Table
+from analyzer.history.zone import check_zone
+from identification.errors import InputError
+
+__all__ = ["Export", "ReadOptions", "open_export"]
+
+
+@dataclass(frozen=True, slots=True)
+class Export:
+    """Paths and layouts, no samples; small to send to a worker process.
+
+    Parameters
+    ----------
+    sources : tuple of Source
+        One a file.
+    tags : tuple of str
+        All tags, in the order in which they are met.
+    """
+
+    sources: tuple[Source, ...]
+    tags: tuple[str, ...]
+    _homes: dict[str, tuple[int, ...]] = field(repr=False, compare=False)
+    _met: dict[str, Counter[str]] = field(default_factory=dict, repr=False, compare=False)
+
+    def read(self, tags: Sequence[str]) -> dict[str, Series]:
+        """Samples of some tags, each oldest first; no other columns are touched.
+
+        Raises
+        ------
+        InputError
+            A tag is not in the export, or a file changed so that it cannot be read.
+        """
+        self._check_known(tags)
+        homes = sorted({home for tag in tags for home in self._homes[tag]})
+        pieces = [self.sources[home].read(tags) for home in homes]
+        series = {}
+        for tag in tags:
+            series[tag], found = settle([piece[tag] for piece in pieces if tag in piece])
+            if found:
+                self._met[tag] = found
+        return series
+
+    def span(self) -> tuple[float, float]:
+        """First and last stamp of all files [s since 1970-01-01 UTC]."""
+        spans = [source.span() for source in self.sources]
+        return min(first for first, _ in spans), max(last for _, last in spans)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was detected, a sentence each: on every file, and on the samples of all tags read so far."""
+        return (*self._file_notes(), *self._sample_notes())
+
+    def _file_notes(self) -> list[str]:
+        files: dict[str, list[str]] = {}
+        for source in self.sources:
+            for note in source.notes:
+                files.setdefault(note, []).append(source.path.name)
+        return [f"{_some(names)}: {note}" for note, names in files.items()]
+
+    def _sample_notes(self) -> list[str]:
+        total: Counter[str] = sum(self._met.values(), Counter())
+        return [f"{count} {what}" for what, count in total.most_common()]
+
+    def _check_known(self, tags: Sequence[str]) -> None:
+        missing = [tag for tag in tags if tag not in self._homes]
+        if not missing:
+            return
+        near = get_close_matches(missing[0], self.tags, n=3)
+        raise InputError(
+            f"tag {missing[0]} is not in the export",
+            f"one of its {len(self.tags)} tags" + (f" (near: {', '.join(near)})" if near else ""),
+            "correct the tag in loops.csv or export it too",
+        )
+
+
+def open_export(paths: Sequence[Path], options: ReadOptions | None = None) -> Export:
+    """Find out what files hold, without reading their values.
+
+    Parameters
+    ----------
+    paths : sequence of Path
+        Files, or folders of them.
+    options : ReadOptions
+        What the user states; the rest is detected.
+
+    Raises
+    ------
+    InputError
+        A file is missing, closed, empty, or no export.
+    """
+    options = options or ReadOptions()
+    if options.timezone is not None:
+        check_zone(options.timezone)
+    sources = tuple(source_of(_table(path, options), options) for path in export_files(paths))
+    homes: dict[str, tuple[int, ...]] = {}
+    for i, source in enumerate(sources):
+        homes.update({tag: (*homes.get(tag, ()), i) for tag in source.tags})
+    return Export(sources, tuple(homes), homes)
+
+
+def _some(names: Sequence[str]) -> str:
+    return names[0] if len(names) == 1 else f"{names[0]} and {len(names) - 1} more files"
+
+
+def _table(path: Path, options: ReadOptions) -> Table:
+    return open_parquet(path) if is_parquet(path) else open_sheet(path, options)

@@ -1,0 +1,83 @@
+"""Which files an export consists of."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from identification.errors import InputError
+
+TEXT_ENDINGS = frozenset({".csv", ".txt", ".tsv"})
+PARQUET_ENDINGS = frozenset({".parquet", ".pq"})
+NO_EXPORTS = frozenset({"loops.csv", "labels.csv", "changes.csv"})
+MAGIC = b"PAR1"
+
+
+def export_files(paths: Sequence[Path]) -> list[Path]:
+    """Files behind the paths given, each once: in the order given, within a folder by name.
+
+    Raises
+    ------
+    InputError
+        A path is missing, cannot be opened, or is a folder without exports.
+    """
+    found: dict[Path, None] = {}
+    for path in paths:
+        found.update(dict.fromkeys(_within(Path(path))))
+    if not found:
+        raise InputError("no path to an export", "a file or a folder", "name the export to read")
+    return list(found)
+
+
+def is_parquet(path: Path) -> bool:
+    """True for files that end as Parquet or begin as Parquet.
+
+    Raises
+    ------
+    InputError
+        The file is empty or cannot be opened.
+    """
+    try:
+        with path.open("rb") as file:
+            start = file.read(len(MAGIC))
+    except OSError as error:
+        raise _closed(path, error) from error
+    if not start:
+        raise InputError(f"{path}: empty file", "a table with a header and samples", "export it again")
+    return start == MAGIC or path.suffix.lower() in PARQUET_ENDINGS
+
+
+def _within(path: Path) -> list[Path]:
+    try:
+        if not path.exists():
+            raise InputError(
+                f"{path}: no such file or folder", "an export or a folder of exports", "correct the path"
+            )
+        return _listed(path) if path.is_dir() else [path]
+    except OSError as error:
+        raise _closed(path, error) from error
+
+
+def _listed(folder: Path) -> list[Path]:
+    files = [path for path in sorted(folder.iterdir()) if path.is_file() and _is_export(path)]
+    files = files or [path for path in sorted(folder.rglob("*")) if path.suffix.lower() in PARQUET_ENDINGS]
+    if not files:
+        raise InputError(
+            f"{folder}: a folder without exports",
+            "files ending in .csv, .txt, .tsv, .parquet or .pq",
+            "name the folder that holds the exports",
+        )
+    return files
+
+
+def _is_export(path: Path) -> bool:
+    known = path.suffix.lower() in TEXT_ENDINGS | PARQUET_ENDINGS
+    return known and path.name.lower() not in NO_EXPORTS and not path.name.startswith(".")
+
+
+def _closed(path: Path, error: OSError) -> InputError:
+    return InputError(
+        f"{path}: cannot be opened ({error.strerror or error})",
+        "a file that may be read",
+        "grant the permission to read",
+    )

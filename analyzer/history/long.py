@@ -1,0 +1,106 @@
+"""Long tables: a row for each sample, with the tag in a column of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+from numpy.typing import NDArray
+
+from analyzer.history.clock import Clock
+from analyzer.history.codes import Scheme, not_good, scheme_of
+from analyzer.history.names import QUALITY_NAMES, TAG_NAMES, VALUE_NAMES, first_named
+from analyzer.history.options import ReadOptions
+from analyzer.history.raw import Raw
+from analyzer.history.table import Table
+from analyzer.history.time_columns import find_clock
+from analyzer.history.values import values
+
+
+@dataclass(frozen=True, slots=True)
+class LongSource:
+    """A long table; see `table.Source`. `tag`, `value` and `quality` are positions of columns (-1: none)."""
+
+    table: Table
+    clock: Clock
+    tags: tuple[str, ...]
+    tag: int
+    value: int
+    quality: int = -1
+    scheme: Scheme = Scheme.TEXT
+    good_quality: tuple[str, ...] | None = None
+
+    @property
+    def path(self) -> Path:
+        """The file."""
+        return self.table.path
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Format and layout of the file."""
+        layout = f"long table, {len(self.tags)} tags in column '{self.table.names[self.tag]}'"
+        if self.quality < 0:
+            return (*self.table.notes, layout)
+        return (
+            *self.table.notes,
+            layout,
+            f"column '{self.table.names[self.quality]}' read as {self.scheme.value}",
+        )
+
+    def read(self, tags: Sequence[str]) -> dict[str, Raw]:
+        """Samples of those of `tags` that the file holds."""
+        present = set(self.tags)
+        wanted = [tag for tag in tags if tag in present]
+        if not wanted:
+            return {}
+        columns = [*self.clock.columns, self.tag, self.value, *([self.quality] if self.quality >= 0 else [])]
+        arrays = self.table.read(columns, where=(self.tag, wanted))
+        times, (tag, *data) = arrays[: len(self.clock.columns)], arrays[len(self.clock.columns) :]
+        second, local = self.clock.seconds(times)
+        rows = _rows_of(tag, wanted)
+        return {name: self._raw(second[rows[name]], local, _at(data, rows[name])) for name in wanted}
+
+    def span(self) -> tuple[float, float]:
+        """First and last stamp [s since 1970-01-01 UTC]."""
+        stamp_s, _ = self.clock.utc(*self.clock.seconds(self.table.read(self.clock.columns)))
+        return float(np.nanmin(stamp_s)), float(np.nanmax(stamp_s))
+
+    def _raw(self, second: NDArray[np.float64], local: bool, data: list[pa.Array]) -> Raw:
+        stamp_s, found = self.clock.utc(second, local)
+        read = values(data[0], self.table.decimal)
+        bad = read.bad
+        if len(data) > 1:
+            rejected, counts = not_good(data[1], self.scheme, self.good_quality)
+            bad, found = bad | rejected, found + counts
+        return Raw(stamp_s, read.value, bad, read.text, found + read.found)
+
+
+def open_long(table: Table, options: ReadOptions) -> LongSource | None:
+    """Take a table as long where it has columns for tag and value; else None."""
+    tag, value = first_named(table.names, TAG_NAMES), first_named(table.names, VALUE_NAMES)
+    if tag is None or value is None:
+        return None
+    clock = find_clock(table, options)
+    tags = tuple(str(name) for name in pc.unique(table.read([tag])[0]).to_pylist() if name not in (None, ""))
+    quality = first_named(table.names, QUALITY_NAMES)
+    if quality is None:
+        return LongSource(table, clock, tags, tag, value)
+    scheme = scheme_of(table.names[quality], pc.unique(table.read([quality])[0]))
+    return LongSource(table, clock, tags, tag, value, quality, scheme, options.good_quality)
+
+
+def _rows_of(tag: pa.Array, wanted: Sequence[str]) -> dict[str, NDArray[np.int64]]:
+    """Rows of each tag, in the order of the file."""
+    texts = tag.dictionary_decode() if pa.types.is_dictionary(tag.type) else tag
+    place = pc.index_in(texts, value_set=pa.array(wanted, texts.type)).to_numpy(zero_copy_only=False)
+    order = np.argsort(place, kind="stable")
+    bounds = np.searchsorted(place[order], np.arange(len(wanted) + 1))
+    return {name: order[bounds[i] : bounds[i + 1]] for i, name in enumerate(wanted)}
+
+
+def _at(arrays: Sequence[pa.Array], rows: NDArray[np.int64]) -> list[pa.Array]:
+    return [array.take(pa.array(rows)) for array in arrays]

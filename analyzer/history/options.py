@@ -1,0 +1,32 @@
+"""What a user may state about an export instead of leaving it to detection."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class ReadOptions:
+    """How exports are written; None means: find out from the file.
+
+    Parameters
+    ----------
+    delimiter, decimal, encoding : str or None
+        Of delimited text: the separator of columns, the decimal mark, the character encoding.
+    day_first : bool or None
+        True where 03/04/2024 is the third of April.
+    date_format : str or None
+        Format of the stamps in the notation of `datetime.strptime`.
+    timezone : str or None
+        IANA name of the zone of stamps that state none; None takes them as UTC.
+    good_quality : tuple of str or None
+        Quality codes or texts that count as good, in place of the detected scheme.
+    """
+
+    delimiter: str | None = None
+    decimal: str | None = None
+    encoding: str | None = None
+    day_first: bool | None = None
+    date_format: str | None = None
+    timezone: str | None = None
+    good_quality: tuple[str, ...] | None = None

@@ -1,0 +1,95 @@
+"""Parquet files: columns by projection, rows of one tag by filter."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+import pyarrow as pa
+import pyarrow.compute as pc
+import pyarrow.parquet as pq
+
+from identification.errors import InputError
+
+MAGIC = b"PAR1"
+HEAD_ROWS = 1000
+CACHED_FOOTERS = 4
+
+
+@dataclass(frozen=True, slots=True)
+class ParquetTable:
+    """A Parquet file, known by its footer; see `table.Table`."""
+
+    path: Path
+    changed_ns: int
+    names: tuple[str, ...]
+    types: tuple[pa.DataType, ...]
+    notes: tuple[str, ...] = ()
+    decimal: str = "."
+    first_row: int | None = None
+
+    def head(self, columns: Sequence[int]) -> list[pa.Array]:
+        """First rows of some columns."""
+        names = [self.names[i] for i in columns]
+        with _file(self) as file:
+            batch = next(file.iter_batches(batch_size=HEAD_ROWS, columns=names))
+        return [batch.column(name) for name in names]
+
+    def read(self, columns: Sequence[int], where: tuple[int, Sequence[str]] | None = None) -> list[pa.Array]:
+        """Whole columns, or the rows where a column holds one of some texts."""
+        names = [self.names[i] for i in columns]
+        if where is None:
+            with _file(self) as file:
+                table = file.read(columns=names)
+        else:
+            table = _filtered(self, names, self.names[where[0]], where[1])
+        return [_one_chunk(table.column(name)) for name in names]
+
+
+def open_parquet(path: Path) -> ParquetTable:
+    """The file's columns from its footer.
+
+    Raises
+    ------
+    InputError
+        The file is no Parquet, is cut short, or holds no rows.
+    """
+    try:
+        with pq.ParquetFile(path) as file:
+            schema, rows = file.schema_arrow, file.metadata.num_rows
+    except (pa.ArrowException, OSError) as error:
+        raise InputError(
+            f"{path}: named as Parquet, but cannot be read as such ({_first_line(error)})",
+            "a whole Parquet file",
+            "export it again, or give it the ending .csv if it is text",
+        ) from error
+    if rows == 0:
+        raise InputError(f"{path}: Parquet without rows", "at least one sample", "export a period with data")
+    return ParquetTable(path, path.stat().st_mtime_ns, tuple(schema.names), tuple(schema.types))
+
+
+def _first_line(error: Exception) -> str:
+    return str(error).splitlines()[0][:100] if str(error) else type(error).__name__
+
+
+@lru_cache(maxsize=CACHED_FOOTERS)
+def _footer(path: Path, changed_ns: int) -> pq.FileMetaData:
+    return pq.read_metadata(path)
+
+
+def _file(table: ParquetTable) -> pq.ParquetFile:
+    return pq.ParquetFile(table.path, metadata=_footer(table.path, table.changed_ns), memory_map=True)
+
+
+def _filtered(table: ParquetTable, names: list[str], key: str, wanted: Sequence[str]) -> pa.Table:
+    kind = table.types[table.names.index(key)]
+    field = pc.field(key).cast(pa.string()) if pa.types.is_dictionary(kind) else pc.field(key)
+    keep = field.isin(list(wanted))
+    return pq.read_table(table.path, columns=names, filters=keep, partitioning=None)
+
+
+def _one_chunk(column: pa.ChunkedArray) -> pa.Array:
+    chunks = column.combine_chunks()
+    return chunks.chunk(0) if isinstance(chunks, pa.ChunkedArray) else chunks

@@ -1,0 +1,179 @@
+"""How a delimited text is written: encoding, delimiter, decimal mark, where its header stands."""
+
+from __future__ import annotations
+
+import codecs
+import csv
+import io
+import re
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from analyzer.history.options import ReadOptions
+from analyzer.history.sheet import Sheet
+from identification.errors import InputError
+
+HEAD_BYTES = 1_000_000
+HEAD_LINES = 200
+DELIMITERS = (",", ";", "\t", "|")
+DELIMITER_NAMES = {",": "comma", ";": "semicolon", "\t": "tab", "|": "bar"}
+ENCODINGS = (
+    (codecs.BOM_UTF8, "utf-8-sig"),
+    (codecs.BOM_UTF32_LE, "utf-32"),
+    (codecs.BOM_UTF16_LE, "utf-16"),
+    (codecs.BOM_UTF16_BE, "utf-16"),
+)
+NO_DATA_LINE = re.compile(r"^\s*(?:#.*|\[\w+\]|sep=.|)\s*$", re.IGNORECASE)
+COMMA_NUMBER = re.compile(r"^[+-]?\d+,\d+(?:[eE][+-]?\d+)?$")
+POINT_NUMBER = re.compile(r"^[+-]?\d*\.\d+(?:[eE][+-]?\d+)?$")
+NUMBER = re.compile(r"^[+-]?\d*[.,]?\d+(?:[eE][+-]?\d+)?$")
+STAMP = re.compile(r"^\d{1,4}[-/.]\w{1,9}[-/.]\d{1,4}\b|^\d{1,2}:\d\d\b")
+
+
+def open_sheet(path: Path, options: ReadOptions) -> Sheet:
+    """Find out how a delimited text is written.
+
+    Raises
+    ------
+    InputError
+        The file is empty, binary, has no header, or no table of at least two columns.
+    """
+    head = _head(path)
+    encoding = options.encoding or detect_encoding(head)
+    lines = _lines(path, head, encoding)
+    delimiter = options.delimiter or _delimiter(path, lines)
+    place, header = _header(path, lines, delimiter)
+    rows = _split([line for line in lines[place + 1 :] if not NO_DATA_LINE.match(line)], delimiter)
+    if not rows:
+        raise InputError(f"{path}: a header and no rows", "at least one sample", "export a period with data")
+    names = _padded(tuple(name.strip() for name in header), rows)
+    decimal = options.decimal or detect_decimal(rows, delimiter)
+    stat = path.stat()
+    sheet = Sheet(path, stat.st_mtime_ns, stat.st_size, encoding, delimiter, decimal, place + 1, names)
+    return _described(sheet)
+
+
+def detect_encoding(head: bytes) -> str:
+    """Encoding by byte-order mark, by the zeros of UTF-16, by valid UTF-8; else Windows Latin."""
+    for mark, name in ENCODINGS:
+        if head.startswith(mark):
+            return name
+    if head[1:400:2].count(0) > 100 or (len(head) < 400 and head[1::2].count(0) * 3 > len(head)):
+        return "utf-16-le"
+    if head[0:400:2].count(0) > 100:
+        return "utf-16-be"
+    try:
+        codecs.getincrementaldecoder("utf-8")().decode(head)
+    except UnicodeDecodeError:
+        return "cp1252"
+    return "utf-8"
+
+
+def detect_decimal(rows: Sequence[Sequence[str]], delimiter: str) -> str:
+    """Decimal mark of most numbers with a fraction; a point where there are none."""
+    cells = [cell.strip() for row in rows for cell in row]
+    commas = sum(COMMA_NUMBER.match(cell) is not None for cell in cells)
+    points = sum(POINT_NUMBER.match(cell) is not None for cell in cells)
+    return "," if commas > points else "."
+
+
+def _head(path: Path) -> bytes:
+    with path.open("rb") as file:
+        head = file.read(HEAD_BYTES)
+    if not head.strip(b"\r\n\t \x00\xef\xbb\xbf\xff\xfe"):
+        raise InputError(f"{path}: empty file", "a table with a header and samples", "export it again")
+    return head
+
+
+def _lines(path: Path, head: bytes, encoding: str) -> list[str]:
+    try:
+        text = codecs.getincrementaldecoder(encoding)().decode(head)
+    except (LookupError, UnicodeError) as error:
+        raise InputError(
+            f"{path}: not readable as {encoding}", "text in the stated encoding", "state another encoding"
+        ) from error
+    if "\x00" in text:
+        raise InputError(f"{path}: binary content", "delimited text or Parquet", "export as CSV or Parquet")
+    lines = re.split(r"\r\n|\n|\r", text)
+    whole = lines if len(head) < HEAD_BYTES else lines[:-1]
+    return whole[:HEAD_LINES]
+
+
+def _split(lines: Sequence[str], delimiter: str) -> list[list[str]]:
+    return list(csv.reader(io.StringIO("\n".join(lines)), delimiter=delimiter))
+
+
+def _widths(lines: Sequence[str], delimiter: str) -> Counter[int]:
+    return Counter(len(row) for row in _split(lines, delimiter) if len(row) > 1)
+
+
+def _delimiter(path: Path, lines: Sequence[str]) -> str:
+    """The delimiter that splits most lines into the same number of columns, the header among them."""
+    body = [line for line in lines if not NO_DATA_LINE.match(line)]
+    scores = {mark: _score(body, mark) for mark in DELIMITERS}
+    best = max(DELIMITERS, key=lambda mark: scores[mark])
+    if scores[best] == (0, 0):
+        raise InputError(
+            f"{path}: no columns; the first line is '{body[0][:60] if body else ''}'",
+            "columns separated by comma, semicolon, tab or bar",
+            "state the delimiter",
+        )
+    return best
+
+
+def _score(body: Sequence[str], mark: str) -> tuple[int, int]:
+    widths = _widths(body, mark)
+    if not widths:
+        return 0, 0
+    width, lines = widths.most_common(1)[0]
+    return lines, width
+
+
+def _header(path: Path, lines: Sequence[str], delimiter: str) -> tuple[int, list[str]]:
+    """Line number (from 0) and cells of the header: the first line as wide as the table, and no data."""
+    body = [line for line in lines if not NO_DATA_LINE.match(line)]
+    width = _widths(body, delimiter).most_common(1)[0][0]
+    for place, line in enumerate(lines):
+        cells = next(iter(_split([line], delimiter)), [])
+        if NO_DATA_LINE.match(line) or len(cells) < max(2, width - 1):
+            continue
+        return (place, cells) if not _is_data(cells) else _commented(path, lines, place, delimiter)
+    raise InputError(f"{path}: no header", f"a line of {width} names above the samples", "add a header line")
+
+
+def _commented(path: Path, lines: Sequence[str], data: int, delimiter: str) -> tuple[int, list[str]]:
+    """A header that stands behind the last comment sign above the data."""
+    wide = len(_split([lines[data]], delimiter)[0])
+    above = _split([lines[data - 1].lstrip("# ")], delimiter) if data else []
+    if above and len(above[0]) == wide and not _is_data(above[0]):
+        return data - 1, above[0]
+    raise InputError(
+        f"{path}: no header; row {data + 1} is already data ('{lines[data][:60]}')",
+        "a line of column names above the samples",
+        "add a header line such as timestamp,FIC101.SP,FIC101.PV,FIC101.OP",
+    )
+
+
+def _is_data(cells: Sequence[str]) -> bool:
+    filled = [cell.strip() for cell in cells if cell.strip()]
+    return any(STAMP.match(cell) for cell in filled) or sum(map(_is_number, filled)) * 2 > len(filled)
+
+
+def _is_number(cell: str) -> bool:
+    return NUMBER.match(cell) is not None
+
+
+def _padded(names: tuple[str, ...], rows: Sequence[Sequence[str]]) -> tuple[str, ...]:
+    """Rows that end with a delimiter have a last column without a name."""
+    width = Counter(len(row) for row in rows).most_common(1)[0][0]
+    return names + ("",) * (width - len(names))
+
+
+def _described(sheet: Sheet) -> Sheet:
+    types = tuple(array.type for array in sheet.head(range(len(sheet.names))))
+    named = DELIMITER_NAMES.get(sheet.delimiter, repr(sheet.delimiter))
+    mark = "comma" if sheet.decimal == "," else "point"
+    note = f"delimited text: {named} between columns, decimal {mark}, encoding {sheet.encoding}"
+    return replace(sheet, types=types, found=(note,))

@@ -1,0 +1,131 @@
+"""Written dates to seconds: one pattern for ISO, either order of day and month, month names, offsets."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+from numpy.typing import NDArray
+
+PATTERN = (
+    r"^\s*(?:(?:Mon|Tue|Wed|Thu|Fri|Sat|Sun)[a-z]*\.?,?\s+)?"
+    r"(?P<a>\d{1,4}|[^\W\d]{3,9})\.?[-/. ]\s*(?P<b>\d{1,2}|[^\W\d]{3,9})\.?[-/. ,]\s*(?P<c>\d{4}|\d{2}|\d)"
+    r"(?:[T ,]+(?P<h>\d{1,2}):(?P<m>\d\d)(?::(?P<s>\d\d)(?:[.,:](?P<f>\d+))?)?"
+    r"\s*(?P<p>[AaPp])?(?:\.?[Mm]\.?)?)?"
+    r"\s*(?P<z>Z|UTC|GMT|[+-]\d\d(?::?\d\d)?)?\s*$"
+)
+COMPACT = r"^(\d{4})(\d\d)(\d\d)[T ]?(\d\d):?(\d\d):?(\d\d)"
+MONTHS = pa.array(  # three letters each: English, German, French, Spanish
+    [
+        *("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec"),
+        *("jan", "feb", "mär", "apr", "mai", "jun", "jul", "aug", "sep", "okt", "nov", "dez"),
+        *("jan", "fév", "mar", "avr", "mai", "jui", "jul", "aoû", "sep", "oct", "nov", "déc"),
+        *("ene", "feb", "mar", "abr", "may", "jun", "jul", "ago", "sep", "oct", "nov", "dic"),
+    ]
+)
+CENTURY_TURN = 70
+
+
+@dataclass(frozen=True, slots=True)
+class Fields:
+    """Parts of written stamps, arrays of shape (n,); `a`, `b`, `c` the date's parts in the order written."""
+
+    a: NDArray[np.int64]
+    b: NDArray[np.int64]
+    c: NDArray[np.int64]
+    clock_s: NDArray[np.float64]
+    offset_s: NDArray[np.float64]
+    readable: NDArray[np.bool_]
+    zoned: bool
+    order: str  # "ymd", "dmy", "mdy" where the writing tells, else "?"
+
+
+def fields(texts: pa.Array) -> Fields | None:
+    """Take written stamps apart; None where not one of them can be read."""
+    parts = pc.extract_regex(texts, PATTERN)
+    if parts.null_count == len(parts):
+        parts = pc.extract_regex(pc.replace_substring_regex(texts, COMPACT, r"\1-\2-\3 \4:\5:\6"), PATTERN)
+    if parts.null_count == len(parts):
+        return None
+    part = {name: pc.fill_null(pc.struct_field(parts, name), "") for name in "abchmsfpz"}
+    return Fields(
+        _number_or_month(part["a"]),
+        _number_or_month(part["b"]),
+        _number(part["c"]),
+        _clock(part),
+        _offset(part["z"]),
+        pc.is_valid(parts).to_numpy(zero_copy_only=False),
+        bool(pc.any(pc.not_equal(part["z"], "")).as_py()),
+        _written_order(part),
+    )
+
+
+def seconds(parts: Fields, day_first: bool) -> NDArray[np.float64]:
+    """Seconds since 1970-01-01 of the stamps, offsets removed; NaN where unreadable or no such date."""
+    order = parts.order if parts.order != "?" else ("dmy" if day_first else "mdy")
+    by_name = {"ymd": (parts.a, parts.b, parts.c), "dmy": (parts.c, parts.b, parts.a)}
+    year, month, day = by_name.get(order, (parts.c, parts.a, parts.b))
+    year = np.where(year < CENTURY_TURN, year + 2000, np.where(year < 100, year + 1900, year))
+    valid = parts.readable & (month >= 1) & (month <= 12) & (day >= 1)
+    first = ((year - 1970) * 12 + np.clip(month, 1, 12) - 1).astype("datetime64[M]")
+    days = first.astype("datetime64[D]").astype(np.int64) + day - 1
+    next_first = (first + 1).astype("datetime64[D]").astype(np.int64)
+    return np.where(valid & (days < next_first), days * 86400.0 + parts.clock_s - parts.offset_s, np.nan)
+
+
+def days_seen(parts: Fields) -> bool | None:
+    """True where a first number above 12 shows day first, False where a second one does not, else None."""
+    if parts.order != "?":
+        return parts.order == "dmy"
+    first, second = (parts.a > 12).any(), (parts.b > 12).any()
+    return None if first == second else bool(first)
+
+
+def _written_order(part: dict[str, pa.Array]) -> str:
+    sample = next(i for i, text in enumerate(part["a"].to_pylist()) if text)
+    a, b = part["a"][sample].as_py(), part["b"][sample].as_py()
+    if len(a) == 4 and a.isdigit():
+        return "ymd"
+    if not a.isdigit():
+        return "mdy"
+    return "?" if b.isdigit() else "dmy"
+
+
+def _number(texts: pa.Array) -> NDArray[np.int64]:
+    filled = pc.if_else(pc.equal(texts, ""), "0", texts)
+    return pc.cast(filled, pa.int64()).to_numpy(zero_copy_only=False)
+
+
+def _number_or_month(texts: pa.Array) -> NDArray[np.int64]:
+    digits = pc.utf8_is_digit(texts)
+    numbers = _number(pc.if_else(digits, texts, "0"))
+    if pc.all(pc.or_(digits, pc.equal(texts, ""))).as_py():
+        return numbers
+    place = pc.index_in(pc.utf8_slice_codeunits(pc.utf8_lower(texts), 0, 3), MONTHS)
+    months = pc.fill_null(place, -1).to_numpy(zero_copy_only=False).astype(np.int64)
+    return np.where(months < 0, numbers, months % 12 + 1)
+
+
+def _clock(part: dict[str, pa.Array]) -> NDArray[np.float64]:
+    """Time of day [s]; 12 h clocks by their first letter."""
+    hour = _number(part["h"])
+    letter = pc.utf8_lower(part["p"])
+    noon = pc.equal(letter, "p").to_numpy(zero_copy_only=False)
+    twelve_hours = pc.not_equal(letter, "").to_numpy(zero_copy_only=False)
+    hour = np.where(twelve_hours, hour % 12 + 12 * noon, hour)
+    fraction = pc.cast(pc.binary_join_element_wise("0.", part["f"], "0", ""), pa.float64())
+    whole = 3600 * hour + 60 * _number(part["m"]) + _number(part["s"])
+    return whole + fraction.to_numpy(zero_copy_only=False)
+
+
+def _offset(zone: pa.Array) -> NDArray[np.float64]:
+    """Offset from UTC [s]; 0 where none is written."""
+    digits = pc.replace_substring_regex(zone, r"^(?:Z|UTC|GMT)$|[+:-]", "")
+    hour, minute = (
+        _number(pc.utf8_slice_codeunits(digits, 0, 2)),
+        _number(pc.utf8_slice_codeunits(digits, 2, 4)),
+    )
+    west = pc.starts_with(zone, "-").to_numpy(zero_copy_only=False)
+    return np.where(west, -1.0, 1.0) * (3600 * hour + 60 * minute)

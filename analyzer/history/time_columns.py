@@ -1,0 +1,154 @@
+"""Finding the time columns of a table and deciding how they are written."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+
+from analyzer.history import stamps
+from analyzer.history.clock import Clock, as_text, is_text, joined, scale_of
+from analyzer.history.names import CLOCK_NAMES, STAMP_NAMES, plain
+from analyzer.history.options import ReadOptions
+from analyzer.history.table import Table
+from identification.errors import InputError
+
+TIME_OF_DAY = r"^\s*\d{1,2}:\d\d(:\d\d([.,]\d+)?)?\s*([AaPp]\.?[Mm]\.?)?\s*$"
+UNREADABLE_SHARE = 0.5
+
+
+def find_clock(table: Table, options: ReadOptions) -> Clock:
+    """The time columns of a table, and how they are written.
+
+    Raises
+    ------
+    InputError
+        No column holds a time, or the one that is named so cannot be read.
+    """
+    columns = _candidates(table)
+    kinds = {i: _kind(table.names[i], head) for i, head in zip(columns, table.head(columns), strict=True)}
+    clock = _chosen(table, kinds, options)
+    if clock is None:
+        raise _no_time(table, columns)
+    return _with_day_order(table, clock, options)
+
+
+def _candidates(table: Table) -> list[int]:
+    """Columns that may hold a time: by type, by name, and columns of text."""
+    named = {i for i, name in enumerate(table.names) if plain(name) in STAMP_NAMES or _is_index(name)}
+    typed = {i for i, kind in enumerate(table.types) if pa.types.is_temporal(kind) or is_text(kind)}
+    return sorted(named | typed)
+
+
+def _is_index(name: str) -> bool:
+    return name.startswith("__index_level_") or name in ("", "index")
+
+
+def _kind(name: str, head: pa.Array) -> str:
+    """'full', 'date', 'time of day', 'number' or '' for what the first rows hold."""
+    if pa.types.is_timestamp(head.type):
+        return "full"
+    if pa.types.is_date(head.type):
+        return "date"
+    if pa.types.is_time(head.type):
+        return "time of day"
+    if is_text(head.type):
+        return _text_kind(as_text(head).drop_null())
+    named = plain(name) in STAMP_NAMES or _is_index(name)
+    numeric = pa.types.is_integer(head.type) or pa.types.is_floating(head.type)
+    return "number" if named and numeric and scale_of(head) is not None else ""
+
+
+def _text_kind(texts: pa.Array) -> str:
+    if len(texts) == 0:
+        return ""
+    if (
+        pc.mean(pc.cast(pc.match_substring_regex(texts, TIME_OF_DAY), pa.float64())).as_py()
+        > UNREADABLE_SHARE
+    ):
+        return "time of day"
+    parts = stamps.fields(texts)
+    if parts is None or parts.readable.mean() <= UNREADABLE_SHARE:
+        return ""
+    return "full" if (parts.clock_s != 0).any() or len(texts) == 1 else "date"
+
+
+def _chosen(table: Table, kinds: dict[int, str], options: ReadOptions) -> Clock | None:
+    by_kind = {kind: _by_name(table, [i for i in kinds if kinds[i] == kind]) for kind in set(kinds.values())}
+    clock = Clock((0,), date_format=options.date_format, timezone=options.timezone)
+    if options.date_format is not None:
+        named = _by_name(table, [i for i in kinds if plain(table.names[i]) in STAMP_NAMES] or list(kinds))
+        return replace(clock, columns=(named[0],)) if named else None
+    if "date" in by_kind and "time of day" in by_kind:
+        return replace(clock, columns=(by_kind["date"][0], by_kind["time of day"][0]))
+    if "full" in by_kind:
+        return replace(clock, columns=(by_kind["full"][0],))
+    if "number" in by_kind:
+        column = by_kind["number"][0]
+        return replace(clock, columns=(column,), scale=scale_of(table.head([column])[0]))
+    return replace(clock, columns=(by_kind["date"][0],)) if "date" in by_kind else None
+
+
+def _by_name(table: Table, columns: Sequence[int]) -> list[int]:
+    """Columns whose names mean a time first, in the order of the dictionary of names."""
+    rank = {name: i for i, name in enumerate((*STAMP_NAMES, *CLOCK_NAMES))}
+    return sorted(columns, key=lambda i: (rank.get(plain(table.names[i]), len(rank)), i))
+
+
+def _no_time(table: Table, columns: Sequence[int]) -> InputError:
+    named = [i for i in columns if plain(table.names[i]) in STAMP_NAMES]
+    if not named:
+        return InputError(
+            f"{table.path}: no time column among {', '.join(table.names[:8])}",
+            "a column of time stamps, named timestamp, time or the like",
+            "add the stamps to the export, or name their column timestamp",
+        )
+    text = next(iter(as_text(table.head(named[:1])[0].drop_null()).to_pylist()), "")
+    row = "" if table.first_row is None else f", row {table.first_row}"
+    return InputError(
+        f"{table.path}: column '{table.names[named[0]]}'{row}: '{text}' is no time stamp that is known",
+        "stamps such as 2024-11-21 08:00:00 or 21.11.2024 08:00:00",
+        "state the date format",
+    )
+
+
+def _with_day_order(table: Table, clock: Clock, options: ReadOptions) -> Clock:
+    """Decide whether day or month stands first, from as much of the column as it takes."""
+    if options.day_first is not None:
+        return replace(clock, day_first=options.day_first, why="as stated")
+    if clock.date_format is not None or clock.scale is not None:
+        return clock
+    head = _texts(table.head(clock.columns))
+    parts = None if head is None else stamps.fields(head)
+    if parts is None or parts.order != "?":
+        return clock
+    return _decided(clock, stamps.fields(_texts(table.read(clock.columns))), head)
+
+
+def _texts(arrays: Sequence[pa.Array]) -> pa.Array | None:
+    column = arrays[0] if len(arrays) == 1 else joined(arrays)
+    return as_text(column) if is_text(column.type) else None
+
+
+def _decided(clock: Clock, parts: stamps.Fields | None, head: pa.Array) -> Clock:
+    if parts is None:
+        return clock
+    seen = stamps.days_seen(parts)
+    if seen is not None:
+        which = "first" if seen else "second"
+        return replace(clock, day_first=seen, why=f"the {which} number exceeds 12")
+    gap = {first: _largest_gap(parts, first) for first in (True, False)}
+    if gap[True] != gap[False]:
+        return replace(clock, day_first=gap[True] < gap[False], why="so read, the stamps run without a leap")
+    if "." in str(head[0].as_py()).split(" ")[0]:
+        return replace(clock, day_first=True, why="dates with points; no day above 12 occurs")
+    return clock
+
+
+def _largest_gap(parts: stamps.Fields, day_first: bool) -> float:
+    second = np.unique(stamps.seconds(parts, day_first))
+    steps = np.diff(second[np.isfinite(second)])
+    return float(steps.max()) if len(steps) else 0.0

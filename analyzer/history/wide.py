@@ -1,0 +1,106 @@
+"""Wide tables: a time column and a column for each tag."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+
+from analyzer.history.clock import Clock, is_text
+from analyzer.history.codes import not_good, scheme_of
+from analyzer.history.names import quality_partners, with_loop
+from analyzer.history.options import ReadOptions
+from analyzer.history.raw import Raw
+from analyzer.history.table import Table
+from analyzer.history.time_columns import find_clock
+from analyzer.history.values import values
+from identification.errors import InputError
+
+
+@dataclass(frozen=True, slots=True)
+class WideSource:
+    """A wide table; see `table.Source`. `columns` and `quality` are columns of each tag, -1 for none."""
+
+    table: Table
+    clock: Clock
+    tags: tuple[str, ...]
+    columns: tuple[int, ...]
+    quality: tuple[int, ...]
+    good_quality: tuple[str, ...] | None = None
+
+    @property
+    def path(self) -> Path:
+        """The file."""
+        return self.table.path
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Format and layout of the file."""
+        return (*self.table.notes, f"wide table, {len(self.tags)} tags")
+
+    def read(self, tags: Sequence[str]) -> dict[str, Raw]:
+        """Samples of those of `tags` that the file holds."""
+        place = {tag: i for i, tag in enumerate(self.tags)}
+        wanted = [place[tag] for tag in tags if tag in place]
+        if not wanted:
+            return {}
+        columns = [*self.clock.columns, *(self.columns[i] for i in wanted)]
+        columns += [self.quality[i] for i in wanted if self.quality[i] >= 0]
+        arrays = dict(zip(columns, self.table.read(columns), strict=True))
+        stamp_s, found = self.clock.utc(*self.clock.seconds([arrays[i] for i in self.clock.columns]))
+        return {self.tags[i]: self._raw(i, arrays, stamp_s, found) for i in wanted}
+
+    def span(self) -> tuple[float, float]:
+        """First and last stamp [s since 1970-01-01 UTC]."""
+        stamp_s, _ = self.clock.utc(*self.clock.seconds(self.table.read(self.clock.columns)))
+        return float(np.nanmin(stamp_s)), float(np.nanmax(stamp_s))
+
+    def _raw(
+        self, i: int, arrays: dict[int, pa.Array], stamp_s: NDArray[np.float64], met: Counter[str]
+    ) -> Raw:
+        read = values(arrays[self.columns[i]], self.table.decimal)
+        bad, found = read.bad, read.found + met
+        if self.quality[i] >= 0:
+            codes = arrays[self.quality[i]]
+            rejected, counts = not_good(
+                codes, scheme_of(self.table.names[self.quality[i]], codes), self.good_quality
+            )
+            bad, found = bad | rejected, found + counts
+        return Raw(stamp_s, read.value, bad, read.text, found)
+
+
+def open_wide(table: Table, options: ReadOptions) -> WideSource:
+    """Take a table as wide.
+
+    Raises
+    ------
+    InputError
+        There is no time column, or no column of values beside it.
+    """
+    clock = find_clock(table, options)
+    partner = quality_partners(table.names)
+    beside = {*partner.values()}
+    columns = [i for i in range(len(table.names)) if i not in clock.columns and _holds_values(table, i)]
+    columns = [i for i in columns if table.names[i] not in beside]
+    if not columns:
+        raise InputError(
+            f"{table.path}: no values beside the time column '{table.names[clock.columns[0]]}'",
+            "a column of values for each tag, named as the tag",
+            "export the tags' values",
+        )
+    names = [table.names[i] for i in columns]
+    quality = tuple(table.names.index(partner[name]) if name in partner else -1 for name in names)
+    tags = with_loop(names, table.path.stem)
+    return WideSource(table, clock, tags, tuple(columns), quality, options.good_quality)
+
+
+def _holds_values(table: Table, i: int) -> bool:
+    name, kind = table.names[i], table.types[i]
+    unnamed = not name or name.startswith(("Unnamed:", "__index_level_"))
+    number = pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_decimal(kind)
+    return not unnamed and (number or is_text(kind) or pa.types.is_boolean(kind) or pa.types.is_null(kind))
