@@ -1,0 +1,100 @@
+"""Describing functions against the operator, python-control and their limits."""
+
+import control
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from identification.models import Backlash, Stiction
+from tuning.describing import (
+    backlash,
+    branches,
+    describe,
+    jump_range,
+    jumps_at,
+    numeric,
+    stick_slip,
+)
+
+WIDTHS = st.floats(0.05, 10.0)
+
+
+@given(WIDTHS, st.floats(1.001, 500.0))
+def test_play_agrees_with_python_control(width, factor):
+    """Play's closed form is python-control's to twelve digits."""
+    amplitude = 0.5 * width * factor
+    other = control.friction_backlash_nonlinearity(width).describing_function(amplitude)
+    assert complex(backlash(amplitude, width)) == pytest.approx(other, abs=1e-12)
+
+
+@pytest.mark.parametrize("factor", [1.05, 1.35, 2.0, 5.0, 40.0])
+def test_play_agrees_with_projection(factor):
+    """Play's closed form is the fundamental of the simulated operator."""
+    valve = Backlash(1.3)
+    assert numeric(valve, 0.65 * factor) == pytest.approx(describe(valve, 0.65 * factor), abs=2e-3)
+
+
+@pytest.mark.parametrize("jump", [0.2, 0.5, 0.8, 1.0])
+@pytest.mark.parametrize("amplitude", [0.617, 0.913, 1.237, 1.873, 3.319])
+def test_stick_slip_agrees_with_projection(jump, amplitude):
+    """The sum of relays is the fundamental of the simulated operator, with one jump a half cycle or many."""
+    valve = Stiction(1.0, jump)
+    assert numeric(valve, amplitude) == pytest.approx(describe(valve, amplitude), abs=2e-3)
+
+
+@given(st.floats(0.1, 3.0), st.floats(1.001, 2.999))
+def test_study_stick_slip(d, factor):
+    """S = J = 2d with one jump is the study's Eq. (2) for d < A < 3d."""
+    a = d * factor
+    study = 2 * d / (np.pi * a**2) * np.sqrt(4 * a**2 - 4 * d**2) - 4j * d**2 / (np.pi * a**2)
+    assert describe(Stiction(2 * d, 2 * d), a) == pytest.approx(study, abs=1e-12)
+
+
+@given(st.floats(0.1, 3.0), st.floats(0.05, 1.0), st.integers(1, 12))
+def test_fewest_jumps_lie_in_their_range(stickband, share, jumps):
+    """At the upper end of a branch the count of jumps is that branch's."""
+    valve = Stiction(stickband, stickband * share)
+    low, high = jump_range(valve, jumps)
+    assert low < high
+    assert jumps_at(high * (1 - 1e-9), valve) == jumps
+
+
+@given(WIDTHS)
+def test_large_amplitude_sees_no_valve(width):
+    """N goes to 1 as the amplitude outgrows play or stickband."""
+    assert abs(describe(Backlash(width), 1e5 * width) - 1) < 1e-4
+    assert abs(describe(Stiction(width, 0.5 * width), 2000 * width) - 1) < 2e-3
+
+
+@given(WIDTHS)
+def test_resting_stem_gives_nothing(width):
+    """Below half the band the stem rests and N is 0; just above it N lags by nearly 90 degrees."""
+    assert abs(describe(Backlash(width), 0.5 * width)) < 1e-12
+    assert describe(Stiction(width, width), 0.49 * width) == 0
+    assert np.angle(describe(Backlash(width), 0.5001 * width), deg=True) < -85
+
+
+@given(WIDTHS, st.floats(1.01, 30.0))
+def test_small_jumps_become_play(width, factor):
+    """Stick-slip with ever smaller jumps tends to play of the same band."""
+    amplitude = 0.5 * width * factor + 0.1 * width
+    many = max(jumps_at(amplitude, Stiction(width, width / 500)), 1)
+    n = stick_slip(amplitude, width, width / 500, many)
+    assert complex(n) == pytest.approx(complex(backlash(amplitude, width)), abs=5e-3)
+
+
+@pytest.mark.parametrize("valve", [Backlash(1.0), Stiction(1.0, 1.0), Stiction(2.0, 0.4)])
+def test_branches_rise_in_phase_and_agree_with_the_closed_form(valve):
+    """On each branch the phase rises with the amplitude, and the table returns the closed form."""
+    for branch in branches(valve):
+        assert np.all(np.diff(branch.root) < 0)
+        inner = -(np.linspace(branch.root[1], branch.root[-2], 37) ** 2)
+        log_a, log_n = branch.at_phase(inner)
+        exact = (
+            backlash(np.exp(log_a), valve.width)
+            if isinstance(valve, Backlash)
+            else stick_slip(np.exp(log_a), valve.stickband, valve.slip_jump, branch.jumps)
+        )
+        assert np.abs(exact) * np.exp(1j * inner) == pytest.approx(exact, abs=1e-5)
+        assert np.exp(log_n) == pytest.approx(np.abs(exact), rel=1e-5)

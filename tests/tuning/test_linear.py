@@ -1,0 +1,88 @@
+"""The linear part against the simulator and against closed forms."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from identification.models import Fopdt, Integrator, Loop, Pid
+from identification.simulate import closed_loop, open_loop
+from tuning.linear import frequencies, is_stable, loop_response, margins, process_sampled
+
+
+def gone_wild(loop: Loop, steps: int) -> float:
+    """Spread of PV at the end over its spread in the middle, after a kick and without output limits."""
+    free = replace(loop, controller=replace(loop.controller, op_lo=-1e12, op_hi=1e12))
+    load = np.ones(steps)
+    load[0] = 0.0
+    pv = closed_loop(free, np.zeros(steps), load, op_start=0.0).pv
+    return float(np.ptp(pv[-steps // 4 :]) / (np.ptp(pv[steps // 4 : steps // 2]) + 1e-12))
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    st.floats(2, 100),
+    st.floats(0.0, 20.0),
+    st.floats(0.1, 3.0),
+    st.floats(0.2, 3.0),
+    st.booleans(),
+    st.sampled_from([1, -1]),
+)
+def test_stability_agrees_with_simulation(time_constant, delay, gain, ti, integrating, sign):
+    """Winding of the characteristic polynomial and a simulated kick agree on stability, for either sign."""
+    process = Integrator(sign / time_constant, delay) if integrating else Fopdt(sign, time_constant, delay)
+    loop = Loop(process, Pid(sign * gain * time_constant / (delay + 1), ti * 4 * (delay + 1)))
+    grown = gone_wild(loop, int(400 * (delay + 1)))
+    if not 0.2 < grown < 5:
+        assert is_stable(loop) == (grown < 1)
+
+
+@pytest.mark.parametrize("process", [Fopdt(2.0, 15.0, 3.3), Integrator(0.1, 2.6)])
+def test_sampled_response_is_the_gain_of_a_simulated_sine(process):
+    """A sine held at the scan comes out with the gain and phase of the sampled response."""
+    omega = 2 * math.pi / 40
+    op = np.sin(omega * np.arange(4000))
+    y = open_loop(process, None, op, 1.0)[2000:]
+    k = np.arange(2000, 4000)
+    fundamental = 2j * np.mean((y - y.mean()) * np.exp(-1j * omega * k))
+    assert complex(process_sampled(process, 1.0, np.array([omega]))[0]) == pytest.approx(
+        fundamental, rel=2e-3
+    )
+
+
+def test_fast_scan_tends_to_the_continuous_response():
+    """At a scan of a thousandth of the dead time sampled and continuous response agree within 0.5 %."""
+    process = Fopdt(80, 200, 1)
+    omega = np.geomspace(1e-3, 2.0, 50)
+    sampled = loop_response(Loop(process, Pid(1, 10, scan_s=1e-3)), omega)
+    continuous = loop_response(Loop(process, Pid(1, 10, scan_s=0)), omega)
+    assert np.abs(sampled / continuous - 1).max() < 5e-3
+
+
+def test_sensitivity_of_simc_is_the_published_one():
+    """SIMC with tau_c = L has Ms 1.59 on a cancelled lag and 1.70 on an integrator (Skogestad 2003)."""
+    lag = Loop(Fopdt(1, 8, 1), Pid(4, 8, scan_s=0))
+    assert margins(lag).ms == pytest.approx(1.59, abs=0.01)
+    integrating = Loop(Integrator(1, 1), Pid(0.5, 8, scan_s=0))
+    assert margins(integrating).ms == pytest.approx(1.70, abs=0.01)
+
+
+def test_wrong_sign_is_unstable():
+    """A controller that acts the wrong way is not stable and has no finite Ms."""
+    assert margins(Loop(Fopdt(1, 10, 2), Pid(-1, 10))).ms == math.inf
+
+
+def test_p_only_is_judged():
+    """Without integral the linear part has margins too."""
+    m = margins(Loop(Integrator(0.1, 2), Pid(1, math.inf)))
+    assert m.stable
+    assert 1 < m.ms < 2
+
+
+def test_grid_ends_at_the_scan():
+    """No frequency beyond half the scan's is looked at."""
+    loop = Loop(Fopdt(1, 10, 0), Pid(1, 10, scan_s=2.0))
+    assert frequencies(loop)[-1] <= math.pi / 2.0 + 1e-9

@@ -1,0 +1,201 @@
+"""Describing functions of play and stick-slip: what a valve does to a sine, as gain and phase.
+
+A sine A sin(wt) of OP comes out as the fundamental N(A) A sin(wt); N is complex, its angle is negative.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from identification.models import Backlash, Stiction, Valve
+from identification.record import Floats
+from identification.valve import stem_position, thresholds
+
+Complexes = NDArray[np.complex128]
+
+PLAY_JUMP_SHARE = 0.02
+"""Slip jump below this share of the stickband counts as play; ours: fifty jumps a stickband look like it."""
+MAX_JUMPS = 60
+"""Jumps per half cycle up to which stick-slip has branches of its own; ours, far beyond what is met."""
+TABLE_SIZE = 4000
+"""Points of each part of a branch's table; interpolation is then better than 1e-5 in amplitude and gain."""
+
+
+def backlash(amplitude: ArrayLike, width: float) -> Complexes:
+    """Describing function of play.
+
+    Johansson et al. (2012), the source study's Eq. (1), with d = width/2. Zero up to A = d, where the stem
+    does not move.
+
+    Parameters
+    ----------
+    amplitude : float or ndarray of any shape
+        Amplitude of OP [% OP], > 0.
+    width : float
+        Full width of the play [% OP], >= 0.
+
+    Returns
+    -------
+    ndarray of complex, the shape of `amplitude`
+    """
+    share = np.minimum(0.5 * width / np.asarray(amplitude, dtype=np.float64), 1.0)
+    u = 1.0 - 2.0 * share
+    root = 2.0 * np.sqrt(share * (1.0 - share))
+    return (0.5 + (np.arcsin(u) + u * root) / np.pi) - 1j * (root**2 / np.pi)
+
+
+def jump_range(valve: Stiction, jumps: int) -> tuple[float, float]:
+    """Amplitudes of OP [% OP] between which a symmetric cycle of `jumps` jumps per half cycle can stand.
+
+    The stem travels jumps*J; the last jump must still be reached and no further one: X + f_d <= A <= X + f_s
+    with X = jumps*J/2 and the thresholds f_s, f_d of identification.valve.
+    """
+    breakaway, sliding = thresholds(valve.stickband, valve.slip_jump)
+    reach = 0.5 * jumps * valve.slip_jump
+    return reach + sliding, reach + breakaway
+
+
+def jumps_at(amplitude: float, valve: Stiction) -> int:
+    """Fewest jumps per half cycle of a symmetric cycle at this amplitude [% OP]; 0 where the stem rests."""
+    breakaway, sliding = thresholds(valve.stickband, valve.slip_jump)
+    if amplitude < sliding + 0.5 * valve.slip_jump:
+        return 0
+    return max(int(np.ceil(2.0 * (amplitude - breakaway) / valve.slip_jump)), 1)
+
+
+def stick_slip(amplitude: ArrayLike, stickband: float, slip_jump: float, jumps: int = 1) -> Complexes:
+    """Describing function of two-parameter stick-slip with a given number of jumps per half cycle.
+
+    A cycle with n jumps is the sum of n relays of height J/2 that switch at h_k = S/2 + J(k - (n+1)/2),
+    k = 1..n, each of which has the textbook describing function (Atherton 1982). One jump with S = J = 2d is
+    the source study's Eq. (2). Derived here; the tests hold it against the projection of the operator.
+
+    Parameters
+    ----------
+    amplitude : float or ndarray of any shape
+        Amplitude of OP [% OP], within `jump_range`; nan outside the switching levels.
+    stickband, slip_jump : float
+        S and J [% OP].
+    jumps : int
+        Jumps per half cycle, >= 1.
+
+    Returns
+    -------
+    ndarray of complex, the shape of `amplitude`
+    """
+    a = np.asarray(amplitude, dtype=np.float64)
+    level = 0.5 * stickband + slip_jump * (np.arange(1, jumps + 1) - 0.5 * (jumps + 1))
+    inside = a[..., None] ** 2 - level**2
+    inside = np.where(inside < -1e-9 * a[..., None] ** 2, np.nan, np.maximum(inside, 0.0))
+    height = 2.0 * slip_jump / (np.pi * a**2)
+    return height * (np.sqrt(inside).sum(axis=-1) - 1j * 0.5 * jumps * stickband)
+
+
+def is_play(valve: Valve) -> bool:
+    """Whether the valve is play, or stick-slip with a jump too small to tell from it."""
+    return isinstance(valve, Backlash) or (
+        isinstance(valve, Stiction) and valve.slip_jump <= PLAY_JUMP_SHARE * valve.stickband
+    )
+
+
+def band(valve: Valve) -> float:
+    """Full width [% OP] of what OP must travel after a reversal: play's width or the stickband; 0 without."""
+    if valve is None:
+        return 0.0
+    return valve.width if isinstance(valve, Backlash) else valve.stickband
+
+
+def describe(valve: Valve, amplitude: float) -> complex:
+    """N(A) of any valve at one amplitude [% OP]; with several cycles possible, that of fewest jumps."""
+    if valve is None or band(valve) <= 0.0:
+        return 1.0 + 0.0j
+    if isinstance(valve, Backlash) or is_play(valve):
+        return complex(backlash(amplitude, band(valve)))
+    jumps = jumps_at(amplitude, valve)
+    return complex(stick_slip(amplitude, valve.stickband, valve.slip_jump, jumps)) if jumps else 0j
+
+
+def numeric(valve: Valve, amplitude: float, start: float | None = None, samples: int = 20_000) -> complex:
+    """N(A) by projecting the simulated operator's output on the fundamental.
+
+    Parameters
+    ----------
+    valve : Backlash, Stiction or None
+    amplitude : float
+        Amplitude of OP [% OP], > 0.
+    start : float or None
+        Stem position at OP's trough [% OP]; None: where a symmetric cycle of fewest jumps has it.
+    samples : int
+        Samples a period.
+
+    Returns
+    -------
+    complex
+        From the last of three periods.
+    """
+    phase = 2.0 * np.pi * np.arange(3 * samples) / samples
+    if start is None and isinstance(valve, Stiction) and not is_play(valve):
+        start = -0.5 * jumps_at(amplitude, valve) * valve.slip_jump
+    stem = stem_position(-amplitude * np.cos(phase), valve, start)[-samples:]
+    wave = np.exp(-1j * phase[-samples:])
+    return complex(-2.0 / (samples * amplitude) * np.sum(stem * wave))
+
+
+@dataclass(frozen=True, slots=True)
+class Branch:
+    """One smooth piece of N(A), tabulated by its phase, which rises with A on every piece.
+
+    jumps per half cycle (0: play), root shape (m,): sqrt(-phase) descending, log_amplitude [ln % OP] and
+    log_gain (m,). The square root makes the table smooth where play's phase goes to zero.
+    """
+
+    jumps: int
+    root: Floats
+    log_amplitude: Floats
+    log_gain: Floats
+
+    def at_phase(self, phase: Floats) -> tuple[Floats, Floats]:
+        """ln A and ln abs(N) where N has this phase [rad], in the shape of `phase`; nan where it never has."""
+        known = (phase < 0.0) & (phase > -np.pi)
+        root = np.sqrt(np.where(known, -phase, np.nan))
+        amplitude = np.interp(root, self.root[::-1], self.log_amplitude[::-1], left=np.nan, right=np.nan)
+        gain = np.interp(root, self.root[::-1], self.log_gain[::-1], left=np.nan, right=np.nan)
+        return amplitude, gain
+
+
+def _branch(jumps: int, amplitude: Floats, n: Complexes) -> Branch:
+    return Branch(jumps, np.sqrt(np.maximum(-np.angle(n), 0.0)), np.log(amplitude), np.log(np.abs(n)))
+
+
+def _play_branch(width: float) -> Branch:
+    """Play's table over the angle x = acos(2d/A - 1) in which the stem moves.
+
+    N = (x - sin(2x)/2 - i sin(x)^2)/pi, Eq. (1) rewritten so that nothing cancels as A tends to d.
+    """
+    nearly_stuck = np.geomspace(1e-5, 0.5, TABLE_SIZE, endpoint=False)
+    moving = np.concatenate((nearly_stuck, np.linspace(0.5, np.pi, TABLE_SIZE + 1)[:-1]))
+    n = (moving - 0.5 * np.sin(2.0 * moving) - 1j * np.sin(moving) ** 2) / np.pi
+    return _branch(0, width / (1.0 + np.cos(moving)), n)
+
+
+@lru_cache(maxsize=64)
+def branches(valve: Valve) -> tuple[Branch, ...]:
+    """The pieces of N(A): one for play, one for each number of jumps of stick-slip, none for a healthy valve."""
+    width = band(valve)
+    if valve is None or width <= 0.0:
+        return ()
+    if isinstance(valve, Backlash) or is_play(valve):
+        return (_play_branch(width),)
+    share = np.linspace(0.0, 1.0, TABLE_SIZE) ** 2
+    found = []
+    for jumps in range(1, min(MAX_JUMPS, int(np.ceil(8 * width / valve.slip_jump))) + 1):
+        low, high = jump_range(valve, jumps)
+        amplitude = low + (high - low) * share
+        found.append(
+            _branch(jumps, amplitude, stick_slip(amplitude, valve.stickband, valve.slip_jump, jumps))
+        )
+    return tuple(found)

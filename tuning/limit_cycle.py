@@ -1,0 +1,254 @@
+"""The limit cycle of a loop with play or stick-slip: predicted by harmonic balance, confirmed by simulation.
+
+G(iw) C(iw) N(A) = -1 (the source study's Eq. 3) has its phase in w alone once A is chosen to fit, so all
+solutions are the zeros of one function of w. Where prediction and simulation differ, simulation counts.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from identification.models import Loop
+from identification.record import Floats
+from identification.simulate import closed_loop, scan_step
+from tuning.describing import Branch, band, branches
+from tuning.linear import controller_response, frequencies, loop_response, slowest_s
+
+POLISH_STEPS = 6
+"""Eightfold bracketings that polish a root found on the grid."""
+PERIODS = 30
+"""Predicted periods that a confirmation simulates at first; ours: the study's loops settle within ten."""
+MOST_STEPS = 600_000
+"""Steps that a confirmation may take in all; some 20 ms."""
+STEADY = 0.02
+"""Relative change of amplitude from one quarter of the record to the next below which a cycle is steady."""
+NO_LIMIT = 1e9
+"""Output limits [% OP] put out of the way: a cycle scales with the play and must not meet a limit."""
+
+
+@dataclass(frozen=True, slots=True)
+class Balance:
+    """One solution of the harmonic balance.
+
+    period_s [s], op_amplitude [% OP] and pv_amplitude [% PV] (half of peak to peak), stable: whether the loop
+    returns to it (a limit cycle) or leaves it (the border between two fates); jumps of the stem per half
+    cycle (0: play); stem_amplitude [% OP] of the stem's fundamental.
+    """
+
+    period_s: float
+    op_amplitude: float
+    pv_amplitude: float
+    stem_amplitude: float
+    stable: bool
+    jumps: int
+
+
+@dataclass(frozen=True, slots=True)
+class Cycle:
+    """A steady cycle found by simulation.
+
+    period_s [s], op_amplitude [% OP], pv_amplitude [% PV] (half of peak to peak), stem_travel [%/h].
+    """
+
+    period_s: float
+    op_amplitude: float
+    pv_amplitude: float
+    stem_travel: float
+
+
+@dataclass(frozen=True, slots=True)
+class Confirmed:
+    """What simulation says: a cycle, none, or no answer.
+
+    cycle : Cycle or None
+    settled : bool
+        False where neither a steady cycle nor rest was reached; `cycle` then is the last one seen.
+    predicted : Balance or None
+        The largest stable solution of the harmonic balance.
+    """
+
+    cycle: Cycle | None
+    settled: bool
+    predicted: Balance | None
+
+
+def _excess(loop: Loop, branch: Branch, omega: Floats) -> Floats:
+    """ln abs(G C N) at the amplitude whose N closes the phase, shape (m,); nan where no amplitude does."""
+    response = loop_response(loop, omega)
+    phase = np.angle(-1.0 / response)
+    return np.log(np.abs(response)) + branch.at_phase(phase)[1]
+
+
+def _roots(loop: Loop, branch: Branch, omega: Floats) -> list[float]:
+    """Frequencies [rad/s] of all solutions on a branch, bracketed on the grid and polished."""
+    excess = _excess(loop, branch, omega)
+    sign = np.sign(excess)
+    at = np.flatnonzero(
+        (sign[:-1] * sign[1:] <= 0) & np.isfinite(excess[:-1] + excess[1:]) & (sign[:-1] != 0)
+    )
+    return [_polish(loop, branch, float(omega[k]), float(omega[k + 1])) for k in at]
+
+
+def _polish(loop: Loop, branch: Branch, low: float, high: float) -> float:
+    for _ in range(POLISH_STEPS):
+        inner = np.linspace(low, high, 9)
+        sign = np.sign(_excess(loop, branch, inner))
+        k = int(np.flatnonzero(sign[:-1] * sign[1:] <= 0)[0]) if np.any(sign[:-1] * sign[1:] <= 0) else 0
+        low, high = float(inner[k]), float(inner[k + 1])
+    return 0.5 * (low + high)
+
+
+def _is_stable(loop: Loop, branch: Branch, omega: float, phase: float) -> bool:
+    """Loeb's criterion: with A a little larger the oscillation must decay.
+
+    From 1 + N(A) L(s) = 0, ds/dA = -i (dlnN/dA)/(dlnL/dw), whose real part must be negative (Atherton 1982).
+    """
+    w = omega * np.array([1 - 1e-4, 1 + 1e-4])
+    slope = np.diff(np.log(loop_response(loop, w)))[0]
+    slope = complex(slope.real, math.remainder(slope.imag, 2 * math.pi))
+    angle = phase + 1e-4 * np.array([-1.0, 1.0])
+    log_a, log_n = branch.at_phase(angle)
+    along_a = complex(log_n[1] - log_n[0], angle[1] - angle[0]) / (log_a[1] - log_a[0])
+    return (along_a / slope).imag < 0
+
+
+def _solution(loop: Loop, branch: Branch, omega: float) -> Balance:
+    at = np.array([omega])
+    phase = np.angle(-1.0 / loop_response(loop, at))
+    log_a, log_n = branch.at_phase(phase)
+    amplitude = float(np.exp(log_a[0]))
+    gain = float(np.abs(controller_response(loop.controller, at))[0])
+    return Balance(
+        period_s=2.0 * math.pi / omega,
+        op_amplitude=amplitude,
+        pv_amplitude=amplitude / gain,
+        stem_amplitude=amplitude * float(np.exp(log_n[0])),
+        stable=_is_stable(loop, branch, omega, float(phase[0])),
+        jumps=branch.jumps,
+    )
+
+
+def harmonic_balance(loop: Loop) -> tuple[Balance, ...]:
+    """All solutions of G C N(A) = -1, dead time and scan exact.
+
+    Parameters
+    ----------
+    loop : Loop
+        With scan_s = 0 the controller is continuous, as in the study.
+
+    Returns
+    -------
+    tuple of Balance
+        From the fastest to the slowest; empty where the curves do not meet.
+    """
+    omega = frequencies(loop)
+    found = [_solution(loop, b, w) for b in branches(loop.valve) for w in _roots(loop, b, omega)]
+    return tuple(sorted(found, key=lambda s: s.period_s))
+
+
+def predicted_cycle(loop: Loop) -> Balance | None:
+    """The largest stable solution of the harmonic balance, None where there is none."""
+    stable = [s for s in harmonic_balance(loop) if s.stable]
+    return max(stable, key=lambda s: s.op_amplitude, default=None)
+
+
+def _rising(x: Floats) -> Floats:
+    """Instants [samples] at which x crosses zero upwards, interpolated; shape (k,)."""
+    k = np.flatnonzero((x[:-1] < 0) & (x[1:] >= 0))
+    return k + x[k] / (x[k] - x[k + 1])
+
+
+def measure(pv: Floats, op: Floats, stem: Floats, dt_s: float) -> Cycle | None:
+    """The cycle in a stretch of a settled loop.
+
+    Parameters
+    ----------
+    pv, op, stem : ndarray of shape (n,)
+        [% PV], [% OP], [% OP].
+    dt_s : float
+        Sample interval [s].
+
+    Returns
+    -------
+    Cycle or None
+        None where the stem rests or fewer than two periods are seen.
+    """
+    at = _rising(pv - 0.5 * (pv.max() + pv.min()))
+    if at.size < 3 or np.ptp(stem) == 0.0:
+        return None
+    whole = slice(math.ceil(at[0]), math.floor(at[-1]) + 1)
+    travel = float(np.abs(np.diff(stem[whole])).sum())
+    return Cycle(
+        period_s=float((at[-1] - at[0]) / (at.size - 1) * dt_s),
+        op_amplitude=0.5 * float(np.ptp(op[whole])),
+        pv_amplitude=0.5 * float(np.ptp(pv[whole])),
+        stem_travel=float(travel / ((at[-1] - at[0]) * dt_s) * 3600.0),
+    )
+
+
+def _unlimited(loop: Loop) -> Loop:
+    return replace(loop, controller=replace(loop.controller, op_lo=-NO_LIMIT, op_hi=NO_LIMIT))
+
+
+def kicked(loop: Loop, steps: int, kick: float) -> tuple[Floats, Floats, Floats, float]:
+    """PV, OP, stem (shape (steps,)) and step [s] of the loop at rest after a step of PV by `kick` [% PV]."""
+    load = np.full(steps, kick)
+    load[0] = 0.0
+    r = closed_loop(_unlimited(loop), np.zeros(steps), load, op_start=0.0)
+    return r.pv, r.op, r.pv if r.position is None else r.position, r.dt_s
+
+
+def _verdict(op: Floats, width: float) -> str:
+    """decays, steady, grows or moves: the amplitude of OP in the last two quarters."""
+    n = op.size // 4
+    before, now = 0.5 * np.ptp(op[-2 * n : -n]), 0.5 * np.ptp(op[-n:])
+    if now < 0.5 * width:
+        return "decays"
+    if now > 1e4 * width:
+        return "grows"
+    return "steady" if abs(now / before - 1.0) < STEADY else "moves"
+
+
+def confirm(loop: Loop, periods: int = PERIODS) -> Confirmed:
+    """The limit cycle that simulation finds after a kick, without noise.
+
+    Parameters
+    ----------
+    loop : Loop
+    periods : int
+        Predicted periods to simulate at first; the record is made longer until it settles.
+
+    Returns
+    -------
+    Confirmed
+    """
+    predicted = predicted_cycle(loop)
+    width = band(loop.valve)
+    if width <= 0.0:
+        return Confirmed(None, True, None)
+    h = scan_step(loop)
+    kick = 3.0 * width / abs(loop.controller.kp)
+    scale = 4.0 * slowest_s(loop)
+    if predicted is not None:
+        kick, scale = max(kick, 3.0 * predicted.pv_amplitude), predicted.period_s
+    steps = int(min(max(periods * scale / h, 2000), MOST_STEPS))
+    return _settle(loop, steps, kick, width, predicted)
+
+
+def _settle(loop: Loop, steps: int, kick: float, width: float, predicted: Balance | None) -> Confirmed:
+    """Simulate ever longer until the loop rests or cycles steadily with four periods in the last quarter."""
+    while True:
+        pv, op, stem, h = kicked(loop, steps, kick)
+        verdict = _verdict(op, width)
+        if verdict == "decays":
+            return Confirmed(None, True, predicted)
+        n = pv.size // 4
+        cycle = measure(pv[-n:], op[-n:], stem[-n:], h)
+        if verdict == "steady" and cycle is not None and cycle.period_s * 4 < n * h:
+            return Confirmed(cycle, True, predicted)
+        if verdict == "grows" or 3 * steps > MOST_STEPS:
+            return Confirmed(cycle, False, predicted)
+        steps *= 3

@@ -1,0 +1,74 @@
+"""Tuning rules in closed form: SIMC for a process without valve trouble, the source study's for play."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+from identification.models import Fopdt, Integrator, Pid, Process
+from tuning.linear import integral_s
+
+TAU_C_PER_DELAY = 1.5
+"""Closed-loop time constant over dead time of the nominal tuning (the source study, section 5)."""
+LEAST_DELAY_SHARE = 5e-4
+"""Least effective dead time over the time constant; ours, a quarter of the study's least (T/L = 500): without
+it a process without dead time asks for infinite gain."""
+
+
+def effective_delay(process: Process, scan_s: float = 0.0) -> float:
+    """Dead time plus half a scan [s], the hold's share of it (Grimholt, Skogestad 2012, rule of the half)."""
+    delay = process.dead_time_s + 0.5 * scan_s
+    if isinstance(process, Fopdt):
+        return max(delay, LEAST_DELAY_SHARE * process.time_constant_s)
+    return delay
+
+
+def simc(process: Process, tau_c: float | None = None, scan_s: float = 0.0) -> Pid:
+    """SIMC settings of a PI controller (Grimholt, Skogestad 2012).
+
+    Kp = T/(K (tau_c + L)), Ti = min(T, 4 (tau_c + L)); for an integrator Kp = 1/(slope (tau_c + L)),
+    Ti = 4 (tau_c + L).
+
+    Parameters
+    ----------
+    process : Fopdt or Integrator
+    tau_c : float or None
+        Closed-loop time constant [s]; None: 1.5 times the dead time, the source study's nominal tuning.
+    scan_s : float
+        Scan [s]; half of it counts as dead time. 0 takes the dead time as it is.
+
+    Returns
+    -------
+    Pid
+        With the scan given and the gain's sign that of the process.
+
+    Raises
+    ------
+    ValueError
+        For a process without gain, or an integrator without dead time, scan and tau_c.
+    """
+    delay = effective_delay(process, scan_s)
+    sum_s = delay + (TAU_C_PER_DELAY * delay if tau_c is None else tau_c)
+    slope = process.slope
+    if slope == 0.0 or sum_s <= 0.0:
+        raise ValueError(
+            f"SIMC needs gain and delay, has slope {slope:g} % PV/(% OP s) and tau_c + L {sum_s:g} s"
+        )
+    slowest = math.inf if isinstance(process, Integrator) else process.time_constant_s
+    return Pid(1.0 / (slope * sum_s), min(slowest, 4.0 * sum_s), scan_s=scan_s)
+
+
+def backlash_rule(process: Process, controller: Pid) -> Pid:
+    """The source study's Eq. (6): Ti at least the time constant, gain kept.
+
+    On an integrator, where the rule has no meaning, the controller comes back as it was.
+    """
+    if isinstance(process, Integrator):
+        return controller
+    return replace(controller, ti_s=max(integral_s(controller), process.time_constant_s))
+
+
+def stick_slip_rule(process: Process, controller: Pid) -> Pid:
+    """The study, section 5: lower gain and longer Ti cut the travel; here half the gain, Ti as for play."""
+    ruled = backlash_rule(process, controller)
+    return replace(ruled, kp=0.5 * controller.kp)
