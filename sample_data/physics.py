@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 Floats = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Three = tuple[float, float, float]
 
 SUBSTEPS = 5  # steps of stem and process in a second; the controller computes once a second
 ACTUATOR_S = 0.6  # lag of the pneumatic actuator
@@ -27,7 +29,9 @@ def drag(stem: float, actuator: float, width: float) -> float:
 
 
 @njit(cache=True)
-def slip(stem: float, way: float, force: float, static: float, kinetic: float, share: float):
+def slip(
+    stem: float, way: float, force: float, static: float, kinetic: float, share: float
+) -> tuple[float, float]:
     """One step of a stem with dry friction and negligible mass (Karnopp 1985, spring and friction alone).
 
     Parameters
@@ -58,7 +62,7 @@ def slip(stem: float, way: float, force: float, static: float, kinetic: float, s
 
 
 @njit(cache=True)
-def shares(lag: float, delay: float, dt: float):
+def shares(lag: float, delay: float, dt: float) -> tuple[int, float, float]:
     """Exact step of a lag behind a dead time that need not be whole steps; lag, delay, dt in seconds.
 
     Returns
@@ -74,7 +78,10 @@ def shares(lag: float, delay: float, dt: float):
 
 
 @njit(cache=True)
-def run(sp, load, noise, kp, ti, push, manual, op0, valve, process):
+def run(
+    sp: Floats, load: Floats, noise: Floats, kp: Floats, ti: Floats, push: Floats, manual: Mask, op0: float,
+    valve: Three, process: Three,
+) -> tuple[Floats, Floats, Floats]:  # fmt: skip
     """One loop, closed by a PI in velocity form (backward Euler, 1 s scan).
 
     Parameters

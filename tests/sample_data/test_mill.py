@@ -14,6 +14,7 @@ SAMPLE = Path(__file__).resolve().parents[2] / "sample_data"
 sys.path.insert(0, str(SAMPLE))
 
 import make  # noqa: E402
+import physics  # noqa: E402
 from historian import compressed, reported  # noqa: E402
 from mill import MILL, RETUNED_S, Loop, Unit, simulate  # noqa: E402
 from physics import run, slip  # noqa: E402
@@ -234,6 +235,25 @@ def test_step_response_is_the_closed_form() -> None:
     pv, _, _ = run(sp, zero, zero, one, one, push, np.ones(n, dtype=bool), 50.0, valve, process)
     late = np.arange(n) - at - delay - 0.6  # the actuator's lag shifts a slow process by its time constant
     assert np.max(np.abs(pv - 50.0 - np.where(late > 0, gain * (1.0 - np.exp(-late / lag)), 0.0))) < 0.02
+
+
+def test_limit_cycle_is_the_published_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    """K 80, T 200, L 1, play 1 %, Kp 1, Ti 10 cycle with a period of 38 s and a PV amplitude of 0.60 %.
+
+    Figure 1 of "Tuning of Control Loops with Valve Problems"; its valve has no actuator lag.
+    """
+    monkeypatch.setattr(physics, "ACTUATOR_S", 1e-3)
+    n = 3000
+    zero, one, sp = np.zeros(n), np.ones(n), np.full(n, 50.0)
+    sp[10:] = 51.0
+    auto = np.zeros(n, dtype=bool)
+    pv, _, _ = run.py_func(
+        sp, zero, zero, one, 10.0 * one, zero, auto, 50.0, (1.0, 0.0, 0.0), (80.0, 200.0, 1.0)
+    )
+    e = (pv - sp)[-1000:]
+    ups = np.flatnonzero((e[:-1] < 0.0) & (e[1:] >= 0.0))
+    assert np.diff(ups).mean() == pytest.approx(38.0, abs=0.5)
+    assert np.ptp(e) / 2.0 == pytest.approx(0.60, abs=0.02)
 
 
 def test_stem_waits_for_the_stickband_and_jumps() -> None:
