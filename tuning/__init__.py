@@ -1,1 +1,1 @@
-"""What to change: describing functions, limit cycles, rules, recommendations. Imports identification alone."""
+"""What to change: describing functions, limit cycles, rules, recommendations."""

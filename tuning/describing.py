@@ -95,6 +95,33 @@ def stick_slip(amplitude: ArrayLike, stickband: float, slip_jump: float, jumps: 
     return height * (np.sqrt(inside).sum(axis=-1) - 1j * 0.5 * jumps * stickband)
 
 
+def sliding(amplitude: ArrayLike, stickband: float, slip_jump: float) -> Complexes:
+    """Describing function of stick-slip whose stem follows OP after its jump.
+
+    From OP's trough the stem rests at -(A - f_d) up to the angle p with cos p = 1 - S/A, then follows at the
+    distance f_d = (S - J)/2 (Choudhury, Thornhill, Shah 2005); the half cycle's integral is derived here.
+    J = 0 is play of width S.
+
+    Parameters
+    ----------
+    amplitude : float or ndarray of any shape
+        Amplitude of OP [% OP]; up to S/2 the stem rests and N is 0.
+    stickband, slip_jump : float
+        S and J [% OP].
+
+    Returns
+    -------
+    ndarray of complex, the shape of `amplitude`
+    """
+    a = np.asarray(amplitude, dtype=np.float64)
+    gap = thresholds(stickband, slip_jump)[1]
+    angle = np.arccos(np.maximum(1.0 - stickband / a, -1.0))
+    turn = np.exp(-1j * angle)
+    rest = (a - gap) * 1j * (turn - 1.0)
+    follow = a * (0.5 * (np.pi - angle) + 0.25j * (1.0 - turn**2)) - 1j * gap * (1.0 + turn)
+    return np.where(a > 0.5 * stickband, 2.0 / (np.pi * a) * (rest + follow), 0.0)
+
+
 def is_play(valve: Valve) -> bool:
     """Whether the valve is play, or stick-slip with a jump too small to tell from it."""
     return isinstance(valve, Backlash) or (
@@ -115,6 +142,8 @@ def describe(valve: Valve, amplitude: float) -> complex:
         return 1.0 + 0.0j
     if isinstance(valve, Backlash) or is_play(valve):
         return complex(backlash(amplitude, band(valve)))
+    if valve.slides:
+        return complex(sliding(amplitude, valve.stickband, valve.slip_jump))
     jumps = jumps_at(amplitude, valve)
     return complex(stick_slip(amplitude, valve.stickband, valve.slip_jump, jumps)) if jumps else 0j
 
@@ -138,7 +167,7 @@ def numeric(valve: Valve, amplitude: float, start: float | None = None, samples:
         From the last of three periods.
     """
     phase = 2.0 * np.pi * np.arange(3 * samples) / samples
-    if start is None and isinstance(valve, Stiction) and not is_play(valve):
+    if start is None and isinstance(valve, Stiction) and not (is_play(valve) or valve.slides):
         start = -0.5 * jumps_at(amplitude, valve) * valve.slip_jump
     stem = stem_position(-amplitude * np.cos(phase), valve, start)[-samples:]
     wave = np.exp(-1j * phase[-samples:])
@@ -159,7 +188,7 @@ class Branch:
     log_gain: Floats
 
     def at_phase(self, phase: Floats) -> tuple[Floats, Floats]:
-        """ln A and ln abs(N) where N has this phase [rad], in the shape of `phase`; nan where it never has."""
+        """ln A and ln abs(N) where N has this phase [rad], shaped as `phase`; nan where it never has."""
         known = (phase < 0.0) & (phase > -np.pi)
         root = np.sqrt(np.where(known, -phase, np.nan))
         amplitude = np.interp(root, self.root[::-1], self.log_amplitude[::-1], left=np.nan, right=np.nan)
@@ -184,15 +213,22 @@ def _play_branch(width: float) -> Branch:
 
 @lru_cache(maxsize=64)
 def branches(valve: Valve) -> tuple[Branch, ...]:
-    """The pieces of N(A): one for play, one for each number of jumps of stick-slip, none for a healthy valve."""
+    """The pieces of N(A): one for play, one per number of jumps for stick-slip, none for a healthy valve."""
     width = band(valve)
     if valve is None or width <= 0.0:
         return ()
     if isinstance(valve, Backlash) or is_play(valve):
         return (_play_branch(width),)
+    if valve.slides:
+        amplitude = width / (1.0 + np.cos(np.linspace(0.0, np.pi, TABLE_SIZE + 1)[:-1]))
+        return (_branch(1, amplitude, sliding(amplitude * (1 + 1e-12), width, valve.slip_jump)),)
+    return _jump_branches(valve)
+
+
+def _jump_branches(valve: Stiction) -> tuple[Branch, ...]:
     share = np.linspace(0.0, 1.0, TABLE_SIZE) ** 2
     found = []
-    for jumps in range(1, min(MAX_JUMPS, int(np.ceil(8 * width / valve.slip_jump))) + 1):
+    for jumps in range(1, min(MAX_JUMPS, int(np.ceil(8 * valve.stickband / valve.slip_jump))) + 1):
         low, high = jump_range(valve, jumps)
         amplitude = low + (high - low) * share
         found.append(

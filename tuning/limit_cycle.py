@@ -11,20 +11,26 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identification.models import Loop
+from identification.models import Integrator, Loop
 from identification.record import Floats
 from identification.simulate import closed_loop, scan_step
 from tuning.describing import Branch, band, branches
-from tuning.linear import controller_response, frequencies, loop_response, slowest_s
+from tuning.linear import controller_response, frequencies, integral_s, loop_response, slowest_s
 
 POLISH_STEPS = 6
 """Eightfold bracketings that polish a root found on the grid."""
+REACH_POINTS = 600
+"""Frequencies at which a branch is looked at: no pair of solutions further apart than 2 % is missed."""
 PERIODS = 30
 """Predicted periods that a confirmation simulates at first; ours: the study's loops settle within ten."""
 MOST_STEPS = 600_000
 """Steps that a confirmation may take in all; some 20 ms."""
+REST_SHARE = 0.45
+"""Amplitude of OP over the width of the play below which a loop rests: no cycle has less than half of it."""
 STEADY = 0.02
 """Relative change of amplitude from one quarter of the record to the next below which a cycle is steady."""
+KICK = 1.0 + math.sqrt(5.0)
+"""Kick in widths of the play, seen at OP; irrational, lest whole jumps of a sticking stem meet it exactly."""
 NO_LIMIT = 1e9
 """Output limits [% OP] put out of the way: a cycle scales with the play and must not meet a limit."""
 
@@ -73,6 +79,21 @@ class Confirmed:
     cycle: Cycle | None
     settled: bool
     predicted: Balance | None
+
+
+def reach(loop: Loop, branch: Branch, points: int = REACH_POINTS) -> Floats:
+    """Grid [rad/s] of the frequencies at which some amplitude of a branch closes the phase.
+
+    `points` for each stretch of them, shape (k,); empty where there is none. The phase of G C does not depend on the gain, and so neither does the grid.
+    """
+    omega = frequencies(loop)
+    root = np.sqrt(np.maximum(-np.angle(-1.0 / loop_response(loop, omega)), 0.0))
+    inside = (root <= branch.root[0]) & (root >= branch.root[-1])
+    above = root > branch.root[0]
+    meets = np.flatnonzero(inside[:-1] | inside[1:] | (above[:-1] != above[1:]))
+    stretches = np.split(meets, np.flatnonzero(np.diff(meets) > 1) + 1) if meets.size else []
+    grids = [np.geomspace(omega[m[0]], omega[m[-1] + 1], points) for m in stretches]
+    return np.concatenate([np.empty(0), *grids])
 
 
 def _excess(loop: Loop, branch: Branch, omega: Floats) -> Floats:
@@ -144,8 +165,7 @@ def harmonic_balance(loop: Loop) -> tuple[Balance, ...]:
     tuple of Balance
         From the fastest to the slowest; empty where the curves do not meet.
     """
-    omega = frequencies(loop)
-    found = [_solution(loop, b, w) for b in branches(loop.valve) for w in _roots(loop, b, omega)]
+    found = [_solution(loop, b, w) for b in branches(loop.valve) for w in _roots(loop, b, reach(loop, b))]
     return tuple(sorted(found, key=lambda s: s.period_s))
 
 
@@ -205,7 +225,7 @@ def _verdict(op: Floats, width: float) -> str:
     """decays, steady, grows or moves: the amplitude of OP in the last two quarters."""
     n = op.size // 4
     before, now = 0.5 * np.ptp(op[-2 * n : -n]), 0.5 * np.ptp(op[-n:])
-    if now < 0.5 * width:
+    if now < REST_SHARE * width:
         return "decays"
     if now > 1e4 * width:
         return "grows"
@@ -230,12 +250,20 @@ def confirm(loop: Loop, periods: int = PERIODS) -> Confirmed:
     if width <= 0.0:
         return Confirmed(None, True, None)
     h = scan_step(loop)
-    kick = 3.0 * width / abs(loop.controller.kp)
-    scale = 4.0 * slowest_s(loop)
+    kick = KICK * width / abs(loop.controller.kp)
+    scale = max(4.0 * slowest_s(loop), _ramp_s(loop))
     if predicted is not None:
         kick, scale = max(kick, 3.0 * predicted.pv_amplitude), predicted.period_s
     steps = int(min(max(periods * scale / h, 2000), MOST_STEPS))
     return _settle(loop, steps, kick, width, predicted)
+
+
+def _ramp_s(loop: Loop) -> float:
+    """Time [s] in which integral action drives OP four times across a stickband at half a band's error."""
+    c = loop.controller
+    if isinstance(loop.process, Integrator) or math.isinf(integral_s(c)):
+        return 0.0
+    return 8.0 * c.ti_s / abs(c.kp * loop.process.gain)
 
 
 def _settle(loop: Loop, steps: int, kick: float, width: float, predicted: Balance | None) -> Confirmed:

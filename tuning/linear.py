@@ -1,4 +1,4 @@
-"""The loop without its valve: frequency response, stability, maximum sensitivity; dead time and scan exact."""
+"""The loop without its valve: frequency response, stability, sensitivity; dead time and scan exact."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from identification.models import Fopdt, Integrator, Loop, Pid, Process
-from identification.record import Floats
+from identification.record import Floats, Mask
 from identification.simulate import discretize, scan_step
 from tuning.describing import Complexes
 
@@ -59,8 +59,7 @@ def process_sampled(process: Process, scan_s: float, omega: Floats) -> Complexes
 def controller_continuous(controller: Pid, omega: Floats) -> Complexes:
     """C(iw) [% OP / % PV] of the ideal PID, shape (m,)."""
     s = 1j * omega
-    law: Complexes = controller.kp * (1.0 + _rate(controller) / s + controller.td_s * s)
-    return law
+    return np.asarray(controller.kp * (1.0 + _rate(controller) / s + controller.td_s * s), np.complex128)
 
 
 def controller_sampled(controller: Pid, omega: Floats) -> Complexes:
@@ -100,7 +99,7 @@ def slowest_s(loop: Loop) -> float:
 
 
 def frequencies(loop: Loop, points: int = POINTS, lowest: float = LOWEST) -> Floats:
-    """Logarithmic grid [rad/s], shape (points,), from `lowest`/slowest time up to where dead time or scan end."""
+    """Logarithmic grid [rad/s], shape (points,), from `lowest`/slowest time to where delay or scan end."""
     delay = loop.process.dead_time_s + 0.5 * loop.controller.scan_s
     top = 6.0 * math.pi / delay if delay > 0 else 1e4 / slowest_s(loop)
     if loop.controller.scan_s > 0:
@@ -108,48 +107,54 @@ def frequencies(loop: Loop, points: int = POINTS, lowest: float = LOWEST) -> Flo
     return np.geomspace(lowest / slowest_s(loop), top, points)
 
 
-def _characteristic(loop: Loop, angle: Floats) -> Complexes:
-    """The closed loop's characteristic polynomial in w = 1/z on the unit circle, shape (m,)."""
+def _characteristic(loop: Loop, points: int) -> tuple[Complexes, Complexes]:
+    """Characteristic polynomial in 1/z along the upper unit circle: the fixed part, and the part times kp.
+
+    A controller without integral leaves a factor 1 - 1/z on the circle, which is taken out.
+    """
     h = scan_step(loop)
     d, c = discretize(loop.process, h), loop.controller
-    w = np.exp(-1j * angle)
-    step = 1.0 - w
-    law = c.kp * (step + _rate(c) * h + c.td_s / h * step**2)
-    return step * (1.0 - d.pole * w) + law * (d.now + d.before * w) * w ** (d.delay + 1)
+    w = np.exp(-1j * _angles(loop, h, points + 8 * d.delay))
+    step, rate = 1.0 - w, _rate(c) * h
+    late = (d.now + d.before * w) * w ** (d.delay + 1)
+    if rate == 0.0:
+        return 1.0 - d.pole * w, (1.0 + c.td_s / h * step) * late
+    return step * (1.0 - d.pole * w), (step + rate + c.td_s / h * step**2) * late
 
 
-def is_stable(loop: Loop, points: int = 600) -> bool:
-    """Whether the sampled linear loop is stable: its characteristic polynomial must not wind around zero.
+def _angles(loop: Loop, h: float, points: int) -> Floats:
+    low = 1e-3 * h / max(slowest_s(loop), h)
+    return np.sort(np.concatenate((np.linspace(0.0, np.pi, points), np.geomspace(low, np.pi, points))))
+
+
+def stable_gains(loop: Loop, kp: Floats, points: int = 500) -> Mask:
+    """True for each gain at which the sampled linear loop is stable.
 
     A continuous controller is taken at the step that the simulator gives it. The polynomial in 1/z has its
-    unstable roots inside the unit circle, and their number is the winding of its values along the circle.
+    unstable roots inside the unit circle; their number is the winding of its values along the circle.
+
+    Parameters
+    ----------
+    loop : Loop
+        Its own gain and its valve do not count.
+    kp : ndarray of shape (n,)
+        Gains [% OP / % PV].
+    points : int
+        Points on the half circle, besides eight for each scan of dead time.
+
+    Returns
+    -------
+    ndarray of bool, shape (n,)
     """
-    if math.isinf(integral_s(loop.controller)):
-        return _stable_without_integral(loop, points)
-    return _winding(_characteristic(loop, _angles(loop, points))) == 0
+    fixed, scaled = _characteristic(loop, points)
+    phase = np.unwrap(np.angle(fixed + np.asarray(kp)[:, None] * scaled), axis=1)
+    stable: Mask = np.abs(phase[:, -1] - phase[:, 0]) < 0.5 * np.pi
+    return stable
 
 
-def _angles(loop: Loop, points: int) -> Floats:
-    h = scan_step(loop)
-    delay = discretize(loop.process, h).delay
-    low = 1e-3 * h / max(slowest_s(loop), h)
-    even = np.linspace(0.0, np.pi, points + 8 * delay)
-    return np.sort(np.concatenate((even, np.geomspace(low, np.pi, points))))
-
-
-def _winding(values: Complexes) -> int:
-    turn = np.unwrap(np.angle(values))
-    return round(abs(turn[-1] - turn[0]) / np.pi)
-
-
-def _stable_without_integral(loop: Loop, points: int) -> bool:
-    """The same with the factor 1 - w taken out, which a controller without integral leaves on the circle."""
-    angle = _angles(loop, points)
-    d = discretize(loop.process, scan_step(loop))
-    w = np.exp(-1j * angle)
-    c = loop.controller
-    law = c.kp * (1.0 + c.td_s / scan_step(loop) * (1.0 - w))
-    return _winding((1.0 - d.pole * w) + law * (d.now + d.before * w) * w ** (d.delay + 1)) == 0
+def is_stable(loop: Loop, points: int = 500) -> bool:
+    """Whether the sampled linear loop, its valve left out, is stable."""
+    return bool(stable_gains(loop, np.array([loop.controller.kp]), points)[0])
 
 
 def margins(loop: Loop, points: int = 400) -> Margins:

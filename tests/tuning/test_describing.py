@@ -14,6 +14,7 @@ from tuning.describing import (
     jump_range,
     jumps_at,
     numeric,
+    sliding,
     stick_slip,
 )
 
@@ -41,6 +42,21 @@ def test_stick_slip_agrees_with_projection(jump, amplitude):
     """The sum of relays is the fundamental of the simulated operator, with one jump a half cycle or many."""
     valve = Stiction(1.0, jump)
     assert numeric(valve, amplitude) == pytest.approx(describe(valve, amplitude), abs=2e-3)
+
+
+@pytest.mark.parametrize("jump", [0.1, 0.5, 1.0])
+@pytest.mark.parametrize("amplitude", [0.53, 0.617, 0.913, 1.873, 13.19])
+def test_sliding_stick_slip_agrees_with_projection(jump, amplitude):
+    """The closed form for a stem that follows after its jump is the fundamental of the simulated operator."""
+    valve = Stiction(1.0, jump, slides=True)
+    assert numeric(valve, amplitude) == pytest.approx(describe(valve, amplitude), abs=2e-3)
+
+
+@given(WIDTHS, st.floats(1.001, 500.0))
+def test_sliding_without_jump_is_play(width, factor):
+    """The sliding form with J = 0 is play's Eq. (1)."""
+    a = 0.5 * width * factor
+    assert complex(sliding(a, width, 0.0)) == pytest.approx(complex(backlash(a, width)), abs=1e-9)
 
 
 @given(st.floats(0.1, 3.0), st.floats(1.001, 2.999))
@@ -84,17 +100,21 @@ def test_small_jumps_become_play(width, factor):
     assert complex(n) == pytest.approx(complex(backlash(amplitude, width)), abs=5e-3)
 
 
-@pytest.mark.parametrize("valve", [Backlash(1.0), Stiction(1.0, 1.0), Stiction(2.0, 0.4)])
+@pytest.mark.parametrize(
+    "valve", [Backlash(1.0), Stiction(1.0, 1.0), Stiction(2.0, 0.4), Stiction(1.0, 0.5, True)]
+)
 def test_branches_rise_in_phase_and_agree_with_the_closed_form(valve):
     """On each branch the phase rises with the amplitude, and the table returns the closed form."""
     for branch in branches(valve):
         assert np.all(np.diff(branch.root) < 0)
         inner = -(np.linspace(branch.root[1], branch.root[-2], 37) ** 2)
         log_a, log_n = branch.at_phase(inner)
-        exact = (
-            backlash(np.exp(log_a), valve.width)
-            if isinstance(valve, Backlash)
-            else stick_slip(np.exp(log_a), valve.stickband, valve.slip_jump, branch.jumps)
-        )
+        a = np.exp(log_a)
+        if isinstance(valve, Backlash):
+            exact = backlash(a, valve.width)
+        elif valve.slides:
+            exact = sliding(a, valve.stickband, valve.slip_jump)
+        else:
+            exact = stick_slip(a, valve.stickband, valve.slip_jump, branch.jumps)
         assert np.abs(exact) * np.exp(1j * inner) == pytest.approx(exact, abs=1e-5)
         assert np.exp(log_n) == pytest.approx(np.abs(exact), rel=1e-5)

@@ -114,7 +114,7 @@ def test_integrator_with_play_always_cycles_under_pi(gain, ti, width):
 @settings(max_examples=25, deadline=None)
 @given(st.floats(0.1, 10.0), st.floats(0.1, 10.0), st.sampled_from([1, -1]))
 def test_amplitude_scales_with_play_and_not_with_sign_or_span(width, span, sign):
-    """Twice the play is twice the cycle at the same period; PV's scale and the action's sign change nothing."""
+    """Twice the play is twice the cycle at the same period; PV's scale and the sign change nothing."""
     base = predicted_cycle(SCANNED)
     loop = Loop(Fopdt(sign * span * 80, 200, 1), Pid(sign / span, 10), Backlash(width))
     b = predicted_cycle(loop)
