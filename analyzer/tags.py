@@ -67,8 +67,8 @@ def controller(spec: LoopSpec, pv_span: float | None) -> Pid | None:
     ideal     Kp (e + 1/Ti int e dt + Td de/dt)
     series    Kp (1 + 1/(Ti s)) (1 + Td s) e
     parallel  Kp e + 1/Ti int e dt + Td de/dt, the latter two with the sign of Kp and in the units of Kp
-    A band is 100/Kp in percent. An integral time of 0 means that there is no integral action. Derivative time is
-    in the unit of the integral time, in minutes where that is repeats/min.
+    A band is 100/Kp in percent. An integral time of 0 means that there is no integral action. Derivative time
+    is in the unit of the integral time, in minutes where that is repeats/min.
 
     Parameters
     ----------
@@ -92,8 +92,8 @@ def controller(spec: LoopSpec, pv_span: float | None) -> Pid | None:
 def as_stated(pid: Pid, spec: LoopSpec, pv_span: float | None) -> tuple[float, float]:
     """Gain and integral time of `pid` in the units and the form of `spec`, to be typed into the controller.
 
-    The inverse of `controller`. No integral action is stated as 0. The series form knows no Ti < 4 Td; there it
-    gets the nearest, both its times alike.
+    The inverse of `controller`. No integral action is stated as 0. The series form knows no Ti < 4 Td; there
+    it gets the nearest, both its times alike.
     """
     gain = pid.kp / _percent_ratio(spec, pv_span)
     gain, ti_s = _from_ideal(spec.form, gain, pid.ti_s, pid.td_s)

@@ -53,6 +53,8 @@ class Clock:
         Meaning of numbers.
     day_first : bool or None
         Order of day and month; None while undecided (then month first).
+    ambiguous : bool
+        True where the dates read either way; then another file may decide.
     why : str
         What decided the order, for the notes.
     date_format, timezone : str or None
@@ -62,6 +64,7 @@ class Clock:
     columns: tuple[int, ...]
     scale: Scale | None = None
     day_first: bool | None = None
+    ambiguous: bool = False
     why: str = ""
     date_format: str | None = None
     timezone: str | None = None
@@ -82,6 +85,16 @@ class Clock:
         if not local or self.timezone is None:
             return second, Counter()
         return zone.to_utc(second, self.timezone)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """How the stamps are read, where that is not plain from their writing."""
+        notes = [] if self.scale is None else [f"stamps are numbers, read as {self.scale.name}"]
+        if self.why:
+            notes.append(f"dates are read {'day' if self.day_first else 'month'} first: {self.why}")
+        if self.timezone is not None:
+            notes.append(f"stamps without a zone are taken as {self.timezone}")
+        return tuple(notes)
 
     def _from_texts(self, texts: pa.Array) -> tuple[NDArray[np.float64], bool]:
         if self.date_format is not None:

@@ -7,8 +7,8 @@ from collections.abc import Iterable, Mapping
 
 ROLES = ("sp", "pv", "op", "mode", "position")
 
-# The same ending means different things: CV is a current value in DeltaV and an output in Rockwell, MV an output
-# in Yokogawa. So a loop follows one row as a whole: the one that explains most of its tags, the earlier of equals.
+# The same ending means different things: CV is a current value in DeltaV and an output in Rockwell, MV an
+# output in Yokogawa. So a loop follows one row as a whole: the one that explains most of its tags.
 ENDINGS: Mapping[str, Mapping[str, tuple[str, ...]]] = {
     "plain": {
         "sp": ("SP", "SETPOINT"),

@@ -6,20 +6,25 @@ series = export.read(["FIC101.PV", "FIC101.OP"])["FIC101.PV"]
 
 from __future__ import annotations
 
+import csv
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from pathlib import Path
+
+import pyarrow as pa
 
 from analyzer.history.dialects import source_of
 from analyzer.history.files import export_files, is_parquet
 from analyzer.history.options import ReadOptions
 from analyzer.history.parquet import open_parquet
-from analyzer.history.raw import settle
+from analyzer.history.raw import Raw, settle
 from analyzer.history.series import Series
 from analyzer.history.sniff import open_sheet
 from analyzer.history.table import Source, Table
+from analyzer.history.time_columns import agreed
 from analyzer.history.zone import check_zone
 from identification.errors import InputError
 
@@ -53,7 +58,7 @@ class Export:
         """
         self._check_known(tags)
         homes = sorted({home for tag in tags for home in self._homes[tag]})
-        pieces = [self.sources[home].read(tags) for home in homes]
+        pieces = [_read(self.sources[home], tags) for home in homes]
         series = {}
         for tag in tags:
             series[tag], found = settle([piece[tag] for piece in pieces if tag in piece])
@@ -112,7 +117,7 @@ def open_export(paths: Sequence[Path], options: ReadOptions | None = None) -> Ex
     options = options or ReadOptions()
     if options.timezone is not None:
         check_zone(options.timezone)
-    sources = tuple(source_of(_table(path, options), options) for path in export_files(paths))
+    sources = agreed([_opened(path, options) for path in export_files(paths)])
     homes: dict[str, tuple[int, ...]] = {}
     for i, source in enumerate(sources):
         homes.update({tag: (*homes.get(tag, ()), i) for tag in source.tags})
@@ -123,5 +128,22 @@ def _some(names: Sequence[str]) -> str:
     return names[0] if len(names) == 1 else f"{names[0]} and {len(names) - 1} more files"
 
 
-def _table(path: Path, options: ReadOptions) -> Table:
-    return open_parquet(path) if is_parquet(path) else open_sheet(path, options)
+def _opened(path: Path, options: ReadOptions) -> Source:
+    with _told(path):
+        table: Table = open_parquet(path) if is_parquet(path) else open_sheet(path, options)
+        return source_of(table, options)
+
+
+def _read(source: Source, tags: Sequence[str]) -> dict[str, Raw]:
+    with _told(source.path):
+        return source.read(tags)
+
+
+@contextmanager
+def _told(path: Path) -> Iterator[None]:
+    """Faults of a file that show only when it is read: gone, cut short, damaged."""
+    try:
+        yield
+    except (OSError, pa.ArrowException, UnicodeError, csv.Error) as error:
+        why = str(error).splitlines()[0][:120] if str(error) else type(error).__name__
+        raise InputError(f"{path}: {why}", "a whole file", "export it again") from error

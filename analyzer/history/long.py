@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Self
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
-from analyzer.history.clock import Clock
+from analyzer.history.clock import Clock, as_text
 from analyzer.history.codes import Scheme, not_good, scheme_of
-from analyzer.history.names import QUALITY_NAMES, TAG_NAMES, VALUE_NAMES, first_named
+from analyzer.history.names import QUALITY_NAMES, STAMP_NAMES, TAG_NAMES, VALUE_NAMES, first_named, plain
 from analyzer.history.options import ReadOptions
 from analyzer.history.raw import Raw
 from analyzer.history.table import Table
@@ -44,12 +45,13 @@ class LongSource:
         """Format and layout of the file."""
         layout = f"long table, {len(self.tags)} tags in column '{self.table.names[self.tag]}'"
         if self.quality < 0:
-            return (*self.table.notes, layout)
-        return (
-            *self.table.notes,
-            layout,
-            f"column '{self.table.names[self.quality]}' read as {self.scheme.value}",
-        )
+            return (*self.table.notes, layout, *self.clock.notes)
+        quality = f"column '{self.table.names[self.quality]}' read as {self.scheme.value}"
+        return (*self.table.notes, layout, quality, *self.clock.notes)
+
+    def with_clock(self, clock: Clock) -> Self:
+        """The same file, its stamps read by another clock."""
+        return replace(self, clock=clock)
 
     def read(self, tags: Sequence[str]) -> dict[str, Raw]:
         """Samples of those of `tags` that the file holds."""
@@ -81,7 +83,8 @@ class LongSource:
 
 def open_long(table: Table, options: ReadOptions) -> LongSource | None:
     """Take a table as long where it has columns for tag and value; else None."""
-    tag, value = first_named(table.names, TAG_NAMES), first_named(table.names, VALUE_NAMES)
+    tag = first_named(table.names, TAG_NAMES)
+    value = None if tag is None else _value_column(table)
     if tag is None or value is None:
         return None
     clock = find_clock(table, options)
@@ -93,10 +96,19 @@ def open_long(table: Table, options: ReadOptions) -> LongSource | None:
     return LongSource(table, clock, tags, tag, value, quality, scheme, options.good_quality)
 
 
+def _value_column(table: Table) -> int | None:
+    """The column that is named so, else the only one of numbers that is neither time nor quality."""
+    named = first_named(table.names, VALUE_NAMES)
+    if named is not None:
+        return named
+    floating = [i for i, kind in enumerate(table.types) if pa.types.is_floating(kind)]
+    free = [i for i in floating if plain(table.names[i]) not in (*STAMP_NAMES, *QUALITY_NAMES)]
+    return free[0] if len(free) == 1 else None
+
+
 def _rows_of(tag: pa.Array, wanted: Sequence[str]) -> dict[str, NDArray[np.int64]]:
     """Rows of each tag, in the order of the file."""
-    texts = tag.dictionary_decode() if pa.types.is_dictionary(tag.type) else tag
-    place = pc.index_in(texts, value_set=pa.array(wanted, texts.type)).to_numpy(zero_copy_only=False)
+    place = pc.index_in(as_text(tag), value_set=pa.array(wanted, pa.string())).to_numpy(zero_copy_only=False)
     order = np.argsort(place, kind="stable")
     bounds = np.searchsorted(place[order], np.arange(len(wanted) + 1))
     return {name: order[bounds[i] : bounds[i + 1]] for i, name in enumerate(wanted)}

@@ -85,7 +85,8 @@ def _file(table: ParquetTable) -> pq.ParquetFile:
 
 def _filtered(table: ParquetTable, names: list[str], key: str, wanted: Sequence[str]) -> pa.Table:
     kind = table.types[table.names.index(key)]
-    field = pc.field(key).cast(pa.string()) if pa.types.is_dictionary(kind) else pc.field(key)
+    text = pa.types.is_string(kind) or pa.types.is_large_string(kind)
+    field = pc.field(key) if text else pc.field(key).cast(pa.string())
     keep = field.isin(list(wanted))
     return pq.read_table(table.path, columns=names, filters=keep, partitioning=None)
 

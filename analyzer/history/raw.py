@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from analyzer.history.series import Series
 
-NEWEST_FIRST = "newest first"
+NEWEST_FIRST = "series run newest first and are turned round"
 REPEATED = "samples repeat a stamp; the last one counts"
 CONTRADICTED = "samples contradict another file at the same stamp; the later file counts"
 UNORDERED = "samples were out of order"
-NO_STAMP = "rows have no readable time stamp and are left out"
+NO_STAMP = "samples have no readable time stamp and are left out"
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,7 +19,8 @@ class Series:
     value : ndarray of float, shape (n,)
         Values in the tag's own unit; NaN where the export holds no number.
     bad : ndarray of bool, shape (n,)
-        True where the historian says that the value is not good, or where there is no number.
+        True where the historian says that the value is not good, or where there is no number; of a text tag,
+        where there is no text.
     text : ndarray of str or None
         The texts, shape (n,), where the tag is a text tag (controller modes); else None.
     """

@@ -21,7 +21,8 @@ KEPT_READS = 2
 class Sheet:
     """A file of delimited text and how it is written; see `table.Table`.
 
-    `skip_rows` is the number of lines up to and with the header, `bytes` the size of the file.
+    `skip_rows` is the number of lines up to and with the header, `bytes` the size of the file. With
+    `as_written` all columns stay text, for dates of a stated format that may look like ISO dates and be none.
     """
 
     path: Path
@@ -32,6 +33,7 @@ class Sheet:
     decimal: str
     skip_rows: int
     names: tuple[str, ...]
+    as_written: bool = False
     types: tuple[pa.DataType, ...] = ()
     found: tuple[str, ...] = ()
 
@@ -70,7 +72,7 @@ class Sheet:
 def _loaded(sheet: Sheet, columns: tuple[int, ...]) -> tuple[dict[int, pa.Array], int]:
     """Columns by position, and the number of lines left out."""
     try:
-        return _parsed(sheet, columns, sheet.encoding)
+        return _parsed(sheet, columns, sheet.encoding.replace("utf-8-sig", "utf-8"))
     except pa.ArrowInvalid as error:
         if "UTF8" not in str(error):
             raise _unreadable(sheet.path, error) from error
@@ -104,6 +106,7 @@ def _parsed(sheet: Sheet, columns: tuple[int, ...], encoding: str) -> tuple[dict
         ),
         csv.ParseOptions(delimiter=sheet.delimiter, invalid_row_handler=leave_out),
         csv.ConvertOptions(
+            column_types=dict.fromkeys(names, pa.string()) if sheet.as_written else None,
             include_columns=[names[i] for i in columns],
             null_values=[""],
             true_values=[],

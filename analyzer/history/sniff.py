@@ -52,7 +52,7 @@ def open_sheet(path: Path, options: ReadOptions) -> Sheet:
     decimal = options.decimal or detect_decimal(rows, delimiter)
     stat = path.stat()
     sheet = Sheet(path, stat.st_mtime_ns, stat.st_size, encoding, delimiter, decimal, place + 1, names)
-    return _described(sheet)
+    return _described(replace(sheet, as_written=options.date_format is not None))
 
 
 def detect_encoding(head: bytes) -> str:

@@ -8,6 +8,7 @@ from typing import Protocol
 
 import pyarrow as pa
 
+from analyzer.history.clock import Clock
 from analyzer.history.raw import Raw
 
 
@@ -48,6 +49,12 @@ class Source(Protocol):
     def tags(self) -> tuple[str, ...]: ...
     @property
     def notes(self) -> tuple[str, ...]: ...
+
+    @property
+    def clock(self) -> Clock: ...
+
+    def with_clock(self, clock: Clock) -> Source:
+        """The same file, its stamps read by another clock."""
 
     def read(self, tags: Sequence[str]) -> dict[str, Raw]:
         """Samples of those of `tags` that the file holds."""

@@ -13,7 +13,7 @@ from analyzer.history import stamps
 from analyzer.history.clock import Clock, as_text, is_text, joined, scale_of
 from analyzer.history.names import CLOCK_NAMES, STAMP_NAMES, plain
 from analyzer.history.options import ReadOptions
-from analyzer.history.table import Table
+from analyzer.history.table import Source, Table
 from identification.errors import InputError
 
 TIME_OF_DAY = r"^\s*\d{1,2}:\d\d(:\d\d([.,]\d+)?)?\s*([AaPp]\.?[Mm]\.?)?\s*$"
@@ -33,7 +33,10 @@ def find_clock(table: Table, options: ReadOptions) -> Clock:
     clock = _chosen(table, kinds, options)
     if clock is None:
         raise _no_time(table, columns)
-    return _with_day_order(table, clock, options)
+    clock = _with_day_order(table, clock, options)
+    if np.isnan(clock.seconds(table.head(clock.columns))[0]).all():
+        raise _unreadable(table, clock.columns[0])
+    return clock
 
 
 def _candidates(table: Table) -> list[int]:
@@ -59,7 +62,9 @@ def _kind(name: str, head: pa.Array) -> str:
         return _text_kind(as_text(head).drop_null())
     named = plain(name) in STAMP_NAMES or _is_index(name)
     numeric = pa.types.is_integer(head.type) or pa.types.is_floating(head.type)
-    return "number" if named and numeric and scale_of(head) is not None else ""
+    if not (named and numeric):
+        return ""
+    return "number" if scale_of(head) is not None else _text_kind(as_text(head.drop_null()))
 
 
 def _text_kind(texts: pa.Array) -> str:
@@ -106,10 +111,14 @@ def _no_time(table: Table, columns: Sequence[int]) -> InputError:
             "a column of time stamps, named timestamp, time or the like",
             "add the stamps to the export, or name their column timestamp",
         )
-    text = next(iter(as_text(table.head(named[:1])[0].drop_null()).to_pylist()), "")
+    return _unreadable(table, named[0])
+
+
+def _unreadable(table: Table, column: int) -> InputError:
+    text = next(iter(as_text(table.head([column])[0].drop_null()).to_pylist()), "")
     row = "" if table.first_row is None else f", row {table.first_row}"
     return InputError(
-        f"{table.path}: column '{table.names[named[0]]}'{row}: '{text}' is no time stamp that is known",
+        f"{table.path}: column '{table.names[column]}'{row}: '{text}' is no time stamp that is known",
         "stamps such as 2024-11-21 08:00:00 or 21.11.2024 08:00:00",
         "state the date format",
     )
@@ -145,7 +154,17 @@ def _decided(clock: Clock, parts: stamps.Fields | None, head: pa.Array) -> Clock
         return replace(clock, day_first=gap[True] < gap[False], why="so read, the stamps run without a leap")
     if "." in str(head[0].as_py()).split(" ")[0]:
         return replace(clock, day_first=True, why="dates with points; no day above 12 occurs")
-    return clock
+    either = "every date fits both orders; state the order if it is not so"
+    return replace(clock, day_first=False, ambiguous=True, why=either)
+
+
+def agreed(sources: Sequence[Source]) -> tuple[Source, ...]:
+    """Files whose dates read either way follow a file of the same export whose dates do not."""
+    sure = next((s for s in sources if s.clock.why and not s.clock.ambiguous), None)
+    if sure is None:
+        return tuple(sources)
+    order = {"day_first": sure.clock.day_first, "ambiguous": False, "why": f"as in {sure.path.name}"}
+    return tuple(s.with_clock(replace(s.clock, **order)) if s.clock.ambiguous else s for s in sources)  # type: ignore[arg-type]
 
 
 def _largest_gap(parts: stamps.Fields, day_first: bool) -> float:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Self
 
 import numpy as np
 import pyarrow as pa
@@ -41,7 +42,11 @@ class WideSource:
     @property
     def notes(self) -> tuple[str, ...]:
         """Format and layout of the file."""
-        return (*self.table.notes, f"wide table, {len(self.tags)} tags")
+        return (*self.table.notes, f"wide table, {len(self.tags)} tags", *self.clock.notes)
+
+    def with_clock(self, clock: Clock) -> Self:
+        """The same file, its stamps read by another clock."""
+        return replace(self, clock=clock)
 
     def read(self, tags: Sequence[str]) -> dict[str, Raw]:
         """Samples of those of `tags` that the file holds."""
