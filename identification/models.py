@@ -64,10 +64,12 @@ class Stiction:
 
     S is the whole of the travel that OP needs after a reversal before the stem moves (deadband plus
     stickband); 0 <= J <= S in what is met in plants, J = 0 being backlash (Choudhury, Thornhill, Shah 2005).
+    After a jump the stem rests, or with `slides` follows OP until OP turns.
     """
 
     stickband: float
     slip_jump: float
+    slides: bool = False
 
 
 Valve = Backlash | Stiction | None

@@ -14,7 +14,7 @@ from numba import njit
 
 from identification.models import Backlash, Fopdt, Integrator, Loop, Process, Valve
 from identification.record import Floats, LoopRecord
-from identification.valve import stem_position, stick_slip_step, thresholds
+from identification.valve import RESTS, stem_position, stem_step, thresholds
 
 CONTINUOUS_STEPS = 50
 """Steps per dead time (or time constant) that stand for a continuous controller, scan_s = 0; ours: at 50 the
@@ -98,16 +98,17 @@ def _closed(
     sp: Floats,
     load: Floats,
     process: tuple[float, float, float, int],
-    valve: tuple[float, float],
+    valve: tuple[float, float, float],
     law: tuple[float, float, float, float, float],
     op0: float,
 ) -> tuple[Floats, Floats, Floats]:
     pole, now, before, delay = process
-    breakaway, sliding = valve
+    breakaway, sliding, tolerance = valve
     kp, ki, kd, lo, hi = law
     n = sp.size
     pv, op, stem = np.empty(n), np.empty(n), np.empty(n)
     y, u, x = 0.0, op0, op0
+    moving, turned = 0.0, op0
     rest = op0
     e1 = sp[0] - (sp[0] + load[0])
     y1 = sp[0] + load[0]
@@ -119,7 +120,10 @@ def _closed(
         u = min(max(u, lo), hi)
         e1, y2, y1 = e, y1, pv[k]
         op[k] = u
-        x = stick_slip_step(x, u, breakaway, sliding) if breakaway > 0 else u
+        if breakaway > 0:
+            x, moving, turned = stem_step(x, moving, turned, u, breakaway, sliding, tolerance)
+        else:
+            x = u
         stem[k] = x
         late = stem[k - delay] - rest if k >= delay else 0.0
         later = stem[k - delay - 1] - rest if k >= delay + 1 else 0.0
@@ -137,12 +141,12 @@ def scan_step(loop: Loop) -> float:
     return scale / CONTINUOUS_STEPS
 
 
-def _valve_thresholds(valve: Valve) -> tuple[float, float]:
+def _valve_constants(valve: Valve) -> tuple[float, float, float]:
     if valve is None:
-        return 0.0, 0.0
+        return 0.0, 0.0, RESTS
     if isinstance(valve, Backlash):
-        return thresholds(valve.width, 0.0)
-    return thresholds(valve.stickband, valve.slip_jump)
+        return *thresholds(valve.width, 0.0), RESTS
+    return *thresholds(valve.stickband, valve.slip_jump), 0.0 if valve.slides else RESTS
 
 
 def closed_loop(
@@ -174,7 +178,7 @@ def closed_loop(
         np.ascontiguousarray(sp, dtype=np.float64),
         np.ascontiguousarray(load, dtype=np.float64),
         (d.pole, d.now, d.before, d.delay),
-        _valve_thresholds(loop.valve),
+        _valve_constants(loop.valve),
         (c.kp, ki, c.kp * c.td_s / h, c.op_lo, c.op_hi),
         float(op_start),
     )

@@ -15,33 +15,43 @@ from identification.record import Floats
 
 
 @njit(cache=True)
-def play_step(stem: float, op: float, half_width: float) -> float:
-    """Stem position after one OP value, for play of half width `half_width` (all % of OP)."""
-    if op - stem > half_width:
-        return op - half_width
-    if stem - op > half_width:
-        return op + half_width
-    return stem
+def stem_step(
+    stem: float, moving: float, turned: float, op: float, breakaway: float, sliding: float, tolerance: float
+) -> tuple[float, float, float]:
+    """Stem position, direction of motion (0: at rest) and OP's extreme since it moved, after one OP value.
+
+    At rest the stem holds until |OP - stem| > breakaway and then moves to the distance `sliding`. With
+    tolerance >= 0 it follows at that distance until OP turns back by more than `tolerance`; with
+    tolerance < 0 it rests after each move.
+    """
+    if moving != 0.0:
+        advance = moving * (op - turned)
+        if tolerance < 0.0 or advance < -tolerance:
+            moving = 0.0
+        elif advance > 0.0:
+            return op - moving * sliding, moving, op
+    if moving == 0.0:
+        gap = op - stem
+        if gap > breakaway:
+            return op - sliding, 1.0, op
+        if gap < -breakaway:
+            return op + sliding, -1.0, op
+    return stem, moving, turned
 
 
 @njit(cache=True)
-def stick_slip_step(stem: float, op: float, breakaway: float, sliding: float) -> float:
-    """Stem position after one OP value: held until |OP - stem| > breakaway, then at distance `sliding`."""
-    gap = op - stem
-    if gap > breakaway:
-        return op - sliding
-    if gap < -breakaway:
-        return op + sliding
-    return stem
-
-
-@njit(cache=True)
-def _walk(op: Floats, breakaway: float, sliding: float, stem: float) -> Floats:
+def walk(op: Floats, breakaway: float, sliding: float, tolerance: float, stem: float) -> Floats:
+    """Stem positions, shape (n,), of a valve given by its two distances and its tolerance [% OP]."""
     out = np.empty_like(op)
+    moving, turned = 0.0, op[0]
     for k in range(op.size):
-        stem = stick_slip_step(stem, op[k], breakaway, sliding)
+        stem, moving, turned = stem_step(stem, moving, turned, op[k], breakaway, sliding, tolerance)
         out[k] = stem
     return out
+
+
+RESTS = -1.0
+"""Tolerance that stands for a stem which comes to rest after each move."""
 
 
 def thresholds(stickband: float, slip_jump: float) -> tuple[float, float]:
@@ -72,12 +82,15 @@ def play(op: Floats, width: float, start: float | None = None) -> Floats:
     return stick_slip(op, width, 0.0, start)
 
 
-def stick_slip(op: Floats, stickband: float, slip_jump: float, start: float | None = None) -> Floats:
+def stick_slip(
+    op: Floats, stickband: float, slip_jump: float, start: float | None = None, slides: bool = False
+) -> Floats:
     """Stem position of a sticking valve with stickband S and slip jump J.
 
-    The stem rests until |OP - stem| exceeds (S + J)/2, then moves at once to the distance (S - J)/2 and rests
-    again (He, Wang, Pottmann, Qin 2007, with f_s = (S + J)/2 and f_d = (S - J)/2). J = 0 is play of width S;
-    S = J is the relay of the describing function with height and hysteresis S/2.
+    The stem rests until |OP - stem| exceeds (S + J)/2, then moves at once to the distance (S - J)/2. It then
+    rests again (He, Wang, Pottmann, Qin 2007, with f_s = (S + J)/2 and f_d = (S - J)/2), or, with `slides`,
+    follows OP at that distance until OP turns (Choudhury, Thornhill, Shah 2005; Kano 2004). J = 0 is play
+    of width S in both; resting with S = J is the relay of the describing function, height and hysteresis S/2.
 
     Parameters
     ----------
@@ -87,6 +100,8 @@ def stick_slip(op: Floats, stickband: float, slip_jump: float, start: float | No
         S and J [% OP], S >= 0 and 0 <= J.
     start : float or None
         Stem position before the first sample [% OP]; None: op[0].
+    slides : bool
+        Whether the stem follows OP after a jump.
 
     Returns
     -------
@@ -97,7 +112,8 @@ def stick_slip(op: Floats, stickband: float, slip_jump: float, start: float | No
     if op.size == 0 or breakaway <= 0.0:
         return op.copy()
     first = float(op[0]) if start is None or math.isnan(start) else float(start)
-    return _walk(np.ascontiguousarray(op, dtype=np.float64), breakaway, sliding, first)
+    tolerance = 0.0 if slides else RESTS
+    return walk(np.ascontiguousarray(op, dtype=np.float64), breakaway, sliding, tolerance, first)
 
 
 def stem_position(op: Floats, valve: Valve, start: float | None = None) -> Floats:
@@ -106,4 +122,4 @@ def stem_position(op: Floats, valve: Valve, start: float | None = None) -> Float
         return op.copy()
     if isinstance(valve, Backlash):
         return play(op, valve.width, start)
-    return stick_slip(op, valve.stickband, valve.slip_jump, start)
+    return stick_slip(op, valve.stickband, valve.slip_jump, start, valve.slides)

@@ -1,0 +1,116 @@
+"""Every threshold of the nightly batch, with unit and source, in one place."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class OscillationLimits:
+    """When a peak of the spectrum is an oscillation.
+
+    Where no source is named the value is ours, set by tests/proofs/negative_controls.py (false alarms at most
+    0.5 % in each family) and tests/proofs/sensitivity.py.
+    """
+
+    periods: float = 3.0
+    """Periods that a record must hold [-]; below it neither peak nor correlation can be told from drift."""
+    prominence: float = 8.0
+    """Power in the peak over the power that its surroundings lead to expect [-]; coloured noise through a well
+    tuned loop reaches 4."""
+    prominence_few: float = 8.0
+    """Added to the prominence [-] times (6 - periods)/3 for records of fewer than 6 periods."""
+    correlation: float = 0.25
+    """First peak of the autocorrelation about the period [-]; the published rhythm of loops that show is 0.3."""
+    correlation_few: float = 1.5
+    """Added to the correlation, over the square root of the periods seen [-]: the scatter of noise."""
+    correlation_most: float = 0.70
+    """Correlation asked at most [-]."""
+    trade: float = 0.12
+    """Correlation that weighs as much as a doubling of the prominence [-]: the two are independent signs of one
+    line, noise that has much of one has little of the other, so an excess of one makes up for some of the other."""
+    least: float = 0.75
+    """Prominence that no correlation makes up for, as a share of the asked [-]."""
+    share: float = 0.2
+    """Share of the error's variance, slower drift apart, within a factor of 2.5 of the period [-]: below it
+    something else moves the loop."""
+    samples: float = 5.0
+    """Samples per period [-]: below it the clock, not the loop, may make the pattern."""
+    envelope: float = 0.4
+    """The loop oscillates where the envelope exceeds this share of its own upper level [-]."""
+    counts_pct: float = 50.0
+    """Share of time from which a loop counts as oscillating [%]; contract of the ranking."""
+
+
+@dataclass(frozen=True, slots=True)
+class QualityLimits:
+    """When samples or trends are unfit."""
+
+    gap_factor: float = 5.0
+    """A gap is a spacing of more than this many sample intervals [-]; ours."""
+    usable_share: float = 0.3
+    """Share of usable automatic samples that an assessment needs [-]; ours."""
+    samples: int = 200
+    """Samples that an assessment needs [-]; ours: 3 periods of 60 samples fit into it."""
+    stale_s: float = 3600.0
+    """An unchanged PV for this long [s] and for stale_samples is stale while OP moves; ours."""
+    stale_samples: int = 300
+    """See stale_s."""
+    straight_share: float = 0.6
+    """Share of samples on straight, sloping segments from which a trend is compressed [-] (Thornhill, Choudhury,
+    Shah 2004 find nonlinearity tests spoilt from a compression factor of 3)."""
+    coarse: float = 0.5
+    """A resolution above this many standard deviations of PV is too coarse for waveforms [-]; ours."""
+    limit_pct: float = 2.0
+    """OP within this distance of a limit is at the limit [% of span]; FACTS: time at limits."""
+    manual_s: float = 1800.0
+    """OP unchanged for this long [s] and for manual_samples, while the error moves, is a loop in manual; ours."""
+    manual_samples: int = 180
+    """See manual_s."""
+
+
+@dataclass(frozen=True, slots=True)
+class CauseLimits:
+    """When a cause is named.
+
+    Where no source is named the value is ours: tests/proofs/negative_controls.py and the healthy loops of a
+    simulated plant set it.
+    """
+
+    window: int = 3000
+    """Blocks of the record that are fitted [-]; more cost time and change no verdict."""
+    blocks_per_period: float = 40.0
+    """Blocks per period [-]."""
+    evidence: float = 10.0
+    """Gain in log likelihood that a play needs over an ideal valve [nat]."""
+    evidence_jump: float = 5.0
+    """Further gain that a slip jump needs, for its two more constants and wider search [nat]."""
+    size: float = 0.45
+    """Stickband over the range of OP from which it can drive a cycle [-]: below it the describing function of
+    play is within 15 degrees of a gain."""
+    line: float = 6.0
+    """Prominence of the reconstructed load's spectrum at the period from which the load itself oscillates [-]."""
+    resonance: float = 2.0
+    """Amplification of load by the loop at its period, |S|, from which the tuning is to blame [-]; Ms of 2 is the
+    usual upper bound of good tuning (Astrom, Hagglund 2006)."""
+    narrow: float = 0.9
+    """Correlation after three periods from which a period is kept as by a clock [-]."""
+    harmonic: float = 0.08
+    """Phase-locked third harmonic over the fundamental from which a wave is not a sine [-]; a triangle has 0.11."""
+    named_pct: float = 50.0
+    """Confidence from which a cause is named [%]."""
+    signs: int = 2
+    """Independent signs that a named cause needs [-]."""
+    coherent: float = 0.6
+    """Coherence at the period from which one loop follows another [-]."""
+    same_period: float = 0.06
+    """Largest relative difference of periods that count as one [-]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Config:
+    """All thresholds of a night."""
+
+    oscillation: OscillationLimits = OscillationLimits()
+    quality: QualityLimits = QualityLimits()
+    cause: CauseLimits = CauseLimits()

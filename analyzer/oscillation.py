@@ -1,0 +1,199 @@
+"""Whether a loop oscillates: periods, amplitude, regularity, share of time, significance.
+
+A peak counts where three signs agree: it stands out of the spectrum about it, the autocorrelation of its band
+comes back after one period, and it carries a fair share of the error. What the set point explains is taken out
+first, so set point steps and a cascade's moving set point are not oscillation of the loop.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from analyzer.config import OscillationLimits
+from identification.record import Floats, LoopRecord, Mask
+from identification.setpoint import without_setpoint
+from identification.spectrum import (
+    WIDE_BAND,
+    Bands,
+    Rhythm,
+    Spectrum,
+    band_signal,
+    bands,
+    envelope,
+    rhythm,
+    spectrum,
+    tapered_power,
+)
+
+MOST = 3
+"""Periods reported per loop."""
+
+
+@dataclass(frozen=True, slots=True)
+class Oscillation:
+    """One period of a loop.
+
+    period_s [s]; amplitude_pct, half of peak to peak of the fundamental [% of PV span] while it oscillates;
+    oscillating_pct, share of time [%]; significance [% h], amplitude times correlation summed over the hours
+    of oscillation; rhythm, what the autocorrelation says; prominence and share as in OscillationLimits;
+    cycles, periods that the record holds; line, its frequency in lines of the spectrum.
+    """
+
+    period_s: float
+    amplitude_pct: float
+    oscillating_pct: float
+    significance: float
+    rhythm: Rhythm
+    prominence: float
+    share: float
+    cycles: float
+    line: float
+
+
+@dataclass(frozen=True, slots=True)
+class Oscillations:
+    """What was found in one record.
+
+    found : the oscillations, the most significant first; active : True where the first one is on, shape (m,), at
+    interval active_dt_s [s]; level : its amplitude over time [% of PV span], shape (m,); spectrum and bands of
+    the error without the set point's part; needs : why it could not be assessed, empty where it could.
+    """
+
+    found: tuple[Oscillation, ...] = ()
+    active: Mask | None = None
+    level: Floats | None = None
+    active_dt_s: float = 1.0
+    spectrum: Spectrum | None = None
+    bands: Bands | None = None
+    needs: str = ""
+
+    @property
+    def first(self) -> Oscillation | None:
+        """The most significant oscillation, None where there is none."""
+        return self.found[0] if self.found else None
+
+
+def fill(x: Floats, bad: Mask) -> Floats:
+    """The signal with straight lines over what must not be used, shape (n,)."""
+    if not bad.any():
+        return x
+    good = np.flatnonzero(~bad)
+    return np.interp(np.arange(x.size), good, x[good])
+
+
+def error_spectrum(record: LoopRecord) -> Spectrum:
+    """Spectrum of the error without what the set point explains."""
+    found = spectrum(fill(record.error, record.bad), record.dt_s)
+    if record.sp_estimated or float(np.ptp(record.sp)) == 0.0:
+        return found
+    sp = spectrum(record.sp, record.dt_s)
+    lines = without_setpoint(found.lines, sp.lines)
+    power = float(np.sum(np.abs(lines[1:]) ** 2)) * 2 / found.n**2
+    return replace(found, lines=lines, variance=power)
+
+
+def _agree(limits: OscillationLimits, cycles: float, prominence: float, correlation: float) -> bool:
+    """Whether spectrum and autocorrelation together are more than noise shows in so many periods."""
+    asked = limits.prominence + limits.prominence_few * max(6.0 - cycles, 0.0) / 3.0
+    scatter = min(limits.correlation + limits.correlation_few / math.sqrt(cycles), limits.correlation_most)
+    if prominence < max(limits.least * asked, limits.prominence) or correlation < limits.correlation:
+        return False
+    return correlation - scatter + limits.trade * math.log2(prominence / asked) >= 0
+
+
+def _candidate(s: Spectrum, b: Bands, k: int, limits: OscillationLimits) -> Oscillation | None:
+    """The oscillation about one trial frequency, None where the signs do not agree."""
+    line = float(b.line[k])
+    expected = s.duration_s / line
+    if expected < limits.samples * s.dt_s:
+        return None
+    x, dt = band_signal(s, line)
+    above = float(np.sum(np.abs(s.lines[math.ceil(line / WIDE_BAND) :]) ** 2)) * 2 / s.n**2
+    share = float(x @ x) / x.size / above if above > 0 else 0.0
+    found = rhythm(x, dt, expected)
+    cycles = s.duration_s / found.period_s
+    if cycles < limits.periods or share < limits.share:
+        return None
+    if not _agree(limits, cycles, float(b.prominence[k]), min(found.first, 1.5 * found.trough)):
+        return None
+    return Oscillation(
+        found.period_s, 0, 0, 0, found, float(b.prominence[k]), share, cycles, s.duration_s / found.period_s
+    )
+
+
+def _peaks(b: Bands, least: float) -> list[int]:
+    """Trial frequencies whose prominence is the highest within half an octave, the most power first."""
+    p = b.prominence
+    ks = [k for k in range(p.size) if p[k] >= least and p[k] >= p[max(k - 3, 0) : k + 4].max()]
+    return sorted(ks, key=lambda k: -float(b.power[k] * b.line[k]))[: 2 * MOST]
+
+
+def _sized(
+    s: Spectrum, o: Oscillation, usable: Mask, limits: OscillationLimits
+) -> tuple[Oscillation, Mask, Floats, float]:
+    """Amplitude, share of time and significance from the envelope of the band."""
+    level, dt = envelope(s, o.line)
+    width = max(round(2 * o.period_s / dt), 1)
+    kernel = np.ones(width) / width
+    smooth = np.sqrt(np.convolve(np.pad(level**2, width, mode="reflect"), kernel, mode="same")[width:-width])
+    at = np.minimum((np.arange(level.size) * dt / s.dt_s).astype(np.int64), usable.size - 1)
+    good = usable[at]
+    if not good.any():
+        return o, good, smooth, dt
+    top = float(np.quantile(smooth[good], 0.9))
+    active = (smooth >= limits.envelope * top) & good
+    amplitude = math.sqrt(float(np.mean(level[active] ** 2))) if active.any() else 0.0
+    hours = active.sum() * dt / 3600.0
+    sized = replace(
+        o,
+        amplitude_pct=amplitude,
+        oscillating_pct=100.0 * float(active.sum()) / float(good.sum()),
+        significance=amplitude * max(o.rhythm.first, 0.0) * hours,
+    )
+    return sized, active, smooth, dt
+
+
+def _is_harmonic(o: Oscillation, other: Oscillation) -> bool:
+    """Whether one oscillation is a whole multiple (2 to 7) of a stronger one's frequency."""
+    ratio = other.period_s / o.period_s
+    whole = round(ratio)
+    return 2 <= whole <= 7 and abs(ratio / whole - 1) < 0.05 and o.share < other.share
+
+
+def detect(record: LoopRecord, limits: OscillationLimits) -> Oscillations:
+    """Find the oscillations of a loop.
+
+    Parameters
+    ----------
+    record : LoopRecord
+    limits : OscillationLimits
+
+    Returns
+    -------
+    Oscillations
+        Empty for noise, drift, ramps, steps and constants.
+    """
+    s = error_spectrum(record)
+    resolution = float(np.max(np.abs(record.error))) * 1e-9
+    if s.n < 16 or s.variance <= resolution**2:
+        return Oscillations(spectrum=s)
+    b = bands(tapered_power(s), limits.periods)
+    usable = ~record.bad[record.bad.size - s.n :]
+    kept: list[Oscillation] = []
+    for k in _peaks(b, limits.prominence):
+        o = _candidate(s, b, k, limits)
+        if o is None or any(abs(math.log(o.period_s / p.period_s)) < math.log(1.3) for p in kept):
+            continue
+        if not any(_is_harmonic(o, p) for p in kept):
+            kept.append(o)
+    if not kept:
+        return Oscillations(spectrum=s, bands=b)
+    sized = sorted((_sized(s, o, usable, limits) for o in kept[:MOST]), key=lambda r: -r[0].significance)
+    first = sized[0]
+    return Oscillations(tuple(r[0] for r in sized), first[1], first[2], first[3], s, b)
+
+
+__all__ = ["WIDE_BAND", "Oscillation", "Oscillations", "detect", "error_spectrum", "fill"]

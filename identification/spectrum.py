@@ -1,0 +1,205 @@
+"""Spectra of a loop's error: one Fourier transform, from which bands, peaks and correlations are read."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import irfft, next_fast_len, rfft
+
+from identification.record import Floats
+
+Complex = NDArray[np.complex128]
+
+HALF_BAND = 1.2
+"""A peak's band reaches from f/1.2 to 1.2 f."""
+SIDES = (1.6, 4.0)
+"""The surroundings of a peak reach from f/4 to f/1.6 and from 1.6 f to 4 f."""
+PER_OCTAVE = 6
+"""Centre frequencies tried per octave."""
+WIDE_BAND = 2.5
+"""Correlations are taken of the signal within a factor of 2.5 of a frequency, which keeps drift and sensor
+noise out and leaves flat noise without a peak at its own centre."""
+
+
+@dataclass(frozen=True, slots=True)
+class Spectrum:
+    """One-sided transform of a signal without its straight line.
+
+    lines : complex, shape (m,); n, dt_s : samples and interval [s]; variance : of the signal.
+    """
+
+    lines: Complex
+    n: int
+    dt_s: float
+    variance: float
+
+    @property
+    def duration_s(self) -> float:
+        """Length [s]; line k is the frequency k / duration_s."""
+        return self.n * self.dt_s
+
+
+def without_line(x: Floats) -> Floats:
+    """The signal less its least-squares straight line, shape (n,)."""
+    t = np.arange(x.size) - (x.size - 1) / 2
+    scale = float(t @ t)
+    return x - x.mean() - (float(t @ x) / scale if scale else 0.0) * t
+
+
+def spectrum(x: Floats, dt_s: float) -> Spectrum:
+    """Transform of a signal, padded by nothing; the length is cut to one that transforms fast."""
+    n = x.size
+    quick = next_fast_len(n, real=True)
+    if quick != n:
+        fast = [k for k in range(n, max(n - 400, 1), -1) if next_fast_len(k, real=True) == k]
+        n = fast[0] if fast else n
+    flat = without_line(x[x.size - n :])
+    return Spectrum(rfft(flat), n, dt_s, float(flat @ flat) / n)
+
+
+def tapered_power(s: Spectrum) -> Floats:
+    """Power of the Hann-tapered signal at each line, shape (m,), from the untapered lines."""
+    x = s.lines
+    h = 0.5 * x
+    h[1:-1] -= 0.25 * (x[:-2] + x[2:])
+    h[0], h[-1] = 0.0, 0.0
+    return h.real**2 + h.imag**2
+
+
+@dataclass(frozen=True, slots=True)
+class Bands:
+    """Mean power about trial frequencies and what their surroundings lead to expect.
+
+    line : trial frequencies in lines, shape (b,); power, prominence : shape (b,).
+    """
+
+    line: Floats
+    power: Floats
+    prominence: Floats
+
+
+def _mean(total: Floats, first: Floats, last: Floats, top: int) -> Floats:
+    a = np.clip(np.round(first), 1, top).astype(np.int64)
+    b = np.maximum(np.clip(np.round(last), 1, top).astype(np.int64), a)
+    return (total[b + 1] - total[a]) / (b - a + 1)
+
+
+def bands(power: Floats, fewest_lines: float) -> Bands:
+    """Power about trial frequencies over the geometric mean of the power on both sides.
+
+    A power law has prominence 1 everywhere; the knee of a double lag reaches 2.8.
+    """
+    top = power.size - 2
+    count = max(int(math.log2(max(top / HALF_BAND / fewest_lines, 1.0)) * PER_OCTAVE), 0) + 1
+    line = fewest_lines * 2.0 ** (np.arange(count) / PER_OCTAVE)
+    line = line[line * HALF_BAND <= top]
+    total = np.concatenate(([0.0], np.cumsum(power)))
+    near = _mean(total, line / HALF_BAND, line * HALF_BAND, top)
+    low = _mean(total, line / SIDES[1], line / SIDES[0], top)
+    high = _mean(total, line * SIDES[0], np.minimum(line * SIDES[1], top), top)
+    floor = 1e-12 * max(float(power.max(initial=0.0)), 1e-300)
+    return Bands(line, near, near / np.maximum(np.sqrt(low * high), floor))
+
+
+def band_signal(
+    s: Spectrum, line: float, factor: float = WIDE_BAND, per_period: int = 24
+) -> tuple[Floats, float]:
+    """The signal within a factor of a frequency, at about `per_period` samples a period.
+
+    Returns
+    -------
+    ndarray of shape (m,), float
+        The band's signal and its sample interval [s].
+    """
+    first, last = math.ceil(line / factor), min(int(line * factor), s.lines.size - 1)
+    m = next_fast_len(max(int(line * per_period), 2 * last + 2, 16), real=True)
+    cut = np.zeros(m // 2 + 1, dtype=np.complex128)
+    cut[first : last + 1] = s.lines[first : last + 1]
+    return irfft(cut, m) * (m / s.n), s.duration_s / m
+
+
+def envelope(s: Spectrum, line: float, factor: float = 1.6, per_period: int = 8) -> tuple[Floats, float]:
+    """Amplitude of the band about a frequency over time, shape (m,), and its sample interval [s]."""
+    first, last = math.ceil(line / factor), min(int(line * factor), s.lines.size - 1)
+    m = next_fast_len(max(int(line * per_period), last + 2, 16))
+    cut = np.zeros(m, dtype=np.complex128)
+    cut[first : last + 1] = 2 * s.lines[first : last + 1]
+    return np.abs(np.fft.ifft(cut)) * (m / s.n), s.duration_s / m
+
+
+def autocorrelation(x: Floats, most: int) -> Floats:
+    """Unbiased autocorrelation at lags 0 to most, shape (most + 1,)."""
+    n = x.size
+    size = next_fast_len(n + most + 1, real=True)
+    f = rfft(x, size)
+    r = irfft(f.real**2 + f.imag**2, size)[: most + 1]
+    if r[0] <= 0:
+        return np.zeros(most + 1)
+    return r / r[0] * n / (n - np.arange(most + 1))
+
+
+@dataclass(frozen=True, slots=True)
+class Rhythm:
+    """What an autocorrelation says about one period.
+
+    period_s : lag of the first peak [s]; first, second, third : heights of the peaks [-]; trough : depth of the
+    first trough [-]; regularity : mean over three standard deviations of the zero crossings' intervals [-]
+    (Thornhill, Huang, Zhang 2003).
+    """
+
+    period_s: float
+    first: float
+    second: float
+    third: float
+    trough: float
+    regularity: float
+
+
+def _peak(r: Floats, low: float, high: float) -> tuple[float, float]:
+    """Lag and height of the highest point between two lags, by parabola."""
+    a, b = max(int(low), 1), min(int(high) + 2, r.size - 1)
+    if b <= a:
+        return float("nan"), 0.0
+    k = a + int(np.argmax(r[a:b]))
+    if k <= a or k + 1 >= r.size:
+        return float(k), float(r[k])
+    curve = r[k - 1] - 2 * r[k] + r[k + 1]
+    shift = 0.5 * (r[k - 1] - r[k + 1]) / curve if curve < 0 else 0.0
+    return k + float(np.clip(shift, -1, 1)), float(r[k])
+
+
+def _regularity(r: Floats) -> float:
+    """Mean over three standard deviations of the intervals between up to eleven zero crossings; 0: too few."""
+    below = np.signbit(r)
+    at = np.flatnonzero(below[1:] != below[:-1])
+    if at.size < 4:
+        return 0.0
+    exact = at + r[at] / (r[at] - r[at + 1])
+    gaps = np.diff(exact[:11])
+    spread = float(gaps.std(ddof=1))
+    return float(gaps.mean()) / max(3 * spread, 1e-3 * float(gaps.mean()))
+
+
+def rhythm(x: Floats, dt_s: float, period_s: float) -> Rhythm:
+    """Read the autocorrelation of a band's signal about an expected period.
+
+    Parameters
+    ----------
+    x : ndarray of shape (m,)
+    dt_s : float
+        Its interval [s].
+    period_s : float
+        Where the peak is expected [s].
+    """
+    lag = period_s / dt_s
+    r = autocorrelation(x, min(x.size - 2, int(6 * lag) + 2))
+    at, first = _peak(r, 0.6 * lag, 1.45 * lag)
+    if not math.isfinite(at):
+        return Rhythm(period_s, 0.0, 0.0, 0.0, 0.0, 0.0)
+    trough = -float(r[int(0.25 * at) : int(0.75 * at) + 2].min())
+    second = _peak(r, 1.75 * at, 2.25 * at)[1]
+    third = _peak(r, 2.75 * at, 3.25 * at)[1]
+    return Rhythm(at * dt_s, first, second, third, trough, _regularity(r))
