@@ -59,6 +59,8 @@ class Clock:
         What decided the order, for the notes.
     date_format, timezone : str or None
         As in `ReadOptions`.
+    local : bool
+        True where the stamps state no zone.
     """
 
     columns: tuple[int, ...]
@@ -68,6 +70,7 @@ class Clock:
     why: str = ""
     date_format: str | None = None
     timezone: str | None = None
+    local: bool = False
 
     def seconds(self, arrays: Sequence[pa.Array]) -> tuple[NDArray[np.float64], bool]:
         """Seconds since 1970-01-01 on the file's clock, NaN where unreadable; True where that is local."""
@@ -92,8 +95,8 @@ class Clock:
         notes = [] if self.scale is None else [f"stamps are numbers, read as {self.scale.name}"]
         if self.why:
             notes.append(f"dates are read {'day' if self.day_first else 'month'} first: {self.why}")
-        if self.timezone is not None:
-            notes.append(f"stamps without a zone are taken as {self.timezone}")
+        if self.local:
+            notes.append(f"stamps state no time zone, taken as {self.timezone or 'UTC'}")
         return tuple(notes)
 
     def _from_texts(self, texts: pa.Array) -> tuple[NDArray[np.float64], bool]:
@@ -116,8 +119,9 @@ def scale_of(column: pa.Array) -> Scale | None:
 
 def is_text(kind: pa.DataType) -> bool:
     """True for the types that hold text."""
-    plain_text = pa.types.is_string(kind) or pa.types.is_large_string(kind) or pa.types.is_string_view(kind)
-    return plain_text or (pa.types.is_dictionary(kind) and is_text(kind.value_type))
+    if pa.types.is_dictionary(kind):
+        return is_text(kind.value_type)
+    return str(kind) in ("string", "large_string", "string_view")
 
 
 def as_text(column: pa.Array) -> pa.Array:

@@ -12,8 +12,8 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
+from analyzer.history.encoding import detect_encoding
 from analyzer.history.endings import ROLES
-from analyzer.history.sniff import detect_encoding
 from identification.errors import InputError
 from identification.models import Form
 

@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+from identification.errors import InputError
 
 STAMP_NAMES = (
     "timestamp", "datetime", "iptrendtime", "tstamp", "dateandtime", "date/time", "sampletime", "timestring",
@@ -42,6 +46,13 @@ def quality_partners(names: Sequence[str]) -> dict[str, str]:
     present = set(names)
     matches = ((name, QUALITY_ENDING.match(name)) for name in names)
     return {m["tag"]: name for name, m in matches if m and m["tag"] in present}
+
+
+def check_once(path: Path, names: Sequence[str]) -> None:
+    """Raise InputError where a column's name stands twice, for then its tag is not clear."""
+    name, count = max(Counter(names).items(), key=lambda item: item[1], default=("", 1))
+    if count > 1:
+        raise InputError(f"{path}: column '{name}' stands twice", "each tag once", "rename or remove one")
 
 
 def with_loop(names: Sequence[str], stem: str) -> tuple[str, ...]:

@@ -11,6 +11,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
+from analyzer.history.names import check_once
 from identification.errors import InputError
 
 MAGIC = b"PAR1"
@@ -65,6 +66,7 @@ def open_parquet(path: Path) -> ParquetTable:
             "a whole Parquet file",
             "export it again, or give it the ending .csv if it is text",
         ) from error
+    check_once(path, schema.names)
     if rows == 0:
         raise InputError(f"{path}: Parquet without rows", "at least one sample", "export a period with data")
     return ParquetTable(path, path.stat().st_mtime_ns, tuple(schema.names), tuple(schema.types))

@@ -47,6 +47,8 @@ def settle(pieces: Sequence[Raw]) -> tuple[Series, Counter[str]]:
     pieces : sequence of Raw
         In the order of the files; of equal stamps the last sample counts.
     """
+    if len(pieces) == 1 and _rises(pieces[0].stamp_s):
+        return _series(pieces[0]), pieces[0].found
     found: Counter[str] = Counter()
     ready = [_oldest_first(_with_stamps(piece, found), found) for piece in pieces]
     for piece in pieces:
@@ -58,7 +60,7 @@ def settle(pieces: Sequence[Raw]) -> tuple[Series, Counter[str]]:
 
 
 def _rises(stamp_s: NDArray[np.float64]) -> bool:
-    return bool((np.diff(stamp_s) > 0).all())
+    return bool((np.diff(stamp_s) > 0).all() and np.isfinite(stamp_s[:1]).all())
 
 
 def _series(raw: Raw) -> Series:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 import pyarrow as pa
 import pyarrow.compute as pc
@@ -15,6 +16,7 @@ from identification.errors import InputError
 
 WHOLE_FILE_BYTES = 64_000_000  # files below are read at once and kept for the next loop's read
 KEPT_READS = 2
+HEAD_ROWS = 1000
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +54,9 @@ class Sheet:
 
     def head(self, columns: Sequence[int]) -> list[pa.Array]:
         """First rows of some columns."""
-        return [array.slice(0, 1000) for array in self.read(columns)]
+        if self.bytes >= WHOLE_FILE_BYTES:
+            return [_first_block(self)[i] for i in columns]
+        return [array.slice(0, HEAD_ROWS) for array in self.read(columns)]
 
     def read(self, columns: Sequence[int], where: tuple[int, Sequence[str]] | None = None) -> list[pa.Array]:
         """Whole columns, or the rows where a column holds one of some texts."""
@@ -72,7 +76,7 @@ class Sheet:
 def _loaded(sheet: Sheet, columns: tuple[int, ...]) -> tuple[dict[int, pa.Array], int]:
     """Columns by position, and the number of lines left out."""
     try:
-        return _parsed(sheet, columns, sheet.encoding.replace("utf-8-sig", "utf-8"))
+        return _parsed(sheet, columns, sheet.encoding)
     except pa.ArrowInvalid as error:
         if "UTF8" not in str(error):
             raise _unreadable(sheet.path, error) from error
@@ -91,22 +95,35 @@ def _unreadable(path: Path, error: Exception) -> InputError:
 
 def _parsed(sheet: Sheet, columns: tuple[int, ...], encoding: str) -> tuple[dict[int, pa.Array], int]:
     left_out: list[int] = []
+    table = csv.read_csv(sheet.path, **_how(sheet, columns, encoding, left_out))
+    return {i: _tidy(table.column(str(i))) for i in columns}, len(left_out)
+
+
+@lru_cache(maxsize=KEPT_READS)
+def _first_block(sheet: Sheet) -> dict[int, pa.Array]:
+    """First rows of all columns, without reading further."""
+    columns = tuple(range(len(sheet.names)))
+    with csv.open_csv(sheet.path, **_how(sheet, columns, sheet.encoding, [])) as reader:
+        batch = reader.read_next_batch().slice(0, HEAD_ROWS)
+    return {i: _tidy(pa.chunked_array([batch.column(i)])) for i in columns}
+
+
+def _how(sheet: Sheet, columns: tuple[int, ...], encoding: str, left_out: list[int]) -> dict[str, Any]:
+    """Options of the parser; it adds to `left_out` for each line that does not fit."""
     names = [str(i) for i in range(len(sheet.names))]
 
     def leave_out(row: csv.InvalidRow) -> str:
         left_out.append(1)
         return "skip"
 
-    table = csv.read_csv(
-        sheet.path,
-        csv.ReadOptions(
-            skip_rows=sheet.skip_rows,
-            column_names=[str(i) for i in range(len(sheet.names))],
-            encoding=encoding,
+    kinds = dict.fromkeys(names, pa.string()) if sheet.as_written else None
+    return {
+        "read_options": csv.ReadOptions(
+            skip_rows=sheet.skip_rows, column_names=names, encoding=encoding.replace("utf-8-sig", "utf-8")
         ),
-        csv.ParseOptions(delimiter=sheet.delimiter, invalid_row_handler=leave_out),
-        csv.ConvertOptions(
-            column_types=dict.fromkeys(names, pa.string()) if sheet.as_written else None,
+        "parse_options": csv.ParseOptions(delimiter=sheet.delimiter, invalid_row_handler=leave_out),
+        "convert_options": csv.ConvertOptions(
+            column_types=kinds,
             include_columns=[names[i] for i in columns],
             null_values=[""],
             true_values=[],
@@ -114,8 +131,7 @@ def _parsed(sheet: Sheet, columns: tuple[int, ...], encoding: str) -> tuple[dict
             strings_can_be_null=True,
             decimal_point=sheet.decimal,
         ),
-    )
-    return {i: _tidy(table.column(str(i))) for i in columns}, len(left_out)
+    }
 
 
 def _tidy(column: pa.ChunkedArray) -> pa.Array:

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from analyzer.history.encoding import detect_encoding
 from analyzer.history.options import ReadOptions
 from analyzer.history.sheet import Sheet
 from identification.errors import InputError
@@ -19,12 +20,6 @@ HEAD_BYTES = 1_000_000
 HEAD_LINES = 200
 DELIMITERS = (",", ";", "\t", "|")
 DELIMITER_NAMES = {",": "comma", ";": "semicolon", "\t": "tab", "|": "bar"}
-ENCODINGS = (
-    (codecs.BOM_UTF8, "utf-8-sig"),
-    (codecs.BOM_UTF32_LE, "utf-32"),
-    (codecs.BOM_UTF16_LE, "utf-16"),
-    (codecs.BOM_UTF16_BE, "utf-16"),
-)
 NO_DATA_LINE = re.compile(r"^\s*(?:#.*|\[\w+\]|sep=.|)\s*$", re.IGNORECASE)
 COMMA_NUMBER = re.compile(r"^[+-]?\d+,\d+(?:[eE][+-]?\d+)?$")
 POINT_NUMBER = re.compile(r"^[+-]?\d*\.\d+(?:[eE][+-]?\d+)?$")
@@ -53,22 +48,6 @@ def open_sheet(path: Path, options: ReadOptions) -> Sheet:
     stat = path.stat()
     sheet = Sheet(path, stat.st_mtime_ns, stat.st_size, encoding, delimiter, decimal, place + 1, names)
     return _described(replace(sheet, as_written=options.date_format is not None))
-
-
-def detect_encoding(head: bytes) -> str:
-    """Encoding by byte-order mark, by the zeros of UTF-16, by valid UTF-8; else Windows Latin."""
-    for mark, name in ENCODINGS:
-        if head.startswith(mark):
-            return name
-    if head[1:400:2].count(0) > 100 or (len(head) < 400 and head[1::2].count(0) * 3 > len(head)):
-        return "utf-16-le"
-    if head[0:400:2].count(0) > 100:
-        return "utf-16-be"
-    try:
-        codecs.getincrementaldecoder("utf-8")().decode(head)
-    except UnicodeDecodeError:
-        return "cp1252"
-    return "utf-8"
 
 
 def detect_decimal(rows: Sequence[Sequence[str]], delimiter: str) -> str:

@@ -34,9 +34,10 @@ def find_clock(table: Table, options: ReadOptions) -> Clock:
     if clock is None:
         raise _no_time(table, columns)
     clock = _with_day_order(table, clock, options)
-    if np.isnan(clock.seconds(table.head(clock.columns))[0]).all():
+    second, local = clock.seconds(table.head(clock.columns))
+    if np.isnan(second).all():
         raise _unreadable(table, clock.columns[0])
-    return clock
+    return replace(clock, local=local)
 
 
 def _candidates(table: Table) -> list[int]:

@@ -12,6 +12,8 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
+from analyzer.history.clock import is_text
+
 BLANK = "cells are blank: no value (a historian that reports by exception leaves unchanged values blank)"
 ERROR_TEXTS = frozenset({
     "i/o timeout", "bad input", "bad", "bad data", "bad quality", "no data", "pt created",
@@ -55,17 +57,15 @@ def values(column: pa.Array, decimal: str = ".") -> Values:
     decimal : str
         Decimal mark of numbers that stand as text.
     """
-    if pa.types.is_dictionary(column.type) or _is_text(column.type):
+    if is_text(column.type):
         return _from_texts(column, decimal)
+    if pa.types.is_dictionary(column.type):
+        column = column.dictionary_decode()
     value = _numbers(column)
     bad = ~np.isfinite(value)
     if bad.any():
         value = np.where(bad, np.nan, value)
     return Values(value, bad, None, +Counter({BLANK: column.null_count}))
-
-
-def _is_text(kind: pa.DataType) -> bool:
-    return pa.types.is_string(kind) or pa.types.is_large_string(kind) or pa.types.is_string_view(kind)
 
 
 def _numbers(column: pa.Array) -> NDArray[np.float64]:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from analyzer.history.clock import Clock, is_text
 from analyzer.history.codes import not_good, scheme_of
-from analyzer.history.names import quality_partners, with_loop
+from analyzer.history.names import check_once, quality_partners, with_loop
 from analyzer.history.options import ReadOptions
 from analyzer.history.raw import Raw
 from analyzer.history.table import Table
@@ -99,6 +99,7 @@ def open_wide(table: Table, options: ReadOptions) -> WideSource:
             "export the tags' values",
         )
     names = [table.names[i] for i in columns]
+    check_once(table.path, names)
     quality = tuple(table.names.index(partner[name]) if name in partner else -1 for name in names)
     tags = with_loop(names, table.path.stem)
     return WideSource(table, clock, tags, tuple(columns), quality, options.good_quality)

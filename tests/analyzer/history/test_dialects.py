@@ -213,6 +213,14 @@ def test_lines_that_do_not_fit_are_told(tmp_path: Path) -> None:
     assert any("1 lines do not have as many columns as the header" in note for note in notes)
 
 
+def test_a_file_too_big_to_keep(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A file above the limit is opened by its first rows and read by column, with the same result."""
+    monkeypatch.setattr("analyzer.history.sheet.WHOLE_FILE_BYTES", 100)
+    table = day(n=70_000)
+    (tmp_path / "x.csv").write_text(as_text(table, "%d.%m.%Y %H:%M:%S", ";", ",", ""))
+    assert_read(tmp_path / "x.csv", table)
+
+
 def test_a_latin_letter_late_in_the_file(tmp_path: Path) -> None:
     """A file that looks like UTF-8 at first and is Windows Latin later is read."""
     table = day(n=60_000)

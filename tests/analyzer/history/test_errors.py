@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import os
+import tempfile
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from analyzer.history.export import ReadOptions, open_export
 from identification.errors import InputError
@@ -28,6 +32,7 @@ ROW = "2024-11-21 08:00:00"
             f"timestamp,comment\n{ROW},\n".encode().replace(b",comment", b","),
             ["no values beside", "'timestamp'"],
         ),
+        (f"timestamp,a,b,a\n{ROW},1,2,3\n".encode(), ["column 'a' stands twice"]),
         (b"timestamp,FIC1.PV\n", ["a header and no rows"]),
         (
             b"timestamp,FIC1.PV\nsoon,1\nlater,2\n",
@@ -86,6 +91,38 @@ def test_a_file_that_goes_or_breaks_after_it_was_opened(tmp_path: Path) -> None:
     (tmp_path / "x.parquet").write_bytes(data)
     with pytest.raises(InputError, match=r"x\.parquet"):
         open_export([tmp_path / "x.parquet"]).read(["a"])
+
+
+CELLS = (
+    *("timestamp", "tag", "value", "quality", "FIC1.PV", "2024-11-21", ROW, "21/11/24", "08:00", "1"),
+    *("1,5", "", " ", '"', "#", "[Data]", "192", "Good", "45617.5", "1732176000", "nan", "ü", "01-xxx-24"),
+    *("1e999", "-2.5", "\x00"),
+)
+
+
+@settings(max_examples=400, deadline=None)
+@given(
+    st.lists(st.lists(st.sampled_from(CELLS), max_size=5), max_size=7),
+    st.sampled_from(",;\t|"),
+    st.booleans(),
+)
+def test_any_text_is_read_or_told(rows: list[list[str]], delimiter: str, headed: bool) -> None:
+    """Whatever stands in a file, it is read, or refused with an error meant for the user."""
+    header = [["timestamp", "FIC1.PV", "x"]] if headed else []
+    text = "\n".join(delimiter.join(row) for row in header + rows)
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "x.csv"
+        path.write_text(text, encoding="utf-8")
+        try:
+            export = open_export([path])
+            series = export.read(export.tags)
+        except InputError:
+            return
+        for one in series.values():
+            assert np.isfinite(one.stamp_s).all()
+            assert (np.diff(one.stamp_s) > 0).all()
+            assert (np.isfinite(one.value) | one.bad | (one.text is not None)).all()
+        assert export.notes
 
 
 def test_paths(tmp_path: Path) -> None:

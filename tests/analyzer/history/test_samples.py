@@ -146,6 +146,7 @@ def test_the_hour_that_autumn_repeats(tmp_path: Path, newest_first: bool, layout
     np.testing.assert_array_equal(series.value, np.arange(30))
     np.testing.assert_array_equal(series.stamp_s, index.as_unit("s").asi8)
     assert any("repeats in autumn" in note for note in export.notes)
+    assert "x.csv: stamps state no time zone, taken as Europe/Berlin" in export.notes
 
 
 def test_the_hour_that_spring_leaves_out(tmp_path: Path) -> None:
