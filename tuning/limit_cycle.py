@@ -1,7 +1,6 @@
 """The limit cycle of a loop with play or stick-slip: predicted by harmonic balance, confirmed by simulation.
 
-G(iw) C(iw) N(A) = -1 (the source study's Eq. 3) has its phase in w alone once A is chosen to fit, so all
-solutions are the zeros of one function of w. Where prediction and simulation differ, simulation counts.
+Where prediction and simulation differ, simulation counts.
 """
 
 from __future__ import annotations
@@ -14,13 +13,21 @@ import numpy as np
 from identification.models import Integrator, Loop
 from identification.record import Floats
 from identification.simulate import closed_loop, scan_step
-from tuning.describing import Branch, band, branches
-from tuning.linear import controller_response, frequencies, integral_s, loop_response, slowest_s
+from tuning.balance import Balance, harmonic_balance, predicted_cycle
+from tuning.describing import band
+from tuning.linear import integral_s, slowest_s
 
-POLISH_STEPS = 6
-"""Eightfold bracketings that polish a root found on the grid."""
-REACH_POINTS = 600
-"""Frequencies at which a branch is looked at: no pair of solutions further apart than 2 % is missed."""
+__all__ = [
+    "Balance",
+    "Confirmed",
+    "Cycle",
+    "confirm",
+    "harmonic_balance",
+    "kicked",
+    "measure",
+    "predicted_cycle",
+]
+
 PERIODS = 30
 """Predicted periods that a confirmation simulates at first; ours: the study's loops settle within ten."""
 MOST_STEPS = 600_000
@@ -33,23 +40,36 @@ KICK = 1.0 + math.sqrt(5.0)
 """Kick in widths of the play, seen at OP; irrational, lest whole jumps of a sticking stem meet it exactly."""
 NO_LIMIT = 1e9
 """Output limits [% OP] put out of the way: a cycle scales with the play and must not meet a limit."""
-
-
-@dataclass(frozen=True, slots=True)
-class Balance:
-    """One solution of the harmonic balance.
-
-    period_s [s], op_amplitude [% OP] and pv_amplitude [% PV] (half of peak to peak), stable: whether the loop
-    returns to it (a limit cycle) or leaves it (the border between two fates); jumps of the stem per half
-    cycle (0: play); stem_amplitude [% OP] of the stem's fundamental.
-    """
-
-    period_s: float
-    op_amplitude: float
-    pv_amplitude: float
-    stem_amplitude: float
-    stable: bool
-    jumps: int
+MOST_STEPS = 600_000
+"""Steps that a confirmation may take in all; some 20 ms."""
+REST_SHARE = 0.45
+"""Amplitude of OP over the width of the play below which a loop rests: no cycle has less than half of it."""
+STEADY = 0.02
+"""Relative change of amplitude from one quarter of the record to the next below which a cycle is steady."""
+KICK = 1.0 + math.sqrt(5.0)
+"""Kick in widths of the play, seen at OP; irrational, lest whole jumps of a sticking stem meet it exactly."""
+NO_LIMIT = 1e9
+"""Output limits [% OP] put out of the way: a cycle scales with the play and must not meet a limit."""
+REST_SHARE = 0.45
+"""Amplitude of OP over the width of the play below which a loop rests: no cycle has less than half of it."""
+STEADY = 0.02
+"""Relative change of amplitude from one quarter of the record to the next below which a cycle is steady."""
+KICK = 1.0 + math.sqrt(5.0)
+"""Kick in widths of the play, seen at OP; irrational, lest whole jumps of a sticking stem meet it exactly."""
+NO_LIMIT = 1e9
+"""Output limits [% OP] put out of the way: a cycle scales with the play and must not meet a limit."""
+STEADY = 0.02
+"""Relative change of amplitude from one quarter of the record to the next below which a cycle is steady."""
+KICK = 1.0 + math.sqrt(5.0)
+"""Kick in widths of the play, seen at OP; irrational, lest whole jumps of a sticking stem meet it exactly."""
+NO_LIMIT = 1e9
+"""Output limits [% OP] put out of the way: a cycle scales with the play and must not meet a limit."""
+KICK = 1.0 + math.sqrt(5.0)
+"""Kick in widths of the play, seen at OP; irrational, lest whole jumps of a sticking stem meet it exactly."""
+NO_LIMIT = 1e9
+"""Output limits [% OP] put out of the way: a cycle scales with the play and must not meet a limit."""
+NO_LIMIT = 1e9
+"""Output limits [% OP] put out of the way: a cycle scales with the play and must not meet a limit."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,100 +99,6 @@ class Confirmed:
     cycle: Cycle | None
     settled: bool
     predicted: Balance | None
-
-
-def reach(loop: Loop, branch: Branch, points: int = REACH_POINTS) -> Floats:
-    """Grid [rad/s] of the frequencies at which some amplitude of a branch closes the phase.
-
-    `points` for each stretch of them, shape (k,); empty where there is none. The phase of G C does not depend on the gain, and so neither does the grid.
-    """
-    omega = frequencies(loop)
-    root = np.sqrt(np.maximum(-np.angle(-1.0 / loop_response(loop, omega)), 0.0))
-    inside = (root <= branch.root[0]) & (root >= branch.root[-1])
-    above = root > branch.root[0]
-    meets = np.flatnonzero(inside[:-1] | inside[1:] | (above[:-1] != above[1:]))
-    stretches = np.split(meets, np.flatnonzero(np.diff(meets) > 1) + 1) if meets.size else []
-    grids = [np.geomspace(omega[m[0]], omega[m[-1] + 1], points) for m in stretches]
-    return np.concatenate([np.empty(0), *grids])
-
-
-def _excess(loop: Loop, branch: Branch, omega: Floats) -> Floats:
-    """ln abs(G C N) at the amplitude whose N closes the phase, shape (m,); nan where no amplitude does."""
-    response = loop_response(loop, omega)
-    phase = np.angle(-1.0 / response)
-    return np.log(np.abs(response)) + branch.at_phase(phase)[1]
-
-
-def _roots(loop: Loop, branch: Branch, omega: Floats) -> list[float]:
-    """Frequencies [rad/s] of all solutions on a branch, bracketed on the grid and polished."""
-    excess = _excess(loop, branch, omega)
-    sign = np.sign(excess)
-    at = np.flatnonzero(
-        (sign[:-1] * sign[1:] <= 0) & np.isfinite(excess[:-1] + excess[1:]) & (sign[:-1] != 0)
-    )
-    return [_polish(loop, branch, float(omega[k]), float(omega[k + 1])) for k in at]
-
-
-def _polish(loop: Loop, branch: Branch, low: float, high: float) -> float:
-    for _ in range(POLISH_STEPS):
-        inner = np.linspace(low, high, 9)
-        sign = np.sign(_excess(loop, branch, inner))
-        k = int(np.flatnonzero(sign[:-1] * sign[1:] <= 0)[0]) if np.any(sign[:-1] * sign[1:] <= 0) else 0
-        low, high = float(inner[k]), float(inner[k + 1])
-    return 0.5 * (low + high)
-
-
-def _is_stable(loop: Loop, branch: Branch, omega: float, phase: float) -> bool:
-    """Loeb's criterion: with A a little larger the oscillation must decay.
-
-    From 1 + N(A) L(s) = 0, ds/dA = -i (dlnN/dA)/(dlnL/dw), whose real part must be negative (Atherton 1982).
-    """
-    w = omega * np.array([1 - 1e-4, 1 + 1e-4])
-    slope = np.diff(np.log(loop_response(loop, w)))[0]
-    slope = complex(slope.real, math.remainder(slope.imag, 2 * math.pi))
-    angle = phase + 1e-4 * np.array([-1.0, 1.0])
-    log_a, log_n = branch.at_phase(angle)
-    along_a = complex(log_n[1] - log_n[0], angle[1] - angle[0]) / (log_a[1] - log_a[0])
-    return (along_a / slope).imag < 0
-
-
-def _solution(loop: Loop, branch: Branch, omega: float) -> Balance:
-    at = np.array([omega])
-    phase = np.angle(-1.0 / loop_response(loop, at))
-    log_a, log_n = branch.at_phase(phase)
-    amplitude = float(np.exp(log_a[0]))
-    gain = float(np.abs(controller_response(loop.controller, at))[0])
-    return Balance(
-        period_s=2.0 * math.pi / omega,
-        op_amplitude=amplitude,
-        pv_amplitude=amplitude / gain,
-        stem_amplitude=amplitude * float(np.exp(log_n[0])),
-        stable=_is_stable(loop, branch, omega, float(phase[0])),
-        jumps=branch.jumps,
-    )
-
-
-def harmonic_balance(loop: Loop) -> tuple[Balance, ...]:
-    """All solutions of G C N(A) = -1, dead time and scan exact.
-
-    Parameters
-    ----------
-    loop : Loop
-        With scan_s = 0 the controller is continuous, as in the study.
-
-    Returns
-    -------
-    tuple of Balance
-        From the fastest to the slowest; empty where the curves do not meet.
-    """
-    found = [_solution(loop, b, w) for b in branches(loop.valve) for w in _roots(loop, b, reach(loop, b))]
-    return tuple(sorted(found, key=lambda s: s.period_s))
-
-
-def predicted_cycle(loop: Loop) -> Balance | None:
-    """The largest stable solution of the harmonic balance, None where there is none."""
-    stable = [s for s in harmonic_balance(loop) if s.stable]
-    return max(stable, key=lambda s: s.op_amplitude, default=None)
 
 
 def _rising(x: Floats) -> Floats:

@@ -10,6 +10,7 @@ import numpy as np
 
 from identification.models import Backlash, Fopdt, Loop, Valve
 from identification.record import Floats, Mask
+from tuning.balance import Balance, harmonic_balance, reach
 from tuning.describing import (
     Branch,
     Complexes,
@@ -21,7 +22,6 @@ from tuning.describing import (
     sliding,
     stick_slip,
 )
-from tuning.limit_cycle import Balance, harmonic_balance, reach
 from tuning.linear import controller_response, frequencies, loop_response, stable_gains
 from tuning.rules import simc
 

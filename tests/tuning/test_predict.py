@@ -1,0 +1,84 @@
+"""Forecasts: assessments against closed forms, intervals, and both tunings on one load."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from tuning_cases import backlash_case
+
+from identification.models import Fopdt, Loop, Pid
+from identification.record import LoopRecord
+from tuning.limits import LIMITS
+from tuning.predict import NAMES, assess, autocorrelation_peak, predict
+from tuning.rules import backlash_rule
+from tuning.search import assumed_uncertainty
+
+
+def record(error, stem):
+    n = error.size
+    return LoopRecord("x", 0.0, 1.0, np.zeros(n), -error, 2 * stem, np.zeros(n, bool), position=stem)
+
+
+def test_assessments_of_a_sine():
+    """A sine of amplitude 1: mean 2/pi, 2 sigma 1.414, oscillation 1, travel of 4 amplitudes a period."""
+    t = np.arange(36_000)
+    wave = np.sin(2 * np.pi * t / 100)
+    a = assess(record(wave, wave))
+    assert a.average_absolute_error == pytest.approx(2 / np.pi, rel=1e-3)
+    assert a.variability == pytest.approx(np.sqrt(2), rel=1e-3)
+    assert a.oscillation == pytest.approx(1.0, rel=0.01)
+    assert a.stem_travel == pytest.approx(4 * 36, rel=1e-3)
+    assert a.op_travel == pytest.approx(8 * 36, rel=1e-3)
+
+
+def test_noise_does_not_oscillate():
+    """White noise and constants have almost no oscillation."""
+    noise = np.random.default_rng(0).normal(size=20_000)
+    assert autocorrelation_peak(noise) < 0.05
+    assert autocorrelation_peak(np.full(500, 3.0)) == 0.0
+
+
+def test_forecast_of_the_same_tuning_is_no_change():
+    """Forecasting the present tuning changes nothing, interval included."""
+    case = backlash_case(0)
+    f = predict(case.loop, case.loop.controller, case.load)
+    for name in NAMES:
+        assert f.change[name].value == 0.0
+        assert (f.change[name].low, f.change[name].high) == (0.0, 0.0)
+
+
+def test_forecast_of_the_rule_is_a_cut_in_travel():
+    """With the rule for play travel and error fall beyond their intervals, on the uncertainty samples too."""
+    case = backlash_case(1)
+    new = backlash_rule(case.loop.process, case.loop.controller)
+    f = predict(case.loop, new, case.load, assumed_uncertainty(case.loop, LIMITS))
+    assert f.change["stem_travel"].high < -0.2
+    assert f.change["oscillation"].value < 0
+    for name in NAMES:
+        for e in (f.before[name], f.after[name], f.change[name]):
+            assert e.low <= e.value <= e.high
+
+
+def test_intervals_cover_the_long_run():
+    """The 90 % interval of the error on a short load covers that of a long one in most of 20 draws."""
+    loop = Loop(Fopdt(1.0, 20, 2), Pid(2.0, 20))
+    rng = np.random.default_rng(5)
+
+    def load(n):
+        return np.convolve(rng.normal(size=n + 200), np.exp(-np.arange(200) / 20), "valid")[:n]
+
+    truth = (
+        predict(loop, replace(loop.controller, kp=1.0), load(200_000)).before["average_absolute_error"].value
+    )
+    hits = 0
+    for _ in range(20):
+        e = predict(loop, replace(loop.controller, kp=1.0), load(6000)).before["average_absolute_error"]
+        hits += e.low <= truth <= e.high
+    assert hits >= 15
+
+
+def test_short_load_is_refused():
+    """A load of too few scans is an error that says how many are needed."""
+    case = backlash_case(0)
+    with pytest.raises(ValueError, match="needs 120 scans of load, has 50"):
+        predict(case.loop, case.loop.controller, case.load[:50])

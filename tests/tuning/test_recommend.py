@@ -1,0 +1,215 @@
+"""Proposals: what they keep, what they gain, and when they abstain."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from tuning_cases import backlash_case, level_case, stick_case
+
+from identification.models import Backlash, Fopdt, Integrator, Loop, Pid, Stiction
+from tuning.limit_cycle import confirm
+from tuning.limits import LIMITS
+from tuning.linear import integral_s, margins
+from tuning.predict import assess, run, settled
+from tuning.recommend import recommend
+from tuning.rules import backlash_rule, simc
+from tuning.search import allowed, assumed_uncertainty, rejection
+
+STUDY = Loop(Fopdt(80, 200, 1), Pid(1, 10), Backlash(1.0))
+
+
+def figures(loop, controller, load):
+    """Stem travel [%/h] and average absolute error [% PV] with a controller on a load."""
+    a = assess(settled(run(replace(loop, controller=controller), load)))
+    return a.stem_travel, a.average_absolute_error
+
+
+def test_rule_for_play_cuts_stem_travel():
+    """Ti := max(Ti, T) at the same gain more than halves stem travel on ten random loops with play."""
+    cuts = []
+    for seed in range(10):
+        case = backlash_case(seed)
+        old, _ = figures(case.loop, case.loop.controller, case.load)
+        new, _ = figures(case.loop, backlash_rule(case.loop.process, case.loop.controller), case.load)
+        cuts.append(1 - new / old)
+    assert min(cuts) > 0
+    assert np.mean(cuts) > 0.5
+
+
+@pytest.fixture(scope="module")
+def proposals():
+    """Proposals for six loops each with play, stick-slip and play on an integrator."""
+    makers = (backlash_case, stick_case, level_case)
+    cases = [maker(seed) for maker in makers for seed in range(6)]
+    return [(c, recommend(c.loop, "valve", load=c.load)) for c in cases]
+
+
+def test_proposals_keep_robustness_and_load_rejection(proposals):
+    """Every proposal keeps Ms, on the loop and all corners, and the stated factors of load rejection."""
+    for case, p in proposals:
+        if p.controller is None:
+            continue
+        assert margins(replace(case.loop, controller=p.controller)).ms <= LIMITS.ms_most
+        for one in assumed_uncertainty(case.loop, LIMITS):
+            assert margins(replace(one, controller=p.controller)).ms <= LIMITS.ms_most_sample
+        most, got = allowed(case.loop, LIMITS), rejection(case.loop.process, p.controller)
+        assert got.peak <= most.peak
+        assert got.integral <= most.integral * (1 + 1e-9)
+
+
+def test_proposals_have_no_limit_cycle_or_a_smaller_one(proposals):
+    """Simulated without noise, a proposal's cycle is none, or travels less and grows no more than allowed."""
+    for case, p in proposals:
+        if p.controller is None:
+            continue
+        after = confirm(replace(case.loop, controller=p.controller)).cycle
+        before = confirm(case.loop).cycle
+        if after is not None:
+            growth = (
+                LIMITS.cycle_growth_stick if isinstance(case.loop.valve, Stiction) else LIMITS.cycle_growth
+            )
+            assert after.stem_travel <= before.stem_travel
+            assert after.pv_amplitude <= growth * before.pv_amplitude
+
+
+def test_proposals_beat_the_rule_for_play(proposals):
+    """With play the proposal travels less than under the rule, with no more error than at present."""
+    shares = []
+    for case, p in proposals[:6]:
+        assert p.action == "retune"
+        old, error = figures(case.loop, case.loop.controller, case.load)
+        new, new_error = figures(case.loop, p.controller, case.load)
+        rule, _ = figures(case.loop, backlash_rule(case.loop.process, case.loop.controller), case.load)
+        shares.append((new / old, rule / old))
+        assert new_error <= error
+        assert p.controller.ti_s >= case.loop.process.time_constant_s * 0.995
+    assert np.mean([s[0] for s in shares]) < 0.15
+    assert np.mean([s[0] for s in shares]) < np.mean([s[1] for s in shares])
+
+
+def test_stick_slip_travels_less(proposals):
+    """Where stick-slip is retuned, stem travel or error falls as promised and the error does not grow."""
+    found = [(c, p) for c, p in proposals[6:12] if p.action == "retune"]
+    assert found
+    for case, p in found:
+        old, error = figures(case.loop, case.loop.controller, case.load)
+        new, new_error = figures(case.loop, p.controller, case.load)
+        assert new < old or new_error < 0.9 * error
+        assert new_error <= error * 1.001
+        assert "Tuning cannot end stick-slip" in p.reason
+
+
+def test_integrating_level_is_told_what_would_end_the_cycle(proposals):
+    """On an integrator the cycle stays, slower and no larger, and the reason names P-only and gap."""
+    found = [p for _, p in proposals[12:] if p.action == "retune"]
+    assert len(found) >= 4
+    for p in found:
+        assert p.after.cycle.period_s > p.before.cycle.period_s
+        assert "P alone or a gap" in p.reason
+
+
+def test_study_level_loop():
+    """The study's level loop gets Ti of at least T, more than half its gain, and rests."""
+    p = recommend(STUDY, "valve")
+    assert p.action == "retune"
+    assert p.controller.ti_s >= 200
+    assert 0.5 < p.controller.kp <= 1.1
+    assert p.after.cycle is None
+    assert p.before.cycle.period_s == pytest.approx(38.0, abs=0.05)
+    assert "38 s" in p.reason
+
+
+def test_sign_is_a_mirror():
+    """A falling process with a direct-acting controller gets the mirrored proposal."""
+    case = backlash_case(3)
+    loop = case.loop
+    other = Loop(
+        replace(loop.process, gain=-loop.process.gain),
+        replace(loop.controller, kp=-loop.controller.kp),
+        loop.valve,
+    )
+    a, b = recommend(loop, "valve", load=case.load), recommend(other, "valve", load=case.load)
+    assert a.controller.kp == -b.controller.kp
+    assert a.controller.ti_s == b.controller.ti_s
+
+
+def test_uncertainty_samples_are_respected():
+    """A sample with three times the slope keeps the gain down; the proposal is stable on it."""
+    wild = replace(STUDY, process=Fopdt(200, 200, 1))
+    p = recommend(STUDY, "valve", uncertainty=[wild])
+    if p.controller is not None:
+        assert margins(replace(wild, controller=p.controller)).ms <= LIMITS.ms_most_sample
+
+
+def test_tight_tuning_gets_simc():
+    """A loop at three times its nominal gain gets SIMC's settings, with Ms in bounds, sign kept."""
+    for sign in (1.0, -1.0):
+        process = Fopdt(sign * 1.5, 100, 8)
+        nominal = simc(process, scan_s=1.0)
+        p = recommend(Loop(process, replace(nominal, kp=3 * nominal.kp)), "tuning")
+        assert p.action == "retune"
+        assert p.controller.kp == pytest.approx(nominal.kp, rel=0.01)
+        assert p.controller.ti_s == pytest.approx(nominal.ti_s, rel=0.01)
+        assert p.ms < LIMITS.ms_most < p.ms_before
+
+
+def test_robust_loop_is_not_called_tight():
+    """A loop at nominal tuning blamed on its tuning is left undecided with its Ms."""
+    process = Fopdt(1.5, 100, 8)
+    p = recommend(Loop(process, simc(process, scan_s=1.0)), "tuning")
+    assert p.action == "undecided"
+    assert "Ms 1." in p.reason
+
+
+def test_load_is_left_alone():
+    """A load gets no settings; a known source is named."""
+    assert recommend(STUDY, "load").action == "none"
+    p = recommend(STUDY, "load", source="FIC7")
+    assert p.action == "see source loop"
+    assert "FIC7" in p.reason
+    assert p.controller is None
+
+
+@pytest.mark.parametrize(("cause", "action"), [("none", "none"), ("undecided", "undecided")])
+def test_without_a_cause_nothing_changes(cause, action):
+    """No cause, no settings."""
+    p = recommend(STUDY, cause)
+    assert (p.action, p.controller) == (action, None)
+    assert p.reason
+
+
+def test_wide_play_is_for_the_workshop():
+    """Play beyond the limit is sent to repair, with settings for the meantime and none to keep."""
+    p = recommend(replace(STUDY, valve=Backlash(14.0)), "valve")
+    assert p.action == "repair valve"
+    assert p.controller is None
+    assert p.meanwhile is not None
+    assert "beyond tuning" in p.reason
+
+
+def test_abstentions_say_why():
+    """A wrong sign, a valve of unknown size and an unknown cause are refused in words."""
+    assert recommend(replace(STUDY, controller=Pid(-1, 10)), "valve").action == "undecided"
+    assert "wrong way" in recommend(replace(STUDY, controller=Pid(-1, 10)), "valve").reason
+    assert "size is needed" in recommend(replace(STUDY, valve=None), "valve").reason
+    with pytest.raises(ValueError, match="cause is one of"):
+        recommend(STUDY, "gremlins")
+
+
+@pytest.mark.parametrize("ti", [0.0, math.inf])
+def test_integral_off_is_survived(ti):
+    """A loop whose integral is off is advised on like any other, with finite settings or none."""
+    loop = Loop(Fopdt(2, 60, 4), Pid(2, ti), Backlash(1.0))
+    assert math.isinf(integral_s(loop.controller))
+    p = recommend(loop, "valve")
+    assert p.controller is None or math.isfinite(p.controller.ti_s)
+
+
+def test_extremes_do_not_raise():
+    """Tiny and huge gains, no dead time, scans longer than the dead time: always an answer in words."""
+    for process in (Fopdt(1e-3, 5, 0), Fopdt(500, 1000, 0.2), Integrator(1e-4, 60), Fopdt(1, 3, 40)):
+        for kp in (0.01, 1.0, 50.0):
+            p = recommend(Loop(process, Pid(kp, 20, scan_s=2.0), Stiction(1.5, 0.9)), "valve")
+            assert p.reason
+            assert (p.controller is not None) == (p.action == "retune")

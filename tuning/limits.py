@@ -1,0 +1,56 @@
+"""Every threshold of the advice, with its unit and source."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class TuningLimits:
+    """What a proposal must keep.
+
+    | name | unit | source |
+    |---|---|---|
+    | ms_most | - | 1.8: Astrom, Hagglund (2006) ask for 1.4 to 2.0; SIMC has 1.6 to 1.7 |
+    | ms_most_sample | - | 2.5, on every uncertainty sample: gain margin 1.7 is left; ours |
+    | peak_factor | - | PV's peak after a load step at the valve over the nominal tuning's; ours |
+    | integral_factor | - | Ti/Kp over that of nominal gain with Ti = max(T, nominal Ti); ours, from Ti >= T |
+    | integral_factor_ramp | - | the same on an integrator, where no T lifts the reference; ours |
+    | gain_up | - | most that the gain is raised in one step; ours |
+    | error_growth | - | error on the model over the present one; ours, so that reality is under 1.05 |
+    | error_growth_sample | - | the same on the worst uncertainty sample; ours |
+    | error_weight | - | weight of ln(error) beside ln(travel) in the score; ours |
+    | travel_floor | - | travel over the present one below which less counts little; ours |
+    | worth_travel, worth_error | - | least cut in travel or error for which a change is proposed; ours |
+    | cycle_growth | - | PV amplitude of the new limit cycle over the old one's with play; ours |
+    | cycle_growth_stick | - | the same with stick-slip, whose slower cycle lets PV go further; ours |
+    | band_beyond | % OP | play or stickband from which the valve is to be repaired first; ours |
+    | spread_slope, spread_delay, spread_band | - | half widths of the uncertainty assumed for want of any |
+    | most_steps | scans | load used in the search; ours, for the answer within 2 s |
+    | warm_up | - | share of a simulated record left out at its start; ours |
+    """
+
+    ms_most: float = 1.8
+    ms_most_sample: float = 2.5
+    peak_factor: float = 2.0
+    integral_factor: float = 3.0
+    integral_factor_ramp: float = 6.0
+    gain_up: float = 2.0
+    error_growth: float = 1.0
+    error_growth_sample: float = 1.05
+    error_weight: float = 0.3
+    travel_floor: float = 0.03
+    worth_travel: float = 0.2
+    worth_error: float = 0.1
+    cycle_growth: float = 1.05
+    cycle_growth_stick: float = 1.5
+    band_beyond: float = 10.0
+    spread_slope: float = 0.15
+    spread_delay: float = 0.25
+    spread_band: float = 0.15
+    most_steps: int = 30_000
+    warm_up: float = 0.1
+
+
+LIMITS = TuningLimits()
+"""The limits in force."""

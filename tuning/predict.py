@@ -1,0 +1,170 @@
+"""What a change of tuning would do: both tunings simulated on the same load, with intervals."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+from itertools import pairwise
+
+import numpy as np
+
+from identification.models import Estimate, Loop, Pid
+from identification.record import Floats, LoopRecord
+from identification.simulate import closed_loop
+from tuning.limits import LIMITS
+
+BLOCKS = 12
+"""Blocks that a record is cut into for the bootstrap; ours: a block holds cycles enough to be counted."""
+DRAWS = 200
+"""Bootstrap draws over all loops together."""
+
+
+@dataclass(frozen=True, slots=True)
+class Assessed:
+    """Assessments of one simulated stretch.
+
+    average_absolute_error [% PV], stem_travel and op_travel [%/h], variability [% PV] (2 sigma of the error),
+    oscillation [% PV]: amplitude of the sine with the error's power, times the first peak of its
+    autocorrelation; near 0 for noise, the amplitude for a clean cycle.
+    """
+
+    average_absolute_error: float
+    stem_travel: float
+    op_travel: float
+    oscillation: float
+    variability: float
+
+
+UNITS = {"stem_travel": "%/h", "op_travel": "%/h"}
+NAMES = tuple(f.name for f in fields(Assessed))
+
+
+@dataclass(frozen=True, slots=True)
+class Forecast:
+    """Both tunings on the same load, by assessment name.
+
+    before, after [unit of the assessment], and change = after/before - 1 [-], each with its 90 % interval
+    over blocks of the load and over the uncertainty samples.
+    """
+
+    before: dict[str, Estimate]
+    after: dict[str, Estimate]
+    change: dict[str, Estimate]
+
+
+def run(loop: Loop, load: Floats, op_start: float | None = None) -> LoopRecord:
+    """The loop at a constant set point of 0 under a load on the controller's clock, shape (n,) [% PV].
+
+    op_start [% OP] is the OP at rest; None takes the middle of the controller's range.
+    """
+    c = loop.controller
+    start = 0.5 * (c.op_lo + c.op_hi) if op_start is None else op_start
+    return closed_loop(loop, np.zeros(load.size), load, op_start=start)
+
+
+def autocorrelation_peak(error: Floats) -> float:
+    """Height of the first peak of the autocorrelation beyond its first zero, at least 0; constants have 0.
+
+    error of shape (n,) [% PV]; the estimate is biased towards 0 at long lags, which favours several periods.
+    """
+    x = error - error.mean()
+    power = float(x @ x)
+    if x.size < 8 or power <= 1e-18:
+        return 0.0
+    size = 2 ** int(np.ceil(np.log2(2 * x.size)))
+    r = np.fft.irfft(np.abs(np.fft.rfft(x, size)) ** 2)[: x.size] / power
+    below = np.flatnonzero(r < 0)
+    if below.size == 0:
+        return 0.0
+    return float(max(r[below[0] :].max(), 0.0))
+
+
+def assess(record: LoopRecord) -> Assessed:
+    """Assessments of a simulated record, its stem in `position` (OP where it has none)."""
+    e = record.error
+    hours = record.duration_s / 3600.0
+    stem = record.op if record.position is None else record.position
+    sigma = float(np.std(e))
+    return Assessed(
+        average_absolute_error=float(np.mean(np.abs(e))),
+        stem_travel=float(np.abs(np.diff(stem)).sum()) / hours,
+        op_travel=float(np.abs(np.diff(record.op)).sum()) / hours,
+        oscillation=float(np.sqrt(2.0)) * sigma * autocorrelation_peak(e),
+        variability=2.0 * sigma,
+    )
+
+
+def settled(record: LoopRecord) -> LoopRecord:
+    """The record without its warm-up."""
+    return record.span(int(LIMITS.warm_up * len(record)), len(record))
+
+
+def _blocks(record: LoopRecord) -> Floats:
+    """Assessments of each block, shape (BLOCKS, number of assessments)."""
+    edges = np.linspace(0, len(record), BLOCKS + 1).astype(int)
+    found = [assess(record.span(int(a), int(b))) for a, b in pairwise(edges)]
+    return np.array([[getattr(a, n) for n in NAMES] for a in found])
+
+
+def _estimates(value: Floats, draws: Floats, units: bool = True) -> dict[str, Estimate]:
+    low, high = np.quantile(draws, [0.05, 0.95], axis=0)
+    return {
+        n: Estimate(
+            float(value[k]),
+            float(min(low[k], value[k])),
+            float(max(high[k], value[k])),
+            UNITS.get(n, "% of span") if units else "",
+        )
+        for k, n in enumerate(NAMES)
+    }
+
+
+def predict(
+    loop: Loop, controller: Pid, load: Floats, uncertainty: Sequence[Loop] = (), seed: int = 0
+) -> Forecast:
+    """Both tunings on the same load, on the identified loop and on its uncertainty samples.
+
+    Parameters
+    ----------
+    loop : Loop
+        With its present controller.
+    controller : Pid
+        The new one.
+    load : ndarray of shape (n,)
+        Load and noise as they add to PV, on the controller's clock [% PV]; n >= 120.
+    uncertainty : sequence of Loop
+        Other loops that the data allow; their controllers are not used.
+    seed : int
+        Of the block bootstrap (Kunsch 1989, blocks that do not overlap).
+
+    Returns
+    -------
+    Forecast
+
+    Raises
+    ------
+    ValueError
+        For a load of fewer than ten scans a block.
+    """
+    if load.size < 10 * BLOCKS:
+        raise ValueError(f"a forecast needs {10 * BLOCKS} scans of load, has {load.size}")
+    rng = np.random.default_rng(seed)
+    cases = [replace(one, controller=loop.controller) for one in (loop, *uncertainty)]
+    old = [_blocks(settled(run(one, load))) for one in cases]
+    new = [_blocks(settled(run(replace(one, controller=controller), load))) for one in cases]
+    draws = [rng.integers(0, BLOCKS, BLOCKS) for _ in range(max(DRAWS // len(cases), 20))]
+    before = np.array([b[d].mean(axis=0) for b in old for d in draws])
+    after = np.array([b[d].mean(axis=0) for b in new for d in draws])
+    first, second = old[0].mean(axis=0), new[0].mean(axis=0)
+    return Forecast(
+        _estimates(first, before),
+        _estimates(second, after),
+        _estimates(_change(first, second), _change(before, after), units=False),
+    )
+
+
+def _change(before: Floats, after: Floats) -> Floats:
+    """after/before - 1, 0 where both are nothing; any shape."""
+    nothing = before <= 1e-12
+    ratio = after / np.where(nothing, 1.0, before) - 1.0
+    return np.where(nothing, 0.0, ratio)

@@ -1,0 +1,132 @@
+"""The words of a proposal: why, with figures and units."""
+
+from __future__ import annotations
+
+import math
+
+from identification.models import Backlash, Integrator, Loop, Pid
+from tuning.describing import band, is_play
+from tuning.limit_cycle import Confirmed, Cycle
+from tuning.limits import TuningLimits
+from tuning.linear import integral_s
+from tuning.search import Bench, Candidate, rejection
+
+
+def load(source: str) -> str:
+    """Why a loop under load is left alone."""
+    if source:
+        return f"The oscillation comes from loop {source}; new settings here would not end it."
+    return "The load oscillates, not this loop; new settings here would not end it. Look upstream."
+
+
+def no_cause(cause: str) -> str:
+    """Why a loop without a known cause is left alone."""
+    if cause == "none":
+        return "The loop is not in trouble; nothing to change."
+    return "The cause is not decided; no settings are proposed on a guess."
+
+
+def wrong_sign(loop: Loop) -> str:
+    """Why a loop whose controller acts the wrong way gets no settings."""
+    return (
+        f"Kp {loop.controller.kp:.3g} and the process's slope {loop.process.slope:.3g} % PV/(% OP s) have no "
+        "common sign: the controller would act the wrong way. Check the action and the identified gain."
+    )
+
+
+def not_tight(ms: float) -> str:
+    """Why a loop said to be tight gets no settings."""
+    return (
+        f"The identified loop is robust as it is (Ms {ms:.2f}); its tuning does not explain the oscillation."
+    )
+
+
+def too_uncertain(limits: TuningLimits) -> str:
+    """Why no SIMC settings could be found."""
+    return (
+        f"The process is too uncertain: no settings keep Ms below {limits.ms_most_sample:g} on all it may be."
+    )
+
+
+def no_size() -> str:
+    """Why a valve without a size gets no settings."""
+    return "The valve is at fault, but neither play nor stickband is known; a size is needed for settings."
+
+
+def no_travel(loop: Loop) -> str:
+    """Why a valve fault that the model does not show gets no settings."""
+    return (
+        f"With {_fault(loop)} the identified loop rests at its present settings; the model does not show it."
+    )
+
+
+def settings(controller: Pid) -> str:
+    """Kp and Ti in words."""
+    ti = integral_s(controller)
+    return f"Kp {controller.kp:.3g}, Ti {f'{ti:.3g} s' if math.isfinite(ti) else 'off'}"
+
+
+def tight(loop: Loop, new: Pid, before: float, ms: float) -> str:
+    """Why SIMC settings are proposed."""
+    was = f"Ms {before:.2f}" if math.isfinite(before) else "unstable on the identified process"
+    return (
+        f"Too tight: {was} at {settings(loop.controller)}. SIMC for the identified process gives "
+        f"{settings(new)} with Ms {ms:.2f}."
+    )
+
+
+def _fault(loop: Loop) -> str:
+    width = band(loop.valve)
+    return (
+        f"play of {width:.2g} %" if is_play(loop.valve) else f"stick-slip with a stickband of {width:.2g} %"
+    )
+
+
+def _cycle(cycle: Cycle | None) -> str:
+    if cycle is None:
+        return "no limit cycle"
+    return f"a cycle of {cycle.period_s:.3g} s and ±{cycle.pv_amplitude:.2g} % PV"
+
+
+def _percent(ratio: float) -> str:
+    return f"{100 * (ratio - 1):+.0f} %"
+
+
+def valve(
+    loop: Loop, best: Candidate, before: Confirmed, after: Confirmed, ms_before: float, table: Bench
+) -> str:
+    """Why settings for a loop with a faulty valve are proposed."""
+    was = f"Ms {ms_before:.2f}" if math.isfinite(ms_before) else "unstable"
+    old, new = rejection(loop.process, loop.controller), rejection(loop.process, best.controller)
+    return (
+        f"The valve has {_fault(loop)}: simulated, {_cycle(before.cycle)} at {settings(loop.controller)} "
+        f"({was}) and {_cycle(after.cycle)} at {settings(best.controller)} (Ms {best.ms:.2f}). "
+        f"On the load, mean over {len(table.loops)} models: stem travel {_percent(best.travel)}, "
+        f"average absolute error {_percent(best.error)}. A load step at the valve peaks "
+        f"{new.peak / old.peak:.2g} times as high as now.{_outlook(loop, after)}"
+    )
+
+
+def _outlook(loop: Loop, after: Confirmed) -> str:
+    if not is_play(loop.valve):
+        return " Tuning cannot end stick-slip, only slow it; repairing the valve ends it."
+    if isinstance(loop.process, Integrator):
+        return " On an integrating process play always cycles under PI; P alone or a gap would end it."
+    return "" if after.cycle is None else " Only a smaller play ends the rest."
+
+
+def beyond(loop: Loop, limits: TuningLimits) -> str:
+    """Why the valve comes first."""
+    return (
+        f"The valve is beyond tuning ({_fault(loop)}, limit {limits.band_beyond:g} %): repair it. Meanwhile: "
+    )
+
+
+def nothing_better(loop: Loop, before: Confirmed, considered: bool) -> str:
+    """Why a faulty valve's loop gets no settings."""
+    what = "is worth a change" if considered else "keeps robustness, load rejection and error"
+    kind = "play" if isinstance(loop.valve, Backlash) else "stick-slip"
+    return (
+        f"The valve has {_fault(loop)} and gives {_cycle(before.cycle)}; no pair of Kp and Ti {what}. "
+        f"Only less {kind} helps: repair the valve."
+    )

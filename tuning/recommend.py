@@ -1,0 +1,193 @@
+"""What to type into the controller, or why to leave it alone: a proposal for a loop in trouble."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from identification.models import Loop, Pid
+from identification.record import Floats
+from identification.simulate import scan_step
+from tuning import reasons
+from tuning.describing import band, is_play
+from tuning.limit_cycle import Confirmed, confirm
+from tuning.limits import LIMITS, TuningLimits
+from tuning.linear import margins
+from tuning.rules import TAU_C_PER_DELAY, effective_delay, simc
+from tuning.search import (
+    Bench,
+    Candidate,
+    assumed_uncertainty,
+    bench,
+    robust,
+    rounded,
+    search,
+    standard_load,
+)
+
+Action = Literal["retune", "repair valve", "see source loop", "none", "undecided"]
+CAUSES = ("valve", "tuning", "load", "none", "undecided")
+
+CONFIRMED = 30
+"""Candidates whose limit cycle is simulated, from the best down, before the search gives up."""
+SAMPLES_CONFIRMED = 4
+"""Uncertainty samples on which the chosen candidate's limit cycle is simulated too."""
+SLOWER = 1.25
+"""Factor by which SIMC's closed-loop time constant grows until every sample keeps its Ms."""
+
+
+@dataclass(frozen=True, slots=True)
+class Proposal:
+    """What to do about a loop.
+
+    action : str
+        retune, repair valve, see source loop, none or undecided.
+    controller : Pid or None
+        The new settings; None unless action is retune.
+    reason : str
+        Why, with figures.
+    meanwhile : Pid or None
+        With action "repair valve": settings that are better than the present ones until then.
+    before, after : Confirmed or None
+        Simulated limit cycle without noise at the present and at the new settings.
+    ms_before, ms : float or None
+        Maximum sensitivity at the present and at the new settings [-]; inf where unstable.
+    candidates : tuple of Candidate
+        What was considered, best first.
+    """
+
+    action: Action
+    reason: str
+    controller: Pid | None = None
+    meanwhile: Pid | None = None
+    before: Confirmed | None = None
+    after: Confirmed | None = None
+    ms_before: float | None = None
+    ms: float | None = None
+    candidates: tuple[Candidate, ...] = ()
+
+
+def recommend(
+    loop: Loop,
+    cause: str,
+    uncertainty: Sequence[Loop] = (),
+    load: Floats | None = None,
+    limits: TuningLimits = LIMITS,
+    source: str = "",
+) -> Proposal:
+    """The proposal for one loop.
+
+    Parameters
+    ----------
+    loop : Loop
+        Identified process and valve with the present controller.
+    cause : str
+        Why the loop is in trouble: valve, tuning, load, none or undecided.
+    uncertainty : sequence of Loop
+        Other loops that the data allow; empty: corners around the loop (tuning.limits).
+    load : ndarray of shape (n,) or None
+        Load and noise as they add to PV, on the controller's clock [% PV]; None: steps at the valve.
+    limits : TuningLimits
+    source : str
+        Name of the loop from which the load comes, if known.
+
+    Returns
+    -------
+    Proposal
+
+    Raises
+    ------
+    ValueError
+        For a cause that is none of the five.
+    """
+    if cause not in CAUSES:
+        raise ValueError(f"cause is one of {', '.join(CAUSES)}, got {cause!r}")
+    if cause == "load":
+        return Proposal("see source loop" if source else "none", reasons.load(source))
+    if cause in ("none", "undecided"):
+        return Proposal("none" if cause == "none" else "undecided", reasons.no_cause(cause))
+    if loop.controller.kp * loop.process.slope <= 0.0:
+        return Proposal("undecided", reasons.wrong_sign(loop))
+    others = tuple(uncertainty) or assumed_uncertainty(loop, limits)
+    return _tight(loop, others, limits) if cause == "tuning" else _valve(loop, others, load, limits)
+
+
+def _tight(loop: Loop, others: Sequence[Loop], limits: TuningLimits) -> Proposal:
+    """SIMC for a loop that swings by its tuning; slower until every sample keeps its Ms."""
+    now = margins(loop).ms
+    if now <= limits.ms_most:
+        return Proposal("undecided", reasons.not_tight(now), ms_before=now)
+    h = scan_step(loop)
+    tau_c = TAU_C_PER_DELAY * effective_delay(loop.process, h)
+    for _ in range(12):
+        nominal = simc(loop.process, tau_c, h)
+        new = replace(loop.controller, kp=rounded(nominal.kp), ti_s=rounded(nominal.ti_s), td_s=0.0)
+        ms = robust(loop, others, new, limits)
+        if ms is not None:
+            return Proposal("retune", reasons.tight(loop, new, now, ms), new, ms_before=now, ms=ms)
+        tau_c *= SLOWER
+    return Proposal("undecided", reasons.too_uncertain(limits), ms_before=now)
+
+
+def _valve(loop: Loop, others: Sequence[Loop], load: Floats | None, limits: TuningLimits) -> Proposal:
+    """The least travel and error that the limits allow, for a loop with play or stick-slip."""
+    if band(loop.valve) <= 0.0:
+        return Proposal("undecided", reasons.no_size())
+    before = confirm(loop)
+    load = standard_load(loop, limits.most_steps) if load is None else load
+    table = bench(loop, others, load, limits)
+    now = margins(loop).ms
+    if table.travel[0] <= 0.0:
+        return Proposal("undecided", reasons.no_travel(loop), before=before, ms_before=now)
+    candidates = search(table)
+    chosen = _confirmed(table, candidates, before)
+    if chosen is None:
+        why = reasons.nothing_better(loop, before, bool(candidates))
+        return Proposal("repair valve", why, before=before, ms_before=now, candidates=candidates)
+    best, after = chosen
+    why = reasons.valve(loop, best, before, after, now, table)
+    beyond = band(loop.valve) >= limits.band_beyond
+    return Proposal(
+        "repair valve" if beyond else "retune",
+        reasons.beyond(loop, limits) + why if beyond else why,
+        controller=None if beyond else best.controller,
+        meanwhile=best.controller if beyond else None,
+        before=before,
+        after=after,
+        ms_before=now,
+        ms=best.ms,
+        candidates=candidates,
+    )
+
+
+def _worth(candidate: Candidate, limits: TuningLimits) -> bool:
+    return candidate.travel <= 1.0 - limits.worth_travel or candidate.error <= 1.0 - limits.worth_error
+
+
+def _smaller(after: Confirmed, before: Confirmed, most_growth: float) -> bool:
+    """Whether the new limit cycle is none, or has less travel than the old one and has not grown in PV."""
+    if after.cycle is None:
+        return after.settled
+    if before.cycle is None:
+        return False
+    grown = after.cycle.pv_amplitude > most_growth * before.cycle.pv_amplitude
+    return not grown and after.cycle.stem_travel <= before.cycle.stem_travel
+
+
+def _confirmed(
+    table: Bench, candidates: tuple[Candidate, ...], before: Confirmed
+) -> tuple[Candidate, Confirmed] | None:
+    """The best candidate worth a change whose simulated limit cycle is none or smaller, on samples too."""
+    worthy = [c for c in candidates if _worth(c, table.limits)][:CONFIRMED]
+    samples = [(one, confirm(one)) for one in table.loops[1 : 1 + SAMPLES_CONFIRMED]] if worthy else []
+    limits = table.limits
+    growth = limits.cycle_growth if is_play(table.loops[0].valve) else limits.cycle_growth_stick
+    for candidate in worthy:
+        after = confirm(replace(table.loops[0], controller=candidate.controller))
+        if _smaller(after, before, growth) and all(
+            _smaller(confirm(replace(one, controller=candidate.controller)), old, growth)
+            for one, old in samples
+        ):
+            return candidate, after
+    return None

@@ -1,0 +1,234 @@
+"""The search over the Kp-Ti plane: candidates that keep robustness and load rejection, scored on a load."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+
+from identification.models import Backlash, Fopdt, Integrator, Loop, Pid, Process, Valve
+from identification.record import Floats
+from identification.simulate import closed_loop, discretize, respond, scan_step
+from tuning.describing import band, is_play
+from tuning.limits import TuningLimits
+from tuning.linear import integral_s, margins, slowest_s
+from tuning.predict import run, settled
+from tuning.rules import effective_delay, simc
+
+GAINS, TIMES = 11, 13
+"""Points of the coarse grid in Kp and Ti."""
+FINE = 5
+"""Points of the fine grid in each direction, over one coarse step to either side of the best."""
+
+
+@dataclass(frozen=True, slots=True)
+class Candidate:
+    """A pair of settings and what the model says of it.
+
+    ms [-]; travel and error: stem travel and average absolute error over those of the present tuning [-],
+    means over the loops simulated; worst_error the largest of these; score: lower is better.
+    """
+
+    controller: Pid
+    ms: float
+    travel: float
+    error: float
+    worst_error: float
+    score: float
+
+
+@dataclass(frozen=True, slots=True)
+class Rejection:
+    """Answer of the linear loop to a unit step of load at the valve.
+
+    peak [% PV / % OP]: largest deviation; integral [s % PV / % OP]: Ti/abs(Kp), the integral of the error.
+    """
+
+    peak: float
+    integral: float
+
+
+@dataclass(frozen=True, slots=True)
+class Bench:
+    """What candidates are tried on: loops with the present controller, loads, and the present figures.
+
+    Every other loop gets the load backwards: a second record of the same kind, for a sticking stem's fate
+    hangs on the load's very course.
+
+    travel [%/h] and error [% PV] of shape (number of loops,).
+    """
+
+    loops: tuple[Loop, ...]
+    loads: tuple[Floats, ...]
+    travel: Floats
+    error: Floats
+    limits: TuningLimits
+
+
+def rejection(process: Process, controller: Pid) -> Rejection:
+    """Peak and integral of the error after a unit load step at the process's input, valve left out."""
+    loop = Loop(process, replace(controller, op_lo=-1e9, op_hi=1e9))
+    h = scan_step(loop)
+    ti = integral_s(controller)
+    horizon = 20.0 * effective_delay(process, h) + (2.0 * ti if math.isfinite(ti) else 0.0)
+    steps = int(min(max(horizon / h, 100), 20_000))
+    d = discretize(process, h)
+    load = respond(np.r_[0.0, np.ones(steps)], d.pole, d.now, d.before, d.delay)
+    pv = closed_loop(loop, np.zeros(load.size), load, op_start=0.0).pv
+    return Rejection(float(np.abs(pv).max()), ti / abs(controller.kp))
+
+
+def allowed(loop: Loop, limits: TuningLimits) -> Rejection:
+    """The slowest rejection that a proposal may have: stated factors of the nominal, or the present one's."""
+    nominal = simc(loop.process, scan_s=scan_step(loop))
+    best = rejection(loop.process, nominal)
+    now = rejection(loop.process, loop.controller)
+    lag = loop.process.time_constant_s if isinstance(loop.process, Fopdt) else 0.0
+    factor = limits.integral_factor_ramp if isinstance(loop.process, Integrator) else limits.integral_factor
+    integral = factor * max(lag, nominal.ti_s) / abs(nominal.kp)
+    present = now.integral if math.isfinite(now.integral) else 0.0
+    return Rejection(max(limits.peak_factor * best.peak, now.peak), max(integral, present))
+
+
+def standard_load(loop: Loop, steps: int) -> Floats:
+    """A load for when none is known, shape (steps,) [% PV]: steps at the valve, half the play high."""
+    h = scan_step(loop)
+    hold = max(int(15.0 * slowest_s(loop) / h), 50)
+    height = 0.5 * max(band(loop.valve), 0.5)
+    d = discretize(loop.process, h)
+    at_valve = height * np.array([0.0, 1.0, -0.62, 0.31])[(np.arange(steps) // hold) % 4]
+    load: Floats = respond(at_valve, d.pole, d.now, d.before, d.delay)
+    return load
+
+
+def assumed_uncertainty(loop: Loop, limits: TuningLimits) -> tuple[Loop, ...]:
+    """Eight corners of slope, dead time and play around the loop, for want of samples from identification."""
+    corners = product((-1.0, 1.0), repeat=3)
+    return tuple(
+        replace(
+            loop,
+            process=_scaled(loop.process, 1.0 + up * limits.spread_slope, 1.0 + late * limits.spread_delay),
+            valve=scaled_valve(loop.valve, 1.0 + wide * limits.spread_band),
+        )
+        for up, late, wide in corners
+    )
+
+
+def _scaled(process: Process, slope: float, delay: float) -> Process:
+    late = process.dead_time_s * delay
+    if isinstance(process, Integrator):
+        return Integrator(process.slope * slope, late)
+    return Fopdt(process.gain * slope, process.time_constant_s, late)
+
+
+def scaled_valve(valve: Valve, factor: float) -> Valve:
+    """The valve with play, or stickband and slip jump, times a factor [-]."""
+    if valve is None:
+        return None
+    if isinstance(valve, Backlash):
+        return Backlash(valve.width * factor)
+    return replace(valve, stickband=valve.stickband * factor, slip_jump=valve.slip_jump * factor)
+
+
+def _figures(loop: Loop, load: Floats) -> tuple[float, float]:
+    """Stem travel [%/h] and average absolute error [% PV] on the load."""
+    r = settled(run(loop, load))
+    stem = r.op if r.position is None else r.position
+    return float(np.abs(np.diff(stem)).sum()) / r.duration_s * 3600.0, float(np.mean(np.abs(r.pv)))
+
+
+def bench(loop: Loop, others: Sequence[Loop], load: Floats, limits: TuningLimits) -> Bench:
+    """The present tuning on every loop, so that candidates can be compared with it."""
+    cut = np.ascontiguousarray(load[-limits.most_steps :])
+    loops = tuple(replace(one, controller=loop.controller) for one in (loop, *others))
+    loads = tuple(cut if k % 2 == 0 else np.ascontiguousarray(cut[::-1]) for k in range(len(loops)))
+    figures = np.array([_figures(*case) for case in zip(loops, loads, strict=True)])
+    return Bench(loops, loads, figures[:, 0], figures[:, 1], limits)
+
+
+def try_out(table: Bench, controller: Pid, ms: float, loops: int | None = None) -> Candidate:
+    """Score a candidate on the first `loops` loops of the bench (None: all)."""
+    some = table.loops[:loops]
+    cases = zip(some, table.loads, strict=False)
+    figures = np.array([_figures(replace(one, controller=controller), load) for one, load in cases])
+    travel = figures[:, 0] / np.maximum(table.travel[: len(some)], 1e-9)
+    error = figures[:, 1] / np.maximum(table.error[: len(some)], 1e-9)
+    limits = table.limits
+    score = np.log(travel + limits.travel_floor) + limits.error_weight * np.log(np.maximum(error, 1e-9))
+    return Candidate(
+        controller, ms, float(travel.mean()), float(error.mean()), float(error.max()), float(score.mean())
+    )
+
+
+def rounded(x: float) -> float:
+    """Three significant digits: what one types into a controller."""
+    return float(f"{x:.3g}")
+
+
+def _pairs(loop: Loop, gains: Floats, times: Floats) -> list[Pid]:
+    sign = math.copysign(1.0, loop.controller.kp)
+    return [
+        replace(loop.controller, kp=rounded(sign * float(k)), ti_s=rounded(float(t)))
+        for k in gains
+        for t in times
+    ]
+
+
+def robust(loop: Loop, others: Sequence[Loop], controller: Pid, limits: TuningLimits) -> float | None:
+    """Ms on the loop where it and those of all samples keep the limits, else None."""
+    ms = margins(replace(loop, controller=controller)).ms
+    if ms > limits.ms_most:
+        return None
+    samples = (margins(replace(one, controller=controller)).ms for one in others)
+    return ms if all(m <= limits.ms_most_sample for m in samples) else None
+
+
+def _kept(table: Bench, most: Rejection, pairs: list[Pid]) -> list[Candidate]:
+    """Those of the pairs that keep robustness, load rejection and error, tried on every loop."""
+    loop, others = table.loops[0], table.loops[1:]
+    found = []
+    for pid in pairs:
+        if pid.ti_s / abs(pid.kp) > most.integral:
+            continue
+        ms = robust(loop, others, pid, table.limits)
+        if ms is None or rejection(loop.process, pid).peak > most.peak:
+            continue
+        if try_out(table, pid, ms, 1).error <= table.limits.error_growth:
+            found.append(try_out(table, pid, ms))
+    return [c for c in found if c.worst_error <= table.limits.error_growth_sample]
+
+
+def _grid(loop: Loop, most: Rejection, limits: TuningLimits) -> tuple[Floats, Floats]:
+    """Gains [% OP / % PV] and integral times [s] of the coarse grid.
+
+    With play before a lag no integral time is shorter than the time constant (the source study's Eq. 6).
+    """
+    nominal, now = simc(loop.process, scan_s=scan_step(loop)), loop.controller
+    high = min(limits.gain_up * abs(now.kp), 2.0 * abs(nominal.kp))
+    low = min(0.3 * min(abs(now.kp), abs(nominal.kp)), 0.5 * high)
+    shortest = 0.5 * min(integral_s(now), nominal.ti_s)
+    if is_play(loop.valve) and isinstance(loop.process, Fopdt):
+        shortest = loop.process.time_constant_s
+    longest = max(most.integral * high, 2.0 * shortest)
+    return np.geomspace(low, high, GAINS), np.geomspace(shortest, longest, TIMES)
+
+
+def search(table: Bench) -> tuple[Candidate, ...]:
+    """Candidates from best to worst, tried on all loops of the bench; empty where none keeps the limits.
+
+    A logarithmic grid over Kp and Ti, then a finer one around its best.
+    """
+    loop = table.loops[0]
+    most = allowed(loop, table.limits)
+    gains, times = _grid(loop, most, table.limits)
+    coarse = _kept(table, most, _pairs(loop, gains, times))
+    if not coarse:
+        return ()
+    best = min(coarse, key=lambda c: c.score).controller
+    step = np.linspace(-1.0, 1.0, FINE)
+    longer = np.maximum(best.ti_s * (times[1] / times[0]) ** step, times[0])
+    fine = _pairs(loop, abs(best.kp) * (gains[1] / gains[0]) ** step, np.unique(longer))
+    return tuple(sorted(coarse + _kept(table, most, fine), key=lambda c: c.score))
