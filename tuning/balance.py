@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -18,6 +19,8 @@ from tuning.linear import controller_response, frequencies, loop_response
 
 POLISH_STEPS = 6
 """Eightfold bracketings that polish a root found on the grid."""
+END_STEPS, FINER = 2, 40
+"""Refinements, and points of each, of the frequencies at which a branch begins and ends."""
 REACH_POINTS = 600
 """Frequencies at which a branch is looked at: no pair of solutions further apart than 2 % is missed."""
 PERIODS = 30
@@ -32,6 +35,8 @@ KICK = 1.0 + math.sqrt(5.0)
 """Kick in widths of the play, seen at OP; irrational, lest whole jumps of a sticking stem meet it exactly."""
 NO_LIMIT = 1e9
 """Output limits [% OP] put out of the way: a cycle scales with the play and must not meet a limit."""
+END_STEPS, FINER = 2, 40
+"""Refinements, and points of each, of the frequencies at which a branch begins and ends."""
 REACH_POINTS = 600
 """Frequencies at which a branch is looked at: no pair of solutions further apart than 2 % is missed."""
 PERIODS = 30
@@ -65,20 +70,40 @@ class Balance:
     jumps: int
 
 
+@lru_cache(maxsize=8)
+def _roots_of_phase(loop: Loop) -> tuple[Floats, Floats]:
+    """Frequencies [rad/s] and sqrt(-phase) that N(A) must have there, both of shape (m,)."""
+    omega = frequencies(loop)
+    return omega, np.sqrt(np.maximum(-np.angle(-1.0 / loop_response(loop, omega)), 0.0))
+
+
 def reach(loop: Loop, branch: Branch, points: int = REACH_POINTS) -> Floats:
     """Grid [rad/s] of the frequencies at which some amplitude of a branch closes the phase.
 
-    `points` for each stretch of them, shape (k,); empty where there is none. The phase of G C does not
-    depend on the gain, and so neither does the grid.
+    `points` for each stretch of them, shape (k,), dense towards the ends, where the amplitude runs away;
+    empty where there is none. The phase of G C does not depend on the gain, and so neither does the grid.
     """
-    omega = frequencies(loop)
-    root = np.sqrt(np.maximum(-np.angle(-1.0 / loop_response(loop, omega)), 0.0))
+    omega, root = _roots_of_phase(loop)
     inside = (root <= branch.root[0]) & (root >= branch.root[-1])
     above = root > branch.root[0]
     meets = np.flatnonzero(inside[:-1] | inside[1:] | (above[:-1] != above[1:]))
     stretches = np.split(meets, np.flatnonzero(np.diff(meets) > 1) + 1) if meets.size else []
-    grids = [np.geomspace(omega[m[0]], omega[m[-1] + 1], points) for m in stretches]
-    return np.concatenate([np.empty(0), *grids])
+    share = 0.5 * (1.0 - np.cos(np.pi * np.linspace(0.0, 1.0, points)))
+    ends = [_ends(loop, branch, omega[m[0] : m[-1] + 2]) for m in stretches]
+    return np.concatenate([np.empty(0), *(low * (high / low) ** share for low, high in ends)])
+
+
+def _ends(loop: Loop, branch: Branch, omega: Floats) -> tuple[float, float]:
+    """The frequencies [rad/s] between which a branch closes the phase, within omega of shape (m,), m >= 2."""
+    low, high = omega[:2], omega[-2:]
+    for _ in range(END_STEPS):
+        up, down = np.geomspace(low[0], low[1], FINER), np.geomspace(high[0], high[1], FINER)
+        begins = np.flatnonzero(np.isfinite(_excess(loop, branch, up)))
+        ends = np.flatnonzero(np.isfinite(_excess(loop, branch, down)))
+        first = max(begins[0] - 1, 0) if begins.size else FINER - 2
+        last = min(ends[-1], FINER - 2) if ends.size else 0
+        low, high = up[first : first + 2], down[last : last + 2]
+    return float(low[0]), float(high[1])
 
 
 def _excess(loop: Loop, branch: Branch, omega: Floats) -> Floats:

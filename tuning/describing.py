@@ -228,7 +228,7 @@ def branches(valve: Valve) -> tuple[Branch, ...]:
 def _jump_branches(valve: Stiction) -> tuple[Branch, ...]:
     share = np.linspace(0.0, 1.0, TABLE_SIZE) ** 2
     found = []
-    for jumps in range(1, min(MAX_JUMPS, int(np.ceil(8 * valve.stickband / valve.slip_jump))) + 1):
+    for jumps in range(1, min(MAX_JUMPS, int(np.ceil(6 * valve.stickband / valve.slip_jump))) + 1):
         low, high = jump_range(valve, jumps)
         amplitude = low + (high - low) * share
         found.append(

@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identification.models import Integrator, Loop
-from identification.record import Floats
+from identification.models import Fopdt, Integrator, Loop, Stiction
+from identification.record import Floats, LoopRecord
 from identification.simulate import closed_loop, scan_step
 from tuning.balance import Balance, harmonic_balance, predicted_cycle
 from tuning.describing import band
@@ -37,7 +37,7 @@ REST_SHARE = 0.45
 STEADY = 0.02
 """Relative change of amplitude from one quarter of the record to the next below which a cycle is steady."""
 KICK = 1.0 + math.sqrt(5.0)
-"""Kick in widths of the play, seen at OP; irrational, lest whole jumps of a sticking stem meet it exactly."""
+"""Kick in widths of the play, seen at OP; irrational, lest the stem's travel meet it exactly."""
 NO_LIMIT = 1e9
 """Output limits [% OP] put out of the way: a cycle scales with the play and must not meet a limit."""
 MOST_STEPS = 600_000
@@ -47,7 +47,7 @@ REST_SHARE = 0.45
 STEADY = 0.02
 """Relative change of amplitude from one quarter of the record to the next below which a cycle is steady."""
 KICK = 1.0 + math.sqrt(5.0)
-"""Kick in widths of the play, seen at OP; irrational, lest whole jumps of a sticking stem meet it exactly."""
+"""Kick in widths of the play, seen at OP; irrational, lest the stem's travel meet it exactly."""
 NO_LIMIT = 1e9
 """Output limits [% OP] put out of the way: a cycle scales with the play and must not meet a limit."""
 REST_SHARE = 0.45
@@ -55,17 +55,17 @@ REST_SHARE = 0.45
 STEADY = 0.02
 """Relative change of amplitude from one quarter of the record to the next below which a cycle is steady."""
 KICK = 1.0 + math.sqrt(5.0)
-"""Kick in widths of the play, seen at OP; irrational, lest whole jumps of a sticking stem meet it exactly."""
+"""Kick in widths of the play, seen at OP; irrational, lest the stem's travel meet it exactly."""
 NO_LIMIT = 1e9
 """Output limits [% OP] put out of the way: a cycle scales with the play and must not meet a limit."""
 STEADY = 0.02
 """Relative change of amplitude from one quarter of the record to the next below which a cycle is steady."""
 KICK = 1.0 + math.sqrt(5.0)
-"""Kick in widths of the play, seen at OP; irrational, lest whole jumps of a sticking stem meet it exactly."""
+"""Kick in widths of the play, seen at OP; irrational, lest the stem's travel meet it exactly."""
 NO_LIMIT = 1e9
 """Output limits [% OP] put out of the way: a cycle scales with the play and must not meet a limit."""
 KICK = 1.0 + math.sqrt(5.0)
-"""Kick in widths of the play, seen at OP; irrational, lest whole jumps of a sticking stem meet it exactly."""
+"""Kick in widths of the play, seen at OP; irrational, lest the stem's travel meet it exactly."""
 NO_LIMIT = 1e9
 """Output limits [% OP] put out of the way: a cycle scales with the play and must not meet a limit."""
 NO_LIMIT = 1e9
@@ -140,11 +140,25 @@ def _unlimited(loop: Loop) -> Loop:
 
 
 def kicked(loop: Loop, steps: int, kick: float) -> tuple[Floats, Floats, Floats, float]:
-    """PV, OP, stem (shape (steps,)) and step [s] of the loop at rest after a step of PV by `kick` [% PV]."""
+    """PV, OP, stem (shape (steps,)) and step [s] of the loop at rest after a step of PV by `kick` [% PV].
+
+    Halfway the load of a stem that moves by whole jumps is trimmed so that rest would lie midway between two
+    of its places. The share of a jump that a load asks for sets how lopsided and slow the cycle is; half a
+    jump gives the symmetric and fastest one, which is also what the balance describes.
+    """
+    free, valve, half = _unlimited(loop), loop.valve, steps // 2
     load = np.full(steps, kick)
     load[0] = 0.0
-    r = closed_loop(_unlimited(loop), np.zeros(steps), load, op_start=0.0)
-    return r.pv, r.op, r.pv if r.position is None else r.position, r.dt_s
+    if isinstance(valve, Stiction) and not valve.slides and isinstance(loop.process, Fopdt):
+        stem = _stem(closed_loop(free, np.zeros(half), load[:half], op_start=0.0))[-1]
+        rests = -loop.process.gain * (stem + valve.slip_jump * np.array([-0.5, 0.5]))
+        load[half:] = rests[np.argmin(np.abs(rests - kick))]
+    r = closed_loop(free, np.zeros(steps), load, op_start=0.0)
+    return r.pv, r.op, _stem(r), r.dt_s
+
+
+def _stem(record: LoopRecord) -> Floats:
+    return record.op if record.position is None else record.position
 
 
 def _verdict(op: Floats, width: float) -> str:

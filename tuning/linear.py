@@ -14,7 +14,7 @@ from tuning.describing import Complexes
 
 LOWEST = 1e-6
 """Lowest frequency looked at, over that of the slowest of time constant, integral time and dead time."""
-POINTS = 1500
+POINTS = 900
 """Frequencies of a grid."""
 
 
