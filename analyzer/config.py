@@ -63,6 +63,11 @@ class QualityLimits:
     """A resolution above this many standard deviations of PV is too coarse for waveforms [-]; ours."""
     limit_pct: float = 2.0
     """OP within this distance of a limit is at the limit [% of span]; FACTS: time at limits."""
+    outside_pct: float = 5.0
+    """OP beyond its range by this [% of span] shows that the range is not known; ours."""
+    saturated_share: float = 0.6
+    """Share of time at a limit of OP from which no cause is told [-]; ours: a loop that runs from limit to limit is
+    there for half of it."""
     manual_s: float = 1800.0
     """OP unchanged for this long [s] and for manual_samples, while the error moves, is a loop in manual; ours."""
     manual_samples: int = 180
@@ -77,14 +82,29 @@ class CauseLimits:
     simulated plant set it.
     """
 
-    window: int = 3000
+    window: int = 2500
     """Blocks of the record that are fitted [-]; more cost time and change no verdict."""
     blocks_per_period: float = 40.0
     """Blocks per period [-]."""
+    fast_process: tuple[tuple[str, float, float], ...] = (("flow", 60.0, 30.0),)
+    """Types with largest time constant and dead time [s] of loop types whose process is fast: a flow answers its valve within
+    seconds (Seborg, Edgar, Mellichamp 2011, ch. 12); a longer wait is the valve's."""
     evidence: float = 10.0
     """Gain in log likelihood that a play needs over an ideal valve [nat]."""
+    evidence_per_sample: float = 0.005
+    """The same as a share of the samples judged [nat]: no model is exact, and what it lacks grows with them."""
+    quiet_factor: float = 2.5
+    """What the share is multiplied with in loops that do not oscillate [-]."""
     evidence_jump: float = 5.0
     """Further gain that a slip jump needs, for its two more constants and wider search [nat]."""
+    jump_share: float = 0.04
+    """Gain of the jump over that of the play from which the fault is stiction [-]."""
+    least_jump: float = 0.08
+    """Slip jump over stickband below which the fault is a play [-]."""
+    consistent: float = 0.35
+    """Gain outside the period's band over gain with it, from which both see one process [-]."""
+    wound_pct: float = 20.0
+    """Travel of OP without any answer of PV from which the valve is dead [% of span]."""
     size: float = 0.45
     """Stickband over the range of OP from which it can drive a cycle [-]: below it the describing function of
     play is within 15 degrees of a gain."""
@@ -93,8 +113,14 @@ class CauseLimits:
     resonance: float = 2.0
     """Amplification of load by the loop at its period, |S|, from which the tuning is to blame [-]; Ms of 2 is the
     usual upper bound of good tuning (Astrom, Hagglund 2006)."""
-    narrow: float = 0.9
+    narrow: float = 0.93
     """Correlation after three periods from which a period is kept as by a clock [-]."""
+    steadier: float = 0.3
+    """The same above what the loop's own resonance would give [-]; ours: the scatter over 50 periods is 0.1."""
+    at_limits: float = 0.02
+    """Share of time at a limit of OP from which a loop may run from limit to limit [-]."""
+    left: float = 0.75
+    """Prominence of the load that a valve model leaves over that of the error, from which it explains nothing."""
     harmonic: float = 0.08
     """Phase-locked third harmonic over the fundamental from which a wave is not a sine [-]; a triangle has 0.11."""
     named_pct: float = 50.0

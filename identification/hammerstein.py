@@ -35,7 +35,8 @@ class Window:
     """A stretch of a record prepared for fitting.
 
     y : PV [% PV] in blocks, shape (n,); op : OP [% OP] at the record's own interval, shape (n * factor,);
-    usable : bool, shape (n,), False at gaps; dt_s : interval of the blocks [s].
+    usable : bool, shape (n,), False at gaps; dt_s : interval of the blocks [s]; most_time_constant_s and
+    most_dead_time_s : what is known of such processes [s], inf where nothing is.
     """
 
     y: Floats
@@ -43,6 +44,15 @@ class Window:
     usable: Mask
     dt_s: float
     factor: int = 1
+    most_time_constant_s: float = math.inf
+    most_dead_time_s: float = math.inf
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """Largest time constant and dead time that are searched [s]."""
+        longest = LONGEST_TIME_CONSTANT * self.duration_s, LONGEST_DEAD_TIME * self.duration_s
+        known = self.most_time_constant_s, self.most_dead_time_s
+        return max(min(longest[0], known[0]), self.dt_s), max(min(longest[1], known[1]), 2 * self.dt_s)
 
     @property
     def duration_s(self) -> float:
@@ -54,6 +64,12 @@ class Window:
         """Range of OP without its 2 % tails [% OP]."""
         low, high = np.quantile(self.op, [0.02, 0.98])
         return float(high - low)
+
+
+def block_means(x: Floats, factor: int) -> Floats:
+    """Means of consecutive blocks, shape (n // factor,)."""
+    n = x.size // factor
+    return x[: n * factor].reshape(n, factor).mean(axis=1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -268,16 +284,18 @@ def prepare(window: Window, valve: ValveTrial, ar: Floats, notch_period: float =
 
 def compass(prepared: Prepared, start: tuple[float, float], halvings: int = 4) -> tuple[float, float]:
     """Time constant and dead time [s] of least innovations variance near a start, by compass search."""
-    dt, duration = prepared.window.dt_s, prepared.window.duration_s
+    dt = prepared.window.dt_s
+    most_t, most_dead = prepared.window.bounds
 
     def value(log_t: float, dead: float) -> float:
-        if not 0 <= dead <= LONGEST_DEAD_TIME * duration:
-            return math.inf
-        if not 0.05 * dt <= math.exp(log_t) <= LONGEST_TIME_CONSTANT * duration:
+        if not 0 <= dead <= most_dead or not 0.05 * dt <= math.exp(log_t) <= most_t:
             return math.inf
         return math.log(prepared.score(math.exp(log_t), dead)[0])
 
-    best = (min(max(math.log(start[0]), math.log(0.1 * dt)), math.log(2 * duration)), start[1])
+    best = (
+        min(max(math.log(start[0]), math.log(0.1 * dt)), math.log(0.9 * most_t)),
+        min(start[1], most_dead),
+    )
     least = value(*best)
     step_t, step_d = 0.4, 2.0 * dt
     for _ in range(halvings):
@@ -335,17 +353,33 @@ def starts(window: Window, period_s: float) -> list[tuple[float, float]]:
     """Starts of the search: time constants and dead times spread over the period [s]."""
     times = [period_s * s for s in (0.03, 0.1, 0.3, 1.0, 5.0)]
     deads = [period_s * s for s in (0.0, 0.04, 0.1, 0.2, 0.35)]
-    top = 2 * window.duration_s
-    return [(min(t, top), d) for t in times for d in deads]
+    most_t, most_dead = window.bounds
+    return sorted({(min(t, 0.7 * most_t), min(d, most_dead)) for t in times for d in deads})
 
 
-def refit(window: Window, prepared: Prepared, dynamics: tuple[float, float], rounds: int = 2) -> Fit:
-    """Noise model and dynamics refitted in turns from a start."""
+Dynamics = tuple[float, float]
+
+
+def refit(
+    window: Window,
+    prepared: Prepared,
+    dynamics: Dynamics,
+    rounds: int = 2,
+    anew: list[Dynamics] | None = None,
+) -> Fit:
+    """Noise model and dynamics refitted in turns from a start.
+
+    `anew` are starts that are tried again under the first new noise model, where the old one came from another
+    valve and may have led to another minimum.
+    """
     fit = finish(prepared, *compass(prepared, dynamics))
-    for _ in range(rounds):
+    for k in range(rounds):
         ar = autoregression(residual(window, fit), window.usable, fit.ar.size)
         prepared = prepare(window, fit.valve, ar, prepared.notch_period)
-        fit = finish(prepared, *compass(prepared, (fit.time_constant_s, fit.dead_time_s), 3))
+        here = (fit.time_constant_s, fit.dead_time_s)
+        if k == 0 and anew:
+            here = best_of(prepared, [here, *anew])
+        fit = finish(prepared, *compass(prepared, here, 3))
     return fit
 
 
@@ -385,7 +419,7 @@ def _scan(window: Window, near: Fit, valves: list[ValveTrial], period_s: float) 
         t, dead = compass(prepared, best_of(prepared, begins), 2)
         trials.append((prepared.score(t, dead)[0], prepared, (t, dead)))
     trials.sort(key=lambda trial: trial[0])
-    fits = [refit(window, prepared, dynamics) for _, prepared, dynamics in trials[:REFITTED]]
+    fits = [refit(window, prepared, dynamics, 3, begins) for _, prepared, dynamics in trials[:REFITTED]]
     return sorted(fits, key=lambda fit: -fit.log_likelihood)
 
 

@@ -104,6 +104,17 @@ def bands(power: Floats, fewest_lines: float) -> Bands:
     return Bands(line, near, near / np.maximum(np.sqrt(low * high), floor))
 
 
+def peak_prominence(power: Floats, line: float) -> float:
+    """Power about one frequency over the geometric mean of the power on both sides of it."""
+    top = power.size - 2
+    at = np.array([line])
+    total = np.concatenate(([0.0], np.cumsum(power)))
+    near = _mean(total, at / HALF_BAND, at * HALF_BAND, top)
+    low = _mean(total, at / SIDES[1], at / SIDES[0], top)
+    high = _mean(total, at * SIDES[0], np.minimum(at * SIDES[1], top), top)
+    return float(near[0] / max(math.sqrt(low[0] * high[0]), 1e-12 * float(power.max()) + 1e-300))
+
+
 def band_signal(
     s: Spectrum, line: float, factor: float = WIDE_BAND, per_period: int = 24
 ) -> tuple[Floats, float]:
@@ -119,6 +130,30 @@ def band_signal(
     cut = np.zeros(m // 2 + 1, dtype=np.complex128)
     cut[first : last + 1] = s.lines[first : last + 1]
     return irfft(cut, m) * (m / s.n), s.duration_s / m
+
+
+def analytic(s: Spectrum, line: float, factor: float, size: int) -> Complex:
+    """Analytic signal of the band about a frequency on `size` points over the record, shape (size,)."""
+    first, last = max(math.ceil(line / factor), 1), min(int(line * factor), s.lines.size - 1)
+    cut = np.zeros(size, dtype=np.complex128)
+    cut[first : last + 1] = 2 * s.lines[first : last + 1]
+    return np.fft.ifft(cut) * (size / s.n)
+
+
+def locked_harmonic(s: Spectrum, period_s: float, order: int = 3) -> float:
+    """Size of a harmonic that is locked to the fundamental's phase, over the fundamental.
+
+    The mean of z3 exp(-3i phase1) over the mean of |z1|: a triangle gives 1/9, a square 1/3, a sine with noise
+    about it nothing, for its third harmonic has no fixed phase.
+    """
+    line = s.duration_s / period_s
+    if order * line * 1.15 >= s.lines.size - 1:
+        return 0.0
+    size = next_fast_len(max(int(line * 4 * order), 16))
+    z1, z3 = analytic(s, line, 1.3, size), analytic(s, order * line, 1.15, size)
+    turned = z3 * np.exp(-1j * order * np.angle(z1))
+    weight = float(np.mean(np.abs(z1)))
+    return float(np.abs(np.mean(turned))) / weight if weight > 0 else 0.0
 
 
 def envelope(s: Spectrum, line: float, factor: float = 1.6, per_period: int = 8) -> tuple[Floats, float]:

@@ -66,9 +66,10 @@ class Export:
                 self._met[tag] = found
         return series
 
-    def span(self) -> tuple[float, float]:
-        """First and last stamp of all files [s since 1970-01-01 UTC]."""
-        spans = [source.span() for source in self.sources]
+    def span(self, tag: str | None = None) -> tuple[float, float]:
+        """First and last stamp of all files, or of those that hold a tag [s since 1970-01-01 UTC]."""
+        homes = range(len(self.sources)) if tag is None else self._homes[tag]
+        spans = [self.sources[home].span() for home in homes]
         return min(first for first, _ in spans), max(last for _, last in spans)
 
     @property

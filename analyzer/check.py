@@ -1,0 +1,65 @@
+"""What `triage check` says: what was read, and which questions each loop's trends are fit for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from datetime import UTC, datetime
+
+from analyzer.assess import assessable, unfit_for_cause
+from analyzer.config import Config
+from analyzer.history.export import Export
+from analyzer.history.loops_csv import LoopSpec
+from analyzer.quality import Prepared, prepare
+from identification.errors import NotAssessedError, TriageError
+
+
+def _stamp(seconds: float) -> str:
+    return datetime.fromtimestamp(seconds, UTC).strftime("%Y-%m-%d %H:%M:%S")
+
+
+def _tags(spec: LoopSpec) -> str:
+    found = [(role, getattr(spec, role)) for role in ("sp", "pv", "op", "mode", "position")]
+    return ", ".join(f"{role.upper()} {tag}" for role, tag in found if tag)
+
+
+def _fit(prepared: Prepared, config: Config) -> str:
+    """Which questions the record is fit for."""
+    try:
+        assessable(prepared.record, config)
+    except NotAssessedError as error:
+        return f"fit for nothing: {error}"
+    unfit = unfit_for_cause(prepared, config)
+    return (
+        f"fit for oscillation and assessments; not for the cause: {unfit}"
+        if unfit
+        else "fit for all questions"
+    )
+
+
+def loop_line(export: Export, spec: LoopSpec, config: Config) -> tuple[str, bool]:
+    """One loop's line, and whether it cannot be assessed."""
+    if spec.pv is None:
+        return f"{spec.loop}: no PV tag {spec.wanted_pv or spec.loop + '.PV'} in the export", True
+    try:
+        prepared = prepare(spec, export.read(spec.tags), config.quality)
+    except TriageError as error:
+        return f"{spec.loop}: {_tags(spec)}; fit for nothing: {error}", True
+    record = prepared.record
+    fit = _fit(prepared, config)
+    parts = [_tags(spec), f"{len(record)} samples every {record.dt_s:g} s", *prepared.notes, fit]
+    return f"{spec.loop}: " + "; ".join(parts), fit.startswith("fit for nothing")
+
+
+def lines(export: Export, specs: Sequence[LoopSpec], notes: Sequence[str]) -> Iterator[tuple[str, bool]]:
+    """All lines, each with whether a loop of it cannot be assessed."""
+    config = Config()
+    first, last = export.span()
+    yield f"{len(export.tags)} tags, {len(specs)} loops, {_stamp(first)} to {_stamp(last)} UTC", False
+    for note in notes:
+        yield note, False
+    if specs and specs[0].defaults:
+        yield "assumed where loops.csv is silent: " + ", ".join(specs[0].defaults), False
+    for spec in specs:
+        yield loop_line(export, spec, config)
+    for note in export.notes:
+        yield note, False

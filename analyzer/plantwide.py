@@ -1,0 +1,131 @@
+"""Which loop leads and which follow: oscillations of one plant that are one oscillation.
+
+A loop whose error moves with that of another at the same period (coherence over the lines about it, so that
+starts, stops and wanderings of the phase agree, not the period alone) and that shows no fault of its own is a
+follower: its cause is a load, and the loop that has the fault is the source.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from analyzer.config import CauseLimits
+from identification.spectrum import Complex, Spectrum
+
+HALF_BAND = 0.08
+"""Half width of the band that is compared, as a share of the frequency; ours."""
+PIECE, PIECE_LINES = 0.03, 8
+"""Width of the pieces of the band within which the phase may be taken as constant, as a share of the frequency and
+in lines at least: the delay from loop to loop turns it over the whole band."""
+LEAST_LINES = 4
+"""Fewest lines on each side of the period."""
+REACH = 2.0
+"""Lines kept about a loop's own period reach from f/REACH to f*REACH, for neighbours of other periods."""
+
+
+@dataclass(frozen=True, slots=True)
+class Fingerprint:
+    """Lines of a loop's error about its period, small enough to keep for every loop.
+
+    loop; period_s [s]; start_s, duration_s of the record [s]; first, the number of the first line kept; lines,
+    complex, shape (m,).
+    """
+
+    loop: str
+    period_s: float
+    start_s: float
+    duration_s: float
+    first: int
+    lines: Complex
+
+
+def fingerprint(loop: str, period_s: float, start_s: float, s: Spectrum) -> Fingerprint:
+    """Cut the lines about a period out of a spectrum."""
+    line = s.duration_s / period_s
+    first = max(math.floor(line / REACH), 1)
+    last = min(math.ceil(line * REACH), s.lines.size - 1)
+    return Fingerprint(
+        loop, period_s, start_s, s.duration_s, first, s.lines[first : last + 1].astype(np.complex64)
+    )
+
+
+def _cut(f: Fingerprint, low: int, high: int) -> Complex | None:
+    if low < f.first or high >= f.first + f.lines.size:
+        return None
+    return f.lines[low - f.first : high - f.first + 1]
+
+
+def coherence(follower: Fingerprint, leader: Fingerprint) -> float:
+    """Coherence of two errors about the follower's period [-]; 0 where the records do not cover one time."""
+    if abs(follower.start_s - leader.start_s) > 0.02 * follower.period_s:
+        return 0.0
+    if abs(follower.duration_s - leader.duration_s) > 1e-3 * follower.duration_s:
+        return 0.0
+    line = follower.duration_s / follower.period_s
+    half = max(HALF_BAND * line, LEAST_LINES)
+    low, high = max(round(line - half), 1), round(line + half)
+    x, y = _cut(follower, low, high), _cut(leader, low, high)
+    if x is None or y is None:
+        return 0.0
+    pieces = max(x.size // max(PIECE_LINES, round(PIECE * line)), 1)
+    edges = (np.arange(pieces) * x.size) // pieces
+    cross = np.abs(np.add.reduceat(x * y.conj(), edges)) ** 2
+    power = np.add.reduceat(np.abs(x) ** 2, edges) * np.add.reduceat(np.abs(y) ** 2, edges)
+    return float(cross.sum() / power.sum()) if power.sum() > 0 else 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Peer:
+    """What a loop's own verdict says when sources are looked for.
+
+    cause; evidence [nat] of its valve fault; tuning_pct, confidence of its tuning [%].
+    """
+
+    cause: str
+    evidence: float
+    tuning_pct: float
+
+    @property
+    def rank(self) -> float:
+        """How much the loop can be a source: a valve at fault before a tuning, by the evidence."""
+        if self.cause == "valve":
+            return 1000.0 + self.evidence
+        return self.tuning_pct if self.cause == "tuning" else 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """The loop that another one follows, and their coherence [-]."""
+
+    loop: str
+    coherence: float
+
+
+def source_of(
+    own: Fingerprint, prints: Sequence[Fingerprint], peers: Mapping[str, Peer], limits: CauseLimits
+) -> Source | None:
+    """The loop with a better reason to oscillate that this one moves with; None where there is none."""
+    best = None
+    for other in prints:
+        near = abs(math.log(other.period_s / own.period_s)) <= limits.same_period
+        if other.loop == own.loop or not near or peers[other.loop].rank <= peers[own.loop].rank:
+            continue
+        found = coherence(own, other)
+        if found >= limits.coherent and (best is None or found > best.coherence):
+            best = Source(other.loop, found)
+    return best
+
+
+def trace(prints: Sequence[Fingerprint], peers: Mapping[str, Peer], limits: CauseLimits) -> dict[str, Source]:
+    """Followers and their sources; a loop with a valve fault of its own is never made a follower."""
+    known = [p for p in prints if p.loop in peers]
+    found = {
+        own.loop: source_of(own, known, peers, limits)
+        for own in known
+        if peers[own.loop].cause not in ("valve", "none")
+    }
+    return {loop: source for loop, source in found.items() if source is not None}

@@ -1,0 +1,126 @@
+"""Results in words: reasons, actions, tables. The only place that chooses words."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from analyzer.plantwide import Source
+
+SHORT = {
+    "loop": "Loop",
+    "type": "Type",
+    "oscillation_significance": "Signif.",
+    "oscillating_pct": "Osc %",
+    "osc_valve_pct": "Valve %",
+    "osc_tuning_pct": "Tuning %",
+    "osc_load_pct": "Load %",
+    "cause": "Cause",
+    "valve_fault": "Fault",
+    "source_loop": "Source",
+    "period_s": "Period s",
+    "pv_amplitude_pct": "Amplitude %",
+    "average_absolute_error_pct": "Abs error %",
+    "valve_travel_pct_per_h": "Travel %/h",
+    "variability_pct": "Variab. %",
+    "kp": "Kp",
+    "ti": "Ti",
+    "kp_new": "Kp new",
+    "ti_new": "Ti new",
+    "action": "Action",
+    "reason": "Reason",
+    "status": "Status",
+}
+"""Headings of tables for people."""
+
+
+CAUSE_STYLES = {"valve": "red", "tuning": "yellow", "load": "cyan", "undecided": "magenta"}
+"""Colours of causes on the terminal."""
+
+
+def _period(seconds: float) -> str:
+    if seconds < 120:
+        return f"{seconds:.3g} s"
+    return f"{seconds / 60:.3g} min" if seconds < 7200 else f"{seconds / 3600:.3g} h"
+
+
+def _strongest(row: Mapping[str, Any], cause: str) -> str:
+    signs = [s for s in json.loads(row.get("signs") or "[]") if s["points_to"] == cause]
+    return "; ".join(s["text"] for s in sorted(signs, key=lambda s: -s["strength"])[:2])
+
+
+def _valve(row: Mapping[str, Any]) -> str:
+    """What is wrong with the valve, in figures where there are any."""
+    fault = {"backlash": "backlash", "stiction": "stick-slip"}.get(row["valve_fault"], "a valve fault")
+    width = row["stickband_pct"] or row["backlash_pct"]
+    if not width or row["valve_size"] is None:
+        return f"{fault}: {_strongest(row, 'valve')}"
+    share, gain = 100 * row["valve_size"], row["evidence"]
+    return f"{fault} of {width:.2g} % explains PV (log likelihood +{gain:.0f}), {share:.0f} % of OP's range"
+
+
+def reason_of(row: Mapping[str, Any], needs: str = "") -> str:
+    """One sentence on what was found and why."""
+    oscillates = (row["oscillating_pct"] or 0.0) >= 50.0 and row["period_s"]
+    cycle = f"cycles with {_period(row['period_s'])}" if oscillates else "does not oscillate"
+    cause = row["cause"]
+    if cause == "valve":
+        return f"{cycle}; {_valve(row)}"
+    if cause in ("tuning", "load"):
+        return f"{cycle}; {cause}: {_strongest(row, cause)}"
+    if cause == "undecided":
+        return f"{cycle}; cause undecided: {needs or 'the signs do not agree'}"
+    return cycle
+
+
+def advised(row: dict[str, Any], needs: str) -> dict[str, Any]:
+    """The row with action and reason; `needs` says why the cause could not be told, if it could not."""
+    actions = {"none": "none", "load": "none"}
+    return {**row, "action": actions.get(row["cause"], "undecided"), "reason": reason_of(row, needs)}
+
+
+def follower_row(row: Mapping[str, Any], source: Source) -> dict[str, Any]:
+    """The row of a loop that follows another one's oscillation."""
+    text = f"moves with {source.loop}, which has a fault of its own (coherence {source.coherence:.2f})"
+    signs = [{"points_to": "load", "strength": 0.9, "text": text}, *json.loads(row["signs"] or "[]")]
+    changed = {
+        **row,
+        "cause": "load",
+        "source_loop": source.loop,
+        "osc_load_pct": max(row["osc_load_pct"] or 0.0, 100.0 * source.coherence),
+        "osc_tuning_pct": min(row["osc_tuning_pct"] or 0.0, 25.0),
+        "osc_valve_pct": min(row["osc_valve_pct"] or 0.0, 25.0),
+        "action": "see source loop",
+        "signs": json.dumps(signs),
+    }
+    changed["reason"] = f"cycles with {_period(row['period_s'])}; {text}"
+    return changed
+
+
+def figure(value: Any, column: str) -> str:
+    """A cell for people: three digits, empty where not known."""
+    if value is None:
+        return ""
+    if isinstance(value, str):
+        return value
+    if column.endswith("_pct") and column.startswith("osc"):
+        return f"{value:.0f}"
+    return f"{value:.3g}" if abs(value) < 1000 else f"{value:.0f}"
+
+
+def escaped(text: str) -> str:
+    """Text of the plant as text in a Markdown table."""
+    text = text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
+    for mark in "\\|`*[]":
+        text = text.replace(mark, f"\\{mark}")
+    return text.replace("\n", " ").replace("\r", " ")
+
+
+def markdown_table(rows: Sequence[Mapping[str, Any]], columns: Sequence[str]) -> str:
+    """A Markdown table of rows."""
+    head = "| " + " | ".join(SHORT.get(c, c) for c in columns) + " |"
+    rule = "|" + "|".join("---" for _ in columns) + "|"
+    body = ["| " + " | ".join(escaped(figure(r[c], c)) for c in columns) + " |" for r in rows]
+    return "\n".join([head, rule, *body])

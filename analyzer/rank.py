@@ -1,0 +1,111 @@
+"""The morning list from a store, as table, CSV, JSON or Markdown; reads what it shows and no more."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from analyzer.columns import RANK_COLUMNS, TEXT_COLUMNS
+from analyzer.store import Store
+from identification.errors import InputError
+
+TABLE_COLUMNS = (
+    "loop",
+    "oscillation_significance",
+    "oscillating_pct",
+    "osc_valve_pct",
+    "osc_tuning_pct",
+    "osc_load_pct",
+    "period_s",
+    "pv_amplitude_pct",
+    "average_absolute_error_pct",
+    "valve_travel_pct_per_h",
+    "action",
+    "reason",
+)
+"""Columns shown to people."""
+
+Row = Mapping[str, Any]
+
+
+def ranked(
+    store: Store, column: str, top: int | None = None, night: str | None = None, ascending: bool = False
+) -> tuple[list[dict[str, Any]], str]:
+    """Rows of a night, sorted; loops without a figure come last in the order of their names.
+
+    Raises
+    ------
+    InputError
+        Where there is no such store, night or column.
+    """
+    if column not in RANK_COLUMNS:
+        raise InputError(f"column {column!r}", "one of " + ", ".join(RANK_COLUMNS), "correct --by")
+    name = night or store.require()
+    rows = store.read("nights", name, RANK_COLUMNS).to_pylist()
+    known = [r for r in rows if r[column] not in (None, "")]
+    others = sorted((r for r in rows if r[column] in (None, "")), key=lambda r: r["loop"])
+    if column in TEXT_COLUMNS:
+        known.sort(key=lambda r: (r[column], r["loop"]))
+    else:
+        known.sort(key=lambda r: (r[column] if ascending else -r[column], r["loop"]))
+    return (known + others)[:top], name
+
+
+def rendered(rows: Sequence[Row], form: str, night: str) -> str:
+    """Rows as text in one of the formats."""
+    return {"csv": as_csv, "json": as_json, "markdown": as_markdown, "table": as_table}[form](rows, night)
+
+
+def as_csv(rows: Sequence[Row], night: str) -> str:
+    """All columns as CSV, empty where not assessed."""
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(RANK_COLUMNS)
+    writer.writerows(["" if r[c] is None else r[c] for c in RANK_COLUMNS] for r in rows)
+    return out.getvalue().rstrip("\n")
+
+
+def as_json(rows: Sequence[Row], night: str) -> str:
+    """All columns as a JSON list of objects, null where not assessed."""
+    return json.dumps([{c: r[c] for c in RANK_COLUMNS} for r in rows], indent=1)
+
+
+def as_markdown(rows: Sequence[Row], night: str) -> str:
+    """The columns for people as a Markdown table."""
+    from analyzer.present import markdown_table
+
+    return markdown_table(rows, TABLE_COLUMNS)
+
+
+def as_table(rows: Sequence[Row], night: str) -> str:
+    """The columns for people as a table for the terminal."""
+    from rich.box import SIMPLE_HEAD
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    from analyzer.present import CAUSE_STYLES, SHORT, figure
+
+    table = Table(box=SIMPLE_HEAD, title=f"Night {night}", title_justify="left", pad_edge=False)
+    for c in TABLE_COLUMNS:
+        wraps = c == "reason"
+        table.add_column(SHORT[c], justify="left" if c in TEXT_COLUMNS else "right", no_wrap=not wraps)
+    for r in rows:
+        cells = [
+            Text(figure(r[c], c), style=CAUSE_STYLES.get(r["cause"], "") if c == "loop" else "")
+            for c in TABLE_COLUMNS
+        ]
+        table.add_row(*cells)
+    console = Console(width=None if _interactive() else 170)
+    with console.capture() as capture:
+        console.print(table)
+    return "\n".join(line.rstrip() for line in capture.get().rstrip().splitlines())
+
+
+def _interactive() -> bool:
+    import sys
+
+    return sys.stdout.isatty()

@@ -1,0 +1,130 @@
+"""An assessment as rows of tables: the ranking's columns are a contract, the others follow them."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from analyzer.assess import Assessment
+from analyzer.cause import Verdict
+from analyzer.columns import ALL_COLUMNS
+from analyzer.history.loops_csv import LoopSpec
+from identification.hammerstein import Fit
+
+
+def empty_row(spec: LoopSpec, night: str) -> dict[str, Any]:
+    """A row in which nothing but the loop's own facts is known."""
+    row: dict[str, Any] = dict.fromkeys(ALL_COLUMNS)
+    row.update(
+        loop=spec.loop,
+        type=spec.type,
+        area=spec.area,
+        description=spec.description,
+        pv_unit=spec.pv_unit,
+        importance=spec.importance,
+        kp=spec.kp,
+        ti=spec.ti,
+        form=str(spec.form),
+        gain_unit=spec.gain_unit,
+        ti_unit=spec.ti_unit,
+        night=night,
+    )
+    return row
+
+
+def lost_row(spec: LoopSpec, night: str, status: str, reason: str) -> dict[str, Any]:
+    """The row of a loop that was not assessed or failed, with the reason."""
+    return {**empty_row(spec, night), "status": status, "reason": reason}
+
+
+def _process_columns(fit: Fit, duration_s: float) -> dict[str, float | None]:
+    """Process constants; gain and time constant apart only where the time constant is well inside the window."""
+    known = fit.time_constant_s < 0.1 * duration_s
+    return {
+        "gain": fit.gain if known else None,
+        "time_constant_s": fit.time_constant_s if known else None,
+        "slope_pct_per_s": fit.slope,
+        "dead_time_s": fit.dead_time_s,
+    }
+
+
+def _model_columns(verdict: Verdict) -> dict[str, float | None]:
+    m = verdict.measured
+    if m is None or verdict.cause not in ("valve", "tuning"):
+        return {}
+    if verdict.cause == "tuning":
+        return _process_columns(m.linear, m.window.duration_s)
+    if verdict.fault == "stiction" and m.stick_slip is not None:
+        valve = m.stick_slip.valve
+        columns = {"stickband_pct": valve.stickband, "slip_jump_pct": valve.slip_jump}
+        return {**_process_columns(m.stick_slip, m.window.duration_s), **columns}
+    return {**_process_columns(m.play, m.window.duration_s), "backlash_pct": m.play.valve.stickband}
+
+
+def _oscillation_columns(a: Assessment) -> dict[str, Any]:
+    first = a.oscillations.first
+    if first is None:
+        return {"oscillation_significance": 0.0, "oscillating_pct": 0.0, "periods": "[]"}
+    periods = [{"period_s": o.period_s, "amplitude_pct": o.amplitude_pct} for o in a.oscillations.found]
+    return {
+        "oscillation_significance": first.significance,
+        "oscillating_pct": first.oscillating_pct,
+        "period_s": first.period_s,
+        "pv_amplitude_pct": first.amplitude_pct,
+        "regularity": first.rhythm.regularity,
+        "prominence": first.prominence,
+        "correlation": first.rhythm.first,
+        "periods": json.dumps(periods),
+    }
+
+
+def night_row(a: Assessment, spec: LoopSpec, night: str) -> dict[str, Any]:
+    """The row of one loop and night, with every column."""
+    v, m = a.verdict, a.verdict.measured
+    signs = [{"points_to": s.points_to, "strength": round(s.strength, 3), "text": s.text} for s in v.signs]
+    row = {
+        **empty_row(spec, night),
+        **a.night.as_row(),
+        **_oscillation_columns(a),
+        **_model_columns(v),
+        "status": "ok",
+        "osc_valve_pct": v.confidence["valve"],
+        "osc_tuning_pct": v.confidence["tuning"],
+        "osc_load_pct": v.confidence["load"],
+        "cause": v.cause,
+        "valve_fault": v.fault,
+        "start_s": a.start_s,
+        "duration_s": a.duration_s,
+        "evidence": m.evidence if m else None,
+        "valve_size": m.size if m else None,
+        "amplification": m.amplification if m else None,
+        "harris_index": a.harris,
+        "settling_time_s": a.settling_s,
+        "signs": json.dumps(signs),
+        "notes": "; ".join((*a.notes, f"cause not assessed: {v.needs}") if v.needs else a.notes),
+    }
+    return {k: _finite(row.get(k)) for k in ALL_COLUMNS}
+
+
+def _finite(value: Any) -> Any:
+    """None for numbers that are none, so that nothing unknown reaches a table as a number."""
+    if value is None or isinstance(value, str):
+        return value
+    return float(value) if math.isfinite(value) else None
+
+
+def hour_rows(a: Assessment, night: str) -> list[dict[str, Any]]:
+    """Rows of the hourly table."""
+    return [
+        {
+            "loop": a.loop,
+            "night": night,
+            "hour_s": h.start_s,
+            "oscillation_significance": h.oscillation_significance,
+            "oscillating_pct": h.oscillating_pct,
+            **{k: _finite(v) for k, v in h.figures.as_row().items()},
+        }
+        for h in a.hours
+    ]

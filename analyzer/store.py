@@ -1,0 +1,105 @@
+"""Results kept as Parquet: nights, hours, trends; written under a temporary name and renamed.
+
+STORE/nights/NIGHT.parquet   one row a loop (rows.ALL_COLUMNS)
+STORE/hours/NIGHT.parquet    one row a loop and hour
+STORE/trends/NIGHT.parquet   thinned trends, one row a loop and bucket
+STORE/parts/NIGHT/...        the same in pieces while a night is being worked on; a resumed run reads them
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from identification.errors import InputError
+
+TABLES = ("nights", "hours", "trends", "prints")
+
+
+def write_table(table: pa.Table, path: Path) -> None:
+    """Write a table so that a reader sees all of it or nothing."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    pq.write_table(table, temporary, compression="zstd")
+    os.replace(temporary, path)
+
+
+def rows_table(rows: Sequence[Mapping[str, Any]], columns: Sequence[str], texts: Iterable[str]) -> pa.Table:
+    """Rows as a table with fixed types: text or 64-bit float, empty where not known."""
+    text = set(texts)
+    fields = [pa.field(c, pa.string() if c in text else pa.float64()) for c in columns]
+    arrays = [pa.array([row.get(f.name) for row in rows], type=f.type) for f in fields]
+    return pa.Table.from_arrays(arrays, schema=pa.schema(fields))
+
+
+class Store:
+    """A directory of results."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    def nights(self) -> list[str]:
+        """Names of the nights that are complete, oldest first."""
+        return sorted(p.stem for p in (self.path / "nights").glob("*.parquet"))
+
+    def require(self) -> str:
+        """The latest night.
+
+        Raises
+        ------
+        InputError
+            Where the path is no store or holds no complete night.
+        """
+        nights = self.nights()
+        if not nights:
+            seen = "no such directory" if not self.path.exists() else "no complete night in it"
+            raise InputError(f"{self.path}: {seen}", "a store", "run 'triage run EXPORT --store DIR' first")
+        return nights[-1]
+
+    def read(self, table: str, night: str, columns: Sequence[str] | None = None, **where: str) -> pa.Table:
+        """One night of one table; `where` filters on equality (loop="...")."""
+        path = self.path / table / f"{night}.parquet"
+        filters = [(k, "=", v) for k, v in where.items()] or None
+        try:
+            return pq.read_table(path, columns=list(columns) if columns else None, filters=filters)
+        except FileNotFoundError as error:
+            known = ", ".join(self.nights()[-3:]) or "none"
+            raise InputError(
+                f"night {night} is not in {self.path}", f"one of {known}", "check --night"
+            ) from error
+
+    def part(self, night: str, table: str, key: str) -> Path:
+        """Where a piece of a night that is being worked on lies."""
+        return self.path / "parts" / night / f"{table}-{key}.parquet"
+
+    def parts(self, night: str, table: str) -> list[Path]:
+        """Pieces of a night that are complete."""
+        return sorted((self.path / "parts" / night).glob(f"{table}-*.parquet"))
+
+    def begun(self) -> list[str]:
+        """Nights that were begun and not finished."""
+        return sorted(p.name for p in (self.path / "parts").glob("*") if p.is_dir())
+
+    def read_parts(self, night: str, table: str) -> pa.Table | None:
+        """All pieces of one table of a night, None where there are none."""
+        found = [pq.read_table(p) for p in self.parts(night, table)]
+        return pa.concat_tables(found) if found else None
+
+    def finish(self, night: str, rows: pa.Table) -> None:
+        """Put a night together from its pieces and the finished rows, then drop the pieces."""
+        for table in ("hours", "trends"):
+            pieces = self.read_parts(night, table)
+            if pieces is not None:
+                write_table(pieces, self.path / table / f"{night}.parquet")
+        write_table(rows, self.path / "nights" / f"{night}.parquet")
+        self.drop_parts(night)
+
+    def drop_parts(self, night: str) -> None:
+        """Forget the pieces of a night."""
+        shutil.rmtree(self.path / "parts" / night, ignore_errors=True)
