@@ -23,34 +23,6 @@ END_STEPS, FINER = 2, 40
 """Refinements, and points of each, of the frequencies at which a branch begins and ends."""
 REACH_POINTS = 600
 """Frequencies at which a branch is looked at: no pair of solutions further apart than 2 % is missed."""
-PERIODS = 30
-"""Predicted periods that a confirmation simulates at first; ours: the study's loops settle within ten."""
-MOST_STEPS = 600_000
-"""Steps that a confirmation may take in all; some 20 ms."""
-REST_SHARE = 0.45
-"""Amplitude of OP over the width of the play below which a loop rests: no cycle has less than half of it."""
-STEADY = 0.02
-"""Relative change of amplitude from one quarter of the record to the next below which a cycle is steady."""
-KICK = 1.0 + math.sqrt(5.0)
-"""Kick in widths of the play, seen at OP; irrational, lest whole jumps of a sticking stem meet it exactly."""
-NO_LIMIT = 1e9
-"""Output limits [% OP] put out of the way: a cycle scales with the play and must not meet a limit."""
-END_STEPS, FINER = 2, 40
-"""Refinements, and points of each, of the frequencies at which a branch begins and ends."""
-REACH_POINTS = 600
-"""Frequencies at which a branch is looked at: no pair of solutions further apart than 2 % is missed."""
-PERIODS = 30
-"""Predicted periods that a confirmation simulates at first; ours: the study's loops settle within ten."""
-MOST_STEPS = 600_000
-"""Steps that a confirmation may take in all; some 20 ms."""
-REST_SHARE = 0.45
-"""Amplitude of OP over the width of the play below which a loop rests: no cycle has less than half of it."""
-STEADY = 0.02
-"""Relative change of amplitude from one quarter of the record to the next below which a cycle is steady."""
-KICK = 1.0 + math.sqrt(5.0)
-"""Kick in widths of the play, seen at OP; irrational, lest whole jumps of a sticking stem meet it exactly."""
-NO_LIMIT = 1e9
-"""Output limits [% OP] put out of the way: a cycle scales with the play and must not meet a limit."""
 
 
 @dataclass(frozen=True, slots=True)

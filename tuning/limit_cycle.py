@@ -38,36 +38,8 @@ STEADY = 0.02
 """Relative change of amplitude from one quarter of the record to the next below which a cycle is steady."""
 KICK = 1.0 + math.sqrt(5.0)
 """Kick in widths of the play, seen at OP; irrational, lest the stem's travel meet it exactly."""
-NO_LIMIT = 1e9
-"""Output limits [% OP] put out of the way: a cycle scales with the play and must not meet a limit."""
-MOST_STEPS = 600_000
-"""Steps that a confirmation may take in all; some 20 ms."""
-REST_SHARE = 0.45
-"""Amplitude of OP over the width of the play below which a loop rests: no cycle has less than half of it."""
-STEADY = 0.02
-"""Relative change of amplitude from one quarter of the record to the next below which a cycle is steady."""
-KICK = 1.0 + math.sqrt(5.0)
-"""Kick in widths of the play, seen at OP; irrational, lest the stem's travel meet it exactly."""
-NO_LIMIT = 1e9
-"""Output limits [% OP] put out of the way: a cycle scales with the play and must not meet a limit."""
-REST_SHARE = 0.45
-"""Amplitude of OP over the width of the play below which a loop rests: no cycle has less than half of it."""
-STEADY = 0.02
-"""Relative change of amplitude from one quarter of the record to the next below which a cycle is steady."""
-KICK = 1.0 + math.sqrt(5.0)
-"""Kick in widths of the play, seen at OP; irrational, lest the stem's travel meet it exactly."""
-NO_LIMIT = 1e9
-"""Output limits [% OP] put out of the way: a cycle scales with the play and must not meet a limit."""
-STEADY = 0.02
-"""Relative change of amplitude from one quarter of the record to the next below which a cycle is steady."""
-KICK = 1.0 + math.sqrt(5.0)
-"""Kick in widths of the play, seen at OP; irrational, lest the stem's travel meet it exactly."""
-NO_LIMIT = 1e9
-"""Output limits [% OP] put out of the way: a cycle scales with the play and must not meet a limit."""
-KICK = 1.0 + math.sqrt(5.0)
-"""Kick in widths of the play, seen at OP; irrational, lest the stem's travel meet it exactly."""
-NO_LIMIT = 1e9
-"""Output limits [% OP] put out of the way: a cycle scales with the play and must not meet a limit."""
+OTHER_KICKS = (1.37, 1.83)
+"""Further kicks, over the first, for a stem that moves by jumps and rests on the set point by chance."""
 NO_LIMIT = 1e9
 """Output limits [% OP] put out of the way: a cycle scales with the play and must not meet a limit."""
 
@@ -195,7 +167,17 @@ def confirm(loop: Loop, periods: int = PERIODS) -> Confirmed:
     if predicted is not None:
         kick, scale = max(kick, 3.0 * predicted.pv_amplitude), predicted.period_s
     steps = int(min(max(periods * scale / h, 2000), MOST_STEPS))
-    return _settle(loop, steps, kick, width, predicted)
+    found = _settle(loop, steps, kick, width, predicted)
+    for factor in OTHER_KICKS if _jumps(loop) else ():
+        if found.cycle is not None:
+            break
+        found = _settle(loop, steps, factor * kick, width, predicted)
+    return found
+
+
+def _jumps(loop: Loop) -> bool:
+    """Whether the stem moves by whole jumps only, so that integral action never finds a place to rest."""
+    return isinstance(loop.valve, Stiction) and not loop.valve.slides and loop.valve.slip_jump > 0.0
 
 
 def _ramp_s(loop: Loop) -> float:

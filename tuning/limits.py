@@ -27,6 +27,7 @@ class TuningLimits:
     | band_beyond | % OP | play or stickband from which the valve is to be repaired first; ours |
     | spread_slope, spread_delay, spread_band | - | half widths of the uncertainty assumed for want of any |
     | most_steps | scans | load used in the search; ours, for the answer within 2 s |
+    | least_steps | scans | a shorter load does not tell tunings apart; ours |
     | warm_up | - | share of a simulated record left out at its start; ours |
     """
 
@@ -49,6 +50,7 @@ class TuningLimits:
     spread_delay: float = 0.25
     spread_band: float = 0.15
     most_steps: int = 30_000
+    least_steps: int = 1_000
     warm_up: float = 0.1
 
 

@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
+import numpy as np
+
 from identification.models import Loop, Pid
 from identification.record import Floats
 from identification.simulate import scan_step
@@ -29,9 +31,9 @@ from tuning.search import (
 Action = Literal["retune", "repair valve", "see source loop", "none", "undecided"]
 CAUSES = ("valve", "tuning", "load", "none", "undecided")
 
-CONFIRMED = 30
+CONFIRMED = 15
 """Candidates whose limit cycle is simulated, from the best down, before the search gives up."""
-SAMPLES_CONFIRMED = 4
+SAMPLES_CONFIRMED = 3
 """Uncertainty samples on which the chosen candidate's limit cycle is simulated too."""
 SLOWER = 1.25
 """Factor by which SIMC's closed-loop time constant grows until every sample keeps its Ms."""
@@ -87,7 +89,8 @@ def recommend(
     uncertainty : sequence of Loop
         Other loops that the data allow; empty: corners around the loop (tuning.limits).
     load : ndarray of shape (n,) or None
-        Load and noise as they add to PV, on the controller's clock [% PV]; None: steps at the valve.
+        Load and noise as they add to PV, on the controller's clock [% PV]; None, or one too short to tell
+        (tuning.limits): steps at the valve.
     limits : TuningLimits
     source : str
         Name of the loop from which the load comes, if known.
@@ -99,10 +102,14 @@ def recommend(
     Raises
     ------
     ValueError
-        For a cause that is none of the five.
+        For a cause that is none of the five, and for a load that is not finite everywhere.
     """
     if cause not in CAUSES:
         raise ValueError(f"cause is one of {', '.join(CAUSES)}, got {cause!r}")
+    if load is not None and not np.all(np.isfinite(load)):
+        raise ValueError(
+            f"load must be finite, {np.sum(~np.isfinite(load))} of its {load.size} values are not"
+        )
     if cause == "load":
         return Proposal("see source loop" if source else "none", reasons.load(source))
     if cause in ("none", "undecided"):
@@ -135,7 +142,8 @@ def _valve(loop: Loop, others: Sequence[Loop], load: Floats | None, limits: Tuni
     if band(loop.valve) <= 0.0:
         return Proposal("undecided", reasons.no_size())
     before = confirm(loop)
-    load = standard_load(loop, limits.most_steps) if load is None else load
+    if load is None or load.size < limits.least_steps:
+        load = standard_load(loop, limits.most_steps)
     table = bench(loop, others, load, limits)
     now = margins(loop).ms
     if table.travel[0] <= 0.0:

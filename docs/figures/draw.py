@@ -89,10 +89,10 @@ def figure_3() -> Figure:
     return fig
 
 
-def draw_map(ax: Axes, m: TravelMap, nominal: Pid, title: str) -> None:
-    """Travel in white to red, rest in green; the cross marks the nominal tuning."""
+def draw_map(ax: Axes, m: TravelMap, nominal: Pid, title: str, share: float = 0.97) -> None:
+    """Travel in white to red, rest in green; a cross at the nominal tuning; the scale ends at a quantile."""
     travel = np.where(m.travel > 0, m.travel, np.nan)
-    top = float(np.nanquantile(travel, 0.97))
+    top = float(np.nanquantile(travel, share))
     mesh = ax.pcolormesh(m.kp, m.ti_s, travel, cmap="Reds", vmin=0, vmax=top, shading="nearest")
     ax.figure.colorbar(mesh, ax=ax, label="valve travel: OP amplitude / period [% OP / s]", extend="max")
     marks = []
@@ -111,17 +111,19 @@ def draw_map(ax: Axes, m: TravelMap, nominal: Pid, title: str) -> None:
     ax.legend(handles=[*marks, cross], loc="upper right", fontsize=8)
 
 
-def map_figure(loop: Loop, kp: tuple[float, float], ti: tuple[float, float], title: str) -> Figure:
+def map_figure(
+    loop: Loop, kp: tuple[float, float], ti: tuple[float, float], title: str, share: float = 0.97
+) -> Figure:
     """One travel map of the harmonic balance with a continuous controller."""
     m = travel_map(continuous(loop), np.linspace(*kp, 160), np.linspace(*ti, 160))
     fig, ax = plt.subplots(figsize=(6.8, 4.6), layout="constrained")
-    draw_map(ax, m, loop.controller, title)
+    draw_map(ax, m, loop.controller, title, share)
     return fig
 
 
 def figure_4() -> Figure:
     """Travel of the flow loop with play."""
-    return map_figure(FLOW, (0.2, 1.6), (0.3, 4.0), "Flow loop (T/L 2) with 1 % play")
+    return map_figure(FLOW, (0.2, 1.6), (0.3, 4.0), "Flow loop (T/L 2) with 1 % play", 0.85)
 
 
 def figure_5() -> Figure:
@@ -144,7 +146,7 @@ def figure_6() -> Figure:
     ax.set(xscale="log", xlabel="T/L [-]", ylabel="Ti/T [-]", ylim=(0, 1.1), xlim=(2, 500))
     ax.set_xticks([2, 5, 10, 20, 50, 100, 200, 500], [2, 5, 10, 20, 50, 100, 200, 500])
     ax.set_title("Longest integral time at which play still cycles")
-    ax.legend(fontsize=8, loc="lower left")
+    ax.legend(fontsize=8, loc="lower center")
     return fig
 
 
