@@ -35,6 +35,8 @@ CONFIRMED = 15
 """Candidates whose limit cycle is simulated, from the best down, before the search gives up."""
 SAMPLES_CONFIRMED = 3
 """Uncertainty samples on which the chosen candidate's limit cycle is simulated too."""
+APART = 0.15
+"""Difference of ln Kp or ln Ti from which two candidates are confirmed apart."""
 SLOWER = 1.25
 """Factor by which SIMC's closed-loop time constant grows until every sample keeps its Ms."""
 
@@ -183,11 +185,22 @@ def _smaller(after: Confirmed, before: Confirmed, most_growth: float) -> bool:
     return not grown and after.cycle.stem_travel <= before.cycle.stem_travel
 
 
+def _apart(candidates: list[Candidate]) -> list[Candidate]:
+    """Those that differ from every better one by more than `APART`: the rest would share its fate."""
+    kept: list[Candidate] = []
+    for c in candidates:
+        here = np.log([abs(c.controller.kp), c.controller.ti_s])
+        others = [np.log([abs(k.controller.kp), k.controller.ti_s]) for k in kept]
+        if all(np.abs(here - other).max() > APART for other in others):
+            kept.append(c)
+    return kept
+
+
 def _confirmed(
     table: Bench, candidates: tuple[Candidate, ...], before: Confirmed
 ) -> tuple[Candidate, Confirmed] | None:
     """The best candidate worth a change whose simulated limit cycle is none or smaller, on samples too."""
-    worthy = [c for c in candidates if _worth(c, table.limits)][:CONFIRMED]
+    worthy = _apart([c for c in candidates if _worth(c, table.limits)])[:CONFIRMED]
     samples = [(one, confirm(one)) for one in table.loops[1 : 1 + SAMPLES_CONFIRMED]] if worthy else []
     limits = table.limits
     growth = limits.cycle_growth if is_play(table.loops[0].valve) else limits.cycle_growth_stick
