@@ -10,11 +10,16 @@ import numpy as np
 
 from identification.models import Estimate, Loop, Pid
 from identification.record import Floats, LoopRecord
-from identification.simulate import closed_loop
+from identification.simulate import closed_loop, scan_step
+from tuning.describing import band, is_play
+from tuning.limit_cycle import KICK
 from tuning.limits import LIMITS
+from tuning.linear import slowest_s
 
 BLOCKS = 12
 """Blocks that a record is cut into for the bootstrap; ours: a block holds cycles enough to be counted."""
+PRELUDE = 6.0
+"""Length of the time between kick and record over the loop's slowest time; ours."""
 DRAWS = 200
 """Bootstrap draws over all loops together."""
 
@@ -55,11 +60,26 @@ class Forecast:
 def run(loop: Loop, load: Floats, op_start: float | None = None) -> LoopRecord:
     """The loop at a constant set point of 0 under a load on the controller's clock, shape (n,) [% PV].
 
-    op_start [% OP] is the OP at rest; None takes the middle of the controller's range.
+    op_start [% OP] is the OP at rest; None takes the middle of the controller's range. A loop with play
+    is kicked once before the record begins: from rest a small load would leave it inside its play, where a
+    plant that cycles is not. Stick-slip needs no kick, for integral action drives it off.
     """
     c = loop.controller
     start = 0.5 * (c.op_lo + c.op_hi) if op_start is None else op_start
-    return closed_loop(loop, np.zeros(load.size), load, op_start=start)
+    before = _prelude(loop, load)
+    whole = np.concatenate((before, load))
+    record = closed_loop(loop, np.zeros(whole.size), whole, op_start=start)
+    return record.span(before.size, whole.size)
+
+
+def _prelude(loop: Loop, load: Floats) -> Floats:
+    """The load's first value, a kick for a while, and the first value again [% PV]; empty without play."""
+    width = band(loop.valve)
+    if not is_play(loop.valve) or width <= 0.0 or load.size == 0:
+        return np.empty(0)
+    hold = int(min(max(PRELUDE * slowest_s(loop) / scan_step(loop), 300), load.size))
+    kick = KICK * width / abs(loop.controller.kp)
+    return load[0] + kick * np.repeat([0.0, 1.0, 0.0], [1, hold // 2, hold])
 
 
 def autocorrelation_peak(error: Floats) -> float:

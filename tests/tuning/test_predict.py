@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from tuning_cases import backlash_case
 
-from identification.models import Fopdt, Loop, Pid
+from identification.models import Backlash, Fopdt, Loop, Pid
 from identification.record import LoopRecord
 from tuning.limits import LIMITS
 from tuning.predict import NAMES, assess, autocorrelation_peak, predict
@@ -82,3 +82,13 @@ def test_short_load_is_refused():
     case = backlash_case(0)
     with pytest.raises(ValueError, match="needs 120 scans of load, has 50"):
         predict(case.loop, case.loop.controller, case.load[:50])
+
+
+def test_quiet_load_does_not_hide_a_cycle():
+    """Under a load too small to move the stem from rest a loop that cycles is still forecast to cycle."""
+    loop = Loop(Fopdt(80, 200, 1), Pid(1.0, 10.0), Backlash(1.0))
+    quiet = 0.002 * np.random.default_rng(0).normal(size=4000)
+    f = predict(loop, Pid(1.0, 220.0), quiet)
+    assert f.before["stem_travel"].value == pytest.approx(65.9, rel=0.05)
+    assert f.after["stem_travel"].value < 5
+    assert f.before["oscillation"].value > 0.3
