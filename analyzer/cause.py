@@ -30,6 +30,7 @@ from identification.hammerstein import (
     IDEAL,
     Fit,
     Window,
+    better_linear,
     block_means,
     fit_linear,
     fit_play,
@@ -175,6 +176,7 @@ def measure(
     controller = controller or recovered(record, scale)
     linear = fit_linear(window, scale)
     play = fit_play(window, linear, scale)
+    linear = better_linear(window, linear, play)
     best, stick, jump = play, None, 0.0
     if _worth_a_jump(play, linear, window, oscillation):
         stick = fit_stick_slip(window, play, scale)
@@ -272,7 +274,7 @@ def is_clockwork(m: Measured, o: Oscillation, limits: CauseLimits) -> bool:
     if m.saturated > limits.at_limits:
         return False
     decay = math.exp(-3 * math.pi / max(m.amplification or 1.0, 1e-3))
-    return o.rhythm.third >= min(limits.narrow, decay + limits.steadier)
+    return o.rhythm.third >= min(limits.narrow, max(decay + limits.steadier, limits.fairly_narrow))
 
 
 def tuning_signs(m: Measured, o: Oscillation, limits: CauseLimits) -> list[Sign]:

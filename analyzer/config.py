@@ -115,6 +115,8 @@ class CauseLimits:
     usual upper bound of good tuning (Astrom, Hagglund 2006)."""
     narrow: float = 0.93
     """Correlation after three periods from which a period is kept as by a clock [-]."""
+    fairly_narrow: float = 0.85
+    """The same where it also exceeds by `steadier` what the identified resonance would give [-]."""
     steadier: float = 0.3
     """The same above what the loop's own resonance would give [-]; ours: the scatter over 50 periods is 0.1."""
     at_limits: float = 0.02
@@ -129,6 +131,10 @@ class CauseLimits:
     """Independent signs that a named cause needs [-]."""
     coherent: float = 0.6
     """Coherence at the period from which one loop follows another [-]."""
+    follows: float = 0.8
+    """Coherence from which even a loop whose own valve seems at fault follows another [-]; ours."""
+    outweighs: float = 4.0
+    """Evidence of the other valve over its own from which it does [-]; ours."""
     same_period: float = 0.06
     """Largest relative difference of periods that count as one [-]."""
 

@@ -105,27 +105,40 @@ class Source:
     coherence: float
 
 
+def _may_follow(own: Peer, other: Peer, level: float, limits: CauseLimits) -> bool:
+    """Whether one loop can follow another at this coherence.
+
+    A loop whose own valve seems at fault follows only one whose valve is so by far more evidence: what comes from
+    a neighbour's stem looks like stem motion in the follower too, but explains it worse.
+    """
+    if other.rank <= own.rank or level < limits.coherent:
+        return False
+    if own.cause != "valve":
+        return True
+    return (
+        other.cause == "valve"
+        and level >= limits.follows
+        and other.evidence >= limits.outweighs * own.evidence
+    )
+
+
 def source_of(
     own: Fingerprint, prints: Sequence[Fingerprint], peers: Mapping[str, Peer], limits: CauseLimits
 ) -> Source | None:
     """The loop with a better reason to oscillate that this one moves with; None where there is none."""
     best = None
     for other in prints:
-        near = abs(math.log(other.period_s / own.period_s)) <= limits.same_period
-        if other.loop == own.loop or not near or peers[other.loop].rank <= peers[own.loop].rank:
+        if other.loop == own.loop or abs(math.log(other.period_s / own.period_s)) > limits.same_period:
             continue
         found = coherence(own, other)
-        if found >= limits.coherent and (best is None or found > best.coherence):
+        follows = _may_follow(peers[own.loop], peers[other.loop], found, limits)
+        if follows and (best is None or found > best.coherence):
             best = Source(other.loop, found)
     return best
 
 
 def trace(prints: Sequence[Fingerprint], peers: Mapping[str, Peer], limits: CauseLimits) -> dict[str, Source]:
-    """Followers and their sources; a loop with a valve fault of its own is never made a follower."""
-    known = [p for p in prints if p.loop in peers]
-    found = {
-        own.loop: source_of(own, known, peers, limits)
-        for own in known
-        if peers[own.loop].cause not in ("valve", "none")
-    }
+    """Followers and their sources."""
+    known = [p for p in prints if p.loop in peers and peers[p.loop].cause != "none"]
+    found = {own.loop: source_of(own, known, peers, limits) for own in known}
     return {loop: source for loop, source in found.items() if source is not None}

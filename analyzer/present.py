@@ -88,6 +88,7 @@ def follower_row(row: Mapping[str, Any], source: Source) -> dict[str, Any]:
     changed = {
         **row,
         "cause": "load",
+        "valve_fault": "none",
         "source_loop": source.loop,
         "osc_load_pct": max(row["osc_load_pct"] or 0.0, 100.0 * source.coherence),
         "osc_tuning_pct": min(row["osc_tuning_pct"] or 0.0, 25.0),

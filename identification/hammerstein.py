@@ -9,12 +9,12 @@ known. Gain and the c are solved linearly, time constant and dead time are searc
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numba import njit
 
-from identification.innovations import arx_noise, autoregression, judged_mask, notch, whiten
+from identification.innovations import arx_noise, judged_mask, notch, whiten
 from identification.record import Floats, Mask
 from identification.valve import RESTS, stem_step
 
@@ -316,21 +316,6 @@ def best_of(prepared: Prepared, starts: list[tuple[float, float]]) -> tuple[floa
     return min(starts, key=lambda s: prepared.score(*s)[0])
 
 
-def finish(prepared: Prepared, time_constant_s: float, dead_time_s: float) -> Fit:
-    """The fit at given dynamics."""
-    sigma2, count, beta = prepared.score(time_constant_s, dead_time_s)
-    return Fit(
-        float(beta[0]),
-        time_constant_s,
-        dead_time_s,
-        prepared.valve,
-        float(sigma2),
-        int(count),
-        prepared.ar,
-        beta[1:],
-    )
-
-
 def residual(window: Window, fit: Fit) -> Floats:
     """PV less the response to the stem [% PV], shape (n,): load and noise, with the model's slow terms in it."""
     x = lag(stem_of(window, fit.valve), *unit_lag(fit.time_constant_s, fit.dead_time_s, window.dt_s))
@@ -344,9 +329,7 @@ def disturbance(window: Window, fit: Fit) -> Floats:
     decay = np.exp(-np.arange(n) * window.dt_s / fit.time_constant_s)
     if fit.time_constant_s > 0.5 * window.duration_s:
         decay[:] = 0.0
-    scale = max(1.0 + float(fit.ar.sum()), 1e-6) if fit.ar.size else 1.0
-    free = fit.base[2] * decay / scale if scale else 0.0
-    return residual(window, fit) - fit.base[0] - fit.base[1] * t - free
+    return residual(window, fit) - fit.base[0] - fit.base[1] * t - fit.base[2] * decay
 
 
 def starts(window: Window, period_s: float) -> list[tuple[float, float]]:
@@ -358,104 +341,212 @@ def starts(window: Window, period_s: float) -> list[tuple[float, float]]:
 
 
 Dynamics = tuple[float, float]
+ITERATIONS = 25
+"""Gauss-Newton steps at most; ours: nine in ten fits stop before the fifteenth."""
+SETTLED = 0.01
+"""Gain in log likelihood [nat] below which the steps stop."""
 
 
-def refit(
-    window: Window,
-    prepared: Prepared,
-    dynamics: Dynamics,
-    rounds: int = 2,
-    anew: list[Dynamics] | None = None,
-) -> Fit:
-    """Noise model and dynamics refitted in turns from a start.
+@njit(cache=True)
+def _sensitivities(
+    y: Floats, stem: Floats, wider: Floats, width_step: float, theta: Floats, order: int, dt: float
+) -> tuple[Floats, Floats]:
+    """Innovations, shape (n,), and their derivatives, shape (n, 7 + order), at theta = log T, L, width, K, 1, t,
+    decay, A; the derivative by the width is that of the given wider stem."""
+    n = y.size
+    t_s, dead = math.exp(theta[0]), theta[1]
+    pole, now, before, delay = unit_lag(t_s, dead, dt)
+    x = lag(stem, pole, now, before, delay)
+    pole2, now2, before2, delay2 = unit_lag(t_s * 1.01, dead, dt)
+    x_t = (lag(stem, pole2, now2, before2, delay2) - x) / math.log(1.01)
+    step = 0.05 * dt
+    pole3, now3, before3, delay3 = unit_lag(t_s, dead + step, dt)
+    x_l = (lag(stem, pole3, now3, before3, delay3) - x) / step
+    x_w = (lag(wider, pole, now, before, delay) - x) / width_step if width_step > 0 else np.zeros(n)
+    columns = np.zeros((n, 7 + order))
+    r = np.empty(n)
+    free = 1.0
+    outlasts = t_s > 0.5 * n * dt
+    gain = theta[3]
+    for k in range(n):
+        t = 2.0 * k / n - 1.0
+        d = 0.0 if outlasts else free
+        r[k] = y[k] - gain * x[k] - theta[4] - theta[5] * t - theta[6] * d
+        columns[k, 0] = -gain * x_t[k]
+        columns[k, 1] = -gain * x_l[k]
+        columns[k, 2] = -gain * x_w[k]
+        columns[k, 3] = -x[k]
+        columns[k, 4] = -1.0
+        columns[k, 5] = -t
+        columns[k, 6] = -d
+        free *= pole
+    e = whiten(r, theta[7:])
+    for j in range(7):
+        columns[:, j] = whiten(columns[:, j].copy(), theta[7:])
+    for k in range(order, n):
+        for i in range(order):
+            columns[k, 7 + i] = r[k - 1 - i]
+    return e, columns
 
-    `anew` are starts that are tried again under the first new noise model, where the old one came from another
-    valve and may have led to another minimum.
+
+def _steps(gram: Floats, slope: Floats, damping: float, frozen: list[int]) -> Floats:
+    """A damped Gauss-Newton step; frozen parameters stay."""
+    scale = np.diag(gram) + 1e-12 * np.trace(gram) + 1e-300
+    damped = gram + damping * np.diag(scale)
+    for j in frozen:
+        damped[j, :], damped[:, j], damped[j, j] = 0.0, 0.0, 1.0
+        slope = slope.copy()
+        slope[j] = 0.0
+    return np.linalg.lstsq(damped / np.sqrt(np.outer(scale, scale)), slope / np.sqrt(scale), rcond=1e-12)[
+        0
+    ] / np.sqrt(scale)
+
+
+@dataclass(frozen=True, slots=True)
+class _Trial:
+    """One point of the Gauss-Newton descent."""
+
+    theta: Floats
+    valve: ValveTrial
+    loss: float
+    count: int
+    gram: Floats
+    slope: Floats
+
+
+def _trial(window: Window, y: Floats, theta: Floats, valve: ValveTrial, free_width: bool) -> _Trial:
+    order = theta.size - 7
+    stem = stem_of(window, valve)
+    step = 0.01 * valve.stickband if free_width else 0.0
+    wider = stem_of(window, _widened(valve, step)) if free_width else stem
+    e, columns = _sensitivities(y, stem, wider, step, theta, order, window.dt_s)
+    judged = judged_mask(window.usable, order)
+    e, columns = e[judged], columns[judged]
+    return _Trial(theta, valve, float(e @ e) / e.size, e.size, columns.T @ columns, -(columns.T @ e))
+
+
+def _widened(valve: ValveTrial, step: float) -> ValveTrial:
+    """The valve with a wider stickband, its jump share kept."""
+    share = valve.slip_jump / valve.stickband if valve.stickband > 0 else 0.0
+    return sticking(valve.stickband + step, share, valve.tolerance)
+
+
+def _moved(window: Window, trial: _Trial, step: Floats, free_width: bool) -> tuple[Floats, ValveTrial] | None:
+    """Parameters after a step, None where it leaves what is searched."""
+    theta = trial.theta + step
+    most_t, most_dead = window.bounds
+    theta[0] = min(max(theta[0], math.log(0.05 * window.dt_s)), math.log(most_t))
+    theta[1] = min(max(theta[1], 0.0), most_dead)
+    if not free_width:
+        return theta, trial.valve
+    width = trial.valve.stickband + step[2]
+    if width <= 0.2 * trial.valve.stickband:
+        return None
+    theta[2] = width
+    return theta, _widened(trial.valve, step[2])
+
+
+def descend(window: Window, fit: Fit, free_width: bool = False) -> Fit:
+    """All constants of a model together to the least innovations variance, by damped Gauss-Newton steps.
+
+    Time constant, dead time, gain, slow terms and the noise model, and with `free_width` the stickband, move at
+    once, because they trade against each other along narrow valleys.
     """
-    fit = finish(prepared, *compass(prepared, dynamics))
-    for k in range(rounds):
-        ar = autoregression(residual(window, fit), window.usable, fit.ar.size)
-        prepared = prepare(window, fit.valve, ar, prepared.notch_period)
-        here = (fit.time_constant_s, fit.dead_time_s)
-        if k == 0 and anew:
-            here = best_of(prepared, [here, *anew])
-        fit = finish(prepared, *compass(prepared, here, 3))
-    return fit
+    y = window.y - window.y.mean()
+    theta = np.concatenate(
+        ([math.log(fit.time_constant_s), fit.dead_time_s, fit.valve.stickband, fit.gain], fit.base, fit.ar)
+    )
+    best = _trial(window, y, theta, fit.valve, free_width)
+    damping = 1e-3
+    frozen = [] if free_width else [2]
+    for _ in range(ITERATIONS):
+        moved = _moved(window, best, _steps(best.gram, best.slope, damping, frozen), free_width)
+        trial = _trial(window, y, *moved, free_width) if moved is not None else None
+        if trial is None or not trial.loss < best.loss:
+            damping *= 10
+            if damping > 1e4:
+                break
+            continue
+        gained = 0.5 * best.count * math.log(best.loss / max(trial.loss, 1e-300))
+        best, damping = trial, max(damping / 5, 1e-7)
+        if gained < SETTLED:
+            break
+    return _fitted(best)
 
 
-def fit_linear(window: Window, period_s: float, notch_out: bool = False) -> Fit:
+def _fitted(trial: _Trial) -> Fit:
+    t = trial.theta
+    return Fit(
+        float(t[3]),
+        float(math.exp(t[0])),
+        float(t[1]),
+        trial.valve,
+        max(trial.loss, 1e-14),
+        trial.count,
+        t[7:].copy(),
+        t[4:7].copy(),
+    )
+
+
+def begin(prepared: Prepared, dynamics: Dynamics) -> Fit:
+    """The fit at given dynamics under a given noise model, a start for the descent."""
+    sigma2, count, beta = prepared.score(*dynamics)
+    t, dead = dynamics
+    base = np.array([beta[1], beta[2], 0.0])
+    return Fit(float(beta[0]), t, dead, prepared.valve, float(sigma2), int(count), prepared.ar, base)
+
+
+def fit_linear(window: Window, period_s: float) -> Fit:
     """The process behind an ideal valve.
 
     Parameters
     ----------
     window : Window
     period_s : float
-        Period of the oscillation [s], which sets the scale of the search.
-    notch_out : bool
-        Whether the band about the period is left out, for loops under a load with a line there.
+        Period of the oscillation, or other scale of the loop [s], about which the search begins.
     """
     stem = stem_of(window, IDEAL)
     ar = arx_noise(window.y - window.y.mean(), stem, window.usable, AR_ORDER, INPUT_LAGS)
-    prepared = prepare(window, IDEAL, ar, period_s / window.dt_s if notch_out else 0.0)
-    return refit(window, prepared, best_of(prepared, starts(window, period_s)))
+    prepared = prepare(window, IDEAL, ar)
+    ranked = sorted(starts(window, period_s), key=lambda s: prepared.score(*s)[0])
+    fits = [descend(window, begin(prepared, compass(prepared, s, 3))) for s in ranked[:LINEAR_STARTS]]
+    return max(fits, key=lambda fit: fit.log_likelihood)
 
 
+LINEAR_STARTS = 2
+"""Starts of the plain process that are followed to the end; ours."""
 STICKBAND_SHARES = (0.06, 0.12, 0.2, 0.3, 0.42, 0.55, 0.7, 0.85, 1.0)
 """Stickbands tried first, as shares of OP's range; a valve much wider than OP's range would not move at all."""
-JUMP_SHARES = (0.3, 0.7)
-"""Slip jumps tried first, as shares of the stickband."""
+JUMP_SHARES = (0.15, 0.3, 0.5, 0.75, 1.0)
+"""Slip jumps tried, as shares of the stickband."""
 COAST_SHARES = (0.0, 0.15)
 """Turnings of OP that a sliding stem ignores, as shares of the stickband: none, and OP's noise; ours."""
-REFITTED = 3
-"""Candidates of a scan that are refitted whole; ours: the best of the scan is among its first three."""
+FOLLOWED = 3
+"""Candidates of a scan that are followed to the end; ours: the best of the scan is among its first three."""
+
+
+GENERIC = -0.95
+"""First coefficient of a noise model that knows nothing: nearly a difference. A noise model that was fitted with
+another valve takes that valve's side, so candidates are ranked by both."""
+
+
+def _ranked(window: Window, ar: Floats, valves: list[ValveTrial], begins: list[Dynamics]) -> list[Fit]:
+    """Valves with dynamics searched anew under one noise model, best first."""
+    trials = []
+    for valve in valves:
+        prepared = prepare(window, valve, ar)
+        trials.append(begin(prepared, compass(prepared, best_of(prepared, begins), 2)))
+    return sorted(trials, key=lambda fit: fit.sigma2)
 
 
 def _scan(window: Window, near: Fit, valves: list[ValveTrial], period_s: float) -> list[Fit]:
-    """Valves tried with dynamics searched anew; the best few refitted whole, best first."""
+    """Valves tried under two noise models; the best few of each followed to the end, best first."""
     begins = [(near.time_constant_s, near.dead_time_s), *starts(window, period_s)]
-    trials = []
-    for valve in valves:
-        prepared = prepare(window, valve, near.ar)
-        t, dead = compass(prepared, best_of(prepared, begins), 2)
-        trials.append((prepared.score(t, dead)[0], prepared, (t, dead)))
-    trials.sort(key=lambda trial: trial[0])
-    fits = [refit(window, prepared, dynamics, 3, begins) for _, prepared, dynamics in trials[:REFITTED]]
+    generic = np.zeros(near.ar.size)
+    generic[0] = GENERIC
+    chosen = [fit for ar in (generic, near.ar) for fit in _ranked(window, ar, valves, begins)[:FOLLOWED]]
+    fits = [descend(window, fit, free_width=True) for fit in chosen]
     return sorted(fits, key=lambda fit: -fit.log_likelihood)
-
-
-def _better_neighbour(window: Window, best: Fit, valves: list[ValveTrial]) -> Fit | None:
-    """The first neighbour, refitted from the best so far, that is better by more than rounding."""
-    for valve in valves:
-        prepared = prepare(window, valve, best.ar)
-        trial = refit(window, prepared, (best.time_constant_s, best.dead_time_s), 1)
-        if trial.log_likelihood > best.log_likelihood + 0.02:
-            return trial
-    return None
-
-
-def _neighbours(valve: ValveTrial, step_s: float, step_j: float) -> list[ValveTrial]:
-    """Valves one step away in stickband and in slip jump."""
-    share = valve.slip_jump / valve.stickband
-    near = [(valve.stickband + d, share) for d in (step_s, -step_s)]
-    if step_j > 0:
-        near += [(valve.stickband, min(max(share + d, 0.0), 1.2)) for d in (step_j, -step_j)]
-        near += [
-            (valve.stickband + step_s, max(share - step_j, 0.0)),
-            (valve.stickband - step_s, share + step_j),
-        ]
-    return [sticking(s, j, valve.tolerance) for s, j in near if s > 0]
-
-
-def _polish(window: Window, best: Fit, reach: float, jumps: bool) -> Fit:
-    """Valve and dynamics walked downhill together."""
-    for scale in (0.06, 0.03, 0.015):
-        while True:
-            near = _neighbours(best.valve, scale * reach, 3 * scale if jumps else 0.0)
-            found = _better_neighbour(window, best, near)
-            if found is None:
-                break
-            best = found
-    return best
 
 
 def fit_play(window: Window, linear: Fit, period_s: float) -> Fit:
@@ -469,20 +560,44 @@ def fit_play(window: Window, linear: Fit, period_s: float) -> Fit:
     period_s : float
         Scale of the search [s].
     """
-    reach = window.op_range
+    reach = max(window.op_range, 1e-9)
     fits = _scan(window, linear, [sticking(share * reach, 0.0) for share in STICKBAND_SHARES], period_s)
-    return _polish(window, fits[0], reach, jumps=False)
+    best = fits[0]
+    for scale in (1.1, 0.9):
+        trial = descend(window, replace(best, valve=_scaled(best.valve, scale)), free_width=True)
+        best = max(best, trial, key=lambda fit: fit.log_likelihood)
+    return best
+
+
+def better_linear(window: Window, linear: Fit, play: Fit) -> Fit:
+    """The better of the plain fit and one followed from the dynamics that were found behind a play.
+
+    The plain process is the play of no width; found from there it is never unfairly behind.
+    """
+    trial = descend(window, replace(play, valve=IDEAL))
+    return max(linear, trial, key=lambda fit: fit.log_likelihood)
+
+
+def _scaled(valve: ValveTrial, factor: float) -> ValveTrial:
+    return _widened(valve, (factor - 1.0) * valve.stickband)
 
 
 def fit_stick_slip(window: Window, play: Fit, period_s: float) -> Fit:
     """The best stick-slip (J > 0, sliding after a jump) followed by a lag, scanned whole and about the play."""
-    reach = window.op_range
-    widths = {round(s, 4) for s in STICKBAND_SHARES[2:]} | {play.valve.stickband / reach}
+    reach = max(window.op_range, 1e-9)
+    near = play.valve.stickband / reach
+    widths = {round(s, 4) for s in STICKBAND_SHARES[3:]} | {near, 1.07 * near, 1.15 * near}
     valves = [
         sticking(width * reach, jump, coast * width * reach)
-        for width in widths
+        for width in sorted(widths)
         for jump in JUMP_SHARES
         for coast in COAST_SHARES
     ]
-    fits = _scan(window, play, valves, period_s)
-    return _polish(window, fits[0], reach, jumps=True)
+    near_play = [
+        descend(
+            window, replace(play, valve=sticking(grown * play.valve.stickband, jump, coast)), free_width=True
+        )
+        for jump, grown in ((0.15, 1.0), (0.4, 1.1), (0.8, 1.1))
+        for coast in (0.0, 0.15 * play.valve.stickband)
+    ]
+    return max([*near_play, *_scan(window, play, valves, period_s)[:1]], key=lambda fit: fit.log_likelihood)
