@@ -219,7 +219,8 @@ def recovered(record: LoopRecord, scale_s: float) -> Pid | None:
 def _worth_a_jump(play: Fit, linear: Fit, window: Window, oscillation: Oscillation | None) -> bool:
     """Whether stick-slip is fitted as well: where a play helps at all, and on short records, where it is cheap."""
     gained = play.log_likelihood - linear.log_likelihood
-    return gained > 3.0 or (oscillation is None and window.y.size < 1500)
+    wide = play.valve.stickband > 0.25 * window.op_range
+    return (gained > 3.0 and wide) or (oscillation is None and window.y.size < 1500)
 
 
 def _amplification(fit: Fit, controller: Pid | None, period_s: float) -> tuple[float | None, bool]:

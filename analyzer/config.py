@@ -82,9 +82,9 @@ class CauseLimits:
     simulated plant set it.
     """
 
-    window: int = 2500
+    window: int = 1800
     """Blocks of the record that are fitted [-]; more cost time and change no verdict."""
-    blocks_per_period: float = 40.0
+    blocks_per_period: float = 30.0
     """Blocks per period [-]."""
     fast_process: tuple[tuple[str, float, float], ...] = (("flow", 60.0, 30.0),)
     """Types with largest time constant and dead time [s] of loop types whose process is fast: a flow answers its valve within

@@ -228,6 +228,10 @@ def score(
     return left, count, beta
 
 
+Dynamics = tuple[float, float]
+"""Time constant and dead time [s]."""
+
+
 @dataclass(frozen=True, slots=True)
 class Prepared:
     """A window, a valve and a noise model, whitened once for many dynamics."""
@@ -241,20 +245,15 @@ class Prepared:
     first: int
     notch_period: float
 
+    @property
+    def level(self) -> float:
+        """A(1)."""
+        return max(1.0 + float(self.ar.sum()), 1e-6)
+
     def score(self, time_constant_s: float, dead_time_s: float) -> tuple[float, int, Floats]:
         """Innovations variance, count and coefficients for a time constant and a dead time [s]."""
-        level = max(1.0 + float(self.ar.sum()), 1e-6)
-        w = self.window
-        return score(
-            self.white_y,
-            self.white_stem,
-            self.judged,
-            level,
-            self.first,
-            time_constant_s,
-            dead_time_s,
-            w.dt_s,
-        )
+        args = (self.white_y, self.white_stem, self.judged, self.level, self.first)
+        return score(*args, time_constant_s, dead_time_s, self.window.dt_s)
 
 
 def _filtered(x: Floats, ar: Floats, notch_period: float) -> Floats:
@@ -282,38 +281,59 @@ def prepare(window: Window, valve: ValveTrial, ar: Floats, notch_period: float =
     )
 
 
-def compass(prepared: Prepared, start: tuple[float, float], halvings: int = 4) -> tuple[float, float]:
-    """Time constant and dead time [s] of least innovations variance near a start, by compass search."""
-    dt = prepared.window.dt_s
-    most_t, most_dead = prepared.window.bounds
-
-    def value(log_t: float, dead: float) -> float:
-        if not 0 <= dead <= most_dead or not 0.05 * dt <= math.exp(log_t) <= most_t:
-            return math.inf
-        return math.log(prepared.score(math.exp(log_t), dead)[0])
-
-    best = (
-        min(max(math.log(start[0]), math.log(0.1 * dt)), math.log(0.9 * most_t)),
-        min(start[1], most_dead),
-    )
-    least = value(*best)
+@njit(cache=True)
+def _least(
+    y: Floats,
+    stem: Floats,
+    judged: Mask,
+    level: float,
+    first: int,
+    dt: float,
+    begins: Floats,
+    bounds: tuple[float, float],
+    halvings: int,
+) -> tuple[float, float, float]:
+    """Best of the starts (rows of log time constant and dead time), then compass search from there."""
+    best_t, best_d, least = begins[0, 0], begins[0, 1], np.inf
+    for i in range(begins.shape[0]):
+        found = score(y, stem, judged, level, first, math.exp(begins[i, 0]), begins[i, 1], dt)[0]
+        if found < least:
+            best_t, best_d, least = begins[i, 0], begins[i, 1], found
+    low_t, high_t = math.log(0.05 * dt), math.log(bounds[0])
     step_t, step_d = 0.4, 2.0 * dt
+    moves = ((1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0), (1.0, -1.0))
     for _ in range(halvings):
         moved = True
         while moved:
             moved = False
-            for d_t, d_d in ((step_t, 0.0), (-step_t, 0.0), (0.0, step_d), (0.0, -step_d), (step_t, -step_d)):
-                trial = (best[0] + d_t, best[1] + d_d)
-                found = value(*trial)
-                if found < least - 1e-7:
-                    best, least, moved = trial, found, True
+            for m_t, m_d in moves:
+                t, d = best_t + m_t * step_t, best_d + m_d * step_d
+                if d < 0 or d > bounds[1] or t < low_t or t > high_t:
+                    continue
+                found = score(y, stem, judged, level, first, math.exp(t), d, dt)[0]
+                if found < least * (1 - 1e-6):
+                    best_t, best_d, least, moved = t, d, found, True
         step_t, step_d = step_t / 2, step_d / 2
-    return math.exp(best[0]), best[1]
+    return math.exp(best_t), best_d, least
 
 
-def best_of(prepared: Prepared, starts: list[tuple[float, float]]) -> tuple[float, float]:
-    """The start (time constant, dead time) of least innovations variance."""
-    return min(starts, key=lambda s: prepared.score(*s)[0])
+def search(prepared: Prepared, begins: list[Dynamics], halvings: int = 3) -> Dynamics:
+    """Time constant and dead time [s] of least innovations variance: the best start, then compass search."""
+    most_t, most_dead = prepared.window.bounds
+    dt = prepared.window.dt_s
+    rows = np.array([[math.log(min(max(t, 0.06 * dt), 0.95 * most_t)), min(d, most_dead)] for t, d in begins])
+    t, dead, _ = _least(
+        prepared.white_y,
+        prepared.white_stem,
+        prepared.judged,
+        prepared.level,
+        prepared.first,
+        dt,
+        rows,
+        (most_t, most_dead),
+        halvings,
+    )
+    return t, dead
 
 
 def residual(window: Window, fit: Fit) -> Floats:
@@ -332,15 +352,14 @@ def disturbance(window: Window, fit: Fit) -> Floats:
     return residual(window, fit) - fit.base[0] - fit.base[1] * t - fit.base[2] * decay
 
 
-def starts(window: Window, period_s: float) -> list[tuple[float, float]]:
+def starts(window: Window, period_s: float) -> list[Dynamics]:
     """Starts of the search: time constants and dead times spread over the period [s]."""
-    times = [period_s * s for s in (0.03, 0.1, 0.3, 1.0, 5.0)]
-    deads = [period_s * s for s in (0.0, 0.04, 0.1, 0.2, 0.35)]
+    times = [period_s * s for s in (0.03, 0.12, 0.5, 2.5)]
+    deads = [period_s * s for s in (0.0, 0.06, 0.15, 0.33)]
     most_t, most_dead = window.bounds
     return sorted({(min(t, 0.7 * most_t), min(d, most_dead)) for t in times for d in deads})
 
 
-Dynamics = tuple[float, float]
 ITERATIONS = 25
 """Gauss-Newton steps at most; ours: nine in ten fits stop before the fifteenth."""
 SETTLED = 0.01
@@ -420,8 +439,10 @@ def _trial(window: Window, y: Floats, theta: Floats, valve: ValveTrial, free_wid
     step = 0.01 * valve.stickband if free_width else 0.0
     wider = stem_of(window, _widened(valve, step)) if free_width else stem
     e, columns = _sensitivities(y, stem, wider, step, theta, order, window.dt_s)
-    judged = judged_mask(window.usable, order)
-    e, columns = e[judged], columns[judged]
+    e, columns = e[order:], columns[order:]
+    if not window.usable.all():
+        judged = judged_mask(window.usable, order)[order:]
+        e, columns = e[judged], columns[judged]
     return _Trial(theta, valve, float(e @ e) / e.size, e.size, columns.T @ columns, -(columns.T @ e))
 
 
@@ -508,21 +529,23 @@ def fit_linear(window: Window, period_s: float) -> Fit:
     stem = stem_of(window, IDEAL)
     ar = arx_noise(window.y - window.y.mean(), stem, window.usable, AR_ORDER, INPUT_LAGS)
     prepared = prepare(window, IDEAL, ar)
-    ranked = sorted(starts(window, period_s), key=lambda s: prepared.score(*s)[0])
-    fits = [descend(window, begin(prepared, compass(prepared, s, 3))) for s in ranked[:LINEAR_STARTS]]
-    return max(fits, key=lambda fit: fit.log_likelihood)
+    return descend(window, begin(prepared, search(prepared, starts(window, period_s))))
 
 
-LINEAR_STARTS = 2
-"""Starts of the plain process that are followed to the end; ours."""
+SCREEN_SHARES = (0.1, 0.3, 0.55, 0.8)
+"""Stickbands that a loop without an evident fault is screened with, as shares of OP's range; ours: a play of any
+width between is seen by the nearest of them."""
+SCREENED = 3.0
+"""Gain in log likelihood [nat] from which the screening is followed by the whole search; ours: a third of what a
+verdict needs."""
 STICKBAND_SHARES = (0.06, 0.12, 0.2, 0.3, 0.42, 0.55, 0.7, 0.85, 1.0)
 """Stickbands tried first, as shares of OP's range; a valve much wider than OP's range would not move at all."""
-JUMP_SHARES = (0.15, 0.3, 0.5, 0.75, 1.0)
+JUMP_SHARES = (0.2, 0.5, 0.9)
 """Slip jumps tried, as shares of the stickband."""
 COAST_SHARES = (0.0, 0.15)
 """Turnings of OP that a sliding stem ignores, as shares of the stickband: none, and OP's noise; ours."""
-FOLLOWED = 3
-"""Candidates of a scan that are followed to the end; ours: the best of the scan is among its first three."""
+FOLLOWED = 2
+"""Candidates of a scan that are followed to the end; ours: the best of the scan is among its first two."""
 
 
 GENERIC = -0.95
@@ -535,22 +558,21 @@ def _ranked(window: Window, ar: Floats, valves: list[ValveTrial], begins: list[D
     trials = []
     for valve in valves:
         prepared = prepare(window, valve, ar)
-        trials.append(begin(prepared, compass(prepared, best_of(prepared, begins), 2)))
+        trials.append(begin(prepared, search(prepared, begins, 2)))
     return sorted(trials, key=lambda fit: fit.sigma2)
 
 
-def _scan(window: Window, near: Fit, valves: list[ValveTrial], period_s: float) -> list[Fit]:
-    """Valves tried under two noise models; the best few of each followed to the end, best first."""
+def _scan(window: Window, near: Fit, valves: list[ValveTrial], period_s: float, followed: int) -> Fit:
+    """Valves tried under two noise models; the best few of each followed to the end, the best returned."""
     begins = [(near.time_constant_s, near.dead_time_s), *starts(window, period_s)]
     generic = np.zeros(near.ar.size)
     generic[0] = GENERIC
-    chosen = [fit for ar in (generic, near.ar) for fit in _ranked(window, ar, valves, begins)[:FOLLOWED]]
-    fits = [descend(window, fit, free_width=True) for fit in chosen]
-    return sorted(fits, key=lambda fit: -fit.log_likelihood)
+    chosen = [fit for ar in (generic, near.ar) for fit in _ranked(window, ar, valves, begins)[:followed]]
+    return max((descend(window, fit, free_width=True) for fit in chosen), key=lambda fit: fit.log_likelihood)
 
 
 def fit_play(window: Window, linear: Fit, period_s: float) -> Fit:
-    """The best play followed by a lag.
+    """The best play followed by a lag: a quick screening, and the whole search where it finds anything.
 
     Parameters
     ----------
@@ -561,12 +583,12 @@ def fit_play(window: Window, linear: Fit, period_s: float) -> Fit:
         Scale of the search [s].
     """
     reach = max(window.op_range, 1e-9)
-    fits = _scan(window, linear, [sticking(share * reach, 0.0) for share in STICKBAND_SHARES], period_s)
-    best = fits[0]
-    for scale in (1.1, 0.9):
-        trial = descend(window, replace(best, valve=_scaled(best.valve, scale)), free_width=True)
-        best = max(best, trial, key=lambda fit: fit.log_likelihood)
-    return best
+    best = _scan(window, linear, [sticking(share * reach, 0.0) for share in SCREEN_SHARES], period_s, 1)
+    if best.log_likelihood - linear.log_likelihood < SCREENED:
+        return best
+    shares = (*STICKBAND_SHARES, best.valve.stickband / reach)
+    found = _scan(window, best, [sticking(share * reach, 0.0) for share in shares], period_s, FOLLOWED)
+    return max(best, found, key=lambda fit: fit.log_likelihood)
 
 
 def better_linear(window: Window, linear: Fit, play: Fit) -> Fit:
@@ -578,15 +600,11 @@ def better_linear(window: Window, linear: Fit, play: Fit) -> Fit:
     return max(linear, trial, key=lambda fit: fit.log_likelihood)
 
 
-def _scaled(valve: ValveTrial, factor: float) -> ValveTrial:
-    return _widened(valve, (factor - 1.0) * valve.stickband)
-
-
 def fit_stick_slip(window: Window, play: Fit, period_s: float) -> Fit:
     """The best stick-slip (J > 0, sliding after a jump) followed by a lag, scanned whole and about the play."""
     reach = max(window.op_range, 1e-9)
     near = play.valve.stickband / reach
-    widths = {round(s, 4) for s in STICKBAND_SHARES[3:]} | {near, 1.07 * near, 1.15 * near}
+    widths = {round(s, 4) for s in STICKBAND_SHARES[4:]} | {near, 1.1 * near}
     valves = [
         sticking(width * reach, jump, coast * width * reach)
         for width in sorted(widths)
@@ -600,4 +618,5 @@ def fit_stick_slip(window: Window, play: Fit, period_s: float) -> Fit:
         for jump, grown in ((0.15, 1.0), (0.4, 1.1), (0.8, 1.1))
         for coast in (0.0, 0.15 * play.valve.stickband)
     ]
-    return max([*near_play, *_scan(window, play, valves, period_s)[:1]], key=lambda fit: fit.log_likelihood)
+    whole = _scan(window, play, valves, period_s, FOLLOWED)
+    return max([*near_play, whole], key=lambda fit: fit.log_likelihood)

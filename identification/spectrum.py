@@ -44,9 +44,13 @@ class Spectrum:
 
 def without_line(x: Floats) -> Floats:
     """The signal less its least-squares straight line, shape (n,)."""
-    t = np.arange(x.size) - (x.size - 1) / 2
-    scale = float(t @ t)
-    return x - x.mean() - (float(t @ x) / scale if scale else 0.0) * t
+    n = x.size
+    t = np.arange(-0.5 * (n - 1), 0.5 * n)
+    slope = 12.0 * float(t @ x) / max(n * (n * n - 1.0), 1.0)
+    t *= -slope
+    t += x
+    t -= x.mean()
+    return t
 
 
 def spectrum(x: Floats, dt_s: float) -> Spectrum:
