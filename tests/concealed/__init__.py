@@ -1,0 +1,1 @@
+"""Sealed cases that prove `triage explain`; shares no code with the packages it judges."""
