@@ -23,23 +23,28 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from analyzer.assessments import noise_band
 from analyzer.config import CauseLimits
 from analyzer.oscillation import Oscillation
 from identification.controller import fit_pi
 from identification.hammerstein import (
     IDEAL,
     Fit,
+    Rival,
     Window,
     better_linear,
     block_means,
+    evidence,
     fit_linear,
     fit_play,
     fit_stick_slip,
     prepare,
     residual,
+    stem_moves,
+    with_load_step,
 )
 from identification.models import Fopdt, Loop, Pid
-from identification.record import Floats, LoopRecord
+from identification.record import Floats, LoopRecord, Mask
 from identification.spectrum import Spectrum, locked_harmonic, peak_prominence, spectrum, tapered_power
 from tuning.linear import is_stable, loop_response
 
@@ -62,7 +67,8 @@ class Measured:
     linear, play, stick_slip : the fits; evidence [nat] of the better valve over none, size its stickband over
     OP's range [-], jump [nat] stick-slip over play; line_left and line_error : prominence of the load's and the
     error's spectrum at the period [-]; amplification |S| there [-], None without settings; stable the
-    identified loop; consistency as in sign 4 [-]; harmonic [-]; saturated share of time at limits [-].
+    identified loop; consistency as in sign 4 [-]; harmonic [-]; saturated share of time at limits [-]; moves, how often the stem of the
+    better valve sets out; excited, whether set point moves drove the loop.
     """
 
     linear: Fit
@@ -80,6 +86,8 @@ class Measured:
     saturated: float
     controller: Pid | None
     window: Window
+    moves: int
+    excited: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,20 +129,45 @@ def time_scale(record: LoopRecord, oscillation: Oscillation | None, controller: 
     return min(60 * record.dt_s, top)
 
 
+def latest_fit_stretch(record: LoopRecord, n: int) -> int:
+    """First sample of the latest stretch of n samples with the fewest out of use."""
+    out = record.bad | record.mask("manual")
+    seen = np.concatenate(([0], np.cumsum(out)))
+    firsts = np.arange(len(record) - n, -1, -max(n // 4, 1))
+    return int(firsts[int(np.argmin(seen[firsts + n] - seen[firsts]))])
+
+
 def window_of(record: LoopRecord, scale_s: float, limits: CauseLimits, kind: str = "") -> Window:
     """The latest stretch with the fewest samples out of use, in blocks of a fraction of the period."""
     factor = max(round(scale_s / limits.blocks_per_period / record.dt_s), 1)
     n = min(len(record) // factor, limits.window) * factor
-    out = record.bad | record.mask("manual")
-    seen = np.concatenate(([0], np.cumsum(out)))
-    firsts = np.arange(len(record) - n, -1, -max(n // 4, 1))
-    first = int(firsts[int(np.argmin(seen[firsts + n] - seen[firsts]))])
-    cut = slice(first, first + n)
-    usable = block_means((~out[cut]).astype(np.float64), factor) > 0.99
-    op = np.ascontiguousarray(record.op[cut])
+    first = latest_fit_stretch(record, n)
+    part = record.span(first, first + n)
+    usable = block_means((~(part.bad | part.mask("manual"))).astype(np.float64), factor) > 0.99
+    op = np.ascontiguousarray(part.op)
     known = {name: (t, dead) for name, t, dead in limits.fast_process}
     most = known.get(kind.lower(), (math.inf, math.inf))
-    return Window(block_means(record.pv[cut], factor), op, usable, record.dt_s * factor, factor, *most)
+    return Window(block_means(part.pv, factor), op, usable, record.dt_s * factor, factor, *most)
+
+
+def answering(record: LoopRecord, window: Window, scale_s: float) -> Mask:
+    """True where PV is due to answer a set point move, shape of the window.
+
+    From a move for scale_s [s], and on until PV has come to the set point, however long the valve takes.
+    """
+    first = latest_fit_stretch(record, window.y.size * window.factor)
+    sp = record.sp[first :: window.factor][: window.y.size]
+    moves = np.flatnonzero(np.abs(np.diff(sp)) > 1e-6) + 1
+    out = np.zeros(window.y.size, dtype=bool)
+    if record.sp_estimated or not 0 < moves.size <= window.y.size / 10:
+        return out
+    reach = max(round(scale_s / window.dt_s), 1)
+    error = np.abs(sp - window.y)
+    near = error <= 3 * noise_band(window.y)
+    for at, end in zip(moves, [*moves[1:], window.y.size], strict=True):
+        there = np.flatnonzero(near[at + 1 : end])
+        out[at : max(at + reach, at + 2 + int(there[0]) if there.size else end)] = True
+    return out
 
 
 def _op_range(window: Window, scale_s: float, oscillating: bool) -> float:
@@ -180,11 +213,11 @@ def measure(
     best, stick, jump = play, None, 0.0
     if _worth_a_jump(play, linear, window, oscillation):
         stick = fit_stick_slip(window, play, scale)
-        jump = stick.log_likelihood - play.log_likelihood
+        jump = evidence(Rival(window, stick), Rival(window, play))
         best = stick if jump > limits.evidence_jump else play
-    evidence = best.log_likelihood - linear.log_likelihood
-    if best is stick:
-        evidence -= limits.evidence_jump
+    due = answering(record, window, scale)
+    plain = with_load_step(window, linear, due, best.ar)
+    gained = evidence(Rival(window, best), plain) - (limits.evidence_jump if best is stick else 0.0)
     size = best.valve.stickband / max(_op_range(window, scale, oscillation is not None), 1e-9)
     amplification, stable = _amplification(linear, controller, scale)
     saturated = float(record.mask("saturated").mean())
@@ -193,7 +226,7 @@ def measure(
         linear,
         play,
         stick,
-        evidence,
+        gained,
         size,
         jump,
         _prominence(residual(window, linear), window.dt_s, scale),
@@ -205,6 +238,8 @@ def measure(
         saturated,
         controller,
         window,
+        stem_moves(window, best.valve),
+        bool(due.any()),
     )
 
 
@@ -240,7 +275,8 @@ def _ramp(x: float, low: float, high: float) -> float:
 def _needed(m: Measured, limits: CauseLimits, oscillating: bool) -> float:
     """Evidence needed [nat]: a floor, and a share of the samples, for no model is exact."""
     per_sample = limits.evidence_per_sample * (1.0 if oscillating else limits.quiet_factor)
-    return max(limits.evidence, per_sample * m.play.count)
+    least = limits.evidence if m.excited or oscillating else limits.evidence_unexcited
+    return max(least, per_sample * m.play.count)
 
 
 def valve_signs(m: Measured, limits: CauseLimits, oscillating: bool) -> list[Sign]:
@@ -248,6 +284,8 @@ def valve_signs(m: Measured, limits: CauseLimits, oscillating: bool) -> list[Sig
     needed = _needed(m, limits, oscillating)
     signs = []
     wrong_way = m.controller is not None and m.controller.kp * m.play.gain < 0
+    if m.moves < limits.moves and not m.excited:
+        return signs
     if m.evidence >= needed and not wrong_way:
         text = f"play or stick-slip explains PV better than an ideal valve, log likelihood +{m.evidence:.0f}"
         signs.append(Sign("valve", 0.5 + 0.5 * _ramp(m.evidence, needed, 4 * needed), text))

@@ -91,12 +91,18 @@ class CauseLimits:
     seconds (Seborg, Edgar, Mellichamp 2011, ch. 12); a longer wait is the valve's."""
     evidence: float = 10.0
     """Gain in log likelihood that a play needs over an ideal valve [nat]."""
+    evidence_unexcited: float = 20.0
+    """The same in a loop that neither oscillates nor has its set point moved [nat]: OP then moves for the load alone,
+    and what moves with the load tells little of the valve."""
     evidence_per_sample: float = 0.005
     """The same as a share of the samples judged [nat]: no model is exact, and what it lacks grows with them."""
     quiet_factor: float = 2.5
     """What the share is multiplied with in loops that do not oscillate [-]."""
     evidence_jump: float = 5.0
     """Further gain that a slip jump needs, for its two more constants and wider search [nat]."""
+    moves: int = 3
+    """How often the stem must set out [-]: one or two moves can be steps of the load as well, unless
+    the set point called for them; ours."""
     jump_share: float = 0.04
     """Gain of the jump over that of the play from which the fault is stiction [-]."""
     least_jump: float = 0.08

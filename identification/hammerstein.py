@@ -36,7 +36,8 @@ class Window:
 
     y : PV [% PV] in blocks, shape (n,); op : OP [% OP] at the record's own interval, shape (n * factor,);
     usable : bool, shape (n,), False at gaps; dt_s : interval of the blocks [s]; most_time_constant_s and
-    most_dead_time_s : what is known of such processes [s], inf where nothing is.
+    most_dead_time_s : what is known of such processes [s], inf where nothing is; step_at : block at which the
+    load steps, 0 where it does not.
     """
 
     y: Floats
@@ -46,6 +47,15 @@ class Window:
     factor: int = 1
     most_time_constant_s: float = math.inf
     most_dead_time_s: float = math.inf
+    step_at: int = 0
+
+    @property
+    def extra(self) -> Floats:
+        """A further regressor, shape (n,): a step of the load at block `step_at`; zero where that is 0."""
+        out = np.zeros(self.y.size)
+        if self.step_at > 0:
+            out[self.step_at :] = 1.0
+        return out
 
     @property
     def bounds(self) -> tuple[float, float]:
@@ -109,7 +119,7 @@ class Fit:
 
     gain [% PV/% OP], time_constant_s and dead_time_s [s], valve, sigma2 the innovations variance
     [% PV squared], count the samples judged, ar the noise polynomial without its leading one, shape (p,), base
-    the coefficients of 1, t and decay, shape (3,).
+    the coefficients of 1, t, decay and the load's step, shape (4,).
     """
 
     gain: float
@@ -349,7 +359,74 @@ def disturbance(window: Window, fit: Fit) -> Floats:
     decay = np.exp(-np.arange(n) * window.dt_s / fit.time_constant_s)
     if fit.time_constant_s > 0.5 * window.duration_s:
         decay[:] = 0.0
-    return residual(window, fit) - fit.base[0] - fit.base[1] * t - fit.base[2] * decay
+    slow = fit.base[0] + fit.base[1] * t + fit.base[2] * decay + fit.base[3] * window.extra
+    return residual(window, fit) - slow
+
+
+OUTLIER = 4.0
+"""Innovations count up to this many standard deviations [-]: beyond it one event (a step of the load, a spike), not
+the valve's repeated motion, would decide; ours: it leaves 0.006 % of Gaussian innovations cut."""
+
+
+def innovations(window: Window, fit: Fit) -> Floats:
+    """Innovations of a fit at the samples judged [% PV]."""
+    white = whiten(np.ascontiguousarray(disturbance(window, fit)), fit.ar)
+    return white[judged_mask(window.usable, fit.ar.size)]
+
+
+@dataclass(frozen=True, slots=True)
+class Rival:
+    """A fit and the window that it is of (which may hold a step of the load)."""
+
+    window: Window
+    fit: Fit
+
+
+def evidence(ours: Rival, theirs: Rival) -> float:
+    """Gain in log likelihood [nat] of one fit over another, no innovation counting for more than OUTLIER.
+
+    The scale is the median absolute innovation of the first over 0.6745, which outliers leave alone.
+    """
+    mine, other = innovations(ours.window, ours.fit), innovations(theirs.window, theirs.fit)
+    scale = float(np.median(np.abs(mine))) / 0.6745
+    if scale <= 0:
+        return 0.0
+    top = (OUTLIER * scale) ** 2
+    gained = np.minimum(other**2, top).sum() - np.minimum(mine**2, top).sum()
+    return float(gained) / (2 * scale**2)
+
+
+STEP_PRICE = 6.0
+"""Gain in log likelihood [nat] that one step of the load at any time costs: log of the blocks, nearly."""
+
+
+def stem_moves(window: Window, valve: ValveTrial) -> int:
+    """How often the stem of a valve sets out or turns: stretches of motion in one direction with rest between."""
+    moved = np.sign(np.diff(stem_of(window, valve)))
+    set_out = np.concatenate(([0.0], moved))
+    return int(((set_out[1:] != set_out[:-1]) & (set_out[1:] != 0)).sum())
+
+
+def with_load_step(window: Window, fit: Fit, answering: Mask, noise: Floats) -> Rival:
+    """The plain process with one step of the load where its largest innovation is, if that is worth its price.
+
+    A single slip of a stem and a single step of the load look alike; only the slip that also explains why the
+    stem stood still before is evidence of the valve. Where PV is due to answer a set point move (`answering`,
+    bool, shape (n,)) its step is no load: a load does not wait for the operator. `noise` is the noise model of
+    the rival, shape (p,), a second start: one fitted across the step is nearly an integrator.
+    """
+    judged = judged_mask(window.usable, fit.ar.size)
+    white = np.where(answering[judged], 0.0, np.abs(innovations(window, fit)))
+    if white.size < 50:
+        return Rival(window, fit)
+    at = int(np.flatnonzero(judged)[int(np.argmax(white))])
+    stepped = replace(window, step_at=at)
+    trial = max(
+        (descend(stepped, start) for start in (fit, replace(fit, ar=noise))), key=lambda f: f.log_likelihood
+    )
+    if trial.log_likelihood - fit.log_likelihood > STEP_PRICE:
+        return Rival(stepped, trial)
+    return Rival(window, fit)
 
 
 def starts(window: Window, period_s: float) -> list[Dynamics]:
@@ -368,10 +445,17 @@ SETTLED = 0.01
 
 @njit(cache=True)
 def _sensitivities(
-    y: Floats, stem: Floats, wider: Floats, width_step: float, theta: Floats, order: int, dt: float
+    y: Floats,
+    stem: Floats,
+    wider: Floats,
+    extra: Floats,
+    width_step: float,
+    theta: Floats,
+    order: int,
+    dt: float,
 ) -> tuple[Floats, Floats]:
-    """Innovations, shape (n,), and their derivatives, shape (n, 7 + order), at theta = log T, L, width, K, 1, t,
-    decay, A; the derivative by the width is that of the given wider stem."""
+    """Innovations, shape (n,), and their derivatives, shape (n, 8 + order), at theta = log T, L, width, K, 1, t,
+    decay, step, A; the derivative by the width is that of the given wider stem."""
     n = y.size
     t_s, dead = math.exp(theta[0]), theta[1]
     pole, now, before, delay = unit_lag(t_s, dead, dt)
@@ -382,7 +466,7 @@ def _sensitivities(
     pole3, now3, before3, delay3 = unit_lag(t_s, dead + step, dt)
     x_l = (lag(stem, pole3, now3, before3, delay3) - x) / step
     x_w = (lag(wider, pole, now, before, delay) - x) / width_step if width_step > 0 else np.zeros(n)
-    columns = np.zeros((n, 7 + order))
+    columns = np.zeros((n, 8 + order))
     r = np.empty(n)
     free = 1.0
     outlasts = t_s > 0.5 * n * dt
@@ -390,7 +474,7 @@ def _sensitivities(
     for k in range(n):
         t = 2.0 * k / n - 1.0
         d = 0.0 if outlasts else free
-        r[k] = y[k] - gain * x[k] - theta[4] - theta[5] * t - theta[6] * d
+        r[k] = y[k] - gain * x[k] - theta[4] - theta[5] * t - theta[6] * d - theta[7] * extra[k]
         columns[k, 0] = -gain * x_t[k]
         columns[k, 1] = -gain * x_l[k]
         columns[k, 2] = -gain * x_w[k]
@@ -398,13 +482,14 @@ def _sensitivities(
         columns[k, 4] = -1.0
         columns[k, 5] = -t
         columns[k, 6] = -d
+        columns[k, 7] = -extra[k]
         free *= pole
-    e = whiten(r, theta[7:])
-    for j in range(7):
-        columns[:, j] = whiten(columns[:, j].copy(), theta[7:])
+    e = whiten(r, theta[8:])
+    for j in range(8):
+        columns[:, j] = whiten(columns[:, j].copy(), theta[8:])
     for k in range(order, n):
         for i in range(order):
-            columns[k, 7 + i] = r[k - 1 - i]
+            columns[k, 8 + i] = r[k - 1 - i]
     return e, columns
 
 
@@ -434,11 +519,11 @@ class _Trial:
 
 
 def _trial(window: Window, y: Floats, theta: Floats, valve: ValveTrial, free_width: bool) -> _Trial:
-    order = theta.size - 7
+    order = theta.size - 8
     stem = stem_of(window, valve)
     step = 0.01 * valve.stickband if free_width else 0.0
     wider = stem_of(window, _widened(valve, step)) if free_width else stem
-    e, columns = _sensitivities(y, stem, wider, step, theta, order, window.dt_s)
+    e, columns = _sensitivities(y, stem, wider, window.extra, step, theta, order, window.dt_s)
     e, columns = e[order:], columns[order:]
     if not window.usable.all():
         judged = judged_mask(window.usable, order)[order:]
@@ -479,7 +564,7 @@ def descend(window: Window, fit: Fit, free_width: bool = False) -> Fit:
     )
     best = _trial(window, y, theta, fit.valve, free_width)
     damping = 1e-3
-    frozen = [] if free_width else [2]
+    frozen = ([] if free_width else [2]) + ([] if window.step_at > 0 else [7])
     for _ in range(ITERATIONS):
         moved = _moved(window, best, _steps(best.gram, best.slope, damping, frozen), free_width)
         trial = _trial(window, y, *moved, free_width) if moved is not None else None
@@ -504,8 +589,8 @@ def _fitted(trial: _Trial) -> Fit:
         trial.valve,
         max(trial.loss, 1e-14),
         trial.count,
-        t[7:].copy(),
-        t[4:7].copy(),
+        t[8:].copy(),
+        t[4:8].copy(),
     )
 
 
@@ -513,7 +598,7 @@ def begin(prepared: Prepared, dynamics: Dynamics) -> Fit:
     """The fit at given dynamics under a given noise model, a start for the descent."""
     sigma2, count, beta = prepared.score(*dynamics)
     t, dead = dynamics
-    base = np.array([beta[1], beta[2], 0.0])
+    base = np.array([beta[1], beta[2], 0.0, 0.0])
     return Fit(float(beta[0]), t, dead, prepared.valve, float(sigma2), int(count), prepared.ar, base)
 
 
@@ -540,10 +625,12 @@ SCREENED = 3.0
 verdict needs."""
 STICKBAND_SHARES = (0.06, 0.12, 0.2, 0.3, 0.42, 0.55, 0.7, 0.85, 1.0)
 """Stickbands tried first, as shares of OP's range; a valve much wider than OP's range would not move at all."""
-JUMP_SHARES = (0.2, 0.5, 0.9)
+JUMP_SHARES = (0.2, 0.4, 0.7, 1.0)
 """Slip jumps tried, as shares of the stickband."""
 COAST_SHARES = (0.0, 0.15)
 """Turnings of OP that a sliding stem ignores, as shares of the stickband: none, and OP's noise; ours."""
+WORK = 5000
+"""Blocks that candidates of a scan may take together; short records can afford to follow more of them."""
 FOLLOWED = 2
 """Candidates of a scan that are followed to the end; ours: the best of the scan is among its first two."""
 
@@ -565,6 +652,7 @@ def _ranked(window: Window, ar: Floats, valves: list[ValveTrial], begins: list[D
 def _scan(window: Window, near: Fit, valves: list[ValveTrial], period_s: float, followed: int) -> Fit:
     """Valves tried under two noise models; the best few of each followed to the end, the best returned."""
     begins = [(near.time_constant_s, near.dead_time_s), *starts(window, period_s)]
+    followed = max(followed, WORK // window.y.size)
     generic = np.zeros(near.ar.size)
     generic[0] = GENERIC
     chosen = [fit for ar in (generic, near.ar) for fit in _ranked(window, ar, valves, begins)[:followed]]

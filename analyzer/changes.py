@@ -1,0 +1,164 @@
+"""Changes of controllers: read from changes.csv, given on the command line, or seen in a loop's behaviour."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from analyzer.block_bootstrap import Floats
+from analyzer.history.encoding import detect_encoding
+from identification.errors import InputError
+
+COLUMNS = ("loop", "time", "kp_old", "ti_old", "kp_new", "ti_new", "who")
+DAY_S = 86400.0
+LEAST_DAYS = 3
+"""Days that must stand on each side of a change that is offered [d]; ours."""
+LEAST_STEP = 0.3
+"""Smallest step of the logarithm of travel over variability that is offered [-]: a third; ours."""
+LEAST_RATIO = 4.0
+"""Smallest ratio of that step to the standard deviation of days within the sides [-]; ours."""
+
+
+@dataclass(frozen=True, slots=True)
+class TuningChange:
+    """New settings of one controller: when [s since 1970-01-01 UTC], from what to what as stated, by whom.
+
+    `seen` says how the change was noticed where nobody stated it; it is then offered, not believed.
+    """
+
+    loop: str
+    time_s: float
+    kp_old: float | None = None
+    ti_old: float | None = None
+    kp_new: float | None = None
+    ti_new: float | None = None
+    who: str = ""
+    seen: str = ""
+
+
+def parse_time(text: str, where: str) -> float:
+    """A time as seconds since 1970-01-01 UTC; without a zone it is UTC.
+
+    Raises
+    ------
+    InputError
+        Where it is no time; `where` names the place in the message.
+    """
+    import pandas as pd
+
+    try:
+        stamp = pd.Timestamp(text.strip())
+    except ValueError:
+        stamp = pd.NaT
+    if stamp is pd.NaT:
+        raise InputError(f"{where}: time {text!r}", "a time such as 2026-03-09T08:00:00Z", "correct the time")
+    return float(stamp.tz_localize("UTC").timestamp() if stamp.tz is None else stamp.timestamp())
+
+
+def _number(text: str, where: str, column: str) -> float | None:
+    if not text.strip():
+        return None
+    try:
+        value = float(text.strip().replace(",", "."))
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise InputError(f"{where}: {column} {text!r}", "a number or nothing", "correct the cell")
+    return value
+
+
+def read_changes(path: Path) -> tuple[TuningChange, ...]:
+    """Read changes.csv: loop and time are required, the settings and `who` are shown where they are given.
+
+    Raises
+    ------
+    InputError
+        Where the file cannot be opened, holds no change, lacks a column, or a cell is neither time nor number.
+    """
+    try:
+        data = Path(path).read_bytes()
+    except OSError as error:
+        raise InputError(f"{path}: cannot be opened", "a CSV of changes", "correct --changes") from error
+    text = data.decode(detect_encoding(data), errors="replace").lstrip("\ufeff")
+    first = text.split("\n", 1)[0]
+    reader = csv.DictReader(io.StringIO(text, newline=""), delimiter=max(",;\t", key=first.count))
+    names = {(n or "").strip().lower(): n for n in reader.fieldnames or ()}
+    for required in ("loop", "time"):
+        if required not in names:
+            raise InputError(f"{path}: no column {required!r}", "columns " + ", ".join(COLUMNS), "add it")
+    rows = [{k: (row[n] or "") for k, n in names.items() if k in COLUMNS} for row in reader]
+    found = tuple(_change(row, f"{path}, row {i}") for i, row in enumerate(rows, 2) if row["loop"].strip())
+    if not found:
+        raise InputError(f"{path}: no changes", "one row a change below the header", "add the changes")
+    return found
+
+
+def _change(row: Mapping[str, str], where: str) -> TuningChange:
+    numbers = {c: _number(row.get(c, ""), where, c) for c in COLUMNS[2:6]}
+    time_s = parse_time(row["time"], where)
+    return TuningChange(row["loop"].strip(), time_s, **numbers, who=row.get("who", "").strip())
+
+
+def stated_changes(rows: Sequence[Mapping[str, object]]) -> list[TuningChange]:
+    """Changes of one loop's stated Kp or Ti between nights.
+
+    Parameters
+    ----------
+    rows : sequence of mapping
+        The loop's rows of the nights in their order, with loop, start_s, kp and ti.
+    """
+    known = [r for r in rows if r["start_s"] is not None and r["kp"] is not None]
+    found = []
+    for a, b in zip(known, known[1:], strict=False):
+        if (a["kp"], a["ti"]) != (b["kp"], b["ti"]):
+            new = {"kp_old": a["kp"], "ti_old": a["ti"], "kp_new": b["kp"], "ti_new": b["ti"]}
+            seen = "the settings stated in loops.csv differ from the night before"
+            found.append(TuningChange(str(b["loop"]), float(str(b["start_s"])), **new, seen=seen))  # type: ignore[arg-type]
+    return found
+
+
+def _ratio(hours: Mapping[str, Floats]) -> tuple[Floats, Floats]:
+    """Logarithm of travel over variability and the hour's start [s], of the hours where both are known."""
+    travel, spread = hours["valve_travel_pct_per_h"], hours["variability_pct"]
+    with np.errstate(invalid="ignore"):
+        known = np.isfinite(travel) & np.isfinite(spread) & (travel > 0.5) & (spread > 0.01)
+    return np.log(travel[known] / spread[known]), hours["hour_s"][known]
+
+
+def behaviour_change(loop: str, hours: Mapping[str, Floats]) -> TuningChange | None:
+    """The hour at which a loop's controller began to answer differently, or None.
+
+    What a controller does to OP for a given error is its tuning's doing: valve travel over variability is steady
+    under changing load and steps when somebody types in new settings. The split that explains most is offered where
+    the step is large and clear against how days differ by themselves.
+    """
+    y, at = _ratio(hours)
+    first = np.searchsorted(at, at[0] + LEAST_DAYS * DAY_S) if y.size else 0
+    last = np.searchsorted(at, at[-1] - LEAST_DAYS * DAY_S) if y.size else 0
+    if last - first < 1:
+        return None
+    total, n = np.cumsum(y), np.arange(1, y.size + 1)
+    split = np.arange(first, last)
+    left, right = total[split - 1] / n[split - 1], (total[-1] - total[split - 1]) / (y.size - n[split - 1])
+    gained = n[split - 1] * (y.size - n[split - 1]) * (left - right) ** 2
+    best = int(np.argmax(gained))
+    cut = int(split[best])
+    step = abs(float(right[best] - left[best]))
+    spread = max(_daily_spread(y[:cut], at[:cut]), _daily_spread(y[cut:], at[cut:]))
+    if step < LEAST_STEP or step < LEAST_RATIO * spread:
+        return None
+    factor = float(np.exp(right[best] - left[best]))
+    return TuningChange(loop, float(at[cut]), seen=f"OP moves {factor:.2g} times as much for the same error since")
+
+
+def _daily_spread(y: Floats, at: Floats) -> float:
+    """Standard deviation of the daily medians [-]."""
+    day = ((at - at[0]) // DAY_S).astype(int)
+    medians = [float(np.median(y[day == d])) for d in np.unique(day)]
+    return float(np.std(medians, ddof=1)) if len(medians) > 1 else 0.0

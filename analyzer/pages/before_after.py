@@ -1,0 +1,230 @@
+"""The before/after page: what retuning brought, per loop and on average, with proof."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from analyzer.before_after import LIMITS, MEASURES, Change, LoopComparison, Verdict, grade
+from analyzer.changes import TuningChange
+from analyzer.pages.reading import Thinned
+from analyzer.pages.trends import trend_block
+from analyzer.pages.words import KINDS, TITLES, counted, interval, number, setting, signed, stamp
+from reports.pages import Block, Cell, Column, Facts, IntervalBar, IntervalChart, Listing, Mark, Page, Section
+from reports.pages import Table, Text, Tiles
+
+TREND_BUCKETS = 4000
+"""Buckets of a trend on this page: two weeks at two pixels a bucket, 64 kB a loop; ours."""
+PRIMARY = tuple(m for m in MEASURES if m.primary)
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """A change with what came of it."""
+
+    change: TuningChange
+    found: LoopComparison
+    description: str
+    units: str
+    trend: Thinned | None
+    wear: tuple[str, ...] = ()
+
+
+GRADES = {
+    "clear": "improved clearly in all four",
+    "modest": "improved modestly",
+    "mixed": "in part better, in part worse",
+    "worse": "worse",
+    "none": "no clear change",
+    "incomparable": "not comparable",
+}
+
+
+def named(changes: Sequence[Change]) -> str:
+    """Names of assessments in a sentence."""
+    names = [TITLES[c.measure.name][0].split(" (")[0].lower() for c in changes]
+    return names[0] if len(names) == 1 else ", ".join(names[:-1]) + " and " + names[-1]
+
+
+def outcome(found: LoopComparison) -> str:
+    """A loop's outcome in one phrase."""
+    kind = grade(found)
+    if kind == "partial":
+        text = f"improved only in {named([c for c in found.primary if c.verdict is Verdict.BETTER])}"
+    elif kind == "incomparable":
+        text = "not comparable: " + ("; ".join(found.reasons) or "no hourly figures on both sides")
+    else:
+        text = GRADES[kind]
+    if found.source_loop:
+        text += f"; the cause lies in the neighbour {found.source_loop}, whose oscillation it follows"
+    return text
+
+
+def _tone(found: LoopComparison) -> str:
+    tones = {"clear": "better", "modest": "better", "partial": "unclear", "mixed": "unclear", "none": "unclear"}
+    return tones.get(grade(found), "worse" if grade(found) == "worse" else "incomparable")
+
+
+def _tiles(cases: Sequence[Case]) -> Tiles:
+    kinds = [grade(c.found) for c in cases]
+    counts = (
+        (kinds.count("clear"), "improved clearly in all four", "better"),
+        (kinds.count("modest"), "improved modestly", "better"),
+        (kinds.count("partial"), "improved only in part", "unclear"),
+        (kinds.count("none"), "without clear change", "unclear"),
+        (kinds.count("mixed") + kinds.count("worse"), "worse in something", "worse"),
+        (kinds.count("incomparable"), "not comparable", "incomparable"),
+    )
+    shown = tuple((str(n), what, tone) for n, what, tone in counts if n)
+    return Tiles(((str(len(cases)), "changes looked at", ""), *shown))
+
+
+def _bar(change: Change, group: str) -> IntervalBar:
+    ends = change.interval_pct
+    low, high = ends if ends else (None, None)
+    text = f"{signed(change.value_pct)} %" if ends else change.verdict.value
+    label = TITLES[change.measure.name][0].split(" (")[0]
+    return IntervalBar(group, label, change.value_pct, low, high, KINDS[change.verdict], text)
+
+
+def per_loop_chart(cases: Sequence[Case]) -> IntervalChart:
+    """Change per loop and assessment (the study's Figure 12)."""
+    bars = tuple(_bar(c, case.found.loop) for case in cases for c in case.found.primary)
+    caption = "Bars: change in % of the span before; lines: its interval. Less is better in all four."
+    return IntervalChart("change-per-loop", "Change per loop and assessment", "% of before", bars, caption)
+
+
+def _average(cases: Sequence[Case], name: str) -> IntervalBar:
+    """Mean of the comparable loops' changes; errors of different loops taken as independent."""
+    changes = [c for case in cases for c in case.found.primary if c.measure.name == name]
+    known = [c for c in changes if c.verdict is not Verdict.INCOMPARABLE and c.value_pct is not None]
+    title = TITLES[name][0].split(" (")[0]
+    if not known:
+        return IntervalBar("", title, None, None, None, "incomparable", "nothing comparable")
+    values = np.array([c.value_pct for c in known], float)
+    ends = np.array([c.interval_pct for c in known], float)
+    down, up = (float(np.sqrt(((ends[:, k] - values) ** 2).sum()) / len(known)) for k in (0, 1))
+    mean = float(values.mean())
+    low, high = max(mean - down, -100.0), mean + up
+    verdict = Verdict.UNCLEAR if low <= 0 <= high else Verdict.BETTER if mean < 0 else Verdict.WORSE
+    text = f"{signed(mean)} % ({counted(len(known), 'loop')})"
+    return IntervalBar("", title, mean, low, high, KINDS[verdict], text)
+
+
+def average_chart(cases: Sequence[Case]) -> IntervalChart:
+    """Average change of all comparable loops (the study's Figure 13)."""
+    bars = tuple(_average(cases, m.name) for m in PRIMARY)
+    caption = "Mean over the loops that can be compared; loops that were not better count as they are."
+    return IntervalChart("average-change", "Average change", "% of before", bars, caption)
+
+
+COLUMNS = (
+    Column("loop", "Loop"),
+    Column("assessment", "Assessment"),
+    Column("unit", "Unit"),
+    Column("before", "Before", True, "Mean over the usable hours before the change"),
+    Column("after", "After", True, "Mean over the usable hours after the change"),
+    Column("change_pct", "Change %", True, "After less before, in % of before"),
+    Column("interval", "Interval"),
+    Column("low", "From", True, "Lower end of the difference, in the figure's unit"),
+    Column("high", "To", True, "Upper end of the difference, in the figure's unit"),
+    Column("verdict", "Verdict"),
+    Column("remark", "Remark", wide=True),
+)
+
+
+def _row(change: Change, found: LoopComparison) -> tuple[Cell, ...]:
+    title, unit = TITLES[change.measure.name]
+    d = change.found
+    remark = "; ".join(found.reasons) or (f"follows {found.source_loop}" if found.source_loop else "")
+    return (
+        Cell(found.loop),
+        Cell(title),
+        Cell(unit),
+        Cell(number(d.before), d.before),
+        Cell(number(d.after), d.after),
+        Cell(signed(change.value_pct), change.value_pct),
+        Cell(interval(change)),
+        Cell(number(d.low), d.low),
+        Cell(number(d.high), d.high),
+        Cell(change.verdict.value, kind=KINDS[change.verdict]),
+        Cell(remark),
+    )
+
+
+def figures(cases: Sequence[Case], primary: bool, name: str, title: str) -> Table:
+    """Figures before and after of all loops (the study's Figure 11)."""
+    rows = [_row(c, case.found) for case in cases for c in case.found.changes if c.measure.primary == primary]
+    return Table(name, title, COLUMNS, tuple(rows), searchable=len(rows) > 12, facet="verdict")
+
+
+def _settings(change: TuningChange, units: str) -> str:
+    if change.kp_new is None and change.ti_new is None:
+        return change.seen or "not stated"
+    old = f"Kp {setting(change.kp_old)}, Ti {setting(change.ti_old)}"
+    return f"{old} → Kp {setting(change.kp_new)}, Ti {setting(change.ti_new)} ({units})"
+
+
+def _span(first_s: float, last_s: float, usable_h: float) -> str:
+    return f"{stamp(first_s)} to {stamp(last_s)} UTC, {usable_h:.0f} usable hours"
+
+
+def loop_section(case: Case, number_: int) -> Section:
+    """What became of one loop: settings, spans, remarks, trends (the study's Figure 10)."""
+    found, change = case.found, case.change
+    facts = (
+        ("Settings", _settings(change, case.units)),
+        ("Changed", f"{stamp(change.time_s)} UTC" + (f" by {change.who}" if change.who else "")),
+        ("Before", _span(found.before.first_s, found.before.last_s, found.hours[0])),
+        ("After", _span(found.after.first_s, found.after.last_s, found.hours[1])),
+    )
+    text = outcome(found)
+    blocks: list[Block] = [Text((text[:1].upper() + text[1:] + ".",), "lead"), Facts(facts)]
+    if case.wear:
+        blocks.append(Listing(tuple(("", w) for w in case.wear)))
+    if case.trend is not None and case.trend.time_s.size > 1:
+        thin = case.trend.between(found.before.first_s, found.after.last_s).coarser(TREND_BUCKETS)
+        marks = (Mark(change.time_s, "changed"),)
+        blocks.append(trend_block(f"trend-{number_}", f"{found.loop}: before and after on one scale", thin, marks))
+    title = f"{found.loop} {case.description}".strip()
+    return Section(title, tuple(blocks))
+
+
+def _method() -> Section:
+    paragraphs = (
+        "Every figure is the mean of the loop's hourly figures over usable hours (good samples, in automatic); the hour "
+        "of the change and the one after it are left out. Oscillation significance is amplitude times regularity "
+        "times hours of oscillation, a day.",
+        f"Intervals: days of 24 hours are drawn at random (circular block bootstrap); the spread is widened for few "
+        f"days (Student's t) and for days that drift. Where nothing changed, at most "
+        f"{100 * (1 - LIMITS.confidence):.0f} % of loops get any of their four assessments called better or worse.",
+        f"Not compared, and never counted: mean SP or PV differing by over {LIMITS.set_point_pct:g} % of span, mean "
+        f"OP by over {LIMITS.load_pct:g} %, time in automatic by over {LIMITS.mode_points:g} points, OP at a limit for "
+        f"over {LIMITS.limit_points:g} % of the time, set point travel more than {LIMITS.sp_travel_ratio:g}-fold, under "
+        f"{LIMITS.least_days:g} usable days a side or under {100 * LIMITS.usable_share:.0f} % of a span.",
+        f"Modest: all four better, and one of them by less than {LIMITS.modest_pct:g} %. Changes under "
+        f"{LIMITS.least_pct:g} % are not called better or worse.",
+    )
+    return Section("How the figures are made", (Text(paragraphs),), closed=True)
+
+
+def page(cases: Sequence[Case], missing: Sequence[tuple[str, str]], subtitle: str, offered: bool = False) -> Page:
+    """The page of all changes; `missing` are changes that could not be looked at, with the reason."""
+    short: list[Block] = [_tiles(cases), Listing(tuple((c.found.loop, outcome(c.found)) for c in cases))]
+    if offered:
+        short.insert(0, Text(("These changes were not stated but seen in the loops' behaviour: confirm them first.",)))
+    if missing:
+        short.append(Listing(tuple((loop, f"not looked at: {why}") for loop, why in missing)))
+    four = figures(cases, True, "figures", "")
+    sections = (
+        Section("In short", tuple(short)),
+        Section("On average", (average_chart(cases),)),
+        Section("Per loop and assessment", (per_loop_chart(cases),)),
+        Section("Figures before and after", (four,)),
+        *(loop_section(c, i) for i, c in enumerate(cases)),
+        Section("Other figures", (figures(cases, False, "other-figures", ""),), closed=True),
+        _method(),
+    )
+    return Page("before-after", "What the changes brought", subtitle, sections)

@@ -1,0 +1,126 @@
+"""What the pages need from a store: nights, hours and trends of some loops, over some time."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime, timedelta
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+import pyarrow.parquet as pq
+
+from analyzer.block_bootstrap import Floats
+from analyzer.spans import Span
+from analyzer.store import Store
+
+SIGNALS = ("sp", "pv", "op")
+AROUND_D = 2
+"""Nights are named by the date of their middle and are up to 36 h long: read this many days more [d]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Thinned:
+    """Thinned signals of a loop: start of each bucket [s], extremes by name ("pv_min") [% of span], gaps."""
+
+    time_s: Floats
+    extremes: Mapping[str, Floats]
+    gap: np.ndarray
+
+    def middle(self, signal: str) -> Floats:
+        """Middle of each bucket's extremes, shape (b,)."""
+        return 0.5 * (self.extremes[f"{signal}_min"] + self.extremes[f"{signal}_max"])
+
+    def between(self, first_s: float, last_s: float) -> Thinned:
+        """The buckets that begin in a span."""
+        a, b = np.searchsorted(self.time_s, [first_s, last_s])
+        return Thinned(self.time_s[a:b], {k: v[a:b] for k, v in self.extremes.items()}, self.gap[a:b])
+
+    def coarser(self, most: int) -> Thinned:
+        """At most about `most` buckets, neighbours joined so that no extreme is lost."""
+        n = self.time_s.size
+        if n <= most:
+            return self
+        edges = (np.arange(most) * n) // most
+        joined = {
+            k: (np.minimum if k.endswith("_min") else np.maximum).reduceat(v, edges)
+            for k, v in self.extremes.items()
+        }
+        return replace(self, time_s=self.time_s[edges], extremes=joined, gap=np.logical_and.reduceat(self.gap, edges))
+
+
+def nights_within(store: Store, span: Span | None) -> list[str]:
+    """Names of the nights that may hold something of a span; all where it is None."""
+    names = store.nights()
+    if span is None:
+        return names
+    around = timedelta(days=AROUND_D)
+    first = (datetime.fromtimestamp(span.first_s, UTC) - around).strftime("%Y-%m-%d")
+    last = (datetime.fromtimestamp(span.last_s, UTC) + around).strftime("%Y-%m-%d")
+    return [n for n in names if first <= n <= last]
+
+
+def _tables(
+    store: Store, table: str, loops: Collection[str], nights: Sequence[str], columns: Sequence[str] | None
+) -> list[pa.Table]:
+    paths = [store.path / table / f"{night}.parquet" for night in nights]
+    where = [("loop", "in", sorted(loops))]
+    return [
+        pq.read_table(p, columns=list(columns) if columns else None, filters=where) for p in paths if p.exists()
+    ]
+
+
+def read_nights(
+    store: Store, nights: Sequence[str], columns: Sequence[str], loops: Collection[str] | None = None
+) -> list[dict[str, Any]]:
+    """Rows of several nights, oldest first; columns that a night lacks are None."""
+    rows: list[dict[str, Any]] = []
+    for night in nights:
+        path = store.path / "nights" / f"{night}.parquet"
+        held = [c for c in columns if c in set(pq.read_schema(path).names)]
+        where = [("loop", "in", sorted(loops))] if loops is not None else None
+        found = pq.read_table(path, columns=held, filters=where).to_pylist()
+        rows += [{**dict.fromkeys(columns), **row, "night": night} for row in found]
+    return rows
+
+
+def read_hours(store: Store, loops: Collection[str], nights: Sequence[str]) -> dict[str, dict[str, Floats]]:
+    """Hourly figures by loop, in order of time, NaN where not known; of an hour that stands twice the fuller one."""
+    tables = _tables(store, "hours", loops, nights, None)
+    if not tables:
+        return {}
+    joined = pa.concat_tables(tables, promote_options="default")
+    joined = joined.sort_by([("loop", "ascending"), ("hour_s", "ascending"), ("usable_h", "ascending")])
+    tags = joined.column("loop").to_numpy(zero_copy_only=False)
+    names = [c for c in joined.column_names if c not in ("loop", "night")]
+    arrays = {c: joined.column(c).to_numpy(zero_copy_only=False).astype(float) for c in names}
+    last = np.append((tags[1:] != tags[:-1]) | (np.diff(arrays["hour_s"]) != 0), True)
+    return {str(tag): {c: v[last & (tags == tag)] for c, v in arrays.items()} for tag in dict.fromkeys(tags)}
+
+
+def read_trends(store: Store, loops: Collection[str], nights: Sequence[str]) -> dict[str, Thinned]:
+    """Thinned trends by loop, in order of time; a bucket of a gap stands where nothing was recorded."""
+    tables = _tables(store, "trends", loops, nights, None)
+    tables = [t.set_column(0, "loop", pc.cast(t.column("loop"), pa.string())) for t in tables]
+    if not tables:
+        return {}
+    joined = pa.concat_tables(tables)
+    tags = joined.column("loop").to_numpy(zero_copy_only=False)
+    return {str(tag): _thinned(joined.filter(pa.array(tags == tag))) for tag in dict.fromkeys(tags)}
+
+
+def _thinned(table: pa.Table) -> Thinned:
+    columns = {
+        c: table.column(c).to_numpy(zero_copy_only=False).astype(float) for c in table.column_names if c != "loop"
+    }
+    _, order = np.unique(columns["time_s"], return_index=True)
+    time_s, gap = columns["time_s"][order], columns["bad"][order] > 0.5
+    extremes = {f"{s}_{end}": columns[f"{s}_{end}"][order] for s in SIGNALS for end in ("min", "max")}
+    step = np.diff(time_s)
+    jumps = np.flatnonzero(step > 3 * np.median(step)) + 1 if step.size else np.array([], int)
+    time_s = np.insert(time_s, jumps, time_s[jumps - 1] + 1.0)
+    return Thinned(
+        time_s, {k: np.insert(v, jumps, v[jumps - 1]) for k, v in extremes.items()}, np.insert(gap, jumps, True)
+    )
