@@ -7,7 +7,9 @@ import io
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -52,10 +54,7 @@ def parse_time(text: str, where: str) -> float:
     """
     import pandas as pd
 
-    try:
-        stamp = pd.Timestamp(text.strip())
-    except ValueError:
-        stamp = pd.NaT
+    stamp: Any = pd.to_datetime([text.strip()], errors="coerce")[0]
     if stamp is pd.NaT:
         raise InputError(f"{where}: time {text!r}", "a time such as 2026-03-09T08:00:00Z", "correct the time")
     return float(stamp.tz_localize("UTC").timestamp() if stamp.tz is None else stamp.timestamp())
@@ -79,7 +78,8 @@ def read_changes(path: Path) -> tuple[TuningChange, ...]:
     Raises
     ------
     InputError
-        Where the file cannot be opened, holds no change, lacks a column, or a cell is neither time nor number.
+        Where the file cannot be opened, holds no change, lacks a column, or a cell is neither time nor
+        number.
     """
     try:
         data = Path(path).read_bytes()
@@ -100,12 +100,12 @@ def read_changes(path: Path) -> tuple[TuningChange, ...]:
 
 
 def _change(row: Mapping[str, str], where: str) -> TuningChange:
-    numbers = {c: _number(row.get(c, ""), where, c) for c in COLUMNS[2:6]}
-    time_s = parse_time(row["time"], where)
-    return TuningChange(row["loop"].strip(), time_s, **numbers, who=row.get("who", "").strip())
+    kp_old, ti_old, kp_new, ti_new = (_number(row.get(c, ""), where, c) for c in COLUMNS[2:6])
+    time_s, who = parse_time(row["time"], where), row.get("who", "").strip()
+    return TuningChange(row["loop"].strip(), time_s, kp_old, ti_old, kp_new, ti_new, who)
 
 
-def stated_changes(rows: Sequence[Mapping[str, object]]) -> list[TuningChange]:
+def stated_changes(rows: Sequence[Mapping[str, Any]]) -> list[TuningChange]:
     """Changes of one loop's stated Kp or Ti between nights.
 
     Parameters
@@ -114,13 +114,12 @@ def stated_changes(rows: Sequence[Mapping[str, object]]) -> list[TuningChange]:
         The loop's rows of the nights in their order, with loop, start_s, kp and ti.
     """
     known = [r for r in rows if r["start_s"] is not None and r["kp"] is not None]
-    found = []
-    for a, b in zip(known, known[1:], strict=False):
-        if (a["kp"], a["ti"]) != (b["kp"], b["ti"]):
-            new = {"kp_old": a["kp"], "ti_old": a["ti"], "kp_new": b["kp"], "ti_new": b["ti"]}
-            seen = "the settings stated in loops.csv differ from the night before"
-            found.append(TuningChange(str(b["loop"]), float(str(b["start_s"])), **new, seen=seen))  # type: ignore[arg-type]
-    return found
+    seen = "the settings stated in loops.csv differ from the night before"
+    return [
+        TuningChange(b["loop"], b["start_s"], a["kp"], a["ti"], b["kp"], b["ti"], seen=seen)
+        for a, b in pairwise(known)
+        if (a["kp"], a["ti"]) != (b["kp"], b["ti"])
+    ]
 
 
 def _ratio(hours: Mapping[str, Floats]) -> tuple[Floats, Floats]:
@@ -134,9 +133,9 @@ def _ratio(hours: Mapping[str, Floats]) -> tuple[Floats, Floats]:
 def behaviour_change(loop: str, hours: Mapping[str, Floats]) -> TuningChange | None:
     """The hour at which a loop's controller began to answer differently, or None.
 
-    What a controller does to OP for a given error is its tuning's doing: valve travel over variability is steady
-    under changing load and steps when somebody types in new settings. The split that explains most is offered where
-    the step is large and clear against how days differ by themselves.
+    What a controller does to OP for a given error is its tuning's doing: valve travel over variability is
+    steady under changing load and steps when somebody types in new settings. The split that explains most is
+    offered where the step is large and clear against how days differ by themselves.
     """
     y, at = _ratio(hours)
     first = np.searchsorted(at, at[0] + LEAST_DAYS * DAY_S) if y.size else 0
@@ -154,7 +153,9 @@ def behaviour_change(loop: str, hours: Mapping[str, Floats]) -> TuningChange | N
     if step < LEAST_STEP or step < LEAST_RATIO * spread:
         return None
     factor = float(np.exp(right[best] - left[best]))
-    return TuningChange(loop, float(at[cut]), seen=f"OP moves {factor:.2g} times as much for the same error since")
+    return TuningChange(
+        loop, float(at[cut]), seen=f"OP moves {factor:.2g} times as much for the same error since"
+    )
 
 
 def _daily_spread(y: Floats, at: Floats) -> float:

@@ -60,7 +60,8 @@ def _written(pages: Sequence[Page], form: str, out: Path, single_file: bool) -> 
 
 def _subtitle(spans: Spans, store: Path) -> str:
     stated = spans.before is not None or spans.after is not None
-    return f"{'The stated spans' if stated else f'{spans.days:g} days'} before against after the change, from {store.name}."
+    span = "The stated spans" if stated else f"{spans.days:g} days"
+    return f"{span} before against after the change, from {store.name}."
 
 
 @click.command()

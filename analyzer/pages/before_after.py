@@ -12,8 +12,21 @@ from analyzer.changes import TuningChange
 from analyzer.pages.reading import Thinned
 from analyzer.pages.trends import trend_block
 from analyzer.pages.words import KINDS, TITLES, counted, interval, number, setting, signed, stamp
-from reports.pages import Block, Cell, Column, Facts, IntervalBar, IntervalChart, Listing, Mark, Page, Section
-from reports.pages import Table, Text, Tiles
+from reports.pages import (
+    Block,
+    Cell,
+    Column,
+    Facts,
+    IntervalBar,
+    IntervalChart,
+    Listing,
+    Mark,
+    Page,
+    Section,
+    Table,
+    Text,
+    Tiles,
+)
 
 TREND_BUCKETS = 4000
 """Buckets of a trend on this page: two weeks at two pixels a bucket, 64 kB a loop; ours."""
@@ -62,11 +75,6 @@ def outcome(found: LoopComparison) -> str:
     return text
 
 
-def _tone(found: LoopComparison) -> str:
-    tones = {"clear": "better", "modest": "better", "partial": "unclear", "mixed": "unclear", "none": "unclear"}
-    return tones.get(grade(found), "worse" if grade(found) == "worse" else "incomparable")
-
-
 def _tiles(cases: Sequence[Case]) -> Tiles:
     kinds = [grade(c.found) for c in cases]
     counts = (
@@ -101,16 +109,17 @@ def _average(cases: Sequence[Case], name: str) -> IntervalBar:
     changes = [c for case in cases for c in case.found.primary if c.measure.name == name]
     known = [c for c in changes if c.verdict is not Verdict.INCOMPARABLE and c.value_pct is not None]
     title = TITLES[name][0].split(" (")[0]
+    group = counted(len(known), "loop")
     if not known:
-        return IntervalBar("", title, None, None, None, "incomparable", "nothing comparable")
+        return IntervalBar(group, title, None, None, None, "incomparable", "nothing comparable")
     values = np.array([c.value_pct for c in known], float)
     ends = np.array([c.interval_pct for c in known], float)
     down, up = (float(np.sqrt(((ends[:, k] - values) ** 2).sum()) / len(known)) for k in (0, 1))
     mean = float(values.mean())
     low, high = max(mean - down, -100.0), mean + up
     verdict = Verdict.UNCLEAR if low <= 0 <= high else Verdict.BETTER if mean < 0 else Verdict.WORSE
-    text = f"{signed(mean)} % ({counted(len(known), 'loop')})"
-    return IntervalBar("", title, mean, low, high, KINDS[verdict], text)
+    text = f"{signed(mean)} %"
+    return IntervalBar(group, title, mean, low, high, KINDS[verdict], text)
 
 
 def average_chart(cases: Sequence[Case]) -> IntervalChart:
@@ -128,8 +137,8 @@ COLUMNS = (
     Column("after", "After", True, "Mean over the usable hours after the change"),
     Column("change_pct", "Change %", True, "After less before, in % of before"),
     Column("interval", "Interval"),
-    Column("low", "From", True, "Lower end of the difference, in the figure's unit"),
-    Column("high", "To", True, "Upper end of the difference, in the figure's unit"),
+    Column("low", "From", True, csv_only=True, hint="Lower end of the difference, in the figure's unit"),
+    Column("high", "To", True, csv_only=True, hint="Upper end of the difference, in the figure's unit"),
     Column("verdict", "Verdict"),
     Column("remark", "Remark", wide=True),
 )
@@ -187,42 +196,49 @@ def loop_section(case: Case, number_: int) -> Section:
     if case.trend is not None and case.trend.time_s.size > 1:
         thin = case.trend.between(found.before.first_s, found.after.last_s).coarser(TREND_BUCKETS)
         marks = (Mark(change.time_s, "changed"),)
-        blocks.append(trend_block(f"trend-{number_}", f"{found.loop}: before and after on one scale", thin, marks))
+        title = f"{found.loop}: before and after on one scale"
+        blocks.append(trend_block(f"trend-{number_}", title, thin, marks))
     title = f"{found.loop} {case.description}".strip()
     return Section(title, tuple(blocks))
 
 
+METHOD = (
+    "Every figure is the mean of the loop's hourly figures over usable hours (good samples, in automatic); "
+    "the hour of the change and the one after it are left out. Oscillation significance is amplitude times "
+    "regularity times hours of oscillation, a day.",
+    "Intervals: days of 24 hours are drawn at random (circular block bootstrap); the spread is widened for "
+    "few days (Student's t) and for days that drift. Where nothing changed, at most {error:.0f} % of loops "
+    "get any of their four assessments called better or worse.",
+    "Not compared, and never counted: mean SP or PV differing by over {m.set_point_pct:g} % of span, mean OP "
+    "by over {m.load_pct:g} %, time in automatic by over {m.mode_points:g} points, OP at a limit for over "
+    "{m.limit_points:g} % of the time, set point travel more than {m.sp_travel_ratio:g}-fold, under "
+    "{m.least_days:g} usable days a side or under {share:.0f} % of a span.",
+    "Modest: all four better, and one of them by less than {m.modest_pct:g} %. Changes under "
+    "{m.least_pct:g} % are not called better or worse.",
+)
+
+
 def _method() -> Section:
-    paragraphs = (
-        "Every figure is the mean of the loop's hourly figures over usable hours (good samples, in automatic); the hour "
-        "of the change and the one after it are left out. Oscillation significance is amplitude times regularity "
-        "times hours of oscillation, a day.",
-        f"Intervals: days of 24 hours are drawn at random (circular block bootstrap); the spread is widened for few "
-        f"days (Student's t) and for days that drift. Where nothing changed, at most "
-        f"{100 * (1 - LIMITS.confidence):.0f} % of loops get any of their four assessments called better or worse.",
-        f"Not compared, and never counted: mean SP or PV differing by over {LIMITS.set_point_pct:g} % of span, mean "
-        f"OP by over {LIMITS.load_pct:g} %, time in automatic by over {LIMITS.mode_points:g} points, OP at a limit for "
-        f"over {LIMITS.limit_points:g} % of the time, set point travel more than {LIMITS.sp_travel_ratio:g}-fold, under "
-        f"{LIMITS.least_days:g} usable days a side or under {100 * LIMITS.usable_share:.0f} % of a span.",
-        f"Modest: all four better, and one of them by less than {LIMITS.modest_pct:g} %. Changes under "
-        f"{LIMITS.least_pct:g} % are not called better or worse.",
-    )
-    return Section("How the figures are made", (Text(paragraphs),), closed=True)
+    said = {"m": LIMITS, "error": 100 * (1 - LIMITS.confidence), "share": 100 * LIMITS.usable_share}
+    return Section("How the figures are made", (Text(tuple(t.format(**said) for t in METHOD)),), closed=True)
 
 
-def page(cases: Sequence[Case], missing: Sequence[tuple[str, str]], subtitle: str, offered: bool = False) -> Page:
+OFFERED = "These changes were not stated but seen in the loops' behaviour: confirm them first."
+
+
+def page(
+    cases: Sequence[Case], missing: Sequence[tuple[str, str]], subtitle: str, offered: bool = False
+) -> Page:
     """The page of all changes; `missing` are changes that could not be looked at, with the reason."""
-    short: list[Block] = [_tiles(cases), Listing(tuple((c.found.loop, outcome(c.found)) for c in cases))]
-    if offered:
-        short.insert(0, Text(("These changes were not stated but seen in the loops' behaviour: confirm them first.",)))
+    short: list[Block] = [Text((OFFERED,))] if offered else []
+    short += [_tiles(cases), Listing(tuple((c.found.loop, outcome(c.found)) for c in cases))]
     if missing:
         short.append(Listing(tuple((loop, f"not looked at: {why}") for loop, why in missing)))
-    four = figures(cases, True, "figures", "")
     sections = (
         Section("In short", tuple(short)),
         Section("On average", (average_chart(cases),)),
         Section("Per loop and assessment", (per_loop_chart(cases),)),
-        Section("Figures before and after", (four,)),
+        Section("Figures before and after", (figures(cases, True, "figures", ""),)),
         *(loop_section(c, i) for i, c in enumerate(cases)),
         Section("Other figures", (figures(cases, False, "other-figures", ""),), closed=True),
         _method(),

@@ -48,7 +48,9 @@ class Thinned:
             k: (np.minimum if k.endswith("_min") else np.maximum).reduceat(v, edges)
             for k, v in self.extremes.items()
         }
-        return replace(self, time_s=self.time_s[edges], extremes=joined, gap=np.logical_and.reduceat(self.gap, edges))
+        return replace(
+            self, time_s=self.time_s[edges], extremes=joined, gap=np.logical_and.reduceat(self.gap, edges)
+        )
 
 
 def nights_within(store: Store, span: Span | None) -> list[str]:
@@ -68,7 +70,9 @@ def _tables(
     paths = [store.path / table / f"{night}.parquet" for night in nights]
     where = [("loop", "in", sorted(loops))]
     return [
-        pq.read_table(p, columns=list(columns) if columns else None, filters=where) for p in paths if p.exists()
+        pq.read_table(p, columns=list(columns) if columns else None, filters=where)
+        for p in paths
+        if p.exists()
     ]
 
 
@@ -87,7 +91,8 @@ def read_nights(
 
 
 def read_hours(store: Store, loops: Collection[str], nights: Sequence[str]) -> dict[str, dict[str, Floats]]:
-    """Hourly figures by loop, in order of time, NaN where not known; of an hour that stands twice the fuller one."""
+    """Hourly figures by loop, in order of time, NaN where not known; of an hour that stands twice the fuller
+    one."""
     tables = _tables(store, "hours", loops, nights, None)
     if not tables:
         return {}
@@ -113,7 +118,9 @@ def read_trends(store: Store, loops: Collection[str], nights: Sequence[str]) -> 
 
 def _thinned(table: pa.Table) -> Thinned:
     columns = {
-        c: table.column(c).to_numpy(zero_copy_only=False).astype(float) for c in table.column_names if c != "loop"
+        c: table.column(c).to_numpy(zero_copy_only=False).astype(float)
+        for c in table.column_names
+        if c != "loop"
     }
     _, order = np.unique(columns["time_s"], return_index=True)
     time_s, gap = columns["time_s"][order], columns["bad"][order] > 0.5
@@ -122,5 +129,7 @@ def _thinned(table: pa.Table) -> Thinned:
     jumps = np.flatnonzero(step > 3 * np.median(step)) + 1 if step.size else np.array([], int)
     time_s = np.insert(time_s, jumps, time_s[jumps - 1] + 1.0)
     return Thinned(
-        time_s, {k: np.insert(v, jumps, v[jumps - 1]) for k, v in extremes.items()}, np.insert(gap, jumps, True)
+        time_s,
+        {k: np.insert(v, jumps, v[jumps - 1]) for k, v in extremes.items()},
+        np.insert(gap, jumps, True),
     )

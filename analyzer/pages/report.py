@@ -14,8 +14,22 @@ from analyzer.pages.wear import wear_texts
 from analyzer.spans import spans_around
 from analyzer.store import Store
 
-COLUMNS = ("loop", "night", "description", "gain_unit", "ti_unit", "form", "kp", "ti", "start_s", "status")
-COLUMNS = (*COLUMNS, "source_loop", "oscillating_pct", "type", "extra")
+COLUMNS = (
+    *(
+        "loop",
+        "night",
+        "description",
+        "type",
+        "gain_unit",
+        "ti_unit",
+        "form",
+        "kp",
+        "ti",
+        "start_s",
+        "status",
+    ),
+    *("source_loop", "oscillating_pct", "extra"),
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +47,8 @@ class Spans:
 
 
 def detected(store: Store, loops: Sequence[str] | None = None) -> list[TuningChange]:
-    """Changes that nobody stated: settings that differ between nights, and steps of a controller's behaviour."""
+    """Changes that nobody stated: settings that differ between nights, and steps of a controller's
+    behaviour."""
     nights = store.nights()
     rows = read_nights(store, nights, COLUMNS, loops)
     tags = list(dict.fromkeys(r["loop"] for r in rows))
@@ -57,8 +72,14 @@ def _source(rows: Sequence[dict[str, Any]]) -> str:
 
 
 def _units(row: dict[str, Any]) -> str:
-    gain = {"percent": "gain in %/%", "engineering": "gain in engineering units", "band": "proportional band in %"}
-    return f"{row['form'] or 'ideal'}, {gain.get(row['gain_unit'] or 'percent')}, Ti in {row['ti_unit'] or 's'}"
+    gain = {
+        "percent": "gain in %/%",
+        "engineering": "gain in engineering units",
+        "band": "proportional band in %",
+    }
+    return (
+        f"{row['form'] or 'ideal'}, {gain.get(row['gain_unit'] or 'percent')}, Ti in {row['ti_unit'] or 's'}"
+    )
 
 
 def cases(

@@ -10,8 +10,8 @@ from reports.pages import Band, Mark, Sparkline, Trend
 SPARK_BUCKETS = 60
 """Buckets of a sparkline: two pixels each."""
 CAPTION = (
-    "Least and greatest of each bucket of {step}; percent of span, UTC. Wheel or drag zooms, shift-drag or arrows "
-    "move, double click shows all."
+    "Least and greatest of each bucket of {step}; percent of span, UTC. Wheel or drag zooms, shift-drag or "
+    "arrows move, double click shows all."
 )
 
 

@@ -1,0 +1,46 @@
+"""Pages written into a folder: HTML or Markdown, assets once, a CSV of every table."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from pathlib import Path
+
+from reports import charts, html, markdown
+from reports.pages import Page
+from reports.tables import as_csv
+
+
+def write_text(path: Path, text: str) -> Path:
+    """Write a file so that a reader sees all of it or the one before."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    temporary.write_text(text, "utf-8", newline="\n")
+    os.replace(temporary, path)
+    return path
+
+
+def write_csv(page: Page, out: Path) -> list[Path]:
+    """A CSV of every table of a page, in `out`/csv."""
+    return [write_text(out / "csv" / f"{page.name}-{t.name}.csv", as_csv(t)) for t in page.tables()]
+
+
+def write_html(pages: Iterable[Page], out: Path, single_file: bool = False) -> list[Path]:
+    """Pages as HTML; their assets beside them unless each is to be one file."""
+    if not single_file:
+        for name in (*html.ASSETS, html.LICENCE):
+            write_text(out / "assets" / name, html.asset(name))
+    return [write_text(out / f"{page.name}.html", html.render(page, single_file)) for page in pages]
+
+
+def write_markdown(pages: Iterable[Page], out: Path) -> list[Path]:
+    """Pages as Markdown with their pictures in a folder of the page's name."""
+    written = []
+    for page in pages:
+        folder = f"{page.name}-pictures"
+        for block in markdown.pictures(page):
+            path = out / folder / f"{block.name}.png"
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(charts.draw(block))
+        written.append(write_text(out / f"{page.name}.md", markdown.render(page, folder)))
+    return written

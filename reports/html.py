@@ -1,0 +1,125 @@
+"""Pages as HTML: self-contained or with shared assets, no request to any network.
+
+Templates place what is prepared here and compute nothing. Every text is escaped by jinja2; what is marked as
+safe is drawn in reports.svg, which escapes its texts itself.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+from functools import cache
+from importlib.resources import files
+
+import numpy as np
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
+
+from reports import svg
+from reports.pages import Band, Bars, Cell, Floats, Page, Sparkline, Trend
+
+ASSETS = ("page.css", "uPlot.min.css", "uPlot.iife.min.js", "page.js")
+LICENCE = "uPlot.LICENSE.txt"
+MISSING = 65535
+"""Code of a bucket that is not shown; levels run from 0 to 65534."""
+
+
+@cache
+def asset(name: str) -> str:
+    """Text of a style sheet, script or licence."""
+    return (files("reports") / "templates" / "assets" / name).read_text("utf-8")
+
+
+def _coded(values: Floats, gap: np.ndarray) -> dict[str, object]:
+    """A signal as 16-bit levels between its ends, base64: 2.7 bytes a value, exact to 1/65534 of its
+    range."""
+    known = np.isfinite(values) & ~gap
+    low, high = (float(values[known].min()), float(values[known].max())) if known.any() else (0.0, 1.0)
+    step = (high - low) / (MISSING - 1) or 1.0
+    level = np.where(known, np.round((np.where(known, values, low) - low) / step), MISSING)
+    return {"low": low, "step": step, "data": base64.b64encode(level.astype("<u2").tobytes()).decode()}
+
+
+def _band(band: Band, gap: np.ndarray) -> dict[str, object]:
+    ends = {"low": _coded(band.low, gap), "high": _coded(band.high, gap)}
+    return {"label": band.label, "kind": band.kind, "panel": band.panel, **ends}
+
+
+def trend_data(trend: Trend) -> Markup:
+    """A trend as JSON for the page's script; '<' is written as an escape, so that no text ends the script."""
+    start = float(trend.time_s[0]) if trend.time_s.size else 0.0
+    offset = np.round(trend.time_s - start).astype("<u4")
+    data = {
+        "start": start,
+        "time": base64.b64encode(offset.tobytes()).decode(),
+        "bands": [_band(b, trend.gap) for b in trend.bands],
+        "panels": list(trend.panels),
+        "marks": [{"x": m.x, "label": m.label} for m in trend.marks],
+    }
+    return Markup(json.dumps(data).replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e"))
+
+
+def cell_figure(cell: Cell) -> Markup:
+    """The picture in a cell, if there is one."""
+    if isinstance(cell.figure, Sparkline):
+        return svg.sparkline(cell.figure)
+    return svg.bars(cell.figure) if isinstance(cell.figure, Bars) else Markup("")
+
+
+def sort_key(cell: Cell) -> str:
+    """What a column is sorted by: the full number; '' where the text itself is."""
+    return "" if cell.number is None else f"{cell.number:.10g}"
+
+
+@cache
+def _environment() -> Environment:
+    loader = PackageLoader("reports")
+    env = Environment(
+        loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    env.filters.update(
+        picture=cell_figure, sort_key=sort_key, intervals=svg.intervals, plot=svg.plot, trend_data=trend_data
+    )
+    env.filters["block"] = lambda block: type(block).__name__
+    return env
+
+
+def _digest(text: str) -> str:
+    return "'sha256-" + base64.b64encode(hashlib.sha256(text.encode()).digest()).decode() + "'"
+
+
+def policy(single_file: bool) -> str:
+    """The content security policy: nothing from outside, no inline code but that of this page."""
+    if single_file:
+        scripts = " ".join(_digest(asset(a)) for a in ASSETS if a.endswith(".js"))
+        styles = " ".join(_digest(asset(a)) for a in ASSETS if a.endswith(".css"))
+    else:
+        scripts = styles = "'self' file:"
+    parts = ("default-src 'none'", f"script-src {scripts}", f"style-src {styles}", "img-src data:")
+    return "; ".join((*parts, "base-uri 'none'", "form-action 'none'"))
+
+
+def render(page: Page, single_file: bool = False, assets: str = "assets/") -> str:
+    """A page as HTML.
+
+    Parameters
+    ----------
+    page : Page
+    single_file : bool
+        Whether style and scripts are written into the page; else it asks for them in `assets`.
+    assets : str
+        Folder of the assets relative to the page, ending in '/'.
+    """
+    inlined = {a: Markup(asset(a)) for a in ASSETS} if single_file else {}
+    return (
+        _environment()
+        .get_template("page.html.j2")
+        .render(
+            page=page,
+            policy=Markup(policy(single_file)),
+            single_file=single_file,
+            assets=assets,
+            inlined=inlined,
+        )
+    )

@@ -1,0 +1,99 @@
+"""Pages as Markdown, with pictures beside them: fit for a wiki or a merge request."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+from reports.pages import (
+    Bars,
+    Block,
+    Cell,
+    Facts,
+    IntervalChart,
+    Listing,
+    Page,
+    Plot,
+    Section,
+    Table,
+    Text,
+    Tiles,
+    Trend,
+)
+
+MARKS = re.compile(r"([\\`*_\[\]#!|~$])")
+STARTS = re.compile(r"^(\d+(?=[.)](?:\s|$))|(?=[-+:](?:\s|$)|=+$|-+$))")
+ADDRESSES = re.compile(r"(?i)\b(https?|ftp|mailto|www)(?=[:.])")
+
+
+def escaped(text: str) -> str:
+    """Text as text: no markup, no HTML, no line breaks, nothing that turns into a link or calls a person."""
+    text = " ".join(text.split())
+    text = text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
+    text = STARTS.sub(r"\1\\", MARKS.sub(r"\\\1", text))
+    return ADDRESSES.sub(r"\1&#8203;", text).replace("@", "&#64;")
+
+
+def _link(href: str) -> str:
+    return href.removesuffix(".html") + ".md" if href.endswith(".html") else href
+
+
+def _cell(cell: Cell) -> str:
+    text = escaped(cell.text)
+    if isinstance(cell.figure, Bars) and not cell.text:
+        text = " / ".join(f"{name} {share:.0f}" for name, share in cell.figure.shares)
+    return f"[{text}]({_link(cell.href)})" if cell.href and text else text
+
+
+def _table(table: Table) -> list[str]:
+    shown = [i for i, c in enumerate(table.columns) if c.key != "trend" and not c.csv_only]
+    head = "| " + " | ".join(escaped(table.columns[i].title) for i in shown) + " |"
+    rule = "|" + "|".join("--:" if table.columns[i].numeric else "---" for i in shown) + "|"
+    body = ["| " + " | ".join(_cell(row[i]) for i in shown) + " |" for row in table.rows]
+    title = [f"**{escaped(table.title)}**", ""] if table.title else []
+    note = ["", escaped(table.note)] if table.note else []
+    return [*title, head, rule, *body, *note]
+
+
+def _block(block: Block, folder: str) -> list[str]:
+    match block:
+        case Table():
+            return _table(block)
+        case Text():
+            return [line for p in block.paragraphs for line in (escaped(p), "")][:-1]
+        case Listing():
+            return [
+                f"- {f'**{escaped(lead)}** ' if lead else ''}{escaped(text)}" for lead, text in block.items
+            ]
+        case Facts():
+            return [f"- {escaped(term)}: {escaped(detail)}" for term, detail in block.items]
+        case Tiles():
+            return [f"- **{escaped(figure)}** {escaped(what)}" for figure, what, _ in block.items]
+        case IntervalChart() | Plot() | Trend():
+            caption = ["", escaped(block.caption)] if block.caption else []
+            return [f"![{escaped(block.title)}]({folder}/{block.name}.png)", *caption]
+
+
+def _section(section: Section, folder: str) -> list[str]:
+    parts = [line for b in section.blocks for line in (*_block(b, folder), "")]
+    return [f"## {escaped(section.title)}", "", *parts]
+
+
+def render(page: Page, folder: str = "pictures") -> str:
+    """A page as Markdown.
+
+    Parameters
+    ----------
+    page : Page
+    folder : str
+        Where the pictures lie, relative to the page.
+    """
+    head = [f"# {escaped(page.title)}", "", escaped(page.subtitle), ""]
+    body = [line for s in page.sections for line in _section(s, folder)]
+    foot = [escaped(page.footer)] if page.footer else []
+    return "\n".join([*head, *body, *foot]).rstrip() + "\n"
+
+
+def pictures(page: Page) -> Sequence[IntervalChart | Plot | Trend]:
+    """The blocks that become pictures."""
+    return [b for s in page.sections for b in s.blocks if isinstance(b, IntervalChart | Plot | Trend)]

@@ -1,0 +1,218 @@
+"""What a page is: frozen data, texts already chosen, numbers already computed; rendered to HTML or Markdown
+elsewhere.
+
+Every text may hold anything that a plant writes; the renderers escape it. Arrays are float64, shape as said.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Masks = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True)
+class Sparkline:
+    """A small trend: least and greatest of each bucket [any unit], shape (b,) each; NaN where there is
+    none."""
+
+    low: Floats
+    high: Floats
+
+
+@dataclass(frozen=True, slots=True)
+class Bars:
+    """Shares of 100 side by side, each with the name of its colour: (("valve", 92.0), ...)."""
+
+    shares: tuple[tuple[str, float], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Cell:
+    """A cell: its text and, where it is a number, the number itself, for sorting and for CSV.
+
+    kind : name of a colour (better, worse, unclear, incomparable, valve, tuning, load), or ''
+    href : where the text leads, relative to the page, or ''
+    """
+
+    text: str
+    number: float | None = None
+    kind: str = ""
+    href: str = ""
+    figure: Sparkline | Bars | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """A column: its key in CSV, its heading, whether it holds numbers, what it means.
+
+    wide : its texts may wrap; csv_only : it stands in the CSV alone
+    """
+
+    key: str
+    title: str
+    numeric: bool = False
+    hint: str = ""
+    wide: bool = False
+    csv_only: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """A table; `facet` is the key of the column whose values filter it, '' for none."""
+
+    name: str
+    title: str
+    columns: tuple[Column, ...]
+    rows: tuple[tuple[Cell, ...], ...]
+    note: str = ""
+    searchable: bool = False
+    facet: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class IntervalBar:
+    """One change with its interval [in the chart's unit]; None where it cannot be told."""
+
+    group: str
+    label: str
+    value: float | None
+    low: float | None
+    high: float | None
+    kind: str
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class IntervalChart:
+    """Changes as bars with intervals, grouped."""
+
+    name: str
+    title: str
+    unit: str
+    bars: tuple[IntervalBar, ...]
+    caption: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Mark:
+    """A place on the horizontal axis with its name."""
+
+    x: float
+    label: str
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """A line (joined) or a cloud of points, shape (n,) each."""
+
+    label: str
+    x: Floats
+    y: Floats
+    joined: bool = True
+    kind: str = "pv"
+
+
+@dataclass(frozen=True, slots=True)
+class Plot:
+    """Lines and points over two linear axes, with marks."""
+
+    name: str
+    title: str
+    x_label: str
+    y_label: str
+    lines: tuple[Line, ...]
+    marks: tuple[Mark, ...] = ()
+    caption: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Band:
+    """A thinned signal: least and greatest of each bucket, shape (b,), and the panel (0 upper, 1 lower) it is
+    in."""
+
+    label: str
+    kind: str
+    panel: int
+    low: Floats
+    high: Floats
+
+
+@dataclass(frozen=True, slots=True)
+class Trend:
+    """Signals over time on linked axes.
+
+    time_s : start of each bucket [s since 1970-01-01 UTC], rising, shape (b,); gap : True where nothing is
+    shown
+    """
+
+    name: str
+    title: str
+    time_s: Floats
+    gap: Masks
+    bands: tuple[Band, ...]
+    panels: tuple[str, str]
+    marks: tuple[Mark, ...] = ()
+    caption: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Text:
+    """Paragraphs."""
+
+    paragraphs: tuple[str, ...]
+    kind: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Listing:
+    """Items of a list, each with an optional lead in bold."""
+
+    items: tuple[tuple[str, str], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Facts:
+    """Terms and what is known of them."""
+
+    items: tuple[tuple[str, str], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Tiles:
+    """A few figures that sum a page up: (figure, what it is, colour)."""
+
+    items: tuple[tuple[str, str, str], ...]
+
+
+Block = Table | IntervalChart | Plot | Trend | Text | Listing | Facts | Tiles
+
+
+@dataclass(frozen=True, slots=True)
+class Section:
+    """A part of a page under a heading; `closed` ones open on demand."""
+
+    title: str
+    blocks: tuple[Block, ...]
+    closed: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Page:
+    """A page: its file name without ending, its title, one line under it, sections, and links (text,
+    href)."""
+
+    name: str
+    title: str
+    subtitle: str
+    sections: tuple[Section, ...]
+    links: tuple[tuple[str, str], ...] = ()
+    footer: str = ""
+
+    def tables(self) -> tuple[Table, ...]:
+        """All tables of the page."""
+        return tuple(b for s in self.sections for b in s.blocks if isinstance(b, Table))

@@ -1,0 +1,190 @@
+"""Small pictures as inline SVG: sparklines, cause bars, changes with intervals, curves.
+
+Colours come from style sheets by class, so that light, dark and print need one picture. Texts are escaped.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+import numpy as np
+from markupsafe import Markup, escape
+
+from reports.pages import Bars, Floats, IntervalBar, IntervalChart, Line, Mark, Plot, Sparkline
+
+SPARK = (120.0, 26.0)
+ROW = 24.0
+LABELS = 110.0
+PANEL = (150.0, 56.0, 14.0)
+"""Width of a panel's bars, of the figures right of them, and of the space to the next."""
+PLOT = (520.0, 300.0)
+MARGIN = (56.0, 12.0, 12.0, 42.0)
+MOST_POINTS = 1500
+
+
+def _n(x: float) -> str:
+    return f"{x:.1f}".rstrip("0").rstrip(".")
+
+
+def _svg(width: float, height: float, body: Iterable[str], label: str, kind: str) -> Markup:
+    head = f'<svg class="{kind}" viewBox="0 0 {_n(width)} {_n(height)}" role="img" aria-label="'
+    return Markup(head) + escape(label) + Markup('">' + "".join(body) + "</svg>")
+
+
+def _text(x: float, y: float, text: str, anchor: str = "start", kind: str = "") -> str:
+    return f'<text x="{_n(x)}" y="{_n(y)}" text-anchor="{anchor}" class="{kind}">{escape(text)}</text>'
+
+
+def sparkline(s: Sparkline) -> Markup:
+    """A trend of a cell's size: the area between least and greatest."""
+    known = np.isfinite(s.low) & np.isfinite(s.high)
+    if not known.any():
+        return Markup("")
+    width, height = SPARK
+    low, high = float(s.low[known].min()), float(s.high[known].max())
+    scale = (height - 4) / max(high - low, 1e-9)
+    x = np.linspace(0, width, s.low.size)[known]
+    top = [f"{_n(a)},{_n(height - 2 - (b - low) * scale)}" for a, b in zip(x, s.high[known], strict=True)]
+    foot = [f"{_n(a)},{_n(height - 2 - (b - low) * scale)}" for a, b in zip(x, s.low[known], strict=True)]
+    path = "M" + "L".join(top) + "L" + "L".join(reversed(foot)) + "Z"
+    return _svg(width, height, [f'<path d="{path}"/>'], "PV of the night", "spark")
+
+
+def _rail(name: str, share: float, y: float) -> str:
+    full = f'<rect class="rail" x="0" y="{_n(y)}" width="60" height="4"/>'
+    held = f'<rect class="{escape(name)}" x="0" y="{_n(y)}" width="{_n(0.6 * min(share, 100))}" height="4"/>'
+    return full + held
+
+
+def bars(b: Bars) -> Markup:
+    """Shares of 100, one thin bar each, under one another."""
+    label = ", ".join(f"{name} {share:.0f} %" for name, share in b.shares)
+    body = [_rail(name, share, 6 * i + 1) for i, (name, share) in enumerate(b.shares)]
+    return _svg(60, 6.0 * len(b.shares), body, label, "bars")
+
+
+def nice_ticks(low: float, high: float, most: int = 6) -> list[float]:
+    """Round numbers from low to high, at most `most` steps of 1, 2 or 5 times a power of ten."""
+    span = max(high - low, 1e-12)
+    raw = span / most
+    power = 10.0 ** math.floor(math.log10(raw))
+    step = next(m * power for m in (1, 2, 5, 10) if m * power >= raw * (1 - 1e-9))
+    first = math.ceil(low / step - 1e-9)
+    last = math.floor(high / step + 1e-9)
+    return [k * step for k in range(first, last + 1)]
+
+
+def _reach(chart: IntervalChart) -> tuple[float, float]:
+    ends = [x for b in chart.bars for x in (b.low, b.high, b.value) if x is not None and math.isfinite(x)]
+    return min([-10.0, *(max(e, -150.0) for e in ends)]), max([10.0, *(min(e, 150.0) for e in ends)])
+
+
+def _interval(bar: IntervalBar, y: float, at: Floats, reach: tuple[float, float, float]) -> str:
+    """A bar from zero to the change, its interval as a line, both cut at the ends; the figure beside it."""
+    if bar.value is None or bar.low is None or bar.high is None:
+        return _text(at[2] + PANEL[1], y + 4, "–", "end", "quiet")
+    zero, value, low, high = np.interp([0.0, bar.value, bar.low, bar.high], reach, at)
+    left, right = sorted((zero, value))
+    place = f'x="{_n(left)}" y="{_n(y - 6)}" width="{_n(right - left)}" height="12"'
+    body = f'<rect class="bar {bar.kind}" {place}/>'
+    ends = f"M{_n(low)},{_n(y - 4)}v8M{_n(high)},{_n(y - 4)}v8"
+    whisker = f'<path class="whisker" d="M{_n(low)},{_n(y)}H{_n(high)}{ends}"/>'
+    return body + whisker + _text(at[2] + PANEL[1], y + 4, bar.text, "end", bar.kind)
+
+
+def _panel(chart: IntervalChart, label: str, left: float, rows: list[str]) -> list[str]:
+    low, high = _reach(chart)
+    at = np.array([left, left + PANEL[0] * low / (low - high), left + PANEL[0]])
+    foot = 26 + ROW * len(rows)
+    body = [_text(left, 14, label, "start", "strong")]
+    for tick in nice_ticks(low, high, 4):
+        x = float(np.interp(tick, [low, 0, high], at))
+        body.append(f'<path class="{"zero" if tick == 0 else "grid"}" d="M{_n(x)},22V{_n(foot)}"/>')
+        body.append(_text(x, foot + 14, f"{tick:g}", "middle", "tick"))
+    bars_ = [b for b in chart.bars if b.label == label]
+    return [*body, *(_interval(b, 38 + ROW * rows.index(b.group), at, (low, 0.0, high)) for b in bars_)]
+
+
+def intervals(chart: IntervalChart) -> Markup:
+    """Changes as bars with intervals: a panel for each label, a row for each group."""
+    rows = list(dict.fromkeys(b.group for b in chart.bars))
+    labels = list(dict.fromkeys(b.label for b in chart.bars))
+    body = [_text(0, 42 + ROW * i, row, "start", "") for i, row in enumerate(rows)]
+    for i, label in enumerate(labels):
+        body += _panel(chart, label, LABELS + i * sum(PANEL), rows)
+    return _svg(
+        LABELS + len(labels) * sum(PANEL), 46 + ROW * len(rows), body, f"{chart.title}, {chart.unit}", "chart"
+    )
+
+
+def _extent(values: list[Floats], pad: float) -> tuple[float, float]:
+    joined = np.concatenate(values) if values else np.zeros(1)
+    joined = joined[np.isfinite(joined)]
+    if joined.size == 0:
+        return 0.0, 1.0
+    low, high = float(joined.min()), float(joined.max())
+    space = pad * (high - low) or (0.0 if high > low else 1.0)
+    return low - space, high + space
+
+
+def _line(line: Line, x: Floats, y: Floats) -> str:
+    pairs = zip(x, y, strict=True)
+    points = [f"{_n(a)},{_n(b)}" for a, b in pairs if math.isfinite(a) and math.isfinite(b)]
+    if line.joined:
+        return f'<path class="line {line.kind}" d="M{"L".join(points)}"/>' if points else ""
+    return f'<path class="dots {line.kind}" d="{"".join(f"M{p}h0" for p in points)}"/>'
+
+
+class _Frame:
+    """Where data lie in a plot."""
+
+    def __init__(self, p: Plot) -> None:
+        joined = any(line.joined for line in p.lines)
+        self.x = _extent([line.x for line in p.lines], 0.0 if joined else 0.04)
+        self.y = _extent([line.y for line in p.lines], 0.04)
+        (self.width, self.height), (self.left, right, self.top, bottom) = PLOT, MARGIN
+        self.right, self.foot = self.width - right, self.height - bottom
+
+    def px(self, x: Floats) -> Floats:
+        """Horizontal place."""
+        return self.left + (x - self.x[0]) / (self.x[1] - self.x[0]) * (self.right - self.left)
+
+    def py(self, y: Floats) -> Floats:
+        """Vertical place."""
+        return self.foot - (y - self.y[0]) / (self.y[1] - self.y[0]) * (self.foot - self.top)
+
+    def grid(self) -> list[str]:
+        """Lines and figures of both axes."""
+        body = []
+        for tick in nice_ticks(*self.x):
+            x = float(self.px(np.array(tick)))
+            body.append(f'<path class="grid" d="M{_n(x)},{_n(self.top)}V{_n(self.foot)}"/>')
+            body.append(_text(x, self.foot + 16, f"{tick:.6g}", "middle", "tick"))
+        for tick in nice_ticks(*self.y, 5):
+            y = float(self.py(np.array(tick)))
+            body.append(f'<path class="grid" d="M{_n(self.left)},{_n(y)}H{_n(self.right)}"/>')
+            body.append(_text(self.left - 6, y + 4, f"{tick:.6g}", "end", "tick"))
+        return body
+
+    def mark(self, mark: Mark) -> list[str]:
+        """A marked place with its name, on the side where there is room."""
+        x = float(self.px(np.array(mark.x)))
+        anchor, aside = ("start", 4) if x < self.width * 0.6 else ("end", -4)
+        line = f'<path class="mark" d="M{_n(x)},{_n(self.top)}V{_n(self.foot)}"/>'
+        return [line, _text(x + aside, self.top + 12, mark.label, anchor, "marked")]
+
+
+def plot(p: Plot) -> Markup:
+    """Lines or points over two axes."""
+    frame = _Frame(p)
+    body = frame.grid()
+    for line in p.lines:
+        step = max(math.ceil(line.x.size / MOST_POINTS), 1)
+        body.append(_line(line, frame.px(line.x[::step]), frame.py(line.y[::step])))
+    for mark in p.marks:
+        body += frame.mark(mark)
+    body.append(_text((frame.left + frame.right) / 2, frame.height - 6, p.x_label, "middle", "axis"))
+    turned = f'<g transform="translate(13 {_n((frame.top + frame.foot) / 2)}) rotate(-90)">'
+    body.append(f"{turned}{_text(0, 0, p.y_label, 'middle', 'axis')}</g>")
+    return _svg(frame.width, frame.height, body, f"{p.title}: {p.y_label} over {p.x_label}", "plot")

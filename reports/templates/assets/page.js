@@ -1,0 +1,264 @@
+(function () {
+  "use strict";
+
+  /* Tables: sorting by buttons in the headings, filtering by text and by one column. */
+
+  function keyOf(row, index) {
+    const cell = row.cells[index];
+    const number = cell.getAttribute("data-sort");
+    return number === null ? cell.textContent.trim() : Number(number);
+  }
+
+  function compare(a, b) {
+    if (typeof a === "number" && typeof b === "number") return a - b;
+    if (typeof a === "number") return -1;
+    if (typeof b === "number") return 1;
+    return a.localeCompare(b, "en", { numeric: true });
+  }
+
+  function sortBy(table, index, direction) {
+    const body = table.tBodies[0];
+    const keyed = Array.from(body.rows, (row) => ({ row, key: keyOf(row, index) }));
+    keyed.sort((p, q) => {
+      if ((p.key === "") !== (q.key === "")) return p.key === "" ? 1 : -1;
+      return direction * compare(p.key, q.key);
+    });
+    const piece = document.createDocumentFragment();
+    keyed.forEach((k) => piece.appendChild(k.row));
+    body.appendChild(piece);
+  }
+
+  function sortable(table) {
+    const heads = Array.from(table.tHead.rows[0].cells);
+    heads.forEach((head, index) => {
+      head.querySelector("button").addEventListener("click", () => {
+        const first = head.classList.contains("n") ? "descending" : "ascending";
+        const other = first === "ascending" ? "descending" : "ascending";
+        const next = head.getAttribute("aria-sort") === first ? other : first;
+        heads.forEach((h) => h.removeAttribute("aria-sort"));
+        head.setAttribute("aria-sort", next);
+        sortBy(table, index, next === "ascending" ? 1 : -1);
+      });
+    });
+  }
+
+  function filterable(tools) {
+    const table = document.getElementById(tools.dataset.for);
+    const rows = Array.from(table.tBodies[0].rows, (row) => ({ row, text: row.textContent.toLowerCase() }));
+    const search = tools.querySelector("input");
+    const select = tools.querySelector("select");
+    const said = tools.querySelector("output");
+    const heads = Array.from(table.tHead.rows[0].cells);
+    const at = select ? heads.findIndex((h) => h.dataset.key === select.dataset.facet) : -1;
+    if (select) {
+      const values = new Set(rows.map((r) => r.row.cells[at].textContent.trim()).filter((v) => v));
+      Array.from(values).sort().forEach((v) => select.add(new Option(v, v)));
+    }
+    function apply() {
+      const words = search.value.toLowerCase().split(/\s+/).filter((w) => w);
+      let shown = 0;
+      rows.forEach((r) => {
+        const fits = words.every((w) => r.text.includes(w)) &&
+          (!select || !select.value || r.row.cells[at].textContent.trim() === select.value);
+        r.row.hidden = !fits;
+        shown += fits ? 1 : 0;
+      });
+      said.textContent = shown === rows.length ? rows.length + " rows" : shown + " of " + rows.length + " rows";
+    }
+    search.addEventListener("input", apply);
+    if (select) select.addEventListener("change", apply);
+    apply();
+  }
+
+  /* Trends: two panels over one time axis; wheel and drag zoom, shift-drag and keys move, double click shows all. */
+
+  function bytes(text) {
+    const raw = atob(text);
+    const out = new Uint8Array(raw.length);
+    for (let i = 0; i < raw.length; i += 1) out[i] = raw.charCodeAt(i);
+    return out.buffer;
+  }
+
+  function decoded(coded) {
+    return Array.from(new Uint16Array(bytes(coded.data)), (v) => (v === 65535 ? null : coded.low + v * coded.step));
+  }
+
+  function colour(name) {
+    return getComputedStyle(document.documentElement).getPropertyValue("--" + name).trim();
+  }
+
+  function stamp(seconds) {
+    return new Date(seconds * 1000).toISOString().slice(0, 19).replace("T", " ");
+  }
+
+  function figureOf(value) {
+    return Math.abs(value) >= 100 ? value.toFixed(0) : value.toPrecision(3);
+  }
+
+  function seriesOf(band) {
+    const stroke = () => colour(band.kind);
+    const common = { stroke, width: 1, points: { show: false }, spanGaps: false };
+    return [{ ...common, label: band.label + " max" }, { ...common, label: band.label + " min" }];
+  }
+
+  function marksOn(u, marks) {
+    const ctx = u.ctx;
+    ctx.save();
+    ctx.strokeStyle = colour("worse");
+    ctx.fillStyle = colour("worse");
+    ctx.setLineDash([6, 4]);
+    ctx.font = Math.round(11 * devicePixelRatio) + "px sans-serif";
+    marks.forEach((mark) => {
+      const x = u.valToPos(mark.x, "x", true);
+      if (x < u.bbox.left || x > u.bbox.left + u.bbox.width) return;
+      ctx.beginPath();
+      ctx.moveTo(x, u.bbox.top);
+      ctx.lineTo(x, u.bbox.top + u.bbox.height);
+      ctx.stroke();
+      ctx.fillText(mark.label, x + 4, u.bbox.top + 12 * devicePixelRatio);
+    });
+    ctx.restore();
+  }
+
+  function trend(figure) {
+    const data = JSON.parse(figure.querySelector('script[type="application/json"]').textContent);
+    const time = Array.from(new Uint32Array(bytes(data.time)), (v) => v + data.start);
+    if (time.length < 2) return;
+    const whole = { min: time[0], max: time[time.length - 1] };
+    const holders = figure.querySelectorAll(".panel");
+    const readout = figure.querySelector(".readout");
+    const values = data.bands.map((b) => ({ low: decoded(b.low), high: decoded(b.high) }));
+    const plots = [];
+    let now = { ...whole };
+
+    function show(min, max) {
+      const least = Math.min(20 * (whole.max - whole.min) / time.length, whole.max - whole.min);
+      const width = Math.min(Math.max(max - min, least), whole.max - whole.min);
+      const first = Math.min(Math.max(min, whole.min), whole.max - width);
+      now = { min: first, max: first + width };
+      figure.dataset.from = String(now.min);
+      figure.dataset.to = String(now.max);
+      plots.forEach((u) => u.setScale("x", now));
+    }
+
+    function zoom(factor, share) {
+      const at = now.min + (now.max - now.min) * share;
+      show(at - (at - now.min) * factor, at + (now.max - at) * factor);
+    }
+
+    function move(share) {
+      const by = (now.max - now.min) * share;
+      show(now.min + by, now.max + by);
+    }
+
+    function told(index) {
+      readout.replaceChildren();
+      if (index === null || index === undefined) return;
+      readout.append(stamp(time[index]) + " UTC");
+      data.bands.forEach((band, i) => {
+        const low = values[i].low[index], high = values[i].high[index];
+        if (low === null) return;
+        const key = document.createElement("span");
+        key.className = "key-" + band.kind;
+        key.textContent = band.label;
+        const text = figureOf(low) === figureOf(high) ? figureOf(low) : figureOf(low) + " … " + figureOf(high);
+        readout.append("   ", key, " " + text);
+      });
+    }
+
+    function handlers(u) {
+      const over = u.over;
+      over.addEventListener("wheel", (event) => {
+        event.preventDefault();
+        const box = over.getBoundingClientRect();
+        zoom(event.deltaY < 0 ? 0.75 : 1 / 0.75, (event.clientX - box.left) / box.width);
+      }, { passive: false });
+      over.addEventListener("mousedown", (event) => {
+        if (!event.shiftKey && event.button !== 1) return;
+        event.preventDefault();
+        event.stopImmediatePropagation();
+        const width = over.getBoundingClientRect().width, from = { ...now }, x = event.clientX;
+        const drag = (e) => {
+          const by = (x - e.clientX) / width * (from.max - from.min);
+          show(from.min + by, from.max + by);
+        };
+        const drop = () => {
+          document.removeEventListener("mousemove", drag);
+          document.removeEventListener("mouseup", drop);
+        };
+        document.addEventListener("mousemove", drag);
+        document.addEventListener("mouseup", drop);
+      }, true);
+      over.addEventListener("dblclick", () => show(whole.min, whole.max));
+    }
+
+    function axis(extra) {
+      return { stroke: () => colour("quiet"), grid: { stroke: () => colour("rule"), width: 1 },
+        ticks: { stroke: () => colour("rule"), width: 1 }, font: "11px sans-serif", ...extra };
+    }
+
+    const sync = uPlot.sync(figure.id);
+    data.panels.forEach((label, panel) => {
+      const own = data.bands.map((band, i) => ({ band, i })).filter((b) => b.band.panel === panel);
+      if (!own.length) return;
+      const rows = [time], series = [{}], bands = [];
+      own.forEach(({ band, i }) => {
+        bands.push({ series: [rows.length, rows.length + 1], fill: () => colour(band.kind) });
+        rows.push(values[i].high, values[i].low);
+        series.push(...seriesOf(band));
+      });
+      const options = {
+        width: Math.max(holders[panel].clientWidth, 200), height: panel === 0 ? 240 : 150,
+        tzDate: (ts) => uPlot.tzDate(new Date(ts * 1000), "Etc/UTC"),
+        legend: { show: false }, series, bands,
+        scales: { x: { time: true, auto: false, min: whole.min, max: whole.max, range: () => [now.min, now.max] } },
+        axes: [axis({ space: 70 }), axis({ label, labelSize: 18, labelFont: "11px sans-serif", size: 48 })],
+        cursor: { sync: { key: sync.key }, drag: { x: true, y: false, setScale: false }, y: false, focus: { prox: -1 } },
+        hooks: {
+          draw: [(u) => marksOn(u, data.marks)],
+          setCursor: [(u) => told(u.cursor.idx)],
+          setSelect: [(u) => {
+            if (u.select.width < 4) return;
+            show(u.posToVal(u.select.left, "x"), u.posToVal(u.select.left + u.select.width, "x"));
+            u.setSelect({ left: 0, top: 0, width: 0, height: 0 }, false);
+          }],
+        },
+      };
+      const u = new uPlot(options, rows, holders[panel]);
+      handlers(u);
+      plots.push(u);
+    });
+
+    const actions = [["+", "Zoom in", () => zoom(0.5, 0.5)], ["−", "Zoom out", () => zoom(2, 0.5)],
+      ["◀", "Earlier", () => move(-0.25)], ["▶", "Later", () => move(0.25)],
+      ["All", "Show all", () => show(whole.min, whole.max)]];
+    const keys = figure.querySelector(".keys");
+    actions.forEach(([text, label, act]) => {
+      const button = document.createElement("button");
+      button.type = "button";
+      button.textContent = text;
+      button.setAttribute("aria-label", label);
+      button.addEventListener("click", act);
+      keys.append(button);
+    });
+    const byKey = { "+": 0, "=": 0, "-": 1, ArrowLeft: 2, ArrowRight: 3, 0: 4 };
+    figure.addEventListener("keydown", (event) => {
+      if (event.ctrlKey || event.metaKey || event.altKey || !(event.key in byKey)) return;
+      event.preventDefault();
+      actions[byKey[event.key]][2]();
+    });
+
+    function fit() {
+      plots.forEach((u, i) => u.setSize({ width: Math.max(holders[i].clientWidth, 200), height: u.height }));
+    }
+    new ResizeObserver(fit).observe(figure);
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => plots.forEach((u) => u.redraw()));
+    show(whole.min, whole.max);
+    figure.dataset.ready = "yes";
+  }
+
+  document.querySelectorAll("main table").forEach(sortable);
+  document.querySelectorAll(".tools").forEach(filterable);
+  document.querySelectorAll("figure.trend").forEach(trend);
+  addEventListener("beforeprint", () => document.querySelectorAll("details").forEach((d) => { d.open = true; }));
+})();
