@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
+from analyzer.advice import Advice, advise
 from analyzer.assess import Assessment, assess
 from analyzer.assessments import Assessments
 from analyzer.columns import ALL_COLUMNS, TEXT_COLUMNS
@@ -107,11 +108,14 @@ class Done:
     lost: tuple[tuple[str, str], ...]
 
 
-def assess_loop(spec: LoopSpec, series: dict[str, Series], config: Config) -> Assessment:
-    """Prepare and assess one loop from its raw samples."""
+def assess_loop(spec: LoopSpec, series: dict[str, Series], config: Config) -> tuple[Assessment, Advice]:
+    """Prepare, assess and advise on one loop from its raw samples."""
     prepared = prepare(spec, series, config.quality)
-    span = None if prepared.scale.recorded else prepared.scale.span
-    return assess(prepared, controller(spec, span or prepared.scale.span), config, spec.type)
+    stated = controller(spec, prepared.scale.span)
+    if stated is not None and spec.scan_s is None:
+        stated = replace(stated, scan_s=prepared.record.dt_s)
+    found = assess(prepared, stated, config, spec.type)
+    return found, advise(found.verdict, spec, stated, prepared.scale.span)
 
 
 def _loop_row(
@@ -119,14 +123,14 @@ def _loop_row(
 ) -> tuple[dict[str, Any], Assessment | None]:
     """The row of one loop and night, whatever happens."""
     try:
-        found = assess_loop(spec, {tag: cut(s, night) for tag, s in series.items()}, config)
+        found, advice = assess_loop(spec, {tag: cut(s, night) for tag, s in series.items()}, config)
     except NotAssessedError as error:
         return lost_row(spec, night.name, "not assessed", str(error)), None
     except TriageError as error:
         return lost_row(spec, night.name, "failed", str(error)), None
     except Exception as error:  # an error of one loop is that loop's result, never the night's end
         return lost_row(spec, night.name, "failed", f"{type(error).__name__}: {error}"), None
-    return advised(night_row(found, spec, night.name), found.verdict.needs), found
+    return advised(night_row(found, spec, night.name), found.verdict.needs, advice), found
 
 
 def _read(task: Task, spec: LoopSpec) -> dict[str, Series] | str:

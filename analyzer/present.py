@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from analyzer.advice import Advice
     from analyzer.plantwide import Source
 
 SHORT = {
@@ -75,10 +76,16 @@ def reason_of(row: Mapping[str, Any], needs: str = "") -> str:
     return cycle
 
 
-def advised(row: dict[str, Any], needs: str) -> dict[str, Any]:
-    """The row with action and reason; `needs` says why the cause could not be told, if it could not."""
-    actions = {"none": "none", "load": "none"}
-    return {**row, "action": actions.get(row["cause"], "undecided"), "reason": reason_of(row, needs)}
+def advised(row: dict[str, Any], needs: str, advice: Advice) -> dict[str, Any]:
+    """The row with action, new settings and reason; `needs` says why the cause could not be told, if not."""
+    found = reason_of(row, needs)
+    return {
+        **row,
+        "action": advice.action,
+        "kp_new": advice.kp_new,
+        "ti_new": advice.ti_new,
+        "reason": f"{found}. {advice.reason}" if advice.reason else found,
+    }
 
 
 def follower_row(row: Mapping[str, Any], source: Source) -> dict[str, Any]:
@@ -94,6 +101,8 @@ def follower_row(row: Mapping[str, Any], source: Source) -> dict[str, Any]:
         "osc_tuning_pct": min(row["osc_tuning_pct"] or 0.0, 25.0),
         "osc_valve_pct": min(row["osc_valve_pct"] or 0.0, 25.0),
         "action": "see source loop",
+        "kp_new": None,
+        "ti_new": None,
         "signs": json.dumps(signs),
     }
     changed["reason"] = f"cycles with {_period(row['period_s'])}; {text}"
