@@ -114,13 +114,15 @@ def load_oscillation(scene: Scene, s: float, rng: Rng) -> Made:
 
 
 def supply_variation(scene: Scene, s: float, rng: Rng) -> Made:
-    """Head that wanders slowly by the share `s` (rms): gain and bias together."""
+    """Head that wanders slowly by the share `s` (rms): gain and, by a part of the flow at rest, bias."""
+    bias = rng.uniform(0.05, 0.25) * scene.plant.v0
 
     def breathe(d: Drive) -> Drive:
         n = len(d.sp)
         slow = wander(rng, n, n / rng.uniform(8, 20))
         smooth = lfilter([0.02], [1, -0.98], slow - slow[0])
-        return replace(d, supply=d.supply * np.clip(1.0 + s * smooth, 0.2, 3.0))
+        head = np.clip(1.0 + s * smooth, 0.2, 3.0)
+        return replace(d, supply=d.supply * head, act=d.act + bias * (head - 1.0))
 
     return both(scene, breathe), {"supply_rms": s}
 

@@ -192,7 +192,7 @@ NAMES = (
     Effect("controller-logic", "controller", acting.controller_logic, sizes=(1.0, 0.6, 0.35, 0.2)),
     Effect("load-step", "load", acting.load_step, 0.02, 25.0),
     Effect("load-oscillation", "load", acting.load_oscillation, 0.02, 15.0),
-    Effect("supply-variation", "load", acting.supply_variation, 0.002, 0.4),
+    Effect("supply-variation", "load", acting.supply_variation, 0.004, 0.8),
     Effect("coupling", "load", acting.coupling, 0.01, 6.0),
 )
 CATALOGUE = {e.name: e for e in NAMES}

@@ -33,7 +33,7 @@ def quiet(d: Drive) -> Drive:
 
 
 def fopdt(op: np.ndarray, T: float, L: float, scan: float) -> np.ndarray:
-    """Response of unit gain to OP, shape (n,), counted from rest and held between scans; exact for any L [s]."""
+    """Response of unit gain to OP, shape (n,), counted from rest and held between scans; any L [s]."""
     d, part = divmod(L / scan, 1.0)
     a, b = math.exp(-scan / T), math.exp(-scan * (1 - part) / T)
     late = np.concatenate([np.zeros(int(d) + 2), op])[: len(op) + 1]

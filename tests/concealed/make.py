@@ -81,9 +81,7 @@ def hide(case: Case, library: list[np.ndarray]) -> tuple[Scene, Scene, list[dict
         if all(f is not None for f in found):
             break
     else:
-        raise RuntimeError(
-            f"{case.tag} {case.effects}: no loop of {ATTEMPTS} carries it; widen the strengths"
-        )
+        raise RuntimeError(f"{case.tag} {case.effects}: none of {ATTEMPTS} loops carries it; widen it")
     scene, entries = base, []
     for i, ((name, level), f) in enumerate(zip(case.effects, found, strict=True)):
         scene, hidden = apply(EFFECTS[name], scene, f[0], case.seed + i)
@@ -139,14 +137,9 @@ def truth_of(case: Case, base: Scene, scene: Scene, entries: list[dict], later: 
 
 def rows_of(tag: str, scene: Scene) -> list[dict]:
     """What the plant knows of the loop, and of its neighbour."""
-    kp, ti = scene.told
-    span = {"pv_lo": 0, "pv_hi": 100, "op_lo": 0, "op_hi": 100}
-    rows = [{"loop": tag, "type": scene.kind, "kp": kp, "ti": ti, "scan_s": scene.scan, **span}]
-    if scene.neighbours:
-        rows.append(
-            {"loop": f"N{tag[1:]}", "type": scene.kind, "kp": None, "ti": None, "scan_s": scene.scan, **span}
-        )
-    return rows
+    rest = {"scan_s": scene.scan, "pv_lo": 0, "pv_hi": 100, "op_lo": 0, "op_hi": 100}
+    known = {tag: scene.told} | ({f"N{tag[1:]}": (None, None)} if scene.neighbours else {})
+    return [{"loop": t, "type": scene.kind, "kp": kp, "ti": ti, **rest} for t, (kp, ti) in known.items()]
 
 
 def seal(out: pathlib.Path, library: list[np.ndarray], case: Case) -> tuple[list[dict], str, dict]:

@@ -179,7 +179,7 @@ def run(p: Any, c: Any, rows: np.ndarray, given: np.ndarray, closed: bool, h: fl
             old = now - int(p.echo_s / dt)
             again = p.echo * past[old] / p.K if old > 0 else 0.0
             aided = aid(aided, p.y0 + x[0], rows[8, k], dt, p)
-            feed = p.K * gain * (q * rows[2, k] + rows[1, k] + rows[9, k] + again + aided - p.v0)
+            feed = p.K * gain * ((q - p.v0) * rows[2, k] + rows[1, k] + rows[9, k] + again + aided)
             advance(x, work, feed, rows[3, k], dt, p)
             past[now] = level_of(x, p) - p.y0
     return out

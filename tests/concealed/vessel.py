@@ -49,7 +49,7 @@ def rates(x: np.ndarray, dx: np.ndarray, feed: float, pre: float, p: Any) -> Non
 
 @njit(cache=True)
 def advance(x: np.ndarray, work: np.ndarray, feed: float, pre: float, dt: float, p: Any) -> None:
-    """Move the states, shape (9,), on by `dt` [s] with the classic fourth-order rule; work has shape (5, 9)."""
+    """Move the states, shape (9,), on by `dt` [s] by the classic fourth-order rule; work: shape (5, 9)."""
     rates(x, work[0], feed, pre, p)
     for i in range(x.size):
         work[4, i] = x[i] + 0.5 * dt * work[0, i]
