@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from analyzer.cause import Measured, Verdict
 from analyzer.history.loops_csv import LoopSpec
 from analyzer.tags import as_stated
-from identification.hammerstein import Fit
+from identification.hammerstein import Fit, Window, covariance
 from identification.models import Backlash, Fopdt, Loop, Pid, Stiction, Valve
 from tuning.recommend import Proposal, recommend
+from tuning.search import rounded, scaled_valve
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +60,35 @@ def model_of(verdict: Verdict, controller: Pid) -> Loop:
     return Loop(process, controller, valve_of(verdict, fit))
 
 
-def advise(verdict: Verdict, spec: LoopSpec, controller: Pid | None, pv_span: float) -> Advice:
+def uncertain(window: Window, fit: Fit, loop: Loop, samples: int = 6, seed: int = 0) -> tuple[Loop, ...]:
+    """Loops drawn from the fit's covariance, of the same controller."""
+    rng = np.random.default_rng(seed)
+    mean = np.array([math.log(fit.time_constant_s), fit.dead_time_s, fit.valve.stickband, fit.gain])
+    spread = covariance(window, fit, free_width=loop.valve is not None)
+    draws = rng.multivariate_normal(mean, spread, size=samples, method="svd")
+    out = []
+    for log_t, dead, width, gain in draws:
+        t = math.exp(min(max(log_t, mean[0] - 2.3), mean[0] + 2.3))
+        gain = gain if gain * fit.gain > 0 else 0.3 * fit.gain
+        process = Fopdt(float(gain), t, max(float(dead), 0.0))
+        factor = max(float(width), 0.2 * fit.valve.stickband) / max(fit.valve.stickband, 1e-9)
+        out.append(Loop(process, loop.controller, scaled_valve(loop.valve, factor)))
+    return tuple(out)
+
+
+def cautious(fit: Fit, period_s: float | None) -> Fopdt:
+    """The process of a fit, its time constant raised to two periods at the same slope.
+
+    A cycle tells gain over time constant; a time constant much beyond the period cannot be told from it, and an
+    integral time after one that is too short makes a loop swing that should be calmed.
+    """
+    t = max(fit.time_constant_s, 2.0 * (period_s or 0.0))
+    return Fopdt(fit.slope * t, t, fit.dead_time_s)
+
+
+def advise(
+    verdict: Verdict, spec: LoopSpec, controller: Pid | None, pv_span: float, period_s: float | None
+) -> Advice:
     """The advice on one loop.
 
     Parameters
@@ -67,6 +99,8 @@ def advise(verdict: Verdict, spec: LoopSpec, controller: Pid | None, pv_span: fl
         The stated settings in percent and seconds.
     pv_span : float
         Span of PV in its own unit, for settings in engineering units.
+    period_s : float or None
+        Period of the oscillation [s], None where there is none.
     """
     if verdict.cause in ("none", "load"):
         return Advice("none")
@@ -76,7 +110,17 @@ def advise(verdict: Verdict, spec: LoopSpec, controller: Pid | None, pv_span: fl
         return Advice("repair valve")
     if controller is None:
         return Advice("undecided", "no kp and ti in loops.csv, so no new settings")
-    return _stated(recommend(model_of(verdict, controller), verdict.cause), spec, pv_span)
+    return _stated(propose(verdict, controller, period_s), spec, pv_span)
+
+
+def propose(verdict: Verdict, controller: Pid, period_s: float | None) -> Proposal:
+    """The tuning package's proposal on the model of a verdict and on its uncertainty."""
+    fit, loop = chosen_fit(verdict), model_of(verdict, controller)
+    others = uncertain(_measured(verdict).window, fit, loop)
+    if verdict.cause == "tuning":
+        slow = replace(loop, process=cautious(fit, period_s))
+        return recommend(slow, verdict.cause, (loop, *others[:2]))
+    return recommend(loop, verdict.cause, others)
 
 
 def _stated(proposal: Proposal, spec: LoopSpec, pv_span: float) -> Advice:
@@ -84,4 +128,4 @@ def _stated(proposal: Proposal, spec: LoopSpec, pv_span: float) -> Advice:
     if proposal.controller is None:
         return Advice(proposal.action, proposal.reason)
     kp, ti = as_stated(proposal.controller, spec, pv_span)
-    return Advice(proposal.action, proposal.reason, kp, ti)
+    return Advice(proposal.action, proposal.reason, rounded(kp), rounded(ti))

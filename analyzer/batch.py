@@ -36,6 +36,8 @@ from identification.errors import InputError, NotAssessedError, TriageError
 
 CHUNK = 8
 """Loops per task: enough to carry the cost of a task, few enough for a smooth progress bar."""
+HISTORY = {"none": "none", "load": "none"}
+"""Actions of nights that are not the last: settings are advised on for tomorrow, not for the week before."""
 DAY_S = 86400.0
 WHOLE_H = 36.0
 """Records up to this long [h] are one night; longer ones are cut at midnights (UTC)."""
@@ -78,7 +80,23 @@ def nights(spans: Sequence[tuple[float, float]]) -> list[Night]:
     if lengths[len(lengths) // 2] > WHOLE_H * 3600.0:
         return daily(first, last)
     latest = max(spans, key=lambda s: s[1])
-    return [replace(_named(*latest), first_s=-math.inf, last_s=math.inf)]
+    return [replace(_named(*latest), first_s=first, last_s=last + 1.0)]
+
+
+def clipped(
+    spans: Sequence[tuple[float, float]], since_s: float, until_s: float
+) -> list[tuple[float, float]]:
+    """Spans within a span of time; those outside are left out.
+
+    Raises
+    ------
+    InputError
+        Where nothing is left.
+    """
+    inside = [(max(a, since_s), min(b, until_s - 1.0)) for a, b in spans if a < until_s and b >= since_s]
+    if not inside:
+        raise InputError("no samples between --since and --until", "a span of the export", "widen it")
+    return inside
 
 
 def cut(series: Series, night: Night) -> Series:
@@ -108,22 +126,28 @@ class Done:
     lost: tuple[tuple[str, str], ...]
 
 
-def assess_loop(spec: LoopSpec, series: dict[str, Series], config: Config) -> tuple[Assessment, Advice]:
-    """Prepare, assess and advise on one loop from its raw samples."""
+def assess_loop(
+    spec: LoopSpec, series: dict[str, Series], config: Config, advising: bool = True
+) -> tuple[Assessment, Advice]:
+    """Prepare and assess one loop from its raw samples, and advise on it if wanted."""
     prepared = prepare(spec, series, config.quality)
     stated = controller(spec, prepared.scale.span)
     if stated is not None and spec.scan_s is None:
         stated = replace(stated, scan_s=prepared.record.dt_s)
     found = assess(prepared, stated, config, spec.type)
-    return found, advise(found.verdict, spec, stated, prepared.scale.span)
+    if not advising:
+        return found, Advice(HISTORY.get(found.verdict.cause, "undecided"))
+    first = found.oscillations.first
+    period = first.period_s if first is not None else None
+    return found, advise(found.verdict, spec, stated, prepared.scale.span, period)
 
 
 def _loop_row(
-    spec: LoopSpec, series: dict[str, Series], night: Night, config: Config
+    spec: LoopSpec, series: dict[str, Series], night: Night, config: Config, advising: bool
 ) -> tuple[dict[str, Any], Assessment | None]:
     """The row of one loop and night, whatever happens."""
     try:
-        found, advice = assess_loop(spec, {tag: cut(s, night) for tag, s in series.items()}, config)
+        found, advice = assess_loop(spec, {tag: cut(s, night) for tag, s in series.items()}, config, advising)
     except NotAssessedError as error:
         return lost_row(spec, night.name, "not assessed", str(error)), None
     except TriageError as error:
@@ -155,7 +179,8 @@ def work(task: Task) -> Done:
             if isinstance(series, str):
                 row, assessment = lost_row(spec, night.name, "not assessed", series), None
             else:
-                row, assessment = _loop_row(spec, series, night, task.config)
+                advising = night is task.nights[-1]
+                row, assessment = _loop_row(spec, series, night, task.config, advising)
             rows[night.name].append(row)
             if assessment is not None:
                 found[night.name].append(assessment)
@@ -268,6 +293,8 @@ def run(
     config: Config,
     jobs: int = 1,
     resume: bool = False,
+    since_s: float = -math.inf,
+    until_s: float = math.inf,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> tuple[list[Night], list[tuple[str, str]]]:
     """Assess all loops of an export and keep the results.
@@ -283,6 +310,8 @@ def run(
         Worker processes; 1 works in this one.
     resume : bool
         Go on with the pieces of a run that was stopped, instead of starting anew.
+    since_s, until_s : float
+        Only samples of this span of time are assessed [s since 1970-01-01 UTC].
     progress : callable
         Called with loops done and loops in all.
 
@@ -300,7 +329,7 @@ def run(
         raise InputError(
             "no PV tag of any loop is in the export", f"tags such as {specs[0].wanted_pv}", "check --loops"
         )
-    spans = nights([export.span(tag) for tag in present])
+    spans = nights(clipped([export.span(tag) for tag in present], since_s, until_s))
     if not resume:
         for span in spans:
             store.drop_parts(span.name)

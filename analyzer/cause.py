@@ -282,7 +282,7 @@ def _needed(m: Measured, limits: CauseLimits, oscillating: bool) -> float:
 def valve_signs(m: Measured, limits: CauseLimits, oscillating: bool) -> list[Sign]:
     """Signs for and against the valve."""
     needed = _needed(m, limits, oscillating)
-    signs = []
+    signs: list[Sign] = []
     wrong_way = m.controller is not None and m.controller.kp * m.play.gain < 0
     if m.moves < limits.moves and not m.excited:
         return signs

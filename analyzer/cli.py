@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Callable, Sequence
+from datetime import UTC, datetime
 from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -79,6 +81,10 @@ def opened(
     return source, specs, notes
 
 
+def _seconds(at: datetime | None, otherwise: float) -> float:
+    return otherwise if at is None else at.replace(tzinfo=UTC).timestamp()
+
+
 @click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
 @click.version_option(package_name="loop-triage", prog_name="triage")
 def main() -> None:
@@ -115,11 +121,22 @@ def check(export: tuple[Path, ...], loops: Path | None, **reading: Any) -> None:
 )
 @click.option("--jobs", default=1, show_default=True, type=click.IntRange(1), help="Worker processes.")
 @click.option("--resume", is_flag=True, help="Go on with a run that was stopped.")
+@click.option("--since", type=click.DateTime(), help="First day or time assessed (UTC).")
+@click.option("--until", type=click.DateTime(), help="Day or time (UTC) before which samples are assessed.")
 @told
 def run(
-    export: tuple[Path, ...], loops: Path | None, store: Path, jobs: int, resume: bool, **reading: Any
+    export: tuple[Path, ...],
+    loops: Path | None,
+    store: Path,
+    jobs: int,
+    resume: bool,
+    since: datetime | None,
+    until: datetime | None,
+    **reading: Any,
 ) -> None:
     """The nightly batch: assess every loop and keep the results in a store.
+
+    An export of several days is kept day by day; new settings are advised on for the last of them.
 
     Example: triage run export.parquet --loops loops.csv --store store --jobs 4
     """
@@ -132,7 +149,8 @@ def run(
     for note in notes:
         click.echo(f"triage: {note}", err=True)
     with bar("loops") as progress:
-        nights, lost = batch.run(source, specs, Store(store), Config(), jobs, resume, progress)
+        span = _seconds(since, -math.inf), _seconds(until, math.inf)
+        nights, lost = batch.run(source, specs, Store(store), Config(), jobs, resume, *span, progress)
     for loop, reason in lost:
         click.echo(f"{loop}: {reason}", err=True)
     last = nights[-1].name

@@ -36,7 +36,19 @@ RANK_COLUMNS = (
 """The ranking's columns in their order; contract."""
 TEXT_COLUMNS = frozenset(
     ("loop", "type", "status", "cause", "valve_fault", "source_loop", "action", "reason")
-    + ("night", "area", "description", "pv_unit", "signs", "periods", "notes", "form", "gain_unit", "ti_unit")
+    + (
+        "night",
+        "area",
+        "description",
+        "pv_unit",
+        "signs",
+        "advice",
+        "periods",
+        "notes",
+        "form",
+        "gain_unit",
+        "ti_unit",
+    )
 )
 """Columns that hold text; all others hold numbers."""
 OTHER_COLUMNS = (
@@ -72,6 +84,7 @@ OTHER_COLUMNS = (
     "ti_unit",
     "periods",
     "signs",
+    "advice",
     "notes",
 )
 ALL_COLUMNS = RANK_COLUMNS + OTHER_COLUMNS

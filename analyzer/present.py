@@ -47,6 +47,30 @@ def _period(seconds: float) -> str:
     return f"{seconds / 60:.3g} min" if seconds < 7200 else f"{seconds / 3600:.3g} h"
 
 
+def brief(row: Mapping[str, Any]) -> dict[str, str]:
+    """A row for the terminal: figures in few characters, settings as old and new in one cell."""
+    period = row["period_s"]
+    return {
+        "Loop": row["loop"],
+        "Signif.": figure(row["oscillation_significance"], ""),
+        "Osc %": figure(row["oscillating_pct"], "oscillating_pct"),
+        "Valve %": figure(row["osc_valve_pct"], "osc_valve_pct"),
+        "Tuning %": figure(row["osc_tuning_pct"], "osc_tuning_pct"),
+        "Load %": figure(row["osc_load_pct"], "osc_load_pct"),
+        "Error %": figure(row["average_absolute_error_pct"], ""),
+        "Travel %/h": figure(row["valve_travel_pct_per_h"], ""),
+        "Period": _period(period) if period else "",
+        "Kp": _settings(row["kp"], row["kp_new"]),
+        "Ti": _settings(row["ti"], row["ti_new"]),
+        "Action": row["action"] or "",
+        "Reason": row["reason"] or "",
+    }
+
+
+def _settings(now: float | None, new: float | None) -> str:
+    return figure(now, "") if new is None else f"{figure(now, '')} -> {figure(new, '')}"
+
+
 def _strongest(row: Mapping[str, Any], cause: str) -> str:
     signs = [s for s in json.loads(row.get("signs") or "[]") if s["points_to"] == cause]
     return "; ".join(s["text"] for s in sorted(signs, key=lambda s: -s["strength"])[:2])
@@ -59,7 +83,7 @@ def _valve(row: Mapping[str, Any]) -> str:
     if not width or row["valve_size"] is None:
         return f"{fault}: {_strongest(row, 'valve')}"
     share, gain = 100 * row["valve_size"], row["evidence"]
-    return f"{fault} of {width:.2g} % explains PV (log likelihood +{gain:.0f}), {share:.0f} % of OP's range"
+    return f"{fault} of {width:.2g} %, {share:.0f} % of OP's range (log likelihood +{gain:.0f})"
 
 
 def reason_of(row: Mapping[str, Any], needs: str = "") -> str:
@@ -77,14 +101,14 @@ def reason_of(row: Mapping[str, Any], needs: str = "") -> str:
 
 
 def advised(row: dict[str, Any], needs: str, advice: Advice) -> dict[str, Any]:
-    """The row with action, new settings and reason; `needs` says why the cause could not be told, if not."""
-    found = reason_of(row, needs)
+    """The row with action, new settings, advice and reason; `needs` says why no cause could be told, if so."""
     return {
         **row,
         "action": advice.action,
         "kp_new": advice.kp_new,
         "ti_new": advice.ti_new,
-        "reason": f"{found}. {advice.reason}" if advice.reason else found,
+        "advice": advice.reason,
+        "reason": reason_of(row, needs),
     }
 
 
@@ -103,6 +127,7 @@ def follower_row(row: Mapping[str, Any], source: Source) -> dict[str, Any]:
         "action": "see source loop",
         "kp_new": None,
         "ti_new": None,
+        "advice": f"Look at {source.loop} first.",
         "signs": json.dumps(signs),
     }
     changed["reason"] = f"cycles with {_period(row['period_s'])}; {text}"

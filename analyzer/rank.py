@@ -23,6 +23,10 @@ TABLE_COLUMNS = (
     "pv_amplitude_pct",
     "average_absolute_error_pct",
     "valve_travel_pct_per_h",
+    "kp",
+    "kp_new",
+    "ti",
+    "ti_new",
     "action",
     "reason",
 )
@@ -87,19 +91,19 @@ def as_table(rows: Sequence[Row], night: str) -> str:
     from rich.table import Table
     from rich.text import Text
 
-    from analyzer.present import CAUSE_STYLES, SHORT, figure
+    from analyzer.present import CAUSE_STYLES, brief
 
-    table = Table(box=SIMPLE_HEAD, title=f"Night {night}", title_justify="left", pad_edge=False)
-    for c in TABLE_COLUMNS:
-        wraps = c == "reason"
-        table.add_column(SHORT[c], justify="left" if c in TEXT_COLUMNS else "right", no_wrap=not wraps)
-    for r in rows:
-        cells = [
-            Text(figure(r[c], c), style=CAUSE_STYLES.get(r["cause"], "") if c == "loop" else "")
-            for c in TABLE_COLUMNS
-        ]
-        table.add_row(*cells)
-    console = Console(width=None if _interactive() else 170)
+    table = Table(
+        box=SIMPLE_HEAD, title=f"Night {night}", title_justify="left", pad_edge=False, padding=(0, 1, 0, 0)
+    )
+    shown = [brief(r) for r in rows]
+    for name in shown[0] if shown else ():
+        texts = name in ("Loop", "Action", "Reason", "Period", "Kp", "Ti")
+        table.add_column(name, justify="left" if texts else "right", no_wrap=name != "Reason")
+    for r, cells in zip(rows, shown, strict=True):
+        style = CAUSE_STYLES.get(r["cause"], "")
+        table.add_row(*(Text(text, style=style if name == "Loop" else "") for name, text in cells.items()))
+    console = Console(width=None if _interactive() else 180)
     with console.capture() as capture:
         console.print(table)
     return "\n".join(line.rstrip() for line in capture.get().rstrip().splitlines())

@@ -110,5 +110,27 @@ def report(
     sys.exit(SOME_LOST if missing else 0)
 
 
-COMMANDS = (report,)
+@click.command()
+@click.argument("store", type=click.Path(path_type=Path))
+@click.option("--night", help="Night to show, e.g. 2026-03-08. Default: the latest.")
+@click.option(
+    "--top", default=50, show_default=True, type=click.IntRange(0), help="Loops with a page of their own."
+)
+@click.option("--format", "form", type=click.Choice(["html", "markdown"]), default="html", show_default=True)
+@click.option("--single-file", is_flag=True, help="Style and scripts in each page itself.")
+@click.option("--out", required=True, type=click.Path(path_type=Path), help="Folder to write into.")
+def pages(store: Path, night: str | None, top: int, form: str, single_file: bool, out: Path) -> None:
+    """The morning page of a night and a page for each of its worst loops.
+
+    Example: triage pages store --out pages --top 50
+    """
+    from analyzer.pages import night as night_pages
+    from analyzer.store import Store
+
+    kept = Store(store)
+    kept.require()
+    _written(list(night_pages.pages(kept, night, top)), form, out, single_file)
+
+
+COMMANDS = (report, pages)
 """To be added to the command line; errors are told there."""

@@ -235,7 +235,7 @@ def score(
     left = max((power - np.dot(beta, cross)) / max(count, 1), 1e-14)
     beta[1] /= level
     beta[2] /= level
-    return left, count, beta
+    return left, count, beta  # type: ignore[return-value]
 
 
 Dynamics = tuple[float, float]
@@ -263,7 +263,8 @@ class Prepared:
     def score(self, time_constant_s: float, dead_time_s: float) -> tuple[float, int, Floats]:
         """Innovations variance, count and coefficients for a time constant and a dead time [s]."""
         args = (self.white_y, self.white_stem, self.judged, self.level, self.first)
-        return score(*args, time_constant_s, dead_time_s, self.window.dt_s)
+        sigma2, count, beta = score(*args, time_constant_s, dead_time_s, self.window.dt_s)
+        return float(sigma2), int(count), np.asarray(beta, dtype=np.float64)
 
 
 def _filtered(x: Floats, ar: Floats, notch_period: float) -> Floats:
@@ -552,6 +553,32 @@ def _moved(window: Window, trial: _Trial, step: Floats, free_width: bool) -> tup
     return theta, _widened(trial.valve, step[2])
 
 
+def _theta(fit: Fit) -> Floats:
+    head = [math.log(fit.time_constant_s), fit.dead_time_s, fit.valve.stickband, fit.gain]
+    return np.concatenate((head, fit.base, fit.ar))
+
+
+def _held(window: Window, free_width: bool) -> list[int]:
+    """Places in theta that do not move."""
+    return ([] if free_width else [2]) + ([] if window.step_at > 0 else [7])
+
+
+def covariance(window: Window, fit: Fit, free_width: bool = False) -> Floats:
+    """Covariance of (log T, L, stickband, gain) from the curvature at a fit, shape (4, 4).
+
+    The inverse of the Gauss-Newton matrix times the innovations variance (Ljung 1999, eq. 9.31), the noise model's
+    and the slow terms' share in it; zero for what was held.
+    """
+    trial = _trial(window, window.y - window.y.mean(), _theta(fit), fit.valve, free_width)
+    held = _held(window, free_width)
+    free = np.array([j for j in range(trial.gram.shape[0]) if j not in held and trial.gram[j, j] > 0])
+    scale = np.sqrt(np.diag(trial.gram)[free])
+    inside = np.linalg.pinv(trial.gram[np.ix_(free, free)] / np.outer(scale, scale), rcond=1e-10)
+    out = np.zeros_like(trial.gram)
+    out[np.ix_(free, free)] = trial.loss * inside / np.outer(scale, scale)
+    return out[:4, :4]
+
+
 def descend(window: Window, fit: Fit, free_width: bool = False) -> Fit:
     """All constants of a model together to the least innovations variance, by damped Gauss-Newton steps.
 
@@ -559,12 +586,9 @@ def descend(window: Window, fit: Fit, free_width: bool = False) -> Fit:
     once, because they trade against each other along narrow valleys.
     """
     y = window.y - window.y.mean()
-    theta = np.concatenate(
-        ([math.log(fit.time_constant_s), fit.dead_time_s, fit.valve.stickband, fit.gain], fit.base, fit.ar)
-    )
-    best = _trial(window, y, theta, fit.valve, free_width)
+    best = _trial(window, y, _theta(fit), fit.valve, free_width)
     damping = 1e-3
-    frozen = ([] if free_width else [2]) + ([] if window.step_at > 0 else [7])
+    frozen = _held(window, free_width)
     for _ in range(ITERATIONS):
         moved = _moved(window, best, _steps(best.gram, best.slope, damping, frozen), free_width)
         trial = _trial(window, y, *moved, free_width) if moved is not None else None

@@ -65,7 +65,7 @@ class LoopRecord:
     @property
     def time_s(self) -> Floats:
         """Seconds since the first sample, shape (n,)."""
-        return np.arange(self.pv.size) * self.dt_s
+        return np.asarray(np.arange(self.pv.size) * self.dt_s, dtype=np.float64)
 
     @property
     def duration_s(self) -> float:

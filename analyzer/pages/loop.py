@@ -1,0 +1,211 @@
+"""The page of one loop: what, why, the evidence, the trends, and how it was over the nights."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from analyzer.pages.reading import Thinned
+from analyzer.pages.rhythm import rhythm_plots
+from analyzer.pages.trends import trend_block
+from analyzer.pages.words import TITLES, duration, number, setting
+from reports.names import slug
+from reports.pages import Block, Cell, Column, Facts, Line, Page, Plot, Section, Table, Text
+
+Row = Mapping[str, Any]
+WEEK = 7
+COLUMNS = (
+    *("loop", "type", "area", "description", "pv_unit", "status", "reason", "action", "cause", "valve_fault"),
+    *(
+        "source_loop",
+        "osc_valve_pct",
+        "osc_tuning_pct",
+        "osc_load_pct",
+        "kp",
+        "ti",
+        "kp_new",
+        "ti_new",
+        "form",
+    ),
+    *("gain_unit", "ti_unit", "gain", "time_constant_s", "slope_pct_per_s", "dead_time_s", "backlash_pct"),
+    *("stickband_pct", "slip_jump_pct", "signs", "notes", "start_s", "duration_s", *TITLES),
+    *("predicted_period_s", "predicted_pv_amplitude_pct", "expected_period_s", "expected_pv_amplitude_pct"),
+)
+FIGURES = (
+    *("oscillation_significance", "oscillating_pct", "average_absolute_error_pct", "variability_pct"),
+    *("valve_travel_pct_per_h", "reversals_per_h", "crossings_per_h", "noise_band_pct", "harris_index"),
+    *("settling_time_s", "regularity", "normal_pct", "at_limits_pct", "service_pct", "usable_h"),
+    *("sp_mean_pct", "pv_mean_pct", "op_mean_pct"),
+)
+MODEL = (
+    ("gain", "Gain", "% PV per % OP"),
+    ("time_constant_s", "Time constant", "s"),
+    ("slope_pct_per_s", "Gain over time constant", "% per % and s"),
+    ("dead_time_s", "Dead time", "s"),
+    ("backlash_pct", "Backlash, full width", "% of OP"),
+    ("stickband_pct", "Stickband", "% of OP"),
+    ("slip_jump_pct", "Slip jump", "% of OP"),
+)
+
+
+def _verdict(row: Row) -> Section:
+    reason = row["reason"] or "nothing was found"
+    facts = [("Action", row["action"] or "–"), ("Cause", row["cause"] or "not assessed")]
+    facts += [
+        (f"Confidence in {c}", f"{row[f'osc_{c}_pct']:.0f} %")
+        for c in CAUSES
+        if row[f"osc_{c}_pct"] is not None
+    ]
+    if row["valve_fault"] not in (None, "", "none"):
+        facts.append(("Valve fault", row["valve_fault"]))
+    if row["source_loop"]:
+        facts.append(("Source loop", row["source_loop"]))
+    if row["period_s"] is not None:
+        facts.append(("Period", duration(row["period_s"])))
+        facts.append(("Amplitude of PV", f"{number(row['pv_amplitude_pct'])} % of span"))
+    if row["kp"] is not None:
+        facts.append(("Settings now", f"Kp {setting(row['kp'])}, Ti {setting(row['ti'])} {_units(row)}"))
+    if row["kp_new"] is not None or row["ti_new"] is not None:
+        new = f"Kp {setting(row['kp_new'])}, Ti {setting(row['ti_new'])} {_units(row)}"
+        facts.append(("Settings to type in", new))
+    return Section(
+        "What and why", (Text((reason[:1].upper() + reason[1:] + ".",), "lead"), Facts(tuple(facts)))
+    )
+
+
+CAUSES = ("valve", "tuning", "load")
+
+
+def _units(row: Row) -> str:
+    return (
+        f"({row['form'] or 'ideal'}, gain in {row['gain_unit'] or 'percent'}, Ti in {row['ti_unit'] or 's'})"
+    )
+
+
+def _evidence(row: Row) -> Section:
+    columns = (
+        Column("points_to", "Points to"),
+        Column("strength", "Strength", True),
+        Column("sign", "Sign", wide=True),
+    )
+    signs = sorted(json.loads(row["signs"] or "[]"), key=lambda s: -s["strength"])
+    rows = tuple(
+        (
+            Cell(s["points_to"], kind=s["points_to"] if s["points_to"] in CAUSES else ""),
+            Cell(f"{s['strength']:.2f}", s["strength"]),
+            Cell(s["text"]),
+        )
+        for s in signs
+    )
+    blocks: list[Block] = [Table("evidence", "", columns, rows)] if rows else [Text(("No sign of a fault.",))]
+    known = [(title, f"{number(row[k])} {unit}") for k, title, unit in MODEL if row[k] is not None]
+    if known:
+        blocks.append(Facts(tuple(known)))
+    if row["notes"]:
+        blocks.append(Text((f"About the data: {row['notes']}.",), "note"))
+    return Section("Evidence", tuple(blocks))
+
+
+def _pv_op(thin: Thinned) -> Plot:
+    shown = ~thin.gap
+    line = Line("PV over OP", thin.middle("op")[shown], thin.middle("pv")[shown], joined=False)
+    caption = "A cloud along a line: a sound valve. An ellipse or a parallelogram: lag, play or stick-slip."
+    return Plot("pv-op", "PV over OP, the last night", "OP [%]", "PV [% of span]", (line,), (), caption)
+
+
+HISTORY = (
+    Column("night", "Night"),
+    Column("cause", "Cause"),
+    *(
+        Column(c, t, True)
+        for c, t in (("oscillation_significance", "Signif."), ("oscillating_pct", "Osc. %"))
+    ),
+    Column("period_s", "Period", True),
+    Column("average_absolute_error_pct", "Error %", True),
+    Column("valve_travel_pct_per_h", "Travel %/h", True),
+    Column("variability_pct", "Variab. %", True),
+    Column("action", "Action", wide=True),
+)
+
+
+def _history_row(row: Row) -> tuple[Cell, ...]:
+    cells = []
+    for column in HISTORY:
+        value = row[column.key]
+        text = (
+            duration(value) if column.key == "period_s" else number(value) if column.numeric else value or ""
+        )
+        cells.append(Cell(text or "", value if column.numeric else None))
+    if row["status"] != "ok":
+        cells[-1] = Cell(f"{row['status']}: {row['reason']}")
+    return tuple(cells)
+
+
+def _history(rows: Sequence[Row]) -> Section:
+    table = Table("history", "", HISTORY, tuple(_history_row(r) for r in reversed(rows)))
+    known = [(i - len(rows) + 1.0, r["oscillation_significance"]) for i, r in enumerate(rows)]
+    points = np.array([(x, y) for x, y in known if y is not None], float)
+    blocks: list[Block] = [table]
+    if len(points) > 2:
+        line = Line("significance", points[:, 0], points[:, 1])
+        title = "Oscillation significance over the nights"
+        blocks.insert(0, Plot("nights", title, "nights before this one", "% h", (line,)))
+    return Section("Over the nights", tuple(blocks))
+
+
+CYCLES = (
+    ("recorded", "period_s", "pv_amplitude_pct"),
+    ("predicted by the model", "predicted_period_s", "predicted_pv_amplitude_pct"),
+    ("expected with the new settings", "expected_period_s", "expected_pv_amplitude_pct"),
+)
+
+
+def _limit_cycle(row: Row) -> list[Section]:
+    """Recorded against predicted limit cycle, and what new settings promise, where the night holds them."""
+    known = [(name, row[p], row[a]) for name, p, a in CYCLES if row[p] is not None]
+    if len(known) < 2:
+        return []
+    columns = (
+        Column("cycle", "Limit cycle"),
+        Column("period_s", "Period", True),
+        Column("amplitude_pct", "PV amplitude %", True),
+    )
+    rows = tuple((Cell(name), Cell(duration(p), p), Cell(number(a), a)) for name, p, a in known)
+    return [Section("Limit cycle", (Table("limit-cycle", "", columns, rows),))]
+
+
+def _trends(thin: Thinned | None, row: Row) -> list[Section]:
+    if thin is None or thin.time_s.size < 2:
+        return []
+    last = thin.between(row["start_s"] or 0.0, float("inf"))
+    pictures = (_pv_op(last), *rhythm_plots(last, row["period_s"]))
+    return [
+        Section("Trends", (trend_block("trend", "SP, PV and OP", thin),)),
+        Section("PV over OP, and its rhythm", pictures),
+    ]
+
+
+def page(rows: Sequence[Row], thin: Thinned | None, index: str = "index.html") -> Page:
+    """A loop's page.
+
+    Parameters
+    ----------
+    rows : sequence of mapping
+        The loop's nights, oldest first; the last is the night that the page is about.
+    thin : Thinned or None
+        Its trends of the last week.
+    index : str
+        The morning page.
+    """
+    row = rows[-1]
+    figures = [
+        (TITLES[k][0], f"{number(row[k])} {TITLES[k][1]}".strip()) for k in FIGURES if row[k] is not None
+    ]
+    sections = [_verdict(row), _evidence(row), *_trends(thin, row), *_limit_cycle(row), _history(rows)]
+    sections.insert(-1, Section("Figures of the night", (Facts(tuple(figures)),)))
+    known = [row["description"], row["type"], row["area"], f"night {row['night']}"]
+    links = (("All loops", index),)
+    return Page(slug(row["loop"]), row["loop"], ", ".join(k for k in known if k), tuple(sections), links)

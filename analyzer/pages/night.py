@@ -1,0 +1,31 @@
+"""All pages of a night: the morning page, then the worst loops one by one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from analyzer.pages import loop, morning
+from analyzer.pages.reading import read_nights, read_trends
+from analyzer.store import Store
+from reports.pages import Page
+
+HISTORY = 60
+"""Nights of history on a loop's page; ours: two months, as a maintenance round takes."""
+
+
+def pages(store: Store, name: str | None = None, top: int = 50) -> Iterator[Page]:
+    """The morning page of a night (the latest by default) and the pages of its worst loops.
+
+    Raises
+    ------
+    InputError
+        Where the store holds no such night.
+    """
+    night = morning.read_night(store, name, top)
+    yield morning.page(night)
+    nights = [n for n in store.nights() if n <= night.name][-HISTORY:]
+    rows = read_nights(store, nights, loop.COLUMNS, night.paged)
+    trends = read_trends(store, night.paged, nights[-loop.WEEK :])
+    for worst in night.worst:
+        tag = worst["loop"]
+        yield loop.page([r for r in rows if r["loop"] == tag], trends.get(tag))
