@@ -197,6 +197,11 @@
         ticks: { stroke: () => colour("rule"), width: 1 }, font: "11px sans-serif", ...extra };
     }
 
+    function ticks(u, splits, axisIndex, space, step) {
+      return splits.map((s) => (s === null ? "" : step >= 86400 || s % 86400 === 0 ? stamp(s).slice(5, 10)
+        : stamp(s).slice(11, step < 60 ? 19 : 16)));
+    }
+
     const sync = uPlot.sync(figure.id);
     data.panels.forEach((label, panel) => {
       const own = data.bands.map((band, i) => ({ band, i })).filter((b) => b.band.panel === panel);
@@ -212,7 +217,7 @@
         tzDate: (ts) => uPlot.tzDate(new Date(ts * 1000), "Etc/UTC"),
         legend: { show: false }, series, bands,
         scales: { x: { time: true, auto: false, min: whole.min, max: whole.max, range: () => [now.min, now.max] } },
-        axes: [axis({ space: 70 }), axis({ label, labelSize: 18, labelFont: "11px sans-serif", size: 48 })],
+        axes: [axis({ space: 70, values: ticks }), axis({ label, labelSize: 18, labelFont: "11px sans-serif", size: 48 })],
         cursor: { sync: { key: sync.key }, drag: { x: true, y: false, setScale: false }, y: false, focus: { prox: -1 } },
         hooks: {
           draw: [(u) => marksOn(u, data.marks)],
