@@ -70,4 +70,4 @@ def plan(cases: int, seed: int) -> list[Case]:
     every = [((), o) for o in odd] + [(h, "") for h in hidden]
     order = rng.permutation(len(every))
     seeds = rng.integers(2**31, size=len(every))
-    return [Case(f"L{i:04d}", *every[j], int(seeds[i])) for i, j in enumerate(order)]
+    return [Case(f"L{i:04d}", every[j][0], every[j][1], int(seeds[i])) for i, j in enumerate(order)]

@@ -1,6 +1,7 @@
 """Words, tables and the picture of the sealed cases' results."""
 
 import pathlib
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -28,7 +29,7 @@ def share(hits: pd.Series) -> str:
     return f"{k} of {n}, {100 * k / n:.0f} % ({100 * low:.0f}–{100 * high:.0f})"
 
 
-def table(head: list[str], rows: list[list[str]]) -> str:
+def table(head: list[str], rows: list[list]) -> str:
     """A Markdown table."""
     lines = [head, ["---"] * len(head), *rows]
     return "\n".join("| " + " | ".join(map(str, line)) + " |" for line in lines)
@@ -46,7 +47,7 @@ def by_level(rows: pd.DataFrame) -> str:
     ]
     info, size = rows[rows.group == "information"], rows[rows.group == "size"]
     some = rows[rows.group.isin(["information", "size"])]
-    lines = []
+    lines: list[list] = []
     for lv in LEVELS:
         back = some[some.level == lv].recovered.dropna()
         shown = f"{back.median():.2f} ({len(back)})" if len(back) else "–"
@@ -95,7 +96,7 @@ def oddities(rows: pd.DataFrame) -> str:
 
 def confusion(rows: pd.DataFrame) -> str:
     """What each effect was called, single effects of all levels, commonest first."""
-    lines = []
+    lines: list[list] = []
     for effect, g in rows[rows.group != "pair"].groupby("effect"):
         counts = g.verdict.value_counts()
         per = [f"{int(g[g.level == lv].lenient.sum())}/{int((g.level == lv).sum())}" for lv in LEVELS]
@@ -107,7 +108,7 @@ def parameter_table(params: pd.DataFrame) -> str:
     """Errors and interval coverage of parameters that truth and answer share."""
     if params.empty:
         return "No answer shares a parameter with its truth."
-    lines = []
+    lines: list[list] = []
     for (effect, name), g in params.groupby(["effect", "parameter"]):
         inside = g.inside.dropna().astype(bool)
         middle, worst = 100 * g.error.abs().median(), 100 * g.error.abs().max()
@@ -171,7 +172,7 @@ def draw(rows: pd.DataFrame, picture: pathlib.Path) -> None:
     plt.close(fig)
 
 
-def pooled(ax, info: pd.DataFrame) -> None:
+def pooled(ax: Any, info: pd.DataFrame) -> None:
     """Share of right names per level with exact intervals."""
     for column, colour, shift in (("strict", "tab:blue", 0.97), ("lenient", "tab:green", 1.03)):
         for level, energy in LEVELS.items():
@@ -191,7 +192,7 @@ def pooled(ax, info: pd.DataFrame) -> None:
     ax.legend(frameon=False)
 
 
-def strips(ax, info: pd.DataFrame) -> None:
+def strips(ax: Any, info: pd.DataFrame) -> None:
     """Every case: its information, and whether the name was right, kin, withheld or wrong."""
     names = sorted(info.effect.unique(), reverse=True)
     withheld = info.verdict.isin(ABSTAINED)
