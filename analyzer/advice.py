@@ -7,10 +7,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analyzer.cause import Measured, Verdict
+from analyzer.cause import Verdict
 from analyzer.history.loops_csv import LoopSpec
+from analyzer.measure import Measured
 from analyzer.tags import as_stated
-from identification.hammerstein import Fit, Window, covariance
+from identification.descent import covariance
+from identification.hammerstein import Fit, Window
 from identification.models import Backlash, Fopdt, Loop, Pid, Stiction, Valve
 from tuning.recommend import Proposal, recommend
 from tuning.search import rounded, scaled_valve
@@ -106,7 +108,7 @@ def advise(
         return Advice("none")
     if verdict.cause == "undecided":
         return Advice("undecided")
-    if verdict.measured is None or verdict.fault == "undecided" and verdict.measured.play.gain == 0:
+    if verdict.measured is None or (verdict.fault == "undecided" and verdict.measured.play.gain == 0):
         return Advice("repair valve")
     if controller is None:
         return Advice("undecided", "no kp and ti in loops.csv, so no new settings")

@@ -8,8 +8,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from analyzer.assessments import Assessments, Hour, assess_span, hourly, settling_time, usable
-from analyzer.cause import NO_CAUSE, Verdict, dead_valve, judge, measure, not_assessed, with_dead_valve
+from analyzer.cause import NO_CAUSE, Verdict, dead_valve, judge, not_assessed, with_dead_valve
 from analyzer.config import Config
+from analyzer.measure import measure
 from analyzer.oscillation import Oscillation, Oscillations, detect
 from analyzer.plantwide import Fingerprint, fingerprint
 from analyzer.quality import Prepared, has_op

@@ -23,30 +23,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analyzer.assessments import noise_band
 from analyzer.config import CauseLimits
+from analyzer.measure import Measured
 from analyzer.oscillation import Oscillation
-from identification.controller import fit_pi
-from identification.hammerstein import (
-    IDEAL,
-    Fit,
-    Rival,
-    Window,
-    better_linear,
-    block_means,
-    evidence,
-    fit_linear,
-    fit_play,
-    fit_stick_slip,
-    prepare,
-    residual,
-    stem_moves,
-    with_load_step,
-)
-from identification.models import Fopdt, Loop, Pid
-from identification.record import Floats, LoopRecord, Mask
-from identification.spectrum import Spectrum, locked_harmonic, peak_prominence, spectrum, tapered_power
-from tuning.linear import is_stable, loop_response
+from identification.record import LoopRecord
 
 CAUSES = ("valve", "tuning", "load")
 
@@ -58,36 +38,6 @@ class Sign:
     points_to: str
     strength: float
     text: str
-
-
-@dataclass(frozen=True, slots=True)
-class Measured:
-    """What the signs are read from.
-
-    linear, play, stick_slip : the fits; evidence [nat] of the better valve over none, size its stickband over
-    OP's range [-], jump [nat] stick-slip over play; line_left and line_error : prominence of the load's and the
-    error's spectrum at the period [-]; amplification |S| there [-], None without settings; stable the
-    identified loop; consistency as in sign 4 [-]; harmonic [-]; saturated share of time at limits [-]; moves, how often the stem of the
-    better valve sets out; excited, whether set point moves drove the loop.
-    """
-
-    linear: Fit
-    play: Fit
-    stick_slip: Fit | None
-    evidence: float
-    size: float
-    jump: float
-    line_linear: float
-    line_valve: float
-    amplification: float | None
-    stable: bool
-    consistency: float
-    harmonic: float
-    saturated: float
-    controller: Pid | None
-    window: Window
-    moves: int
-    excited: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,158 +63,6 @@ NO_CAUSE = Verdict("none", dict.fromkeys(CAUSES, 0.0), "none")
 def not_assessed(needs: str) -> Verdict:
     """The verdict that abstains and says what it needs."""
     return Verdict("undecided", dict.fromkeys(CAUSES, 0.0), "undecided", needs=needs)
-
-
-def time_scale(record: LoopRecord, oscillation: Oscillation | None, controller: Pid | None) -> float:
-    """The period [s], or a guess of the loop's time scale where it does not oscillate.
-
-    Four integral times where they are stated (the cycle of a PI loop with play is of that order), else sixty
-    samples, so that blocks are samples.
-    """
-    if oscillation is not None:
-        return oscillation.period_s
-    top = len(record) * record.dt_s / 8
-    if controller is not None and math.isfinite(controller.ti_s) and controller.ti_s > 0:
-        return min(max(4 * controller.ti_s, 10 * record.dt_s), top)
-    return min(60 * record.dt_s, top)
-
-
-def latest_fit_stretch(record: LoopRecord, n: int) -> int:
-    """First sample of the latest stretch of n samples with the fewest out of use."""
-    out = record.bad | record.mask("manual")
-    seen = np.concatenate(([0], np.cumsum(out)))
-    firsts = np.arange(len(record) - n, -1, -max(n // 4, 1))
-    return int(firsts[int(np.argmin(seen[firsts + n] - seen[firsts]))])
-
-
-def window_of(record: LoopRecord, scale_s: float, limits: CauseLimits, kind: str = "") -> Window:
-    """The latest stretch with the fewest samples out of use, in blocks of a fraction of the period."""
-    factor = max(round(scale_s / limits.blocks_per_period / record.dt_s), 1)
-    n = min(len(record) // factor, limits.window) * factor
-    first = latest_fit_stretch(record, n)
-    part = record.span(first, first + n)
-    usable = block_means((~(part.bad | part.mask("manual"))).astype(np.float64), factor) > 0.99
-    op = np.ascontiguousarray(part.op)
-    known = {name: (t, dead) for name, t, dead in limits.fast_process}
-    most = known.get(kind.lower(), (math.inf, math.inf))
-    return Window(block_means(part.pv, factor), op, usable, record.dt_s * factor, factor, *most)
-
-
-def answering(record: LoopRecord, window: Window, scale_s: float) -> Mask:
-    """True where PV is due to answer a set point move, shape of the window.
-
-    From a move for scale_s [s], and on until PV has come to the set point, however long the valve takes.
-    """
-    first = latest_fit_stretch(record, window.y.size * window.factor)
-    sp = record.sp[first :: window.factor][: window.y.size]
-    moves = np.flatnonzero(np.abs(np.diff(sp)) > 1e-6) + 1
-    out = np.zeros(window.y.size, dtype=bool)
-    if record.sp_estimated or not 0 < moves.size <= window.y.size / 10:
-        return out
-    reach = max(round(scale_s / window.dt_s), 1)
-    error = np.abs(sp - window.y)
-    near = error <= 3 * noise_band(window.y)
-    for at, end in zip(moves, [*moves[1:], window.y.size], strict=True):
-        there = np.flatnonzero(near[at + 1 : end])
-        out[at : max(at + reach, at + 2 + int(there[0]) if there.size else end)] = True
-    return out
-
-
-def _op_range(window: Window, scale_s: float, oscillating: bool) -> float:
-    """Range of OP that a fault is compared with [% OP]: within two periods where it oscillates, else of all."""
-    whole = window.op_range
-    if not oscillating:
-        return whole
-    length = max(round(2 * scale_s / window.dt_s * window.factor), 2)
-    rows = window.op.size // length
-    if rows < 2:
-        return whole
-    local = np.ptp(window.op[: rows * length].reshape(rows, length), axis=1)
-    return min(whole, float(np.quantile(local, 0.75)))
-
-
-def _prominence(x: Floats, dt_s: float, period_s: float) -> float:
-    s = spectrum(x, dt_s)
-    return peak_prominence(tapered_power(s), s.duration_s / period_s)
-
-
-def _consistency(window: Window, fit: Fit, period_s: float) -> float:
-    """Gain of the identified process outside the period's band over its gain with it."""
-    prepared = prepare(window, IDEAL, fit.ar, period_s / window.dt_s)
-    gain = float(prepared.score(fit.time_constant_s, fit.dead_time_s)[2][0])
-    return gain / fit.gain if fit.gain else 0.0
-
-
-def measure(
-    record: LoopRecord,
-    oscillation: Oscillation | None,
-    controller: Pid | None,
-    limits: CauseLimits,
-    error: Spectrum | None = None,
-    kind: str = "",
-) -> Measured:
-    """Fit the rivals and read what the signs need; see Measured."""
-    scale = time_scale(record, oscillation, controller)
-    window = window_of(record, scale, limits, kind)
-    controller = controller or recovered(record, scale)
-    linear = fit_linear(window, scale)
-    play = fit_play(window, linear, scale)
-    linear = better_linear(window, linear, play)
-    best, stick, jump = play, None, 0.0
-    if _worth_a_jump(play, linear, window, oscillation):
-        stick = fit_stick_slip(window, play, scale)
-        jump = evidence(Rival(window, stick), Rival(window, play))
-        best = stick if jump > limits.evidence_jump else play
-    due = answering(record, window, scale)
-    plain = with_load_step(window, linear, due, best.ar)
-    gained = evidence(Rival(window, best), plain) - (limits.evidence_jump if best is stick else 0.0)
-    size = best.valve.stickband / max(_op_range(window, scale, oscillation is not None), 1e-9)
-    amplification, stable = _amplification(linear, controller, scale)
-    saturated = float(record.mask("saturated").mean())
-    harmonic = locked_harmonic(error, scale) if error is not None and oscillation is not None else 0.0
-    return Measured(
-        linear,
-        play,
-        stick,
-        gained,
-        size,
-        jump,
-        _prominence(residual(window, linear), window.dt_s, scale),
-        _prominence(residual(window, best), window.dt_s, scale),
-        amplification,
-        stable,
-        _consistency(window, linear, scale) if oscillation is not None else 1.0,
-        harmonic,
-        saturated,
-        controller,
-        window,
-        stem_moves(window, best.valve),
-        bool(due.any()),
-    )
-
-
-def recovered(record: LoopRecord, scale_s: float) -> Pid | None:
-    """PI settings recovered from the record where they explain OP, None where they do not."""
-    found = fit_pi(record, scale_s)
-    if found is None or found.explained < 0.5 or not math.isfinite(found.ti_s):
-        return None
-    return Pid(found.kp, found.ti_s, scan_s=record.dt_s)
-
-
-def _worth_a_jump(play: Fit, linear: Fit, window: Window, oscillation: Oscillation | None) -> bool:
-    """Whether stick-slip is fitted as well: where a play helps at all, and on short records, where it is cheap."""
-    gained = play.log_likelihood - linear.log_likelihood
-    wide = play.valve.stickband > 0.25 * window.op_range
-    return (gained > 3.0 and wide) or (oscillation is None and window.y.size < 1500)
-
-
-def _amplification(fit: Fit, controller: Pid | None, period_s: float) -> tuple[float | None, bool]:
-    """|S| of the identified loop at the period, and whether the loop is stable."""
-    if controller is None or fit.gain * controller.kp <= 0:
-        return None, True
-    loop = Loop(Fopdt(fit.gain, fit.time_constant_s, fit.dead_time_s), controller)
-    omega = np.array([2 * math.pi / period_s])
-    return float(1 / abs(1 + loop_response(loop, omega)[0])), is_stable(loop)
 
 
 def _ramp(x: float, low: float, high: float) -> float:

@@ -35,8 +35,15 @@ RANK_COLUMNS = (
 )
 """The ranking's columns in their order; contract."""
 TEXT_COLUMNS = frozenset(
-    ("loop", "type", "status", "cause", "valve_fault", "source_loop", "action", "reason")
-    + (
+    {
+        "loop",
+        "type",
+        "status",
+        "cause",
+        "valve_fault",
+        "source_loop",
+        "action",
+        "reason",
         "night",
         "area",
         "description",
@@ -48,7 +55,7 @@ TEXT_COLUMNS = frozenset(
         "form",
         "gain_unit",
         "ti_unit",
-    )
+    }
 )
 """Columns that hold text; all others hold numbers."""
 OTHER_COLUMNS = (

@@ -87,8 +87,8 @@ class CauseLimits:
     blocks_per_period: float = 30.0
     """Blocks per period [-]."""
     fast_process: tuple[tuple[str, float, float], ...] = (("flow", 60.0, 30.0),)
-    """Types with largest time constant and dead time [s] of loop types whose process is fast: a flow answers its valve within
-    seconds (Seborg, Edgar, Mellichamp 2011, ch. 12); a longer wait is the valve's."""
+    """Types with largest time constant and dead time [s] of loops whose process is fast: a flow answers its valve
+    within seconds (Seborg, Edgar, Mellichamp 2011, ch. 12); a longer wait is the valve's."""
     evidence: float = 10.0
     """Gain in log likelihood that a play needs over an ideal valve [nat]."""
     evidence_unexcited: float = 20.0

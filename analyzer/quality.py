@@ -115,15 +115,15 @@ def _held(value: Floats, good: Mask) -> tuple[Floats, Mask]:
     return value[np.where(at < 0, int(np.argmax(good)), at)], ~good
 
 
-def longest_runs(value: Floats) -> tuple[np.ndarray, np.ndarray]:
-    """First index and length of each run of equal values."""
+def run_lengths(value: Floats) -> np.ndarray:
+    """Length of each run of equal values."""
     first = np.flatnonzero(np.concatenate(([True], value[1:] != value[:-1])))
-    return first, np.diff(np.concatenate((first, [value.size])))
+    return np.diff(np.concatenate((first, [value.size])))
 
 
 def constant_stretches(value: Floats, dt_s: float, seconds: float, samples: int) -> Mask:
     """True where a value stands unchanged for so long and so many samples, shape (n,)."""
-    first, length = longest_runs(value)
+    length = run_lengths(value)
     enough = (length >= samples) & (length * dt_s >= seconds)
     return np.repeat(enough, length)
 

@@ -60,7 +60,8 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=2)
     options = parser.parse_args()
     text = table(options.records, options.jobs)
-    OUT.write_text(f"# Negative controls\n\n`python -m tests.proofs.negative_controls --records {options.records}`\n\n{text}\n")
+    command = f"python -m tests.proofs.negative_controls --records {options.records}"
+    OUT.write_text(f"# Negative controls\n\n`{command}`\n\n{text}\n")
     print(text)
 
 

@@ -1,0 +1,141 @@
+"""The best lag behind an ideal valve, behind a play, and behind stick-slip: scanned, then followed to the end."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from identification.descent import descend
+from identification.hammerstein import (
+    AR_ORDER,
+    IDEAL,
+    INPUT_LAGS,
+    Dynamics,
+    Fit,
+    Prepared,
+    ValveTrial,
+    Window,
+    prepare,
+    search,
+    starts,
+    stem_of,
+    sticking,
+)
+from identification.innovations import arx_noise
+from identification.record import Floats
+
+SCREEN_SHARES = (0.1, 0.3, 0.55, 0.8)
+"""Stickbands that a loop without an evident fault is screened with, as shares of OP's range; ours: a play of any
+width between is seen by the nearest of them."""
+SCREENED = 3.0
+"""Gain in log likelihood [nat] from which the screening is followed by the whole search; ours: a third of what a
+verdict needs."""
+STICKBAND_SHARES = (0.06, 0.12, 0.2, 0.3, 0.42, 0.55, 0.7, 0.85, 1.0)
+"""Stickbands tried first, as shares of OP's range; a valve much wider than OP's range would not move at all."""
+JUMP_SHARES = (0.2, 0.4, 0.7, 1.0)
+"""Slip jumps tried, as shares of the stickband."""
+COAST_SHARES = (0.0, 0.15)
+"""Turnings of OP that a sliding stem ignores, as shares of the stickband: none, and OP's noise; ours."""
+WORK = 5000
+"""Blocks that candidates of a scan may take together; short records can afford to follow more of them."""
+FOLLOWED = 2
+"""Candidates of a scan that are followed to the end; ours: the best of the scan is among its first two."""
+
+
+GENERIC = -0.95
+"""First coefficient of a noise model that knows nothing: nearly a difference. A noise model that was fitted with
+another valve takes that valve's side, so candidates are ranked by both."""
+
+
+def begin(prepared: Prepared, dynamics: Dynamics) -> Fit:
+    """The fit at given dynamics under a given noise model, a start for the descent."""
+    sigma2, count, beta = prepared.score(*dynamics)
+    t, dead = dynamics
+    base = np.array([beta[1], beta[2], 0.0, 0.0])
+    return Fit(float(beta[0]), t, dead, prepared.valve, float(sigma2), int(count), prepared.ar, base)
+
+
+def fit_linear(window: Window, period_s: float) -> Fit:
+    """The process behind an ideal valve.
+
+    Parameters
+    ----------
+    window : Window
+    period_s : float
+        Period of the oscillation, or other scale of the loop [s], about which the search begins.
+    """
+    stem = stem_of(window, IDEAL)
+    ar = arx_noise(window.y - window.y.mean(), stem, window.usable, AR_ORDER, INPUT_LAGS)
+    prepared = prepare(window, IDEAL, ar)
+    return descend(window, begin(prepared, search(prepared, starts(window, period_s))))
+
+
+def _ranked(window: Window, ar: Floats, valves: list[ValveTrial], begins: list[Dynamics]) -> list[Fit]:
+    """Valves with dynamics searched anew under one noise model, best first."""
+    trials = []
+    for valve in valves:
+        prepared = prepare(window, valve, ar)
+        trials.append(begin(prepared, search(prepared, begins, 2)))
+    return sorted(trials, key=lambda fit: fit.sigma2)
+
+
+def _scan(window: Window, near: Fit, valves: list[ValveTrial], period_s: float, followed: int) -> Fit:
+    """Valves tried under two noise models; the best few of each followed to the end, the best returned."""
+    begins = [(near.time_constant_s, near.dead_time_s), *starts(window, period_s)]
+    followed = max(followed, WORK // window.y.size)
+    generic = np.zeros(near.ar.size)
+    generic[0] = GENERIC
+    chosen = [fit for ar in (generic, near.ar) for fit in _ranked(window, ar, valves, begins)[:followed]]
+    return max((descend(window, fit, free_width=True) for fit in chosen), key=lambda fit: fit.log_likelihood)
+
+
+def fit_play(window: Window, linear: Fit, period_s: float) -> Fit:
+    """The best play followed by a lag: a quick screening, and the whole search where it finds anything.
+
+    Parameters
+    ----------
+    window : Window
+    linear : Fit
+        The best fit behind an ideal valve.
+    period_s : float
+        Scale of the search [s].
+    """
+    reach = max(window.op_range, 1e-9)
+    best = _scan(window, linear, [sticking(share * reach, 0.0) for share in SCREEN_SHARES], period_s, 1)
+    if best.log_likelihood - linear.log_likelihood < SCREENED:
+        return best
+    shares = (*STICKBAND_SHARES, best.valve.stickband / reach)
+    found = _scan(window, best, [sticking(share * reach, 0.0) for share in shares], period_s, FOLLOWED)
+    return max(best, found, key=lambda fit: fit.log_likelihood)
+
+
+def better_linear(window: Window, linear: Fit, play: Fit) -> Fit:
+    """The better of the plain fit and one followed from the dynamics that were found behind a play.
+
+    The plain process is the play of no width; found from there it is never unfairly behind.
+    """
+    trial = descend(window, replace(play, valve=IDEAL))
+    return max(linear, trial, key=lambda fit: fit.log_likelihood)
+
+
+def fit_stick_slip(window: Window, play: Fit, period_s: float) -> Fit:
+    """The best stick-slip (J > 0, sliding after a jump) followed by a lag, scanned whole and about the play."""
+    reach = max(window.op_range, 1e-9)
+    near = play.valve.stickband / reach
+    widths = {round(s, 4) for s in STICKBAND_SHARES[4:]} | {near, 1.1 * near}
+    valves = [
+        sticking(width * reach, jump, coast * width * reach)
+        for width in sorted(widths)
+        for jump in JUMP_SHARES
+        for coast in COAST_SHARES
+    ]
+    near_play = [
+        descend(
+            window, replace(play, valve=sticking(grown * play.valve.stickband, jump, coast)), free_width=True
+        )
+        for jump, grown in ((0.15, 1.0), (0.4, 1.1), (0.8, 1.1))
+        for coast in (0.0, 0.15 * play.valve.stickband)
+    ]
+    whole = _scan(window, play, valves, period_s, FOLLOWED)
+    return max([*near_play, whole], key=lambda fit: fit.log_likelihood)

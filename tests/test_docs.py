@@ -1,0 +1,61 @@
+"""The documents do not drift from the program."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from analyzer.cli import main
+
+ROOT = Path(__file__).resolve().parents[1]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+def shell_blocks() -> list[str]:
+    """The fenced sh blocks of the README."""
+    return re.findall(r"```sh\n(.*?)```", README, flags=re.DOTALL)
+
+
+def test_readme_starts_with_two_commands():
+    """The README holds two sh blocks of one command each: the main job and the tests."""
+    blocks = shell_blocks()
+    assert len(blocks) == 2
+    assert all(block.count("\n") == 1 for block in blocks)
+    assert "triage run" in blocks[0]
+    assert "pytest" in blocks[1]
+
+
+def test_ci_runs_the_readme_tests():
+    """.ci/run runs the test command of the README."""
+    command = re.search(r"\.venv/bin/python -m pytest.*", shell_blocks()[1])
+    assert command is not None
+    assert command.group(0) in (ROOT / ".ci" / "run").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("name", sorted(main.commands))
+def test_each_command_has_help_and_an_example(name):
+    """Each command explains itself and shows an example."""
+    result = CliRunner().invoke(main, [name, "--help"])
+    assert result.exit_code == 0
+    assert "Example" in result.output
+
+
+def test_main_job_of_the_readme_on_one_day(tmp_path):
+    """The README's main job, on one day of the sample mill, ranks the loops that are hidden as faulty first."""
+    triage = [sys.executable, "-m", "analyzer.cli"]
+    sample = ROOT / "sample_data"
+    run = [*triage, "run", str(sample / "mill.parquet"), "--loops", str(sample / "loops.csv")]
+    days = ["--store", str(tmp_path), "--since", "2026-03-04", "--until", "2026-03-05"]
+    ran = subprocess.run([*run, *days], capture_output=True, text=True, check=False)
+    assert ran.returncode == 1, ran.stderr
+    assert "FIC2120: needs PV samples" in ran.stderr
+    ranked = subprocess.run(
+        [*triage, "rank", str(tmp_path)], capture_output=True, text=True, check=True
+    ).stdout
+    loops = re.findall(r"^ ([A-Z]{3}\d{4})", ranked, flags=re.MULTILINE)
+    assert set(loops[:11]) >= {"LIC2102", "LIC2105", "LIC2107", "TIC2104", "TIC2106", "FIC2110", "PIC2112"}
