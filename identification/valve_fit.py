@@ -66,9 +66,19 @@ def fit_linear(window: Window, period_s: float) -> Fit:
         Period of the oscillation, or other scale of the loop [s], about which the search begins.
     """
     stem = stem_of(window, IDEAL)
-    ar = arx_noise(window.y - window.y.mean(), stem, window.usable, AR_ORDER, INPUT_LAGS)
-    prepared = prepare(window, IDEAL, ar)
-    return descend(window, begin(prepared, search(prepared, starts(window, period_s))))
+    learnt = arx_noise(window.y - window.y.mean(), stem, window.usable, AR_ORDER, INPUT_LAGS)
+    fits = []
+    for ar in (learnt, generic_noise()):
+        prepared = prepare(window, IDEAL, ar)
+        fits.append(descend(window, begin(prepared, search(prepared, starts(window, period_s)))))
+    return max(fits, key=lambda fit: fit.log_likelihood)
+
+
+def generic_noise() -> Floats:
+    """The noise model that knows nothing, shape (AR_ORDER,)."""
+    out = np.zeros(AR_ORDER)
+    out[0] = GENERIC
+    return out
 
 
 def _ranked(window: Window, ar: Floats, valves: list[ValveTrial], begins: list[Dynamics]) -> list[Fit]:
@@ -84,9 +94,9 @@ def _scan(window: Window, near: Fit, valves: list[ValveTrial], period_s: float, 
     """Valves tried under two noise models; the best few of each followed to the end, the best returned."""
     begins = [(near.time_constant_s, near.dead_time_s), *starts(window, period_s)]
     followed = max(followed, WORK // window.y.size)
-    generic = np.zeros(near.ar.size)
-    generic[0] = GENERIC
-    chosen = [fit for ar in (generic, near.ar) for fit in _ranked(window, ar, valves, begins)[:followed]]
+    chosen = [
+        fit for ar in (generic_noise(), near.ar) for fit in _ranked(window, ar, valves, begins)[:followed]
+    ]
     return max((descend(window, fit, free_width=True) for fit in chosen), key=lambda fit: fit.log_likelihood)
 
 
