@@ -43,6 +43,8 @@ FOLLOWED = 2
 """Candidates of a scan that are followed to the end; ours: the best of the scan is among its first two."""
 
 
+CLEAR = 1.0
+"""Gain in log likelihood [nat] from which one fit of the same model is preferred to another; ours."""
 GENERIC = -0.95
 """First coefficient of a noise model that knows nothing: nearly a difference. A noise model that was fitted with
 another valve takes that valve's side, so candidates are ranked by both."""
@@ -123,10 +125,11 @@ def fit_play(window: Window, linear: Fit, period_s: float) -> Fit:
 def better_linear(window: Window, linear: Fit, play: Fit) -> Fit:
     """The better of the plain fit and one followed from the dynamics that were found behind a play.
 
-    The plain process is the play of no width; found from there it is never unfairly behind.
+    The plain process is the play of no width; found from there it is never unfairly behind. Where the two are as
+    likely, the one that was searched on its own stays.
     """
     trial = descend(window, replace(play, valve=IDEAL))
-    return max(linear, trial, key=lambda fit: fit.log_likelihood)
+    return trial if trial.log_likelihood > linear.log_likelihood + CLEAR else linear
 
 
 def fit_stick_slip(window: Window, play: Fit, period_s: float) -> Fit:
