@@ -11,8 +11,6 @@ import multiprocessing
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, replace
-from datetime import UTC, datetime
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -26,6 +24,7 @@ from analyzer.config import Config
 from analyzer.history.export import Export
 from analyzer.history.loops_csv import LoopSpec
 from analyzer.history.series import Series
+from analyzer.nights import Night, cut, nights_of
 from analyzer.plantwide import Fingerprint, Peer, trace
 from analyzer.present import advised, follower_row
 from analyzer.quality import prepare
@@ -38,72 +37,7 @@ CHUNK = 8
 """Loops per task: enough to carry the cost of a task, few enough for a smooth progress bar."""
 HISTORY = {"none": "none", "load": "none"}
 """Actions of nights that are not the last: settings are advised on for tomorrow, not for the week before."""
-DAY_S = 86400.0
-WHOLE_H = 36.0
-"""Records up to this long [h] are one night; longer ones are cut at midnights (UTC)."""
-LEAST_PIECE_S = 6 * 3600.0
-"""A first or last piece shorter than this [s] joins its neighbour."""
 HOUR_COLUMNS = ("loop", "night", "hour_s", "oscillation_significance", "oscillating_pct")
-
-
-@dataclass(frozen=True, slots=True)
-class Night:
-    """A span of time that is assessed as one: its name (date of its end) and its ends [s]."""
-
-    name: str
-    first_s: float
-    last_s: float
-
-
-def _named(first_s: float, last_s: float) -> Night:
-    middle = datetime.fromtimestamp((first_s + last_s) / 2, UTC)
-    return Night(middle.strftime("%Y-%m-%d"), first_s, last_s)
-
-
-def daily(first_s: float, last_s: float) -> list[Night]:
-    """Cut a span of time at midnights (UTC); a first or last piece of under 6 h joins its neighbour."""
-    cuts = np.arange(math.floor(first_s / DAY_S) + 1, math.ceil(last_s / DAY_S)) * DAY_S
-    inner = [c for c in cuts if c - first_s >= LEAST_PIECE_S and last_s - c >= LEAST_PIECE_S]
-    edges = [first_s, *inner, last_s + 1.0]
-    return [_named(a, b) for a, b in pairwise(edges)]
-
-
-def nights(spans: Sequence[tuple[float, float]]) -> list[Night]:
-    """The nights of an export from the spans of its loops [s].
-
-    Where the median loop has over 36 h, the export is cut into days; else each loop is assessed whole, in one
-    night, named by the date of the middle of the loop that ends last. Recordings of different days can so be
-    ranked together.
-    """
-    lengths = sorted(last - first for first, last in spans)
-    first, last = min(s[0] for s in spans), max(s[1] for s in spans)
-    if lengths[len(lengths) // 2] > WHOLE_H * 3600.0:
-        return daily(first, last)
-    latest = max(spans, key=lambda s: s[1])
-    return [replace(_named(*latest), first_s=first, last_s=last + 1.0)]
-
-
-def clipped(
-    spans: Sequence[tuple[float, float]], since_s: float, until_s: float
-) -> list[tuple[float, float]]:
-    """Spans within a span of time; those outside are left out.
-
-    Raises
-    ------
-    InputError
-        Where nothing is left.
-    """
-    inside = [(max(a, since_s), min(b, until_s - 1.0)) for a, b in spans if a < until_s and b >= since_s]
-    if not inside:
-        raise InputError("no samples between --since and --until", "a span of the export", "widen it")
-    return inside
-
-
-def cut(series: Series, night: Night) -> Series:
-    """The samples of one night."""
-    a, b = np.searchsorted(series.stamp_s, [night.first_s, night.last_s])
-    text = None if series.text is None else series.text[a:b]
-    return Series(series.stamp_s[a:b], series.value[a:b], series.bad[a:b], text)
 
 
 @dataclass(frozen=True, slots=True)
@@ -324,12 +258,7 @@ def run(
         raise InputError(
             "no loops in the export", "tags such as LOOP.PV", "state them with --loops loops.csv"
         )
-    present = [s.pv for s in specs if s.pv is not None]
-    if not present:
-        raise InputError(
-            "no PV tag of any loop is in the export", f"tags such as {specs[0].wanted_pv}", "check --loops"
-        )
-    spans = nights(clipped([export.span(tag) for tag in present], since_s, until_s))
+    spans = nights_of(export, specs, since_s, until_s)
     if not resume:
         for span in spans:
             store.drop_parts(span.name)

@@ -192,5 +192,36 @@ def rank(store: Path, column: str, top: int | None, night: str | None, ascending
     click.echo(rendered(rows, form, name))
 
 
+@main.command()
+@export_options
+@click.option("--loop", "tag", required=True, help="The loop to tune.")
+@click.option("--until", type=click.DateTime(), help="Day or time (UTC) before which samples are used.")
+@click.option("--out", type=click.Path(path_type=Path), help="Directory for the pictures.")
+@told
+def tune(
+    export: tuple[Path, ...],
+    loops: Path | None,
+    tag: str,
+    until: datetime | None,
+    out: Path | None,
+    **reading: Any,
+) -> None:
+    """One loop: model, limit cycle predicted, new Kp and Ti with reasons, forecast, travel map.
+
+    Example: triage tune export.parquet --loops loops.csv --loop LIC2107 --out pictures
+    """
+    from analyzer.tune_loop import proposal
+
+    source, specs, _ = opened(export, loops, **reading)
+    lines, pictures = proposal(source, specs, tag, _seconds(until, math.inf), drawn=out is not None)
+    for line in lines:
+        click.echo(line)
+    if out is not None:
+        out.mkdir(parents=True, exist_ok=True)
+        for name, picture in pictures.items():
+            (out / name).write_bytes(picture)
+            click.echo(f"written: {out / name}")
+
+
 if __name__ == "__main__":
     main()

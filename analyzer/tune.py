@@ -1,0 +1,248 @@
+"""What `triage tune` says of one loop: the model with intervals, the limit cycle, the proposal, the forecast."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from analyzer.advice import chosen_fit, model_of, propose, uncertain
+from analyzer.assess import Assessment
+from analyzer.history.loops_csv import LoopSpec
+from analyzer.tags import as_stated
+from identification.controller import fit_pi
+from identification.descent import covariance
+from identification.errors import NotAssessedError
+from identification.hammerstein import Fit, Window, disturbance
+from identification.models import Estimate, Loop, Pid
+from identification.record import Floats, LoopRecord
+from tuning.describing import describe
+from tuning.limit_cycle import Confirmed, confirm
+from tuning.maps import curves, travel_map
+from tuning.predict import Forecast, predict, run
+from tuning.recommend import Proposal
+
+if TYPE_CHECKING:
+    from reports.tuning_charts import ForecastPicture, MapPicture
+
+NINETY = 1.645
+"""Standard deviations to the ends of a 90 % interval."""
+MAP_POINTS = 36
+"""Points of the map along each axis."""
+SPREAD = 20.0
+"""The map reaches this factor below and above the present settings."""
+MOST_SCANS = 20000
+"""Scans of load that the forecast runs over at most."""
+DISAGREES = 0.15
+"""Relative difference of recovered and stated settings from which it is told; ours: recovery is within 2 % on
+trends recorded at the scan and within some 10 % on thinned ones."""
+
+
+@dataclass(frozen=True, slots=True)
+class Tuning:
+    """All that is known about retuning one loop.
+
+    estimates by name with 90 % intervals; model, the identified loop with its present controller; period_s and
+    amplitude_pct of the recorded cycle [s], [% of span], None where there is none; cycle, the one simulation
+    finds; proposal; forecast, None where nothing is proposed; load [% PV] on the scan's clock; recovered
+    settings (kp, ti_s), None where the record does not tell.
+    """
+
+    estimates: dict[str, Estimate]
+    model: Loop
+    period_s: float | None
+    amplitude_pct: float | None
+    cycle: Confirmed
+    proposal: Proposal
+    forecast: Forecast | None
+    load: Floats
+    recovered: tuple[float, float] | None
+
+
+def intervals(window: Window, fit: Fit, valve: bool) -> dict[str, Estimate]:
+    """Estimates of a fit with 90 % intervals from the curvature of the likelihood.
+
+    Gain and time constant are left out where the time constant is beyond a tenth of the window or its interval
+    spans a factor of four: then the record tells their ratio alone.
+    """
+    spread = np.sqrt(np.maximum(np.diag(covariance(window, fit, free_width=valve)), 0.0))
+    t = fit.time_constant_s
+    out = {"slope_pct_per_s": _slope(window, fit, valve)}
+    factor = math.exp(min(NINETY * spread[0], 20.0))
+    if t < 0.1 * window.duration_s and factor < 2.0:
+        out["gain"] = _around(fit.gain, NINETY * spread[3], "%/%")
+        out["time_constant_s"] = Estimate(t, t / factor, t * factor, "s")
+    out["dead_time_s"] = _around(fit.dead_time_s, NINETY * spread[1], "s", least=0.0)
+    if valve:
+        name = "backlash_pct" if fit.valve.slip_jump == 0 else "stickband_pct"
+        out[name] = _around(fit.valve.stickband, NINETY * spread[2], "% of OP", least=0.0)
+        if fit.valve.slip_jump > 0:
+            out["slip_jump_pct"] = Estimate(fit.valve.slip_jump, 0.0, fit.valve.stickband, "% of OP")
+    return out
+
+
+def _slope(window: Window, fit: Fit, valve: bool) -> Estimate:
+    """Gain over time constant with its interval; the errors of the two are strongly correlated."""
+    c = covariance(window, fit, free_width=valve)
+    relative = c[3, 3] / fit.gain**2 + c[0, 0] - 2 * c[0, 3] / fit.gain
+    return _around(fit.slope, NINETY * abs(fit.slope) * math.sqrt(max(relative, 0.0)), "%/(% s)")
+
+
+def _around(value: float, half: float, unit: str, least: float = -math.inf) -> Estimate:
+    return Estimate(value, max(value - half, least), value + half, unit)
+
+
+def _load(window: Window, fit: Fit, scan_s: float) -> Floats:
+    """Load and noise [% PV] that the model leaves, on the scan's clock, the latest MOST_SCANS."""
+    left = disturbance(window, fit)
+    clock = np.arange(int(window.duration_s / scan_s)) * scan_s
+    load = np.interp(clock, np.arange(left.size) * window.dt_s, left)
+    return np.asarray(load[-MOST_SCANS:], dtype=np.float64)
+
+
+def tune(found: Assessment, record: LoopRecord, controller: Pid) -> Tuning:
+    """Propose settings for one assessed loop.
+
+    Parameters
+    ----------
+    found : Assessment
+    record : LoopRecord
+    controller : Pid
+        The stated settings in percent and seconds.
+
+    Raises
+    ------
+    NotAssessedError
+        Where the loop's trends give no model.
+    """
+    verdict = found.verdict
+    if verdict.measured is None:
+        raise NotAssessedError(verdict.needs or "needs trends from which a model can be identified")
+    first = found.oscillations.first
+    period = first.period_s if first else None
+    window, fit = verdict.measured.window, chosen_fit(verdict)
+    model = model_of(verdict, controller)
+    proposal = propose(verdict, controller, period)
+    load = _load(window, fit, controller.scan_s or window.dt_s)
+    new = proposal.controller or proposal.meanwhile
+    forecast = predict(model, new, load, uncertain(window, fit, model)) if new and load.size >= 240 else None
+    pi = fit_pi(record, period or 60 * record.dt_s)
+    told = pi is not None and pi.explained > 0.8 and math.isfinite(pi.ti_s)
+    return Tuning(
+        intervals(window, fit, verdict.cause == "valve"),
+        model,
+        period,
+        first.amplitude_pct if first else None,
+        confirm(model),
+        proposal,
+        forecast,
+        load,
+        (pi.kp, pi.ti_s) if pi is not None and told else None,
+    )
+
+
+def _between(e: Estimate) -> str:
+    return f"{e.value:.3g} ({e.low:.3g} to {e.high:.3g}) {e.unit}"
+
+
+def _cycle(t: Tuning) -> list[str]:
+    recorded = "none"
+    if t.period_s is not None and t.amplitude_pct is not None:
+        recorded = f"{t.period_s:.3g} s, ±{t.amplitude_pct:.3g} % of PV span"
+    c = t.cycle.cycle
+    simulated = f"{c.period_s:.3g} s, ±{c.pv_amplitude:.3g} %" if c else "none"
+    p = t.cycle.predicted
+    predicted = f"{p.period_s:.3g} s, ±{p.pv_amplitude:.3g} %" if p else "none"
+    return [
+        f"limit cycle recorded: {recorded}",
+        f"  simulated: {simulated}",
+        f"  describing function: {predicted}",
+    ]
+
+
+def _forecast(t: Tuning) -> list[str]:
+    if t.forecast is None:
+        return []
+    names = {
+        "average_absolute_error": "average absolute error",
+        "stem_travel": "stem travel",
+        "oscillation": "oscillation",
+        "variability": "variability",
+    }
+    lines = ["forecast on the reconstructed load (90 % intervals):"]
+    for key, name in names.items():
+        b, a, c = t.forecast.before[key], t.forecast.after[key], t.forecast.change[key]
+        change = f"{100 * c.value:+.0f} % ({100 * c.low:+.0f} to {100 * c.high:+.0f})"
+        lines.append(f"  {name}: {b.value:.3g} to {a.value:.3g} {b.unit}, {change}")
+    return lines
+
+
+def _disagreement(t: Tuning) -> list[str]:
+    """A line where the record gives other settings than loops.csv states."""
+    if t.recovered is None:
+        return []
+    kp, ti = t.recovered
+    c = t.model.controller
+    if abs(kp / c.kp - 1) <= DISAGREES and abs(ti / c.ti_s - 1) <= DISAGREES:
+        return []
+    seen = f"OP follows kp {kp:.3g} %/% and ti {ti:.3g} s, loops.csv states {c.kp:.3g} and {c.ti_s:.3g}"
+    return [f"{seen}: check the settings before you change them"]
+
+
+def lines(t: Tuning, spec: LoopSpec, pv_span: float) -> list[str]:
+    """The proposal in words and figures."""
+    out = [f"{name}: {_between(e)}" for name, e in t.estimates.items()]
+    if "gain" not in t.estimates:
+        out.append("gain and time constant: only their ratio is known from this record")
+    out += _disagreement(t) + _cycle(t) + [f"action: {t.proposal.action}"]
+    for title, pid in (("new settings", t.proposal.controller), ("until the repair", t.proposal.meanwhile)):
+        if pid is not None:
+            kp, ti = as_stated(pid, spec, pv_span)
+            out.append(f"{title}: kp {kp:.3g}, ti {ti:.3g} {spec.ti_unit} ({spec.gain_unit}, {spec.form})")
+    return [*out, t.proposal.reason, *_forecast(t)]
+
+
+def pictures(t: Tuning, title: str) -> dict[str, bytes]:
+    """PNGs by file name: describing functions, travel map, forecast."""
+    from reports import tuning_charts as charts
+
+    out = {}
+    if t.model.valve is not None:
+        c = curves(t.model)
+        at = np.array([describe(t.model.valve, b.op_amplitude) for b in c.crossings], dtype=np.complex128)
+        labels = [f"{b.period_s:.3g} s{'' if b.stable else ', unstable'}" for b in c.crossings]
+        drawn = charts.CurvesPicture(c.valve, c.linear, at, labels)
+        out["limit-cycle.png"] = charts.curves(drawn, f"{title}: N(A) and −1/(G C)")
+        out["travel-map.png"] = charts.travel_map(_map(t), f"{title}: predicted travel")
+    new = t.proposal.controller or t.proposal.meanwhile
+    if new is not None:
+        out["forecast.png"] = charts.forecast(_trends(t, new), f"{title}: both tunings on the same load")
+    return out
+
+
+def _map(t: Tuning) -> MapPicture:
+    from reports.tuning_charts import MapPicture
+
+    c, new = t.model.controller, t.proposal.controller
+    kp = c.kp * np.geomspace(1 / SPREAD, SPREAD, MAP_POINTS)
+    top = max(SPREAD * c.ti_s, 3 * new.ti_s if new else 0.0)
+    found = travel_map(t.model, kp, np.geomspace(c.ti_s / 4, top, MAP_POINTS))
+    chosen = (new.kp, new.ti_s) if new else None
+    travel = 3600.0 * found.travel
+    return MapPicture(found.kp, found.ti_s, travel, found.rests, found.unstable, (c.kp, c.ti_s), chosen)
+
+
+def _trends(t: Tuning, new: Pid) -> ForecastPicture:
+    from reports.tuning_charts import ForecastPicture
+
+    both = [run(replace(t.model, controller=c), t.load) for c in (t.model.controller, new)]
+    n = min(len(both[0]), int(15 * (t.period_s or 600) / both[0].dt_s))
+    stems = [r.op if r.position is None else r.position for r in both]
+    return ForecastPicture(
+        both[0].time_s[-n:] / 3600.0,
+        (both[0].pv[-n:], both[1].pv[-n:]),
+        (both[0].op[-n:], both[1].op[-n:]),
+        (stems[0][-n:], stems[1][-n:]),
+    )

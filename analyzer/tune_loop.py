@@ -1,0 +1,63 @@
+"""From an export to the proposal for one loop: the last night of it, read, assessed and tuned."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from difflib import get_close_matches
+
+from analyzer.assess import assess
+from analyzer.config import Config
+from analyzer.history.export import Export
+from analyzer.history.loops_csv import LoopSpec
+from analyzer.nights import cut, nights_of
+from analyzer.quality import prepare
+from analyzer.tags import controller
+from analyzer.tune import lines, pictures, tune
+from identification.errors import InputError
+
+
+def spec_of(specs: Sequence[LoopSpec], loop: str) -> LoopSpec:
+    """The row of one loop.
+
+    Raises
+    ------
+    InputError
+        Where there is no such loop; the nearest names are told.
+    """
+    for spec in specs:
+        if spec.loop == loop:
+            return spec
+    near = ", ".join(get_close_matches(loop, [s.loop for s in specs], n=3)) or "none is near"
+    raise InputError(
+        f"loop {loop} is not among the {len(specs)} loops", f"one of them ({near})", "correct --loop"
+    )
+
+
+def proposal(
+    export: Export, specs: Sequence[LoopSpec], loop: str, until_s: float = math.inf, drawn: bool = True
+) -> tuple[list[str], dict[str, bytes]]:
+    """Lines of text and, if wanted, pictures by file name for one loop's last night.
+
+    Raises
+    ------
+    InputError, NotAssessedError
+        Where the loop or its settings are not known, or its trends give no model.
+    """
+    config, spec = Config(), spec_of(specs, loop)
+    night = nights_of(export, [spec], until_s=until_s)[-1]
+    prepared = prepare(spec, {t: cut(s, night) for t, s in export.read(spec.tags).items()}, config.quality)
+    stated = controller(spec, prepared.scale.span)
+    if stated is None:
+        raise InputError(
+            f"{loop}: no kp and ti in loops.csv", "both", "state them, so that new ones can be compared"
+        )
+    if spec.scan_s is None:
+        stated = replace(stated, scan_s=prepared.record.dt_s)
+    found = assess(prepared, stated, config, spec.type)
+    tuning = tune(found, prepared.record, stated)
+    head = [f"{loop}, night {night.name}: cause {found.verdict.cause}"]
+    text = head + [f"sign of {s.points_to}: {s.text}" for s in found.verdict.signs]
+    text += lines(tuning, spec, prepared.scale.span)
+    return text, pictures(tuning, loop) if drawn else {}
