@@ -12,7 +12,7 @@ from analyzer.history.loops_csv import LoopSpec
 from analyzer.measure import Measured
 from analyzer.tags import as_stated
 from identification.descent import covariance
-from identification.hammerstein import Fit, Window
+from identification.hammerstein import Fit, Window, process_of
 from identification.models import Backlash, Fopdt, Loop, Pid, Stiction, Valve
 from tuning.recommend import Proposal, recommend
 from tuning.search import rounded, scaled_valve
@@ -58,14 +58,15 @@ def valve_of(verdict: Verdict, fit: Fit) -> Valve:
 def model_of(verdict: Verdict, controller: Pid) -> Loop:
     """The closed loop that a verdict's model and the settings make."""
     fit = chosen_fit(verdict)
-    process = Fopdt(fit.gain, fit.time_constant_s, fit.dead_time_s)
+    process = process_of(_measured(verdict).window, fit)
     return Loop(process, controller, valve_of(verdict, fit))
 
 
 def uncertain(window: Window, fit: Fit, loop: Loop, samples: int = 6, seed: int = 0) -> tuple[Loop, ...]:
     """Loops drawn from the fit's covariance, of the same controller."""
     rng = np.random.default_rng(seed)
-    mean = np.array([math.log(fit.time_constant_s), fit.dead_time_s, fit.valve.stickband, fit.gain])
+    dead_time_s = fit.dead_time_s + window.half_block_s
+    mean = np.array([math.log(fit.time_constant_s), dead_time_s, fit.valve.stickband, fit.gain])
     spread = covariance(window, fit, free_width=loop.valve is not None)
     draws = rng.multivariate_normal(mean, spread, size=samples, method="svd")
     out = []
@@ -78,14 +79,14 @@ def uncertain(window: Window, fit: Fit, loop: Loop, samples: int = 6, seed: int 
     return tuple(out)
 
 
-def cautious(fit: Fit, period_s: float | None) -> Fopdt:
-    """The process of a fit, its time constant raised to two periods at the same slope.
+def cautious(process: Fopdt, period_s: float | None) -> Fopdt:
+    """A process with its time constant raised to two periods at the same slope.
 
     A cycle tells gain over time constant; a time constant much beyond the period cannot be told from it, and an
     integral time after one that is too short makes a loop swing that should be calmed.
     """
-    t = max(fit.time_constant_s, 2.0 * (period_s or 0.0))
-    return Fopdt(fit.slope * t, t, fit.dead_time_s)
+    t = max(process.time_constant_s, 2.0 * (period_s or 0.0))
+    return Fopdt(process.slope * t, t, process.dead_time_s)
 
 
 def advise(
@@ -120,7 +121,7 @@ def propose(verdict: Verdict, controller: Pid, period_s: float | None) -> Propos
     fit, loop = chosen_fit(verdict), model_of(verdict, controller)
     others = uncertain(_measured(verdict).window, fit, loop)
     if verdict.cause == "tuning":
-        slow = replace(loop, process=cautious(fit, period_s))
+        slow = replace(loop, process=cautious(process_of(_measured(verdict).window, fit), period_s))
         return recommend(slow, verdict.cause, (loop, *others[:2]))
     return recommend(loop, verdict.cause, others)
 

@@ -12,7 +12,7 @@ from analyzer.config import CauseLimits
 from analyzer.oscillation import Oscillation
 from identification.controller import fit_pi
 from identification.evidence import Rival, evidence, stem_moves, with_load_step
-from identification.hammerstein import IDEAL, Fit, Window, block_means, prepare, residual
+from identification.hammerstein import IDEAL, Fit, Window, block_means, prepare, process_of, residual
 from identification.models import Fopdt, Loop, Pid
 from identification.record import Floats, LoopRecord, Mask
 from identification.spectrum import Spectrum, locked_harmonic, peak_prominence, spectrum, tapered_power
@@ -80,9 +80,9 @@ def window_of(record: LoopRecord, scale_s: float, limits: CauseLimits, kind: str
     first = latest_fit_stretch(record, n)
     part = record.span(first, first + n)
     usable = block_means((~(part.bad | part.mask("manual"))).astype(np.float64), factor) > 0.99
-    op = np.ascontiguousarray(part.op)
     known = {name: (t, dead) for name, t, dead in limits.fast_process}
     most = known.get(kind.lower(), (math.inf, math.inf))
+    op = np.ascontiguousarray(part.op)
     return Window(block_means(part.pv, factor), op, usable, record.dt_s * factor, factor, *most)
 
 
@@ -155,7 +155,7 @@ def measure(
     plain = with_load_step(window, linear, due, best.ar)
     gained = evidence(Rival(window, best), plain) - (limits.evidence_jump if best is stick else 0.0)
     size = best.valve.stickband / max(_op_range(window, scale, oscillation is not None), 1e-9)
-    amplification, stable = _amplification(linear, controller, scale)
+    amplification, stable = _amplification(process_of(window, linear), controller, scale)
     saturated = float(record.mask("saturated").mean())
     harmonic = locked_harmonic(error, scale) if error is not None and oscillation is not None else 0.0
     return Measured(
@@ -194,10 +194,10 @@ def _worth_a_jump(play: Fit, linear: Fit, window: Window, oscillation: Oscillati
     return (gained > 3.0 and wide) or (oscillation is None and window.y.size < 1500)
 
 
-def _amplification(fit: Fit, controller: Pid | None, period_s: float) -> tuple[float | None, bool]:
+def _amplification(process: Fopdt, controller: Pid | None, period_s: float) -> tuple[float | None, bool]:
     """|S| of the identified loop at the period, and whether the loop is stable."""
-    if controller is None or fit.gain * controller.kp <= 0:
+    if controller is None or process.gain * controller.kp <= 0:
         return None, True
-    loop = Loop(Fopdt(fit.gain, fit.time_constant_s, fit.dead_time_s), controller)
+    loop = Loop(process, controller)
     omega = np.array([2 * math.pi / period_s])
     return float(1 / abs(1 + loop_response(loop, omega)[0])), is_stable(loop)

@@ -10,7 +10,7 @@ from analyzer.assess import Assessment
 from analyzer.cause import Verdict
 from analyzer.columns import ALL_COLUMNS
 from analyzer.history.loops_csv import LoopSpec
-from identification.hammerstein import Fit
+from identification.hammerstein import Fit, Window
 
 
 def empty_row(spec: LoopSpec, night: str) -> dict[str, Any]:
@@ -38,14 +38,14 @@ def lost_row(spec: LoopSpec, night: str, status: str, reason: str) -> dict[str, 
     return {**empty_row(spec, night), "status": status, "reason": reason}
 
 
-def _process_columns(fit: Fit, duration_s: float) -> dict[str, float | None]:
+def _process_columns(fit: Fit, window: Window) -> dict[str, float | None]:
     """Process constants; gain and time constant apart only where the time constant is well inside the window."""
-    known = fit.time_constant_s < 0.1 * duration_s
+    known = fit.time_constant_s < 0.1 * window.duration_s
     return {
         "gain": fit.gain if known else None,
         "time_constant_s": fit.time_constant_s if known else None,
         "slope_pct_per_s": fit.slope,
-        "dead_time_s": fit.dead_time_s,
+        "dead_time_s": fit.dead_time_s + window.half_block_s,
     }
 
 
@@ -54,12 +54,12 @@ def _model_columns(verdict: Verdict) -> dict[str, float | None]:
     if m is None or verdict.cause not in ("valve", "tuning"):
         return {}
     if verdict.cause == "tuning":
-        return _process_columns(m.linear, m.window.duration_s)
+        return _process_columns(m.linear, m.window)
     if verdict.fault == "stiction" and m.stick_slip is not None:
         valve = m.stick_slip.valve
         columns = {"stickband_pct": valve.stickband, "slip_jump_pct": valve.slip_jump}
-        return {**_process_columns(m.stick_slip, m.window.duration_s), **columns}
-    return {**_process_columns(m.play, m.window.duration_s), "backlash_pct": m.play.valve.stickband}
+        return {**_process_columns(m.stick_slip, m.window), **columns}
+    return {**_process_columns(m.play, m.window), "backlash_pct": m.play.valve.stickband}
 
 
 def _oscillation_columns(a: Assessment) -> dict[str, Any]:

@@ -74,7 +74,7 @@ def intervals(window: Window, fit: Fit, valve: bool) -> dict[str, Estimate]:
     if t < 0.1 * window.duration_s and factor < 2.0:
         out["gain"] = _around(fit.gain, NINETY * spread[3], "%/%")
         out["time_constant_s"] = Estimate(t, t / factor, t * factor, "s")
-    out["dead_time_s"] = _around(fit.dead_time_s, NINETY * spread[1], "s", least=0.0)
+    out["dead_time_s"] = _around(fit.dead_time_s + window.half_block_s, NINETY * spread[1], "s", least=0.0)
     if valve:
         name = "backlash_pct" if fit.valve.slip_jump == 0 else "stickband_pct"
         out[name] = _around(fit.valve.stickband, NINETY * spread[2], "% of OP", least=0.0)

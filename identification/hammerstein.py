@@ -15,6 +15,7 @@ import numpy as np
 from numba import njit
 
 from identification.innovations import judged_mask, notch, whiten
+from identification.models import Fopdt
 from identification.record import Floats, Mask
 from identification.valve import RESTS, stem_step
 
@@ -68,6 +69,13 @@ class Window:
     def duration_s(self) -> float:
         """Length of the window [s]."""
         return self.y.size * self.dt_s
+
+    @property
+    def half_block_s(self) -> float:
+        """What is missing from a fitted dead time [s]: the mean of a block of PV stands later than its first sample,
+        where the model's response stands. Centring the blocks instead would let PV's noise meet the OP that
+        answers it."""
+        return 0.5 * (self.factor - 1) * self.dt_s / self.factor
 
     @property
     def op_range(self) -> float:
@@ -351,6 +359,11 @@ def residual(window: Window, fit: Fit) -> Floats:
     """PV less the response to the stem [% PV], shape (n,): load and noise, with the model's slow terms in it."""
     x = lag(stem_of(window, fit.valve), *unit_lag(fit.time_constant_s, fit.dead_time_s, window.dt_s))
     return window.y - window.y.mean() - fit.gain * x
+
+
+def process_of(window: Window, fit: Fit) -> Fopdt:
+    """The process of a fit, its dead time in the record's own samples."""
+    return Fopdt(fit.gain, fit.time_constant_s, fit.dead_time_s + window.half_block_s)
 
 
 def disturbance(window: Window, fit: Fit) -> Floats:

@@ -8,7 +8,7 @@ from io import BytesIO
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.colors import ListedColormap
+from matplotlib.colors import ListedColormap, LogNorm
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
@@ -74,8 +74,14 @@ def curves(picture: CurvesPicture, title: str) -> bytes:
         ax.annotate(text, (at.real, at.imag), textcoords="offset points", xytext=(8, -12), fontsize=8)
     ax.axhline(0, color="0.7", linewidth=0.6)
     ax.axvline(0, color="0.7", linewidth=0.6)
-    ax.set(xlim=(-reach, reach), ylim=(-reach, 0.6 * reach), xlabel="real", ylabel="imaginary", title=title)
-    ax.legend(fontsize=8, loc="upper left")
+    ax.set(
+        xlim=(-0.3 * reach, reach),
+        ylim=(-0.8 * reach, 0.25 * reach),
+        xlabel="real",
+        ylabel="imaginary",
+        title=title,
+    )
+    ax.legend(fontsize=8, loc="lower left")
     return png(figure)
 
 
@@ -84,7 +90,10 @@ def travel_map(picture: MapPicture, title: str) -> bytes:
     figure = Figure(figsize=(6.4, 4.8), layout="constrained")
     ax: Axes = figure.subplots()
     shown = np.where(picture.travel > 0, picture.travel, np.nan)
-    mesh = ax.pcolormesh(picture.kp, picture.ti_s, shown, cmap="YlOrBr", shading="nearest")
+    cycling = picture.travel[picture.travel > 0]
+    low, high = np.quantile(cycling, [0.02, 0.98]) if cycling.size else (1.0, 10.0)
+    norm = LogNorm(max(low, 1e-6), max(high, 2 * low, 1e-5))
+    mesh = ax.pcolormesh(picture.kp, picture.ti_s, shown, cmap="YlOrBr", shading="nearest", norm=norm)
     for mask, colour in ((picture.rests, RESTS), (picture.unstable, "#c0392b")):
         area = np.where(mask, 1.0, np.nan)
         ax.pcolormesh(picture.kp, picture.ti_s, area, cmap=_one(colour), shading="nearest")

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 from analyzer.pages import loop, morning
 from analyzer.pages.reading import read_nights, read_trends
+from analyzer.pages.view import read_night
 from analyzer.store import Store
 from reports.pages import Page
 
@@ -21,7 +22,7 @@ def pages(store: Store, name: str | None = None, top: int = 50) -> Iterator[Page
     InputError
         Where the store holds no such night.
     """
-    night = morning.read_night(store, name, top)
+    night = read_night(store, name, top)
     yield morning.page(night)
     nights = [n for n in store.nights() if n <= night.name][-HISTORY:]
     rows = read_nights(store, nights, loop.COLUMNS, night.paged)

@@ -1,0 +1,74 @@
+"""What is new since the night before, and what got better."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from analyzer.pages.view import Night, Row, linked, oscillates, proposal
+from analyzer.pages.words import number
+from reports.pages import Block, Cell, Column, Section, Table, Text
+
+HALVED = 0.5
+"""A loop got better where its significance fell to this share of the night before [-]; ours."""
+
+
+def _news(night: Night, row: Row) -> tuple[str, str]:
+    """What is new about a loop since the night before, and its colour; '' where nothing is."""
+    old = night.before.get(row["loop"])
+    if old is None or old["status"] != "ok" or row["status"] != "ok":
+        return "", ""
+    now, then = (r["oscillation_significance"] or 0.0 for r in (row, old))
+    if oscillates(row) and not oscillates(old):
+        return "began to oscillate", "worse"
+    if oscillates(old) and not oscillates(row):
+        return "stopped oscillating", "better"
+    if oscillates(old) and now < HALVED * then:
+        return "oscillates less than half as much", "better"
+    if row["cause"] != old["cause"]:
+        return f"cause was {old['cause']}, is {row['cause']}", "unclear"
+    return "", ""
+
+
+def _significance(row: Row) -> Cell:
+    return Cell(number(row["oscillation_significance"]), row["oscillation_significance"])
+
+
+NEWS = (
+    Column("loop", "Loop"),
+    Column("news", "Since the night before"),
+    Column("before", "Signif. before", True),
+    Column("now", "Signif. now", True),
+    Column("action", "Action", wide=True),
+)
+
+
+def news_table(night: Night, tones: Sequence[str], name: str, title: str) -> Table:
+    """Loops of which there is something new, of the colours asked for."""
+    found = [(row, *_news(night, row)) for row in night.rows]
+    rows = tuple(
+        (
+            linked(night, row["loop"]),
+            Cell(text, kind=tone),
+            _significance(night.before[row["loop"]]),
+            _significance(row),
+            Cell(proposal(row)),
+        )
+        for row, text, tone in found
+        if text and tone in tones
+    )
+    return Table(name, f"{title} ({len(rows)})", NEWS, rows)
+
+
+def _news_blocks(night: Night) -> tuple[Block, ...]:
+    tables = (
+        news_table(night, ("worse", "unclear"), "new", "New"),
+        news_table(night, ("better",), "better", "Better"),
+    )
+    return tuple(t if t.rows else Text((f"{t.title.split(' (')[0]}: nothing.",), "note") for t in tables)
+
+
+def since(night: Night) -> Section:
+    """The section of what changed overnight."""
+    if not night.before_name:
+        return Section("Since the night before", (Text(("This is the first night in the store.",)),))
+    return Section(f"Since {night.before_name}", _news_blocks(night))

@@ -1,0 +1,1 @@
+"""Where a plain loop and its recording differ: the catalogue of left-out physics, fitted, compared, named."""

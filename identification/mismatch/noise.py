@@ -1,0 +1,61 @@
+"""The noise model of the rivals: an autoregression whose lags widen, so that slow loads and fast noise both fit."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from identification.record import Floats, Mask
+
+EDGES = np.array([0, 1, 2, 3, 4, 5, 6, 8, 10, 13, 17, 22, 29, 38, 50, 66, 88, 117], dtype=np.int64)
+"""Lags between consecutive edges act together, by their mean; ours: single lags where noise is, a third of an
+octave where load is, reaching as far as a loop of 100 samples' time constant needs."""
+REACH = int(EDGES[-1])
+
+
+@njit(cache=True)
+def lag_means(r: Floats, edges: Floats) -> Floats:
+    """Means of the residual over each group of lags, shape (groups, n); zero where they reach before the start."""
+    n, groups = r.size, edges.size - 1
+    total = np.zeros(n + 1)
+    for k in range(n):
+        total[k + 1] = total[k] + r[k]
+    out = np.zeros((groups, n))
+    for j in range(groups):
+        near, far = edges[j], edges[j + 1]
+        scale = 1.0 / (far - near)
+        for k in range(far, n):
+            out[j, k] = (total[k - near] - total[k - far]) * scale
+    return out
+
+
+@njit(cache=True)
+def whitened(x: Floats, ar: Floats, edges: Floats) -> Floats:
+    """Innovations of x under a noise model, shape (n,)."""
+    n, groups = x.size, edges.size - 1
+    total = np.zeros(n + 1)
+    for k in range(n):
+        total[k + 1] = total[k] + x[k]
+    out = x.copy()
+    for j in range(groups):
+        near, far = edges[j], edges[j + 1]
+        scale = ar[j] / (far - near)
+        for k in range(far, n):
+            out[k] -= (total[k - near] - total[k - far]) * scale
+    return out
+
+
+def judged(usable: Mask) -> Mask:
+    """True where a sample and all that its prediction uses may be used, shape (n,)."""
+    seen = np.concatenate(([0], np.cumsum(~usable)))
+    out = np.zeros(usable.size, dtype=bool)
+    out[REACH:] = seen[REACH + 1 :] == seen[: usable.size - REACH]
+    return out
+
+
+def fitted(columns: Floats, r: Floats, weight: Floats) -> Floats:
+    """Noise model, shape (groups,), of least weighted innovations; columns from lag_means."""
+    w = columns * weight
+    gram = w @ columns.T
+    ridge = 1e-10 * np.trace(gram) / gram.shape[0] + 1e-300
+    return np.linalg.solve(gram + ridge * np.eye(gram.shape[0]), w @ r)

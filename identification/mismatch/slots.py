@@ -1,0 +1,79 @@
+"""The constants of the loop model that every rival shares: one place per constant, neutral unless freed."""
+
+from __future__ import annotations
+
+import math
+from enum import IntEnum
+
+import numpy as np
+
+from identification.record import Floats
+
+KNOTS = 12
+"""Knots of a slow supply; ours: a wander of a twelfth of the record is followed, loop dynamics are not."""
+STEPS = 3
+"""Load steps that one model may hold."""
+
+
+class Slot(IntEnum):
+    """Index of a constant. Seconds, % of span; gains % PV / % OP."""
+
+    T = 0
+    L = 1
+    K = 2
+    BIAS = 3
+    START = 4
+    STICKBAND = 5
+    JUMP = 6
+    COAST = 7
+    RATE = 8
+    STOP_HI = 9
+    STOP_LO = 10
+    BEND = 11
+    SERVO = 12
+    DAMPING = 13
+    DEADBAND = 14
+    SPLIT = 15
+    RATIO = 16
+    SPLIT_DEAD = 17
+    SPLIT_LAG = 18
+    T2 = 19
+    SHARE = 20
+    MODE_T = 21
+    ASYMMETRY = 22
+    SLOPE = 23
+    ROOT = 24
+    CAP = 25
+    SPILL = 26
+    LEAK = 27
+    PIPE = 28
+    DRIFT = 29
+    CLIP_HI = 30
+    CLIP_LO = 31
+    SINE = 32
+    COSINE = 33
+    OMEGA = 34
+    NEIGHBOUR = 35
+    NEIGHBOUR_T = 36
+    HEAD_BIAS = 37
+    SPILL_T = 38
+    T3 = 39
+    STEP = 40
+    HEAD = 43
+
+
+SIZE = int(Slot.HEAD) + KNOTS
+
+
+def neutral() -> Floats:
+    """Constants of the plain loop, shape (SIZE,): unit gain and a time constant of one second."""
+    c = np.zeros(SIZE)
+    c[Slot.T], c[Slot.K], c[Slot.LEAK], c[Slot.RATIO] = 1.0, 1.0, 1.0, 1.0
+    c[Slot.COAST] = -1.0
+    c[Slot.MODE_T], c[Slot.NEIGHBOUR_T], c[Slot.OMEGA], c[Slot.SPILL_T] = 1.0, 1.0, 1.0, 1.0
+    c[Slot.DAMPING] = 0.5
+    for slot in (Slot.RATE, Slot.STOP_HI, Slot.SPLIT, Slot.CAP, Slot.CLIP_HI):
+        c[slot] = math.inf
+    for slot in (Slot.STOP_LO, Slot.CLIP_LO):
+        c[slot] = -math.inf
+    return c
