@@ -257,7 +257,9 @@
       plots.forEach((u, i) => u.setSize({ width: Math.max(holders[i].clientWidth, 200), height: u.height }));
     }
     new ResizeObserver(fit).observe(figure);
-    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => plots.forEach((u) => u.redraw()));
+    ["(prefers-color-scheme: dark)", "print"].forEach((query) => {
+      matchMedia(query).addEventListener("change", () => plots.forEach((u) => u.redraw()));
+    });
     show(whole.min, whole.max);
     figure.dataset.ready = "yes";
   }

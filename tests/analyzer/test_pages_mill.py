@@ -1,0 +1,95 @@
+"""The sample mill's two weeks come out as the study's: from the store alone, the recordings' truth unread."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from analyzer.before_after import Verdict, grade
+from analyzer.changes import read_changes
+from analyzer.config import Config
+from analyzer.history.export import ReadOptions, open_export
+from analyzer.pages import before_after
+from analyzer.pages.report import Case, Spans, cases, detected
+from analyzer.store import Store
+from analyzer.tags import match, read_loops
+from reports.markdown import render
+
+MILL = Path(__file__).parents[2] / "sample_data"
+RETUNED = ("LIC2101", "LIC2102", "LIC2103", "TIC2104", "LIC2105", "TIC2106", "LIC2107")
+OTHERS = ("FIC2110", "TIC2111", "PIC2112", "FIC2113", "PIC2114", "PIC2116")
+
+
+@pytest.fixture(scope="module")
+def store(tmp_path_factory: pytest.TempPathFactory) -> Store:
+    """The mill's fourteen nights, of the retuned loops and some others."""
+    from analyzer import batch
+
+    export = open_export([MILL / "mill.parquet"], ReadOptions())
+    specs, _ = match(read_loops(MILL / "loops.csv"), export.tags)
+    kept = Store(tmp_path_factory.mktemp("mill"))
+    batch.run(export, [s for s in specs if s.loop in (*RETUNED, *OTHERS)], kept, Config(), jobs=2)
+    return kept
+
+
+@pytest.fixture(scope="module")
+def found(store: Store) -> dict[str, Case]:
+    """What became of each change."""
+    known, missing = cases(store, read_changes(MILL / "changes.csv"), Spans())
+    assert missing == []
+    return {c.found.loop: c for c in known}
+
+
+def test_five_loops_improve_clearly(found: dict[str, Case]) -> None:
+    """Five of the seven retuned loops improve clearly in all four assessments, as in the study."""
+    clear = [loop for loop, c in found.items() if grade(c.found) == "clear"]
+    assert clear == ["LIC2102", "TIC2104", "LIC2105", "TIC2106", "LIC2107"]
+
+
+def test_loop_1_improves_modestly(found: dict[str, Case]) -> None:
+    """Loop 1 improves modestly, as in the study."""
+    assert grade(found["LIC2101"].found) == "modest"
+
+
+def test_loop_3_improves_only_in_travel(found: dict[str, Case]) -> None:
+    """Loop 3 improves in valve travel alone, and its neighbour is named as the cause, as in the study."""
+    case = found["LIC2103"].found
+    better = [c.measure.name for c in case.primary if c.verdict is Verdict.BETTER]
+    assert better == ["valve_travel_pct_per_h"]
+    assert case.source_loop == "FIC2110"
+    assert "FIC2110" in before_after.outcome(case)
+
+
+def test_untouched_loops_do_not_change(store: Store) -> None:
+    """Loops that nobody touched are called neither better nor worse at the same moment."""
+    from dataclasses import replace
+
+    moment = read_changes(MILL / "changes.csv")[0]
+    known, _ = cases(store, [replace(moment, loop=loop) for loop in OTHERS], Spans())
+    calls = {c.found.loop: {x.verdict for x in c.found.primary} for c in known}
+    assert len(calls) == len(OTHERS)
+    assert all(v <= {Verdict.UNCLEAR, Verdict.INCOMPARABLE} for v in calls.values())
+
+
+def test_changes_are_offered_where_there_were_some(store: Store) -> None:
+    """Changes of behaviour are offered for retuned loops only, within six hours of the truth; most are seen."""
+    truth = {c.loop: c.time_s for c in read_changes(MILL / "changes.csv")}
+    offered = {c.loop: c.time_s for c in detected(store)}
+    assert set(offered) <= set(truth)
+    assert len(offered) >= 5
+    assert all(abs(t - truth[loop]) < 6 * 3600 for loop, t in offered.items())
+
+
+def kept_part(text: str) -> str:
+    """What a change of the analysis should not move: the summary, and the verdicts without their digits."""
+    short, _, rest = text.partition("## On average")
+    table = rest.partition("## Figures before and after")[2].partition("## ")[0]
+    rows = [line.split(" | ") for line in table.splitlines() if line.startswith("| ")]
+    return short + "\n".join(" | ".join((*r[:2], *r[-2:])) for r in rows) + "\n"
+
+
+def test_markdown_says_what_it_said(found: dict[str, Case]) -> None:
+    """The report's summary and verdicts in Markdown are those kept beside this test."""
+    text = render(before_after.page(list(found.values()), [], "7 days before against after the change."))
+    assert kept_part(text) == (Path(__file__).parent / "test_pages_mill.md").read_text("utf-8")

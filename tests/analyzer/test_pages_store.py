@@ -1,0 +1,208 @@
+"""Pages hold what the store holds, of the right size, in good time."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+from analyzer.changes import TuningChange
+from analyzer.pages import before_after, morning, night
+from analyzer.pages.areas import score
+from analyzer.pages.reading import read_hours, read_trends
+from analyzer.pages.report import Spans, cases, detected
+from analyzer.pages.rhythm import autocorrelation, rhythm_plots
+from analyzer.pages.view import read_night
+from analyzer.pages.wear import wear_texts
+from analyzer.store import Store
+from identification.errors import InputError
+from reports.folder import write_csv, write_html, write_markdown
+from reports.html import render
+from reports.pages import Page, Plot, Table, Text
+from tests.reports.small_store import NASTY, START_S, small_store
+
+CHANGED_S = START_S + 7 * 86400.0
+
+
+@pytest.fixture(scope="module")
+def store(tmp_path_factory: pytest.TempPathFactory) -> Store:
+    """Two weeks of 30 made-up loops."""
+    return small_store(tmp_path_factory.mktemp("store"))
+
+
+def table(page: Page, name: str) -> Table:
+    """A page's table by name."""
+    return next(t for t in page.tables() if t.name == name)
+
+
+def column(found: Table, key: str) -> list[float | None]:
+    """Numbers of a column."""
+    at = [c.key for c in found.columns].index(key)
+    return [row[at].number for row in found.rows]
+
+
+def test_ranking_holds_the_nights_numbers(store: Store) -> None:
+    """Every number of the ranking equals the store's, to the last digit."""
+    found = table(morning.page(read_night(store, None, 5)), "ranking")
+    rows = {r["loop"]: r for r in store.read("nights", store.require()).to_pylist()}
+    tags = [row[0].text for row in found.rows]
+    assert sorted(tags) == sorted(rows)
+    for key in (c.key for c in found.columns if c.numeric):
+        assert column(found, key) == [rows[t][key] for t in tags]
+
+
+def test_before_after_means_are_the_hours(store: Store) -> None:
+    """Means before and after equal the means of the store's hours, the hours of the change left out."""
+    loop = NASTY[0]
+    (case,), missing = cases(store, [TuningChange(loop, CHANGED_S)], Spans())
+    assert missing == []
+    hours = read_hours(store, [loop], store.nights())[loop]
+    at, name = hours["hour_s"], "average_absolute_error_pct"
+    change = next(c for c in case.found.changes if c.measure.name == name)
+    assert change.found.before == pytest.approx(hours[name][at < CHANGED_S].mean())
+    assert change.found.after == pytest.approx(hours[name][at >= CHANGED_S + 3600].mean())
+    assert change.verdict == "better"
+    assert change.value_pct == pytest.approx(-50, abs=2)
+
+
+def test_loops_that_the_store_lacks_are_named(store: Store) -> None:
+    """A change of a loop that the store does not hold is named with the reason, the others are looked at."""
+    found, missing = cases(
+        store, [TuningChange("GONE", CHANGED_S), TuningChange(NASTY[1], CHANGED_S)], Spans()
+    )
+    assert [c.found.loop for c in found] == [NASTY[1]]
+    assert [m[0] for m in missing] == ["GONE"]
+    assert "GONE" in render(before_after.page(found, missing, ""))
+
+
+def test_morning_page_names_every_loop_once(store: Store) -> None:
+    """Loops not assessed stand in the list of those with their reason; what is new and better is told."""
+    view = read_night(store, "2026-03-09", 50)
+    page = morning.page(view)
+    lost = table(page, "not-assessed")
+    assert [row[0].text for row in lost.rows] == sorted(r["loop"] for r in view.rows if r["status"] != "ok")
+    assert all("needs a PV" in row[2].text for row in lost.rows)
+    news = {t.name: [row[1].text for row in t.rows] for t in page.tables() if t.name in ("new", "better")}
+    assert "began to oscillate" in news["new"]
+    assert "stopped oscillating" in news["better"]
+
+
+def test_first_night_has_nothing_before(store: Store) -> None:
+    """The first night's page says that there is none before."""
+    page = morning.page(read_night(store, "2026-03-02", 3))
+    texts = [b.paragraphs[0] for s in page.sections for b in s.blocks if isinstance(b, Text)]
+    assert "This is the first night in the store." in texts
+
+
+def test_unknown_night_is_an_error(store: Store) -> None:
+    """A night that the store lacks is refused with those it has."""
+    with pytest.raises(InputError, match="2026-03-15"):
+        list(night.pages(store, "1999-01-01"))
+
+
+def test_trends_keep_extremes_and_gaps(store: Store) -> None:
+    """Thinning further keeps the least and the greatest; a gap between nights is a gap in the trend."""
+    nights = store.nights()
+    loop = NASTY[2]
+    thin = read_trends(store, [loop], [nights[0], nights[2]])[loop]
+    coarse = thin.coarser(100)
+    assert coarse.time_s.size == 100
+    assert coarse.extremes["pv_max"].max() == thin.extremes["pv_max"].max()
+    assert coarse.extremes["pv_min"].min() == thin.extremes["pv_min"].min()
+    inside = (thin.time_s > START_S + 86400.0) & (thin.time_s < START_S + 2 * 86400.0)
+    assert thin.gap[inside].all() or not inside.any()
+    jump = int(np.argmax(np.diff(thin.time_s)))
+    assert thin.gap[jump] or thin.gap[jump + 1]
+
+
+def test_rhythm_shows_the_period(store: Store) -> None:
+    """Autocorrelation and spectrum of a cycle of 400 s have their peaks where the mark is."""
+    loop = NASTY[0]
+    thin = read_trends(store, [loop], store.nights()[:1])[loop]
+    correlation, spectrum = rhythm_plots(thin, 400.0)
+    assert isinstance(correlation, Plot)
+    assert isinstance(spectrum, Plot)
+    lag, height = correlation.lines[0].x, correlation.lines[0].y
+    around = (lag > 4) & (lag < 10)
+    assert lag[around][np.argmax(height[around])] == pytest.approx(400 / 60, abs=1.3)
+    line = spectrum.lines[0]
+    assert line.x[np.argmax(line.y)] == pytest.approx(9.0, abs=0.3)
+    assert spectrum.marks[0].x == pytest.approx(9.0)
+
+
+def test_short_periods_are_not_drawn_from_coarse_trends(store: Store) -> None:
+    """A period that the stored trend cannot show is said, not drawn."""
+    loop = NASTY[0]
+    thin = read_trends(store, [loop], store.nights()[:1])[loop]
+    (found,) = rhythm_plots(thin, 30.0)
+    assert isinstance(found, Text)
+    assert "72 s" in found.paragraphs[0]
+
+
+def test_autocorrelation_equals_its_definition() -> None:
+    """The autocorrelation by Fourier transform equals the sum of products."""
+    x = np.random.default_rng(0).normal(size=50)
+    slow = [float((x[: 50 - k] * x[k:]).sum() / (x * x).sum()) for k in range(25)]
+    np.testing.assert_allclose(autocorrelation(x), slow, atol=1e-12)
+
+
+def test_area_score_weighs_importance() -> None:
+    """The score is the share of sound loops by importance; an area in which none is assessed has none."""
+    row = {"status": "ok", "importance": 3.0, "cause": "none"}
+    bad = {**row, "importance": 1.0, "cause": "valve"}
+    assert score([row, bad]) == 75.0
+    assert score([{**row, "status": "failed"}]) is None
+
+
+def test_wear_is_never_invented(store: Store) -> None:
+    """Valve life and cost appear only where the plant states its numbers, and follow from them."""
+    (case,), _ = cases(store, [TuningChange(NASTY[0], CHANGED_S)], Spans())
+    assert wear_texts(case.found, {}) == ()
+    assert wear_texts(case.found, {"extra": '{"valve_life_travel_pct": "nonsense"}'}) == ()
+    stated = '{"valve_life_travel_pct": "8760", "cost_per_error_pct_h": "2", "cost_unit": "EUR"}'
+    life, cost = wear_texts(case.found, {"extra": stated})
+    assert life.startswith("Valve life at this travel: 1.0")
+    assert "2 years after" in life or "1.9" in life
+    assert "EUR a year" in cost
+
+
+def test_everything_is_written(store: Store, tmp_path: Path) -> None:
+    """HTML, Markdown with its pictures, and a CSV of every table are written, all inside the folder."""
+    pages = list(night.pages(store, None, 3))
+    html, text = write_html(pages, tmp_path / "h"), write_markdown(pages, tmp_path / "m")
+    tables = [p for page in pages for p in write_csv(page, tmp_path / "c")]
+    assert len(html) == len(text) == 4
+    assert len(tables) == sum(len(p.tables()) for p in pages)
+    named = list((tmp_path / "m").rglob("*.png"))
+    assert len(named) == sum(t.read_text("utf-8").count("![") for t in text)
+    assert all(p.resolve().is_relative_to(tmp_path) for p in (*html, *text, *tables))
+    assert not list(tmp_path.rglob("*.tmp"))
+
+
+def test_behaviour_changes_are_offered(tmp_path: Path) -> None:
+    """A loop whose valve moves four times as much for the same error is offered as changed, at the right hour."""
+    found = small_store(tmp_path, loops=6)
+    for path in sorted((tmp_path / "hours").glob("*.parquet"))[7:]:
+        rows = pq.read_table(path)
+        at = rows.column_names.index("valve_travel_pct_per_h")
+        more = np.where(np.array(rows["loop"]) == NASTY[4], 4.0, 1.0)
+        moved = more * rows["valve_travel_pct_per_h"].to_numpy()
+        pq.write_table(rows.set_column(at, "valve_travel_pct_per_h", [moved]), path)
+    offered = detected(found)
+    assert [c.loop for c in offered] == [NASTY[4]]
+    assert offered[0].time_s == pytest.approx(CHANGED_S, abs=3600)
+    assert "4 times" in offered[0].seen
+
+
+def test_a_big_plant_is_quick_and_small(tmp_path: Path) -> None:
+    """The morning page of 1,500 loops stays under 3 MB, 50 loop pages with a week under 1.5 MB each and 60 s."""
+    big = small_store(tmp_path / "store", loops=1500, nights=7, hours=False)
+    start = time.monotonic()
+    written = write_html(night.pages(big, None, 50), tmp_path / "out", single_file=True)
+    assert time.monotonic() - start < 60.0
+    assert len(written) == 51
+    assert written[0].stat().st_size < 3e6
+    assert max(p.stat().st_size for p in written[1:]) < 1.5e6

@@ -1,0 +1,107 @@
+"""HTML pages are self-contained and carry their numbers."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+import re
+from html import unescape
+
+import numpy as np
+import pytest
+from jinja2 import UndefinedError
+
+from reports import html
+from reports.pages import Band, Cell, Column, Page, Section, Table, Trend
+from reports.svg import nice_ticks
+
+
+def trend(n: int, rng: np.random.Generator) -> Trend:
+    """A trend of n buckets with noise."""
+    low = rng.normal(50, 5, (3, n))
+    bands = tuple(
+        Band(s.upper(), s, int(s == "op"), x, x + 1) for s, x in zip(("sp", "pv", "op"), low, strict=True)
+    )
+    return Trend("trend", "trend", 1.7e9 + 72.0 * np.arange(n), np.arange(n) % 100 == 0, bands, ("PV", "OP"))
+
+
+def decoded(coded: dict[str, float | str]) -> np.ndarray:
+    """What the page's script reads."""
+    level = np.frombuffer(base64.b64decode(str(coded["data"])), "<u2").astype(float)
+    return np.where(level == html.MISSING, np.nan, float(coded["low"]) + level * float(coded["step"]))
+
+
+def test_trend_data_come_back() -> None:
+    """A trend's levels come back within a 65,000th of their range, gaps as gaps, times exactly."""
+    t = trend(2000, np.random.default_rng(1))
+    data = json.loads(str(html.trend_data(t)))
+    offset = np.frombuffer(base64.b64decode(data["time"]), "<u4")
+    np.testing.assert_array_equal(data["start"] + offset, t.time_s)
+    for coded, band in zip(data["bands"], t.bands, strict=True):
+        back = decoded(coded["low"])
+        np.testing.assert_array_equal(np.isnan(back), t.gap)
+        np.testing.assert_allclose(back[~t.gap], band.low[~t.gap], atol=np.ptp(band.low) / 65000)
+
+
+def test_week_of_buckets_is_small() -> None:
+    """A loop page with a week of 1,200 buckets a day in one file stays under 1.5 MB; so it does at 6,000."""
+    for buckets, most in ((8400, 0.5e6), (42000, 1.5e6)):
+        page = Page("p", "p", "", (Section("s", (trend(buckets, np.random.default_rng(2)),)),))
+        assert len(html.render(page, single_file=True)) < most
+
+
+def test_single_file_asks_for_nothing() -> None:
+    """A page in one file has no address to fetch, and its policy names the digest of every script and style."""
+    page = Page("p", "p", "", (Section("s", (trend(10, np.random.default_rng(3)),)),))
+    text = html.render(page, single_file=True)
+    assert not re.search(r"<(?:link|img|iframe|script[^>]*\ssrc)", text)
+    policy = unescape(re.search(r'Security-Policy" content="([^"]*)"', text)[1])  # type: ignore[index]
+    assert policy.startswith("default-src 'none'")
+    scripts = re.findall(r"<script>(.*?)</script>", text, re.S) + re.findall(
+        r"<style>(.*?)</style>", text, re.S
+    )
+    assert len(scripts) == 4
+    for body in scripts:
+        assert base64.b64encode(hashlib.sha256(body.encode()).digest()).decode() in policy
+
+
+def test_folder_pages_ask_for_their_assets_alone() -> None:
+    """A page of a folder asks for files in its assets folder and for nothing else."""
+    text = html.render(Page("p", "p", "", ()))
+    asked = re.findall(r'(?:src|href)="([^"#]+)"', text)
+    assert asked
+    assert all(re.fullmatch(r"assets/[\w.]+", a) for a in asked)
+
+
+def test_no_asset_names_a_network() -> None:
+    """No script or style sheet of ours fetches anything."""
+    for name in ("page.css", "page.js", "uPlot.min.css"):
+        assert not re.search(r"https?://|fetch\(|XMLHttpRequest|@import|url\(", html.asset(name))
+
+
+def test_undefined_names_are_errors() -> None:
+    """A template that asks for what a page lacks fails instead of leaving a blank."""
+    with pytest.raises(UndefinedError):
+        html._environment().from_string("{{ page.nothing.at_all }}").render(page=Page("p", "p", "", ()))
+
+
+def test_cells_sort_by_full_numbers() -> None:
+    """A number's cell carries all its digits for sorting, an unknown one none."""
+    table = Table("t", "", (Column("x", "x", True),), ((Cell("1.23", 1.2345678),), (Cell(""),)))
+    text = html.render(Page("p", "p", "", (Section("s", (table,)),)))
+    assert 'data-sort="1.2345678"' in text
+    assert text.count("data-sort") == 1
+
+
+@pytest.mark.parametrize(("low", "high"), [(0, 1), (-97, 12), (0.001, 0.0013), (-1e6, 3e6)])
+def test_ticks_are_round_and_inside(low: float, high: float) -> None:
+    """Ticks lie within the axis, evenly, at one, two or five times a power of ten."""
+    ticks = nice_ticks(low, high)
+    steps = np.diff(ticks)
+    assert 2 <= len(ticks) <= 8
+    assert min(ticks) >= low - 1e-9 * abs(low)
+    assert max(ticks) <= high + 1e-9 * abs(high)
+    np.testing.assert_allclose(steps, steps[0], rtol=1e-6)
+    mantissa = steps[0] / 10 ** np.floor(np.log10(steps[0]) + 1e-9)
+    assert min(abs(mantissa - m) for m in (1, 2, 5, 10)) < 1e-6
