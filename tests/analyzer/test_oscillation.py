@@ -162,7 +162,7 @@ def test_a_harmonic_is_not_another_oscillation():
 @settings(max_examples=20, deadline=None)
 @given(st.floats(0.01, 15.0), st.floats(-1e8, 1e8), st.floats(-20, 20))
 def test_scaling_pv_scales_amplitude_and_significance_alone(factor, shift_s, level):
-    """A deviation `factor` as large has that amplitude and significance; nothing else moves, whenever and wherever."""
+    """A deviation `factor` as large has that amplitude and significance; nothing else moves, whenever, wherever."""
     deviation = np.sin(2 * np.pi * T / 130) + 0.5 * noise(11)
     one = first_of(record(50 + deviation))
     moved = replace(record(50 + level + factor * deviation, 50.0 + level), start_s=START_S + shift_s)

@@ -101,7 +101,7 @@ def test_autocorrelation_of_nothing_is_nothing():
     ids=["triangle", "square", "sine"],
 )
 def test_locked_harmonic_of_known_waves(wave, expected):
-    """The third harmonic of a triangle is 1/9 of the fundamental, of a square 1/3, of a sine nothing, in noise too."""
+    """The third harmonic of a triangle is 1/9 of the fundamental, of a square 1/3, of a sine 0, in noise too."""
     for clean in (wave, wave + 0.2 * noise(7)):
         assert locked_harmonic(spectrum(clean, 1.0), PERIOD) == pytest.approx(expected, abs=0.015)
 

@@ -1,0 +1,239 @@
+"""Verdicts on simulated loops whose fault is known; the simulation shares no code with the estimators."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from plant import CONFIG, START_S, Sketch, Trends, prepared, record, simulate
+
+from analyzer.assess import Assessment, assess
+from analyzer.cause import dead_valve
+from analyzer.plantwide import Peer, coherence, trace
+from identification.errors import NotAssessedError
+
+SKETCHES = {
+    "healthy flow": Sketch(
+        "none", (0.9, 15.0, 4.0), 0.8, 16.0, noise=0.15, load_std=0.8, moves=3.0, kind="flow"
+    ),
+    "healthy pressure": Sketch("none", (1.5, 40.0, 8.0), 1.2, 40.0, noise=0.1, load_std=0.8),
+    "healthy temperature": Sketch("none", (1.2, 400.0, 40.0), 2.5, 420.0, noise=0.03, load_std=1.0),
+    "sluggish": Sketch("none", (1.2, 60.0, 10.0), 0.2, 300.0, noise=0.1, load_std=1.0),
+    "play, fast level": Sketch("valve", (80.0, 200.0, 1.0), 1.0, 10.0, backlash=1.0, load_std=0.05),
+    "play, level": Sketch("valve", (40.0, 1200.0, 8.0), 0.8, 100.0, backlash=0.8, load_std=0.1),
+    "play, tank": Sketch("valve", (60.0, 1800.0, 9.0), 0.9, 40.0, backlash=2.5),
+    "play, temperature": Sketch(
+        "valve", (2.4, 600.0, 18.0), 3.6, 90.0, backlash=4.0, noise=0.02, load_std=0.3
+    ),
+    "sticking flow": Sketch(
+        "valve", (1.2, 8.0, 3.0), 0.4, 20.0, stickband=4.0, slip_jump=3.0, noise=0.08, kind="flow"
+    ),
+    "sticking pressure": Sketch("valve", (1.5, 40.0, 8.0), 0.8, 40.0, stickband=3.0, slip_jump=1.5),
+    "tight pressure": Sketch(
+        "tuning", (1.2, 260.0, 40.0), 7.8, 170.0, noise=0.03, load_std=0.6, load_s=300.0
+    ),
+    "tight temperature": Sketch(
+        "tuning", (1.5, 120.0, 20.0), 4.6, 60.0, noise=0.03, load_std=0.6, load_s=300.0
+    ),
+    "swinging load, pressure": Sketch(
+        "load", (1.4, 90.0, 10.0), 0.8, 120.0, noise=0.08, load_std=0.3, sine=3.0, sine_s=840.0
+    ),
+    "swinging load, flow": Sketch(
+        "load", (1.0, 20.0, 5.0), 0.6, 22.0, noise=0.1, load_std=0.3, sine=2.0, sine_s=130.0
+    ),
+}
+SEEDS = {"tight pressure": 2}
+
+
+@cache
+def trends(name: str) -> Trends:
+    """Four hours of a sketch, six where its process is slow."""
+    return simulate(SKETCHES[name], 6 if SKETCHES[name].process[1] > 500 else 4, SEEDS.get(name, 1))
+
+
+@cache
+def assessed(name: str) -> Assessment:
+    """What is said of a sketch, its settings being stated."""
+    sketch = SKETCHES[name]
+    return assess(prepared(trends(name), sketch.kind, name), sketch.controller, CONFIG, sketch.kind)
+
+
+def named(cause: str) -> list[str]:
+    """The sketches of one cause."""
+    return [name for name, sketch in SKETCHES.items() if sketch.cause == cause]
+
+
+@pytest.mark.parametrize("name", named("none"))
+def test_a_healthy_loop_is_blamed_for_nothing(name):
+    """Healthy and sluggish loops under load neither oscillate nor have a cause, and no confidence reaches 50 %."""
+    found = assessed(name)
+    assert found.oscillations.first is None
+    assert (found.verdict.cause, found.verdict.fault) == ("none", "none")
+    assert max(found.verdict.confidence.values()) < 50
+
+
+@pytest.mark.parametrize("name", [n for n, s in SKETCHES.items() if s.cause != "none"])
+def test_the_cause_is_named_for_two_reasons(name):
+    """Play, stick-slip, tight tuning and a swinging load are each named, with two signs or more in words."""
+    found = assessed(name)
+    first = found.oscillations.first
+    assert first is not None
+    assert first.oscillating_pct >= 50
+    verdict = found.verdict
+    assert verdict.cause == SKETCHES[name].cause
+    assert verdict.confidence[verdict.cause] >= 50
+    pointing = [sign for sign in verdict.signs if sign.points_to == verdict.cause]
+    assert len(pointing) >= 2
+    assert all(sign.text and 0 < sign.strength <= 1 for sign in pointing)
+
+
+@pytest.mark.parametrize("name", [n for n in named("valve") if SKETCHES[n].backlash])
+def test_width_of_play_is_recovered(name):
+    """Play is told from stick-slip and its width recovered within 10 %, the actuator's lag notwithstanding."""
+    verdict = assessed(name).verdict
+    assert verdict.fault == "backlash"
+    assert verdict.measured is not None
+    assert verdict.measured.play.valve.stickband == pytest.approx(SKETCHES[name].backlash, rel=0.10)
+
+
+@pytest.mark.parametrize("name", [n for n in named("valve") if SKETCHES[n].stickband])
+def test_stick_slip_is_told_from_play(name):
+    """Stick-slip is called stiction, its stickband recovered within 15 %."""
+    verdict = assessed(name).verdict
+    assert verdict.fault == "stiction"
+    assert verdict.measured is not None
+    assert verdict.measured.stick_slip is not None
+    assert verdict.measured.stick_slip.valve.stickband == pytest.approx(SKETCHES[name].stickband, rel=0.15)
+
+
+@pytest.mark.parametrize("name", named("load"))
+def test_period_of_the_load_is_that_of_the_machine(name):
+    """The period of a loop that a load swings is the load's, within 1 %."""
+    first = assessed(name).oscillations.first
+    assert first is not None
+    assert first.period_s == pytest.approx(SKETCHES[name].sine_s, rel=0.01)
+
+
+@pytest.mark.parametrize("name", ["play, level", "sticking flow"])
+def test_the_valve_is_found_without_the_settings(name):
+    """Where no settings are stated the valve is found all the same."""
+    sketch = SKETCHES[name]
+    found = assess(prepared(trends(name), sketch.kind), None, CONFIG, sketch.kind)
+    assert found.verdict.cause == "valve"
+
+
+@pytest.mark.parametrize("name", ["play, level", "tight temperature", "swinging load, flow"])
+def test_verdict_does_not_depend_on_the_clock(name):
+    """The same trends a year later have the same verdict, figures and signs."""
+    sketch = SKETCHES[name]
+    made = prepared(trends(name), sketch.kind, name)
+    later = replace(made, record=replace(made.record, start_s=START_S + 365 * 86400))
+    found = assess(later, sketch.controller, CONFIG, sketch.kind).verdict
+    assert (found.cause, found.signs) == (assessed(name).verdict.cause, assessed(name).verdict.signs)
+
+
+def test_direct_acting_loops_are_judged_alike():
+    """Turning the signs of process and controller turns nothing else."""
+    sketch = SKETCHES["play, level"]
+    made = trends("play, level")
+    turned = Trends(100 - made.sp, 100 - made.pv, made.op, made.stem)
+    settings = replace(sketch.controller, kp=-sketch.kp)
+    verdict = assess(prepared(turned), settings, CONFIG).verdict
+    assert (verdict.cause, verdict.fault) == ("valve", "backlash")
+    assert verdict.measured is not None
+    assert verdict.measured.play.valve.stickband == pytest.approx(sketch.backlash, rel=0.10)
+
+
+def test_trends_that_cannot_tell_say_what_they_need():
+    """Without OP, and with compressed trends, the cause is undecided and the verdict says what it needs and has."""
+    made = prepared(trends("swinging load, flow"))
+    blind = assess(replace(made, notes=("no OP recorded: no cause can be told",)), None, CONFIG).verdict
+    assert (blind.cause, blind.fault) == ("undecided", "undecided")
+    assert blind.needs == "needs OP, which is not recorded"
+    straight = assess(replace(made, compressed_share=0.9), None, CONFIG).verdict
+    assert straight.cause == "undecided"
+    assert straight.needs == "needs trends without compression, 90 % lie on straight segments"
+
+
+def test_a_loop_in_manual_is_not_assessed():
+    """A loop whose OP stood all night while PV swung was in manual, and is not assessed."""
+    made = trends("swinging load, flow")
+    with pytest.raises(NotAssessedError, match="manual 100 %"):
+        assess(prepared(replace(made, op=np.full(made.op.size, 50.0))), None, CONFIG)
+
+
+# Neighbours
+
+
+def followed(coupling: float = 1.0) -> tuple[Assessment, Assessment]:
+    """A tank with play and the temperature loop that it feeds."""
+    source = trends("play, tank")
+    extra = coupling * (source.pv - source.sp)
+    sketch = Sketch("load", (1.3, 60.0, 10.0), 0.8, 80.0)
+    fed = simulate(sketch, 6, 5, extra)
+    return assessed("play, tank"), assess(prepared(fed, loop="fed"), sketch.controller, CONFIG)
+
+
+def traced(*found: Assessment) -> dict[str, str]:
+    """Followers and their sources as the plant-wide pass names them."""
+    peers = {}
+    for a in found:
+        m = a.verdict.measured
+        peers[a.loop] = Peer(a.verdict.cause, m.evidence if m else 0.0, a.verdict.confidence["tuning"])
+    prints = [a.print for a in found if a.print is not None]
+    return {loop: source.loop for loop, source in trace(prints, peers, CONFIG.cause).items()}
+
+
+def test_a_follower_is_traced_to_its_source():
+    """A loop fed by a tank with play follows the tank, at its period, and its own valve is not blamed."""
+    source, fed = followed()
+    assert traced(source, fed) == {"fed": "play, tank"}
+    assert fed.verdict.cause != "valve"
+
+
+def test_loops_that_cycle_by_themselves_follow_nobody():
+    """Two loops with play of their own, and one that a machine swings, follow nobody."""
+    found = [assessed(name) for name in ("play, tank", "play, temperature", "swinging load, pressure")]
+    assert traced(*found) == {}
+
+
+def test_coherence_of_a_loop_with_itself_is_one():
+    """A fingerprint has coherence 1 with itself and, at another time, 0."""
+    mark = assessed("play, tank").print
+    assert mark is not None
+    assert coherence(mark, mark) == pytest.approx(1.0)
+    assert coherence(mark, replace(mark, start_s=mark.start_s + 3600)) == 0.0
+
+
+# A valve that no longer moves
+
+
+def wound(answer: float = 0.0) -> Trends:
+    """OP that winds up over 60 % while PV, short of its set point, moves by `answer` [%]."""
+    n = 7200
+    rise = np.linspace(0, 1, n)
+    noise = np.random.default_rng(7).standard_normal(n)
+    return Trends(np.full(n, 50.0), 30 + answer * rise + 0.1 * noise, 20 + 60 * rise, np.full(n, 20.0))
+
+
+def test_a_dead_valve_is_blamed_without_oscillation():
+    """OP that winds over 60 % while PV stands off its set point is a dead valve, undecided of which fault."""
+    found = assess(prepared(wound()), None, CONFIG)
+    assert found.oscillations.first is None
+    assert (found.verdict.cause, found.verdict.fault) == ("valve", "undecided")
+    assert "OP winds over 60 %" in found.verdict.signs[0].text
+
+
+def test_a_valve_that_answers_is_not_dead():
+    """The same OP with PV that rises by 10 % is no dead valve."""
+    assert dead_valve(prepared(wound(10.0)).record, CONFIG.cause) is None
+
+
+def test_a_loop_at_rest_has_no_dead_valve():
+    """PV on its set point while OP wanders is no dead valve, nor is PV beside it while OP rests."""
+    n = 7200
+    noise = 0.1 * np.random.default_rng(8).standard_normal(n)
+    assert dead_valve(record(50 + noise, op=np.linspace(20, 80, n)), CONFIG.cause) is None
+    assert dead_valve(record(30 + noise, op=np.full(n, 100.0)), CONFIG.cause) is None

@@ -1,0 +1,259 @@
+"""The morning list from a large store: in time, in order, in every format."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+
+from analyzer.cli import main
+from analyzer.columns import ALL_COLUMNS, TEXT_COLUMNS
+from analyzer.store import Store, rows_table, write_table
+
+LOOPS = 10_000
+NIGHT = "2026-03-08"
+STATED = """
+loop, type, status, oscillation_significance, oscillating_pct, osc_valve_pct, osc_tuning_pct, osc_load_pct, cause,
+valve_fault, source_loop, period_s, pv_amplitude_pct, average_absolute_error_pct, valve_travel_pct_per_h,
+variability_pct, gain, time_constant_s, slope_pct_per_s, dead_time_s, backlash_pct, stickband_pct, slip_jump_pct,
+kp, ti, kp_new, ti_new, action, reason
+"""
+CONTRACT = [column.strip() for column in STATED.split(",")]
+"""Columns of `triage rank --format csv` as DESIGN.md states them."""
+
+
+def rows(loops: int) -> list[dict[str, object]]:
+    """Rows of loops of which every tenth was not assessed and every fifth oscillates."""
+    rng = np.random.default_rng(1)
+    out = []
+    for k in range(loops):
+        row: dict[str, object] = {"loop": f"FIC{k:05d}", "type": "flow", "status": "ok", "night": NIGHT}
+        if k % 10 == 3:
+            out.append({**row, "status": "not assessed", "reason": "needs 200 good PV samples, has 12"})
+            continue
+        row |= {c: float(rng.uniform(0, 50)) for c in ALL_COLUMNS if c not in TEXT_COLUMNS}
+        cycles = k % 5 == 0
+        row |= {
+            "cause": "valve" if cycles else "none",
+            "valve_fault": "backlash" if cycles else "none",
+            "oscillation_significance": float(rng.uniform(0, 20)) if cycles else 0.0,
+            "action": "retune" if cycles else "none",
+            "reason": "cycles with 38 s; backlash of 2 %, 80 % of OP's range"
+            if cycles
+            else "does not oscillate",
+            "signs": json.dumps(
+                [{"points_to": "valve", "strength": 0.9, "text": "a play explains PV better"}] * 4
+            ),
+        }
+        out.append(row)
+    return out
+
+
+def written(path: Path, loops: int) -> Path:
+    """A store of one night of so many loops."""
+    write_table(rows_table(rows(loops), ALL_COLUMNS, TEXT_COLUMNS), path / "nights" / f"{NIGHT}.parquet")
+    return path
+
+
+@pytest.fixture(scope="module")
+def large(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A store of 10,000 loops."""
+    return written(tmp_path_factory.mktemp("large") / "store", LOOPS)
+
+
+@pytest.fixture(scope="module")
+def small(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A store of 20 loops."""
+    return written(tmp_path_factory.mktemp("small") / "store", 20)
+
+
+def asked(*arguments: str | Path) -> Result:
+    """Answer of `triage rank`."""
+    return CliRunner().invoke(main, ["rank", *map(str, arguments)])
+
+
+# In time
+
+
+def spent() -> float:
+    """Processor time of all children so far [s], wall time where the system does not tell."""
+    try:
+        import resource
+    except ImportError:
+        return time.perf_counter()
+    usage = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return usage.ru_utime + usage.ru_stime
+
+
+def seconds(*arguments: str | Path) -> float:
+    """Least processor time of three runs of python with these arguments [s]: what an idle machine takes."""
+    least = math.inf
+    for _ in range(3):
+        begun = spent()
+        subprocess.run([sys.executable, *map(str, arguments)], check=True, capture_output=True)
+        least = min(least, spent() - begun)
+    return least
+
+
+@pytest.mark.parametrize("form", ["csv", "table"])
+def test_ten_thousand_loops_are_ranked_within_a_second(large, form):
+    """Ranking 10,000 loops costs at most 5 starts of Python with pyarrow and click, and under 1.5 s."""
+    floor = seconds("-c", "import pyarrow.parquet, click")
+    found = seconds("-m", "analyzer.cli", "rank", large, "--top", "20", "--format", form)
+    assert found < 5 * floor, (found, floor)
+    assert found < 1.5 * max(1.0, floor / 0.3), (found, floor)
+
+
+def test_help_answers_at_once():
+    """`triage --help` costs at most twice what Python takes to start with click, and under 0.3 s."""
+    floor = seconds("-c", "import click")
+    found = seconds("-m", "analyzer.cli", "--help")
+    assert found < 2 * floor, (found, floor)
+    assert found < 0.3 * max(1.0, floor / 0.1), (found, floor)
+
+
+@pytest.mark.parametrize(
+    "heavy",
+    [
+        "numba",
+        "scipy",
+        "matplotlib",
+        pytest.param(
+            "pandas",
+            marks=pytest.mark.xfail(strict=True, reason="pq.read_table imports pyarrow.dataset and pandas"),
+        ),
+    ],
+)
+def test_ranking_imports_nothing_heavy(small, heavy):
+    """Neither help nor ranking imports what only the analysis needs."""
+    code = (
+        "import sys\nfrom analyzer.cli import main\n"
+        f"main(['rank', {str(small)!r}, '--format', 'csv'], standalone_mode=False)\n"
+        f"sys.exit({heavy!r} in sys.modules)"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)
+
+
+# In order
+
+
+def test_csv_is_the_contract(large):
+    """All loops with the contract's columns in their order, empty where not assessed."""
+    found = list(csv.reader(io.StringIO(asked(large, "--format", "csv").stdout)))
+    assert found[0] == list(CONTRACT)
+    assert len(found) == LOOPS + 1
+    assert {len(row) for row in found} == {len(CONTRACT)}
+    lost = [row for row in found[1:] if row[2] == "not assessed"]
+    assert len(lost) == LOOPS // 10
+    assert {tuple(row[3:9]) for row in lost} == {("",) * 6}
+    assert "nan" not in asked(large, "--format", "csv").stdout.lower()
+
+
+def test_the_worst_come_first_and_the_unknown_last(small):
+    """Sorted by significance, loops without a figure last by name; --ascending turns the known, not the unknown."""
+    expected = sorted(
+        (r for r in rows(20) if r["status"] == "ok"),
+        key=lambda r: (-r["oscillation_significance"], r["loop"]),
+    )
+    lost = [r["loop"] for r in rows(20) if r["status"] != "ok"]
+    found = json.loads(asked(small, "--format", "json").stdout)
+    assert [r["loop"] for r in found] == [r["loop"] for r in expected] + lost
+    turned = json.loads(asked(small, "--format", "json", "--ascending").stdout)
+    assert [r["loop"] for r in turned][-2:] == lost
+    figures = [r["oscillation_significance"] for r in turned[:-2]]
+    assert figures == sorted(figures)
+
+
+@pytest.mark.parametrize("column", CONTRACT)
+def test_any_column_sorts(small, column):
+    """--by takes every column of the contract, texts from A to Z and numbers from the largest."""
+    found = [r[column] for r in json.loads(asked(small, "--format", "json", "--by", column).stdout)]
+    known = [value for value in found if value not in (None, "")]
+    assert found[: len(known)] == known
+    assert known == sorted(known, reverse=bool(known) and not isinstance(known[0], str))
+
+
+def test_top_is_the_head_of_the_whole(large):
+    """--top 7 gives the first seven of the whole list."""
+    whole = asked(large, "--format", "csv").stdout.splitlines()
+    assert asked(large, "--format", "csv", "--top", "7").stdout.splitlines() == whole[:8]
+
+
+# In every format
+
+
+def test_formats_tell_the_same(small):
+    """CSV, JSON, Markdown and table list the same loops in the same order."""
+    order = [r["loop"] for r in json.loads(asked(small, "--format", "json").stdout)]
+    table, markdown, values = (
+        asked(small, "--format", form).stdout.splitlines() for form in ("table", "markdown", "csv")
+    )
+    assert [line.split(",")[0] for line in values[1:]] == order
+    assert [line.split("|")[1].strip() for line in markdown[2:]] == order
+    assert [line.split()[0] for line in table if line.lstrip().startswith("FIC")] == order
+    assert {line.count("|") for line in markdown} == {markdown[0].count("|")}
+
+
+def test_json_has_numbers_and_null(small):
+    """JSON has the contract's keys, numbers as numbers and null where not assessed."""
+    found = json.loads(asked(small, "--format", "json").stdout)
+    assert list(found[0]) == list(CONTRACT)
+    assert isinstance(found[0]["period_s"], float)
+    assert found[-1]["period_s"] is None
+
+
+def test_text_of_the_plant_does_not_break_the_markdown(tmp_path):
+    """Bars, line ends and tags in a loop's name stay text in the Markdown table."""
+    odd = {**rows(1)[0], "loop": "FIC|1\n<b>", "reason": "a | b"}
+    table = rows_table([odd], ALL_COLUMNS, TEXT_COLUMNS)
+    write_table(table, tmp_path / "nights" / f"{NIGHT}.parquet")
+    found = asked(tmp_path, "--format", "markdown").stdout.splitlines()
+    assert len(found) == 3
+    assert "<b>" not in found[2]
+    assert found[2].replace("\\|", "").count("|") == found[0].count("|")
+
+
+# Refused
+
+
+@pytest.mark.parametrize(
+    ("arguments", "fragments"),
+    [
+        (["--by", "oscilation"], ["column 'oscilation'", "oscillation_significance", "correct --by"]),
+        (["--night", "1999-01-01"], ["night 1999-01-01", NIGHT, "check --night"]),
+    ],
+)
+def test_what_is_not_there_is_one_line(small, arguments, fragments):
+    """An unknown column and an unknown night are one line on stderr, nothing on stdout, and exit status 2."""
+    result = asked(small, *arguments)
+    assert (result.exit_code, result.stdout) == (2, "")
+    assert len(result.stderr.splitlines()) == 1
+    assert all(fragment in result.stderr for fragment in fragments)
+
+
+def test_no_store_is_one_line(tmp_path):
+    """A path that is no store is one line that says what to run first, and exit status 2."""
+    for path in (tmp_path / "none", tmp_path):
+        result = asked(path)
+        assert result.exit_code == 2
+        assert len(result.stderr.splitlines()) == 1
+        assert "triage run EXPORT --store DIR" in result.stderr
+
+
+def test_latest_night_is_the_default(small, tmp_path):
+    """Without --night the latest complete night is shown, with it the one named."""
+    for night, loop in (("2026-03-01", "OLD"), ("2026-03-02", "NEW")):
+        table = rows_table([{"loop": loop, "status": "ok"}], ALL_COLUMNS, TEXT_COLUMNS)
+        write_table(table, tmp_path / "nights" / f"{night}.parquet")
+    assert Store(tmp_path).nights() == ["2026-03-01", "2026-03-02"]
+    assert "NEW" in asked(tmp_path).stdout
+    assert "OLD" in asked(tmp_path, "--night", "2026-03-01").stdout
