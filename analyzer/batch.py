@@ -262,6 +262,8 @@ def run(
     if not resume:
         for span in spans:
             store.drop_parts(span.name)
+    else:
+        store.drop_unfinished([span.name for span in spans])
     tasks = _tasks(export, specs, spans, store, config)
     done = len(specs) - sum(len(t.specs) for t in tasks)
     progress(done, len(specs))

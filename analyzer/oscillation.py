@@ -119,9 +119,8 @@ def _candidate(s: Spectrum, b: Bands, k: int, limits: OscillationLimits) -> Osci
         return None
     if not _agree(limits, cycles, float(b.prominence[k]), min(found.first, 1.5 * found.trough)):
         return None
-    return Oscillation(
-        found.period_s, 0, 0, 0, found, float(b.prominence[k]), share, cycles, s.duration_s / found.period_s
-    )
+    amplitude = math.sqrt(2 * float(x @ x) / x.size)
+    return Oscillation(found.period_s, amplitude, 0, 0, found, float(b.prominence[k]), share, cycles, cycles)
 
 
 def _peaks(b: Bands, least: float) -> list[int]:
@@ -160,7 +159,7 @@ def _is_harmonic(o: Oscillation, other: Oscillation) -> bool:
     """Whether one oscillation is a whole multiple (2 to 7) of a stronger one's frequency."""
     ratio = other.period_s / o.period_s
     whole = round(ratio)
-    return 2 <= whole <= 7 and abs(ratio / whole - 1) < 0.05 and o.share < other.share
+    return 2 <= whole <= 7 and abs(ratio / whole - 1) < 0.05 and o.amplitude_pct < other.amplitude_pct
 
 
 def detect(record: LoopRecord, limits: OscillationLimits) -> Oscillations:

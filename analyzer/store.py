@@ -65,9 +65,14 @@ class Store:
     def read(self, table: str, night: str, columns: Sequence[str] | None = None, **where: str) -> pa.Table:
         """One night of one table; `where` filters on equality (loop="...")."""
         path = self.path / table / f"{night}.parquet"
-        filters = [(k, "=", v) for k, v in where.items()] or None
         try:
-            return pq.read_table(path, columns=list(columns) if columns else None, filters=filters)
+            if where:
+                filters = [(k, "=", v) for k, v in where.items()]
+                return pq.read_table(path, columns=list(columns) if columns else None, filters=filters)
+            with pq.ParquetFile(
+                path
+            ) as file:  # read_table would import pandas, which takes longer than the rest
+                return file.read(columns=list(columns) if columns else None)
         except FileNotFoundError as error:
             known = ", ".join(self.nights()[-3:]) or "none"
             raise InputError(
@@ -81,6 +86,14 @@ class Store:
     def parts(self, night: str, table: str) -> list[Path]:
         """Pieces of a night that are complete."""
         return sorted((self.path / "parts" / night).glob(f"{table}-*.parquet"))
+
+    def drop_unfinished(self, nights: Sequence[str]) -> None:
+        """Forget pieces of chunks that were stopped before their last night was written, so none is kept twice."""
+        done = {p.name.removeprefix("nights-") for p in self.parts(nights[-1], "nights")}
+        for night in nights:
+            for piece in (self.path / "parts" / night).glob("*.parquet"):
+                if piece.name.partition("-")[2] not in done:
+                    piece.unlink()
 
     def begun(self) -> list[str]:
         """Nights that were begun and not finished."""

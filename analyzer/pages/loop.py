@@ -31,7 +31,7 @@ COLUMNS = (
         "form",
     ),
     *("gain_unit", "ti_unit", "gain", "time_constant_s", "slope_pct_per_s", "dead_time_s", "backlash_pct"),
-    *("stickband_pct", "slip_jump_pct", "signs", "notes", "start_s", "duration_s", *TITLES),
+    *("stickband_pct", "slip_jump_pct", "signs", "notes", "advice", "start_s", *TITLES),
     *("predicted_period_s", "predicted_pv_amplitude_pct", "expected_period_s", "expected_pv_amplitude_pct"),
 )
 FIGURES = (
@@ -51,14 +51,10 @@ MODEL = (
 )
 
 
-def _verdict(row: Row) -> Section:
-    reason = row["reason"] or "nothing was found"
+def _facts(row: Row) -> Facts:
     facts = [("Action", row["action"] or "–"), ("Cause", row["cause"] or "not assessed")]
-    facts += [
-        (f"Confidence in {c}", f"{row[f'osc_{c}_pct']:.0f} %")
-        for c in CAUSES
-        if row[f"osc_{c}_pct"] is not None
-    ]
+    shares = [(c, row[f"osc_{c}_pct"]) for c in CAUSES]
+    facts += [(f"Confidence in {c}", f"{share:.0f} %") for c, share in shares if share is not None]
     if row["valve_fault"] not in (None, "", "none"):
         facts.append(("Valve fault", row["valve_fault"]))
     if row["source_loop"]:
@@ -67,13 +63,22 @@ def _verdict(row: Row) -> Section:
         facts.append(("Period", duration(row["period_s"])))
         facts.append(("Amplitude of PV", f"{number(row['pv_amplitude_pct'])} % of span"))
     if row["kp"] is not None:
-        facts.append(("Settings now", f"Kp {setting(row['kp'])}, Ti {setting(row['ti'])} {_units(row)}"))
+        facts.append(
+            ("Settings as stated", f"Kp {setting(row['kp'])}, Ti {setting(row['ti'])} {_units(row)}")
+        )
     if row["kp_new"] is not None or row["ti_new"] is not None:
         new = f"Kp {setting(row['kp_new'])}, Ti {setting(row['ti_new'])} {_units(row)}"
         facts.append(("Settings to type in", new))
-    return Section(
-        "What and why", (Text((reason[:1].upper() + reason[1:] + ".",), "lead"), Facts(tuple(facts)))
-    )
+    return Facts(tuple(facts))
+
+
+def _verdict(row: Row) -> Section:
+    """What is wrong, what to do, and what the advice promises, where the night holds it."""
+    reason = row["reason"] or "nothing was found"
+    blocks: list[Block] = [Text((reason[:1].upper() + reason[1:] + ".",), "lead"), _facts(row)]
+    if row["advice"]:
+        blocks.append(Text((row["advice"],)))
+    return Section("What and why", tuple(blocks))
 
 
 CAUSES = ("valve", "tuning", "load")

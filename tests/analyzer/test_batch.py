@@ -154,9 +154,6 @@ def test_a_stopped_run_goes_on_where_it_stood(night, whole, tmp_path, monkeypatc
     assert Store(store).begun() == []
 
 
-@pytest.mark.xfail(
-    strict=True, reason="hours and trends of a chunk that was killed half written are kept twice"
-)
 def test_a_chunk_stopped_half_written_is_not_kept_twice(night, whole, tmp_path):
     """A run killed between the pieces of one chunk goes on with that chunk and keeps its hours once."""
     store = tmp_path / "store"

@@ -121,18 +121,7 @@ def test_help_answers_at_once():
     assert found < 0.3 * max(1.0, floor / 0.1), (found, floor)
 
 
-@pytest.mark.parametrize(
-    "heavy",
-    [
-        "numba",
-        "scipy",
-        "matplotlib",
-        pytest.param(
-            "pandas",
-            marks=pytest.mark.xfail(strict=True, reason="pq.read_table imports pyarrow.dataset and pandas"),
-        ),
-    ],
-)
+@pytest.mark.parametrize("heavy", ["numba", "scipy", "matplotlib", "pandas"])
 def test_ranking_imports_nothing_heavy(small, heavy):
     """Neither help nor ranking imports what only the analysis needs."""
     code = (
