@@ -159,7 +159,7 @@ def _is_harmonic(o: Oscillation, other: Oscillation) -> bool:
     """Whether one oscillation is a whole multiple (2 to 7) of a stronger one's frequency."""
     ratio = other.period_s / o.period_s
     whole = round(ratio)
-    return 2 <= whole <= 7 and abs(ratio / whole - 1) < 0.05 and o.amplitude_pct < other.amplitude_pct
+    return 2 <= whole <= 7 and abs(ratio / whole - 1) < 0.02 and o.amplitude_pct < 0.6 * other.amplitude_pct
 
 
 def detect(record: LoopRecord, limits: OscillationLimits) -> Oscillations:

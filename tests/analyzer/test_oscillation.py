@@ -151,9 +151,6 @@ def test_amplitude_holds_the_noise_of_its_band():
     assert np.mean(found) == pytest.approx(expected, rel=0.02)
 
 
-@pytest.mark.xfail(
-    strict=True, reason="a harmonic's share leaves the fundamental out, so it is not told as weaker"
-)
 def test_a_harmonic_is_not_another_oscillation():
     """The odd harmonics of a square wave are not reported beside it."""
     assert len(found_in(record(50 + 2 * square(2 * np.pi * T / 300) + 0.1 * noise(10))).found) == 1
