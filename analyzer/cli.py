@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from analyzer.report_cli import COMMANDS
 from identification.errors import TriageError
 
 if TYPE_CHECKING:
@@ -221,6 +222,12 @@ def tune(
         for name, picture in pictures.items():
             (out / name).write_bytes(picture)
             click.echo(f"written: {out / name}")
+
+
+for page_command in COMMANDS:
+    if page_command.callback is not None:
+        page_command.callback = told(page_command.callback)
+    main.add_command(page_command)
 
 
 if __name__ == "__main__":

@@ -50,6 +50,7 @@ TEXT_COLUMNS = frozenset(
         "pv_unit",
         "signs",
         "advice",
+        "extra",
         "periods",
         "notes",
         "form",
@@ -92,6 +93,7 @@ OTHER_COLUMNS = (
     "periods",
     "signs",
     "advice",
+    "extra",
     "notes",
 )
 ALL_COLUMNS = RANK_COLUMNS + OTHER_COLUMNS

@@ -16,8 +16,11 @@ from identification.hammerstein import IDEAL, Fit, Window, block_means, prepare,
 from identification.models import Fopdt, Loop, Pid
 from identification.record import Floats, LoopRecord, Mask
 from identification.spectrum import Spectrum, locked_harmonic, peak_prominence, spectrum, tapered_power
-from identification.valve_fit import better_linear, fit_linear, fit_play, fit_stick_slip
+from identification.valve_fit import SCREENED, better_linear, fit_linear, fit_play, fit_stick_slip
 from tuning.linear import is_stable, loop_response
+
+SHORT = 1000
+"""Blocks of a record that is so short that every rival can be tried on it; ours."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,17 +146,9 @@ def measure(
     scale = time_scale(record, oscillation, controller)
     window = window_of(record, scale, limits, kind)
     controller = controller or recovered(record, scale)
-    linear = fit_linear(window, scale)
-    play = fit_play(window, linear, scale)
-    linear = better_linear(window, linear, play)
-    best, stick, jump = play, None, 0.0
-    if _worth_a_jump(play, linear, window, oscillation):
-        stick = fit_stick_slip(window, play, scale)
-        jump = evidence(Rival(window, stick), Rival(window, play))
-        best = stick if jump > limits.evidence_jump else play
     due = answering(record, window, scale)
-    plain = with_load_step(window, linear, due, best.ar)
-    gained = evidence(Rival(window, best), plain) - (limits.evidence_jump if best is stick else 0.0)
+    fits = _rivals(window, scale, due, limits, oscillation)
+    linear, play, stick, best, gained, jump = fits
     size = best.valve.stickband / max(_op_range(window, scale, oscillation is not None), 1e-9)
     amplification, stable = _amplification(process_of(window, linear), controller, scale)
     saturated = float(record.mask("saturated").mean())
@@ -179,19 +174,33 @@ def measure(
     )
 
 
+def _rivals(
+    window: Window, scale_s: float, due: Mask, limits: CauseLimits, oscillation: Oscillation | None
+) -> tuple[Fit, Fit, Fit | None, Fit, float, float]:
+    """Plain fit, play, stick-slip if it was tried, the better valve, its evidence and that of the jump [nat]."""
+    linear = fit_linear(window, scale_s)
+    play = fit_play(window, linear, scale_s)
+    gained = play.log_likelihood - linear.log_likelihood
+    short = oscillation is None and window.y.size < SHORT
+    if gained < SCREENED and not short:
+        return linear, play, None, play, gained, 0.0
+    linear = better_linear(window, linear, play)
+    best, stick, jump = play, None, 0.0
+    if short or play.valve.stickband > 0.25 * window.op_range:
+        stick = fit_stick_slip(window, play, scale_s)
+        jump = evidence(Rival(window, stick), Rival(window, play))
+        best = stick if jump > limits.evidence_jump else play
+    plain = with_load_step(window, linear, due, best.ar)
+    gained = evidence(Rival(window, best), plain) - (limits.evidence_jump if best is stick else 0.0)
+    return linear, play, stick, best, gained, jump
+
+
 def recovered(record: LoopRecord, scale_s: float) -> Pid | None:
     """PI settings recovered from the record where they explain OP, None where they do not."""
     found = fit_pi(record, scale_s)
     if found is None or found.explained < 0.5 or not math.isfinite(found.ti_s):
         return None
     return Pid(found.kp, found.ti_s, scan_s=record.dt_s)
-
-
-def _worth_a_jump(play: Fit, linear: Fit, window: Window, oscillation: Oscillation | None) -> bool:
-    """Whether stick-slip is fitted as well: where a play helps at all, and on short records, where it is cheap."""
-    gained = play.log_likelihood - linear.log_likelihood
-    wide = play.valve.stickband > 0.25 * window.op_range
-    return (gained > 3.0 and wide) or (oscillation is None and window.y.size < 1500)
 
 
 def _amplification(process: Fopdt, controller: Pid | None, period_s: float) -> tuple[float | None, bool]:

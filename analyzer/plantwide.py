@@ -141,4 +141,14 @@ def trace(prints: Sequence[Fingerprint], peers: Mapping[str, Peer], limits: Caus
     """Followers and their sources."""
     known = [p for p in prints if p.loop in peers and peers[p.loop].cause != "none"]
     found = {own.loop: source_of(own, known, peers, limits) for own in known}
-    return {loop: source for loop, source in found.items() if source is not None}
+    sources = {loop: source for loop, source in found.items() if source is not None}
+    return {loop: _root(loop, sources) for loop in sources}
+
+
+def _root(loop: str, sources: Mapping[str, Source]) -> Source:
+    """The source at the end of the chain: a follower's follower follows the loop that leads both."""
+    at, seen = sources[loop], {loop}
+    while at.loop in sources and at.loop not in seen:
+        seen.add(at.loop)
+        at = Source(sources[at.loop].loop, min(at.coherence, sources[at.loop].coherence))
+    return at

@@ -28,6 +28,7 @@ def empty_row(spec: LoopSpec, night: str) -> dict[str, Any]:
         form=str(spec.form),
         gain_unit=spec.gain_unit,
         ti_unit=spec.ti_unit,
+        extra=json.dumps(dict(spec.extra)),
         night=night,
     )
     return row

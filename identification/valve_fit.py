@@ -37,8 +37,8 @@ JUMP_SHARES = (0.2, 0.4, 0.7, 1.0)
 """Slip jumps tried, as shares of the stickband."""
 COAST_SHARES = (0.0, 0.15)
 """Turnings of OP that a sliding stem ignores, as shares of the stickband: none, and OP's noise; ours."""
-WORK = 5000
-"""Blocks that candidates of a scan may take together; short records can afford to follow more of them."""
+WORK = 4500
+"""Blocks that the candidates followed in a scan may take together: short records can afford to follow more."""
 FOLLOWED = 2
 """Candidates of a scan that are followed to the end; ours: the best of the scan is among its first two."""
 
@@ -95,7 +95,6 @@ def _ranked(window: Window, ar: Floats, valves: list[ValveTrial], begins: list[D
 def _scan(window: Window, near: Fit, valves: list[ValveTrial], period_s: float, followed: int) -> Fit:
     """Valves tried under two noise models; the best few of each followed to the end, the best returned."""
     begins = [(near.time_constant_s, near.dead_time_s), *starts(window, period_s)]
-    followed = max(followed, WORK // window.y.size)
     chosen = [
         fit for ar in (generic_noise(), near.ar) for fit in _ranked(window, ar, valves, begins)[:followed]
     ]
@@ -114,11 +113,14 @@ def fit_play(window: Window, linear: Fit, period_s: float) -> Fit:
         Scale of the search [s].
     """
     reach = max(window.op_range, 1e-9)
-    best = _scan(window, linear, [sticking(share * reach, 0.0) for share in SCREEN_SHARES], period_s, 1)
+    more = max(WORK // window.y.size, 1)
+    best = _scan(window, linear, [sticking(share * reach, 0.0) for share in SCREEN_SHARES], period_s, more)
     if best.log_likelihood - linear.log_likelihood < SCREENED:
         return best
     shares = (*STICKBAND_SHARES, best.valve.stickband / reach)
-    found = _scan(window, best, [sticking(share * reach, 0.0) for share in shares], period_s, FOLLOWED)
+    found = _scan(
+        window, best, [sticking(share * reach, 0.0) for share in shares], period_s, max(FOLLOWED, more)
+    )
     return max(best, found, key=lambda fit: fit.log_likelihood)
 
 
@@ -150,5 +152,5 @@ def fit_stick_slip(window: Window, play: Fit, period_s: float) -> Fit:
         for jump, grown in ((0.15, 1.0), (0.4, 1.1), (0.8, 1.1))
         for coast in (0.0, 0.15 * play.valve.stickband)
     ]
-    whole = _scan(window, play, valves, period_s, FOLLOWED)
+    whole = _scan(window, play, valves, period_s, max(FOLLOWED, WORK // window.y.size))
     return max([*near_play, whole], key=lambda fit: fit.log_likelihood)
