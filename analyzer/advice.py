@@ -14,8 +14,16 @@ from analyzer.tags import as_stated
 from identification.descent import covariance
 from identification.hammerstein import Fit, Window, process_of
 from identification.models import Backlash, Fopdt, Loop, Pid, Stiction, Valve
+from tuning.linear import is_stable
 from tuning.recommend import Proposal, recommend
 from tuning.search import rounded, scaled_valve
+
+
+UNSTABLE = (
+    "The identified loop would be unstable at the present settings, which the bounded cycle contradicts: the process "
+    "is not known well enough for new settings."
+)
+CALM = "The loop does not oscillate, so new settings would bring nothing; the valve's fault remains."
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,6 +131,10 @@ def propose(verdict: Verdict, controller: Pid, period_s: float | None) -> Propos
     if verdict.cause == "tuning":
         slow = replace(loop, process=cautious(process_of(_measured(verdict).window, fit), period_s))
         return recommend(slow, verdict.cause, (loop, *others[:2]))
+    if not is_stable(loop):
+        return Proposal("undecided", UNSTABLE)
+    if period_s is None:
+        return Proposal("repair valve", CALM)
     return recommend(loop, verdict.cause, others)
 
 
