@@ -18,7 +18,6 @@ from tuning.linear import is_stable
 from tuning.recommend import Proposal, recommend
 from tuning.search import rounded, scaled_valve
 
-
 UNSTABLE = (
     "The identified loop would be unstable at the present settings, which the bounded cycle contradicts: the process "
     "is not known well enough for new settings."

@@ -87,6 +87,9 @@ def valve_signs(m: Measured, limits: CauseLimits, oscillating: bool) -> list[Sig
     if m.evidence >= needed and not wrong_way:
         text = f"play or stick-slip explains PV better than an ideal valve, log likelihood +{m.evidence:.0f}"
         signs.append(Sign("valve", 0.5 + 0.5 * _ramp(m.evidence, needed, 4 * needed), text))
+    if m.evidence >= needed and m.cycles_alike:
+        text = f"the identified loop with a play of {100 * m.size:.0f} % of OP's range cycles by itself as recorded"
+        signs.append(Sign("valve", 0.8, text))
     if m.evidence >= needed and m.size >= limits.size and not wrong_way:
         text = f"its width is {100 * m.size:.0f} % of OP's range"
         signs.append(Sign("valve", 0.6 + 0.4 * _ramp(m.size, limits.size, 0.7), text))
@@ -193,7 +196,8 @@ def judge(m: Measured, oscillation: Oscillation | None, limits: CauseLimits) -> 
     """
     signs = valve_signs(m, limits, oscillation is not None)
     valve = combined(signs, "valve")
-    is_valve = sum(s.points_to == "valve" for s in signs) >= limits.signs and m.size >= limits.size
+    is_valve = sum(s.points_to == "valve" for s in signs) >= limits.signs
+    is_valve = is_valve and (m.size >= limits.size or m.cycles_alike)
     is_valve = (
         is_valve and valve >= limits.named_pct and m.evidence >= _needed(m, limits, oscillation is not None)
     )

@@ -100,6 +100,9 @@ class CauseLimits:
     """What the share is multiplied with in loops that do not oscillate [-]."""
     evidence_jump: float = 5.0
     """Further gain that a slip jump needs, for its two more constants and wider search [nat]."""
+    open_size: float = 0.25
+    """Stickband over the range of OP from which it can drive a cycle where simulation of the identified loop shows
+    that it does [-]; ours."""
     moves: int = 3
     """How often the stem must set out [-]: one or two moves can be steps of the load as well, unless
     the set point called for them; ours."""

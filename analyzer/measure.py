@@ -13,12 +13,16 @@ from analyzer.oscillation import Oscillation
 from identification.controller import fit_pi
 from identification.evidence import Rival, evidence, stem_moves, with_load_step
 from identification.hammerstein import IDEAL, Fit, Window, block_means, prepare, process_of, residual
-from identification.models import Fopdt, Loop, Pid
+from identification.models import Backlash, Fopdt, Loop, Pid, Stiction
 from identification.record import Floats, LoopRecord, Mask
 from identification.spectrum import Spectrum, locked_harmonic, peak_prominence, spectrum, tapered_power
 from identification.valve_fit import SCREENED, better_linear, fit_linear, fit_play, fit_stick_slip
+from tuning.limit_cycle import confirm
 from tuning.linear import is_stable, loop_response
 
+ALIKE_PERIOD = 1.3
+"""Largest ratio of a simulated to the recorded period that counts as the same [-]; ours: models whose play is 10 %
+off differ by less."""
 SHORT = 1000
 """Blocks of a record that is so short that every rival can be tried on it; ours."""
 
@@ -32,7 +36,9 @@ class Measured:
     load that the plain model and the valve model leave [-]; amplification |S| there [-], None without settings;
     stable, the identified loop; consistency [-], gain outside the period's band over gain with it; harmonic [-],
     locked third over the fundamental; saturated, share of time at limits [-]; moves, how often the stem of the
-    better valve sets out; excited, whether set point moves drove the loop.
+    better valve sets out; excited, whether set point moves drove the loop;
+    cycles_alike, whether the identified loop with its valve, simulated, cycles by itself as recorded (looked at
+    only where the size leaves it open).
     """
 
     linear: Fit
@@ -52,6 +58,7 @@ class Measured:
     window: Window
     moves: int
     excited: bool
+    cycles_alike: bool
 
 
 def time_scale(record: LoopRecord, oscillation: Oscillation | None, controller: Pid | None) -> float:
@@ -171,6 +178,10 @@ def measure(
         window,
         stem_moves(window, best.valve),
         bool(due.any()),
+        limits.open_size <= size < limits.size
+        and gained >= limits.evidence
+        and oscillation is not None
+        and _cycles_alike(window, best, controller, oscillation),
     )
 
 
@@ -193,6 +204,26 @@ def _rivals(
     plain = with_load_step(window, linear, due, best.ar)
     gained = evidence(Rival(window, best), plain) - (limits.evidence_jump if best is stick else 0.0)
     return linear, play, stick, best, gained, jump
+
+
+def _cycles_alike(window: Window, fit: Fit, controller: Pid | None, o: Oscillation) -> bool:
+    """Whether the identified loop, simulated without load, cycles with the recorded period and amplitude."""
+    if controller is None or fit.gain * controller.kp <= 0 or fit.valve.stickband <= 0:
+        return False
+    valve = Stiction(fit.valve.stickband, fit.valve.slip_jump, slides=fit.valve.tolerance >= 0)
+    if fit.valve.slip_jump <= 0:
+        loop = Loop(process_of(window, fit), controller, Backlash(fit.valve.stickband))
+    else:
+        loop = Loop(process_of(window, fit), controller, valve)
+    if not is_stable(loop):
+        return False
+    cycle = confirm(loop).cycle
+    if cycle is None or o.amplitude_pct <= 0 or cycle.pv_amplitude <= 0:
+        return False
+    periods = abs(math.log(cycle.period_s / o.period_s))
+    return periods < math.log(ALIKE_PERIOD) and abs(
+        math.log(cycle.pv_amplitude / o.amplitude_pct)
+    ) < math.log(2)
 
 
 def recovered(record: LoopRecord, scale_s: float) -> Pid | None:
