@@ -4,17 +4,25 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from identification.record import Floats, Mask
 
+Edges = NDArray[np.int64]
 EDGES = np.array([0, 1, 2, 3, 4, 5, 6, 8, 10, 13, 17, 22, 29, 38, 50, 66, 88, 117], dtype=np.int64)
 """Lags between consecutive edges act together, by their mean; ours: single lags where noise is, a third of an
 octave where load is, reaching as far as a loop of 100 samples' time constant needs."""
-REACH = int(EDGES[-1])
+SHORTEST = 12
+"""Records hold at least this many times the longest lag; ours."""
+
+
+def edges_for(samples: int) -> Edges:
+    """Edges of the lag groups for a record of so many samples."""
+    return EDGES[: max(int(np.searchsorted(EDGES, samples / SHORTEST, side="right")), 4)]
 
 
 @njit(cache=True)
-def lag_means(r: Floats, edges: Floats) -> Floats:
+def lag_means(r: Floats, edges: Edges) -> Floats:
     """Means of the residual over each group of lags, shape (groups, n); zero where they reach before the start."""
     n, groups = r.size, edges.size - 1
     total = np.zeros(n + 1)
@@ -30,7 +38,7 @@ def lag_means(r: Floats, edges: Floats) -> Floats:
 
 
 @njit(cache=True)
-def whitened(x: Floats, ar: Floats, edges: Floats) -> Floats:
+def whitened(x: Floats, ar: Floats, edges: Edges) -> Floats:
     """Innovations of x under a noise model, shape (n,)."""
     n, groups = x.size, edges.size - 1
     total = np.zeros(n + 1)
@@ -45,11 +53,11 @@ def whitened(x: Floats, ar: Floats, edges: Floats) -> Floats:
     return out
 
 
-def judged(usable: Mask) -> Mask:
-    """True where a sample and all that its prediction uses may be used, shape (n,)."""
+def judged(usable: Mask, reach: int) -> Mask:
+    """True where a sample and the `reach` samples before it may be used, shape (n,)."""
     seen = np.concatenate(([0], np.cumsum(~usable)))
     out = np.zeros(usable.size, dtype=bool)
-    out[REACH:] = seen[REACH + 1 :] == seen[: usable.size - REACH]
+    out[reach:] = seen[reach + 1 :] == seen[: usable.size - reach]
     return out
 
 

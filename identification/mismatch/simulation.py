@@ -31,13 +31,14 @@ class Scene:
     """What is recorded and not fitted.
 
     op : shape (n,) [% OP]; dt_s [s]; middle : OP that counts as zero [% OP]; level : PV that counts as zero
-    [% PV]; step_at : samples at which the load may step; neighbour : another loop's OP less its mean, shape (n,).
+    [% PV]; pv_range : lowest and highest PV; step_at : samples at which the load may step; neighbour : another loop's OP less its mean, shape (n,).
     """
 
     op: Floats
     dt_s: float
     middle: float
     level: float
+    pv_range: tuple[float, float]
     step_at: tuple[int, ...] = ()
     neighbour: Floats | None = field(default=None, repr=False)
 

@@ -12,7 +12,9 @@ from identification.record import Floats
 
 T, L, K, BIAS, START = (int(s) for s in (Slot.T, Slot.L, Slot.K, Slot.BIAS, Slot.START))
 T2, T3, SHARE, MODE_T, ASYM = (int(s) for s in (Slot.T2, Slot.T3, Slot.SHARE, Slot.MODE_T, Slot.ASYMMETRY))
-SLOPE, ROOT, CAP, SPILL, SPILL_T = (int(s) for s in (Slot.SLOPE, Slot.ROOT, Slot.CAP, Slot.SPILL, Slot.SPILL_T))
+SLOPE, ROOT, CAP, SPILL, SPILL_T = (
+    int(s) for s in (Slot.SLOPE, Slot.ROOT, Slot.CAP, Slot.SPILL, Slot.SPILL_T)
+)
 LEAK, PIPE = int(Slot.LEAK), int(Slot.PIPE)
 WEIR = 25.0
 """Outflow over the cap per % of level, in terms of the vessel's own; ours: stiff against every vessel."""
@@ -82,7 +84,9 @@ def eased(at: float, aim: float, lag_s: float, h: float) -> tuple[float, float]:
 
 
 @njit(cache=True)
-def vessel(flow: Floats, act: Floats, gain: Floats, c: Floats, dt_s: float, base: float, head: float) -> Floats:
+def vessel(
+    flow: Floats, act: Floats, gain: Floats, c: Floats, dt_s: float, base: float, head: float
+) -> Floats:
     """PV's deviation [% PV], shape (n,), of a vessel with any of the catalogue's physics.
 
     flow, act, gain : shape (n,), flow during each sample, load at the inlet [% OP] and relative gain; base : the

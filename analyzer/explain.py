@@ -1,0 +1,225 @@
+"""From an export's loop to its explanation and back: records in, the answer as plain data and as words out."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from analyzer.config import Config
+from analyzer.history.loops_csv import LoopSpec
+from analyzer.history.series import Series
+from analyzer.quality import Prepared, has_op, onto_clock, prepare
+from analyzer.tags import controller
+from identification.errors import InputError, NotAssessedError
+from identification.mismatch import explain as mismatch
+from identification.mismatch.answer import Answer, answer
+from identification.mismatch.control import Stated
+from identification.mismatch.saved import carried, carried_closed, constants, to_data
+from identification.mismatch.words import sentence, unexplained_reason
+from identification.record import Floats
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """One loop of an export, ready to be explained: its record, and the subject made of it."""
+
+    spec: LoopSpec
+    prepared: Prepared
+    subject: mismatch.Subject
+
+
+def loop_of(specs: tuple[LoopSpec, ...], tag: str) -> LoopSpec:
+    """The row of one loop.
+
+    Raises
+    ------
+    InputError
+        There is none of that name.
+    """
+    for spec in specs:
+        if spec.loop == tag:
+            return spec
+    known = ", ".join(s.loop for s in specs[:6])
+    raise InputError(f"no loop {tag}", f"one of {known}", "check --loop and --loops")
+
+
+def stated_law(spec: LoopSpec, prepared: Prepared) -> Stated | None:
+    """The controller as stated, integral time in samples; None where it is not known or is no PI."""
+    pid = controller(spec, prepared.scale.span)
+    if pid is None or pid.td_s > 0 or not math.isfinite(pid.ti_s):
+        return None
+    return Stated(pid.kp, pid.ti_s / prepared.record.dt_s)
+
+
+def neighbours(
+    spec: LoopSpec, specs: tuple[LoopSpec, ...], series: Mapping[str, Series], p: Prepared
+) -> tuple[Floats, ...]:
+    """OPs of the export's other loops on this loop's clock."""
+    r = p.record
+    clock = r.start_s + r.time_s
+    out = []
+    for other in specs:
+        if other.loop != spec.loop and other.op and other.op in series:
+            op, gap = onto_clock(series[other.op], clock, r.dt_s, Config().quality)
+            if not gap.all() and float(np.ptp(op)) > 0:
+                out.append(op)
+    return tuple(out)
+
+
+def case(spec: LoopSpec, specs: tuple[LoopSpec, ...], series: dict[str, Series], config: Config) -> Case:
+    """Prepare one loop.
+
+    Raises
+    ------
+    NotAssessedError
+        Where PV or OP is missing or never moves.
+    """
+    prepared = prepare(spec, series, config.quality)
+    r = prepared.record
+    if not has_op(prepared):
+        raise NotAssessedError(f"{spec.loop}: needs OP, has none")
+    if float(np.ptp(r.op)) == 0 or float(np.ptp(r.pv)) == 0:
+        raise NotAssessedError(f"{spec.loop}: needs OP and PV that move, one of them stands still")
+    raw = series[spec.pv or ""]
+    subject = mismatch.Subject(
+        None if r.sp_estimated else r.sp,
+        r.pv,
+        r.op,
+        ~(r.bad | r.mask("gap")),
+        r.dt_s,
+        raw.stamp_s[~raw.bad],
+        stated_law(spec, prepared),
+        not prepared.scale.recorded,
+        neighbours(spec, specs, series, prepared),
+    )
+    return Case(spec, prepared, subject)
+
+
+def explained(
+    c: Case, tell: Callable[[str], None], brought: Mapping[str, Any] | None = None
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    """The answer (the contract of `triage explain`) and the model to save; `brought` is the user's own model."""
+    start = None if brought is None else constants(brought)
+    found = mismatch.explain(c.subject, tell, start)
+    said = answer(found, c.subject)
+    data = as_data(c, said)
+    return data, saved_model(c, found, said)
+
+
+def as_data(c: Case, said: Answer) -> dict[str, Any]:
+    """The answer as data that JSON can hold."""
+    effects = [
+        {
+            "name": e.name,
+            "block": e.block,
+            "parameters": {
+                k: {"value": v.value, "low": v.low, "high": v.high, "unit": v.unit}
+                for k, v in e.parameters.items()
+            },
+            "held_out_share": e.held_out_share,
+            "alternatives": list(e.alternatives),
+        }
+        for e in said.effects
+    ]
+    reason = sentence(said) if said.verdict != "unexplained" else unexplained_reason(said)
+    data = {
+        "loop": c.spec.loop,
+        "verdict": said.verdict,
+        "block": said.block,
+        "effects": effects,
+        "where": said.where,
+        "fit": said.fit,
+        "moved": said.moved,
+        "remaining": said.remaining,
+        "reason": reason,
+    }
+    return json_ready(data)
+
+
+def json_ready(x: Any) -> Any:
+    """The same with numbers that JSON knows: no NaN, no infinity, no numpy types."""
+    if isinstance(x, dict):
+        return {str(k): json_ready(v) for k, v in x.items()}
+    if isinstance(x, list | tuple):
+        return [json_ready(v) for v in x]
+    if isinstance(x, np.generic):
+        x = x.item()
+    if isinstance(x, float):
+        return float(f"{x:.6g}") if math.isfinite(x) else None
+    return x
+
+
+def abstained(loop: str, reason: str) -> dict[str, Any]:
+    """The answer where the question cannot be answered from the record."""
+    return {
+        "loop": loop,
+        "verdict": "unexplained",
+        "block": "none",
+        "effects": [],
+        "where": {},
+        "fit": {},
+        "moved": {},
+        "remaining": None,
+        "reason": reason,
+    }
+
+
+def saved_model(c: Case, found: mismatch.Explanation, said: Answer) -> dict[str, Any]:
+    """The model found, the plain loop where nothing was, as data to be written."""
+    s = c.prepared.scale
+    scale = {"pv_low": s.low, "pv_span": s.span, "op_low": s.op_low, "op_span": s.op_span}
+    model = found.best.model
+    data = to_data(
+        c.spec.loop, found.p.scene, model.c, tuple(e.name for e in said.effects), found.late_s, scale
+    )
+    if found.trace is not None and found.trace.name == "sensor-clipping":
+        side = "CLIP_HI" if found.trace.value > float(np.median(c.subject.pv)) else "CLIP_LO"
+        data["constants"][side] = found.trace.value
+    return data
+
+
+def write_model(data: Mapping[str, Any], path: Path) -> None:
+    """Write a model."""
+    path.write_text(json.dumps(data, indent=1))
+
+
+def read_model(path: Path, loop: str) -> dict[str, Any]:
+    """Read a model of that loop.
+
+    Raises
+    ------
+    InputError
+        It is no model, or another loop's.
+    """
+    try:
+        data = json.loads(path.read_text())
+    except ValueError as error:
+        raise InputError(f"{path}: {error}", "a model saved by `triage explain`", "save it anew") from None
+    if not isinstance(data, dict) or "constants" not in data:
+        raise InputError(f"{path}: no model", "a model saved by `triage explain`", "save it anew")
+    if data.get("loop") != loop:
+        raise InputError(f"{path}: a model of {data.get('loop')}", f"one of {loop}", "check MODEL and --loop")
+    return data
+
+
+def simulated(c: Case, data: dict[str, Any], stamps: Floats, closed: bool) -> tuple[Floats, Floats]:
+    """PV and OP in their own units at each stamp, from a saved model run open loop or, if wished, closed."""
+    r, scale = c.prepared.record, c.prepared.scale
+    law = c.subject.stated
+    if closed and law is None:
+        raise InputError(
+            f"{c.spec.loop}: no settings of its controller", "kp and ti", "state them in loops.csv"
+        )
+    if closed and law is not None:
+        pv, op = carried_closed(data, r.sp, r.op, r.pv, r.dt_s, law)
+    else:
+        pv, op = carried(data, r.op, r.pv, r.dt_s), r.op
+    at = r.start_s + r.time_s
+    pv_at = np.interp(stamps, at, scale.low + pv * scale.span / 100.0)
+    return pv_at, np.interp(stamps, at, scale.op_low + op * scale.op_span / 100.0)

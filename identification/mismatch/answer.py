@@ -1,0 +1,197 @@
+"""The answer in numbers: effects with parameters and intervals, where, fit before and after, what moved."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from identification.mismatch.explain import Explanation, Subject, alternatives, restored
+from identification.mismatch.fitting import Fitted, deviations
+from identification.mismatch.locate import where_of
+from identification.mismatch.physics import Row
+from identification.mismatch.proof import HeldOut, Misfit, held_out, misfit
+from identification.mismatch.simulation import simulate
+from identification.mismatch.thresholds import Z90
+from identification.models import Estimate
+
+BLOCKS = {
+    "compression": "recorder",
+    "sampling": "recorder",
+    "clock-offset": "recorder",
+    "quantization": "sensor",
+    "sensor-clipping": "sensor",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Effect:
+    """One effect: name, block, parameters, the part of the held-out misfit it removes, and its alternatives."""
+
+    name: str
+    block: str
+    parameters: dict[str, Estimate]
+    held_out_share: float | None
+    alternatives: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """What `triage explain` says of one loop, in numbers."""
+
+    verdict: str
+    block: str
+    effects: tuple[Effect, ...]
+    where: dict[str, Any]
+    fit: dict[str, Any]
+    moved: dict[str, tuple[float, float]]
+    remaining: float | None
+    note: str = field(default="")
+
+
+def exact(value: float, unit: str, half: float = 0.0) -> Estimate:
+    """An estimate with a symmetric interval."""
+    return Estimate(value, value - half, value + half, unit)
+
+
+def trace_effect(found: Explanation, s: Subject) -> Effect | None:
+    """The finding about the recorder as an effect."""
+    t = found.trace
+    if t is None:
+        return None
+    step = float(np.median(np.diff(np.unique(s.pv)))) if t.name == "sensor-clipping" else 0.0
+    shown = {
+        "compression": {"straight_share": exact(t.value, "")},
+        "sampling": {"jitter_samples": exact(t.value, "samples", 0.1 * t.value)},
+        "quantization": {"step_pct": exact(t.value, "% PV", 0.01 * t.value)},
+        "sensor-clipping": {"clip_pct": exact(t.value, "% PV", step)},
+    }[t.name]
+    return Effect(t.name, BLOCKS[t.name], shown, None)
+
+
+def ruling_effect(found: Explanation, s: Subject) -> Effect | None:
+    """The finding about clock or controller as an effect."""
+    r = found.ruling
+    if r is None:
+        return None
+    v, dt = r.values, s.dt_s
+    if r.name == "clock-offset":
+        return Effect(r.name, "recorder", {"shift_s": exact(v["late_samples"] * dt, "s", 0.25 * dt)}, None)
+    if r.name == "controller-settings":
+        kp, ti = v["kp"], v["ti_samples"] * dt
+        shown = {"kp": exact(kp, "% OP/% PV", 0.02 * abs(kp)), "ti_s": exact(ti, "s", 0.02 * ti)}
+    elif r.name == "controller-gap":
+        shown = {"gap_pct": exact(v["gap_pct"], "% PV", 0.2 * v["gap_pct"])}
+    else:
+        shown = {"share_pct": exact(100 * v["share"], "%", 10 * v["share"])}
+    return Effect(r.name, "controller", shown, None)
+
+
+def parameters(found: Explanation, fit: Fitted, row: Row) -> dict[str, Estimate]:
+    """A row's constants with 90 % intervals from the curvature."""
+    wide = dict(zip((p.slot for p in fit.model.params), deviations(found.p, fit), strict=True))
+    out = {}
+    for p in row.params:
+        value, half = float(fit.model.c[p.slot]), Z90 * float(wide[p.slot])
+        if p.log:
+            spread = math.exp(min(half, 5.0))
+            out[p.name] = Estimate(value, value / spread, value * spread, p.unit)
+        else:
+            out[p.name] = exact(value, p.unit, half)
+    return out | _derived(row, out)
+
+
+def _derived(row: Row, own: dict[str, Estimate]) -> dict[str, Estimate]:
+    """Numbers that readers look for and that follow from a row's constants."""
+    if row.name == "load-oscillation":
+        w = own["angular_frequency"]
+        low, high = (2 * math.pi / max(x, 1e-9) for x in (w.high, w.low))
+        size = math.hypot(own["sine_pct"].value, own["cosine_pct"].value)
+        half = max(e.high - e.value for e in (own["sine_pct"], own["cosine_pct"]))
+        period = Estimate(2 * math.pi / max(w.value, 1e-9), low, high, "s")
+        return {"period_s": period, "amplitude_pct": exact(size, "% OP", half)}
+    if row.name == "direction-asymmetry":
+        r = own["log_ratio_down_up"]
+        return {"ratio_down_up": Estimate(math.exp(r.value), math.exp(r.low), math.exp(r.high), "")}
+    return {}
+
+
+def effects_of(found: Explanation, s: Subject, proof: HeldOut | None) -> tuple[Effect, ...]:
+    """Every effect found, the likeliest first."""
+    gates = [e for e in (trace_effect(found, s), ruling_effect(found, s)) if e is not None]
+    rows = found.best.model.rows
+    physics = [
+        Effect(
+            row.name,
+            row.block,
+            parameters(found, found.best, row),
+            proof.share if proof is not None and i == 0 else None,
+            alternatives(found) if i == 0 else (),
+        )
+        for i, row in enumerate(rows)
+    ]
+    return (*gates, *physics)
+
+
+def fit_of(found: Explanation, proof: HeldOut | None) -> dict[str, Any]:
+    """Misfit before and after, on what was fitted and on what was held out."""
+    if proof is None:
+        shown = misfit(found.p.y, simulate(found.p.scene, found.plain.model.c))
+        part = {"fitted": _said(shown), "held_out": _said(shown)}
+        return {"baseline": part, "explained": part}
+    return {
+        name: {"fitted": _said(proof.fitted[i]), "held_out": _said(proof.held[i])}
+        for i, name in enumerate(("baseline", "explained"))
+    }
+
+
+def _said(m: Misfit) -> dict[str, float]:
+    return {"rmse": m.rmse, "fit_pct": m.fit_pct}
+
+
+def moved(found: Explanation) -> dict[str, tuple[float, float]]:
+    """The plain loop's constants before and after, where effects were added."""
+    if not found.accepted:
+        return {}
+    before, after = restored(found.plain.model), restored(found.best.model)
+    return {k: (before[k], after[k]) for k in before}
+
+
+def remaining(found: Explanation) -> float:
+    """Share of PV's mean square about its mean that the last model leaves."""
+    left = misfit(found.p.y, simulate(found.p.scene, found.best.model.c))
+    return (left.rmse / max(float(np.std(found.p.y)), 1e-12)) ** 2
+
+
+def answer(found: Explanation, s: Subject) -> Answer:
+    """The answer of an explanation.
+
+    Parameters
+    ----------
+    found : Explanation
+    s : Subject
+        What was explained.
+    """
+    proof = held_out(found.p, found.plain, found.best) if found.accepted else None
+    effects = effects_of(found, s, proof)
+    verdict, block = (effects[0].name, effects[0].block) if effects else ("none", "none")
+    if found.left > 0 and not effects:
+        verdict, block = "unexplained", "process"
+    return Answer(
+        verdict,
+        block,
+        effects,
+        where_of(found, s, block),
+        fit_of(found, proof),
+        moved(found),
+        remaining(found),
+        _note(found),
+    )
+
+
+def _note(found: Explanation) -> str:
+    if found.left <= 0:
+        return ""
+    return f"A flexible model explains more (gain {found.left:.0f}) than any effect of the catalogue."

@@ -1,0 +1,177 @@
+"""From one recording to its explanation: recorder, controller, then effect by effect until nothing passes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from identification.mismatch import recorder
+from identification.mismatch.control import Law, Ruling, Stated, judge, shifted
+from identification.mismatch.fitting import Fitted, Model, Problem, descend
+from identification.mismatch.physics import CATALOGUE
+from identification.mismatch.proof import passes
+from identification.mismatch.rivals import Progress, Rival, compete, excited, prepared, silent
+from identification.mismatch.simulation import Scene
+from identification.mismatch.slots import Slot
+from identification.mismatch.thresholds import FULL_STEPS, PROVEN, ROUNDS, TIE
+from identification.record import Floats, Mask
+
+
+@dataclass(frozen=True, slots=True)
+class Subject:
+    """One recording to be explained.
+
+    sp : shape (n,) [% PV], None where not recorded; pv, op : shape (n,) [% of span]; usable : bool, shape (n,);
+    dt_s [s]; stamp_s : stamps as logged [s]; stated : the controller as the plant states it; ranged : whether PV's
+    range is stated; neighbours : OPs of other loops on the same clock, each shape (n,).
+    """
+
+    sp: Floats | None
+    pv: Floats
+    op: Floats
+    usable: Mask
+    dt_s: float
+    stamp_s: Floats
+    stated: Stated | None = None
+    ranged: bool = True
+    neighbours: tuple[Floats, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Explanation:
+    """What was found.
+
+    trace, ruling : findings about recorder and controller; plain, best : fits without and with the effects; p, p0 :
+    the problems that they solve; accepted : the rivals taken, in order; last : the rivals of the last round;
+    before : the fit to which each accepted rival was added; late_s : PV's lateness that was taken out [s].
+    """
+
+    p: Problem = field(repr=False)
+    plain: Fitted
+    best: Fitted
+    accepted: tuple[Rival, ...] = ()
+    before: tuple[Fitted, ...] = ()
+    first: tuple[Rival, ...] = ()
+    trace: recorder.Trace | None = None
+    ruling: Ruling | None = None
+    law: Law | None = None
+    late_s: float = 0.0
+    left: float = 0.0
+
+
+def trace_of(s: Subject) -> recorder.Trace | None:
+    """The first thing that the recorder did to the trends."""
+    found = recorder.compression(s.pv) or recorder.sampling(s.stamp_s, s.dt_s)
+    return found or recorder.quantization(s.pv, s.ranged) or recorder.clipped(s.pv)
+
+
+def ruling_of(s: Subject, trace: recorder.Trace | None) -> tuple[Ruling | None, Law | None]:
+    """What clock and controller did, where there is a controller to judge and a recording fit for it."""
+    if s.sp is None or s.stated is None or (trace is not None and trace.name in GATES):
+        return None, None
+    return judge(s.sp, s.pv, s.op, s.usable & (s.op > 0.05) & (s.op < 99.95), s.stated)
+
+
+GATES = ("compression", "sampling")
+"""Findings about the recorder after which neither controller nor physics are judged."""
+ALONE = (*GATES, "quantization", "controller-gap", "controller-logic", "clock-offset", "controller-settings")
+"""Findings that are the answer; the physics is then fitted plain."""
+
+
+def scene_of(s: Subject) -> Scene:
+    """What drives the model of a recording."""
+    level = float(np.mean(s.pv))
+    neighbour = s.neighbours[0] - s.neighbours[0].mean() if s.neighbours else None
+    return Scene(
+        s.op, s.dt_s, float(s.op.mean()), level, (float(s.pv.min()), float(s.pv.max())), (), neighbour
+    )
+
+
+def without_spikes(pv: Floats, usable: Mask) -> Mask:
+    """Usable samples less single values that stand far off both neighbours."""
+    rise = np.diff(pv)
+    alone = np.zeros(pv.size, dtype=bool)
+    size = np.median(np.abs(rise)) + 1e-9
+    away = np.minimum(np.abs(rise[:-1]), np.abs(rise[1:]))
+    alone[1:-1] = (away > 20 * size) & (np.sign(rise[:-1]) != np.sign(rise[1:]))
+    return usable & ~alone
+
+
+def explain(s: Subject, tell: Progress = silent, brought: Floats | None = None) -> Explanation:
+    """Explain where a plain loop and a recording differ.
+
+    Parameters
+    ----------
+    s : Subject
+    tell : callable
+        Is told what is tried, for progress.
+    brought : ndarray of shape (SIZE,) or None
+        Constants of the user's own model, with which the plain loop's search begins beside its own starts.
+
+    Returns
+    -------
+    Explanation
+    """
+    trace = trace_of(s)
+    ruling, law = ruling_of(s, trace)
+    usable = without_spikes(s.pv, s.usable)
+    late_s = 0.0
+    pv = s.pv
+    if trace is not None and trace.name == "sensor-clipping":
+        usable = usable & ~trace.where
+    if ruling is not None and ruling.name == "clock-offset":
+        late_s = ruling.values["late_samples"] * s.dt_s
+        pv = shifted(pv, ruling.values["late_samples"])
+    scene = scene_of(replace(s, pv=pv))
+    tell("plain loop")
+    p, plain = prepared(scene, pv - scene.level, usable, brought)
+    found = Explanation(p, plain, plain, trace=trace, ruling=ruling, law=law, late_s=late_s)
+    if any(x is not None and x.name in ALONE for x in (trace, ruling)):
+        return found
+    return physics(found, tell)
+
+
+def physics(found: Explanation, tell: Progress) -> Explanation:
+    """Add effects of the catalogue one by one, as long as one passes."""
+    p, best = found.p, found.plain
+    accepted: list[Rival] = []
+    before: list[Fitted] = []
+    first: tuple[Rival, ...] = ()
+    for _ in range(ROUNDS):
+        x = excited(p, best)
+        rivals = compete(x, best, CATALOGUE, tell)
+        first = first or tuple(rivals)
+        winner = proven(x.p, best, rivals)
+        if winner is None:
+            break
+        accepted.append(winner)
+        before.append(best)
+        p, best = x.p, descend(x.p, winner.fit.model, FULL_STEPS)
+    return replace(found, p=p, best=best, accepted=tuple(accepted), before=tuple(before), first=first)
+
+
+def proven(p: Problem, near: Fitted, rivals: list[Rival]) -> Rival | None:
+    """The best rival with a gain left after its price that passes the proof."""
+    for rival in rivals[:PROVEN]:
+        if rival.net <= 0:
+            return None
+        if passes(p, near, rival.fit, rival.name):
+            return rival
+    return None
+
+
+def alternatives(found: Explanation) -> tuple[str, ...]:
+    """Names that the data cannot tell from the first effect: as good, or of the same mark by their nature."""
+    if not found.accepted:
+        return ()
+    winner = found.accepted[0]
+    close = [r.name for r in found.first if r.net > max(winner.net - TIE, 0.0)]
+    names = dict.fromkeys((*close, *winner.row.likeness))
+    return tuple(n for n in names if n != winner.name)
+
+
+def restored(model: Model) -> dict[str, float]:
+    """The plain loop's constants of a model: gain, time constant [s], dead time [s]."""
+    c = model.c
+    return {"gain": float(c[Slot.K]), "time_constant_s": float(c[Slot.T]), "dead_time_s": float(c[Slot.L])}

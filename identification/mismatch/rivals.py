@@ -1,0 +1,223 @@
+"""The rivals of a record: every row of the catalogue started, screened, followed, and ranked by what it gains."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from identification.mismatch.fitting import Fitted, Model, Problem, descend, gain, problem, scales
+from identification.mismatch.noise import lag_means, whitened
+from identification.mismatch.physics import CATALOGUE, Row
+from identification.mismatch.simulation import Scene, simulate
+from identification.mismatch.slots import STEPS, Slot, neutral
+from identification.mismatch.thresholds import (
+    FOLLOWED,
+    FULL_STEPS,
+    OUTLIER,
+    PARAMETER_PRICE,
+    SCREEN_STEPS,
+    SEARCH_PRICE,
+)
+from identification.process import plain_processes
+from identification.record import Floats, Mask
+
+Progress = Callable[[str], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Rival:
+    """A fitted rival: what it gains over the fit before, and what is left of that after its price."""
+
+    fit: Fitted
+    gain: float
+    net: float
+
+    @property
+    def name(self) -> str:
+        """The name of the row that it adds."""
+        return self.fit.names[-1]
+
+    @property
+    def row(self) -> Row:
+        """The row that it adds."""
+        return self.fit.model.rows[-1]
+
+
+def silent(_: str) -> None:
+    """Progress that nobody watches."""
+
+
+def plain(p: Problem, brought: Floats | None = None) -> Fitted:
+    """The plain loop at its optimum; a brought model (its constants) is one more start."""
+    fits = [] if brought is None else [descend(p, Model((), brought.copy()), FULL_STEPS)]
+    for process in plain_processes(p.y, p.scene.op, p.usable, p.scene.dt_s):
+        c = neutral()
+        c[Slot.T], c[Slot.L], c[Slot.K] = process.time_constant_s, process.dead_time_s, process.gain
+        c[Slot.START] = p.y[0]
+        c[Slot.BIAS] = float(np.mean(p.y)) - process.gain * float(np.mean(p.scene.op) - p.scene.middle)
+        fits.append(descend(p, Model((), c), FULL_STEPS))
+    return min(fits, key=lambda fit: fit.loss)
+
+
+def calmed(p: Problem, fit: Fitted) -> Problem:
+    """The problem with innovations beyond OUTLIER robust standard deviations counting less."""
+    inside = p.weight > 0
+    scale = float(np.median(np.abs(fit.e[inside]))) / 0.6745
+    size = np.abs(fit.e) / max(scale, 1e-12)
+    return replace(p, weight=np.where(inside, np.minimum(1.0, OUTLIER / np.maximum(size, OUTLIER)), 0.0))
+
+
+def step_places(p: Problem, fit: Fitted) -> tuple[int, ...]:
+    """Samples at which a step of the load explains the innovations best, greedily, shape (STEPS,)."""
+    n = p.y.size
+    e = fit.e * (p.weight > 0)
+    one = neutral()
+    for slot in (Slot.T, Slot.K):
+        one[slot] = fit.model.c[slot]
+    pulse = np.zeros(n)
+    quiet = replace(p.scene, op=np.full(n, p.scene.middle), step_at=(0,))
+    one[int(Slot.STEP)] = 1.0
+    pulse = whitened(np.concatenate((np.zeros(200), simulate(quiet, one)))[:n], fit.ar, p.edges)[200:]
+    places: list[int] = []
+    for _ in range(STEPS):
+        places.append(_best_place(e, pulse))
+        part = pulse[: n - places[-1]]
+        tail = e[places[-1] :][: part.size]
+        part = part[: tail.size]
+        e = e.copy()
+        e[places[-1] :][: part.size] -= part * float(part @ tail) / max(float(part @ part), 1e-300)
+    return tuple(places)
+
+
+def _best_place(e: Floats, pulse: Floats) -> int:
+    n, m = e.size, pulse.size
+    size = 1 << int(math.ceil(math.log2(n + m)))
+    cross = np.fft.irfft(np.fft.rfft(e, size) * np.conj(np.fft.rfft(pulse, size)), size)[:n]
+    power = np.cumsum(pulse**2)
+    room = power[np.minimum(n - 1 - np.arange(n), m - 1)]
+    share = cross**2 / np.maximum(room, 1e-3 * power[-1])
+    share[int(0.98 * n) :] = 0.0
+    share[: int(0.01 * n)] = 0.0
+    return int(np.argmax(share))
+
+
+def line_frequency(p: Problem, fit: Fitted) -> float:
+    """Angular frequency [rad/s] of the strongest line in the innovations."""
+    e = fit.e * (p.weight > 0)
+    size = 4 * e.size
+    power = np.abs(np.fft.rfft(e, size)) ** 2
+    low, high = 4 * 4, size // 5
+    k = low + int(np.argmax(power[low:high]))
+    return 2 * math.pi * k / (size * p.scene.dt_s)
+
+
+@dataclass(frozen=True, slots=True)
+class Excited:
+    """A problem with the places and frequencies at which a load may act."""
+
+    p: Problem
+    omega: float
+
+
+def excited(p: Problem, fit: Fitted) -> Excited:
+    """Steps and a line located in what a fit leaves."""
+    held = p.scene.step_at if any(r.needs == "steps" for r in fit.model.rows) else step_places(p, fit)
+    return Excited(replace(p, scene=replace(p.scene, step_at=held)), line_frequency(p, fit))
+
+
+def candidates(x: Excited, near: Fitted, row: Row) -> list[Model]:
+    """Starts of a row added to a fit."""
+    out = []
+    for start in row.starts:
+        c = near.model.c.copy()
+        for slot, value in (row.fixed or {}).items():
+            c[slot] = value
+        for param in row.params:
+            offset, factor = scales(x.p.scene, near.model.c, param)
+            c[param.slot] = offset + factor * start.get(int(param.slot), 0.0)
+        if row.needs == "line":
+            c[Slot.OMEGA] = x.omega
+        if row.name == "integrator":
+            c[Slot.K] = 1.0
+            c[Slot.T] = near.model.c[Slot.T] / max(abs(near.model.c[Slot.K]), 1e-6)
+            c[Slot.BIAS] = 0.0
+        out.append(Model((*near.model.rows, row), c))
+    return out
+
+
+def screened(p: Problem, near: Fitted, models: list[Model]) -> list[Model]:
+    """Starts ordered by how much of the innovations their difference from the fit explains, linearly."""
+    here = simulate(p.scene, near.model.c)
+    columns = lag_means(p.y - here, p.edges)
+    scored = []
+    for i, model in enumerate(models):
+        d = whitened(simulate(p.scene, model.c) - here, near.ar, p.edges)
+        basis = np.vstack((d, columns[:6])) * p.weight
+        power = float(basis[0] @ d)
+        scored.append((-(float(basis[0] @ near.e) ** 2) / max(power, 1e-12), i))
+    return [models[i] for _, i in sorted(scored)]
+
+
+def applies(x: Excited, near: Fitted, row: Row) -> bool:
+    """Whether a row may be added: what it needs is there, and it is not in the model yet."""
+    taken = {p.slot for r in near.model.rows for p in r.params}
+    if row.name in near.names or taken & {p.slot for p in row.params}:
+        return False
+    if row.needs == "neighbour":
+        return x.p.scene.neighbour is not None
+    return True
+
+
+def price(row: Row) -> float:
+    """Doubled log likelihood that a row costs."""
+    return SEARCH_PRICE + PARAMETER_PRICE * max(len(row.params), 1) + row.price
+
+
+def rival(p: Problem, near: Fitted, models: list[Model], steps: int) -> Rival:
+    """The best of some starts, followed for some steps."""
+    fit = min((descend(p, model, steps) for model in models), key=lambda f: f.loss)
+    won = gain(fit, near)
+    return Rival(fit, won, won - price(fit.model.rows[-1]))
+
+
+def followed(p: Problem, near: Fitted, first: Rival, models: list[Model]) -> Rival:
+    """A rival of the first round followed to the end, from there and from its second and third start."""
+    starts = [first.fit.model, *models[1:3]]
+    best = rival(p, near, starts, FULL_STEPS)
+    return best if best.net > first.net else first
+
+
+def compete(
+    x: Excited, near: Fitted, rows: tuple[Row, ...] = CATALOGUE, tell: Progress = silent
+) -> list[Rival]:
+    """All rows as rivals of a fit, best first; the better half followed to the end.
+
+    Parameters
+    ----------
+    x : Excited
+    near : Fitted
+        The fit to which each row is added.
+    rows : tuple of Row
+    tell : callable
+        Is told each row's name before it is tried.
+    """
+    tried: list[tuple[Rival, list[Model]]] = []
+    for row in rows:
+        if applies(x, near, row):
+            tell(row.name)
+            models = screened(x.p, near, candidates(x, near, row))
+            tried.append((rival(x.p, near, models[:1], SCREEN_STEPS), models))
+    tried.sort(key=lambda t: -t[0].net)
+    ended = [followed(x.p, near, first, models) for first, models in tried[:FOLLOWED]]
+    return sorted([*ended, *(first for first, _ in tried[FOLLOWED:])], key=lambda r: -r.net)
+
+
+def prepared(scene: Scene, y: Floats, usable: Mask, brought: Floats | None = None) -> tuple[Problem, Fitted]:
+    """A problem with its outliers calmed, and its plain fit."""
+    p = problem(scene, y, usable)
+    first = plain(p, brought)
+    calm = calmed(p, first)
+    return calm, descend(calm, first.model, FULL_STEPS)

@@ -1,0 +1,82 @@
+"""Every number that decides an answer, with its reason. Doubled log-likelihood gains are called `gain`."""
+
+from __future__ import annotations
+
+PARAMETER_PRICE = 6.0
+"""Gain that one more constant has to bring; ours: log(n) would be 9, chance brings 1."""
+SEARCH_PRICE = 12.0
+"""Gain that the choice among some forty rivals and their starts costs; ours: the largest of forty chance gains."""
+OUTLIER = 5.0
+"""Innovations beyond this many robust standard deviations count less: no single event decides a name."""
+ROUNDS = 3
+"""Effects named at most; a record seldom tells more."""
+FOLLOWED = 6
+"""Rivals that are followed to the end from several starts."""
+SCREEN_STEPS = 5
+"""Gauss-Newton steps in the first round."""
+FULL_STEPS = 20
+"""Gauss-Newton steps of those that are followed."""
+SETTLED = 0.05
+"""Gain of a step below which the descent ends."""
+TIE = 4.0
+"""Rivals within this gain of the winner cannot be told from it and are its alternatives."""
+HELD_OUT = 0.35
+"""Last part of the record that is held out when the winner is proven."""
+SPREAD = 0.15
+"""Share of the gain that must remain when the best tenth of the record is left out (loads excepted)."""
+Z90 = 1.645
+"""Half width of a 90 % interval in standard deviations."""
+LAW_SPAN = 40
+"""Fewest samples in a span of the controller's regression."""
+LAW_SPANS = 12
+"""Fewest spans in it."""
+SHIFTS = (-2.0, -1.0, 0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0)
+"""Latenesses of PV that are tried [samples]."""
+STRAIGHT = 0.3
+"""Share of samples on straight slopes from which a trend counts as compressed; ours: rounding alone leaves under
+0.27."""
+GRID_STEP = 0.06
+"""Step of values [% of span] from which it is the sensor's and not the historian's, which keeps 0.05 or finer."""
+GRID_STEP_OF_RANGE = 2.0
+"""The same where percent is of the recorded range."""
+CLIP_SAMPLES = 15
+"""Fewest samples at one extreme that count as clipped."""
+CLIP_RATIO = 4.0
+"""Times that the extreme is commoner than each of its six neighbours."""
+JITTER = 0.02
+"""Scatter of stamps [samples] from which it is the polling; logging alone scatters by 0.01."""
+LATE = 1.4
+"""Lateness of PV's clock [samples] from which it is named; ours: jitter and filters stay under 0.8."""
+SETTING = 0.055
+"""Logarithm of found over stated setting from which it is named; ours: sound loops stay under 0.03."""
+LAW_EXPLAINS = 0.9
+"""Share of OP that a law has to give before its settings are believed."""
+GAPS = (0.05, 0.07, 0.1, 0.14, 0.2, 0.28, 0.4, 0.55, 0.75, 1.0, 1.35, 1.8, 2.5, 3.5, 5.0)
+"""Gaps tried, in medians of the error's size."""
+GAP_LEAVES = 0.8
+"""Residual of the median span under the best gap, in terms of that without one, from which a gap is named."""
+STUCK_RUN = 20
+"""Samples of a constant OP that a law would have moved before it counts as ruled by logic."""
+STUCK_MOVE = 6.0
+"""Moves missed in such a run, in steps of OP's resolution."""
+STUCK_SHARE = 0.006
+"""Share of the record in such runs from which logic is named."""
+SAME_LAW = 1.15
+"""Times the residual of the law found that the stated law may leave in the median span and still be believed."""
+FROZEN = 0.55
+"""Share of due moves of OP that do not happen within a gap."""
+FROZEN_MOVES = 25
+"""Due moves within a gap before one is named."""
+LAWLESS = 5.0
+"""Residual of a span, in medians of all spans (plus a step of OP), from which the law does not hold there."""
+LAWLESS_SHARE = 0.03
+"""Share of the record in such spans from which logic is named; ours: gaps and single outliers stay under it."""
+HELD_OUT_LOSS = -2.0
+"""Gain on the held-out part under which an effect falls; ours: chance moves it by about one."""
+PROVEN = 3
+"""Rivals that are put to the proof, best first, until one passes."""
+CEILING_PRICE = 55.0
+"""Gain that the flexible model needs over the last fit before something is said to be left; ours: by cases with
+nothing hidden."""
+START_SCATTER = 1.0
+"""Standard deviation [% PV] of the model's first value about the recorded one, which short time constants need."""
