@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Callable, Sequence
+from copy import copy
 from datetime import UTC, datetime
 from functools import wraps
 from pathlib import Path
@@ -224,10 +225,16 @@ def tune(
             click.echo(f"written: {out / name}")
 
 
+def registered(command: click.Command) -> click.Command:
+    """A command of another module with errors told as here."""
+    own = copy(command)
+    if command.callback is not None:
+        own.callback = told(command.callback)
+    return own
+
+
 for page_command in COMMANDS:
-    if page_command.callback is not None:
-        page_command.callback = told(page_command.callback)
-    main.add_command(page_command)
+    main.add_command(registered(page_command))
 
 
 if __name__ == "__main__":

@@ -100,9 +100,10 @@ class CauseLimits:
     """What the share is multiplied with in loops that do not oscillate [-]."""
     evidence_jump: float = 5.0
     """Further gain that a slip jump needs, for its two more constants and wider search [nat]."""
-    open_size: float = 0.25
+    open_size: float = 0.35
     """Stickband over the range of OP from which it can drive a cycle where simulation of the identified loop shows
-    that it does [-]; ours."""
+    that it does [-]; ours: below it a loop that a neighbour swings passes the simulation too, for its feedback was
+    identified with the rest."""
     moves: int = 3
     """How often the stem must set out [-]: one or two moves can be steps of the load as well, unless
     the set point called for them; ours."""
@@ -144,6 +145,10 @@ class CauseLimits:
     """Coherence from which even a loop whose own valve seems at fault follows another [-]; ours."""
     outweighs: float = 4.0
     """Evidence of the other valve over its own from which it does [-]; ours."""
+    one_wave: float = 0.98
+    """Coherence from which two loops share one wave, so that the valve with more evidence leads [-]; ours."""
+    outweighs_wave: float = 1.5
+    """Evidence of the other valve over its own from which it leads then [-]; ours."""
     same_period: float = 0.06
     """Largest relative difference of periods that count as one [-]."""
 

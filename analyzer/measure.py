@@ -20,9 +20,9 @@ from identification.valve_fit import SCREENED, better_linear, fit_linear, fit_pl
 from tuning.limit_cycle import confirm
 from tuning.linear import is_stable, loop_response
 
-ALIKE_PERIOD = 1.3
-"""Largest ratio of a simulated to the recorded period that counts as the same [-]; ours: models whose play is 10 %
-off differ by less."""
+ALIKE_PERIOD, ALIKE_AMPLITUDE = 1.1, 1.3
+"""Largest ratios of a simulated to the recorded cycle that count as the same [-]; ours: identified loops of simulated
+tanks with play come within 1.04 and 1.12."""
 SHORT = 1000
 """Blocks of a record that is so short that every rival can be tried on it; ours."""
 
@@ -220,10 +220,10 @@ def _cycles_alike(window: Window, fit: Fit, controller: Pid | None, o: Oscillati
     cycle = confirm(loop).cycle
     if cycle is None or o.amplitude_pct <= 0 or cycle.pv_amplitude <= 0:
         return False
-    periods = abs(math.log(cycle.period_s / o.period_s))
-    return periods < math.log(ALIKE_PERIOD) and abs(
-        math.log(cycle.pv_amplitude / o.amplitude_pct)
-    ) < math.log(2)
+    periods, sizes = cycle.period_s / o.period_s, cycle.pv_amplitude / o.amplitude_pct
+    return abs(math.log(periods)) < math.log(ALIKE_PERIOD) and abs(math.log(sizes)) < math.log(
+        ALIKE_AMPLITUDE
+    )
 
 
 def recovered(record: LoopRecord, scale_s: float) -> Pid | None:

@@ -115,11 +115,9 @@ def _may_follow(own: Peer, other: Peer, level: float, limits: CauseLimits) -> bo
         return False
     if own.cause != "valve":
         return True
-    return (
-        other.cause == "valve"
-        and level >= limits.follows
-        and other.evidence >= limits.outweighs * own.evidence
-    )
+    factor = limits.outweighs_wave if level >= limits.one_wave else limits.outweighs
+    outweighed = other.evidence >= factor * own.evidence
+    return other.cause == "valve" and level >= limits.follows and outweighed
 
 
 def source_of(
