@@ -14,6 +14,7 @@ from analyzer.tags import as_stated
 from identification.descent import covariance
 from identification.hammerstein import Fit, Window, process_of
 from identification.models import Backlash, Fopdt, Loop, Pid, Stiction, Valve
+from tuning.limit_cycle import Cycle
 from tuning.linear import is_stable
 from tuning.recommend import Proposal, recommend
 from tuning.search import rounded, scaled_valve
@@ -30,13 +31,16 @@ class Advice:
     """A proposal in the loop's own units.
 
     action as in the ranking; reason in words, empty where the finding says it all; kp_new and ti_new in the
-    units and form that loops.csv states, None unless action is retune.
+    units and form that loops.csv states, None unless action is retune; before and after, the limit cycles that
+    simulation finds at the present and at the new settings, None where there is none.
     """
 
     action: str
     reason: str = ""
     kp_new: float | None = None
     ti_new: float | None = None
+    before: Cycle | None = None
+    after: Cycle | None = None
 
 
 def chosen_fit(verdict: Verdict) -> Fit:
@@ -139,7 +143,8 @@ def propose(verdict: Verdict, controller: Pid, period_s: float | None) -> Propos
 
 def _stated(proposal: Proposal, spec: LoopSpec, pv_span: float) -> Advice:
     """A proposal in the units and form of the plant's controller."""
+    cycles = [c.cycle if c is not None else None for c in (proposal.before, proposal.after)]
     if proposal.controller is None:
-        return Advice(proposal.action, proposal.reason)
+        return Advice(proposal.action, proposal.reason, before=cycles[0])
     kp, ti = as_stated(proposal.controller, spec, pv_span)
-    return Advice(proposal.action, proposal.reason, rounded(kp), rounded(ti))
+    return Advice(proposal.action, proposal.reason, rounded(kp), rounded(ti), *cycles)

@@ -14,7 +14,7 @@ from analyzer.measure import measure
 from analyzer.oscillation import Oscillation, Oscillations, detect
 from analyzer.plantwide import Fingerprint, fingerprint
 from analyzer.quality import Prepared, has_op
-from analyzer.trends import thinned
+from analyzer.trends import BUCKETS, FINE_BUCKETS, thinned
 from identification.errors import NotAssessedError
 from identification.harris import harris_index
 from identification.models import Pid
@@ -135,6 +135,6 @@ def assess(prepared: Prepared, controller: Pid | None, config: Config, kind: str
         harris,
         settling_time(record, night.noise_band_pct or 0.0),
         fingerprint(record.tag, first.period_s, record.start_s, s) if first and s else None,
-        thinned(record),
+        thinned(record, FINE_BUCKETS if first else BUCKETS),
         prepared.notes,
     )

@@ -108,8 +108,18 @@ def advised(row: dict[str, Any], needs: str, advice: Advice) -> dict[str, Any]:
         "kp_new": advice.kp_new,
         "ti_new": advice.ti_new,
         "advice": advice.reason,
+        **_cycles(advice),
         "reason": reason_of(row, needs),
     }
+
+
+def _cycles(advice: Advice) -> dict[str, float]:
+    """Limit cycles that simulation finds at the present (predicted) and at the new (expected) settings."""
+    out: dict[str, float] = {}
+    for name, cycle in (("predicted", advice.before), ("expected", advice.after)):
+        if cycle is not None:
+            out |= {f"{name}_period_s": cycle.period_s, f"{name}_pv_amplitude_pct": cycle.pv_amplitude}
+    return out
 
 
 def follower_row(row: Mapping[str, Any], source: Source) -> dict[str, Any]:
