@@ -76,9 +76,10 @@ def _steps(gram: Floats, slope: Floats, damping: float, frozen: list[int]) -> Fl
         damped[j, :], damped[:, j], damped[j, j] = 0.0, 0.0, 1.0
         slope = slope.copy()
         slope[j] = 0.0
-    return np.linalg.lstsq(damped / np.sqrt(np.outer(scale, scale)), slope / np.sqrt(scale), rcond=1e-12)[
-        0
-    ] / np.sqrt(scale)
+    root = np.sqrt(scale)
+    level = damped / np.outer(root, root)
+    level[np.diag_indices_from(level)] += 1e-12
+    return np.asarray(np.linalg.solve(level, slope / root) / root, dtype=np.float64)
 
 
 @dataclass(frozen=True, slots=True)

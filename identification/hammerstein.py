@@ -282,7 +282,10 @@ def _filtered(x: Floats, ar: Floats, notch_period: float) -> Floats:
 
 def stem_of(window: Window, valve: ValveTrial) -> Floats:
     """Stem in blocks less its mean [% OP], shape (n,)."""
-    stem = stem_blocks(window.op, valve.breakaway, valve.sliding, valve.tolerance, window.factor)
+    if valve.breakaway <= 0.0:
+        stem = block_means(window.op, window.factor)
+    else:
+        stem = stem_blocks(window.op, valve.breakaway, valve.sliding, valve.tolerance, window.factor)
     return stem - stem.mean()
 
 
