@@ -95,6 +95,13 @@ def travel(signal: Floats, deadband: float) -> tuple[float, int]:
     return float(np.abs(moved).sum()), int((turns[1:] != turns[:-1]).sum())
 
 
+def _joined(signal: Floats, use: Mask) -> Floats:
+    """The signal's moves between usable neighbours as one path: what it moved during a gap is not known."""
+    moves = np.diff(signal)
+    moves[~(use[1:] & use[:-1])] = 0.0
+    return np.concatenate(([0.0], np.cumsum(moves)))
+
+
 def crossings(error: Floats, band: float) -> int:
     """How often the error goes from beyond one side of a band to beyond the other."""
     side = np.sign(error[np.abs(error) > band])
@@ -119,7 +126,7 @@ def assess_span(record: LoopRecord, noise: float | None = None) -> Assessments:
     e, pv, op = (x if everything else x[use] for x in (record.error, record.pv, record.op))
     stem = record.op if record.position is None else record.position
     step = max(round(TRAVEL_GRID_S / record.dt_s), 1)
-    path, turns = travel((stem if everything else stem[use])[::step], TRAVEL_DEADBAND_PCT)
+    path, turns = travel(_joined(stem[::step], use[::step]), TRAVEL_DEADBAND_PCT)
     band = noise_band(pv) if noise is None else noise
     mean_pv = float(pv.mean())
     good = ~record.bad

@@ -80,8 +80,12 @@ class Prepared:
 
 
 def interval(stamp_s: Floats) -> float:
-    """The sample interval of raw stamps [s]: their median spacing."""
-    return float(np.median(np.diff(stamp_s))) if stamp_s.size > 1 else math.nan
+    """The sample interval of raw stamps [s]: their median spacing, to three digits where stamps jitter about it."""
+    if stamp_s.size < 2:
+        return math.nan
+    median = float(np.median(np.diff(stamp_s)))
+    even = float(f"{median:.3g}")
+    return even if abs(even - median) < 1e-3 * median else median
 
 
 def onto_clock(series: Series, clock: Floats, dt_s: float, limits: QualityLimits) -> tuple[Floats, Mask]:
