@@ -97,6 +97,7 @@ def case(spec: LoopSpec, specs: tuple[LoopSpec, ...], series: dict[str, Series],
         stated_law(spec, prepared),
         not prepared.scale.recorded,
         neighbours(spec, specs, series, prepared),
+        spec.type.strip().lower(),
     )
     return Case(spec, prepared, subject)
 

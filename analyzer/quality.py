@@ -85,7 +85,7 @@ def interval(stamp_s: Floats) -> float:
         return math.nan
     median = float(np.median(np.diff(stamp_s)))
     even = float(f"{median:.3g}")
-    return even if abs(even - median) < 1e-3 * median else median
+    return even if abs(even - median) < 3e-3 * median else median
 
 
 def onto_clock(series: Series, clock: Floats, dt_s: float, limits: QualityLimits) -> tuple[Floats, Mask]:
