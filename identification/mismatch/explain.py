@@ -24,7 +24,8 @@ class Subject:
 
     sp : shape (n,) [% PV], None where not recorded; pv, op : shape (n,) [% of span]; usable : bool, shape (n,);
     dt_s [s]; stamp_s : stamps as logged [s]; stated : the controller as the plant states it; ranged : whether PV's
-    range is stated; neighbours : OPs of other loops on the same clock, each shape (n,).
+    range is stated; neighbours : OPs of other loops on the same clock, each shape (n,);
+    kind : the loop's type as stated, lower case.
     """
 
     sp: Floats | None
@@ -36,6 +37,7 @@ class Subject:
     stated: Stated | None = None
     ranged: bool = True
     neighbours: tuple[Floats, ...] = ()
+    kind: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,17 +131,17 @@ def explain(s: Subject, tell: Progress = silent, brought: Floats | None = None) 
     found = Explanation(p, plain, plain, trace=trace, ruling=ruling, law=law, late_s=late_s)
     if any(x is not None and x.name in ALONE for x in (trace, ruling)):
         return found
-    return physics(found, tell)
+    return physics(found, tell, s.kind)
 
 
-def physics(found: Explanation, tell: Progress) -> Explanation:
+def physics(found: Explanation, tell: Progress, kind: str = "") -> Explanation:
     """Add effects of the catalogue one by one, as long as one passes."""
     p, best = found.p, found.plain
     accepted: list[Rival] = []
     before: list[Fitted] = []
     first: tuple[Rival, ...] = ()
     for _ in range(ROUNDS):
-        x = excited(p, best)
+        x = excited(p, best, kind)
         rivals = compete(x, best, CATALOGUE, tell)
         first = first or tuple(rivals)
         winner = proven(x.p, best, rivals)

@@ -183,7 +183,7 @@ def curvature(p: Problem, model: Model, ar: Floats, columns: Floats, e: Floats) 
     gram, slope = weighted @ j.T, weighted @ e
     m = len(model.params)
     inner = gram[m:, m:] + 1e-10 * np.trace(gram[m:, m:]) / (gram.shape[0] - m) * np.eye(gram.shape[0] - m)
-    cross = np.linalg.solve(inner, np.column_stack((gram[m:, :m], slope[m:])))
+    cross = np.linalg.lstsq(inner, np.column_stack((gram[m:, :m], slope[m:])), rcond=1e-13)[0]
     gram, slope = gram[:m, :m] - gram[:m, m:] @ cross[:, :-1], slope[:m] - gram[:m, m:] @ cross[:, -1]
     i = [param.slot for param in model.params].index(Slot.START)
     held = loss_of(p, e) / START_SCATTER**2

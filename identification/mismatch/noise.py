@@ -66,4 +66,4 @@ def fitted(columns: Floats, r: Floats, weight: Floats) -> Floats:
     w = columns * weight
     gram = w @ columns.T
     ridge = 1e-10 * np.trace(gram) / gram.shape[0] + 1e-300
-    return np.linalg.solve(gram + ridge * np.eye(gram.shape[0]), w @ r)
+    return np.linalg.lstsq(gram + ridge * np.eye(gram.shape[0]), w @ r, rcond=1e-13)[0]

@@ -32,6 +32,8 @@ Start = Mapping[int, float]
 class Row:
     """One piece of physics as a rival: its name, block, constants, and starts in units of their scales.
 
+    delays : constants whose start is taken off the dead time, which stood for them in the plain loop.
+    types : loop types that can have it, any where empty or the type is not known.
     fixed : constants set, not searched; needs : what the record must hold (steps, neighbour) for it to be tried.
     """
 
@@ -42,11 +44,10 @@ class Row:
     fixed: Start | None = None
     needs: str = ""
     variant: str = ""
+    types: tuple[str, ...] = ()
     likeness: tuple[str, ...] = ()
+    delays: tuple[int, ...] = ()
     price: float = 0.0
-
-
-T = Param(Slot.T, "time_constant_s", "s", 0.0, 0.0, log=True)
 
 
 def _each(slot: int, *values: float) -> tuple[Start, ...]:
@@ -120,6 +121,7 @@ VALVE = (
             for d in (0.02, 0.08)
         ),
         likeness=("stiction",),
+        delays=(Slot.SERVO,),
     ),
     Row(
         "split-range",
@@ -138,9 +140,10 @@ PROCESS = (
     Row(
         "second-lag",
         "process",
-        (Param(Slot.T2, "second_lag_s", "s", 0.02, 1.5, "T", True),),
-        _each(Slot.T2, 0.03, 0.1, 0.3),
+        (Param(Slot.T2, "second_lag_s", "s", 0.1, 1e4, "dt", True),),
+        _each(Slot.T2, 0.7, 1.5, 3.0, 6.0, 12.0, 25.0, 50.0, 100.0),
         likeness=("sensor-lag",),
+        delays=(Slot.T2,),
     ),
     Row(
         "slow-mode",
@@ -156,9 +159,13 @@ PROCESS = (
         "process",
         (
             Param(Slot.SHARE, "opposing_share", "", -5.0, 0.0),
-            Param(Slot.MODE_T, "opposing_time_constant_s", "s", 0.002, 0.6, "T", True),
+            Param(Slot.MODE_T, "opposing_time_constant_s", "s", 0.1, 1e4, "dt", True),
         ),
-        tuple({Slot.SHARE: s, Slot.MODE_T: t} for s in (-0.05, -0.25) for t in (0.02, 0.1)),
+        tuple(
+            {Slot.SHARE: s, Slot.MODE_T: t}
+            for s in (-0.01, -0.03, -0.1, -0.3, -0.8)
+            for t in (0.3, 2.0, 8.0, 30.0)
+        ),
     ),
     Row(
         "direction-asymmetry",
@@ -170,22 +177,36 @@ PROCESS = (
         "nonlinear-gain",
         "process",
         (Param(Slot.SLOPE, "gain_slope", "per 50 % PV", -6.0, 6.0),),
-        _each(Slot.SLOPE, -0.3, 0.3),
+        _each(Slot.SLOPE, -0.5, 0.5),
         likeness=("valve-characteristic",),
+    ),
+    *(
+        Row(
+            "nonlinear-gain",
+            "process",
+            (Param(Slot.GAIN_SLOPE, "gain_slope", "per 50 % PV", -6.0, 6.0),),
+            _each(Slot.GAIN_SLOPE, -0.5, 0.5),
+            {Slot.SPEED: speed},
+            variant=variant,
+            likeness=("valve-characteristic",),
+        )
+        for speed, variant in ((0.0, "gain alone"), (-1.0, "faster with gain"))
     ),
     Row(
         "sqrt-outflow",
         "process",
         (Param(Slot.ROOT, "root", "", 0.05, 3.0),),
         _each(Slot.ROOT, 0.3, 1.0),
+        types=("level",),
     ),
     Row(
         "overflow",
         "process",
         (Param(Slot.CAP, "cap_pct", "% PV", 0.0, 1.0, "pvspan"),),
         _each(Slot.CAP, 0.7, 0.85, 0.95),
+        types=("level",),
     ),
-    Row("integrator", "process", (), ({},), {Slot.LEAK: 0.0}),
+    Row("integrator", "process", (), ({},), {Slot.LEAK: 0.0}, types=("level", "pressure")),
     Row(
         "flow-dependent-delay",
         "process",
@@ -208,7 +229,7 @@ LOAD = (
             (dict.fromkeys((int(Slot.STEP) + i for i in range(count)), 0.0),),
             needs="steps",
             variant=f"{count}",
-            price=8.0 * count,
+            price=6.0 * count,
         )
         for count in (1, 2, 3)
     ),
@@ -222,7 +243,7 @@ LOAD = (
         ),
         ({Slot.SINE: 0.0, Slot.COSINE: 0.0},),
         needs="line",
-        price=6.0,
+        price=2.0,
     ),
     Row(
         "coupling",
@@ -242,7 +263,7 @@ LOAD = (
             *(Param(int(Slot.HEAD) + i, f"head_{i + 1}", "", -2.0, 2.0) for i in range(12)),
         ),
         ({Slot.HEAD_BIAS: 8.0},),
-        price=-20.0,
+        price=-10.0,
     ),
 )
 CATALOGUE = (*VALVE, *PROCESS, *LOAD)

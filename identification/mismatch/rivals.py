@@ -7,9 +7,20 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.ndimage import median_filter
 
-from identification.mismatch.fitting import Fitted, Model, Problem, descend, gain, problem, scales
-from identification.mismatch.noise import lag_means, whitened
+from identification.mismatch.fitting import (
+    Fitted,
+    Model,
+    Problem,
+    descend,
+    gain,
+    problem,
+    scales,
+    sensitivities,
+)
+from identification.mismatch.friction import fit_sticking
+from identification.mismatch.noise import whitened
 from identification.mismatch.physics import CATALOGUE, Row
 from identification.mismatch.simulation import Scene, simulate
 from identification.mismatch.slots import STEPS, Slot, neutral
@@ -20,11 +31,16 @@ from identification.mismatch.thresholds import (
     PARAMETER_PRICE,
     SCREEN_STEPS,
     SEARCH_PRICE,
+    STICKING_HINT,
 )
 from identification.process import plain_processes
 from identification.record import Floats, Mask
 
 Progress = Callable[[str], None]
+KNOWN_TYPES = ("flow", "pressure", "temperature", "level")
+"""Loop types under which a row may be left out; any other text says nothing."""
+LINE_SIDE = 25
+"""Half of the lines whose median is a line's surroundings."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,27 +121,28 @@ def _best_place(e: Floats, pulse: Floats) -> int:
 
 
 def line_frequency(p: Problem, fit: Fitted) -> float:
-    """Angular frequency [rad/s] of the strongest line in the innovations."""
+    """Angular frequency [rad/s] of the strongest line, against its surroundings, in the innovations."""
     e = fit.e * (p.weight > 0)
-    size = 4 * e.size
-    power = np.abs(np.fft.rfft(e, size)) ** 2
-    low, high = 4 * 4, size // 5
-    k = low + int(np.argmax(power[low:high]))
-    return 2 * math.pi * k / (size * p.scene.dt_s)
+    power = np.abs(np.fft.rfft(e, 2 * e.size)) ** 2
+    around = median_filter(power, 2 * LINE_SIDE, mode="nearest")
+    low, high = 8, power.size // 3
+    k = low + int(np.argmax(power[low:high] / np.maximum(around[low:high], 1e-30)))
+    return math.pi * k / (e.size * p.scene.dt_s)
 
 
 @dataclass(frozen=True, slots=True)
 class Excited:
-    """A problem with the places and frequencies at which a load may act."""
+    """A problem with the places and frequencies at which a load may act, and the loop's type where known."""
 
     p: Problem
     omega: float
+    kind: str = ""
 
 
-def excited(p: Problem, fit: Fitted) -> Excited:
+def excited(p: Problem, fit: Fitted, kind: str = "") -> Excited:
     """Steps and a line located in what a fit leaves."""
     held = p.scene.step_at if any(r.needs == "steps" for r in fit.model.rows) else step_places(p, fit)
-    return Excited(replace(p, scene=replace(p.scene, step_at=held)), line_frequency(p, fit))
+    return Excited(replace(p, scene=replace(p.scene, step_at=held)), line_frequency(p, fit), kind)
 
 
 def candidates(x: Excited, near: Fitted, row: Row) -> list[Model]:
@@ -138,33 +155,44 @@ def candidates(x: Excited, near: Fitted, row: Row) -> list[Model]:
         for param in row.params:
             offset, factor = scales(x.p.scene, near.model.c, param)
             c[param.slot] = offset + factor * start.get(int(param.slot), 0.0)
+        stood = sum(c[slot] for slot in row.delays) + max(-c[Slot.SHARE] * c[Slot.T], 0.0)
         if row.needs == "line":
             c[Slot.OMEGA] = x.omega
         if row.name == "integrator":
             c[Slot.K] = 1.0
             c[Slot.T] = near.model.c[Slot.T] / max(abs(near.model.c[Slot.K]), 1e-6)
             c[Slot.BIAS] = 0.0
-        out.append(Model((*near.model.rows, row), c))
+        for part in (0.4, 1.0) if stood > 0 else (0.0,):
+            shorter = c.copy()
+            shorter[Slot.L] = max(c[Slot.L] - part * stood, 0.2 * c[Slot.L])
+            out.append(Model((*near.model.rows, row), shorter))
     return out
 
 
-def screened(p: Problem, near: Fitted, models: list[Model]) -> list[Model]:
-    """Starts ordered by how much of the innovations their difference from the fit explains, linearly."""
-    here = simulate(p.scene, near.model.c)
-    columns = lag_means(p.y - here, p.edges)
-    scored = []
+def span_of(p: Problem, near: Fitted) -> Floats:
+    """Orthonormal directions, shape (n, m), in which a fit's own constants move the weighted innovations."""
+    moves = sensitivities(p, near.model, near.ar) * np.sqrt(p.weight)
+    return np.linalg.qr(moves.T)[0]
+
+
+def screened(p: Problem, near: Fitted, span: Floats, models: list[Model]) -> list[Model]:
+    """Starts ordered by the innovations that they leave once the fit's own constants have followed, linearly."""
+    if len(models) == 1:
+        return models
+    root = np.sqrt(p.weight)
+    left = []
     for i, model in enumerate(models):
-        d = whitened(simulate(p.scene, model.c) - here, near.ar, p.edges)
-        basis = np.vstack((d, columns[:6])) * p.weight
-        power = float(basis[0] @ d)
-        scored.append((-(float(basis[0] @ near.e) ** 2) / max(power, 1e-12), i))
-    return [models[i] for _, i in sorted(scored)]
+        e = whitened(p.y - simulate(p.scene, model.c), near.ar, p.edges) * root
+        left.append((float(e @ e) - float(((e @ span) ** 2).sum()), i))
+    return [models[i] for _, i in sorted(left)]
 
 
 def applies(x: Excited, near: Fitted, row: Row) -> bool:
     """Whether a row may be added: what it needs is there, and it is not in the model yet."""
     taken = {p.slot for r in near.model.rows for p in r.params}
     if row.name in near.names or taken & {p.slot for p in row.params}:
+        return False
+    if row.types and x.kind in KNOWN_TYPES and x.kind not in row.types:
         return False
     if row.needs == "neighbour":
         return x.p.scene.neighbour is not None
@@ -205,13 +233,15 @@ def compete(
         Is told each row's name before it is tried.
     """
     tried: list[tuple[Rival, list[Model]]] = []
+    span = span_of(x.p, near)
     for row in rows:
         if applies(x, near, row):
             tell(row.name)
-            models = screened(x.p, near, candidates(x, near, row))
+            models = screened(x.p, near, span, candidates(x, near, row))
             tried.append((rival(x.p, near, models[:1], SCREEN_STEPS), models))
     tried.sort(key=lambda t: -t[0].net)
     ended = [followed(x.p, near, first, models) for first, models in tried[:FOLLOWED]]
+    ended += stuck(x, near, [first for first, _ in tried], rows, tell)
     return sorted([*ended, *(first for first, _ in tried[FOLLOWED:])], key=lambda r: -r.net)
 
 
@@ -221,3 +251,21 @@ def prepared(scene: Scene, y: Floats, usable: Mask, brought: Floats | None = Non
     first = plain(p, brought)
     calm = calmed(p, first)
     return calm, descend(calm, first.model, FULL_STEPS)
+
+
+def stuck(
+    x: Excited, near: Fitted, tried: list[Rival], rows: tuple[Row, ...], tell: Progress = silent
+) -> list[Rival]:
+    """Sticking valves scanned about the best play, where a play or the like gains anything at all."""
+    plays = [r for r in tried if r.name == "backlash"]
+    hints = [r.gain for r in tried if r.name in ("backlash", "stiction", "positioner")]
+    if not plays or max(hints) < STICKING_HINT:
+        return []
+    tell("stiction")
+    out = []
+    for row in rows:
+        if row.name == "stiction":
+            fit = fit_sticking(x.p, plays[0].fit, row, near.model.rows)
+            won = gain(fit, near)
+            out.append(Rival(fit, won, won - price(row)))
+    return out

@@ -11,21 +11,21 @@ from numba import njit
 from identification.errors import InputError
 from identification.mismatch.control import Stated
 from identification.mismatch.simulation import Scene, simulate
-from identification.mismatch.slots import KNOTS, Slot, neutral
+from identification.mismatch.slots import KNOTS, STEPS, Slot, neutral
 from identification.record import Floats
 
 VERSION = 1
 TIMED = (
-    Slot.DRIFT,
     Slot.SINE,
     Slot.COSINE,
     Slot.NEIGHBOUR,
     Slot.START,
     Slot.HEAD_BIAS,
-    *range(40, 43 + KNOTS),
+    *(Slot.STEP + i for i in range(STEPS)),
+    *(Slot.HEAD + i for i in range(KNOTS)),
 )
 """Constants that belong to the recording that was fitted, not to the loop."""
-NAMES = {int(s): s.name for s in Slot if int(s) < int(Slot.STEP)}
+NAMES = {int(s): s.name for s in Slot if s not in (Slot.STEP, Slot.HEAD)}
 
 
 def to_data(
@@ -43,7 +43,6 @@ def to_data(
         "level_pv_pct": scene.level,
         "late_s": late_s,
         "scale": pv_scale,
-        "drift_at_end": float(c[Slot.DRIFT]),
     }
 
 

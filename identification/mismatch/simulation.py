@@ -18,6 +18,7 @@ RICH = (
     Slot.SHARE,
     Slot.ASYMMETRY,
     Slot.SLOPE,
+    Slot.GAIN_SLOPE,
     Slot.ROOT,
     Slot.DRIFT,
     Slot.PIPE,

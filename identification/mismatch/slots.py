@@ -59,7 +59,9 @@ class Slot(IntEnum):
     SPILL_T = 38
     T3 = 39
     STEP = 40
-    HEAD = 43
+    GAIN_SLOPE = 43
+    SPEED = 44
+    HEAD = 45
 
 
 SIZE = int(Slot.HEAD) + KNOTS

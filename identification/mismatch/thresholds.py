@@ -80,3 +80,5 @@ CEILING_PRICE = 55.0
 nothing hidden."""
 START_SCATTER = 1.0
 """Standard deviation [% PV] of the model's first value about the recorded one, which short time constants need."""
+STICKING_HINT = 12.0
+"""Gain of a play, or of a sticking valve started coarsely, from which the fine scan for stiction is worth its time."""

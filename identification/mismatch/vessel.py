@@ -15,7 +15,7 @@ T2, T3, SHARE, MODE_T, ASYM = (int(s) for s in (Slot.T2, Slot.T3, Slot.SHARE, Sl
 SLOPE, ROOT, CAP, SPILL, SPILL_T = (
     int(s) for s in (Slot.SLOPE, Slot.ROOT, Slot.CAP, Slot.SPILL, Slot.SPILL_T)
 )
-LEAK, PIPE = int(Slot.LEAK), int(Slot.PIPE)
+LEAK, PIPE, GAIN_SLOPE, SPEED = (int(s) for s in (Slot.LEAK, Slot.PIPE, Slot.GAIN_SLOPE, Slot.SPEED))
 WEIR = 25.0
 """Outflow over the cap per % of level, in terms of the vessel's own; ours: stiff against every vessel."""
 
@@ -61,6 +61,12 @@ def outflow(x: float, head: float, slope: float, leak: float, root: float) -> tu
 
 
 @njit(cache=True)
+def scheduled(x: float, slope: float) -> float:
+    """Relative gain at level x [% PV]; `slope` is its change over 50 %."""
+    return max(1.0 + slope * x / 50.0, 0.05)
+
+
+@njit(cache=True)
 def filled(x: float, feed: float, h: float, c: Floats, head: float, basin: float) -> tuple[float, float]:
     """Level after h seconds of constant feed, and the spill meanwhile (exponential step, exact where linear)."""
     out, rise = outflow(x, head, c[SLOPE], c[LEAK], c[ROOT])
@@ -69,6 +75,8 @@ def filled(x: float, feed: float, h: float, c: Floats, head: float, basin: float
         rise += WEIR
     net = feed + c[SPILL] * basin - out - WEIR * over
     t = c[T]
+    if c[GAIN_SLOPE] != 0.0:
+        t *= scheduled(x, c[GAIN_SLOPE]) ** c[SPEED]
     if c[ASYM] != 0.0:
         t *= math.exp(-0.5 * c[ASYM] if net > 0.0 else 0.5 * c[ASYM])
     z = rise * h / t
@@ -106,7 +114,10 @@ def vessel(
             if h <= 0.0:
                 continue
             j = max(k - delay - 1 + half, 0)
-            feed = c[K] * (gain[k] * (flow[j] - base) + act[k]) + c[BIAS]
+            feed = gain[k] * (c[K] * (flow[j] - base) + c[BIAS])
+            if c[GAIN_SLOPE] != 0.0:
+                feed *= scheduled(x, c[GAIN_SLOPE])
+            feed += c[K] * act[k]
             if c[T2] > 0.0:
                 z2, feed = eased(z2, feed, c[T2], h)
             if c[T3] > 0.0:
