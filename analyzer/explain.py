@@ -72,6 +72,27 @@ def neighbours(
     return tuple(out)
 
 
+def snapped(series: dict[str, Series], pv: str) -> dict[str, Series]:
+    """The same samples with stamps that scatter by less than half a sample put onto PV's uniform clock.
+
+    Holding values on a clock would repeat or lose a sample wherever a stamp is a little late.
+    """
+    stamp = series[pv].stamp_s
+    if stamp.size < 3:
+        return series
+    spacing = float(np.median(np.diff(stamp)))
+    index = np.concatenate(([0.0], np.cumsum(np.maximum(np.round(np.diff(stamp) / spacing), 1.0))))
+    dt, start = (float(v) for v in np.polyfit(index, stamp - stamp[0], 1))
+    out = {}
+    for tag, x in series.items():
+        at = np.round((x.stamp_s - stamp[0] - start) / dt)
+        near = bool(np.max(np.abs(x.stamp_s - stamp[0] - start - at * dt), initial=0.0) < 0.49 * dt)
+        if not near or (x.stamp_s.size > 1 and float(np.diff(at).min()) < 1.0):
+            return series
+        out[tag] = Series(stamp[0] + at * dt, x.value, x.bad, x.text)
+    return out
+
+
 def case(spec: LoopSpec, specs: tuple[LoopSpec, ...], series: dict[str, Series], config: Config) -> Case:
     """Prepare one loop.
 
@@ -80,13 +101,14 @@ def case(spec: LoopSpec, specs: tuple[LoopSpec, ...], series: dict[str, Series],
     NotAssessedError
         Where PV or OP is missing or never moves.
     """
+    raw = series[spec.pv or ""]
+    series = snapped(series, spec.pv or "")
     prepared = prepare(spec, series, config.quality)
     r = prepared.record
     if not has_op(prepared):
         raise NotAssessedError(f"{spec.loop}: needs OP, has none")
     if float(np.ptp(r.op)) == 0 or float(np.ptp(r.pv)) == 0:
         raise NotAssessedError(f"{spec.loop}: needs OP and PV that move, one of them stands still")
-    raw = series[spec.pv or ""]
     subject = mismatch.Subject(
         None if r.sp_estimated else r.sp,
         r.pv,

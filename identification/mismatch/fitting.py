@@ -22,6 +22,8 @@ BASE = (
     Param(Slot.START, "start_pct", "% PV", -300.0, 300.0),
 )
 """Constants of the plain loop, free in every rival."""
+FAR = 1e5
+"""Residuals are cut here [% PV]: a model that runs away loses, and sums stay finite."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,6 +99,10 @@ def scales(scene: Scene, c: Floats, param: Param) -> tuple[float, float]:
             return 0.0, reach / scene.dt_s
         case "opspan":
             return float(op.min()), reach
+        case "1/op":
+            return 0.0, 100.0 / reach
+        case "1/pv":
+            return 0.0, 50.0 / max(scene.pv_range[1] - scene.pv_range[0], 1e-6)
         case "pvspan":
             return scene.pv_range[0], scene.pv_range[1] - scene.pv_range[0]
         case "T":
@@ -118,7 +124,7 @@ def bounds(scene: Scene, c: Floats, param: Param) -> tuple[float, float]:
 
 def residual_fit(p: Problem, c: Floats) -> tuple[Floats, Floats, Floats, Floats]:
     """Residual, its lag means, noise model and innovations at given constants."""
-    r = p.y - simulate(p.scene, c)
+    r = np.clip(p.y - simulate(p.scene, c), -FAR, FAR)
     columns = lag_means(r, p.edges)
     ar = fitted(columns, r, p.weight)
     return r, columns, ar, r - ar @ columns
@@ -152,7 +158,7 @@ def sensitivities(p: Problem, model: Model, ar: Floats) -> Floats:
             h = -h
         c[param.slot] += h
         slope = (simulate(p.scene, c) - here) / (h / model.c[param.slot] if param.log else h)
-        out[i] = whitened(slope, ar, p.edges)
+        out[i] = whitened(np.clip(slope, -FAR, FAR), ar, p.edges)
     return out
 
 
@@ -173,6 +179,8 @@ def newton(gram: Floats, slope: Floats, damping: float) -> Floats:
     """A damped Gauss-Newton step in scaled constants."""
     scale = np.sqrt(np.diag(gram)) + 1e-12 * math.sqrt(float(np.trace(gram))) + 1e-150
     unit = gram / np.outer(scale, scale)
+    if not (np.isfinite(unit).all() and np.isfinite(slope).all()):
+        return np.zeros(scale.size)
     return np.linalg.lstsq(unit + damping * np.eye(scale.size), slope / scale, rcond=1e-11)[0] / scale
 
 

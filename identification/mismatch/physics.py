@@ -13,7 +13,7 @@ class Param:
     """A constant that a row frees.
 
     slot : its place; name, unit : as answered; low, high : bounds in its own unit, times the scale named by
-    `scale` (one of 1, T, dt, op: OP's range, pv: PV's range); log : searched by its logarithm.
+    `scale` (scales() in fitting.py); log : searched by its logarithm.
     """
 
     slot: int
@@ -57,6 +57,13 @@ def _each(slot: int, *values: float) -> tuple[Start, ...]:
 WIDTH = Param(Slot.STICKBAND, "backlash_pct", "% OP", 1e-4, 2.0, "op", True)
 BAND = Param(Slot.STICKBAND, "stickband_pct", "% OP", 1e-4, 2.0, "op", True)
 JUMP = Param(Slot.JUMP, "slip_jump_pct", "% OP", 1e-5, 2.0, "op", True)
+
+SPLIT = (
+    Param(Slot.SPLIT, "split_pct", "% OP", 0.0, 1.0, "opspan"),
+    Param(Slot.RATIO, "gain_ratio", "", -5.0, 5.0),
+    Param(Slot.SPLIT_DEAD, "dead_zone_pct", "% OP", 0.0, 0.5, "op"),
+    Param(Slot.SPLIT_LAG, "second_valve_lag_s", "s", 0.001, 3.0, "T", True),
+)
 
 VALVE = (
     Row("backlash", "valve", (WIDTH,), _each(Slot.STICKBAND, 0.01, 0.03, 0.08, 0.2, 0.5), {Slot.JUMP: 0.0}),
@@ -103,8 +110,8 @@ VALVE = (
     Row(
         "valve-characteristic",
         "valve",
-        (Param(Slot.BEND, "curve", "ln gain per 100 % OP", -20.0, 20.0),),
-        _each(Slot.BEND, -1.0, 1.0),
+        (Param(Slot.BEND, "curve", "ln gain per 100 % OP", -6.0, 6.0, "1/op"),),
+        _each(Slot.BEND, -0.3, 0.3),
         likeness=("nonlinear-gain",),
     ),
     Row(
@@ -123,17 +130,20 @@ VALVE = (
         likeness=("stiction",),
         delays=(Slot.SERVO,),
     ),
-    Row(
-        "split-range",
-        "valve",
-        (
-            Param(Slot.SPLIT, "split_pct", "% OP", 0.0, 1.0, "opspan"),
-            Param(Slot.RATIO, "gain_ratio", "", -5.0, 5.0),
-            Param(Slot.SPLIT_DEAD, "dead_zone_pct", "% OP", 0.0, 0.5, "op"),
-        ),
-        tuple(
-            {Slot.SPLIT: s, Slot.RATIO: r, Slot.SPLIT_DEAD: 0.03} for s in (0.4, 0.5, 0.6) for r in (0.7, 1.4)
-        ),
+    *(
+        Row(
+            "split-range",
+            "valve",
+            SPLIT[:count],
+            tuple(
+                {Slot.SPLIT: s, Slot.RATIO: r, Slot.SPLIT_DEAD: d, Slot.SPLIT_LAG: 0.1}
+                for s in (0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8)
+                for r in (0.5, 0.8, 1.25, 2.0)
+                for d in (0.005, 0.03)
+            ),
+            variant=variant,
+        )
+        for count, variant in ((3, ""), (4, "with a lag"))
     ),
 )
 PROCESS = (
@@ -176,16 +186,16 @@ PROCESS = (
     Row(
         "nonlinear-gain",
         "process",
-        (Param(Slot.SLOPE, "gain_slope", "per 50 % PV", -6.0, 6.0),),
-        _each(Slot.SLOPE, -0.5, 0.5),
+        (Param(Slot.SLOPE, "gain_slope", "per 50 % PV", -1.9, 1.9, "1/pv"),),
+        _each(Slot.SLOPE, -0.15, 0.15),
         likeness=("valve-characteristic",),
     ),
     *(
         Row(
             "nonlinear-gain",
             "process",
-            (Param(Slot.GAIN_SLOPE, "gain_slope", "per 50 % PV", -6.0, 6.0),),
-            _each(Slot.GAIN_SLOPE, -0.5, 0.5),
+            (Param(Slot.GAIN_SLOPE, "gain_slope", "per 50 % PV", -1.9, 1.9, "1/pv"),),
+            _each(Slot.GAIN_SLOPE, -0.15, 0.15),
             {Slot.SPEED: speed},
             variant=variant,
             likeness=("valve-characteristic",),
@@ -243,7 +253,6 @@ LOAD = (
         ),
         ({Slot.SINE: 0.0, Slot.COSINE: 0.0},),
         needs="line",
-        price=2.0,
     ),
     Row(
         "coupling",

@@ -9,7 +9,7 @@ import numpy as np
 from identification.mismatch.fitting import Fitted, Model, Problem, descend
 from identification.mismatch.noise import whitened
 from identification.mismatch.simulation import simulate
-from identification.mismatch.thresholds import HELD_OUT, HELD_OUT_LOSS, SCREEN_STEPS, SPREAD
+from identification.mismatch.thresholds import HELD_OUT, HELD_OUT_LOSS, ONE_MOVE, SCREEN_STEPS, SPREAD
 from identification.record import Floats
 
 TIMED = ("load-step", "gain-drift", "supply-variation", "load-oscillation")
@@ -39,7 +39,10 @@ def gains_by_block(p: Problem, better: Fitted, worse: Fitted) -> Floats:
 
 
 def is_spread(p: Problem, better: Fitted, worse: Fitted) -> bool:
-    """Whether a share of the gain remains without the two parts that pay most."""
+    """Whether a share of the gain remains without the two parts that pay most; no matter where OP moves in no more."""
+    travel = np.sort([float(np.abs(np.diff(part)).sum()) for part in np.array_split(p.scene.op, BLOCKS)])
+    if float(travel[-2:].sum()) > ONE_MOVE * float(travel.sum()):
+        return True
     parts = np.sort(gains_by_block(p, better, worse))
     return float(parts[:-2].sum()) > SPREAD * float(parts.sum())
 

@@ -20,6 +20,7 @@ from identification.mismatch.fitting import (
     sensitivities,
 )
 from identification.mismatch.friction import fit_sticking
+from identification.mismatch.modes import OTHERS, mode_starts
 from identification.mismatch.noise import whitened
 from identification.mismatch.physics import CATALOGUE, Row
 from identification.mismatch.simulation import Scene, simulate
@@ -237,8 +238,11 @@ def compete(
     for row in rows:
         if applies(x, near, row):
             tell(row.name)
-            models = screened(x.p, near, span, candidates(x, near, row))
-            tried.append((rival(x.p, near, models[:1], SCREEN_STEPS), models))
+            models = screened(x.p, near, span, candidates(x, near, row))[:3]
+            first = models[:1]
+            if row.name in OTHERS:
+                first += mode_starts(x.p, near, row)
+            tried.append((rival(x.p, near, first, SCREEN_STEPS), models))
     tried.sort(key=lambda t: -t[0].net)
     ended = [followed(x.p, near, first, models) for first, models in tried[:FOLLOWED]]
     ended += stuck(x, near, [first for first, _ in tried], rows, tell)

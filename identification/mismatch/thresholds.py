@@ -82,3 +82,5 @@ START_SCATTER = 1.0
 """Standard deviation [% PV] of the model's first value about the recorded one, which short time constants need."""
 STICKING_HINT = 12.0
 """Gain of a play, or of a sticking valve started coarsely, from which the fine scan for stiction is worth its time."""
+ONE_MOVE = 0.8
+"""Share of OP's travel in two parts of the record from which it is a single experiment, and spread cannot be asked."""

@@ -20,7 +20,7 @@ WEIR = 25.0
 """Outflow over the cap per % of level, in terms of the vessel's own; ours: stiff against every vessel."""
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def transported(flow: Floats, delay_s: float, pipe: float, middle: float, dt_s: float) -> Floats:
     """Mean of what leaves the pipe during each sample, shape (n,), where the flow sets the transport's speed.
 
@@ -48,7 +48,7 @@ def transported(flow: Floats, delay_s: float, pipe: float, middle: float, dt_s: 
     return out
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def outflow(x: float, head: float, slope: float, leak: float, root: float) -> tuple[float, float]:
     """Outflow at level x [% PV] and its derivative, for the plain, the rooted and the bent vessel."""
     if root != 0.0:
@@ -60,13 +60,13 @@ def outflow(x: float, head: float, slope: float, leak: float, root: float) -> tu
     return leak * x, leak
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def scheduled(x: float, slope: float) -> float:
     """Relative gain at level x [% PV]; `slope` is its change over 50 %."""
     return max(1.0 + slope * x / 50.0, 0.05)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def filled(x: float, feed: float, h: float, c: Floats, head: float, basin: float) -> tuple[float, float]:
     """Level after h seconds of constant feed, and the spill meanwhile (exponential step, exact where linear)."""
     out, rise = outflow(x, head, c[SLOPE], c[LEAK], c[ROOT])
@@ -84,14 +84,14 @@ def filled(x: float, feed: float, h: float, c: Floats, head: float, basin: float
     return x + net * grown, WEIR * over
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def eased(at: float, aim: float, lag_s: float, h: float) -> tuple[float, float]:
     """A first-order lag after h seconds, and its mean meanwhile."""
     pole = math.exp(-h / lag_s)
     return aim + (at - aim) * pole, aim + (at - aim) * (1.0 - pole) * lag_s / h
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def vessel(
     flow: Floats, act: Floats, gain: Floats, c: Floats, dt_s: float, base: float, head: float
 ) -> Floats:
@@ -130,7 +130,7 @@ def vessel(
     return out
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def plain_vessel(flow: Floats, act: Floats, c: Floats, dt_s: float, base: float) -> Floats:
     """The same, shape (n,), where nothing but K, T, L, bias and start is set: exact and several times faster."""
     n = flow.size
