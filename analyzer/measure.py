@@ -16,15 +16,13 @@ from identification.hammerstein import IDEAL, Fit, Window, block_means, prepare,
 from identification.models import Backlash, Fopdt, Loop, Pid, Stiction
 from identification.record import Floats, LoopRecord, Mask
 from identification.spectrum import Spectrum, locked_harmonic, peak_prominence, spectrum, tapered_power
-from identification.valve_fit import SCREENED, better_linear, fit_linear, fit_play, fit_stick_slip
+from identification.valve_fit import SCREENED, SHORT, better_linear, fit_linear, fit_play, fit_stick_slip
 from tuning.limit_cycle import confirm
 from tuning.linear import is_stable, loop_response
 
 ALIKE_PERIOD, ALIKE_AMPLITUDE = 1.1, 1.3
 """Largest ratios of a simulated to the recorded cycle that count as the same [-]; ours: identified loops of simulated
 tanks with play come within 1.04 and 1.12."""
-SHORT = 1000
-"""Blocks of a record that is so short that every rival can be tried on it; ours."""
 
 
 @dataclass(frozen=True, slots=True)

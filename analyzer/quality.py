@@ -80,12 +80,12 @@ class Prepared:
 
 
 def interval(stamp_s: Floats) -> float:
-    """The sample interval of raw stamps [s]: their median spacing, to three digits where stamps jitter about it."""
+    """The sample interval of raw stamps [s]: the median spacing, or the mean where it is the same but for jitter."""
     if stamp_s.size < 2:
         return math.nan
     median = float(np.median(np.diff(stamp_s)))
-    even = float(f"{median:.3g}")
-    return even if abs(even - median) < 3e-3 * median else median
+    even = float(f"{(stamp_s[-1] - stamp_s[0]) / (stamp_s.size - 1):.4g}")
+    return even if abs(even - median) < 0.005 * median else median
 
 
 def onto_clock(series: Series, clock: Floats, dt_s: float, limits: QualityLimits) -> tuple[Floats, Mask]:

@@ -37,8 +37,10 @@ JUMP_SHARES = (0.2, 0.4, 0.7, 1.0)
 """Slip jumps tried, as shares of the stickband."""
 COAST_SHARES = (0.0, 0.15)
 """Turnings of OP that a sliding stem ignores, as shares of the stickband: none, and OP's noise; ours."""
-WORK = 4500
-"""Blocks that the candidates followed in a scan may take together: short records can afford to follow more."""
+SHORT = 1000
+"""Blocks of a record that is so short that every rival can be tried on it; ours."""
+FOLLOWED_SHORT = 5
+"""Candidates of a scan that are followed to the end on a short record: with few events there are more valleys."""
 FOLLOWED = 2
 """Candidates of a scan that are followed to the end; ours: the best of the scan is among its first two."""
 
@@ -113,7 +115,7 @@ def fit_play(window: Window, linear: Fit, period_s: float) -> Fit:
         Scale of the search [s].
     """
     reach = max(window.op_range, 1e-9)
-    more = max(WORK // window.y.size, 1)
+    more = FOLLOWED_SHORT if window.y.size < SHORT else 1
     best = _scan(window, linear, [sticking(share * reach, 0.0) for share in SCREEN_SHARES], period_s, more)
     if best.log_likelihood - linear.log_likelihood < SCREENED:
         return best
@@ -152,5 +154,6 @@ def fit_stick_slip(window: Window, play: Fit, period_s: float) -> Fit:
         for jump, grown in ((0.15, 1.0), (0.4, 1.1), (0.8, 1.1))
         for coast in (0.0, 0.15 * play.valve.stickband)
     ]
-    whole = _scan(window, play, valves, period_s, max(FOLLOWED, WORK // window.y.size))
+    followed = FOLLOWED_SHORT if window.y.size < SHORT else FOLLOWED
+    whole = _scan(window, play, valves, period_s, followed)
     return max([*near_play, whole], key=lambda fit: fit.log_likelihood)
