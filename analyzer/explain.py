@@ -128,7 +128,7 @@ def explained(
     c: Case, tell: Callable[[str], None], brought: Mapping[str, Any] | None = None
 ) -> tuple[dict[str, Any], dict[str, Any]]:
     """The answer (the contract of `triage explain`) and the model to save; `brought` is the user's own model."""
-    start = None if brought is None else constants(brought)
+    start = None if brought is None else constants(dict(brought))
     found = mismatch.explain(c.subject, tell, start)
     said = answer(found, c.subject)
     data = as_data(c, said)

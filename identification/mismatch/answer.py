@@ -177,7 +177,7 @@ def answer(found: Explanation, s: Subject) -> Answer:
     proof = held_out(found.p, found.plain, found.best) if found.accepted else None
     effects = effects_of(found, s, proof)
     verdict, block = (effects[0].name, effects[0].block) if effects else ("none", "none")
-    if found.left > 0 and not effects:
+    if found.left > 0 and not any(found_first(found)):
         verdict, block = "unexplained", "process"
     return Answer(
         verdict,
@@ -189,6 +189,11 @@ def answer(found: Explanation, s: Subject) -> Answer:
         remaining(found),
         _note(found),
     )
+
+
+def found_first(found: Explanation) -> tuple[bool, bool]:
+    """Whether recorder and controller have an answer of their own, which nothing left over takes away."""
+    return found.trace is not None, found.ruling is not None
 
 
 def _note(found: Explanation) -> str:

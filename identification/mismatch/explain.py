@@ -7,14 +7,17 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from identification.mismatch import recorder
-from identification.mismatch.control import Law, Ruling, Stated, judge, shifted
-from identification.mismatch.fitting import Fitted, Model, Problem, descend
-from identification.mismatch.physics import CATALOGUE
+from identification.mismatch.catalogue import CATALOGUE
+from identification.mismatch.ceiling import ceiling
+from identification.mismatch.control import Ruling, Stated, judge
+from identification.mismatch.fitting import Fitted, Model, Problem, descend, gain
+from identification.mismatch.law import Law, shifted
 from identification.mismatch.proof import passes
-from identification.mismatch.rivals import Progress, Rival, compete, excited, prepared, silent
+from identification.mismatch.rivals import Progress, Rival, compete, prepared, silent
 from identification.mismatch.simulation import Scene
 from identification.mismatch.slots import Slot
-from identification.mismatch.thresholds import FULL_STEPS, PROVEN, ROUNDS, TIE
+from identification.mismatch.starting import excited
+from identification.mismatch.thresholds import CEILING_PRICE, CEILING_SHARE, FULL_STEPS, PROVEN, ROUNDS, TIE
 from identification.record import Floats, Mask
 
 
@@ -150,7 +153,11 @@ def physics(found: Explanation, tell: Progress, kind: str = "") -> Explanation:
         accepted.append(winner)
         before.append(best)
         p, best = x.p, descend(x.p, winner.fit.model, FULL_STEPS)
-    return replace(found, p=p, best=best, accepted=tuple(accepted), before=tuple(before), first=first)
+    won, weights = ceiling(p, best)
+    least = max(CEILING_PRICE, CEILING_SHARE * gain(best, found.plain))
+    left = won - weights - least
+    found = replace(found, p=p, best=best, accepted=tuple(accepted), before=tuple(before), first=first)
+    return replace(found, left=left if left > 0 else 0.0)
 
 
 def proven(p: Problem, near: Fitted, rivals: list[Rival]) -> Rival | None:

@@ -11,19 +11,21 @@ from identification.mismatch.noise import Edges, edges_for, fitted, judged, lag_
 from identification.mismatch.physics import Param, Row
 from identification.mismatch.simulation import Scene, simulate
 from identification.mismatch.slots import Slot
-from identification.mismatch.thresholds import SETTLED, START_SCATTER
+from identification.mismatch.thresholds import BIAS_SCATTER, SETTLED, START_SCATTER
 from identification.record import Floats, Mask
 
 BASE = (
     Param(Slot.T, "time_constant_s", "s", 0.3, 1e9, "dt", True),
     Param(Slot.L, "dead_time_s", "s", 0.0, 0.2, "span"),
     Param(Slot.K, "gain", "% PV/% OP", -1e4, 1e4),
-    Param(Slot.BIAS, "bias_pct", "% PV", -1e5, 1e5),
+    Param(Slot.BIAS, "bias_pct", "% PV", -2e3, 2e3),
     Param(Slot.START, "start_pct", "% PV", -300.0, 300.0),
 )
 """Constants of the plain loop, free in every rival."""
-FAR = 1e5
-"""Residuals are cut here [% PV]: a model that runs away loses, and sums stay finite."""
+PRIOR = (Slot.START, Slot.BIAS)
+"""Constants that short time constants, or a load like a random walk, leave open; they are held near the recording."""
+FAR = 3e3
+"""A model whose residual reaches this [% PV] has run away and is the worst there is."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,7 +126,10 @@ def bounds(scene: Scene, c: Floats, param: Param) -> tuple[float, float]:
 
 def residual_fit(p: Problem, c: Floats) -> tuple[Floats, Floats, Floats, Floats]:
     """Residual, its lag means, noise model and innovations at given constants."""
-    r = np.clip(p.y - simulate(p.scene, c), -FAR, FAR)
+    r = p.y - simulate(p.scene, c)
+    if not float(np.abs(r).max()) < FAR:
+        groups = p.edges.size - 1
+        return r, np.zeros((groups, r.size)), np.zeros(groups), np.full(r.size, FAR)
     columns = lag_means(r, p.edges)
     ar = fitted(columns, r, p.weight)
     return r, columns, ar, r - ar @ columns
@@ -158,7 +163,7 @@ def sensitivities(p: Problem, model: Model, ar: Floats) -> Floats:
             h = -h
         c[param.slot] += h
         slope = (simulate(p.scene, c) - here) / (h / model.c[param.slot] if param.log else h)
-        out[i] = whitened(np.clip(slope, -FAR, FAR), ar, p.edges)
+        out[i] = whitened(np.clip(slope, -1e9, 1e9), ar, p.edges)
     return out
 
 
@@ -193,10 +198,12 @@ def curvature(p: Problem, model: Model, ar: Floats, columns: Floats, e: Floats) 
     inner = gram[m:, m:] + 1e-10 * np.trace(gram[m:, m:]) / (gram.shape[0] - m) * np.eye(gram.shape[0] - m)
     cross = np.linalg.lstsq(inner, np.column_stack((gram[m:, :m], slope[m:])), rcond=1e-13)[0]
     gram, slope = gram[:m, :m] - gram[:m, m:] @ cross[:, :-1], slope[:m] - gram[:m, m:] @ cross[:, -1]
-    i = [param.slot for param in model.params].index(Slot.START)
-    held = loss_of(p, e) / START_SCATTER**2
-    gram[i, i] += held
-    slope[i] += held * (p.y[0] - model.c[Slot.START])
+    for i, param in enumerate(model.params):
+        if param.slot in PRIOR:
+            aim, scatter = (p.y[0], START_SCATTER) if param.slot == Slot.START else (0.0, BIAS_SCATTER)
+            held = loss_of(p, e) / scatter**2
+            gram[i, i] += held
+            slope[i] += held * (aim - model.c[param.slot])
     return gram, slope
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -23,7 +24,7 @@ SIGNALS = {"recorder": ["PV", "OP"], "sensor": ["PV"], "controller": ["SP", "PV"
 def carrying(won: Floats) -> list[tuple[int, int]]:
     """Parts that together carry CARRIES of a gain, neighbours joined: first and last (excluded) sample of each."""
     edges = np.linspace(0, won.size, PARTS + 1).astype(int)
-    parts = np.maximum([won[a:b].sum() for a, b in zip(edges[:-1], edges[1:], strict=True)], 0.0)
+    parts = np.maximum([won[a:b].sum() for a, b in pairwise(edges)], 0.0)
     order = np.argsort(-parts)
     count = int(np.searchsorted(np.cumsum(parts[order]), CARRIES * parts.sum())) + 1
     chosen = np.zeros(PARTS, dtype=np.int8)

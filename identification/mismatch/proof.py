@@ -39,7 +39,7 @@ def gains_by_block(p: Problem, better: Fitted, worse: Fitted) -> Floats:
 
 
 def is_spread(p: Problem, better: Fitted, worse: Fitted) -> bool:
-    """Whether a share of the gain remains without the two parts that pay most; no matter where OP moves in no more."""
+    """Whether a share of the gain remains without the two parts that pay most; True where OP moves in two alone."""
     travel = np.sort([float(np.abs(np.diff(part)).sum()) for part in np.array_split(p.scene.op, BLOCKS)])
     if float(travel[-2:].sum()) > ONE_MOVE * float(travel.sum()):
         return True

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.ndimage import median_filter
 
+from identification.mismatch.catalogue import CATALOGUE
 from identification.mismatch.fitting import (
     Fitted,
     Model,
@@ -16,15 +15,13 @@ from identification.mismatch.fitting import (
     descend,
     gain,
     problem,
-    scales,
-    sensitivities,
 )
 from identification.mismatch.friction import fit_sticking
 from identification.mismatch.modes import OTHERS, mode_starts
-from identification.mismatch.noise import whitened
-from identification.mismatch.physics import CATALOGUE, Row
-from identification.mismatch.simulation import Scene, simulate
-from identification.mismatch.slots import STEPS, Slot, neutral
+from identification.mismatch.physics import Row
+from identification.mismatch.simulation import Scene
+from identification.mismatch.slots import Slot, neutral
+from identification.mismatch.starting import Excited, candidates, screened, span_of
 from identification.mismatch.thresholds import (
     FOLLOWED,
     FULL_STEPS,
@@ -40,8 +37,6 @@ from identification.record import Floats, Mask
 Progress = Callable[[str], None]
 KNOWN_TYPES = ("flow", "pressure", "temperature", "level")
 """Loop types under which a row may be left out; any other text says nothing."""
-LINE_SIDE = 25
-"""Half of the lines whose median is a line's surroundings."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,107 +80,6 @@ def calmed(p: Problem, fit: Fitted) -> Problem:
     scale = float(np.median(np.abs(fit.e[inside]))) / 0.6745
     size = np.abs(fit.e) / max(scale, 1e-12)
     return replace(p, weight=np.where(inside, np.minimum(1.0, OUTLIER / np.maximum(size, OUTLIER)), 0.0))
-
-
-def step_places(p: Problem, fit: Fitted) -> tuple[int, ...]:
-    """Samples at which a step of the load explains the innovations best, greedily, shape (STEPS,)."""
-    n = p.y.size
-    e = fit.e * (p.weight > 0)
-    one = neutral()
-    for slot in (Slot.T, Slot.K):
-        one[slot] = fit.model.c[slot]
-    pulse = np.zeros(n)
-    quiet = replace(p.scene, op=np.full(n, p.scene.middle), step_at=(0,))
-    one[int(Slot.STEP)] = 1.0
-    pulse = whitened(np.concatenate((np.zeros(200), simulate(quiet, one)))[:n], fit.ar, p.edges)[200:]
-    places: list[int] = []
-    for _ in range(STEPS):
-        places.append(_best_place(e, pulse))
-        part = pulse[: n - places[-1]]
-        tail = e[places[-1] :][: part.size]
-        part = part[: tail.size]
-        e = e.copy()
-        e[places[-1] :][: part.size] -= part * float(part @ tail) / max(float(part @ part), 1e-300)
-    return tuple(places)
-
-
-def _best_place(e: Floats, pulse: Floats) -> int:
-    n, m = e.size, pulse.size
-    size = 1 << int(math.ceil(math.log2(n + m)))
-    cross = np.fft.irfft(np.fft.rfft(e, size) * np.conj(np.fft.rfft(pulse, size)), size)[:n]
-    power = np.cumsum(pulse**2)
-    room = power[np.minimum(n - 1 - np.arange(n), m - 1)]
-    share = cross**2 / np.maximum(room, 1e-3 * power[-1])
-    share[int(0.98 * n) :] = 0.0
-    share[: int(0.01 * n)] = 0.0
-    return int(np.argmax(share))
-
-
-def line_frequency(p: Problem, fit: Fitted) -> float:
-    """Angular frequency [rad/s] of the strongest line, against its surroundings, in the innovations."""
-    e = fit.e * (p.weight > 0)
-    power = np.abs(np.fft.rfft(e, 2 * e.size)) ** 2
-    around = median_filter(power, 2 * LINE_SIDE, mode="nearest")
-    low, high = 8, power.size // 3
-    k = low + int(np.argmax(power[low:high] / np.maximum(around[low:high], 1e-30)))
-    return math.pi * k / (e.size * p.scene.dt_s)
-
-
-@dataclass(frozen=True, slots=True)
-class Excited:
-    """A problem with the places and frequencies at which a load may act, and the loop's type where known."""
-
-    p: Problem
-    omega: float
-    kind: str = ""
-
-
-def excited(p: Problem, fit: Fitted, kind: str = "") -> Excited:
-    """Steps and a line located in what a fit leaves."""
-    held = p.scene.step_at if any(r.needs == "steps" for r in fit.model.rows) else step_places(p, fit)
-    return Excited(replace(p, scene=replace(p.scene, step_at=held)), line_frequency(p, fit), kind)
-
-
-def candidates(x: Excited, near: Fitted, row: Row) -> list[Model]:
-    """Starts of a row added to a fit."""
-    out = []
-    for start in row.starts:
-        c = near.model.c.copy()
-        for slot, value in (row.fixed or {}).items():
-            c[slot] = value
-        for param in row.params:
-            offset, factor = scales(x.p.scene, near.model.c, param)
-            c[param.slot] = offset + factor * start.get(int(param.slot), 0.0)
-        stood = sum(c[slot] for slot in row.delays) + max(-c[Slot.SHARE] * c[Slot.T], 0.0)
-        if row.needs == "line":
-            c[Slot.OMEGA] = x.omega
-        if row.name == "integrator":
-            c[Slot.K] = 1.0
-            c[Slot.T] = near.model.c[Slot.T] / max(abs(near.model.c[Slot.K]), 1e-6)
-            c[Slot.BIAS] = 0.0
-        for part in (0.4, 1.0) if stood > 0 else (0.0,):
-            shorter = c.copy()
-            shorter[Slot.L] = max(c[Slot.L] - part * stood, 0.2 * c[Slot.L])
-            out.append(Model((*near.model.rows, row), shorter))
-    return out
-
-
-def span_of(p: Problem, near: Fitted) -> Floats:
-    """Orthonormal directions, shape (n, m), in which a fit's own constants move the weighted innovations."""
-    moves = sensitivities(p, near.model, near.ar) * np.sqrt(p.weight)
-    return np.linalg.qr(moves.T)[0]
-
-
-def screened(p: Problem, near: Fitted, span: Floats, models: list[Model]) -> list[Model]:
-    """Starts ordered by the innovations that they leave once the fit's own constants have followed, linearly."""
-    if len(models) == 1:
-        return models
-    root = np.sqrt(p.weight)
-    left = []
-    for i, model in enumerate(models):
-        e = whitened(p.y - simulate(p.scene, model.c), near.ar, p.edges) * root
-        left.append((float(e @ e) - float(((e @ span) ** 2).sum()), i))
-    return [models[i] for _, i in sorted(left)]
 
 
 def applies(x: Excited, near: Fitted, row: Row) -> bool:
@@ -238,8 +132,11 @@ def compete(
     for row in rows:
         if applies(x, near, row):
             tell(row.name)
-            models = screened(x.p, near, span, candidates(x, near, row))[:3]
-            first = models[:1]
+            models = candidates(x, near, row)
+            first = models
+            if row.needs != "line":
+                models = screened(x.p, near, span, models)[:3]
+                first = models[:1]
             if row.name in OTHERS:
                 first += mode_starts(x.p, near, row)
             tried.append((rival(x.p, near, first, SCREEN_STEPS), models))

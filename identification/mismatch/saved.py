@@ -61,7 +61,7 @@ def constants(data: dict[str, Any]) -> Floats:
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise InputError(
             f"a model without {error}", "a file that `triage explain --save-model` wrote", "save it anew"
-        )
+        ) from error
     if not (c[Slot.T] > 0 and c[Slot.L] >= 0 and np.isfinite([c[Slot.T], c[Slot.L], c[Slot.K]]).all()):
         raise InputError(
             f"time constant {c[Slot.T]:g} s, dead time {c[Slot.L]:g} s, gain {c[Slot.K]:g}",

@@ -32,7 +32,8 @@ class Scene:
     """What is recorded and not fitted.
 
     op : shape (n,) [% OP]; dt_s [s]; middle : OP that counts as zero [% OP]; level : PV that counts as zero
-    [% PV]; pv_range : lowest and highest PV; step_at : samples at which the load may step; neighbour : another loop's OP less its mean, shape (n,).
+    [% PV]; pv_range : lowest and highest PV; step_at : samples at which the load may step; neighbour : another
+    loop's OP less its mean, shape (n,).
     """
 
     op: Floats
@@ -84,10 +85,7 @@ def simulate(scene: Scene, c: Floats) -> Floats:
     through = flow(scene.op, c, dt, scene.middle)
     act = load(scene, c)
     rich = any(c[s] != 0 for s in RICH) or c[Slot.LEAK] != 1 or math.isfinite(c[Slot.CAP])
-    if not rich:
-        out = plain_vessel(through, act, c, dt, scene.middle)
-    else:
-        out = _rich(scene, c, through, act)
+    out = _rich(scene, c, through, act) if rich else plain_vessel(through, act, c, dt, scene.middle)
     if math.isfinite(c[Slot.CLIP_HI]) or math.isfinite(c[Slot.CLIP_LO]):
         out = np.clip(out, c[Slot.CLIP_LO] - scene.level, c[Slot.CLIP_HI] - scene.level)
     return np.nan_to_num(out, nan=1e6, posinf=1e6, neginf=-1e6)

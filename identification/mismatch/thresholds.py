@@ -75,12 +75,16 @@ HELD_OUT_LOSS = -2.0
 """Gain on the held-out part under which an effect falls; ours: chance moves it by about one."""
 PROVEN = 3
 """Rivals that are put to the proof, best first, until one passes."""
-CEILING_PRICE = 55.0
-"""Gain that the flexible model needs over the last fit before something is said to be left; ours: by cases with
-nothing hidden."""
+CEILING_PRICE = 32.0
+"""Gain beyond its number of weights that the flexible model needs over the last fit before something is said to be
+left; ours: with nothing hidden it stays under 10, chance has a standard deviation of 9."""
+CEILING_SHARE = 0.3
+"""The same in terms of what the named effects gain: a name stands if little is left beside it."""
 START_SCATTER = 1.0
 """Standard deviation [% PV] of the model's first value about the recorded one, which short time constants need."""
 STICKING_HINT = 12.0
-"""Gain of a play, or of a sticking valve started coarsely, from which the fine scan for stiction is worth its time."""
+"""Gain of a play, or of a sticking valve started coarsely, from which stiction is scanned finely."""
 ONE_MOVE = 0.8
-"""Share of OP's travel in two parts of the record from which it is a single experiment, and spread cannot be asked."""
+"""Share of OP's travel in two parts of the record from which it is one experiment without spread."""
+BIAS_SCATTER = 20.0
+"""Standard deviation [% PV] of the model's bias about the record's mean."""
