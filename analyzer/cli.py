@@ -4,83 +4,15 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Callable, Sequence
 from copy import copy
 from datetime import UTC, datetime
-from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
-from analyzer.report_cli import COMMANDS
-from identification.errors import TriageError
-
-if TYPE_CHECKING:
-    from analyzer.history.export import Export
-    from analyzer.history.loops_csv import LoopSpec
-
-NOTHING_DONE = 2
-SOME_LOST = 1
-
-
-def told(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Errors that are ours, or the system's, as one line on stderr and exit status 2."""
-
-    @wraps(command)
-    def wrapped(*args: Any, **kwargs: Any) -> Any:
-        try:
-            return command(*args, **kwargs)
-        except TriageError as error:
-            click.echo(f"triage: {error}", err=True)
-        except BrokenPipeError:
-            sys.stderr.close()
-        except OSError as error:
-            click.echo(
-                f"triage: {error.filename or ''}: {error.strerror}; check path and permissions", err=True
-            )
-        sys.exit(NOTHING_DONE)
-
-    return wrapped
-
-
-def export_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """EXPORT..., --loops and how to read text exports."""
-    options = [
-        click.argument("export", nargs=-1, required=True, type=click.Path(path_type=Path)),
-        click.option(
-            "--loops", type=click.Path(path_type=Path), help="loops.csv; without it loops are found by tags."
-        ),
-        click.option(
-            "--timezone", help="Time zone of stamps without one, e.g. Europe/Helsinki. Default UTC."
-        ),
-        click.option("--delimiter", help="Delimiter of text exports. Default: detected."),
-        click.option("--decimal", type=click.Choice([".", ","]), help="Decimal mark. Default: detected."),
-        click.option("--encoding", help="Encoding of text exports. Default: detected."),
-        click.option("--day-first/--month-first", default=None, help="Order in dates such as 03/04/2026."),
-        click.option("--date-format", help="Format of the stamps, e.g. '%d-%b-%y %H:%M:%S'."),
-        click.option(
-            "--good-quality", multiple=True, help="Quality code or text that means good; may be repeated."
-        ),
-    ]
-    for option in reversed(options):
-        command = option(command)
-    return command
-
-
-def opened(
-    export: Sequence[Path], loops: Path | None, **reading: Any
-) -> tuple[Export, tuple[LoopSpec, ...], tuple[str, ...]]:
-    """The export, its loops with their tags, and what there is to say about them."""
-    from analyzer.history.export import ReadOptions, open_export
-    from analyzer.tags import find_loops, match, read_loops
-
-    reading["good_quality"] = tuple(reading.get("good_quality") or ()) or None
-    source = open_export(list(export), ReadOptions(**reading))
-    if loops is None:
-        return source, find_loops(source.tags), ()
-    specs, notes = match(read_loops(loops), source.tags)
-    return source, specs, notes
+from analyzer import explain_cli, report_cli
+from analyzer.options import NOTHING_DONE, SOME_LOST, export_options, opened, told
 
 
 def _seconds(at: datetime | None, otherwise: float) -> float:
@@ -233,8 +165,10 @@ def registered(command: click.Command) -> click.Command:
     return own
 
 
-for page_command in COMMANDS:
+for page_command in report_cli.COMMANDS:
     main.add_command(registered(page_command))
+for model_command in explain_cli.main.commands.values():
+    main.add_command(model_command)
 
 
 if __name__ == "__main__":

@@ -13,7 +13,7 @@ from typing import Any
 
 import click
 
-from analyzer.cli import NOTHING_DONE, export_options, opened, told
+from analyzer.options import NOTHING_DONE, export_options, opened, told
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
