@@ -122,7 +122,7 @@ def write_trends(out: Path, stamps: Any, pv: Any, op: Any) -> None:
     """Write columns timestamp, PV and OP."""
     import pandas as pd
 
-    stamp = pd.to_datetime((stamps * 1e9).round().astype("int64"))
+    stamp = pd.to_datetime((stamps * 1e6).round().astype("int64"), unit="us")
     pd.DataFrame({"timestamp": stamp, "PV": pv, "OP": op}).to_parquet(out, index=False)
 
 

@@ -1,0 +1,70 @@
+"""Clock and controller judged from SP, PV and OP."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from mismatch_scenes import N, subject
+
+from identification.mismatch.control import Stated, judge
+
+GOOD = np.ones(N, dtype=bool)
+
+
+def law(e: np.ndarray, kp: float, ti: float, gap: float = 0.0) -> np.ndarray:
+    """OP, shape (n,), of a plain PI that stands still while |e| < gap."""
+    out, u, last = np.empty_like(e), 50.0, 0.0
+    for k, now in enumerate(e):
+        if abs(now) >= gap:
+            u += kp * (now - last) + kp * now / ti
+            last = now
+        out[k] = u
+    return np.round(out, 2)
+
+
+def test_true_settings_are_not_blamed() -> None:
+    """A controller that does what is stated is not named."""
+    s = subject(1)
+    assert s.stated is not None
+    assert judge(s.sp, s.pv, s.op, GOOD, s.stated)[0] is None
+
+
+@pytest.mark.parametrize(("kp", "ti"), [(2.1, 20.0), (1.8, 23.0)])
+def test_wrong_settings_are_found(kp: float, ti: float) -> None:
+    """Settings stated 15 % wrong are named and the true ones given within 3 %."""
+    s = subject(2)
+    found, _ = judge(s.sp, s.pv, s.op, GOOD, Stated(kp, ti))
+    assert found is not None
+    assert found.name == "controller-settings"
+    assert found.values["kp"] == pytest.approx(1.8, rel=0.03)
+    assert found.values["ti_samples"] == pytest.approx(20.0, rel=0.03)
+
+
+def test_late_clock_is_found() -> None:
+    """PV stamped three samples late is named with its shift."""
+    s = subject(3)
+    late = np.concatenate((np.full(3, s.pv[0]), s.pv[:-3]))
+    found, _ = judge(s.sp, late, s.op, GOOD, Stated(1.8, 20.0))
+    assert found is not None
+    assert (found.name, found.values["late_samples"]) == ("clock-offset", 3.0)
+
+
+def test_gap_is_found() -> None:
+    """An OP that stands while the error is under 0.4 % is a gap of that size."""
+    s = subject(4)
+    op = law(s.sp - s.pv, 1.8, 20.0, 0.4)
+    found, _ = judge(s.sp, s.pv, op, GOOD, Stated(1.8, 20.0))
+    assert found is not None
+    assert found.name == "controller-gap"
+    assert found.values["gap_pct"] == pytest.approx(0.4, rel=0.3)
+
+
+def test_held_output_is_logic() -> None:
+    """OP held for a twentieth of the record whatever the error is logic, not a gap."""
+    s = subject(5)
+    op = s.op.copy()
+    for first in (700, 2200, 3900):
+        op[first : first + 90] = op[first]
+    found, _ = judge(s.sp, s.pv, op, GOOD, Stated(1.8, 20.0))
+    assert found is not None
+    assert found.name == "controller-logic"
