@@ -13,7 +13,7 @@ from identification.mismatch.control import Ruling, Stated, judge
 from identification.mismatch.fitting import Fitted, Model, Problem, descend, gain
 from identification.mismatch.law import Law, shifted
 from identification.mismatch.proof import passes
-from identification.mismatch.rivals import Progress, Rival, compete, prepared, silent
+from identification.mismatch.rivals import Clip, Progress, Rival, compete, prepared, silent
 from identification.mismatch.simulation import Scene
 from identification.mismatch.slots import Slot
 from identification.mismatch.starting import excited
@@ -103,6 +103,13 @@ def without_spikes(pv: Floats, usable: Mask) -> Mask:
     return usable & ~alone
 
 
+def trace_clip(trace: recorder.Trace | None, pv: Floats) -> Clip | None:
+    """Where a transmitter's range ends, if it does."""
+    if trace is None or trace.name != "sensor-clipping":
+        return None
+    return Clip(trace.value, trace.value > float(np.median(pv)), trace.where)
+
+
 def explain(s: Subject, tell: Progress = silent, brought: Floats | None = None) -> Explanation:
     """Explain where a plain loop and a recording differ.
 
@@ -123,14 +130,12 @@ def explain(s: Subject, tell: Progress = silent, brought: Floats | None = None) 
     usable = without_spikes(s.pv, s.usable)
     late_s = 0.0
     pv = s.pv
-    if trace is not None and trace.name == "sensor-clipping":
-        usable = usable & ~trace.where
     if ruling is not None and ruling.name == "clock-offset":
         late_s = ruling.values["late_samples"] * s.dt_s
         pv = shifted(pv, ruling.values["late_samples"])
     scene = scene_of(replace(s, pv=pv))
     tell("plain loop")
-    p, plain = prepared(scene, pv - scene.level, usable, brought)
+    p, plain = prepared(scene, pv - scene.level, usable, brought, trace_clip(trace, pv))
     found = Explanation(p, plain, plain, trace=trace, ruling=ruling, law=law, late_s=late_s)
     if any(x is not None and x.name in ALONE for x in (trace, ruling)):
         return found

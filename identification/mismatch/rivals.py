@@ -62,11 +62,27 @@ def silent(_: str) -> None:
     """Progress that nobody watches."""
 
 
-def plain(p: Problem, brought: Floats | None = None) -> Fitted:
+@dataclass(frozen=True, slots=True)
+class Clip:
+    """A transmitter's end: its value [% PV], whether it is the upper one, and where PV stands at it, shape (n,)."""
+
+    value: float
+    upper: bool
+    where: Mask
+
+
+def censored(p: Problem, clip: Clip) -> Problem:
+    """The problem without the samples at a clip; those after them still count, and the model is clipped too."""
+    return replace(p, weight=np.where(clip.where, 0.0, p.weight))
+
+
+def plain(p: Problem, brought: Floats | None = None, clip: Clip | None = None) -> Fitted:
     """The plain loop at its optimum; a brought model (its constants) is one more start."""
     fits = [] if brought is None else [descend(p, Model((), brought.copy()), FULL_STEPS)]
     for process in plain_processes(p.y, p.scene.op, p.usable, p.scene.dt_s):
         c = neutral()
+        if clip is not None:
+            c[Slot.CLIP_HI if clip.upper else Slot.CLIP_LO] = clip.value
         c[Slot.T], c[Slot.L], c[Slot.K] = process.time_constant_s, process.dead_time_s, process.gain
         c[Slot.START] = p.y[0]
         c[Slot.BIAS] = float(np.mean(p.y)) - process.gain * float(np.mean(p.scene.op) - p.scene.middle)
@@ -146,10 +162,14 @@ def compete(
     return sorted([*ended, *(first for first, _ in tried[FOLLOWED:])], key=lambda r: -r.net)
 
 
-def prepared(scene: Scene, y: Floats, usable: Mask, brought: Floats | None = None) -> tuple[Problem, Fitted]:
+def prepared(
+    scene: Scene, y: Floats, usable: Mask, brought: Floats | None = None, clip: Clip | None = None
+) -> tuple[Problem, Fitted]:
     """A problem with its outliers calmed, and its plain fit."""
     p = problem(scene, y, usable)
-    first = plain(p, brought)
+    if clip is not None:
+        p = censored(p, clip)
+    first = plain(p, brought, clip)
     calm = calmed(p, first)
     return calm, descend(calm, first.model, FULL_STEPS)
 
