@@ -14,6 +14,8 @@ from analyzer.explain_cli import main
 from identification.models import Backlash, Fopdt, Loop, Pid
 from identification.simulate import closed_loop
 
+pytestmark = pytest.mark.slow
+
 RIGS = Path(__file__).parents[2].parent / "shared" / "recordings" / "rigs"
 KEYS = {"loop", "verdict", "block", "effects", "where", "fit", "moved", "remaining", "reason"}
 N = 4000

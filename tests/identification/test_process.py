@@ -13,6 +13,8 @@ from identification.process import plain_processes
 from identification.record import LoopRecord
 from identification.simulate import closed_loop
 
+pytestmark = pytest.mark.slow
+
 N = 5000
 
 

@@ -8,6 +8,8 @@ from mismatch_scenes import N, subject
 
 from identification.mismatch.control import Stated, judge
 
+pytestmark = pytest.mark.slow
+
 GOOD = np.ones(N, dtype=bool)
 
 

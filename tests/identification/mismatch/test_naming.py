@@ -11,6 +11,8 @@ from mismatch_scenes import PLAY, STICKING, N, subject
 from identification.mismatch.answer import answer
 from identification.mismatch.explain import explain
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_plain_loop_is_none(seed: int) -> None:

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from mismatch_scenes import subject
 
 from identification.mismatch import recorder
+
+pytestmark = pytest.mark.slow
 
 PV = subject(1).pv
 TICKS = np.arange(PV.size, dtype=float)

@@ -13,6 +13,8 @@ from identification.mismatch.saved import carried, carried_closed, constants, to
 from identification.mismatch.simulation import Scene, simulate
 from identification.mismatch.slots import Slot, neutral
 
+pytestmark = pytest.mark.slow
+
 
 def model() -> tuple[Scene, np.ndarray]:
     """A plain loop with play, and OP that moves."""

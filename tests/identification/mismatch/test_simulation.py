@@ -13,6 +13,8 @@ from identification.models import Backlash, Fopdt
 from identification.simulate import open_loop
 from identification.valve import play
 
+pytestmark = pytest.mark.slow
+
 
 def scene(seed: int = 1, n: int = 600) -> Scene:
     """OP that moves every thirty samples."""
