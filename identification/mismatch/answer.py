@@ -10,11 +10,11 @@ import numpy as np
 
 from identification.mismatch.explain import Explanation, Subject, alternatives, restored
 from identification.mismatch.fitting import Fitted, deviations
-from identification.mismatch.locate import where_of
 from identification.mismatch.physics import Row
 from identification.mismatch.proof import HeldOut, Misfit, held_out, misfit
 from identification.mismatch.simulation import simulate
 from identification.mismatch.thresholds import Z90
+from identification.mismatch.where import located_in, where_of
 from identification.models import Estimate
 
 BLOCKS = {
@@ -183,7 +183,7 @@ def answer(found: Explanation, s: Subject) -> Answer:
         verdict,
         block,
         effects,
-        where_of(found, s, block),
+        where_of(found, s, block, located_in(found.p, found.best if found.left > 0 else found.plain, s)),
         fit_of(found, proof),
         moved(found),
         remaining(found),

@@ -1,0 +1,160 @@
+"""A misfit is located where it was put, beside features that go with it, and nowhere on white noise."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from identification.mismatch.features import at_limits, hats, least_turn, turns
+from identification.mismatch.locate import Located, block_products, directions, located, part_of_range
+
+N = 4000
+MEMORY = 25
+
+
+def trends(seed: int, n: int = N) -> tuple[np.ndarray, np.ndarray]:
+    """OP that wanders about 50 %, and PV that follows it with a lag and noise of its own."""
+    rng = np.random.default_rng(seed)
+    op = 50 + lfilter([1.0], [1.0, -0.99], rng.normal(0, 1, n))
+    return 1.2 * lfilter([0.05], [1.0, -0.95], op) + rng.normal(0, 0.5, n), op
+
+
+def at(e: np.ndarray, pv: np.ndarray, op: np.ndarray) -> Located:
+    """Located with no dead time."""
+    return located(e, pv, op, np.ones(e.size, dtype=bool), 1.0, 0, MEMORY)
+
+
+def names(found: Located) -> list[str]:
+    """Names of what carries the misfit."""
+    return [f.name for f in found.carrying]
+
+
+def test_white_noise_is_located_nowhere() -> None:
+    """Of 120 draws of white noise on a wandering loop at least 95 % are tied to no feature."""
+    pv, op = trends(1)
+    called = sum(bool(at(np.random.default_rng(s).normal(0, 1, N), pv, op).carrying) for s in range(120))
+    assert called <= 6
+
+
+def test_residual_above_an_op_is_located_there() -> None:
+    """A residual that grows where OP was above 60 % is laid to OP above 57 to 63 %, and not to PV."""
+    pv, op = trends(2)
+    e = np.random.default_rng(3).normal(0, 1, N) * np.where(np.roll(op, 2) > 60, 2.0, 1.0)
+    found = at(e, pv, op)
+    assert found.features[0].name == "op_level"
+    assert "pv_level" not in names(found)
+    low = found.features[0].low
+    assert low is not None
+    assert 57 < low < 63
+
+
+def test_residual_by_pv_is_laid_to_pv_beside_op() -> None:
+    """A residual that lives above a PV is laid to PV although OP goes with it."""
+    pv, op = trends(4)
+    e = np.random.default_rng(5).normal(0, 1, N) * np.where(np.roll(pv, 2) > np.quantile(pv, 0.8), 2.0, 1.0)
+    assert at(e, pv, op).features[0].name == "pv_level"
+
+
+def test_residual_of_one_sign_per_direction_is_laid_to_direction() -> None:
+    """A bias that turns its sign with OP's direction is laid to the direction, by sign and not by power."""
+    pv, op = trends(6)
+    way = np.roll(turns(op, least_turn(op))[0], 2)
+    first = at(np.random.default_rng(7).normal(0, 1, N) + 0.4 * way, pv, op).features[0]
+    assert (first.name, first.of) == ("op_direction", "sign")
+
+
+def test_residual_after_reversals_is_laid_to_them() -> None:
+    """A bias against OP's direction within ten samples after it turned is laid to the time since the turn."""
+    pv, op = trends(8)
+    way, since = (np.roll(x, 2) for x in turns(op, least_turn(op)))
+    e = np.random.default_rng(9).normal(0, 1, N) - 0.8 * way * (since < 10)
+    first = at(e, pv, op).features[0]
+    assert first.name == "after_reversals"
+    assert first.low is not None
+    assert first.low < 10
+
+
+def test_late_residual_is_laid_to_time() -> None:
+    """A residual that grows in the last fifth of the record is laid to time."""
+    pv, op = trends(10)
+    e = np.random.default_rng(11).normal(0, 1, N) * np.where(np.arange(N) > 0.8 * N, 1.8, 1.0)
+    assert at(e, pv, op).features[0].name == "time_in_record"
+
+
+def test_scale_and_masked_samples_change_nothing() -> None:
+    """Residuals a thousand times as large, or wild where they are not judged, are located alike."""
+    pv, op = trends(12)
+    e = np.random.default_rng(13).normal(0, 1, N) * np.where(np.roll(op, 2) > 55, 1.6, 1.0)
+    judged = np.ones(N, dtype=bool)
+    judged[500:600] = False
+    wild = np.where(judged, 1000 * e, 1e9)
+    one, two = (located(x, pv, op, judged, 1.0, 0, MEMORY) for x in (e, wild))
+    assert [(f.name, f.p) for f in one.features] == [(f.name, f.p) for f in two.features]
+
+
+def test_short_record_is_not_located() -> None:
+    """A record of under ten memories is located by nothing, and says so by having no features."""
+    pv, op = trends(14, 200)
+    assert at(np.random.default_rng(15).normal(0, 1, 200), pv, op).features == ()
+
+
+def test_day_of_seconds_takes_under_a_second() -> None:
+    """20,000 samples are located within a second."""
+    pv, op = trends(16, 20000)
+    e = np.random.default_rng(17).normal(0, 1, 20000)
+    at(e[:N], pv[:N], op[:N])
+    start = time.process_time()
+    at(e, pv, op)
+    assert time.process_time() - start < 1.0
+
+
+def test_turns_are_those_of_a_triangle() -> None:
+    """OP up 4, down 4 and up again turns where it has come back far enough, and ripples turn nothing."""
+    op = np.array([0, 1, 2, 3, 4, 3, 2, 1, 0, 1, 2, 1.8, 2, 3.0])
+    way, since = turns(op, 0.5)
+    np.testing.assert_array_equal(way, [0, 1, 1, 1, 1, -1, -1, -1, -1, 1, 1, 1, 1, 1])
+    np.testing.assert_array_equal(since[4:10], [3, 0, 1, 2, 3, 0])
+
+
+def test_turns_know_no_future() -> None:
+    """What OP does after a sample changes neither its direction nor its time since the turn."""
+    _, op = trends(18)
+    whole, part = turns(op, 1.0), turns(op[:1000], 1.0)
+    np.testing.assert_array_equal(whole[0][:1000], part[0])
+    np.testing.assert_array_equal(whole[1][:1000], part[1])
+
+
+def test_block_products_agree_with_a_slow_twin() -> None:
+    """Products of reordered blocks are those of arrays that were reordered."""
+    rng = np.random.default_rng(19)
+    x, y, order = rng.normal(0, 1, (60, 3)), rng.normal(0, 1, (60, 2)), rng.permutation(6)
+    moved = np.concatenate([y.reshape(6, 10, 2)[i] for i in order])
+    fast = block_products(x, y, 6)[np.arange(6), order].sum(axis=0)
+    np.testing.assert_allclose(fast, x.T @ moved, atol=1e-12)
+
+
+def test_directions_leave_out_what_others_hold() -> None:
+    """What a group adds is orthogonal to all other groups; a copy of another group adds nothing."""
+    rng = np.random.default_rng(20)
+    a, b = rng.normal(0, 1, (500, 2)), rng.normal(0, 1, (500, 1))
+    own, twin, free = directions([a, a.copy(), b + a[:, :1]])
+    assert own.shape[1] == twin.shape[1] == 0
+    np.testing.assert_allclose(free.T @ (a - a.mean(axis=0)), 0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("height", "run"), [([0, 0, 5, 6, 0, 4], (2, 3)), ([1, 1, 1, 1], None), ([1, 9], None)]
+)
+def test_part_of_range_is_the_longest_high_run(height: list[float], run: tuple[int, int] | None) -> None:
+    """The part of a range named is the run that stands out; a level profile has none."""
+    assert part_of_range(np.array(height, dtype=float)) == run
+
+
+def test_limits_and_hats() -> None:
+    """OP at 100 % or standing at its own end is at a limit; a signal that stands still has no pieces."""
+    op = np.array([50.0, 100, 100, 60, 70, 40, 40, 40, 55])
+    np.testing.assert_array_equal(at_limits(op), [0, 1, 1, 0, 0, 1, 1, 1, 0])
+    assert hats(np.full(50, 3.0)).shape == (50, 0)
