@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from reports.pages import IntervalChart, Plot, Trend
+from reports.pages import IntervalChart, Panels, Plot, Trend
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -21,8 +21,17 @@ COLOURS = {
     "sp": "#8a949a",
     "pv": "#0b5c8a",
     "op": "#a0521d",
+    "recorded": "#2a3238",
+    "baseline": "#d97706",
+    "model": "#1f6fb4",
+    "brought": "#8e44ad",
+    "edge": "#7fa9cd",
 }
 """As the style sheet's in light."""
+DASHES = {"baseline": "--", "edge": ":"}
+"""Lines that are not solid."""
+ACROSS = 3
+"""Small plots side by side."""
 RIM = 150.0
 """Changes are drawn to this [%]; the text beside says more."""
 
@@ -40,11 +49,15 @@ def _figure(width: float, height: float, rows: int = 1, **more: Any) -> tuple[Fi
     FigureCanvasAgg(figure)
     axes = figure.subplots(rows, 1, squeeze=False, **more)
     for ax in axes[:, 0]:
-        ax.spines[["top", "right"]].set_visible(False)
-        ax.grid(color="#dde1e2", linewidth=0.6)
-        ax.set_axisbelow(True)
-        ax.tick_params(labelsize=8, colors="#5d6970")
+        _styled(ax)
     return figure, list(axes[:, 0])
+
+
+def _styled(ax: Axes) -> None:
+    ax.spines[["top", "right"]].set_visible(False)
+    ax.grid(color="#dde1e2", linewidth=0.6)
+    ax.set_axisbelow(True)
+    ax.tick_params(labelsize=8, colors="#5d6970")
 
 
 def _png(figure: Figure) -> bytes:
@@ -58,17 +71,20 @@ def _day(time_s: float) -> float:
     return time_s / 86400.0
 
 
-def draw(block: Trend | Plot | IntervalChart) -> bytes:
+def draw(block: Trend | Plot | Panels | IntervalChart) -> bytes:
     """A picture as PNG."""
     if isinstance(block, Trend):
         return trend(block)
+    if isinstance(block, Panels):
+        return panels(block)
     return plot(block) if isinstance(block, Plot) else intervals(block)
 
 
 def trend(t: Trend) -> bytes:
-    """Two panels over one time axis, each signal as the band between least and greatest."""
-    figure, axes = _figure(9.5, 4.4, 2, sharex=True, height_ratios=(3, 2))
-    stamps = t.time_s.astype("datetime64[s]")
+    """Panels over one time axis, each signal as the band between least and greatest."""
+    rows = len(t.panels)
+    figure, axes = _figure(9.5, 1.2 + 1.6 * rows, rows, sharex=True, height_ratios=(3, *[2] * (rows - 1)))
+    stamps = (1000.0 * t.time_s).astype("datetime64[ms]")
     for band in t.bands:
         ax, colour = axes[band.panel], COLOURS[band.kind]
         low, high = np.where(t.gap, np.nan, band.low), np.where(t.gap, np.nan, band.high)
@@ -76,6 +92,8 @@ def trend(t: Trend) -> bytes:
     for ax, label in zip(axes, t.panels, strict=True):
         ax.set_ylabel(plain(label), fontsize=8)
         ax.legend(loc="upper right", fontsize=8, frameon=False, ncols=3)
+        for first, last in t.spans:
+            ax.axvspan(_day(first), _day(last), color=COLOURS["worse"], alpha=0.12, linewidth=0)
         for mark in t.marks:
             ax.axvline(_day(mark.x), color=COLOURS["worse"], linestyle="--", linewidth=1)
     for mark in t.marks:
@@ -92,9 +110,43 @@ def trend(t: Trend) -> bytes:
 def plot(p: Plot) -> bytes:
     """Lines or points over two axes."""
     figure, (ax,) = _figure(5.4, 3.3)
+    _onto(ax, p)
+    if len({line.label for line in p.lines}) > 1:
+        ax.legend(fontsize=7, frameon=False)
+    ax.set_title(plain(p.title), fontsize=10, loc="left", pad=14)
+    return _png(figure)
+
+
+def panels(block: Panels) -> bytes:
+    """Small plots three in a row, with one key."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    rows = -(-len(block.plots) // ACROSS)
+    figure = Figure(figsize=(10.5, 2.7 * rows + 0.4), layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.subplots(rows, ACROSS, squeeze=False).ravel()
+    known: dict[str, Any] = {}
+    for ax, p in zip(axes, block.plots, strict=False):
+        _styled(ax)
+        _onto(ax, p)
+        ax.set_title(plain(p.title), fontsize=9, loc="left")
+        known.update(dict(zip(*reversed(ax.get_legend_handles_labels()), strict=True)))
+    for ax in axes[len(block.plots) :]:
+        ax.set_axis_off()
+    figure.legend(
+        list(known.values()), list(known), loc="outside upper right", ncols=4, fontsize=8, frameon=False
+    )
+    return _png(figure)
+
+
+def _onto(ax: Axes, p: Plot) -> None:
+    """Areas, lines, marks and labels of a plot."""
+    for a in p.areas:
+        ax.fill_between(a.x, a.low, a.high, color=COLOURS[a.kind], alpha=0.2, linewidth=0)
     for line in p.lines:
         style = (
-            {"linewidth": 1.2}
+            {"linewidth": 1.2, "linestyle": DASHES.get(line.kind, "-")}
             if line.joined
             else {"linestyle": "none", "marker": ".", "markersize": 2, "alpha": 0.5}
         )
@@ -102,10 +154,12 @@ def plot(p: Plot) -> bytes:
     for mark in p.marks:
         ax.axvline(mark.x, color=COLOURS["worse"], linestyle="--", linewidth=1)
         ax.annotate(plain(mark.label), (mark.x, 1.0), xycoords=("data", "axes fraction"), fontsize=8)
+    if "x" in p.log:
+        ax.set_xscale("log")
+    if "y" in p.log:
+        ax.set_yscale("log")
     ax.set_xlabel(plain(p.x_label), fontsize=8)
     ax.set_ylabel(plain(p.y_label), fontsize=8)
-    ax.set_title(plain(p.title), fontsize=10, loc="left", pad=14)
-    return _png(figure)
 
 
 def intervals(chart: IntervalChart) -> bytes:

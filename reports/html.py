@@ -21,6 +21,8 @@ from reports.pages import Band, Bars, Cell, Floats, Page, Sparkline, Trend
 
 ASSETS = ("page.css", "uPlot.min.css", "uPlot.iife.min.js", "page.js")
 LICENCE = "uPlot.LICENSE.txt"
+FINE_S = 1e-3
+"""Step of times that are no whole seconds [s]."""
 MISSING = 65535
 """Code of a bucket that is not shown; levels run from 0 to 65534."""
 
@@ -49,13 +51,17 @@ def _band(band: Band, gap: np.ndarray) -> dict[str, object]:
 def trend_data(trend: Trend) -> Markup:
     """A trend as JSON for the page's script; '<' is written as an escape, so that no text ends the script."""
     start = float(trend.time_s[0]) if trend.time_s.size else 0.0
-    offset = np.round(trend.time_s - start).astype("<u4")
+    passed = trend.time_s - start
+    tick = 1.0 if np.abs(passed - np.round(passed)).max(initial=0.0) < FINE_S else FINE_S
+    offset = np.round(passed / tick).astype("<u4")
     data = {
         "start": start,
+        "tick": tick,
         "time": base64.b64encode(offset.tobytes()).decode(),
         "bands": [_band(b, trend.gap) for b in trend.bands],
         "panels": list(trend.panels),
         "marks": [{"x": m.x, "label": m.label} for m in trend.marks],
+        "spans": [list(s) for s in trend.spans],
     }
     return Markup(json.dumps(data).replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e"))
 
@@ -79,7 +85,12 @@ def _environment() -> Environment:
         loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
     env.filters.update(
-        picture=cell_figure, sort_key=sort_key, intervals=svg.intervals, plot=svg.plot, trend_data=trend_data
+        picture=cell_figure,
+        sort_key=sort_key,
+        intervals=svg.intervals,
+        plot=svg.plot,
+        keys=svg.keys,
+        trend_data=trend_data,
     )
     env.filters["block"] = lambda block: type(block).__name__
     return env

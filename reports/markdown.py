@@ -13,6 +13,7 @@ from reports.pages import (
     IntervalChart,
     Listing,
     Page,
+    Panels,
     Plot,
     Section,
     Table,
@@ -69,14 +70,17 @@ def _block(block: Block, folder: str) -> list[str]:
             return [f"- {escaped(term)}: {escaped(detail)}" for term, detail in block.items]
         case Tiles():
             return [f"- **{escaped(figure)}** {escaped(what)}" for figure, what, _ in block.items]
-        case IntervalChart() | Plot() | Trend():
+        case IntervalChart() | Plot() | Panels() | Trend():
+            if not folder:
+                return []
             caption = ["", escaped(block.caption)] if block.caption else []
             return [f"![{escaped(block.title)}]({folder}/{block.name}.png)", *caption]
 
 
 def _section(section: Section, folder: str) -> list[str]:
-    parts = [line for b in section.blocks for line in (*_block(b, folder), "")]
-    return [f"## {escaped(section.title)}", "", *parts]
+    shown = [lines for b in section.blocks if (lines := _block(b, folder))]
+    parts = [line for lines in shown for line in (*lines, "")]
+    return [f"## {escaped(section.title)}", "", *parts] if parts else []
 
 
 def render(page: Page, folder: str = "pictures") -> str:
@@ -86,7 +90,7 @@ def render(page: Page, folder: str = "pictures") -> str:
     ----------
     page : Page
     folder : str
-        Where the pictures lie, relative to the page.
+        Where the pictures lie, relative to the page; '' leaves the pictures out.
     """
     head = [f"# {escaped(page.title)}", "", escaped(page.subtitle), ""]
     body = [line for s in page.sections for line in _section(s, folder)]
@@ -94,6 +98,7 @@ def render(page: Page, folder: str = "pictures") -> str:
     return "\n".join([*head, *body, *foot]).rstrip() + "\n"
 
 
-def pictures(page: Page) -> Sequence[IntervalChart | Plot | Trend]:
+def pictures(page: Page) -> Sequence[IntervalChart | Plot | Panels | Trend]:
     """The blocks that become pictures."""
-    return [b for s in page.sections for b in s.blocks if isinstance(b, IntervalChart | Plot | Trend)]
+    kinds = IntervalChart | Plot | Panels | Trend
+    return [b for s in page.sections for b in s.blocks if isinstance(b, kinds)]

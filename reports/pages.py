@@ -118,8 +118,21 @@ class Line:
 
 
 @dataclass(frozen=True, slots=True)
+class Area:
+    """What lies between two lines, shape (n,) each; `kind` names its colour."""
+
+    x: Floats
+    low: Floats
+    high: Floats
+    kind: str = "pv"
+
+
+@dataclass(frozen=True, slots=True)
 class Plot:
-    """Lines and points over two linear axes, with marks."""
+    """Lines and points over two axes, with areas under them and marks.
+
+    log : axes that count in powers of ten, of "x" and "y"; all that lies on them is above zero
+    """
 
     name: str
     title: str
@@ -128,12 +141,23 @@ class Plot:
     lines: tuple[Line, ...]
     marks: tuple[Mark, ...] = ()
     caption: str = ""
+    areas: tuple[Area, ...] = ()
+    log: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Panels:
+    """Small plots of one figure, side by side as room allows, with one key for all."""
+
+    name: str
+    title: str
+    plots: tuple[Plot, ...]
+    caption: str = ""
 
 
 @dataclass(frozen=True, slots=True)
 class Band:
-    """A thinned signal: least and greatest of each bucket, shape (b,), and the panel (0 upper, 1 lower) it is
-    in."""
+    """A thinned signal: least and greatest of each bucket, shape (b,), and the panel (0 is the upmost) it is in."""
 
     label: str
     kind: str
@@ -147,7 +171,7 @@ class Trend:
     """Signals over time on linked axes.
 
     time_s : start of each bucket [s since 1970-01-01 UTC], rising, shape (b,); gap : True where nothing is
-    shown
+    shown; spans : first and last time [s] of spans that are marked
     """
 
     name: str
@@ -155,9 +179,10 @@ class Trend:
     time_s: Floats
     gap: Masks
     bands: tuple[Band, ...]
-    panels: tuple[str, str]
+    panels: tuple[str, ...]
     marks: tuple[Mark, ...] = ()
     caption: str = ""
+    spans: tuple[tuple[float, float], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -189,7 +214,7 @@ class Tiles:
     items: tuple[tuple[str, str, str], ...]
 
 
-Block = Table | IntervalChart | Plot | Trend | Text | Listing | Facts | Tiles
+Block = Table | IntervalChart | Plot | Panels | Trend | Text | Listing | Facts | Tiles
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,7 @@ from collections.abc import Iterable
 import numpy as np
 from markupsafe import Markup, escape
 
-from reports.pages import Bars, Floats, IntervalBar, IntervalChart, Line, Mark, Plot, Sparkline
+from reports.pages import Area, Bars, Floats, IntervalBar, IntervalChart, Line, Mark, Panels, Plot, Sparkline
 
 SPARK = (120.0, 26.0)
 ROW = 24.0
@@ -136,32 +136,65 @@ def _line(line: Line, x: Floats, y: Floats) -> str:
     return f'<path class="dots {line.kind}" d="{"".join(f"M{p}h0" for p in points)}"/>'
 
 
+def _area(a: Area, x: Floats, low: Floats, high: Floats) -> str:
+    """What lies between two lines."""
+    known = np.isfinite(x) & np.isfinite(low) & np.isfinite(high)
+    there = [f"{_n(p)},{_n(q)}" for p, q in zip(x[known], high[known], strict=True)]
+    back = [f"{_n(p)},{_n(q)}" for p, q in zip(x[known], low[known], strict=True)]
+    return (
+        f'<path class="area {a.kind}" d="M{"L".join(there)}L{"L".join(reversed(back))}Z"/>' if there else ""
+    )
+
+
+def _decades(low: float, high: float) -> list[float]:
+    """Powers of ten between two logarithms; where there are under two, ones, twos and fives as well."""
+    found = [float(k) for k in range(math.ceil(low - 1e-9), math.floor(high + 1e-9) + 1)]
+    if len(found) >= 2:
+        return found[:: max(len(found) // 5, 1)]
+    around = range(math.floor(low), math.ceil(high) + 1)
+    finer = [k + math.log10(m) for k in around for m in (1, 2, 5)]
+    return [f for f in finer if low - 1e-9 <= f <= high + 1e-9]
+
+
 class _Frame:
-    """Where data lie in a plot."""
+    """Where data lie in a plot; along a logarithmic axis all places are logarithms."""
 
     def __init__(self, p: Plot) -> None:
         joined = any(line.joined for line in p.lines)
-        self.x = _extent([line.x for line in p.lines], 0.0 if joined else 0.04)
-        self.y = _extent([line.y for line in p.lines], 0.04)
+        self.log = p.log
+        across = [line.x for line in p.lines] + [a.x for a in p.areas]
+        along = [line.y for line in p.lines] + [e for a in p.areas for e in (a.low, a.high)]
+        self.x = _extent([self._scaled(x, "x") for x in across], 0.0 if joined else 0.04)
+        self.y = _extent([self._scaled(y, "y") for y in along], 0.04)
         (self.width, self.height), (self.left, right, self.top, bottom) = PLOT, MARGIN
         self.right, self.foot = self.width - right, self.height - bottom
 
+    def _scaled(self, x: Floats, axis: str) -> Floats:
+        return np.log10(np.maximum(x, 1e-300)) if axis in self.log else x
+
     def px(self, x: Floats) -> Floats:
         """Horizontal place."""
+        x = self._scaled(x, "x")
         return self.left + (x - self.x[0]) / (self.x[1] - self.x[0]) * (self.right - self.left)
 
     def py(self, y: Floats) -> Floats:
         """Vertical place."""
+        y = self._scaled(y, "y")
         return self.foot - (y - self.y[0]) / (self.y[1] - self.y[0]) * (self.foot - self.top)
+
+    def _ticks(self, axis: str, ends: tuple[float, float], most: int) -> list[float]:
+        if axis in self.log:
+            return [10.0**k for k in _decades(*ends)]
+        return nice_ticks(*ends, most)
 
     def grid(self) -> list[str]:
         """Lines and figures of both axes."""
         body = []
-        for tick in nice_ticks(*self.x):
+        for tick in self._ticks("x", self.x, 6):
             x = float(self.px(np.array(tick)))
             body.append(f'<path class="grid" d="M{_n(x)},{_n(self.top)}V{_n(self.foot)}"/>')
             body.append(_text(x, self.foot + 16, f"{tick:.6g}", "middle", "tick"))
-        for tick in nice_ticks(*self.y, 5):
+        for tick in self._ticks("y", self.y, 5):
             y = float(self.py(np.array(tick)))
             body.append(f'<path class="grid" d="M{_n(self.left)},{_n(y)}H{_n(self.right)}"/>')
             body.append(_text(self.left - 6, y + 4, f"{tick:.6g}", "end", "tick"))
@@ -179,6 +212,10 @@ def plot(p: Plot) -> Markup:
     """Lines or points over two axes."""
     frame = _Frame(p)
     body = frame.grid()
+    for a in p.areas:
+        step = max(math.ceil(a.x.size / MOST_POINTS), 1)
+        x, low, high = frame.px(a.x[::step]), frame.py(a.low[::step]), frame.py(a.high[::step])
+        body.append(_area(a, x, low, high))
     for line in p.lines:
         step = max(math.ceil(line.x.size / MOST_POINTS), 1)
         body.append(_line(line, frame.px(line.x[::step]), frame.py(line.y[::step])))
@@ -188,3 +225,19 @@ def plot(p: Plot) -> Markup:
     turned = f'<g transform="translate(13 {_n((frame.top + frame.foot) / 2)}) rotate(-90)">'
     body.append(f"{turned}{_text(0, 0, p.y_label, 'middle', 'axis')}</g>")
     return _svg(frame.width, frame.height, body, f"{p.title}: {p.y_label} over {p.x_label}", "plot")
+
+
+def keys(block: Plot | Panels) -> Markup:
+    """Which line is which, one entry a name; nothing where there is one line alone."""
+    plots = block.plots if isinstance(block, Panels) else (block,)
+    named = {line.label: line for p in plots for line in p.lines}
+    if len(named) < 2:
+        return Markup("")
+    parts = []
+    for label, line in named.items():
+        path = "M0,6H22" if line.joined else "M5,6h0M11,6h0M17,6h0"
+        kind = "line" if line.joined else "dots"
+        drawn = f'<path class="{kind} {line.kind}" d="{path}"/>'
+        swatch = f'<svg class="swatch" viewBox="0 0 22 12" aria-hidden="true">{drawn}</svg>'
+        parts.append(f"<li>{swatch}{escape(label)}</li>")
+    return Markup('<ul class="legend">' + "".join(parts) + "</ul>")

@@ -120,9 +120,22 @@
     ctx.restore();
   }
 
+  function spansOn(u, spans) {
+    const ctx = u.ctx;
+    ctx.save();
+    ctx.globalAlpha = 0.12;
+    ctx.fillStyle = colour("worse");
+    spans.forEach((span) => {
+      const left = Math.max(u.valToPos(span[0], "x", true), u.bbox.left);
+      const right = Math.min(u.valToPos(span[1], "x", true), u.bbox.left + u.bbox.width);
+      if (right > left) ctx.fillRect(left, u.bbox.top, right - left, u.bbox.height);
+    });
+    ctx.restore();
+  }
+
   function trend(figure) {
     const data = JSON.parse(figure.querySelector('script[type="application/json"]').textContent);
-    const time = Array.from(new Uint32Array(bytes(data.time)), (v) => v + data.start);
+    const time = Array.from(new Uint32Array(bytes(data.time)), (v) => v * data.tick + data.start);
     if (time.length < 2) return;
     const whole = { min: time[0], max: time[time.length - 1] };
     const holders = figure.querySelectorAll(".panel");
@@ -220,6 +233,7 @@
         axes: [axis({ space: 70, values: ticks }), axis({ label, labelSize: 18, labelFont: "11px sans-serif", size: 48 })],
         cursor: { sync: { key: sync.key }, drag: { x: true, y: false, setScale: false }, y: false, focus: { prox: -1 } },
         hooks: {
+          drawClear: [(u) => spansOn(u, data.spans)],
           draw: [(u) => marksOn(u, data.marks)],
           setCursor: [(u) => told(u.cursor.idx)],
           setSelect: [(u) => {
