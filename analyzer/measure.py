@@ -208,7 +208,7 @@ def _cycles_alike(window: Window, fit: Fit, controller: Pid | None, o: Oscillati
     """Whether the identified loop, simulated without load, cycles with the recorded period and amplitude."""
     if controller is None or fit.gain * controller.kp <= 0 or fit.valve.stickband <= 0:
         return False
-    valve = Stiction(fit.valve.stickband, fit.valve.slip_jump, slides=fit.valve.tolerance >= 0)
+    valve = Stiction(fit.valve.stickband, fit.valve.slip_jump, slides=fit.valve.slides)
     if fit.valve.slip_jump <= 0:
         loop = Loop(process_of(window, fit), controller, Backlash(fit.valve.stickband))
     else:

@@ -17,7 +17,7 @@ from numba import njit
 from identification.innovations import judged_mask, notch, whiten
 from identification.models import Fopdt
 from identification.record import Floats, Mask
-from identification.valve import RESTS, stem_step
+from identification.valve import RESTS, first_slip, stem_step
 
 AR_ORDER = 8
 """Order of the noise model; ours: on the simulated plants 12 gives innovations less than 1 % smaller."""
@@ -95,7 +95,7 @@ class ValveTrial:
     """Valve constants in the form the kernels use.
 
     breakaway, sliding [% OP]: (S + J)/2 and (S - J)/2; tolerance [% OP]: OP's turning that a sliding stem
-    ignores, negative where the stem rests after each move.
+    ignores, or HALTS or RESTS (valve.py).
     """
 
     breakaway: float = 0.0
@@ -111,6 +111,11 @@ class ValveTrial:
     def slip_jump(self) -> float:
         """J [% OP]."""
         return self.breakaway - self.sliding
+
+    @property
+    def slides(self) -> bool:
+        """Whether the stem follows OP after a jump."""
+        return self.tolerance > RESTS
 
 
 IDEAL = ValveTrial()
@@ -155,7 +160,7 @@ def stem_blocks(op: Floats, breakaway: float, sliding: float, tolerance: float, 
     """Stem behind OP as means of blocks, shape (n // factor,); breakaway 0 is an ideal valve."""
     n = op.size // factor
     out = np.empty(n)
-    stem, moving, turned = op[0], 0.0, op[0]
+    stem, moving, turned = first_slip(op, breakaway, sliding), 0.0, op[0]
     for k in range(n):
         total = 0.0
         for i in range(k * factor, (k + 1) * factor):
@@ -356,6 +361,57 @@ def search(prepared: Prepared, begins: list[Dynamics], halvings: int = 3) -> Dyn
         halvings,
     )
     return t, dead
+
+
+@njit(cache=True)
+def _scan(
+    op: Floats,
+    white_y: Floats,
+    judged: Mask,
+    ar: Floats,
+    dt_s: float,
+    factor: int,
+    pairs: Floats,
+    tolerance: float,
+    begins: Floats,
+) -> Floats:
+    level = max(1.0 + ar.sum(), 1e-6)
+    out = np.empty(pairs.shape[0])
+    for i in range(pairs.shape[0]):
+        width, share = pairs[i, 0], pairs[i, 1]
+        stem = stem_blocks(op, 0.5 * width * (1 + share), 0.5 * width * (1 - share), tolerance, factor)
+        white = whiten(stem - stem.mean(), ar)
+        out[i] = np.inf
+        for j in range(begins.shape[0]):
+            left = score(white_y, white, judged, level, ar.size, begins[j, 0], begins[j, 1], dt_s)[0]
+            out[i] = min(out[i], left)
+    return out
+
+
+def scan(window: Window, pairs: Floats, tolerance: float, ar: Floats, begins: list[Dynamics]) -> Floats:
+    """Innovations variance of many stick-slips at once.
+
+    Parameters
+    ----------
+    window : Window
+    pairs : ndarray of shape (m, 2)
+        Stickband [% OP] and slip jump as a share of it.
+    tolerance : float
+        How the stems behave in motion (valve.py).
+    ar : ndarray of shape (p,)
+        Noise model.
+    begins : list of Dynamics
+        Time constants and dead times tried [s]; the best counts.
+
+    Returns
+    -------
+    ndarray of shape (m,)
+        Least innovations variance of each pair [% PV squared].
+    """
+    white_y = whiten(np.ascontiguousarray(window.y - window.y.mean()), ar)
+    judged = judged_mask(window.usable, ar.size)
+    table = np.array(begins)
+    return _scan(window.op, white_y, judged, ar, window.dt_s, window.factor, pairs, tolerance, table)  # type: ignore[no-any-return]
 
 
 def residual(window: Window, fit: Fit) -> Floats:

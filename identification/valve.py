@@ -20,13 +20,12 @@ def stem_step(
 ) -> tuple[float, float, float]:
     """Stem position, direction of motion (0: at rest) and OP's extreme since it moved, after one OP value.
 
-    At rest the stem holds until |OP - stem| > breakaway and then moves to the distance `sliding`. With
-    tolerance >= 0 it follows at that distance until OP turns back by more than `tolerance`; with
-    tolerance < 0 it rests after each move.
+    At rest the stem holds until |OP - stem| > breakaway and then moves to the distance `sliding`. It follows at
+    that distance until OP turns back by more than `tolerance`; see SLIDES, HALTS, RESTS.
     """
     if moving != 0.0:
         advance = moving * (op - turned)
-        if tolerance < 0.0 or advance < -tolerance:
+        if advance < -tolerance:
             moving = 0.0
         elif advance > 0.0:
             return op - moving * sliding, moving, op
@@ -50,8 +49,32 @@ def walk(op: Floats, breakaway: float, sliding: float, tolerance: float, stem: f
     return out
 
 
-RESTS = -1.0
-"""Tolerance that stands for a stem which comes to rest after each move."""
+@njit(cache=True)
+def first_slip(op: Floats, breakaway: float, sliding: float) -> float:
+    """Stem position before the first sample [% OP] of a valve of which only OP is known.
+
+    Once OP has covered the stickband (breakaway + sliding) the stem has slipped, wherever it was: it lets go there
+    at the latest. A valve whose OP never covers it does not move and stands at the first OP.
+
+    Parameters
+    ----------
+    op : ndarray of shape (n,)
+        Controller output [% OP].
+    breakaway, sliding : float
+        Distances |OP - stem| at which the stem lets go, and at which it comes to rest [% OP].
+    """
+    low, high = op[0], op[0]
+    for k in range(op.size):
+        low, high = min(low, op[k]), max(high, op[k])
+        if high - low > breakaway + sliding:
+            return high - breakaway if op[k] == high else low + breakaway
+    return op[0]
+
+
+SLIDES, HALTS, RESTS = 0.0, -1e-9, -math.inf
+"""Tolerances [% OP] of a stem in motion: it follows OP until OP turns (Choudhury, Thornhill, Shah 2005), until OP
+turns or stands still (Kano 2004; dry friction does so too, tests/identification/test_valve.py), or not at all
+(He, Wang, Pottmann, Qin 2007)."""
 
 
 def thresholds(stickband: float, slip_jump: float) -> tuple[float, float]:
@@ -112,7 +135,7 @@ def stick_slip(
     if op.size == 0 or breakaway <= 0.0:
         return op.copy()
     first = float(op[0]) if start is None or math.isnan(start) else float(start)
-    tolerance = 0.0 if slides else RESTS
+    tolerance = SLIDES if slides else RESTS
     return walk(np.ascontiguousarray(op, dtype=np.float64), breakaway, sliding, tolerance, first)
 
 

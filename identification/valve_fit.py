@@ -17,6 +17,7 @@ from identification.hammerstein import (
     ValveTrial,
     Window,
     prepare,
+    scan,
     search,
     starts,
     stem_of,
@@ -24,6 +25,7 @@ from identification.hammerstein import (
 )
 from identification.innovations import arx_noise
 from identification.record import Floats
+from identification.valve import HALTS, RESTS, SLIDES
 
 SCREEN_SHARES = (0.1, 0.3, 0.55, 0.8)
 """Stickbands that a loop without an evident fault is screened with, as shares of OP's range; ours: a play of any
@@ -35,8 +37,19 @@ STICKBAND_SHARES = (0.06, 0.12, 0.2, 0.3, 0.42, 0.55, 0.7, 0.85, 1.0)
 """Stickbands tried first, as shares of OP's range; a valve much wider than OP's range would not move at all."""
 JUMP_SHARES = (0.2, 0.4, 0.7, 1.0)
 """Slip jumps tried, as shares of the stickband."""
-COAST_SHARES = (0.0, 0.15)
-"""Turnings of OP that a sliding stem ignores, as shares of the stickband: none, and OP's noise; ours."""
+COAST = 0.15
+"""Turning of OP that a sliding stem ignores, as share of the stickband: OP's noise; ours."""
+FINE_WIDTHS = tuple(float(w) for w in np.arange(0.88, 1.34, 0.012))
+"""Stickbands tried about a play, in its width; ours: on simulated stick-slip from 0.94 to 1.3 times the play that
+fits best, in pits about 1 % wide where OP is recorded finely."""
+FINE_JUMPS = tuple(float(j) for j in np.arange(0.1, 1.01, 0.06))
+"""Slip jumps tried about a play, as shares of the stickband."""
+LATER = (0.0, 0.4, 0.8, 1.2, 1.6, 2.0, 2.5, 3.0)
+"""Dead times tried about a play, in blocks beyond the play's: a play in place of a jump answers too soon; ours."""
+FINALISTS = 4
+"""Candidates of the fine scan, per behaviour and noise model, that are followed to the end; ours."""
+COMPASS = (0.02, 0.007, 0.0025)
+"""Relative steps of the search within a pit."""
 SHORT = 1000
 """Blocks of a record that is so short that every rival can be tried on it; ours."""
 FOLLOWED_SHORT = 5
@@ -137,23 +150,66 @@ def better_linear(window: Window, linear: Fit, play: Fit) -> Fit:
 
 
 def fit_stick_slip(window: Window, play: Fit, period_s: float) -> Fit:
-    """The best stick-slip (J > 0, sliding after a jump) followed by a lag, scanned whole and about the play."""
+    """The best stick-slip (J > 0) followed by a lag, scanned whole and finely about the play.
+
+    Parameters
+    ----------
+    window : Window
+    play : Fit
+        The best play: its width is near the stickband, for OP tells both by its travel between slips.
+    period_s : float
+        Scale of the search [s].
+    """
+    whole = _scan(window, play, _coarse(window, play), period_s, _followed(window))
+    return max([whole, *_finely(window, play)], key=lambda fit: fit.log_likelihood)
+
+
+def _followed(window: Window) -> int:
+    return FOLLOWED_SHORT if window.y.size < SHORT else FOLLOWED
+
+
+def _coarse(window: Window, play: Fit) -> list[ValveTrial]:
+    """Stickbands up to OP's range, with stems that rest and stems that slide."""
     reach = max(window.op_range, 1e-9)
     near = play.valve.stickband / reach
     widths = {round(s, 4) for s in STICKBAND_SHARES[4:]} | {near, 1.1 * near}
-    valves = [
-        sticking(width * reach, jump, coast * width * reach)
+    return [
+        sticking(width * reach, jump, tolerance)
         for width in sorted(widths)
         for jump in JUMP_SHARES
-        for coast in COAST_SHARES
+        for tolerance in (RESTS, COAST * width * reach)
     ]
-    near_play = [
-        descend(
-            window, replace(play, valve=sticking(grown * play.valve.stickband, jump, coast)), free_width=True
-        )
-        for jump, grown in ((0.15, 1.0), (0.4, 1.1), (0.8, 1.1))
-        for coast in (0.0, 0.15 * play.valve.stickband)
-    ]
-    followed = FOLLOWED_SHORT if window.y.size < SHORT else FOLLOWED
-    whole = _scan(window, play, valves, period_s, followed)
-    return max([*near_play, whole], key=lambda fit: fit.log_likelihood)
+
+
+def _finely(window: Window, play: Fit) -> list[Fit]:
+    """Stick-slips about a play, the best few of each behaviour brought to the bottom of their pits.
+
+    A slip more or less changes the stem until the next one, so likelihood has many narrow pits in S and J.
+    """
+    pairs = np.array([(w * play.valve.stickband, j) for w in FINE_WIDTHS for j in FINE_JUMPS])
+    begins = [(play.time_constant_s, play.dead_time_s + blocks * window.dt_s) for blocks in LATER]
+    out = []
+    for tolerance in (RESTS, HALTS, SLIDES):
+        left = scan(window, pairs, tolerance, generic_noise(), begins)
+        best = [sticking(pairs[i, 0], pairs[i, 1], tolerance) for i in np.argsort(left)[:FINALISTS]]
+        fits = _ranked(window, generic_noise(), best, begins)
+        out += [_bottom(window, _bottom(window, descend(window, fit))) for fit in fits]
+    return out
+
+
+def _bottom(window: Window, fit: Fit) -> Fit:
+    """Stickband and jump moved by ever smaller steps to the least innovations, the rest following at the end."""
+    valve, least = fit.valve, fit.sigma2
+    dynamics = fit.time_constant_s, fit.dead_time_s
+    for step in COMPASS:
+        moved = True
+        while moved:
+            moved = False
+            for wider, jumpier in ((1, 0), (-1, 0), (0, 1), (0, -1)):
+                width = valve.stickband * (1 + wider * step)
+                jump = min(valve.slip_jump * (1 + 2 * jumpier * step), width)
+                trial = sticking(width, jump / width, valve.tolerance)
+                found = prepare(window, trial, fit.ar).score(*dynamics)[0]
+                if found < least * (1 - 1e-7):
+                    valve, least, moved = trial, found, True
+    return descend(window, replace(fit, valve=valve))

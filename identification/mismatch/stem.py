@@ -9,7 +9,7 @@ from numba import njit
 
 from identification.mismatch.slots import Slot
 from identification.record import Floats
-from identification.valve import thresholds, walk
+from identification.valve import RESTS, first_slip, thresholds, walk
 
 SERVO_STEPS = 5
 """Steps of a positioner within one sample; ours: its period is never under four samples."""
@@ -82,10 +82,12 @@ def curved(stem: Floats, bend: float, middle: float) -> Floats:
 
 
 def friction(op: Floats, c: Floats) -> Floats:
-    """Stem, shape (n,), behind play or stick-slip."""
+    """Stem, shape (n,), behind play or stick-slip; it starts where OP does, if it ever leaves there."""
     away, sliding = thresholds(c[Slot.STICKBAND], c[Slot.JUMP])
-    coast = -1.0 if c[Slot.COAST] < 0 else c[Slot.COAST] * c[Slot.STICKBAND]
-    return walk(op, away, max(sliding, 0.0), coast, float(op[0]))
+    coast = RESTS if c[Slot.COAST] < 0 else c[Slot.COAST] * c[Slot.STICKBAND]
+    moves = float(np.abs(op - op[0]).max()) > away
+    start = float(op[0]) if moves else first_slip(op, away, sliding)
+    return walk(op, away, max(sliding, 0.0), coast, start)
 
 
 def flow(op: Floats, c: Floats, dt_s: float, middle: float) -> Floats:

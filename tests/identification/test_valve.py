@@ -6,7 +6,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from identification.models import Backlash
-from identification.valve import play, stem_position, stick_slip
+from identification.valve import (
+    HALTS,
+    RESTS,
+    SLIDES,
+    first_slip,
+    play,
+    stem_position,
+    stick_slip,
+    thresholds,
+    walk,
+)
 
 
 def slow_play(op: list[float], width: float, stem: float) -> list[float]:
@@ -51,3 +61,50 @@ def test_play_is_rate_independent():
     assert np.array_equal(
         stem_position(np.repeat(op, 3), Backlash(2.0))[::3], stem_position(op, Backlash(2.0))
     )
+
+
+@given(st.lists(st.floats(-50, 50), min_size=2, max_size=60), st.floats(0.5, 20), st.floats(-1, 1))
+def test_play_has_one_path_once_op_has_covered_it(op, width, where):
+    """From any start within the play, the stem joins the path from first_slip once OP has covered the width."""
+    x = np.array(op)
+    covered = np.flatnonzero(np.maximum.accumulate(x) - np.minimum.accumulate(x) > width)
+    known = play(x, width, first_slip(x, width / 2, width / 2))
+    free = play(x, width, x[0] + where * width / 2)
+    after = covered[0] if covered.size else x.size
+    assert known[after:] == pytest.approx(free[after:], abs=1e-9)
+
+
+def test_stick_slip_that_needs_more_than_half_of_the_range_moves():
+    """A valve that lets go at 0.9 of OP's amplitude beyond its middle still cycles: its start is not OP's middle."""
+    op = np.sin(np.linspace(0, 20 * np.pi, 2001))
+    breakaway, sliding = thresholds(1.2, 1.0)
+    stem = walk(op, breakaway, sliding, RESTS, first_slip(op, breakaway, sliding))
+    assert np.ptp(stem[200:]) > 1.0
+    assert np.ptp(walk(op, breakaway, sliding, RESTS, 0.0)) == 0.0
+
+
+def dry_stem(op: np.ndarray, static: float, kinetic: float) -> np.ndarray:
+    """A light stem on a spring with dry friction in fine steps: at rest below `static`, else towards `kinetic`."""
+    z, moving, out = 0.0, False, []
+    for u in op:
+        for _ in range(200):
+            pull = u - z
+            if not moving and abs(pull) <= static:
+                continue
+            step = 0.1 * (abs(pull) - kinetic)
+            moving = step > 1e-6
+            z += np.sign(pull) * max(step, 0.0)
+        out.append(z)
+    return np.array(out)
+
+
+def test_dry_friction_halts_with_op():
+    """Dry friction lets a stem go by J again after OP stood still, as HALTS does and SLIDES does not."""
+    op = np.concatenate([np.linspace(0, 3, 31), np.full(5, 3.0), np.linspace(3, 4, 11)[1:], np.full(3, 4.0)])
+    breakaway, sliding = thresholds(2.0, 1.0)
+    true = dry_stem(op, breakaway, sliding)
+    halts, slides = (walk(op, breakaway, sliding, t, 0.0) for t in (HALTS, SLIDES))
+    after = op.size - 3 - 6
+    assert true[after] == pytest.approx(true[35], abs=1e-3)
+    assert halts[after] == pytest.approx(halts[35])
+    assert slides[after] > slides[35] + 0.3
