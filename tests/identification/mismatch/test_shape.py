@@ -1,0 +1,185 @@
+"""Shapes of what was found: against closed forms, with bands that hold them."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from identification.mismatch.catalogue import CATALOGUE
+from identification.mismatch.physics import Row
+from identification.mismatch.record_shape import around, biggest_move, busiest, gap_profile, grid, rebuilt
+from identification.mismatch.shape import Shape, banded, shape_of
+from identification.mismatch.simulation import Scene
+from identification.mismatch.slots import Slot, neutral
+from identification.models import Estimate
+from identification.valve import play
+
+N = 2000
+
+
+def scene() -> Scene:
+    """OP between 20 and 80 % for 2,000 s, PV between 30 and 70 %."""
+    op = 50 + 30 * np.sin(np.arange(N) / 50.0)
+    return Scene(op, 1.0, 50.0, 50.0, (30.0, 70.0), (500,))
+
+
+def row(name: str) -> Row:
+    """The catalogue's first row of that name."""
+    return next(r for r in CATALOGUE if r.name == name)
+
+
+def shape(name: str, spread: float = 0.1, **constants: float) -> Shape:
+    """The shape of an effect with the given constants, each known within a share."""
+    plain = neutral()
+    plain[Slot.K], plain[Slot.T], plain[Slot.L] = 1.2, 20.0, 5.0
+    best = plain.copy()
+    for key, value in constants.items():
+        best[Slot[key]] = value
+    known = {}
+    for p in row(name).params:
+        value = float(best[p.slot])
+        known[p.name] = Estimate(value, *sorted((value * (1 - spread), value * (1 + spread))), p.unit)
+    found = shape_of(scene(), row(name), known, best, plain)
+    assert found is not None
+    return found
+
+
+def test_play_is_drawn_as_a_loop_of_its_width() -> None:
+    """The loop of play is what the play operator gives on the same sweep, half its width to either side of OP."""
+    found = shape("backlash", STICKBAND=4.0)
+    loop = found.curves[0]
+    assert np.abs(loop.y - loop.x).max() == pytest.approx(2.0, abs=1e-9)
+    twice = play(np.concatenate((loop.x, loop.x)), 4.0)[loop.x.size :]
+    np.testing.assert_allclose(loop.y, twice, atol=1e-9)
+
+
+def test_sticking_loop_holds_both_its_ends() -> None:
+    """The widest and the narrowest loop of a sticking valve are those of its interval's ends."""
+    found = shape("stiction", STICKBAND=4.0, JUMP=2.0)
+    width = {c.name: float(np.abs(c.y - c.x).max()) for c in found.curves}
+    assert width["least"] < width["found"] < width["most"]
+    assert width["most"] == pytest.approx(0.5 * 1.1 * (4.0 + 2.0), rel=0.03)
+
+
+def test_saturation_is_flat_beyond_its_limit() -> None:
+    """Flow follows OP to the limit and stays there, within a band of the limit's interval."""
+    curve = shape("saturation", STOP_HI=60.0).curves[0]
+    np.testing.assert_allclose(curve.y, np.minimum(curve.x, 60.0))
+    assert curve.high is not None
+    assert curve.high[-1] == pytest.approx(66.0)
+
+
+def test_slew_takes_size_over_rate() -> None:
+    """A step of a slewing valve arrives after its size over the rate."""
+    curve = shape("rate-limit", RATE=0.5).curves[0]
+    size = curve.y[-1]
+    arrived = curve.x[np.argmax(curve.y > 0.999 * size)]
+    assert arrived == pytest.approx(size / 0.5, rel=0.03)
+
+
+def test_second_lag_response_is_the_closed_form() -> None:
+    """The step response of two lags and a dead time is that of the textbook."""
+    found = shape("second-lag", T2=8.0)
+    t, y = found.curves[0].x, found.curves[0].y
+    late = np.maximum(t - 5.0, 0.0)
+    theory = 12.0 * (1 - (20 * np.exp(-late / 20) - 8 * np.exp(-late / 8)) / 12)
+    np.testing.assert_allclose(y, theory, atol=0.01)
+
+
+def test_falling_is_slower_where_asymmetry_says_so() -> None:
+    """With a ratio of four PV falls four times as slowly as it rises."""
+    curve = shape("direction-asymmetry", ASYMMETRY=math.log(4.0)).curves[0]
+    top, half = curve.y.max(), curve.x[-1] / 2
+    rise = curve.x[np.argmax(curve.y > 0.632 * top)] - 5.0
+    fall = curve.x[(curve.x > half) & (curve.y < 0.368 * top)][0] - curve.x[np.argmax(curve.y)] - 5.0
+    assert fall / rise == pytest.approx(4.0, rel=0.3)
+
+
+def test_gain_over_pv_and_time_are_straight_lines() -> None:
+    """Gain by slope and gain by drift are the lines that their constants say, about the plain gain."""
+    level = shape("nonlinear-gain", SLOPE=0.5).curves[0]
+    np.testing.assert_allclose(level.y, 1.2 * (1 + 0.5 * (level.x - 50) / 50))
+    drift = shape("gain-drift", DRIFT=-0.4).curves[0]
+    np.testing.assert_allclose(drift.y, 1.2 * (1 - 0.4 * (drift.x / N - 0.5)))
+
+
+def test_dead_time_falls_with_flow() -> None:
+    """With a share of one the dead time is that of a pipe: in inverse proportion to flow."""
+    curve = shape("flow-dependent-delay", PIPE=1.0).curves[0]
+    np.testing.assert_allclose(curve.y, 5.0 * 50.0 / curve.x, rtol=1e-9)
+
+
+def test_load_step_stands_at_its_time() -> None:
+    """A load step is drawn at its time and size, and marked there."""
+    found = shape("load-step", STEP=3.0)
+    curve = found.curves[0]
+    assert found.places == (500.0,)
+    assert curve.y[curve.x < 499].max() == 0.0
+    assert curve.y[-1] == 3.0
+
+
+def test_every_row_of_the_catalogue_has_a_shape() -> None:
+    """No effect of the catalogue is found and then not shown; every curve is finite and above its lower band."""
+    alone = {
+        "SERVO": 2.0,
+        "DAMPING": 0.5,
+        "DEADBAND": 1.0,
+        "SHARE": 0.3,
+        "MODE_T": 60.0,
+        "CAP": 60.0,
+        "OMEGA": 0.02,
+    }
+    alone |= {"SINE": 1.0, "SPLIT": 50.0, "STICKBAND": 2.0, "RATE": 1.0, "ROOT": 0.5, "HEAD": 0.1}
+    for r in CATALOGUE:
+        slots = {Slot(p.slot).name for p in r.params if p.slot in set(Slot)}
+        found = shape(r.name, **{k: v for k, v in alone.items() if k in slots})
+        for curve in found.curves:
+            assert np.isfinite(curve.y).all(), r.name
+            assert curve.low is None or (curve.low <= curve.y + 1e-9).all(), r.name
+
+
+def test_band_adds_deviations_as_squares() -> None:
+    """Two constants that each move a value by 3 and 4 give a band of 5."""
+    c = neutral()
+    y, low, high = banded(
+        lambda k: np.array([k[Slot.T] + k[Slot.L]]), c, ((Slot.T, c[0] - 3, c[0] + 3), (Slot.L, -4.0, 4.0))
+    )
+    assert (y[0] - low[0], high[0] - y[0]) == pytest.approx((5.0, 5.0))
+
+
+def test_stretches_hold_what_they_are_for() -> None:
+    """The busiest stretch holds the burst, those about a run or a move hold them; all are in the record."""
+    x = np.zeros(1000)
+    x[700:740] = np.random.default_rng(0).normal(0, 1, 40)
+    part = busiest(x, 100)
+    assert part.start <= 700
+    assert part.stop >= 740
+    where = np.zeros(1000, dtype=bool)
+    where[10:30] = True
+    part = around(where, 100)
+    assert part.start == 0
+    assert part.stop >= 30
+    step = np.where(np.arange(1000) >= 990, 5.0, 0.0)
+    assert biggest_move(step, 60, np.ones(1000, dtype=bool)) == slice(940, 1000)
+
+
+def test_rebuilt_output_is_the_law() -> None:
+    """OP computed by a PI is rebuilt by the same settings to rounding, and not by others."""
+    e = np.random.default_rng(1).normal(0, 1, 500)
+    op = 50 + 1.5 * (e + np.cumsum(e) / 30.0)
+    np.testing.assert_allclose(rebuilt(e, op, 1.5, 30.0), op, atol=1e-9)
+    assert np.abs(rebuilt(e, op, 1.0, 30.0) - op).max() > 0.3
+
+
+def test_grid_and_gap_are_seen_in_their_pictures() -> None:
+    """Teeth stand a step apart; OP stands still under the gap alone."""
+    rng = np.random.default_rng(2)
+    teeth = grid(np.round(rng.normal(50, 3, 5000) / 0.5) * 0.5, 0.5).curves[0]
+    np.testing.assert_allclose(np.diff(np.unique(teeth.x)), 0.5)
+    e = rng.normal(0, 1, 5000)
+    op = np.cumsum(np.where(np.abs(e) > 0.6, e, 0.0))
+    curve = gap_profile(e, op, 0.6, np.ones(5000, dtype=bool)).curves[0]
+    assert curve.y[curve.x < 0.58].min() > 99
+    assert curve.y[curve.x > 0.62].max() < 1
