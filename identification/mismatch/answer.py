@@ -10,6 +10,8 @@ import numpy as np
 
 from identification.mismatch.explain import Explanation, Subject, alternatives, restored
 from identification.mismatch.fitting import Fitted, deviations
+from identification.mismatch.informed import uninformed
+from identification.mismatch.locate import Located
 from identification.mismatch.physics import Row
 from identification.mismatch.proof import HeldOut, Misfit, held_out, misfit
 from identification.mismatch.simulation import simulate
@@ -24,6 +26,14 @@ BLOCKS = {
     "quantization": "sensor",
     "sensor-clipping": "sensor",
 }
+LIVES = {
+    "op_level": "valve",
+    "after_reversals": "valve",
+    "at_limits": "valve",
+    "time_in_record": "load",
+    "pv_level": "process",
+}
+"""Block in which a misfit without a name is looked for first, by the feature that carries it; else the process."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +49,10 @@ class Effect:
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """What `triage explain` says of one loop, in numbers."""
+    """What `triage explain` says of one loop, in numbers.
+
+    note : why there is no name; caution : what the recording lacks although there is one.
+    """
 
     verdict: str
     block: str
@@ -49,6 +62,7 @@ class Answer:
     moved: dict[str, tuple[float, float]]
     remaining: float | None
     note: str = field(default="")
+    caution: str = field(default="")
 
 
 def exact(value: float, unit: str, half: float = 0.0) -> Estimate:
@@ -135,12 +149,8 @@ def effects_of(found: Explanation, s: Subject, proof: HeldOut | None) -> tuple[E
     return (*gates, *physics)
 
 
-def fit_of(found: Explanation, proof: HeldOut | None) -> dict[str, Any]:
+def fit_of(proof: HeldOut) -> dict[str, Any]:
     """Misfit before and after, on what was fitted and on what was held out."""
-    if proof is None:
-        shown = misfit(found.p.y, simulate(found.p.scene, found.plain.model.c))
-        part = {"fitted": _said(shown), "held_out": _said(shown)}
-        return {"baseline": part, "explained": part}
     return {
         name: {"fitted": _said(proof.fitted[i]), "held_out": _said(proof.held[i])}
         for i, name in enumerate(("baseline", "explained"))
@@ -174,21 +184,31 @@ def answer(found: Explanation, s: Subject) -> Answer:
     s : Subject
         What was explained.
     """
-    proof = held_out(found.p, found.plain, found.best) if found.accepted else None
-    effects = effects_of(found, s, proof)
-    verdict, block = (effects[0].name, effects[0].block) if effects else ("none", "none")
-    if found.left > 0 and not any(found_first(found)):
-        verdict, block = "unexplained", "process"
+    proof = held_out(found.p, found.plain, found.best)
+    effects = effects_of(found, s, proof if found.accepted else None)
+    lacking = "" if any(found_first(found)) else uninformed(found, s)
+    at = located_in(found.p, found.best if found.left > 0 else found.plain, s)
+    verdict, block = verdict_of(found, effects, lacking, at)
     return Answer(
         verdict,
         block,
         effects,
-        where_of(found, s, block, located_in(found.p, found.best if found.left > 0 else found.plain, s)),
-        fit_of(found, proof),
+        where_of(found, s, block, at),
+        fit_of(proof),
         moved(found),
         remaining(found),
-        _note(found),
+        _note(found) if effects or not lacking else f"Not told: {lacking}.",
+        lacking if effects else "",
     )
+
+
+def verdict_of(found: Explanation, effects: tuple[Effect, ...], lacking: str, at: Located) -> tuple[str, str]:
+    """The verdict and its block; what is left over, and what a record cannot tell, has no name."""
+    if found.left > 0 and not any(found_first(found)):
+        return "unexplained", LIVES.get(at.carrying[0].name, "process") if at.carrying else "process"
+    if effects:
+        return effects[0].name, effects[0].block
+    return ("unexplained", "none") if lacking else ("none", "none")
 
 
 def found_first(found: Explanation) -> tuple[bool, bool]:

@@ -141,6 +141,7 @@ def groups(pv: Floats, op: Floats, dt_s: float, late: int, memory: int) -> tuple
     m = motion(o, dt_s, max(memory // 4, 1))
     fading = np.exp(-m.since_turn / (max(memory, 2) * dt_s))
     rate = ranked(m.rate) - 0.5
+    index = dt_s * np.arange(pv.size, dtype=np.float64)
     limit = at_limits(o)
     found = (
         Group("pv_level", hats(before), before),
@@ -148,7 +149,7 @@ def groups(pv: Floats, op: Floats, dt_s: float, late: int, memory: int) -> tuple
         Group("op_direction", m.direction[:, None], m.direction),
         Group("op_rate", np.stack([rate, rate * m.direction], axis=1), m.rate, m.direction),
         Group("after_reversals", np.stack([fading, fading * m.direction], axis=1), m.since_turn, m.direction),
-        Group("time_in_record", hats(np.arange(pv.size, dtype=float)), np.arange(pv.size) * dt_s),
+        Group("time_in_record", hats(index), index),
         Group("at_limits", limit[:, None].astype(float), limit.astype(float)),
     )
     alive = [g for g in found if g.columns.shape[1] and float(np.ptp(g.columns)) > 0]

@@ -34,7 +34,7 @@ SHOWN = 12
 
 @dataclass(frozen=True, slots=True)
 class Profile:
-    """Misfit along one feature: ends of each part, mean and mean square of the innovations there, shape (b,) each.
+    """Misfit along one feature: ends of each part, samples, mean and mean square of the innovations, shape (b,) each.
 
     Mean and mean square are in standard deviations and mean squares of the whole record; of OP's rate and the time
     since its turn the mean is along OP's direction.
@@ -42,6 +42,7 @@ class Profile:
 
     low: Floats
     high: Floats
+    count: Floats
     mean: Floats
     power: Floats
 
@@ -175,7 +176,7 @@ def profile(x: Floats, y: Floats, parts: int = SHOWN) -> Profile:
         levels = np.unique(np.searchsorted(x, cuts))
     count = np.diff(np.append(levels, x.size))
     mean, power = (np.add.reduceat(w, levels) / count for w in (y, y**2))
-    return Profile(x[levels], x[np.append(levels[1:], x.size) - 1], mean, power)
+    return Profile(x[levels], x[np.append(levels[1:], x.size) - 1], count.astype(np.float64), mean, power)
 
 
 def part_of_range(height: Floats) -> tuple[int, int] | None:
