@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from analyzer.brought import Brought, judged
 from analyzer.config import Config
 from analyzer.history.loops_csv import LoopSpec
 from analyzer.history.series import Series
@@ -21,8 +22,12 @@ from identification.mismatch import explain as mismatch
 from identification.mismatch.answer import Answer, answer
 from identification.mismatch.control import Stated
 from identification.mismatch.saved import carried, carried_closed, constants, to_data
+from identification.mismatch.slots import Slot, neutral
 from identification.mismatch.words import sentence, unexplained_reason
 from identification.record import Floats
+
+SPAN_DIFFERS = 0.01
+"""Relative difference of two PV spans from which a model's percent are not the record's; ours."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,18 +129,51 @@ def case(spec: LoopSpec, specs: tuple[LoopSpec, ...], series: dict[str, Series],
     return Case(spec, prepared, subject)
 
 
-def explained(
-    c: Case, tell: Callable[[str], None], brought: Mapping[str, Any] | None = None
-) -> tuple[dict[str, Any], dict[str, Any]]:
-    """The answer (the contract of `triage explain`) and the model to save; `brought` is the user's own model."""
-    start = None if brought is None else constants(dict(brought))
+@dataclass(frozen=True, slots=True)
+class Explained:
+    """One loop explained: what was asked, what was found, the answer in numbers and as data, the user's own model."""
+
+    case: Case
+    found: mismatch.Explanation
+    said: Answer
+    data: dict[str, Any]
+    brought: Brought | None = None
+
+    def model(self) -> dict[str, Any]:
+        """The model found, the plain loop where nothing was, as data to be written."""
+        return saved_model(self.case, self.found, self.said)
+
+
+def explained(c: Case, tell: Callable[[str], None], brought: Mapping[str, Any] | None = None) -> Explained:
+    """Explain one loop; `brought` is the user's own model, which is judged and is one more start of the search."""
+    start = None if brought is None else plain_start(brought)
     found = mismatch.explain(c.subject, tell, start)
     said = answer(found, c.subject)
-    data = as_data(c, said)
-    return data, saved_model(c, found, said)
+    own = None if brought is None else judged(brought, found, c.subject, span_note(c, brought))
+    return Explained(c, found, said, as_data(c, said, own), own)
 
 
-def as_data(c: Case, said: Answer) -> dict[str, Any]:
+def plain_start(brought: Mapping[str, Any]) -> Floats:
+    """Constants of the plain loop in a model, shape (SIZE,): the rest of it is judged, not believed."""
+    own, out = constants(dict(brought)), neutral()
+    for slot in (Slot.T, Slot.L, Slot.K):
+        out[slot] = own[slot]
+    return out
+
+
+def span_note(c: Case, brought: Mapping[str, Any]) -> str:
+    """What to say where a model was made with another PV span than the record now has; empty where not."""
+    scale = brought.get("scale")
+    then = scale.get("pv_span") if isinstance(scale, dict) else None
+    if not isinstance(then, int | float) or abs(then / c.prepared.scale.span - 1.0) < SPAN_DIFFERS:
+        return ""
+    now = c.prepared.scale.span
+    return (
+        f"it was made with a PV span of {then:.4g}, this record has {now:.4g}: its gain is off by their ratio"
+    )
+
+
+def as_data(c: Case, said: Answer, brought: Brought | None = None) -> dict[str, Any]:
     """The answer as data that JSON can hold."""
     effects = [
         {
@@ -150,19 +188,27 @@ def as_data(c: Case, said: Answer) -> dict[str, Any]:
         }
         for e in said.effects
     ]
-    reason = sentence(said) if said.verdict != "unexplained" else unexplained_reason(said)
+    fit = said.fit if brought is None else said.fit | {"brought": brought.as_data()}
     data = {
         "loop": c.spec.loop,
         "verdict": said.verdict,
         "block": said.block,
         "effects": effects,
         "where": said.where,
-        "fit": said.fit,
+        "fit": fit,
         "moved": said.moved,
         "remaining": said.remaining,
-        "reason": reason,
+        "reason": reason_of(said),
     }
     return json_ready(data)
+
+
+def reason_of(said: Answer) -> str:
+    """The verdict in words, with what the recording lacks."""
+    if said.verdict == "unexplained":
+        return unexplained_reason(said)
+    caution = f" The figures are rough: it {said.caution}." if said.caution else ""
+    return sentence(said) + caution
 
 
 def json_ready(x: Any) -> Any:
@@ -228,7 +274,20 @@ def read_model(path: Path, loop: str) -> dict[str, Any]:
         raise InputError(f"{path}: no model", "a model saved by `triage explain`", "save it anew")
     if data.get("loop") != loop:
         raise InputError(f"{path}: a model of {data.get('loop')}", f"one of {loop}", "check MODEL and --loop")
+    checked(data, path)
     return data
+
+
+def checked(data: Mapping[str, Any], path: Path) -> None:
+    """Raise InputError where a number of a model is none."""
+    constants(dict(data))
+    held = data["constants"] if isinstance(data["constants"], dict) else {}
+    plain = {k: data.get(k, 0.0) for k in ("middle_op_pct", "level_pv_pct", "late_s")}
+    for name, value in {**held, **plain}.items():
+        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+            raise InputError(
+                f"{path}: {name} is {value!r}", "a finite number", "correct it or save the model anew"
+            )
 
 
 def simulated(c: Case, data: dict[str, Any], stamps: Floats, closed: bool) -> tuple[Floats, Floats]:

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import base64
-import html
-import io
 import json
 import sys
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from analyzer.options import NOTHING_DONE, export_options, opened, told
+
+if TYPE_CHECKING:
+    from analyzer.explain import Explained
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
@@ -40,7 +39,7 @@ def _case(export: tuple[Path, ...], loops: Path | None, tag: str, reading: dict[
 @export_options
 @click.option("--loop", "tag", required=True, help="Loop to explain.")
 @click.option(
-    "--model", type=click.Path(path_type=Path), help="A saved model to start from and to be judged."
+    "--model", type=click.Path(path_type=Path), help="Your own saved model: judged beside the refitted one."
 )
 @click.option("--save-model", type=click.Path(path_type=Path), help="Write the model found, for `simulate`.")
 @click.option(
@@ -49,8 +48,9 @@ def _case(export: tuple[Path, ...], loops: Path | None, tag: str, reading: dict[
     type=click.Choice(["text", "json", "html", "markdown"]),
     default="text",
     show_default=True,
-    help="Output format.",
+    help="Output format; html is one file that needs no network.",
 )
+@click.option("--out", type=click.Path(path_type=Path), help="Folder for the page and Markdown's pictures.")
 @told
 def explain(
     export: tuple[Path, ...],
@@ -59,6 +59,7 @@ def explain(
     model: Path | None,
     save_model: Path | None,
     form: str,
+    out: Path | None,
     **reading: Any,
 ) -> None:
     """Where recording and plain simulation differ, which physics was left out, and how much it explains.
@@ -69,16 +70,43 @@ def explain(
     from identification.errors import NotAssessedError
 
     try:
-        case, _ = _case(export, loops, tag, reading)
         brought = read_model(model, tag) if model is not None else None
-        answer, found = explained(case, _told_rival, brought)
+        case, _ = _case(export, loops, tag, reading)
+        found = explained(case, _told_rival, brought)
     except NotAssessedError as error:
-        click.echo(rendered(abstained(tag, str(error)), form))
+        _show(abstained(tag, str(error)), None, form, out)
         click.echo(f"triage: {error}", err=True)
         sys.exit(NOTHING_DONE)
+    finally:
+        _told_rival("")
     if save_model is not None:
-        write_model(found, save_model)
-    click.echo(rendered(answer, form, lambda: picture(case, found)))
+        write_model(found.model(), save_model)
+    _show(found.data, found, form, out)
+
+
+def _show(data: dict[str, Any], found: Explained | None, form: str, out: Path | None) -> None:
+    """Print the answer in a format, or write its page into a folder."""
+    if form == "json":
+        click.echo(json.dumps(data))
+    elif form == "text":
+        from analyzer.explain_text import lines
+
+        click.echo("\n".join(lines(data)))
+    else:
+        _show_page(data, found, form, out)
+
+
+def _show_page(data: dict[str, Any], found: Explained | None, form: str, out: Path | None) -> None:
+    from analyzer.pages import explain as pages
+    from reports import folder, html, markdown
+
+    page = pages.abstention(data) if found is None else pages.page(found)
+    if out is None:
+        click.echo(html.render(page, True) if form == "html" else markdown.render(page, ""))
+        return
+    written = folder.write_html([page], out, True) if form == "html" else folder.write_markdown([page], out)
+    for path in written:
+        click.echo(f"written: {path}", err=True)
 
 
 @main.command()
@@ -113,9 +141,9 @@ def simulate(
 
 
 def _told_rival(name: str) -> None:
-    """Show on a terminal what is being tried."""
+    """Show on a terminal what is being tried; nothing wipes it out."""
     if sys.stderr.isatty():
-        click.echo(f"\r\033[Ktrying {name}", nl=False, err=True)
+        click.echo(f"\r\033[K{f'trying {name}' if name else ''}", nl=False, err=True)
 
 
 def write_trends(out: Path, stamps: Any, pv: Any, op: Any) -> None:
@@ -124,71 +152,6 @@ def write_trends(out: Path, stamps: Any, pv: Any, op: Any) -> None:
 
     stamp = pd.to_datetime((stamps * 1e6).round().astype("int64"), unit="us")
     pd.DataFrame({"timestamp": stamp, "PV": pv, "OP": op}).to_parquet(out, index=False)
-
-
-def _shown(x: dict[str, Any]) -> str:
-    low, high = (f"{x[k]:.3g}" if x[k] is not None else "?" for k in ("low", "high"))
-    return f"{x['value']:.4g} ({low} to {high}) {x['unit']}".strip()
-
-
-def lines(said: dict[str, Any]) -> list[str]:
-    """The answer as lines of text."""
-    out = [f"{said['loop']}: {said['verdict']} ({said['block']})", said["reason"]]
-    for effect in said["effects"]:
-        out.append(f"- {effect['name']} ({effect['block']})")
-        out += [f"  - {name}: {_shown(value)}" for name, value in effect["parameters"].items()]
-        if effect["held_out_share"] is not None:
-            out.append(f"  - removes {100 * effect['held_out_share']:.0f} % of the misfit on held-out spans")
-        if effect["alternatives"]:
-            out.append(f"  - could also be: {', '.join(effect['alternatives'])}")
-    for name, part in said["fit"].items():
-        fitted, held = part["fitted"], part["held_out"]
-        out.append(f"- {name}: rms misfit {fitted['rmse']:.3g} % fitted, {held['rmse']:.3g} % held out")
-    out += [f"- {name} moved from {a:.4g} to {b:.4g}" for name, (a, b) in said["moved"].items()]
-    return out
-
-
-def rendered(said: dict[str, Any], form: str, draw: Callable[[], str] | None = None) -> str:
-    """The answer in one of the formats; `draw` gives a picture (base64 PNG) where pages want one."""
-    if form == "json":
-        return json.dumps(said)
-    if form == "text":
-        return "\n".join(lines(said))
-    if form == "markdown":
-        head, reason, *rest = lines(said)
-        return "\n".join([f"# {head}", "", reason, "", *rest])
-    body = "".join(f"<p>{html.escape(line)}</p>\n" for line in lines(said))
-    image = f'<img alt="trends" src="data:image/png;base64,{draw()}">' if draw is not None else ""
-    title = html.escape(said["loop"])
-    return (
-        f'<!doctype html><html lang="en"><meta charset="utf-8"><title>{title}</title>\n{body}{image}</html>'
-    )
-
-
-def picture(case: Any, model: dict[str, Any]) -> str:
-    """Recording and simulation above their difference, as a base64 PNG."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
-    from analyzer.explain import simulated
-
-    r = case.prepared.record
-    stamps = r.start_s + r.time_s
-    pv, _ = simulated(case, model, stamps, False)
-    fig, (above, below) = plt.subplots(2, 1, sharex=True, figsize=(11, 6), layout="constrained")
-    own = case.prepared.scale.low + r.pv * case.prepared.scale.span / 100.0
-    above.plot(r.time_s, own, lw=0.8, label="recorded")
-    above.plot(r.time_s, pv, lw=0.8, label="model")
-    below.plot(r.time_s, own - pv, lw=0.8)
-    above.set_ylabel("PV")
-    below.set(ylabel="difference", xlabel="time [s]")
-    above.legend(frameon=False)
-    buffer = io.BytesIO()
-    fig.savefig(buffer, dpi=90)
-    plt.close(fig)
-    return base64.b64encode(buffer.getvalue()).decode()
 
 
 if __name__ == "__main__":

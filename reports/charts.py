@@ -145,7 +145,7 @@ def _onto(ax: Axes, p: Plot) -> None:
     for a in p.areas:
         ax.fill_between(a.x, a.low, a.high, color=COLOURS[a.kind], alpha=0.2, linewidth=0)
     for line in p.lines:
-        style = (
+        style: dict[str, Any] = (
             {"linewidth": 1.2, "linestyle": DASHES.get(line.kind, "-")}
             if line.joined
             else {"linestyle": "none", "marker": ".", "markersize": 2, "alpha": 0.5}
@@ -154,6 +154,9 @@ def _onto(ax: Axes, p: Plot) -> None:
     for mark in p.marks:
         ax.axvline(mark.x, color=COLOURS["worse"], linestyle="--", linewidth=1)
         ax.annotate(plain(mark.label), (mark.x, 1.0), xycoords=("data", "axes fraction"), fontsize=8)
+    if p.reach:
+        ax.update_datalim([(p.lines[0].x[0], y) for y in p.reach], updatex=False)
+        ax.autoscale_view()
     if "x" in p.log:
         ax.set_xscale("log")
     if "y" in p.log:

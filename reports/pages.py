@@ -131,7 +131,8 @@ class Area:
 class Plot:
     """Lines and points over two axes, with areas under them and marks.
 
-    log : axes that count in powers of ten, of "x" and "y"; all that lies on them is above zero
+    log : axes that count in powers of ten, of "x" and "y"; all that lies on them is above zero; reach : values that
+    the vertical axis holds at least, so that small things look small
     """
 
     name: str
@@ -143,6 +144,7 @@ class Plot:
     caption: str = ""
     areas: tuple[Area, ...] = ()
     log: str = ""
+    reach: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,19 @@ from collections.abc import Iterable
 import numpy as np
 from markupsafe import Markup, escape
 
-from reports.pages import Area, Bars, Floats, IntervalBar, IntervalChart, Line, Mark, Panels, Plot, Sparkline
+from reports.pages import (
+    Area,
+    Bars,
+    Floats,
+    IntervalBar,
+    IntervalChart,
+    Line,
+    Mark,
+    Panels,
+    Plot,
+    Sparkline,
+    Trend,
+)
 
 SPARK = (120.0, 26.0)
 ROW = 24.0
@@ -164,6 +176,7 @@ class _Frame:
         self.log = p.log
         across = [line.x for line in p.lines] + [a.x for a in p.areas]
         along = [line.y for line in p.lines] + [e for a in p.areas for e in (a.low, a.high)]
+        along.append(np.array(p.reach, dtype=np.float64))
         self.x = _extent([self._scaled(x, "x") for x in across], 0.0 if joined else 0.04)
         self.y = _extent([self._scaled(y, "y") for y in along], 0.04)
         (self.width, self.height), (self.left, right, self.top, bottom) = PLOT, MARGIN
@@ -227,17 +240,25 @@ def plot(p: Plot) -> Markup:
     return _svg(frame.width, frame.height, body, f"{p.title}: {p.y_label} over {p.x_label}", "plot")
 
 
-def keys(block: Plot | Panels) -> Markup:
-    """Which line is which, one entry a name; nothing where there is one line alone."""
+def _named(block: Plot | Panels | Trend) -> dict[str, tuple[str, bool]]:
+    """Colour of each name, and whether its points are joined; one name for each colour of a trend."""
+    if isinstance(block, Trend):
+        first = {band.kind: band for band in reversed(block.bands)}
+        return {band.label: (band.kind, True) for band in block.bands if first[band.kind] is band}
     plots = block.plots if isinstance(block, Panels) else (block,)
-    named = {line.label: line for p in plots for line in p.lines}
+    return {line.label: (line.kind, line.joined) for p in plots for line in p.lines}
+
+
+def keys(block: Plot | Panels | Trend) -> Markup:
+    """Which line is which, one entry a name; nothing where there is one line alone."""
+    named = _named(block)
     if len(named) < 2:
         return Markup("")
     parts = []
-    for label, line in named.items():
-        path = "M0,6H22" if line.joined else "M5,6h0M11,6h0M17,6h0"
-        kind = "line" if line.joined else "dots"
-        drawn = f'<path class="{kind} {line.kind}" d="{path}"/>'
+    for label, (colour, joined) in named.items():
+        path = "M0,6H22" if joined else "M5,6h0M11,6h0M17,6h0"
+        kind = "line" if joined else "dots"
+        drawn = f'<path class="{kind} {colour}" d="{path}"/>'
         swatch = f'<svg class="swatch" viewBox="0 0 22 12" aria-hidden="true">{drawn}</svg>'
         parts.append(f"<li>{swatch}{escape(label)}</li>")
     return Markup('<ul class="legend">' + "".join(parts) + "</ul>")
