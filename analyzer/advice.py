@@ -12,9 +12,10 @@ from analyzer.history.loops_csv import LoopSpec
 from analyzer.measure import Measured
 from analyzer.tags import as_stated
 from identification.descent import covariance
-from identification.hammerstein import Fit, Window, process_of
-from identification.models import Backlash, Fopdt, Loop, Pid, Stiction, Valve
-from tuning.limit_cycle import Cycle
+from identification.hammerstein import Fit, Window, disturbance, process_of
+from identification.models import Backlash, Fopdt, Integrator, Loop, Pid, Process, Stiction, Valve
+from identification.record import Floats
+from tuning.limit_cycle import Cycle, confirm
 from tuning.linear import is_stable
 from tuning.recommend import Proposal, recommend
 from tuning.search import rounded, scaled_valve
@@ -23,6 +24,13 @@ UNSTABLE = (
     "The identified loop would be unstable at the present settings, which the bounded cycle contradicts: the process "
     "is not known well enough for new settings."
 )
+NINETY = 1.645
+"""Standard deviations to the ends of a 90 % interval."""
+LONGEST_SHARE, MOST_FACTOR = 0.1, 2.0
+"""Largest time constant, as a share of the window, and largest factor to its 90 % limits at which it counts as known;
+ours: beyond them a lag and an integrator explain the record alike."""
+MOST_SCANS = 20_000
+"""Scans of reconstructed load that settings are tried on at most."""
 CALM = "The loop does not oscillate, so new settings would bring nothing; the valve's fault remains."
 
 
@@ -62,7 +70,7 @@ def valve_of(verdict: Verdict, fit: Fit) -> Valve:
     if verdict.cause != "valve":
         return None
     if verdict.fault == "stiction":
-        return Stiction(fit.valve.stickband, fit.valve.slip_jump, slides=fit.valve.tolerance >= 0)
+        return Stiction(fit.valve.stickband, fit.valve.slip_jump, slides=fit.valve.slides)
     return Backlash(fit.valve.stickband)
 
 
@@ -73,21 +81,72 @@ def model_of(verdict: Verdict, controller: Pid) -> Loop:
     return Loop(process, controller, valve_of(verdict, fit))
 
 
+def lag_factor(window: Window, fit: Fit, valve: bool) -> float | None:
+    """Factor from the time constant to its 90 % limits [-]; None where the record tells gain over it alone."""
+    spread = math.sqrt(max(float(covariance(window, fit, free_width=valve)[0, 0]), 0.0))
+    factor = math.exp(min(NINETY * spread, 20.0))
+    known = fit.time_constant_s < LONGEST_SHARE * window.duration_s and factor < MOST_FACTOR
+    return factor if known else None
+
+
+def tuned(window: Window, fit: Fit, valve: bool) -> Process:
+    """The process that settings are sought for: an integrator where the time constant is not known."""
+    process = process_of(window, fit)
+    if lag_factor(window, fit, valve) is None:
+        return Integrator(process.slope, process.dead_time_s)
+    return process
+
+
 def uncertain(window: Window, fit: Fit, loop: Loop, samples: int = 6, seed: int = 0) -> tuple[Loop, ...]:
-    """Loops drawn from the fit's covariance, of the same controller."""
-    rng = np.random.default_rng(seed)
+    """Loops drawn from the fit's covariance, of the same controller and the same kind of process."""
     dead_time_s = fit.dead_time_s + window.half_block_s
-    mean = np.array([math.log(fit.time_constant_s), dead_time_s, fit.valve.stickband, fit.gain])
-    spread = covariance(window, fit, free_width=loop.valve is not None)
-    draws = rng.multivariate_normal(mean, spread, size=samples, method="svd")
-    out = []
-    for log_t, dead, width, gain in draws:
-        t = math.exp(min(max(log_t, mean[0] - 2.3), mean[0] + 2.3))
-        gain = gain if gain * fit.gain > 0 else 0.3 * fit.gain
-        process = Fopdt(float(gain), t, max(float(dead), 0.0))
-        factor = max(float(width), 0.2 * fit.valve.stickband) / max(fit.valve.stickband, 1e-9)
-        out.append(Loop(process, loop.controller, scaled_valve(loop.valve, factor)))
-    return tuple(out)
+    lag, gain = math.log(fit.time_constant_s), math.log(abs(fit.gain))
+    mean = np.array([lag, dead_time_s, fit.valve.stickband, gain])
+    relative = np.array([1.0, 1.0, 1.0, 1.0 / fit.gain])
+    spread = covariance(window, fit, free_width=loop.valve is not None) * np.outer(relative, relative)
+    draws = np.random.default_rng(seed).multivariate_normal(mean, spread, size=samples, method="svd")
+    return tuple(_drawn(draw, fit, loop) for draw in draws)
+
+
+def _drawn(draw: Floats, fit: Fit, loop: Loop) -> Loop:
+    """The loop at one draw of log time constant, dead time, stickband and log gain, none further off than tenfold.
+
+    Gain over time constant is drawn well where the two by themselves are not: their errors go together.
+    """
+    log_t = min(max(draw[0], math.log(fit.time_constant_s) - 2.3), math.log(fit.time_constant_s) + 2.3)
+    slope = math.copysign(math.exp(draw[3] - draw[0]), fit.gain)
+    slope = min(max(slope / fit.slope, 0.3), 3.0) * fit.slope
+    dead, t = max(float(draw[1]), 0.0), math.exp(log_t)
+    is_ramp = isinstance(loop.process, Integrator)
+    process: Process = Integrator(slope, dead) if is_ramp else Fopdt(slope * t, t, dead)
+    factor = max(float(draw[2]), 0.2 * fit.valve.stickband) / max(fit.valve.stickband, 1e-9)
+    return Loop(process, loop.controller, scaled_valve(loop.valve, factor))
+
+
+def load_of(window: Window, fit: Fit, controller: Pid, seed: int = 0) -> Floats:
+    """Load and noise [% PV] that the model leaves, on the scan's clock, the latest `MOST_SCANS`, shape (m,).
+
+    The window's blocks have lost the noise from scan to scan. OP still has it, times the gain, and it dithers the
+    stem; white noise of that size is added.
+    """
+    scan_s = controller.scan_s or window.dt_s
+    left = disturbance(window, fit)
+    clock = np.arange(int(window.duration_s / scan_s)) * scan_s
+    load = np.interp(clock, np.arange(left.size) * window.dt_s, left)[-MOST_SCANS:]
+    if window.factor > 1:
+        load += scan_noise(window, controller) * np.random.default_rng(seed).normal(size=load.size)
+    return np.asarray(load, dtype=np.float64)
+
+
+def scan_noise(window: Window, controller: Pid) -> float:
+    """Standard deviation of PV's noise from sample to sample [% PV], read from OP's second differences.
+
+    Those of white noise have sqrt(6) times its deviation; the median leaves steps aside (Rousseeuw, Croux 1993).
+    """
+    jumps = np.abs(np.diff(window.op, 2))
+    if jumps.size == 0 or controller.kp == 0:
+        return 0.0
+    return float(1.4826 * np.median(jumps) / math.sqrt(6.0) / abs(controller.kp))
 
 
 def cautious(process: Fopdt, period_s: float | None) -> Fopdt:
@@ -127,18 +186,49 @@ def advise(
     return _stated(propose(verdict, controller, period_s), spec, pv_span)
 
 
+def _sticks(m: Measured, controller: Pid) -> Loop | None:
+    """The loop with the stick-slip that was tried beside a play, None where none was."""
+    fit = m.stick_slip
+    if fit is None or fit.valve.slip_jump <= 0:
+        return None
+    valve = Stiction(fit.valve.stickband, fit.valve.slip_jump, slides=fit.valve.tolerance >= 0)
+    return Loop(tuned(m.window, fit, True), controller, valve)
+
+
+def _cycles_alone(one: Loop, other: Loop) -> bool:
+    """Whether the first loop, simulated without load, cycles and the second does not."""
+    return confirm(other).cycle is None and confirm(one).cycle is not None
+
+
+def sought_for(verdict: Verdict, controller: Pid) -> tuple[Loop, Fit, tuple[Loop, ...]]:
+    """The loop that settings are sought for, its fit, and what else it may be, for a valve at fault.
+
+    Where the loop with its play does not cycle, and with the stick-slip that was tried beside it does, the stem
+    sticks: something must move it.
+    """
+    m, fit = _measured(verdict), chosen_fit(verdict)
+    loop = replace(model_of(verdict, controller), process=tuned(m.window, fit, True))
+    other = _sticks(m, controller) if fit is m.play else None
+    if other is None or m.stick_slip is None or not _cycles_alone(other, loop):
+        return loop, fit, uncertain(m.window, fit, loop)
+    samples = uncertain(m.window, m.stick_slip, other, 3), uncertain(m.window, fit, loop, 2)
+    return other, m.stick_slip, (loop, *samples[0], *samples[1])
+
+
 def propose(verdict: Verdict, controller: Pid, period_s: float | None) -> Proposal:
-    """The tuning package's proposal on the model of a verdict and on its uncertainty."""
-    fit, loop = chosen_fit(verdict), model_of(verdict, controller)
-    others = uncertain(_measured(verdict).window, fit, loop)
+    """The tuning package's proposal on the model of a verdict, on its uncertainty, and on the load it leaves."""
+    window, fit = _measured(verdict).window, chosen_fit(verdict)
+    loop = model_of(verdict, controller)
     if verdict.cause == "tuning":
-        slow = replace(loop, process=cautious(process_of(_measured(verdict).window, fit), period_s))
-        return recommend(slow, verdict.cause, (loop, *others[:2]))
+        slow = replace(loop, process=cautious(process_of(window, fit), period_s))
+        others = (loop, *uncertain(window, fit, loop)[:2])
+        return recommend(slow, verdict.cause, others, load_of(window, fit, controller))
     if not is_stable(loop):
         return Proposal("undecided", UNSTABLE)
-    if period_s is None:
+    sought, fit, others = sought_for(verdict, controller)
+    if period_s is None and confirm(sought).cycle is None:
         return Proposal("repair valve", CALM)
-    return recommend(loop, verdict.cause, others)
+    return recommend(sought, verdict.cause, others, load_of(window, fit, controller))
 
 
 def _stated(proposal: Proposal, spec: LoopSpec, pv_span: float) -> Advice:

@@ -8,14 +8,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from analyzer.advice import chosen_fit, model_of, propose, uncertain
+from analyzer.advice import NINETY, chosen_fit, lag_factor, load_of, model_of, propose, sought_for, uncertain
 from analyzer.assess import Assessment
+from analyzer.cause import Verdict
 from analyzer.history.loops_csv import LoopSpec
 from analyzer.tags import as_stated
 from identification.controller import fit_pi
 from identification.descent import covariance
 from identification.errors import NotAssessedError
-from identification.hammerstein import Fit, Window, disturbance
+from identification.hammerstein import Fit, Window
 from identification.models import Estimate, Loop, Pid
 from identification.record import Floats, LoopRecord
 from tuning.describing import describe
@@ -27,14 +28,12 @@ from tuning.recommend import Proposal
 if TYPE_CHECKING:
     from reports.tuning_charts import ForecastPicture, MapPicture
 
-NINETY = 1.645
-"""Standard deviations to the ends of a 90 % interval."""
 MAP_POINTS = 36
 """Points of the map along each axis."""
 SPREAD = 20.0
 """The map reaches this factor below and above the present settings."""
-MOST_SCANS = 20000
-"""Scans of load that the forecast runs over at most."""
+LEAST_SCANS = 240
+"""Scans of load that a forecast needs; ours: twenty for each block of its bootstrap."""
 DISAGREES = 0.15
 """Relative difference of recovered and stated settings from which it is told; ours: recovery is within 2 % on
 trends recorded at the scan and within some 10 % on thinned ones."""
@@ -64,14 +63,13 @@ class Tuning:
 def intervals(window: Window, fit: Fit, valve: bool) -> dict[str, Estimate]:
     """Estimates of a fit with 90 % intervals from the curvature of the likelihood.
 
-    Gain and time constant are left out where the time constant is beyond a tenth of the window or its interval
-    spans a factor of four: then the record tells their ratio alone.
+    Gain and time constant are left out where the record tells their ratio alone (analyzer.advice.lag_factor).
     """
     spread = np.sqrt(np.maximum(np.diag(covariance(window, fit, free_width=valve)), 0.0))
     t = fit.time_constant_s
     out = {"slope_pct_per_s": _slope(window, fit, valve)}
-    factor = math.exp(min(NINETY * spread[0], 20.0))
-    if t < 0.1 * window.duration_s and factor < 2.0:
+    factor = lag_factor(window, fit, valve)
+    if factor is not None:
         out["gain"] = _around(fit.gain, NINETY * spread[3], "%/%")
         out["time_constant_s"] = Estimate(t, t / factor, t * factor, "s")
     out["dead_time_s"] = _around(fit.dead_time_s + window.half_block_s, NINETY * spread[1], "s", least=0.0)
@@ -94,12 +92,13 @@ def _around(value: float, half: float, unit: str, least: float = -math.inf) -> E
     return Estimate(value, max(value - half, least), value + half, unit)
 
 
-def _load(window: Window, fit: Fit, scan_s: float) -> Floats:
-    """Load and noise [% PV] that the model leaves, on the scan's clock, the latest MOST_SCANS."""
-    left = disturbance(window, fit)
-    clock = np.arange(int(window.duration_s / scan_s)) * scan_s
-    load = np.interp(clock, np.arange(left.size) * window.dt_s, left)
-    return np.asarray(load[-MOST_SCANS:], dtype=np.float64)
+def _model(verdict: Verdict, controller: Pid) -> tuple[Loop, Fit, tuple[Loop, ...]]:
+    """The loop that the forecast runs on, its fit, and what else it may be."""
+    if verdict.cause == "valve":
+        return sought_for(verdict, controller)
+    fit, model = chosen_fit(verdict), model_of(verdict, controller)
+    window = verdict.measured.window if verdict.measured else None
+    return model, fit, uncertain(window, fit, model) if window else ()
 
 
 def tune(found: Assessment, record: LoopRecord, controller: Pid) -> Tuning:
@@ -122,12 +121,12 @@ def tune(found: Assessment, record: LoopRecord, controller: Pid) -> Tuning:
         raise NotAssessedError(verdict.needs or "needs trends from which a model can be identified")
     first = found.oscillations.first
     period = first.period_s if first else None
-    window, fit = verdict.measured.window, chosen_fit(verdict)
-    model = model_of(verdict, controller)
+    window = verdict.measured.window
+    model, fit, others = _model(verdict, controller)
     proposal = propose(verdict, controller, period)
-    load = _load(window, fit, controller.scan_s or window.dt_s)
+    load = load_of(window, fit, controller)
     new = proposal.controller or proposal.meanwhile
-    forecast = predict(model, new, load, uncertain(window, fit, model)) if new and load.size >= 240 else None
+    forecast = predict(model, new, load, others) if new and load.size >= LEAST_SCANS else None
     pi = fit_pi(record, period or 60 * record.dt_s)
     told = pi is not None and pi.explained > 0.8 and math.isfinite(pi.ti_s)
     return Tuning(

@@ -11,15 +11,17 @@ class TuningLimits:
 
     | name | unit | source |
     |---|---|---|
-    | ms_most | - | 1.8: Astrom, Hagglund (2006) ask for 1.4 to 2.0; SIMC has 1.6 to 1.7 |
+    | ms_most | - | 2.0: Astrom, Hagglund (2006) ask for 1.4 to 2.0; SIMC has 1.6 to 1.7 |
     | ms_most_sample | - | 2.5, on every uncertainty sample: gain margin 1.7 is left; ours |
-    | peak_factor | - | PV's peak after a load step at the valve over the nominal tuning's; ours |
-    | integral_factor | - | Ti/Kp over that of nominal gain with Ti = max(T, nominal Ti); ours, from Ti >= T |
-    | integral_factor_ramp | - | the same on an integrator, where no T lifts the reference; ours |
+    | peak_factor | - | PV's peak after a load step at the valve over nominal; ours, for reality under 2 |
+    | integral_factor | - | Ti/Kp over nominal gain with Ti = max(T, nominal Ti); ours, for reality under 3.5 |
+    | integral_factor_ramp | - | Ti/Kp over nominal on an integrator or a slow lag; ours, for reality under 10 |
     | gain_up | - | most that the gain is raised in one step; ours |
-    | error_growth | - | error on the model over the present one; ours, so that reality is under 1.05 |
+    | gain_down | - | least gain with play over the lower of present and nominal; ours |
+    | error_growth | - | error on the model, and its mean over all samples, over the present one |
     | error_growth_sample | - | the same on the worst uncertainty sample; ours |
     | error_weight | - | weight of ln(error) beside ln(travel) in the score; ours |
+    | error_aim, error_beyond | - | error up to which error_weight holds, and the weight added above; ours |
     | travel_floor | - | travel over the present one below which less counts little; ours |
     | worth_travel, worth_error | - | least cut in travel or error for which a change is proposed; ours |
     | cycle_growth | - | PV amplitude of the new limit cycle over the old one's with play; ours |
@@ -29,17 +31,25 @@ class TuningLimits:
     | most_steps | scans | load used in the search; ours, for the answer within 2 s |
     | least_steps | scans | a shorter load does not tell tunings apart; ours |
     | warm_up | - | share of a simulated record left out at its start; ours |
+
+    Set on the plants of tests/proofs/retuning.py, seeds 1 and 2, and proved on others. A model's forecast of the
+    error is within 8 % on nine in ten of them, hence error_aim. The rule for play keeps the gain: with gain_down at
+    0.7 errors grew that do not at 0.85. On an integrator with play Ti of 60 delays leaves 3 % of the travel that 10
+    delays make, so integral_factor_ramp need not be larger.
     """
 
-    ms_most: float = 1.8
+    ms_most: float = 2.0
     ms_most_sample: float = 2.5
-    peak_factor: float = 2.0
-    integral_factor: float = 3.0
-    integral_factor_ramp: float = 6.0
-    gain_up: float = 2.0
+    peak_factor: float = 1.7
+    integral_factor: float = 2.4
+    integral_factor_ramp: float = 6.5
+    gain_up: float = 1.3
+    gain_down: float = 0.85
     error_growth: float = 1.0
-    error_growth_sample: float = 1.05
+    error_growth_sample: float = 1.15
     error_weight: float = 0.3
+    error_aim: float = 0.92
+    error_beyond: float = 5.0
     travel_floor: float = 0.03
     worth_travel: float = 0.2
     worth_error: float = 0.1

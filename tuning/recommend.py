@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from identification.models import Loop, Pid
+from identification.models import Fopdt, Loop, Pid
 from identification.record import Floats
 from identification.simulate import scan_step
 from tuning import reasons
@@ -22,6 +22,7 @@ from tuning.search import (
     Candidate,
     assumed_uncertainty,
     bench,
+    mean_error,
     robust,
     rounded,
     search,
@@ -39,6 +40,9 @@ APART = 0.15
 """Difference of ln Kp or ln Ti from which two candidates are confirmed apart."""
 SLOWER = 1.25
 """Factor by which SIMC's closed-loop time constant grows until every sample keeps its Ms."""
+STEPS, FASTER, ENOUGH = 12, 2, 6
+"""Growths tried at most, shrinkings tried first where the load is known, and settings that are enough to choose from;
+ours: two shrinkings make the closed loop as slow as the dead time, SIMC's tightest."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,24 +123,50 @@ def recommend(
     if loop.controller.kp * loop.process.slope <= 0.0:
         return Proposal("undecided", reasons.wrong_sign(loop))
     others = tuple(uncertainty) or assumed_uncertainty(loop, limits)
-    return _tight(loop, others, limits) if cause == "tuning" else _valve(loop, others, load, limits)
+    if load is not None and load.size < limits.least_steps:
+        load = None
+    return (_tight if cause == "tuning" else _valve)(loop, others, load, limits)
 
 
-def _tight(loop: Loop, others: Sequence[Loop], limits: TuningLimits) -> Proposal:
-    """SIMC for a loop that swings by its tuning; slower until every sample keeps its Ms."""
+def _tight(loop: Loop, others: Sequence[Loop], load: Floats | None, limits: TuningLimits) -> Proposal:
+    """SIMC for a loop that swings by its tuning: the nominal, or on a known load the one of least error."""
     now = margins(loop).ms
     if now <= limits.ms_most:
         return Proposal("undecided", reasons.not_tight(now), ms_before=now)
+    found = _simc_settings(loop, others, -FASTER if load is not None else 0, limits)
+    if not found:
+        return Proposal("undecided", reasons.too_uncertain(limits), ms_before=now)
+    new, ms = found[0]
+    if load is not None:
+        new, ms = min(found, key=lambda pair: mean_error((loop, *others), pair[0], load))
+    return Proposal("retune", reasons.tight(loop, new, now, ms), new, ms_before=now, ms=ms)
+
+
+def _simc_settings(
+    loop: Loop, others: Sequence[Loop], first: int, limits: TuningLimits
+) -> list[tuple[Pid, float]]:
+    """SIMC settings with their Ms from the `first` step of the closed-loop time constant on, all samples robust.
+
+    The loop's own time constant and the shortest of its samples' give the integral times.
+    """
     h = scan_step(loop)
     tau_c = TAU_C_PER_DELAY * effective_delay(loop.process, h)
-    for _ in range(12):
-        nominal = simc(loop.process, tau_c, h)
-        new = replace(loop.controller, kp=rounded(nominal.kp), ti_s=rounded(nominal.ti_s), td_s=0.0)
-        ms = robust(loop, others, new, limits)
-        if ms is not None:
-            return Proposal("retune", reasons.tight(loop, new, now, ms), new, ms_before=now, ms=ms)
-        tau_c *= SLOWER
-    return Proposal("undecided", reasons.too_uncertain(limits), ms_before=now)
+    found = []
+    for k in range(first, STEPS):
+        nominal = simc(loop.process, tau_c * SLOWER**k, h)
+        for ti in dict.fromkeys((nominal.ti_s, min(nominal.ti_s, _shortest(others, nominal.ti_s)))):
+            new = replace(loop.controller, kp=rounded(nominal.kp), ti_s=rounded(ti), td_s=0.0)
+            ms = robust(loop, others, new, limits)
+            found += [] if ms is None else [(new, ms)]
+        if len(found) >= ENOUGH:
+            break
+    return found
+
+
+def _shortest(others: Sequence[Loop], otherwise: float) -> float:
+    """The shortest time constant of the samples [s]."""
+    lags = (one.process.time_constant_s for one in others if isinstance(one.process, Fopdt))
+    return min(lags, default=otherwise)
 
 
 def _valve(loop: Loop, others: Sequence[Loop], load: Floats | None, limits: TuningLimits) -> Proposal:
@@ -144,7 +174,7 @@ def _valve(loop: Loop, others: Sequence[Loop], load: Floats | None, limits: Tuni
     if band(loop.valve) <= 0.0:
         return Proposal("undecided", reasons.no_size())
     before = confirm(loop)
-    if load is None or load.size < limits.least_steps:
+    if load is None:
         load = standard_load(loop, limits.most_steps)
     table = bench(loop, others, load, limits)
     now = margins(loop).ms

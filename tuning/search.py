@@ -82,13 +82,21 @@ def rejection(process: Process, controller: Pid) -> Rejection:
 
 
 def allowed(loop: Loop, limits: TuningLimits) -> Rejection:
-    """The slowest rejection that a proposal may have: stated factors of the nominal, or the present one's."""
+    """The slowest rejection that a proposal may have: stated factors of the nominal, or the present one's.
+
+    The integral's reference is nominal gain with Ti of at least T, for that is what play asks for. Beyond
+    `integral_factor_ramp` times SIMC's own integral a longer Ti hardly slows the cycle further, so there only the
+    rule itself, Ti = T at the present gain, goes on.
+    """
     nominal = simc(loop.process, scan_s=scan_step(loop))
     best = rejection(loop.process, nominal)
     now = rejection(loop.process, loop.controller)
     lag = loop.process.time_constant_s if isinstance(loop.process, Fopdt) else 0.0
-    factor = limits.integral_factor_ramp if isinstance(loop.process, Integrator) else limits.integral_factor
-    integral = factor * max(lag, nominal.ti_s) / abs(nominal.kp)
+    longest = max(lag, nominal.ti_s)
+    most = limits.integral_factor * longest / abs(nominal.kp)
+    ramp = limits.integral_factor_ramp * nominal.ti_s / abs(nominal.kp)
+    rule = longest / min(abs(nominal.kp), abs(loop.controller.kp))
+    integral = ramp if isinstance(loop.process, Integrator) else max(min(most, ramp), min(1.5 * rule, most))
     present = now.integral if math.isfinite(now.integral) else 0.0
     return Rejection(max(limits.peak_factor * best.peak, now.peak), max(integral, present))
 
@@ -140,6 +148,11 @@ def _figures(loop: Loop, load: Floats) -> tuple[float, float]:
     return float(np.abs(np.diff(stem)).sum()) / r.duration_s * 3600.0, float(np.mean(np.abs(r.pv)))
 
 
+def mean_error(loops: Sequence[Loop], controller: Pid, load: Floats) -> float:
+    """Average absolute error [% PV] on a load, shape (n,), mean over the loops with one controller."""
+    return float(np.mean([_figures(replace(one, controller=controller), load)[1] for one in loops]))
+
+
 def bench(loop: Loop, others: Sequence[Loop], load: Floats, limits: TuningLimits) -> Bench:
     """The present tuning on every loop, so that candidates can be compared with it."""
     cut = np.ascontiguousarray(load[-limits.most_steps :])
@@ -156,11 +169,16 @@ def try_out(table: Bench, controller: Pid, ms: float, loops: int | None = None) 
     figures = np.array([_figures(replace(one, controller=controller), load) for one, load in cases])
     travel = figures[:, 0] / np.maximum(table.travel[: len(some)], 1e-9)
     error = figures[:, 1] / np.maximum(table.error[: len(some)], 1e-9)
-    limits = table.limits
-    score = np.log(travel + limits.travel_floor) + limits.error_weight * np.log(np.maximum(error, 1e-9))
-    return Candidate(
-        controller, ms, float(travel.mean()), float(error.mean()), float(error.max()), float(score.mean())
-    )
+    score = _score(travel, error, table.limits)
+    return Candidate(controller, ms, float(travel.mean()), float(error.mean()), float(error.max()), score)
+
+
+def _score(travel: Floats, error: Floats, limits: TuningLimits) -> float:
+    """Log of the mean travel, and of the error, which weighs more once above its aim; lower is better."""
+    mean_error = max(float(error.mean()), float(error[0]), 1e-9)
+    above = max(math.log(mean_error / limits.error_aim), 0.0)
+    mean_travel = float(travel.mean()) + limits.travel_floor
+    return math.log(mean_travel) + limits.error_weight * math.log(mean_error) + limits.error_beyond * above
 
 
 def rounded(x: float) -> float:
@@ -179,26 +197,56 @@ def _pairs(loop: Loop, gains: Floats, times: Floats) -> list[Pid]:
 
 def robust(loop: Loop, others: Sequence[Loop], controller: Pid, limits: TuningLimits) -> float | None:
     """Ms on the loop where it and those of all samples keep the limits, else None."""
+    bounds = Bounds(limits.ms_most, (limits.ms_most_sample,) * len(others))
+    return _within(loop, others, controller, bounds)
+
+
+@dataclass(frozen=True, slots=True)
+class Bounds:
+    """Largest Ms [-] on the loop, and on each of its samples."""
+
+    loop: float
+    samples: tuple[float, ...]
+
+
+def bounds_now(loop: Loop, others: Sequence[Loop], limits: TuningLimits) -> Bounds:
+    """The limits, or the present tuning's own Ms where that is larger, the loop's up to the samples' limit.
+
+    A loop that has run for years at its present Ms is not made less robust by settings with no more; a valve model
+    that takes a jump for play asks for twice the gain of the process, and its Ms is then too high by as much.
+    """
+    most = limits.ms_most_sample
+    own = max(limits.ms_most, min(margins(loop).ms, most))
+    finite = (margins(one).ms for one in others)
+    return Bounds(own, tuple(max(most, ms if math.isfinite(ms) else most) for ms in finite))
+
+
+def _within(loop: Loop, others: Sequence[Loop], controller: Pid, bounds: Bounds) -> float | None:
     ms = margins(replace(loop, controller=controller)).ms
-    if ms > limits.ms_most:
+    if ms > bounds.loop:
         return None
-    samples = (margins(replace(one, controller=controller)).ms for one in others)
-    return ms if all(m <= limits.ms_most_sample for m in samples) else None
+    pairs = zip(others, bounds.samples, strict=True)
+    fits = all(margins(replace(one, controller=controller)).ms <= most for one, most in pairs)
+    return ms if fits else None
 
 
 def _kept(table: Bench, most: Rejection, pairs: list[Pid]) -> list[Candidate]:
     """Those of the pairs that keep robustness, load rejection and error, tried on every loop."""
     loop, others = table.loops[0], table.loops[1:]
+    bounds = bounds_now(loop, others, table.limits)
     found = []
     for pid in pairs:
         if pid.ti_s / abs(pid.kp) > most.integral:
             continue
-        ms = robust(loop, others, pid, table.limits)
+        ms = _within(loop, others, pid, bounds)
         if ms is None or rejection(loop.process, pid).peak > most.peak:
             continue
         if try_out(table, pid, ms, 1).error <= table.limits.error_growth:
             found.append(try_out(table, pid, ms))
-    return [c for c in found if c.worst_error <= table.limits.error_growth_sample]
+    limits = table.limits
+    return [
+        c for c in found if c.error <= limits.error_growth and c.worst_error <= limits.error_growth_sample
+    ]
 
 
 def _grid(loop: Loop, most: Rejection, limits: TuningLimits) -> tuple[Floats, Floats]:
@@ -208,7 +256,8 @@ def _grid(loop: Loop, most: Rejection, limits: TuningLimits) -> tuple[Floats, Fl
     """
     nominal, now = simc(loop.process, scan_s=scan_step(loop)), loop.controller
     high = min(limits.gain_up * abs(now.kp), 2.0 * abs(nominal.kp))
-    low = min(0.3 * min(abs(now.kp), abs(nominal.kp)), 0.5 * high)
+    low = (limits.gain_down if is_play(loop.valve) else 0.3) * min(abs(now.kp), abs(nominal.kp))
+    low = min(low, 0.5 * high)
     shortest = 0.5 * min(integral_s(now), nominal.ti_s)
     if is_play(loop.valve) and isinstance(loop.process, Fopdt):
         shortest = loop.process.time_constant_s

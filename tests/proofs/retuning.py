@@ -9,11 +9,10 @@ and under the new tuning. Writes retuning.md and retuning.png beside this file.
 
 from __future__ import annotations
 
-import argparse
 import math
 import tempfile
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 

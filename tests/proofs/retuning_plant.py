@@ -24,7 +24,6 @@ if str(TESTS) not in sys.path:
 
 from concealed.stem import push_through_gap, stick_slip  # noqa: E402
 
-
 Floats = NDArray[np.float64]
 STEPS = 10
 """Fine steps a scan."""
@@ -179,7 +178,9 @@ def wander(rng: np.random.Generator, n: int, corner: float) -> Floats:
     """A smooth random path of unit variance, shape (n,): white noise through two lags of `corner` [scans]."""
     pole = math.exp(-1.0 / corner)
     skip = int(10 * corner)
-    path = lfilter([1.0], np.convolve([1.0, -pole], [1.0, -math.exp(-5.0 / corner)]), rng.normal(size=n + skip))
+    path = lfilter(
+        [1.0], np.convolve([1.0, -pole], [1.0, -math.exp(-5.0 / corner)]), rng.normal(size=n + skip)
+    )
     return np.asarray(path[skip:] / np.std(path[skip:]), dtype=np.float64)
 
 
