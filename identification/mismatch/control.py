@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from identification.mismatch.law import Law, centred, found_law, shifted, span_length
+from identification.mismatch.law import Law, centred, found_law, shifted, span_length, trusted
 from identification.mismatch.thresholds import (
     FROZEN,
     FROZEN_MOVES,
@@ -154,11 +154,13 @@ def typical(residual: Floats, length: int) -> float:
 
 
 def obeys(sp: Floats, pv: Floats, op: Floats, said: Stated, found: Law) -> bool:
-    """Whether the stated law gives OP in most spans nearly as well as the one found."""
+    """Whether the stated law gives OP nearly as well as the one found, in most spans and in those that move it."""
     n, length = found.residual.size, found.length
     e = (sp - shifted(pv, found.late))[:n]
     left = centred(op[:n], length) - said.kp * (centred(e, length) + centred(np.cumsum(e), length) / said.ti)
-    return typical(left, length) < SAME_LAW * typical(found.residual, length)
+    lawful = trusted(found.residual, length)
+    whole = float(np.mean(left[lawful] ** 2)) < SAME_LAW**2 * float(np.mean(found.residual[lawful] ** 2))
+    return whole and typical(left, length) < SAME_LAW * typical(found.residual, length)
 
 
 def settings(found: Law, said: Stated) -> Ruling | None:

@@ -13,7 +13,7 @@ from identification.mismatch.control import Ruling, Stated, judge
 from identification.mismatch.fitting import Fitted, Model, Problem, descend, gain
 from identification.mismatch.law import Law, shifted
 from identification.mismatch.proof import passes
-from identification.mismatch.rivals import Clip, Progress, Rival, compete, prepared, silent
+from identification.mismatch.rivals import Clip, Progress, Rival, compete, prepared, silent, unsettled
 from identification.mismatch.simulation import Scene
 from identification.mismatch.slots import Slot
 from identification.mismatch.starting import excited
@@ -125,6 +125,7 @@ def explain(s: Subject, tell: Progress = silent, brought: Floats | None = None) 
     -------
     Explanation
     """
+    s = replace(s, usable=s.usable & ~recorder.unlogged(s.stamp_s, s.pv.size, s.dt_s))
     trace = trace_of(s)
     ruling, law = ruling_of(s, trace)
     usable = without_spikes(s.pv, s.usable)
@@ -144,10 +145,12 @@ def explain(s: Subject, tell: Progress = silent, brought: Floats | None = None) 
 
 def physics(found: Explanation, tell: Progress, kind: str = "") -> Explanation:
     """Add effects of the catalogue one by one, as long as one passes."""
-    p, best = found.p, found.plain
+    p, best = unsettled(found.p, found.plain, kind)
+    found = replace(found, p=p, plain=best)
     accepted: list[Rival] = []
     before: list[Fitted] = []
     first: tuple[Rival, ...] = ()
+    rivals: list[Rival] = []
     for _ in range(ROUNDS):
         x = excited(p, best, kind)
         rivals = compete(x, best, CATALOGUE, tell)
@@ -161,6 +164,8 @@ def physics(found: Explanation, tell: Progress, kind: str = "") -> Explanation:
     won, weights = ceiling(p, best)
     least = max(CEILING_PRICE, CEILING_SHARE * gain(best, found.plain))
     left = won - weights - least
+    if not accepted and any(r.name == "load-step" and r.net > 0 for r in rivals):
+        left = max(left, rivals[0].net)
     found = replace(found, p=p, best=best, accepted=tuple(accepted), before=tuple(before), first=first)
     return replace(found, left=left if left > 0 else 0.0)
 

@@ -119,7 +119,8 @@ def scales(scene: Scene, c: Floats, param: Param) -> tuple[float, float]:
 def bounds(scene: Scene, c: Floats, param: Param) -> tuple[float, float]:
     """Lowest and highest value of a constant, in its own unit."""
     if param.slot == Slot.T:
-        return 0.3 * scene.dt_s, 2.0 * scene.dt_s * scene.op.size
+        longest = 2.0 * scene.dt_s * scene.op.size
+        return 0.3 * scene.dt_s, longest if c[Slot.LEAK] == 0 else min(longest, scene.longest_s)
     offset, factor = scales(scene, c, param)
     return offset + factor * param.low, offset + factor * param.high
 

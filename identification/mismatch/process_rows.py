@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from identification.mismatch.physics import Param, Row, each
 from identification.mismatch.slots import Slot
+from identification.mismatch.thresholds import TIE
 
 PROCESS = (
     Row(
@@ -67,6 +68,8 @@ PROCESS = (
         (Param(Slot.ROOT, "root", "", 0.05, 3.0),),
         each(Slot.ROOT, 0.3, 1.0),
         types=("level",),
+        likeness=("nonlinear-gain",),
+        price=-TIE,
     ),
     Row(
         "overflow",

@@ -6,10 +6,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identification.mismatch.fitting import Fitted, Model, Problem, descend
+from identification.mismatch.fitting import Fitted, Model, Problem, descend, gain
 from identification.mismatch.noise import whitened
 from identification.mismatch.simulation import simulate
-from identification.mismatch.thresholds import HELD_OUT, HELD_OUT_LOSS, ONE_MOVE, SCREEN_STEPS, SPREAD
+from identification.mismatch.starting import at_inlet
+from identification.mismatch.thresholds import (
+    HELD_OUT,
+    HELD_OUT_LOSS,
+    HELD_OUT_SHARE,
+    ONE_MOVE,
+    SCREEN_STEPS,
+    SPREAD,
+)
 from identification.record import Floats
 
 TIMED = ("load-step", "gain-drift", "supply-variation", "load-oscillation")
@@ -88,8 +96,10 @@ def _refit(p: Problem, model: Model) -> Fitted:
 
 def passes(p: Problem, worse: Fitted, better: Fitted, name: str) -> bool:
     """Whether the effect stands: spread over the record and, where it is bound to no time, on held-out spans."""
+    if name == "load-step":
+        return at_inlet(p, worse)
     if name in TIMED:
         return True
     if name not in ("saturation", "overflow") and not is_spread(p, better, worse):
         return False
-    return held_out(p, worse, better).gain > HELD_OUT_LOSS
+    return held_out(p, worse, better).gain > HELD_OUT_LOSS - HELD_OUT_SHARE * gain(better, worse)

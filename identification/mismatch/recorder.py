@@ -12,6 +12,7 @@ from identification.mismatch.thresholds import (
     GRID_STEP,
     GRID_STEP_OF_RANGE,
     JITTER,
+    MISSED,
     STRAIGHT,
 )
 from identification.record import Floats, Mask
@@ -96,3 +97,17 @@ def sampling(stamp_s: Floats, dt_s: float) -> Trace | None:
     if found < JITTER:
         return None
     return Trace("sampling", found, np.ones(stamp_s.size, dtype=bool))
+
+
+def unlogged(stamp_s: Floats, n: int, dt_s: float) -> Mask:
+    """True where a record of n samples holds a value over from before because none was logged, shape (n,).
+
+    Nothing is marked where the record does not begin with the first stamp and end with the last.
+    """
+    out = np.zeros(n, dtype=bool)
+    at = (stamp_s - stamp_s[0]) / dt_s if stamp_s.size else stamp_s
+    if stamp_s.size < 2 or abs(float(at[-1]) - (n - 1)) > 1.5:
+        return out
+    for k in np.flatnonzero(np.diff(at) > MISSED):
+        out[int(np.ceil(at[k] + 0.5)) : int(np.floor(at[k + 1] + 0.5))] = True
+    return out

@@ -27,8 +27,10 @@ from identification.mismatch.thresholds import (
     FULL_STEPS,
     OUTLIER,
     PARAMETER_PRICE,
+    SAME,
     SCREEN_STEPS,
     SEARCH_PRICE,
+    SETTLES,
     STICKING_HINT,
 )
 from identification.process import plain_processes
@@ -172,6 +174,26 @@ def prepared(
     first = plain(p, brought, clip)
     calm = calmed(p, first)
     return calm, descend(calm, first.model, FULL_STEPS)
+
+
+def unsettled(p: Problem, free: Fitted, kind: str) -> tuple[Problem, Fitted]:
+    """Problem and plain fit, the time constant kept within the record where it might as well have no end.
+
+    A plain loop whose time constant outlasts the record is an integrator under another name. Where an integrator
+    does as well with one constant fewer, the plain loop is one that settles within the record.
+    """
+    rows = [r for r in CATALOGUE if r.name == "integrator"]
+    longest = SETTLES * p.scene.dt_s * p.y.size
+    if float(free.model.c[Slot.T]) <= longest or not applies(Excited(p, (), kind), free, rows[0]):
+        return p, free
+    ended = rival(p, free, candidates(Excited(p, (), kind), free, rows[0]), FULL_STEPS)
+    if ended.gain < -SAME:
+        return p, free
+    held = replace(p, scene=replace(p.scene, longest_s=longest))
+    c = free.model.c.copy()
+    c[Slot.K] *= longest / c[Slot.T]
+    c[Slot.T] = longest
+    return held, descend(held, Model((), c), FULL_STEPS)
 
 
 def stuck(

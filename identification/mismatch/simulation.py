@@ -33,7 +33,7 @@ class Scene:
 
     op : shape (n,) [% OP]; dt_s [s]; middle : OP that counts as zero [% OP]; level : PV that counts as zero
     [% PV]; pv_range : lowest and highest PV; step_at : samples at which the load may step; neighbour : another
-    loop's OP less its mean, shape (n,).
+    loop's OP less its mean, shape (n,); longest_s : longest time constant that counts as one [s].
     """
 
     op: Floats
@@ -43,6 +43,7 @@ class Scene:
     pv_range: tuple[float, float]
     step_at: tuple[int, ...] = ()
     neighbour: Floats | None = field(default=None, repr=False)
+    longest_s: float = math.inf
 
     @property
     def clock(self) -> Floats:

@@ -13,10 +13,21 @@ from identification.mismatch.noise import whitened
 from identification.mismatch.physics import Row
 from identification.mismatch.simulation import simulate
 from identification.mismatch.slots import STEPS, Slot, neutral
-from identification.record import Floats
+from identification.record import Floats, Mask
 
 LINES = 4
 """Lines that are tried."""
+LEAD = 200
+"""Samples of rest before a pulse is whitened; ours: the noise model reaches 117 back."""
+JUMPS = 2.0
+"""Times that jumps of PV itself must explain more than load steps before they are believed; ours: in steps that came
+through the process up to 1.2, in bursts of a sensor from 4 on."""
+NEAR, DELAYED = 3, 20
+"""Samples about a step's place in which its onset is looked for, and how much later that of a jump of PV; ours."""
+GAP_SAMPLES = 5
+"""Missing samples from which OP may have moved unseen; ours: an outlier is one or two."""
+FORGOTTEN = 3.0
+"""Time constants after which a gap's OP is forgotten; ours: a twentieth is left."""
 LINE_SIDE = 25
 """Half of the lines whose median is a line's surroundings."""
 
@@ -25,16 +36,11 @@ def step_places(p: Problem, fit: Fitted) -> tuple[int, ...]:
     """Samples at which a step of the load explains the innovations best, greedily, shape (STEPS,)."""
     n = p.y.size
     e = fit.e * (p.weight > 0)
-    one = neutral()
-    for slot in (Slot.T, Slot.K):
-        one[slot] = fit.model.c[slot]
-    pulse = np.zeros(n)
-    quiet = replace(p.scene, op=np.full(n, p.scene.middle), step_at=(0,))
-    one[int(Slot.STEP)] = 1.0
-    pulse = whitened(np.concatenate((np.zeros(200), simulate(quiet, one)))[:n], fit.ar, p.edges)[200:]
+    shut = after_gaps(p, fit)
+    pulse = step_pulse(p, fit)
     places: list[int] = []
     for _ in range(STEPS):
-        places.append(_best_place(e, pulse))
+        places.append(_best_place(e, pulse, shut))
         part = pulse[: n - places[-1]]
         tail = e[places[-1] :][: part.size]
         part = part[: tail.size]
@@ -43,7 +49,48 @@ def step_places(p: Problem, fit: Fitted) -> tuple[int, ...]:
     return tuple(places)
 
 
-def _best_place(e: Floats, pulse: Floats) -> int:
+def step_pulse(p: Problem, fit: Fitted) -> Floats:
+    """Whitened response to a step of the load at the first sample, shape (n - LEAD,)."""
+    n = p.y.size
+    one = neutral()
+    for slot in (Slot.T, Slot.K):
+        one[slot] = fit.model.c[slot]
+    one[int(Slot.STEP)] = 1.0
+    quiet = replace(p.scene, op=np.full(n, p.scene.middle), step_at=(0,))
+    return whitened(np.concatenate((np.zeros(LEAD), simulate(quiet, one)))[:n], fit.ar, p.edges)[LEAD:]
+
+
+def at_inlet(p: Problem, fit: Fitted) -> bool:
+    """Whether the steps found by step_places came through the process, or PV jumped by itself, as a sensor does."""
+    e = fit.e * (p.weight > 0)
+    through = step_pulse(p, fit)
+    jump = whitened(np.concatenate((np.zeros(LEAD), np.ones(p.y.size - LEAD))), fit.ar, p.edges)[LEAD:]
+    came, jumped = 0.0, 0.0
+    for at in dict.fromkeys(p.scene.step_at):
+        came += max(_share(e, through, at + i) for i in range(-NEAR, NEAR + 1))
+        jumped += max(_share(e, jump, at + i) for i in range(-NEAR, DELAYED))
+    return jumped < JUMPS * came
+
+
+def _share(e: Floats, pulse: Floats, at: int) -> float:
+    """Sum of squares of innovations that a pulse at a sample takes away."""
+    at = min(max(at, 0), e.size - 2)
+    part = pulse[: e.size - at]
+    return float(part @ e[at : at + part.size]) ** 2 / max(float(part @ part), 1e-300)
+
+
+def after_gaps(p: Problem, fit: Fitted) -> Mask:
+    """True in gaps and until what OP did in them has died away in PV, shape (n,): no step can be told there."""
+    held = round(float(fit.model.c[Slot.L] + FORGOTTEN * fit.model.c[Slot.T]) / p.scene.dt_s)
+    gone = np.diff(np.concatenate(([0], (~p.usable).astype(np.int8), [0])))
+    out = np.zeros(p.y.size, dtype=bool)
+    for first, last in zip(np.flatnonzero(gone == 1), np.flatnonzero(gone == -1), strict=True):
+        if last - first >= GAP_SAMPLES:
+            out[max(first - 1, 0) : last + held] = True
+    return out
+
+
+def _best_place(e: Floats, pulse: Floats, shut: Mask) -> int:
     n, m = e.size, pulse.size
     size = 1 << math.ceil(math.log2(n + m))
     cross = np.fft.irfft(np.fft.rfft(e, size) * np.conj(np.fft.rfft(pulse, size)), size)[:n]
@@ -52,6 +99,7 @@ def _best_place(e: Floats, pulse: Floats) -> int:
     share = cross**2 / np.maximum(room, 1e-3 * power[-1])
     share[int(0.98 * n) :] = 0.0
     share[: int(0.01 * n)] = 0.0
+    share[shut] = 0.0
     return int(np.argmax(share))
 
 

@@ -9,8 +9,10 @@ from numba import njit
 
 from identification.mismatch.slots import Slot
 from identification.record import Floats
-from identification.valve import RESTS, first_slip, thresholds, walk
+from identification.valve import HALTS, RESTS, SLIDES, first_slip, thresholds, walk
 
+BEHAVIOUR = {-1.0: RESTS, -0.5: HALTS, 0.0: SLIDES}
+"""What a stem in motion does, by the constant COAST."""
 SERVO_STEPS = 5
 """Steps of a positioner within one sample; ours: its period is never under four samples."""
 
@@ -84,7 +86,7 @@ def curved(stem: Floats, bend: float, middle: float) -> Floats:
 def friction(op: Floats, c: Floats) -> Floats:
     """Stem, shape (n,), behind play or stick-slip; it starts where OP does, if it ever leaves there."""
     away, sliding = thresholds(c[Slot.STICKBAND], c[Slot.JUMP])
-    coast = RESTS if c[Slot.COAST] < 0 else c[Slot.COAST] * c[Slot.STICKBAND]
+    coast = BEHAVIOUR.get(float(c[Slot.COAST]), SLIDES)
     moves = float(np.abs(op - op[0]).max()) > away
     start = float(op[0]) if moves else first_slip(op, away, sliding)
     return walk(op, away, max(sliding, 0.0), coast, start)

@@ -18,26 +18,21 @@ SPLIT = (
 
 VALVE = (
     Row("backlash", "valve", (WIDTH,), each(Slot.STICKBAND, 0.01, 0.03, 0.08, 0.2, 0.5), {Slot.JUMP: 0.0}),
-    Row(
-        "stiction",
-        "valve",
-        (BAND, JUMP),
-        tuple(
-            {Slot.STICKBAND: s, Slot.JUMP: j * s} for s in (0.01, 0.03, 0.08, 0.2, 0.5) for j in (0.4, 0.8)
-        ),
-        {Slot.COAST: -1.0},
-        likeness=("positioner",),
-    ),
-    Row(
-        "stiction",
-        "valve",
-        (BAND, JUMP),
-        tuple(
-            {Slot.STICKBAND: s, Slot.JUMP: j * s} for s in (0.01, 0.03, 0.08, 0.2, 0.5) for j in (0.4, 0.8)
-        ),
-        {Slot.COAST: 0.0},
-        variant="slides",
-        likeness=("positioner",),
+    *(
+        Row(
+            "stiction",
+            "valve",
+            (BAND, JUMP),
+            tuple(
+                {Slot.STICKBAND: s, Slot.JUMP: j * s}
+                for s in (0.01, 0.03, 0.08, 0.2, 0.5)
+                for j in (0.4, 0.8)
+            ),
+            {Slot.COAST: coast},
+            variant=variant,
+            likeness=("positioner",),
+        )
+        for coast, variant in ((-1.0, "rests"), (-0.5, "halts"), (0.0, "slides"))
     ),
     Row(
         "rate-limit",

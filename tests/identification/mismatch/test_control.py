@@ -42,6 +42,18 @@ def test_wrong_settings_are_found(kp: float, ti: float) -> None:
     assert found.values["ti_samples"] == pytest.approx(20.0, rel=0.03)
 
 
+def test_wrong_integral_time_is_found_where_the_loop_seldom_moves() -> None:
+    """With one set point move in the record most spans hold noise alone; the few that move decide."""
+    rng = np.random.default_rng(5)
+    e = rng.normal(0, 0.02, N)
+    e[2500:2700] += 6 * np.exp(-np.arange(200) / 50.0)
+    op = law(e, 1.8, 20.0) + np.round(rng.normal(0, 0.05, N), 2)
+    found, _ = judge(np.full(N, 50.0), 50.0 - e, op, GOOD, Stated(1.8, 32.0))
+    assert found is not None
+    assert found.name == "controller-settings"
+    assert found.values["ti_samples"] == pytest.approx(20.0, rel=0.05)
+
+
 def test_late_clock_is_found() -> None:
     """PV stamped three samples late is named with its shift."""
     s = subject(3)

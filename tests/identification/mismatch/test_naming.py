@@ -6,10 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from mismatch_scenes import PLAY, STICKING, N, subject
+from mismatch_scenes import PLAY, STICKING, N, noise, setpoints, subject
 
 from identification.mismatch.answer import answer
-from identification.mismatch.explain import explain
+from identification.mismatch.control import Stated
+from identification.mismatch.explain import Subject, explain
+from identification.models import Integrator, Loop, Pid
+from identification.simulate import closed_loop
 
 pytestmark = pytest.mark.slow
 
@@ -67,3 +70,45 @@ def test_compressed_trends_end_at_the_recorder() -> None:
     said = answer(explain(s), s)
     assert (said.verdict, said.block) == ("compression", "recorder")
     assert len(said.effects) == 1
+
+
+def test_process_that_never_settles_is_an_integrator_of_its_kind() -> None:
+    """A pressure whose process integrates is named so; as a flow, which cannot, it is left unnamed."""
+    law = Pid(0.9, 23.0)
+    n = noise(9)
+    r = closed_loop(Loop(Integrator(0.05, 5.0), law), setpoints(9), 0.3 * n)
+    held = Stated(law.kp, law.ti_s)
+    s = Subject(
+        r.sp,
+        np.round(r.pv, 2),
+        np.round(r.op, 2),
+        np.ones(N, dtype=bool),
+        1.0,
+        r.time_s,
+        held,
+        kind="pressure",
+    )
+    said = answer(explain(s), s)
+    assert (said.verdict, said.block) == ("integrator", "process")
+    assert answer(explain(replace(s, kind="flow")), s).verdict != "integrator"
+
+
+def test_bursts_of_a_sensor_are_no_load_steps() -> None:
+    """One-sided bursts on PV itself are unexplained: they did not come through the process."""
+    s = subject(10)
+    rng = np.random.default_rng(10)
+    pv = s.pv.copy()
+    for first in rng.integers(200, N - 200, 8):
+        pv[first : first + 40] += 2.0 * rng.exponential(1.0, 40)
+    said = answer(explain(replace(s, pv=pv, stated=None)), s)
+    assert said.verdict in ("unexplained", "none")
+
+
+def test_samples_held_over_a_hole_are_not_taken_for_a_load() -> None:
+    """Where the stamps have a hole, the values held over it raise no load step though nobody marked them."""
+    s = subject(11)
+    kept = np.ones(N, dtype=bool)
+    kept[2300:2320] = kept[3600:3650] = False
+    held = np.maximum.accumulate(np.where(kept, np.arange(N), 0))
+    s = replace(s, pv=s.pv[held], op=s.op[held], stamp_s=s.stamp_s[kept])
+    assert answer(explain(s), s).verdict == "none"

@@ -44,3 +44,13 @@ def test_scattered_polling_is_found() -> None:
     found = recorder.sampling(TICKS + np.random.default_rng(0).normal(0, 0.08, PV.size), 1.0)
     assert found is not None
     assert found.name == "sampling"
+
+
+def test_samples_over_a_hole_are_unlogged() -> None:
+    """Exactly the samples between two stamps that lie apart are marked, and none where the clock is full."""
+    stamps = np.arange(100.0)[np.r_[0:40, 47:100]] * 2.0 + 7.0
+    found = recorder.unlogged(stamps, 100, 2.0)
+    assert np.array_equal(np.flatnonzero(found), np.arange(40, 47))
+    assert not recorder.unlogged(
+        np.arange(100.0) * 2.0 + np.random.default_rng(0).normal(0, 0.3, 100), 100, 2.0
+    ).any()
