@@ -4,15 +4,22 @@ from __future__ import annotations
 
 import math
 import sys
+from collections.abc import Sequence
 from copy import copy
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from analyzer import explain_cli, report_cli
 from analyzer.options import NOTHING_DONE, SOME_LOST, export_options, opened, told
+
+if TYPE_CHECKING:
+    from analyzer.history.export import Export
+    from analyzer.history.loops_csv import LoopSpec
+    from analyzer.nights import Night
+    from analyzer.store import Store
 
 
 def _seconds(at: datetime | None, otherwise: float) -> float:
@@ -57,6 +64,7 @@ def check(export: tuple[Path, ...], loops: Path | None, **reading: Any) -> None:
 @click.option("--resume", is_flag=True, help="Go on with a run that was stopped.")
 @click.option("--since", type=click.DateTime(), help="First day or time assessed (UTC).")
 @click.option("--until", type=click.DateTime(), help="Day or time (UTC) before which samples are assessed.")
+@click.option("--explain", "explaining", is_flag=True, help="Explain the last night's flagged loops as well.")
 @told
 def run(
     export: tuple[Path, ...],
@@ -66,6 +74,7 @@ def run(
     resume: bool,
     since: datetime | None,
     until: datetime | None,
+    explaining: bool,
     **reading: Any,
 ) -> None:
     """The nightly batch: assess every loop and keep the results in a store.
@@ -94,7 +103,29 @@ def run(
     )
     if len(lost) == len(specs):
         sys.exit(NOTHING_DONE)
+    if explaining:
+        _explain_night(source, specs, Store(store), nights[-1], jobs, resume)
     sys.exit(SOME_LOST if lost else 0)
+
+
+def _explain_night(
+    source: Export, specs: Sequence[LoopSpec], store: Store, night: Night, jobs: int, resume: bool
+) -> None:
+    """Explain the flagged loops of a night, with progress, and say how many."""
+    from analyzer import explain_night
+    from analyzer.batch import executor
+    from analyzer.config import Config
+    from analyzer.progress import bar
+
+    pool = executor(jobs) if jobs > 1 else None
+    try:
+        with bar("explained") as progress:
+            rows = explain_night.run(source, specs, store, night, Config(), pool, resume, progress)
+    finally:
+        if pool is not None:
+            pool.shutdown(cancel_futures=True)
+    named = sum(r["verdict"] not in ("none", "unexplained") for r in rows)
+    click.echo(f"{len(rows)} flagged loops explained, {named} with a name", err=True)
 
 
 @main.command()

@@ -147,8 +147,9 @@ class Explained:
 def explained(c: Case, tell: Callable[[str], None], brought: Mapping[str, Any] | None = None) -> Explained:
     """Explain one loop; `brought` is the user's own model, which is judged and is one more start of the search."""
     start = None if brought is None else plain_start(brought)
-    found = mismatch.explain(c.subject, tell, start)
-    said = answer(found, c.subject)
+    with np.errstate(all="ignore"):  # a rival that runs away loses; its overflow is nobody's business
+        found = mismatch.explain(c.subject, tell, start)
+        said = answer(found, c.subject)
     own = None if brought is None else judged(brought, found, c.subject, span_note(c, brought))
     return Explained(c, found, said, as_data(c, said, own), own)
 

@@ -2,6 +2,7 @@
 
 STORE/nights/NIGHT.parquet   one row a loop (rows.ALL_COLUMNS)
 STORE/hours/NIGHT.parquet    one row a loop and hour
+STORE/explained/NIGHT.parquet  one row a loop that was explained (explain_night.COLUMNS)
 STORE/trends/NIGHT.parquet   thinned trends, one row a loop and bucket
 STORE/parts/NIGHT/...        the same in pieces while a night is being worked on; a resumed run reads them
 """

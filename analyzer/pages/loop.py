@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from analyzer.pages.explain_words import check, title
 from analyzer.pages.reading import Thinned
 from analyzer.pages.rhythm import rhythm_plots
 from analyzer.pages.trends import trend_block
@@ -193,7 +194,17 @@ def _trends(thin: Thinned | None, row: Row) -> list[Section]:
     ]
 
 
-def page(rows: Sequence[Row], thin: Thinned | None, index: str = "index.html") -> Page:
+def _explained(found: Row | None) -> list[Section]:
+    """What the plain loop lacks, where the night was explained."""
+    if found is None:
+        return []
+    text = Text((f"{title(found['verdict']).capitalize()}: {found['reason']}", check(found["verdict"])))
+    return [Section("What the plain loop lacks", (text,))]
+
+
+def page(
+    rows: Sequence[Row], thin: Thinned | None, index: str = "index.html", explained: Row | None = None
+) -> Page:
     """A loop's page.
 
     Parameters
@@ -204,12 +215,21 @@ def page(rows: Sequence[Row], thin: Thinned | None, index: str = "index.html") -
         Its trends of the last week.
     index : str
         The morning page.
+    explained : mapping or None
+        The night's explanation of the loop (explain_night.COLUMNS).
     """
     row = rows[-1]
     figures = [
         (TITLES[k][0], f"{number(row[k])} {TITLES[k][1]}".strip()) for k in FIGURES if row[k] is not None
     ]
-    sections = [_verdict(row), _evidence(row), *_trends(thin, row), *_limit_cycle(row), _history(rows)]
+    sections = [
+        _verdict(row),
+        *_explained(explained),
+        _evidence(row),
+        *_trends(thin, row),
+        *_limit_cycle(row),
+        _history(rows),
+    ]
     sections.insert(-1, Section("Figures of the night", (Facts(tuple(figures)),)))
     known = [row["description"], row["type"], row["area"], f"night {row['night']}"]
     links = (("All loops", index),)

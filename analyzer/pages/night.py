@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from analyzer.explain_night import known
 from analyzer.pages import loop, morning
 from analyzer.pages.reading import read_nights, read_trends
 from analyzer.pages.view import read_night
@@ -27,6 +28,8 @@ def pages(store: Store, name: str | None = None, top: int = 50) -> Iterator[Page
     nights = [n for n in store.nights() if n <= night.name][-HISTORY:]
     rows = read_nights(store, nights, loop.COLUMNS, night.paged)
     trends = read_trends(store, night.paged, nights[-loop.WEEK :])
+    explained = {r["loop"]: r for r in known(store, night.name)}
     for worst in night.worst:
         tag = worst["loop"]
-        yield loop.page([r for r in rows if r["loop"] == tag], trends.get(tag))
+        own = [r for r in rows if r["loop"] == tag]
+        yield loop.page(own, trends.get(tag), explained=explained.get(tag))

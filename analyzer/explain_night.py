@@ -1,0 +1,170 @@
+"""The flagged loops of a night explained, one by one on an executor, each answer kept as it comes.
+
+An error of one loop, a dead worker included, is that loop's answer. Kept in STORE/explained/NIGHT.parquet: a row a
+loop with verdict, block, reason and the whole answer as JSON.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import Executor, Future, as_completed
+from dataclasses import dataclass
+from typing import Any
+
+from analyzer.config import Config
+from analyzer.history.export import Export
+from analyzer.history.loops_csv import LoopSpec
+from analyzer.nights import Night, cut
+from analyzer.store import Store, rows_table, write_table
+from identification.errors import TriageError
+
+TABLE = "explained"
+COLUMNS = ("loop", "night", "verdict", "block", "reason", "answer")
+COUNTS_PCT = 50.0
+"""A loop counts as oscillating from here [% of time]; contract of the ranking."""
+QUIET = ("none", "", None)
+"""Causes and actions that are none."""
+Row = dict[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Question:
+    """One loop of a night to be explained, with the loop that leads it where one is known."""
+
+    export: Export
+    spec: LoopSpec
+    source: LoopSpec | None
+    night: Night
+    config: Config
+
+
+def flagged(row: Mapping[str, Any]) -> bool:
+    """Whether a loop of a night is worth an explanation: it oscillates, or has a cause or an action."""
+    if row["status"] != "ok":
+        return False
+    oscillates = (row["oscillating_pct"] or 0.0) >= COUNTS_PCT
+    return oscillates or row["cause"] not in QUIET or row["action"] not in QUIET
+
+
+def answered(q: Question) -> Row:
+    """The row of one loop, whatever happens; runs in a worker process."""
+    from analyzer.explain import abstained
+
+    try:
+        data = _explained(q)
+    except TriageError as error:
+        data = abstained(q.spec.loop, str(error))
+    except Exception as error:  # an error of one loop is that loop's answer, never the night's end
+        data = abstained(q.spec.loop, f"not explained: {type(error).__name__}: {error}")
+    return row_of(data, q.night.name)
+
+
+def _explained(q: Question) -> dict[str, Any]:
+    from analyzer.explain import case, explained
+
+    with_source = [q.source.op] if q.source is not None and q.source.op else []
+    tags = list(dict.fromkeys([*q.spec.tags, *with_source]))
+    series = {tag: cut(s, q.night) for tag, s in q.export.read(tags).items()}
+    specs = (q.spec,) if q.source is None else (q.spec, q.source)
+    return explained(case(q.spec, specs, series, q.config), lambda name: None).data
+
+
+def row_of(data: Mapping[str, Any], night: str) -> Row:
+    """An answer as a row of the store."""
+    texts = {k: data[k] for k in ("loop", "verdict", "block", "reason")}
+    return {**texts, "night": night, "answer": json.dumps(data)}
+
+
+def questions(
+    export: Export, specs: Sequence[LoopSpec], rows: Sequence[Mapping[str, Any]], night: Night, config: Config
+) -> list[Question]:
+    """The flagged loops of a night, the most significant first."""
+    by_name = {s.loop: s for s in specs}
+    chosen = sorted((r for r in rows if flagged(r)), key=lambda r: -(r["oscillation_significance"] or 0.0))
+    return [
+        Question(export, by_name[r["loop"]], by_name.get(r["source_loop"] or ""), night, config)
+        for r in chosen
+        if r["loop"] in by_name
+    ]
+
+
+def _rows(asked: Sequence[Question], pool: Executor | None) -> Iterator[Row]:
+    from analyzer.explain import abstained
+
+    if pool is None:
+        yield from map(answered, asked)
+        return
+    futures: dict[Future[Row], Question] = {pool.submit(answered, q): q for q in asked}
+    for future in as_completed(futures):
+        q, error = futures[future], future.exception()
+        if error is None:
+            yield future.result()
+        else:
+            yield row_of(abstained(q.spec.loop, f"not explained: {type(error).__name__}"), q.night.name)
+
+
+def known(store: Store, night: str) -> list[Row]:
+    """Rows that the store holds of a night; none where nothing was explained."""
+    if not (store.path / TABLE / f"{night}.parquet").exists():
+        return []
+    return store.read(TABLE, night).to_pylist()
+
+
+def keep(store: Store, night: str, rows: Sequence[Row]) -> None:
+    """Write what is explained so far."""
+    write_table(rows_table(rows, COLUMNS, COLUMNS), store.path / TABLE / f"{night}.parquet")
+
+
+def run(
+    export: Export,
+    specs: Sequence[LoopSpec],
+    store: Store,
+    night: Night,
+    config: Config,
+    pool: Executor | None = None,
+    resume: bool = False,
+    progress: Callable[[int, int], None] = lambda done, total: None,
+) -> list[Row]:
+    """Explain the flagged loops of an assessed night and keep the answers.
+
+    Parameters
+    ----------
+    export : Export
+    specs : sequence of LoopSpec
+    store : Store
+        Which holds the night.
+    night : Night
+    config : Config
+    pool : Executor or None
+        Worker processes or a cluster; None works in this one.
+    resume : bool
+        Leave out loops that the store holds an answer of.
+    progress : callable
+        Called with loops done and loops in all.
+
+    Returns
+    -------
+    list of dict
+        The rows kept, in the order in which they came.
+    """
+    columns = [
+        "loop",
+        "status",
+        "oscillating_pct",
+        "oscillation_significance",
+        "cause",
+        "action",
+        "source_loop",
+    ]
+    asked = questions(export, specs, store.read("nights", night.name, columns).to_pylist(), night, config)
+    rows = known(store, night.name) if resume else []
+    done = {r["loop"] for r in rows}
+    left = [q for q in asked if q.spec.loop not in done]
+    keep(store, night.name, rows)
+    progress(len(rows), len(rows) + len(left))
+    for row in _rows(left, pool):
+        rows.append(row)
+        keep(store, night.name, rows)
+        progress(len(rows), len(done) + len(left))
+    return rows

@@ -1,0 +1,91 @@
+"""Explanations of simulated loops, fitted outright without the search for a name."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+
+from analyzer.brought import judged
+from analyzer.config import Config
+from analyzer.explain import Case, Explained, as_data, case
+from analyzer.history.loops_csv import LoopSpec
+from analyzer.history.series import Series
+from identification.mismatch.answer import answer
+from identification.mismatch.catalogue import CATALOGUE
+from identification.mismatch.control import judge
+from identification.mismatch.explain import Explanation, scene_of, trace_of
+from identification.mismatch.fitting import Model, descend, gain
+from identification.mismatch.rivals import Rival, prepared
+from identification.mismatch.slots import Slot
+from identification.models import Backlash, Fopdt, Loop, Pid
+from identification.simulate import closed_loop
+
+N = 2400
+START_S = 1_772_409_600.0
+
+
+def of_loop(width: float, grid: float = 0.01, stated: float = 1.8) -> Case:
+    """A loop with play of that width, PV kept in steps of `grid` %, and a stated gain (1.8 is true)."""
+    rng = np.random.default_rng(5)
+    sp = 50 + np.repeat(rng.uniform(-7, 7, N // 120), 120)
+    load = np.cumsum(rng.normal(0, 0.02, N)) + rng.normal(0, 0.08, N)
+    r = closed_loop(Loop(Fopdt(1.2, 20.0, 3.4), Pid(1.8, 20.0), Backlash(width) if width else None), sp, load)
+    stamp = START_S + np.arange(N, dtype=float)
+    pv = np.round(r.pv / grid) * grid
+    trends = {"A.SP": r.sp, "A.PV": pv, "A.OP": np.round(r.op, 2)}
+    series = {k: Series(stamp, v, np.zeros(N, dtype=bool)) for k, v in trends.items()}
+    spec = LoopSpec(
+        "A",
+        "<b>feed</b>",
+        "flow",
+        sp="A.SP",
+        pv="A.PV",
+        op="A.OP",
+        pv_lo=0.0,
+        pv_hi=100.0,
+        kp=stated,
+        ti=20.0,
+    )
+    return case(spec, (spec,), series, Config())
+
+
+def with_play(found: Explanation, width: float) -> Explanation:
+    """The explanation with play taken as its effect."""
+    row = next(r for r in CATALOGUE if r.name == "backlash")
+    c = found.plain.model.c.copy()
+    c[Slot.STICKBAND] = width
+    best = descend(found.p, Model((row,), c), 8)
+    won = gain(best, found.plain)
+    rival = Rival(best, won, won - 18.0)
+    return Explanation(found.p, found.plain, best, (rival,), (found.plain,), (rival,), law=found.law)
+
+
+@cache
+def explanation(kind: str) -> Explained:
+    """An explanation with that verdict: backlash, none, quantization, controller-settings or unexplained."""
+    asked = of_loop(2.0 if kind == "backlash" else 0.0, 0.8 if kind == "quantization" else 0.01,
+                    1.0 if kind == "controller-settings" else 1.8)  # fmt: skip
+    s = asked.subject
+    assert s.sp is not None
+    assert s.stated is not None
+    scene = scene_of(s)
+    p, plain = prepared(scene, s.pv - scene.level, s.usable)
+    trace = trace_of(s) if kind == "quantization" else None
+    ruling, law = judge(s.sp, s.pv, s.op, s.usable, s.stated)
+    found = Explanation(
+        p, plain, plain, trace=trace, ruling=ruling if kind == "controller-settings" else None, law=law
+    )
+    if kind == "backlash":
+        found = with_play(found, 1.5)
+    if kind == "unexplained":
+        found = Explanation(p, plain, plain, left=99.0)
+    said = answer(found, s)
+    model = {
+        "loop": "A",
+        "constants": {"K": 120.0, "T": 20.0, "L": 3.0},
+        "level_pv_pct": 50.0,
+        "middle_op_pct": 50.0,
+    }
+    brought = judged(model, found, s) if kind == "backlash" else None
+    return Explained(asked, found, said, as_data(asked, said, brought), brought)

@@ -1,0 +1,143 @@
+"""A night's flagged loops are explained, whatever one of them does, and the answers are kept and shown."""
+
+from __future__ import annotations
+
+import json
+from concurrent.futures import Executor, Future
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from analyzer import explain_night
+from analyzer.config import Config
+from analyzer.explain import abstained
+from analyzer.explain_night import Question, answered, flagged, keep, known, questions, row_of, run
+from analyzer.history.loops_csv import LoopSpec
+from analyzer.nights import Night
+from analyzer.pages import night as night_pages
+from analyzer.store import Store
+from identification.errors import NotAssessedError
+from reports.html import render
+from reports.pages import Text
+from tests.reports.small_store import NASTY, small_store, tags
+
+NIGHT = Night("2026-03-15", 0.0, 1.0)
+SPECS = tuple(LoopSpec(tag, pv=f"{tag}.PV", op=f"{tag}.OP") for tag in tags(30))
+EXPORT: Any = None
+ROW = {"status": "ok", "oscillating_pct": 0.0, "cause": "none", "action": "none"}
+
+
+@pytest.fixture
+def store(tmp_path: Path) -> Store:
+    """Two weeks of 30 made-up loops."""
+    return small_store(tmp_path / "store", hours=False, buckets=50)
+
+
+def told(q: Question) -> dict[str, Any]:
+    """An answer that needs no recording; the second nasty loop fails, the third abstains."""
+    if q.spec.loop == NASTY[1]:
+        raise ZeroDivisionError("broken")
+    if q.spec.loop == NASTY[2]:
+        raise NotAssessedError("needs OP, has none")
+    return abstained(q.spec.loop, "said of " + q.spec.loop) | {"verdict": "backlash", "block": "valve"}
+
+
+class DyingPool(Executor):
+    """A pool whose every second worker dies."""
+
+    def submit(self, fn: Any, /, *args: Any, **kwargs: Any) -> Future[Any]:
+        """Do the work at once, or die."""
+        out: Future[Any] = Future()
+        self.count = getattr(self, "count", 0) + 1
+        if self.count % 2:
+            out.set_result(fn(*args, **kwargs))
+        else:
+            out.set_exception(RuntimeError("killed"))
+        return out
+
+
+@pytest.mark.parametrize(
+    ("changed", "worth"),
+    [
+        ({}, False),
+        ({"oscillating_pct": 60.0}, True),
+        ({"cause": "valve"}, True),
+        ({"action": "retune"}, True),
+        ({"oscillating_pct": None, "cause": None, "action": ""}, False),
+        ({"oscillating_pct": 90.0, "status": "failed"}, False),
+    ],
+)
+def test_flagged_loops_oscillate_or_have_cause_or_action(changed: dict[str, Any], worth: bool) -> None:
+    """A loop is explained where it oscillates, or has a cause or an action, and was assessed."""
+    assert flagged(ROW | changed) is worth
+
+
+def test_worst_loop_comes_first_with_the_loop_that_leads_it() -> None:
+    """Questions go by significance, and a follower brings its source's tags."""
+    rows = [
+        ROW | {"loop": tag, "cause": "load", "oscillation_significance": size, "source_loop": lead}
+        for tag, size, lead in (("FIC0000", 1.0, None), ("FIC0001", 9.0, "FIC0000"))
+    ]
+    first, second = questions(EXPORT, SPECS, rows, NIGHT, Config())
+    assert (first.spec.loop, second.spec.loop) == ("FIC0001", "FIC0000")
+    assert first.source is not None
+    assert first.source.loop == "FIC0000"
+    assert second.source is None
+
+
+def test_one_failing_loop_never_stops_the_night(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A loop that breaks and one that abstains have their reason as answer; all others are explained."""
+    monkeypatch.setattr(explain_night, "_explained", told)
+    seen: list[tuple[int, int]] = []
+    rows = run(EXPORT, SPECS, store, NIGHT, Config(), progress=lambda *x: seen.append(x))
+    by = {r["loop"]: r for r in known(store, NIGHT.name)}
+    assert len(by) == len(rows) == seen[-1][0] == seen[-1][1]
+    assert {"unexplained", "backlash"} == {r["verdict"] for r in rows}
+    if NASTY[1] in by:
+        assert "ZeroDivisionError" in by[NASTY[1]]["reason"]
+    assert all(json.loads(r["answer"])["loop"] == r["loop"] for r in rows)
+
+
+def test_dead_worker_costs_its_loop_alone(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where every second worker dies, every second loop says so and the others have their answers."""
+    monkeypatch.setattr(explain_night, "_explained", told)
+    rows = run(EXPORT, SPECS, store, NIGHT, Config(), DyingPool())
+    dead = [r for r in rows if "RuntimeError" in r["reason"]]
+    assert abs(2 * len(dead) - len(rows)) <= 1
+
+
+def test_resumed_night_keeps_what_it_has(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A stopped night goes on with the loops that have no answer yet."""
+    monkeypatch.setattr(explain_night, "_explained", told)
+    whole = run(EXPORT, SPECS, store, NIGHT, Config())
+    keep(store, NIGHT.name, [whole[0] | {"reason": "kept"}])
+    again = run(EXPORT, SPECS, store, NIGHT, Config(), resume=True)
+    assert again[0]["reason"] == "kept"
+    assert {r["loop"] for r in again} == {r["loop"] for r in whole}
+
+
+def test_failure_is_an_answer(monkeypatch: pytest.MonkeyPatch) -> None:
+    """An abstention's reason stands as it is, an error's with its kind."""
+    monkeypatch.setattr(explain_night, "_explained", told)
+    spec = {s.loop: s for s in SPECS}
+    ask = [answered(Question(EXPORT, spec[n], None, NIGHT, Config()))["reason"] for n in NASTY[1:3]]
+    assert ask == ["not explained: ZeroDivisionError: broken", "needs OP, has none"]
+
+
+def test_loop_page_shows_the_explanation(store: Store) -> None:
+    """The loop's page has the explanation's sentence and what to look at, escaped; without one it has no section."""
+    name = store.nights()[-1]
+    before = {p.title: p for p in night_pages.pages(store, name, 8)}
+    tag = next(t for t in before if t in tags(30))
+    evil = "<script>evil</script>"
+    data = abstained(tag, evil) | {"verdict": "backlash", "block": "valve"}
+    keep(store, name, [row_of(data, name)])
+    after = {p.title: p for p in night_pages.pages(store, name, 8)}
+    title = "What the plain loop lacks"
+    assert title not in [s.title for s in before[tag].sections]
+    section = next(s for s in after[tag].sections if s.title == title)
+    assert isinstance(section.blocks[0], Text)
+    assert evil in section.blocks[0].paragraphs[0]
+    assert "linkage" in section.blocks[0].paragraphs[1]
+    assert evil not in render(after[tag], True)

@@ -1,0 +1,120 @@
+"""The page and the text of an explanation say and show what the answer holds."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from analyzer.explain import abstained
+from analyzer.explain_text import columns, lines
+from analyzer.pages import explain as pages
+from analyzer.pages.explain_plots import close_part, simulations, trends
+from identification.mismatch.where import located_in
+from reports.folder import write_markdown
+from reports.html import render
+from reports.markdown import render as as_markdown
+from reports.pages import Page, Panels, Plot, Trend
+from tests.analyzer.explained import N, explanation
+
+KINDS = ("backlash", "none", "quantization", "controller-settings", "unexplained")
+
+
+def blocks(page: Page) -> list:
+    """All blocks of a page."""
+    return [b for s in page.sections for b in s.blocks]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_each_kind_of_answer_has_a_whole_page(kind: str) -> None:
+    """Whatever the verdict, the page has its sentence, the recording, where the misfit lives and the fit."""
+    e = explanation(kind)
+    assert e.said.verdict == kind
+    page = pages.page(e)
+    titles = [s.title for s in page.sections]
+    assert titles[:2] == ["What it is", "Recording and simulation"]
+    assert {"Where the misfit lives", "How well it fits"} <= set(titles)
+    assert any(isinstance(b, Trend) for b in blocks(page))
+    assert any(isinstance(b, Panels) for b in blocks(page))
+    text = render(page, True)
+    assert e.data["reason"].split(":")[0].replace("'", "&#39;") in text
+    assert "<b>feed" not in text
+    assert len(text) < 600_000
+
+
+@pytest.mark.parametrize("kind", ["backlash", "quantization", "controller-settings"])
+def test_findings_have_a_picture(kind: str) -> None:
+    """Play, a coarse sensor and other settings are each drawn."""
+    page = pages.page(explanation(kind))
+    section = next(s for s in page.sections if s.title == "What was found")
+    plot = next(b for b in section.blocks if isinstance(b, Plot))
+    assert all(np.isfinite(line.y).all() for line in plot.lines)
+
+
+def test_page_of_play_shows_both_models_and_the_users(tmp_path: Path) -> None:
+    """Plain, improved and brought simulation stand in trend and table, the improved one nearest to the recording."""
+    e = explanation("backlash")
+    page = pages.page(e)
+    whole = next(b for b in blocks(page) if isinstance(b, Trend))
+    assert {"recorded", "baseline", "model", "brought"} <= {b.kind for b in whole.bands}
+    size = {k: float(np.std(e.case.subject.pv - x)) for k, x in simulations(e).items()}
+    assert size["model"] < size["baseline"] < size["brought"]
+    fit = next(t for t in page.tables() if t.name == "fit")
+    assert [row[0].text for row in fit.rows] == ["plain loop", "improved loop", "your model"]
+    assert "100 times off" in render(page, True)
+    written = write_markdown([page], tmp_path)
+    assert written[0].read_text().count("![") == len(list((tmp_path / f"{page.name}-pictures").iterdir()))
+
+
+def test_marked_spans_and_close_look_lie_in_the_recording() -> None:
+    """Spans that carry the misfit lie within the recording, and the close look is a part of it."""
+    e = explanation("backlash")
+    at = located_in(e.found.p, e.found.plain, e.case.subject)
+    whole, closer = trends(e, at)
+    first, last = whole.time_s[0], whole.time_s[0] + N
+    assert whole.spans
+    assert all(first <= a < b <= last for a, b in whole.spans)
+    part = close_part(e, at)
+    assert 0 <= part.start < part.stop <= N
+    assert closer.time_s.size == part.stop - part.start
+
+
+def test_where_tells_what_carries_play() -> None:
+    """Of play the answer tells features with their chances, and the keys of the contract are there."""
+    where = explanation("backlash").data["where"]
+    assert {"signals", "spans", "pv_range", "op_range", "direction", "band_s"} <= set(where)
+    assert {f["name"] for f in where["features"]} >= {"pv_level", "op_level", "after_reversals"}
+    assert json.loads(json.dumps(where)) == where
+
+
+def test_none_shows_what_was_held_out() -> None:
+    """Where nothing was found the plain loop still has a held-out misfit of its own, under 1 %."""
+    fit = explanation("none").data["fit"]["baseline"]
+    assert fit["held_out"]["rmse"] != fit["fitted"]["rmse"]
+    assert fit["held_out"]["rmse"] < 1.0
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_text_is_narrow_and_without_raw_floats(kind: str) -> None:
+    """Text keeps within 112 columns and shows no number of more than six digits."""
+    text = lines(explanation(kind).data)
+    assert max(len(line) for line in text) <= 112
+    assert not any(len(word.strip(".,;()").replace(".", "")) > 6 for line in text for word in line.split()
+                   if word.strip(".,;()").replace(".", "").isdigit())  # fmt: skip
+
+
+def test_columns_line_up() -> None:
+    """Numbers end, and texts begin, at the same place in each row."""
+    rows = columns([("a", "1.5", "short"), ("longer", "10", "words " * 40)], (1,))
+    assert rows[0].index("short") == rows[1].index("words")
+    assert rows[0].index("1.5") + 3 == rows[1].index("10") + 2
+    assert all(len(r) <= 112 for r in rows)
+
+
+def test_abstention_has_a_page() -> None:
+    """Where nothing can be said the page says what is missing, in HTML and in Markdown."""
+    page = pages.abstention(abstained("A", "A: needs OP, has none"))
+    assert "needs OP, has none" in render(page, True)
+    assert "needs OP, has none" in as_markdown(page, "")
