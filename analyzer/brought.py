@@ -60,7 +60,7 @@ def wrong_units(own: Floats, found: Mapping[str, float]) -> str:
     said = []
     if within(gain, HUNDRED):
         said.append(
-            f"its gain, {own[Slot.K]:.3g}, is about 100 times off {found['gain']:.3g}: percent or fractions?"
+            f"its gain, {own[Slot.K]:.3g}, is about 100 times off {found['gain']:.3g}, as percent are off fractions"
         )
     elif gain < 0:
         said.append(f"its gain, {own[Slot.K]:.3g}, has another sign than {found['gain']:.3g} found")

@@ -281,14 +281,14 @@ def read_model(path: Path, loop: str) -> dict[str, Any]:
 
 def checked(data: Mapping[str, Any], path: Path) -> None:
     """Raise InputError where a number of a model is none."""
-    constants(dict(data))
     held = data["constants"] if isinstance(data["constants"], dict) else {}
-    plain = {k: data.get(k, 0.0) for k in ("middle_op_pct", "level_pv_pct", "late_s")}
-    for name, value in {**held, **plain}.items():
+    placed = {k: data.get(k, 0.0) for k in ("middle_op_pct", "level_pv_pct", "late_s")}
+    for name, value in {**held, **placed}.items():
         if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
             raise InputError(
                 f"{path}: {name} is {value!r}", "a finite number", "correct it or save the model anew"
             )
+    constants(dict(data))
 
 
 def simulated(c: Case, data: dict[str, Any], stamps: Floats, closed: bool) -> tuple[Floats, Floats]:

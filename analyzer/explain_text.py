@@ -102,7 +102,7 @@ def lines(data: Mapping[str, Any]) -> list[str]:
     data : mapping
         The contract's answer.
     """
-    head = f"{data['loop']}: {title(data['verdict'])}"
+    head = f"{data['loop']}: {title(data['verdict']) if data['fit'] else 'not told'}"
     block = f" ({data['block']})" if data["block"] != "none" else ""
     out = [head + block, *wrap(data["reason"], WIDTH), *wrap(check(data["verdict"]), WIDTH)]
     out += _part("Parameters (90 % intervals)", _parameters(data), (2,))

@@ -10,7 +10,7 @@ import numpy as np
 
 from identification.mismatch.explain import Explanation, Subject, alternatives, restored
 from identification.mismatch.fitting import Fitted, deviations
-from identification.mismatch.informed import uninformed
+from identification.mismatch.informed import DEAF, uninformed
 from identification.mismatch.locate import Located
 from identification.mismatch.physics import Row
 from identification.mismatch.proof import HeldOut, Misfit, held_out, misfit
@@ -197,7 +197,7 @@ def answer(found: Explanation, s: Subject) -> Answer:
         fit_of(proof),
         moved(found),
         remaining(found),
-        _note(found) if effects or not lacking else f"Not told: {lacking}.",
+        f"Not told: {lacking}." if lacking and (verdict, block) == ("unexplained", "none") else _note(found),
         lacking if effects else "",
     )
 
@@ -206,7 +206,7 @@ def verdict_of(found: Explanation, effects: tuple[Effect, ...], lacking: str, at
     """The verdict and its block; what is left over, and what a record cannot tell, has no name."""
     if found.left > 0 and not any(found_first(found)):
         return "unexplained", LIVES.get(at.carrying[0].name, "process") if at.carrying else "process"
-    if effects:
+    if effects and not (lacking.startswith(DEAF) and effects[0].block in ("valve", "process")):
         return effects[0].name, effects[0].block
     return ("unexplained", "none") if lacking else ("none", "none")
 

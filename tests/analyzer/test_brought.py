@@ -47,7 +47,7 @@ def test_right_model_does_as_well(asked: tuple[Explanation, Subject]) -> None:
     own = judged(model(), *asked)
     assert own.held_out.rmse == pytest.approx(0.1, rel=0.1)
     assert "it does as well as the plain loop" in own.note
-    assert "?" not in own.note
+    assert "off" not in own.note
 
 
 @pytest.mark.parametrize(

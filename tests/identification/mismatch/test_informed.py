@@ -10,7 +10,7 @@ from mismatch_scenes import noise, subject
 
 from identification.mismatch.answer import answer
 from identification.mismatch.explain import Explanation, Subject, scene_of
-from identification.mismatch.informed import too_short, unanswered, uninformed
+from identification.mismatch.informed import ANSWERS, brings, too_short, unanswered, uninformed
 from identification.mismatch.rivals import prepared
 from identification.mismatch.slots import Slot
 
@@ -40,7 +40,14 @@ def test_output_that_pv_does_not_answer_is_an_abstention() -> None:
     assert "needs moves of OP that PV answers" in unanswered(found)
     said = answer(found, deaf)
     assert (said.verdict, said.block) == ("unexplained", "none")
-    assert "cannot be told from zero" in said.note
+    assert "without OP the fit is as good" in said.note
+
+
+def test_slow_level_answers_although_its_gain_is_open() -> None:
+    """A near integrator, whose gain and time constant are known by their ratio alone, answers OP all the same."""
+    s = subject(5)
+    found = plainly(s)
+    assert brings(found.p, found.plain) > 10 * ANSWERS
 
 
 @pytest.mark.parametrize(("kind", "told"), [("temperature", True), ("level", False)])
