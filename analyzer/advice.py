@@ -16,7 +16,7 @@ from identification.hammerstein import Fit, Window, disturbance, process_of
 from identification.models import Backlash, Fopdt, Integrator, Loop, Pid, Process, Stiction, Valve
 from identification.record import Floats
 from tuning.limit_cycle import Cycle, confirm
-from tuning.linear import is_stable
+from tuning.linear import integral_s, is_stable
 from tuning.recommend import Proposal, recommend
 from tuning.search import rounded, scaled_valve
 
@@ -31,6 +31,10 @@ LONGEST_SHARE, MOST_FACTOR = 0.1, 2.0
 ours: beyond them a lag and an integrator explain the record alike."""
 MOST_SCANS = 20_000
 """Scans of reconstructed load that settings are tried on at most."""
+NO_INTEGRAL = (
+    "Without integral action, as loops.csv states, the identified loop would come to rest, but the record cycles: "
+    "check kp and ti before new settings are sought."
+)
 CALM = "The loop does not oscillate, so new settings would bring nothing; the valve's fault remains."
 
 
@@ -109,13 +113,14 @@ def uncertain(window: Window, fit: Fit, loop: Loop, samples: int = 6, seed: int 
 
 
 def _drawn(draw: Floats, fit: Fit, loop: Loop) -> Loop:
-    """The loop at one draw of log time constant, dead time, stickband and log gain, none further off than tenfold.
+    """The loop at one draw of log time constant, dead time, stickband and log gain.
 
-    Gain over time constant is drawn well where the two by themselves are not: their errors go together.
+    The lag stays within a factor of ten, the slope of three. Gain over time constant is drawn well where the two by
+    themselves are not: their errors go together.
     """
     log_t = min(max(draw[0], math.log(fit.time_constant_s) - 2.3), math.log(fit.time_constant_s) + 2.3)
-    slope = math.copysign(math.exp(draw[3] - draw[0]), fit.gain)
-    slope = min(max(slope / fit.slope, 0.3), 3.0) * fit.slope
+    off = draw[3] - draw[0] - math.log(abs(fit.slope))
+    slope = fit.slope * math.exp(min(max(off, -math.log(3.0)), math.log(3.0)))
     dead, t = max(float(draw[1]), 0.0), math.exp(log_t)
     is_ramp = isinstance(loop.process, Integrator)
     process: Process = Integrator(slope, dead) if is_ramp else Fopdt(slope * t, t, dead)
@@ -219,6 +224,10 @@ def propose(verdict: Verdict, controller: Pid, period_s: float | None) -> Propos
     """The tuning package's proposal on the model of a verdict, on its uncertainty, and on the load it leaves."""
     window, fit = _measured(verdict).window, chosen_fit(verdict)
     loop = model_of(verdict, controller)
+    if verdict.cause not in ("valve", "tuning"):
+        return recommend(loop, verdict.cause, source=verdict.source)
+    if loop.controller.kp * loop.process.slope <= 0.0:
+        return recommend(loop, verdict.cause)
     if verdict.cause == "tuning":
         slow = replace(loop, process=cautious(process_of(window, fit), period_s))
         others = (loop, *uncertain(window, fit, loop)[:2])
@@ -226,8 +235,11 @@ def propose(verdict: Verdict, controller: Pid, period_s: float | None) -> Propos
     if not is_stable(loop):
         return Proposal("undecided", UNSTABLE)
     sought, fit, others = sought_for(verdict, controller)
-    if period_s is None and confirm(sought).cycle is None:
+    rests = confirm(sought).cycle is None
+    if rests and period_s is None:
         return Proposal("repair valve", CALM)
+    if rests and math.isinf(integral_s(controller)):
+        return Proposal("undecided", NO_INTEGRAL)
     return recommend(sought, verdict.cause, others, load_of(window, fit, controller))
 
 

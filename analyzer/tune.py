@@ -17,13 +17,15 @@ from identification.controller import fit_pi
 from identification.descent import covariance
 from identification.errors import NotAssessedError
 from identification.hammerstein import Fit, Window
-from identification.models import Estimate, Loop, Pid
+from identification.models import Estimate, Loop, Pid, Process
 from identification.record import Floats, LoopRecord
 from tuning.describing import describe
 from tuning.limit_cycle import Confirmed, confirm
+from tuning.linear import integral_s
 from tuning.maps import curves, travel_map
 from tuning.predict import Forecast, predict, run
 from tuning.recommend import Proposal
+from tuning.rules import simc
 
 if TYPE_CHECKING:
     from reports.tuning_charts import ForecastPicture, MapPicture
@@ -184,10 +186,13 @@ def _disagreement(t: Tuning) -> list[str]:
         return []
     kp, ti = t.recovered
     c = t.model.controller
-    if abs(kp / c.kp - 1) <= DISAGREES and abs(ti / c.ti_s - 1) <= DISAGREES:
+    stated = integral_s(c)
+    if abs(kp / c.kp - 1) <= DISAGREES and abs(ti / stated - 1) <= DISAGREES:
         return []
-    seen = f"OP follows kp {kp:.3g} %/% and ti {ti:.3g} s, loops.csv states {c.kp:.3g} and {c.ti_s:.3g}"
-    return [f"{seen}: check the settings before you change them"]
+    integral = f"{stated:.3g} s" if math.isfinite(stated) else "no integral action"
+    seen = f"OP follows kp {kp:.3g} %/% and ti {ti:.3g} s, loops.csv states {c.kp:.3g} and {integral}"
+    wrong = "the sign of kp is wrong, " if kp * c.kp < 0 else ""
+    return [f"{seen}: {wrong}check the settings before you change them"]
 
 
 def lines(t: Tuning, spec: LoopSpec, pv_span: float) -> list[str]:
@@ -226,11 +231,18 @@ def _map(t: Tuning) -> MapPicture:
 
     c, new = t.model.controller, t.proposal.controller
     kp = c.kp * np.geomspace(1 / SPREAD, SPREAD, MAP_POINTS)
-    top = max(SPREAD * c.ti_s, 3 * new.ti_s if new else 0.0)
-    found = travel_map(t.model, kp, np.geomspace(c.ti_s / 4, top, MAP_POINTS))
+    now_s = _finite_ti(c, t.model.process)
+    top = max(SPREAD * now_s, 3 * new.ti_s if new else 0.0)
+    found = travel_map(t.model, kp, np.geomspace(now_s / 4, top, MAP_POINTS))
     chosen = (new.kp, new.ti_s) if new else None
     travel = 3600.0 * found.travel
-    return MapPicture(found.kp, found.ti_s, travel, found.rests, found.unstable, (c.kp, c.ti_s), chosen)
+    return MapPicture(found.kp, found.ti_s, travel, found.rests, found.unstable, (c.kp, now_s), chosen)
+
+
+def _finite_ti(controller: Pid, process: Process) -> float:
+    """Integral time [s] for a map's axis; SIMC's where the integral is off."""
+    ti = integral_s(controller)
+    return ti if math.isfinite(ti) else simc(process, scan_s=max(controller.scan_s, 1.0)).ti_s
 
 
 def _trends(t: Tuning, new: Pid) -> ForecastPicture:

@@ -7,15 +7,17 @@ from collections.abc import Sequence
 from dataclasses import replace
 from difflib import get_close_matches
 
-from analyzer.assess import assess
+from analyzer.assess import assess, unfit_for_cause
 from analyzer.config import Config
 from analyzer.history.export import Export
 from analyzer.history.loops_csv import LoopSpec
 from analyzer.nights import cut, nights_of
-from analyzer.quality import prepare
+from analyzer.quality import Prepared, has_op, prepare
 from analyzer.tags import controller
 from analyzer.tune import lines, pictures, tune
-from identification.errors import InputError
+from identification.errors import InputError, NotAssessedError
+
+NO_MODEL = "needs PV that moves with OP, so that a model can be identified"
 
 
 def spec_of(specs: Sequence[LoopSpec], loop: str) -> LoopSpec:
@@ -33,6 +35,14 @@ def spec_of(specs: Sequence[LoopSpec], loop: str) -> LoopSpec:
     raise InputError(
         f"loop {loop} is not among the {len(specs)} loops", f"one of them ({near})", "correct --loop"
     )
+
+
+def _unfit(prepared: Prepared, config: Config) -> str:
+    """Why the trends give no model, the nearest reason first; empty where none is known."""
+    at_limit = float(prepared.record.mask("saturated").mean())
+    if has_op(prepared) and at_limit > config.quality.saturated_share:
+        return f"needs OP within its limits, it is at one for {100 * at_limit:.0f} % of the time"
+    return unfit_for_cause(prepared, config)
 
 
 def proposal(
@@ -56,8 +66,13 @@ def proposal(
     if spec.scan_s is None:
         stated = replace(stated, scan_s=prepared.record.dt_s)
     found = assess(prepared, stated, config, spec.type)
-    tuning = tune(found, prepared.record, stated)
     head = [f"{loop}, night {night.name}: cause {found.verdict.cause}"]
     text = head + [f"sign of {s.points_to}: {s.text}" for s in found.verdict.signs]
+    needs = _unfit(prepared, config)
+    if found.verdict.measured is None and found.verdict.cause == "valve":
+        return [*text, "action: repair valve", f"no settings: {needs or NO_MODEL}"], {}
+    if found.verdict.measured is None:
+        raise NotAssessedError(f"{loop}: {needs or found.verdict.needs or NO_MODEL}")
+    tuning = tune(found, prepared.record, stated)
     text += lines(tuning, spec, prepared.scale.span)
     return text, pictures(tuning, loop) if drawn else {}

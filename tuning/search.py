@@ -169,14 +169,16 @@ def try_out(table: Bench, controller: Pid, ms: float, loops: int | None = None) 
     figures = np.array([_figures(replace(one, controller=controller), load) for one, load in cases])
     travel = figures[:, 0] / np.maximum(table.travel[: len(some)], 1e-9)
     error = figures[:, 1] / np.maximum(table.error[: len(some)], 1e-9)
-    score = _score(travel, error, table.limits)
+    limits = table.limits
+    aim = limits.error_aim if is_play(table.loops[0].valve) else limits.error_aim_stick
+    score = _score(travel, error, aim, limits)
     return Candidate(controller, ms, float(travel.mean()), float(error.mean()), float(error.max()), score)
 
 
-def _score(travel: Floats, error: Floats, limits: TuningLimits) -> float:
+def _score(travel: Floats, error: Floats, aim: float, limits: TuningLimits) -> float:
     """Log of the mean travel, and of the error, which weighs more once above its aim; lower is better."""
     mean_error = max(float(error.mean()), float(error[0]), 1e-9)
-    above = max(math.log(mean_error / limits.error_aim), 0.0)
+    above = max(math.log(mean_error / aim), 0.0)
     mean_travel = float(travel.mean()) + limits.travel_floor
     return math.log(mean_travel) + limits.error_weight * math.log(mean_error) + limits.error_beyond * above
 
@@ -256,8 +258,8 @@ def _grid(loop: Loop, most: Rejection, limits: TuningLimits) -> tuple[Floats, Fl
     """
     nominal, now = simc(loop.process, scan_s=scan_step(loop)), loop.controller
     high = min(limits.gain_up * abs(now.kp), 2.0 * abs(nominal.kp))
-    low = (limits.gain_down if is_play(loop.valve) else 0.3) * min(abs(now.kp), abs(nominal.kp))
-    low = min(low, 0.5 * high)
+    down = limits.gain_down if is_play(loop.valve) else limits.gain_down_stick
+    low = min(down * min(abs(now.kp), abs(nominal.kp)), 0.5 * high)
     shortest = 0.5 * min(integral_s(now), nominal.ti_s)
     if is_play(loop.valve) and isinstance(loop.process, Fopdt):
         shortest = loop.process.time_constant_s

@@ -1,0 +1,181 @@
+"""Advice from a verdict: the model that settings are sought on, its uncertainty, the load, and abstentions."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from plant import CONFIG, Sketch, prepared, simulate, spec
+
+from analyzer.advice import (
+    advise,
+    chosen_fit,
+    lag_factor,
+    load_of,
+    propose,
+    scan_noise,
+    sought_for,
+    tuned,
+    uncertain,
+)
+from analyzer.assess import Assessment, assess
+from analyzer.cause import NO_CAUSE, not_assessed
+from identification.models import Backlash, Fopdt, Integrator, Pid
+from tuning.limits import LIMITS
+from tuning.linear import margins
+
+TANK = Sketch("valve", (60.0, 1800.0, 9.0), 0.9, 40.0, backlash=2.5)
+PIPE = Sketch("valve", (12.0, 150.0, 6.0), 0.65, 30.0, backlash=2.5, load_std=0.1)
+SWUNG = Sketch("load", (1.4, 90.0, 10.0), 0.8, 120.0, load_std=0.3, sine=3.0, sine_s=300.0)
+
+
+def assessed(sketch: Sketch, hours: float = 3.0) -> Assessment:
+    """One night of a sketch."""
+    return assess(prepared(simulate(sketch, hours)), sketch.controller, CONFIG)
+
+
+@pytest.fixture(scope="module")
+def tank() -> Assessment:
+    """A tank whose time constant outlasts what the record tells."""
+    return assessed(TANK)
+
+
+@pytest.fixture(scope="module")
+def pipe() -> Assessment:
+    """A lag of 150 s with play, whose record tells the time constant."""
+    return assessed(PIPE, 6.0)
+
+
+def settings(found: Assessment, sketch: Sketch, **stated: object):
+    """The advice on one assessed sketch."""
+    first = found.oscillations.first
+    row = spec(kp=sketch.kp, ti=sketch.ti, **stated)
+    return advise(found.verdict, row, sketch.controller, 100.0, first.period_s if first else None)
+
+
+def test_play_before_a_known_lag_gets_ti_of_at_least_the_lag(pipe):
+    """With play before a lag that the record tells, Ti is at least the lag and the gain nearly kept."""
+    advice = settings(pipe, PIPE)
+    assert advice.action == "retune"
+    assert advice.ti_new > 0.8 * PIPE.process[1]
+    assert LIMITS.gain_down * 0.99 < advice.kp_new / PIPE.kp < LIMITS.gain_up * 1.01
+
+
+def test_unknown_lag_is_sought_as_an_integrator(tank):
+    """Where the record tells gain over time constant alone, settings are sought for an integrator of that slope."""
+    m = tank.verdict.measured
+    fit = chosen_fit(tank.verdict)
+    assert lag_factor(m.window, fit, True) is None
+    process = tuned(m.window, fit, True)
+    assert isinstance(process, Integrator)
+    assert process.slope == pytest.approx(TANK.process[0] / TANK.process[1], rel=0.1)
+
+
+def test_known_lag_is_sought_as_a_lag(pipe):
+    """Where the record tells the time constant, settings are sought for that lag, within a quarter."""
+    m = pipe.verdict.measured
+    process = tuned(m.window, chosen_fit(pipe.verdict), True)
+    assert isinstance(process, Fopdt)
+    assert process.time_constant_s == pytest.approx(PIPE.process[1], rel=0.25)
+
+
+def test_proposal_is_stable_on_the_true_process(tank, pipe):
+    """On the true process the proposal's Ms stays below 2.5."""
+    for found, sketch in ((tank, TANK), (pipe, PIPE)):
+        new = propose(found.verdict, sketch.controller, found.oscillations.first.period_s).controller
+        loop = sought_for(found.verdict, sketch.controller)[0]
+        true = replace(loop, process=Fopdt(*sketch.process), controller=new)
+        assert margins(true).ms < LIMITS.ms_most_sample
+
+
+def test_samples_spread_about_the_fit(tank):
+    """Samples keep the sign and kind of the process; their slopes spread no more than threefold about the fit's."""
+    loop, fit, _ = sought_for(tank.verdict, TANK.controller)
+    samples = uncertain(tank.verdict.measured.window, fit, loop, 40)
+    ratio = np.array([one.process.slope / loop.process.slope for one in samples])
+    assert all(isinstance(one.process, Integrator) for one in samples)
+    assert (ratio >= 0.333).all()
+    assert (ratio <= 3.001).all()
+    assert np.median(ratio) == pytest.approx(1.0, abs=0.1)
+
+
+def test_same_seed_same_samples(tank):
+    """The same night gets the same advice twice."""
+    assert settings(tank, TANK) == settings(tank, TANK)
+
+
+def test_load_keeps_the_noise_of_a_scan(tank):
+    """The reconstructed load moves from scan to scan by the noise that was put in, though blocks have lost it."""
+    m = tank.verdict.measured
+    fit = chosen_fit(tank.verdict)
+    assert scan_noise(m.window, TANK.controller) == pytest.approx(TANK.noise, rel=0.15)
+    load = load_of(m.window, fit, TANK.controller)
+    assert np.isfinite(load).all()
+    jumps = np.median(np.abs(np.diff(load, 2))) * 1.4826 / math.sqrt(6)
+    assert jumps == pytest.approx(TANK.noise, rel=0.3)
+
+
+def test_mirror_image_gets_mirrored_settings(pipe):
+    """With OP turned about and a direct-acting controller, the advice is the same with the gain's sign turned."""
+    trends = simulate(PIPE, 6.0)
+    turned = replace(PIPE, kp=-PIPE.kp)
+    other = assess(prepared(replace(trends, op=100 - trends.op)), turned.controller, CONFIG)
+    one, mirrored = settings(pipe, PIPE), settings(other, turned)
+    assert mirrored.action == one.action == "retune"
+    assert mirrored.kp_new == pytest.approx(-one.kp_new, rel=0.05)
+    assert mirrored.ti_new == pytest.approx(one.ti_new, rel=0.1)
+
+
+def test_units_and_form_of_the_plant(pipe):
+    """In minutes and proportional band the advice is the one in seconds and percent, converted."""
+    plain = settings(pipe, PIPE)
+    other = settings(pipe, PIPE, ti_unit="min", gain_unit="band")
+    assert other.ti_new == pytest.approx(plain.ti_new / 60, rel=0.01)
+    assert other.kp_new == pytest.approx(100 / plain.kp_new, rel=0.01)
+
+
+def test_load_is_left_alone():
+    """A loop that a machine swings gets action none and no settings."""
+    found = assessed(SWUNG)
+    advice = settings(found, SWUNG)
+    assert found.verdict.cause == "load"
+    assert (advice.action, advice.kp_new, advice.ti_new) == ("none", None, None)
+    assert propose(found.verdict, SWUNG.controller, 300.0).action == "none"
+
+
+def test_no_cause_no_settings():
+    """Verdicts without a cause and verdicts that abstain get no settings."""
+    row = spec(kp=1.0, ti=10.0)
+    assert advise(NO_CAUSE, row, Pid(1, 10), 100.0, None).action == "none"
+    assert advise(not_assessed("needs OP"), row, Pid(1, 10), 100.0, 60.0).action == "undecided"
+
+
+def test_unstated_settings_are_asked_for(pipe):
+    """Without kp and ti there are no new ones, and the reason says what is missing."""
+    advice = advise(pipe.verdict, spec(), None, 100.0, 100.0)
+    assert advice.action == "undecided"
+    assert "no kp and ti" in advice.reason
+
+
+def test_wrong_sign_is_told(pipe):
+    """A gain of the wrong sign gets no settings and says that the controller would act the wrong way."""
+    turned = replace(PIPE.controller, kp=-PIPE.kp)
+    p = propose(pipe.verdict, turned, 100.0)
+    assert (p.action, p.controller) == ("undecided", None)
+    assert "wrong way" in p.reason
+
+
+def test_integral_off_is_told(pipe):
+    """Stated without integral action, a loop that cycles by it is sent to check its settings."""
+    p = propose(pipe.verdict, replace(PIPE.controller, ti_s=math.inf), 100.0)
+    assert p.controller is None
+    assert "check kp and ti" in p.reason
+
+
+def test_play_is_the_model_where_it_cycles_by_itself(tank):
+    """Where the loop with the identified play cycles, that play is the model, and so are its samples."""
+    loop, fit, others = sought_for(tank.verdict, TANK.controller)
+    assert loop.valve == Backlash(fit.valve.stickband)
+    assert all(isinstance(one.valve, Backlash) for one in others)

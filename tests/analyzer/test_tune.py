@@ -1,0 +1,182 @@
+"""`triage tune` on small exports: the proposal, its pictures, and what it says where it abstains."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from click.testing import CliRunner, Result
+from plant import START_S, Sketch, Trends, simulate
+
+from analyzer.cli import main
+
+TANK = Sketch("valve", (60.0, 1800.0, 9.0), 0.9, 40.0, backlash=2.5)
+STATED = "0.9,40,0,100"
+PNG = b"\x89PNG\r\n\x1a\n"
+
+
+@pytest.fixture(scope="module")
+def tank() -> Trends:
+    """Two hours of a tank with a play of 2.5 %."""
+    return simulate(TANK, 2.0)
+
+
+def asked(folder: Path, trends: Trends, stated: str = STATED, *more: str) -> Result:
+    """Answer of `triage tune` on an export of one loop with kp, ti, pv_lo and pv_hi as stated."""
+    stamp = pd.to_datetime(START_S + np.arange(trends.pv.size), unit="s")
+    columns = {"timestamp": stamp, "L.SP": trends.sp, "L.PV": trends.pv, "L.OP": trends.op}
+    pd.DataFrame(columns).to_parquet(folder / "export.parquet")
+    (folder / "loops.csv").write_text(f"loop,kp,ti,pv_lo,pv_hi\nL,{stated}\n")
+    command = ["tune", str(folder / "export.parquet"), "--loops", str(folder / "loops.csv"), "--loop", "L"]
+    return CliRunner().invoke(main, [*command, *more])
+
+
+def clean(result: Result, status: int) -> str:
+    """What was printed, of a command that ended as it should."""
+    assert result.exception is None or isinstance(result.exception, SystemExit), result.exception
+    assert result.exit_code == status, result.output
+    assert "Traceback" not in result.output
+    return result.output
+
+
+def refused(result: Result) -> str:
+    """The one line of a command that could do nothing."""
+    clean(result, 2)
+    assert result.stdout == ""
+    assert len(result.stderr.splitlines()) == 1
+    return result.stderr
+
+
+def test_play_gets_settings_and_three_pictures(tmp_path, tank):
+    """A tank with play gets a longer Ti at about its gain, its play within 10 %, a forecast and three PNGs."""
+    out = clean(asked(tmp_path, tank, STATED, "--out", str(tmp_path / "pictures")), 0)
+    assert "action: retune" in out
+    kp, ti = map(float, re.search(r"new settings: kp ([\d.e+]+), ti ([\d.e+]+) s", out).groups())
+    assert 0.7 < kp / TANK.kp < 1.4
+    assert ti > 5 * TANK.ti
+    play = float(re.search(r"backlash_pct: ([\d.]+)", out)[1])
+    assert play == pytest.approx(TANK.backlash, rel=0.1)
+    assert re.search(r"stem travel: .* -\d\d %", out)
+    made = {p.name: p.read_bytes() for p in (tmp_path / "pictures").iterdir()}
+    assert set(made) == {"limit-cycle.png", "travel-map.png", "forecast.png"}
+    assert all(picture.startswith(PNG) for picture in made.values())
+
+
+def test_settings_typed_in_calm_the_tank(tmp_path, tank):
+    """On the true tank, under the same load and noise, the proposal takes four fifths of the stem's travel."""
+    out = clean(asked(tmp_path, tank), 0)
+    kp, ti = map(float, re.search(r"new settings: kp ([\d.e+]+), ti ([\d.e+]+) s", out).groups())
+    after = simulate(replace(TANK, kp=kp, ti=ti), 4.0)
+    before = simulate(TANK, 4.0)
+    late = slice(2 * 3600, None)
+    assert np.abs(np.diff(after.stem[late])).sum() < 0.2 * np.abs(np.diff(before.stem[late])).sum()
+    assert np.abs(after.pv[late] - 50).mean() < np.abs(before.pv[late] - 50).mean()
+
+
+def test_settings_come_in_the_units_stated(tmp_path, tank):
+    """Stated in minutes, Ti comes in minutes: the same settings as in seconds over sixty."""
+    seconds = clean(asked(tmp_path, tank), 0)
+    (tmp_path / "loops.csv").write_text(f"loop,kp,ti,pv_lo,pv_hi,ti_unit\nL,0.9,{40 / 60},0,100,min\n")
+    files = [str(tmp_path / "export.parquet"), "--loops", str(tmp_path / "loops.csv")]
+    minutes = clean(CliRunner().invoke(main, ["tune", *files, "--loop", "L"]), 0)
+    ti_s, ti_min = (float(re.search(r"ti ([\d.e+]+) (?:s|min) ", x)[1]) for x in (seconds, minutes))
+    assert ti_min == pytest.approx(ti_s / 60, rel=0.01)
+
+
+def test_missing_values_change_little(tmp_path, tank):
+    """A minute of NaN inside PV leaves the action and the play's size as they are."""
+    holed = tank.pv.copy()
+    holed[100:160] = np.nan
+    out = clean(asked(tmp_path, replace(tank, pv=holed)), 0)
+    assert "action: retune" in out
+    assert float(re.search(r"backlash_pct: ([\d.]+)", out)[1]) == pytest.approx(TANK.backlash, rel=0.1)
+
+
+def test_integral_off_is_an_abstention(tmp_path, tank):
+    """A stated Ti of 0 on a loop that cycles by integral action is told, with the settings OP follows."""
+    out = clean(asked(tmp_path, tank, "0.9,0,0,100", "--out", str(tmp_path / "pictures")), 0)
+    assert "action: undecided" in out
+    assert "no integral action" in out
+    assert re.search(r"OP follows kp 0\.9 %/% and ti (39|40|41)", out)
+
+
+def test_wrong_sign_is_an_abstention(tmp_path, tank):
+    """A gain stated with the wrong sign gets no settings, and its sign is named."""
+    out = clean(asked(tmp_path, tank, "-0.9,40,0,100"), 0)
+    assert "new settings:" not in out
+    assert "the sign of kp is wrong" in out
+
+
+def test_load_is_left_alone(tmp_path):
+    """A loop that a machine swings gets no settings: the load oscillates."""
+    swung = Sketch("load", (1.4, 90.0, 10.0), 0.8, 120.0, load_std=0.3, sine=3.0, sine_s=300.0)
+    out = clean(asked(tmp_path, simulate(swung, 2.0), "0.8,120,0,100"), 0)
+    assert "action: none" in out
+    assert "The load oscillates" in out
+    assert "new settings:" not in out
+
+
+def test_healthy_loop_is_left_alone(tmp_path):
+    """A loop without fault and hardly any load gets no settings."""
+    sound = Sketch("none", (1.4, 90.0, 10.0), 0.8, 120.0, load_std=0.02, noise=0.02)
+    out = clean(asked(tmp_path, simulate(sound, 1.0), "0.8,120,0,100"), 0)
+    assert "action: none" in out
+    assert "not in trouble" in out
+
+
+def flat(n: int, **trends: np.ndarray) -> Trends:
+    """An hour of a loop at 50 %, PV with a little noise, but for the trends given."""
+    rest = np.full(n, 50.0)
+    noisy = 50 + 0.05 * np.random.default_rng(0).standard_normal(n)
+    return Trends(**{"sp": rest, "pv": noisy, "op": rest, "stem": rest, **trends})
+
+
+N = 3600
+UNFIT = {
+    "OP that never moves": (flat(N, pv=flat(N).pv + np.linspace(0, 9, N)), "manual 100 %"),
+    "OP at its limit": (flat(N, pv=flat(N).pv - 10, op=np.full(N, 100.0)), "OP within its limits"),
+    "no samples of PV": (flat(N, pv=np.full(N, np.nan)), "none that is good"),
+    "a record of a minute": (flat(60), "needs 200 good PV samples, has 60"),
+}
+
+
+@pytest.mark.parametrize("name", UNFIT)
+def test_unfit_records_are_refused_in_one_line(tmp_path, name):
+    """A record without excitation, at a limit, in manual, empty or too short is refused with what it lacks."""
+    trends, wanted = UNFIT[name]
+    assert wanted in refused(asked(tmp_path, trends))
+
+
+def test_compressed_trends_are_refused(tmp_path, tank):
+    """Trends on straight segments are refused: a play leaves no trace in them."""
+    at = np.arange(tank.pv.size)
+    kept = at[::100]
+    thinned = replace(tank, pv=np.interp(at, kept, tank.pv[kept]), op=np.interp(at, kept, tank.op[kept]))
+    assert "without compression" in refused(asked(tmp_path, thinned))
+
+
+def test_dead_time_beyond_the_record_gives_no_settings(tmp_path):
+    """Where PV has not answered OP by the end of the record, no settings are proposed."""
+    rng = np.random.default_rng(2)
+    op = 50 + np.cumsum(0.05 * rng.standard_normal(1200))
+    pv = 50 + 0.05 * rng.standard_normal(1200)
+    result = asked(tmp_path, Trends(np.full(1200, 50.0), pv, op, op))
+    assert "new settings:" not in clean(result, result.exit_code)
+    assert result.exit_code in (0, 2)
+
+
+def test_unstated_settings_are_asked_for(tmp_path, tank):
+    """Without kp and ti in loops.csv the line asks for both."""
+    assert "no kp and ti in loops.csv" in refused(asked(tmp_path, tank, ",,0,100"))
+
+
+def test_unknown_loop_names_the_nearest(tmp_path, tank):
+    """A loop that is not there is told with the nearest names."""
+    asked(tmp_path, tank)
+    files = [str(tmp_path / "export.parquet"), "--loops", str(tmp_path / "loops.csv")]
+    line = refused(CliRunner().invoke(main, ["tune", *files, "--loop", "LL"]))
+    assert "loop LL is not among the 1 loops" in line
