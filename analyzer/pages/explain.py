@@ -17,6 +17,7 @@ from analyzer.pages.explain_words import (
     called,
     carried_by,
     chance,
+    change,
     check,
     figure,
     interval,
@@ -33,6 +34,9 @@ from identification.mismatch.words import located_sentence, telltale
 from reports.names import slug
 from reports.pages import Block, Cell, Column, Facts, Page, Section, Table, Text, Tiles
 
+HARDLY = 0.05
+"""Relative change of the plain loop's constants under which they count as kept."""
+BENT = "What was left out had to be made up for by these; with it they move back."
 RIVALS = 12
 """Rivals shown."""
 
@@ -221,9 +225,9 @@ def _moved(moved: Mapping[str, Sequence[float]]) -> tuple[Block, ...]:
     rows = []
     for key, (a, b) in moved.items():
         name, unit = MOVED.get(key, (key, ""))
-        change = f"{100 * (b / a - 1):+.0f} %" if a else "–"
-        rows.append((Cell(name), Cell(number(a), a), Cell(number(b), b), Cell(change), Cell(unit)))
-    note = "What was left out had to be made up for by these; with it they move back."
+        rows.append((Cell(name), Cell(number(a), a), Cell(number(b), b), Cell(change(a, b)), Cell(unit)))
+    most = max(abs(b / a - 1) if a else 0.0 for a, b in moved.values())
+    note = "They hardly move: what was left out had not bent them." if most < HARDLY else BENT
     return (Table("moved", "How the plain loop's constants moved", columns, tuple(rows), note),)
 
 

@@ -144,13 +144,22 @@ def figure(value: float | None, unit: str = "") -> str:
 
 
 def interval(value: Mapping[str, Any]) -> str:
-    """The ends of a parameter's interval; a dash where it has no width."""
+    """The ends of a parameter's interval, with as many digits as tell them apart; a dash where it has no width."""
     low, high = value["low"], value["high"]
-    if low is None or high is None:
+    if low is None or high is None or low == high:
         return "–"
-    if low == high:
+    if number(low) != number(high):
+        return f"{number(low)} … {number(high)}"
+    digits = next((d for d in range(4, 7) if f"{low:.{d}g}" != f"{high:.{d}g}"), 6)
+    return f"{low:.{digits}g} … {high:.{digits}g}"
+
+
+def change(before: float, after: float) -> str:
+    """A change in whole percent."""
+    if not before:
         return "–"
-    return f"{number(low)} … {number(high)}"
+    pct = round(100 * (after / before - 1))
+    return f"{pct:+d} %" if pct else "0 %"
 
 
 def share(value: float | None) -> str:

@@ -12,6 +12,7 @@ from analyzer.explain import abstained
 from analyzer.explain_text import columns, lines
 from analyzer.pages import explain as pages
 from analyzer.pages.explain_plots import close_part, simulations, trends
+from analyzer.pages.explain_words import change, interval
 from identification.mismatch.where import located_in
 from reports.folder import write_markdown
 from reports.html import render
@@ -103,6 +104,19 @@ def test_text_is_narrow_and_without_raw_floats(kind: str) -> None:
     assert max(len(line) for line in text) <= 112
     assert not any(len(word.strip(".,;()").replace(".", "")) > 6 for line in text for word in line.split()
                    if word.strip(".,;()").replace(".", "").isdigit())  # fmt: skip
+
+
+def test_narrow_intervals_keep_their_width() -> None:
+    """Ends that agree in three digits are shown with as many as tell them apart, an exact value with a dash."""
+    assert interval({"low": 1.0691, "high": 1.0704}) == "1.069 … 1.07"
+    assert interval({"low": 1.0, "high": 2.0}) == "1 … 2"
+    assert interval({"low": 3.0, "high": 3.0}) == "–"
+
+
+@pytest.mark.parametrize(("after", "said"), [(1.001, "0 %"), (0.999, "0 %"), (1.5, "+50 %"), (0.5, "-50 %")])
+def test_changes_have_a_sign_unless_none(after: float, said: str) -> None:
+    """A change is in whole percent with its sign; nothing has none."""
+    assert change(1.0, after) == said
 
 
 def test_columns_line_up() -> None:
