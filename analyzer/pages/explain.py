@@ -102,7 +102,8 @@ def _verdict(e: Explained) -> tuple[Block, ...]:
 def _tiles(e: Explained) -> tuple[tuple[str, str, str], ...]:
     d, recorded = e.data, e.found.p.scene.level + e.found.p.y
     size = {k: rms(float(np.std(recorded - x))) for k, x in plots.simulations(e).items()}
-    tiles = [(d["block"], "where it sits", "")] if d["block"] != "none" else []
+    seat = "where to look first" if d["verdict"] == "unexplained" else "where it sits"
+    tiles = [(d["block"], seat, "")] if d["block"] != "none" else []
     if e.found.accepted:
         what = "rms misfit over the recording, plain and improved"
         tiles.append((f"{size['baseline']} → {size['model']}", what, "better"))

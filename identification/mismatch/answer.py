@@ -219,4 +219,7 @@ def found_first(found: Explanation) -> tuple[bool, bool]:
 def _note(found: Explanation) -> str:
     if found.left <= 0:
         return ""
-    return f"A flexible model explains more (gain {found.left:.0f}) than any effect of the catalogue."
+    return (
+        "The loop does something that no known cause explains: a flexible model without a name does better "
+        f"(doubled log likelihood {found.left:.0f})."
+    )

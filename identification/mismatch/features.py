@@ -20,6 +20,8 @@ PAST = 2
 """Samples by which features are older than the innovation; ours: one, and one for what looks at a neighbour."""
 LIMIT = 0.05
 """Distance from 0 or 100 % of OP that counts as at the limit [% OP]; a historian rounds to that."""
+FEWEST_LEVELS = 12
+"""Values that OP must take for an end of its own range to be a limit; a test signal between two is at none."""
 FEWEST_AT_LIMIT = 10
 """Samples at a limit below which there is nothing to be told of them."""
 
@@ -112,7 +114,8 @@ def ranked(x: Floats) -> Floats:
 def at_limits(op: Floats) -> Mask:
     """True where OP is at 0 or 100 %, or stands at an end of its own range for three samples, shape (n,)."""
     out = (op <= LIMIT) | (op >= 100.0 - LIMIT)
-    for end in (op.max(), op.min()):
+    ends = (op.max(), op.min()) if np.unique(op).size > FEWEST_LEVELS else ()
+    for end in ends:
         out |= binary_opening(op == end, np.ones(3))
     return out
 

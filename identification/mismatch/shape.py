@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 POINTS = 241
 """Points of a static curve."""
 STEP_PCT = 10.0
-"""Size of the step whose response is drawn [% OP]."""
+"""Size of the step whose response is drawn, OP's range where that is less [% OP]."""
 LENGTHS = 5.0
 """Length of a response, in dead time and all time constants together."""
 SWEEP = 2.5
@@ -194,7 +194,8 @@ def step_response(scene: Scene, c: Floats, row: Row, known: Mapping[str, Estimat
     length = fast if fast < EARLY * length else length
     dt = min(length / POINTS, scene.dt_s) if length < POINTS * scene.dt_s else length / POINTS
     n = min(int(length / dt), 4 * POINTS)
-    time, op = _step(STEP_PCT, n, dt, row.name == "direction-asymmetry")
+    size = min(STEP_PCT, float(np.ptp(scene.op)))
+    time, op = _step(size, n, dt, row.name == "direction-asymmetry")
     drawn = Scene(op, dt, 0.0, scene.level, (0.0, 100.0))
 
     def read(k: Floats) -> Floats:

@@ -131,7 +131,8 @@ def where_of(found: Explanation, s: Subject, block: str, at: Located) -> dict[st
     if found.accepted:
         won, difference = won_over(p, found.plain, found.best)
     elif found.left > 0:
-        won, difference = at.local, np.where(p.weight > 0, found.best.e, 0.0)
+        won = at.local if at.carrying else p.weight * found.best.e**2
+        difference = np.where(p.weight > 0, found.best.e, 0.0)
     else:
         return {"signals": [], "spans": []} | told
     return {

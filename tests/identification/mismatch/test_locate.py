@@ -154,7 +154,8 @@ def test_part_of_range_is_the_longest_high_run(height: list[float], run: tuple[i
 
 
 def test_limits_and_hats() -> None:
-    """OP at 100 % or standing at its own end is at a limit; a signal that stands still has no pieces."""
-    op = np.array([50.0, 100, 100, 60, 70, 40, 40, 40, 55])
-    np.testing.assert_array_equal(at_limits(op), [0, 1, 1, 0, 0, 1, 1, 1, 0])
+    """OP at 100 % or standing at its own end is at a limit, a test signal between two values is not."""
+    op = np.concatenate(([50.0, 100, 100, 60, 70, 40, 40, 40], np.arange(45.0, 60.0)))
+    np.testing.assert_array_equal(at_limits(op)[:9], [0, 1, 1, 0, 0, 1, 1, 1, 0])
+    assert not at_limits(np.repeat([40.0, 60.0, 40.0], 5)).any()
     assert hats(np.full(50, 3.0)).shape == (50, 0)
