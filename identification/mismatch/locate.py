@@ -16,8 +16,8 @@ from identification.record import Floats, Mask
 
 ORDERS = 400
 """Block orders of the null; ours: a p-value of 0.05 is known within 0.01, and 20,000 samples take under a second."""
-CHANCE = 0.03
-"""Chance, over all features together, of calling any on a residual that is tied to none; ours: one page in thirty."""
+CHANCE = 0.02
+"""Chance, over all features together, of calling any on a residual that is tied to none; ours: one page in fifty."""
 BLOCK_MEMORIES = 3.0
 """Length of a block in memories of the loop; ours: within it what the loop remembers stays in order."""
 SHORTEST_BLOCK = 30
