@@ -56,7 +56,7 @@ class Case:
 
 @dataclass(frozen=True)
 class Row:
-    """Median errors of one method over records: gain and time constant [%], dead time [s]; median time [ms]."""
+    """Median errors of one method over records: gain, time constant [%], dead time [s]; processor time [ms]."""
 
     name: str
     gain: float
@@ -184,9 +184,9 @@ def row(name: str, method: Callable[[Case], Model], cases: Sequence[Case]) -> Ro
     method(cases[0])
     errors, times = [], []
     for made in cases:
-        begun = time.perf_counter()
+        begun = time.process_time()
         model = np.array(method(made))
-        times.append(1000 * (time.perf_counter() - begun))
+        times.append(1000 * (time.process_time() - begun))
         off = np.abs(model - np.array(made.truth)) / np.array([made.truth[0] / 100, made.truth[1] / 100, 1.0])
         errors.append(off if np.all(np.isfinite(off)) and model[1] > 0 else np.full(3, np.inf))
     lost = sum(not np.isfinite(e[0]) for e in errors)
@@ -251,13 +251,13 @@ def describing_table() -> str:
 
 
 def fastest(task: Callable[[], object]) -> tuple[float, object]:
-    """Least time of a few runs [s], the first left out, and what the last of them gave."""
+    """Least processor time of a few runs [s], the first left out, and what the last of them gave."""
     made = task()
     least = np.inf
     for _ in range(REPEATS):
-        begun = time.perf_counter()
+        begun = time.process_time()
         made = task()
-        least = min(least, time.perf_counter() - begun)
+        least = min(least, time.process_time() - begun)
     return float(least), made
 
 
@@ -270,14 +270,14 @@ from identification.valve_fit import fit_linear
 loop = Loop(Fopdt(80, 200, 1), Pid(1, 10), Backlash(1.0))
 n = np.zeros(86400)
 for _ in range(2):
-    begun = time.perf_counter()
+    begun = time.process_time()
     closed_loop(loop, n, n)
-    print(1000 * (time.perf_counter() - begun))
+    print(1000 * (time.process_time() - begun))
 """
 
 
 def first_calls() -> tuple[float, float]:
-    """First and second simulation of a day in a fresh process [ms], the kernels compiled before."""
+    """First and second simulation of a day in a fresh process [ms of processor time], kernels compiled before."""
     for _ in range(2):
         done = subprocess.run([sys.executable, "-c", FRESH], capture_output=True, text=True, check=True)
     first, second = (float(x) for x in done.stdout.split())
@@ -333,7 +333,7 @@ def main() -> None:
         f"Medians over {options.records} records of {SCANS} scans in closed loop, set point steps under coloured\n"
         "load, dead times of no whole scans. The others but AIC are told the structure and the whole scans of dead\n"
         "time, this package is told neither. The time is that of one record; with this package it holds the search\n"
-        "for a valve fault. One core, after one call that is not counted."
+        "for a valve fault. Processor time, after one call that is not counted."
     )
     missing = "" if find_spec("sippy_unipi") else "\n\nsippy_unipi is not installed and was left out."
     tables = [identification_table(identification(options.records)), describing_table(), speed_table()]

@@ -1,6 +1,6 @@
 """What the proposed settings do on plants that the estimator's simulator did not make.
 
-    python -m tests.proofs.retuning --seed 11 12
+    python -m tests.proofs.retuning --seed 21 22
 
 Loops with play or sticking stems, second lags, load and noise are recorded for some hours; `triage run` reads the
 export and proposes; the settings are typed in on the true plant, and the same load and noise go on under the old
@@ -39,13 +39,15 @@ from tests.proofs.retuning_table import draw, each, failures, groups, rejections
 OUT = Path(__file__).with_suffix(".md")
 FIGURE = Path(__file__).with_suffix(".png")
 START = pd.Timestamp("2026-03-02")
-ABOUT = """Each seed has {counts}; {levels} of them integrating levels. Loops with a faulty valve keep cycling without
-load and noise, and the fault makes their error more than three times what it would be without. Travel is that of the
-true stem, error that of the true PV, both after a quarter of the time is left to settle, under the same load and
-noise as without the change. The rule is Ti = max(Ti, T) at the present gain. "Everything known" is a search on the
+ABOUT = """Each seed has {counts}; {levels} of them integrating levels.
+Loops with a faulty valve keep cycling without load and noise, and the fault makes their error more than
+three times what it would be without. Travel is that of the true stem, error that of the true PV, both after
+a quarter of the time is left to settle, under the same load and noise as without the change. The rule is Ti = max(Ti, T) at the present gain. "Everything known" is a search on the
 true plant itself, error up to +5 %, load rejection within the stated factors: largest deviation after a load step
 at the valve at most {peak:g} times that of SIMC, integral of the error at most {lag:g} times ({ramp:g} on a level)
-that of SIMC's gain with Ti = max(T, SIMC's Ti). The limits of the search were set on seeds 1 and 2."""
+that of SIMC's gain with Ti = max(T, SIMC's Ti). The limits of the search were set on seeds 1, 2, 11 and 12.
+Loads, noise and friction were drawn so that the rule does on seed 1 about what it does where all is known in the
+project's notes: 81 % of the travel on lags with play, 12 % with stick-slip; wider loads leave any tuning less to gain."""
 """What the page says before its tables."""
 TI_UNITS = ("s", "min", "repeats/min")
 
@@ -150,7 +152,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--seed", type=int, nargs="+", default=[11, 12])
+    parser.add_argument("--seed", type=int, nargs="+", default=[21, 22])
     options = parser.parse_args()
     found = [o for seed in options.seed for o in examined(seed)]
     command = f"python -m tests.proofs.retuning --seed {' '.join(map(str, options.seed))}"
