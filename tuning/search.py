@@ -258,8 +258,8 @@ def _grid(loop: Loop, most: Rejection, limits: TuningLimits) -> tuple[Floats, Fl
     """
     nominal, now = simc(loop.process, scan_s=scan_step(loop)), loop.controller
     high = min(limits.gain_up * abs(now.kp), 2.0 * abs(nominal.kp))
-    down = limits.gain_down if is_play(loop.valve) else limits.gain_down_stick
-    low = min(down * min(abs(now.kp), abs(nominal.kp)), 0.5 * high)
+    down = limits.gain_down_play if is_play(loop.valve) else limits.gain_down_stick
+    low = min(limits.gain_down * abs(now.kp), down * abs(nominal.kp))
     shortest = 0.5 * min(integral_s(now), nominal.ti_s)
     if is_play(loop.valve) and isinstance(loop.process, Fopdt):
         shortest = loop.process.time_constant_s

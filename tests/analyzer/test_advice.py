@@ -56,7 +56,7 @@ def settings(found: Assessment, sketch: Sketch, **stated: object):
 
 
 def test_play_before_a_known_lag_gets_ti_of_at_least_the_lag(pipe):
-    """With play before a lag that the record tells, Ti is at least the lag and the gain nearly kept."""
+    """With play before a lag that the record tells, Ti is at least the lag and the gain about kept."""
     advice = settings(pipe, PIPE)
     assert advice.action == "retune"
     assert advice.ti_new > 0.8 * PIPE.process[1]

@@ -40,14 +40,15 @@ OUT = Path(__file__).with_suffix(".md")
 FIGURE = Path(__file__).with_suffix(".png")
 START = pd.Timestamp("2026-03-02")
 ABOUT = """Each seed has {counts}; {levels} of them integrating levels.
-Loops with a faulty valve keep cycling without load and noise, and the fault makes their error more than
-three times what it would be without. Travel is that of the true stem, error that of the true PV, both after
-a quarter of the time is left to settle, under the same load and noise as without the change. The rule is Ti = max(Ti, T) at the present gain. "Everything known" is a search on the
-true plant itself, error up to +5 %, load rejection within the stated factors: largest deviation after a load step
-at the valve at most {peak:g} times that of SIMC, integral of the error at most {lag:g} times ({ramp:g} on a level)
-that of SIMC's gain with Ti = max(T, SIMC's Ti). The limits of the search were set on seeds 1, 2, 11 and 12.
-Loads, noise and friction were drawn so that the rule does on seed 1 about what it does where all is known in the
-project's notes: 81 % of the travel on lags with play, 12 % with stick-slip; wider loads leave any tuning less to gain."""
+Loops with a faulty valve keep cycling without load and noise, and the fault makes their error more than three
+times what it would be without. Travel is that of the true stem, error that of the true PV, both after a
+quarter of the time is left to settle, under the same load and noise as without the change. The rule is Ti =
+max(Ti, T) at the present gain. "Everything known" is a search on the true plant itself, error up to +5 %,
+load rejection within the stated factors: largest deviation after a load step at the valve at most {peak:g}
+times that of SIMC, integral of the error at most {lag:g} times ({ramp:g} on a level) that of SIMC's gain with
+Ti = max(T, SIMC's Ti). The limits of the search were set on seeds 1, 2, 11 and 12. Loads, noise and friction
+were drawn so that the rule does on seed 1 about what it does on other simulated loops with everything known:
+81 % of the travel on lags with play, 12 % with stick-slip; wider loads leave any tuning less to gain."""
 """What the page says before its tables."""
 TI_UNITS = ("s", "min", "repeats/min")
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tuning_cases import backlash_case, level_case, stick_case
+from tuning_cases import backlash_case, level_case, load, stick_case
 
 from identification.models import Backlash, Fopdt, Integrator, Loop, Pid, Stiction
 from tuning.limit_cycle import confirm
@@ -153,6 +153,27 @@ def test_tight_tuning_gets_simc():
         assert p.controller.kp == pytest.approx(nominal.kp, rel=0.01)
         assert p.controller.ti_s == pytest.approx(nominal.ti_s, rel=0.01)
         assert p.ms < LIMITS.ms_most < p.ms_before
+
+
+def test_tight_loop_gets_the_robust_settings_of_least_error_on_its_load():
+    """Where the load is known, tight tuning gets robust SIMC settings with no more error than nominal."""
+    process = Fopdt(1.5, 100, 8)
+    nominal = simc(process, scan_s=1.0)
+    loop = Loop(process, replace(nominal, kp=3 * nominal.kp))
+    slow = load(np.random.default_rng(3), 6000, 1.0, 100.0, 0.02)
+    plain, known = recommend(loop, "tuning"), recommend(loop, "tuning", load=slow)
+    _, error = figures(loop, plain.controller, slow)
+    _, less = figures(loop, known.controller, slow)
+    assert less <= error
+    assert known.ms <= LIMITS.ms_most
+
+
+def test_gain_with_play_stays_near_the_present(proposals):
+    """With play the gain is kept within the stated factors, unless it was above the nominal one."""
+    for case, p in proposals[:6]:
+        nominal = simc(case.loop.process, scan_s=1.0).kp
+        low = min(LIMITS.gain_down * abs(case.loop.controller.kp), LIMITS.gain_down_play * abs(nominal))
+        assert low * 0.99 <= abs(p.controller.kp) <= LIMITS.gain_up * abs(case.loop.controller.kp) * 1.01
 
 
 def test_robust_loop_is_not_called_tight():
