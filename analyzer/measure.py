@@ -198,6 +198,7 @@ def _rivals(
     if short or play.valve.stickband > 0.25 * window.op_range:
         stick = fit_stick_slip(window, play, scale_s)
         jump = evidence(Rival(window, stick), Rival(window, play))
+        jump = min(jump, 0.0) if stick.log_likelihood < play.log_likelihood else jump
         best = stick if jump > limits.evidence_jump else play
     plain = with_load_step(window, linear, due, best.ar)
     gained = evidence(Rival(window, best), plain) - (limits.evidence_jump if best is stick else 0.0)

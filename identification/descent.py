@@ -8,12 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from identification.hammerstein import Fit, ValveTrial, Window, lag, stem_of, sticking, unit_lag
+from identification.hammerstein import Fit, ValveTrial, Window, fine_stem, lag_blocks, sticking, unit_lag
 from identification.innovations import judged_mask, whiten
 from identification.record import Floats
 
 ITERATIONS = 25
 """Gauss-Newton steps at most; ours: nine in ten fits stop before the fifteenth."""
+STRETCHES = 30
+"""Stretches whose scores are compared; ours: a window of 1,800 blocks holds thirty periods."""
 SETTLED = 0.01
 """Gain in log likelihood [nat] below which the steps stop."""
 
@@ -28,22 +30,27 @@ def _sensitivities(
     theta: Floats,
     order: int,
     dt: float,
+    factor: int,
 ) -> tuple[Floats, Floats]:
     """Innovations, shape (n,), and their derivatives, shape (n, 8 + order), at theta = log T, L, width, K, 1, t,
-    decay, step, A; the derivative by the width is that of the given wider stem."""
+    decay, step, A; the derivative by the width is that of the given wider stem. Stems have `factor` samples a
+    block of `dt` [s], and the response is averaged over the blocks, as PV was."""
     n = y.size
-    t_s, dead = math.exp(theta[0]), theta[1]
-    pole, now, before, delay = unit_lag(t_s, dead, dt)
-    x = lag(stem, pole, now, before, delay)
-    pole2, now2, before2, delay2 = unit_lag(t_s * 1.01, dead, dt)
-    x_t = (lag(stem, pole2, now2, before2, delay2) - x) / math.log(1.01)
+    fine = dt / factor
+    t_s, dead = math.exp(theta[0]), theta[1] + 0.5 * (factor - 1) * fine
+    pole, now, before, delay = unit_lag(t_s, dead, fine)
+    x = lag_blocks(stem, pole, now, before, delay, factor)
+    pole2, now2, before2, delay2 = unit_lag(t_s * 1.01, dead, fine)
+    x_t = (lag_blocks(stem, pole2, now2, before2, delay2, factor) - x) / math.log(1.01)
     step = 0.05 * dt
-    pole3, now3, before3, delay3 = unit_lag(t_s, dead + step, dt)
-    x_l = (lag(stem, pole3, now3, before3, delay3) - x) / step
-    x_w = (lag(wider, pole, now, before, delay) - x) / width_step if width_step > 0 else np.zeros(n)
+    pole3, now3, before3, delay3 = unit_lag(t_s, dead + step, fine)
+    x_l = (lag_blocks(stem, pole3, now3, before3, delay3, factor) - x) / step
+    x_w = np.zeros(n)
+    if width_step > 0:
+        x_w = (lag_blocks(wider, pole, now, before, delay, factor) - x) / width_step
     columns = np.zeros((n, 8 + order))
     r = np.empty(n)
-    free = 1.0
+    free, faded = 1.0, math.exp(-dt / t_s)
     outlasts = t_s > 0.5 * n * dt
     gain = theta[3]
     for k in range(n):
@@ -58,7 +65,7 @@ def _sensitivities(
         columns[k, 5] = -t
         columns[k, 6] = -d
         columns[k, 7] = -extra[k]
-        free *= pole
+        free *= faded
     e = whiten(r, theta[8:])
     for j in range(8):
         columns[:, j] = whiten(columns[:, j].copy(), theta[8:])
@@ -94,16 +101,24 @@ class _Trial:
     slope: Floats
 
 
-def _trial(window: Window, y: Floats, theta: Floats, valve: ValveTrial, free_width: bool) -> _Trial:
+def _judged(
+    window: Window, y: Floats, theta: Floats, valve: ValveTrial, free_width: bool
+) -> tuple[Floats, Floats]:
+    """Innovations and their derivatives at the samples judged."""
     order = theta.size - 8
-    stem = stem_of(window, valve)
+    stem = fine_stem(window, valve)
     step = 0.01 * valve.stickband if free_width else 0.0
-    wider = stem_of(window, _widened(valve, step)) if free_width else stem
-    e, columns = _sensitivities(y, stem, wider, window.extra, step, theta, order, window.dt_s)
+    wider = fine_stem(window, _widened(valve, step)) if free_width else stem
+    e, columns = _sensitivities(y, stem, wider, window.extra, step, theta, order, window.dt_s, window.factor)
     e, columns = e[order:], columns[order:]
     if not window.usable.all():
         judged = judged_mask(window.usable, order)[order:]
         e, columns = e[judged], columns[judged]
+    return e, columns
+
+
+def _trial(window: Window, y: Floats, theta: Floats, valve: ValveTrial, free_width: bool) -> _Trial:
+    e, columns = _judged(window, y, theta, valve, free_width)
     return _Trial(theta, valve, float(e @ e) / e.size, e.size, columns.T @ columns, -(columns.T @ e))
 
 
@@ -118,7 +133,7 @@ def _moved(window: Window, trial: _Trial, step: Floats, free_width: bool) -> tup
     theta = trial.theta + step
     most_t, most_dead = window.bounds
     theta[0] = min(max(theta[0], math.log(0.05 * window.dt_s)), math.log(most_t))
-    theta[1] = min(max(theta[1], 0.0), most_dead)
+    theta[1] = min(max(theta[1], -window.half_block_s), most_dead)
     if not free_width:
         return theta, trial.valve
     width = trial.valve.stickband + step[2]
@@ -139,18 +154,26 @@ def _held(window: Window, free_width: bool) -> list[int]:
 
 
 def covariance(window: Window, fit: Fit, free_width: bool = False) -> Floats:
-    """Covariance of (log T, L, stickband, gain) from the curvature at a fit, shape (4, 4).
+    """Covariance of (log T, L, stickband, gain) at a fit, shape (4, 4).
 
     The inverse of the Gauss-Newton matrix times the innovations variance (Ljung 1999, eq. 9.31), the noise model's
-    and the slow terms' share in it; zero for what was held.
+    and the slow terms' share in it; zero for what was held. Where the scores of whole stretches scatter by more
+    than that (Huber 1967: the model is not the truth, and what it lacks lasts longer than a sample), the standard
+    deviations are those of the scatter.
     """
-    trial = _trial(window, window.y - window.y.mean(), _theta(fit), fit.valve, free_width)
-    held = _held(window, free_width)
-    free = np.array([j for j in range(trial.gram.shape[0]) if j not in held and trial.gram[j, j] > 0])
-    scale = np.sqrt(np.diag(trial.gram)[free])
-    inside = np.linalg.pinv(trial.gram[np.ix_(free, free)] / np.outer(scale, scale), rcond=1e-10)
-    out = np.zeros_like(trial.gram)
-    out[np.ix_(free, free)] = trial.loss * inside / np.outer(scale, scale)
+    y, theta, held = window.y - window.y.mean(), _theta(fit), _held(window, free_width)
+    e, columns = _judged(window, y, theta, fit.valve, free_width)
+    gram = columns.T @ columns
+    free = np.array([j for j in range(gram.shape[0]) if j not in held and gram[j, j] > 0])
+    scale = np.sqrt(np.diag(gram)[free])
+    inside = np.linalg.pinv(gram[np.ix_(free, free)] / np.outer(scale, scale), rcond=1e-10)
+    inside /= np.outer(scale, scale)
+    stretches = np.array_split(columns[:, free] * e[:, None], STRETCHES)
+    moves = np.array([part.sum(axis=0) for part in stretches]) @ inside
+    usual = float(e @ e) / e.size * np.diag(inside)
+    wider = np.sqrt(np.maximum((moves**2).sum(axis=0) / np.maximum(usual, 1e-300), 1.0))
+    out = np.zeros_like(gram)
+    out[np.ix_(free, free)] = float(e @ e) / e.size * inside * np.outer(wider, wider)
     return out[:4, :4]
 
 

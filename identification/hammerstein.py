@@ -17,7 +17,7 @@ from numba import njit
 from identification.innovations import judged_mask, notch, whiten
 from identification.models import Fopdt
 from identification.record import Floats, Mask
-from identification.valve import RESTS, first_slip, stem_step
+from identification.valve import RESTS, first_slip, stem_step, walk
 
 AR_ORDER = 8
 """Order of the noise model; ours: on the simulated plants 12 gives innovations less than 1 % smaller."""
@@ -73,8 +73,7 @@ class Window:
     @property
     def half_block_s(self) -> float:
         """What is missing from a fitted dead time [s]: the mean of a block of PV stands later than its first sample,
-        where the model's response stands. Centring the blocks instead would let PV's noise meet the OP that
-        answers it."""
+        from which the search, whose model knows blocks alone, counts."""
         return 0.5 * (self.factor - 1) * self.dt_s / self.factor
 
     @property
@@ -182,6 +181,22 @@ def lag(stem: Floats, pole: float, now: float, before: float, delay: int) -> Flo
     for k in range(n):
         out[k] = y
         y = pole * y + now * stem[max(k - delay, 0)] + before * stem[max(k - delay - 1, 0)]
+    return out
+
+
+@njit(cache=True)
+def lag_blocks(stem: Floats, pole: float, now: float, before: float, delay: int, factor: int) -> Floats:
+    """The same as means of blocks of the stem's own samples, shape (n // factor,)."""
+    n = stem.size // factor
+    out = np.empty(n)
+    y, k = 0.0, 0
+    for block in range(n):
+        total = 0.0
+        for _ in range(factor):
+            total += y
+            y = pole * y + now * stem[max(k - delay, 0)] + before * stem[max(k - delay - 1, 0)]
+            k += 1
+        out[block] = total / factor
     return out
 
 
@@ -414,9 +429,23 @@ def scan(window: Window, pairs: Floats, tolerance: float, ar: Floats, begins: li
     return _scan(window.op, white_y, judged, ar, window.dt_s, window.factor, pairs, tolerance, table)  # type: ignore[no-any-return]
 
 
+def fine_stem(window: Window, valve: ValveTrial) -> Floats:
+    """Stem at the record's own interval less its mean [% OP], shape (n * factor,)."""
+    if valve.breakaway <= 0.0:
+        return window.op - window.op.mean()
+    start = first_slip(window.op, valve.breakaway, valve.sliding)
+    stem = walk(window.op, valve.breakaway, valve.sliding, valve.tolerance, start)
+    return np.asarray(stem - stem.mean(), dtype=np.float64)
+
+
 def residual(window: Window, fit: Fit) -> Floats:
-    """PV less the response to the stem [% PV], shape (n,): load and noise, with the model's slow terms in it."""
-    x = lag(stem_of(window, fit.valve), *unit_lag(fit.time_constant_s, fit.dead_time_s, window.dt_s))
+    """PV less the response to the stem [% PV], shape (n,): load and noise, with the model's slow terms in it.
+
+    The response is stepped at the record's own interval and then averaged over the blocks, as PV was.
+    """
+    fine = window.dt_s / window.factor
+    steps = unit_lag(fit.time_constant_s, fit.dead_time_s + window.half_block_s, fine)
+    x = lag_blocks(fine_stem(window, fit.valve), *steps, window.factor)
     return window.y - window.y.mean() - fit.gain * x
 
 

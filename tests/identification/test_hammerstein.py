@@ -11,6 +11,7 @@ from identification.hammerstein import (
     Window,
     block_means,
     lag,
+    process_of,
     stem_blocks,
     sticking,
     unit_lag,
@@ -195,3 +196,16 @@ def test_stick_slip_is_recovered_from_its_limit_cycle(jump):
     assert found.valve.slip_jump == pytest.approx(jump, rel=0.1)
     assert found.slope == pytest.approx(0.1, rel=0.1)
     assert found.log_likelihood > play.log_likelihood + 20
+
+
+def test_descent_and_disturbance_tell_one_story():
+    """The innovations of what a fit leaves have the variance that the descent reports, in blocks of eight samples."""
+    rng = np.random.default_rng(2)
+    op = 50 + np.cumsum(rng.normal(0, 0.2, 8 * 600))
+    pv = block_means(lag(op - 50, *unit_lag(300.0, 12.0, 1.0)), 8) + rng.normal(0, 0.05, 600) + 3.0
+    window = Window(pv, op, np.ones(600, dtype=bool), 8.0, 8)
+    for fit in (fit_linear(window, 400.0), fit_play(window, fit_linear(window, 400.0), 400.0)):
+        assert float(np.mean(innovations(window, fit) ** 2)) == pytest.approx(fit.sigma2, rel=1e-6)
+    process = process_of(window, fit_linear(window, 400.0))
+    assert process.time_constant_s == pytest.approx(300.0, rel=0.05)
+    assert process.dead_time_s == pytest.approx(12.0, abs=2.0)
