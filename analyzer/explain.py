@@ -59,7 +59,8 @@ def stated_law(spec: LoopSpec, prepared: Prepared) -> Stated | None:
     pid = controller(spec, prepared.scale.span)
     if pid is None or pid.td_s > 0 or not math.isfinite(pid.ti_s):
         return None
-    return Stated(pid.kp, pid.ti_s / prepared.record.dt_s)
+    dt_s = prepared.record.dt_s
+    return Stated(pid.kp, pid.ti_s / dt_s, dt_s / (spec.scan_s or dt_s))
 
 
 def neighbours(

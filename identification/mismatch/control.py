@@ -10,6 +10,7 @@ from numba import njit
 
 from identification.mismatch.law import Law, centred, found_law, shifted, span_length, trusted
 from identification.mismatch.thresholds import (
+    ASKED,
     FROZEN,
     FROZEN_MOVES,
     GAP_LEAVES,
@@ -20,19 +21,27 @@ from identification.mismatch.thresholds import (
     LAWLESS_SHARE,
     SAME_LAW,
     SETTING,
+    SETTING_THINNED,
     STUCK_MOVE,
     STUCK_RUN,
     STUCK_SHARE,
+    THINNED,
 )
 from identification.record import Floats, Mask
 
 
 @dataclass(frozen=True, slots=True)
 class Stated:
-    """What the plant says of the controller: kp [% OP/% PV] and ti [samples]."""
+    """What the plant says of the controller: kp [% OP/% PV], ti [samples], and scans per sample of the recording."""
 
     kp: float
     ti: float
+    scans: float = 1.0
+
+    @property
+    def thinned(self) -> bool:
+        """Whether OP answered values of PV that the recording does not hold."""
+        return self.scans >= THINNED
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,6 +127,12 @@ def runs(still: Mask) -> list[tuple[int, int]]:
     return list(zip(np.flatnonzero(edge == 1), np.flatnonzero(edge == -1), strict=True))
 
 
+def asked(sp: Floats, op: Floats) -> Mask:
+    """True where a move of SP or a limit of OP stands in for the law, and a sample about it, shape (n,)."""
+    here = (np.abs(np.diff(sp, prepend=sp[0])) > ASKED) | (op <= 0.05) | (op >= 99.95)
+    return np.convolve(here, np.ones(3), mode="same") > 0
+
+
 def lawless(found: Law, usable: Mask, step: float) -> Mask:
     """True in spans of good samples where OP is far from the law that the others obey, shape (n,)."""
     n, length = found.residual.size, found.length
@@ -170,7 +185,7 @@ def settings(found: Law, said: Stated) -> Ruling | None:
     ti = found.kp / found.ki
     off_kp = abs(math.log(max(found.kp / said.kp, 1e-6)))
     off_ti = abs(math.log(max(ti / said.ti, 1e-6)))
-    if max(off_kp, off_ti) < SETTING:
+    if max(off_kp, off_ti) < (SETTING_THINNED if said.thinned else SETTING):
         return None
     values = {"kp": found.kp, "ti_samples": ti} if off_kp >= off_ti else {"ti_samples": ti, "kp": found.kp}
     return Ruling("controller-settings", values, np.ones(found.residual.size, dtype=bool))
@@ -186,14 +201,17 @@ def judge(sp: Floats, pv: Floats, op: Floats, usable: Mask, said: Stated) -> tup
     usable : ndarray of bool, shape (n,)
         False in gaps, in manual and at OP's limits.
     said : Stated
+        Of a thinned recording nothing but settings plainly wrong is said: the law is not seen at work.
     """
-    found = found_law(sp, pv, op, usable, said.ti)
-    if found.late >= LATE and found.explained > LAW_EXPLAINS:
-        return Ruling("clock-offset", {"late_samples": found.late}, np.ones(op.size, dtype=bool)), found
+    found = found_law(sp, pv, op, usable, said.ti, said.kp, late=not said.thinned)
     e = sp - pv
     wrong = None if obeys(sp, pv, op, said, found) else settings(found, said)
+    if said.thinned:
+        return wrong, found
+    if found.late >= LATE and found.explained > LAW_EXPLAINS:
+        return Ruling("clock-offset", {"late_samples": found.late}, np.ones(op.size, dtype=bool)), found
     law_now = Stated(found.kp, found.kp / found.ki) if wrong is not None else said
-    frozen, other = gap(e, op, law_now, usable), ruled(e, op, law_now, usable, found)
+    frozen, other = gap(e, op, law_now, usable), ruled(e, op, law_now, usable & ~asked(sp, op), found)
     if frozen is not None:
         return frozen, found
     return (other if other is not None else wrong), found

@@ -67,14 +67,24 @@ def trusted(residual: Floats, length: int) -> Mask:
     return np.repeat(size <= 2.0 * np.median(size) + 1e-9, length)
 
 
+def unbroken(usable: Mask, length: int) -> Mask:
+    """True in spans that are usable throughout, shape (m * length,); the samples themselves where too few are.
+
+    A limit or a hole within a span leaves the integral another constant behind it than before.
+    """
+    whole = np.repeat(usable.reshape(-1, length).all(axis=1), length)
+    return whole if whole.sum() >= LAW_SPANS * length else usable.copy()
+
+
 def law(sp: Floats, pv: Floats, op: Floats, usable: Mask, length: int, late: float) -> Law:
     """The PI law at a given lateness of PV, spans that do not obey it left out twice."""
     e = sp - shifted(pv, late)
     n = (e.size // length) * length
-    keep = usable[:n].copy()
+    fit = unbroken(usable[:n], length)
+    keep = fit
     for _ in range(3):
         kp, ki, residual = regress(e[:n], op[:n], length, keep)
-        keep = usable[:n] & trusted(residual, length)
+        keep = fit & trusted(residual, length)
     moved = centred(op[:n], length)
     left = float((residual[keep] ** 2).mean()) if keep.any() else math.inf
     power = float((moved[keep] ** 2).mean()) if keep.any() else 1.0
@@ -86,12 +96,31 @@ def span_length(n: int, ti_samples: float) -> int:
     return int(np.clip(ti_samples, LAW_SPAN, max(n // LAW_SPANS, LAW_SPAN)))
 
 
-def found_law(sp: Floats, pv: Floats, op: Floats, usable: Mask, ti_samples: float) -> Law:
-    """The PI law, with PV's lateness searched in whole samples and then between them."""
+def found_law(
+    sp: Floats,
+    pv: Floats,
+    op: Floats,
+    usable: Mask,
+    ti_samples: float,
+    stated_kp: float = 1.0,
+    late: bool = True,
+) -> Law:
+    """The PI law, with PV's lateness searched in whole samples and then between them.
+
+    Under an oscillation a law of the wrong sign, half a period late, gives OP as well; only laws whose gain has the
+    stated one's sign are looked for. late : whether PV's clock may be late at all.
+    """
     length = span_length(op.size, ti_samples)
-    laws = [law(sp, pv, op, usable, length, float(s)) for s in SHIFTS]
-    best = min(laws, key=lambda x: x.scatter)
+
+    def at(shift: float) -> Law:
+        return law(sp, pv, op, usable, length, shift)
+
+    def scatter(x: Law) -> float:
+        return x.scatter if x.kp * stated_kp > 0 and x.kp * x.ki > 0 else math.inf
+
+    best = min((at(s) for s in (SHIFTS if late else (0.0,))), key=scatter)
+    if not late or math.isinf(scatter(best)):
+        return at(0.0)
     for step in (0.5, 0.25):
-        near = [law(sp, pv, op, usable, length, best.late + s) for s in (-step, step)]
-        best = min([best, *near], key=lambda x: x.scatter)
+        best = min([best, at(best.late - step), at(best.late + step)], key=scatter)
     return best

@@ -16,6 +16,18 @@ PROCESS = (
         delays=(Slot.T2,),
     ),
     Row(
+        "second-lag",
+        "process",
+        (
+            Param(Slot.T2, "second_lag_s", "s", 0.1, 1e4, "dt", True),
+            Param(Slot.T3, "third_lag_s", "s", 0.1, 1e4, "dt", True),
+        ),
+        tuple({Slot.T2: t, Slot.T3: 0.5 * t} for t in (1.5, 4.0, 12.0, 40.0)),
+        variant="and a third",
+        likeness=("sensor-lag",),
+        delays=(Slot.T2, Slot.T3),
+    ),
+    Row(
         "slow-mode",
         "process",
         (

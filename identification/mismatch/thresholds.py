@@ -96,3 +96,10 @@ SAME = 2.0
 """Gain that a model may lack beside one with a constant more and still count as good as that."""
 MISSED = 1.8
 """Spacing of stamps [samples] from which a sample is missing; ours: polling scatters by less."""
+ASKED = 0.5
+"""Move of SP within a sample [% PV] from which the kick of OP, not the law, is seen; ours: ramps are slower."""
+THINNED = 1.5
+"""Scans per sample from which a recording is thinned."""
+SETTING_THINNED = 0.3
+"""SETTING on thinned recordings: values of PV that were not kept moved OP, which biases a found law; ours: at ten
+scans a sample sound loops of the sample mill reach 0.26."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from mismatch_scenes import N, subject
+from mismatch_scenes import PLAY, N, subject
 
 from identification.mismatch.control import Stated, judge
 
@@ -52,6 +52,17 @@ def test_wrong_integral_time_is_found_where_the_loop_seldom_moves() -> None:
     assert found is not None
     assert found.name == "controller-settings"
     assert found.values["ti_samples"] == pytest.approx(20.0, rel=0.05)
+
+
+def test_thinned_recordings_blame_no_sound_controller() -> None:
+    """Of every fifth sample, oscillation and all, neither clock nor settings within a fifth are blamed."""
+    s = subject(2, PLAY)
+    pv, op, sp = s.pv[::5], s.op[::5], s.sp[::5]
+    good = np.ones(pv.size, dtype=bool)
+    assert judge(sp, pv, op, good, Stated(1.8, 4.0, 5.0))[0] is None
+    wrong, _ = judge(sp, pv, op, good, Stated(0.9, 4.0, 5.0))
+    assert wrong is not None
+    assert wrong.name == "controller-settings"
 
 
 def test_late_clock_is_found() -> None:
