@@ -15,7 +15,7 @@ from analyzer.brought import Brought, judged
 from analyzer.config import Config
 from analyzer.history.loops_csv import LoopSpec
 from analyzer.history.series import Series
-from analyzer.quality import Prepared, has_op, onto_clock, prepare
+from analyzer.quality import Prepared, Scale, has_op, onto_clock, prepare
 from analyzer.tags import controller
 from identification.errors import InputError, NotAssessedError
 from identification.mismatch import explain as mismatch
@@ -292,18 +292,38 @@ def checked(data: Mapping[str, Any], path: Path) -> None:
     constants(dict(data))
 
 
+def scale_of(data: Mapping[str, Any], now: Scale) -> Scale:
+    """What percent means to a saved model: what it meant in the recording that was fitted.
+
+    Without a stated range percent is of the range recorded, and the next recording has another.
+    """
+    then = data.get("scale")
+    names = ("pv_low", "pv_span", "op_low", "op_span")
+    if not isinstance(then, dict) or not all(isinstance(then.get(n), int | float) for n in names):
+        return now
+    return Scale(*(float(then[n]) for n in names), recorded=now.recorded)
+
+
 def simulated(c: Case, data: dict[str, Any], stamps: Floats, closed: bool) -> tuple[Floats, Floats]:
-    """PV and OP in their own units at each stamp, from a saved model run open loop or, if wished, closed."""
-    r, scale = c.prepared.record, c.prepared.scale
-    law = c.subject.stated
-    if closed and law is None:
-        raise InputError(
-            f"{c.spec.loop}: no settings of its controller", "kp and ti", "state them in loops.csv"
-        )
-    if closed and law is not None:
-        pv, op = carried_closed(data, r.sp, r.op, r.pv, r.dt_s, law)
+    """PV and OP in their own units at each stamp, from a saved model run open loop or, if wished, closed.
+
+    Raises
+    ------
+    InputError
+        The loop is to be closed and its controller is not known.
+    """
+    r, law = c.prepared.record, c.subject.stated
+    scale, now = scale_of(data, c.prepared.scale), c.prepared.scale
+    sp, pv = (scale.pv_pct(now.low + x * now.span / 100.0) for x in (r.sp, r.pv))
+    op = scale.op_pct(now.op_low + r.op * now.op_span / 100.0)
+    if closed:
+        if law is None:
+            raise InputError(
+                f"{c.spec.loop}: no settings of its controller", "kp and ti", "state them in loops.csv"
+            )
+        pv, op = carried_closed(data, sp, op, pv, r.dt_s, law)
     else:
-        pv, op = carried(data, r.op, r.pv, r.dt_s), r.op
+        pv = carried(data, op, pv, r.dt_s)
     at = r.start_s + r.time_s
     pv_at = np.interp(stamps, at, scale.low + pv * scale.span / 100.0)
     return pv_at, np.interp(stamps, at, scale.op_low + op * scale.op_span / 100.0)

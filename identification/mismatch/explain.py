@@ -12,11 +12,21 @@ from identification.mismatch.ceiling import ceiling
 from identification.mismatch.control import Ruling, Stated, judge
 from identification.mismatch.fitting import Fitted, Model, Problem, descend, gain
 from identification.mismatch.law import Law, shifted
+from identification.mismatch.physics import Row
 from identification.mismatch.proof import passes
-from identification.mismatch.rivals import Clip, Progress, Rival, compete, prepared, silent, unsettled
+from identification.mismatch.rivals import (
+    Clip,
+    Progress,
+    Rival,
+    compete,
+    prepared,
+    price,
+    silent,
+    unsettled,
+)
 from identification.mismatch.simulation import Scene
-from identification.mismatch.slots import Slot
-from identification.mismatch.starting import excited
+from identification.mismatch.slots import Slot, neutral
+from identification.mismatch.starting import Excited, excited
 from identification.mismatch.thresholds import CEILING_PRICE, CEILING_SHARE, FULL_STEPS, PROVEN, ROUNDS, TIE
 from identification.record import Floats, Mask
 
@@ -80,8 +90,9 @@ def ruling_of(s: Subject, trace: recorder.Trace | None) -> tuple[Ruling | None, 
 
 GATES = ("compression", "sampling")
 """Findings about the recorder after which neither controller nor physics are judged."""
-ALONE = (*GATES, "quantization", "controller-gap", "controller-logic", "clock-offset", "controller-settings")
-"""Findings that are the answer; the physics is then fitted plain."""
+ALONE = (*GATES, "quantization")
+"""Findings that are the whole answer; the physics is then fitted plain. After a finding about the controller the
+physics is still asked, for whatever made OP, PV answers it."""
 
 
 def scene_of(s: Subject) -> Scene:
@@ -161,6 +172,10 @@ def physics(found: Explanation, tell: Progress, kind: str = "") -> Explanation:
         accepted.append(winner)
         before.append(best)
         p, best = x.p, descend(x.p, winner.fit.model, FULL_STEPS)
+    if len(accepted) > 1:
+        tell("other sets of effects")
+        x = excited(p, best, kind)
+        best, accepted = exchanged(x, best, accepted, tell)
     won, weights = ceiling(p, best)
     least = max(CEILING_PRICE, CEILING_SHARE * gain(best, found.plain))
     left = won - weights - least
@@ -168,6 +183,32 @@ def physics(found: Explanation, tell: Progress, kind: str = "") -> Explanation:
         left = max(left, rivals[0].net)
     found = replace(found, p=p, best=best, accepted=tuple(accepted), before=tuple(before), first=first)
     return replace(found, left=left if left > 0 else 0.0)
+
+
+def exchanged(x: Excited, best: Fitted, accepted: list[Rival], tell: Progress) -> tuple[Fitted, list[Rival]]:
+    """The accepted effects, each given up once for whatever does better beside the others.
+
+    Effects are added one at a time, so the first may have been taken in the place of two that act together.
+    """
+    for i, old in enumerate(accepted):
+        others = tuple(r for r in best.model.rows if r.name != old.name)
+        near = descend(x.p, Model(others, cleared(best.model.c, old.row)), FULL_STEPS)
+        rivals = [r for r in compete(x, near, CATALOGUE, tell) if r.name != old.name]
+        if not rivals:
+            continue
+        least = gain(best, near) - price(old.row) + TIE
+        if rivals[0].net > max(least, 0.0) and passes(x.p, near, rivals[0].fit, rivals[0].name):
+            best = descend(x.p, rivals[0].fit.model, FULL_STEPS)
+            accepted = [*accepted[:i], rivals[0], *accepted[i + 1 :]]
+    return best, accepted
+
+
+def cleared(c: Floats, row: Row) -> Floats:
+    """Constants with those of a row at rest, shape (SIZE,)."""
+    out, rest = c.copy(), neutral()
+    for slot in [p.slot for p in row.params] + [int(s) for s in row.fixed or {}]:
+        out[slot] = rest[slot]
+    return out
 
 
 def proven(p: Problem, near: Fitted, rivals: list[Rival]) -> Rival | None:

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from analyzer.brought import compared, judged, within, wrong_units
-from analyzer.explain import plain_start, read_model
+from analyzer.explain import plain_start, read_model, scale_of
+from analyzer.quality import Scale
 from identification.errors import InputError
 from identification.mismatch.explain import Explanation, Subject, scene_of
 from identification.mismatch.rivals import prepared
@@ -116,3 +117,12 @@ def test_unusable_models_are_one_line(tmp_path: Path, text: str) -> None:
     with pytest.raises(InputError) as refused:
         read_model(path, "A")
     assert "\n" not in str(refused.value)
+
+
+def test_percent_means_to_a_model_what_it_meant_when_it_was_fitted() -> None:
+    """A model fitted where the recorded range was 20 to 60 keeps it over a recording that reaches from 30 to 40."""
+    now = Scale(30.0, 10.0, 0.0, 100.0, recorded=True)
+    kept = {"scale": {"pv_low": 20.0, "pv_span": 40.0, "op_low": 0.0, "op_span": 10.0}}
+    assert scale_of(kept, now) == Scale(20.0, 40.0, 0.0, 10.0, recorded=True)
+    assert scale_of({}, now) == now
+    assert scale_of({"scale": {"pv_low": "x"}}, now) == now

@@ -112,3 +112,12 @@ def test_samples_held_over_a_hole_are_not_taken_for_a_load() -> None:
     held = np.maximum.accumulate(np.where(kept, np.arange(N), 0))
     s = replace(s, pv=s.pv[held], op=s.op[held], stamp_s=s.stamp_s[kept])
     assert answer(explain(s), s).verdict == "none"
+
+
+def test_wrong_settings_do_not_hide_the_play() -> None:
+    """Where the controller is stated wrongly and the valve has play, the settings are the verdict and both are told."""
+    s = subject(12, PLAY)
+    s = replace(s, stated=Stated(3.0, 20.0))
+    said = answer(explain(s), s)
+    assert said.verdict == "controller-settings"
+    assert [e.name for e in said.effects] == ["controller-settings", "backlash"]
