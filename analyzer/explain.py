@@ -301,7 +301,8 @@ def scale_of(data: Mapping[str, Any], now: Scale) -> Scale:
     names = ("pv_low", "pv_span", "op_low", "op_span")
     if not isinstance(then, dict) or not all(isinstance(then.get(n), int | float) for n in names):
         return now
-    return Scale(*(float(then[n]) for n in names), recorded=now.recorded)
+    low, span, op_low, op_span = (float(then[n]) for n in names)
+    return Scale(low, span, op_low, op_span, now.recorded)
 
 
 def simulated(c: Case, data: dict[str, Any], stamps: Floats, closed: bool) -> tuple[Floats, Floats]:

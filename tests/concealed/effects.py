@@ -151,7 +151,8 @@ def sensor_lag(scene: Scene, s: float, rng: Rng) -> Made:
 
 def quantization(scene: Scene, s: float, rng: Rng) -> Made:
     """A converter of `s` % steps."""
-    return scene.with_plant(grid=s * rng.uniform(0.8, 1.25)), {"quant": s}
+    grid = s * rng.uniform(0.8, 1.25)
+    return scene.with_plant(grid=grid), {"quant": grid}
 
 
 def sensor_clipping(scene: Scene, s: float, rng: Rng) -> Made:

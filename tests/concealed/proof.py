@@ -8,7 +8,6 @@ import pandas as pd
 from concealed.grade import LEVELS
 from scipy.stats import beta
 
-BEGIN, END = "<!-- concealed: begin -->", "<!-- concealed: end -->"
 ABSTAINED = ("none", "unexplained", "no answer")
 
 
@@ -126,6 +125,21 @@ def parameter_table(params: pd.DataFrame) -> str:
     return table(["effect", "parameter", "cases", "median error", "largest", "truth within interval"], lines)
 
 
+def plain_loops(rows: pd.DataFrame) -> str:
+    """How well the plain loop's constants come out where nothing, or a load alone, is hidden."""
+    lines: list[list] = []
+    groups = {"nothing hidden": "none", "load step": "load-step", "load oscillation": "load-oscillation"}
+    for title, effect in groups.items():
+        g = rows[(rows.effect == effect) & (rows.group != "pair")]
+        if len(g) == 0 or "K_error" not in g:
+            continue
+        errors = [g[f"{k}_error"].abs() for k in "KTL"]
+        shown = [f"{100 * e.median():.1f} %, {share(e < 0.05)}" for e in errors]
+        lines.append([title, *shown])
+    head = ["hidden", "gain", "time constant", "dead time"]
+    return table(head, lines) if lines else "No model was saved."
+
+
 def section(rows: pd.DataFrame, params: pd.DataFrame, picture: str | None) -> str:
     """The section of PROOF.md."""
     time = rows.seconds.dropna()
@@ -142,17 +156,25 @@ def section(rows: pd.DataFrame, params: pd.DataFrame, picture: str | None) -> st
         oddities(rows),
         "### Parameters",
         parameter_table(params),
+        "### The plain loop\nMedian error, and saved models within 5 %. Set points move under load.",
+        plain_loops(rows),
     ]
     return "\n\n".join(p for p in parts if p) + "\n"
 
 
 def place(proof: pathlib.Path, text: str) -> None:
-    """Put the section into the file, in place of an older one; the rest of the file stays."""
+    """Put the sealed cases' section into the file, in place of an older one; the rest of the file stays."""
+    place_section(proof, "concealed", text)
+
+
+def place_section(proof: pathlib.Path, name: str, text: str) -> None:
+    """Put a named section into the file, in place of an older one; the rest of the file stays."""
+    begin, end = f"<!-- {name}: begin -->", f"<!-- {name}: end -->"
     old = proof.read_text() if proof.exists() else "# Proof\n\n"
-    block = f"{BEGIN}\n{text}{END}\n"
-    if BEGIN in old and END in old:
-        head, rest = old.split(BEGIN, 1)
-        proof.write_text(head + block + rest.split(END, 1)[1].lstrip("\n"))
+    block = f"{begin}\n{text}{end}\n"
+    if begin in old and end in old:
+        head, rest = old.split(begin, 1)
+        proof.write_text(head + block + rest.split(end, 1)[1].lstrip("\n"))
     else:
         proof.write_text(old.rstrip("\n") + "\n\n" + block)
 

@@ -17,36 +17,37 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1]))
 TWINS = [{"valve-characteristic", "nonlinear-gain"}]  # one mark when OP alone moves PV
 KIN = [*TWINS, {"sensor-lag", "second-lag"}, {"stiction", "positioner"}]
 ABSTAINED = {"none", "unexplained"}
-SHARED = {  # parameter of the truth: words an answer may use for it
-    "backlash": ("backlash", "backlash_pct", "play", "play_pct", "width", "width_pct", "gap"),
-    "stick_S": ("stickband", "stickband_pct", "S", "s"),
-    "stick_J": ("slip_jump", "slip_jump_pct", "jump", "J", "j"),
-    "rate": ("rate", "slew", "slew_up", "rate_up", "slew_pct_per_s"),
-    "vmax": ("limit", "vmax", "high", "upper", "clip", "limit_pct"),
-    "T2": (
-        "T2",
-        "second_lag",
-        "second_lag_s",
-        "second_time_constant",
-        "second_time_constant_s",
-        "lag",
-        "lag_s",
-    ),
-    "lag": ("lag", "lag_s", "filter", "filter_s", "sensor_lag", "sensor_lag_s", "T2"),
-    "slow_share": ("share", "slow_share"),
-    "slow_T": ("slow_time_constant", "slow_time_constant_s", "slow_T", "slow_s"),
-    "inverse": ("beta", "zero", "zero_s", "beta_s", "inverse", "inverse_s"),
-    "quant": ("step", "grid", "step_pct", "quantum", "quant"),
-    "pv_clip": ("clip", "limit", "high", "low", "upper", "lower", "clip_pct"),
-    "pv_late_by_s": ("shift", "shift_s", "offset", "offset_s", "clock_offset_s", "pv_late_s"),
-    "Kp": ("kp", "Kp"),
-    "Ti": ("ti", "Ti", "ti_s"),
-    "gap": ("gap", "gap_pct"),
-    "cap": ("cap", "cap_pct", "level"),
-    "period": ("period", "period_s"),
-    "load_step": ("size", "step", "size_pct", "load_step"),
-    "coupling_gain": ("gain", "coupling_gain", "neighbour_gain"),
+SHARED = {  # parameter of the truth: the name that an answer gives it
+    "backlash": "backlash_pct",
+    "stick_S": "stickband_pct",
+    "stick_J": "slip_jump_pct",
+    "rate": "rate_pct_per_s",
+    "vmax": "limit_pct",
+    "bend": "curve",
+    "positioner_lag": "positioner_lag_s",
+    "deadband": "deadband_pct",
+    "split_at": "split_pct",
+    "split_ratio": "gain_ratio",
+    "T2": "second_lag_s",
+    "lag": "second_lag_s",
+    "slow_share": "slow_share",
+    "slow_T": "slow_time_constant_s",
+    "ratio_down_up": "ratio_down_up",
+    "gain_slope": "gain_slope",
+    "root": "root",
+    "cap": "cap_pct",
+    "flow_delay": "flow_share",
+    "gain_drift": "gain_drift",
+    "quant": "step_pct",
+    "pv_clip": "clip_pct",
+    "pv_late_by_s": "shift_s",
+    "Kp": "kp",
+    "Ti": "ti_s",
+    "gap": "gap_pct",
+    "period": "period_s",
+    "coupling_gain": "coupling_gain",
 }
+SAID_AS = {"sensor-lag": "second-lag"}  # named alike, since OP and PV cannot tell them apart
 
 
 def said_of(out: pathlib.Path, tag: str) -> dict:
@@ -92,11 +93,14 @@ def parameters(truth: dict, said: dict) -> list[dict]:
     given = {
         k: v
         for e in said.get("effects", [])
-        if e["name"] == truth["effect"]
+        if e["name"] in (truth["effect"], SAID_AS.get(truth["effect"]))
         for k, v in e["parameters"].items()
     }
-    for key, true in truth.get("hidden", {}).items():
-        hit = next((given[w] for w in SHARED.get(key, ()) if w in given), None)
+    hidden = dict(truth.get("hidden", {}))
+    if "T_up" in hidden:
+        hidden["ratio_down_up"] = hidden["T_down"] / hidden["T_up"]
+    for key, true in hidden.items():
+        hit = given.get(SHARED.get(key, ""))
         if hit is None or not true or hit.get("value") is None:
             continue
         low, high = hit.get("low"), hit.get("high")
@@ -104,6 +108,15 @@ def parameters(truth: dict, said: dict) -> list[dict]:
         row = {"effect": truth["effect"], "parameter": key, "true": true, "found": hit["value"]}
         found.append(row | {"error": hit["value"] / true - 1.0, "inside": inside})
     return found
+
+
+def plain_errors(out: pathlib.Path, tag: str, truth: dict) -> dict[str, float]:
+    """Relative errors of the plain loop's gain, time constant and dead time in the saved model."""
+    try:
+        found = json.loads((out / f"{tag}.model.json").read_text())["constants"]
+        return {f"{k}_error": found.get(k, 0.0) / truth["base"][k] - 1.0 for k in "KTL"}
+    except (OSError, ValueError, KeyError, AttributeError):
+        return {}
 
 
 def judge(cases: pathlib.Path, out: pathlib.Path) -> tuple[pd.DataFrame, pd.DataFrame]:
@@ -120,6 +133,7 @@ def judge(cases: pathlib.Path, out: pathlib.Path) -> tuple[pd.DataFrame, pd.Data
             | {"block": said.get("block") == truth["block"], "group": group_of(truth)}
             | {"both": names >= set(truth.get("pair", [])), "recovered": recovered(cases, out, tag, truth)}
             | {"seconds": seconds_of(out, tag)}
+            | plain_errors(out, tag, truth)
         )
         params += [{"loop": tag, "level": truth["level"]} | p for p in parameters(truth, said)]
     return pd.DataFrame(rows), pd.DataFrame(params)

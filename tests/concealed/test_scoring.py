@@ -17,7 +17,7 @@ assert "truth" not in " ".join(a)
 if a[1] == "explain":
     open(a[a.index("--save-model") + 1], "w").write("{}")
     name = "backlash" if a[a.index("--loop") + 1] == "L0000" else "none"
-    width = {"width": {"value": 2.0, "low": 0.0, "high": 99.0, "unit": "%"}}
+    width = {"backlash_pct": {"value": 2.0, "low": 0.0, "high": 99.0, "unit": "%"}}
     effect = {"name": name, "block": "valve", "parameters": width, "alternatives": []}
     block = "valve" if name == "backlash" else "none"
     print(json.dumps({"verdict": name, "block": block, "effects": [effect] if name != "none" else []}))

@@ -115,7 +115,7 @@ def test_samples_held_over_a_hole_are_not_taken_for_a_load() -> None:
 
 
 def test_wrong_settings_do_not_hide_the_play() -> None:
-    """Where the controller is stated wrongly and the valve has play, the settings are the verdict and both are told."""
+    """Of wrongly stated settings and a play in the valve the settings are the verdict, and both are told."""
     s = subject(12, PLAY)
     s = replace(s, stated=Stated(3.0, 20.0))
     said = answer(explain(s), s)
