@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import sys
 from collections.abc import Sequence
 from copy import copy
@@ -20,6 +21,11 @@ if TYPE_CHECKING:
     from analyzer.history.loops_csv import LoopSpec
     from analyzer.nights import Night
     from analyzer.store import Store
+
+for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ.setdefault(_name, "1")
+"""Loops run side by side, one a process, on matrices of a few columns: threads of linear algebra only get in their
+way. Set before numpy is imported."""
 
 
 def _seconds(at: datetime | None, otherwise: float) -> float:
