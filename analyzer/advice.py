@@ -12,9 +12,10 @@ from analyzer.history.loops_csv import LoopSpec
 from analyzer.measure import Measured
 from analyzer.tags import as_stated
 from identification.descent import covariance
-from identification.hammerstein import Fit, Window, disturbance, process_of
+from identification.hammerstein import Fit, disturbance, process_of
 from identification.models import Backlash, Fopdt, Integrator, Loop, Pid, Process, Stiction, Valve
 from identification.record import Floats
+from identification.window import Window
 from tuning.limit_cycle import Cycle, confirm
 from tuning.linear import integral_s, is_stable
 from tuning.recommend import Proposal, recommend

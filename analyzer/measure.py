@@ -12,11 +12,13 @@ from analyzer.config import CauseLimits
 from analyzer.oscillation import Oscillation
 from identification.controller import fit_pi
 from identification.evidence import Rival, evidence, stem_moves, with_load_step
-from identification.hammerstein import IDEAL, Fit, Window, block_means, prepare, process_of, residual
+from identification.hammerstein import IDEAL, Fit, process_of, residual
 from identification.models import Backlash, Fopdt, Loop, Pid, Stiction
 from identification.record import Floats, LoopRecord, Mask
+from identification.search import prepare
 from identification.spectrum import Spectrum, locked_harmonic, peak_prominence, spectrum, tapered_power
 from identification.valve_fit import SCREENED, SHORT, better_linear, fit_linear, fit_play, fit_stick_slip
+from identification.window import Window, block_means
 from tuning.limit_cycle import confirm
 from tuning.linear import is_stable, loop_response
 

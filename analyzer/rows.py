@@ -10,7 +10,8 @@ from analyzer.assess import Assessment
 from analyzer.cause import Verdict
 from analyzer.columns import ALL_COLUMNS
 from analyzer.history.loops_csv import LoopSpec
-from identification.hammerstein import Fit, Window
+from identification.hammerstein import Fit
+from identification.window import Window
 
 
 def empty_row(spec: LoopSpec, night: str) -> dict[str, Any]:

@@ -16,9 +16,10 @@ from analyzer.tags import as_stated
 from identification.controller import fit_pi
 from identification.descent import covariance
 from identification.errors import NotAssessedError
-from identification.hammerstein import Fit, ValveTrial, Window
+from identification.hammerstein import Fit, ValveTrial
 from identification.models import Estimate, Loop, Pid, Process
 from identification.record import Floats, LoopRecord
+from identification.window import Window
 from tuning.describing import describe
 from tuning.limit_cycle import Confirmed, confirm
 from tuning.linear import integral_s

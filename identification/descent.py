@@ -8,9 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from identification.hammerstein import Fit, ValveTrial, Window, fine_stem, lag_blocks, sticking, unit_lag
+from identification.hammerstein import Fit, ValveTrial, fine_stem, lag_blocks, sticking, unit_lag
 from identification.innovations import judged_mask, whiten
 from identification.record import Floats
+from identification.window import Window
 
 ITERATIONS = 25
 """Gauss-Newton steps at most; ours: nine in ten fits stop before the fifteenth."""

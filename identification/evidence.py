@@ -7,9 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from identification.descent import descend
-from identification.hammerstein import Fit, ValveTrial, Window, disturbance, stem_of
+from identification.hammerstein import Fit, ValveTrial, disturbance, stem_of
 from identification.innovations import judged_mask, whiten
 from identification.record import Floats, Mask
+from identification.window import Window
 
 OUTLIER = 4.0
 """Innovations count up to this many standard deviations [-]: beyond it one event (a step of the load, a spike), not

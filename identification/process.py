@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from identification.hammerstein import AR_ORDER, IDEAL, INPUT_LAGS, Dynamics, Window, prepare, search, stem_of
+from identification.hammerstein import IDEAL, stem_of
 from identification.innovations import arx_noise
 from identification.models import Fopdt
 from identification.record import Floats, Mask
+from identification.search import AR_ORDER, INPUT_LAGS, Dynamics, prepare, search
 from identification.valve_fit import begin, generic_noise
+from identification.window import Window
 
 TIMES = (1.5, 4.0, 10.0, 25.0, 60.0, 150.0, 400.0)
 """Time constants tried [samples]; ours: from the scan to the longest that a shift of logging shows."""

@@ -7,25 +7,12 @@ from dataclasses import replace
 import numpy as np
 
 from identification.descent import descend
-from identification.hammerstein import (
-    AR_ORDER,
-    IDEAL,
-    INPUT_LAGS,
-    Dynamics,
-    Fit,
-    Prepared,
-    ValveTrial,
-    Window,
-    prepare,
-    scan,
-    search,
-    starts,
-    stem_of,
-    sticking,
-)
+from identification.hammerstein import IDEAL, Fit, ValveTrial, stem_of, sticking
 from identification.innovations import arx_noise
 from identification.record import Floats
+from identification.search import AR_ORDER, INPUT_LAGS, Dynamics, Prepared, prepare, scan, search, starts
 from identification.valve import HALTS, RESTS, SLIDES
+from identification.window import Window
 
 SCREEN_SHARES = (0.1, 0.3, 0.55, 0.8)
 """Stickbands that a loop without an evident fault is screened with, as shares of OP's range; ours: a play of any

@@ -7,18 +7,11 @@ import pytest
 
 from identification.descent import descend
 from identification.evidence import Rival, evidence, innovations
-from identification.hammerstein import (
-    Window,
-    block_means,
-    lag,
-    process_of,
-    stem_blocks,
-    sticking,
-    unit_lag,
-)
+from identification.hammerstein import lag, process_of, stem_blocks, sticking, unit_lag
 from identification.models import Backlash, Fopdt, Loop, Pid
 from identification.simulate import closed_loop, open_loop
 from identification.valve_fit import better_linear, fit_linear, fit_play, fit_stick_slip
+from identification.window import Window, block_means
 
 N = 3000
 

@@ -1,0 +1,73 @@
+"""A stretch of a record prepared for fitting: PV in blocks, OP as recorded."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from identification.record import Floats, Mask
+
+LONGEST_DEAD_TIME = 0.25
+"""Largest dead time searched, as a share of the window; ours: beyond it the window holds under four of them."""
+LONGEST_TIME_CONSTANT = 3.0
+"""Largest time constant searched, in windows; beyond it a lag and an integrator are one (PHYSICS: integrator)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Window:
+    """A stretch of a record prepared for fitting.
+
+    y : PV [% PV] in blocks, shape (n,); op : OP [% OP] at the record's own interval, shape (n * factor,);
+    usable : bool, shape (n,), False at gaps; dt_s : interval of the blocks [s]; most_time_constant_s and
+    most_dead_time_s : what is known of such processes [s], inf where nothing is; step_at : block at which the
+    load steps, 0 where it does not.
+    """
+
+    y: Floats
+    op: Floats
+    usable: Mask
+    dt_s: float
+    factor: int = 1
+    most_time_constant_s: float = math.inf
+    most_dead_time_s: float = math.inf
+    step_at: int = 0
+
+    @property
+    def extra(self) -> Floats:
+        """A further regressor, shape (n,): a step of the load at block `step_at`; zero where that is 0."""
+        out = np.zeros(self.y.size)
+        if self.step_at > 0:
+            out[self.step_at :] = 1.0
+        return out
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """Largest time constant and dead time that are searched [s]."""
+        longest = LONGEST_TIME_CONSTANT * self.duration_s, LONGEST_DEAD_TIME * self.duration_s
+        known = self.most_time_constant_s, self.most_dead_time_s
+        return max(min(longest[0], known[0]), self.dt_s), max(min(longest[1], known[1]), 2 * self.dt_s)
+
+    @property
+    def duration_s(self) -> float:
+        """Length of the window [s]."""
+        return self.y.size * self.dt_s
+
+    @property
+    def half_block_s(self) -> float:
+        """What is missing from a fitted dead time [s]: the mean of a block of PV stands later than its first sample,
+        from which the search, whose model knows blocks alone, counts."""
+        return 0.5 * (self.factor - 1) * self.dt_s / self.factor
+
+    @property
+    def op_range(self) -> float:
+        """Range of OP without its 2 % tails [% OP]."""
+        low, high = np.quantile(self.op, [0.02, 0.98])
+        return float(high - low)
+
+
+def block_means(x: Floats, factor: int) -> Floats:
+    """Means of consecutive blocks, shape (n // factor,)."""
+    n = x.size // factor
+    return x[: n * factor].reshape(n, factor).mean(axis=1)
