@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,9 +11,11 @@ from analyzer.assessments import noise_band
 from analyzer.config import CauseLimits
 from analyzer.oscillation import Oscillation
 from identification.controller import fit_pi
+from identification.descent import descend
 from identification.evidence import Rival, evidence, stem_moves, with_load_step
 from identification.hammerstein import IDEAL, Fit, process_of, residual
 from identification.models import Backlash, Fopdt, Loop, Pid, Stiction
+from identification.position import Seen, seen
 from identification.record import Floats, LoopRecord, Mask
 from identification.search import prepare
 from identification.spectrum import Spectrum, locked_harmonic, peak_prominence, spectrum, tapered_power
@@ -93,7 +95,10 @@ def window_of(record: LoopRecord, scale_s: float, limits: CauseLimits, kind: str
     known = {name: (t, dead) for name, t, dead in limits.fast_process}
     most = known.get(kind.lower(), (math.inf, math.inf))
     op = np.ascontiguousarray(part.op)
-    return Window(block_means(part.pv, factor), op, usable, record.dt_s * factor, factor, *most)
+    stem = None if part.position is None else np.ascontiguousarray(part.position)
+    return Window(
+        block_means(part.pv, factor), op, usable, record.dt_s * factor, factor, *most, position=stem
+    )
 
 
 def answering(record: LoopRecord, window: Window, scale_s: float) -> Mask:
@@ -190,6 +195,10 @@ def _rivals(
 ) -> tuple[Fit, Fit, Fit | None, Fit, float, float]:
     """Plain fit, play, stick-slip if it was tried, the better valve, its evidence and that of the jump [nat]."""
     linear = fit_linear(window, scale_s)
+    shown = None if window.position is None else seen(window.op, window.position)
+    if shown is not None:
+        return _shown(window, linear, shown, due, scale_s)
+    window = replace(window, position=None)
     play = fit_play(window, linear, scale_s)
     gained = play.log_likelihood - linear.log_likelihood
     short = oscillation is None and window.y.size < SHORT
@@ -205,6 +214,18 @@ def _rivals(
     plain = with_load_step(window, linear, due, best.ar)
     gained = evidence(Rival(window, best), plain) - (limits.evidence_jump if best is stick else 0.0)
     return linear, play, stick, best, gained, jump
+
+
+def _shown(
+    window: Window, linear: Fit, shown: Seen, due: Mask, scale_s: float
+) -> tuple[Fit, Fit, Fit | None, Fit, float, float]:
+    """The same where the stem is recorded: its fault is seen, and PV answers the stem itself."""
+    behind = replace(window, op=window.op if window.position is None else window.position)
+    play = descend(window, replace(fit_linear(behind, scale_s), valve=shown.play))
+    stick = None if shown.jumping is None else replace(play, valve=shown.jumping)
+    best = play if stick is None else stick
+    gained = evidence(Rival(window, best), with_load_step(window, linear, due, best.ar))
+    return linear, play, stick, best, gained, 0.0 if stick is None else math.inf
 
 
 def _cycles_alike(window: Window, fit: Fit, controller: Pid | None, o: Oscillation) -> bool:

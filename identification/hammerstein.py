@@ -143,7 +143,10 @@ def unit_lag(time_constant_s: float, dead_time_s: float, dt_s: float) -> tuple[f
 
 
 def stem_of(window: Window, valve: ValveTrial) -> Floats:
-    """Stem in blocks less its mean [% OP], shape (n,)."""
+    """Stem in blocks less its mean [% OP], shape (n,): the recorded one behind a faulty valve, where there is one."""
+    if valve.breakaway > 0.0 and window.position is not None:
+        stem = block_means(window.position, window.factor)
+        return stem - stem.mean()
     if valve.breakaway <= 0.0:
         stem = block_means(window.op, window.factor)
     else:
@@ -152,7 +155,9 @@ def stem_of(window: Window, valve: ValveTrial) -> Floats:
 
 
 def fine_stem(window: Window, valve: ValveTrial) -> Floats:
-    """Stem at the record's own interval less its mean [% OP], shape (n * factor,)."""
+    """Stem at the record's own interval less its mean [% OP], shape (n * factor,); as stem_of."""
+    if valve.breakaway > 0.0 and window.position is not None:
+        return window.position - window.position.mean()
     if valve.breakaway <= 0.0:
         return window.op - window.op.mean()
     start = first_slip(window.op, valve.breakaway, valve.sliding)

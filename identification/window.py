@@ -22,7 +22,7 @@ class Window:
     y : PV [% PV] in blocks, shape (n,); op : OP [% OP] at the record's own interval, shape (n * factor,);
     usable : bool, shape (n,), False at gaps; dt_s : interval of the blocks [s]; most_time_constant_s and
     most_dead_time_s : what is known of such processes [s], inf where nothing is; step_at : block at which the
-    load steps, 0 where it does not.
+    load steps, 0 where it does not; position : stem [% OP], shape of op, where recorded.
     """
 
     y: Floats
@@ -33,6 +33,7 @@ class Window:
     most_time_constant_s: float = math.inf
     most_dead_time_s: float = math.inf
     step_at: int = 0
+    position: Floats | None = None
 
     @property
     def extra(self) -> Floats:
