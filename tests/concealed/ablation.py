@@ -28,6 +28,7 @@ from concealed.score import KIN, kin
 from analyzer.config import Config
 from analyzer.explain import Case, case, loop_of
 from analyzer.options import opened
+from identification.mismatch.catalogue import CATALOGUE
 from identification.mismatch.explain import scene_of, without_spikes
 from identification.mismatch.law import found_law
 from identification.mismatch.rivals import Rival, compete, prepared, unsettled
@@ -53,6 +54,12 @@ def chosen(truths: dict, count: int) -> list[str]:
         for level in LEVELS
     }
     return [t for level in LEVELS for t in able[level][: count // len(LEVELS)]]
+
+
+def tellable(truth: dict, rows: set[str]) -> bool:
+    """Whether a case hides one effect that a row models, and its later recording can tell."""
+    named = any(kin(r, truth["effect"], KIN) for r in rows)
+    return named and "later_plain" in truth and "pair" not in truth
 
 
 def left_later(rival: Rival, p: object, later: Case) -> float:
