@@ -19,7 +19,7 @@ from identification.errors import NotAssessedError
 from identification.hammerstein import Fit, ValveTrial
 from identification.models import Estimate, Loop, Pid, Process
 from identification.record import Floats, LoopRecord
-from identification.window import Window
+from identification.window import Window, block_means
 from tuning.describing import describe
 from tuning.limit_cycle import Confirmed, confirm
 from tuning.linear import integral_s
@@ -43,6 +43,8 @@ makes leaves the likelihood rough; ours: the 90 % quantile of their ratio over 5
 for slope, dead time and width, where it should be 1.64 (tests/proofs/coverage.py, seed 9)."""
 LEAST_JUMP = 2.0
 """Times that a slip jump may be smaller than found; ours: on simulated dry friction found ones are too small."""
+LEAST_BAND = 1.5
+"""Times that a stickband may be smaller than found; ours: on simulated dry friction up to 1.45."""
 DISAGREES = 0.15
 """Relative difference of recovered and stated settings from which it is told; ours: recovery is within 2 % on
 trends recorded at the scan and within some 10 % on thinned ones."""
@@ -90,21 +92,33 @@ def intervals(window: Window, fit: Fit, valve: bool) -> dict[str, Estimate]:
         name = "backlash_pct" if fit.valve.slip_jump == 0 else "stickband_pct"
         out[name] = _around(fit.valve.stickband, NINETY * rough * spread[2], "% of OP", least=0.0)
         if fit.valve.slip_jump > 0:
-            out |= _jumping(fit.valve, out)
+            out |= _jumping(window, fit.valve, out)
     return out
 
 
-def _jumping(valve: ValveTrial, found: dict[str, Estimate]) -> dict[str, Estimate]:
-    """Slip jump, slope and gain of a valve that jumps: the jump from half of the found one to the whole stickband,
-    slope and gain by what their product with the jump leaves."""
-    jump, share = valve.slip_jump, valve.slip_jump / valve.stickband
-    out = {"slip_jump_pct": Estimate(jump, jump / LEAST_JUMP, valve.stickband, "% of OP")}
+def _jumping(window: Window, valve: ValveTrial, found: dict[str, Estimate]) -> dict[str, Estimate]:
+    """What is told of a valve that jumps, within what PV leaves open.
+
+    Slip jump from half of the found one to the whole stickband, slope and gain by what their product with the jump
+    leaves; a stem that lets go later is as good as a process that answers later by the time OP takes for that.
+    """
+    jump, band = valve.slip_jump, valve.stickband
+    out = {"slip_jump_pct": Estimate(jump, jump / LEAST_JUMP, band, "% of OP")}
     for name in ("slope_pct_per_s", "gain"):
         if name in found:
-            e = found[name]
-            ends = (e.low, e.high, e.value * share, e.value * LEAST_JUMP)
-            out[name] = Estimate(e.value, min(ends), max(ends), e.unit)
+            out[name] = _reaching(
+                found[name], found[name].value * jump / band, found[name].value * LEAST_JUMP
+            )
+    out["stickband_pct"] = _reaching(found["stickband_pct"], band / LEAST_BAND)
+    travel = float(np.abs(np.diff(block_means(window.op, window.factor))).sum())
+    later_s = 0.5 * band * (1.0 - 1.0 / LEAST_BAND) * window.duration_s / max(travel, 1e-9)
+    out["dead_time_s"] = _reaching(found["dead_time_s"], found["dead_time_s"].value + later_s)
     return out
+
+
+def _reaching(e: Estimate, *ends: float) -> Estimate:
+    """An estimate whose interval holds some values too."""
+    return Estimate(e.value, min(e.low, *ends), max(e.high, *ends), e.unit)
 
 
 def _slope(window: Window, fit: Fit, valve: bool, rough: float = 1.0) -> Estimate:
