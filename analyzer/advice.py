@@ -109,7 +109,10 @@ def uncertain(window: Window, fit: Fit, loop: Loop, samples: int = 6, seed: int 
     mean = np.array([lag, dead_time_s, fit.valve.stickband, gain])
     relative = np.array([1.0, 1.0, 1.0, 1.0 / fit.gain])
     spread = covariance(window, fit, free_width=loop.valve is not None) * np.outer(relative, relative)
-    draws = np.random.default_rng(seed).multivariate_normal(mean, spread, size=samples, method="svd")
+    scale = np.sqrt(np.maximum(np.diag(spread), 1e-24))
+    unit = spread / np.outer(scale, scale) + 1e-9 * np.eye(mean.size)
+    root = scale[:, None] * np.linalg.cholesky(unit)  # signs of singular vectors would be a matter of rounding
+    draws = mean + np.random.default_rng(seed).normal(size=(samples, mean.size)) @ root.T
     return tuple(_drawn(draw, fit, loop) for draw in draws)
 
 

@@ -165,10 +165,11 @@ def measure(
     amplification, stable = _amplification(process_of(window, linear), controller, scale)
     saturated = float(record.mask("saturated").mean())
     harmonic = locked_harmonic(error, scale) if error is not None and oscillation is not None else 0.0
+    told, (fine_linear, fine_play, fine_stick) = _refined(window, (linear, play, stick), best)
     return Measured(
-        linear,
-        play,
-        stick,
+        fine_linear,
+        fine_play,
+        fine_stick,
         gained,
         size,
         jump,
@@ -180,13 +181,30 @@ def measure(
         harmonic,
         saturated,
         controller,
-        window,
+        told,
         stem_moves(window, best.valve),
         bool(due.any()),
         limits.open_size <= size < limits.size
         and gained >= limits.evidence
         and oscillation is not None
         and _cycles_alike(window, best, controller, oscillation),
+    )
+
+
+Rivals = tuple[Fit, Fit, Fit | None]
+"""Plain fit, play and stick-slip."""
+
+
+def _refined(window: Window, fits: Rivals, best: Fit) -> tuple[Window, Rivals]:
+    """Window and fits at the record's own interval, where the dead time is no shorter than a block."""
+    if window.factor == 1 or best.dead_time_s + window.half_block_s < window.dt_s:
+        return window, fits
+    fine = replace(window, fine=True)
+    linear, play, stick = fits
+    return fine, (
+        descend(fine, linear),
+        descend(fine, play, free_width=window.position is None),
+        None if stick is None else descend(fine, stick),
     )
 
 
@@ -209,7 +227,7 @@ def _rivals(
     if short or play.valve.stickband > 0.25 * window.op_range:
         stick = fit_stick_slip(window, play, scale_s)
         jump = evidence(Rival(window, stick), Rival(window, play))
-        jump = min(jump, 0.0) if stick.log_likelihood < play.log_likelihood else jump
+        jump -= max(play.log_likelihood - stick.log_likelihood, 0.0)
         best = stick if jump > limits.evidence_jump else play
     plain = with_load_step(window, linear, due, best.ar)
     gained = evidence(Rival(window, best), plain) - (limits.evidence_jump if best is stick else 0.0)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from identification.hammerstein import Fit, ValveTrial, fine_stem, lag_blocks, sticking, unit_lag
+from identification.hammerstein import Fit, ValveTrial, fine_stem, lag_blocks, stem_of, sticking, unit_lag
 from identification.innovations import judged_mask, whiten
 from identification.record import Floats
 from identification.window import Window
@@ -107,10 +107,12 @@ def _judged(
 ) -> tuple[Floats, Floats]:
     """Innovations and their derivatives at the samples judged."""
     order = theta.size - 8
-    stem = fine_stem(window, valve)
+    stems = fine_stem if window.fine else stem_of
+    stem = stems(window, valve)
     step = 0.01 * valve.stickband if free_width else 0.0
-    wider = fine_stem(window, _widened(valve, step)) if free_width else stem
-    e, columns = _sensitivities(y, stem, wider, window.extra, step, theta, order, window.dt_s, window.factor)
+    wider = stems(window, _widened(valve, step)) if free_width else stem
+    factor = window.factor if window.fine else 1
+    e, columns = _sensitivities(y, stem, wider, window.extra, step, theta, order, window.dt_s, factor)
     e, columns = e[order:], columns[order:]
     if not window.usable.all():
         judged = judged_mask(window.usable, order)[order:]
@@ -134,7 +136,7 @@ def _moved(window: Window, trial: _Trial, step: Floats, free_width: bool) -> tup
     theta = trial.theta + step
     most_t, most_dead = window.bounds
     theta[0] = min(max(theta[0], math.log(0.05 * window.dt_s)), math.log(most_t))
-    theta[1] = min(max(theta[1], -window.half_block_s), most_dead)
+    theta[1] = min(max(theta[1], -window.half_block_s if window.fine else 0.0), most_dead)
     if not free_width:
         return theta, trial.valve
     width = trial.valve.stickband + step[2]

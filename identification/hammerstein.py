@@ -168,11 +168,14 @@ def fine_stem(window: Window, valve: ValveTrial) -> Floats:
 def residual(window: Window, fit: Fit) -> Floats:
     """PV less the response to the stem [% PV], shape (n,): load and noise, with the model's slow terms in it.
 
-    The response is stepped at the record's own interval and then averaged over the blocks, as PV was.
+    In a fine window the response is stepped at the record's own interval and then averaged over blocks, as PV was.
     """
-    fine = window.dt_s / window.factor
-    steps = unit_lag(fit.time_constant_s, fit.dead_time_s + window.half_block_s, fine)
-    x = lag_blocks(fine_stem(window, fit.valve), *steps, window.factor)
+    if window.fine:
+        fine = window.dt_s / window.factor
+        steps = unit_lag(fit.time_constant_s, fit.dead_time_s + window.half_block_s, fine)
+        x = lag_blocks(fine_stem(window, fit.valve), *steps, window.factor)
+    else:
+        x = lag(stem_of(window, fit.valve), *unit_lag(fit.time_constant_s, fit.dead_time_s, window.dt_s))
     return window.y - window.y.mean() - fit.gain * x
 
 

@@ -33,7 +33,7 @@ FINE_JUMPS = tuple(float(j) for j in np.arange(0.1, 1.01, 0.06))
 """Slip jumps tried about a play, as shares of the stickband."""
 LATER = (0.0, 0.4, 0.8, 1.2, 1.6, 2.0, 2.5, 3.0)
 """Dead times tried about a play, in blocks beyond the play's: a play in place of a jump answers too soon; ours."""
-FINALISTS = 4
+FINALISTS = 8
 """Candidates of the fine scan, per behaviour and noise model, that are followed to the end; ours."""
 COMPASS = (0.02, 0.007, 0.0025)
 """Relative steps of the search within a pit."""

@@ -35,6 +35,8 @@ from identification.mismatch.rivals import Rival, compete, prepared, unsettled
 from identification.mismatch.saved import carried, to_data
 from identification.mismatch.starting import excited
 
+ALIKE = 1.02
+"""Ratio of misfits up to which two models do alike: rows that hold the right one as a special case reach it."""
 LEVELS = ("plain", "masked", "concealed")
 
 
@@ -47,11 +49,9 @@ def loaded(cases: pathlib.Path, tag: str, which: str) -> Case:
 
 def chosen(truths: dict, count: int) -> list[str]:
     """Single effects graded by information whose later recording can tell, the levels in turn."""
+    rows = {r.name for r in CATALOGUE}
     able = {
-        level: [
-            t for t, v in truths.items() if v["level"] == level and "later_plain" in v and "pair" not in v
-        ]
-        for level in LEVELS
+        level: [t for t, v in truths.items() if v["level"] == level and tellable(v, rows)] for level in LEVELS
     }
     return [t for level in LEVELS for t in able[level][: count // len(LEVELS)]]
 
@@ -87,8 +87,8 @@ def compared(cases: pathlib.Path, truths: dict, tag: str) -> dict:
         "effect": truth["effect"],
         "level": truth["level"],
         "wrong": wrong[0].name,
-        "gain_right": mine[0].gain,
-        "gain_wrong": wrong[0].gain,
+        "net_right": mine[0].net,
+        "net_wrong": wrong[0].net,
         "later_right": left_later(mine[0], p, later),
         "later_wrong": left_later(wrong[0], p, later),
         "kp_error": law.kp / base["Kp"] - 1.0,
@@ -108,16 +108,23 @@ def section(rows: pd.DataFrame) -> str:
     for level, g in rows.groupby("level", sort=False):
         ratio = (g.later_wrong / g.later_right).median()
         lines.append(
-            [level, share(g.gain_right > g.gain_wrong), share(g.later_right < g.later_wrong), f"{ratio:.2f}"]
+            [
+                level,
+                share(g.net_right > g.net_wrong),
+                share(g.later_right < ALIKE * g.later_wrong),
+                f"{ratio:.2f}",
+            ]
         )
-    lost = rows[rows.gain_right <= rows.gain_wrong]
+    lost = rows[rows.net_right <= rows.net_wrong]
     worst = ", ".join(f"{r.effect} ({r.level}) to {r.wrong}" for r in lost.itertuples())
     settings = f"{(rows.kp_error.abs() < 0.02).sum()} and {(rows.ti_error.abs() < 0.02).sum()} of {len(rows)}"
-    head = ["level", "right ahead, fitted recording", "right ahead, later one", "misfit, wrong over right"]
+    head = ["level", "right ahead, fitted recording", "right no worse, later one", "misfit, wrong over right"]
     parts = [
         "## Ablation: the best wrong effect in the right one's place",
         "`python tests/concealed/ablation.py CASES --out PROOF.md`. Every row is fitted whole and at its best\n"
-        "size, a harder opponent than a wrong effect of the right one's size.",
+        "size, a harder opponent than a wrong effect of the right one's size. Gains are compared after the price of\n"
+        "constants and search. Some rows hold others as special cases (stick-slip a play, two valves a stop), so a\n"
+        "wrong one may do as well on later data; no worse is within 2 %.",
         table(head, lines),
         f"Lost on the fitted recording: {worst or 'none'}.",
         f"The controller's Kp and Ti, found from SP, PV and OP of the same cases, are within 2 % in {settings}\n"

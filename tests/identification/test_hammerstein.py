@@ -196,9 +196,10 @@ def test_descent_and_disturbance_tell_one_story():
     rng = np.random.default_rng(2)
     op = 50 + np.cumsum(rng.normal(0, 0.2, 8 * 600))
     pv = block_means(lag(op - 50, *unit_lag(300.0, 12.0, 1.0)), 8) + rng.normal(0, 0.05, 600) + 3.0
-    window = Window(pv, op, np.ones(600, dtype=bool), 8.0, 8)
-    for fit in (fit_linear(window, 400.0), fit_play(window, fit_linear(window, 400.0), 400.0)):
-        assert float(np.mean(innovations(window, fit) ** 2)) == pytest.approx(fit.sigma2, rel=1e-6)
+    for fine in (False, True):
+        window = Window(pv, op, np.ones(600, dtype=bool), 8.0, 8, fine=fine)
+        for fit in (fit_linear(window, 400.0), fit_play(window, fit_linear(window, 400.0), 400.0)):
+            assert float(np.mean(innovations(window, fit) ** 2)) == pytest.approx(fit.sigma2, rel=1e-6)
     process = process_of(window, fit_linear(window, 400.0))
     assert process.time_constant_s == pytest.approx(300.0, rel=0.05)
     assert process.dead_time_s == pytest.approx(12.0, abs=2.0)
