@@ -111,7 +111,9 @@ def uncertain(window: Window, fit: Fit, loop: Loop, samples: int = 6, seed: int 
     spread = covariance(window, fit, free_width=loop.valve is not None) * np.outer(relative, relative)
     scale = np.sqrt(np.maximum(np.diag(spread), 1e-24))
     unit = spread / np.outer(scale, scale) + 1e-9 * np.eye(mean.size)
-    root = scale[:, None] * np.linalg.cholesky(unit)  # signs of singular vectors would be a matter of rounding
+    root = scale[:, None] * np.linalg.cholesky(
+        unit
+    )  # signs of singular vectors would be a matter of rounding
     draws = mean + np.random.default_rng(seed).normal(size=(samples, mean.size)) @ root.T
     return tuple(_drawn(draw, fit, loop) for draw in draws)
 
