@@ -282,14 +282,14 @@ def test_dark_follows_the_system(browser: Any, folder: Path) -> None:
 
 
 def test_structure_is_sane_for_screen_readers(browser: Any, folder: Path) -> None:
-    """Each page has one main heading, a language, named pictures and named controls, and ids that are unique."""
+    """Each page has one main heading, a language, named pictures (but for ornaments) and controls, unique ids."""
     for path in every_page(folder):
         opened(browser, path)
         wrong = browser.execute_script(
             """const all = (q) => Array.from(document.querySelectorAll(q));
             const ids = all('[id]').map((e) => e.id);
             return [all('h1').length !== 1 && 'h1', !document.documentElement.lang && 'lang',
-              all('svg').some((s) => !s.getAttribute('aria-label')) && 'svg',
+              all('svg:not([aria-hidden])').some((s) => !s.getAttribute('aria-label')) && 'svg',
               all('button').some((b) => !b.textContent.trim() && !b.getAttribute('aria-label')) && 'button',
               all('input, select').some((i) => !i.closest('label')) && 'label',
               all('th').some((h) => h.scope !== 'col') && 'th',
