@@ -13,7 +13,7 @@ from analyzer.measure import Measured
 from analyzer.tags import as_stated
 from identification.descent import covariance
 from identification.hammerstein import Fit, disturbance, process_of
-from identification.models import Backlash, Fopdt, Integrator, Loop, Pid, Process, Stiction, Valve
+from identification.models import Fopdt, Integrator, Loop, Pid, Process, Valve
 from identification.record import Floats
 from identification.window import Window
 from tuning.limit_cycle import Cycle, confirm
@@ -72,11 +72,7 @@ def _measured(verdict: Verdict) -> Measured:
 
 def valve_of(verdict: Verdict, fit: Fit) -> Valve:
     """The valve of a verdict's model, None where it is not at fault."""
-    if verdict.cause != "valve":
-        return None
-    if verdict.fault == "stiction":
-        return Stiction(fit.valve.stickband, fit.valve.slip_jump, slides=fit.valve.slides)
-    return Backlash(fit.valve.stickband)
+    return fit.valve.valve if verdict.cause == "valve" else None
 
 
 def model_of(verdict: Verdict, controller: Pid) -> Loop:
@@ -111,9 +107,8 @@ def uncertain(window: Window, fit: Fit, loop: Loop, samples: int = 6, seed: int 
     spread = covariance(window, fit, free_width=loop.valve is not None) * np.outer(relative, relative)
     scale = np.sqrt(np.maximum(np.diag(spread), 1e-24))
     unit = spread / np.outer(scale, scale) + 1e-9 * np.eye(mean.size)
-    root = scale[:, None] * np.linalg.cholesky(
-        unit
-    )  # signs of singular vectors would be a matter of rounding
+    # not by singular vectors, whose signs are a matter of rounding
+    root = scale[:, None] * np.linalg.cholesky(unit)
     draws = mean + np.random.default_rng(seed).normal(size=(samples, mean.size)) @ root.T
     return tuple(_drawn(draw, fit, loop) for draw in draws)
 
@@ -202,8 +197,7 @@ def _sticks(m: Measured, controller: Pid) -> Loop | None:
     fit = m.stick_slip
     if fit is None or fit.valve.slip_jump <= 0:
         return None
-    valve = Stiction(fit.valve.stickband, fit.valve.slip_jump, slides=fit.valve.tolerance >= 0)
-    return Loop(tuned(m.window, fit, True), controller, valve)
+    return Loop(tuned(m.window, fit, True), controller, fit.valve.valve)
 
 
 def _cycles_alone(one: Loop, other: Loop) -> bool:

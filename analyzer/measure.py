@@ -14,7 +14,7 @@ from identification.controller import fit_pi
 from identification.descent import descend
 from identification.evidence import Rival, evidence, stem_moves, with_load_step
 from identification.hammerstein import IDEAL, Fit, process_of, residual
-from identification.models import Backlash, Fopdt, Loop, Pid, Stiction
+from identification.models import Fopdt, Loop, Pid
 from identification.position import Seen, seen
 from identification.record import Floats, LoopRecord, Mask
 from identification.search import prepare
@@ -159,7 +159,12 @@ def measure(
     window = window_of(record, scale, limits, kind)
     controller = controller or recovered(record, scale)
     due = answering(record, window, scale)
-    fits = _rivals(window, scale, due, limits, oscillation)
+    shown = None if window.position is None else seen(window.op, window.position)
+    if shown is None:
+        window = replace(window, position=None)
+        fits = _rivals(window, scale, due, limits, oscillation)
+    else:
+        fits = _shown(window, shown, due, scale)
     linear, play, stick, best, gained, jump = fits
     size = best.valve.stickband / max(_op_range(window, scale, oscillation is not None), 1e-9)
     amplification, stable = _amplification(process_of(window, linear), controller, scale)
@@ -213,10 +218,6 @@ def _rivals(
 ) -> tuple[Fit, Fit, Fit | None, Fit, float, float]:
     """Plain fit, play, stick-slip if it was tried, the better valve, its evidence and that of the jump [nat]."""
     linear = fit_linear(window, scale_s)
-    shown = None if window.position is None else seen(window.op, window.position)
-    if shown is not None:
-        return _shown(window, linear, shown, due, scale_s)
-    window = replace(window, position=None)
     play = fit_play(window, linear, scale_s)
     gained = play.log_likelihood - linear.log_likelihood
     short = oscillation is None and window.y.size < SHORT
@@ -235,10 +236,11 @@ def _rivals(
 
 
 def _shown(
-    window: Window, linear: Fit, shown: Seen, due: Mask, scale_s: float
+    window: Window, shown: Seen, due: Mask, scale_s: float
 ) -> tuple[Fit, Fit, Fit | None, Fit, float, float]:
     """The same where the stem is recorded: its fault is seen, and PV answers the stem itself."""
-    behind = replace(window, op=window.op if window.position is None else window.position)
+    linear = fit_linear(window, scale_s)
+    behind = window if window.position is None else replace(window, op=window.position)
     play = descend(window, replace(fit_linear(behind, scale_s), valve=shown.play))
     stick = None if shown.jumping is None else replace(play, valve=shown.jumping)
     best = play if stick is None else stick
@@ -250,11 +252,7 @@ def _cycles_alike(window: Window, fit: Fit, controller: Pid | None, o: Oscillati
     """Whether the identified loop, simulated without load, cycles with the recorded period and amplitude."""
     if controller is None or fit.gain * controller.kp <= 0 or fit.valve.stickband <= 0:
         return False
-    valve = Stiction(fit.valve.stickband, fit.valve.slip_jump, slides=fit.valve.slides)
-    if fit.valve.slip_jump <= 0:
-        loop = Loop(process_of(window, fit), controller, Backlash(fit.valve.stickband))
-    else:
-        loop = Loop(process_of(window, fit), controller, valve)
+    loop = Loop(process_of(window, fit), controller, fit.valve.valve)
     if not is_stable(loop):
         return False
     cycle = confirm(loop).cycle

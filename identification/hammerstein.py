@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from identification.models import Fopdt
+from identification.models import Backlash, Fopdt, Stiction, Valve
 from identification.record import Floats
 from identification.valve import RESTS, first_slip, stem_step, walk
 from identification.window import Window, block_means
@@ -46,6 +46,16 @@ class ValveTrial:
     def slides(self) -> bool:
         """Whether the stem follows OP after a jump."""
         return self.tolerance > RESTS
+
+
+    @property
+    def valve(self) -> Valve:
+        """The valve of models.py that these constants are: ideal, play or stick-slip."""
+        if self.breakaway <= 0.0:
+            return None
+        if self.slip_jump <= 0.0:
+            return Backlash(self.stickband)
+        return Stiction(self.stickband, self.slip_jump, slides=self.slides)
 
 
 IDEAL = ValveTrial()
