@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from datetime import UTC, datetime
 
 from analyzer.assess import assessable, unfit_for_cause
 from analyzer.config import Config
 from analyzer.history.export import Export
 from analyzer.history.loops_csv import LoopSpec
+from analyzer.history.stray import stamp_text
 from analyzer.quality import Prepared, prepare
 from identification.errors import NotAssessedError, TriageError
-
-
-def _stamp(seconds: float) -> str:
-    return datetime.fromtimestamp(seconds, UTC).strftime("%Y-%m-%d %H:%M:%S")
 
 
 def _tags(spec: LoopSpec) -> str:
@@ -54,7 +50,7 @@ def lines(export: Export, specs: Sequence[LoopSpec], notes: Sequence[str]) -> It
     """All lines, each with whether a loop of it cannot be assessed."""
     config = Config()
     first, last = export.span()
-    yield f"{len(export.tags)} tags, {len(specs)} loops, {_stamp(first)} to {_stamp(last)} UTC", False
+    yield f"{len(export.tags)} tags, {len(specs)} loops, {stamp_text(first)} to {stamp_text(last)} UTC", False
     for note in notes:
         yield note, False
     if specs and specs[0].defaults:

@@ -5,31 +5,20 @@ from __future__ import annotations
 import math
 import os
 import sys
-from collections.abc import Sequence
 from copy import copy
-from datetime import UTC, datetime
+from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
-from analyzer import explain_cli, report_cli
-from analyzer.options import NOTHING_DONE, SOME_LOST, export_options, opened, told
-
-if TYPE_CHECKING:
-    from analyzer.history.export import Export
-    from analyzer.history.loops_csv import LoopSpec
-    from analyzer.nights import Night
-    from analyzer.store import Store
+from analyzer import explain_cli, report_cli, run_cli
+from analyzer.options import SOME_LOST, export_options, opened, told, utc_seconds
 
 for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
 """Loops run side by side, one a process, on matrices of a few columns: threads of linear algebra only get in their
 way. Set before numpy is imported."""
-
-
-def _seconds(at: datetime | None, otherwise: float) -> float:
-    return otherwise if at is None else at.replace(tzinfo=UTC).timestamp()
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
@@ -59,79 +48,6 @@ def check(export: tuple[Path, ...], loops: Path | None, **reading: Any) -> None:
         lost += bad
         click.echo(line)
     sys.exit(SOME_LOST if lost else 0)
-
-
-@main.command()
-@export_options
-@click.option(
-    "--store", required=True, type=click.Path(path_type=Path), help="Directory that keeps the results."
-)
-@click.option("--jobs", default=1, show_default=True, type=click.IntRange(1), help="Worker processes.")
-@click.option("--resume", is_flag=True, help="Go on with a run that was stopped.")
-@click.option("--since", type=click.DateTime(), help="First day or time assessed (UTC).")
-@click.option("--until", type=click.DateTime(), help="Day or time (UTC) before which samples are assessed.")
-@click.option("--explain", "explaining", is_flag=True, help="Explain the last night's flagged loops as well.")
-@told
-def run(
-    export: tuple[Path, ...],
-    loops: Path | None,
-    store: Path,
-    jobs: int,
-    resume: bool,
-    since: datetime | None,
-    until: datetime | None,
-    explaining: bool,
-    **reading: Any,
-) -> None:
-    """The nightly batch: assess every loop and keep the results in a store.
-
-    An export of several days is kept day by day; new settings are advised on for the last of them.
-
-    Example: triage run export.parquet --loops loops.csv --store store --jobs 4
-    """
-    from analyzer import batch
-    from analyzer.config import Config
-    from analyzer.progress import bar
-    from analyzer.store import Store
-
-    source, specs, notes = opened(export, loops, **reading)
-    for note in notes:
-        click.echo(f"triage: {note}", err=True)
-    with bar("loops") as progress:
-        span = _seconds(since, -math.inf), _seconds(until, math.inf)
-        nights, lost = batch.run(source, specs, Store(store), Config(), jobs, resume, *span, progress)
-    for loop, reason in lost:
-        click.echo(f"{loop}: {reason}", err=True)
-    last = nights[-1].name
-    more = f" ({len(nights)} nights from {nights[0].name})" if len(nights) > 1 else ""
-    click.echo(
-        f"{len(specs) - len(lost)} of {len(specs)} loops assessed, night {last}{more}, in {store}", err=True
-    )
-    if len(lost) == len(specs):
-        sys.exit(NOTHING_DONE)
-    if explaining:
-        _explain_night(source, specs, Store(store), nights[-1], jobs, resume)
-    sys.exit(SOME_LOST if lost else 0)
-
-
-def _explain_night(
-    source: Export, specs: Sequence[LoopSpec], store: Store, night: Night, jobs: int, resume: bool
-) -> None:
-    """Explain the flagged loops of a night, with progress, and say how many."""
-    from analyzer import explain_night
-    from analyzer.batch import executor
-    from analyzer.config import Config
-    from analyzer.progress import bar
-
-    pool = executor(jobs) if jobs > 1 else None
-    try:
-        with bar("explained") as progress:
-            rows = explain_night.run(source, specs, store, night, Config(), pool, resume, progress)
-    finally:
-        if pool is not None:
-            pool.shutdown(cancel_futures=True)
-    named = sum(r["verdict"] not in ("none", "unexplained") for r in rows)
-    click.echo(f"{len(rows)} flagged loops explained, {named} with a name", err=True)
 
 
 @main.command()
@@ -184,7 +100,7 @@ def tune(
     from analyzer.tune_loop import proposal
 
     source, specs, _ = opened(export, loops, **reading)
-    lines, pictures = proposal(source, specs, tag, _seconds(until, math.inf), drawn=out is not None)
+    lines, pictures = proposal(source, specs, tag, utc_seconds(until, math.inf), drawn=out is not None)
     for line in lines:
         click.echo(line)
     if out is not None:
@@ -202,7 +118,7 @@ def registered(command: click.Command) -> click.Command:
     return own
 
 
-for page_command in report_cli.COMMANDS:
+for page_command in (run_cli.run, *report_cli.COMMANDS):
     main.add_command(registered(page_command))
 for model_command in explain_cli.main.commands.values():
     main.add_command(model_command)

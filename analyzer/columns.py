@@ -67,6 +67,7 @@ OTHER_COLUMNS = (
     "importance",
     "start_s",
     "duration_s",
+    "good_h",
     "usable_h",
     "regularity",
     "prominence",

@@ -1,4 +1,4 @@
-"""The flagged loops of a night explained, one by one on an executor, each answer kept as it comes.
+"""The flagged loops of a night explained, one by one on worker processes, each answer kept as it comes.
 
 An error of one loop, a dead worker included, is that loop's answer. Kept in STORE/explained/NIGHT.parquet: a row a
 loop with verdict, block, reason and the whole answer as JSON.
@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import Executor, Future, as_completed
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,6 +16,7 @@ from analyzer.history.export import Export
 from analyzer.history.loops_csv import LoopSpec
 from analyzer.nights import Night, cut
 from analyzer.store import Store, rows_table, write_table
+from analyzer.workers import Died, Workers
 from identification.errors import TriageError
 
 TABLE = "explained"
@@ -47,7 +47,7 @@ def flagged(row: Mapping[str, Any]) -> bool:
     return oscillates or row["cause"] not in QUIET or row["action"] not in QUIET
 
 
-def answered(q: Question) -> Row:
+def answered(q: Question, began: Callable[[int], None] = lambda at: None) -> Row:
     """The row of one loop, whatever happens; runs in a worker process."""
     from analyzer.explain import abstained
 
@@ -89,19 +89,21 @@ def questions(
     ]
 
 
-def _rows(asked: Sequence[Question], pool: Executor | None) -> Iterator[Row]:
+def _rows(asked: Sequence[Question], jobs: int, config: Config) -> Iterator[Row]:
     from analyzer.explain import abstained
 
-    if pool is None:
+    if jobs == 0:
         yield from map(answered, asked)
         return
-    futures: dict[Future[Row], Question] = {pool.submit(answered, q): q for q in asked}
-    for future in as_completed(futures):
-        q, error = futures[future], future.exception()
-        if error is None:
-            yield future.result()
-        else:
-            yield row_of(abstained(q.spec.loop, f"not explained: {type(error).__name__}"), q.night.name)
+    with Workers(min(jobs, max(len(asked), 1)), answered, config.workers) as workers:
+        for q in asked:
+            workers.submit(q)
+        for result in workers.results():
+            if isinstance(result, Died):
+                q = result.task
+                yield row_of(abstained(q.spec.loop, f"not explained: {result.why}"), q.night.name)
+            else:
+                yield result
 
 
 def known(store: Store, night: str) -> list[Row]:
@@ -122,7 +124,7 @@ def run(
     store: Store,
     night: Night,
     config: Config,
-    pool: Executor | None = None,
+    jobs: int = 0,
     resume: bool = False,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> list[Row]:
@@ -136,8 +138,8 @@ def run(
         Which holds the night.
     night : Night
     config : Config
-    pool : Executor or None
-        Worker processes or a cluster; None works in this one.
+    jobs : int
+        Worker processes; 0 works in this one.
     resume : bool
         Leave out loops that the store holds an answer of.
     progress : callable
@@ -158,13 +160,14 @@ def run(
         "source_loop",
     ]
     asked = questions(export, specs, store.read("nights", night.name, columns).to_pylist(), night, config)
-    rows = known(store, night.name) if resume else []
-    done = {r["loop"] for r in rows}
+    names = {q.spec.loop for q in asked}
+    rows = [r for r in known(store, night.name) if resume or r["loop"] not in names]
+    done = {r["loop"] for r in rows} & names
     left = [q for q in asked if q.spec.loop not in done]
     keep(store, night.name, rows)
-    progress(len(rows), len(rows) + len(left))
-    for row in _rows(left, pool):
+    progress(len(done), len(asked))
+    for at, row in enumerate(_rows(left, jobs, config), len(done) + 1):
         rows.append(row)
         keep(store, night.name, rows)
-        progress(len(rows), len(done) + len(left))
-    return rows
+        progress(at, len(asked))
+    return [r for r in rows if r["loop"] in names]

@@ -13,11 +13,14 @@ import numpy as np
 from analyzer.history.export import Export
 from analyzer.history.loops_csv import LoopSpec
 from analyzer.history.series import Series
+from analyzer.history.stray import stamp_text
 from identification.errors import InputError
 
 DAY_S = 86400.0
 WHOLE_H = 36.0
 """Records up to this long [h] are one night; longer ones are cut at midnights (UTC)."""
+MOST_NIGHTS = 2000
+"""Nights of one run at most [-]; ours: five years of them."""
 LEAST_PIECE_S = 6 * 3600.0
 """A first or last piece shorter than this [s] joins its neighbour."""
 
@@ -37,7 +40,20 @@ def _named(first_s: float, last_s: float) -> Night:
 
 
 def daily(first_s: float, last_s: float) -> list[Night]:
-    """Cut a span of time at midnights (UTC); a first or last piece of under 6 h joins its neighbour."""
+    """Cut a span of time at midnights (UTC); a first or last piece of under 6 h joins its neighbour.
+
+    Raises
+    ------
+    InputError
+        There would be more than MOST_NIGHTS of them.
+    """
+    if last_s - first_s > MOST_NIGHTS * DAY_S:
+        days, ends = (last_s - first_s) / DAY_S, f"{stamp_text(first_s)} to {stamp_text(last_s)} UTC"
+        raise InputError(
+            f"the export spans {days:.0f} days, {ends}",
+            f"at most {MOST_NIGHTS} nights in one run",
+            "state the part that is meant with --since and --until",
+        )
     cuts = np.arange(math.floor(first_s / DAY_S) + 1, math.ceil(last_s / DAY_S)) * DAY_S
     inner = [c for c in cuts if c - first_s >= LEAST_PIECE_S and last_s - c >= LEAST_PIECE_S]
     edges = [first_s, *inner, last_s + 1.0]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Sequence
+from datetime import UTC, datetime
 from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -38,6 +39,11 @@ def told(command: Callable[..., Any]) -> Callable[..., Any]:
         sys.exit(NOTHING_DONE)
 
     return wrapped
+
+
+def utc_seconds(at: datetime | None, otherwise: float) -> float:
+    """A day or time of the command line as UTC [s since 1970-01-01]."""
+    return otherwise if at is None else at.replace(tzinfo=UTC).timestamp()
 
 
 def export_options(command: Callable[..., Any]) -> Callable[..., Any]:

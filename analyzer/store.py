@@ -88,32 +88,46 @@ class Store:
         """Pieces of a night that are complete."""
         return sorted((self.path / "parts" / night).glob(f"{table}-*.parquet"))
 
-    def drop_unfinished(self, nights: Sequence[str]) -> None:
-        """Forget pieces of chunks that were stopped before their last night was written, so none is kept twice."""
-        done = {p.name.removeprefix("nights-") for p in self.parts(nights[-1], "nights")}
-        for night in nights:
-            for piece in (self.path / "parts" / night).glob("*.parquet"):
-                if piece.name.partition("-")[2] not in done:
-                    piece.unlink()
+    @property
+    def run_file(self) -> Path:
+        """Where the run whose pieces lie here is written down."""
+        return self.path / "parts" / "run.json"
+
+    def whole_chunks(self, night: str) -> list[str]:
+        """Keys of the chunks whose last piece, that of the table of nights, is there."""
+        return [p.stem.removeprefix("nights-") for p in self.parts(night, "nights")]
 
     def begun(self) -> list[str]:
         """Nights that were begun and not finished."""
         return sorted(p.name for p in (self.path / "parts").glob("*") if p.is_dir())
 
-    def read_parts(self, night: str, table: str) -> pa.Table | None:
-        """All pieces of one table of a night, None where there are none."""
-        found = [pq.read_table(p) for p in self.parts(night, table)]
+    def read_parts(self, night: str, table: str, keys: Sequence[str]) -> pa.Table | None:
+        """The pieces of one table of a night that some chunks have written, None where there are none."""
+        paths = [self.part(night, table, key) for key in keys]
+        found = [pq.read_table(p) for p in paths if p.exists()]
         return pa.concat_tables(found) if found else None
 
-    def finish(self, night: str, rows: pa.Table) -> None:
-        """Put a night together from its pieces and the finished rows, then drop the pieces."""
-        for table in ("hours", "trends"):
-            pieces = self.read_parts(night, table)
-            if pieces is not None:
-                write_table(pieces, self.path / table / f"{night}.parquet")
-        write_table(rows, self.path / "nights" / f"{night}.parquet")
-        self.drop_parts(night)
+    def read_if_there(self, table: str, night: str) -> pa.Table | None:
+        """One night of one table, None where the store has none."""
+        return self.read(table, night) if (self.path / table / f"{night}.parquet").exists() else None
 
-    def drop_parts(self, night: str) -> None:
-        """Forget the pieces of a night."""
-        shutil.rmtree(self.path / "parts" / night, ignore_errors=True)
+    def write(self, table: str, night: str, rows: pa.Table | None) -> None:
+        """Keep one night of one table; where there are no rows, keep none."""
+        path = self.path / table / f"{night}.parquet"
+        if rows is None:
+            path.unlink(missing_ok=True)
+        else:
+            write_table(rows, path)
+
+    def forget_explained(self, night: str, loops: Sequence[str] | None) -> None:
+        """Drop the explanations of some loops of a night, of all where None: their records have been replaced."""
+        table = self.read_if_there("explained", night)
+        if table is None:
+            return
+        gone = set(table.column("loop").to_pylist() if loops is None else loops)
+        stay = table.filter(pa.array([name not in gone for name in table.column("loop").to_pylist()]))
+        self.write("explained", night, stay if stay.num_rows else None)
+
+    def drop_parts(self) -> None:
+        """Forget all pieces, and the run that they are of."""
+        shutil.rmtree(self.path / "parts", ignore_errors=True)

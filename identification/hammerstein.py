@@ -47,7 +47,6 @@ class ValveTrial:
         """Whether the stem follows OP after a jump."""
         return self.tolerance > RESTS
 
-
     @property
     def valve(self) -> Valve:
         """The valve of models.py that these constants are: ideal, play or stick-slip."""

@@ -52,7 +52,7 @@ def test_main_job_of_the_readme_on_one_day(tmp_path):
     run = [*triage, "run", str(sample / "mill.parquet"), "--loops", str(sample / "loops.csv")]
     days = ["--store", str(tmp_path), "--since", "2026-03-04", "--until", "2026-03-05"]
     ran = subprocess.run([*run, *days], capture_output=True, text=True, check=False)
-    assert ran.returncode == 1, ran.stderr
+    assert ran.returncode == 0, ran.stderr
     assert "FIC2120: needs PV samples" in ran.stderr
     ranked = subprocess.run(
         [*triage, "rank", str(tmp_path)], capture_output=True, text=True, check=True

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import csv
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from difflib import get_close_matches
@@ -23,6 +23,7 @@ from analyzer.history.parquet import open_parquet
 from analyzer.history.raw import Raw, settle
 from analyzer.history.series import Series
 from analyzer.history.sniff import open_sheet
+from analyzer.history.stray import MainSpan
 from analyzer.history.table import Source, Table
 from analyzer.history.time_columns import agreed
 from analyzer.history.zone import check_zone
@@ -47,6 +48,7 @@ class Export:
     tags: tuple[str, ...]
     _homes: dict[str, tuple[int, ...]] = field(repr=False, compare=False)
     _met: dict[str, Counter[str]] = field(default_factory=dict, repr=False, compare=False)
+    _spans: dict[int, MainSpan] = field(default_factory=dict, repr=False, compare=False)
 
     def read(self, tags: Sequence[str]) -> dict[str, Series]:
         """Samples of some tags, each oldest first; no other columns are touched.
@@ -67,15 +69,37 @@ class Export:
         return series
 
     def span(self, tag: str | None = None) -> tuple[float, float]:
-        """First and last stamp of all files, or of those that hold a tag [s since 1970-01-01 UTC]."""
+        """First and last stamp of all files, or of those that hold a tag [s since 1970-01-01 UTC].
+
+        Stray stamps, far from the rest of their file, do not count and are told in the notes.
+        """
         homes = range(len(self.sources)) if tag is None else self._homes[tag]
-        spans = [self.sources[home].span() for home in homes]
-        return min(first for first, _ in spans), max(last for _, last in spans)
+        spans = [self._span(home) for home in homes]
+        return min(s.first_s for s in spans), max(s.last_s for s in spans)
+
+    def _span(self, home: int) -> MainSpan:
+        """Where the samples of one file lie, found out once."""
+        if home not in self._spans:
+            self._spans[home] = self.sources[home].span()
+        return self._spans[home]
 
     @property
     def notes(self) -> tuple[str, ...]:
         """What was detected, a sentence each: on every file, and on the samples of all tags read so far."""
-        return (*self._file_notes(), *self._sample_notes())
+        return (*self.file_notes, *self._sample_notes())
+
+    @property
+    def file_notes(self) -> tuple[str, ...]:
+        """What was detected of every file, and stamps that were set aside."""
+        return (*self._file_notes(), *self._stray_notes())
+
+    def met(self, tags: Iterable[str]) -> Counter[str]:
+        """How often something worth telling was met in the samples of some tags that were read."""
+        return sum((self._met[tag] for tag in tags if tag in self._met), Counter())
+
+    def _stray_notes(self) -> list[str]:
+        stray = sum(s.stray for s in self._spans.values())
+        return [f"{stray} stamps lie far from the rest of their file and are set aside"] if stray else []
 
     def _file_notes(self) -> list[str]:
         files: dict[str, list[str]] = {}
@@ -85,8 +109,7 @@ class Export:
         return [f"{_some(names)}: {note}" for note, names in files.items()]
 
     def _sample_notes(self) -> list[str]:
-        total: Counter[str] = sum(self._met.values(), Counter())
-        return [f"{count} {what}" for what, count in total.most_common()]
+        return counted(self.met(self._met))
 
     def _check_known(self, tags: Sequence[str]) -> None:
         missing = [tag for tag in tags if tag not in self._homes]
@@ -123,6 +146,11 @@ def open_export(paths: Sequence[Path], options: ReadOptions | None = None) -> Ex
     for i, source in enumerate(sources):
         homes.update({tag: (*homes.get(tag, ()), i) for tag in source.tags})
     return Export(sources, tuple(homes), homes)
+
+
+def counted(met: Counter[str]) -> list[str]:
+    """Sentences on what was met in samples, the most frequent first."""
+    return [f"{count} {what}" for what, count in met.most_common()]
 
 
 def _some(names: Sequence[str]) -> str:

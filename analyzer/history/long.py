@@ -17,6 +17,7 @@ from analyzer.history.codes import Scheme, not_good, scheme_of
 from analyzer.history.names import QUALITY_NAMES, STAMP_NAMES, TAG_NAMES, VALUE_NAMES, first_named, plain
 from analyzer.history.options import ReadOptions
 from analyzer.history.raw import Raw
+from analyzer.history.stray import MainSpan, main_span
 from analyzer.history.table import Table
 from analyzer.history.time_columns import find_clock
 from analyzer.history.values import values
@@ -66,10 +67,9 @@ class LongSource:
         rows = _rows_of(tag, wanted)
         return {name: self._raw(second[rows[name]], local, _at(data, rows[name])) for name in wanted}
 
-    def span(self) -> tuple[float, float]:
-        """First and last stamp [s since 1970-01-01 UTC]."""
-        stamp_s, _ = self.clock.utc(*self.clock.seconds(self.table.read(self.clock.columns)))
-        return float(np.nanmin(stamp_s)), float(np.nanmax(stamp_s))
+    def span(self) -> MainSpan:
+        """Where the samples lie in time, stray ones apart [s since 1970-01-01 UTC]."""
+        return main_span(self.clock.utc(*self.clock.seconds(self.table.read(self.clock.columns)))[0])
 
     def _raw(self, second: NDArray[np.float64], local: bool, data: list[pa.Array]) -> Raw:
         stamp_s, found = self.clock.utc(second, local)

@@ -10,6 +10,7 @@ import pyarrow as pa
 
 from analyzer.history.clock import Clock
 from analyzer.history.raw import Raw
+from analyzer.history.stray import MainSpan
 
 
 class Table(Protocol):
@@ -59,5 +60,5 @@ class Source(Protocol):
     def read(self, tags: Sequence[str]) -> dict[str, Raw]:
         """Samples of those of `tags` that the file holds."""
 
-    def span(self) -> tuple[float, float]:
-        """First and last stamp [s since 1970-01-01 UTC]."""
+    def span(self) -> MainSpan:
+        """Where the samples lie in time, stray ones apart [s since 1970-01-01 UTC]."""

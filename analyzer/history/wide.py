@@ -17,6 +17,7 @@ from analyzer.history.codes import not_good, scheme_of
 from analyzer.history.names import check_once, quality_partners, with_loop
 from analyzer.history.options import ReadOptions
 from analyzer.history.raw import Raw
+from analyzer.history.stray import MainSpan, main_span
 from analyzer.history.table import Table
 from analyzer.history.time_columns import find_clock
 from analyzer.history.values import values
@@ -60,10 +61,9 @@ class WideSource:
         stamp_s, found = self.clock.utc(*self.clock.seconds([arrays[i] for i in self.clock.columns]))
         return {self.tags[i]: self._raw(i, arrays, stamp_s, found) for i in wanted}
 
-    def span(self) -> tuple[float, float]:
-        """First and last stamp [s since 1970-01-01 UTC]."""
-        stamp_s, _ = self.clock.utc(*self.clock.seconds(self.table.read(self.clock.columns)))
-        return float(np.nanmin(stamp_s)), float(np.nanmax(stamp_s))
+    def span(self) -> MainSpan:
+        """Where the samples lie in time, stray ones apart [s since 1970-01-01 UTC]."""
+        return main_span(self.clock.utc(*self.clock.seconds(self.table.read(self.clock.columns)))[0])
 
     def _raw(
         self, i: int, arrays: dict[int, pa.Array], stamp_s: NDArray[np.float64], met: Counter[str]

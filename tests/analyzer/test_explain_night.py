@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from concurrent.futures import Executor, Future
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +17,7 @@ from analyzer.history.loops_csv import LoopSpec
 from analyzer.nights import Night
 from analyzer.pages import night as night_pages
 from analyzer.store import Store
+from analyzer.workers import Died
 from identification.errors import NotAssessedError
 from reports.html import render
 from reports.pages import Text
@@ -43,18 +44,28 @@ def told(q: Question) -> dict[str, Any]:
     return abstained(q.spec.loop, "said of " + q.spec.loop) | {"verdict": "backlash", "block": "valve"}
 
 
-class DyingPool(Executor):
-    """A pool whose every second worker dies."""
+class DyingWorkers:
+    """Workers of which every second dies over its task."""
 
-    def submit(self, fn: Any, /, *args: Any, **kwargs: Any) -> Future[Any]:
-        """Do the work at once, or die."""
-        out: Future[Any] = Future()
-        self.count = getattr(self, "count", 0) + 1
-        if self.count % 2:
-            out.set_result(fn(*args, **kwargs))
-        else:
-            out.set_exception(RuntimeError("killed"))
-        return out
+    def __init__(self, count: int, function: Callable[[Question], dict[str, Any]], limits: object) -> None:
+        self.function, self.tasks = function, []
+
+    def __enter__(self) -> DyingWorkers:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        return
+
+    def submit(self, task: Question) -> None:
+        self.tasks.append(task)
+
+    def results(self) -> Iterator[dict[str, Any] | Died[Question]]:
+        for at, task in enumerate(self.tasks):
+            yield (
+                Died(task, 0, "its worker process was ended by SIGKILL", True)
+                if at % 2
+                else self.function(task)
+            )
 
 
 @pytest.mark.parametrize(
@@ -102,8 +113,9 @@ def test_one_failing_loop_never_stops_the_night(store: Store, monkeypatch: pytes
 def test_dead_worker_costs_its_loop_alone(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
     """Where every second worker dies, every second loop says so and the others have their answers."""
     monkeypatch.setattr(explain_night, "_explained", told)
-    rows = run(EXPORT, SPECS, store, NIGHT, Config(), DyingPool())
-    dead = [r for r in rows if "RuntimeError" in r["reason"]]
+    monkeypatch.setattr(explain_night, "Workers", DyingWorkers)
+    rows = run(EXPORT, SPECS, store, NIGHT, Config(), 2)
+    dead = [r for r in rows if "SIGKILL" in r["reason"]]
     assert abs(2 * len(dead) - len(rows)) <= 1
 
 

@@ -1,0 +1,182 @@
+"""What a worker does: a few loops over some nights, each on its own, the results written as pieces of the nights.
+
+An error of one loop is a result of that loop.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+
+from analyzer.advice import Advice, advise
+from analyzer.assess import Assessment, assess
+from analyzer.assessments import Assessments
+from analyzer.columns import ALL_COLUMNS, TEXT_COLUMNS
+from analyzer.config import Config
+from analyzer.history.export import Export
+from analyzer.history.loops_csv import LoopSpec
+from analyzer.history.series import Series
+from analyzer.nights import Night, cut
+from analyzer.plantwide import Fingerprint
+from analyzer.present import advised
+from analyzer.quality import interval, prepare
+from analyzer.rows import hour_rows, lost_row, night_row
+from analyzer.store import Store, rows_table, write_table
+from analyzer.tags import controller
+from identification.errors import NotAssessedError, TriageError
+
+HISTORY = {"none": "none", "load": "none"}
+"""Actions of nights that are not the last: settings are advised on for tomorrow, not for the week before."""
+HOUR_COLUMNS = ("loop", "night", "hour_s", "oscillation_significance", "oscillating_pct")
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """One chunk of loops over some nights, small enough to send to a worker; `key` names its pieces."""
+
+    export: Export
+    specs: tuple[LoopSpec, ...]
+    nights: tuple[Night, ...]
+    store: Store
+    config: Config
+    key: str
+
+
+@dataclass(frozen=True, slots=True)
+class Done:
+    """What a worker says of its chunk: the key of its pieces, the loops they hold, what was met in their samples."""
+
+    key: str
+    loops: int
+    met: Counter[str] = field(default_factory=Counter)
+
+
+def assess_loop(
+    spec: LoopSpec, series: dict[str, Series], config: Config, advising: bool = True
+) -> tuple[Assessment, Advice]:
+    """Prepare and assess one loop from its raw samples, and advise on it if wanted."""
+    prepared = prepare(spec, series, config.quality)
+    stated = controller(spec, prepared.scale.span)
+    if stated is not None and spec.scan_s is None:
+        stated = replace(stated, scan_s=prepared.record.dt_s)
+    found = assess(prepared, stated, config, spec.type)
+    if not advising:
+        return found, Advice(HISTORY.get(found.verdict.cause, "undecided"))
+    return found, advise(found, spec, stated, prepared.scale.span, config)
+
+
+def _loop_row(
+    spec: LoopSpec, series: dict[str, Series], night: Night, config: Config, advising: bool
+) -> tuple[dict[str, Any], Assessment | None]:
+    """The row of one loop and night, whatever happens."""
+    part = {tag: cut(s, night) for tag, s in series.items()}
+    good_h = _good_h(part.get(spec.pv or ""))
+    try:
+        found, advice = assess_loop(spec, part, config, advising)
+    except Exception as error:  # an error of one loop is that loop's result, never the night's end
+        return {**lost_row(spec, night.name, *_told(error, config)), "good_h": good_h}, None
+    row = {**night_row(found, spec, night.name), "good_h": good_h}
+    return advised(row, found.verdict.needs, advice), found
+
+
+def _told(error: Exception, config: Config) -> tuple[str, str]:
+    """Status and reason of a loop that an error has ended."""
+    if isinstance(error, NotAssessedError):
+        return "not assessed", str(error)
+    if isinstance(error, TriageError):
+        return "failed", str(error)
+    if isinstance(error, MemoryError):
+        return (
+            "failed",
+            f"needs more memory than the {config.workers.memory_mb:.0f} MB that one loop may take",
+        )
+    return "failed", f"{type(error).__name__}: {error}"
+
+
+def _good_h(pv: Series | None) -> float:
+    """Hours of good samples of a PV as logged [h]."""
+    good = 0 if pv is None else int((~pv.bad).sum())
+    if pv is None or good < 2:
+        return 0.0
+    return good * interval(pv.stamp_s) / 3600.0
+
+
+def _read(task: Task, spec: LoopSpec) -> dict[str, Series] | tuple[str, str]:
+    """The loop's raw samples, or status and reason where there are none."""
+    if spec.pv is None:
+        return "not assessed", f"no PV tag {spec.wanted_pv or spec.loop + '.PV'} in the export"
+    try:
+        return task.export.read(spec.tags)
+    except Exception as error:  # a broken column is that loop's result
+        return _told(error, task.config)
+
+
+def work(task: Task, began: Callable[[int], None] = lambda at: None) -> Done:
+    """Assess a chunk and write its pieces; `began` is told the number of each loop that is begun with."""
+    rows: dict[str, list[dict[str, Any]]] = {n.name: [] for n in task.nights}
+    found: dict[str, list[Assessment]] = {n.name: [] for n in task.nights}
+    for at, spec in enumerate(task.specs):
+        began(at)
+        series = _read(task, spec)
+        for night in task.nights:
+            if isinstance(series, tuple):
+                row, assessment = lost_row(spec, night.name, *series), None
+            else:
+                advising = night is task.nights[-1]
+                row, assessment = _loop_row(spec, series, night, task.config, advising)
+            rows[night.name].append(row)
+            if assessment is not None:
+                found[night.name].append(assessment)
+    for night in task.nights:
+        _write_pieces(task, night.name, rows[night.name], found[night.name])
+    return Done(task.key, len(task.specs), task.export.met(tag for spec in task.specs for tag in spec.tags))
+
+
+def lose(task: Task, reason: str) -> Done:
+    """Write the rows of a chunk that no worker could finish."""
+    for night in task.nights:
+        rows = [lost_row(spec, night.name, "failed", reason) for spec in task.specs]
+        _write_pieces(task, night.name, rows, [])
+    return Done(task.key, len(task.specs))
+
+
+def _write_pieces(task: Task, night: str, rows: list[dict[str, Any]], found: list[Assessment]) -> None:
+    """The piece of the table of nights comes last: where it is, the chunk is whole."""
+    hours = [row for a in found for row in hour_rows(a, night)]
+    columns = (*HOUR_COLUMNS, *Assessments(0.0).as_row())
+    if hours:
+        write_table(rows_table(hours, columns, ("loop", "night")), task.store.part(night, "hours", task.key))
+    if found:
+        write_table(_trend_table(found), task.store.part(night, "trends", task.key))
+    prints = [a.print for a in found if a.print is not None]
+    if prints:
+        write_table(_print_table(prints), task.store.part(night, "prints", task.key))
+    write_table(rows_table(rows, ALL_COLUMNS, TEXT_COLUMNS), task.store.part(night, "nights", task.key))
+
+
+def _trend_table(found: Sequence[Assessment]) -> pa.Table:
+    tables = []
+    for a in found:
+        columns = {k: pa.array(v) for k, v in a.trend.items()}
+        n = len(a.trend["time_s"])
+        tables.append(pa.table({"loop": pa.array([a.loop] * n).dictionary_encode(), **columns}))
+    return pa.concat_tables(tables).unify_dictionaries()
+
+
+def _print_table(prints: Sequence[Fingerprint]) -> pa.Table:
+    return pa.table(
+        {
+            "loop": [p.loop for p in prints],
+            "period_s": [p.period_s for p in prints],
+            "start_s": [p.start_s for p in prints],
+            "duration_s": [p.duration_s for p in prints],
+            "first": [p.first for p in prints],
+            "real": [p.lines.real.astype(np.float32) for p in prints],
+            "imag": [p.lines.imag.astype(np.float32) for p in prints],
+        }
+    )

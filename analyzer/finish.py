@@ -1,0 +1,151 @@
+"""A night put together: the plant-wide pass over its pieces, then one table, joined with what the store has of it.
+
+A second export of the same night adds its loops. Of a loop that stands in both the fuller record is kept, and the
+newer of two that are alike, so that the same night twice replaces and a good night is never lost to an empty one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+
+from analyzer.columns import ALL_COLUMNS, TEXT_COLUMNS
+from analyzer.config import Config
+from analyzer.plantwide import Fingerprint, Peer, trace
+from analyzer.present import follower_row, root_row
+from analyzer.store import Store, rows_table
+
+FULLER_SHARE, FULLER_H = 1.02, 0.1
+"""A record is fuller than another where it has this factor and so many hours more of good samples; ours: less is the
+edge of an export."""
+WORTH = {"ok": 2, "not assessed": 1}
+"""What a status is worth when two records of one loop meet; a failure is worth nothing."""
+Row = Mapping[str, Any]
+
+
+def _prints(table: pa.Table | None) -> list[Fingerprint]:
+    rows = [] if table is None else table.to_pylist()
+    return [
+        Fingerprint(
+            r["loop"],
+            r["period_s"],
+            r["start_s"],
+            r["duration_s"],
+            int(r["first"]),
+            np.array(r["real"]) + 1j * np.array(r["imag"]),
+        )
+        for r in rows
+    ]
+
+
+def _traced(rows: dict[str, Row], prints: pa.Table | None, config: Config) -> dict[str, Row]:
+    """The rows with those of followers changed."""
+    peers = {
+        k: Peer(r["cause"] or "none", r["evidence"] or 0.0, r["osc_tuning_pct"] or 0.0)
+        for k, r in rows.items()
+    }
+    followers = trace(_prints(prints), peers, config.cause)
+    moved: dict[str, list[str]] = {}
+    for loop, source in followers.items():
+        moved.setdefault(source.loop, []).append(loop)
+    roots = {loop: root_row(rows[loop], sorted(names)) for loop, names in moved.items()}
+    return rows | roots | {loop: follower_row(rows[loop], source) for loop, source in followers.items()}
+
+
+def fuller(old: Row, new: Row) -> bool:
+    """Whether the record that the store has of a loop is worth more than the new one."""
+    worth = [WORTH.get(r["status"], 0) for r in (old, new)]
+    if worth[0] != worth[1]:
+        return worth[0] > worth[1]
+    had, has = (r.get("good_h") or 0.0 for r in (old, new))
+    return had > FULLER_SHARE * has + FULLER_H
+
+
+def is_empty(store: Store, night: str, keys: Sequence[str]) -> bool:
+    """Whether no loop of a night has a good sample, and none failed, so that there is nothing to keep."""
+    table = store.read_parts(night, "nights", keys)
+    if table is None:
+        return False
+    rows = table.select(["status", "good_h"]).to_pylist()
+    return all(r["status"] == "not assessed" and not r["good_h"] for r in rows)
+
+
+def finish_night(
+    store: Store, night: str, order: Sequence[str], config: Config, keys: Sequence[str], replace: bool = False
+) -> tuple[str, ...]:
+    """Put one night together from its pieces and keep it; nothing where it has none.
+
+    Parameters
+    ----------
+    store : Store
+    night : str
+    order : sequence of str
+        The loops of the run, in the order in which they are kept.
+    config : Config
+    keys : sequence of str
+        The chunks whose pieces count.
+    replace : bool
+        Forget what the store has of the night.
+
+    Returns
+    -------
+    tuple of str
+        Sentences on what was joined, and on loops whose earlier record was kept.
+    """
+    table = store.read_parts(night, "nights", keys)
+    if table is None:
+        return ()
+    rows = _traced({r["loop"]: r for r in table.to_pylist()}, store.read_parts(night, "prints", keys), config)
+    old = {} if replace else _known(store, night)
+    kept = {loop for loop, row in rows.items() if loop in old and fuller(old[loop], row)}
+    beside = [loop for loop in old if loop not in rows]
+    joined = [old[k] if k in kept else rows[k] for k in order if k in rows] + [old[k] for k in beside]
+    mine = [loop for loop in rows if loop not in kept]
+    pieces = {name: store.read_parts(night, name, keys) for name in ("hours", "trends")}
+    for name, piece in pieces.items():
+        before = None if replace else store.read_if_there(name, night)
+        store.write(name, night, _joined(before, piece, mine))
+    store.write("nights", night, rows_table(joined, ALL_COLUMNS, TEXT_COLUMNS))
+    store.forget_explained(night, None if replace else mine)
+    return _told(night, rows, old, kept, beside)
+
+
+def _known(store: Store, night: str) -> dict[str, Row]:
+    table = store.read_if_there("nights", night)
+    return {} if table is None else {r["loop"]: r for r in table.to_pylist()}
+
+
+def _joined(before: pa.Table | None, piece: pa.Table | None, mine: Sequence[str]) -> pa.Table | None:
+    """Rows of a table of the store, those of some loops taken from a piece."""
+    wanted = pa.array(mine, pa.string())
+    tables = []
+    if before is not None:
+        tables.append(before.filter(pc.invert(pc.is_in(_loops(before), value_set=wanted))))
+    if piece is not None:
+        tables.append(piece.filter(pc.is_in(_loops(piece), value_set=wanted)))
+    tables = [t for t in tables if t.num_rows] or tables[:1]
+    return pa.concat_tables(tables, promote_options="default").unify_dictionaries() if tables else None
+
+
+def _loops(table: pa.Table) -> pa.ChunkedArray:
+    return pc.cast(table.column("loop"), pa.string())
+
+
+def _told(
+    night: str, rows: Mapping[str, Row], old: Mapping[str, Row], kept: set[str], beside: Sequence[str]
+) -> tuple[str, ...]:
+    """What is worth saying of a night that was there already."""
+    said = []
+    if beside:
+        said.append(f"night {night}: {len(beside)} loops of an earlier run are kept beside these")
+    for loop in sorted(kept):
+        had, has = (r.get("good_h") or 0.0 for r in (old[loop], rows[loop]))
+        said.append(
+            f"{loop}: the store has {had:.1f} good hours of night {night}, this export {has:.1f}; the fuller record "
+            "is kept (--replace takes this one)"
+        )
+    return tuple(said)

@@ -1,0 +1,78 @@
+"""By what a run is known: the bytes of its export, its loops, its options and this program's version.
+
+A stopped run is gone on with only by the same run; pieces of two exports are never mixed.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+
+from analyzer.config import Config
+from analyzer.history.export import Export
+from analyzer.history.loops_csv import LoopSpec
+from identification.errors import InputError
+
+ENDS_BYTES = 65_536
+"""Bytes at both ends of a file that stand for it beside its size; ours: headers, footers and the newest samples are
+there, and a folder of thousands of files is known in a second."""
+
+
+@dataclass(frozen=True, slots=True)
+class RunIdentity:
+    """A run as it is written down beside its pieces: fingerprint, and words for people."""
+
+    fingerprint: str
+    export: str
+    loops: int
+    begun: str
+
+
+def identity(
+    export: Export, specs: Sequence[LoopSpec], since_s: float, until_s: float, config: Config
+) -> RunIdentity:
+    """The identity of a run over an export within a span of time [s since 1970-01-01 UTC]."""
+    mark = hashlib.blake2b(digest_size=16)
+    for source in export.sources:
+        mark.update(_ends(source.path))
+        mark.update(repr(source.clock).encode())
+    mark.update(repr((tuple(specs), since_s, until_s, config)).encode())
+    names = [source.path.name for source in export.sources]
+    more = f" and {len(names) - 1} more files" if len(names) > 1 else ""
+    now = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
+    return RunIdentity(mark.hexdigest(), names[0] + more, len(specs), now)
+
+
+def _ends(path: Path) -> bytes:
+    """Size and both ends of a file."""
+    with path.open("rb") as file:
+        size = file.seek(0, 2)
+        file.seek(0)
+        head = file.read(ENDS_BYTES)
+        file.seek(max(size - ENDS_BYTES, 0))
+        return str(size).encode() + head + file.read()
+
+
+def write(path: Path, run: RunIdentity) -> None:
+    """Write a run down beside its pieces."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(json.dumps(asdict(run)), encoding="utf-8")
+
+
+def check_same(path: Path, run: RunIdentity) -> None:
+    """Raise InputError where the pieces at `path` are of another run; nothing where there are none."""
+    try:
+        stopped = RunIdentity(**json.loads(path.read_text(encoding="utf-8")))
+    except (OSError, ValueError, TypeError):
+        return
+    if stopped.fingerprint != run.fingerprint:
+        raise InputError(
+            f"the run that was stopped read {stopped.export} ({stopped.loops} loops, begun {stopped.begun}), "
+            f"this one reads {run.export} ({run.loops} loops)",
+            "--resume with the same EXPORT, --loops, --since, --until and version",
+            "give them again, or leave out --resume to give up what the stopped run had done",
+        )

@@ -1,0 +1,255 @@
+"""Worker processes that may die: each has a pipe of its own, so that what kills one harms no other.
+
+A pool whose workers share a queue ends with the first of them that the system kills. Here a worker says which item
+of its task it has in hand; when it dies, that item is known and the rest is given to others. Workers end with the
+process that started them, have a limit of memory and, for each item, of processor time and of time by the clock.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import multiprocessing
+import os
+import signal
+import sys
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from multiprocessing.connection import Connection, wait
+from typing import Any, Generic, TypeVar
+
+from analyzer.config import WorkerLimits
+
+T = TypeVar("T")
+R = TypeVar("R")
+Began = Callable[[int], None]
+"""Told by a worker's function: the number of the item of its task that it begins with."""
+POLL_S = 0.5
+"""How often the clocks of the items in hand are looked at [s]."""
+MEGABYTE = 2**20
+OUT_OF_TIME = -int(getattr(signal, "SIGXCPU", 24))
+"""Exit status of a worker that used up its processor time."""
+
+
+@dataclass(frozen=True, slots=True)
+class Died(Generic[T]):
+    """A worker died over a task, or was ended.
+
+    task : what it worked on; at : number of the item in hand; why, in words; again : whether the item may
+    succeed on another try (not where it took too long).
+    """
+
+    task: T
+    at: int
+    why: str
+    again: bool
+
+
+@dataclass(slots=True)
+class _Worker:
+    process: Any
+    pipe: Connection
+    task: Any = None
+    at: int = 0
+    since_s: float = 0.0
+
+    @property
+    def busy(self) -> bool:
+        return self.task is not None
+
+
+@dataclass(slots=True)
+class Workers(Generic[T, R]):
+    """Some processes that carry out one function on many tasks.
+
+    Parameters
+    ----------
+    count : int
+        Processes at most.
+    function : callable
+        Of a task and of `Began`; importable by name, for the processes are started afresh.
+    limits : WorkerLimits
+    """
+
+    count: int
+    function: Callable[[T, Began], R]
+    limits: WorkerLimits
+    _waiting: deque[T] = field(default_factory=deque)
+    _alone: deque[T] = field(default_factory=deque)
+    _workers: list[_Worker] = field(default_factory=list)
+
+    def __enter__(self) -> Workers[T, R]:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.stop()
+
+    def submit(self, task: T, alone: bool = False) -> None:
+        """Add a task; those that are to run alone wait until nothing else does."""
+        (self._alone if alone else self._waiting).append(task)
+
+    def results(self) -> Iterator[R | Died[T]]:
+        """What comes back, as it comes, until no task is left; tasks may be added meanwhile.
+
+        Raises
+        ------
+        Exception
+            Whatever the function raised: an error of an item is the function's business.
+        """
+        while self._waiting or self._alone or any(w.busy for w in self._workers):
+            self._feed()
+            yield from self._gathered()
+
+    def stop(self) -> None:
+        """End all processes at once, whatever they are at."""
+        for worker in self._workers:
+            worker.process.kill()
+        for worker in self._workers:
+            worker.process.join()
+            worker.pipe.close()
+        self._workers.clear()
+
+    def _feed(self) -> None:
+        """Give each idle worker a task, and start workers where there are more tasks than idle ones."""
+        busy = sum(w.busy for w in self._workers)
+        alone = not self._waiting and not busy
+        queue = self._alone if alone else self._waiting
+        room = 1 if alone else self.count - busy
+        for _ in range(min(room, len(queue))):
+            worker = next((w for w in self._workers if not w.busy), None) or self._started()
+            worker.task, worker.at, worker.since_s = queue.popleft(), 0, time.monotonic()
+            with contextlib.suppress(BrokenPipeError, ConnectionResetError):  # seen as its death below
+                worker.pipe.send(worker.task)
+
+    def _started(self) -> _Worker:
+        context = multiprocessing.get_context("spawn")
+        ours, theirs = context.Pipe()
+        process = context.Process(target=_serve, args=(theirs, self.function, self.limits), daemon=True)
+        process.start()
+        theirs.close()
+        worker = _Worker(process, ours)
+        self._workers.append(worker)
+        return worker
+
+    def _gathered(self) -> Iterator[R | Died[T]]:
+        busy = [w for w in self._workers if w.busy]
+        ready = set(wait([w.pipe for w in busy], POLL_S))
+        for worker in busy:
+            if worker.pipe in ready:
+                yield from self._heard(worker)
+            elif time.monotonic() - worker.since_s > self.limits.wall_s:
+                worker.process.kill()
+                yield self._buried(worker, f"took longer than {self.limits.wall_s:g} s", again=False)
+
+    def _heard(self, worker: _Worker) -> Iterator[R | Died[T]]:
+        try:
+            kind, said = worker.pipe.recv()
+        except (EOFError, OSError):
+            worker.process.join()
+            status = worker.process.exitcode
+            yield self._buried(worker, _cause_of_death(status, self.limits), again=status != OUT_OF_TIME)
+            return
+        if kind == "began":
+            worker.at, worker.since_s = said, time.monotonic()
+            return
+        worker.task = None
+        if kind == "raised":
+            raise said
+        yield said
+
+    def _buried(self, worker: _Worker, why: str, again: bool) -> Died[T]:
+        worker.process.join()
+        worker.pipe.close()
+        self._workers.remove(worker)
+        return Died(worker.task, worker.at, why, again)
+
+
+def _cause_of_death(status: int | None, limits: WorkerLimits) -> str:
+    if status == OUT_OF_TIME:
+        return f"took more than {limits.processor_s:g} s of processor time"
+    if status is None or status >= 0:
+        return f"its worker process ended by itself (status {status})"
+    name = signal.Signals(-status).name if -status in set(signal.Signals) else f"signal {-status}"
+    hint = ", as the system does where memory ends" if name == "SIGKILL" else ""
+    return f"its worker process was ended by {name}{hint}"
+
+
+def _serve(pipe: Connection, function: Callable[[Any, Began], Any], limits: WorkerLimits) -> None:
+    """A worker's life: tasks in, results out, until the pipe closes."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the parent decides
+    _end_with_parent()
+    _limit_memory(limits.memory_mb)
+
+    def began(at: int) -> None:
+        _limit_processor(limits.processor_s)
+        pipe.send(("began", at))
+
+    while True:
+        try:
+            task = pipe.recv()
+        except (EOFError, OSError):
+            return
+        _limit_processor(limits.processor_s)
+        try:
+            answer = ("done", function(task, began))
+        except Exception as error:  # told to the parent, which raises it
+            answer = ("raised", error)
+        try:
+            pipe.send(answer)
+        except (BrokenPipeError, ConnectionResetError):
+            return
+        except Exception as error:  # an answer that cannot be sent
+            pipe.send(("raised", RuntimeError(f"{type(error).__name__}: {error}; {answer[1]!r}"[:500])))
+
+
+def _end_with_parent() -> None:
+    """End this process when its parent does, however that ends: at once on Linux, else as a thread sees it."""
+    parent = multiprocessing.parent_process()
+
+    def watch() -> None:
+        if parent is not None:
+            parent.join()
+            os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
+    if sys.platform == "linux":
+        import ctypes
+
+        set_death_signal = 1
+        with contextlib.suppress(OSError, AttributeError):
+            ctypes.CDLL(None).prctl(set_death_signal, int(signal.SIGKILL))
+
+
+def _limit_memory(megabytes: float) -> None:
+    """Let allocations fail beyond what is held now and so many megabytes more; nothing where the system cannot."""
+    if sys.platform != "linux":
+        return
+    import resource
+
+    with contextlib.suppress(OSError, ValueError):
+        most = _held_bytes() + int(megabytes * MEGABYTE)
+        _, hard = resource.getrlimit(resource.RLIMIT_DATA)
+        limit = most if hard == resource.RLIM_INFINITY else min(most, hard)
+        resource.setrlimit(resource.RLIMIT_DATA, (limit, hard))
+
+
+def _held_bytes() -> int:
+    """Memory of this process that counts towards RLIMIT_DATA [bytes]."""
+    with open("/proc/self/status", encoding="ascii") as status:
+        line = next(line for line in status if line.startswith("VmData:"))
+    return int(line.split()[1]) * 1024
+
+
+def _limit_processor(seconds: float) -> None:
+    """Let this process be ended after so many more seconds of processor time; nothing where the system cannot."""
+    if sys.platform == "win32":
+        return
+    import resource
+
+    used = resource.getrusage(resource.RUSAGE_SELF)
+    limit = int(used.ru_utime + used.ru_stime + seconds) + 1
+    _, hard = resource.getrlimit(resource.RLIMIT_CPU)
+    if hard == resource.RLIM_INFINITY or limit <= hard:
+        resource.setrlimit(resource.RLIMIT_CPU, (limit, hard))

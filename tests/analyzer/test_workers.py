@@ -1,0 +1,147 @@
+"""Worker processes that die, hang, take all memory or all time: each costs its own item and nothing else."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from analyzer.config import WorkerLimits
+from analyzer.workers import Began, Died, Workers
+
+LIMITS = WorkerLimits(memory_mb=512.0, processor_s=2.0, wall_s=6.0)
+posix = pytest.mark.skipif(sys.platform == "win32", reason="signals and limits of a POSIX system")
+linux = pytest.mark.skipif(sys.platform != "linux", reason="the limit of memory is Linux's")
+
+
+def act(task: tuple[str, ...], began: Began) -> tuple[str, ...]:
+    """Carry out a task of words; some of them do harm."""
+    done = []
+    for at, word in enumerate(task):
+        began(at)
+        if word == "killed":
+            os.kill(os.getpid(), signal.SIGKILL)
+        if word == "spinning":
+            while True:
+                pass
+        if word == "hanging":
+            time.sleep(60)
+        if word == "greedy":
+            try:
+                np.ones(2_000_000_000)
+            except MemoryError:
+                word = "no memory"
+        if word == "wrong":
+            raise ValueError("of all things")
+        done.append(word)
+    return tuple(done)
+
+
+def carried_out(*tasks: tuple[str, ...]) -> list[tuple[str, ...] | Died[tuple[str, ...]]]:
+    """What two workers make of some tasks."""
+    with Workers(2, act, LIMITS) as workers:
+        for task in tasks:
+            workers.submit(task)
+        return list(workers.results())
+
+
+def test_all_tasks_come_back_once():
+    """Twenty tasks on two workers come back once each."""
+    tasks = [(f"a{k}", f"b{k}") for k in range(20)]
+    assert sorted(carried_out(*tasks)) == sorted(tasks)
+
+
+@posix
+def test_a_killed_worker_costs_its_item_and_the_others_go_on():
+    """A worker that is killed says which item it had in hand; all other tasks are done."""
+    found = carried_out(("a", "killed", "b"), ("c",), ("d",), ("e",))
+    died = [r for r in found if isinstance(r, Died)]
+    assert [(d.task, d.at, d.again) for d in died] == [(("a", "killed", "b"), 1, True)]
+    assert "SIGKILL" in died[0].why
+    assert sorted(r for r in found if not isinstance(r, Died)) == [("c",), ("d",), ("e",)]
+
+
+@linux
+def test_a_greedy_item_gets_a_memory_error():
+    """An item that asks for 16 GB under a limit of 0.5 GB gets a MemoryError of its own, and the worker lives on."""
+    assert carried_out(("greedy", "a")) == [("no memory", "a")]
+
+
+@posix
+def test_an_item_that_computes_for_ever_is_ended():
+    """An item over its processor time ends its worker, with that reason and no second try."""
+    (died,) = carried_out(("a", "spinning"))
+    assert isinstance(died, Died)
+    assert (died.at, died.again) == (1, False)
+    assert "2 s of processor time" in died.why
+
+
+def test_an_item_that_hangs_is_ended():
+    """An item that waits for ever without computing is ended by the clock."""
+    (died,) = carried_out(("hanging",))
+    assert isinstance(died, Died)
+    assert (died.at, died.again) == (0, False)
+    assert "longer than 6 s" in died.why
+
+
+def test_an_error_of_the_function_reaches_the_caller():
+    """What the function raises is raised where the results are read."""
+    with pytest.raises(ValueError, match="of all things"):
+        carried_out(("wrong",))
+
+
+def test_a_task_that_is_to_run_alone_waits_for_the_others():
+    """A task to be run alone begins when no other is in hand."""
+    with Workers(2, act, LIMITS) as workers:
+        workers.submit(("alone",), alone=True)
+        for k in range(6):
+            workers.submit((str(k),))
+        assert list(workers.results())[-1] == ("alone",)
+
+
+PARENT = """
+import sys
+sys.path.insert(0, sys.argv[1])
+from test_workers import LIMITS, act
+from analyzer.workers import Workers
+if __name__ == "__main__":
+    with Workers(2, act, LIMITS) as workers:
+        workers.submit(("hanging",)); workers.submit(("hanging",))
+        workers._feed()
+        print(*(w.process.pid for w in workers._workers), flush=True)
+        list(workers.results())
+"""
+
+
+def alive(pid: int) -> bool:
+    """Whether a process runs (a zombie does not)."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+@linux
+def test_workers_end_with_their_parent(tmp_path):
+    """Where the parent is killed with signal 9 its workers are gone, none writes on."""
+    script = tmp_path / "parent.py"
+    script.write_text(PARENT)
+    command = [sys.executable, str(script), str(Path(__file__).parent)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as parent:
+        assert parent.stdout is not None
+        workers = [int(pid) for pid in parent.stdout.readline().split()]
+        assert len(workers) == 2
+        assert all(alive(pid) for pid in workers)
+        parent.kill()
+        parent.wait()
+    for _ in range(200):
+        if not any(alive(pid) for pid in workers):
+            break
+        time.sleep(0.05)
+    assert [pid for pid in workers if alive(pid)] == []
