@@ -7,9 +7,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from analyzer import words
+from analyzer.assess import Assessment
 from analyzer.cause import Verdict
+from analyzer.config import Config
 from analyzer.history.loops_csv import LoopSpec
 from analyzer.measure import Measured
+from analyzer.oscillation import counting
 from analyzer.tags import as_stated
 from identification.descent import covariance
 from identification.hammerstein import Fit, disturbance, process_of
@@ -18,7 +22,7 @@ from identification.record import Floats
 from identification.window import Window
 from tuning.limit_cycle import Cycle, confirm
 from tuning.linear import integral_s, is_stable
-from tuning.recommend import Proposal, recommend
+from tuning.recommend import Action, Proposal, recommend
 from tuning.search import rounded, scaled_valve
 
 UNSTABLE = (
@@ -36,7 +40,10 @@ NO_INTEGRAL = (
     "Without integral action, as loops.csv states, the identified loop would come to rest, but the record cycles: "
     "check kp and ti before new settings are sought."
 )
-CALM = "The loop does not oscillate, so new settings would bring nothing; the valve's fault remains."
+CALM = "At the settings in force the valve's fault makes no cycle: nothing to do now."
+BEYOND_RECORD = 0.25
+"""Dead time over the length of the window from which the record does not support the model [-]; ours: four dead times
+hold no answer and its aftermath twice."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,13 +123,14 @@ def uncertain(window: Window, fit: Fit, loop: Loop, samples: int = 6, seed: int 
 def _drawn(draw: Floats, fit: Fit, loop: Loop) -> Loop:
     """The loop at one draw of log time constant, dead time, stickband and log gain.
 
-    The lag stays within a factor of ten, the slope of three. Gain over time constant is drawn well where the two by
-    themselves are not: their errors go together.
+    The lag stays within a factor of ten, slope and dead time within three. Gain over time constant is drawn well
+    where the two by themselves are not: their errors go together.
     """
     log_t = min(max(draw[0], math.log(fit.time_constant_s) - 2.3), math.log(fit.time_constant_s) + 2.3)
     off = draw[3] - draw[0] - math.log(abs(fit.slope))
     slope = fit.slope * math.exp(min(max(off, -math.log(3.0)), math.log(3.0)))
-    dead, t = max(float(draw[1]), 0.0), math.exp(log_t)
+    longest = 3.0 * max(loop.process.dead_time_s, loop.controller.scan_s)
+    dead, t = min(max(float(draw[1]), 0.0), longest), math.exp(log_t)
     is_ramp = isinstance(loop.process, Integrator)
     process: Process = Integrator(slope, dead) if is_ramp else Fopdt(slope * t, t, dead)
     factor = max(float(draw[2]), 0.2 * fit.valve.stickband) / max(fit.valve.stickband, 1e-9)
@@ -166,30 +174,57 @@ def cautious(process: Fopdt, period_s: float | None) -> Fopdt:
 
 
 def advise(
-    verdict: Verdict, spec: LoopSpec, controller: Pid | None, pv_span: float, period_s: float | None
+    found: Assessment, spec: LoopSpec, controller: Pid | None, pv_span: float, config: Config
 ) -> Advice:
-    """The advice on one loop.
+    """The advice on one assessed loop.
 
     Parameters
     ----------
-    verdict : Verdict
+    found : Assessment
     spec : LoopSpec
     controller : Pid or None
         The stated settings in percent and seconds.
     pv_span : float
         Span of PV in its own unit, for settings in engineering units.
-    period_s : float or None
-        Period of the oscillation [s], None where there is none.
+    config : Config
     """
+    verdict, oscillation = found.verdict, counting(found.oscillations, config.oscillation)
+    if verdict.dead:
+        return Advice("repair valve")
+    if found.settings is not None:
+        return Advice("check settings", words.settings_differ(found.settings, spec, pv_span))
+    if found.needs:
+        return Advice("needs data", found.needs)
     if verdict.cause in ("none", "load"):
         return Advice("none")
+    if oscillation is None:
+        return Advice("none", CALM)
     if verdict.cause == "undecided":
         return Advice("undecided")
+    return _remedy(found, spec, controller, pv_span, oscillation.period_s, config)
+
+
+def _remedy(
+    found: Assessment,
+    spec: LoopSpec,
+    controller: Pid | None,
+    pv_span: float,
+    period_s: float,
+    config: Config,
+) -> Advice:
+    """What to do about a loop that oscillates for its valve or its tuning."""
+    verdict = found.verdict
+    otherwise: Action = "repair valve" if verdict.cause == "valve" else "undecided"
     if verdict.measured is None or (verdict.fault == "undecided" and verdict.measured.play.gain == 0):
-        return Advice("repair valve")
+        return Advice(otherwise)
     if controller is None:
-        return Advice("undecided", "no kp and ti in loops.csv, so no new settings")
-    return _stated(propose(verdict, controller, period_s), spec, pv_span)
+        return Advice(otherwise, "No new settings: loops.csv states no kp and ti.")
+    if found.night.usable_h < config.advice.least_h:
+        return Advice("needs data", words.too_short(found.night.usable_h, config.advice.least_h))
+    proposal = propose(verdict, controller, period_s)
+    if proposal.action == "undecided":
+        proposal = replace(proposal, action=otherwise)
+    return _stated(proposal, spec, pv_span)
 
 
 def _sticks(m: Measured, controller: Pid) -> Loop | None:
@@ -228,6 +263,8 @@ def propose(verdict: Verdict, controller: Pid, period_s: float | None) -> Propos
         return recommend(loop, verdict.cause, source=verdict.source)
     if loop.controller.kp * loop.process.slope <= 0.0:
         return recommend(loop, verdict.cause)
+    if loop.process.dead_time_s > BEYOND_RECORD * window.duration_s:
+        return Proposal("undecided", words.beyond_record(loop.process.dead_time_s, window.duration_s))
     if verdict.cause == "tuning":
         slow = replace(loop, process=cautious(process_of(window, fit), period_s))
         others = (loop, *uncertain(window, fit, loop)[:2])
@@ -237,9 +274,9 @@ def propose(verdict: Verdict, controller: Pid, period_s: float | None) -> Propos
     sought, fit, others = sought_for(verdict, controller)
     rests = confirm(sought).cycle is None
     if rests and period_s is None:
-        return Proposal("repair valve", CALM)
+        return Proposal("none", CALM)
     if rests and math.isinf(integral_s(controller)):
-        return Proposal("undecided", NO_INTEGRAL)
+        return Proposal("check settings", NO_INTEGRAL)
     return recommend(sought, verdict.cause, others, load_of(window, fit, controller))
 
 

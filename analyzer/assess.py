@@ -2,23 +2,29 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from analyzer.assessments import Assessments, Hour, assess_span, hourly, settling_time, usable
-from analyzer.cause import NO_CAUSE, Verdict, dead_valve, judge, not_assessed, with_dead_valve
+from analyzer.cause import NO_CAUSE, Verdict, as_hint, dead_valve, judge, not_assessed, with_dead_valve
 from analyzer.config import Config
-from analyzer.measure import measure
-from analyzer.oscillation import Oscillation, Oscillations, detect
+from analyzer.measure import measure, time_scale
+from analyzer.oscillation import Oscillations, counting, detect
 from analyzer.plantwide import Fingerprint, fingerprint
-from analyzer.quality import Prepared, has_op
+from analyzer.quality import Prepared
+from analyzer.settings_check import SettingsDiffer, differing
 from analyzer.trends import BUCKETS, FINE_BUCKETS, thinned
+from analyzer.words import too_coarse
 from identification.errors import NotAssessedError
 from identification.harris import harris_index
 from identification.models import Pid
 from identification.record import LoopRecord
+
+OF_OP = ("valve_travel_pct_per_h", "reversals_per_h", "at_limits_pct", "service_pct", "op_mean_pct")
+"""Figures that rest on OP."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,8 +32,10 @@ class Assessment:
     """What is known about one loop after one night.
 
     loop; start_s, duration_s of the record [s]; night, the figures of the whole span; hours, of each clock
-    hour; oscillations; verdict; harris index (1: minimum variance) and settling time [s] where known; print,
-    its fingerprint for the plant-wide pass; trend, thinned; notes, plain sentences about the data.
+    hour; oscillations; verdict; settings, where the controller's are not the stated ones; harris index (1: minimum
+    variance) and settling time [s] where known; print, its fingerprint for the plant-wide pass; trend, thinned;
+    notes, plain sentences about the data; needs, what it takes to tell whether the loop oscillates, empty where that
+    is told.
     """
 
     loop: str
@@ -37,11 +45,13 @@ class Assessment:
     hours: tuple[Hour, ...]
     oscillations: Oscillations
     verdict: Verdict
+    settings: SettingsDiffer | None = None
     harris: float | None = None
     settling_s: float | None = None
     print: Fingerprint | None = None
     trend: Mapping[str, np.ndarray] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    needs: str = ""
 
 
 def assessable(record: LoopRecord, config: Config) -> None:
@@ -58,15 +68,10 @@ def assessable(record: LoopRecord, config: Config) -> None:
         )
 
 
-def _counting(found: Oscillations, config: Config) -> Oscillation | None:
-    first = found.first
-    return first if first is not None and first.oscillating_pct >= config.oscillation.counts_pct else None
-
-
 def unfit_for_cause(prepared: Prepared, config: Config) -> str:
     """Why no cause can be told from these trends; empty where it can."""
     record, q = prepared.record, config.quality
-    if not has_op(prepared):
+    if not prepared.op_known:
         return "needs OP, which is not recorded"
     if float(np.ptp(record.op)) == 0.0:
         return "needs OP that moves, it stands still"
@@ -82,8 +87,8 @@ def cause_of(
     prepared: Prepared, found: Oscillations, controller: Pid | None, config: Config, kind: str
 ) -> Verdict:
     """The verdict on one loop by itself; abstains where the trends cannot tell."""
-    record, oscillation = prepared.record, _counting(found, config)
-    dead = dead_valve(record, config.cause) if has_op(prepared) else None
+    record, oscillation = prepared.record, counting(found, config.oscillation)
+    dead = dead_valve(record, config.cause) if prepared.op_known else None
     needs = unfit_for_cause(prepared, config)
     if needs or float(np.ptp(record.pv)) == 0.0:
         verdict = not_assessed(needs) if oscillation is not None else NO_CAUSE
@@ -91,6 +96,32 @@ def cause_of(
     measured = measure(record, oscillation, controller, config.cause, found.spectrum, kind)
     verdict = judge(measured, oscillation, config.cause)
     return with_dead_valve(verdict, dead) if dead and verdict.cause != "valve" else verdict
+
+
+def _known(figures: Assessments, op: bool) -> Assessments:
+    """The figures without those that rest on OP where there is none: unknown is empty, never zero."""
+    if op:
+        return figures
+    return Assessments(**{k: None if k in OF_OP else v for k, v in figures.as_row().items()})  # type: ignore[arg-type]
+
+
+def _hidden(record: LoopRecord, found: Oscillations, controller: Pid | None, config: Config) -> str:
+    """Why silence says nothing: cycles of the loop would be too fast for the sampling; '' where they would show."""
+    if found.first is not None or controller is None or not math.isfinite(controller.ti_s):
+        return ""
+    period = config.advice.cycle_per_ti * controller.ti_s
+    samples = config.oscillation.samples
+    return too_coarse(record.dt_s, period, samples) if period < samples * record.dt_s else ""
+
+
+def _settings(
+    prepared: Prepared, found: Oscillations, stated: Pid | None, config: Config
+) -> SettingsDiffer | None:
+    """Where the controller works with other settings than the stated ones."""
+    if stated is None or not prepared.op_known:
+        return None
+    scale = time_scale(prepared.record, counting(found, config.oscillation), stated)
+    return differing(prepared.record, stated, scale, config.settings)
 
 
 def _dead_time(verdict: Verdict) -> float | None:
@@ -119,22 +150,27 @@ def assess(prepared: Prepared, controller: Pid | None, config: Config, kind: str
     record = prepared.record
     assessable(record, config)
     found = detect(record, config.oscillation)
-    verdict = cause_of(prepared, found, controller, config, kind)
+    settings = _settings(prepared, found, controller, config)
+    verdict = cause_of(prepared, found, settings.recorded if settings else controller, config, kind)
     dead_time = _dead_time(verdict)
-    night = assess_span(record)
+    night = _known(assess_span(record), prepared.op_known)
+    if night.usable_h < config.advice.least_h:
+        verdict = as_hint(verdict, config.advice.hint_pct)
     harris = harris_index(record.error, usable(record), record.dt_s, dead_time) if dead_time else None
-    first, s = _counting(found, config), found.spectrum
+    first, s = counting(found, config.oscillation), found.spectrum
     return Assessment(
         record.tag,
         record.start_s,
         record.duration_s,
         night,
-        tuple(hourly(record, found)),
+        tuple(replace(h, figures=_known(h.figures, prepared.op_known)) for h in hourly(record, found)),
         found,
         verdict,
+        settings,
         harris,
         settling_time(record, night.noise_band_pct or 0.0),
         fingerprint(record.tag, first.period_s, record.start_s, s) if first and s else None,
         thinned(record, FINE_BUCKETS if first else BUCKETS),
         prepared.notes,
+        _hidden(record, found, controller, config),
     )

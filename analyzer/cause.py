@@ -45,7 +45,8 @@ class Verdict:
     """The cause of one loop's oscillation.
 
     cause : valve, tuning, load, none or undecided; confidence [%] of each cause; fault : backlash, stiction,
-    none or undecided; signs in words; source : the loop that leads, empty where none is known; measured.
+    none or undecided; signs in words; source : the loop that leads, empty where none is known; measured; dead :
+    the valve no longer moves PV at all.
     """
 
     cause: str
@@ -55,6 +56,7 @@ class Verdict:
     source: str = ""
     needs: str = ""
     measured: Measured | None = None
+    dead: bool = False
 
 
 NO_CAUSE = Verdict("none", dict.fromkeys(CAUSES, 0.0), "none")
@@ -224,6 +226,11 @@ def _named(signs: list[Sign], confidence: dict[str, float], limits: CauseLimits)
     return first
 
 
+def as_hint(verdict: Verdict, most_pct: float) -> Verdict:
+    """A verdict that rests on little: no confidence above `most_pct` [%]."""
+    return replace(verdict, confidence={k: min(v, most_pct) for k, v in verdict.confidence.items()})
+
+
 def dead_valve(record: LoopRecord, limits: CauseLimits) -> Sign | None:
     """A valve that no longer moves PV: OP winds over much of its range, the error stays on one side, PV is still.
 
@@ -248,5 +255,10 @@ def with_dead_valve(verdict: Verdict, sign: Sign) -> Verdict:
     """A verdict of a valve that is plainly at fault without oscillation."""
     confidence = {"valve": 90.0, "tuning": 0.0, "load": 0.0}
     return replace(
-        verdict, cause="valve", confidence=confidence, fault="undecided", signs=(sign, *verdict.signs)
+        verdict,
+        cause="valve",
+        confidence=confidence,
+        fault="undecided",
+        signs=(sign, *verdict.signs),
+        dead=True,
     )

@@ -52,6 +52,9 @@ class QualityLimits:
     """Share of usable automatic samples that an assessment needs [-]; ours."""
     samples: int = 200
     """Samples that an assessment needs [-]; ours: 3 periods of 60 samples fit into it."""
+    ticks_per_sample: float = 20.0
+    """Ticks of a uniform clock per sample [-] beyond which a record is all gaps; ours: it bounds memory, and such a
+    record would fail usable_share by far."""
     stale_s: float = 3600.0
     """An unchanged PV for this long [s] and for stale_samples is stale while OP moves; ours."""
     stale_samples: int = 300
@@ -154,9 +157,57 @@ class CauseLimits:
 
 
 @dataclass(frozen=True, slots=True)
+class SettingsLimits:
+    """When the settings that OP follows are not the stated ones; ours, set by tests/proofs/settings.py."""
+
+    explained: float = 0.4
+    """Share of the variance of OP's increments that the recovered settings must explain [-]."""
+    gain: float = 0.1
+    """Share that they must explain beyond the stated ones [-]."""
+    left: float = 2.0
+    """What the stated ones leave unexplained over what the recovered ones leave [-]."""
+    factor: float = 1.3
+    """Factor between stated and recovered gain, or integral time, from which they are others [-]; sampling every
+    tenth of a period takes off 10 %."""
+    straight_share: float = 0.3
+    """Share of samples on straight segments from which a compressed trend does not tell the law [-]."""
+    ti_samples: float = 4.0
+    """Integral time that can be recovered [samples]: within fewer, OP moves between the samples."""
+
+
+@dataclass(frozen=True, slots=True)
+class AdviceLimits:
+    """What new settings and firm verdicts rest on at least; ours."""
+
+    least_h: float = 2.0
+    """Good hours in automatic that new settings need [h]: the load of less than that is not the plant's."""
+    hint_pct: float = 75.0
+    """Confidence at most in a cause that rests on fewer hours [%]."""
+    cycle_per_ti: float = 4.0
+    """Period of a PI loop's cycle over its integral time [-], for what a sampling must be able to show: 1 to 7 on the
+    study's and the sample mill's loops."""
+
+
+@dataclass(frozen=True, slots=True)
+class WorkerLimits:
+    """What one loop may cost before it is given up, so that the night goes on."""
+
+    memory_mb: float = 4096.0
+    """Memory that a worker may take beyond what it holds when it starts [MB]; ours: a day of a loop at 1 s takes 0.1,
+    a text export of under 64 MB that is kept whole 0.6; what asks for more is a fault."""
+    processor_s: float = 300.0
+    """Processor time that one loop may take, all its nights together [s]; ours: two weeks at 1 s take 30."""
+    wall_s: float = 1800.0
+    """The same by the clock [s], for what hangs without computing; ours: six times, for machines are busy."""
+
+
+@dataclass(frozen=True, slots=True)
 class Config:
     """All thresholds of a night."""
 
     oscillation: OscillationLimits = OscillationLimits()
     quality: QualityLimits = QualityLimits()
     cause: CauseLimits = CauseLimits()
+    settings: SettingsLimits = SettingsLimits()
+    advice: AdviceLimits = AdviceLimits()
+    workers: WorkerLimits = WorkerLimits()

@@ -15,7 +15,7 @@ from analyzer.brought import Brought, judged
 from analyzer.config import Config
 from analyzer.history.loops_csv import LoopSpec
 from analyzer.history.series import Series
-from analyzer.quality import Prepared, Scale, has_op, onto_clock, prepare
+from analyzer.quality import Prepared, Scale, onto_clock, prepare
 from analyzer.tags import controller
 from identification.errors import InputError, NotAssessedError
 from identification.mismatch import explain as mismatch
@@ -111,7 +111,7 @@ def case(spec: LoopSpec, specs: tuple[LoopSpec, ...], series: dict[str, Series],
     series = snapped(series, spec.pv or "")
     prepared = prepare(spec, series, config.quality)
     r = prepared.record
-    if not has_op(prepared):
+    if not prepared.op_known:
         raise NotAssessedError(f"{spec.loop}: needs OP, has none")
     if float(np.ptp(r.op)) == 0 or float(np.ptp(r.pv)) == 0:
         raise NotAssessedError(f"{spec.loop}: needs OP and PV that move, one of them stands still")

@@ -16,6 +16,7 @@ import numpy as np
 from analyzer.config import QualityLimits
 from analyzer.history.loops_csv import LoopSpec
 from analyzer.history.series import Series
+from analyzer.history.stray import main_span
 from identification.errors import NotAssessedError
 from identification.record import Floats, LoopRecord, Mask
 
@@ -68,7 +69,7 @@ class Prepared:
     """A record with its scale, the resolution of its trends and plain sentences about its quality.
 
     pv_step, op_step : resolution of PV and OP [% of span], 0 where none was seen; compressed_share : share of
-    samples on straight segments [-]; stuck_pv, stuck_op : True where the trend never moved.
+    samples on straight segments [-]; op_known : False where no OP was recorded.
     """
 
     record: LoopRecord
@@ -77,6 +78,7 @@ class Prepared:
     op_step: float
     compressed_share: float
     notes: tuple[str, ...]
+    op_known: bool = True
 
 
 def interval(stamp_s: Floats) -> float:
@@ -195,12 +197,24 @@ def _mode_mask(mode: Series, clock: Floats) -> Mask | None:
     return (mode.value == 0)[at] & ~mode.bad[at]
 
 
-def _clock(pv: Series, dt_s: float) -> Floats:
-    """PV's own stamps where they are uniform, else a uniform clock over them."""
+def _clock(pv: Series, dt_s: float, limits: QualityLimits) -> Floats:
+    """PV's own stamps where they are uniform, else a uniform clock over them.
+
+    Raises
+    ------
+    NotAssessedError
+        The samples are spread so thinly that most of that clock would be gaps.
+    """
     spacing = np.diff(pv.stamp_s)
     if spacing.size and float(np.max(np.abs(spacing - dt_s))) <= 0.01 * dt_s:
         return pv.stamp_s
     count = int((pv.stamp_s[-1] - pv.stamp_s[0]) / dt_s + 1e-6) + 1
+    if count > limits.ticks_per_sample * pv.stamp_s.size:
+        share = 100 * pv.stamp_s.size / count
+        raise NotAssessedError(
+            f"needs samples that follow each other, has {pv.stamp_s.size}, mostly {dt_s:g} s apart, spread over "
+            f"{(pv.stamp_s[-1] - pv.stamp_s[0]) / 86400:.1f} days ({share:.1f} % of that time)"
+        )
     return pv.stamp_s[0] + dt_s * np.arange(count)
 
 
@@ -231,11 +245,11 @@ def prepare(spec: LoopSpec, series: Mapping[str, Series], limits: QualityLimits)
         Where there is no PV, or too little of it; the text says what is needed and what there is.
     """
     pv_raw = _enough(series.get(spec.pv or ""), spec, limits)
-    trimmed = _without_empty_ends(pv_raw)
+    trimmed = _without_stray_ends(pv_raw)
     dt = interval(trimmed.stamp_s)
     if not dt > 0:
         raise NotAssessedError("needs samples at different times, has one stamp")
-    clock = _clock(trimmed, dt)
+    clock = _clock(trimmed, dt, limits)
     pv, gap = onto_clock(trimmed, clock, dt, limits)
     scale = scale_of(spec, pv[~gap])
     pv = scale.pv_pct(pv)
@@ -271,8 +285,13 @@ def _signal(
     return onto_clock(found, clock, dt, limits)
 
 
-def _without_empty_ends(pv: Series) -> Series:
-    """PV from its first to its last good sample."""
+def _without_stray_ends(pv: Series) -> Series:
+    """PV from its first to its last good sample, those far from the rest left out."""
+    stamp = pv.stamp_s[~pv.bad]
+    span = main_span(stamp)
+    if span.stray:
+        inside = slice(*np.searchsorted(pv.stamp_s, [span.first_s, np.nextafter(span.last_s, np.inf)]))
+        pv = Series(pv.stamp_s[inside], pv.value[inside], pv.bad[inside])
     good = np.flatnonzero(~pv.bad)
     if good[0] == 0 and good[-1] == pv.bad.size - 1:
         return pv
@@ -347,9 +366,4 @@ def _described(record: LoopRecord, scale: Scale, op: Floats, limits: QualityLimi
     op_step = resolution(record.op) if known_op else 0.0
     if step > 0:
         notes.append(f"PV on a grid of {step:.3g} % of span")
-    return Prepared(record, scale, step, op_step, compressed, tuple(notes))
-
-
-def has_op(prepared: Prepared) -> bool:
-    """Whether OP was recorded."""
-    return not any(note.startswith("no OP") for note in prepared.notes)
+    return Prepared(record, scale, step, op_step, compressed, tuple(notes), known_op)

@@ -13,6 +13,12 @@ from analyzer.history.loops_csv import LoopSpec
 from identification.hammerstein import Fit
 from identification.window import Window
 
+NOT_SHOWN = (
+    *("oscillation_significance", "oscillating_pct", "osc_valve_pct", "osc_tuning_pct", "osc_load_pct"),
+    *("regularity", "prominence", "correlation", "period_s", "pv_amplitude_pct"),
+)
+"""Columns that stay empty where the record cannot show whether the loop oscillates."""
+
 
 def empty_row(spec: LoopSpec, night: str) -> dict[str, Any]:
     """A row in which nothing but the loop's own facts is known."""
@@ -106,6 +112,8 @@ def night_row(a: Assessment, spec: LoopSpec, night: str) -> dict[str, Any]:
         "signs": json.dumps(signs),
         "notes": "; ".join((*a.notes, f"cause not assessed: {v.needs}") if v.needs else a.notes),
     }
+    if a.needs:
+        row.update(dict.fromkeys(NOT_SHOWN), cause="undecided", valve_fault="undecided")
     return {k: _finite(row.get(k)) for k in ALL_COLUMNS}
 
 

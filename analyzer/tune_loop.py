@@ -12,7 +12,7 @@ from analyzer.config import Config
 from analyzer.history.export import Export
 from analyzer.history.loops_csv import LoopSpec
 from analyzer.nights import cut, nights_of
-from analyzer.quality import Prepared, has_op, prepare
+from analyzer.quality import Prepared, prepare
 from analyzer.tags import controller
 from analyzer.tune import lines, pictures, tune
 from identification.errors import InputError, NotAssessedError
@@ -40,7 +40,7 @@ def spec_of(specs: Sequence[LoopSpec], loop: str) -> LoopSpec:
 def _unfit(prepared: Prepared, config: Config) -> str:
     """Why the trends give no model, the nearest reason first; empty where none is known."""
     at_limit = float(prepared.record.mask("saturated").mean())
-    if has_op(prepared) and at_limit > config.quality.saturated_share:
+    if prepared.op_known and at_limit > config.quality.saturated_share:
         return f"needs OP within its limits, it is at one for {100 * at_limit:.0f} % of the time"
     return unfit_for_cause(prepared, config)
 

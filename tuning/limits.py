@@ -20,7 +20,8 @@ class TuningLimits:
     | gain_down | - | least gain over the present one; ours |
     | gain_down_play, gain_down_stick | - | least gain over nominal, where that is lower, by valve; ours |
     | error_growth | - | error on the model, and its mean over all samples, over the present one |
-    | error_growth_sample | - | the same on the worst uncertainty sample; ours |
+    | error_growth_sample, travel_growth_sample | - | error and travel on the worst uncertainty sample; ours: what is
+    worse on any plant that the data allow is not told |
     | error_weight | - | weight of ln(error) beside ln(travel) in the score; ours |
     | error_aim, error_beyond | - | error up to which error_weight holds, and the weight added above; ours |
     | travel_floor | - | travel over the present one below which less counts little; ours |
@@ -28,6 +29,8 @@ class TuningLimits:
     | cycle_growth | - | PV amplitude of the new limit cycle over the old one's with play; ours |
     | cycle_growth_stick | - | the same with stick-slip, whose slower cycle lets PV go further; ours |
     | band_beyond | % OP | play or stickband from which the valve is to be repaired first; ours |
+    | stick_ratio | - | T over effective delay below which a sticking stem gets no settings: on plants of another make
+    (tests/proofs/retuning.py, seeds 31, 32, 41, 42) their error grew by more than 5 % in one of three |
     | spread_slope, spread_delay, spread_band | - | half widths of the uncertainty assumed for want of any |
     | most_steps | scans | load used in the search; ours, for the answer within 2 s |
     | least_steps | scans | a shorter load does not tell tunings apart; ours |
@@ -45,11 +48,12 @@ class TuningLimits:
     integral_factor: float = 2.4
     integral_factor_ramp: float = 6.5
     gain_up: float = 1.3
-    gain_down: float = 0.65
+    gain_down: float = 0.85
     gain_down_play: float = 0.85
-    gain_down_stick: float = 0.75
+    gain_down_stick: float = 0.95
     error_growth: float = 1.0
-    error_growth_sample: float = 1.15
+    error_growth_sample: float = 1.05
+    travel_growth_sample: float = 1.05
     error_weight: float = 0.3
     error_aim: float = 0.92
     error_aim_stick: float = 0.85
@@ -60,6 +64,7 @@ class TuningLimits:
     cycle_growth: float = 1.05
     cycle_growth_stick: float = 1.5
     band_beyond: float = 10.0
+    stick_ratio: float = 10.0
     spread_slope: float = 0.15
     spread_delay: float = 0.25
     spread_band: float = 0.15

@@ -16,6 +16,10 @@ LOWEST = 1e-6
 """Lowest frequency looked at, over that of the slowest of time constant, integral time and dead time."""
 POINTS = 900
 """Frequencies of a grid."""
+MOST_DELAY = 4000
+"""Scans of dead time that stability is judged with at most [-]; ours: beyond it the loop is judged at a scan of that
+share of the dead time, which shifts its phase by 1/8000 of the dead time's own, so that no grid grows with the data.
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,7 +116,7 @@ def _characteristic(loop: Loop, points: int) -> tuple[Complexes, Complexes]:
 
     A controller without integral leaves a factor 1 - 1/z on the circle, which is taken out.
     """
-    h = scan_step(loop)
+    h = max(scan_step(loop), loop.process.dead_time_s / MOST_DELAY)
     d, c = discretize(loop.process, h), loop.controller
     w = np.exp(-1j * _angles(loop, h, points + 8 * d.delay))
     step, rate = 1.0 - w, _rate(c) * h

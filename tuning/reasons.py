@@ -122,6 +122,14 @@ def beyond(loop: Loop, limits: TuningLimits) -> str:
     )
 
 
+def sticks_on_short_lag(loop: Loop, before: Confirmed, limits: TuningLimits) -> str:
+    """Why a stem that sticks before a short lag gets no settings."""
+    return (
+        f"The valve has {_fault(loop)} and gives {_cycle(before.cycle)}. On a process whose lag is under "
+        f"{limits.stick_ratio:g} dead times no settings calm it without more error: repair the valve."
+    )
+
+
 def nothing_better(loop: Loop, before: Confirmed, considered: bool) -> str:
     """Why a faulty valve's loop gets no settings."""
     what = "is worth a change" if considered else "keeps robustness, load rejection and error"

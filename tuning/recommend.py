@@ -29,7 +29,7 @@ from tuning.search import (
     standard_load,
 )
 
-Action = Literal["retune", "repair valve", "see source loop", "none", "undecided"]
+Action = Literal["retune", "repair valve", "see source loop", "check settings", "none", "undecided"]
 CAUSES = ("valve", "tuning", "load", "none", "undecided")
 
 CONFIRMED = 15
@@ -50,7 +50,7 @@ class Proposal:
     """What to do about a loop.
 
     action : str
-        retune, repair valve, see source loop, none or undecided.
+        retune, repair valve, see source loop, check settings, none or undecided.
     controller : Pid or None
         The new settings; None unless action is retune.
     reason : str
@@ -121,7 +121,7 @@ def recommend(
     if cause in ("none", "undecided"):
         return Proposal("none" if cause == "none" else "undecided", reasons.no_cause(cause))
     if loop.controller.kp * loop.process.slope <= 0.0:
-        return Proposal("undecided", reasons.wrong_sign(loop))
+        return Proposal("check settings", reasons.wrong_sign(loop))
     others = tuple(uncertainty) or assumed_uncertainty(loop, limits)
     if load is not None and load.size < limits.least_steps:
         load = None
@@ -174,6 +174,8 @@ def _valve(loop: Loop, others: Sequence[Loop], load: Floats | None, limits: Tuni
     if band(loop.valve) <= 0.0:
         return Proposal("undecided", reasons.no_size())
     before = confirm(loop)
+    if _is_short_and_sticks(loop, limits):
+        return Proposal("repair valve", reasons.sticks_on_short_lag(loop, before, limits), before=before)
     if load is None:
         load = standard_load(loop, limits.most_steps)
     table = bench(loop, others, load, limits)
@@ -199,6 +201,13 @@ def _valve(loop: Loop, others: Sequence[Loop], load: Floats | None, limits: Tuni
         ms=best.ms,
         candidates=candidates,
     )
+
+
+def _is_short_and_sticks(loop: Loop, limits: TuningLimits) -> bool:
+    """Whether a stem that sticks sits before a lag that is no more than a few dead times long."""
+    if is_play(loop.valve) or not isinstance(loop.process, Fopdt):
+        return False
+    return loop.process.time_constant_s < limits.stick_ratio * effective_delay(loop.process, scan_step(loop))
 
 
 def _worth(candidate: Candidate, limits: TuningLimits) -> bool:

@@ -29,13 +29,14 @@ class Candidate:
     """A pair of settings and what the model says of it.
 
     ms [-]; travel and error: stem travel and average absolute error over those of the present tuning [-],
-    means over the loops simulated; worst_error the largest of these; score: lower is better.
+    means over the loops simulated; worst_travel and worst_error the largest of these; score: lower is better.
     """
 
     controller: Pid
     ms: float
     travel: float
     error: float
+    worst_travel: float
     worst_error: float
     score: float
 
@@ -172,7 +173,8 @@ def try_out(table: Bench, controller: Pid, ms: float, loops: int | None = None) 
     limits = table.limits
     aim = limits.error_aim if is_play(table.loops[0].valve) else limits.error_aim_stick
     score = _score(travel, error, aim, limits)
-    return Candidate(controller, ms, float(travel.mean()), float(error.mean()), float(error.max()), score)
+    worst = float(travel.max()), float(error.max())
+    return Candidate(controller, ms, float(travel.mean()), float(error.mean()), *worst, score)
 
 
 def _score(travel: Floats, error: Floats, aim: float, limits: TuningLimits) -> float:
@@ -245,10 +247,13 @@ def _kept(table: Bench, most: Rejection, pairs: list[Pid]) -> list[Candidate]:
             continue
         if try_out(table, pid, ms, 1).error <= table.limits.error_growth:
             found.append(try_out(table, pid, ms))
-    limits = table.limits
-    return [
-        c for c in found if c.error <= limits.error_growth and c.worst_error <= limits.error_growth_sample
-    ]
+    return [c for c in found if is_harmless(c, table.limits)]
+
+
+def is_harmless(c: Candidate, limits: TuningLimits) -> bool:
+    """Whether a candidate is worse on none of the loops that the data allow."""
+    worst = c.worst_error <= limits.error_growth_sample and c.worst_travel <= limits.travel_growth_sample
+    return worst and c.error <= limits.error_growth
 
 
 def _grid(loop: Loop, most: Rejection, limits: TuningLimits) -> tuple[Floats, Floats]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -22,6 +23,7 @@ from analyzer.advice import (
 )
 from analyzer.assess import Assessment, assess
 from analyzer.cause import NO_CAUSE, not_assessed
+from analyzer.oscillation import Oscillations
 from identification.models import Backlash, Fopdt, Integrator, Pid
 from tuning.limits import LIMITS
 from tuning.linear import margins
@@ -50,9 +52,8 @@ def pipe() -> Assessment:
 
 def settings(found: Assessment, sketch: Sketch, **stated: object):
     """The advice on one assessed sketch."""
-    first = found.oscillations.first
     row = spec(kp=sketch.kp, ti=sketch.ti, **stated)
-    return advise(found.verdict, row, sketch.controller, 100.0, first.period_s if first else None)
+    return advise(found, row, sketch.controller, 100.0, CONFIG)
 
 
 def test_play_before_a_known_lag_gets_ti_of_at_least_the_lag(pipe):
@@ -145,17 +146,58 @@ def test_load_is_left_alone():
     assert propose(found.verdict, SWUNG.controller, 300.0).action == "none"
 
 
-def test_no_cause_no_settings():
+def test_no_cause_no_settings(pipe):
     """Verdicts without a cause and verdicts that abstain get no settings."""
     row = spec(kp=1.0, ti=10.0)
-    assert advise(NO_CAUSE, row, Pid(1, 10), 100.0, None).action == "none"
-    assert advise(not_assessed("needs OP"), row, Pid(1, 10), 100.0, 60.0).action == "undecided"
+    asked = [replace(pipe, verdict=v) for v in (NO_CAUSE, not_assessed("needs OP"))]
+    assert [advise(a, row, Pid(1, 10), 100.0, CONFIG).action for a in asked] == ["none", "undecided"]
+
+
+def test_a_calm_loop_is_left_alone(pipe):
+    """A loop with play that does not oscillate gets neither settings nor a repair: at its settings nothing cycles."""
+    advice = settings(replace(pipe, oscillations=Oscillations()), PIPE)
+    assert (advice.action, advice.kp_new, advice.ti_new) == ("none", None, None)
+    assert "nothing to do now" in advice.reason
+
+
+def test_one_hour_is_a_hint():
+    """One hour of a plainly cycling loop: its cause at 75 % at most, no settings, and what they would need."""
+    found = assessed(PIPE, 1.0)
+    assert found.verdict.cause == "valve"
+    assert max(found.verdict.confidence.values()) == 75
+    advice = settings(found, PIPE)
+    assert (advice.action, advice.kp_new) == ("needs data", None)
+    assert "2 good hours" in advice.reason
+
+
+def test_stale_settings_are_told_and_nothing_is_advised():
+    """A loop that runs at another gain and Ti than stated is told so, both pairs in the controller's own units."""
+    stated = replace(PIPE, kp=PIPE.kp / 2, ti=3 * PIPE.ti)
+    found = assess(prepared(simulate(PIPE, 6.0)), stated.controller, CONFIG)
+    row = spec(kp=100 / stated.kp, ti=stated.ti / 60, ti_unit="min", gain_unit="band")
+    advice = advise(found, row, stated.controller, 100.0, CONFIG)
+    assert (advice.action, advice.kp_new, advice.ti_new) == ("check settings", None, None)
+    assert f"stated Kp {100 / stated.kp:.3g} % band, Ti {stated.ti / 60:.3g} min" in advice.reason
+    told = re.search(r"recorded about Kp ([\d.]+) % band, Ti ([\d.]+) min", advice.reason)
+    assert told is not None
+    assert float(told[1]) == pytest.approx(100 / PIPE.kp, rel=0.1)
+    assert float(told[2]) == pytest.approx(PIPE.ti / 60, rel=0.15)
+
+
+def test_a_model_beyond_its_record_gets_no_advice(pipe):
+    """A fit whose dead time is a third of the record gets no settings, and its reason says why."""
+    m = pipe.verdict.measured
+    late = replace(m.play, dead_time_s=m.window.duration_s / 3)
+    verdict = replace(pipe.verdict, measured=replace(m, play=late), fault="backlash")
+    p = propose(verdict, PIPE.controller, 100.0)
+    assert p.controller is None
+    assert "dead time" in p.reason
 
 
 def test_unstated_settings_are_asked_for(pipe):
-    """Without kp and ti there are no new ones, and the reason says what is missing."""
-    advice = advise(pipe.verdict, spec(), None, 100.0, 100.0)
-    assert advice.action == "undecided"
+    """Without kp and ti there are no new ones, and the reason says what is missing; the valve is told anyway."""
+    advice = advise(pipe, spec(), None, 100.0, CONFIG)
+    assert advice.action == "repair valve"
     assert "no kp and ti" in advice.reason
 
 
@@ -163,14 +205,14 @@ def test_wrong_sign_is_told(pipe):
     """A gain of the wrong sign gets no settings and says that the controller would act the wrong way."""
     turned = replace(PIPE.controller, kp=-PIPE.kp)
     p = propose(pipe.verdict, turned, 100.0)
-    assert (p.action, p.controller) == ("undecided", None)
+    assert (p.action, p.controller) == ("check settings", None)
     assert "wrong way" in p.reason
 
 
 def test_integral_off_is_told(pipe):
     """Stated without integral action, a loop that cycles by it is sent to check its settings."""
     p = propose(pipe.verdict, replace(PIPE.controller, ti_s=math.inf), 100.0)
-    assert p.controller is None
+    assert (p.action, p.controller) == ("check settings", None)
     assert "check kp and ti" in p.reason
 
 

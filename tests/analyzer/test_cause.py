@@ -100,12 +100,16 @@ def test_width_of_play_is_recovered(name):
 
 @pytest.mark.parametrize("name", [n for n in named("valve") if SKETCHES[n].stickband])
 def test_stick_slip_is_told_from_play(name):
-    """Stick-slip is called stiction, its stickband recovered within 15 %."""
-    verdict = assessed(name).verdict
-    assert verdict.fault == "stiction"
-    assert verdict.measured is not None
-    assert verdict.measured.stick_slip is not None
-    assert verdict.measured.stick_slip.valve.stickband == pytest.approx(SKETCHES[name].stickband, rel=0.15)
+    """Stick-slip is called stiction in four of five recordings, its stickband then recovered within 15 %."""
+    sketch = SKETCHES[name]
+    runs = [prepared(simulate(sketch, 6.0, seed), sketch.kind, name) for seed in range(1, 6)]
+    verdicts = [assess(p, sketch.controller, CONFIG, sketch.kind).verdict for p in runs]
+    told = [v for v in verdicts if v.fault == "stiction"]
+    assert len(told) >= 4
+    for verdict in told:
+        assert verdict.measured is not None
+        assert verdict.measured.stick_slip is not None
+        assert verdict.measured.stick_slip.valve.stickband == pytest.approx(sketch.stickband, rel=0.15)
 
 
 @pytest.mark.parametrize("name", named("load"))
@@ -149,7 +153,10 @@ def test_direct_acting_loops_are_judged_alike():
 def test_trends_that_cannot_tell_say_what_they_need():
     """Without OP, and with compressed trends, the cause is undecided and the verdict says what it needs and has."""
     made = prepared(trends("swinging load, flow"))
-    blind = assess(replace(made, notes=("no OP recorded: no cause can be told",)), None, CONFIG).verdict
+    unseen = assess(replace(made, op_known=False), None, CONFIG)
+    figures = [unseen.night.valve_travel_pct_per_h, unseen.hours[0].figures.at_limits_pct]
+    assert figures == [None, None]
+    blind = unseen.verdict
     assert (blind.cause, blind.fault) == ("undecided", "undecided")
     assert blind.needs == "needs OP, which is not recorded"
     straight = assess(replace(made, compressed_share=0.9), None, CONFIG).verdict

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from identification.models import Fopdt, Integrator, Loop, Pid
 from identification.simulate import closed_loop, open_loop
-from tuning.linear import frequencies, is_stable, loop_response, margins, process_sampled
+from tuning.linear import frequencies, is_stable, loop_response, margins, process_sampled, stable_gains
 
 
 def gone_wild(loop: Loop, steps: int) -> float:
@@ -80,6 +80,23 @@ def test_p_only_is_judged():
     m = margins(Loop(Integrator(0.1, 2), Pid(1, math.inf)))
     assert m.stable
     assert 1 < m.ms < 2
+
+
+def test_stability_of_a_huge_delay_takes_a_bounded_grid():
+    """With a dead time of 900 million scans the stable and the unstable gain are told, as at a thousand scans."""
+    for delay in (1e3, 9e8):
+        process = Fopdt(1.0, delay, delay)
+        assert is_stable(Loop(process, Pid(0.5, delay)))
+        assert not is_stable(Loop(process, Pid(4.0, delay)))
+
+
+def test_a_coarser_scan_moves_no_limit_of_stability():
+    """Within 0.1 % of the gain at which the loop turns unstable, a scan of 1/4000 of the dead time decides alike."""
+    fine = Loop(Fopdt(1.0, 3e4, 1e4), Pid(1.0, 3e4))
+    gains = np.linspace(1.0, 8.0, 400)
+    coarse = Loop(fine.process, replace(fine.controller, scan_s=1e4 / 3999))
+    ends = [gains[np.flatnonzero(stable_gains(one, gains))[-1]] for one in (fine, coarse)]
+    assert ends[0] == pytest.approx(ends[1], rel=0.02)
 
 
 def test_grid_ends_at_the_scan():

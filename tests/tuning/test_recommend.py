@@ -212,7 +212,7 @@ def test_wide_play_is_for_the_workshop():
 
 def test_abstentions_say_why():
     """A wrong sign, a valve of unknown size and an unknown cause are refused in words."""
-    assert recommend(replace(STUDY, controller=Pid(-1, 10)), "valve").action == "undecided"
+    assert recommend(replace(STUDY, controller=Pid(-1, 10)), "valve").action == "check settings"
     assert "wrong way" in recommend(replace(STUDY, controller=Pid(-1, 10)), "valve").reason
     assert "size is needed" in recommend(replace(STUDY, valve=None), "valve").reason
     with pytest.raises(ValueError, match="cause is one of"):

@@ -1,0 +1,45 @@
+"""Sentences on settings and on what a recording lacks, with units; `present` makes rows of them."""
+
+from __future__ import annotations
+
+from analyzer.history.loops_csv import LoopSpec
+from analyzer.settings_check import SettingsDiffer
+from analyzer.tags import as_stated
+from analyzer.units import gain_unit, settings
+from identification.models import Pid
+
+
+def of_controller(pid: Pid, spec: LoopSpec, pv_span: float) -> str:
+    """A controller's settings as they are typed into it."""
+    kp, ti = as_stated(pid, spec, pv_span)
+    return settings(kp, ti, gain_unit(spec.gain_unit, spec.pv_unit), spec.ti_unit)
+
+
+def settings_differ(found: SettingsDiffer, spec: LoopSpec, pv_span: float) -> str:
+    """What loops.csv states beside what OP follows."""
+    stated, recorded = (of_controller(pid, spec, pv_span) for pid in (found.stated, found.recorded))
+    return (
+        f"settings in loops.csv are not those of the controller: stated {stated}; recorded about {recorded}. Correct "
+        "loops.csv (or find out who changed them) before anything is typed in"
+    )
+
+
+def too_short(hours: float, least: float) -> str:
+    """Why a short record is a hint and no ground for new settings."""
+    return f"new settings need {least:g} good hours in automatic, there are {hours:.1f}: take this as a hint"
+
+
+def too_coarse(dt_s: float, period_s: float, samples: float) -> str:
+    """Why a record cannot show the cycles that the loop would have."""
+    return (
+        f"oscillation needs a sample every {period_s / samples:.2g} s or faster, has one every {dt_s:g} s (the "
+        f"loop's own cycle would take about {period_s:.3g} s)"
+    )
+
+
+def beyond_record(dead_time_s: float, duration_s: float) -> str:
+    """Why a model gets no advice."""
+    return (
+        f"No settings: the model found has a dead time of {dead_time_s:.3g} s, more than a record of "
+        f"{duration_s / 3600:.2g} h can show."
+    )
