@@ -6,36 +6,11 @@ import json
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from analyzer.units import gain_unit
+
 if TYPE_CHECKING:
     from analyzer.advice import Advice
     from analyzer.plantwide import Source
-
-SHORT = {
-    "loop": "Loop",
-    "type": "Type",
-    "oscillation_significance": "Signif.",
-    "oscillating_pct": "Osc %",
-    "osc_valve_pct": "Valve %",
-    "osc_tuning_pct": "Tuning %",
-    "osc_load_pct": "Load %",
-    "cause": "Cause",
-    "valve_fault": "Fault",
-    "source_loop": "Source",
-    "period_s": "Period s",
-    "pv_amplitude_pct": "Amplitude %",
-    "average_absolute_error_pct": "Abs error %",
-    "valve_travel_pct_per_h": "Travel %/h",
-    "variability_pct": "Variab. %",
-    "kp": "Kp",
-    "ti": "Ti",
-    "kp_new": "Kp new",
-    "ti_new": "Ti new",
-    "action": "Action",
-    "reason": "Reason",
-    "status": "Status",
-}
-"""Headings of tables for people."""
-
 
 CAUSE_STYLES = {"valve": "red", "tuning": "yellow", "load": "cyan", "undecided": "magenta"}
 """Colours of causes on the terminal."""
@@ -60,15 +35,18 @@ def brief(row: Mapping[str, Any]) -> dict[str, str]:
         "Error %": figure(row["average_absolute_error_pct"], ""),
         "Travel %/h": figure(row["valve_travel_pct_per_h"], ""),
         "Period": _period(period) if period else "",
-        "Kp": _settings(row["kp"], row["kp_new"]),
-        "Ti": _settings(row["ti"], row["ti_new"]),
+        "Kp": _settings(row["kp"], row["kp_new"], gain_unit(row.get("gain_unit"), row.get("pv_unit"))),
+        "Ti": _settings(row["ti"], row["ti_new"], row.get("ti_unit") or ""),
         "Action": row["action"] or "",
         "Reason": row["reason"] or "",
     }
 
 
-def _settings(now: float | None, new: float | None) -> str:
-    return figure(now, "") if new is None else f"{figure(now, '')} -> {figure(new, '')}"
+def _settings(now: float | None, new: float | None, unit: str) -> str:
+    """A setting and what to make of it, with its unit; empty where it is not known."""
+    if now is None:
+        return ""
+    return f"{figure(now, '')} {unit}" if new is None else f"{figure(now, '')} -> {figure(new, '')} {unit}"
 
 
 def _strongest(row: Mapping[str, Any], cause: str) -> str:
@@ -100,8 +78,19 @@ def reason_of(row: Mapping[str, Any], needs: str = "") -> str:
     return cycle
 
 
+MOST_NAMES = 5
+"""Followers that are named in a row."""
+SAID_AT_ONCE = ("check settings", "needs data")
+"""Actions whose reason belongs into the list."""
+
+
 def advised(row: dict[str, Any], needs: str, advice: Advice) -> dict[str, Any]:
     """The row with action, new settings, advice and reason; `needs` says why no cause could be told, if so."""
+    reason = reason_of(row, needs)
+    if row["oscillating_pct"] is None:
+        reason = f"not assessed: {advice.reason}"
+    elif advice.action in SAID_AT_ONCE:
+        reason = f"{reason}; {advice.reason}"
     return {
         **row,
         "action": advice.action,
@@ -109,7 +98,7 @@ def advised(row: dict[str, Any], needs: str, advice: Advice) -> dict[str, Any]:
         "ti_new": advice.ti_new,
         "advice": advice.reason,
         **_cycles(advice),
-        "reason": reason_of(row, needs),
+        "reason": reason,
     }
 
 
@@ -144,6 +133,12 @@ def follower_row(row: Mapping[str, Any], source: Source) -> dict[str, Any]:
     return changed
 
 
+def root_row(row: Mapping[str, Any], followers: Sequence[str]) -> dict[str, Any]:
+    """The row of a loop that moves others: what is known of it, and whom it moves."""
+    names = ", ".join(followers[:MOST_NAMES]) + (" ..." if len(followers) > MOST_NAMES else "")
+    return {**row, "reason": f"{row['reason']}; also moves {names}: fix this one first"}
+
+
 def figure(value: Any, column: str) -> str:
     """A cell for people: three digits, empty where not known."""
     if value is None:
@@ -155,17 +150,14 @@ def figure(value: Any, column: str) -> str:
     return f"{value:.3g}" if abs(value) < 1000 else f"{value:.0f}"
 
 
-def escaped(text: str) -> str:
-    """Text of the plant as text in a Markdown table."""
-    text = text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
-    for mark in "\\|`*[]":
-        text = text.replace(mark, f"\\{mark}")
-    return text.replace("\n", " ").replace("\r", " ")
+def markdown_table(rows: Sequence[Mapping[str, Any]]) -> str:
+    """Rows for people as a Markdown table: figures in few characters, settings with their units."""
+    from reports.markdown import escaped
 
-
-def markdown_table(rows: Sequence[Mapping[str, Any]], columns: Sequence[str]) -> str:
-    """A Markdown table of rows."""
-    head = "| " + " | ".join(SHORT.get(c, c) for c in columns) + " |"
-    rule = "|" + "|".join("---" for _ in columns) + "|"
-    body = ["| " + " | ".join(escaped(figure(r[c], c)) for c in columns) + " |" for r in rows]
-    return "\n".join([head, rule, *body])
+    shown = [brief(row) for row in rows]
+    names = tuple(shown[0]) if shown else ("Loop",)
+    head = "| " + " | ".join(names) + " |"
+    rule = "|" + "|".join("---" for _ in names) + "|"
+    return "\n".join(
+        [head, rule, *("| " + " | ".join(map(escaped, cells.values())) + " |" for cells in shown)]
+    )

@@ -11,26 +11,20 @@ from typing import Any
 from analyzer.columns import RANK_COLUMNS, TEXT_COLUMNS
 from analyzer.store import Store
 from identification.errors import InputError
+from reports.tables import harmless
 
-TABLE_COLUMNS = (
-    "loop",
-    "oscillation_significance",
-    "oscillating_pct",
-    "osc_valve_pct",
-    "osc_tuning_pct",
-    "osc_load_pct",
-    "period_s",
-    "pv_amplitude_pct",
-    "average_absolute_error_pct",
-    "valve_travel_pct_per_h",
-    "kp",
-    "kp_new",
-    "ti",
-    "ti_new",
-    "action",
-    "reason",
+LIST_COLUMNS = (
+    *RANK_COLUMNS,
+    "area",
+    "description",
+    "importance",
+    "form",
+    "gain_unit",
+    "ti_unit",
+    "pv_unit",
+    "advice",
 )
-"""Columns shown to people."""
+"""Columns of CSV and JSON: the contract's, then what says in which units settings stand, and the advice in full."""
 
 Row = Mapping[str, Any]
 
@@ -48,7 +42,7 @@ def ranked(
     if column not in RANK_COLUMNS:
         raise InputError(f"column {column!r}", "one of " + ", ".join(RANK_COLUMNS), "correct --by")
     name = night or store.require()
-    rows = store.read("nights", name, RANK_COLUMNS).to_pylist()
+    rows = store.read("nights", name, LIST_COLUMNS).to_pylist()
     known = [r for r in rows if r[column] not in (None, "")]
     others = sorted((r for r in rows if r[column] in (None, "")), key=lambda r: r["loop"])
     if column in TEXT_COLUMNS:
@@ -64,24 +58,31 @@ def rendered(rows: Sequence[Row], form: str, night: str) -> str:
 
 
 def as_csv(rows: Sequence[Row], night: str) -> str:
-    """All columns as CSV, empty where not assessed."""
+    """All columns as CSV, empty where not assessed, texts of the plant harmless to spreadsheets."""
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(RANK_COLUMNS)
-    writer.writerows(["" if r[c] is None else r[c] for c in RANK_COLUMNS] for r in rows)
+    writer.writerow(LIST_COLUMNS)
+    writer.writerows([_cell(r[c]) for c in LIST_COLUMNS] for r in rows)
     return out.getvalue().rstrip("\n")
+
+
+def _cell(value: Any) -> Any:
+    """A cell that no spreadsheet takes for a formula; empty where nothing is known."""
+    if value is None:
+        return ""
+    return harmless(value) if isinstance(value, str) else value
 
 
 def as_json(rows: Sequence[Row], night: str) -> str:
     """All columns as a JSON list of objects, null where not assessed."""
-    return json.dumps([{c: r[c] for c in RANK_COLUMNS} for r in rows], indent=1)
+    return json.dumps([{c: r[c] for c in LIST_COLUMNS} for r in rows], indent=1)
 
 
 def as_markdown(rows: Sequence[Row], night: str) -> str:
     """The columns for people as a Markdown table."""
     from analyzer.present import markdown_table
 
-    return markdown_table(rows, TABLE_COLUMNS)
+    return markdown_table(rows)
 
 
 def as_table(rows: Sequence[Row], night: str) -> str:

@@ -12,7 +12,8 @@ from analyzer.pages.explain_words import check, title
 from analyzer.pages.reading import Thinned
 from analyzer.pages.rhythm import rhythm_plots
 from analyzer.pages.trends import trend_block
-from analyzer.pages.words import TITLES, duration, number, setting
+from analyzer.pages.words import TITLES, duration, number
+from analyzer.units import row_settings
 from reports.names import slug
 from reports.pages import Block, Cell, Column, Facts, Line, Page, Plot, Section, Table, Text
 
@@ -64,12 +65,9 @@ def _facts(row: Row) -> Facts:
         facts.append(("Period", duration(row["period_s"])))
         facts.append(("Amplitude of PV", f"{number(row['pv_amplitude_pct'])} % of span"))
     if row["kp"] is not None:
-        facts.append(
-            ("Settings as stated", f"Kp {setting(row['kp'])}, Ti {setting(row['ti'])} {_units(row)}")
-        )
+        facts.append(("Settings as stated", f"{row_settings(row)} ({row['form']} form)"))
     if row["kp_new"] is not None or row["ti_new"] is not None:
-        new = f"Kp {setting(row['kp_new'])}, Ti {setting(row['ti_new'])} {_units(row)}"
-        facts.append(("Settings to type in", new))
+        facts.append(("Settings to type in", row_settings(row, "kp_new", "ti_new")))
     return Facts(tuple(facts))
 
 
@@ -83,12 +81,6 @@ def _verdict(row: Row) -> Section:
 
 
 CAUSES = ("valve", "tuning", "load")
-
-
-def _units(row: Row) -> str:
-    return (
-        f"({row['form'] or 'ideal'}, gain in {row['gain_unit'] or 'percent'}, Ti in {row['ti_unit'] or 's'})"
-    )
 
 
 def _evidence(row: Row) -> Section:

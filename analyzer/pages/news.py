@@ -18,15 +18,26 @@ def _news(night: Night, row: Row) -> tuple[str, str]:
     if old is None or old["status"] != "ok" or row["status"] != "ok":
         return "", ""
     now, then = (r["oscillation_significance"] or 0.0 for r in (row, old))
+    if row["oscillating_pct"] is None or old["oscillating_pct"] is None:
+        return "", ""
     if oscillates(row) and not oscillates(old):
         return "began to oscillate", "worse"
     if oscillates(old) and not oscillates(row):
         return "stopped oscillating", "better"
     if oscillates(old) and now < HALVED * then:
         return "oscillates less than half as much", "better"
-    if row["cause"] != old["cause"]:
-        return f"cause was {old['cause']}, is {row['cause']}", "unclear"
-    return "", ""
+    return _cause_news(row["cause"] or "undecided", old["cause"] or "undecided")
+
+
+def _cause_news(now: str, then: str) -> tuple[str, str]:
+    """What another cause than the night before's means: a fault gone, one come, or one told otherwise."""
+    if now == then:
+        return "", ""
+    if now == "none":
+        return f"no fault is seen any more (cause was {then})", "better"
+    if then == "none":
+        return f"a fault is seen: cause {now}", "worse"
+    return f"the cause is now told as {now} (was {then})", "unclear"
 
 
 def _significance(row: Row) -> Cell:

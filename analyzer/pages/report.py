@@ -13,6 +13,7 @@ from analyzer.pages.reading import nights_within, read_hours, read_nights, read_
 from analyzer.pages.wear import wear_texts
 from analyzer.spans import spans_around
 from analyzer.store import Store
+from analyzer.units import gain_unit
 
 COLUMNS = (
     *(
@@ -22,6 +23,7 @@ COLUMNS = (
         "type",
         "gain_unit",
         "ti_unit",
+        "pv_unit",
         "form",
         "kp",
         "ti",
@@ -72,14 +74,8 @@ def _source(rows: Sequence[dict[str, Any]]) -> str:
 
 
 def _units(row: dict[str, Any]) -> str:
-    gain = {
-        "percent": "gain in %/%",
-        "engineering": "gain in engineering units",
-        "band": "proportional band in %",
-    }
-    return (
-        f"{row['form'] or 'ideal'}, {gain.get(row['gain_unit'] or 'percent')}, Ti in {row['ti_unit'] or 's'}"
-    )
+    gain = gain_unit(row["gain_unit"], row["pv_unit"])
+    return f"{row['form'] or 'ideal'} form, Kp in {gain}, Ti in {row['ti_unit'] or 's'}"
 
 
 def cases(

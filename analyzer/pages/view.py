@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from analyzer.pages.reading import Thinned, read_nights, read_trends
-from analyzer.pages.words import setting
 from analyzer.store import Store
+from analyzer.units import row_settings
 from reports.names import slug
 from reports.pages import Cell
 
@@ -27,7 +27,7 @@ COLUMNS = (
         "period_s",
     ),
     *("source_loop", "average_absolute_error_pct", "valve_travel_pct_per_h", "variability_pct", "kp", "ti"),
-    *("kp_new", "ti_new", "action", "reason"),
+    *("kp_new", "ti_new", "action", "reason", "form", "gain_unit", "ti_unit", "pv_unit"),
 )
 
 
@@ -84,4 +84,4 @@ def proposal(row: Row) -> str:
     """The action, with the settings to type in where there are any."""
     if row["kp_new"] is None and row["ti_new"] is None:
         return row["action"] or ""
-    return f"{row['action']}: Kp {setting(row['kp_new'])}, Ti {setting(row['ti_new'])}"
+    return f"{row['action']}: {row_settings(row, 'kp_new', 'ti_new')}"

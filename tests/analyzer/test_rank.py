@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import re
 import math
 import subprocess
 import sys
@@ -138,9 +139,10 @@ def test_ranking_imports_nothing_heavy(small, heavy):
 def test_csv_is_the_contract(large):
     """All loops with the contract's columns in their order, empty where not assessed."""
     found = list(csv.reader(io.StringIO(asked(large, "--format", "csv").stdout)))
-    assert found[0] == list(CONTRACT)
+    assert found[0][: len(CONTRACT)] == list(CONTRACT)
+    assert {"gain_unit", "ti_unit", "form", "pv_unit"} <= set(found[0])
     assert len(found) == LOOPS + 1
-    assert {len(row) for row in found} == {len(CONTRACT)}
+    assert {len(row) for row in found} == {len(found[0])}
     lost = [row for row in found[1:] if row[2] == "not assessed"]
     assert len(lost) == LOOPS // 10
     assert {tuple(row[3:9]) for row in lost} == {("",) * 6}
@@ -195,7 +197,7 @@ def test_formats_tell_the_same(small):
 def test_json_has_numbers_and_null(small):
     """JSON has the contract's keys, numbers as numbers and null where not assessed."""
     found = json.loads(asked(small, "--format", "json").stdout)
-    assert list(found[0]) == list(CONTRACT)
+    assert list(found[0])[: len(CONTRACT)] == list(CONTRACT)
     assert isinstance(found[0]["period_s"], float)
     assert found[-1]["period_s"] is None
 
@@ -246,3 +248,41 @@ def test_latest_night_is_the_default(small, tmp_path):
     assert Store(tmp_path).nights() == ["2026-03-01", "2026-03-02"]
     assert "NEW" in asked(tmp_path).stdout
     assert "OLD" in asked(tmp_path, "--night", "2026-03-01").stdout
+
+
+def test_csv_starts_no_formula(tmp_path):
+    """Tags and texts that begin as a formula get an apostrophe in CSV; numbers below zero stay numbers."""
+    for k, tag in enumerate(("=HYPERLINK(1)", "+FIC1", "-FIC2", "@FIC3")):
+        odd = {**rows(1)[0], "loop": tag, "reason": tag, "gain": -4.5}
+        store = tmp_path / str(k)
+        write_table(rows_table([odd], ALL_COLUMNS, TEXT_COLUMNS), store / "nights" / f"{NIGHT}.parquet")
+        (row,) = csv.DictReader(io.StringIO(asked(store, "--format", "csv").stdout))
+        assert (row["loop"], row["reason"], row["gain"]) == (f"'{tag}", f"'{tag}", "-4.5")
+
+
+def test_markdown_makes_no_link_and_no_picture(tmp_path):
+    """Links, pictures, addresses and calls of people in tags and texts stay text in the Markdown table."""
+    text = "![x](http://a.example/b) [y](javascript:z) @all www.a.example"
+    odd = {**rows(1)[0], "reason": text}
+    write_table(rows_table([odd], ALL_COLUMNS, TEXT_COLUMNS), tmp_path / "nights" / f"{NIGHT}.parquet")
+    shown = asked(tmp_path, "--format", "markdown").stdout.splitlines()[-1]
+    assert not any(live in shown for live in ("http:", "@all", "www.a"))
+    assert re.search(r"(?<!\\)[!\[\]]", shown) is None
+
+
+def test_settings_stand_with_their_units(tmp_path):
+    """Kp and Ti, old and new, have the units of loops.csv beside them in table and Markdown."""
+    odd = {
+        **rows(1)[0],
+        "kp": 125.0,
+        "kp_new": 96.2,
+        "ti": 0.8,
+        "ti_new": 7.67,
+        "gain_unit": "band",
+        "ti_unit": "min",
+    }
+    write_table(rows_table([odd], ALL_COLUMNS, TEXT_COLUMNS), tmp_path / "nights" / f"{NIGHT}.parquet")
+    for form in ("table", "markdown"):
+        shown = asked(tmp_path, "--format", form).stdout
+        assert "% band" in shown
+        assert "7.67 min" in shown
