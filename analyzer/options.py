@@ -61,6 +61,10 @@ def export_options(command: Callable[..., Any]) -> Callable[..., Any]:
         click.option("--encoding", help="Encoding of text exports. Default: detected."),
         click.option("--day-first/--month-first", default=None, help="Order in dates such as 03/04/2026."),
         click.option("--date-format", help="Format of the stamps, e.g. '%d-%b-%y %H:%M:%S'."),
+        click.option("--time-column", help="Name of the column of stamps. Default: detected."),
+        click.option(
+            "--quality-column", help="Name of a long export's column of quality codes. Default: detected."
+        ),
         click.option(
             "--good-quality", multiple=True, help="Quality code or text that means good; may be repeated."
         ),
@@ -75,11 +79,19 @@ def opened(
 ) -> tuple[Export, tuple[LoopSpec, ...], tuple[str, ...]]:
     """The export, its loops with their tags, and what there is to say about them."""
     from analyzer.history.export import ReadOptions, open_export
+    from analyzer.history.loops_csv import unknown_columns
     from analyzer.tags import find_loops, match, read_loops
 
     reading["good_quality"] = tuple(reading.get("good_quality") or ()) or None
     source = open_export(list(export), ReadOptions(**reading))
     if loops is None:
         return source, find_loops(source.tags), ()
-    specs, notes = match(read_loops(loops), source.tags)
+    stated = read_loops(loops)
+    specs, notes = match(stated, source.tags)
+    own = unknown_columns(stated)
+    if own:
+        notes = (
+            f"{loops}: columns {', '.join(own)} mean nothing here and are kept as the plant's own",
+            *notes,
+        )
     return source, specs, notes

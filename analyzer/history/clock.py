@@ -30,8 +30,19 @@ class Scale:
     local: bool = False
 
 
+SINCE_START_MOST = 1e8
+"""Largest number of a clock that counts from the start of the export; above it are the seconds since 1970."""
+EXCEL_MOST_SPAN = 4000.0
+"""Days that stamps in Excel days may span [d]; ours: numbers that rise further count seconds."""
+SINCE_START = {
+    "ms": Scale("milliseconds since the start", 0, SINCE_START_MOST, 1e-3),
+    "s": Scale("seconds since the start", 0, SINCE_START_MOST, 1.0),
+    "min": Scale("minutes since the start", 0, SINCE_START_MOST, 60.0),
+    "h": Scale("hours since the start", 0, SINCE_START_MOST, 3600.0),
+    "d": Scale("days since the start", 0, 2e4, 86400.0),
+}
+"""Clocks that count from the start, by the unit that the column's name states; seconds where it states none."""
 SCALES = (
-    Scale("seconds since the start", 0, 2e4, 1.0),
     Scale("Excel days", 2e4, 8e4, 86400.0, EXCEL_ORIGIN_S, local=True),
     Scale("seconds since 1970", 1e8, 4e9, 1.0),
     Scale("millions of Excel days", 2e10, 8e10, 0.0864, EXCEL_ORIGIN_S, local=True),
@@ -108,13 +119,25 @@ class Clock:
         return stamps.seconds(parts, bool(self.day_first)), not parts.zoned
 
 
-def scale_of(column: pa.Array) -> Scale | None:
-    """How the numbers of a column mean a time, by their size; None where they mean none."""
+def scale_of(column: pa.Array, unit: str = "") -> Scale | None:
+    """How the numbers of a column mean a time, by their size and a unit in its name; None where they mean none."""
     number = pc.cast(column, pa.float64(), safe=False).drop_null().to_numpy()
+    number = number[np.isfinite(number)]
     if len(number) == 0:
         return None
-    middle = float(np.median(number))
-    return next((scale for scale in SCALES if scale.low <= middle < scale.high), None)
+    middle, reach = float(np.median(number)), float(np.ptp(number))
+    found = next((scale for scale in SCALES if scale.low <= middle < scale.high), None)
+    is_excel = found is not None and found.name == "Excel days"
+    if found is not None and not (is_excel and (unit in ("ms", "s", "min", "h") or reach > EXCEL_MOST_SPAN)):
+        return found
+    since = SINCE_START[unit or "s"]
+    return since if since.low <= middle < since.high else None
+
+
+def is_count(column: pa.Array) -> bool:
+    """Whether numbers merely count the rows: whole, and each one more than the one before."""
+    number = pc.cast(column, pa.float64(), safe=False).to_numpy(zero_copy_only=False)
+    return number.size > 1 and bool((np.diff(number) == 1).all()) and number[0] in (0.0, 1.0)
 
 
 def is_text(kind: pa.DataType) -> bool:

@@ -16,10 +16,27 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
-from analyzer.history.names import plain
+from analyzer.history.names import FLAG_NAMES, plain
 
 GOOD_TEXTS = frozenset(
-    {"good", "g", "ok", "valid", "true", "gut", "normal", "good quality", "non-cascade", "cascade"}
+    {
+        *("good", "g", "ok", "valid", "true", "normal", "good quality", "non-cascade", "cascade", "y", "yes"),
+        *(
+            "gut",
+            "gültig",
+            "ja",
+            "bon",
+            "bonne",
+            "valide",
+            "vrai",
+            "oui",
+            "bueno",
+            "buena",
+            "hyvä",
+            "god",
+            "goed",
+        ),
+    }
 )
 DA_GOOD, UA_UNCERTAIN, CONFIDENCE_GOOD, CONFIDENCE_FULL = 192, 0x40000000, 50, 100
 INTERPOLATED = 0x00020000  # flag of OPC historical access beside the DA code in the low byte
@@ -33,6 +50,7 @@ class Scheme(StrEnum):
     DA = "OPC DA codes, 192 and above good"
     UA = "codes with 0 good"
     CONFIDENCE = "confidence in percent, good from 50"
+    FLAG = "flags, 1 good and 0 bad"
 
 
 def scheme_of(name: str, codes: pa.Array) -> Scheme:
@@ -43,6 +61,8 @@ def scheme_of(name: str, codes: pa.Array) -> Scheme:
         return Scheme.TEXT
     if "confidence" in plain(name):
         return Scheme.CONFIDENCE
+    if plain(name).endswith(FLAG_NAMES) and set(known.tolist()) <= {0, 1}:
+        return Scheme.FLAG
     small = known[(known >= 0) & (known < UA_UNCERTAIN)]
     if (known < 0).any() or (known >= UA_UNCERTAIN).any():
         return Scheme.UA
@@ -97,6 +117,8 @@ def _good(kinds: pa.Array, scheme: Scheme) -> NDArray[np.bool_]:
     code = np.nan_to_num(number, nan=-1).astype(np.int64)
     if scheme is Scheme.CONFIDENCE:
         return code >= CONFIDENCE_GOOD
+    if scheme is Scheme.FLAG:
+        return code == 1
     if scheme is Scheme.DA:
         return (code >= 0) & ((code & 0xC0) == DA_GOOD)
     return np.isfinite(number) & ((code & 0xFFFFFFFF) < UA_UNCERTAIN) & ~((code > 0) & (code < 0x100))

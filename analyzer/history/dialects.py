@@ -10,12 +10,13 @@ from collections.abc import Callable
 
 from analyzer.history.long import open_long
 from analyzer.history.options import ReadOptions
+from analyzer.history.pairs import open_pairs
 from analyzer.history.table import Source, Table
 from analyzer.history.wide import open_wide
 
 Dialect = Callable[[Table, ReadOptions], Source | None]
 
-DIALECTS: tuple[Dialect, ...] = (open_long, open_wide)
+DIALECTS: tuple[Dialect, ...] = (open_long, open_pairs, open_wide)
 
 
 def source_of(table: Table, options: ReadOptions) -> Source:

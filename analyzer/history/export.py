@@ -42,11 +42,14 @@ class Export:
         One a file.
     tags : tuple of str
         All tags, in the order in which they are met.
+    skipped : tuple of str
+        Files of a folder that could not be read, each with the reason.
     """
 
     sources: tuple[Source, ...]
     tags: tuple[str, ...]
     _homes: dict[str, tuple[int, ...]] = field(repr=False, compare=False)
+    skipped: tuple[str, ...] = ()
     _met: dict[str, Counter[str]] = field(default_factory=dict, repr=False, compare=False)
     _spans: dict[int, MainSpan] = field(default_factory=dict, repr=False, compare=False)
 
@@ -91,7 +94,7 @@ class Export:
     @property
     def file_notes(self) -> tuple[str, ...]:
         """What was detected of every file, and stamps that were set aside."""
-        return (*self._file_notes(), *self._stray_notes())
+        return (*self.skipped, *self._file_notes(), *self._stray_notes())
 
     def met(self, tags: Iterable[str]) -> Counter[str]:
         """How often something worth telling was met in the samples of some tags that were read."""
@@ -141,11 +144,29 @@ def open_export(paths: Sequence[Path], options: ReadOptions | None = None) -> Ex
     options = options or ReadOptions()
     if options.timezone is not None:
         check_zone(options.timezone)
-    sources = agreed([_opened(path, options) for path in export_files(paths)])
+    opened, skipped = _readable(paths, options)
+    sources = agreed(opened)
     homes: dict[str, tuple[int, ...]] = {}
     for i, source in enumerate(sources):
         homes.update({tag: (*homes.get(tag, ()), i) for tag in source.tags})
-    return Export(sources, tuple(homes), homes)
+    return Export(sources, tuple(homes), homes, skipped=tuple(skipped))
+
+
+def _readable(paths: Sequence[Path], options: ReadOptions) -> tuple[list[Source], list[str]]:
+    """The files that can be read, and why others of a folder cannot: those cost their own loops and no more."""
+    sources: list[Source] = []
+    skipped: list[InputError] = []
+    named = {Path(path) for path in paths}
+    for path in export_files(paths):
+        try:
+            sources.append(_opened(path, options))
+        except InputError as error:
+            if path in named:
+                raise
+            skipped.append(error)
+    if not sources:
+        raise skipped[0]
+    return sources, [f"left out: {error}" for error in skipped]
 
 
 def counted(met: Counter[str]) -> list[str]:

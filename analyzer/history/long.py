@@ -21,6 +21,7 @@ from analyzer.history.stray import MainSpan, main_span
 from analyzer.history.table import Table
 from analyzer.history.time_columns import find_clock
 from analyzer.history.values import values
+from identification.errors import InputError
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +79,7 @@ class LongSource:
         if len(data) > 1:
             rejected, counts = not_good(data[1], self.scheme, self.good_quality)
             bad, found = bad | rejected, found + counts
-        return Raw(stamp_s, read.value, bad, read.text, found + read.found)
+        return Raw(stamp_s, read.value, bad, read.text, found + read.found, read.unread, read.example)
 
 
 def open_long(table: Table, options: ReadOptions) -> LongSource | None:
@@ -89,11 +90,30 @@ def open_long(table: Table, options: ReadOptions) -> LongSource | None:
         return None
     clock = find_clock(table, options)
     tags = tuple(str(name) for name in pc.unique(table.read([tag])[0]).to_pylist() if name not in (None, ""))
-    quality = first_named(table.names, QUALITY_NAMES)
+    quality = _quality_column(table, options)
     if quality is None:
         return LongSource(table, clock, tags, tag, value)
     scheme = scheme_of(table.names[quality], pc.unique(table.read([quality])[0]))
     return LongSource(table, clock, tags, tag, value, quality, scheme, options.good_quality)
+
+
+def _quality_column(table: Table, options: ReadOptions) -> int | None:
+    """The column of quality codes: the stated one, else by its name.
+
+    Raises
+    ------
+    InputError
+        There is no column of the stated name.
+    """
+    if options.quality_column is None:
+        return first_named(table.names, QUALITY_NAMES)
+    if options.quality_column not in table.names:
+        raise InputError(
+            f"{table.path}: no column '{options.quality_column}' among {', '.join(table.names[:8])}",
+            "the name of the quality column as it stands in the header",
+            "correct --quality-column",
+        )
+    return table.names.index(options.quality_column)
 
 
 def _value_column(table: Table) -> int | None:

@@ -27,6 +27,24 @@ CHOICES: Mapping[str, tuple[str, ...]] = {
 COLUMNS = (*TEXTS, *ROLES, *NUMBERS, *CHOICES)
 OWN_COLUMNS = ("op_unit", "sp_unit")  # near to a known name, and yet none misspelt
 MISSPELT = 0.75
+OTHER_NAMES: Mapping[str, str] = {
+    **dict.fromkeys(
+        ("gain", "kc", "k_p", "p_gain", "proportional", "proportional_gain", "controller_gain"), "kp"
+    ),
+    **dict.fromkeys(("band", "pb", "xp", "proportional_band"), "kp' with gain_unit 'band"),
+    **dict.fromkeys(
+        ("reset", "integral", "tn", "t_i", "integral_time", "reset_time", "repeats", "reset_rate"), "ti"
+    ),
+    **dict.fromkeys(("rate", "derivative", "tv", "t_d", "derivative_time"), "td"),
+    **dict.fromkeys(("setpoint", "sp_tag"), "sp"),
+    **dict.fromkeys(("pv_tag", "measurement"), "pv"),
+    **dict.fromkeys(("op_tag", "output", "out", "mv", "co"), "op"),
+    **dict.fromkeys(("pv_min", "range_lo", "range_min", "lrv", "pv_low"), "pv_lo"),
+    **dict.fromkeys(("pv_max", "range_hi", "range_max", "urv", "pv_high"), "pv_hi"),
+    **dict.fromkeys(("scan", "scan_time", "scan_rate", "execution_s"), "scan_s"),
+    **dict.fromkeys(("eu", "unit", "units", "engineering_unit"), "pv_unit"),
+}
+"""What other systems call a column; such a column left aside would be a setting lost without a word."""
 DEFAULTS: Mapping[str, str] = {
     "form": "form ideal",
     "gain_unit": "gain in percent",
@@ -103,6 +121,11 @@ def read_loops(path: Path) -> tuple[LoopSpec, ...]:
     return specs
 
 
+def unknown_columns(specs: Sequence[LoopSpec]) -> tuple[str, ...]:
+    """Columns of loops.csv that mean nothing here and are kept as the plant's own."""
+    return tuple(dict.fromkeys(name for spec in specs for name in spec.extra if name not in OWN_COLUMNS))
+
+
 def _table(path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
     """Header in lower case, and the filled rows with their numbers as an editor counts them."""
     try:
@@ -127,6 +150,12 @@ def _check_header(path: Path, header: Sequence[str]) -> None:
         if near and near[0] not in header:
             raise InputError(
                 f"{path}: column '{name}'", f"'{near[0]}'", f"did you mean '{near[0]}'? Rename it"
+            )
+    for name in header if "loop" in header else ():
+        meant = OTHER_NAMES.get(name.replace(" ", "_"), "")
+        if meant and meant.split("'")[0] not in header:
+            raise InputError(
+                f"{path}: column '{name}'", f"'{meant}'", f"rename it to '{meant}', or remove it"
             )
     if "loop" not in header:
         raise InputError(

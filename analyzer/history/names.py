@@ -24,15 +24,65 @@ VALUE_NAMES = (
 )  # fmt: skip
 QUALITY_NAMES = (
     "opcquality", "qualitydetail", "iptrendqstatus", "qstatus", "quality", "confidence", "qualitycode",
-    "statuscode", "status", "qual",
+    "statuscode", "status", "qual", "dataquality", "opcquality", "validity", "isgood", "good", "valid", "isvalid",
+    "samplequality", "valuequality", "valuestatus", "datastatus", "pointstatus", "goodness", "opcstatus",
+    "qualität", "qualitaet", "datenqualität", "status", "güte", "qualité", "qualite", "calidad", "qualità",
+    "qualita", "kvalitet", "laatu", "kwaliteit", "jakość", "qualidade", "gültig", "gueltig",
 )  # fmt: skip
-QUALITY_ENDING = re.compile(r"^(?P<tag>.+?)[ ._:/-]?\(?(?:quality|qstatus|status|confidence|qual)\)?$", re.I)
+FLAG_NAMES = ("isgood", "good", "valid", "isvalid", "validity", "gültig", "gueltig")
+"""Quality columns in which 1 or true says that the sample is good."""
+_QUALITIES = (
+    r"data ?quality|quality(?: ?code| ?detail)?|qstatus|status|confidence|qual|validity|is ?good|is ?valid|valid"
+    r"|qualität|qualitaet|qualité|calidad"
+)
+QUALITY_ENDING = re.compile(rf"^(?P<tag>.+?)[ ._:/-]?\(?(?:{_QUALITIES})\)?$", re.IGNORECASE)
+UNIT_IN_NAME = re.compile(
+    r"[\s_(\[.,-]+(?P<unit>ms|msec|s|sec|secs|seconds?|sek|sekunden|min|mins|minutes?|minuten|h|hr|hrs|hours?|std"
+    r"|stunden|d|days?|tage)[)\].]*$",
+    re.IGNORECASE,
+)
+UNITS = {
+    "ms": "ms",
+    "s": "s",
+    "se": "s",
+    "mi": "min",
+    "h": "h",
+    "st": "h",
+    "d": "d",
+    "ta": "d",
+    "ho": "h",
+    "hr": "h",
+}
 BARE_ENDINGS = frozenset({"pv", "sp", "op", "mv", "out", "mode", "pos", "position", "sv", "meas", "spt"})
 
 
 def plain(name: str) -> str:
     """Name without case, units in brackets, blanks and underscores: ' Time_Stamp (UTC)' is 'timestamp'."""
     return re.sub(r"\(.*?\)|\[.*?\]|[\s_\-\"']", "", name).lower()
+
+
+def time_unit(name: str) -> str:
+    """The unit that a time column's name states, as in 'Time (min)' or 't_h': ms, s, min, h or d; '' where none."""
+    found = UNIT_IN_NAME.search(name)
+    if found is None:
+        return ""
+    unit = found["unit"].lower()
+    return UNITS.get("ms" if unit.startswith("ms") else unit[:2], UNITS.get(unit[:1], ""))
+
+
+def without_unit(name: str) -> str:
+    """A time column's name without the unit that stands behind it."""
+    return UNIT_IN_NAME.sub("", name)
+
+
+def is_stamp(name: str) -> bool:
+    """Whether a column is named as stamps are, with or without a unit behind the name."""
+    return plain(name) in STAMP_NAMES or plain(without_unit(name)) in (
+        *STAMP_NAMES,
+        "t",
+        "elapsed",
+        "elapsedtime",
+    )
 
 
 def first_named(names: Sequence[str], wanted: Iterable[str]) -> int | None:

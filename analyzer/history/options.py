@@ -19,6 +19,8 @@ class ReadOptions:
         Format of the stamps in the notation of `datetime.strptime`.
     timezone : str or None
         IANA name of the zone of stamps that state none; None takes them as UTC.
+    time_column, quality_column : str or None
+        Names of the columns of stamps and, in long tables, of quality codes as they stand in the header.
     good_quality : tuple of str or None
         Quality codes or texts that count as good, in place of the detected scheme.
     """
@@ -30,3 +32,5 @@ class ReadOptions:
     date_format: str | None = None
     timezone: str | None = None
     good_quality: tuple[str, ...] | None = None
+    time_column: str | None = None
+    quality_column: str | None = None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +28,8 @@ class Raw:
         Time stamps [s since 1970-01-01 UTC]; NaN where unreadable.
     value, bad, text
         As in `Series`.
+    unread : int, example : str
+        As in `Series`.
     found : Counter of str
         How often something worth telling was met; each key completes the sentence "12 ...".
     """
@@ -37,6 +39,8 @@ class Raw:
     bad: NDArray[np.bool_]
     text: NDArray[np.object_] | None = None
     found: Counter[str] = field(default_factory=Counter)
+    unread: int = 0
+    example: str = ""
 
 
 def settle(pieces: Sequence[Raw]) -> tuple[Series, Counter[str]]:
@@ -60,16 +64,25 @@ def settle(pieces: Sequence[Raw]) -> tuple[Series, Counter[str]]:
 
 
 def _rises(stamp_s: NDArray[np.float64]) -> bool:
-    return bool((np.diff(stamp_s) > 0).all() and np.isfinite(stamp_s[:1]).all())
+    return bool(
+        (np.diff(stamp_s) > 0).all() and np.isfinite(stamp_s[:1]).all() and np.isfinite(stamp_s[-1:]).all()
+    )
 
 
 def _series(raw: Raw) -> Series:
-    return Series(raw.stamp_s, raw.value, raw.bad, raw.text)
+    return Series(raw.stamp_s, raw.value, raw.bad, raw.text, raw.unread, raw.example)
 
 
 def _taken(raw: Raw, index: NDArray[np.generic] | slice) -> Raw:
     text = None if raw.text is None else raw.text[index]
-    return Raw(raw.stamp_s[index], raw.value[index], raw.bad[index], text)
+    return replace(
+        raw,
+        stamp_s=raw.stamp_s[index],
+        value=raw.value[index],
+        bad=raw.bad[index],
+        text=text,
+        found=Counter(),
+    )
 
 
 def _with_stamps(raw: Raw, found: Counter[str]) -> Raw:
@@ -97,6 +110,8 @@ def _joined(pieces: Sequence[Raw]) -> Raw:
         np.concatenate([piece.value for piece in pieces]),
         np.concatenate([piece.bad for piece in pieces]),
         texts,
+        unread=sum(piece.unread for piece in pieces),
+        example=next((piece.example for piece in pieces if piece.example), ""),
     )
 
 

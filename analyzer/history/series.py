@@ -23,9 +23,15 @@ class Series:
         where there is no text.
     text : ndarray of str or None
         The texts, shape (n,), where the tag is a text tag (controller modes); else None.
+    unread : int
+        Values in the export that look like numbers and could not be understood; bad here.
+    example : str
+        One of them.
     """
 
     stamp_s: NDArray[np.float64]
     value: NDArray[np.float64]
     bad: NDArray[np.bool_]
     text: NDArray[np.object_] | None = None
+    unread: int = 0
+    example: str = ""

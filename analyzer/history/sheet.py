@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+import re
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,10 @@ from identification.errors import InputError
 WHOLE_FILE_BYTES = 64_000_000  # files below are read at once and kept for the next loop's read
 KEPT_READS = 2
 HEAD_ROWS = 1000
+BLOCK_BYTES = 1 << 24
+WHOLE_SHARE = 0.95
+"""Share of a file's lines that must come back as rows [-]; where fewer do, an open quote has swallowed the rest."""
+LATE_TEXT = re.compile(r"In CSV column #(?P<column>\d+): CSV conversion error")
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,7 +29,8 @@ class Sheet:
     """A file of delimited text and how it is written; see `table.Table`.
 
     `skip_rows` is the number of lines up to and with the header, `bytes` the size of the file. With
-    `as_written` all columns stay text, for dates of a stated format that may look like ISO dates and be none.
+    `as_written` all columns stay text, for dates of a stated format that may look like ISO dates and be none; with
+    `unquoted` quotes are no quotes.
     """
 
     path: Path
@@ -36,6 +42,7 @@ class Sheet:
     skip_rows: int
     names: tuple[str, ...]
     as_written: bool = False
+    unquoted: bool = False
     types: tuple[pa.DataType, ...] = ()
     found: tuple[str, ...] = ()
 
@@ -47,10 +54,13 @@ class Sheet:
     @property
     def notes(self) -> tuple[str, ...]:
         """How the file is written, and the lines of it that do not fit its header."""
-        left_out = _loaded(self, self._wanted([0]))[1]
-        if left_out == 0:
-            return self.found
-        return (*self.found, f"{left_out} lines do not have as many columns as the header and are left out")
+        loaded = _loaded(self, self._wanted([0]))
+        told = []
+        if loaded.unquoted:
+            told.append("a quote is not closed: quotes are taken as they stand")
+        if loaded.left_out:
+            told.append(f"{loaded.left_out} lines do not have as many columns as the header and are left out")
+        return (*self.found, *told)
 
     def head(self, columns: Sequence[int]) -> list[pa.Array]:
         """First rows of some columns."""
@@ -61,7 +71,7 @@ class Sheet:
     def read(self, columns: Sequence[int], where: tuple[int, Sequence[str]] | None = None) -> list[pa.Array]:
         """Whole columns, or the rows where a column holds one of some texts."""
         wanted = [*columns] if where is None else [*columns, where[0]]
-        loaded = _loaded(self, self._wanted(wanted))[0]
+        loaded = _loaded(self, self._wanted(wanted)).columns
         arrays = [loaded[i] for i in wanted]
         if where is None:
             return arrays
@@ -72,17 +82,56 @@ class Sheet:
         return tuple(range(len(self.names))) if self.bytes < WHOLE_FILE_BYTES else tuple(sorted(set(columns)))
 
 
+@dataclass(frozen=True, slots=True)
+class Loaded:
+    """Columns by position, the number of lines left out, and whether quotes were taken as they stand."""
+
+    columns: dict[int, pa.Array]
+    left_out: int
+    unquoted: bool = False
+
+
 @lru_cache(maxsize=KEPT_READS)
-def _loaded(sheet: Sheet, columns: tuple[int, ...]) -> tuple[dict[int, pa.Array], int]:
-    """Columns by position, and the number of lines left out."""
+def _loaded(sheet: Sheet, columns: tuple[int, ...]) -> Loaded:
+    """Some columns of the whole file."""
     try:
-        return _parsed(sheet, columns, sheet.encoding)
-    except pa.ArrowInvalid as error:
-        if "UTF8" not in str(error):
-            raise _unreadable(sheet.path, error) from error
-        return _parsed(sheet, columns, "cp1252")
-    except (UnicodeError, OSError) as error:
+        loaded = _as_far_as_numbers_go(sheet, columns)
+        lines = _lines(sheet.path, sheet.changed_ns) - sheet.skip_rows
+        rows = len(loaded.columns[columns[0]]) + loaded.left_out
+        if rows >= WHOLE_SHARE * lines - 1 or sheet.unquoted:
+            return loaded
+        again = _as_far_as_numbers_go(replace(sheet, unquoted=True), columns)
+        more = len(again.columns[columns[0]]) > rows
+        return replace(again, unquoted=True) if more else loaded
+    except (UnicodeError, OSError, pa.ArrowInvalid) as error:
         raise _unreadable(sheet.path, error) from error
+
+
+def _as_far_as_numbers_go(sheet: Sheet, columns: tuple[int, ...]) -> Loaded:
+    """Columns as numbers, or as text where the first block holds only numbers and a later one does not."""
+    encoding, texts = sheet.encoding, set[int]()
+    while True:
+        try:
+            return _parsed(sheet, columns, encoding, texts)
+        except pa.ArrowInvalid as error:
+            late = LATE_TEXT.search(str(error))
+            if "UTF8" in str(error) and encoding != "cp1252":
+                encoding = "cp1252"
+            elif late is not None and int(late["column"]) not in texts:
+                texts.add(int(late["column"]))
+            else:
+                raise
+
+
+@lru_cache(maxsize=KEPT_READS)
+def _lines(path: Path, changed_ns: int) -> int:
+    """Lines of a file that hold anything, within one."""
+    count = 0
+    with path.open("rb") as file:
+        while block := file.read(BLOCK_BYTES):
+            count += block.count(b"\n") or block.count(b"\r")
+            count -= block.count(b"\n\n") + block.count(b"\n\r\n")
+    return count
 
 
 def _unreadable(path: Path, error: Exception) -> InputError:
@@ -93,37 +142,49 @@ def _unreadable(path: Path, error: Exception) -> InputError:
     )
 
 
-def _parsed(sheet: Sheet, columns: tuple[int, ...], encoding: str) -> tuple[dict[int, pa.Array], int]:
+def _parsed(sheet: Sheet, columns: tuple[int, ...], encoding: str, texts: Collection[int]) -> Loaded:
     left_out: list[int] = []
-    table = csv.read_csv(sheet.path, **_how(sheet, columns, encoding, left_out))
-    return {i: _tidy(table.column(str(i))) for i in columns}, len(left_out)
+    table = csv.read_csv(sheet.path, **_how(sheet, columns, encoding, left_out, texts))
+    return Loaded({i: _tidy(table.column(str(i)), sheet.unquoted) for i in columns}, len(left_out))
 
 
 @lru_cache(maxsize=KEPT_READS)
 def _first_block(sheet: Sheet) -> dict[int, pa.Array]:
     """First rows of all columns, without reading further."""
     columns = tuple(range(len(sheet.names)))
-    with csv.open_csv(sheet.path, **_how(sheet, columns, sheet.encoding, [])) as reader:
+    with csv.open_csv(sheet.path, **_how(sheet, columns, sheet.encoding, [], ())) as reader:
         batch = reader.read_next_batch().slice(0, HEAD_ROWS)
-    return {i: _tidy(pa.chunked_array([batch.column(i)])) for i in columns}
+    return {i: _tidy(pa.chunked_array([batch.column(i)]), sheet.unquoted) for i in columns}
 
 
-def _how(sheet: Sheet, columns: tuple[int, ...], encoding: str, left_out: list[int]) -> dict[str, Any]:
-    """Options of the parser; it adds to `left_out` for each line that does not fit."""
+def _how(
+    sheet: Sheet, columns: tuple[int, ...], encoding: str, left_out: list[int], texts: Collection[int]
+) -> dict[str, Any]:
+    """Options of the parser; it adds to `left_out` for each line that does not fit.
+
+    One thread: the parser calls back for such lines, and from threads of its own that ended processes now and then.
+    """
     names = [str(i) for i in range(len(sheet.names))]
 
     def leave_out(row: csv.InvalidRow) -> str:
         left_out.append(1)
         return "skip"
 
-    kinds = dict.fromkeys(names, pa.string()) if sheet.as_written else None
+    as_text = names if sheet.as_written else [names[i] for i in texts]
     return {
         "read_options": csv.ReadOptions(
-            skip_rows=sheet.skip_rows, column_names=names, encoding=encoding.replace("utf-8-sig", "utf-8")
+            skip_rows=sheet.skip_rows,
+            column_names=names,
+            encoding=encoding.replace("utf-8-sig", "utf-8"),
+            use_threads=False,
         ),
-        "parse_options": csv.ParseOptions(delimiter=sheet.delimiter, invalid_row_handler=leave_out),
+        "parse_options": csv.ParseOptions(
+            delimiter=sheet.delimiter,
+            quote_char=False if sheet.unquoted else '"',
+            invalid_row_handler=leave_out,
+        ),
         "convert_options": csv.ConvertOptions(
-            column_types=kinds,
+            column_types=dict.fromkeys(as_text, pa.string()) if as_text else None,
             include_columns=[names[i] for i in columns],
             null_values=[""],
             true_values=[],
@@ -134,8 +195,10 @@ def _how(sheet: Sheet, columns: tuple[int, ...], encoding: str, left_out: list[i
     }
 
 
-def _tidy(column: pa.ChunkedArray) -> pa.Array:
-    """One array; texts trimmed."""
+def _tidy(column: pa.ChunkedArray, unquoted: bool) -> pa.Array:
+    """One array; texts trimmed, of quotes too where those were taken as they stand."""
     chunks = column.combine_chunks()
     array = chunks.chunk(0) if isinstance(chunks, pa.ChunkedArray) else chunks
-    return pc.utf8_trim_whitespace(array) if pa.types.is_string(array.type) else array
+    if not pa.types.is_string(array.type):
+        return array
+    return pc.utf8_trim(array, ' \t"') if unquoted else pc.utf8_trim_whitespace(array)

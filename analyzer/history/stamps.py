@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 PATTERN = (
     r"^\s*(?:(?:Mon|Tue|Wed|Thu|Fri|Sat|Sun)[a-z]*\.?,?\s+)?"
-    r"(?P<a>\d{1,4}|[^\W\d]{3,9})\.?[-/. ]\s*(?P<b>\d{1,2}|[^\W\d]{3,9})\.?[-/. ,]\s*(?P<c>\d{4}|\d{2}|\d)"
+    r"(?P<a>\d{1,4}|\p{L}{3,10})\.?[-/. ]\s*(?P<b>\d{1,2}|\p{L}{3,10})\.?[-/. ,]\s*(?P<c>\d{4}|\d{2}|\d)"
     r"(?:[T ,]+(?P<h>\d{1,2}):(?P<m>\d\d)(?::(?P<s>\d\d)(?:[.,:](?P<f>\d+))?)?"
     r"\s*(?P<p>[AaPp])?(?:\.?[Mm]\.?)?)?"
     r"\s*(?P<z>Z|UTC|GMT|[+-]\d\d(?::?\d\d)?)?\s*$"
@@ -28,9 +28,16 @@ MONTHS = pa.array(  # three letters each: English, German, French, Spanish
 CENTURY_TURN = 70
 
 
+YMD, DMY, MDY, OPEN = 0, 1, 2, 3
+"""Orders in which a date can be written; OPEN where two numbers below 13 leave day and month open."""
+
+
 @dataclass(frozen=True, slots=True)
 class Fields:
-    """Parts of written stamps, arrays of shape (n,); `a`, `b`, `c` the date's parts in the order written."""
+    """Parts of written stamps, arrays of shape (n,); `a`, `b`, `c` the date's parts in the order written.
+
+    `order` is each stamp's own: one file may hold stamps of several writings.
+    """
 
     a: NDArray[np.int64]
     b: NDArray[np.int64]
@@ -39,14 +46,20 @@ class Fields:
     offset_s: NDArray[np.float64]
     readable: NDArray[np.bool_]
     zoned: bool
-    order: str  # "ymd", "dmy", "mdy" where the writing tells, else "?"
+    order: NDArray[np.int8]
+
+    @property
+    def is_open(self) -> bool:
+        """Whether the writing leaves open which number is the day."""
+        return bool((self.readable & (self.order == OPEN)).any())
 
 
 def fields(texts: pa.Array) -> Fields | None:
     """Take written stamps apart; None where not one of them can be read."""
     parts = pc.extract_regex(texts, PATTERN)
-    if parts.null_count == len(parts):
-        parts = pc.extract_regex(pc.replace_substring_regex(texts, COMPACT, r"\1-\2-\3 \4:\5:\6"), PATTERN)
+    if parts.null_count > texts.null_count:
+        spaced = pc.replace_substring_regex(texts, COMPACT, r"\1-\2-\3 \4:\5:\6")
+        parts = pc.extract_regex(spaced, PATTERN)
     if parts.null_count == len(parts):
         return None
     part = {name: pc.fill_null(pc.struct_field(parts, name), "") for name in "abchmsfpz"}
@@ -64,9 +77,10 @@ def fields(texts: pa.Array) -> Fields | None:
 
 def seconds(parts: Fields, day_first: bool) -> NDArray[np.float64]:
     """Seconds since 1970-01-01 of the stamps, offsets removed; NaN where unreadable or no such date."""
-    order = parts.order if parts.order != "?" else ("dmy" if day_first else "mdy")
-    by_name = {"ymd": (parts.a, parts.b, parts.c), "dmy": (parts.c, parts.b, parts.a)}
-    year, month, day = by_name.get(order, (parts.c, parts.a, parts.b))
+    order = np.where(parts.order == OPEN, DMY if day_first else MDY, parts.order)
+    year = np.where(order == YMD, parts.a, parts.c)
+    month = np.where(order == MDY, parts.a, parts.b)
+    day = np.select([order == YMD, order == DMY], [parts.c, parts.a], parts.b)
     year = np.where(year < CENTURY_TURN, year + 2000, np.where(year < 100, year + 1900, year))
     valid = parts.readable & (month >= 1) & (month <= 12) & (day >= 1)
     first = ((year - 1970) * 12 + np.clip(month, 1, 12) - 1).astype("datetime64[M]")
@@ -77,20 +91,17 @@ def seconds(parts: Fields, day_first: bool) -> NDArray[np.float64]:
 
 def days_seen(parts: Fields) -> bool | None:
     """True where a first number above 12 shows day first, False where a second one does not, else None."""
-    if parts.order != "?":
-        return parts.order == "dmy"
-    first, second = (parts.a > 12).any(), (parts.b > 12).any()
+    either = parts.readable & (parts.order == OPEN)
+    first, second = (parts.a[either] > 12).any(), (parts.b[either] > 12).any()
     return None if first == second else bool(first)
 
 
-def _written_order(part: dict[str, pa.Array]) -> str:
-    sample = next(i for i, text in enumerate(part["a"].to_pylist()) if text)
-    a, b = part["a"][sample].as_py(), part["b"][sample].as_py()
-    if len(a) == 4 and a.isdigit():
-        return "ymd"
-    if not a.isdigit():
-        return "mdy"
-    return "?" if b.isdigit() else "dmy"
+def _written_order(part: dict[str, pa.Array]) -> NDArray[np.int8]:
+    """The order of each stamp, as far as its writing tells."""
+    digits_a, digits_b = (pc.utf8_is_digit(part[name]).to_numpy(zero_copy_only=False) for name in "ab")
+    long_a = pc.equal(pc.utf8_length(part["a"]), 4).to_numpy(zero_copy_only=False)
+    written = np.select([long_a & digits_a, ~digits_a, ~digits_b], [YMD, MDY, DMY], OPEN)
+    return written.astype(np.int8)
 
 
 def _number(texts: pa.Array) -> NDArray[np.int64]:
@@ -103,7 +114,9 @@ def _number_or_month(texts: pa.Array) -> NDArray[np.int64]:
     numbers = _number(pc.if_else(digits, texts, "0"))
     if pc.all(pc.or_(digits, pc.equal(texts, ""))).as_py():
         return numbers
-    place = pc.index_in(pc.utf8_slice_codeunits(pc.utf8_lower(texts), 0, 3), MONTHS)
+    short = pc.replace_substring_regex(pc.utf8_lower(texts), "^jui[ln].*", "jul")
+    short = pc.if_else(pc.starts_with(pc.utf8_lower(texts), "juin"), "jun", short)
+    place = pc.index_in(pc.utf8_slice_codeunits(short, 0, 3), MONTHS)
     months = pc.fill_null(place, -1).to_numpy(zero_copy_only=False).astype(np.int64)
     return np.where(months < 0, numbers, months % 12 + 1)
 

@@ -10,8 +10,8 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from analyzer.history import stamps
-from analyzer.history.clock import Clock, as_text, is_text, joined, scale_of
-from analyzer.history.names import CLOCK_NAMES, STAMP_NAMES, plain
+from analyzer.history.clock import Clock, as_text, is_count, is_text, joined, scale_of
+from analyzer.history.names import CLOCK_NAMES, STAMP_NAMES, is_stamp, plain, time_unit, without_unit
 from analyzer.history.options import ReadOptions
 from analyzer.history.table import Source, Table
 from identification.errors import InputError
@@ -28,10 +28,11 @@ def find_clock(table: Table, options: ReadOptions) -> Clock:
     InputError
         No column holds a time, or the one that is named so cannot be read.
     """
-    columns = _candidates(table)
-    kinds = {i: _kind(table.names[i], head) for i, head in zip(columns, table.head(columns), strict=True)}
+    columns = _candidates(table, options)
+    heads = dict(zip(columns, table.head(columns), strict=True))
+    kinds = {i: _kind(table.names[i], head) for i, head in heads.items()}
     clock = _chosen(table, kinds, options)
-    if clock is None:
+    if clock is None or _is_doubtful(table, clock, kinds, heads):
         raise _no_time(table, columns)
     clock = _with_day_order(table, clock, options)
     second, local = clock.seconds(table.head(clock.columns))
@@ -40,9 +41,56 @@ def find_clock(table: Table, options: ReadOptions) -> Clock:
     return replace(clock, local=local)
 
 
-def _candidates(table: Table) -> list[int]:
-    """Columns that may hold a time: by type, by name, and columns of text."""
-    named = {i for i, name in enumerate(table.names) if plain(name) in STAMP_NAMES or _is_index(name)}
+def clock_of(table: Table, column: int, options: ReadOptions) -> Clock:
+    """The clock of one column that is known to hold stamps."""
+    head = table.head([column])[0]
+    is_number = pa.types.is_integer(head.type) or pa.types.is_floating(head.type)
+    scale = scale_of(head, time_unit(table.names[column])) if is_number else None
+    clock = Clock((column,), timezone=options.timezone, scale=scale)
+    clock = _with_day_order(table, clock, options)
+    return replace(clock, local=clock.seconds([head])[1])
+
+
+def holds_stamps(name: str, head: pa.Array) -> bool:
+    """Whether the first rows of a column are stamps; numbers only where the column is named as stamps are."""
+    filled = head.drop_null()
+    if len(filled) == 0 or pa.types.is_boolean(head.type):
+        return False
+    if pa.types.is_integer(head.type) or pa.types.is_floating(head.type):
+        return name != "" and scale_of(filled) is not None
+    return _kind(name, filled) == "full"
+
+
+def _is_doubtful(table: Table, clock: Clock, kinds: dict[int, str], heads: dict[int, pa.Array]) -> bool:
+    """Whether what was chosen stands in for a time column that cannot be read, or merely counts the rows."""
+    chosen = clock.columns[0]
+    if is_stamp(table.names[chosen]):
+        return False
+    unread = [
+        i
+        for i, kind in kinds.items()
+        if kind == "" and is_stamp(table.names[i]) and heads[i].null_count < len(heads[i])
+    ]
+    return bool(unread) or (clock.scale is not None and is_count(heads[chosen]))
+
+
+def _candidates(table: Table, options: ReadOptions) -> list[int]:
+    """Columns that may hold a time: the stated one, else by type, by name, and columns of text.
+
+    Raises
+    ------
+    InputError
+        There is no column of the stated name.
+    """
+    if options.time_column is not None:
+        if options.time_column not in table.names:
+            raise InputError(
+                f"{table.path}: no column '{options.time_column}' among {', '.join(table.names[:8])}",
+                "the name of the time column as it stands in the header",
+                "correct --time-column",
+            )
+        return [table.names.index(options.time_column)]
+    named = {i for i, name in enumerate(table.names) if is_stamp(name) or _is_index(name)}
     typed = {i for i, kind in enumerate(table.types) if pa.types.is_temporal(kind) or is_text(kind)}
     return sorted(named | typed)
 
@@ -61,11 +109,10 @@ def _kind(name: str, head: pa.Array) -> str:
         return "time of day"
     if is_text(head.type):
         return _text_kind(as_text(head).drop_null())
-    named = plain(name) in STAMP_NAMES or _is_index(name)
     numeric = pa.types.is_integer(head.type) or pa.types.is_floating(head.type)
-    if not (named and numeric):
+    if not numeric:
         return ""
-    return "number" if scale_of(head) is not None else _text_kind(as_text(head.drop_null()))
+    return "number" if scale_of(head, time_unit(name)) is not None else _text_kind(as_text(head.drop_null()))
 
 
 def _text_kind(texts: pa.Array) -> str:
@@ -86,7 +133,7 @@ def _chosen(table: Table, kinds: dict[int, str], options: ReadOptions) -> Clock 
     by_kind = {kind: _by_name(table, [i for i in kinds if kinds[i] == kind]) for kind in set(kinds.values())}
     clock = Clock((0,), date_format=options.date_format, timezone=options.timezone)
     if options.date_format is not None:
-        named = _by_name(table, [i for i in kinds if plain(table.names[i]) in STAMP_NAMES] or list(kinds))
+        named = _by_name(table, [i for i in kinds if is_stamp(table.names[i])] or list(kinds))
         return replace(clock, columns=(named[0],)) if named else None
     if "date" in by_kind and "time of day" in by_kind:
         return replace(clock, columns=(by_kind["date"][0], by_kind["time of day"][0]))
@@ -94,18 +141,20 @@ def _chosen(table: Table, kinds: dict[int, str], options: ReadOptions) -> Clock 
         return replace(clock, columns=(by_kind["full"][0],))
     if "number" in by_kind:
         column = by_kind["number"][0]
-        return replace(clock, columns=(column,), scale=scale_of(table.head([column])[0]))
+        return replace(
+            clock, columns=(column,), scale=scale_of(table.head([column])[0], time_unit(table.names[column]))
+        )
     return replace(clock, columns=(by_kind["date"][0],)) if "date" in by_kind else None
 
 
 def _by_name(table: Table, columns: Sequence[int]) -> list[int]:
     """Columns whose names mean a time first, in the order of the dictionary of names."""
     rank = {name: i for i, name in enumerate((*STAMP_NAMES, *CLOCK_NAMES))}
-    return sorted(columns, key=lambda i: (rank.get(plain(table.names[i]), len(rank)), i))
+    return sorted(columns, key=lambda i: (rank.get(plain(without_unit(table.names[i])), len(rank)), i))
 
 
 def _no_time(table: Table, columns: Sequence[int]) -> InputError:
-    named = [i for i in columns if plain(table.names[i]) in STAMP_NAMES]
+    named = [i for i in columns if is_stamp(table.names[i])]
     if not named:
         return InputError(
             f"{table.path}: no time column among {', '.join(table.names[:8])}",
@@ -133,7 +182,7 @@ def _with_day_order(table: Table, clock: Clock, options: ReadOptions) -> Clock:
         return clock
     head = _texts(table.head(clock.columns))
     parts = None if head is None else stamps.fields(head)
-    if parts is None or parts.order != "?":
+    if parts is None or not parts.is_open:
         return clock
     return _decided(clock, stamps.fields(_texts(table.read(clock.columns))), head)
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
-import pandas as pd
 import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
@@ -32,14 +32,37 @@ ERROR_SHAPES = re.compile(
 )
 
 
+MINUS = str.maketrans({"\u2212": "-", "\u2013": "-", "\u2012": "-", "\ufe63": "-", "\uff0d": "-"})
+"""Signs that stand for a minus."""
+SPACES = re.compile("[\u00a0\u2007\u2009\u202f' ]")
+"""Marks that group thousands, besides comma and point."""
+NUMBER = re.compile(r"^[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?$")
+GROUPED = {
+    ".": re.compile(r"^[+-]?\d{1,3}(?:,\d{3})+(?:\.\d+)?$"),
+    ",": re.compile(r"^[+-]?\d{1,3}(?:\.\d{3})+(?:,\d+)?$"),
+}
+"""Numbers with their thousands grouped, by decimal mark."""
+SPACED = re.compile(r"^[+-]?\d{1,3}(?: \d{3})+(?:[.,]\d+)?$")
+COMMA_FRACTION = re.compile(r"^[+-]?\d+,(?:\d{1,2}|\d{4,})(?:[eE][+-]?\d+)?$|^[+-]?0,\d+$")
+"""A decimal comma that can be nothing else."""
+WITH_UNIT = re.compile(r"^(?P<number>[+-]?[\d.,]*\d(?:[eE][+-]?\d+)?)\s*(?P<unit>[^\d\s.,+-][^\d]{0,11})$")
+LIKE_NUMBER = re.compile(r"^[^\w]*\d")
+"""A text that begins as a number does, and so was meant as one."""
+
+
 @dataclass(frozen=True, slots=True)
 class Values:
-    """Arrays of shape (n,): `value` NaN where no number, `bad` where neither number nor mode text."""
+    """Arrays of shape (n,): `value` NaN where no number, `bad` where neither number nor mode text.
+
+    `unread`: how many texts look like numbers and are not understood, with one of them as `example`.
+    """
 
     value: NDArray[np.float64]
     bad: NDArray[np.bool_]
     text: NDArray[np.object_] | None
     found: Counter[str]
+    unread: int = 0
+    example: str = ""
 
 
 def is_error_text(text: str) -> bool:
@@ -82,24 +105,60 @@ def _from_texts(column: pa.Array, decimal: str) -> Values:
     place = pc.fill_null(encoded.indices, len(encoded.dictionary)).to_numpy(zero_copy_only=False)
     kinds = [str(text).strip() for text in encoded.dictionary.to_pylist()] + [""]
     count = np.bincount(place, minlength=len(kinds))
-    number = _parsed(kinds, decimal)
+    number, notes = parsed(kinds, decimal)
     blank = np.array([text == "" for text in kinds])
     error = np.array([is_error_text(text) for text in kinds]) & ~np.isfinite(number)
     word = ~np.isfinite(number) & ~blank & ~error
     found = _found(kinds, count, blank, error)
-    if count[word].sum() * 2 > count[~blank & ~error].sum():
+    found.update({note: int(count[np.isfinite(number)].sum()) for note in notes})
+    unread = word & np.array([LIKE_NUMBER.match(text) is not None for text in kinds])
+    lost, example = int(count[unread].sum()), next((kinds[i] for i in np.flatnonzero(unread)), "")
+    if count[word].sum() * 2 > count[~blank & ~error].sum() and not lost:
         text = np.array(kinds, dtype=object)
         return Values(number[place], (blank | error)[place], text[place], found)
     found.update(_found(kinds, count, np.zeros_like(blank), word))
-    return Values(number[place], ~np.isfinite(number[place]), None, found)
+    return Values(number[place], ~np.isfinite(number[place]), None, found, lost, example)
 
 
-def _parsed(texts: list[str], decimal: str) -> NDArray[np.float64]:
-    written = pd.Series(texts, dtype=object)
-    if decimal != ".":
-        written = written.str.replace(decimal, ".", regex=False)
-    number = pd.to_numeric(written, errors="coerce").to_numpy(dtype=np.float64)
-    return np.where(np.isfinite(number), number, np.nan)
+def parsed(texts: list[str], decimal: str) -> tuple[NDArray[np.float64], list[str]]:
+    """Texts as numbers, shape (n,), NaN where none; and sentences on how they were read, without their count.
+
+    A minus may be any dash, thousands may be grouped, a unit may stand behind if it is the same everywhere, and a
+    comma that can only be decimal decides for the column.
+    """
+    plain = [text.translate(MINUS) for text in texts]
+    plain, unit = _without_unit(plain)
+    notes = [f"values have the unit '{unit}' behind the number"] if unit else []
+    if decimal == "." and any(COMMA_FRACTION.match(text) for text in plain):
+        decimal = ","
+        notes.append("values are read with a decimal comma")
+    read = [_number(text, decimal) for text in plain]
+    if any(grouped for _, grouped in read):
+        notes.append(
+            f"values are read with grouped thousands and a decimal {'comma' if decimal == ',' else 'point'}"
+        )
+    return np.array([number for number, _ in read], dtype=np.float64), notes
+
+
+def _number(text: str, decimal: str) -> tuple[float, bool]:
+    """A text as a number, NaN where it is none, and whether its thousands are grouped."""
+    spaced = SPACES.sub(" ", text)
+    grouped = bool(SPACED.match(spaced)) or bool(GROUPED[decimal].match(text))
+    if grouped:
+        text = spaced.replace(" ", "").replace("." if decimal == "," else ",", "")
+    text = text.replace(",", ".") if decimal == "," else text
+    number = float(text) if NUMBER.match(text) else math.nan
+    return (number, grouped) if math.isfinite(number) else (math.nan, False)
+
+
+def _without_unit(texts: list[str]) -> tuple[list[str], str]:
+    """The texts without a unit that stands behind every number, and that unit; as they are where there is none."""
+    found = [WITH_UNIT.match(text) for text in texts]
+    units = {m["unit"].strip() for m in found if m is not None}
+    bare = any(NUMBER.match(text.replace(",", ".")) for text in texts)
+    if len(units) != 1 or bare or sum(m is not None for m in found) * 2 < len(texts) - texts.count(""):
+        return texts, ""
+    return [text if m is None else m["number"] for text, m in zip(texts, found, strict=True)], units.pop()
 
 
 def _found(

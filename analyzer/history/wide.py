@@ -76,7 +76,7 @@ class WideSource:
                 codes, scheme_of(self.table.names[self.quality[i]], codes), self.good_quality
             )
             bad, found = bad | rejected, found + counts
-        return Raw(stamp_s, read.value, bad, read.text, found)
+        return Raw(stamp_s, read.value, bad, read.text, found, read.unread, read.example)
 
 
 def open_wide(table: Table, options: ReadOptions) -> WideSource:

@@ -121,3 +121,20 @@ def test_real_recordings(folder: str) -> None:
         series = export.read([tag])[tag]
         assert (np.diff(series.stamp_s) > 0).all()
         assert series.bad.mean() < 0.05
+
+
+def test_an_unreadable_file_in_a_folder_costs_its_own_loops(tmp_path: Path) -> None:
+    """A readme, an empty file and a damaged Parquet beside good exports are left out and told; named, refused."""
+    good = pd.DataFrame(
+        {"timestamp": pd.date_range("2026-03-02", periods=50, freq="s"), "FIC1.PV": range(50)}
+    )
+    good.to_parquet(tmp_path / "good.parquet")
+    (tmp_path / "readme.txt").write_text("How this was exported\nby hand")
+    (tmp_path / "empty.csv").write_text("")
+    (tmp_path / "bad.parquet").write_bytes(b"PAR1 and then nothing")
+    export = open_export([tmp_path])
+    assert export.tags == ("FIC1.PV",)
+    told = " ".join(export.file_notes)
+    assert all(name in told for name in ("readme.txt", "empty.csv", "bad.parquet"))
+    with pytest.raises(InputError, match=r"bad\.parquet"):
+        open_export([tmp_path / "good.parquet", tmp_path / "bad.parquet"])
