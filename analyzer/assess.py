@@ -10,11 +10,11 @@ import numpy as np
 
 from analyzer.assessments import Assessments, Hour, assess_span, hourly, settling_time, usable
 from analyzer.cause import NO_CAUSE, Verdict, as_hint, dead_valve, judge, not_assessed, with_dead_valve
-from analyzer.config import Config
+from analyzer.config import Config, QualityLimits
 from analyzer.measure import measure, time_scale
 from analyzer.oscillation import Oscillations, counting, detect
 from analyzer.plantwide import Fingerprint, fingerprint
-from analyzer.quality import Prepared
+from analyzer.quality import Prepared, run_lengths
 from analyzer.settings_check import SettingsDiffer, differing
 from analyzer.trends import BUCKETS, FINE_BUCKETS, thinned
 from analyzer.words import too_coarse
@@ -77,10 +77,24 @@ def unfit_for_cause(prepared: Prepared, config: Config) -> str:
         return "needs OP that moves, it stands still"
     if prepared.compressed_share > q.straight_share:
         return f"needs trends without compression, {100 * prepared.compressed_share:.0f} % lie on straight segments"
+    scattered = _scattered(record, q)
+    if scattered:
+        return scattered
     saturated = float(record.mask("saturated").mean())
     if saturated > q.saturated_share:
         return f"needs OP within its limits, it is at one for {100 * saturated:.0f} % of the time"
     return ""
+
+
+def _scattered(record: LoopRecord, q: QualityLimits) -> str:
+    """Why the good samples are too scattered for a model; '' where enough of them follow each other."""
+    good = ~record.bad
+    length = run_lengths(good.astype(np.float64))
+    share = float(good[np.repeat(length >= q.run_samples, length)].sum()) / max(len(record), 1)
+    if share >= q.run_share:
+        return ""
+    wanted = f"{100 * q.run_share:.0f} % of the time in runs of {q.run_samples} good samples"
+    return f"needs {wanted}, has {100 * share:.0f} %"
 
 
 def cause_of(
@@ -93,7 +107,11 @@ def cause_of(
     if needs or float(np.ptp(record.pv)) == 0.0:
         verdict = not_assessed(needs) if oscillation is not None else NO_CAUSE
         return with_dead_valve(verdict, dead) if dead else verdict
-    measured = measure(record, oscillation, controller, config.cause, found.spectrum, kind)
+    try:
+        measured = measure(record, oscillation, controller, config.cause, found.spectrum, kind)
+    except NotAssessedError as error:
+        verdict = not_assessed(str(error)) if oscillation is not None else NO_CAUSE
+        return with_dead_valve(verdict, dead) if dead else verdict
     verdict = judge(measured, oscillation, config.cause)
     return with_dead_valve(verdict, dead) if dead and verdict.cause != "valve" else verdict
 

@@ -52,6 +52,14 @@ class QualityLimits:
     """Share of usable automatic samples that an assessment needs [-]; ours."""
     samples: int = 200
     """Samples that an assessment needs [-]; ours: 3 periods of 60 samples fit into it."""
+    run_samples: int = 20
+    """Good samples in a row from which a run tells how PV follows OP [-]; ours: twice what the noise model sees."""
+    run_share: float = 0.6
+    """Share of the time that such runs must cover for a cause to be told [-]; ours: with half of a record missing in
+    blocks of three periods, play passes for tight tuning."""
+    unread_share: float = 0.02
+    """Share of a tag's values that may be no numbers though they look like some [-]; ours: more is a way of writing
+    that was not understood."""
     ticks_per_sample: float = 20.0
     """Ticks of a uniform clock per sample [-] beyond which a record is all gaps; ours: it bounds memory, and such a
     record would fail usable_share by far."""
@@ -85,6 +93,9 @@ class CauseLimits:
     simulated plant set it.
     """
 
+    judged: int = 60
+    """Blocks that follow on as many good ones as the noise model looks back, that a fit needs [-]; ours: six for each
+    constant fitted."""
     window: int = 1800
     """Blocks of the record that are fitted [-]; more cost time and change no verdict."""
     blocks_per_period: float = 30.0

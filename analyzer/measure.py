@@ -12,12 +12,14 @@ from analyzer.config import CauseLimits
 from analyzer.oscillation import Oscillation
 from identification.controller import fit_pi
 from identification.descent import descend
+from identification.errors import NotAssessedError
 from identification.evidence import Rival, evidence, stem_moves, with_load_step
 from identification.hammerstein import IDEAL, Fit, process_of, residual
+from identification.innovations import judged_mask
 from identification.models import Fopdt, Loop, Pid
 from identification.position import Seen, seen
 from identification.record import Floats, LoopRecord, Mask
-from identification.search import prepare
+from identification.search import AR_ORDER, prepare
 from identification.spectrum import Spectrum, locked_harmonic, peak_prominence, spectrum, tapered_power
 from identification.valve_fit import SCREENED, SHORT, better_linear, fit_linear, fit_play, fit_stick_slip
 from identification.window import Window, block_means
@@ -154,9 +156,20 @@ def measure(
     error: Spectrum | None = None,
     kind: str = "",
 ) -> Measured:
-    """Fit the rivals and read what the signs need; see Measured."""
+    """Fit the rivals and read what the signs need; see Measured.
+
+    Raises
+    ------
+    NotAssessedError
+        Good samples are too scattered for a model of how one follows from those before it.
+    """
     scale = time_scale(record, oscillation, controller)
     window = window_of(record, scale, limits, kind)
+    judged = int(judged_mask(window.usable, AR_ORDER).sum())
+    if judged < limits.judged:
+        raise NotAssessedError(
+            f"needs {limits.judged} stretches of {AR_ORDER + 1} good samples in a row, has {judged}"
+        )
     controller = controller or recovered(record, scale)
     due = answering(record, window, scale)
     shown = None if window.position is None else seen(window.op, window.position)

@@ -95,7 +95,9 @@ def cut(series: Series, night: Night) -> Series:
     """The samples of one night."""
     a, b = np.searchsorted(series.stamp_s, [night.first_s, night.last_s])
     text = None if series.text is None else series.text[a:b]
-    return Series(series.stamp_s[a:b], series.value[a:b], series.bad[a:b], text)
+    return replace(
+        series, stamp_s=series.stamp_s[a:b], value=series.value[a:b], bad=series.bad[a:b], text=text
+    )
 
 
 def nights_of(

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 import numpy as np
@@ -244,6 +244,7 @@ def prepare(spec: LoopSpec, series: Mapping[str, Series], limits: QualityLimits)
     NotAssessedError
         Where there is no PV, or too little of it; the text says what is needed and what there is.
     """
+    series = _numeric(spec, series, limits)
     pv_raw = _enough(series.get(spec.pv or ""), spec, limits)
     trimmed = _without_stray_ends(pv_raw)
     dt = interval(trimmed.stamp_s)
@@ -274,6 +275,29 @@ def prepare(spec: LoopSpec, series: Mapping[str, Series], limits: QualityLimits)
         MappingProxyType(masks),
     )
     return _described(record, scale, op, limits)
+
+
+def _numeric(spec: LoopSpec, series: Mapping[str, Series], limits: QualityLimits) -> dict[str, Series]:
+    """The samples of a loop, what is no number in SP, PV, OP or position bad.
+
+    Raises
+    ------
+    NotAssessedError
+        Where many values of one of them were not understood: what is left would be another trend.
+    """
+    out = dict(series)
+    for role in ("pv", "sp", "op", "position"):
+        tag = getattr(spec, role)
+        found = series.get(tag) if tag else None
+        if found is None:
+            continue
+        if found.unread > limits.unread_share * max(found.value.size, 1):
+            raise NotAssessedError(
+                f"{found.unread} values of {tag}, such as '{found.example}', are not understood as numbers; needs "
+                "plain numbers: export them so, or state --decimal and --delimiter"
+            )
+        out[tag] = replace(found, bad=found.bad | ~np.isfinite(found.value), text=None)
+    return out
 
 
 def _signal(

@@ -7,11 +7,12 @@ from functools import cache
 
 import numpy as np
 import pytest
-from plant import CONFIG, START_S, Sketch, Trends, prepared, record, simulate
+from plant import CONFIG, START_S, Sketch, Trends, prepared, record, series, simulate, spec
 
 from analyzer.assess import Assessment, assess
 from analyzer.cause import dead_valve
 from analyzer.plantwide import Peer, coherence, trace
+from analyzer.quality import prepare
 from identification.errors import NotAssessedError
 
 SKETCHES = {
@@ -162,6 +163,20 @@ def test_trends_that_cannot_tell_say_what_they_need():
     straight = assess(replace(made, compressed_share=0.9), None, CONFIG).verdict
     assert straight.cause == "undecided"
     assert straight.needs == "needs trends without compression, 90 % lie on straight segments"
+
+
+@pytest.mark.parametrize("every", [2, 3, 1200])
+def test_scattered_samples_tell_no_cause(every):
+    """With every second or third PV bad, or every other ten minutes, no cause is told and the verdict says why."""
+    made = trends("play, tank")
+    stamp = START_S + np.arange(made.pv.size, dtype=float)
+    at = np.arange(made.pv.size)
+    bad = at % every != 0 if every < 10 else at % every < every // 2
+    found = {f"L.{name.upper()}": series(stamp, getattr(made, name)) for name in ("sp", "op")}
+    found["L.PV"] = series(stamp, np.where(bad, np.nan, made.pv), bad)
+    verdict = assess(prepare(spec("L"), found, CONFIG.quality), None, CONFIG).verdict
+    assert verdict.cause in ("none", "undecided")
+    assert not verdict.needs or "in runs of 20 good samples" in verdict.needs
 
 
 def test_a_loop_in_manual_is_not_assessed():
