@@ -106,4 +106,6 @@ def judged(data: Mapping[str, Any], found: Explanation, s: Subject, more: str = 
     units = "" if unanswered(found) else wrong_units(constants(dict(data)), restored(found.plain.model))
     verdict = "" if units else compared(whole.rmse, plain.rmse)
     note = "; ".join(x for x in (said, verdict, units, more) if x) + "."
-    return Brought(out, misfit(s.pv[:cut], out[:cut]), misfit(s.pv[cut:], out[cut:]), note)
+    window = found.proof.window if found.proof is not None else 0
+    fitted, held = misfit(s.pv[:cut], out[:cut], window), misfit(s.pv[cut:], out[cut:], window)
+    return Brought(out, fitted, held, note)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -32,11 +32,12 @@ SPAN_DIFFERS = 0.01
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """One loop of an export, ready to be explained: its record, and the subject made of it."""
+    """One loop of an export, ready to be explained: its record, the subject made of it, and what was left aside."""
 
     spec: LoopSpec
     prepared: Prepared
     subject: mismatch.Subject
+    shortened: str = ""
 
 
 def loop_of(specs: tuple[LoopSpec, ...], tag: str) -> LoopSpec:
@@ -99,8 +100,32 @@ def snapped(series: dict[str, Series], pv: str) -> dict[str, Series]:
     return out
 
 
-def case(spec: LoopSpec, specs: tuple[LoopSpec, ...], series: dict[str, Series], config: Config) -> Case:
-    """Prepare one loop.
+MOST_SAMPLES, STRETCH_SAMPLES = 40_000, 15_000
+"""Samples up to which a recording is explained whole, and length of the most telling stretch of a longer one; ours:
+20 s of processor time either way, for a long recording holds more that asks for an effect."""
+
+
+def telling_stretch(prepared: Prepared, most: int | None) -> tuple[Prepared, str]:
+    """The stretch in which OP travels most of a recording of more than so many samples, and a sentence on it."""
+    r = prepared.record
+    if most is None or len(r) <= most:
+        return prepared, ""
+    most = min(most, STRETCH_SAMPLES)
+    travel = np.concatenate(([0.0], np.cumsum(np.abs(np.diff(r.op)))))
+    first = int(np.argmax(travel[most - 1 :] - travel[: len(r) - most + 1]))
+    days = f"{most * r.dt_s / 86400:.1f} of {len(r) * r.dt_s / 86400:.1f} days"
+    said = f"Judged on {most} of {len(r)} samples, the {days} in which OP moves most."
+    return replace(prepared, record=r.span(first, first + most)), said
+
+
+def case(
+    spec: LoopSpec,
+    specs: tuple[LoopSpec, ...],
+    series: dict[str, Series],
+    config: Config,
+    most: int | None = MOST_SAMPLES,
+) -> Case:
+    """Prepare one loop; of a recording of more than `most` samples the most telling stretch, None for all.
 
     Raises
     ------
@@ -109,25 +134,26 @@ def case(spec: LoopSpec, specs: tuple[LoopSpec, ...], series: dict[str, Series],
     """
     raw = series[spec.pv or ""]
     series = snapped(series, spec.pv or "")
-    prepared = prepare(spec, series, config.quality)
+    prepared, shortened = telling_stretch(prepare(spec, series, config.quality), most)
     r = prepared.record
     if not prepared.op_known:
         raise NotAssessedError(f"{spec.loop}: needs OP, has none")
     if float(np.ptp(r.op)) == 0 or float(np.ptp(r.pv)) == 0:
         raise NotAssessedError(f"{spec.loop}: needs OP and PV that move, one of them stands still")
+    stamps = raw.stamp_s[~raw.bad]
     subject = mismatch.Subject(
         None if r.sp_estimated else r.sp,
         r.pv,
         r.op,
         ~(r.bad | r.mask("gap")),
         r.dt_s,
-        raw.stamp_s[~raw.bad],
+        stamps[(stamps >= r.start_s - r.dt_s) & (stamps <= r.start_s + r.duration_s)],
         stated_law(spec, prepared),
         not prepared.scale.recorded,
         neighbours(spec, specs, series, prepared),
         spec.type.strip().lower(),
     )
-    return Case(spec, prepared, subject)
+    return Case(spec, prepared, subject, shortened)
 
 
 @dataclass(frozen=True, slots=True)
@@ -200,7 +226,7 @@ def as_data(c: Case, said: Answer, brought: Brought | None = None) -> dict[str, 
         "fit": fit,
         "moved": said.moved,
         "remaining": said.remaining,
-        "reason": reason_of(said),
+        "reason": f"{reason_of(said)} {c.shortened}".strip(),
     }
     return json_ready(data)
 

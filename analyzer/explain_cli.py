@@ -20,9 +20,11 @@ def main() -> None:
     """What physics a loop's plain model lacks, and the model carried to another recording."""
 
 
-def _case(export: tuple[Path, ...], loops: Path | None, tag: str, reading: dict[str, Any]) -> Any:
+def _case(
+    export: tuple[Path, ...], loops: Path | None, tag: str, reading: dict[str, Any], whole: bool = False
+) -> Any:
     from analyzer.config import Config
-    from analyzer.explain import case, loop_of
+    from analyzer.explain import MOST_SAMPLES, case, loop_of
 
     source, specs, _ = opened(export, loops, **reading)
     spec = loop_of(specs, tag)
@@ -32,7 +34,7 @@ def _case(export: tuple[Path, ...], loops: Path | None, tag: str, reading: dict[
         raise InputError(f"{tag}: no PV tag in the export", f"{tag}.PV", "check --loops and the export")
     others = [s.op for s in specs if s.loop != tag and s.op][:8]
     series = source.read(list(dict.fromkeys([*spec.tags, *others])))
-    return case(spec, specs, series, Config()), series[spec.pv]
+    return case(spec, specs, series, Config(), None if whole else MOST_SAMPLES), series[spec.pv]
 
 
 @main.command()
@@ -135,7 +137,7 @@ def simulate(
     """
     from analyzer.explain import read_model, simulated
 
-    case, raw = _case(export, loops, tag, reading)
+    case, raw = _case(export, loops, tag, reading, whole=True)
     pv, op = simulated(case, read_model(model, tag), raw.stamp_s, closed_loop)
     write_trends(out, raw.stamp_s, pv, op)
 

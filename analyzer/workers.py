@@ -14,6 +14,7 @@ import signal
 import sys
 import threading
 import time
+import warnings
 from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
@@ -179,6 +180,8 @@ def _cause_of_death(status: int | None, limits: WorkerLimits) -> str:
 def _serve(pipe: Connection, function: Callable[[Any, Began], Any], limits: WorkerLimits) -> None:
     """A worker's life: tasks in, results out, until the pipe closes."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the parent decides
+    if not sys.warnoptions:
+        warnings.simplefilter("ignore")  # a library's warning says nothing to an engineer
     _end_with_parent()
     _limit_memory(limits.memory_mb)
 

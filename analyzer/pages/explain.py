@@ -104,16 +104,17 @@ def _tiles(e: Explained) -> tuple[tuple[str, str, str], ...]:
     size = {k: rms(float(np.std(recorded - x))) for k, x in plots.simulations(e).items()}
     seat = "where to look first" if d["verdict"] == "unexplained" else "where it sits"
     tiles = [(d["block"], seat, "")] if d["block"] != "none" else []
+    horizon = d["fit"]["horizon_s"]
+    over = f"within windows of {duration(horizon)}" if horizon else "over the recording"
     if e.found.accepted:
-        what = "rms misfit over the recording, plain and improved"
+        what = f"rms misfit {over}, plain and improved"
         tiles.append((f"{size['baseline']} → {size['model']}", what, "better"))
     else:
         rest = ": load and noise" if d["verdict"] == "none" else ""
         tiles.append((size["baseline"], f"rms misfit of the plain simulation{rest}", ""))
     held = next((x["held_out_share"] for x in d["effects"] if x["held_out_share"] is not None), None)
     if held is not None:
-        what = f"of the misfit on held-out data {'removed' if held > 0 else 'added'}"
-        tiles.append((share(abs(held)), what, "better" if held > 0 else "unclear"))
+        tiles.append((share(held), "of the misfit on held-out data removed", "better"))
     others = d["effects"][0]["alternatives"] if d["effects"] else []
     if others:
         tiles.append((str(len(others)), "other names fit as well or look alike", "incomparable"))
@@ -182,10 +183,15 @@ def _fit(e: Explained) -> tuple[Block, ...]:
             m = e.data["fit"][key][part]
             cells += [Cell(rms(m["rmse"]), m["rmse"]), Cell(f"{m['fit_pct']:.1f}", m["fit_pct"])]
         rows.append(tuple(cells))
-    late = f"{100 * HELD_OUT:.0f} %"
+    late, horizon = f"{100 * HELD_OUT:.0f} %", e.data["fit"]["horizon_s"]
     note = (
         f"Held out: the last {late} of the recording, on which models fitted to the first part are judged. "
         "Fit % is 100 where the simulation is exact and 0 where the mean does as well; load and noise keep it lower."
+        + (
+            f" The simulations begin anew every {duration(horizon)}, so that slow load does not drown them."
+            if horizon
+            else ""
+        )
     )
     return (Table("fit", "", columns, tuple(rows), note),)
 

@@ -13,6 +13,7 @@ from analyzer.pages.words import number
 from identification.mismatch.features import Group, groups
 from identification.mismatch.fitting import Fitted, Problem
 from identification.mismatch.locate import Located, profile
+from identification.mismatch.proof import anchored
 from identification.mismatch.record_shape import busiest, obeyed, ruling_shape, trace_shape
 from identification.mismatch.shape import Shape, shape_of
 from identification.mismatch.simulation import simulate
@@ -42,13 +43,13 @@ ERRORS = 2.0
 
 
 def simulations(e: Explained) -> dict[str, Floats]:
-    """PV as simulated [% of span], its mean freed, shape (n,) each, by colour; improved where there is one."""
+    """PV as simulated [% of span], anchored as for the proof, shape (n,) each, by colour."""
     p = e.found.p
     fits = {"baseline": e.found.plain} | ({"model": e.found.best} if e.found.accepted else {})
     out = {}
+    window = e.found.proof.window if e.found.proof is not None else 0
     for kind, fit in fits.items():
-        left = p.y - simulate(p.scene, fit.model.c)
-        out[kind] = p.scene.level + p.y - (left - left.mean())
+        out[kind] = p.scene.level + anchored(p.y, simulate(p.scene, fit.model.c), window)
     if e.brought is not None:
         out["brought"] = e.brought.simulated
     return out

@@ -141,7 +141,7 @@ def effects_of(found: Explanation, s: Subject, proof: HeldOut | None) -> tuple[E
             row.name,
             row.block,
             parameters(found, found.best, row),
-            proof.share if proof is not None and i == 0 else None,
+            proof.share if proof is not None and i == 0 and proof.share > 0.0 else None,
             alternatives(found) if i == 0 else (),
         )
         for i, row in enumerate(rows)
@@ -149,12 +149,13 @@ def effects_of(found: Explanation, s: Subject, proof: HeldOut | None) -> tuple[E
     return (*gates, *physics)
 
 
-def fit_of(proof: HeldOut) -> dict[str, Any]:
-    """Misfit before and after, on what was fitted and on what was held out."""
-    return {
+def fit_of(proof: HeldOut, dt_s: float) -> dict[str, Any]:
+    """Misfit before and after, fitted and held out, and the horizon that simulations run over [s]; None: all."""
+    both: dict[str, Any] = {
         name: {"fitted": _said(proof.fitted[i]), "held_out": _said(proof.held[i])}
         for i, name in enumerate(("baseline", "explained"))
     }
+    return both | {"horizon_s": proof.window * dt_s if proof.window else None}
 
 
 def _said(m: Misfit) -> dict[str, float]:
@@ -184,7 +185,7 @@ def answer(found: Explanation, s: Subject) -> Answer:
     s : Subject
         What was explained.
     """
-    proof = held_out(found.p, found.plain, found.best)
+    proof = found.proof or held_out(found.p, found.plain, found.best)
     effects = effects_of(found, s, proof if found.accepted else None)
     lacking = "" if any(found_first(found)) else uninformed(found, s)
     at = located_in(found.p, found.best if found.left > 0 else found.plain, s)
@@ -194,7 +195,7 @@ def answer(found: Explanation, s: Subject) -> Answer:
         block,
         effects,
         where_of(found, s, block, at),
-        fit_of(proof),
+        fit_of(proof, s.dt_s),
         moved(found),
         remaining(found),
         f"Not told: {lacking}." if lacking and (verdict, block) == ("unexplained", "none") else _note(found),
@@ -204,6 +205,8 @@ def answer(found: Explanation, s: Subject) -> Answer:
 
 def verdict_of(found: Explanation, effects: tuple[Effect, ...], lacking: str, at: Located) -> tuple[str, str]:
     """The verdict and its block; what is left over, and what a record cannot tell, has no name."""
+    if found.refuted and not found.accepted and not any(found_first(found)):
+        return "unexplained", "none"
     if found.left > 0 and not any(found_first(found)):
         return "unexplained", LIVES.get(at.carrying[0].name, "process") if at.carrying else "process"
     if effects and not (lacking.startswith(DEAF) and effects[0].block in ("valve", "process")):
@@ -217,6 +220,12 @@ def found_first(found: Explanation) -> tuple[bool, bool]:
 
 
 def _note(found: Explanation) -> str:
+    if found.refuted and not found.accepted:
+        names = " and ".join(found.refuted)
+        return (
+            f"What explains the first part of the recording ({names}) does not carry over to the rest, so nothing is "
+            "told as found: another recording of this loop is needed."
+        )
     if found.left <= 0:
         return ""
     return (

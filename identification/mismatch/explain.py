@@ -13,7 +13,7 @@ from identification.mismatch.control import Ruling, Stated, judge
 from identification.mismatch.fitting import Fitted, Model, Problem, descend, gain
 from identification.mismatch.law import Law, shifted
 from identification.mismatch.physics import Row
-from identification.mismatch.proof import passes
+from identification.mismatch.proof import TIMED, HeldOut, held_out, passes
 from identification.mismatch.rivals import (
     Clip,
     Progress,
@@ -59,7 +59,8 @@ class Explanation:
 
     trace, ruling : findings about recorder and controller; plain, best : fits without and with the effects; p, p0 :
     the problems that they solve; accepted : the rivals taken, in order; last : the rivals of the last round;
-    before : the fit to which each accepted rival was added; late_s : PV's lateness that was taken out [s].
+    before : the fit to which each accepted rival was added; late_s : PV's lateness that was taken out [s]; proof :
+    plain and best on held-out data; refuted : names of effects that explain the fitted part and not the rest.
     """
 
     p: Problem = field(repr=False)
@@ -73,6 +74,8 @@ class Explanation:
     law: Law | None = None
     late_s: float = 0.0
     left: float = 0.0
+    proof: HeldOut | None = None
+    refuted: tuple[str, ...] = ()
 
 
 def trace_of(s: Subject) -> recorder.Trace | None:
@@ -151,7 +154,30 @@ def explain(s: Subject, tell: Progress = silent, brought: Floats | None = None) 
     found = Explanation(p, plain, plain, trace=trace, ruling=ruling, law=law, late_s=late_s)
     if any(x is not None and x.name in ALONE for x in (trace, ruling)):
         return found
-    return physics(found, tell, s.kind)
+    return carried_over(physics(found, tell, s.kind))
+
+
+def carried_over(found: Explanation) -> Explanation:
+    """The explanation with its proof: as many effects, in the order taken, as carry over to held-out data."""
+    names = tuple(r.name for r in found.accepted)
+    for count in range(len(names), 0, -1):
+        kept = found if count == len(names) else first_effects(found, count)
+        proof = held_out(kept.p, kept.plain, kept.best)
+        if proof.share > 0.0 or all(name in TIMED for name in names[:count]):
+            return replace(kept, proof=proof, refuted=names[count:])
+    proof = held_out(found.p, found.plain, found.plain)
+    return replace(found, best=found.plain, accepted=(), before=(), proof=proof, refuted=names)
+
+
+def first_effects(found: Explanation, count: int) -> Explanation:
+    """The explanation with its first effects alone, the others given up and the rest fitted anew."""
+    c = found.best.model.c
+    for rival in found.accepted[count:]:
+        c = cleared(c, rival.row)
+    names = {r.name for r in found.accepted[:count]}
+    rows = tuple(r for r in found.best.model.rows if r.name in names)
+    best = descend(found.p, Model(rows, c), FULL_STEPS)
+    return replace(found, best=best, accepted=found.accepted[:count], before=found.before[:count])
 
 
 def physics(found: Explanation, tell: Progress, kind: str = "") -> Explanation:

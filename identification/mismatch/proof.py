@@ -9,6 +9,7 @@ import numpy as np
 from identification.mismatch.fitting import Fitted, Model, Problem, descend, gain
 from identification.mismatch.noise import whitened
 from identification.mismatch.simulation import simulate
+from identification.mismatch.slots import Slot
 from identification.mismatch.starting import at_inlet
 from identification.mismatch.thresholds import (
     HELD_OUT,
@@ -17,6 +18,8 @@ from identification.mismatch.thresholds import (
     ONE_MOVE,
     SCREEN_STEPS,
     SPREAD,
+    WINDOW_SAMPLES,
+    WINDOW_TIMES,
 )
 from identification.record import Floats
 
@@ -33,11 +36,27 @@ class Misfit:
     fit_pct: float
 
 
-def misfit(y: Floats, simulated: Floats) -> Misfit:
-    """Misfit of a simulation with a free bias; fit_pct is 100 (1 - rms error / rms of PV about its mean)."""
+def anchored(y: Floats, simulated: Floats, window: int) -> Floats:
+    """A simulation begun anew in each window of so many samples: a straight line of load is added there, shape (n,).
+
+    With 0 the whole is one window with a free bias. A level that integrates drifts in open loop under its load, and
+    then shows the load and not the model; over a window of some time constants it shows the model.
+    """
     left = y - simulated
-    rmse = float(np.std(left))
-    return Misfit(rmse, 100.0 * (1.0 - rmse / max(float(np.std(y)), 1e-12)))
+    if window <= 0 or window >= y.size:
+        return simulated + left.mean()
+    out = np.empty_like(simulated)
+    for part in np.array_split(np.arange(y.size), max(y.size // window, 1)):
+        slope, bias = np.polyfit(part - part[0], left[part], 1)
+        out[part] = simulated[part] + bias + slope * (part - part[0])
+    return out
+
+
+def misfit(y: Floats, simulated: Floats, window: int = 0) -> Misfit:
+    """Misfit of a simulation anchored in windows; fit_pct is 100 (1 - rms error / rms of PV so anchored itself)."""
+    rmse = float(np.std(y - anchored(y, simulated, window)))
+    moves = float(np.std(y - anchored(y, np.zeros(y.size), window)))
+    return Misfit(rmse, 100.0 * (1.0 - rmse / max(moves, 1e-12)))
 
 
 def gains_by_block(p: Problem, better: Fitted, worse: Fitted) -> Floats:
@@ -57,11 +76,15 @@ def is_spread(p: Problem, better: Fitted, worse: Fitted) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class HeldOut:
-    """Before and after on the held-out part: gain of the innovations, and misfit of the simulations."""
+    """Before and after on the held-out part: gain of the innovations, and misfit of the simulations.
+
+    window : samples after which the simulations begin anew, 0 for one run over all.
+    """
 
     gain: float
     fitted: tuple[Misfit, Misfit]
     held: tuple[Misfit, Misfit]
+    window: int = 0
 
     @property
     def share(self) -> float:
@@ -73,21 +96,27 @@ class HeldOut:
 def held_out(p: Problem, worse: Fitted, better: Fitted) -> HeldOut:
     """Both models fitted anew to the first part of the record and compared on the rest.
 
-    A model's START is of the first sample, so the rest is simulated from the beginning.
+    A model's START is of the first sample, so the rest is simulated from the beginning. They are compared over the
+    whole rest, and where load drowns the difference there, over windows of some time constants of the plain loop.
     """
     cut = int((1.0 - HELD_OUT) * p.y.size)
     early = replace(p, weight=np.where(np.arange(p.y.size) < cut, p.weight, 0.0))
     fits = [_refit(early, m.model) for m in (worse, better)]
+    simulated = [simulate(p.scene, fit.model.c) for fit in fits]
     late = p.weight[cut:]
-    losses, seen, unseen = [], [], []
-    for fit in fits:
-        simulated = simulate(p.scene, fit.model.c)
-        e = whitened(p.y - simulated, fit.ar, p.edges)[cut:]
-        losses.append(float((late * e) @ e))
-        seen.append(misfit(p.y[:cut], simulated[:cut]))
-        unseen.append(misfit(p.y[cut:], simulated[cut:]))
+    whitenings = [whitened(p.y - x, fit.ar, p.edges)[cut:] for x, fit in zip(simulated, fits, strict=True)]
+    losses = [float((late * e) @ e) for e in whitenings]
     won = (losses[0] - losses[1]) / max(fits[1].loss, 1e-30)
-    return HeldOut(won, (seen[0], seen[1]), (unseen[0], unseen[1]))
+    c = fits[0].model.c
+    window = max(int(WINDOW_TIMES * float(c[Slot.T] + c[Slot.L]) / p.scene.dt_s), WINDOW_SAMPLES)
+    whole, windowed = (_compared(p.y, simulated, cut, won, size) for size in (0, window))
+    return windowed if whole.share <= 0.0 < windowed.share else whole
+
+
+def _compared(y: Floats, simulated: list[Floats], cut: int, won: float, window: int) -> HeldOut:
+    seen = [misfit(y[:cut], x[:cut], window) for x in simulated]
+    unseen = [misfit(y[cut:], x[cut:], window) for x in simulated]
+    return HeldOut(won, (seen[0], seen[1]), (unseen[0], unseen[1]), window)
 
 
 def _refit(p: Problem, model: Model) -> Fitted:

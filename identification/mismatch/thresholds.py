@@ -103,3 +103,8 @@ THINNED = 1.5
 SETTING_THINNED = 0.3
 """SETTING on thinned recordings: values of PV that were not kept moved OP, which biases a found law; ours: at ten
 scans a sample sound loops of the sample mill reach 0.26."""
+WINDOW_TIMES = 2.0
+"""Length of the windows in which a model is judged where a run over all shows the load alone, in T + L of the plain
+loop; ours: over the shared sealed cases the right effect then removes misfit in all but one, at 5 and 10 in fewer."""
+WINDOW_SAMPLES = 100
+"""Fewest samples of such a window."""
