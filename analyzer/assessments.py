@@ -20,6 +20,8 @@ TRAVEL_GRID_S = 10.0
 """Travel is summed on this grid [s] or on the record's own where that is coarser; ours."""
 TRAVEL_DEADBAND_PCT = 0.1
 """Moves within this band [% of OP] are not travel; ours: the resolution of common historians and outputs."""
+ROUNDING = 1e-9
+"""Moves under this [% of OP] are rounding and turn nothing: a signal may stand exactly at the edge of the band."""
 SMALL_ERROR_PCT = 5.0
 """A loop serves while abs(e) is below this [% of span]; FACTS: effective service factor."""
 LEAST_SHARE = 0.1
@@ -91,7 +93,7 @@ def travel(signal: Floats, deadband: float) -> tuple[float, int]:
     moved = np.diff(
         walk(np.ascontiguousarray(signal), 0.5 * deadband, 0.5 * deadband, RESTS, float(signal[0]))
     )
-    turns = np.sign(moved[moved != 0])
+    turns = np.sign(moved[np.abs(moved) > ROUNDING])
     return float(np.abs(moved).sum()), int((turns[1:] != turns[:-1]).sum())
 
 

@@ -5,11 +5,9 @@ from __future__ import annotations
 import csv
 import io
 import json
-import math
 import re
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import numpy as np
@@ -82,44 +80,7 @@ def asked(*arguments: str | Path) -> Result:
     return CliRunner().invoke(main, ["rank", *map(str, arguments)])
 
 
-# In time
-
-
-def spent() -> float:
-    """Processor time of all children so far [s], wall time where the system does not tell."""
-    try:
-        import resource
-    except ImportError:
-        return time.perf_counter()
-    usage = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return usage.ru_utime + usage.ru_stime
-
-
-def seconds(*arguments: str | Path) -> float:
-    """Least processor time of three runs of python with these arguments [s]: what an idle machine takes."""
-    least = math.inf
-    for _ in range(3):
-        begun = spent()
-        subprocess.run([sys.executable, *map(str, arguments)], check=True, capture_output=True)
-        least = min(least, spent() - begun)
-    return least
-
-
-@pytest.mark.parametrize("form", ["csv", "table"])
-def test_ten_thousand_loops_are_ranked_within_a_second(large, form):
-    """Ranking 10,000 loops costs at most 5 starts of Python with pyarrow and click, and under 1.5 s."""
-    floor = seconds("-c", "import pyarrow.parquet, click")
-    found = seconds("-m", "analyzer.cli", "rank", large, "--top", "20", "--format", form)
-    assert found < 5 * floor, (found, floor)
-    assert found < 1.5 * max(1.0, floor / 0.3), (found, floor)
-
-
-def test_help_answers_at_once():
-    """`triage --help` costs at most twice what Python takes to start with click, and under 0.3 s."""
-    floor = seconds("-c", "import click")
-    found = seconds("-m", "analyzer.cli", "--help")
-    assert found < 2 * floor, (found, floor)
-    assert found < 0.3 * max(1.0, floor / 0.1), (found, floor)
+# Light
 
 
 @pytest.mark.parametrize("heavy", ["numba", "scipy", "matplotlib", "pandas"])

@@ -1,7 +1,6 @@
 """Proposals: what they keep, what they gain, and when they abstain."""
 
 import math
-import time
 from dataclasses import replace
 
 import numpy as np
@@ -237,13 +236,3 @@ def test_extremes_do_not_raise():
             p = recommend(Loop(process, Pid(kp, 20, scan_s=2.0), Stiction(1.5, 0.9)), "valve")
             assert p.reason
             assert (p.controller is not None) == (p.action == "retune")
-
-
-def test_a_recommendation_takes_less_than_two_seconds():
-    """On 30,000 scans of load a recommendation takes less than 2 s of one core once compiled."""
-    cases = [stick_case(2, 30_000), backlash_case(2, 30_000)]
-    recommend(cases[1].loop, "valve", load=cases[1].load[:2000])
-    for case in cases:
-        begun = time.process_time()
-        recommend(case.loop, "valve", load=case.load)
-        assert time.process_time() - begun < 2.0

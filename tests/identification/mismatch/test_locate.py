@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import time
-
 import numpy as np
 import pytest
 from scipy.signal import lfilter
@@ -120,16 +118,6 @@ def test_short_record_is_not_located() -> None:
     """A record of under ten memories is located by nothing, and says so by having no features."""
     pv, op = trends(14, 200)
     assert at(np.random.default_rng(15).normal(0, 1, 200), pv, op).features == ()
-
-
-def test_day_of_seconds_takes_under_a_second() -> None:
-    """20,000 samples are located within a second."""
-    pv, op = trends(16, 20000)
-    e = np.random.default_rng(17).normal(0, 1, 20000)
-    at(e[:N], pv[:N], op[:N])
-    start = time.process_time()
-    at(e, pv, op)
-    assert time.process_time() - start < 1.0
 
 
 def test_turns_are_those_of_a_triangle() -> None:
