@@ -173,7 +173,7 @@ class SettingsLimits:
 
     explained: float = 0.4
     """Share of the variance of OP's increments that the recovered settings must explain [-]."""
-    gain: float = 0.1
+    gain: float = 0.04
     """Share that they must explain beyond the stated ones [-]."""
     left: float = 2.0
     """What the stated ones leave unexplained over what the recovered ones leave [-]."""

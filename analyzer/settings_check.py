@@ -42,6 +42,17 @@ def _factor(a: float, b: float) -> float:
 def differing(
     record: LoopRecord, stated: Pid, scale_s: float, limits: SettingsLimits
 ) -> SettingsDiffer | None:
+    """The recorded settings where they are plainly not the stated ones, in the whole record or in its later half.
+
+    Settings that were changed within the record show in its later half, and those are the ones in force.
+    """
+    later = record.span(len(record) // 2, len(record))
+    return _differing(later, stated, scale_s, limits) or _differing(record, stated, scale_s, limits)
+
+
+def _differing(
+    record: LoopRecord, stated: Pid, scale_s: float, limits: SettingsLimits
+) -> SettingsDiffer | None:
     """The recorded settings where they are plainly not the stated ones.
 
     Parameters

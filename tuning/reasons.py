@@ -48,6 +48,14 @@ def too_uncertain(limits: TuningLimits) -> str:
     )
 
 
+def more_error(grown: float, now: float) -> str:
+    """Why a tight loop gets no settings: calmer ones would cost error."""
+    return (
+        f"Too tight (Ms {now:.2f}), but on a process that the data allow robust settings would raise the average "
+        f"absolute error by {100 * (grown - 1):.0f} %: a record with set point moves would tell more."
+    )
+
+
 def no_size() -> str:
     """Why a valve without a size gets no settings."""
     return "The valve is at fault, but neither play nor stickband is known; a size is needed for settings."

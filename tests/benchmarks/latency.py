@@ -1,7 +1,7 @@
 """How long a person waits for an answer, over a floor of the same run: python -m tests.benchmarks.latency
 
 Whole commands are timed by the processor time of the process, over a start of Python with what they cannot do
-without; calls by the processor time of this process. The least of some runs counts. Writes latency.md beside this file.
+without; calls by the processor time of this process. The least of some runs counts. Writes latency.md here.
 """
 
 from __future__ import annotations
