@@ -221,6 +221,10 @@ def _remedy(
         return Advice(otherwise, "No new settings: loops.csv states no kp and ti.")
     if found.night.usable_h < config.advice.least_h:
         return Advice("needs data", words.too_short(found.night.usable_h, config.advice.least_h))
+    window, samples = verdict.measured.window, config.settings.ti_samples
+    dt_s = window.dt_s / window.factor
+    if dt_s > controller.ti_s / samples:
+        return Advice("needs data", words.too_thin(dt_s, controller.ti_s, samples))
     proposal = propose(verdict, controller, period_s)
     if proposal.action == "undecided":
         proposal = replace(proposal, action=otherwise)

@@ -12,7 +12,7 @@ from analyzer.assessments import Assessments, Hour, assess_span, hourly, settlin
 from analyzer.cause import NO_CAUSE, Verdict, as_hint, dead_valve, judge, not_assessed, with_dead_valve
 from analyzer.config import Config, QualityLimits
 from analyzer.measure import measure, time_scale
-from analyzer.oscillation import Oscillations, counting, detect
+from analyzer.oscillation import Oscillations, barely_seen, counting, detect
 from analyzer.plantwide import Fingerprint, fingerprint
 from analyzer.quality import Prepared, run_lengths
 from analyzer.settings_check import SettingsDiffer, differing
@@ -123,13 +123,21 @@ def _known(figures: Assessments, op: bool) -> Assessments:
     return Assessments(**{k: None if k in OF_OP else v for k, v in figures.as_row().items()})  # type: ignore[arg-type]
 
 
+def _is_coarse(record: LoopRecord, controller: Pid | None, config: Config) -> bool:
+    """Whether the controller acts several times between two samples, unseen."""
+    return controller is not None and record.dt_s > controller.ti_s / config.settings.ti_samples
+
+
 def _hidden(record: LoopRecord, found: Oscillations, controller: Pid | None, config: Config) -> str:
     """Why silence says nothing: cycles of the loop would be too fast for the sampling; '' where they would show."""
-    if found.first is not None or controller is None or not math.isfinite(controller.ti_s):
+    if found.first is not None:
         return ""
-    period = config.advice.cycle_per_ti * controller.ti_s
     samples = config.oscillation.samples
-    return too_coarse(record.dt_s, period, samples) if period < samples * record.dt_s else ""
+    period = barely_seen(found, config.oscillation)
+    if period is None and controller is not None and math.isfinite(controller.ti_s):
+        expected = config.advice.cycle_per_ti * controller.ti_s
+        period = expected if expected < samples * record.dt_s else None
+    return "" if period is None else too_coarse(record.dt_s, period, samples)
 
 
 def _settings(
@@ -172,7 +180,7 @@ def assess(prepared: Prepared, controller: Pid | None, config: Config, kind: str
     verdict = cause_of(prepared, found, settings.recorded if settings else controller, config, kind)
     dead_time = _dead_time(verdict)
     night = _known(assess_span(record), prepared.op_known)
-    if night.usable_h < config.advice.least_h:
+    if night.usable_h < config.advice.least_h or _is_coarse(record, controller, config):
         verdict = as_hint(verdict, config.advice.hint_pct)
     harris = harris_index(record.error, usable(record), record.dt_s, dead_time) if dead_time else None
     first, s = counting(found, config.oscillation), found.spectrum

@@ -163,6 +163,9 @@ class CauseLimits:
     """Coherence from which two loops share one wave, so that the valve with more evidence leads [-]; ours."""
     outweighs_wave: float = 1.5
     """Evidence of the other valve over its own from which it leads then [-]; ours."""
+    follow_cycles: float = 30.0
+    """Periods that a record must hold for loops to be told apart from others that happen to cycle alike [-]; ours: in
+    fewer, periods a few percent apart are coherent."""
     same_period: float = 0.06
     """Largest relative difference of periods that count as one [-]."""
 

@@ -130,6 +130,23 @@ def _peaks(b: Bands, least: float) -> list[int]:
     return sorted(ks, key=lambda k: -float(b.power[k] * b.line[k]))[: 2 * MOST]
 
 
+FEWEST = 2.2
+"""Samples per period from which a peak of the spectrum is a cycle at all [-]: below it every tone folds back."""
+
+
+def barely_seen(found: Oscillations, limits: OscillationLimits) -> float | None:
+    """Period [s] of a cycle that stands out of the spectrum with too few samples to be judged, or None."""
+    s, b = found.spectrum, found.bands
+    if s is None or b is None:
+        return None
+    few = replace(limits, samples=FEWEST)
+    peaks = [
+        k for k in _peaks(b, limits.prominence) if s.duration_s / float(b.line[k]) < limits.samples * s.dt_s
+    ]
+    seen = [o.period_s for k in peaks if (o := _candidate(s, b, k, few)) is not None]
+    return seen[0] if seen else None
+
+
 def _sized(
     s: Spectrum, o: Oscillation, usable: Mask, limits: OscillationLimits
 ) -> tuple[Oscillation, Mask, Floats, float]:

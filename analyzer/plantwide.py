@@ -126,6 +126,8 @@ def source_of(
     """The loop with a better reason to oscillate that this one moves with; None where there is none."""
     best = None
     for other in prints:
+        if own.duration_s < limits.follow_cycles * own.period_s:
+            break
         if other.loop == own.loop or abs(math.log(other.period_s / own.period_s)) > limits.same_period:
             continue
         found = coherence(own, other)

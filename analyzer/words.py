@@ -24,6 +24,14 @@ def settings_differ(found: SettingsDiffer, spec: LoopSpec, pv_span: float) -> st
     )
 
 
+def too_thin(dt_s: float, ti_s: float, samples: float) -> str:
+    """Why a coarse recording gives no new settings."""
+    return (
+        f"new settings need a sample every {ti_s / samples:.2g} s or faster for an integral time of {ti_s:.3g} s, "
+        f"there is one every {dt_s:g} s: take this as a hint"
+    )
+
+
 def too_short(hours: float, least: float) -> str:
     """Why a short record is a hint and no ground for new settings."""
     return f"new settings need {least:g} good hours in automatic, there are {hours:.1f}: take this as a hint"
@@ -32,8 +40,8 @@ def too_short(hours: float, least: float) -> str:
 def too_coarse(dt_s: float, period_s: float, samples: float) -> str:
     """Why a record cannot show the cycles that the loop would have."""
     return (
-        f"oscillation needs a sample every {period_s / samples:.2g} s or faster, has one every {dt_s:g} s (the "
-        f"loop's own cycle would take about {period_s:.3g} s)"
+        f"oscillation needs a sample every {period_s / samples:.2g} s or faster, has one every {dt_s:g} s (a cycle "
+        f"of this loop would take about {period_s:.3g} s)"
     )
 
 

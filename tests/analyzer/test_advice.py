@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from plant import CONFIG, Sketch, prepared, simulate, spec
+from plant import CONFIG, START_S, Sketch, prepared, series, simulate, spec
 
 from analyzer.advice import (
     advise,
@@ -24,10 +24,13 @@ from analyzer.advice import (
 from analyzer.assess import Assessment, assess
 from analyzer.cause import NO_CAUSE, not_assessed
 from analyzer.oscillation import Oscillations
+from analyzer.quality import prepare
+from analyzer.rows import night_row
 from identification.models import Backlash, Fopdt, Integrator, Pid
 from tuning.limits import LIMITS
 from tuning.linear import margins
 
+ROLES = ("sp", "pv", "op")
 TANK = Sketch("valve", (60.0, 1800.0, 9.0), 0.9, 40.0, backlash=2.5)
 PIPE = Sketch("valve", (12.0, 150.0, 6.0), 0.65, 30.0, backlash=2.5, load_std=0.1)
 SWUNG = Sketch("load", (1.4, 90.0, 10.0), 0.8, 120.0, load_std=0.3, sine=3.0, sine_s=300.0)
@@ -168,6 +171,38 @@ def test_one_hour_is_a_hint():
     advice = settings(found, PIPE)
     assert (advice.action, advice.kp_new) == ("needs data", None)
     assert "2 good hours" in advice.reason
+
+
+@pytest.mark.parametrize(("every", "action"), [(15, "needs data"), (5, "retune")])
+def test_a_sample_for_each_half_of_ti_gives_no_settings(every, action):
+    """At 15 s a sample a loop with Ti 30 s gets no settings but what they would need; at 5 s it gets some."""
+    t = simulate(PIPE, 24.0)
+    thin = {
+        f"L.{n.upper()}": series(START_S + np.arange(0.0, t.pv.size, every), getattr(t, n)[::every])
+        for n in ROLES
+    }
+    found = assess(prepare(spec("L"), thin, CONFIG.quality), PIPE.controller, CONFIG)
+    advice = settings(found, PIPE)
+    assert advice.action == action
+    assert ("sample every 7.5 s" in advice.reason) == (action == "needs data")
+
+
+def test_cycles_too_fast_for_the_sampling_are_not_denied():
+    """Sampled three times a cycle, a plainly cycling loop is not said to be calm: what it takes to see is said."""
+    t = simulate(TANK, 24.0)
+    every = 60
+    thin = {
+        f"L.{n.upper()}": series(START_S + np.arange(0.0, t.pv.size, every), getattr(t, n)[::every])
+        for n in ROLES
+    }
+    found = assess(prepare(spec("L"), thin, CONFIG.quality), TANK.controller, CONFIG)
+    assert found.oscillations.first is None
+    assert "has one every 60 s" in found.needs
+    advice = settings(found, TANK)
+    assert (advice.action, advice.reason) == ("needs data", found.needs)
+    row = night_row(found, spec("L"), "2026-03-02")
+    assert row["oscillating_pct"] is None
+    assert row["cause"] == "undecided"
 
 
 def test_stale_settings_are_told_and_nothing_is_advised():
