@@ -163,7 +163,7 @@ def carried_over(found: Explanation) -> Explanation:
     for count in range(len(names), 0, -1):
         kept = found if count == len(names) else first_effects(found, count)
         proof = held_out(kept.p, kept.plain, kept.best)
-        if proof.share > 0.0 or all(name in TIMED for name in names[:count]):
+        if proof.carries or all(name in TIMED for name in names[:count]):
             return replace(kept, proof=proof, refuted=names[count:])
     proof = held_out(found.p, found.plain, found.plain)
     return replace(found, best=found.plain, accepted=(), before=(), proof=proof, refuted=names)

@@ -78,13 +78,20 @@ def is_spread(p: Problem, better: Fitted, worse: Fitted) -> bool:
 class HeldOut:
     """Before and after on the held-out part: gain of the innovations, and misfit of the simulations.
 
-    window : samples after which the simulations begin anew, 0 for one run over all.
+    overall : misfit over the whole record of the models fitted to all of it, which is what pages draw; window :
+    samples after which the simulations begin anew, 0 for one run over all.
     """
 
     gain: float
     fitted: tuple[Misfit, Misfit]
     held: tuple[Misfit, Misfit]
+    overall: tuple[Misfit, Misfit]
     window: int = 0
+
+    @property
+    def carries(self) -> bool:
+        """Whether the misfit falls, on held-out data and over the whole."""
+        return self.share > 0.0 and self.overall[1].rmse < self.overall[0].rmse
 
     @property
     def share(self) -> float:
@@ -109,14 +116,18 @@ def held_out(p: Problem, worse: Fitted, better: Fitted) -> HeldOut:
     won = (losses[0] - losses[1]) / max(fits[1].loss, 1e-30)
     c = fits[0].model.c
     window = max(int(WINDOW_TIMES * float(c[Slot.T] + c[Slot.L]) / p.scene.dt_s), WINDOW_SAMPLES)
-    whole, windowed = (_compared(p.y, simulated, cut, won, size) for size in (0, window))
-    return windowed if whole.share <= 0.0 < windowed.share else whole
+    final = [simulate(p.scene, m.model.c) for m in (worse, better)]
+    whole, windowed = (_compared(p.y, simulated, final, cut, won, size) for size in (0, window))
+    return windowed if windowed.carries and not whole.carries else whole
 
 
-def _compared(y: Floats, simulated: list[Floats], cut: int, won: float, window: int) -> HeldOut:
+def _compared(
+    y: Floats, simulated: list[Floats], final: list[Floats], cut: int, won: float, window: int
+) -> HeldOut:
     seen = [misfit(y[:cut], x[:cut], window) for x in simulated]
     unseen = [misfit(y[cut:], x[cut:], window) for x in simulated]
-    return HeldOut(won, (seen[0], seen[1]), (unseen[0], unseen[1]), window)
+    drawn = [misfit(y, x, window) for x in final]
+    return HeldOut(won, (seen[0], seen[1]), (unseen[0], unseen[1]), (drawn[0], drawn[1]), window)
 
 
 def _refit(p: Problem, model: Model) -> Fitted:
