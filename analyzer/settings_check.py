@@ -71,7 +71,7 @@ def _differing(
     shortest = limits.ti_samples * record.dt_s
     if stated.td_s > 0 or stated.ti_s < shortest or record.mask("compressed").mean() > limits.straight_share:
         return None
-    found = compare_laws(record, scale_s, stated.kp, stated.ti_s)
+    found = compare_laws(record, scale_s, stated.kp, stated.ti_s, limits.gain)
     if found is None or not shortest <= found.ti_s < math.inf:
         return None
     if found.explained < limits.explained:

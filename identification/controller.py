@@ -106,7 +106,9 @@ class LawsCompared:
     explained_given: float
 
 
-def compare_laws(record: LoopRecord, period_s: float, kp: float, ti_s: float) -> LawsCompared | None:
+def compare_laws(
+    record: LoopRecord, period_s: float, kp: float, ti_s: float, alike: float = 0.0
+) -> LawsCompared | None:
     """Given settings and the best ones for the record, a PV filter allowed to both.
 
     Many controllers act on a filtered PV while the raw one is recorded. Left out, a filter of a tenth of the period
@@ -119,6 +121,8 @@ def compare_laws(record: LoopRecord, period_s: float, kp: float, ti_s: float) ->
         Period, or other time scale on which the loop moves [s].
     kp, ti_s : float
         The given settings [% OP / % PV], [s]; ti_s may be inf.
+    alike : float
+        Difference of the shares explained below which no filter is tried: the given settings do [-].
 
     Returns
     -------
@@ -136,6 +140,8 @@ def compare_laws(record: LoopRecord, period_s: float, kp: float, ti_s: float) ->
         needed = -math.inf if best is None else best.explained + FILTER_WORTH
         best = free if best is None or free.explained > needed else best
         given = max(given, _explained(*found, np.array([kp, kp / ti_s])))
+        if best.explained - given < alike:
+            break
     return None if best is None else LawsCompared(best.kp, best.ti_s, best.explained, given)
 
 
