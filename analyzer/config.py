@@ -225,3 +225,6 @@ class Config:
     settings: SettingsLimits = SettingsLimits()
     advice: AdviceLimits = AdviceLimits()
     workers: WorkerLimits = WorkerLimits()
+    opening: WorkerLimits = WorkerLimits(memory_mb=65_536.0, processor_s=3600.0, wall_s=7200.0)
+    """The same for finding out about an export, which reads its clocks and tags once; ours: ten times what 3 GB of
+    text take. Memory ends where the machine's does, and that ends this process alone."""

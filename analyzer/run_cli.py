@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import signal
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from datetime import datetime
 from pathlib import Path
@@ -95,7 +95,7 @@ def run(
 
     try:
         with stoppable():
-            source, specs, notes = opened(export, loops, **reading)
+            source, specs, notes = _opened(export, loops, reading)
             _say(notes)
             span = utc_seconds(since, -math.inf), utc_seconds(until, math.inf)
             outcome = _assessed(source, specs, Store(store), jobs, resume, span, replacing)
@@ -106,6 +106,44 @@ def run(
         click.echo(f"triage: stopped by {stopped}; {kept}", err=True)
         sys.exit(STOPPED + stopped.number)
     sys.exit(_status(outcome, len(specs)))
+
+
+def _opened(
+    export: tuple[Path, ...], loops: Path | None, reading: dict[str, Any]
+) -> tuple[Export, Sequence[LoopSpec], Sequence[str]]:
+    """The export found out about in a worker process: a damaged file may take memory or time without end.
+
+    Raises
+    ------
+    InputError
+        The export cannot be used, or the process that read it died.
+    """
+    from analyzer.config import Config
+    from analyzer.workers import Died, Workers
+    from identification.errors import InputError
+
+    with Workers(1, find_out, Config().opening) as workers:
+        workers.submit((export, loops, reading))
+        (found,) = workers.results()
+    if isinstance(found, Died):
+        raise InputError(
+            f"{export[0]}: reading it ended without a result ({found.why})",
+            "files that are whole and fit into memory",
+            "export them again or in parts; 'triage check FILE' on each finds the one",
+        )
+    return found
+
+
+def find_out(
+    asked: tuple[tuple[Path, ...], Path | None, dict[str, Any]], began: Callable[[int], None]
+) -> tuple[Export, Sequence[LoopSpec], Sequence[str]]:
+    """What a worker finds out about an export, its span of time included."""
+    export, loops, reading = asked
+    source, specs, notes = opened(export, loops, **reading)
+    for spec in specs:
+        if spec.pv is not None:
+            source.span(spec.pv)
+    return source, specs, notes
 
 
 def _status(outcome: Outcome, loops: int) -> int:

@@ -3,6 +3,8 @@
 Every error that reaches a user says what was seen, what was expected and what to do about it.
 """
 
+from __future__ import annotations
+
 
 class TriageError(Exception):
     """Base of all errors that this project raises on purpose."""
@@ -24,6 +26,10 @@ class InputError(TriageError):
     def __init__(self, seen: str, expected: str, remedy: str) -> None:
         self.seen, self.expected, self.remedy = seen, expected, remedy
         super().__init__(f"{seen}; expected {expected}; {remedy}")
+
+    def __reduce__(self) -> tuple[type[InputError], tuple[str, str, str]]:
+        """How it travels between processes: by what it was made of."""
+        return type(self), (self.seen, self.expected, self.remedy)
 
 
 class NotAssessedError(TriageError):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import pickle
 import signal
 import subprocess
 import sys
@@ -20,9 +21,11 @@ from click.testing import CliRunner, Result
 from plant import START_S, write_export
 from test_batch import quiet, stopped, tables
 
+from analyzer import run_cli
 from analyzer.cli import main
 from analyzer.store import Store
 from analyzer.store_lock import locked
+from identification.errors import InputError
 
 LOOPS = 24
 linux = pytest.mark.skipif(sys.platform != "linux", reason="processes are looked for in /proc")
@@ -245,3 +248,30 @@ def test_explanations_of_other_loops_stay(export, tmp_path):
     ran(part(export, tmp_path / "b.parquet", range(3, 6)), store.path)
     kept = store.read("explained", night)
     assert pc.unique(kept.column("loop")).to_pylist() == ["L00"]
+
+
+def dies(asked: object, began: object) -> None:
+    """In place of finding out about an export: be ended by the system."""
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+@linux
+def test_what_dies_over_an_export_is_told_in_one_line(export, tmp_path, monkeypatch):
+    """Where the process that finds out about an export is ended, the run ends with exit 2 and one line."""
+    monkeypatch.setattr(run_cli, "find_out", dies)
+    told = ran(export, tmp_path / "store")
+    assert told.exit_code == 2
+    assert "reading it ended without a result (its worker process was ended by SIGKILL" in told.stderr
+    assert told.stderr.count("\n") == 1
+
+
+def test_an_error_of_ours_travels_between_processes():
+    """An InputError is the same after its way from a worker."""
+    error = InputError("seen", "expected", "remedy")
+    again = pickle.loads(pickle.dumps(error))
+    assert (str(again), again.seen, again.expected, again.remedy) == (
+        str(error),
+        "seen",
+        "expected",
+        "remedy",
+    )
