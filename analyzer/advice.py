@@ -55,7 +55,7 @@ class Advice:
     simulation finds at the present and at the new settings, None where there is none.
     """
 
-    action: str
+    action: Action
     reason: str = ""
     kp_new: float | None = None
     ti_new: float | None = None
@@ -188,7 +188,26 @@ def advise(
         Span of PV in its own unit, for settings in engineering units.
     config : Config
     """
-    verdict, oscillation = found.verdict, counting(found.oscillations, config.oscillation)
+    kept = withheld(found, spec, controller, pv_span, config)
+    oscillation = counting(found.oscillations, config.oscillation)
+    if kept is not None or controller is None or oscillation is None:
+        return kept or Advice(_without_settings(found.verdict))
+    proposal = propose(found.verdict, controller, oscillation.period_s)
+    if proposal.action == "undecided":
+        proposal = replace(proposal, action=_without_settings(found.verdict))
+    return _stated(proposal, spec, pv_span)
+
+
+def _without_settings(verdict: Verdict) -> Action:
+    """What is left to do where no settings are told: a valve at fault is one all the same."""
+    return "repair valve" if verdict.cause == "valve" else "undecided"
+
+
+def withheld(
+    found: Assessment, spec: LoopSpec, controller: Pid | None, pv_span: float, config: Config
+) -> Advice | None:
+    """Why no settings are sought for a loop, and what to do instead; None where they are sought."""
+    verdict = found.verdict
     if verdict.dead:
         return Advice("repair valve")
     if found.settings is not None:
@@ -197,38 +216,26 @@ def advise(
         return Advice("needs data", found.needs)
     if verdict.cause in ("none", "load"):
         return Advice("none")
-    if oscillation is None:
+    if counting(found.oscillations, config.oscillation) is None:
         return Advice("none", CALM)
     if verdict.cause == "undecided":
         return Advice("undecided")
-    return _remedy(found, spec, controller, pv_span, oscillation.period_s, config)
+    return _unsupported(found, controller, config)
 
 
-def _remedy(
-    found: Assessment,
-    spec: LoopSpec,
-    controller: Pid | None,
-    pv_span: float,
-    period_s: float,
-    config: Config,
-) -> Advice:
-    """What to do about a loop that oscillates for its valve or its tuning."""
-    verdict = found.verdict
-    otherwise: Action = "repair valve" if verdict.cause == "valve" else "undecided"
-    if verdict.measured is None or (verdict.fault == "undecided" and verdict.measured.play.gain == 0):
-        return Advice(otherwise)
+def _unsupported(found: Assessment, controller: Pid | None, config: Config) -> Advice | None:
+    """What a loop that oscillates for its valve or its tuning lacks for new settings; None where nothing."""
+    verdict, m = found.verdict, found.verdict.measured
+    if m is None or (verdict.fault == "undecided" and m.play.gain == 0):
+        return Advice(_without_settings(verdict))
     if controller is None:
-        return Advice(otherwise, "No new settings: loops.csv states no kp and ti.")
+        return Advice(_without_settings(verdict), "No new settings: loops.csv states no kp and ti.")
     if found.night.usable_h < config.advice.least_h:
         return Advice("needs data", words.too_short(found.night.usable_h, config.advice.least_h))
-    window, samples = verdict.measured.window, config.settings.ti_samples
-    dt_s = window.dt_s / window.factor
+    dt_s, samples = m.window.dt_s / m.window.factor, config.settings.ti_samples
     if dt_s > controller.ti_s / samples:
         return Advice("needs data", words.too_thin(dt_s, controller.ti_s, samples))
-    proposal = propose(verdict, controller, period_s)
-    if proposal.action == "undecided":
-        proposal = replace(proposal, action=otherwise)
-    return _stated(proposal, spec, pv_span)
+    return None
 
 
 def _sticks(m: Measured, controller: Pid) -> Loop | None:

@@ -29,8 +29,9 @@ from analyzer.rows import hour_rows, lost_row, night_row
 from analyzer.store import Store, rows_table, write_table
 from analyzer.tags import controller
 from identification.errors import NotAssessedError, TriageError
+from tuning.recommend import Action
 
-HISTORY = {"none": "none", "load": "none"}
+HISTORY: dict[str, Action] = {"none": "none", "load": "none"}
 """Actions of nights that are not the last: settings are advised on for tomorrow, not for the week before."""
 HOUR_COLUMNS = ("loop", "night", "hour_s", "oscillation_significance", "oscillating_pct")
 

@@ -165,11 +165,7 @@ def measure(
     """
     scale = time_scale(record, oscillation, controller)
     window = window_of(record, scale, limits, kind)
-    judged = int(judged_mask(window.usable, AR_ORDER).sum())
-    if judged < limits.judged:
-        raise NotAssessedError(
-            f"needs {limits.judged} stretches of {AR_ORDER + 1} good samples in a row, has {judged}"
-        )
+    _check_judged(window, limits)
     controller = controller or recovered(record, scale)
     due = answering(record, window, scale)
     shown = None if window.position is None else seen(window.op, window.position)
@@ -207,6 +203,15 @@ def measure(
         and oscillation is not None
         and _cycles_alike(window, best, controller, oscillation),
     )
+
+
+def _check_judged(window: Window, limits: CauseLimits) -> None:
+    """Raise NotAssessedError where too few blocks follow on as many good ones as the noise model looks back."""
+    judged = int(judged_mask(window.usable, AR_ORDER).sum())
+    if judged < limits.judged:
+        raise NotAssessedError(
+            f"needs {limits.judged} stretches of {AR_ORDER + 1} good samples in a row, has {judged}"
+        )
 
 
 Rivals = tuple[Fit, Fit, Fit | None]

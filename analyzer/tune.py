@@ -8,17 +8,26 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from analyzer.advice import NINETY, chosen_fit, lag_factor, load_of, model_of, propose, sought_for, uncertain
+from analyzer.advice import (
+    NINETY,
+    Advice,
+    chosen_fit,
+    lag_factor,
+    load_of,
+    model_of,
+    propose,
+    sought_for,
+    uncertain,
+)
 from analyzer.assess import Assessment
 from analyzer.cause import Verdict
 from analyzer.history.loops_csv import LoopSpec
 from analyzer.tags import as_stated
-from identification.controller import fit_pi
 from identification.descent import covariance
 from identification.errors import NotAssessedError
 from identification.hammerstein import Fit, ValveTrial
 from identification.models import Estimate, Loop, Pid, Process
-from identification.record import Floats, LoopRecord
+from identification.record import Floats
 from identification.window import Window, block_means
 from tuning.describing import describe
 from tuning.limit_cycle import Confirmed, confirm
@@ -45,9 +54,6 @@ LEAST_JUMP = 2.0
 """Times that a slip jump may be smaller than found; ours: on simulated dry friction found ones are too small."""
 LEAST_BAND = 1.5
 """Times that a stickband may be smaller than found; ours: on simulated dry friction up to 1.45."""
-DISAGREES = 0.15
-"""Relative difference of recovered and stated settings from which it is told; ours: recovery is within 2 % on
-trends recorded at the scan and within some 10 % on thinned ones."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,8 +62,7 @@ class Tuning:
 
     estimates by name with 90 % intervals; model, the identified loop with its present controller; period_s and
     amplitude_pct of the recorded cycle [s], [% of span], None where there is none; cycle, the one simulation
-    finds; proposal; forecast, None where nothing is proposed; load [% PV] on the scan's clock; recovered
-    settings (kp, ti_s), None where the record does not tell.
+    finds; proposal; forecast, None where nothing is proposed; load [% PV] on the scan's clock.
     """
 
     estimates: dict[str, Estimate]
@@ -68,7 +73,6 @@ class Tuning:
     proposal: Proposal
     forecast: Forecast | None
     load: Floats
-    recovered: tuple[float, float] | None
 
 
 def intervals(window: Window, fit: Fit, valve: bool) -> dict[str, Estimate]:
@@ -141,15 +145,16 @@ def _model(verdict: Verdict, controller: Pid) -> tuple[Loop, Fit, tuple[Loop, ..
     return model, fit, uncertain(window, fit, model) if window else ()
 
 
-def tune(found: Assessment, record: LoopRecord, controller: Pid) -> Tuning:
+def tune(found: Assessment, controller: Pid, kept: Advice | None = None) -> Tuning:
     """Propose settings for one assessed loop.
 
     Parameters
     ----------
     found : Assessment
-    record : LoopRecord
     controller : Pid
         The stated settings in percent and seconds.
+    kept : Advice or None
+        Why none are to be proposed (analyzer.advice.withheld).
 
     Raises
     ------
@@ -163,12 +168,13 @@ def tune(found: Assessment, record: LoopRecord, controller: Pid) -> Tuning:
     period = first.period_s if first else None
     window = verdict.measured.window
     model, fit, others = _model(verdict, controller)
-    proposal = propose(verdict, controller, period)
+    if kept is not None and kept.reason:
+        proposal = Proposal(kept.action, kept.reason)
+    else:
+        proposal = propose(verdict, controller, period)
     load = load_of(window, fit, controller)
     new = proposal.controller or proposal.meanwhile
     forecast = predict(model, new, load, others) if new and load.size >= LEAST_SCANS else None
-    pi = fit_pi(record, period or 60 * record.dt_s)
-    told = pi is not None and pi.explained > 0.8 and math.isfinite(pi.ti_s)
     return Tuning(
         intervals(window, fit, verdict.cause == "valve"),
         model,
@@ -178,7 +184,6 @@ def tune(found: Assessment, record: LoopRecord, controller: Pid) -> Tuning:
         proposal,
         forecast,
         load,
-        (pi.kp, pi.ti_s) if pi is not None and told else None,
     )
 
 
@@ -218,27 +223,12 @@ def _forecast(t: Tuning) -> list[str]:
     return lines
 
 
-def _disagreement(t: Tuning) -> list[str]:
-    """A line where the record gives other settings than loops.csv states."""
-    if t.recovered is None:
-        return []
-    kp, ti = t.recovered
-    c = t.model.controller
-    stated = integral_s(c)
-    if abs(kp / c.kp - 1) <= DISAGREES and abs(ti / stated - 1) <= DISAGREES:
-        return []
-    integral = f"{stated:.3g} s" if math.isfinite(stated) else "no integral action"
-    seen = f"OP follows kp {kp:.3g} %/% and ti {ti:.3g} s, loops.csv states {c.kp:.3g} and {integral}"
-    wrong = "the sign of kp is wrong, " if kp * c.kp < 0 else ""
-    return [f"{seen}: {wrong}check the settings before you change them"]
-
-
 def lines(t: Tuning, spec: LoopSpec, pv_span: float) -> list[str]:
     """The proposal in words and figures."""
     out = [f"{name}: {_between(e)}" for name, e in t.estimates.items()]
     if "gain" not in t.estimates:
         out.append("gain and time constant: only their ratio is known from this record")
-    out += _disagreement(t) + _cycle(t) + [f"action: {t.proposal.action}"]
+    out += [*_cycle(t), f"action: {t.proposal.action}"]
     for title, pid in (("new settings", t.proposal.controller), ("until the repair", t.proposal.meanwhile)):
         if pid is not None:
             kp, ti = as_stated(pid, spec, pv_span)

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from difflib import get_close_matches
 
+from analyzer.advice import withheld
 from analyzer.assess import assess, unfit_for_cause
 from analyzer.config import Config
 from analyzer.history.export import Export
@@ -73,6 +74,6 @@ def proposal(
         return [*text, "action: repair valve", f"no settings: {needs or NO_MODEL}"], {}
     if found.verdict.measured is None:
         raise NotAssessedError(f"{loop}: {needs or found.verdict.needs or NO_MODEL}")
-    tuning = tune(found, prepared.record, stated)
+    tuning = tune(found, stated, withheld(found, spec, stated, prepared.scale.span, config))
     text += lines(tuning, spec, prepared.scale.span)
     return text, pictures(tuning, loop) if drawn else {}

@@ -34,7 +34,7 @@ def too_thin(dt_s: float, ti_s: float, samples: float) -> str:
 
 def too_short(hours: float, least: float) -> str:
     """Why a short record is a hint and no ground for new settings."""
-    return f"new settings need {least:g} good hours in automatic, there are {hours:.1f}: take this as a hint"
+    return f"new settings need {least:g} good hours in automatic, there are {hours:.3g}: take this as a hint"
 
 
 def too_coarse(dt_s: float, period_s: float, samples: float) -> str:

@@ -29,7 +29,9 @@ from tuning.search import (
     standard_load,
 )
 
-Action = Literal["retune", "repair valve", "see source loop", "check settings", "none", "undecided"]
+Action = Literal[
+    "retune", "repair valve", "see source loop", "check settings", "needs data", "none", "undecided"
+]
 CAUSES = ("valve", "tuning", "load", "none", "undecided")
 
 CONFIRMED = 15

@@ -22,7 +22,7 @@ PNG = b"\x89PNG\r\n\x1a\n"
 @pytest.fixture(scope="module")
 def tank() -> Trends:
     """Two hours of a tank with a play of 2.5 %."""
-    return simulate(TANK, 2.0)
+    return simulate(TANK, 2.5)
 
 
 def asked(folder: Path, trends: Trends, stated: str = STATED, *more: str) -> Result:
@@ -101,14 +101,23 @@ def test_integral_off_is_an_abstention(tmp_path, tank):
     out = clean(asked(tmp_path, tank, "0.9,0,0,100", "--out", str(tmp_path / "pictures")), 0)
     assert "action: check settings" in out
     assert "no integral action" in out
-    assert re.search(r"OP follows kp 0\.9 %/% and ti (39|40|41)", out)
+    assert re.search(r"recorded about Kp 0\.(89|9|90|91)\d* %/%, Ti (39|40|41)", out)
 
 
 def test_wrong_sign_is_an_abstention(tmp_path, tank):
     """A gain stated with the wrong sign gets no settings, and its sign is named."""
     out = clean(asked(tmp_path, tank, "-0.9,40,0,100"), 0)
     assert "new settings:" not in out
-    assert "the sign of kp is wrong" in out
+    assert re.search(r"stated Kp -0\.9 %/%, Ti 40 s; recorded about Kp 0\.(89|9|90|91)", out)
+
+
+def test_stale_settings_get_no_advice(tmp_path, tank):
+    """Where loops.csv is stale, no settings, no forecast, and both pairs with their units."""
+    out = clean(asked(tmp_path, tank, "0.45,120,0,100"), 0)
+    assert "action: check settings" in out
+    assert "stated Kp 0.45 %/%, Ti 120 s" in out
+    assert "new settings:" not in out
+    assert "forecast" not in out
 
 
 def test_load_is_left_alone(tmp_path):
