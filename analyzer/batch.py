@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from analyzer import chunk, run_identity
+from analyzer.changes import TuningChange
 from analyzer.chunk import Done, Task, assess_loop
 from analyzer.config import Config
 from analyzer.finish import finish_night, is_empty
@@ -51,12 +52,15 @@ def _tasks(
     store: Store,
     config: Config,
     known: set[str],
+    changes: Sequence[TuningChange],
 ) -> list[Task]:
     """Chunks of the loops that no piece of the last night holds yet."""
     left = [s for s in specs if s.loop not in known]
     mark = uuid.uuid4().hex[:8]  # a worker of a killed run may write yet; its pieces have another mark
     return [
-        Task(export, tuple(left[i : i + CHUNK]), tuple(spans), store, config, f"{mark}-{i:06d}")
+        Task(
+            export, tuple(left[i : i + CHUNK]), tuple(spans), store, config, f"{mark}-{i:06d}", tuple(changes)
+        )
         for i in range(0, len(left), CHUNK)
     ]
 
@@ -117,6 +121,7 @@ def run(
     until_s: float = math.inf,
     progress: Callable[[int, int], None] = lambda done, total: None,
     replacing: bool = False,
+    changes: Sequence[TuningChange] = (),
 ) -> Outcome:
     """Assess all loops of an export and keep the results.
 
@@ -138,6 +143,8 @@ def run(
         Called with loops done and loops in all.
     replacing : bool
         Forget what the store has of these nights, instead of adding to it.
+    changes : sequence of TuningChange
+        When settings were changed; each night has those in force at its end.
 
     Raises
     ------
@@ -150,11 +157,13 @@ def run(
         )
     with locked(store.path):
         spans = nights_of(export, specs, since_s, until_s)
-        keys = _begun(store, spans, run_identity.identity(export, specs, since_s, until_s, config), resume)
+        keys = _begun(
+            store, spans, run_identity.identity(export, (*specs, *changes), since_s, until_s, config), resume
+        )
         known = _loops_in(store, spans[-1].name, keys)
         progress(len(known), len(specs))
         done, met = len(known), Counter[str]()
-        for result in _results(_tasks(export, specs, spans, store, config, known), jobs, config):
+        for result in _results(_tasks(export, specs, spans, store, config, known, changes), jobs, config):
             keys.append(result.key)
             done += result.loops
             met.update(result.met)

@@ -16,6 +16,7 @@ import pyarrow as pa
 from analyzer.advice import Advice, advise
 from analyzer.assess import Assessment, assess
 from analyzer.assessments import Assessments
+from analyzer.changes import TuningChange
 from analyzer.columns import ALL_COLUMNS, TEXT_COLUMNS
 from analyzer.config import Config
 from analyzer.history.export import Export
@@ -26,6 +27,7 @@ from analyzer.plantwide import Fingerprint
 from analyzer.present import advised
 from analyzer.quality import interval, prepare
 from analyzer.rows import hour_rows, lost_row, night_row
+from analyzer.settings_in_force import in_force
 from analyzer.store import Store, rows_table, write_table
 from analyzer.tags import controller
 from identification.errors import NotAssessedError, TriageError
@@ -46,6 +48,7 @@ class Task:
     store: Store
     config: Config
     key: str
+    changes: tuple[TuningChange, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,7 +132,8 @@ def work(task: Task, began: Callable[[int], None] = lambda at: None) -> Done:
                 row, assessment = lost_row(spec, night.name, *series), None
             else:
                 advising = night is task.nights[-1]
-                row, assessment = _loop_row(spec, series, night, task.config, advising)
+                stated = in_force(spec, task.changes, night.last_s)
+                row, assessment = _loop_row(stated, series, night, task.config, advising)
             rows[night.name].append(row)
             if assessment is not None:
                 found[night.name].append(assessment)

@@ -82,6 +82,9 @@ def rank(store: Path, column: str, top: int | None, night: str | None, ascending
 @main.command()
 @export_options
 @click.option("--loop", "tag", required=True, help="The loop to tune.")
+@click.option(
+    "--changes", type=click.Path(path_type=Path), help="changes.csv: when settings were changed, old and new."
+)
 @click.option("--until", type=click.DateTime(), help="Day or time (UTC) before which samples are used.")
 @click.option("--out", type=click.Path(path_type=Path), help="Directory for the pictures.")
 @told
@@ -89,6 +92,7 @@ def tune(
     export: tuple[Path, ...],
     loops: Path | None,
     tag: str,
+    changes: Path | None,
     until: datetime | None,
     out: Path | None,
     **reading: Any,
@@ -97,10 +101,12 @@ def tune(
 
     Example: triage tune export.parquet --loops loops.csv --loop LIC2107 --out pictures
     """
+    from analyzer.changes import read_changes
     from analyzer.tune_loop import proposal
 
     source, specs, _ = opened(export, loops, **reading)
-    lines, pictures = proposal(source, specs, tag, utc_seconds(until, math.inf), drawn=out is not None)
+    dated = () if changes is None else read_changes(changes)
+    lines, pictures = proposal(source, specs, tag, utc_seconds(until, math.inf), out is not None, dated)
     for line in lines:
         click.echo(line)
     if out is not None:

@@ -18,6 +18,7 @@ from analyzer.options import NOTHING_DONE, SOME_LOST, export_options, opened, ut
 
 if TYPE_CHECKING:
     from analyzer.batch import Outcome
+    from analyzer.changes import TuningChange
     from analyzer.history.export import Export
     from analyzer.history.loops_csv import LoopSpec
     from analyzer.nights import Night
@@ -64,6 +65,9 @@ def stoppable() -> Iterator[None]:
 @click.option(
     "--store", required=True, type=click.Path(path_type=Path), help="Directory that keeps the results."
 )
+@click.option(
+    "--changes", type=click.Path(path_type=Path), help="changes.csv: when settings were changed, old and new."
+)
 @click.option("--jobs", default=1, show_default=True, type=click.IntRange(1), help="Worker processes.")
 @click.option("--resume", is_flag=True, help="Go on with a run that was stopped.")
 @click.option("--replace", "replacing", is_flag=True, help="Forget what the store has of these nights first.")
@@ -74,6 +78,7 @@ def run(
     export: tuple[Path, ...],
     loops: Path | None,
     store: Path,
+    changes: Path | None,
     jobs: int,
     resume: bool,
     replacing: bool,
@@ -91,14 +96,16 @@ def run(
 
     Example: triage run export.parquet --loops loops.csv --store store --jobs 4
     """
+    from analyzer.changes import read_changes
     from analyzer.store import Store
 
+    dated = () if changes is None else read_changes(changes)
     try:
         with stoppable():
             source, specs, notes = _opened(export, loops, reading)
             _say(notes)
             span = utc_seconds(since, -math.inf), utc_seconds(until, math.inf)
-            outcome = _assessed(source, specs, Store(store), jobs, resume, span, replacing)
+            outcome = _assessed(source, specs, Store(store), jobs, resume, span, replacing, dated)
             if explaining and len(outcome.unassessed) + len(outcome.failed) < len(specs):
                 _explained(source, specs, Store(store), outcome.nights[-1], jobs, resume)
     except StoppedError as stopped:
@@ -165,6 +172,7 @@ def _assessed(
     resume: bool,
     span: tuple[float, float],
     replacing: bool,
+    changes: Sequence[TuningChange],
 ) -> Outcome:
     """Run the batch with progress and say what came of it."""
     from analyzer import batch
@@ -172,7 +180,7 @@ def _assessed(
     from analyzer.progress import bar
 
     with bar("loops") as progress:
-        outcome = batch.run(source, specs, store, Config(), jobs, resume, *span, progress, replacing)
+        outcome = batch.run(source, specs, store, Config(), jobs, resume, *span, progress, replacing, changes)
     more = len(outcome.notes) - FEW
     _say(outcome.notes[:FEW])
     if more > 0:

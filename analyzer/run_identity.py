@@ -33,18 +33,19 @@ class RunIdentity:
 
 
 def identity(
-    export: Export, specs: Sequence[LoopSpec], since_s: float, until_s: float, config: Config
+    export: Export, stated: Sequence[object], since_s: float, until_s: float, config: Config
 ) -> RunIdentity:
-    """The identity of a run over an export within a span of time [s since 1970-01-01 UTC]."""
+    """The identity of a run over an export, with what is stated of its loops, within a span of time [s, UTC]."""
     mark = hashlib.blake2b(digest_size=16)
     for source in export.sources:
         mark.update(_ends(source.path))
         mark.update(repr(source.clock).encode())
-    mark.update(repr((tuple(specs), since_s, until_s, config)).encode())
+    mark.update(repr((tuple(stated), since_s, until_s, config)).encode())
     names = [source.path.name for source in export.sources]
+    loops = sum(isinstance(row, LoopSpec) for row in stated)
     more = f" and {len(names) - 1} more files" if len(names) > 1 else ""
     now = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
-    return RunIdentity(mark.hexdigest(), names[0] + more, len(specs), now)
+    return RunIdentity(mark.hexdigest(), names[0] + more, loops, now)
 
 
 def _ends(path: Path) -> bytes:

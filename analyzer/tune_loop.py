@@ -9,11 +9,13 @@ from difflib import get_close_matches
 
 from analyzer.advice import withheld
 from analyzer.assess import assess, unfit_for_cause
+from analyzer.changes import TuningChange
 from analyzer.config import Config
 from analyzer.history.export import Export
 from analyzer.history.loops_csv import LoopSpec
 from analyzer.nights import cut, nights_of
 from analyzer.quality import Prepared, prepare
+from analyzer.settings_in_force import in_force
 from analyzer.tags import controller
 from analyzer.tune import lines, pictures, tune
 from identification.errors import InputError, NotAssessedError
@@ -47,7 +49,12 @@ def _unfit(prepared: Prepared, config: Config) -> str:
 
 
 def proposal(
-    export: Export, specs: Sequence[LoopSpec], loop: str, until_s: float = math.inf, drawn: bool = True
+    export: Export,
+    specs: Sequence[LoopSpec],
+    loop: str,
+    until_s: float = math.inf,
+    drawn: bool = True,
+    changes: Sequence[TuningChange] = (),
 ) -> tuple[list[str], dict[str, bytes]]:
     """Lines of text and, if wanted, pictures by file name for one loop's last night.
 
@@ -58,6 +65,7 @@ def proposal(
     """
     config, spec = Config(), spec_of(specs, loop)
     night = nights_of(export, [spec], until_s=until_s)[-1]
+    spec = in_force(spec, changes, night.last_s)
     prepared = prepare(spec, {t: cut(s, night) for t, s in export.read(spec.tags).items()}, config.quality)
     stated = controller(spec, prepared.scale.span)
     if stated is None:

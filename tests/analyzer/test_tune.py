@@ -21,7 +21,7 @@ PNG = b"\x89PNG\r\n\x1a\n"
 
 @pytest.fixture(scope="module")
 def tank() -> Trends:
-    """Two hours of a tank with a play of 2.5 %."""
+    """Two and a half hours of a tank with a play of 2.5 %."""
     return simulate(TANK, 2.5)
 
 

@@ -1,0 +1,59 @@
+"""Settings have dates: each night has those in force at its end."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from plant import START_S, Sketch, simulate, spec, write_export
+
+from analyzer import batch
+from analyzer.changes import TuningChange
+from analyzer.config import Config
+from analyzer.history.export import open_export
+from analyzer.settings_in_force import in_force
+from analyzer.store import Store
+from analyzer.tags import match
+
+LOOP = spec("L", kp=1.0, ti=10.0)
+FIRST = TuningChange("L", 100.0, 1.0, 10.0, 2.0, 20.0)
+SECOND = TuningChange("L", 200.0, kp_new=3.0)
+
+
+@pytest.mark.parametrize(
+    ("at_s", "expected"),
+    [
+        (50.0, (0.5, 5.0)),
+        (100.0, (2.0, 20.0)),
+        (150.0, (2.0, 20.0)),
+        (200.0, (3.0, 20.0)),
+        (1e9, (3.0, 20.0)),
+    ],
+)
+def test_the_last_change_before_a_time_counts(at_s, expected):
+    """Old settings before the first change, then those of the last one; what a change leaves out stays as it was."""
+    first = TuningChange("L", 100.0, 0.5, 5.0, 2.0, 20.0)
+    found = in_force(LOOP, (SECOND, TuningChange("M", 60.0, kp_new=9.0), first), at_s)
+    assert (found.kp, found.ti) == expected
+
+
+def test_without_changes_loops_csv_stands():
+    """No changes, or other loops', leave loops.csv as it is."""
+    assert in_force(LOOP, (), 0.0) is LOOP
+    assert in_force(LOOP, (TuningChange("M", 0.0, kp_new=9.0),), 1e9) is LOOP
+
+
+def test_a_run_advises_on_the_settings_in_force(tmp_path):
+    """With loops.csv old by a factor of two in gain, the change's date makes 'check settings' a retune."""
+    pipe = Sketch("valve", (12.0, 150.0, 6.0), 0.65, 30.0, backlash=2.5, load_std=0.1)
+    export = open_export([write_export(tmp_path / "x.parquet", {"L": simulate(pipe, 6.0)})])
+    stale = match([spec("L", kp=0.3, ti=90.0, scan_s=1.0)], export.tags)[0]
+    dated = (TuningChange("L", START_S - 86400.0, 0.3, 90.0, 0.65, 30.0),)
+    rows = []
+    for changes in ((), dated):
+        store = Store(tmp_path / f"store{len(changes)}")
+        batch.run(export, stale, store, Config(), 0, False, -math.inf, math.inf, changes=changes)
+        (row,) = store.read("nights", store.require()).to_pylist()
+        rows.append(row)
+    assert [r["action"] for r in rows] == ["check settings", "retune"]
+    assert (rows[1]["kp"], rows[1]["ti"]) == (0.65, 30.0)
