@@ -36,6 +36,10 @@ LIVES = {
 """Block in which a misfit without a name is looked for first, by the feature that carries it; else the process."""
 
 
+ONE_MOVE_ONLY = "rests on one move of OP, of which nothing is left to prove it on; another recording would"
+"""What a recording of one experiment lacks."""
+
+
 @dataclass(frozen=True, slots=True)
 class Effect:
     """One effect: name, block, parameters, the part of the held-out misfit it removes, and its alternatives."""
@@ -199,7 +203,7 @@ def answer(found: Explanation, s: Subject) -> Answer:
         moved(found),
         remaining(found),
         f"Not told: {lacking}." if lacking and (verdict, block) == ("unexplained", "none") else _note(found),
-        lacking if effects else "",
+        (lacking or (ONE_MOVE_ONLY if found.unproven else "")) if effects else "",
     )
 
 

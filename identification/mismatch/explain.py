@@ -13,7 +13,7 @@ from identification.mismatch.control import Ruling, Stated, judge
 from identification.mismatch.fitting import Fitted, Model, Problem, descend, gain
 from identification.mismatch.law import Law, shifted
 from identification.mismatch.physics import Row
-from identification.mismatch.proof import TIMED, HeldOut, held_out, passes
+from identification.mismatch.proof import TIMED, HeldOut, held_out, is_one_move, passes
 from identification.mismatch.rivals import (
     Clip,
     Progress,
@@ -60,7 +60,8 @@ class Explanation:
     trace, ruling : findings about recorder and controller; plain, best : fits without and with the effects; p, p0 :
     the problems that they solve; accepted : the rivals taken, in order; last : the rivals of the last round;
     before : the fit to which each accepted rival was added; late_s : PV's lateness that was taken out [s]; proof :
-    plain and best on held-out data; refuted : names of effects that explain the fitted part and not the rest.
+    plain and best on held-out data; refuted : names of effects that explain the fitted part and not the rest;
+    unproven : whether OP moved once, so that nothing is left to prove the effects on.
     """
 
     p: Problem = field(repr=False)
@@ -76,6 +77,7 @@ class Explanation:
     left: float = 0.0
     proof: HeldOut | None = None
     refuted: tuple[str, ...] = ()
+    unproven: bool = False
 
 
 def trace_of(s: Subject) -> recorder.Trace | None:
@@ -163,8 +165,9 @@ def carried_over(found: Explanation) -> Explanation:
     for count in range(len(names), 0, -1):
         kept = found if count == len(names) else first_effects(found, count)
         proof = held_out(kept.p, kept.plain, kept.best)
-        if proof.carries or all(name in TIMED for name in names[:count]):
-            return replace(kept, proof=proof, refuted=names[count:])
+        unproven = not proof.carries and proof.falls and is_one_move(found.p)
+        if proof.carries or unproven or all(name in TIMED for name in names[:count]):
+            return replace(kept, proof=proof, refuted=names[count:], unproven=unproven)
     proof = held_out(found.p, found.plain, found.plain)
     return replace(found, best=found.plain, accepted=(), before=(), proof=proof, refuted=names)
 

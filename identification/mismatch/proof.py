@@ -65,10 +65,15 @@ def gains_by_block(p: Problem, better: Fitted, worse: Fitted) -> Floats:
     return np.array([part.sum() for part in np.array_split(won, BLOCKS)])
 
 
+def is_one_move(p: Problem) -> bool:
+    """Whether OP moves in two parts of the record alone: one experiment, of which no part is left to prove it on."""
+    travel = np.sort([float(np.abs(np.diff(part)).sum()) for part in np.array_split(p.scene.op, BLOCKS)])
+    return float(travel[-2:].sum()) > ONE_MOVE * float(travel.sum())
+
+
 def is_spread(p: Problem, better: Fitted, worse: Fitted) -> bool:
     """Whether a share of the gain remains without the two parts that pay most; True where OP moves in two alone."""
-    travel = np.sort([float(np.abs(np.diff(part)).sum()) for part in np.array_split(p.scene.op, BLOCKS)])
-    if float(travel[-2:].sum()) > ONE_MOVE * float(travel.sum()):
+    if is_one_move(p):
         return True
     parts = np.sort(gains_by_block(p, better, worse))
     return float(parts[:-2].sum()) > SPREAD * float(parts.sum())
@@ -89,9 +94,14 @@ class HeldOut:
     window: int = 0
 
     @property
+    def falls(self) -> bool:
+        """Whether the misfit falls over the whole."""
+        return self.overall[1].rmse < self.overall[0].rmse
+
+    @property
     def carries(self) -> bool:
         """Whether the misfit falls, on held-out data and over the whole."""
-        return self.share > 0.0 and self.overall[1].rmse < self.overall[0].rmse
+        return self.share > 0.0 and self.falls
 
     @property
     def share(self) -> float:

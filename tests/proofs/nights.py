@@ -1,8 +1,9 @@
 """Two weeks night by night, advice beside truth: python -m tests.proofs.nights [--jobs 2]
 
-Each night of the sample mill is a run of its own with loops.csv alone, as a plant does it that keeps no list of
-changes; from 2026-03-09 on loops.csv is stale for the seven loops retuned that day. Every pair of settings that is
-advised is typed into the true loop, and the night's load and noise run once more under both. Writes nights.md here.
+Each night of the sample mill is a run of its own: with loops.csv alone, as a plant does it that keeps no list of
+changes (from 2026-03-09 on it is stale for the seven loops retuned that day), and with changes.csv. Every pair of
+settings that is advised is typed into the true loop, and the night's load and noise run once more under both. Writes
+nights.md here.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ import argparse
 import sys
 import tempfile
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from datetime import timedelta
 from pathlib import Path
@@ -20,6 +21,7 @@ from typing import Any
 import numpy as np
 
 from analyzer import batch
+from analyzer.changes import TuningChange, read_changes
 from analyzer.config import Config
 from analyzer.history.export import open_export
 from analyzer.history.loops_csv import LoopSpec
@@ -87,8 +89,8 @@ def typed_in(loop: Loop, spec: LoopSpec, row: dict[str, Any], night: int) -> tup
     return after[0] / before[0], after[1] / max(before[1], 1e-9)
 
 
-def nights(jobs: int) -> Iterator[Advised]:
-    """All loops of all nights."""
+def nights(jobs: int, changes: Sequence[TuningChange]) -> Iterator[Advised]:
+    """All loops of all nights, with the changes that the plant states."""
     export = open_export([SAMPLE / "mill.parquet"])
     specs = match(read_loops(SAMPLE / "loops.csv"), export.tags)[0]
     truth = {loop.tag: loop for loop in MILL}
@@ -97,28 +99,22 @@ def nights(jobs: int) -> Iterator[Advised]:
         with tempfile.TemporaryDirectory() as folder:
             store = Store(Path(folder) / "store")
             span = first.timestamp(), first.timestamp() + DAY_S
-            batch.run(export, specs, store, Config(), jobs, False, *span)
+            batch.run(export, specs, store, Config(), jobs, False, *span, changes=changes)
             rows = {r["loop"]: r for r in ranked(store, "oscillation_significance")[0]}
         for spec in specs:
             row = rows[spec.loop]
-            told = (None, None)
-            if row["kp_new"] is not None:
-                told = typed_in(truth[spec.loop], spec, row, night)
+            told = (None, None) if row["kp_new"] is None else typed_in(truth[spec.loop], spec, row, night)
             yield Advised(f"{first:%m-%d}", spec.loop, row, *told)
 
 
-def page(found: list[Advised]) -> str:
-    """The table of all loops, and every night in which something was said."""
+def section(title: str, found: list[Advised]) -> list[str]:
+    """What was said of each loop, and every night in which settings were advised."""
     advised = [a for a in found if a.error is not None]
     harmful = [a for a in advised if a.is_harmful]
-    worst = max((a.error for a in advised if a.error is not None), default=0.0)
-    most = max((a.travel for a in advised if a.travel is not None), default=0.0)
+    worst = max((a.error for a in advised if a.error is not None), default=1.0)
+    most = max((a.travel for a in advised if a.travel is not None), default=1.0)
     lines = [
-        "# Two weeks night by night, advice beside truth",
-        "",
-        "`python -m tests.proofs.nights`",
-        "",
-        (__doc__ or "").split("\n\n")[1].replace("\n", " ").replace(" Writes nights.md here.", ""),
+        f"## {title}",
         "",
         f"{len(advised)} pairs of settings advised in {len(found)} loops and nights, {len(harmful)} of them harmful "
         f"(error or stem travel of the true loop more than 5 % larger). Largest error {100 * (worst - 1):+.0f} %, "
@@ -134,15 +130,15 @@ def page(found: list[Advised]) -> str:
         lines.append(f"| {tag} | {truth[tag].cause} | {_said(parts[0])} | {_said(parts[1])} |")
     lines += [
         "",
-        "| night | loop | cause | action | new over in force: error % | travel % |",
-        "|---|---|---|---|---|---|",
+        "| night | loop | cause | error under new settings % | stem travel % |",
+        "|---|---|---|---|---|",
     ]
     for a in advised:
         change = (
             f"{100 * (a.error - 1):+.0f} | {100 * (a.travel - 1):+.0f}" if a.error and a.travel else " | "
         )
-        lines.append(f"| {a.night} | {a.loop} | {a.row['cause']} | {a.row['action']} | {change} |")
-    return "\n".join(lines) + "\n"
+        lines.append(f"| {a.night} | {a.loop} | {a.row['cause']} | {change} |")
+    return [*lines, ""]
 
 
 def _said(found: list[Advised]) -> str:
@@ -157,7 +153,19 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--jobs", type=int, default=2)
-    text = page(list(nights(parser.parse_args().jobs)))
+    jobs = parser.parse_args().jobs
+    about = (__doc__ or "").split("\n\n")[1].replace("\n", " ").replace(" Writes nights.md here.", "")
+    lines = [
+        "# Two weeks night by night, advice beside truth",
+        "",
+        "`python -m tests.proofs.nights`",
+        "",
+        about,
+        "",
+    ]
+    lines += section("With loops.csv alone", list(nights(jobs, ())))
+    lines += section("With changes.csv", list(nights(jobs, read_changes(SAMPLE / "changes.csv"))))
+    text = "\n".join(lines).rstrip() + "\n"
     OUT.write_text(text)
     print(text)
 
