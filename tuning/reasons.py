@@ -29,7 +29,7 @@ def no_cause(cause: str) -> str:
 def wrong_sign(loop: Loop) -> str:
     """Why a loop whose controller acts the wrong way gets no settings."""
     return (
-        f"Kp {loop.controller.kp:.3g} and the process's slope {loop.process.slope:.3g} % PV/(% OP s) have no "
+        f"Kp {loop.controller.kp:.3g} %/% and the process's slope {loop.process.slope:.3g} % PV/(% OP s) have no "
         "common sign: the controller would act the wrong way. Check the action and the identified gain."
     )
 
@@ -69,9 +69,9 @@ def no_travel(loop: Loop) -> str:
 
 
 def settings(controller: Pid) -> str:
-    """Kp and Ti in words."""
+    """Kp and Ti in words, in percent of spans and seconds."""
     ti = integral_s(controller)
-    return f"Kp {controller.kp:.3g}, Ti {f'{ti:.3g} s' if math.isfinite(ti) else 'off'}"
+    return f"Kp {controller.kp:.3g} %/%, Ti {f'{ti:.3g} s' if math.isfinite(ti) else 'off'}"
 
 
 def tight(loop: Loop, new: Pid, before: float, ms: float) -> str:
