@@ -98,14 +98,15 @@ def judged(data: Mapping[str, Any], found: Explanation, s: Subject, more: str = 
     """
     out = carried(dict(data), s.op, s.pv, s.dt_s)
     cut = int((1.0 - HELD_OUT) * s.pv.size)
-    whole, plain = misfit(s.pv, out), misfit(found.p.y, simulate(found.p.scene, found.plain.model.c))
+    window = found.proof.window if found.proof is not None else 0
+    whole = misfit(s.pv, out, window)
+    plain = misfit(found.p.y, simulate(found.p.scene, found.plain.model.c), window)
     said = f"Your model leaves {whole.rmse:.3g} % of span rms, the plain loop fitted anew {plain.rmse:.3g} %"
     if found.accepted:
-        best = misfit(found.p.y, simulate(found.p.scene, found.best.model.c))
+        best = misfit(found.p.y, simulate(found.p.scene, found.best.model.c), window)
         said += f", the improved loop {best.rmse:.3g} %"
     units = "" if unanswered(found) else wrong_units(constants(dict(data)), restored(found.plain.model))
     verdict = "" if units else compared(whole.rmse, plain.rmse)
     note = "; ".join(x for x in (said, verdict, units, more) if x) + "."
-    window = found.proof.window if found.proof is not None else 0
     fitted, held = misfit(s.pv[:cut], out[:cut], window), misfit(s.pv[cut:], out[cut:], window)
     return Brought(out, fitted, held, note)

@@ -172,7 +172,11 @@ class CauseLimits:
 
 @dataclass(frozen=True, slots=True)
 class SettingsLimits:
-    """When the settings that OP follows are not the stated ones; ours, set by tests/proofs/settings.py."""
+    """When the settings that OP follows are not the stated ones.
+
+    Ours: set on simulated loops whose settings are stated truly (none called), proved on others of another make
+    (tests/proofs/settings.py).
+    """
 
     explained: float = 0.4
     """Share of the variance of OP's increments that the recovered settings must explain [-]."""

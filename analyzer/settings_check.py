@@ -45,15 +45,6 @@ def differing(
     """The recorded settings where they are plainly not the stated ones, in the whole record or in its later half.
 
     Settings that were changed within the record show in its later half, and those are the ones in force.
-    """
-    later = record.span(len(record) // 2, len(record))
-    return _differing(later, stated, scale_s, limits) or _differing(record, stated, scale_s, limits)
-
-
-def _differing(
-    record: LoopRecord, stated: Pid, scale_s: float, limits: SettingsLimits
-) -> SettingsDiffer | None:
-    """The recorded settings where they are plainly not the stated ones.
 
     Parameters
     ----------
@@ -68,6 +59,14 @@ def _differing(
     SettingsDiffer or None
         None where they agree or the record cannot tell.
     """
+    later = record.span(len(record) // 2, len(record))
+    return _differing(later, stated, scale_s, limits) or _differing(record, stated, scale_s, limits)
+
+
+def _differing(
+    record: LoopRecord, stated: Pid, scale_s: float, limits: SettingsLimits
+) -> SettingsDiffer | None:
+    """The recorded settings where they are plainly not the stated ones, in the whole of a record."""
     shortest = limits.ti_samples * record.dt_s
     if stated.td_s > 0 or stated.ti_s < shortest or record.mask("compressed").mean() > limits.straight_share:
         return None
