@@ -1,4 +1,4 @@
-"""Are stated settings told from the controller's where they are others? python -m tests.proofs.settings [--seed 71 72]
+"""Are stated settings told from the controller's where they differ? python -m tests.proofs.settings [--seed 71 72]
 
 Loops of the retuning proof's plants, whose physics and controllers share no code with the package, are recorded with
 the settings stated as they are, and with the gain or the integral time stated wrong. Writes settings.md here.
