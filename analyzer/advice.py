@@ -11,15 +11,15 @@ from analyzer import words
 from analyzer.assess import Assessment
 from analyzer.cause import Verdict
 from analyzer.config import Config
-from analyzer.history.loops_csv import LoopSpec
+from analyzer.loops.spec import LoopSpec
+from analyzer.loops.tags import as_stated
 from analyzer.measure import Measured
 from analyzer.oscillation import counting
-from analyzer.tags import as_stated
-from identification.descent import covariance
-from identification.hammerstein import Fit, disturbance, process_of
+from identification.estimation.gauss_newton import covariance
+from identification.estimation.hammerstein import Fit, disturbance, process_of
+from identification.estimation.window import Window
 from identification.models import Fopdt, Integrator, Loop, Pid, Process, Valve
 from identification.record import Floats
-from identification.window import Window
 from tuning.limit_cycle import Cycle, confirm
 from tuning.linear import integral_s, is_stable
 from tuning.recommend import Action, Proposal, recommend

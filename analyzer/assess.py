@@ -19,9 +19,9 @@ from analyzer.settings_check import SettingsDiffer, differing
 from analyzer.trends import BUCKETS, FINE_BUCKETS, thinned
 from analyzer.words import too_coarse
 from identification.errors import NotAssessedError
-from identification.harris import harris_index
 from identification.models import Pid
 from identification.record import LoopRecord
+from identification.signals.harris import harris_index
 
 OF_OP = ("valve_travel_pct_per_h", "reversals_per_h", "at_limits_pct", "service_pct", "op_mean_pct")
 """Figures that rest on OP."""

@@ -14,7 +14,7 @@ import numpy as np
 
 from analyzer.oscillation import Oscillations
 from identification.record import Floats, LoopRecord, Mask
-from identification.valve import RESTS, walk
+from identification.simulation.valve import RESTS, walk
 
 TRAVEL_GRID_S = 10.0
 """Travel is summed on this grid [s] or on the record's own where that is coarser; ours."""

@@ -13,12 +13,12 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from analyzer import chunk, run_identity
-from analyzer.changes import TuningChange
 from analyzer.chunk import Done, Task, assess_loop
 from analyzer.config import Config
 from analyzer.finish import finish_night, is_empty
 from analyzer.history.export import Export, counted
-from analyzer.history.loops_csv import LoopSpec
+from analyzer.loops.changes import TuningChange
+from analyzer.loops.spec import LoopSpec
 from analyzer.nights import Night, nights_of
 from analyzer.store import Store
 from analyzer.store_lock import locked

@@ -7,8 +7,8 @@ from collections.abc import Iterator, Sequence
 from analyzer.assess import assessable, unfit_for_cause
 from analyzer.config import Config
 from analyzer.history.export import Export
-from analyzer.history.loops_csv import LoopSpec
 from analyzer.history.stray import stamp_text
+from analyzer.loops.spec import LoopSpec
 from analyzer.quality import Prepared, prepare
 from identification.errors import NotAssessedError, TriageError
 

@@ -16,20 +16,20 @@ import pyarrow as pa
 from analyzer.advice import Advice, advise
 from analyzer.assess import Assessment, assess
 from analyzer.assessments import Assessments
-from analyzer.changes import TuningChange
 from analyzer.columns import ALL_COLUMNS, TEXT_COLUMNS
 from analyzer.config import Config
 from analyzer.history.export import Export
-from analyzer.history.loops_csv import LoopSpec
 from analyzer.history.series import Series
+from analyzer.loops.changes import TuningChange
+from analyzer.loops.settings_in_force import in_force
+from analyzer.loops.spec import LoopSpec
+from analyzer.loops.tags import controller
 from analyzer.nights import Night, cut
 from analyzer.plantwide import Fingerprint
 from analyzer.present import advised
 from analyzer.quality import interval, prepare
 from analyzer.rows import hour_rows, lost_row, night_row
-from analyzer.settings_in_force import in_force
 from analyzer.store import Store, rows_table, write_table
-from analyzer.tags import controller
 from identification.errors import NotAssessedError, TriageError
 from tuning.recommend import Action
 

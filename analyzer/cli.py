@@ -12,8 +12,10 @@ from typing import Any
 
 import click
 
-from analyzer import explain_cli, report_cli, run_cli
-from analyzer.options import SOME_LOST, export_options, opened, told, utc_seconds
+from analyzer.commands import explain as explain_cli
+from analyzer.commands import report as report_cli
+from analyzer.commands import run as run_cli
+from analyzer.commands.options import SOME_LOST, export_options, opened, told, utc_seconds
 
 for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
@@ -101,7 +103,7 @@ def tune(
 
     Example: triage tune export.parquet --loops loops.csv --loop LIC2107 --out pictures
     """
-    from analyzer.changes import read_changes
+    from analyzer.loops.changes import read_changes
     from analyzer.tune_loop import proposal
 
     source, specs, _ = opened(export, loops, **reading)

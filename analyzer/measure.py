@@ -10,19 +10,32 @@ import numpy as np
 from analyzer.assessments import noise_band
 from analyzer.config import CauseLimits
 from analyzer.oscillation import Oscillation
-from identification.controller import fit_pi
-from identification.descent import descend
+from identification.controller.settings import fit_pi
 from identification.errors import NotAssessedError
-from identification.evidence import Rival, evidence, stem_moves, with_load_step
-from identification.hammerstein import IDEAL, Fit, process_of, residual
-from identification.innovations import judged_mask
+from identification.estimation.backlash_stiction import (
+    SCREENED,
+    SHORT,
+    better_linear,
+    fit_linear,
+    fit_play,
+    fit_stick_slip,
+)
+from identification.estimation.gauss_newton import descend
+from identification.estimation.hammerstein import IDEAL, Fit, process_of, residual
+from identification.estimation.innovations import judged_mask
+from identification.estimation.likelihood_ratio import Rival, evidence, stem_moves, with_load_step
+from identification.estimation.search import AR_ORDER, prepare
+from identification.estimation.stem_position import Seen, seen
+from identification.estimation.window import Window, block_means
 from identification.models import Fopdt, Loop, Pid
-from identification.position import Seen, seen
 from identification.record import Floats, LoopRecord, Mask
-from identification.search import AR_ORDER, prepare
-from identification.spectrum import Spectrum, locked_harmonic, peak_prominence, spectrum, tapered_power
-from identification.valve_fit import SCREENED, SHORT, better_linear, fit_linear, fit_play, fit_stick_slip
-from identification.window import Window, block_means
+from identification.signals.spectrum import (
+    Spectrum,
+    locked_harmonic,
+    peak_prominence,
+    spectrum,
+    tapered_power,
+)
 from tuning.limit_cycle import confirm
 from tuning.linear import is_stable, loop_response
 

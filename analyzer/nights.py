@@ -11,9 +11,9 @@ from itertools import pairwise
 import numpy as np
 
 from analyzer.history.export import Export
-from analyzer.history.loops_csv import LoopSpec
 from analyzer.history.series import Series
 from analyzer.history.stray import stamp_text
+from analyzer.loops.spec import LoopSpec
 from identification.errors import InputError
 
 DAY_S = 86400.0

@@ -14,8 +14,8 @@ import numpy as np
 
 from analyzer.config import OscillationLimits
 from identification.record import Floats, LoopRecord, Mask
-from identification.setpoint import without_setpoint
-from identification.spectrum import (
+from identification.signals.setpoint_response import without_setpoint
+from identification.signals.spectrum import (
     WIDE_BAND,
     Bands,
     Rhythm,

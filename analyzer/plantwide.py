@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from analyzer.config import CauseLimits
-from identification.spectrum import Complex, Spectrum
+from identification.signals.spectrum import Complex, Spectrum
 
 HALF_BAND = 0.08
 """Half width of the band that is compared, as a share of the frequency; ours."""

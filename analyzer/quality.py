@@ -14,9 +14,9 @@ from types import MappingProxyType
 import numpy as np
 
 from analyzer.config import QualityLimits
-from analyzer.history.loops_csv import LoopSpec
 from analyzer.history.series import Series
 from analyzer.history.stray import main_span
+from analyzer.loops.spec import LoopSpec
 from identification.errors import NotAssessedError
 from identification.record import Floats, LoopRecord, Mask
 

@@ -9,9 +9,9 @@ from typing import Any
 from analyzer.assess import Assessment
 from analyzer.cause import Verdict
 from analyzer.columns import ALL_COLUMNS
-from analyzer.history.loops_csv import LoopSpec
-from identification.hammerstein import Fit
-from identification.window import Window
+from analyzer.loops.spec import LoopSpec
+from identification.estimation.hammerstein import Fit
+from identification.estimation.window import Window
 
 NOT_SHOWN = (
     *("oscillation_significance", "oscillating_pct", "osc_valve_pct", "osc_tuning_pct", "osc_load_pct"),

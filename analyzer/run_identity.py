@@ -14,7 +14,7 @@ from pathlib import Path
 
 from analyzer.config import Config
 from analyzer.history.export import Export
-from analyzer.history.loops_csv import LoopSpec
+from analyzer.loops.spec import LoopSpec
 from identification.errors import InputError
 
 ENDS_BYTES = 65_536

@@ -21,14 +21,14 @@ from analyzer.advice import (
 )
 from analyzer.assess import Assessment
 from analyzer.cause import Verdict
-from analyzer.history.loops_csv import LoopSpec
-from analyzer.tags import as_stated
-from identification.descent import covariance
+from analyzer.loops.spec import LoopSpec
+from analyzer.loops.tags import as_stated
 from identification.errors import NotAssessedError
-from identification.hammerstein import Fit, ValveTrial
+from identification.estimation.gauss_newton import covariance
+from identification.estimation.hammerstein import Fit, ValveTrial
+from identification.estimation.window import Window, block_means
 from identification.models import Estimate, Loop, Pid, Process
 from identification.record import Floats
-from identification.window import Window, block_means
 from tuning.describing import describe
 from tuning.limit_cycle import Confirmed, confirm
 from tuning.linear import integral_s

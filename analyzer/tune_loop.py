@@ -9,14 +9,14 @@ from difflib import get_close_matches
 
 from analyzer.advice import withheld
 from analyzer.assess import assess, unfit_for_cause
-from analyzer.changes import TuningChange
 from analyzer.config import Config
 from analyzer.history.export import Export
-from analyzer.history.loops_csv import LoopSpec
+from analyzer.loops.changes import TuningChange
+from analyzer.loops.settings_in_force import in_force
+from analyzer.loops.spec import LoopSpec
+from analyzer.loops.tags import controller
 from analyzer.nights import cut, nights_of
 from analyzer.quality import Prepared, prepare
-from analyzer.settings_in_force import in_force
-from analyzer.tags import controller
 from analyzer.tune import lines, pictures, tune
 from identification.errors import InputError, NotAssessedError
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from analyzer.history.loops_csv import LoopSpec
+from analyzer.loops.spec import LoopSpec
+from analyzer.loops.tags import as_stated
 from analyzer.settings_check import SettingsDiffer
-from analyzer.tags import as_stated
 from analyzer.units import gain_unit, settings
 from identification.models import Pid
 

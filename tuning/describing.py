@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from identification.models import Backlash, Stiction, Valve
 from identification.record import Floats
-from identification.valve import stem_position, thresholds
+from identification.simulation.valve import stem_position, thresholds
 
 Complexes = NDArray[np.complex128]
 
@@ -52,7 +52,7 @@ def jump_range(valve: Stiction, jumps: int) -> tuple[float, float]:
     """Amplitudes of OP [% OP] between which a symmetric cycle of `jumps` jumps per half cycle can stand.
 
     The stem travels jumps*J; the last jump must still be reached and no further one: X + f_d <= A <= X + f_s
-    with X = jumps*J/2 and the thresholds f_s, f_d of identification.valve.
+    with X = jumps*J/2 and the thresholds f_s, f_d of identification.simulation.valve.
     """
     breakaway, sliding = thresholds(valve.stickband, valve.slip_jump)
     reach = 0.5 * jumps * valve.slip_jump

@@ -12,7 +12,7 @@ import numpy as np
 
 from identification.models import Fopdt, Integrator, Loop, Stiction
 from identification.record import Floats, LoopRecord
-from identification.simulate import closed_loop, scan_step
+from identification.simulation.closed_loop import closed_loop, scan_step
 from tuning.balance import Balance, harmonic_balance, predicted_cycle
 from tuning.describing import band
 from tuning.linear import integral_s, slowest_s

@@ -10,7 +10,7 @@ import numpy as np
 
 from identification.models import Estimate, Loop, Pid
 from identification.record import Floats, LoopRecord
-from identification.simulate import closed_loop, scan_step
+from identification.simulation.closed_loop import closed_loop, scan_step
 from tuning.describing import band, is_play
 from tuning.limit_cycle import KICK
 from tuning.limits import LIMITS

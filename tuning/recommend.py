@@ -10,7 +10,7 @@ import numpy as np
 
 from identification.models import Fopdt, Loop, Pid
 from identification.record import Floats
-from identification.simulate import scan_step
+from identification.simulation.closed_loop import scan_step
 from tuning import reasons
 from tuning.describing import band, is_play
 from tuning.limit_cycle import Confirmed, confirm

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from analyzer.before_after import LIMITS, MEASURES, Change, LoopComparison, Verdict, grade
-from analyzer.changes import TuningChange
+from analyzer.loops.changes import TuningChange
 from analyzer.pages.reading import Thinned
 from analyzer.pages.trends import trend_block
 from analyzer.pages.words import KINDS, TITLES, counted, interval, number, setting, signed, stamp

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from analyzer.pages.explain_words import check, title
+from analyzer.explain.page_words import check, title
 from analyzer.pages.reading import Thinned
 from analyzer.pages.rhythm import rhythm_plots
 from analyzer.pages.trends import trend_block

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from analyzer.explain_night import known
+from analyzer.explain.night import known
 from analyzer.pages import loop, morning
 from analyzer.pages.reading import read_nights, read_trends
 from analyzer.pages.view import read_night

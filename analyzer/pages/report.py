@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from analyzer.before_after import LoopComparison, Span, compare, follows
-from analyzer.changes import TuningChange, behaviour_change, stated_changes
+from analyzer.loops.changes import TuningChange, behaviour_change, stated_changes
 from analyzer.pages.before_after import Case
 from analyzer.pages.reading import nights_within, read_hours, read_nights, read_trends
 from analyzer.pages.wear import wear_texts

@@ -24,7 +24,7 @@ from matplotlib.patches import Patch
 from PIL import Image
 
 from identification.models import Backlash, Fopdt, Loop, Pid, Stiction
-from identification.simulate import closed_loop
+from identification.simulation.closed_loop import closed_loop
 from tuning.limit_cycle import confirm
 from tuning.maps import TravelMap, curves, largest_cycling_ratio, travel_map
 

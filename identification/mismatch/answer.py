@@ -8,16 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from identification.mismatch.explain import Explanation, Subject, alternatives, restored
-from identification.mismatch.fitting import Fitted, deviations
-from identification.mismatch.informed import DEAF, uninformed
-from identification.mismatch.locate import Located
-from identification.mismatch.physics import Row
-from identification.mismatch.proof import HeldOut, Misfit, held_out, misfit
-from identification.mismatch.simulation import simulate
-from identification.mismatch.thresholds import Z90
-from identification.mismatch.where import located_in, where_of
+from identification.estimation.limits import Z90
+from identification.estimation.prediction_error import Fitted, deviations
+from identification.mismatch.cross_validation import HeldOut, Misfit, held_out, misfit
+from identification.mismatch.diagnosis import Explanation, Subject, alternatives, restored
+from identification.mismatch.identifiability import DEAF, uninformed
+from identification.mismatch.location.locate import Located
+from identification.mismatch.location.where import located_in, where_of
 from identification.models import Estimate
+from identification.simulation.effect import Row
+from identification.simulation.open_loop import simulate
 
 BLOCKS = {
     "compression": "recorder",

@@ -6,20 +6,20 @@ from functools import cache
 
 import numpy as np
 
-from analyzer.brought import judged
 from analyzer.config import Config
-from analyzer.explain import Case, Explained, as_data, case
-from analyzer.history.loops_csv import LoopSpec
+from analyzer.explain.one_loop import Case, Explained, as_data, case
+from analyzer.explain.user_model import judged
 from analyzer.history.series import Series
+from analyzer.loops.spec import LoopSpec
+from identification.controller.check import judge
+from identification.estimation.prediction_error import Model, descend, gain
 from identification.mismatch.answer import answer
 from identification.mismatch.catalogue import CATALOGUE
-from identification.mismatch.control import judge
-from identification.mismatch.explain import Explanation, scene_of, trace_of
-from identification.mismatch.fitting import Model, descend, gain
-from identification.mismatch.rivals import Rival, prepared
-from identification.mismatch.slots import Slot
+from identification.mismatch.diagnosis import Explanation, scene_of, trace_of
+from identification.mismatch.forward_selection import Rival, prepared
 from identification.models import Backlash, Fopdt, Loop, Pid
-from identification.simulate import closed_loop
+from identification.simulation.closed_loop import closed_loop
+from identification.simulation.parameters import Slot
 
 N = 2400
 START_S = 1_772_409_600.0

@@ -11,8 +11,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from analyzer.config import Config, QualityLimits
-from analyzer.history.loops_csv import LoopSpec
 from analyzer.history.series import Series
+from analyzer.loops.spec import LoopSpec
 from analyzer.quality import Prepared, prepare
 from identification.models import Pid
 from identification.record import Floats, LoopRecord

@@ -18,9 +18,9 @@ from analyzer import batch, chunk
 from analyzer.cli import main
 from analyzer.columns import ALL_COLUMNS
 from analyzer.history.export import Export, open_export
-from analyzer.history.loops_csv import LoopSpec
+from analyzer.loops.spec import LoopSpec
+from analyzer.loops.tags import find_loops
 from analyzer.store import Store
-from analyzer.tags import find_loops
 
 LOOPS = 40
 BROKEN = "L17"
@@ -254,7 +254,7 @@ from analyzer import batch
 from analyzer.config import Config
 from analyzer.history.export import open_export
 from analyzer.store import Store
-from analyzer.tags import find_loops
+from analyzer.loops.tags import find_loops
 export = open_export([Path(sys.argv[1])])
 batch.run(export, find_loops(export.tags)[: int(sys.argv[2])], Store(Path(sys.argv[3])), Config())
 print(json.dumps(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss))

@@ -8,15 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from analyzer.brought import compared, judged, within, wrong_units
-from analyzer.explain import plain_start, read_model, scale_of
+from analyzer.explain.one_loop import plain_start, read_model, scale_of
+from analyzer.explain.user_model import compared, judged, within, wrong_units
 from analyzer.quality import Scale
 from identification.errors import InputError
-from identification.mismatch.explain import Explanation, Subject, scene_of
-from identification.mismatch.rivals import prepared
-from identification.mismatch.slots import Slot, neutral
+from identification.mismatch.diagnosis import Explanation, Subject, scene_of
+from identification.mismatch.forward_selection import prepared
 from identification.models import Fopdt, Loop, Pid
-from identification.simulate import closed_loop
+from identification.simulation.closed_loop import closed_loop
+from identification.simulation.parameters import Slot, neutral
 
 FOUND = {"gain": 1.2, "time_constant_s": 20.0}
 N = 3000

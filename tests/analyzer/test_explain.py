@@ -10,9 +10,9 @@ import pandas as pd
 import pytest
 from click.testing import CliRunner
 
-from analyzer.explain_cli import main
+from analyzer.commands.explain import main
 from identification.models import Backlash, Fopdt, Loop, Pid
-from identification.simulate import closed_loop
+from identification.simulation.closed_loop import closed_loop
 
 pytestmark = pytest.mark.slow
 

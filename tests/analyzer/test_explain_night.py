@@ -9,11 +9,11 @@ from typing import Any
 
 import pytest
 
-from analyzer import explain_night
 from analyzer.config import Config
-from analyzer.explain import abstained
-from analyzer.explain_night import Question, answered, flagged, keep, known, questions, row_of, run
-from analyzer.history.loops_csv import LoopSpec
+from analyzer.explain import night as explain_night
+from analyzer.explain.night import Question, answered, flagged, keep, known, questions, row_of, run
+from analyzer.explain.one_loop import abstained
+from analyzer.loops.spec import LoopSpec
 from analyzer.nights import Night
 from analyzer.pages import night as night_pages
 from analyzer.store import Store

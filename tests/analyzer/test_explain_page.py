@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from analyzer.explain import abstained
-from analyzer.explain_text import columns, lines
-from analyzer.pages import explain as pages
-from analyzer.pages.explain_plots import close_part, simulations, trends
-from analyzer.pages.explain_words import change, interval
-from identification.mismatch.where import located_in
+from analyzer.explain import page as pages
+from analyzer.explain.one_loop import abstained
+from analyzer.explain.page_words import change, interval
+from analyzer.explain.plots import close_part, simulations, trends
+from analyzer.explain.text import columns, lines
+from identification.mismatch.location.where import located_in
 from reports.folder import write_markdown
 from reports.html import render
 from reports.markdown import render as as_markdown

@@ -21,8 +21,8 @@ from click.testing import CliRunner, Result
 from plant import START_S, write_export
 from test_batch import quiet, stopped, tables
 
-from analyzer import run_cli
 from analyzer.cli import main
+from analyzer.commands import run as run_cli
 from analyzer.store import Store
 from analyzer.store_lock import locked
 from identification.errors import InputError

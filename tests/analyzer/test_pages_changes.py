@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from analyzer.changes import TuningChange, parse_time, read_changes, stated_changes
+from analyzer.loops.changes import TuningChange, parse_time, read_changes, stated_changes
 from identification.errors import InputError
 
 T = 1773043200.0

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner, Result
 
-from analyzer.report_cli import pages, report
+from analyzer.commands.report import pages, report
 from analyzer.store import Store
 from identification.errors import InputError
 from tests.reports.small_store import NASTY, small_store
@@ -87,6 +87,6 @@ def test_pages_of_a_night(store: Store, tmp_path: Path) -> None:
 def test_commands_are_quick_to_import() -> None:
     """Importing the commands loads neither numpy nor pandas nor matplotlib."""
     heavy = "numpy", "pandas", "matplotlib"
-    code = f"import sys, analyzer.report_cli; print([m for m in {heavy} if m in sys.modules])"
+    code = f"import sys, analyzer.commands.report; print([m for m in {heavy} if m in sys.modules])"
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert found.stdout.strip() == "[]"

@@ -7,13 +7,13 @@ from pathlib import Path
 import pytest
 
 from analyzer.before_after import Verdict, grade
-from analyzer.changes import read_changes
 from analyzer.config import Config
 from analyzer.history.export import ReadOptions, open_export
+from analyzer.loops.changes import read_changes
+from analyzer.loops.tags import match, read_loops
 from analyzer.pages import before_after
 from analyzer.pages.report import Case, Spans, cases, detected
 from analyzer.store import Store
-from analyzer.tags import match, read_loops
 from reports.markdown import render
 
 MILL = Path(__file__).parents[2] / "sample_data"

@@ -8,7 +8,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from analyzer.changes import TuningChange
+from analyzer.loops.changes import TuningChange
 from analyzer.pages import before_after, morning, night
 from analyzer.pages.areas import score
 from analyzer.pages.reading import read_hours, read_trends

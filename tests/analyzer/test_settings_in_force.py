@@ -8,12 +8,12 @@ import pytest
 from plant import START_S, Sketch, simulate, spec, write_export
 
 from analyzer import batch
-from analyzer.changes import TuningChange
 from analyzer.config import Config
 from analyzer.history.export import open_export
-from analyzer.settings_in_force import in_force
+from analyzer.loops.changes import TuningChange
+from analyzer.loops.settings_in_force import in_force
+from analyzer.loops.tags import match
 from analyzer.store import Store
-from analyzer.tags import match
 
 LOOP = spec("L", kp=1.0, ti=10.0)
 FIRST = TuningChange("L", 100.0, 1.0, 10.0, 2.0, 20.0)

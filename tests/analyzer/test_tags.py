@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from analyzer.tags import LoopSpec, as_stated, controller, find_loops, match, read_loops
+from analyzer.loops.tags import LoopSpec, as_stated, controller, find_loops, match, read_loops
 from identification.errors import InputError
 from identification.models import Form
 

@@ -26,9 +26,9 @@ import pyarrow.parquet as pq
 from analyzer.assess import Assessment, assess
 from analyzer.config import Config
 from analyzer.history.export import Export, open_export
-from analyzer.history.loops_csv import LoopSpec
+from analyzer.loops.spec import LoopSpec
+from analyzer.loops.tags import controller, find_loops, match, read_loops
 from analyzer.quality import prepare
-from analyzer.tags import controller, find_loops, match, read_loops
 from identification.errors import TriageError
 from tests.analyzer.plant import Sketch, simulate, write_export
 

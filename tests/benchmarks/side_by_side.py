@@ -25,11 +25,11 @@ import numpy as np
 
 from analyzer.config import Config
 from analyzer.measure import measure, time_scale, window_of
-from identification.hammerstein import process_of
+from identification.estimation.backlash_stiction import fit_linear
+from identification.estimation.hammerstein import process_of
 from identification.models import Backlash, Fopdt, Loop, Pid
 from identification.record import Floats, LoopRecord
-from identification.simulate import closed_loop
-from identification.valve_fit import fit_linear
+from identification.simulation.closed_loop import closed_loop
 from tests.analyzer.plant import START_S, run, wander
 from tuning.describing import backlash, stick_slip
 
@@ -265,8 +265,8 @@ FRESH = """
 import time
 import numpy as np
 from identification.models import Backlash, Fopdt, Loop, Pid
-from identification.simulate import closed_loop
-from identification.valve_fit import fit_linear
+from identification.simulation.closed_loop import closed_loop
+from identification.estimation.backlash_stiction import fit_linear
 loop = Loop(Fopdt(80, 200, 1), Pid(1, 10), Backlash(1.0))
 n = np.zeros(86400)
 for _ in range(2):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from analyzer.history.export import open_export
-from analyzer.tags import find_loops
+from analyzer.loops.tags import find_loops
 from tests.benchmarks.night import measured, plant, stated, table
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from analyzer.pages import explain as pages
+from analyzer.explain import page as pages
 from reports.folder import write_html
 from tests.analyzer.explained import explanation
 from tests.browser.test_pages import browser, opened, pytestmark, wait

@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from analyzer.changes import TuningChange
+from analyzer.loops.changes import TuningChange
 from analyzer.pages import before_after, night
 from analyzer.pages.report import Spans, cases
 from reports.folder import write_html

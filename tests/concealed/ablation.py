@@ -25,15 +25,15 @@ import pandas as pd
 from concealed.proof import interval, place_section, table
 from concealed.score import KIN, kin
 
+from analyzer.commands.options import opened
 from analyzer.config import Config
-from analyzer.explain import Case, case, loop_of
-from analyzer.options import opened
+from analyzer.explain.one_loop import Case, case, loop_of
+from identification.controller.pi_regression import found_law
 from identification.mismatch.catalogue import CATALOGUE
-from identification.mismatch.explain import scene_of, without_spikes
-from identification.mismatch.law import found_law
-from identification.mismatch.rivals import Rival, compete, prepared, unsettled
-from identification.mismatch.saved import carried, to_data
-from identification.mismatch.starting import excited
+from identification.mismatch.diagnosis import scene_of, without_spikes
+from identification.mismatch.forward_selection import Rival, compete, prepared, unsettled
+from identification.mismatch.model_file import carried, to_data
+from identification.mismatch.starts.screening import excited
 
 ALIKE = 1.02
 """Ratio of misfits up to which two models do alike: rows that hold the right one as a special case reach it."""

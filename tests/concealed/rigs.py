@@ -20,11 +20,11 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2]))
 import numpy as np
 from concealed.proof import place_section, table
 
+from analyzer.commands.options import opened
 from analyzer.config import Config
-from analyzer.explain import Case, Explained, case, explained, loop_of, saved_model, simulated
-from analyzer.options import opened
-from identification.mismatch.rivals import silent
-from identification.mismatch.saved import to_data
+from analyzer.explain.one_loop import Case, Explained, case, explained, loop_of, saved_model, simulated
+from identification.mismatch.forward_selection import silent
+from identification.mismatch.model_file import to_data
 
 STEP, LOOP = "DUCT-03_air_step_1_5_90", "DUCT-09_pi_siso_full"
 

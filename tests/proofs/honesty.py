@@ -25,7 +25,7 @@ from analyzer.oscillation import detect
 from analyzer.spans import gridded, spans_around
 from identification.models import Backlash, Fopdt, Loop, Pid, Stiction
 from identification.record import LoopRecord
-from identification.simulate import closed_loop
+from identification.simulation.closed_loop import closed_loop
 
 SCAN_S = 5.0
 DAYS = 14

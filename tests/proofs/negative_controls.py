@@ -13,8 +13,8 @@ import numpy as np
 
 from analyzer.assess import cause_of
 from analyzer.config import Config
-from analyzer.history.loops_csv import LoopSpec
 from analyzer.history.series import Series
+from analyzer.loops.spec import LoopSpec
 from analyzer.oscillation import detect
 from analyzer.quality import prepare
 from tests.proofs.nulls import FAMILIES, record

@@ -21,13 +21,13 @@ from typing import Any
 import numpy as np
 
 from analyzer import batch
-from analyzer.changes import TuningChange, read_changes
 from analyzer.config import Config
 from analyzer.history.export import open_export
-from analyzer.history.loops_csv import LoopSpec
+from analyzer.loops.changes import TuningChange, read_changes
+from analyzer.loops.spec import LoopSpec
+from analyzer.loops.tags import controller, match, read_loops
 from analyzer.rank import ranked
 from analyzer.store import Store
-from analyzer.tags import controller, match, read_loops
 
 SAMPLE = Path(__file__).resolve().parents[2] / "sample_data"
 if str(SAMPLE) not in sys.path:

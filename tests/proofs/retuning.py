@@ -21,9 +21,9 @@ import pandas as pd
 from analyzer import batch
 from analyzer.config import Config
 from analyzer.history.export import open_export
+from analyzer.loops.tags import match, read_loops
 from analyzer.rank import ranked
 from analyzer.store import Store
-from analyzer.tags import match, read_loops
 from tests.proofs.retuning_outcome import (
     STATED_INTEGRAL,
     STATED_INTEGRAL_RAMP,

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from identification.models import Fopdt, Integrator, Loop, Pid
-from identification.simulate import closed_loop, open_loop
+from identification.simulation.closed_loop import closed_loop, open_loop
 from tuning.linear import frequencies, is_stable, loop_response, margins, process_sampled, stable_gains
 
 

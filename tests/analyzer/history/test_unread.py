@@ -9,8 +9,8 @@ import pytest
 
 from analyzer.config import QualityLimits
 from analyzer.history.export import ReadOptions, open_export
-from analyzer.history.loops_csv import LoopSpec
 from analyzer.history.values import parsed
+from analyzer.loops.spec import LoopSpec
 from analyzer.quality import prepare
 from identification.errors import InputError, NotAssessedError
 

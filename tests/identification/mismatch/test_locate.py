@@ -6,8 +6,14 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from identification.mismatch.features import at_limits, hats, least_turn, turns
-from identification.mismatch.locate import Located, block_products, directions, located, part_of_range
+from identification.mismatch.location.features import at_limits, hats, least_turn, turns
+from identification.mismatch.location.locate import (
+    Located,
+    block_products,
+    directions,
+    located,
+    part_of_range,
+)
 
 N = 4000
 MEMORY = 25

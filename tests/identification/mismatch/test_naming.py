@@ -6,13 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from mismatch_scenes import PLAY, STICKING, N, noise, setpoints, subject
 
+from identification.controller.check import Stated
 from identification.mismatch.answer import answer
-from identification.mismatch.control import Stated
-from identification.mismatch.explain import Subject, explain
+from identification.mismatch.diagnosis import Subject, explain
 from identification.models import Integrator, Loop, Pid
-from identification.simulate import closed_loop
+from identification.simulation.closed_loop import closed_loop
+from tests.identification.scenes import PLAY, STICKING, N, noise, setpoints, subject
 
 pytestmark = pytest.mark.slow
 

@@ -8,13 +8,20 @@ import numpy as np
 import pytest
 
 from identification.mismatch.catalogue import CATALOGUE
-from identification.mismatch.physics import Row
-from identification.mismatch.record_shape import around, biggest_move, busiest, gap_profile, grid, rebuilt
-from identification.mismatch.shape import Shape, banded, shape_of
-from identification.mismatch.simulation import Scene
-from identification.mismatch.slots import Slot, neutral
+from identification.mismatch.curves.record_shape import (
+    around,
+    biggest_move,
+    busiest,
+    gap_profile,
+    grid,
+    rebuilt,
+)
+from identification.mismatch.curves.shape import Shape, banded, shape_of
 from identification.models import Estimate
-from identification.valve import play
+from identification.simulation.effect import Row
+from identification.simulation.open_loop import Scene
+from identification.simulation.parameters import Slot, neutral
+from identification.simulation.valve import play
 
 N = 2000
 

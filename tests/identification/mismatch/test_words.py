@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from identification.mismatch.catalogue import CATALOGUE
-from identification.mismatch.features import groups
+from identification.mismatch.location.features import groups
 from identification.mismatch.words import (
     CHECKS,
     LONGER,

@@ -1,0 +1,160 @@
+"""The commands `explain` and `simulate`: parse, call, print."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from analyzer.commands.options import NOTHING_DONE, export_options, opened, told
+
+if TYPE_CHECKING:
+    from analyzer.explain.one_loop import Explained
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
+def main() -> None:
+    """What physics a loop's plain model lacks, and the model carried to another recording."""
+
+
+def _case(
+    export: tuple[Path, ...], loops: Path | None, tag: str, reading: dict[str, Any], whole: bool = False
+) -> Any:
+    from analyzer.config import Config
+    from analyzer.explain.one_loop import MOST_SAMPLES, case, loop_of
+
+    source, specs, _ = opened(export, loops, **reading)
+    spec = loop_of(specs, tag)
+    if spec.pv is None:
+        from identification.errors import InputError
+
+        raise InputError(f"{tag}: no PV tag in the export", f"{tag}.PV", "check --loops and the export")
+    others = [s.op for s in specs if s.loop != tag and s.op][:8]
+    series = source.read(list(dict.fromkeys([*spec.tags, *others])))
+    return case(spec, specs, series, Config(), None if whole else MOST_SAMPLES), series[spec.pv]
+
+
+@main.command()
+@export_options
+@click.option("--loop", "tag", required=True, help="Loop to explain.")
+@click.option(
+    "--model", type=click.Path(path_type=Path), help="Your own saved model: judged beside the refitted one."
+)
+@click.option("--save-model", type=click.Path(path_type=Path), help="Write the model found, for `simulate`.")
+@click.option(
+    "--format",
+    "form",
+    type=click.Choice(["text", "json", "html", "markdown"]),
+    default="text",
+    show_default=True,
+    help="Output format; html is one file that needs no network.",
+)
+@click.option("--out", type=click.Path(path_type=Path), help="Folder for the page and Markdown's pictures.")
+@told
+def explain(
+    export: tuple[Path, ...],
+    loops: Path | None,
+    tag: str,
+    model: Path | None,
+    save_model: Path | None,
+    form: str,
+    out: Path | None,
+    **reading: Any,
+) -> None:
+    """Where recording and plain simulation differ, which physics was left out, and how much it explains.
+
+    Example: triage explain export.parquet --loops loops.csv --loop FIC101
+    """
+    from analyzer.explain.one_loop import abstained, explained, read_model, write_model
+    from identification.errors import NotAssessedError
+
+    try:
+        brought = read_model(model, tag) if model is not None else None
+        case, _ = _case(export, loops, tag, reading)
+        found = explained(case, _told_rival, brought)
+    except NotAssessedError as error:
+        _show(abstained(tag, str(error)), None, form, out)
+        click.echo(f"triage: {error}", err=True)
+        sys.exit(NOTHING_DONE)
+    finally:
+        _told_rival("")
+    if save_model is not None:
+        write_model(found.model(), save_model)
+    _show(found.data, found, form, out)
+
+
+def _show(data: dict[str, Any], found: Explained | None, form: str, out: Path | None) -> None:
+    """Print the answer in a format, or write its page into a folder."""
+    if form == "json":
+        click.echo(json.dumps(data))
+    elif form == "text":
+        from analyzer.explain.text import lines
+
+        click.echo("\n".join(lines(data)))
+    else:
+        _show_page(data, found, form, out)
+
+
+def _show_page(data: dict[str, Any], found: Explained | None, form: str, out: Path | None) -> None:
+    from analyzer.explain import page as pages
+    from reports import folder, html, markdown
+
+    page = pages.abstention(data) if found is None else pages.page(found)
+    if out is None:
+        click.echo(html.render(page, True) if form == "html" else markdown.render(page, ""))
+        return
+    written = folder.write_html([page], out, True) if form == "html" else folder.write_markdown([page], out)
+    for path in written:
+        click.echo(f"written: {path}", err=True)
+
+
+@main.command()
+@click.argument("model", type=click.Path(path_type=Path))
+@export_options
+@click.option("--loop", "tag", required=True, help="Loop to simulate.")
+@click.option(
+    "--out", required=True, type=click.Path(path_type=Path), help="Parquet file: timestamp, PV, OP."
+)
+@click.option(
+    "--closed-loop", is_flag=True, help="Run the stated controller from SP instead of the recorded OP."
+)
+@told
+def simulate(
+    model: Path,
+    export: tuple[Path, ...],
+    loops: Path | None,
+    tag: str,
+    out: Path,
+    closed_loop: bool,
+    **reading: Any,
+) -> None:
+    """Run a saved model over another recording of its loop; a constant bias is freed, nothing else.
+
+    Example: triage simulate model.json week2.parquet --loops loops.csv --loop FIC101 --out week2-sim.parquet
+    """
+    from analyzer.explain.one_loop import read_model, simulated
+
+    case, raw = _case(export, loops, tag, reading, whole=True)
+    pv, op = simulated(case, read_model(model, tag), raw.stamp_s, closed_loop)
+    write_trends(out, raw.stamp_s, pv, op)
+
+
+def _told_rival(name: str) -> None:
+    """Show on a terminal what is being tried; nothing wipes it out."""
+    if sys.stderr.isatty():
+        click.echo(f"\r\033[K{f'trying {name}' if name else ''}", nl=False, err=True)
+
+
+def write_trends(out: Path, stamps: Any, pv: Any, op: Any) -> None:
+    """Write columns timestamp, PV and OP."""
+    import pandas as pd
+
+    stamp = pd.to_datetime((stamps * 1e6).round().astype("int64"), unit="us")
+    pd.DataFrame({"timestamp": stamp, "PV": pv, "OP": op}).to_parquet(out, index=False)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,136 @@
+"""The commands that write pages: parse, call, say what was written."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from identification.errors import InputError
+
+if TYPE_CHECKING:
+    from analyzer.loops.changes import TuningChange
+    from analyzer.pages.report import Spans
+    from analyzer.spans import Span
+    from analyzer.store import Store
+    from reports.pages import Page
+
+SOME_LOST = 1
+
+
+def _span(texts: Sequence[str] | None, option: str) -> Span | None:
+    from analyzer.loops.changes import parse_time
+    from analyzer.spans import Span
+
+    if not texts:
+        return None
+    first, last = (parse_time(t, option) for t in texts)
+    if last <= first:
+        raise InputError(f"{option} {texts[0]} {texts[1]}", "an end after the start", "swap them")
+    return Span(first, last)
+
+
+def _asked(
+    store: Store, changes: Path | None, loop: str | None, changed: str | None, find: bool
+) -> list[TuningChange]:
+    """The changes that the command line names."""
+    from analyzer.loops.changes import TuningChange, parse_time, read_changes
+    from analyzer.pages.report import detected
+
+    if find:
+        return detected(store, [loop] if loop else None)
+    if changes is not None:
+        return [c for c in read_changes(changes) if loop in (None, c.loop)]
+    if loop is not None and changed is not None:
+        return [TuningChange(loop, parse_time(changed, "--changed"))]
+    raise InputError("no change named", "--changes FILE, --loop TAG --changed TIME, or --find", "name one")
+
+
+def _written(pages: Sequence[Page], form: str, out: Path, single_file: bool) -> None:
+    from reports.folder import write_csv, write_html, write_markdown
+
+    paths = write_html(pages, out, single_file) if form == "html" else write_markdown(pages, out)
+    for page in pages:
+        write_csv(page, out)
+    click.echo(f"{paths[0]}" + (f" and {len(paths) - 1} more" if len(paths) > 1 else ""))
+
+
+def _subtitle(spans: Spans, store: Path) -> str:
+    stated = spans.before is not None or spans.after is not None
+    span = "The stated spans" if stated else f"{spans.days:g} days"
+    return f"{span} before against after the change, from {store.name}."
+
+
+@click.command()
+@click.argument("store", type=click.Path(path_type=Path))
+@click.option("--changes", type=click.Path(path_type=Path), help="CSV: loop, time, kp_old ... ti_new, who.")
+@click.option("--loop", help="One loop's tag.")
+@click.option("--changed", help="When that loop was changed, e.g. 2026-03-09T08:00Z.")
+@click.option("--find", is_flag=True, help="Offer changes seen in the loops' behaviour, for confirmation.")
+@click.option("--days", default=7.0, show_default=True, type=click.FloatRange(1), help="Days each side.")
+@click.option("--before", nargs=2, help="Span before, start and end, instead of --days.")
+@click.option("--after", nargs=2, help="Span after, start and end, instead of --days.")
+@click.option("--format", "form", type=click.Choice(["html", "markdown"]), default="html", show_default=True)
+@click.option("--single-file", is_flag=True, help="Everything in the page itself.")
+@click.option("--out", required=True, type=click.Path(path_type=Path), help="Folder to write into.")
+def report(
+    store: Path,
+    changes: Path | None,
+    loop: str | None,
+    changed: str | None,
+    find: bool,
+    days: float,
+    before: tuple[str, str] | None,
+    after: tuple[str, str] | None,
+    form: str,
+    single_file: bool,
+    out: Path,
+) -> None:
+    """Before and after: what changes of controllers brought, with intervals and verdicts.
+
+    Example: triage report store --changes changes.csv --out report
+    """
+    from analyzer.pages.before_after import page
+    from analyzer.pages.report import Spans, cases
+    from analyzer.store import Store
+
+    kept = Store(store)
+    kept.require()
+    spans = Spans(days, _span(before, "--before"), _span(after, "--after"))
+    found, missing = cases(kept, _asked(kept, changes, loop, changed, find), spans)
+    if not found:
+        why = "; ".join(f"{tag}: {reason}" for tag, reason in missing) or "no change found"
+        raise InputError(why, "loops and times that the store holds", "check the tags and times")
+    _written([page(found, missing, _subtitle(spans, store), find)], form, out, single_file)
+    for tag, reason in missing:
+        click.echo(f"{tag}: {reason}", err=True)
+    sys.exit(SOME_LOST if missing else 0)
+
+
+@click.command()
+@click.argument("store", type=click.Path(path_type=Path))
+@click.option("--night", help="Night to show, e.g. 2026-03-08. Default: the latest.")
+@click.option(
+    "--top", default=50, show_default=True, type=click.IntRange(0), help="Loops with a page of their own."
+)
+@click.option("--format", "form", type=click.Choice(["html", "markdown"]), default="html", show_default=True)
+@click.option("--single-file", is_flag=True, help="Style and scripts in each page itself.")
+@click.option("--out", required=True, type=click.Path(path_type=Path), help="Folder to write into.")
+def pages(store: Path, night: str | None, top: int, form: str, single_file: bool, out: Path) -> None:
+    """The morning page of a night and a page for each of its worst loops.
+
+    Example: triage pages store --out pages --top 50
+    """
+    from analyzer.pages import night as night_pages
+    from analyzer.store import Store
+
+    kept = Store(store)
+    kept.require()
+    _written(list(night_pages.pages(kept, night, top)), form, out, single_file)
+
+
+COMMANDS = (report, pages)
+"""To be added to the command line; errors are told there."""

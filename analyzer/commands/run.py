@@ -1,0 +1,209 @@
+"""The command `run`: parse, call, say what was done; and how it ends when it is stopped."""
+
+from __future__ import annotations
+
+import math
+import signal
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from datetime import datetime
+from pathlib import Path
+from types import FrameType
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from analyzer.commands.options import NOTHING_DONE, SOME_LOST, export_options, opened, utc_seconds
+
+if TYPE_CHECKING:
+    from analyzer.batch import Outcome
+    from analyzer.history.export import Export
+    from analyzer.loops.changes import TuningChange
+    from analyzer.loops.spec import LoopSpec
+    from analyzer.nights import Night
+    from analyzer.store import Store
+
+STOPPED = 128
+"""Exit status of a run that a signal has stopped, less the signal's number: what shells and schedulers expect."""
+FEW = 10
+"""Notes on what was read that are printed; the rest is counted."""
+
+
+class StoppedError(Exception):
+    """A signal asks the run to end."""
+
+    def __init__(self, number: int) -> None:
+        self.number = number
+        super().__init__(signal.Signals(number).name)
+
+
+@contextmanager
+def stoppable() -> Iterator[None]:
+    """Turn SIGINT and SIGTERM into `StoppedError`, once; further ones are ignored while the run ends."""
+    numbers = (signal.SIGINT, signal.SIGTERM)
+
+    def stop(number: int, frame: FrameType | None) -> None:
+        for each in numbers:
+            signal.signal(each, signal.SIG_IGN)
+        raise StoppedError(number)
+
+    try:
+        before = {number: signal.signal(number, stop) for number in numbers}
+    except ValueError:  # not the main thread: signals are somebody else's business
+        yield
+        return
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+@click.command()
+@export_options
+@click.option(
+    "--store", required=True, type=click.Path(path_type=Path), help="Directory that keeps the results."
+)
+@click.option(
+    "--changes", type=click.Path(path_type=Path), help="changes.csv: when settings were changed, old and new."
+)
+@click.option("--jobs", default=1, show_default=True, type=click.IntRange(1), help="Worker processes.")
+@click.option("--resume", is_flag=True, help="Go on with a run that was stopped.")
+@click.option("--replace", "replacing", is_flag=True, help="Forget what the store has of these nights first.")
+@click.option("--since", type=click.DateTime(), help="First day or time assessed (UTC).")
+@click.option("--until", type=click.DateTime(), help="Day or time (UTC) before which samples are assessed.")
+@click.option("--explain", "explaining", is_flag=True, help="Explain the last night's flagged loops as well.")
+def run(
+    export: tuple[Path, ...],
+    loops: Path | None,
+    store: Path,
+    changes: Path | None,
+    jobs: int,
+    resume: bool,
+    replacing: bool,
+    since: datetime | None,
+    until: datetime | None,
+    explaining: bool,
+    **reading: Any,
+) -> None:
+    """The nightly batch: assess every loop and keep the results in a store.
+
+    An export of several days is kept day by day; new settings are advised on for the last of them. A second export of
+    a night adds its loops; of a loop that stands in both the fuller record is kept.
+
+    Exit status: 0 the night was written, 1 some loops failed, 2 nothing could be done.
+
+    Example: triage run export.parquet --loops loops.csv --store store --jobs 4
+    """
+    from analyzer.loops.changes import read_changes
+    from analyzer.store import Store
+
+    dated = () if changes is None else read_changes(changes)
+    try:
+        with stoppable():
+            source, specs, notes = _opened(export, loops, reading)
+            _say(notes)
+            span = utc_seconds(since, -math.inf), utc_seconds(until, math.inf)
+            outcome = _assessed(source, specs, Store(store), jobs, resume, span, replacing, dated)
+            if explaining and len(outcome.unassessed) + len(outcome.failed) < len(specs):
+                _explained(source, specs, Store(store), outcome.nights[-1], jobs, resume)
+    except StoppedError as stopped:
+        kept = f"what is done is kept in {store}: go on with the same command and --resume"
+        click.echo(f"triage: stopped by {stopped}; {kept}", err=True)
+        sys.exit(STOPPED + stopped.number)
+    sys.exit(_status(outcome, len(specs)))
+
+
+def _opened(
+    export: tuple[Path, ...], loops: Path | None, reading: dict[str, Any]
+) -> tuple[Export, Sequence[LoopSpec], Sequence[str]]:
+    """The export found out about in a worker process: a damaged file may take memory or time without end.
+
+    Raises
+    ------
+    InputError
+        The export cannot be used, or the process that read it died.
+    """
+    from analyzer.config import Config
+    from analyzer.workers import Died, Workers
+    from identification.errors import InputError
+
+    with Workers(1, find_out, Config().opening) as workers:
+        workers.submit((export, loops, reading))
+        (found,) = workers.results()
+    if isinstance(found, Died):
+        raise InputError(
+            f"{export[0]}: reading it ended without a result ({found.why})",
+            "files that are whole and fit into memory",
+            "export them again or in parts; 'triage check FILE' on each finds the one",
+        )
+    return found
+
+
+def find_out(
+    asked: tuple[tuple[Path, ...], Path | None, dict[str, Any]], began: Callable[[int], None]
+) -> tuple[Export, Sequence[LoopSpec], Sequence[str]]:
+    """What a worker finds out about an export, its span of time included."""
+    export, loops, reading = asked
+    source, specs, notes = opened(export, loops, **reading)
+    for spec in specs:
+        if spec.pv is not None:
+            source.span(spec.pv)
+    return source, specs, notes
+
+
+def _status(outcome: Outcome, loops: int) -> int:
+    if len(outcome.failed) + len(outcome.unassessed) == loops:
+        return NOTHING_DONE
+    return SOME_LOST if outcome.failed else 0
+
+
+def _say(notes: Sequence[str]) -> None:
+    for note in notes:
+        click.echo(f"triage: {note}", err=True)
+
+
+def _assessed(
+    source: Export,
+    specs: Sequence[LoopSpec],
+    store: Store,
+    jobs: int,
+    resume: bool,
+    span: tuple[float, float],
+    replacing: bool,
+    changes: Sequence[TuningChange],
+) -> Outcome:
+    """Run the batch with progress and say what came of it."""
+    from analyzer import batch
+    from analyzer.commands.progress import bar
+    from analyzer.config import Config
+
+    with bar("loops") as progress:
+        outcome = batch.run(source, specs, store, Config(), jobs, resume, *span, progress, replacing, changes)
+    more = len(outcome.notes) - FEW
+    _say(outcome.notes[:FEW])
+    if more > 0:
+        _say([f"{more} further notes on what was read; 'triage check' prints them all"])
+    for loop, reason in (*outcome.unassessed, *outcome.failed):
+        click.echo(f"{loop}: {reason}", err=True)
+    nights, lost = outcome.nights, len(outcome.unassessed) + len(outcome.failed)
+    several = f" ({len(nights)} nights from {nights[0].name})" if len(nights) > 1 else ""
+    failed = f", {len(outcome.failed)} failed" if outcome.failed else ""
+    done = f"{len(specs) - lost} of {len(specs)} loops assessed{failed}"
+    click.echo(f"{done}, night {nights[-1].name}{several}, in {store.path}", err=True)
+    return outcome
+
+
+def _explained(
+    source: Export, specs: Sequence[LoopSpec], store: Store, night: Night, jobs: int, resume: bool
+) -> None:
+    """Explain the flagged loops of a night, with progress, and say how many."""
+    from analyzer.commands.progress import bar
+    from analyzer.config import Config
+    from analyzer.explain import night as explain_night
+
+    with bar("explained") as progress:
+        rows = explain_night.run(source, specs, store, night, Config(), jobs, resume, progress)
+    named = sum(r["verdict"] not in ("none", "unexplained") for r in rows)
+    click.echo(f"{len(rows)} flagged loops explained, {named} with a name", err=True)

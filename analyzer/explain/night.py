@@ -1,0 +1,173 @@
+"""The flagged loops of a night explained, one by one on worker processes, each answer kept as it comes.
+
+An error of one loop, a dead worker included, is that loop's answer. Kept in STORE/explained/NIGHT.parquet: a row a
+loop with verdict, block, reason and the whole answer as JSON.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from analyzer.config import Config
+from analyzer.history.export import Export
+from analyzer.loops.spec import LoopSpec
+from analyzer.nights import Night, cut
+from analyzer.store import Store, rows_table, write_table
+from analyzer.workers import Died, Workers
+from identification.errors import TriageError
+
+TABLE = "explained"
+COLUMNS = ("loop", "night", "verdict", "block", "reason", "answer")
+COUNTS_PCT = 50.0
+"""A loop counts as oscillating from here [% of time]; contract of the ranking."""
+QUIET = ("none", "", None)
+"""Causes and actions that are none."""
+Row = dict[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Question:
+    """One loop of a night to be explained, with the loop that leads it where one is known."""
+
+    export: Export
+    spec: LoopSpec
+    source: LoopSpec | None
+    night: Night
+    config: Config
+
+
+def flagged(row: Mapping[str, Any]) -> bool:
+    """Whether a loop of a night is worth an explanation: it oscillates, or has a cause or an action."""
+    if row["status"] != "ok":
+        return False
+    oscillates = (row["oscillating_pct"] or 0.0) >= COUNTS_PCT
+    return oscillates or row["cause"] not in QUIET or row["action"] not in QUIET
+
+
+def answered(q: Question, began: Callable[[int], None] = lambda at: None) -> Row:
+    """The row of one loop, whatever happens; runs in a worker process."""
+    from analyzer.explain.one_loop import abstained
+
+    try:
+        data = _explained(q)
+    except TriageError as error:
+        data = abstained(q.spec.loop, str(error))
+    except Exception as error:  # an error of one loop is that loop's answer, never the night's end
+        data = abstained(q.spec.loop, f"not explained: {type(error).__name__}: {error}")
+    return row_of(data, q.night.name)
+
+
+def _explained(q: Question) -> dict[str, Any]:
+    from analyzer.explain.one_loop import case, explained
+
+    with_source = [q.source.op] if q.source is not None and q.source.op else []
+    tags = list(dict.fromkeys([*q.spec.tags, *with_source]))
+    series = {tag: cut(s, q.night) for tag, s in q.export.read(tags).items()}
+    specs = (q.spec,) if q.source is None else (q.spec, q.source)
+    return explained(case(q.spec, specs, series, q.config), lambda name: None).data
+
+
+def row_of(data: Mapping[str, Any], night: str) -> Row:
+    """An answer as a row of the store."""
+    texts = {k: data[k] for k in ("loop", "verdict", "block", "reason")}
+    return {**texts, "night": night, "answer": json.dumps(data)}
+
+
+def questions(
+    export: Export, specs: Sequence[LoopSpec], rows: Sequence[Mapping[str, Any]], night: Night, config: Config
+) -> list[Question]:
+    """The flagged loops of a night, the most significant first."""
+    by_name = {s.loop: s for s in specs}
+    chosen = sorted((r for r in rows if flagged(r)), key=lambda r: -(r["oscillation_significance"] or 0.0))
+    return [
+        Question(export, by_name[r["loop"]], by_name.get(r["source_loop"] or ""), night, config)
+        for r in chosen
+        if r["loop"] in by_name
+    ]
+
+
+def _rows(asked: Sequence[Question], jobs: int, config: Config) -> Iterator[Row]:
+    from analyzer.explain.one_loop import abstained
+
+    if jobs == 0:
+        yield from map(answered, asked)
+        return
+    with Workers(min(jobs, max(len(asked), 1)), answered, config.workers) as workers:
+        for q in asked:
+            workers.submit(q)
+        for result in workers.results():
+            if isinstance(result, Died):
+                q = result.task
+                yield row_of(abstained(q.spec.loop, f"not explained: {result.why}"), q.night.name)
+            else:
+                yield result
+
+
+def known(store: Store, night: str) -> list[Row]:
+    """Rows that the store holds of a night; none where nothing was explained."""
+    if not (store.path / TABLE / f"{night}.parquet").exists():
+        return []
+    return store.read(TABLE, night).to_pylist()
+
+
+def keep(store: Store, night: str, rows: Sequence[Row]) -> None:
+    """Write what is explained so far."""
+    write_table(rows_table(rows, COLUMNS, COLUMNS), store.path / TABLE / f"{night}.parquet")
+
+
+def run(
+    export: Export,
+    specs: Sequence[LoopSpec],
+    store: Store,
+    night: Night,
+    config: Config,
+    jobs: int = 0,
+    resume: bool = False,
+    progress: Callable[[int, int], None] = lambda done, total: None,
+) -> list[Row]:
+    """Explain the flagged loops of an assessed night and keep the answers.
+
+    Parameters
+    ----------
+    export : Export
+    specs : sequence of LoopSpec
+    store : Store
+        Which holds the night.
+    night : Night
+    config : Config
+    jobs : int
+        Worker processes; 0 works in this one.
+    resume : bool
+        Leave out loops that the store holds an answer of.
+    progress : callable
+        Called with loops done and loops in all.
+
+    Returns
+    -------
+    list of dict
+        The rows kept, in the order in which they came.
+    """
+    columns = [
+        "loop",
+        "status",
+        "oscillating_pct",
+        "oscillation_significance",
+        "cause",
+        "action",
+        "source_loop",
+    ]
+    asked = questions(export, specs, store.read("nights", night.name, columns).to_pylist(), night, config)
+    names = {q.spec.loop for q in asked}
+    rows = [r for r in known(store, night.name) if resume or r["loop"] not in names]
+    done = {r["loop"] for r in rows} & names
+    left = [q for q in asked if q.spec.loop not in done]
+    keep(store, night.name, rows)
+    progress(len(done), len(asked))
+    for at, row in enumerate(_rows(left, jobs, config), len(done) + 1):
+        rows.append(row)
+        keep(store, night.name, rows)
+        progress(at, len(asked))
+    return [r for r in rows if r["loop"] in names]

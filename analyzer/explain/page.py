@@ -1,0 +1,295 @@
+"""The page of an explanation: what is wrong, how sure it is, what it looks like, what it could also be."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from analyzer.explain import plots
+from analyzer.explain.one_loop import Explained
+from analyzer.explain.page_words import (
+    FEATURES,
+    HIDDEN,
+    MOVED,
+    ROWS,
+    called,
+    carried_by,
+    chance,
+    change,
+    check,
+    figure,
+    interval,
+    rms,
+    share,
+    spans_said,
+    title,
+)
+from analyzer.pages.words import duration, number, stamp
+from identification.estimation.limits import HELD_OUT
+from identification.mismatch.forward_selection import Rival
+from identification.mismatch.location.where import located_in
+from identification.mismatch.words import located_sentence, telltale
+from reports.names import slug
+from reports.pages import Block, Cell, Column, Facts, Page, Section, Table, Text, Tiles
+
+HARDLY = 0.05
+"""Relative change of the plain loop's constants under which they count as kept."""
+BENT = "What was left out had to be made up for by these; with it they move back."
+RIVALS = 12
+"""Rivals shown."""
+
+
+def page(e: Explained) -> Page:
+    """The page of one loop's explanation.
+
+    Parameters
+    ----------
+    e : Explained
+    """
+    at = located_in(e.found.p, e.found.plain, e.case.subject)
+    sections = [
+        Section("What it is", _verdict(e)),
+        Section("Recording and simulation", plots.trends(e, at)),
+        *_found(e),
+        Section("Where the misfit lives", (*_where(e.data["where"]), plots.misfit_panels(e, at))),
+        Section("How well it fits", _fit(e)),
+        *_alternatives(e.data),
+        *_rivals(e),
+        *_controller(e),
+    ]
+    spec = e.case.spec
+    about = [spec.description, spec.type, spec.area, _recorded(e)]
+    heading = f"{spec.loop}: {title(e.said.verdict)}"
+    return Page(
+        f"{slug(spec.loop)}-explained",
+        heading,
+        ", ".join(a for a in about if a),
+        tuple(sections),
+        (),
+        _footer(e),
+    )
+
+
+def abstention(data: Mapping[str, Any]) -> Page:
+    """The page of a loop whose recording cannot be explained at all."""
+    text = Text((data["reason"][:1].upper() + data["reason"][1:] + ".", check("unexplained")), "lead")
+    name = f"{slug(data['loop'])}-explained"
+    return Page(name, f"{data['loop']}: not told", "", (Section("What is missing", (text,)),))
+
+
+def _recorded(e: Explained) -> str:
+    r = e.case.prepared.record
+    return f"{stamp(r.start_s)} UTC, {duration(len(r) * r.dt_s)}, a sample each {figure(r.dt_s, 's')}"
+
+
+def _footer(e: Explained) -> str:
+    s = e.case.prepared.scale
+    unit = f" {e.case.spec.pv_unit}" if e.case.spec.pv_unit else ""
+    how = "of the recorded range, for none is stated, " if s.recorded else ""
+    pv = f"{figure(s.low)} to {figure(s.low + s.span)}{unit}"
+    op = f"{figure(s.op_low)} to {figure(s.op_low + s.op_span)}"
+    return f"Percent of PV are {how}{pv}; percent of OP of {op}. Intervals are 90 %."
+
+
+def _verdict(e: Explained) -> tuple[Block, ...]:
+    d = e.data
+    brought = [Text((d["fit"]["brought"]["note"],))] if "brought" in d["fit"] else []
+    return (Text((d["reason"],), "lead"), Text((check(d["verdict"]),)), *brought, Tiles(_tiles(e)))
+
+
+def _tiles(e: Explained) -> tuple[tuple[str, str, str], ...]:
+    d, recorded = e.data, e.found.p.scene.level + e.found.p.y
+    size = {k: rms(float(np.std(recorded - x))) for k, x in plots.simulations(e).items()}
+    seat = "where to look first" if d["verdict"] == "unexplained" else "where it sits"
+    tiles = [(d["block"], seat, "")] if d["block"] != "none" else []
+    horizon = d["fit"]["horizon_s"]
+    over = f"within windows of {duration(horizon)}" if horizon else "over the recording"
+    if e.found.accepted:
+        what = f"rms misfit {over}, plain and improved"
+        tiles.append((f"{size['baseline']} → {size['model']}", what, "better"))
+    else:
+        rest = ": load and noise" if d["verdict"] == "none" else ""
+        tiles.append((size["baseline"], f"rms misfit of the plain simulation{rest}", ""))
+    held = next((x["held_out_share"] for x in d["effects"] if x["held_out_share"] is not None), None)
+    if held is not None:
+        tiles.append((share(held), "of the misfit on held-out data removed", "better"))
+    others = d["effects"][0]["alternatives"] if d["effects"] else []
+    if others:
+        tiles.append((str(len(others)), "other names fit as well or look alike", "incomparable"))
+    return tuple(tiles)
+
+
+def _found(e: Explained) -> list[Section]:
+    shape = plots.found_shape(e)
+    drawn = (plots.shape_plot(shape),) if shape is not None else ()
+    blocks = (*drawn, *_parameters(e.data), *_moved(e.data["moved"]))
+    return [Section("What was found", blocks)] if blocks else []
+
+
+def _where(where: Mapping[str, Any]) -> tuple[Block, ...]:
+    facts = [("Signals", ", ".join(where.get("signals", [])))] if where.get("signals") else []
+    if where.get("spans"):
+        facts.append(("Spans", spans_said(where["spans"])))
+    for key, name, unit in (("pv_range", "PV", "%"), ("op_range", "OP", "%"), ("band_s", "Periods", "s")):
+        if where.get(key):
+            facts.append((name, f"{number(where[key][0])} to {figure(where[key][1], unit)}"))
+    if where.get("direction"):
+        facts.append(("Direction of OP", where["direction"]))
+    blocks: list[Block] = [Text((located_sentence(where),))] if where.get("features") else []
+    blocks += [Facts(tuple(facts))] if facts else []
+    features = where.get("features", [])
+    if not features:
+        return (
+            *blocks,
+            Text(("The record holds too few memories of the loop for a test of where.",), "note"),
+        )
+    columns = (
+        Column("feature", "Tied to"),
+        Column("p", "Chance", True, "Of as much on errors tied to nothing, over all rows together"),
+        Column("carries", "Carries it"),
+        Column("place", "How", wide=True),
+    )
+    rows = tuple(
+        (
+            Cell(FEATURES[f["name"]], kind="strong" if f["carries"] else ""),
+            Cell(chance(f["p"]), f["p"]),
+            Cell("yes" if f["carries"] else "no"),
+            Cell(carried_by(f)),
+        )
+        for f in features
+    )
+    note = (
+        "The plain loop's one-step errors in one joint regression: each row is what it adds to the others; chances "
+        "from blocks in other orders."
+    )
+    return (*blocks, Table("where", "", columns, rows, note))
+
+
+def _fit(e: Explained) -> tuple[Block, ...]:
+    columns = (
+        Column("model", "Simulation"),
+        Column("fitted", "rms, fitted", True),
+        Column("fitted_fit", "Fit %", True),
+        Column("held", "rms, held out", True),
+        Column("held_fit", "Fit %", True),
+    )
+    shown = [k for k in ROWS if k in e.data["fit"] and (k != "explained" or e.found.accepted)]
+    rows = []
+    for key in shown:
+        cells = [Cell(ROWS[key])]
+        for part in ("fitted", "held_out"):
+            m = e.data["fit"][key][part]
+            cells += [Cell(rms(m["rmse"]), m["rmse"]), Cell(f"{m['fit_pct']:.1f}", m["fit_pct"])]
+        rows.append(tuple(cells))
+    late, horizon = f"{100 * HELD_OUT:.0f} %", e.data["fit"]["horizon_s"]
+    note = (
+        f"Held out: the last {late} of the recording, on which models fitted to the first part are judged. "
+        "Fit % is 100 where the simulation is exact and 0 where the mean does as well; load and noise keep it lower."
+        + (
+            f" The simulations begin anew every {duration(horizon)}, so that slow load does not drown them."
+            if horizon
+            else ""
+        )
+    )
+    return (Table("fit", "", columns, tuple(rows), note),)
+
+
+def _parameters(data: Mapping[str, Any]) -> tuple[Block, ...]:
+    columns = (
+        Column("effect", "Effect"),
+        Column("parameter", "Parameter"),
+        Column("value", "Value", True),
+        Column("interval", "90 % interval", True),
+        Column("unit", "Unit"),
+    )
+    rows = [
+        (
+            Cell(x["name"]),
+            Cell(called(k)),
+            Cell(number(v["value"]), v["value"]),
+            Cell(interval(v)),
+            Cell(v["unit"]),
+        )
+        for x in data["effects"]
+        for k, v in x["parameters"].items()
+        if k not in HIDDEN
+    ]
+    return (Table("parameters", "Parameters", columns, tuple(rows)),) if rows else ()
+
+
+def _moved(moved: Mapping[str, Sequence[float]]) -> tuple[Block, ...]:
+    if not moved:
+        return ()
+    columns = (
+        Column("constant", "Of the plain loop"),
+        Column("before", "Plain", True),
+        Column("after", "Improved", True),
+        Column("change", "Change", True),
+        Column("unit", "Unit"),
+    )
+    rows = []
+    for key, (a, b) in moved.items():
+        name, unit = MOVED.get(key, (key, ""))
+        rows.append((Cell(name), Cell(number(a), a), Cell(number(b), b), Cell(change(a, b)), Cell(unit)))
+    most = max(abs(b / a - 1) if a else 0.0 for a, b in moved.values())
+    note = "They hardly move: what was left out had not bent them." if most < HARDLY else BENT
+    return (Table("moved", "How the plain loop's constants moved", columns, tuple(rows), note),)
+
+
+def _alternatives(data: Mapping[str, Any]) -> list[Section]:
+    named = data["effects"][0] if data["effects"] else None
+    if named is None or not named["alternatives"]:
+        return []
+    columns = (Column("name", "Could also be"), Column("test", "What would tell them apart", wide=True))
+    rows = tuple((Cell(a, kind="strong"), Cell(telltale(named["name"], a))) for a in named["alternatives"])
+    return [Section("What it could also be", (Table("alternatives", "", columns, rows),))]
+
+
+def _rivals(e: Explained) -> list[Section]:
+    best: dict[str, Rival] = {}
+    for r in e.found.first:
+        if r.name not in best or r.net > best[r.name].net:
+            best[r.name] = r
+    ranked = sorted(best.values(), key=lambda r: -r.net)[:RIVALS]
+    if not ranked:
+        return []
+    columns = (
+        Column("name", "Added to the plain loop"),
+        Column("gain", "Gain", True, "Doubled log likelihood"),
+        Column("net", "After its price", True, "Less what its constants and the search cost"),
+        Column("said", ""),
+    )
+    taken = {r.name for r in e.found.accepted}
+    rows = tuple((Cell(r.name), *_gains(r), Cell(_standing(r.net, r.name in taken))) for r in ranked)
+    note = "Each name was fitted with all constants free; the best of so many gains about ten by chance."
+    table = Table("rivals", "", columns, rows, note)
+    return [Section("All that was tried", (table,), closed=bool(e.found.accepted))]
+
+
+def _gains(r: Rival) -> tuple[Cell, Cell]:
+    return Cell(str(round(r.gain)), r.gain), Cell(str(round(r.net)), r.net)
+
+
+def _standing(net: float, taken: bool) -> str:
+    if taken:
+        return "taken"
+    return "does not pay" if net <= 0 else "less, or not proven"
+
+
+def _controller(e: Explained) -> list[Section]:
+    plot, said, law = plots.controller_plot(e), e.case.subject.stated, e.found.law
+    if plot is None or said is None or law is None:
+        return []
+    ti = law.kp / law.ki * e.case.subject.dt_s if law.ki else None
+    facts = Facts(
+        (
+            ("Kp as stated, in percent", number(said.kp)),
+            ("Kp that gives OP", number(law.kp)),
+            ("Ti as stated", figure(said.ti * e.case.subject.dt_s, "s")),
+            ("Ti that gives OP", figure(ti, "s")),
+            ("Share of OP explained", share(law.explained)),
+        )
+    )
+    return [Section("Does the controller do what is stated?", (facts, plot), closed=True)]

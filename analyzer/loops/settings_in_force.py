@@ -1,0 +1,38 @@
+"""Which settings were in force at a time: loops.csv with the dates of changes.csv."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from analyzer.loops.changes import TuningChange
+from analyzer.loops.spec import LoopSpec
+
+
+def in_force(spec: LoopSpec, changes: Sequence[TuningChange], at_s: float) -> LoopSpec:
+    """A loop with the settings that were in force at a time.
+
+    Those of the last change before it; before the first change the old ones that it states; where neither is known,
+    those of loops.csv.
+
+    Parameters
+    ----------
+    spec : LoopSpec
+    changes : sequence of TuningChange
+        Of any loops, in any order.
+    at_s : float
+        [s since 1970-01-01 UTC].
+    """
+    own = sorted((c for c in changes if c.loop == spec.loop), key=lambda c: c.time_s)
+    kp, ti = spec.kp, spec.ti
+    earlier = [c for c in own if c.time_s <= at_s]
+    later = [c for c in own if c.time_s > at_s]
+    for kind in ("kp", "ti"):
+        known = [getattr(c, f"{kind}_new") for c in earlier if getattr(c, f"{kind}_new") is not None]
+        old = [getattr(c, f"{kind}_old") for c in later if getattr(c, f"{kind}_old") is not None]
+        value = known[-1] if known else old[0] if old else None
+        if value is not None and kind == "kp":
+            kp = value
+        elif value is not None:
+            ti = value
+    return spec if (kp, ti) == (spec.kp, spec.ti) else replace(spec, kp=kp, ti=ti)

@@ -1,0 +1,220 @@
+"""loops.csv: what the plant states about each loop."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any
+
+from analyzer.history.encoding import detect_encoding
+from analyzer.loops.endings import ROLES
+from identification.errors import InputError
+from identification.models import Form
+
+TEXTS = ("loop", "description", "type", "area", "pv_unit")
+NUMBERS = ("pv_lo", "pv_hi", "op_lo", "op_hi", "kp", "ti", "td", "scan_s", "importance")
+CHOICES: Mapping[str, tuple[str, ...]] = {
+    "form": tuple(Form),
+    "gain_unit": ("percent", "engineering", "band"),
+    "ti_unit": ("s", "min", "repeats/min"),
+}
+COLUMNS = (*TEXTS, *ROLES, *NUMBERS, *CHOICES)
+OWN_COLUMNS = ("op_unit", "sp_unit")  # near to a known name, and yet none misspelt
+MISSPELT = 0.75
+OTHER_NAMES: Mapping[str, str] = {
+    **dict.fromkeys(
+        ("gain", "kc", "k_p", "p_gain", "proportional", "proportional_gain", "controller_gain"), "kp"
+    ),
+    **dict.fromkeys(("band", "pb", "xp", "proportional_band"), "kp' with gain_unit 'band"),
+    **dict.fromkeys(
+        ("reset", "integral", "tn", "t_i", "integral_time", "reset_time", "repeats", "reset_rate"), "ti"
+    ),
+    **dict.fromkeys(("rate", "derivative", "tv", "t_d", "derivative_time"), "td"),
+    **dict.fromkeys(("setpoint", "sp_tag"), "sp"),
+    **dict.fromkeys(("pv_tag", "measurement"), "pv"),
+    **dict.fromkeys(("op_tag", "output", "out", "mv", "co"), "op"),
+    **dict.fromkeys(("pv_min", "range_lo", "range_min", "lrv", "pv_low"), "pv_lo"),
+    **dict.fromkeys(("pv_max", "range_hi", "range_max", "urv", "pv_high"), "pv_hi"),
+    **dict.fromkeys(("scan", "scan_time", "scan_rate", "execution_s"), "scan_s"),
+    **dict.fromkeys(("eu", "unit", "units", "engineering_unit"), "pv_unit"),
+}
+"""What other systems call a column; such a column left aside would be a setting lost without a word."""
+DEFAULTS: Mapping[str, str] = {
+    "form": "form ideal",
+    "gain_unit": "gain in percent",
+    "ti_unit": "ti in s",
+    "op_lo": "OP from 0",
+    "op_hi": "OP to 100",
+    "pv_lo": "PV range as recorded",
+    "scan_s": "scan as recorded",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class LoopSpec:
+    """One row of loops.csv, or one loop found by its tags.
+
+    Tags are None where the row is silent, and after `tags.match` where the export lacks them; `wanted_pv` is
+    then the tag that was looked for. `kp`, `ti`, `td` are as stated, in `gain_unit`, `ti_unit` and `form`;
+    `pv_lo` and `pv_hi` in the PV's own unit, `op_lo` and `op_hi` in the OP's. `extra` holds columns of the
+    plant's own, `stated` the names of the columns that the row fills.
+    """
+
+    loop: str
+    description: str = ""
+    type: str = ""
+    area: str = ""
+    sp: str | None = None
+    pv: str | None = None
+    op: str | None = None
+    mode: str | None = None
+    position: str | None = None
+    pv_lo: float | None = None
+    pv_hi: float | None = None
+    op_lo: float = 0.0
+    op_hi: float = 100.0
+    pv_unit: str = ""
+    kp: float | None = None
+    ti: float | None = None
+    td: float | None = None
+    form: Form = Form.IDEAL
+    gain_unit: str = "percent"
+    ti_unit: str = "s"
+    scan_s: float | None = None
+    importance: float | None = None
+    extra: Mapping[str, str] = field(default_factory=dict)
+    stated: frozenset[str] = frozenset()
+    wanted_pv: str = ""
+
+    @property
+    def tags(self) -> tuple[str, ...]:
+        """The tags of the loop that are known."""
+        return tuple(tag for tag in (getattr(self, role) for role in ROLES) if tag is not None)
+
+    @property
+    def defaults(self) -> tuple[str, ...]:
+        """What is assumed because the row is silent, for the output to say."""
+        return tuple(text for column, text in DEFAULTS.items() if column not in self.stated)
+
+
+def read_loops(path: Path) -> tuple[LoopSpec, ...]:
+    """Read loops.csv: one loop a row, decimal point or comma, columns in any order.
+
+    Raises
+    ------
+    InputError
+        The file is missing or empty, lacks the column `loop`, misspells a column, names a loop twice, or
+        holds what is no number, no known form or unit, or a range that does not rise.
+    """
+    header, rows = _table(Path(path))
+    _check_header(path, header)
+    specs = tuple(_spec(path, row, dict(zip(header, cells, strict=False))) for row, cells in rows)
+    if not specs:
+        raise InputError(f"{path}: no loops", "one row a loop below the header", "add the loops")
+    _check_unique(path, [(row, spec.loop) for (row, _), spec in zip(rows, specs, strict=True)])
+    return specs
+
+
+def unknown_columns(specs: Sequence[LoopSpec]) -> tuple[str, ...]:
+    """Columns of loops.csv that mean nothing here and are kept as the plant's own."""
+    return tuple(dict.fromkeys(name for spec in specs for name in spec.extra if name not in OWN_COLUMNS))
+
+
+def _table(path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
+    """Header in lower case, and the filled rows with their numbers as an editor counts them."""
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise InputError(
+            f"{path}: cannot be opened ({error.strerror or error})", "a CSV of loops", "correct --loops"
+        ) from error
+    text = data.decode(detect_encoding(data), errors="replace")
+    first = next((line for line in text.splitlines() if line.strip()), "")
+    reader = csv.reader(io.StringIO(text, newline=""), delimiter=max(",;\t", key=first.count))
+    rows = [(reader.line_num, [cell.strip() for cell in cells]) for cells in reader]
+    rows = [(row, cells) for row, cells in rows if any(cells) and not cells[0].startswith("#")]
+    if not rows:
+        raise InputError(f"{path}: empty file", "a header with the column 'loop' and a row a loop", "fill it")
+    return [cell.lower() for cell in rows[0][1]], rows[1:]
+
+
+def _check_header(path: Path, header: Sequence[str]) -> None:
+    for name in header:
+        near = [] if name in (*COLUMNS, *OWN_COLUMNS) else get_close_matches(name, COLUMNS, 1, MISSPELT)
+        if near and near[0] not in header:
+            raise InputError(
+                f"{path}: column '{name}'", f"'{near[0]}'", f"did you mean '{near[0]}'? Rename it"
+            )
+    for name in header if "loop" in header else ():
+        meant = OTHER_NAMES.get(name.replace(" ", "_"), "")
+        if meant and meant.split("'")[0] not in header:
+            raise InputError(
+                f"{path}: column '{name}'", f"'{meant}'", f"rename it to '{meant}', or remove it"
+            )
+    if "loop" not in header:
+        raise InputError(
+            f"{path}: no column 'loop' among {', '.join(header[:8])}", "a column 'loop'", "add it"
+        )
+    twice = [name for name, count in Counter(header).items() if count > 1 and name]
+    if twice:
+        raise InputError(f"{path}: column '{twice[0]}' stands twice", "each column once", "remove one")
+
+
+def _spec(path: Path, row: int, cells: Mapping[str, str]) -> LoopSpec:
+    filled = {name: cell for name, cell in cells.items() if cell}
+    if "loop" not in filled:
+        raise InputError(f"{path}, row {row}: no loop name", "a name in column 'loop'", "name the loop")
+    given: dict[str, Any] = {name: filled[name] for name in (*TEXTS, *ROLES) if name in filled}
+    given |= {name: _number(path, row, name, filled[name]) for name in NUMBERS if name in filled}
+    given |= {name: _choice(path, row, name, filled[name]) for name in CHOICES if name in filled}
+    extra = {name: cell for name, cell in cells.items() if name and name not in COLUMNS}
+    spec = LoopSpec(**given, extra=extra, stated=frozenset(given))
+    _check_range(path, row, "pv", spec.pv_lo, spec.pv_hi)
+    _check_range(path, row, "op", spec.op_lo, spec.op_hi)
+    return spec
+
+
+def _number(path: Path, row: int, name: str, cell: str) -> float:
+    try:
+        number = float(cell if "." in cell else cell.replace(",", "."))
+    except ValueError:
+        number = math.nan
+    lowest = 0.0 if name in ("ti", "td", "scan_s") else -math.inf
+    if math.isnan(number) or number < lowest:
+        expected = "a number" if lowest < 0 else "a number, not below 0"
+        raise InputError(
+            f"{path}, row {row}, column '{name}': '{cell}'", expected, "correct the cell or empty it"
+        )
+    return number
+
+
+def _choice(path: Path, row: int, name: str, cell: str) -> str:
+    allowed = CHOICES[name]
+    if cell.lower() not in allowed:
+        seen = f"{path}, row {row}, column '{name}': '{cell}'"
+        raise InputError(seen, f"one of {', '.join(allowed)}", "correct the cell or empty it")
+    return Form(cell.lower()) if name == "form" else cell.lower()
+
+
+def _check_range(path: Path, row: int, signal: str, low: float | None, high: float | None) -> None:
+    if low is None and high is None:
+        return
+    if low is None or high is None or not low < high:
+        seen = f"{path}, row {row}: {signal}_lo {low} and {signal}_hi {high}"
+        raise InputError(seen, f"{signal}_hi above {signal}_lo, both or neither", "correct the range")
+
+
+def _check_unique(path: Path, loops: Sequence[tuple[int, str]]) -> None:
+    rows: dict[str, list[int]] = {}
+    for row, loop in loops:
+        rows.setdefault(loop, []).append(row)
+    for loop, places in rows.items():
+        if len(places) > 1:
+            where = ", ".join(str(place) for place in places)
+            raise InputError(f"{path}: loop {loop} in rows {where}", "each loop once", "remove all but one")

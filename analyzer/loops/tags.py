@@ -1,0 +1,154 @@
+"""The loops of an export: their tags, and their controllers in the project's units and in the plant's."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+from analyzer.loops.endings import ROLES, loops_of
+from analyzer.loops.spec import LoopSpec, read_loops
+from identification.errors import InputError
+from identification.models import Form, Pid
+
+__all__ = ["LoopSpec", "as_stated", "controller", "find_loops", "match", "read_loops"]
+
+
+def find_loops(tags: Iterable[str]) -> tuple[LoopSpec, ...]:
+    """Loops with at least a PV, found by the endings of the tags."""
+    return tuple(LoopSpec(loop, **tags_of) for loop, tags_of in loops_of(tags).items())  # type: ignore[arg-type]
+
+
+def match(specs: Sequence[LoopSpec], tags: Iterable[str]) -> tuple[tuple[LoopSpec, ...], tuple[str, ...]]:
+    """Give each loop the tags that the export has for it.
+
+    A tag that the row does not state is found by its ending, LOOP.SP and so on by default.
+
+    Returns
+    -------
+    tuple of LoopSpec
+        All of `specs`; `pv` is None where the export lacks it.
+    tuple of str
+        A sentence for every loop and tag that is missing, and one for loops that only the export has.
+    """
+    known = dict.fromkeys(tags)
+    by_ending = loops_of(known)
+    matched = tuple(_matched(spec, known, by_ending.get(spec.loop, {})) for spec in specs)
+    notes = [note for before, after in zip(specs, matched, strict=True) for note in _missing(before, after)]
+    taken = {tag for spec in matched for tag in spec.tags}
+    others = [loop for loop, roles in by_ending.items() if roles["pv"] not in taken]
+    if others:
+        notes.append(f"{len(others)} loops of the export are not in loops.csv, not assessed: {_few(others)}")
+    return matched, tuple(notes)
+
+
+def _matched(spec: LoopSpec, known: Mapping[str, None], found: Mapping[str, str]) -> LoopSpec:
+    wanted = {role: getattr(spec, role) or found.get(role, f"{spec.loop}.{role.upper()}") for role in ROLES}
+    present: dict[str, Any] = {role: tag if tag in known else None for role, tag in wanted.items()}
+    return replace(spec, **present, wanted_pv=wanted["pv"])
+
+
+def _missing(before: LoopSpec, after: LoopSpec) -> list[str]:
+    notes = [] if after.pv else [f"{after.loop}: not assessed, no PV tag {after.wanted_pv} in the export"]
+    stated = [(role, getattr(before, role)) for role in ROLES if role != "pv" and getattr(before, role)]
+    lost = [(role, tag) for role, tag in stated if getattr(after, role) is None]
+    return notes + [f"{after.loop}: {role.upper()} tag {tag} is not in the export" for role, tag in lost]
+
+
+def _few(names: Sequence[str]) -> str:
+    return ", ".join(names[:5]) + (" ..." if len(names) > 5 else "")
+
+
+def controller(spec: LoopSpec, pv_span: float | None) -> Pid | None:
+    """The stated controller in percent, seconds and ideal form; None without gain or integral time.
+
+    Laws, with Kp, Ti, Td as loops.csv states them and e = SP - PV:
+    ideal     Kp (e + 1/Ti int e dt + Td de/dt)
+    series    Kp (1 + 1/(Ti s)) (1 + Td s) e
+    parallel  Kp e + 1/Ti int e dt + Td de/dt, the latter two with the sign of Kp and in the units of Kp
+    A band is 100/Kp in percent. An integral time of 0 means that there is no integral action. Derivative time
+    is in the unit of the integral time, in minutes where that is repeats/min.
+
+    Parameters
+    ----------
+    spec : LoopSpec
+    pv_span : float or None
+        Span of the PV in its own unit; needed where the gain is stated in engineering units.
+
+    Raises
+    ------
+    InputError
+        The gain is in engineering units and there is no span.
+    """
+    if spec.kp is None or spec.ti is None or spec.kp == 0:
+        return None
+    gain = 100 / spec.kp if spec.gain_unit == "band" else spec.kp
+    ti_s, td_s = _seconds(spec.ti, spec.ti_unit), _derivative_s(spec)
+    kp, ti_s, td_s = _to_ideal(spec.form, gain, ti_s, td_s)
+    return Pid(kp * _percent_ratio(spec, pv_span), ti_s, td_s, **_scan(spec))
+
+
+def as_stated(pid: Pid, spec: LoopSpec, pv_span: float | None) -> tuple[float, float]:
+    """Gain and integral time of `pid` in the units and the form of `spec`, to be typed into the controller.
+
+    The inverse of `controller`. No integral action is stated as 0. The series form knows no Ti < 4 Td; there
+    it gets the nearest, both its times alike.
+    """
+    gain = pid.kp / _percent_ratio(spec, pv_span)
+    gain, ti_s = _from_ideal(spec.form, gain, pid.ti_s, pid.td_s)
+    kp = 100 / gain if spec.gain_unit == "band" else gain
+    return kp, _stated_time(ti_s, spec.ti_unit)
+
+
+def _scan(spec: LoopSpec) -> dict[str, float]:
+    return {} if spec.scan_s is None else {"scan_s": spec.scan_s}
+
+
+def _percent_ratio(spec: LoopSpec, pv_span: float | None) -> float:
+    """Percent of OP per percent of PV, for one unit of the stated gain."""
+    if spec.gain_unit != "engineering":
+        return 1.0
+    if not pv_span:
+        raise InputError(
+            f"{spec.loop}: gain in engineering units and no PV range",
+            "pv_lo and pv_hi",
+            "state them in loops.csv",
+        )
+    return pv_span / (spec.op_hi - spec.op_lo)
+
+
+def _seconds(ti: float, unit: str) -> float:
+    """Integral time [s]; infinite where 0 switches the integral action off."""
+    if ti == 0:
+        return math.inf
+    return {"s": ti, "min": 60 * ti, "repeats/min": 60 / ti}[unit]
+
+
+def _stated_time(ti_s: float, unit: str) -> float:
+    if math.isinf(ti_s):
+        return 0.0
+    return {"s": ti_s, "min": ti_s / 60, "repeats/min": 60 / ti_s}[unit]
+
+
+def _derivative_s(spec: LoopSpec) -> float:
+    return (spec.td or 0.0) * (1 if spec.ti_unit == "s" else 60)
+
+
+def _to_ideal(form: Form, gain: float, ti_s: float, td_s: float) -> tuple[float, float, float]:
+    if form is Form.PARALLEL:
+        return gain, abs(gain) * ti_s, td_s / abs(gain)
+    if form is Form.IDEAL or td_s == 0:
+        return gain, ti_s, td_s
+    if math.isinf(ti_s):
+        return gain, ti_s, td_s
+    return gain * (1 + td_s / ti_s), ti_s + td_s, ti_s * td_s / (ti_s + td_s)
+
+
+def _from_ideal(form: Form, gain: float, ti_s: float, td_s: float) -> tuple[float, float]:
+    if form is Form.PARALLEL:
+        return gain, ti_s / abs(gain)
+    if form is Form.IDEAL or td_s == 0 or math.isinf(ti_s):
+        return gain, ti_s
+    share = (1 + math.sqrt(max(0.0, 1 - 4 * td_s / ti_s))) / 2
+    return gain * share, ti_s * share

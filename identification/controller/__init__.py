@@ -1,0 +1,1 @@
+"""Which law gives OP from SP and PV."""

@@ -1,0 +1,217 @@
+"""Does the stated controller give OP from SP and PV: settings, clock, gap and logic, judged before any physics."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from identification.controller.pi_regression import Law, centred, found_law, shifted, span_length, trusted
+from identification.estimation.limits import (
+    ASKED,
+    FROZEN,
+    FROZEN_MOVES,
+    GAP_LEAVES,
+    GAPS,
+    LATE,
+    LAW_EXPLAINS,
+    LAWLESS,
+    LAWLESS_SHARE,
+    SAME_LAW,
+    SETTING,
+    SETTING_THINNED,
+    STUCK_MOVE,
+    STUCK_RUN,
+    STUCK_SHARE,
+    THINNED,
+)
+from identification.record import Floats, Mask
+
+
+@dataclass(frozen=True, slots=True)
+class Stated:
+    """What the plant says of the controller: kp [% OP/% PV], ti [samples], and scans per sample of the recording."""
+
+    kp: float
+    ti: float
+    scans: float = 1.0
+
+    @property
+    def thinned(self) -> bool:
+        """Whether OP answered values of PV that the recording does not hold."""
+        return self.scans >= THINNED
+
+
+@dataclass(frozen=True, slots=True)
+class Ruling:
+    """One finding about the controller: its name, its numbers, where it is (bool, shape (n,))."""
+
+    name: str
+    values: dict[str, float]
+    where: Mask
+
+
+def op_step(op: Floats) -> float:
+    """Resolution of OP [% OP]."""
+    gaps = np.diff(np.unique(op))
+    return float(np.quantile(gaps, 0.1)) if gaps.size else 0.0
+
+
+def due_moves(e: Floats, said: Stated) -> Floats:
+    """Moves of OP that the stated law asks for at each sample, shape (n,)."""
+    return said.kp * (np.diff(e, prepend=e[0]) + e / said.ti)
+
+
+@njit(cache=True)
+def gapped(e: Floats, kp: float, ki: float, width: float, catches_up: bool) -> Floats:
+    """Path of OP, shape (n,), of a PI that stands still while |e| < width.
+
+    catches_up : whether the proportional part, on leaving the gap, answers for what e did within.
+    """
+    out = np.empty_like(e)
+    u, last = 0.0, e[0]
+    for k in range(e.size):
+        if abs(e[k]) >= width:
+            u += kp * (e[k] - last) + ki * e[k]
+            last = e[k]
+        elif not catches_up:
+            last = e[k]
+        out[k] = u
+    return out
+
+
+def frozen_width(e: Floats, op: Floats, said: Stated, usable: Mask) -> float:
+    """Largest error [% PV] under which due moves of OP do not happen while those beyond do; 0 without one."""
+    due = np.abs(due_moves(e, said)) > max(op_step(op), 1e-6)
+    still = np.diff(op, prepend=op[0]) == 0
+    size = np.maximum(np.abs(e), np.abs(np.concatenate((e[:1], e[:-1]))))
+    use = due & usable
+    order = np.argsort(size[use])
+    frozen, size = still[use][order], size[use][order]
+    if frozen.size < 4 * FROZEN_MOVES:
+        return 0.0
+    inside = np.cumsum(frozen) / np.arange(1, frozen.size + 1)
+    beyond = (frozen.sum() - np.cumsum(frozen)) / np.maximum(np.arange(frozen.size)[::-1], 1)
+    enough = np.arange(frozen.size) >= FROZEN_MOVES
+    good = np.flatnonzero(enough & (inside >= FROZEN) & (beyond < 0.4 * inside))
+    return float(size[good[-1]]) if good.size else 0.0
+
+
+def gap(e: Floats, op: Floats, said: Stated, usable: Mask) -> Ruling | None:
+    """OP standing still while the error is small: a law with a gap gives OP where the one without does not."""
+    length = span_length(op.size, said.ti)
+    n = (op.size // length) * length
+    y = centred(op[:n], length)
+
+    def left(width: float, catches_up: bool) -> float:
+        path = gapped(e, said.kp, said.kp / said.ti, width, catches_up)
+        return typical(y - centred(path[:n], length), length)
+
+    size = float(np.median(np.abs(e[usable]))) if usable.any() else 0.0
+    trials = [(left(size * w, c), size * w) for w in GAPS for c in (True, False)]
+    best, width = min(trials)
+    still = np.diff(op, prepend=op[0]) == 0
+    if best > GAP_LEAVES * left(0.0, True):
+        width = frozen_width(e, op, said, usable)
+    inside = still & (np.abs(e) < width)
+    if inside.mean() < 0.02:
+        return None
+    return Ruling("controller-gap", {"gap_pct": width}, inside)
+
+
+def runs(still: Mask) -> list[tuple[int, int]]:
+    """First and last (excluded) samples of each run of True."""
+    edge = np.diff(np.concatenate(([0], still.astype(np.int8), [0])))
+    return list(zip(np.flatnonzero(edge == 1), np.flatnonzero(edge == -1), strict=True))
+
+
+def asked(sp: Floats, op: Floats) -> Mask:
+    """True where a move of SP or a limit of OP stands in for the law, and a sample about it, shape (n,)."""
+    here = (np.abs(np.diff(sp, prepend=sp[0])) > ASKED) | (op <= 0.05) | (op >= 99.95)
+    return np.convolve(here, np.ones(3), mode="same") > 0
+
+
+def lawless(found: Law, usable: Mask, step: float) -> Mask:
+    """True in spans of good samples where OP is far from the law that the others obey, shape (n,)."""
+    n, length = found.residual.size, found.length
+    size = np.sqrt((found.residual.reshape(-1, length) ** 2).mean(axis=1))
+    whole = usable[:n].reshape(-1, length).all(axis=1)
+    out = np.zeros(usable.size, dtype=bool)
+    out[:n] = np.repeat(whole & (size > LAWLESS * np.median(size) + step), length)
+    return out
+
+
+def ruled(e: Floats, op: Floats, said: Stated, usable: Mask, found: Law) -> Ruling | None:
+    """Spans in which something other than the law moves OP, or keeps it."""
+    off = lawless(found, usable, op_step(op))
+    if float(off.mean()) > LAWLESS_SHARE and found.explained > 0.0:
+        return Ruling("controller-logic", {"share": float(off.mean())}, off)
+    return logic(e, op, said, usable)
+
+
+def logic(e: Floats, op: Floats, said: Stated, usable: Mask) -> Ruling | None:
+    """Stretches in which OP stands although the law asks it to go, whatever the error."""
+    path = np.cumsum(due_moves(e, said))
+    least = STUCK_MOVE * max(op_step(op), 0.02)
+    where = np.zeros(op.size, dtype=bool)
+    for first, last in runs((np.diff(op, prepend=op[0] + 1.0) == 0) & usable):
+        if last - first >= STUCK_RUN and float(np.ptp(path[first:last])) > least:
+            where[first:last] = True
+    share = float(where.mean())
+    return Ruling("controller-logic", {"share": share}, where) if share > STUCK_SHARE else None
+
+
+def typical(residual: Floats, length: int) -> float:
+    """Residual of the median span [% OP]."""
+    return float(np.median(np.sqrt((residual.reshape(-1, length) ** 2).mean(axis=1))))
+
+
+def obeys(sp: Floats, pv: Floats, op: Floats, said: Stated, found: Law) -> bool:
+    """Whether the stated law gives OP nearly as well as the one found, in most spans and in those that move it."""
+    n, length = found.residual.size, found.length
+    e = (sp - shifted(pv, found.late))[:n]
+    left = centred(op[:n], length) - said.kp * (centred(e, length) + centred(np.cumsum(e), length) / said.ti)
+    lawful = trusted(found.residual, length)
+    whole = float(np.mean(left[lawful] ** 2)) < SAME_LAW**2 * float(np.mean(found.residual[lawful] ** 2))
+    return whole and typical(left, length) < SAME_LAW * typical(found.residual, length)
+
+
+def settings(found: Law, said: Stated) -> Ruling | None:
+    """Settings that reproduce OP where the stated ones do not."""
+    if found.explained < LAW_EXPLAINS or found.ki == 0 or found.kp / found.ki <= 0:
+        return None
+    ti = found.kp / found.ki
+    off_kp = abs(math.log(max(found.kp / said.kp, 1e-6)))
+    off_ti = abs(math.log(max(ti / said.ti, 1e-6)))
+    if max(off_kp, off_ti) < (SETTING_THINNED if said.thinned else SETTING):
+        return None
+    values = {"kp": found.kp, "ti_samples": ti} if off_kp >= off_ti else {"ti_samples": ti, "kp": found.kp}
+    return Ruling("controller-settings", values, np.ones(found.residual.size, dtype=bool))
+
+
+def judge(sp: Floats, pv: Floats, op: Floats, usable: Mask, said: Stated) -> tuple[Ruling | None, Law]:
+    """The first thing that is wrong with clock or controller, and the law as found.
+
+    Parameters
+    ----------
+    sp, pv, op : ndarray of shape (n,)
+        Trends [% of span].
+    usable : ndarray of bool, shape (n,)
+        False in gaps, in manual and at OP's limits.
+    said : Stated
+        Of a thinned recording nothing but settings plainly wrong is said: the law is not seen at work.
+    """
+    found = found_law(sp, pv, op, usable, said.ti, said.kp, late=not said.thinned)
+    e = sp - pv
+    wrong = None if obeys(sp, pv, op, said, found) else settings(found, said)
+    if said.thinned:
+        return wrong, found
+    if found.late >= LATE and found.explained > LAW_EXPLAINS:
+        return Ruling("clock-offset", {"late_samples": found.late}, np.ones(op.size, dtype=bool)), found
+    law_now = Stated(found.kp, found.kp / found.ki) if wrong is not None else said
+    frozen, other = gap(e, op, law_now, usable), ruled(e, op, law_now, usable & ~asked(sp, op), found)
+    if frozen is not None:
+        return frozen, found
+    return (other if other is not None else wrong), found

@@ -1,0 +1,126 @@
+"""The PI law that gives OP from SP and PV, with the lateness of PV's clock.
+
+On a span where the law holds OP = kp (e + integral of e / Ti) + constant, so a level regression over short spans,
+each with a constant of its own, gives kp and Ti without the bias that increments of rounded trends bring.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from identification.estimation.limits import (
+    LAW_SPAN,
+    LAW_SPANS,
+    SHIFTS,
+)
+from identification.record import Floats, Mask
+
+
+@dataclass(frozen=True, slots=True)
+class Law:
+    """A PI law as found: kp [% OP/% PV], ki [% OP/(% PV sample)], the PV's lateness in samples, the residual of OP
+    (scatter, in % OP, and per sample, shape (n,), less each span's constant) and the share that the law explains."""
+
+    kp: float
+    ki: float
+    late: float
+    scatter: float
+    explained: float
+    length: int
+    residual: Floats = field(repr=False)
+
+
+def shifted(x: Floats, late: float) -> Floats:
+    """The signal `late` samples earlier, shape (n,), by straight lines between samples."""
+    k = np.arange(x.size)
+    return np.interp(k + late, k, x)
+
+
+def spans(n: int, length: int) -> list[slice]:
+    """Consecutive spans of that many samples."""
+    return [slice(a, a + length) for a in range(0, n - length + 1, length)]
+
+
+def centred(x: Floats, length: int) -> Floats:
+    """The signal less its mean in each span, shape (m * length,)."""
+    m = x.size // length
+    cut = x[: m * length].reshape(m, length)
+    return (cut - cut.mean(axis=1, keepdims=True)).ravel()
+
+
+def regress(e: Floats, op: Floats, length: int, keep: Mask) -> tuple[float, float, Floats]:
+    """kp, ki and residual of OP on e and its sum, each span with a constant of its own."""
+    rows = np.stack([centred(e, length), centred(np.cumsum(e), length)])
+    y = centred(op, length)
+    use = keep[: y.size]
+    gram = (rows * use) @ rows.T
+    found = np.linalg.lstsq(gram, (rows * use) @ y, rcond=1e-12)[0]
+    return float(found[0]), float(found[1]), y - found @ rows
+
+
+def trusted(residual: Floats, length: int) -> Mask:
+    """True in the spans whose residual is not far above the median span's, shape (m * length,)."""
+    size = np.sqrt((residual.reshape(-1, length) ** 2).mean(axis=1))
+    return np.repeat(size <= 2.0 * np.median(size) + 1e-9, length)
+
+
+def unbroken(usable: Mask, length: int) -> Mask:
+    """True in spans that are usable throughout, shape (m * length,); the samples themselves where too few are.
+
+    A limit or a hole within a span leaves the integral another constant behind it than before.
+    """
+    whole = np.repeat(usable.reshape(-1, length).all(axis=1), length)
+    return whole if whole.sum() >= LAW_SPANS * length else usable.copy()
+
+
+def law(sp: Floats, pv: Floats, op: Floats, usable: Mask, length: int, late: float) -> Law:
+    """The PI law at a given lateness of PV, spans that do not obey it left out twice."""
+    e = sp - shifted(pv, late)
+    n = (e.size // length) * length
+    fit = unbroken(usable[:n], length)
+    keep = fit
+    for _ in range(3):
+        kp, ki, residual = regress(e[:n], op[:n], length, keep)
+        keep = fit & trusted(residual, length)
+    moved = centred(op[:n], length)
+    left = float((residual[keep] ** 2).mean()) if keep.any() else math.inf
+    power = float((moved[keep] ** 2).mean()) if keep.any() else 1.0
+    return Law(kp, ki, late, math.sqrt(left), 1.0 - left / max(power, 1e-12), length, residual)
+
+
+def span_length(n: int, ti_samples: float) -> int:
+    """Samples in a span of the regression: an integral time, but at least LAW_SPANS spans in the record."""
+    return int(np.clip(ti_samples, LAW_SPAN, max(n // LAW_SPANS, LAW_SPAN)))
+
+
+def found_law(
+    sp: Floats,
+    pv: Floats,
+    op: Floats,
+    usable: Mask,
+    ti_samples: float,
+    stated_kp: float = 1.0,
+    late: bool = True,
+) -> Law:
+    """The PI law, with PV's lateness searched in whole samples and then between them.
+
+    Under an oscillation a law of the wrong sign, half a period late, gives OP as well; only laws whose gain has the
+    stated one's sign are looked for. late : whether PV's clock may be late at all.
+    """
+    length = span_length(op.size, ti_samples)
+
+    def at(shift: float) -> Law:
+        return law(sp, pv, op, usable, length, shift)
+
+    def scatter(x: Law) -> float:
+        return x.scatter if x.kp * stated_kp > 0 and x.kp * x.ki > 0 else math.inf
+
+    best = min((at(s) for s in (SHIFTS if late else (0.0,))), key=scatter)
+    if not late or math.isinf(scatter(best)):
+        return at(0.0)
+    for step in (0.5, 0.25):
+        best = min([best, at(best.late - step), at(best.late + step)], key=scatter)
+    return best

@@ -1,0 +1,1 @@
+"""How process, valve and noise are estimated from OP and PV."""

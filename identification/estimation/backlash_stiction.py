@@ -1,0 +1,211 @@
+"""The best lag behind an ideal valve, behind a play, and behind stick-slip: scanned, then followed to the end."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from identification.estimation.gauss_newton import descend
+from identification.estimation.hammerstein import IDEAL, Fit, ValveTrial, stem_of, sticking
+from identification.estimation.innovations import arx_noise
+from identification.estimation.search import (
+    AR_ORDER,
+    INPUT_LAGS,
+    Dynamics,
+    Prepared,
+    prepare,
+    scan,
+    search,
+    starts,
+)
+from identification.estimation.window import Window
+from identification.record import Floats
+from identification.simulation.valve import HALTS, RESTS, SLIDES
+
+SCREEN_SHARES = (0.1, 0.3, 0.55, 0.8)
+"""Stickbands that a loop without an evident fault is screened with, as shares of OP's range; ours: a play of any
+width between is seen by the nearest of them."""
+SCREENED = 3.0
+"""Gain in log likelihood [nat] from which the screening is followed by the whole search; ours: a third of what a
+verdict needs."""
+STICKBAND_SHARES = (0.06, 0.12, 0.2, 0.3, 0.42, 0.55, 0.7, 0.85, 1.0)
+"""Stickbands tried first, as shares of OP's range; a valve much wider than OP's range would not move at all."""
+JUMP_SHARES = (0.2, 0.4, 0.7, 1.0)
+"""Slip jumps tried, as shares of the stickband."""
+COAST = 0.15
+"""Turning of OP that a sliding stem ignores, as share of the stickband: OP's noise; ours."""
+FINE_WIDTHS = tuple(float(w) for w in np.arange(0.88, 1.34, 0.012))
+"""Stickbands tried about a play, in its width; ours: on simulated stick-slip from 0.94 to 1.3 times the play that
+fits best, in pits about 1 % wide where OP is recorded finely."""
+FINE_JUMPS = tuple(float(j) for j in np.arange(0.1, 1.01, 0.06))
+"""Slip jumps tried about a play, as shares of the stickband."""
+LATER = (0.0, 0.4, 0.8, 1.2, 1.6, 2.0, 2.5, 3.0)
+"""Dead times tried about a play, in blocks beyond the play's: a play in place of a jump answers too soon; ours."""
+FINALISTS = 8
+"""Candidates of the fine scan, per behaviour and noise model, that are followed to the end; ours."""
+COMPASS = (0.02, 0.007, 0.0025)
+"""Relative steps of the search within a pit."""
+SHORT = 1000
+"""Blocks of a record that is so short that every rival can be tried on it; ours."""
+FOLLOWED_SHORT = 5
+"""Candidates of a scan that are followed to the end on a short record: with few events there are more valleys."""
+FOLLOWED = 2
+"""Candidates of a scan that are followed to the end; ours: the best of the scan is among its first two."""
+
+
+CLEAR = 1.0
+"""Gain in log likelihood [nat] from which one fit of the same model is preferred to another; ours."""
+GENERIC = -0.95
+"""First coefficient of a noise model that knows nothing: nearly a difference. A noise model that was fitted with
+another valve takes that valve's side, so candidates are ranked by both."""
+
+
+def begin(prepared: Prepared, dynamics: Dynamics) -> Fit:
+    """The fit at given dynamics under a given noise model, a start for the descent."""
+    sigma2, count, beta = prepared.score(*dynamics)
+    t, dead = dynamics
+    base = np.array([beta[1], beta[2], 0.0, 0.0])
+    return Fit(float(beta[0]), t, dead, prepared.valve, float(sigma2), int(count), prepared.ar, base)
+
+
+def fit_linear(window: Window, period_s: float) -> Fit:
+    """The process behind an ideal valve.
+
+    Parameters
+    ----------
+    window : Window
+    period_s : float
+        Period of the oscillation, or other scale of the loop [s], about which the search begins.
+    """
+    stem = stem_of(window, IDEAL)
+    learnt = arx_noise(window.y - window.y.mean(), stem, window.usable, AR_ORDER, INPUT_LAGS)
+    fits = []
+    for ar in (learnt, generic_noise()):
+        prepared = prepare(window, IDEAL, ar)
+        fits.append(descend(window, begin(prepared, search(prepared, starts(window, period_s)))))
+    return max(fits, key=lambda fit: fit.log_likelihood)
+
+
+def generic_noise() -> Floats:
+    """The noise model that knows nothing, shape (AR_ORDER,)."""
+    out = np.zeros(AR_ORDER)
+    out[0] = GENERIC
+    return out
+
+
+def _ranked(window: Window, ar: Floats, valves: list[ValveTrial], begins: list[Dynamics]) -> list[Fit]:
+    """Valves with dynamics searched anew under one noise model, best first."""
+    trials = []
+    for valve in valves:
+        prepared = prepare(window, valve, ar)
+        trials.append(begin(prepared, search(prepared, begins, 2)))
+    return sorted(trials, key=lambda fit: fit.sigma2)
+
+
+def _scan(window: Window, near: Fit, valves: list[ValveTrial], period_s: float, followed: int) -> Fit:
+    """Valves tried under two noise models; the best few of each followed to the end, the best returned."""
+    begins = [(near.time_constant_s, near.dead_time_s), *starts(window, period_s)]
+    chosen = [
+        fit for ar in (generic_noise(), near.ar) for fit in _ranked(window, ar, valves, begins)[:followed]
+    ]
+    return max((descend(window, fit, free_width=True) for fit in chosen), key=lambda fit: fit.log_likelihood)
+
+
+def fit_play(window: Window, linear: Fit, period_s: float) -> Fit:
+    """The best play followed by a lag: a quick screening, and the whole search where it finds anything.
+
+    Parameters
+    ----------
+    window : Window
+    linear : Fit
+        The best fit behind an ideal valve.
+    period_s : float
+        Scale of the search [s].
+    """
+    reach = max(window.op_range, 1e-9)
+    more = FOLLOWED_SHORT if window.y.size < SHORT else 1
+    best = _scan(window, linear, [sticking(share * reach, 0.0) for share in SCREEN_SHARES], period_s, more)
+    if best.log_likelihood - linear.log_likelihood < SCREENED:
+        return best
+    shares = (*STICKBAND_SHARES, best.valve.stickband / reach)
+    found = _scan(
+        window, best, [sticking(share * reach, 0.0) for share in shares], period_s, max(FOLLOWED, more)
+    )
+    return max(best, found, key=lambda fit: fit.log_likelihood)
+
+
+def better_linear(window: Window, linear: Fit, play: Fit) -> Fit:
+    """The better of the plain fit and one followed from the dynamics that were found behind a play.
+
+    The plain process is the play of no width; found from there it is never unfairly behind. Where the two are as
+    likely, the one that was searched on its own stays.
+    """
+    trial = descend(window, replace(play, valve=IDEAL))
+    return trial if trial.log_likelihood > linear.log_likelihood + CLEAR else linear
+
+
+def fit_stick_slip(window: Window, play: Fit, period_s: float) -> Fit:
+    """The best stick-slip (J > 0) followed by a lag, scanned whole and finely about the play.
+
+    Parameters
+    ----------
+    window : Window
+    play : Fit
+        The best play: its width is near the stickband, for OP tells both by its travel between slips.
+    period_s : float
+        Scale of the search [s].
+    """
+    whole = _scan(window, play, _coarse(window, play), period_s, _followed(window))
+    return max([whole, *_finely(window, play)], key=lambda fit: fit.log_likelihood)
+
+
+def _followed(window: Window) -> int:
+    return FOLLOWED_SHORT if window.y.size < SHORT else FOLLOWED
+
+
+def _coarse(window: Window, play: Fit) -> list[ValveTrial]:
+    """Stickbands up to OP's range, with stems that rest and stems that slide."""
+    reach = max(window.op_range, 1e-9)
+    near = play.valve.stickband / reach
+    widths = {round(s, 4) for s in STICKBAND_SHARES[4:]} | {near, 1.1 * near}
+    return [
+        sticking(width * reach, jump, tolerance)
+        for width in sorted(widths)
+        for jump in JUMP_SHARES
+        for tolerance in (RESTS, COAST * width * reach)
+    ]
+
+
+def _finely(window: Window, play: Fit) -> list[Fit]:
+    """Stick-slips about a play, the best few of each behaviour brought to the bottom of their pits.
+
+    A slip more or less changes the stem until the next one, so likelihood has many narrow pits in S and J.
+    """
+    pairs = np.array([(w * play.valve.stickband, j) for w in FINE_WIDTHS for j in FINE_JUMPS])
+    begins = [(play.time_constant_s, play.dead_time_s + blocks * window.dt_s) for blocks in LATER]
+    out = []
+    for tolerance in (RESTS, HALTS, SLIDES):
+        left = scan(window, pairs, tolerance, generic_noise(), begins)
+        best = [sticking(pairs[i, 0], pairs[i, 1], tolerance) for i in np.argsort(left)[:FINALISTS]]
+        fits = _ranked(window, generic_noise(), best, begins)
+        out += [_bottom(window, _bottom(window, descend(window, fit))) for fit in fits]
+    return out
+
+
+def _bottom(window: Window, fit: Fit) -> Fit:
+    """Stickband and jump moved by ever smaller steps to the least innovations, the rest following at the end."""
+    valve, least = fit.valve, fit.sigma2
+    dynamics = fit.time_constant_s, fit.dead_time_s
+    for step in COMPASS:
+        moved = True
+        while moved:
+            moved = False
+            for wider, jumpier in ((1, 0), (-1, 0), (0, 1), (0, -1)):
+                width = valve.stickband * (1 + wider * step)
+                jump = min(valve.slip_jump * (1 + 2 * jumpier * step), width)
+                trial = sticking(width, jump / width, valve.tolerance)
+                found = prepare(window, trial, fit.ar).score(*dynamics)[0]
+                if found < least * (1 - 1e-7):
+                    valve, least, moved = trial, found, True
+    return descend(window, replace(fit, valve=valve))

@@ -1,0 +1,204 @@
+"""How well a valve fault followed by a lag explains PV from OP, judged by its innovations.
+
+The model is y = c0 + c1 t + c2 decay + K x + noise with A(q) noise = innovation: the stem is a valve operator on
+the recorded OP, x the response of a unit-gain lag with dead time, A an autoregression that makes the residual
+white. An integrator is the lag whose time constant outlasts the window; then only gain over time constant is
+known. Gain and the c are solved linearly, time constant and dead time are searched, the valve is scanned.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from identification.estimation.window import Window, block_means
+from identification.models import Backlash, Fopdt, Stiction, Valve
+from identification.record import Floats
+from identification.simulation.valve import RESTS, first_slip, stem_step, walk
+
+
+@dataclass(frozen=True, slots=True)
+class ValveTrial:
+    """Valve constants in the form the kernels use.
+
+    breakaway, sliding [% OP]: (S + J)/2 and (S - J)/2; tolerance [% OP]: OP's turning that a sliding stem
+    ignores, or HALTS or RESTS (valve.py).
+    """
+
+    breakaway: float = 0.0
+    sliding: float = 0.0
+    tolerance: float = RESTS
+
+    @property
+    def stickband(self) -> float:
+        """S [% OP]; the width of the play where slip_jump is 0."""
+        return self.breakaway + self.sliding
+
+    @property
+    def slip_jump(self) -> float:
+        """J [% OP]."""
+        return self.breakaway - self.sliding
+
+    @property
+    def slides(self) -> bool:
+        """Whether the stem follows OP after a jump."""
+        return self.tolerance > RESTS
+
+    @property
+    def valve(self) -> Valve:
+        """The valve of models.py that these constants are: ideal, play or stick-slip."""
+        if self.breakaway <= 0.0:
+            return None
+        if self.slip_jump <= 0.0:
+            return Backlash(self.stickband)
+        return Stiction(self.stickband, self.slip_jump, slides=self.slides)
+
+
+IDEAL = ValveTrial()
+
+
+def sticking(stickband: float, jump_share: float, tolerance: float = RESTS) -> ValveTrial:
+    """Valve of stickband S [% OP] and slip jump J = jump_share S."""
+    return ValveTrial(0.5 * stickband * (1 + jump_share), 0.5 * stickband * (1 - jump_share), tolerance)
+
+
+@dataclass(frozen=True, slots=True)
+class Fit:
+    """A fitted model.
+
+    gain [% PV/% OP], time_constant_s and dead_time_s [s], valve, sigma2 the innovations variance
+    [% PV squared], count the samples judged, ar the noise polynomial without its leading one, shape (p,), base
+    the coefficients of 1, t, decay and the load's step, shape (4,).
+    """
+
+    gain: float
+    time_constant_s: float
+    dead_time_s: float
+    valve: ValveTrial
+    sigma2: float
+    count: int
+    ar: Floats
+    base: Floats
+
+    @property
+    def log_likelihood(self) -> float:
+        """Gaussian log likelihood of the innovations, up to a constant."""
+        return -0.5 * self.count * math.log(self.sigma2)
+
+    @property
+    def slope(self) -> float:
+        """Gain over time constant [% PV / (% OP s)]."""
+        return self.gain / self.time_constant_s
+
+
+@njit(cache=True)
+def stem_blocks(op: Floats, breakaway: float, sliding: float, tolerance: float, factor: int) -> Floats:
+    """Stem behind OP as means of blocks, shape (n // factor,); breakaway 0 is an ideal valve."""
+    n = op.size // factor
+    out = np.empty(n)
+    stem, moving, turned = first_slip(op, breakaway, sliding), 0.0, op[0]
+    for k in range(n):
+        total = 0.0
+        for i in range(k * factor, (k + 1) * factor):
+            if breakaway > 0.0:
+                stem, moving, turned = stem_step(stem, moving, turned, op[i], breakaway, sliding, tolerance)
+            else:
+                stem = op[i]
+            total += stem
+        out[k] = total / factor
+    return out
+
+
+@njit(cache=True)
+def lag(stem: Floats, pole: float, now: float, before: float, delay: int) -> Floats:
+    """Unit-gain response at rest at first, shape (n,)."""
+    n = stem.size
+    out = np.empty(n)
+    y = 0.0
+    for k in range(n):
+        out[k] = y
+        y = pole * y + now * stem[max(k - delay, 0)] + before * stem[max(k - delay - 1, 0)]
+    return out
+
+
+@njit(cache=True)
+def lag_blocks(stem: Floats, pole: float, now: float, before: float, delay: int, factor: int) -> Floats:
+    """The same as means of blocks of the stem's own samples, shape (n // factor,)."""
+    n = stem.size // factor
+    out = np.empty(n)
+    y, k = 0.0, 0
+    for block in range(n):
+        total = 0.0
+        for _ in range(factor):
+            total += y
+            y = pole * y + now * stem[max(k - delay, 0)] + before * stem[max(k - delay - 1, 0)]
+            k += 1
+        out[block] = total / factor
+    return out
+
+
+@njit(cache=True)
+def unit_lag(time_constant_s: float, dead_time_s: float, dt_s: float) -> tuple[float, float, float, int]:
+    """Exact zero-order hold of a unit-gain lag with fractional dead time: pole, now, before, delay."""
+    steps = dead_time_s / dt_s
+    delay = int(steps)
+    fraction = steps - delay
+    pole = math.exp(-dt_s / time_constant_s)
+    rest = math.exp(-dt_s * (1 - fraction) / time_constant_s)
+    return pole, 1 - rest, rest - pole, delay
+
+
+def stem_of(window: Window, valve: ValveTrial) -> Floats:
+    """Stem in blocks less its mean [% OP], shape (n,): the recorded one behind a faulty valve, where there is one."""
+    if valve.breakaway > 0.0 and window.position is not None:
+        stem = block_means(window.position, window.factor)
+        return stem - stem.mean()
+    if valve.breakaway <= 0.0:
+        stem = block_means(window.op, window.factor)
+    else:
+        stem = stem_blocks(window.op, valve.breakaway, valve.sliding, valve.tolerance, window.factor)
+    return stem - stem.mean()
+
+
+def fine_stem(window: Window, valve: ValveTrial) -> Floats:
+    """Stem at the record's own interval less its mean [% OP], shape (n * factor,); as stem_of."""
+    if valve.breakaway > 0.0 and window.position is not None:
+        return window.position - window.position.mean()
+    if valve.breakaway <= 0.0:
+        return window.op - window.op.mean()
+    start = first_slip(window.op, valve.breakaway, valve.sliding)
+    stem = walk(window.op, valve.breakaway, valve.sliding, valve.tolerance, start)
+    return np.asarray(stem - stem.mean(), dtype=np.float64)
+
+
+def residual(window: Window, fit: Fit) -> Floats:
+    """PV less the response to the stem [% PV], shape (n,): load and noise, with the model's slow terms in it.
+
+    In a fine window the response is stepped at the record's own interval and then averaged over blocks, as PV was.
+    """
+    if window.fine:
+        fine = window.dt_s / window.factor
+        steps = unit_lag(fit.time_constant_s, fit.dead_time_s + window.half_block_s, fine)
+        x = lag_blocks(fine_stem(window, fit.valve), *steps, window.factor)
+    else:
+        x = lag(stem_of(window, fit.valve), *unit_lag(fit.time_constant_s, fit.dead_time_s, window.dt_s))
+    return window.y - window.y.mean() - fit.gain * x
+
+
+def process_of(window: Window, fit: Fit) -> Fopdt:
+    """The process of a fit, its dead time in the record's own samples."""
+    return Fopdt(fit.gain, fit.time_constant_s, fit.dead_time_s + window.half_block_s)
+
+
+def disturbance(window: Window, fit: Fit) -> Floats:
+    """PV less the whole model, slow terms included [% PV], shape (n,)."""
+    n = window.y.size
+    t = 2.0 * np.arange(n) / n - 1.0
+    decay = np.exp(-np.arange(n) * window.dt_s / fit.time_constant_s)
+    if fit.time_constant_s > 0.5 * window.duration_s:
+        decay[:] = 0.0
+    slow = fit.base[0] + fit.base[1] * t + fit.base[2] * decay + fit.base[3] * window.extra
+    return residual(window, fit) - slow

@@ -1,0 +1,249 @@
+"""A rival fitted: all its constants and the noise model at once to the least innovations."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from identification.estimation.limits import BIAS_SCATTER, SETTLED, START_SCATTER
+from identification.estimation.noise import Edges, edges_for, fitted, judged, lag_means, whitened
+from identification.record import Floats, Mask
+from identification.simulation.effect import Param, Row
+from identification.simulation.open_loop import Scene, simulate
+from identification.simulation.parameters import Slot
+
+BASE = (
+    Param(Slot.T, "time_constant_s", "s", 0.3, 1e9, "dt", True),
+    Param(Slot.L, "dead_time_s", "s", 0.0, 0.2, "span"),
+    Param(Slot.K, "gain", "% PV/% OP", -1e4, 1e4),
+    Param(Slot.BIAS, "bias_pct", "% PV", -2e3, 2e3),
+    Param(Slot.START, "start_pct", "% PV", -300.0, 300.0),
+)
+"""Constants of the plain loop, free in every rival."""
+PRIOR = (Slot.START, Slot.BIAS)
+"""Constants that short time constants, or a load like a random walk, leave open; they are held near the recording."""
+FAR = 3e3
+"""A model whose residual reaches this [% PV] has run away and is the worst there is."""
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """A recording prepared for fitting.
+
+    scene : what drives the model; y : PV less scene.level, shape (n,); usable : bool, shape (n,); weight : shape
+    (n,), what each innovation counts, 0 where it is not judged.
+    """
+
+    scene: Scene
+    y: Floats
+    usable: Mask
+    weight: Floats
+    edges: Edges = field(repr=False)
+
+    @property
+    def count(self) -> int:
+        """Samples judged."""
+        return int((self.weight > 0).sum())
+
+
+def problem(scene: Scene, y: Floats, usable: Mask) -> Problem:
+    """A problem whose usable samples all count alike."""
+    edges = edges_for(y.size)
+    return Problem(scene, y, usable, judged(usable, int(edges[-1])).astype(float), edges)
+
+
+@dataclass(frozen=True, slots=True)
+class Model:
+    """Rows added to the plain loop, and all constants, shape (SIZE,)."""
+
+    rows: tuple[Row, ...]
+    c: Floats
+
+    @property
+    def params(self) -> tuple[Param, ...]:
+        """What is free: the plain loop's constants and the rows'."""
+        own = tuple(p for row in self.rows for p in row.params)
+        dead = any(row.name == "integrator" for row in self.rows)
+        return (*(p for p in BASE if not (dead and p.slot == Slot.K)), *own)
+
+
+@dataclass(frozen=True, slots=True)
+class Fitted:
+    """A model at its optimum: `loss` the weighted mean square innovation, `ar` the noise model."""
+
+    model: Model
+    loss: float
+    count: int
+    ar: Floats
+    e: Floats = field(repr=False)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the rows."""
+        return tuple(row.name for row in self.model.rows)
+
+
+def gain(better: Fitted, worse: Fitted) -> float:
+    """Doubled gain in log likelihood."""
+    return worse.count * math.log(max(worse.loss, 1e-30) / max(better.loss, 1e-30))
+
+
+def scales(scene: Scene, c: Floats, param: Param) -> tuple[float, float]:
+    """Offset and factor that turn a row's numbers into the constant's own unit."""
+    op = scene.op
+    reach = max(float(np.ptp(op)), 1e-6)
+    match param.scale:
+        case "op":
+            return 0.0, reach
+        case "op/dt":
+            return 0.0, reach / scene.dt_s
+        case "opspan":
+            return float(op.min()), reach
+        case "1/op":
+            return 0.0, 100.0 / reach
+        case "1/pv":
+            return 0.0, 50.0 / max(scene.pv_range[1] - scene.pv_range[0], 1e-6)
+        case "pvspan":
+            return scene.pv_range[0], scene.pv_range[1] - scene.pv_range[0]
+        case "T":
+            return 0.0, float(c[Slot.T])
+        case "dt":
+            return 0.0, scene.dt_s
+        case "span":
+            return 0.0, scene.dt_s * op.size
+    return 0.0, 1.0
+
+
+def bounds(scene: Scene, c: Floats, param: Param) -> tuple[float, float]:
+    """Lowest and highest value of a constant, in its own unit."""
+    if param.slot == Slot.T:
+        longest = 2.0 * scene.dt_s * scene.op.size
+        return 0.3 * scene.dt_s, longest if c[Slot.LEAK] == 0 else min(longest, scene.longest_s)
+    offset, factor = scales(scene, c, param)
+    return offset + factor * param.low, offset + factor * param.high
+
+
+def residual_fit(p: Problem, c: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+    """Residual, its lag means, noise model and innovations at given constants."""
+    r = p.y - simulate(p.scene, c)
+    if not float(np.abs(r).max()) < FAR:
+        groups = p.edges.size - 1
+        return r, np.zeros((groups, r.size)), np.zeros(groups), np.full(r.size, FAR)
+    columns = lag_means(r, p.edges)
+    ar = fitted(columns, r, p.weight)
+    return r, columns, ar, r - ar @ columns
+
+
+def loss_of(p: Problem, e: Floats) -> float:
+    """Weighted mean square innovation."""
+    return float((p.weight * e) @ e / p.weight.sum())
+
+
+def step_of(scene: Scene, c: Floats, param: Param) -> float:
+    """Step of the numeric derivative of a constant, in its own unit."""
+    if param.log:
+        return 0.01 * float(c[param.slot])
+    if param.slot == Slot.L:
+        return 0.05 * scene.dt_s
+    if param.scale in ("op", "opspan"):
+        return 2e-3 * float(np.ptp(scene.op))
+    if param.slot == Slot.OMEGA:
+        return 0.02 * 2 * math.pi / (scene.dt_s * scene.op.size)
+    return 0.01 * max(abs(float(c[param.slot])), 0.1)
+
+
+def sensitivities(p: Problem, model: Model, ar: Floats) -> Floats:
+    """Whitened derivatives of the simulation by the free constants (logarithms where so searched), (m, n)."""
+    here = simulate(p.scene, model.c)
+    out = np.empty((len(model.params), p.y.size))
+    for i, param in enumerate(model.params):
+        c, h = model.c.copy(), step_of(p.scene, model.c, param)
+        if c[param.slot] + h > bounds(p.scene, model.c, param)[1]:
+            h = -h
+        c[param.slot] += h
+        slope = (simulate(p.scene, c) - here) / (h / model.c[param.slot] if param.log else h)
+        out[i] = whitened(np.clip(slope, -1e9, 1e9), ar, p.edges)
+    return out
+
+
+def moved(p: Problem, model: Model, step: Floats) -> Model:
+    """The model after a step in its free constants, kept within bounds."""
+    c = model.c.copy()
+    for param, s in zip(model.params, step, strict=True):
+        low, high = bounds(p.scene, model.c, param)
+        value = c[param.slot]
+        value = value * math.exp(min(max(s, -1.5), 1.5)) if param.log else value + s
+        c[param.slot] = min(max(value, low), high)
+    if c[Slot.JUMP] > c[Slot.STICKBAND]:
+        c[Slot.JUMP] = c[Slot.STICKBAND]
+    return replace(model, c=c)
+
+
+def newton(gram: Floats, slope: Floats, damping: float) -> Floats:
+    """A damped Gauss-Newton step in scaled constants."""
+    scale = np.sqrt(np.diag(gram)) + 1e-12 * math.sqrt(float(np.trace(gram))) + 1e-150
+    unit = gram / np.outer(scale, scale)
+    if not (np.isfinite(unit).all() and np.isfinite(slope).all()):
+        return np.zeros(scale.size)
+    return np.linalg.lstsq(unit + damping * np.eye(scale.size), slope / scale, rcond=1e-11)[0] / scale
+
+
+def curvature(p: Problem, model: Model, ar: Floats, columns: Floats, e: Floats) -> tuple[Floats, Floats]:
+    """Gauss-Newton matrix of the constants with the noise model eliminated, and the slope."""
+    j = np.concatenate((sensitivities(p, model, ar), columns))
+    weighted = j * p.weight
+    gram, slope = weighted @ j.T, weighted @ e
+    m = len(model.params)
+    inner = gram[m:, m:] + 1e-10 * np.trace(gram[m:, m:]) / (gram.shape[0] - m) * np.eye(gram.shape[0] - m)
+    cross = np.linalg.lstsq(inner, np.column_stack((gram[m:, :m], slope[m:])), rcond=1e-13)[0]
+    gram, slope = gram[:m, :m] - gram[:m, m:] @ cross[:, :-1], slope[:m] - gram[:m, m:] @ cross[:, -1]
+    for i, param in enumerate(model.params):
+        if param.slot in PRIOR:
+            aim, scatter = (p.y[0], START_SCATTER) if param.slot == Slot.START else (0.0, BIAS_SCATTER)
+            held = loss_of(p, e) / scatter**2
+            gram[i, i] += held
+            slope[i] += held * (aim - model.c[param.slot])
+    return gram, slope
+
+
+def descend(p: Problem, model: Model, steps: int) -> Fitted:
+    """Follow a model to the least innovations by damped Gauss-Newton steps.
+
+    Parameters
+    ----------
+    p : Problem
+    model : Model
+        Where to start.
+    steps : int
+        Steps at most.
+    """
+    _, columns, ar, e = residual_fit(p, model.c)
+    loss, damping, failed = loss_of(p, e), 1e-3, 0
+    for _ in range(steps):
+        gram, slope = curvature(p, model, ar, columns, e)
+        while failed < 5:
+            trial = moved(p, model, newton(gram, slope, damping))
+            _, columns2, ar2, e2 = residual_fit(p, trial.c)
+            less = loss_of(p, e2)
+            if less < loss:
+                break
+            damping, failed = damping * 20, failed + 1
+        else:
+            break
+        won = p.count * math.log(loss / max(less, 1e-300))
+        model, columns, ar, e, loss = trial, columns2, ar2, e2, less
+        damping, failed = max(damping / 10, 1e-7), 0
+        if won < SETTLED:
+            break
+    return Fitted(model, loss, p.count, ar, e)
+
+
+def deviations(p: Problem, fit: Fitted) -> Floats:
+    """Standard deviations of the free constants (of logarithms where so searched), from the curvature."""
+    _, columns, ar, e = residual_fit(p, fit.model.c)
+    gram, _ = curvature(p, fit.model, ar, columns, e)
+    scale = np.sqrt(np.maximum(np.diag(gram), 1e-300))
+    inside = np.linalg.pinv(gram / np.outer(scale, scale), rcond=1e-10)
+    return np.sqrt(np.maximum(np.diag(inside), 0.0) * fit.loss) / scale

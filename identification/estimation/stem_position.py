@@ -1,0 +1,115 @@
+"""The valve's fault read from a recorded stem position: OP in, stem out, no process between."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from identification.estimation.hammerstein import ValveTrial, sticking
+from identification.record import Floats
+from identification.simulation.valve import RESTS, first_slip, walk
+
+WIDTHS = tuple(float(w) for w in np.geomspace(0.03, 1.2, 60))
+"""Plays tried, in OP's range: steps of a sixteenth."""
+COMPASS = (0.03, 0.01, 0.003, 0.001)
+"""Relative steps in which the best is closed in on."""
+LEAST_SHARE = 0.5
+"""Share of the difference between position and OP that a fault has to explain; ours: a positioner's lag leaves less
+than a third to a play."""
+SLIP = 5.0
+"""Move of the stem within a sample, in standard deviations of its noise, from which it may be a slip."""
+SLIPS = 6
+"""Slips of which medians are taken."""
+BY_SLIPS = 0.5
+"""Share of the stem's way that slips make, from which it sticks and does not merely play; ours."""
+
+
+@dataclass(frozen=True, slots=True)
+class Seen:
+    """A valve as its position shows it: its play, the stick-slip where it has one, and the share of the stem's way
+    that its slips make."""
+
+    play: ValveTrial
+    jumping: ValveTrial | None
+    by_slips: float
+
+
+def left(op: Floats, position: Floats, valve: ValveTrial) -> float:
+    """Mean square that a valve leaves of a position, an offset between both signals freed [% of span squared]."""
+    start = first_slip(op, valve.breakaway, valve.sliding)
+    return float(np.var(position - walk(op, valve.breakaway, valve.sliding, valve.tolerance, start)))
+
+
+def closed_in(op: Floats, position: Floats, width: float) -> ValveTrial:
+    """The play after its width [% OP] has been moved by ever smaller steps."""
+    least = left(op, position, sticking(width, 0.0))
+    for step in COMPASS:
+        moved = True
+        while moved:
+            moved = False
+            for factor in (1 + step, 1 - step):
+                found = left(op, position, sticking(width * factor, 0.0))
+                if found < least * (1 - 1e-9):
+                    width, least, moved = width * factor, found, True
+    return sticking(width, 0.0, RESTS)
+
+
+def least_move(position: Floats) -> float:
+    """Move within a sample that stands above the stem's noise and resolution [% OP]."""
+    step = np.diff(position)
+    noise = float(np.median(np.abs(step - np.median(step)))) / 0.6745 / np.sqrt(2.0)
+    resolution = float(np.min(np.abs(step)[np.abs(step) > 0], initial=np.inf))
+    return max(SLIP * noise, 2.5 * resolution)
+
+
+def slips(op: Floats, position: Floats) -> Floats:
+    """Slips of a stem, shape (m, 3): |OP - stem| [% OP] as it lets go and as it comes to rest, and the way between.
+
+    A slip is a run of samples in which the stem goes one way by more than its noise; medians of what stands about it
+    need no model of when it lets go.
+    """
+    step = np.diff(position)
+    going = np.where(np.abs(step) > least_move(position), np.sign(step), 0.0)
+    turn = np.flatnonzero(np.diff(np.concatenate(([0.0], going, [0.0]))) != 0)
+    out = []
+    for first, last in pairwise(turn):
+        way = going[first]
+        if way != 0 and last < position.size - 1 and first > 0:
+            before = float(np.mean(position[max(first - 2, 0) : first + 1]))
+            after = float(np.mean(position[last : last + 3]))
+            out.append((way * (op[first + 1] - before), way * (op[last] - after), way * (after - before)))
+    return np.array(out, dtype=np.float64).reshape(-1, 3)
+
+
+def seen(op: Floats, position: Floats) -> Seen | None:
+    """Play or stick-slip between a recorded OP and a recorded stem.
+
+    Parameters
+    ----------
+    op, position : ndarray of shape (n,)
+        OP and stem [% of span].
+
+    Returns
+    -------
+    Seen or None
+        None where the stem follows OP, or nothing of this kind explains why it does not.
+    """
+    low, high = np.quantile(op, [0.02, 0.98])
+    reach, offset = float(high - low), float(np.median(position - op))
+    apart = float(np.var(position - op))
+    if reach <= 0 or apart <= 0:
+        return None
+    best = min((w * reach for w in WIDTHS), key=lambda w: left(op, position, sticking(w, 0.0)))
+    play = closed_in(op, position, best)
+    found = slips(op, position - offset)
+    large = found[found[:, 2] > 0.5 * np.max(found[:, 2], initial=0.0)]
+    band = 0.5 * least_move(position)
+    way = float(np.abs(np.diff(walk(position, band, band, RESTS, float(position[0])))).sum())
+    by_slips = min(float(found[:, 2].sum()) / max(way, 1e-9), 1.0)
+    if len(large) >= SLIPS and by_slips > BY_SLIPS:
+        go, rest = float(np.median(large[:, 0])), float(np.median(large[:, 1]))
+        if go > max(rest, 0.0):
+            return Seen(play, sticking(go + rest, (go - rest) / (go + rest), RESTS), by_slips)
+    return Seen(play, None, by_slips) if left(op, position, play) < (1.0 - LEAST_SHARE) * apart else None

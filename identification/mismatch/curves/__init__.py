@@ -1,0 +1,1 @@
+"""What was found, as curves to draw."""

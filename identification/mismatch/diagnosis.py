@@ -1,0 +1,266 @@
+"""From one recording to its explanation: recorder, controller, then effect by effect until nothing passes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from identification.controller.check import Ruling, Stated, judge
+from identification.controller.pi_regression import Law, shifted
+from identification.estimation.limits import CEILING_PRICE, CEILING_SHARE, FULL_STEPS, PROVEN, ROUNDS, TIE
+from identification.estimation.prediction_error import Fitted, Model, Problem, descend, gain
+from identification.mismatch import recording_faults as recorder
+from identification.mismatch.catalogue import CATALOGUE
+from identification.mismatch.cross_validation import TIMED, HeldOut, held_out, is_one_move, passes
+from identification.mismatch.forward_selection import (
+    Clip,
+    Progress,
+    Rival,
+    compete,
+    prepared,
+    price,
+    silent,
+    unsettled,
+)
+from identification.mismatch.lack_of_fit import ceiling
+from identification.mismatch.starts.screening import Excited, excited
+from identification.record import Floats, Mask
+from identification.simulation.effect import Row
+from identification.simulation.open_loop import Scene
+from identification.simulation.parameters import Slot, neutral
+
+
+@dataclass(frozen=True, slots=True)
+class Subject:
+    """One recording to be explained.
+
+    sp : shape (n,) [% PV], None where not recorded; pv, op : shape (n,) [% of span]; usable : bool, shape (n,);
+    dt_s [s]; stamp_s : stamps as logged [s]; stated : the controller as the plant states it; ranged : whether PV's
+    range is stated; neighbours : OPs of other loops on the same clock, each shape (n,);
+    kind : the loop's type as stated, lower case.
+    """
+
+    sp: Floats | None
+    pv: Floats
+    op: Floats
+    usable: Mask
+    dt_s: float
+    stamp_s: Floats
+    stated: Stated | None = None
+    ranged: bool = True
+    neighbours: tuple[Floats, ...] = ()
+    kind: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Explanation:
+    """What was found.
+
+    trace, ruling : findings about recorder and controller; plain, best : fits without and with the effects; p, p0 :
+    the problems that they solve; accepted : the rivals taken, in order; last : the rivals of the last round;
+    before : the fit to which each accepted rival was added; late_s : PV's lateness that was taken out [s]; proof :
+    plain and best on held-out data; refuted : names of effects that explain the fitted part and not the rest;
+    unproven : whether OP moved once, so that nothing is left to prove the effects on.
+    """
+
+    p: Problem = field(repr=False)
+    plain: Fitted
+    best: Fitted
+    accepted: tuple[Rival, ...] = ()
+    before: tuple[Fitted, ...] = ()
+    first: tuple[Rival, ...] = ()
+    trace: recorder.Trace | None = None
+    ruling: Ruling | None = None
+    law: Law | None = None
+    late_s: float = 0.0
+    left: float = 0.0
+    proof: HeldOut | None = None
+    refuted: tuple[str, ...] = ()
+    unproven: bool = False
+
+
+def trace_of(s: Subject) -> recorder.Trace | None:
+    """The first thing that the recorder did to the trends."""
+    found = recorder.compression(s.pv) or recorder.sampling(s.stamp_s, s.dt_s)
+    return found or recorder.quantization(s.pv, s.ranged) or recorder.clipped(s.pv)
+
+
+def ruling_of(s: Subject, trace: recorder.Trace | None) -> tuple[Ruling | None, Law | None]:
+    """What clock and controller did, where there is a controller to judge and a recording fit for it."""
+    if s.sp is None or s.stated is None or (trace is not None and trace.name in GATES):
+        return None, None
+    return judge(s.sp, s.pv, s.op, s.usable & (s.op > 0.05) & (s.op < 99.95), s.stated)
+
+
+GATES = ("compression", "sampling")
+"""Findings about the recorder after which neither controller nor physics are judged."""
+ALONE = (*GATES, "quantization")
+"""Findings that are the whole answer; the physics is then fitted plain. After a finding about the controller the
+physics is still asked, for whatever made OP, PV answers it."""
+
+
+def scene_of(s: Subject) -> Scene:
+    """What drives the model of a recording."""
+    level = float(np.mean(s.pv))
+    neighbour = s.neighbours[0] - s.neighbours[0].mean() if s.neighbours else None
+    return Scene(
+        s.op, s.dt_s, float(s.op.mean()), level, (float(s.pv.min()), float(s.pv.max())), (), neighbour
+    )
+
+
+def without_spikes(pv: Floats, usable: Mask) -> Mask:
+    """Usable samples less single values that stand far off both neighbours."""
+    rise = np.diff(pv)
+    alone = np.zeros(pv.size, dtype=bool)
+    size = np.median(np.abs(rise)) + 1e-9
+    away = np.minimum(np.abs(rise[:-1]), np.abs(rise[1:]))
+    alone[1:-1] = (away > 20 * size) & (np.sign(rise[:-1]) != np.sign(rise[1:]))
+    return usable & ~alone
+
+
+def trace_clip(trace: recorder.Trace | None, pv: Floats) -> Clip | None:
+    """Where a transmitter's range ends, if it does."""
+    if trace is None or trace.name != "sensor-clipping":
+        return None
+    return Clip(trace.value, trace.value > float(np.median(pv)), trace.where)
+
+
+def explain(s: Subject, tell: Progress = silent, brought: Floats | None = None) -> Explanation:
+    """Explain where a plain loop and a recording differ.
+
+    Parameters
+    ----------
+    s : Subject
+    tell : callable
+        Is told what is tried, for progress.
+    brought : ndarray of shape (SIZE,) or None
+        Constants of the user's own model, with which the plain loop's search begins beside its own starts.
+
+    Returns
+    -------
+    Explanation
+    """
+    s = replace(s, usable=s.usable & ~recorder.unlogged(s.stamp_s, s.pv.size, s.dt_s))
+    trace = trace_of(s)
+    ruling, law = ruling_of(s, trace)
+    usable = without_spikes(s.pv, s.usable)
+    late_s = 0.0
+    pv = s.pv
+    if ruling is not None and ruling.name == "clock-offset":
+        late_s = ruling.values["late_samples"] * s.dt_s
+        pv = shifted(pv, ruling.values["late_samples"])
+    scene = scene_of(replace(s, pv=pv))
+    tell("plain loop")
+    p, plain = prepared(scene, pv - scene.level, usable, brought, trace_clip(trace, pv))
+    found = Explanation(p, plain, plain, trace=trace, ruling=ruling, law=law, late_s=late_s)
+    if any(x is not None and x.name in ALONE for x in (trace, ruling)):
+        return found
+    return carried_over(physics(found, tell, s.kind))
+
+
+def carried_over(found: Explanation) -> Explanation:
+    """The explanation with its proof: as many effects, in the order taken, as carry over to held-out data."""
+    names = tuple(r.name for r in found.accepted)
+    for count in range(len(names), 0, -1):
+        kept = found if count == len(names) else first_effects(found, count)
+        proof = held_out(kept.p, kept.plain, kept.best)
+        unproven = not proof.carries and proof.falls and is_one_move(found.p)
+        if proof.carries or unproven or all(name in TIMED for name in names[:count]):
+            return replace(kept, proof=proof, refuted=names[count:], unproven=unproven)
+    proof = held_out(found.p, found.plain, found.plain)
+    return replace(found, best=found.plain, accepted=(), before=(), proof=proof, refuted=names)
+
+
+def first_effects(found: Explanation, count: int) -> Explanation:
+    """The explanation with its first effects alone, the others given up and the rest fitted anew."""
+    c = found.best.model.c
+    for rival in found.accepted[count:]:
+        c = cleared(c, rival.row)
+    names = {r.name for r in found.accepted[:count]}
+    rows = tuple(r for r in found.best.model.rows if r.name in names)
+    best = descend(found.p, Model(rows, c), FULL_STEPS)
+    return replace(found, best=best, accepted=found.accepted[:count], before=found.before[:count])
+
+
+def physics(found: Explanation, tell: Progress, kind: str = "") -> Explanation:
+    """Add effects of the catalogue one by one, as long as one passes."""
+    p, best = unsettled(found.p, found.plain, kind)
+    found = replace(found, p=p, plain=best)
+    accepted: list[Rival] = []
+    before: list[Fitted] = []
+    first: tuple[Rival, ...] = ()
+    rivals: list[Rival] = []
+    for _ in range(ROUNDS):
+        x = excited(p, best, kind)
+        rivals = compete(x, best, CATALOGUE, tell)
+        first = first or tuple(rivals)
+        winner = proven(x.p, best, rivals)
+        if winner is None:
+            break
+        accepted.append(winner)
+        before.append(best)
+        p, best = x.p, descend(x.p, winner.fit.model, FULL_STEPS)
+    if len(accepted) > 1:
+        tell("other sets of effects")
+        x = excited(p, best, kind)
+        best, accepted = exchanged(x, best, accepted, tell)
+    won, weights = ceiling(p, best)
+    least = max(CEILING_PRICE, CEILING_SHARE * gain(best, found.plain))
+    left = won - weights - least
+    if not accepted and any(r.name == "load-step" and r.net > 0 for r in rivals):
+        left = max(left, rivals[0].net)
+    found = replace(found, p=p, best=best, accepted=tuple(accepted), before=tuple(before), first=first)
+    return replace(found, left=left if left > 0 else 0.0)
+
+
+def exchanged(x: Excited, best: Fitted, accepted: list[Rival], tell: Progress) -> tuple[Fitted, list[Rival]]:
+    """The accepted effects, each given up once for whatever does better beside the others.
+
+    Effects are added one at a time, so the first may have been taken in the place of two that act together.
+    """
+    for i, old in enumerate(accepted):
+        others = tuple(r for r in best.model.rows if r.name != old.name)
+        near = descend(x.p, Model(others, cleared(best.model.c, old.row)), FULL_STEPS)
+        rivals = [r for r in compete(x, near, CATALOGUE, tell) if r.name != old.name]
+        if not rivals:
+            continue
+        least = gain(best, near) - price(old.row) + TIE
+        if rivals[0].net > max(least, 0.0) and passes(x.p, near, rivals[0].fit, rivals[0].name):
+            best = descend(x.p, rivals[0].fit.model, FULL_STEPS)
+            accepted = [*accepted[:i], rivals[0], *accepted[i + 1 :]]
+    return best, accepted
+
+
+def cleared(c: Floats, row: Row) -> Floats:
+    """Constants with those of a row at rest, shape (SIZE,)."""
+    out, rest = c.copy(), neutral()
+    for slot in [p.slot for p in row.params] + [int(s) for s in row.fixed or {}]:
+        out[slot] = rest[slot]
+    return out
+
+
+def proven(p: Problem, near: Fitted, rivals: list[Rival]) -> Rival | None:
+    """The best rival with a gain left after its price that passes the proof."""
+    for rival in rivals[:PROVEN]:
+        if rival.net <= 0:
+            return None
+        if passes(p, near, rival.fit, rival.name):
+            return rival
+    return None
+
+
+def alternatives(found: Explanation) -> tuple[str, ...]:
+    """Names that the data cannot tell from the first effect: as good, or of the same mark by their nature."""
+    if not found.accepted:
+        return ()
+    winner = found.accepted[0]
+    close = [r.name for r in found.first if r.net > max(winner.net - TIE, 0.0)]
+    names = dict.fromkeys((*close, *winner.row.likeness))
+    return tuple(n for n in names if n != winner.name)
+
+
+def restored(model: Model) -> dict[str, float]:
+    """The plain loop's constants of a model: gain, time constant [s], dead time [s]."""
+    c = model.c
+    return {"gain": float(c[Slot.K]), "time_constant_s": float(c[Slot.T]), "dead_time_s": float(c[Slot.L])}

@@ -1,0 +1,214 @@
+"""The rivals of a record: every row of the catalogue started, screened, followed, and ranked by what it gains."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from identification.estimation.limits import (
+    FOLLOWED,
+    FULL_STEPS,
+    OUTLIER,
+    PARAMETER_PRICE,
+    SAME,
+    SCREEN_STEPS,
+    SEARCH_PRICE,
+    SETTLES,
+    STICKING_HINT,
+)
+from identification.estimation.prediction_error import (
+    Fitted,
+    Model,
+    Problem,
+    descend,
+    gain,
+    problem,
+)
+from identification.estimation.start_values import plain_processes
+from identification.mismatch.catalogue import CATALOGUE
+from identification.mismatch.starts.screening import Excited, candidates, screened, span_of
+from identification.mismatch.starts.stick_slip import fit_sticking
+from identification.mismatch.starts.two_modes import OTHERS, mode_starts
+from identification.record import Floats, Mask
+from identification.simulation.effect import Row
+from identification.simulation.open_loop import Scene
+from identification.simulation.parameters import Slot, neutral
+
+Progress = Callable[[str], None]
+KNOWN_TYPES = ("flow", "pressure", "temperature", "level")
+"""Loop types under which a row may be left out; any other text says nothing."""
+
+
+@dataclass(frozen=True, slots=True)
+class Rival:
+    """A fitted rival: what it gains over the fit before, and what is left of that after its price."""
+
+    fit: Fitted
+    gain: float
+    net: float
+
+    @property
+    def name(self) -> str:
+        """The name of the row that it adds."""
+        return self.fit.names[-1]
+
+    @property
+    def row(self) -> Row:
+        """The row that it adds."""
+        return self.fit.model.rows[-1]
+
+
+def silent(_: str) -> None:
+    """Progress that nobody watches."""
+
+
+@dataclass(frozen=True, slots=True)
+class Clip:
+    """A transmitter's end: its value [% PV], whether it is the upper one, and where PV stands at it, shape (n,)."""
+
+    value: float
+    upper: bool
+    where: Mask
+
+
+def censored(p: Problem, clip: Clip) -> Problem:
+    """The problem without the samples at a clip; those after them still count, and the model is clipped too."""
+    return replace(p, weight=np.where(clip.where, 0.0, p.weight))
+
+
+def plain(p: Problem, brought: Floats | None = None, clip: Clip | None = None) -> Fitted:
+    """The plain loop at its optimum; a brought model (its constants) is one more start."""
+    fits = [] if brought is None else [descend(p, Model((), brought.copy()), FULL_STEPS)]
+    for process in plain_processes(p.y, p.scene.op, p.usable, p.scene.dt_s):
+        c = neutral()
+        if clip is not None:
+            c[Slot.CLIP_HI if clip.upper else Slot.CLIP_LO] = clip.value
+        c[Slot.T], c[Slot.L], c[Slot.K] = process.time_constant_s, process.dead_time_s, process.gain
+        c[Slot.START] = p.y[0]
+        c[Slot.BIAS] = float(np.mean(p.y)) - process.gain * float(np.mean(p.scene.op) - p.scene.middle)
+        fits.append(descend(p, Model((), c), FULL_STEPS))
+    return min(fits, key=lambda fit: fit.loss)
+
+
+def calmed(p: Problem, fit: Fitted) -> Problem:
+    """The problem with innovations beyond OUTLIER robust standard deviations counting less."""
+    inside = p.weight > 0
+    scale = float(np.median(np.abs(fit.e[inside]))) / 0.6745
+    size = np.abs(fit.e) / max(scale, 1e-12)
+    return replace(p, weight=np.where(inside, np.minimum(1.0, OUTLIER / np.maximum(size, OUTLIER)), 0.0))
+
+
+def applies(x: Excited, near: Fitted, row: Row) -> bool:
+    """Whether a row may be added: what it needs is there, and it is not in the model yet."""
+    taken = {p.slot for r in near.model.rows for p in r.params}
+    if row.name in near.names or taken & {p.slot for p in row.params}:
+        return False
+    if row.types and x.kind in KNOWN_TYPES and x.kind not in row.types:
+        return False
+    if row.needs == "neighbour":
+        return x.p.scene.neighbour is not None
+    return True
+
+
+def price(row: Row) -> float:
+    """Doubled log likelihood that a row costs."""
+    return SEARCH_PRICE + PARAMETER_PRICE * max(len(row.params), 1) + row.price
+
+
+def rival(p: Problem, near: Fitted, models: list[Model], steps: int) -> Rival:
+    """The best of some starts, followed for some steps."""
+    fit = min((descend(p, model, steps) for model in models), key=lambda f: f.loss)
+    won = gain(fit, near)
+    return Rival(fit, won, won - price(fit.model.rows[-1]))
+
+
+def followed(p: Problem, near: Fitted, first: Rival, models: list[Model]) -> Rival:
+    """A rival of the first round followed to the end, from there and from its second and third start."""
+    starts = [first.fit.model, *models[1:3]]
+    best = rival(p, near, starts, FULL_STEPS)
+    return best if best.net > first.net else first
+
+
+def compete(
+    x: Excited, near: Fitted, rows: tuple[Row, ...] = CATALOGUE, tell: Progress = silent
+) -> list[Rival]:
+    """All rows as rivals of a fit, best first; the better half followed to the end.
+
+    Parameters
+    ----------
+    x : Excited
+    near : Fitted
+        The fit to which each row is added.
+    rows : tuple of Row
+    tell : callable
+        Is told each row's name before it is tried.
+    """
+    tried: list[tuple[Rival, list[Model]]] = []
+    span = span_of(x.p, near)
+    for row in rows:
+        if applies(x, near, row):
+            tell(row.name)
+            models = candidates(x, near, row)
+            first = models
+            if row.needs != "line":
+                models = screened(x.p, near, span, models)[:3]
+                first = models[:1]
+            if row.name in OTHERS:
+                first += mode_starts(x.p, near, row)
+            tried.append((rival(x.p, near, first, SCREEN_STEPS), models))
+    tried.sort(key=lambda t: -t[0].net)
+    ended = [followed(x.p, near, first, models) for first, models in tried[:FOLLOWED]]
+    ended += stuck(x, near, [first for first, _ in tried], rows, tell)
+    return sorted([*ended, *(first for first, _ in tried[FOLLOWED:])], key=lambda r: -r.net)
+
+
+def prepared(
+    scene: Scene, y: Floats, usable: Mask, brought: Floats | None = None, clip: Clip | None = None
+) -> tuple[Problem, Fitted]:
+    """A problem with its outliers calmed, and its plain fit."""
+    p = problem(scene, y, usable)
+    if clip is not None:
+        p = censored(p, clip)
+    first = plain(p, brought, clip)
+    calm = calmed(p, first)
+    return calm, descend(calm, first.model, FULL_STEPS)
+
+
+def unsettled(p: Problem, free: Fitted, kind: str) -> tuple[Problem, Fitted]:
+    """Problem and plain fit, the time constant kept within the record where it might as well have no end.
+
+    A plain loop whose time constant outlasts the record is an integrator under another name. Where an integrator
+    does as well with one constant fewer, the plain loop is one that settles within the record.
+    """
+    rows = [r for r in CATALOGUE if r.name == "integrator"]
+    longest = SETTLES * p.scene.dt_s * p.y.size
+    if float(free.model.c[Slot.T]) <= longest or not applies(Excited(p, (), kind), free, rows[0]):
+        return p, free
+    ended = rival(p, free, candidates(Excited(p, (), kind), free, rows[0]), FULL_STEPS)
+    if ended.gain < -SAME:
+        return p, free
+    held = replace(p, scene=replace(p.scene, longest_s=longest))
+    c = free.model.c.copy()
+    c[Slot.K] *= longest / c[Slot.T]
+    c[Slot.T] = longest
+    return held, descend(held, Model((), c), FULL_STEPS)
+
+
+def stuck(
+    x: Excited, near: Fitted, tried: list[Rival], rows: tuple[Row, ...], tell: Progress = silent
+) -> list[Rival]:
+    """Sticking valves scanned about the best play, where a play or the like gains anything at all."""
+    plays = [r for r in tried if r.name == "backlash"]
+    hints = [r.gain for r in tried if r.name in ("backlash", "stiction", "positioner")]
+    if not plays or max(hints) < STICKING_HINT:
+        return []
+    tell("stiction")
+    out = []
+    for row in rows:
+        if row.name == "stiction":
+            fit = fit_sticking(x.p, plays[0].fit, row, near.model.rows)
+            won = gain(fit, near)
+            out.append(Rival(fit, won, won - price(row)))
+    return out

@@ -1,0 +1,72 @@
+"""Whether a recording can answer at all: does PV answer OP, and is it long enough to tell how fast."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from identification.estimation.prediction_error import Fitted, Problem, loss_of, residual_fit
+from identification.simulation.parameters import Slot
+
+if TYPE_CHECKING:
+    from identification.mismatch.diagnosis import Explanation, Subject
+
+ANSWERS = 25.0
+"""Doubled log likelihood that OP must bring for PV to answer it; ours: chance brings three constants under 17 in 999
+of 1,000 records, and the model without OP is not fitted to the end."""
+DEAF = "needs moves of OP that PV answers"
+"""What is said where PV does not answer OP."""
+ENOUGH = 5.0
+"""Time constants that a recording of a process that settles must hold; the catalogue's need."""
+INTEGRATING = ("level",)
+"""Loop types that need not settle, of which a short record still tells the slope."""
+
+
+def brings(p: Problem, fit: Fitted) -> float:
+    """Doubled log likelihood that OP brings to a fit: over the same with no gain, its mean and start as recorded."""
+    c = fit.model.c.copy()
+    c[Slot.K], c[Slot.BIAS], c[Slot.START] = 0.0, float(np.mean(p.y)), float(p.y[0])
+    without = loss_of(p, residual_fit(p, c)[3])
+    return fit.count * math.log(max(without, 1e-300) / max(fit.loss, 1e-300))
+
+
+def unanswered(found: Explanation) -> str:
+    """What is needed where PV does not answer OP; empty where it does."""
+    loaded = any(
+        row.block == "load" for row in found.best.model.rows
+    )  # a load is counted in terms of the gain
+    if brings(found.p, found.plain if loaded else found.best) >= ANSWERS:
+        return ""
+    return DEAF + "; without OP the fit is as good"
+
+
+def too_short(found: Explanation, s: Subject) -> str:
+    """What is needed where the record is short against the time constant; empty where it is not."""
+    lag, length = float(found.plain.model.c[Slot.T]), s.pv.size * s.dt_s
+    if s.kind in INTEGRATING or any(r.name == "integrator" for r in found.best.model.rows):
+        return ""
+    if length >= ENOUGH * lag:
+        return ""
+    return (
+        f"needs {ENOUGH:.0f} time constants, has {length / lag:.2g} "
+        f"(a record of {_time(length)}, a time constant of about {_time(lag)})"
+    )
+
+
+def uninformed(found: Explanation, s: Subject) -> str:
+    """What the recording lacks for an answer, empty where it is enough.
+
+    Parameters
+    ----------
+    found : Explanation
+    s : Subject
+    """
+    return unanswered(found) or too_short(found, s)
+
+
+def _time(seconds: float) -> str:
+    if seconds < 120:
+        return f"{seconds:.3g} s"
+    return f"{seconds / 60:.3g} min" if seconds < 7200 else f"{seconds / 3600:.3g} h"

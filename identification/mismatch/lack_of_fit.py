@@ -1,0 +1,73 @@
+"""What a flexible model of no name could still explain: the ceiling under which a named effect has to be near."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from identification.estimation.noise import lag_means, whitened
+from identification.estimation.prediction_error import Fitted, Problem, sensitivities
+from identification.record import Floats
+from identification.simulation.open_loop import simulate
+from identification.simulation.parameters import Slot
+from identification.simulation.process import plain_vessel
+from identification.simulation.valve_chain import flow, lagged
+
+BOXES = 32
+"""Past stretches of OP that may act, each with a weight of its own."""
+REACH = 8.0
+"""How far back they go, in time constants plus dead times; ours: a recycle of seven is within it."""
+FEWEST = 3.0
+"""A stretch is at least this many samples."""
+
+
+def past_moves(p: Problem, through: Floats, length_s: float) -> list[Floats]:
+    """OP's means over past stretches, each shape (n,)."""
+    width = max(round(length_s / BOXES / p.scene.dt_s), int(FEWEST))
+    total = np.concatenate(([0.0], np.cumsum(through - through.mean())))
+    n = through.size
+    k = np.arange(n)
+    out = []
+    for i in range(BOXES):
+        near, far = np.maximum(k - i * width, 0), np.maximum(k - (i + 1) * width, 0)
+        out.append((total[near] - total[far]) / width)
+    return out
+
+
+def bent_moves(p: Problem, fit: Fitted, through: Floats) -> list[Floats]:
+    """Responses to OP's fast part by size, to its square and to PV's square, each shape (n,)."""
+    c = fit.model.c.copy()
+    c[Slot.K], c[Slot.BIAS], c[Slot.START] = 1.0, 0.0, 0.0
+    scene = p.scene
+    still = np.zeros(through.size)
+    inputs = []
+    for share in (0.1, 0.5):
+        fast = through - lagged(through, max(share * float(c[Slot.T]), scene.dt_s), scene.dt_s)
+        inputs += [fast * np.abs(fast), np.abs(fast)]
+    level = through - through.mean()
+    inputs += [level**2, level**3]
+    return [plain_vessel(x - x[0], still, c, scene.dt_s, 0.0) for x in inputs]
+
+
+def ceiling(p: Problem, fit: Fitted) -> tuple[float, int]:
+    """Doubled log-likelihood gain that the flexible model has over a fit, and the number of its weights.
+
+    The fit's own constants and its noise model follow linearly, so the gain is of what they cannot give.
+    """
+    c = fit.model.c
+    through = flow(p.scene.op, c, p.scene.dt_s, p.scene.middle)
+    length = REACH * float(c[Slot.T] + c[Slot.L])
+    free = past_moves(p, through, min(length, 0.2 * through.size * p.scene.dt_s)) + bent_moves(
+        p, fit, through
+    )
+    root = np.sqrt(p.weight)
+    r = p.y - simulate(p.scene, c)
+    own = np.concatenate((sensitivities(p, fit.model, fit.ar), lag_means(r, p.edges))) * root
+    more = np.stack([whitened(x, fit.ar, p.edges) for x in free]) * root
+    span = np.linalg.qr(own.T)[0]
+    e = fit.e * root
+    e = e - span @ (span.T @ e)
+    more = more.T - span @ (span.T @ more.T)
+    q, scale = np.linalg.qr(more)
+    kept = np.abs(np.diag(scale)) > 1e-8 * np.abs(np.diag(scale)).max()
+    won = float(((q[:, kept].T @ e) ** 2).sum()) / max(fit.loss, 1e-30)
+    return won, int(kept.sum())

@@ -1,0 +1,250 @@
+"""Where a misfit lives: one joint regression of the plain loop's innovations on what the loop was doing.
+
+Bins one by one confound what goes together (PV with OP, level with time), so all features stand in one regression
+and each is judged by what it adds to the others. The null is empirical: blocks of the innovations are put in
+another order against the features, so that nothing is left of any link while colour and outliers stay.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from identification.mismatch.location.features import Group, groups
+from identification.record import Floats, Mask
+
+ORDERS = 400
+"""Block orders of the null; ours: a p-value of 0.05 is known within 0.01, and 20,000 samples take under a second."""
+CHANCE = 0.02
+"""Chance, over all features together, of calling any on a residual that is tied to none; ours: one page in fifty."""
+BLOCK_MEMORIES = 3.0
+"""Length of a block in memories of the loop; ours: within it what the loop remembers stays in order."""
+SHORTEST_BLOCK = 30
+"""Fewest samples of a block."""
+MOST_BLOCKS = 150
+"""Most blocks; ours: more only cost memory."""
+FEWEST_BLOCKS = 10
+"""Blocks below which no order says anything; a record shorter than this is located by nothing."""
+MOST_POWER = 16.0
+"""Squared innovations are cut at this many mean squares, four standard deviations: no single event is a place."""
+SHOWN = 12
+"""Parts of a feature's profile, of as many samples each."""
+
+
+@dataclass(frozen=True, slots=True)
+class Profile:
+    """Misfit along one feature: ends of each part, samples, mean and mean square of the innovations, shape (b,) each.
+
+    Mean and mean square are in standard deviations and mean squares of the whole record; of OP's rate and the time
+    since its turn the mean is along OP's direction.
+    """
+
+    low: Floats
+    high: Floats
+    count: Floats
+    mean: Floats
+    power: Floats
+
+
+@dataclass(frozen=True, slots=True)
+class Feature:
+    """What one feature says of the misfit.
+
+    p : chance, over all features, of as much on an untied residual; share : part of the variance of the misfit's
+    power or sign that it alone gives; of : "power" or "sign", by which it shows more; low, high : part of the
+    feature's range in which the misfit is above its mean, None where it has no order.
+    """
+
+    name: str
+    p: float
+    share: float
+    of: str
+    profile: Profile = field(repr=False)
+    low: float | None = None
+    high: float | None = None
+
+    @property
+    def carries(self) -> bool:
+        """Whether the misfit is tied to this feature beside all others."""
+        return self.p <= CHANCE
+
+
+@dataclass(frozen=True, slots=True)
+class Located:
+    """The features, the likeliest first; together : chance that all of them together say as much of nothing;
+    local : power of the misfit that the features give at each sample, in mean squares, shape (n,), 0 where not
+    judged."""
+
+    features: tuple[Feature, ...]
+    together: float
+    local: Floats = field(repr=False)
+
+    @property
+    def carrying(self) -> tuple[Feature, ...]:
+        """Features that carry the misfit."""
+        return tuple(f for f in self.features if f.carries)
+
+
+def responses(e: Floats) -> Floats:
+    """Power (cut) and sign of innovations about their mean, standardized, shape (n, 2)."""
+    power = np.minimum(e**2 / max(float(np.mean(e**2)), 1e-300), MOST_POWER)
+    size = max(float(np.sqrt(np.mean(e**2))), 1e-300)
+    sign = np.clip(e / size, -np.sqrt(MOST_POWER), np.sqrt(MOST_POWER))
+    y = np.stack([power, sign], axis=1)
+    y -= y.mean(axis=0)
+    return y / np.maximum(y.std(axis=0), 1e-12)
+
+
+def directions(columns: list[Floats]) -> list[Floats]:
+    """What each group's columns hold beside all others: orthonormal, shape (n, k) each; k = 0 where nothing."""
+    centred = [c - c.mean(axis=0) for c in columns]
+    out = []
+    for i, own in enumerate(centred):
+        others = np.concatenate([c for j, c in enumerate(centred) if j != i] or [own[:, :0]], axis=1)
+        left = own - _along(_basis(others), own)
+        out.append(_basis(left, np.linalg.norm(own, axis=0).max()))
+    return out
+
+
+def _along(basis: Floats, x: Floats) -> Floats:
+    return np.asarray(basis @ (basis.T @ x))
+
+
+def _basis(x: Floats, scale: float | None = None) -> Floats:
+    """Orthonormal directions of some columns, those of under a hundredth of their size left out."""
+    if x.shape[1] == 0:
+        return x
+    u, s, _ = np.linalg.svd(x, full_matrices=False)
+    return np.asarray(u[:, s > 0.03 * max(scale or s[0], 1e-12)])
+
+
+def chances(bases: list[Floats], y: Floats, blocks: int, seed: int) -> tuple[Floats, Floats, float]:
+    """Chance of each group over all groups, (groups,); each response's excess, (groups, 2); chance of all together.
+
+    The largest excess over groups and responses is compared with that of every other order of the blocks (Westfall
+    and Young 1993, single step). The last basis is of all groups together and is judged by itself.
+    """
+    rng = np.random.default_rng(seed)
+    flat = np.concatenate(bases, axis=1)
+    ends = np.cumsum([0, *(b.shape[1] for b in bases)])
+    pairs = block_products(flat, y, blocks)
+    here = np.arange(blocks)
+    seen = _scores(pairs[here, here].sum(axis=0), ends)
+    null = np.stack([_scores(pairs[here, rng.permutation(blocks)].sum(axis=0), ends) for _ in range(ORDERS)])
+    middle, spread = null.mean(axis=0), np.maximum(null.std(axis=0), 1e-9)
+    most, excess = ((null - middle) / spread).max(axis=2), ((seen - middle) / spread)
+    above = (most[:, :-1].max(axis=1)[None, :] >= excess[:-1].max(axis=1)[:, None]).sum(axis=1)
+    together = float((1 + (most[:, -1] >= excess[-1].max()).sum()) / (ORDERS + 1))
+    return (1 + above) / (ORDERS + 1), excess[:-1], together
+
+
+def block_products(flat: Floats, y: Floats, blocks: int) -> Floats:
+    """Products of each block of the columns with each block of the responses, shape (blocks, blocks, k, 2)."""
+    length = y.shape[0] // blocks
+    n = blocks * length
+    left = flat[:n].reshape(blocks, length, -1).transpose(0, 2, 1).reshape(-1, length)
+    right = y[:n].reshape(blocks, length, -1).transpose(1, 0, 2).reshape(length, -1)
+    product = left @ right
+    return product.reshape(blocks, flat.shape[1], blocks, y.shape[1]).transpose(0, 2, 1, 3)
+
+
+def _scores(products: Floats, ends: np.ndarray) -> Floats:
+    """What stacked bases give of each response, nearly standard normal under independence, shape (groups, 2).
+
+    The cube root of a mean square is nearly normal (Wilson and Hilferty 1931).
+    """
+    square = np.concatenate((np.zeros((1, products.shape[1])), np.cumsum(products**2, axis=0)))
+    k = np.maximum(np.diff(ends), 1)[:, None]
+    mean_square = (square[ends[1:]] - square[ends[:-1]]) / k
+    return np.asarray((np.cbrt(mean_square) - (1 - 2 / (9 * k))) / np.sqrt(2 / (9 * k)))
+
+
+def profile(x: Floats, y: Floats, parts: int = SHOWN) -> Profile:
+    """Innovations along a feature, in parts of as many samples.
+
+    Parameters
+    ----------
+    x, y : ndarray of shape (n,)
+        Feature, and innovations in standard deviations.
+    """
+    order = np.argsort(x, kind="stable")
+    x, y = x[order], y[order]
+    levels = np.flatnonzero(np.diff(x, prepend=x[0] - 1.0))
+    if levels.size > parts:
+        cuts = x[(np.arange(parts) * x.size) // parts]
+        levels = np.unique(np.searchsorted(x, cuts))
+    count = np.diff(np.append(levels, x.size))
+    mean, power = (np.add.reduceat(w, levels) / count for w in (y, y**2))
+    return Profile(x[levels], x[np.append(levels[1:], x.size) - 1], count.astype(np.float64), mean, power)
+
+
+def part_of_range(height: Floats) -> tuple[int, int] | None:
+    """First and last (included) place of the longest run of a profile well above its middle; None without one."""
+    if height.size < 4:
+        return None
+    line = 0.5 * float(height.max() + np.median(height))
+    edge = np.diff(np.concatenate(([0], (height > line).astype(np.int8), [0])))
+    firsts, lasts = np.flatnonzero(edge == 1), np.flatnonzero(edge == -1)
+    if firsts.size == 0:
+        return None
+    run = int(np.argmax([height[a:b].sum() for a, b in zip(firsts, lasts, strict=True)]))
+    return int(firsts[run]), int(lasts[run]) - 1
+
+
+def nothing(n: int) -> Located:
+    """What is said of a record too short to be located in."""
+    return Located((), 1.0, np.zeros(n))
+
+
+def located(
+    e: Floats, pv: Floats, op: Floats, judged: Mask, dt_s: float, late: int, memory: int, seed: int = 0
+) -> Located:
+    """Where innovations are large or keep one sign.
+
+    Parameters
+    ----------
+    e : ndarray of shape (n,)
+        Innovations of the plain loop [% PV].
+    pv, op : ndarray of shape (n,)
+        Trends [% of span].
+    judged : ndarray of bool, shape (n,)
+        False where an innovation does not count.
+    dt_s : float
+        Sample interval [s].
+    late, memory : int
+        Samples of dead time, and of dead time and time constant together.
+    seed : int
+        Of the block orders.
+    """
+    count = int(judged.sum())
+    wanted = max(BLOCK_MEMORIES * memory, SHORTEST_BLOCK)
+    blocks = min(max(int(count / wanted), FEWEST_BLOCKS), MOST_BLOCKS)
+    if count // blocks < max(memory, SHORTEST_BLOCK) or float(np.ptp(e[judged])) == 0.0:
+        return nothing(e.size)
+    found = groups(pv, op, dt_s, late, memory)
+    columns = [g.columns[judged] for g in found]
+    y = responses(e[judged])
+    bases = directions(columns)
+    whole = _basis(np.concatenate(columns, axis=1) - np.concatenate(columns, axis=1).mean(axis=0))
+    p, excess, together = chances([*bases, whole], y, blocks, seed)
+    size = max(float(np.sqrt(np.mean(e[judged] ** 2))), 1e-300)
+    features = [
+        _feature(g, basis, y, float(p[i]), excess[i], e[judged] / size, judged)
+        for i, (g, basis) in enumerate(zip(found, bases, strict=True))
+    ]
+    local = np.zeros(e.size)
+    local[judged] = np.maximum(_along(whole, y[:, :1])[:, 0], 0.0)
+    return Located(tuple(sorted(features, key=lambda f: (f.p, -f.share))), together, local)
+
+
+def _feature(
+    g: Group, basis: Floats, y: Floats, p: float, excess: Floats, scaled: Floats, judged: Mask
+) -> Feature:
+    own = ((basis.T @ y) ** 2).sum(axis=0) / y.shape[0]
+    by = int(np.argmax(excess))
+    along = scaled if g.sense is None else scaled * g.sense[judged]
+    drawn = profile(g.signal[judged], along)
+    run = part_of_range(drawn.power if by == 0 else np.abs(drawn.mean))
+    low, high = (None, None) if run is None else (float(drawn.low[run[0]]), float(drawn.high[run[1]]))
+    return Feature(g.name, p, float(own[by]), ("power", "sign")[by], drawn, low, high)

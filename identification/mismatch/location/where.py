@@ -1,0 +1,153 @@
+"""Where simulation and recording differ, as told: signals, spans, ranges, direction, period, features."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from identification.estimation.noise import whitened
+from identification.mismatch.location.locate import Feature, Located, located
+from identification.record import Floats, Mask
+from identification.simulation.open_loop import simulate
+from identification.simulation.parameters import Slot
+
+if TYPE_CHECKING:
+    from identification.estimation.prediction_error import Fitted, Problem
+    from identification.mismatch.diagnosis import Explanation, Subject
+
+PARTS = 40
+"""Parts of the record that spans are made of."""
+CARRIES = 0.5
+"""Share of the gain that the named spans carry together."""
+SIGNALS: Mapping[str, list[str]] = {
+    "recorder": ["PV", "OP"],
+    "sensor": ["PV"],
+    "controller": ["SP", "PV", "OP"],
+    "load": ["PV"],
+}
+FEWEST_MEMORY = 2
+"""A loop is taken to remember at least this many samples."""
+
+
+def carrying(won: Floats) -> list[tuple[int, int]]:
+    """Parts that together carry CARRIES of a gain, neighbours joined: first and last (excluded) sample of each."""
+    edges = np.linspace(0, won.size, PARTS + 1).astype(int)
+    parts = np.maximum([won[a:b].sum() for a, b in pairwise(edges)], 0.0)
+    order = np.argsort(-parts)
+    count = int(np.searchsorted(np.cumsum(parts[order]), CARRIES * parts.sum())) + 1
+    chosen = np.zeros(PARTS, dtype=np.int8)
+    chosen[order[:count]] = 1
+    turn = np.diff(np.concatenate(([0], chosen, [0])))
+    firsts, lasts = np.flatnonzero(turn == 1), np.flatnonzero(turn == -1)
+    return [(int(edges[a]), int(edges[b])) for a, b in zip(firsts, lasts, strict=True)]
+
+
+def masked_spans(where: Mask) -> list[tuple[int, int]]:
+    """Spans of a mask, by the parts that hold most of it; the whole record where it is True throughout."""
+    return [(0, where.size)] if where.all() else carrying(where.astype(float))
+
+
+def ranges(x: Floats, weight: Floats) -> list[float]:
+    """Range of a signal that carries nine tenths of a weight."""
+    order = np.argsort(x)
+    total = np.cumsum(np.maximum(weight[order], 0.0))
+    if total[-1] <= 0:
+        return [float(x.min()), float(x.max())]
+    low, high = np.searchsorted(total, [0.05 * total[-1], 0.95 * total[-1]])
+    return [float(x[order[low]]), float(x[order[min(high, x.size - 1)]])]
+
+
+def direction(op: Floats, won: Floats) -> str:
+    """Whether the gain lives in OP's moves up, down, or both."""
+    way = np.sign(np.diff(op, prepend=op[0]))
+    up, down = float(won[way > 0].sum()), float(won[way < 0].sum())
+    if up > 3 * max(down, 0.0):
+        return "up"
+    return "down" if down > 3 * max(up, 0.0) else "both"
+
+
+def band(difference: Floats, dt_s: float) -> list[float]:
+    """Periods [s] between which half of a difference's power lies."""
+    power = np.abs(np.fft.rfft(difference - difference.mean())) ** 2
+    total = np.cumsum(power)
+    if total[-1] <= 0:
+        return []
+    low, high = (max(int(np.searchsorted(total, q * total[-1])), 1) for q in (0.25, 0.75))
+    length = difference.size * dt_s
+    return [length / high, length / low]
+
+
+def located_in(p: Problem, fit: Fitted, s: Subject) -> Located:
+    """Where a fit's innovations are large or keep one sign."""
+    late_s, lag_s = float(fit.model.c[Slot.L]), float(fit.model.c[Slot.T])
+    late = min(round(late_s / s.dt_s), s.pv.size // 4)
+    memory = max(round((late_s + lag_s) / s.dt_s), FEWEST_MEMORY)
+    return located(fit.e, s.pv, s.op, p.weight > 0, s.dt_s, late, min(memory, s.pv.size), 0)
+
+
+def won_over(p: Problem, plain: Fitted, best: Fitted) -> tuple[Floats, Floats]:
+    """Squared innovations that the better model saves at each sample, and both simulations' difference, (n,)."""
+    before, after = simulate(p.scene, plain.model.c), simulate(p.scene, best.model.c)
+    e0, e1 = (whitened(p.y - x, best.ar, p.edges) for x in (before, after))
+    return p.weight * (e0**2 - e1**2), after - before
+
+
+def features_said(found: Located) -> list[dict[str, Any]]:
+    """The features as data: name, chance, whether they carry the misfit, by what, in which part of their range."""
+    return [
+        {"name": f.name, "p": f.p, "carries": f.carries, "share": f.share, "by": f.of, "range": _part(f)}
+        for f in found.features
+    ]
+
+
+def _part(f: Feature) -> list[float]:
+    return [] if f.low is None or f.high is None else [f.low, f.high]
+
+
+def where_of(found: Explanation, s: Subject, block: str, at: Located) -> dict[str, Any]:
+    """Where the misfit is: signals, spans [s], ranges, direction of OP, periods [s] and the features that carry it.
+
+    Of an effect of the physics it is where the plain model loses to the better one; of recorder and controller,
+    where the finding is; of what has no name, where the plain loop's innovations are large.
+
+    Parameters
+    ----------
+    found : Explanation
+    s : Subject
+    block : str
+        Block of the verdict.
+    at : Located
+        Of the plain loop's innovations (of the last model's, where something is left over).
+    """
+    marked = found.trace or found.ruling
+    told: dict[str, Any] = {"features": features_said(at), "after_reversals": _carries(at, "after_reversals")}
+    if marked is not None:
+        spans = masked_spans(marked.where[: s.pv.size])
+        return {"signals": SIGNALS.get(block, ["OP", "PV"]), "spans": _seconds(spans, s.dt_s)} | told
+    p = found.p
+    if found.accepted:
+        won, difference = won_over(p, found.plain, found.best)
+    elif found.left > 0:
+        won = at.local if at.carrying else p.weight * found.best.e**2
+        difference = np.where(p.weight > 0, found.best.e, 0.0)
+    else:
+        return {"signals": [], "spans": []} | told
+    return {
+        "signals": SIGNALS.get(block, ["OP", "PV"]),
+        "spans": _seconds(carrying(won), s.dt_s),
+        "pv_range": ranges(s.pv, won),
+        "op_range": ranges(s.op, won),
+        "direction": direction(s.op, won),
+        "band_s": band(difference, s.dt_s),
+    } | told
+
+
+def _carries(at: Located, name: str) -> bool:
+    return any(f.name == name for f in at.carrying)
+
+
+def _seconds(spans: list[tuple[int, int]], dt_s: float) -> list[list[float]]:
+    return [[a * dt_s, b * dt_s] for a, b in spans]

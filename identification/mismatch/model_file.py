@@ -1,0 +1,136 @@
+"""A model as plain data, and plain data as a model that runs over another recording."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from identification.controller.check import Stated
+from identification.errors import InputError
+from identification.record import Floats
+from identification.simulation.open_loop import Scene, simulate
+from identification.simulation.parameters import KNOTS, STEPS, Slot, neutral
+
+VERSION = 1
+BIAS_PASSES = 4
+"""Passes in which the bias and the start that it moves settle; ours: each leaves a time constant over the record."""
+TIMED = (
+    Slot.SINE,
+    Slot.COSINE,
+    Slot.NEIGHBOUR,
+    Slot.START,
+    Slot.HEAD_BIAS,
+    *(Slot.STEP + i for i in range(STEPS)),
+    *(Slot.HEAD + i for i in range(KNOTS)),
+)
+"""Constants that belong to the recording that was fitted, not to the loop."""
+NAMES = {int(s): s.name for s in Slot if s not in (Slot.STEP, Slot.HEAD)}
+
+
+def to_data(
+    loop: str, scene: Scene, c: Floats, names: tuple[str, ...], late_s: float, pv_scale: Any
+) -> dict[str, Any]:
+    """The model as a mapping that JSON can hold; constants at their neutral value are left out."""
+    rest = neutral()
+    own = {NAMES[i]: float(c[i]) for i in NAMES if c[i] != rest[i] and i not in TIMED}
+    return {
+        "version": VERSION,
+        "loop": loop,
+        "effects": list(names),
+        "constants": own,
+        "middle_op_pct": scene.middle,
+        "level_pv_pct": scene.level,
+        "late_s": late_s,
+        "scale": pv_scale,
+    }
+
+
+def constants(data: dict[str, Any]) -> Floats:
+    """Constants of a saved model, shape (SIZE,).
+
+    Raises
+    ------
+    InputError
+        The mapping is no model of this kind.
+    """
+    try:
+        c = neutral()
+        for name, value in data["constants"].items():
+            c[Slot[name]] = float(value)
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise InputError(
+            f"a model without {error}", "a file that `triage explain --save-model` wrote", "save it anew"
+        ) from error
+    if not (c[Slot.T] > 0 and c[Slot.L] >= 0 and np.isfinite([c[Slot.T], c[Slot.L], c[Slot.K]]).all()):
+        raise InputError(
+            f"time constant {c[Slot.T]:g} s, dead time {c[Slot.L]:g} s, gain {c[Slot.K]:g}",
+            "positive times and a finite gain in seconds and percent",
+            "check the model's units",
+        )
+    return c
+
+
+def carried(data: dict[str, Any], op: Floats, pv: Floats, dt_s: float) -> Floats:
+    """PV [% PV], shape (n,), that a saved model gives for another recording's OP, with a constant bias freed."""
+    c = constants(data)
+    level = float(data.get("level_pv_pct", np.mean(pv)))
+    middle = float(data.get("middle_op_pct", np.mean(op)))
+    scene = Scene(op, dt_s, middle, level, (float(pv.min()), float(pv.max())))
+    bias, out = 0.0, pv
+    for _ in range(BIAS_PASSES):
+        free = c.copy()
+        free[Slot.START] = float(pv[0]) - level - bias
+        for clip in (Slot.CLIP_HI, Slot.CLIP_LO):
+            free[clip] = math.copysign(math.inf, neutral()[clip])
+        out = level + simulate(scene, free)
+        bias = _bias(pv, out, c)
+    out = np.clip(out + bias, c[Slot.CLIP_LO], c[Slot.CLIP_HI])
+    late = float(data.get("late_s", 0.0)) / dt_s
+    if late:
+        k = np.arange(out.size)
+        out = np.interp(k - late, k, out)
+    return out
+
+
+@njit(cache=True)
+def _law(e: Floats, kp: float, ti: float, start: float) -> Floats:
+    """OP, shape (n,), of a PI within 0 to 100 %, its integral standing at the limits."""
+    out = np.empty_like(e)
+    total = start - kp * e[0]
+    for k in range(e.size):
+        free = total + kp * e[k] / ti + kp * e[k]
+        out[k] = min(max(free, 0.0), 100.0)
+        if out[k] == free:
+            total += kp * e[k] / ti
+    return out
+
+
+def carried_closed(
+    data: dict[str, Any], sp: Floats, op: Floats, pv: Floats, dt_s: float, law: Stated
+) -> tuple[Floats, Floats]:
+    """PV and OP, each shape (n,), of a saved model under its PI controller, load and noise left out.
+
+    PV answers OP no sooner than a dead time and a sample later, so each pass over the recording makes that many
+    more samples exact; passes go on until all are.
+    """
+    c = constants(data)
+    level, middle = float(data["level_pv_pct"]), float(data["middle_op_pct"])
+    c[Slot.START] = float(pv[0]) - level
+    ahead = int(c[Slot.L] / dt_s) + 1
+    out = np.full(sp.size, float(pv[0]))
+    for done in range(ahead, sp.size + ahead, ahead):
+        now = _law(sp[:done] - out[:done], law.kp, law.ti, float(op[0]))
+        scene = Scene(now, dt_s, middle, level, (float(pv.min()), float(pv.max())))
+        out[: now.size] = level + simulate(scene, c)
+        out[now.size : now.size + 1] = out[now.size - 1]
+    return out, _law(sp - out, law.kp, law.ti, float(op[0]))
+
+
+def _bias(pv: Floats, out: Floats, c: Floats) -> float:
+    inside = (pv < c[Slot.CLIP_HI] - 1e-6) & (pv > c[Slot.CLIP_LO] + 1e-6)
+    if not inside.any():
+        return 0.0
+    return float(np.mean(pv[inside] - out[inside]))

@@ -1,0 +1,113 @@
+"""What the recording itself did to the trends: compression, grid, clip, stamps. Judged before any physics."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from identification.estimation.limits import (
+    CLIP_RATIO,
+    CLIP_SAMPLES,
+    GRID_STEP,
+    GRID_STEP_OF_RANGE,
+    JITTER,
+    MISSED,
+    STRAIGHT,
+)
+from identification.record import Floats, Mask
+
+
+@dataclass(frozen=True, slots=True)
+class Trace:
+    """One finding about the recording: its name, the number that tells it, where it is (bool, shape (n,))."""
+
+    name: str
+    value: float
+    where: Mask
+
+
+def level_gaps(pv: Floats) -> Floats:
+    """Differences of neighbouring values that occur, in the middle nine tenths of the range; shape (levels - 1,)."""
+    low, high = np.quantile(pv, [0.05, 0.95])
+    return np.diff(np.unique(pv[(pv >= low) & (pv <= high)]))
+
+
+def straight(pv: Floats) -> Mask:
+    """True where a moving trend is straight through three samples, shape (n,)."""
+    out = np.zeros(pv.size, dtype=bool)
+    rise = np.diff(pv)
+    tiny = 2e-7 * max(float(np.abs(pv).max()), 1e-3)
+    out[1:-1] = (np.abs(np.diff(rise)) < 3 * tiny) & (np.abs(rise[1:]) > 10 * tiny)
+    return out
+
+
+def on_grid(gaps: Floats) -> bool:
+    """Whether differences of values are multiples of the smallest that is common."""
+    if gaps.size < 5:
+        return True
+    unit = float(np.quantile(gaps, 0.1))
+    return float(np.mean(np.abs(gaps / unit - np.round(gaps / unit)) < 0.05)) > 0.6
+
+
+def compression(pv: Floats) -> Trace | None:
+    """Straight segments whose breaks stand on no grid (swinging door and the like)."""
+    found = straight(pv)
+    share = float(found.mean())
+    if share < STRAIGHT or on_grid(level_gaps(pv)):
+        return None
+    return Trace("compression", share, found)
+
+
+def quantization(pv: Floats, ranged: bool) -> Trace | None:
+    """Values on a grid coarser than a historian's; `ranged` is False where percent is of the recorded range."""
+    gaps = level_gaps(pv)
+    least = GRID_STEP if ranged else GRID_STEP_OF_RANGE
+    if gaps.size == 0 or gaps.size * 20 > pv.size or float(gaps.mean()) < least:
+        return None
+    if float(gaps.max()) > 4.0 * float(gaps.mean()):
+        return None
+    return Trace("quantization", float(gaps.mean()), np.ones(pv.size, dtype=bool))
+
+
+def clipped(pv: Floats) -> Trace | None:
+    """PV standing at exactly its highest or lowest value far more often than at those next to it."""
+    levels, counts = np.unique(pv, return_counts=True)
+    if levels.size < 12:
+        return None
+    best = None
+    for end, near in ((-1, counts[-7:-1]), (0, counts[1:7])):
+        top = int(counts[end])
+        enough = top >= CLIP_SAMPLES and top > CLIP_RATIO * float(near.mean())
+        if enough and (best is None or top > best.where.sum()):
+            best = Trace("sensor-clipping", float(levels[end]), pv == levels[end])
+    return best
+
+
+def jitter(stamp_s: Floats, dt_s: float) -> float:
+    """Scatter of the stamps about a uniform clock [samples], gaps left out."""
+    spacing = np.diff(stamp_s) / dt_s
+    spacing = spacing[(spacing > 0.02) & (spacing < 1.98)]
+    return float(np.std(spacing)) / np.sqrt(2.0) if spacing.size > 10 else 0.0
+
+
+def sampling(stamp_s: Floats, dt_s: float) -> Trace | None:
+    """Polling that scatters by more than logging does."""
+    found = jitter(stamp_s, dt_s)
+    if found < JITTER:
+        return None
+    return Trace("sampling", found, np.ones(stamp_s.size, dtype=bool))
+
+
+def unlogged(stamp_s: Floats, n: int, dt_s: float) -> Mask:
+    """True where a record of n samples holds a value over from before because none was logged, shape (n,).
+
+    Nothing is marked where the record does not begin with the first stamp and end with the last.
+    """
+    out = np.zeros(n, dtype=bool)
+    at = (stamp_s - stamp_s[0]) / dt_s if stamp_s.size else stamp_s
+    if stamp_s.size < 2 or abs(float(at[-1]) - (n - 1)) > 1.5:
+        return out
+    for k in np.flatnonzero(np.diff(at) > MISSED):
+        out[int(np.ceil(at[k] + 0.5)) : int(np.floor(at[k + 1] + 0.5))] = True
+    return out

@@ -1,0 +1,1 @@
+"""Where the search for an effect's parameters begins."""

@@ -1,0 +1,103 @@
+"""Where to start two-mode processes: dead time and time constants on a grid, both gains solved linearly."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from identification.estimation.noise import whitened
+from identification.estimation.prediction_error import Fitted, Model, Problem
+from identification.record import Floats
+from identification.simulation.effect import Row
+from identification.simulation.parameters import Slot
+from identification.simulation.process import plain_vessel
+from identification.simulation.valve_chain import flow
+
+SHORTER = (0.15, 0.35, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
+"""Dead times tried, in that of the plain loop: a missing lag or zero has lengthened it."""
+LONGER = (0.7, 1.0, 1.4)
+"""Time constants tried, in that of the plain loop."""
+OTHERS = {"inverse-response": (0.005, 0.02, 0.08, 0.25), "slow-mode": (3.0, 6.0, 15.0)}
+"""Time constants of the second mode, in that of the plain loop."""
+LEADING = 0.95
+"""First coefficient of the noise model that knows nothing: nearly a difference."""
+KEPT = 2
+"""Starts kept under each noise model."""
+
+
+@dataclass(frozen=True, slots=True)
+class Point:
+    """One point of the grid: dead time, the two time constants [s], both gains, what is left."""
+
+    dead_s: float
+    first_s: float
+    other_s: float
+    gains: tuple[float, float]
+    left: float
+
+
+def responses(p: Problem, near: Fitted, dead_s: float, times: set[float], ar: Floats) -> dict[float, Floats]:
+    """Whitened unit responses, each shape (n,), of lags with these time constants [s]."""
+    scene, c = p.scene, near.model.c.copy()
+    through = flow(scene.op, c, scene.dt_s, scene.middle)
+    still = np.zeros(scene.op.size)
+    c[Slot.K], c[Slot.BIAS], c[Slot.START], c[Slot.L] = 1.0, 0.0, 0.0, dead_s
+    out = {}
+    for t in times:
+        c[Slot.T] = max(t, 0.1 * scene.dt_s)
+        out[t] = whitened(plain_vessel(through, still, c, scene.dt_s, scene.middle), ar, p.edges)
+    return out
+
+
+def solved(
+    y: Floats, one: Floats, two: Floats, level: Floats, weight: Floats
+) -> tuple[tuple[float, float], float]:
+    """Both gains and what is left, of whitened PV on two responses and a level."""
+    rows = np.stack([one, two, level])
+    weighted = rows * weight
+    beta = np.linalg.lstsq(weighted @ rows.T, weighted @ y, rcond=1e-12)[0]
+    return (float(beta[0]), float(beta[1])), float((weight * y) @ y - beta @ (weighted @ y))
+
+
+def grid(p: Problem, near: Fitted, row: Row, ar: Floats) -> list[Point]:
+    """All points of the grid under one noise model, best first."""
+    t0, dead0 = float(near.model.c[Slot.T]), float(near.model.c[Slot.L])
+    y, level = whitened(p.y, ar, p.edges), whitened(np.ones(p.y.size), ar, p.edges)
+    firsts, others = [t0 * f for f in LONGER], [t0 * f for f in OTHERS[row.name]]
+    out = []
+    for dead in {dead0 * f for f in SHORTER}:
+        found = responses(p, near, dead, {*firsts, *others}, ar)
+        for first in firsts:
+            for other in others:
+                gains, left = solved(y, found[first], found[other], level, p.weight)
+                out.append(Point(dead, first, other, gains, left))
+    return sorted(out, key=lambda point: point.left)
+
+
+def fits_row(point: Point, row: Row) -> bool:
+    """Whether a point's second mode has the sign that the row is about."""
+    a, b = point.gains
+    if a + b == 0:
+        return False
+    share = b / (a + b)
+    return -5.0 < share < -0.002 if row.name == "inverse-response" else 0.002 < share < 0.95
+
+
+def mode_starts(p: Problem, near: Fitted, row: Row) -> list[Model]:
+    """Starts of a two-mode row from the grid."""
+    blind = np.zeros_like(near.ar)
+    blind[0] = LEADING
+    out = []
+    for ar in (near.ar, blind):
+        for point in [q for q in grid(p, near, row, ar) if fits_row(q, row)][:KEPT]:
+            c = near.model.c.copy()
+            c[Slot.T], c[Slot.L], c[Slot.MODE_T] = (
+                point.first_s,
+                point.dead_s,
+                max(point.other_s, 0.1 * p.scene.dt_s),
+            )
+            c[Slot.K] = sum(point.gains)
+            c[Slot.SHARE] = point.gains[1] / c[Slot.K]
+            out.append(Model((*near.model.rows, row), c))
+    return out

@@ -1,0 +1,104 @@
+"""The loop model run open over a recorded OP: the one simulator of rivals, explanation and saved model."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from identification.record import Floats
+from identification.simulation.parameters import KNOTS, STEPS, Slot
+from identification.simulation.process import plain_vessel, transported, vessel
+from identification.simulation.valve_chain import flow, lagged
+
+RICH = (
+    Slot.T2,
+    Slot.T3,
+    Slot.SHARE,
+    Slot.ASYMMETRY,
+    Slot.SLOPE,
+    Slot.GAIN_SLOPE,
+    Slot.ROOT,
+    Slot.DRIFT,
+    Slot.PIPE,
+    *(Slot.HEAD + i for i in range(KNOTS)),
+)
+"""Constants that are zero in a vessel of first order with constant gain."""
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """What is recorded and not fitted.
+
+    op : shape (n,) [% OP]; dt_s [s]; middle : OP that counts as zero [% OP]; level : PV that counts as zero
+    [% PV]; pv_range : lowest and highest PV; step_at : samples at which the load may step; neighbour : another
+    loop's OP less its mean, shape (n,); longest_s : longest time constant that counts as one [s].
+    """
+
+    op: Floats
+    dt_s: float
+    middle: float
+    level: float
+    pv_range: tuple[float, float]
+    step_at: tuple[int, ...] = ()
+    neighbour: Floats | None = field(default=None, repr=False)
+    longest_s: float = math.inf
+
+    @property
+    def clock(self) -> Floats:
+        """Time from -0.5 to 0.5 over the record, shape (n,)."""
+        return np.arange(self.op.size) / self.op.size - 0.5
+
+
+def head(scene: Scene, c: Floats) -> Floats:
+    """Slow relative supply, shape (n,): straight lines between knots, mean zero."""
+    knots = c[int(Slot.HEAD) : int(Slot.HEAD) + KNOTS]
+    if not knots.any():
+        return np.zeros(scene.op.size)
+    line = np.interp(scene.clock, np.linspace(-0.5, 0.5, KNOTS), knots)
+    return line - line.mean()
+
+
+def load(scene: Scene, c: Floats) -> Floats:
+    """Load at the vessel's inlet, shape (n,) [% OP], as the constants say."""
+    act = np.zeros(scene.op.size)
+    for i, at in enumerate(scene.step_at[:STEPS]):
+        act[at:] += c[int(Slot.STEP) + i]
+    if c[Slot.SINE] != 0 or c[Slot.COSINE] != 0:
+        angle = c[Slot.OMEGA] * scene.dt_s * np.arange(scene.op.size)
+        act += c[Slot.SINE] * np.sin(angle) + c[Slot.COSINE] * np.cos(angle)
+    if scene.neighbour is not None and c[Slot.NEIGHBOUR] != 0:
+        act += c[Slot.NEIGHBOUR] * lagged(scene.neighbour, c[Slot.NEIGHBOUR_T], scene.dt_s)
+    return act
+
+
+def simulate(scene: Scene, c: Floats) -> Floats:
+    """PV's deviation from scene.level [% PV], shape (n,), that the model gives for the recorded OP.
+
+    Parameters
+    ----------
+    scene : Scene
+    c : ndarray of shape (SIZE,)
+        Constants (slots.py).
+    """
+    dt = scene.dt_s
+    through = flow(scene.op, c, dt, scene.middle)
+    act = load(scene, c)
+    rich = any(c[s] != 0 for s in RICH) or c[Slot.LEAK] != 1 or math.isfinite(c[Slot.CAP])
+    out = _rich(scene, c, through, act) if rich else plain_vessel(through, act, c, dt, scene.middle)
+    if math.isfinite(c[Slot.CLIP_HI]) or math.isfinite(c[Slot.CLIP_LO]):
+        out = np.clip(out, c[Slot.CLIP_LO] - scene.level, c[Slot.CLIP_HI] - scene.level)
+    return np.nan_to_num(out, nan=1e6, posinf=1e6, neginf=-1e6)
+
+
+def _rich(scene: Scene, c: Floats, through: Floats, act: Floats) -> Floats:
+    supply = head(scene, c)
+    gain = 1.0 + c[Slot.DRIFT] * scene.clock + supply
+    act = act + c[Slot.HEAD_BIAS] * supply
+    if c[Slot.PIPE] != 0:
+        through = transported(through, c[Slot.L], c[Slot.PIPE], max(scene.middle, 1e-3), scene.dt_s)
+    full = c.copy()
+    full[Slot.CAP] -= scene.level
+    empty = max(scene.level, 1.0) / c[Slot.ROOT] if c[Slot.ROOT] > 0 else 1.0
+    return vessel(through, act, gain, full, scene.dt_s, scene.middle, empty)

@@ -1,0 +1,149 @@
+"""From flow to PV: transport, vessel, further modes and transmitter, stepped exactly for held inputs."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from identification.record import Floats
+from identification.simulation.parameters import Slot
+
+T, L, K, BIAS, START = (int(s) for s in (Slot.T, Slot.L, Slot.K, Slot.BIAS, Slot.START))
+T2, T3, SHARE, MODE_T, ASYM = (int(s) for s in (Slot.T2, Slot.T3, Slot.SHARE, Slot.MODE_T, Slot.ASYMMETRY))
+SLOPE, ROOT, CAP, SPILL, SPILL_T = (
+    int(s) for s in (Slot.SLOPE, Slot.ROOT, Slot.CAP, Slot.SPILL, Slot.SPILL_T)
+)
+LEAK, PIPE, GAIN_SLOPE, SPEED = (int(s) for s in (Slot.LEAK, Slot.PIPE, Slot.GAIN_SLOPE, Slot.SPEED))
+WEIR = 25.0
+"""Outflow over the cap per % of level, in terms of the vessel's own; ours: stiff against every vessel."""
+
+
+@njit(cache=True, error_model="numpy")
+def transported(flow: Floats, delay_s: float, pipe: float, middle: float, dt_s: float) -> Floats:
+    """Mean of what leaves the pipe during each sample, shape (n,), where the flow sets the transport's speed.
+
+    delay_s [s] at flow `middle`; pipe : relative change of speed per relative change of flow.
+    """
+    n = flow.size
+    passed = np.zeros(n + 1)
+    moved = np.zeros(n + 1)
+    for k in range(n):
+        speed = max(1.0 + pipe * (flow[k] / middle - 1.0), 0.1)
+        passed[k + 1] = passed[k] + dt_s * speed
+        moved[k + 1] = moved[k] + dt_s * speed * flow[k]
+    out = np.empty(n)
+    at, before = 0, -delay_s * flow[0]
+    for k in range(n):
+        mark = passed[k + 1] - delay_s
+        if mark <= 0.0:
+            total = mark * flow[0]
+        else:
+            while passed[at + 1] < mark:
+                at += 1
+            total = moved[at] + (mark - passed[at]) * flow[at]
+        out[k] = (total - before) / (passed[k + 1] - passed[k])
+        before = total
+    return out
+
+
+@njit(cache=True, error_model="numpy")
+def outflow(x: float, head: float, slope: float, leak: float, root: float) -> tuple[float, float]:
+    """Outflow at level x [% PV] and its derivative, for the plain, the rooted and the bent vessel."""
+    if root != 0.0:
+        inside = max(1.0 + x / head, 1e-3)
+        return 2.0 * head * (math.sqrt(inside) - 1.0), 1.0 / math.sqrt(inside)
+    if slope != 0.0:
+        inside = max(1.0 + slope * x / 50.0, 0.05)
+        return 50.0 / slope * math.log(inside), 1.0 / inside
+    return leak * x, leak
+
+
+@njit(cache=True, error_model="numpy")
+def scheduled(x: float, slope: float) -> float:
+    """Relative gain at level x [% PV]; `slope` is its change over 50 %."""
+    return max(1.0 + slope * x / 50.0, 0.05)
+
+
+@njit(cache=True, error_model="numpy")
+def filled(x: float, feed: float, h: float, c: Floats, head: float, basin: float) -> tuple[float, float]:
+    """Level after h seconds of constant feed, and the spill meanwhile (exponential step, exact where linear)."""
+    out, rise = outflow(x, head, c[SLOPE], c[LEAK], c[ROOT])
+    over = max(x - c[CAP], 0.0)
+    if over > 0.0:
+        rise += WEIR
+    net = feed + c[SPILL] * basin - out - WEIR * over
+    t = c[T]
+    if c[GAIN_SLOPE] != 0.0:
+        t *= scheduled(x, c[GAIN_SLOPE]) ** c[SPEED]
+    if c[ASYM] != 0.0:
+        t *= math.exp(-0.5 * c[ASYM] if net > 0.0 else 0.5 * c[ASYM])
+    z = rise * h / t
+    grown = h / t if z < 1e-9 else (1.0 - math.exp(-z)) / rise
+    return x + net * grown, WEIR * over
+
+
+@njit(cache=True, error_model="numpy")
+def eased(at: float, aim: float, lag_s: float, h: float) -> tuple[float, float]:
+    """A first-order lag after h seconds, and its mean meanwhile."""
+    pole = math.exp(-h / lag_s)
+    return aim + (at - aim) * pole, aim + (at - aim) * (1.0 - pole) * lag_s / h
+
+
+@njit(cache=True, error_model="numpy")
+def vessel(
+    flow: Floats, act: Floats, gain: Floats, c: Floats, dt_s: float, base: float, head: float
+) -> Floats:
+    """PV's deviation [% PV], shape (n,), of a vessel with any of the catalogue's physics.
+
+    flow, act, gain : shape (n,), flow during each sample, load at the inlet [% OP] and relative gain; base : the
+    flow that counts as zero; head : level deviation at which a rooted vessel would be empty, with its sign turned.
+    """
+    n = flow.size
+    delay = 0 if c[PIPE] != 0.0 else int(c[L] / dt_s)
+    part = 0.0 if c[PIPE] != 0.0 else c[L] - delay * dt_s
+    out = np.empty(n)
+    x, mode, basin = c[START], c[START], 0.0
+    first = c[K] * (flow[0] - base) + c[BIAS]
+    z2, z3 = first, first
+    for k in range(n):
+        out[k] = (1.0 - c[SHARE]) * x + c[SHARE] * mode
+        for half in range(2):
+            h = part if half == 0 else dt_s - part
+            if h <= 0.0:
+                continue
+            j = max(k - delay - 1 + half, 0)
+            feed = gain[k] * (c[K] * (flow[j] - base) + c[BIAS])
+            if c[GAIN_SLOPE] != 0.0:
+                feed *= scheduled(x, c[GAIN_SLOPE])
+            feed += c[K] * act[k]
+            if c[T2] > 0.0:
+                z2, feed = eased(z2, feed, c[T2], h)
+            if c[T3] > 0.0:
+                z3, feed = eased(z3, feed, c[T3], h)
+            x, spill = filled(x, feed, h, c, head, basin)
+            if c[SPILL] > 0.0:
+                basin += (spill - basin) * (1.0 - math.exp(-h / c[SPILL_T]))
+            if c[SHARE] != 0.0:
+                mode += (feed - mode) * (1.0 - math.exp(-h / c[MODE_T]))
+    return out
+
+
+@njit(cache=True, error_model="numpy")
+def plain_vessel(flow: Floats, act: Floats, c: Floats, dt_s: float, base: float) -> Floats:
+    """The same, shape (n,), where nothing but K, T, L, bias and start is set: exact and several times faster."""
+    n = flow.size
+    delay = int(c[L] / dt_s)
+    part = c[L] - delay * dt_s
+    older, newer = math.exp(-part / c[T]), math.exp(-(dt_s - part) / c[T])
+    out = np.empty(n)
+    x = c[START]
+    for k in range(n):
+        out[k] = x
+        one, two = flow[max(k - delay - 1, 0)] - base, flow[max(k - delay, 0)] - base
+        feed = c[K] * (one + act[k]) + c[BIAS]
+        x = feed + (x - feed) * older
+        feed = c[K] * (two + act[k]) + c[BIAS]
+        x = feed + (x - feed) * newer
+    return out

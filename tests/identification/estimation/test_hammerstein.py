@@ -1,0 +1,205 @@
+"""Valve and lag fitted to trends whose process and valve are known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from identification.estimation.backlash_stiction import better_linear, fit_linear, fit_play, fit_stick_slip
+from identification.estimation.gauss_newton import descend
+from identification.estimation.hammerstein import lag, process_of, stem_blocks, sticking, unit_lag
+from identification.estimation.likelihood_ratio import Rival, evidence, innovations
+from identification.estimation.window import Window, block_means
+from identification.models import Backlash, Fopdt, Loop, Pid
+from identification.simulation.closed_loop import closed_loop, open_loop
+
+N = 3000
+
+
+def steps(seed: int, n: int = N) -> np.ndarray:
+    """OP that moves to a new place every half minute or so [% OP], shape (n,)."""
+    rng = np.random.default_rng(seed)
+    moves = (rng.random(n) < 1 / 30) * rng.normal(0.0, 3.0, n)
+    return 50 + np.cumsum(moves) - np.linspace(0, moves.sum(), n)
+
+
+def window(process: Fopdt, valve: Backlash | None, seed: int, noise: float = 0.1) -> Window:
+    """An open loop under moving OP with white noise on PV."""
+    op = steps(seed)
+    pv = open_loop(process, valve, op, 1.0) + noise * np.random.default_rng(seed + 1).standard_normal(N)
+    return Window(pv, op, np.ones(N, dtype=bool), 1.0)
+
+
+@pytest.mark.parametrize(
+    "process",
+    [Fopdt(2.0, 30.0, 5.0), Fopdt(-0.8, 12.0, 3.4), Fopdt(1.5, 90.0, 12.0)],
+    ids=["lag", "negative gain", "slow"],
+)
+def test_process_is_recovered(process):
+    """Gain, time constant and dead time of an open loop in noise are recovered within 3 %, dead time within 0.3 s."""
+    for seed in (1, 2, 3):
+        fit = fit_linear(window(process, None, seed), 120.0)
+        assert fit.gain == pytest.approx(process.gain, rel=0.03)
+        assert fit.time_constant_s == pytest.approx(process.time_constant_s, rel=0.05)
+        assert fit.dead_time_s == pytest.approx(process.dead_time_s, abs=0.3)
+
+
+def test_noise_level_is_recovered():
+    """The innovations variance of a fit is the variance of the noise that was added."""
+    fit = fit_linear(window(Fopdt(2.0, 30.0, 5.0), None, 4, noise=0.2), 120.0)
+    assert fit.sigma2 == pytest.approx(0.04, rel=0.08)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_ideal_valve_gives_no_evidence_of_play(seed):
+    """Behind an ideal valve a play gains no more than a handful of nats, under half of what a verdict asks."""
+    w = window(Fopdt(2.0, 30.0, 5.0), None, 10 + seed)
+    linear = fit_linear(w, 120.0)
+    found = fit_play(w, linear, 120.0)
+    assert evidence(Rival(w, found), Rival(w, better_linear(w, linear, found))) < 5.0
+
+
+@pytest.mark.parametrize("width", [1.0, 2.5, 5.0])
+def test_width_of_play_is_recovered(width):
+    """Play of 1 to 5 % behind moving OP is recovered within 0.1 %, with overwhelming evidence."""
+    w = window(Fopdt(2.0, 30.0, 5.0), Backlash(width), 20)
+    linear = fit_linear(w, 120.0)
+    found = fit_play(w, linear, 120.0)
+    assert found.valve.stickband == pytest.approx(width, abs=0.1)
+    assert evidence(Rival(w, found), Rival(w, better_linear(w, linear, found))) > 100
+
+
+def test_play_is_recovered_from_its_limit_cycle():
+    """In closed loop, where OP is made by PV, the play of the study's loop (1 %) is recovered within 2 %."""
+    loop = Loop(Fopdt(80.0, 200.0, 1.0), Pid(1.0, 10.0), Backlash(1.0))
+    noise = 0.05 * np.random.default_rng(30).standard_normal(N)
+    noise[5:] += 1.0  # a step of the load, without which the stem would never leave its play
+    record = closed_loop(loop, np.full(N, 50.0), noise)
+    w = Window(record.pv, record.op, np.ones(N, dtype=bool), 1.0)
+    found = fit_play(w, fit_linear(w, 38.0), 38.0)
+    assert found.valve.stickband == pytest.approx(1.0, rel=0.02)
+    assert found.slope == pytest.approx(0.4, rel=0.02)
+
+
+@pytest.mark.parametrize("free_width", [False, True], ids=["width held", "width free"])
+def test_descent_never_loses(free_width):
+    """From wherever it starts, the descent ends at innovations no larger than those it started with."""
+    w = window(Fopdt(2.0, 30.0, 5.0), Backlash(2.0), 40)
+    first = fit_linear(w, 120.0)
+    rng = np.random.default_rng(41)
+    for _ in range(12):
+        start = type(first)(
+            gain=first.gain * rng.uniform(0.2, 3),
+            time_constant_s=first.time_constant_s * 10 ** rng.uniform(-1, 1),
+            dead_time_s=rng.uniform(0, 30),
+            valve=sticking(rng.uniform(0.3, 6), rng.uniform(0, 1)),
+            sigma2=1.0,
+            count=first.count,
+            ar=first.ar * rng.uniform(0, 1),
+            base=first.base,
+        )
+        end = descend(w, start, free_width)
+        before, after = (float(np.mean(innovations(w, fit) ** 2)) for fit in (start, end))
+        assert after <= before * (1 + 1e-9)
+        assert end.sigma2 == pytest.approx(after, rel=1e-6)
+
+
+def test_evidence_is_antisymmetric_about_nothing():
+    """A fit has no evidence over itself."""
+    w = window(Fopdt(2.0, 30.0, 5.0), None, 50)
+    fit = fit_linear(w, 120.0)
+    assert evidence(Rival(w, fit), Rival(w, fit)) == 0.0
+
+
+def test_unusable_samples_do_not_count():
+    """Nonsense at samples that are not usable changes neither gain nor time constant beyond the scatter."""
+    w = window(Fopdt(2.0, 30.0, 5.0), None, 60)
+    y, usable = w.y.copy(), np.ones(N, dtype=bool)
+    y[1000:1200], usable[1000:1200] = 500.0, False
+    fit = fit_linear(Window(y, w.op, usable, 1.0), 120.0)
+    assert fit.gain == pytest.approx(2.0, rel=0.04)
+    assert fit.time_constant_s == pytest.approx(30.0, rel=0.06)
+
+
+def test_lag_agrees_with_slow_twin():
+    """The kernel's lag with whole dead time is the textbook recursion, sample by sample."""
+    stem = steps(70, 200) - 50
+    pole = np.exp(-1 / 20)
+    y, slow = 0.0, []
+    for k in range(200):
+        slow.append(y)
+        y = pole * y + (1 - pole) * stem[max(k - 4, 0)]
+    assert lag(stem, *unit_lag(20.0, 4.0, 1.0)) == pytest.approx(np.array(slow), abs=1e-9)
+
+
+def test_stem_in_blocks_is_the_mean_of_the_stem():
+    """Stem positions of blocks are means of the stem walked at the record's own interval."""
+    op = steps(80, 1200)
+    fine = stem_blocks(op, 1.0, 1.0, -1.0, 1)
+    assert stem_blocks(op, 1.0, 1.0, -1.0, 6) == pytest.approx(block_means(fine, 6))
+
+
+class KanoValve:
+    """Stick-slip by the rules of Kano (2004), written from OP's stops and turns instead of from distances."""
+
+    def __init__(self, stickband: float, jump: float) -> None:
+        self.stickband, self.jump = stickband, jump
+        self.stem, self.stopped_at, self.way, self.moving, self.last = 0.0, 0.0, 1.0, False, 0.0
+
+    def follow(self, u: float) -> float:
+        """Stem [% OP] for the next OP [% OP]."""
+        if self.moving and (u - self.last) * self.way < 0:
+            self.moving, self.stopped_at = False, self.last
+        if not self.moving:
+            gone = (u - self.stopped_at) * self.way
+            if gone > self.jump or -gone > self.stickband:
+                self.way = self.way if gone > 0 else -self.way
+                self.moving = True
+        if self.moving:
+            self.stem = u - self.way * (self.stickband - self.jump) / 2
+        self.last = u
+        return self.stem
+
+
+def cycling_tank(seed: int, stickband: float, jump: float, slope: float = 0.1) -> Window:
+    """A tank under PI behind such a valve, PV stepped in tenths of a scan, OP kept at 0.05 %."""
+    rng = np.random.default_rng(seed)
+    n, dead = 1800, 3
+    valve, level, total = KanoValve(stickband, jump), 3.0, 0.0
+    path, pv, op = [0.0] * (dead * 10 + 1), np.empty(n), np.empty(n)
+    for k in range(n):
+        pv[k] = level + rng.normal(0, 0.03)
+        total -= pv[k] / 25.0
+        op[k] = np.round(1.5 * (total - pv[k]) / 0.05) * 0.05
+        stem = valve.follow(op[k])
+        for _ in range(10):
+            path.append(stem)
+            level += 0.1 * slope * path[-dead * 10 - 1]
+    return Window(pv, op, np.ones(n, dtype=bool), 1.0)
+
+
+@pytest.mark.parametrize("jump", [1.22, 2.02])
+def test_stick_slip_is_recovered_from_its_limit_cycle(jump):
+    """Stickband, jump and slope of a cycling tank come back within 3, 10 and 10 %, ahead of any play."""
+    window = cycling_tank(3, 2.43, jump)
+    linear = fit_linear(window, 60.0)
+    play = fit_play(window, linear, 60.0)
+    found = fit_stick_slip(window, play, 60.0)
+    assert found.valve.stickband == pytest.approx(2.43, rel=0.03)
+    assert found.valve.slip_jump == pytest.approx(jump, rel=0.1)
+    assert found.slope == pytest.approx(0.1, rel=0.1)
+    assert found.log_likelihood > play.log_likelihood + 20
+
+
+def test_descent_and_disturbance_tell_one_story():
+    """The innovations of what a fit leaves have the variance that the descent reports, in blocks of eight samples."""
+    rng = np.random.default_rng(2)
+    op = 50 + np.cumsum(rng.normal(0, 0.2, 8 * 600))
+    pv = block_means(lag(op - 50, *unit_lag(300.0, 12.0, 1.0)), 8) + rng.normal(0, 0.05, 600) + 3.0
+    for fine in (False, True):
+        window = Window(pv, op, np.ones(600, dtype=bool), 8.0, 8, fine=fine)
+        for fit in (fit_linear(window, 400.0), fit_play(window, fit_linear(window, 400.0), 400.0)):
+            assert float(np.mean(innovations(window, fit) ** 2)) == pytest.approx(fit.sigma2, rel=1e-6)
+    process = process_of(window, fit_linear(window, 400.0))
+    assert process.time_constant_s == pytest.approx(300.0, rel=0.05)
+    assert process.dead_time_s == pytest.approx(12.0, abs=2.0)

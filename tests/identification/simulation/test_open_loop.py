@@ -1,0 +1,103 @@
+"""The rivals' simulator against closed forms and against the project's other simulator."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identification.models import Backlash, Fopdt
+from identification.simulation.closed_loop import open_loop
+from identification.simulation.open_loop import Scene, simulate
+from identification.simulation.parameters import Slot, neutral
+from identification.simulation.valve import play
+
+pytestmark = pytest.mark.slow
+
+
+def scene(seed: int = 1, n: int = 600) -> Scene:
+    """OP that moves every thirty samples."""
+    op = 50 + np.repeat(np.random.default_rng(seed).uniform(-5, 5, n // 30), 30)
+    return Scene(op, 2.0, float(op[0]), 50.0, (40.0, 60.0))
+
+
+def constants(**given: float) -> np.ndarray:
+    """The plain loop with gain 1.5, time constant 40 s and dead time 7 s, and what is given by slot name."""
+    c = neutral()
+    c[Slot.K], c[Slot.T], c[Slot.L] = 1.5, 40.0, 7.0
+    for name, value in given.items():
+        c[Slot[name]] = value
+    return c
+
+
+def test_plain_equals_exact_open_loop() -> None:
+    """Without any effect the model is the exact first-order lag with fractional dead time."""
+    s = scene()
+    expected = open_loop(Fopdt(1.5, 40.0, 7.0), None, s.op, s.dt_s)
+    assert np.allclose(simulate(s, constants()), expected, atol=1e-9)
+
+
+def test_play_equals_play_before_lag() -> None:
+    """The play of a rival is the project's own play before the same lag."""
+    s = scene()
+    got = simulate(s, constants(STICKBAND=3.0))
+    expected = open_loop(Fopdt(1.5, 40.0, 7.0), Backlash(3.0), s.op, s.dt_s)
+    assert np.allclose(got - got[0], expected, atol=1e-9)
+    assert not np.allclose(play(s.op, 3.0), s.op)
+
+
+@pytest.mark.parametrize(
+    "neutral_effect",
+    [
+        {"T2": 1e-6},
+        {"SLOPE": 1e-9},
+        {"GAIN_SLOPE": 1e-9},
+        {"ASYMMETRY": 1e-12},
+        {"DRIFT": 1e-12},
+        {"CAP": 1e6},
+    ],
+)
+def test_rich_vessel_without_strength_is_plain(neutral_effect: dict[str, float]) -> None:
+    """An effect of no strength changes nothing."""
+    s = scene()
+    assert np.allclose(simulate(s, constants(**neutral_effect)), simulate(s, constants()), atol=1e-4)
+
+
+def test_second_lag_equals_two_lags() -> None:
+    """A second lag gives the closed-form step response of two lags in series."""
+    op = np.concatenate((np.full(5, 50.0), np.full(400, 51.0)))
+    s = Scene(op, 2.0, 50.0, 50.0, (40.0, 60.0))
+    y = simulate(s, constants(T2=15.0, L=0.0))
+    t = 2.0 * (np.arange(405) - 5)
+    step = 1.5 * (1 - (40 * np.exp(-t / 40) - 15 * np.exp(-t / 15)) / 25)
+    assert np.allclose(y, np.where(t > 0, step, 0.0), atol=5e-3)
+
+
+def test_opposing_mode_starts_the_wrong_way() -> None:
+    """A fast mode of opposite sign moves PV down before it goes up."""
+    op = np.concatenate((np.full(5, 50.0), np.full(200, 52.0)))
+    y = simulate(Scene(op, 1.0, 50.0, 50.0, (40.0, 60.0)), constants(SHARE=-0.3, MODE_T=2.0, L=0.0))
+    assert y[:20].min() < -0.2
+    assert y[-1] > 2.5
+
+
+def test_pipe_delay_is_dead_time_at_rest_and_shorter_at_flow() -> None:
+    """A pipe at its nominal flow is the plain dead time; with more flow PV answers sooner."""
+    op = np.concatenate((np.full(50, 50.0), np.full(100, 50.2), np.full(100, 90.0), np.full(100, 90.2)))
+    s = Scene(op, 1.0, 50.0, 50.0, (40.0, 60.0))
+    plain, piped = (simulate(s, constants(L=20.0, PIPE=pipe)) for pipe in (0.0, 1.0))
+    assert np.allclose(plain[:140], piped[:140], atol=2e-2)
+    assert np.flatnonzero(piped > 5.0)[0] < np.flatnonzero(plain > 5.0)[0] - 3
+
+
+def test_overflow_is_flat_and_then_late() -> None:
+    """Above its cap PV stands; a clipped sensor stands too but the vessel beneath goes on."""
+    s = scene()
+    top = float(simulate(s, constants()).max())
+    wide = replace(s, pv_range=(0.0, 100.0))
+    capped = simulate(wide, constants(CAP=50.0 + 0.5 * top))
+    clipped = simulate(wide, constants(CLIP_HI=50.0 + 0.5 * top))
+    assert capped.max() < 0.5 * top + 0.3
+    assert clipped.max() <= 0.5 * top + 1e-9
+    assert not np.allclose(capped, clipped, atol=0.05)

@@ -1,0 +1,110 @@
+"""Valve operators against their definitions."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from identification.models import Backlash
+from identification.simulation.valve import (
+    HALTS,
+    RESTS,
+    SLIDES,
+    first_slip,
+    play,
+    stem_position,
+    stick_slip,
+    thresholds,
+    walk,
+)
+
+
+def slow_play(op: list[float], width: float, stem: float) -> list[float]:
+    """Play by its picture: a slot of the given width pushed along by OP."""
+    out = []
+    for u in op:
+        left, right = stem - width / 2, stem + width / 2
+        if u > right:
+            stem += u - right
+        elif u < left:
+            stem -= left - u
+        out.append(stem)
+    return out
+
+
+@given(st.lists(st.floats(-50, 50), min_size=1, max_size=60), st.floats(0.01, 20))
+def test_play_agrees_with_slow_twin(op, width):
+    """The kernel and a pushed slot give the same stem to rounding."""
+    assert play(np.array(op), width, 0.0) == pytest.approx(slow_play(op, width, 0.0), abs=1e-9)
+
+
+@given(st.lists(st.floats(-50, 50), min_size=1, max_size=60), st.floats(0.01, 20), st.floats(0, 1))
+def test_stem_never_leaves_breakaway(op, stickband, share):
+    """The stem is never further from OP than the breakaway distance (S + J)/2."""
+    jump = stickband * share
+    stem = stick_slip(np.array(op), stickband, jump)
+    assert np.all(np.abs(np.array(op) - stem) <= (stickband + jump) / 2 + 1e-9)
+
+
+def test_equal_stickband_and_jump_is_a_relay():
+    """S = J = 2d under a sine of amplitude 2d is a relay of height d switching at d (the study's Eq. 2)."""
+    d = 1.0
+    op = 2 * d * np.sin(np.linspace(0, 8 * np.pi, 4001))
+    stem = stick_slip(op, 2 * d, 2 * d, start=-d)[1000:]
+    assert set(np.round(np.sign(stem))) == {-1.0, 1.0}
+    assert np.abs(np.abs(stem) - d).max() < 0.01
+
+
+def test_play_is_rate_independent():
+    """Repeating every OP sample leaves the stem's path unchanged."""
+    op = np.cumsum(np.random.default_rng(1).normal(size=300))
+    assert np.array_equal(
+        stem_position(np.repeat(op, 3), Backlash(2.0))[::3], stem_position(op, Backlash(2.0))
+    )
+
+
+@given(st.lists(st.floats(-50, 50), min_size=2, max_size=60), st.floats(0.5, 20), st.floats(-1, 1))
+def test_play_has_one_path_once_op_has_covered_it(op, width, where):
+    """From any start within the play, the stem joins the path from first_slip once OP has covered the width."""
+    x = np.array(op)
+    covered = np.flatnonzero(np.maximum.accumulate(x) - np.minimum.accumulate(x) > width)
+    known = play(x, width, first_slip(x, width / 2, width / 2))
+    free = play(x, width, x[0] + where * width / 2)
+    after = covered[0] if covered.size else x.size
+    assert known[after:] == pytest.approx(free[after:], abs=1e-9)
+
+
+def test_stick_slip_that_needs_more_than_half_of_the_range_moves():
+    """A valve that lets go at 0.9 of OP's amplitude beyond its middle still cycles: its start is not OP's middle."""
+    op = np.sin(np.linspace(0, 20 * np.pi, 2001))
+    breakaway, sliding = thresholds(1.2, 1.0)
+    stem = walk(op, breakaway, sliding, RESTS, first_slip(op, breakaway, sliding))
+    assert np.ptp(stem[200:]) > 1.0
+    assert np.ptp(walk(op, breakaway, sliding, RESTS, 0.0)) == 0.0
+
+
+def dry_stem(op: np.ndarray, static: float, kinetic: float) -> np.ndarray:
+    """A light stem on a spring with dry friction in fine steps: at rest below `static`, else towards `kinetic`."""
+    z, moving, out = 0.0, False, []
+    for u in op:
+        for _ in range(200):
+            pull = u - z
+            if not moving and abs(pull) <= static:
+                continue
+            step = 0.1 * (abs(pull) - kinetic)
+            moving = step > 1e-6
+            z += np.sign(pull) * max(step, 0.0)
+        out.append(z)
+    return np.array(out)
+
+
+def test_dry_friction_halts_with_op():
+    """Dry friction lets a stem go by J again after OP stood still, as HALTS does and SLIDES does not."""
+    op = np.concatenate([np.linspace(0, 3, 31), np.full(5, 3.0), np.linspace(3, 4, 11)[1:], np.full(3, 4.0)])
+    breakaway, sliding = thresholds(2.0, 1.0)
+    true = dry_stem(op, breakaway, sliding)
+    halts, slides = (walk(op, breakaway, sliding, t, 0.0) for t in (HALTS, SLIDES))
+    after = op.size - 3 - 6
+    assert true[after] == pytest.approx(true[35], abs=1e-3)
+    assert halts[after] == pytest.approx(halts[35])
+    assert slides[after] > slides[35] + 0.3
