@@ -23,7 +23,7 @@ from identification.estimation.backlash_stiction import (
 from identification.estimation.gauss_newton import descend
 from identification.estimation.hammerstein import IDEAL, Fit, process_of, residual
 from identification.estimation.innovations import judged_mask
-from identification.estimation.likelihood_ratio import Rival, evidence, stem_moves, with_load_step
+from identification.estimation.likelihood_ratio import WindowFit, evidence, stem_moves, with_load_step
 from identification.estimation.search import AR_ORDER, prepare
 from identification.estimation.stem_position import Seen, seen
 from identification.estimation.window import Window, block_means
@@ -258,11 +258,11 @@ def _rivals(
     best, stick, jump = play, None, 0.0
     if short or play.valve.stickband > 0.25 * window.op_range:
         stick = fit_stick_slip(window, play, scale_s)
-        jump = evidence(Rival(window, stick), Rival(window, play))
+        jump = evidence(WindowFit(window, stick), WindowFit(window, play))
         jump -= max(play.log_likelihood - stick.log_likelihood, 0.0)
         best = stick if jump > limits.evidence_jump else play
     plain = with_load_step(window, linear, due, best.ar)
-    gained = evidence(Rival(window, best), plain) - (limits.evidence_jump if best is stick else 0.0)
+    gained = evidence(WindowFit(window, best), plain) - (limits.evidence_jump if best is stick else 0.0)
     return linear, play, stick, best, gained, jump
 
 
@@ -275,7 +275,7 @@ def _shown(
     play = descend(window, replace(fit_linear(behind, scale_s), valve=shown.play))
     stick = None if shown.jumping is None else replace(play, valve=shown.jumping)
     best = play if stick is None else stick
-    gained = evidence(Rival(window, best), with_load_step(window, linear, due, best.ar))
+    gained = evidence(WindowFit(window, best), with_load_step(window, linear, due, best.ar))
     return linear, play, stick, best, gained, 0.0 if stick is None else math.inf
 
 

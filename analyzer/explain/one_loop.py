@@ -36,7 +36,7 @@ class Case:
 
     spec: LoopSpec
     prepared: Prepared
-    subject: mismatch.Subject
+    subject: mismatch.Recording
     shortened: str = ""
 
 
@@ -141,7 +141,7 @@ def case(
     if float(np.ptp(r.op)) == 0 or float(np.ptp(r.pv)) == 0:
         raise NotAssessedError(f"{spec.loop}: needs OP and PV that move, one of them stands still")
     stamps = raw.stamp_s[~raw.bad]
-    subject = mismatch.Subject(
+    subject = mismatch.Recording(
         None if r.sp_estimated else r.sp,
         r.pv,
         r.op,
@@ -174,7 +174,7 @@ class Explained:
 def explained(c: Case, tell: Callable[[str], None], brought: Mapping[str, Any] | None = None) -> Explained:
     """Explain one loop; `brought` is the user's own model, which is judged and is one more start of the search."""
     start = None if brought is None else plain_start(brought)
-    with np.errstate(all="ignore"):  # a rival that runs away loses; its overflow is nobody's business
+    with np.errstate(all="ignore"):  # a candidate that runs away loses; its overflow is nobody's business
         found = mismatch.explain(c.subject, tell, start)
         said = answer(found, c.subject)
     own = None if brought is None else judged(brought, found, c.subject, span_note(c, brought))
@@ -273,11 +273,11 @@ def saved_model(c: Case, found: mismatch.Explanation, said: Answer) -> dict[str,
     scale = {"pv_low": s.low, "pv_span": s.span, "op_low": s.op_low, "op_span": s.op_span}
     model = found.best.model
     data = to_data(
-        c.spec.loop, found.p.scene, model.c, tuple(e.name for e in said.effects), found.late_s, scale
+        c.spec.loop, found.p.inputs, model.c, tuple(e.name for e in said.effects), found.late_s, scale
     )
-    if found.trace is not None and found.trace.name == "sensor-clipping":
-        side = "CLIP_HI" if found.trace.value > float(np.median(c.subject.pv)) else "CLIP_LO"
-        data["constants"][side] = found.trace.value
+    if found.recorder is not None and found.recorder.name == "sensor-clipping":
+        side = "CLIP_HI" if found.recorder.value > float(np.median(c.subject.pv)) else "CLIP_LO"
+        data["constants"][side] = found.recorder.value
     return data
 
 

@@ -28,9 +28,9 @@ from analyzer.explain.page_words import (
 )
 from analyzer.pages.words import duration, number, stamp
 from identification.estimation.limits import HELD_OUT
-from identification.mismatch.forward_selection import Rival
+from identification.mismatch.forward_selection import Candidate
 from identification.mismatch.location.where import located_in
-from identification.mismatch.words import located_sentence, telltale
+from identification.mismatch.words import discriminating_test, located_sentence
 from reports.names import slug
 from reports.pages import Block, Cell, Column, Facts, Page, Section, Table, Text, Tiles
 
@@ -38,7 +38,7 @@ HARDLY = 0.05
 """Relative change of the plain loop's constants under which they count as kept."""
 BENT = "What was left out had to be made up for by these; with it they move back."
 RIVALS = 12
-"""Rivals shown."""
+"""Candidates shown."""
 
 
 def page(e: Explained) -> Page:
@@ -100,7 +100,7 @@ def _verdict(e: Explained) -> tuple[Block, ...]:
 
 
 def _tiles(e: Explained) -> tuple[tuple[str, str, str], ...]:
-    d, recorded = e.data, e.found.p.scene.level + e.found.p.y
+    d, recorded = e.data, e.found.p.inputs.level + e.found.p.y
     size = {k: rms(float(np.std(recorded - x))) for k, x in plots.simulations(e).items()}
     seat = "where to look first" if d["verdict"] == "unexplained" else "where it sits"
     tiles = [(d["block"], seat, "")] if d["block"] != "none" else []
@@ -243,39 +243,41 @@ def _alternatives(data: Mapping[str, Any]) -> list[Section]:
     if named is None or not named["alternatives"]:
         return []
     columns = (Column("name", "Could also be"), Column("test", "What would tell them apart", wide=True))
-    rows = tuple((Cell(a, kind="strong"), Cell(telltale(named["name"], a))) for a in named["alternatives"])
+    rows = tuple(
+        (Cell(a, kind="strong"), Cell(discriminating_test(named["name"], a))) for a in named["alternatives"]
+    )
     return [Section("What it could also be", (Table("alternatives", "", columns, rows),))]
 
 
 def _rivals(e: Explained) -> list[Section]:
-    best: dict[str, Rival] = {}
+    best: dict[str, Candidate] = {}
     for r in e.found.first:
-        if r.name not in best or r.net > best[r.name].net:
+        if r.name not in best or r.penalised > best[r.name].penalised:
             best[r.name] = r
-    ranked = sorted(best.values(), key=lambda r: -r.net)[:RIVALS]
+    ranked = sorted(best.values(), key=lambda r: -r.penalised)[:RIVALS]
     if not ranked:
         return []
     columns = (
         Column("name", "Added to the plain loop"),
         Column("gain", "Gain", True, "Doubled log likelihood"),
-        Column("net", "After its price", True, "Less what its constants and the search cost"),
+        Column("net", "After its penalty", True, "Less what its constants and the search cost"),
         Column("said", ""),
     )
     taken = {r.name for r in e.found.accepted}
-    rows = tuple((Cell(r.name), *_gains(r), Cell(_standing(r.net, r.name in taken))) for r in ranked)
+    rows = tuple((Cell(r.name), *_gains(r), Cell(_standing(r.penalised, r.name in taken))) for r in ranked)
     note = "Each name was fitted with all constants free; the best of so many gains about ten by chance."
-    table = Table("rivals", "", columns, rows, note)
+    table = Table("candidates", "", columns, rows, note)
     return [Section("All that was tried", (table,), closed=bool(e.found.accepted))]
 
 
-def _gains(r: Rival) -> tuple[Cell, Cell]:
-    return Cell(str(round(r.gain)), r.gain), Cell(str(round(r.net)), r.net)
+def _gains(r: Candidate) -> tuple[Cell, Cell]:
+    return Cell(str(round(r.gain)), r.gain), Cell(str(round(r.penalised)), r.penalised)
 
 
-def _standing(net: float, taken: bool) -> str:
+def _standing(penalised: float, taken: bool) -> str:
     if taken:
         return "taken"
-    return "does not pay" if net <= 0 else "less, or not proven"
+    return "does not pay" if penalised <= 0 else "less, or not proven"
 
 
 def _controller(e: Explained) -> list[Section]:

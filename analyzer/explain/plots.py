@@ -12,7 +12,7 @@ from analyzer.explain.page_words import AXES, BROUGHT, CAPTIONS, CURVES, FEATURE
 from analyzer.pages.words import number
 from identification.estimation.prediction_error import Fitted, Problem
 from identification.mismatch.cross_validation import anchored
-from identification.mismatch.curves.record_shape import busiest, obeyed, ruling_shape, trace_shape
+from identification.mismatch.curves.record_shape import busiest, controller_shape, obeyed, recorder_shape
 from identification.mismatch.curves.shape import Shape, shape_of
 from identification.mismatch.location.features import Group, groups
 from identification.mismatch.location.locate import Located, profile
@@ -49,7 +49,7 @@ def simulations(e: Explained) -> dict[str, Floats]:
     out = {}
     window = e.found.proof.window if e.found.proof is not None else 0
     for kind, fit in fits.items():
-        out[kind] = p.scene.level + anchored(p.y, simulate(p.scene, fit.model.c), window)
+        out[kind] = p.inputs.level + anchored(p.y, simulate(p.inputs, fit.model.c), window)
     if e.brought is not None:
         out["brought"] = e.brought.simulated
     return out
@@ -61,7 +61,7 @@ LABELS = {"baseline": "plain loop", "model": "improved", "brought": BROUGHT}
 def signals(e: Explained) -> list[tuple[str, str, int, Floats]]:
     """Label, colour, panel and values of all that is drawn over time."""
     s, p = e.case.subject, e.found.p
-    recorded = p.scene.level + p.y
+    recorded = p.inputs.level + p.y
     sims = simulations(e)
     out = [] if s.sp is None else [("SP", "sp", 0, s.sp)]
     label = "PV, clock set right" if e.found.late_s else "PV recorded"
@@ -92,7 +92,7 @@ def trend(e: Explained, name: str, title: str, part: slice, buckets: int, captio
 def weight(e: Explained, at: Located) -> Floats:
     """How much each sample matters for the verdict, shape (n,)."""
     n = e.case.subject.pv.size
-    marked = e.found.trace or e.found.ruling
+    marked = e.found.recorder or e.found.controller
     if marked is not None and not marked.where.all():
         return np.concatenate((marked.where.astype(float), np.zeros(n)))[:n]
     if e.found.accepted:
@@ -158,7 +158,7 @@ def feature_plot(g: Group, fits: Sequence[tuple[str, str, Fitted]], p: Problem, 
 def spectrum_plot(e: Explained) -> Plot:
     """Spectrum of what the simulations leave, as its part of the rms per octave of period."""
     s, p = e.case.subject, e.found.p
-    recorded, lines = p.scene.level + p.y, []
+    recorded, lines = p.inputs.level + p.y, []
     for kind, x in simulations(e).items():
         if kind == "brought":
             continue
@@ -213,16 +213,16 @@ def note_of(p: float, carries: bool) -> str:
 def found_shape(e: Explained) -> Shape | None:
     """The shape of the first effect found."""
     f, s = e.found, e.case.subject
-    if f.trace is not None:
+    if f.recorder is not None:
         free = f.plain.model.c.copy()
         free[Slot.CLIP_HI], free[Slot.CLIP_LO] = np.inf, -np.inf
-        return trace_shape(f.trace, s, f.p.scene.level + simulate(f.p.scene, free))
-    if f.ruling is not None:
-        return ruling_shape(f.ruling, s)
+        return recorder_shape(f.recorder, s, f.p.inputs.level + simulate(f.p.inputs, free))
+    if f.controller is not None:
+        return controller_shape(f.controller, s)
     if not f.accepted:
         return None
     row, known = f.best.model.rows[0], e.said.effects[0].parameters
-    return shape_of(f.p.scene, row, known, f.best.model.c, f.plain.model.c)
+    return shape_of(f.p.inputs, row, known, f.best.model.c, f.plain.model.c)
 
 
 def shape_plot(shape: Shape, name: str = "shape") -> Plot:
@@ -253,5 +253,5 @@ def shape_plot(shape: Shape, name: str = "shape") -> Plot:
 
 def controller_plot(e: Explained) -> Plot | None:
     """OP rebuilt by the stated settings, where they are known and nothing is wrong with them."""
-    shape = obeyed(e.case.subject) if e.found.ruling is None and e.found.law is not None else None
+    shape = obeyed(e.case.subject) if e.found.controller is None and e.found.law is not None else None
     return None if shape is None else shape_plot(shape, "law")

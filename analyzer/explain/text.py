@@ -23,7 +23,7 @@ from analyzer.explain.page_words import (
     title,
 )
 from analyzer.pages.words import number
-from identification.mismatch.words import telltale
+from identification.mismatch.words import discriminating_test
 
 WIDTH = 110
 """Columns of text."""
@@ -118,6 +118,6 @@ def lines(data: Mapping[str, Any]) -> list[str]:
     out += _part("Where", _where(data["where"]))
     out += _part("The plain loop's constants moved", _moved(data), (1, 3))
     if first is not None:
-        tests = [(a, telltale(first["name"], a)) for a in first["alternatives"]]
+        tests = [(a, discriminating_test(first["name"], a)) for a in first["alternatives"]]
         out += _part("Could also be, and what would tell", tests)
     return out

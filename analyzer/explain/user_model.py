@@ -8,7 +8,7 @@ from typing import Any
 
 from identification.estimation.limits import HELD_OUT
 from identification.mismatch.cross_validation import Misfit, misfit
-from identification.mismatch.diagnosis import Explanation, Subject, restored
+from identification.mismatch.diagnosis import Explanation, Recording, restored
 from identification.mismatch.identifiability import unanswered
 from identification.mismatch.model_file import carried, constants
 from identification.record import Floats
@@ -84,7 +84,7 @@ def compared(own: float, plain: float) -> str:
     )
 
 
-def judged(data: Mapping[str, Any], found: Explanation, s: Subject, more: str = "") -> Brought:
+def judged(data: Mapping[str, Any], found: Explanation, s: Recording, more: str = "") -> Brought:
     """The user's model on the recording, its mean freed, beside the plain loop refitted.
 
     Parameters
@@ -92,7 +92,7 @@ def judged(data: Mapping[str, Any], found: Explanation, s: Subject, more: str = 
     data : mapping
         A saved model.
     found : Explanation
-    s : Subject
+    s : Recording
     more : str
         What else there is to say of it.
     """
@@ -100,10 +100,10 @@ def judged(data: Mapping[str, Any], found: Explanation, s: Subject, more: str = 
     cut = int((1.0 - HELD_OUT) * s.pv.size)
     window = found.proof.window if found.proof is not None else 0
     whole = misfit(s.pv, out, window)
-    plain = misfit(found.p.y, simulate(found.p.scene, found.plain.model.c), window)
+    plain = misfit(found.p.y, simulate(found.p.inputs, found.plain.model.c), window)
     said = f"Your model leaves {whole.rmse:.3g} % of span rms, the plain loop fitted anew {plain.rmse:.3g} %"
     if found.accepted:
-        best = misfit(found.p.y, simulate(found.p.scene, found.best.model.c), window)
+        best = misfit(found.p.y, simulate(found.p.inputs, found.best.model.c), window)
         said += f", the improved loop {best.rmse:.3g} %"
     units = "" if unanswered(found) else wrong_units(constants(dict(data)), restored(found.plain.model))
     verdict = "" if units else compared(whole.rmse, plain.rmse)

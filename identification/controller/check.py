@@ -8,7 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from identification.controller.pi_regression import Law, centred, found_law, shifted, span_length, trusted
+from identification.controller.pi_regression import (
+    ControlLaw,
+    centred,
+    recovered_law,
+    shifted,
+    span_length,
+    trusted,
+)
 from identification.estimation.limits import (
     ASKED,
     FROZEN,
@@ -45,7 +52,7 @@ class Stated:
 
 
 @dataclass(frozen=True, slots=True)
-class Ruling:
+class ControllerFinding:
     """One finding about the controller: its name, its numbers, where it is (bool, shape (n,))."""
 
     name: str
@@ -99,7 +106,7 @@ def frozen_width(e: Floats, op: Floats, said: Stated, usable: Mask) -> float:
     return float(size[good[-1]]) if good.size else 0.0
 
 
-def gap(e: Floats, op: Floats, said: Stated, usable: Mask) -> Ruling | None:
+def gap(e: Floats, op: Floats, said: Stated, usable: Mask) -> ControllerFinding | None:
     """OP standing still while the error is small: a law with a gap gives OP where the one without does not."""
     length = span_length(op.size, said.ti)
     n = (op.size // length) * length
@@ -118,7 +125,7 @@ def gap(e: Floats, op: Floats, said: Stated, usable: Mask) -> Ruling | None:
     inside = still & (np.abs(e) < width)
     if inside.mean() < 0.02:
         return None
-    return Ruling("controller-gap", {"gap_pct": width}, inside)
+    return ControllerFinding("controller-gap", {"gap_pct": width}, inside)
 
 
 def runs(still: Mask) -> list[tuple[int, int]]:
@@ -133,7 +140,7 @@ def asked(sp: Floats, op: Floats) -> Mask:
     return np.convolve(here, np.ones(3), mode="same") > 0
 
 
-def lawless(found: Law, usable: Mask, step: float) -> Mask:
+def lawless(found: ControlLaw, usable: Mask, step: float) -> Mask:
     """True in spans of good samples where OP is far from the law that the others obey, shape (n,)."""
     n, length = found.residual.size, found.length
     size = np.sqrt((found.residual.reshape(-1, length) ** 2).mean(axis=1))
@@ -143,15 +150,15 @@ def lawless(found: Law, usable: Mask, step: float) -> Mask:
     return out
 
 
-def ruled(e: Floats, op: Floats, said: Stated, usable: Mask, found: Law) -> Ruling | None:
+def ruled(e: Floats, op: Floats, said: Stated, usable: Mask, found: ControlLaw) -> ControllerFinding | None:
     """Spans in which something other than the law moves OP, or keeps it."""
     off = lawless(found, usable, op_step(op))
     if float(off.mean()) > LAWLESS_SHARE and found.explained > 0.0:
-        return Ruling("controller-logic", {"share": float(off.mean())}, off)
+        return ControllerFinding("controller-logic", {"share": float(off.mean())}, off)
     return logic(e, op, said, usable)
 
 
-def logic(e: Floats, op: Floats, said: Stated, usable: Mask) -> Ruling | None:
+def logic(e: Floats, op: Floats, said: Stated, usable: Mask) -> ControllerFinding | None:
     """Stretches in which OP stands although the law asks it to go, whatever the error."""
     path = np.cumsum(due_moves(e, said))
     least = STUCK_MOVE * max(op_step(op), 0.02)
@@ -160,7 +167,7 @@ def logic(e: Floats, op: Floats, said: Stated, usable: Mask) -> Ruling | None:
         if last - first >= STUCK_RUN and float(np.ptp(path[first:last])) > least:
             where[first:last] = True
     share = float(where.mean())
-    return Ruling("controller-logic", {"share": share}, where) if share > STUCK_SHARE else None
+    return ControllerFinding("controller-logic", {"share": share}, where) if share > STUCK_SHARE else None
 
 
 def typical(residual: Floats, length: int) -> float:
@@ -168,7 +175,7 @@ def typical(residual: Floats, length: int) -> float:
     return float(np.median(np.sqrt((residual.reshape(-1, length) ** 2).mean(axis=1))))
 
 
-def obeys(sp: Floats, pv: Floats, op: Floats, said: Stated, found: Law) -> bool:
+def obeys(sp: Floats, pv: Floats, op: Floats, said: Stated, found: ControlLaw) -> bool:
     """Whether the stated law gives OP nearly as well as the one found, in most spans and in those that move it."""
     n, length = found.residual.size, found.length
     e = (sp - shifted(pv, found.late))[:n]
@@ -178,7 +185,7 @@ def obeys(sp: Floats, pv: Floats, op: Floats, said: Stated, found: Law) -> bool:
     return whole and typical(left, length) < SAME_LAW * typical(found.residual, length)
 
 
-def settings(found: Law, said: Stated) -> Ruling | None:
+def settings(found: ControlLaw, said: Stated) -> ControllerFinding | None:
     """Settings that reproduce OP where the stated ones do not."""
     if found.explained < LAW_EXPLAINS or found.ki == 0 or found.kp / found.ki <= 0:
         return None
@@ -188,10 +195,12 @@ def settings(found: Law, said: Stated) -> Ruling | None:
     if max(off_kp, off_ti) < (SETTING_THINNED if said.thinned else SETTING):
         return None
     values = {"kp": found.kp, "ti_samples": ti} if off_kp >= off_ti else {"ti_samples": ti, "kp": found.kp}
-    return Ruling("controller-settings", values, np.ones(found.residual.size, dtype=bool))
+    return ControllerFinding("controller-settings", values, np.ones(found.residual.size, dtype=bool))
 
 
-def judge(sp: Floats, pv: Floats, op: Floats, usable: Mask, said: Stated) -> tuple[Ruling | None, Law]:
+def judge(
+    sp: Floats, pv: Floats, op: Floats, usable: Mask, said: Stated
+) -> tuple[ControllerFinding | None, ControlLaw]:
     """The first thing that is wrong with clock or controller, and the law as found.
 
     Parameters
@@ -203,13 +212,15 @@ def judge(sp: Floats, pv: Floats, op: Floats, usable: Mask, said: Stated) -> tup
     said : Stated
         Of a thinned recording nothing but settings plainly wrong is said: the law is not seen at work.
     """
-    found = found_law(sp, pv, op, usable, said.ti, said.kp, late=not said.thinned)
+    found = recovered_law(sp, pv, op, usable, said.ti, said.kp, late=not said.thinned)
     e = sp - pv
     wrong = None if obeys(sp, pv, op, said, found) else settings(found, said)
     if said.thinned:
         return wrong, found
     if found.late >= LATE and found.explained > LAW_EXPLAINS:
-        return Ruling("clock-offset", {"late_samples": found.late}, np.ones(op.size, dtype=bool)), found
+        return ControllerFinding(
+            "clock-offset", {"late_samples": found.late}, np.ones(op.size, dtype=bool)
+        ), found
     law_now = Stated(found.kp, found.kp / found.ki) if wrong is not None else said
     frozen, other = gap(e, op, law_now, usable), ruled(e, op, law_now, usable & ~asked(sp, op), found)
     if frozen is not None:

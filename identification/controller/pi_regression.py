@@ -20,7 +20,7 @@ from identification.record import Floats, Mask
 
 
 @dataclass(frozen=True, slots=True)
-class Law:
+class ControlLaw:
     """A PI law as found: kp [% OP/% PV], ki [% OP/(% PV sample)], the PV's lateness in samples, the residual of OP
     (scatter, in % OP, and per sample, shape (n,), less each span's constant) and the share that the law explains."""
 
@@ -76,7 +76,7 @@ def unbroken(usable: Mask, length: int) -> Mask:
     return whole if whole.sum() >= LAW_SPANS * length else usable.copy()
 
 
-def law(sp: Floats, pv: Floats, op: Floats, usable: Mask, length: int, late: float) -> Law:
+def law(sp: Floats, pv: Floats, op: Floats, usable: Mask, length: int, late: float) -> ControlLaw:
     """The PI law at a given lateness of PV, spans that do not obey it left out twice."""
     e = sp - shifted(pv, late)
     n = (e.size // length) * length
@@ -88,7 +88,7 @@ def law(sp: Floats, pv: Floats, op: Floats, usable: Mask, length: int, late: flo
     moved = centred(op[:n], length)
     left = float((residual[keep] ** 2).mean()) if keep.any() else math.inf
     power = float((moved[keep] ** 2).mean()) if keep.any() else 1.0
-    return Law(kp, ki, late, math.sqrt(left), 1.0 - left / max(power, 1e-12), length, residual)
+    return ControlLaw(kp, ki, late, math.sqrt(left), 1.0 - left / max(power, 1e-12), length, residual)
 
 
 def span_length(n: int, ti_samples: float) -> int:
@@ -96,7 +96,7 @@ def span_length(n: int, ti_samples: float) -> int:
     return int(np.clip(ti_samples, LAW_SPAN, max(n // LAW_SPANS, LAW_SPAN)))
 
 
-def found_law(
+def recovered_law(
     sp: Floats,
     pv: Floats,
     op: Floats,
@@ -104,7 +104,7 @@ def found_law(
     ti_samples: float,
     stated_kp: float = 1.0,
     late: bool = True,
-) -> Law:
+) -> ControlLaw:
     """The PI law, with PV's lateness searched in whole samples and then between them.
 
     Under an oscillation a law of the wrong sign, half a period late, gives OP as well; only laws whose gain has the
@@ -112,10 +112,10 @@ def found_law(
     """
     length = span_length(op.size, ti_samples)
 
-    def at(shift: float) -> Law:
+    def at(shift: float) -> ControlLaw:
         return law(sp, pv, op, usable, length, shift)
 
-    def scatter(x: Law) -> float:
+    def scatter(x: ControlLaw) -> float:
         return x.scatter if x.kp * stated_kp > 0 and x.kp * x.ki > 0 else math.inf
 
     best = min((at(s) for s in (SHIFTS if late else (0.0,))), key=scatter)

@@ -47,7 +47,7 @@ FINALISTS = 8
 COMPASS = (0.02, 0.007, 0.0025)
 """Relative steps of the search within a pit."""
 SHORT = 1000
-"""Blocks of a record that is so short that every rival can be tried on it; ours."""
+"""Blocks of a record that is so short that every candidate can be tried on it; ours."""
 FOLLOWED_SHORT = 5
 """Candidates of a scan that are followed to the end on a short record: with few events there are more valleys."""
 FOLLOWED = 2

@@ -24,14 +24,14 @@ def innovations(window: Window, fit: Fit) -> Floats:
 
 
 @dataclass(frozen=True, slots=True)
-class Rival:
+class WindowFit:
     """A fit and the window that it is of (which may hold a step of the load)."""
 
     window: Window
     fit: Fit
 
 
-def evidence(ours: Rival, theirs: Rival) -> float:
+def evidence(ours: WindowFit, theirs: WindowFit) -> float:
     """Gain in log likelihood [nat] of one fit over another, no innovation counting for more than OUTLIER.
 
     The scale is the median absolute innovation of the first over 0.6745, which outliers leave alone.
@@ -45,7 +45,7 @@ def evidence(ours: Rival, theirs: Rival) -> float:
     return float(gained) / (2 * scale**2)
 
 
-STEP_PRICE = 6.0
+STEP_PENALTY = 6.0
 """Gain in log likelihood [nat] that one step of the load at any time costs: log of the blocks, nearly."""
 
 
@@ -56,23 +56,23 @@ def stem_moves(window: Window, valve: ValveTrial) -> int:
     return int(((set_out[1:] != set_out[:-1]) & (set_out[1:] != 0)).sum())
 
 
-def with_load_step(window: Window, fit: Fit, answering: Mask, noise: Floats) -> Rival:
-    """The plain process with one step of the load where its largest innovation is, if that is worth its price.
+def with_load_step(window: Window, fit: Fit, answering: Mask, noise: Floats) -> WindowFit:
+    """The plain process with one step of the load where its largest innovation is, if that is worth its penalty.
 
     A single slip of a stem and a single step of the load look alike; only the slip that also explains why the
     stem stood still before is evidence of the valve. Where PV is due to answer a set point move (`answering`,
     bool, shape (n,)) its step is no load: a load does not wait for the operator. `noise` is the noise model of
-    the rival, shape (p,), a second start: one fitted across the step is nearly an integrator.
+    the candidate, shape (p,), a second start: one fitted across the step is nearly an integrator.
     """
     judged = judged_mask(window.usable, fit.ar.size)
     white = np.where(answering[judged], 0.0, np.abs(innovations(window, fit)))
     if white.size < 50:
-        return Rival(window, fit)
+        return WindowFit(window, fit)
     at = int(np.flatnonzero(judged)[int(np.argmax(white))])
     stepped = replace(window, step_at=at)
     trial = max(
         (descend(stepped, start) for start in (fit, replace(fit, ar=noise))), key=lambda f: f.log_likelihood
     )
-    if trial.log_likelihood - fit.log_likelihood > STEP_PRICE:
-        return Rival(stepped, trial)
-    return Rival(window, fit)
+    if trial.log_likelihood - fit.log_likelihood > STEP_PENALTY:
+        return WindowFit(stepped, trial)
+    return WindowFit(window, fit)

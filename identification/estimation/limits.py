@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-PARAMETER_PRICE = 6.0
+PARAMETER_PENALTY = 6.0
 """Gain that one more constant has to bring; ours: log(n) would be 9, chance brings 1."""
-SEARCH_PRICE = 12.0
-"""Gain that the choice among some forty rivals and their starts costs; ours: the largest of forty chance gains."""
+SEARCH_PENALTY = 12.0
+"""Gain that the choice among some forty candidates and their starts costs; ours: the largest of forty by chance."""
 OUTLIER = 5.0
 """Innovations beyond this many robust standard deviations count less: no single event decides a name."""
 ROUNDS = 3
 """Effects named at most; a record seldom tells more."""
 FOLLOWED = 6
-"""Rivals that are followed to the end from several starts."""
+"""Candidates that are followed to the end from several starts."""
 SCREEN_STEPS = 5
 """Gauss-Newton steps in the first round."""
 FULL_STEPS = 20
@@ -19,7 +19,7 @@ FULL_STEPS = 20
 SETTLED = 0.05
 """Gain of a step below which the descent ends."""
 TIE = 4.0
-"""Rivals within this gain of the winner cannot be told from it and are its alternatives."""
+"""Candidates within this gain of the winner cannot be told from it and are its alternatives."""
 HELD_OUT = 0.35
 """Last part of the record that is held out when the winner is proven."""
 SPREAD = 0.15
@@ -74,8 +74,8 @@ LAWLESS_SHARE = 0.03
 HELD_OUT_LOSS = -2.0
 """Gain on the held-out part under which an effect falls; ours: chance moves it by about one."""
 PROVEN = 3
-"""Rivals that are put to the proof, best first, until one passes."""
-CEILING_PRICE = 45.0
+"""Candidates that are put to the proof, best first, until one passes."""
+CEILING_PENALTY = 45.0
 """Gain beyond its number of weights that the flexible model needs over the last fit before something is said to be
 left; ours: with nothing hidden the largest of thirty was 37."""
 CEILING_SHARE = 0.3

@@ -1,4 +1,4 @@
-"""The noise model of the rivals: an autoregression whose lags widen, so that slow loads and fast noise both fit."""
+"""The noise model: an autoregression whose lags widen, so that slow loads and fast noise both fit."""
 
 from __future__ import annotations
 

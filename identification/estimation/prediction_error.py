@@ -1,4 +1,4 @@
-"""A rival fitted: all its constants and the noise model at once to the least innovations."""
+"""A candidate fitted: all its constants and the noise model at once to the least innovations."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from identification.estimation.limits import BIAS_SCATTER, SETTLED, START_SCATTE
 from identification.estimation.noise import Edges, edges_for, fitted, judged, lag_means, whitened
 from identification.record import Floats, Mask
 from identification.simulation.effect import Param, Row
-from identification.simulation.open_loop import Scene, simulate
+from identification.simulation.open_loop import ModelInputs, simulate
 from identification.simulation.parameters import Slot
 
 BASE = (
@@ -21,7 +21,7 @@ BASE = (
     Param(Slot.BIAS, "bias_pct", "% PV", -2e3, 2e3),
     Param(Slot.START, "start_pct", "% PV", -300.0, 300.0),
 )
-"""Constants of the plain loop, free in every rival."""
+"""Constants of the plain loop, free in every candidate."""
 PRIOR = (Slot.START, Slot.BIAS)
 """Constants that short time constants, or a load like a random walk, leave open; they are held near the recording."""
 FAR = 3e3
@@ -32,11 +32,11 @@ FAR = 3e3
 class Problem:
     """A recording prepared for fitting.
 
-    scene : what drives the model; y : PV less scene.level, shape (n,); usable : bool, shape (n,); weight : shape
+    inputs : what drives the model; y : PV less inputs.level, shape (n,); usable : bool, shape (n,); weight : shape
     (n,), what each innovation counts, 0 where it is not judged.
     """
 
-    scene: Scene
+    inputs: ModelInputs
     y: Floats
     usable: Mask
     weight: Floats
@@ -48,10 +48,10 @@ class Problem:
         return int((self.weight > 0).sum())
 
 
-def problem(scene: Scene, y: Floats, usable: Mask) -> Problem:
+def problem(inputs: ModelInputs, y: Floats, usable: Mask) -> Problem:
     """A problem whose usable samples all count alike."""
     edges = edges_for(y.size)
-    return Problem(scene, y, usable, judged(usable, int(edges[-1])).astype(float), edges)
+    return Problem(inputs, y, usable, judged(usable, int(edges[-1])).astype(float), edges)
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,44 +90,44 @@ def gain(better: Fitted, worse: Fitted) -> float:
     return worse.count * math.log(max(worse.loss, 1e-30) / max(better.loss, 1e-30))
 
 
-def scales(scene: Scene, c: Floats, param: Param) -> tuple[float, float]:
+def scales(inputs: ModelInputs, c: Floats, param: Param) -> tuple[float, float]:
     """Offset and factor that turn a row's numbers into the constant's own unit."""
-    op = scene.op
+    op = inputs.op
     reach = max(float(np.ptp(op)), 1e-6)
     match param.scale:
         case "op":
             return 0.0, reach
         case "op/dt":
-            return 0.0, reach / scene.dt_s
+            return 0.0, reach / inputs.dt_s
         case "opspan":
             return float(op.min()), reach
         case "1/op":
             return 0.0, 100.0 / reach
         case "1/pv":
-            return 0.0, 50.0 / max(scene.pv_range[1] - scene.pv_range[0], 1e-6)
+            return 0.0, 50.0 / max(inputs.pv_range[1] - inputs.pv_range[0], 1e-6)
         case "pvspan":
-            return scene.pv_range[0], scene.pv_range[1] - scene.pv_range[0]
+            return inputs.pv_range[0], inputs.pv_range[1] - inputs.pv_range[0]
         case "T":
             return 0.0, float(c[Slot.T])
         case "dt":
-            return 0.0, scene.dt_s
+            return 0.0, inputs.dt_s
         case "span":
-            return 0.0, scene.dt_s * op.size
+            return 0.0, inputs.dt_s * op.size
     return 0.0, 1.0
 
 
-def bounds(scene: Scene, c: Floats, param: Param) -> tuple[float, float]:
+def bounds(inputs: ModelInputs, c: Floats, param: Param) -> tuple[float, float]:
     """Lowest and highest value of a constant, in its own unit."""
     if param.slot == Slot.T:
-        longest = 2.0 * scene.dt_s * scene.op.size
-        return 0.3 * scene.dt_s, longest if c[Slot.LEAK] == 0 else min(longest, scene.longest_s)
-    offset, factor = scales(scene, c, param)
+        longest = 2.0 * inputs.dt_s * inputs.op.size
+        return 0.3 * inputs.dt_s, longest if c[Slot.LEAK] == 0 else min(longest, inputs.longest_s)
+    offset, factor = scales(inputs, c, param)
     return offset + factor * param.low, offset + factor * param.high
 
 
 def residual_fit(p: Problem, c: Floats) -> tuple[Floats, Floats, Floats, Floats]:
     """Residual, its lag means, noise model and innovations at given constants."""
-    r = p.y - simulate(p.scene, c)
+    r = p.y - simulate(p.inputs, c)
     if not float(np.abs(r).max()) < FAR:
         groups = p.edges.size - 1
         return r, np.zeros((groups, r.size)), np.zeros(groups), np.full(r.size, FAR)
@@ -141,29 +141,29 @@ def loss_of(p: Problem, e: Floats) -> float:
     return float((p.weight * e) @ e / p.weight.sum())
 
 
-def step_of(scene: Scene, c: Floats, param: Param) -> float:
+def step_of(inputs: ModelInputs, c: Floats, param: Param) -> float:
     """Step of the numeric derivative of a constant, in its own unit."""
     if param.log:
         return 0.01 * float(c[param.slot])
     if param.slot == Slot.L:
-        return 0.05 * scene.dt_s
+        return 0.05 * inputs.dt_s
     if param.scale in ("op", "opspan"):
-        return 2e-3 * float(np.ptp(scene.op))
+        return 2e-3 * float(np.ptp(inputs.op))
     if param.slot == Slot.OMEGA:
-        return 0.02 * 2 * math.pi / (scene.dt_s * scene.op.size)
+        return 0.02 * 2 * math.pi / (inputs.dt_s * inputs.op.size)
     return 0.01 * max(abs(float(c[param.slot])), 0.1)
 
 
 def sensitivities(p: Problem, model: Model, ar: Floats) -> Floats:
     """Whitened derivatives of the simulation by the free constants (logarithms where so searched), (m, n)."""
-    here = simulate(p.scene, model.c)
+    here = simulate(p.inputs, model.c)
     out = np.empty((len(model.params), p.y.size))
     for i, param in enumerate(model.params):
-        c, h = model.c.copy(), step_of(p.scene, model.c, param)
-        if c[param.slot] + h > bounds(p.scene, model.c, param)[1]:
+        c, h = model.c.copy(), step_of(p.inputs, model.c, param)
+        if c[param.slot] + h > bounds(p.inputs, model.c, param)[1]:
             h = -h
         c[param.slot] += h
-        slope = (simulate(p.scene, c) - here) / (h / model.c[param.slot] if param.log else h)
+        slope = (simulate(p.inputs, c) - here) / (h / model.c[param.slot] if param.log else h)
         out[i] = whitened(np.clip(slope, -1e9, 1e9), ar, p.edges)
     return out
 
@@ -172,7 +172,7 @@ def moved(p: Problem, model: Model, step: Floats) -> Model:
     """The model after a step in its free constants, kept within bounds."""
     c = model.c.copy()
     for param, s in zip(model.params, step, strict=True):
-        low, high = bounds(p.scene, model.c, param)
+        low, high = bounds(p.inputs, model.c, param)
         value = c[param.slot]
         value = value * math.exp(min(max(s, -1.5), 1.5)) if param.log else value + s
         c[param.slot] = min(max(value, low), high)

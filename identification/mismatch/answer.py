@@ -11,8 +11,8 @@ import numpy as np
 from identification.estimation.limits import Z90
 from identification.estimation.prediction_error import Fitted, deviations
 from identification.mismatch.cross_validation import HeldOut, Misfit, held_out, misfit
-from identification.mismatch.diagnosis import Explanation, Subject, alternatives, restored
-from identification.mismatch.identifiability import DEAF, uninformed
+from identification.mismatch.diagnosis import Explanation, Recording, alternatives, restored
+from identification.mismatch.identifiability import INSENSITIVE, uninformed
 from identification.mismatch.location.locate import Located
 from identification.mismatch.location.where import located_in, where_of
 from identification.models import Estimate
@@ -74,9 +74,9 @@ def exact(value: float, unit: str, half: float = 0.0) -> Estimate:
     return Estimate(value, value - half, value + half, unit)
 
 
-def trace_effect(found: Explanation, s: Subject) -> Effect | None:
+def recorder_effect(found: Explanation, s: Recording) -> Effect | None:
     """The finding about the recorder as an effect."""
-    t = found.trace
+    t = found.recorder
     if t is None:
         return None
     step = float(np.median(np.diff(np.unique(s.pv)))) if t.name == "sensor-clipping" else 0.0
@@ -89,9 +89,9 @@ def trace_effect(found: Explanation, s: Subject) -> Effect | None:
     return Effect(t.name, BLOCKS[t.name], shown, None)
 
 
-def ruling_effect(found: Explanation, s: Subject) -> Effect | None:
+def controller_effect(found: Explanation, s: Recording) -> Effect | None:
     """The finding about clock or controller as an effect."""
-    r = found.ruling
+    r = found.controller
     if r is None:
         return None
     v, dt = r.values, s.dt_s
@@ -136,9 +136,9 @@ def _derived(row: Row, own: dict[str, Estimate]) -> dict[str, Estimate]:
     return {}
 
 
-def effects_of(found: Explanation, s: Subject, proof: HeldOut | None) -> tuple[Effect, ...]:
+def effects_of(found: Explanation, s: Recording, proof: HeldOut | None) -> tuple[Effect, ...]:
     """Every effect found, the likeliest first."""
-    gates = [e for e in (trace_effect(found, s), ruling_effect(found, s)) if e is not None]
+    gates = [e for e in (recorder_effect(found, s), controller_effect(found, s)) if e is not None]
     rows = found.best.model.rows
     physics = [
         Effect(
@@ -176,17 +176,17 @@ def moved(found: Explanation) -> dict[str, tuple[float, float]]:
 
 def remaining(found: Explanation) -> float:
     """Share of PV's mean square about its mean that the last model leaves."""
-    left = misfit(found.p.y, simulate(found.p.scene, found.best.model.c))
+    left = misfit(found.p.y, simulate(found.p.inputs, found.best.model.c))
     return (left.rmse / max(float(np.std(found.p.y)), 1e-12)) ** 2
 
 
-def answer(found: Explanation, s: Subject) -> Answer:
+def answer(found: Explanation, s: Recording) -> Answer:
     """The answer of an explanation.
 
     Parameters
     ----------
     found : Explanation
-    s : Subject
+    s : Recording
         What was explained.
     """
     proof = found.proof or held_out(found.p, found.plain, found.best)
@@ -213,14 +213,14 @@ def verdict_of(found: Explanation, effects: tuple[Effect, ...], lacking: str, at
         return "unexplained", "none"
     if found.left > 0 and not any(found_first(found)):
         return "unexplained", LIVES.get(at.carrying[0].name, "process") if at.carrying else "process"
-    if effects and not (lacking.startswith(DEAF) and effects[0].block in ("valve", "process")):
+    if effects and not (lacking.startswith(INSENSITIVE) and effects[0].block in ("valve", "process")):
         return effects[0].name, effects[0].block
     return ("unexplained", "none") if lacking else ("none", "none")
 
 
 def found_first(found: Explanation) -> tuple[bool, bool]:
     """Whether recorder and controller have an answer of their own, which nothing left over takes away."""
-    return found.trace is not None, found.ruling is not None
+    return found.recorder is not None, found.controller is not None
 
 
 def _note(found: Explanation) -> str:

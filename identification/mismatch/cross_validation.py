@@ -1,4 +1,4 @@
-"""Is a rival's gain real: on spans that were not fitted, and without the one span that pays most."""
+"""Is a candidate's gain real: on spans that were not fitted, and without the one span that pays most."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def gains_by_block(p: Problem, better: Fitted, worse: Fitted) -> Floats:
 
 def is_one_move(p: Problem) -> bool:
     """Whether OP moves in two parts of the record alone: one experiment, of which no part is left to prove it on."""
-    travel = np.sort([float(np.abs(np.diff(part)).sum()) for part in np.array_split(p.scene.op, BLOCKS)])
+    travel = np.sort([float(np.abs(np.diff(part)).sum()) for part in np.array_split(p.inputs.op, BLOCKS)])
     return float(travel[-2:].sum()) > ONE_MOVE * float(travel.sum())
 
 
@@ -119,14 +119,14 @@ def held_out(p: Problem, worse: Fitted, better: Fitted) -> HeldOut:
     cut = int((1.0 - HELD_OUT) * p.y.size)
     early = replace(p, weight=np.where(np.arange(p.y.size) < cut, p.weight, 0.0))
     fits = [_refit(early, m.model) for m in (worse, better)]
-    simulated = [simulate(p.scene, fit.model.c) for fit in fits]
+    simulated = [simulate(p.inputs, fit.model.c) for fit in fits]
     late = p.weight[cut:]
     whitenings = [whitened(p.y - x, fit.ar, p.edges)[cut:] for x, fit in zip(simulated, fits, strict=True)]
     losses = [float((late * e) @ e) for e in whitenings]
     won = (losses[0] - losses[1]) / max(fits[1].loss, 1e-30)
     c = fits[0].model.c
-    window = max(int(WINDOW_TIMES * float(c[Slot.T] + c[Slot.L]) / p.scene.dt_s), WINDOW_SAMPLES)
-    final = [simulate(p.scene, m.model.c) for m in (worse, better)]
+    window = max(int(WINDOW_TIMES * float(c[Slot.T] + c[Slot.L]) / p.inputs.dt_s), WINDOW_SAMPLES)
+    final = [simulate(p.inputs, m.model.c) for m in (worse, better)]
     whole, windowed = (_compared(p.y, simulated, final, cut, won, size) for size in (0, window))
     return windowed if windowed.carries and not whole.carries else whole
 

@@ -6,33 +6,33 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from identification.controller.check import Ruling, Stated, judge
-from identification.controller.pi_regression import Law, shifted
-from identification.estimation.limits import CEILING_PRICE, CEILING_SHARE, FULL_STEPS, PROVEN, ROUNDS, TIE
+from identification.controller.check import ControllerFinding, Stated, judge
+from identification.controller.pi_regression import ControlLaw, shifted
+from identification.estimation.limits import CEILING_PENALTY, CEILING_SHARE, FULL_STEPS, PROVEN, ROUNDS, TIE
 from identification.estimation.prediction_error import Fitted, Model, Problem, descend, gain
-from identification.mismatch import recording_faults as recorder
+from identification.mismatch import recording_faults
 from identification.mismatch.catalogue import CATALOGUE
 from identification.mismatch.cross_validation import TIMED, HeldOut, held_out, is_one_move, passes
 from identification.mismatch.forward_selection import (
+    Candidate,
     Clip,
     Progress,
-    Rival,
     compete,
+    integrating_or_first_order,
+    penalty,
     prepared,
-    price,
     silent,
-    unsettled,
 )
 from identification.mismatch.lack_of_fit import ceiling
-from identification.mismatch.starts.screening import Excited, excited
+from identification.mismatch.starts.screening import CandidateInputs, candidate_inputs
 from identification.record import Floats, Mask
 from identification.simulation.effect import Row
-from identification.simulation.open_loop import Scene
+from identification.simulation.open_loop import ModelInputs
 from identification.simulation.parameters import Slot, neutral
 
 
 @dataclass(frozen=True, slots=True)
-class Subject:
+class Recording:
     """One recording to be explained.
 
     sp : shape (n,) [% PV], None where not recorded; pv, op : shape (n,) [% of span]; usable : bool, shape (n,);
@@ -57,22 +57,23 @@ class Subject:
 class Explanation:
     """What was found.
 
-    trace, ruling : findings about recorder and controller; plain, best : fits without and with the effects; p, p0 :
-    the problems that they solve; accepted : the rivals taken, in order; last : the rivals of the last round;
-    before : the fit to which each accepted rival was added; late_s : PV's lateness that was taken out [s]; proof :
-    plain and best on held-out data; refuted : names of effects that explain the fitted part and not the rest;
-    unproven : whether OP moved once, so that nothing is left to prove the effects on.
+    recorder, controller : what was found about them; p : the problem that the fits solve; plain, best : fits without
+    and with the effects; accepted : the candidates taken, in order; before : the fit to which each was added; first :
+    the candidates of the first round; law : the control law recovered; late_s : PV's lateness that was taken out [s];
+    left : gain of a flexible model beyond its least, 0 where nothing is left; proof : plain and best on held-out
+    data; refuted : names of effects that explain the fitted part and not the rest; unproven : whether OP moved once,
+    so that nothing is left to prove the effects on.
     """
 
     p: Problem = field(repr=False)
     plain: Fitted
     best: Fitted
-    accepted: tuple[Rival, ...] = ()
+    accepted: tuple[Candidate, ...] = ()
     before: tuple[Fitted, ...] = ()
-    first: tuple[Rival, ...] = ()
-    trace: recorder.Trace | None = None
-    ruling: Ruling | None = None
-    law: Law | None = None
+    first: tuple[Candidate, ...] = ()
+    recorder: recording_faults.RecorderFinding | None = None
+    controller: ControllerFinding | None = None
+    law: ControlLaw | None = None
     late_s: float = 0.0
     left: float = 0.0
     proof: HeldOut | None = None
@@ -80,15 +81,17 @@ class Explanation:
     unproven: bool = False
 
 
-def trace_of(s: Subject) -> recorder.Trace | None:
+def recorder_finding_of(s: Recording) -> recording_faults.RecorderFinding | None:
     """The first thing that the recorder did to the trends."""
-    found = recorder.compression(s.pv) or recorder.sampling(s.stamp_s, s.dt_s)
-    return found or recorder.quantization(s.pv, s.ranged) or recorder.clipped(s.pv)
+    found = recording_faults.compression(s.pv) or recording_faults.sampling(s.stamp_s, s.dt_s)
+    return found or recording_faults.quantization(s.pv, s.ranged) or recording_faults.clipped(s.pv)
 
 
-def ruling_of(s: Subject, trace: recorder.Trace | None) -> tuple[Ruling | None, Law | None]:
+def controller_finding_of(
+    s: Recording, recorder: recording_faults.RecorderFinding | None
+) -> tuple[ControllerFinding | None, ControlLaw | None]:
     """What clock and controller did, where there is a controller to judge and a recording fit for it."""
-    if s.sp is None or s.stated is None or (trace is not None and trace.name in GATES):
+    if s.sp is None or s.stated is None or (recorder is not None and recorder.name in GATES):
         return None, None
     return judge(s.sp, s.pv, s.op, s.usable & (s.op > 0.05) & (s.op < 99.95), s.stated)
 
@@ -100,11 +103,11 @@ ALONE = (*GATES, "quantization")
 physics is still asked, for whatever made OP, PV answers it."""
 
 
-def scene_of(s: Subject) -> Scene:
+def inputs_of(s: Recording) -> ModelInputs:
     """What drives the model of a recording."""
     level = float(np.mean(s.pv))
     neighbour = s.neighbours[0] - s.neighbours[0].mean() if s.neighbours else None
-    return Scene(
+    return ModelInputs(
         s.op, s.dt_s, float(s.op.mean()), level, (float(s.pv.min()), float(s.pv.max())), (), neighbour
     )
 
@@ -119,19 +122,19 @@ def without_spikes(pv: Floats, usable: Mask) -> Mask:
     return usable & ~alone
 
 
-def trace_clip(trace: recorder.Trace | None, pv: Floats) -> Clip | None:
+def transmitter_end(recorder: recording_faults.RecorderFinding | None, pv: Floats) -> Clip | None:
     """Where a transmitter's range ends, if it does."""
-    if trace is None or trace.name != "sensor-clipping":
+    if recorder is None or recorder.name != "sensor-clipping":
         return None
-    return Clip(trace.value, trace.value > float(np.median(pv)), trace.where)
+    return Clip(recorder.value, recorder.value > float(np.median(pv)), recorder.where)
 
 
-def explain(s: Subject, tell: Progress = silent, brought: Floats | None = None) -> Explanation:
+def explain(s: Recording, tell: Progress = silent, brought: Floats | None = None) -> Explanation:
     """Explain where a plain loop and a recording differ.
 
     Parameters
     ----------
-    s : Subject
+    s : Recording
     tell : callable
         Is told what is tried, for progress.
     brought : ndarray of shape (SIZE,) or None
@@ -141,20 +144,28 @@ def explain(s: Subject, tell: Progress = silent, brought: Floats | None = None) 
     -------
     Explanation
     """
-    s = replace(s, usable=s.usable & ~recorder.unlogged(s.stamp_s, s.pv.size, s.dt_s))
-    trace = trace_of(s)
-    ruling, law = ruling_of(s, trace)
+    s = replace(s, usable=s.usable & ~recording_faults.unlogged(s.stamp_s, s.pv.size, s.dt_s))
+    recorder = recorder_finding_of(s)
+    controller, law = controller_finding_of(s, recorder)
     usable = without_spikes(s.pv, s.usable)
     late_s = 0.0
     pv = s.pv
-    if ruling is not None and ruling.name == "clock-offset":
-        late_s = ruling.values["late_samples"] * s.dt_s
-        pv = shifted(pv, ruling.values["late_samples"])
-    scene = scene_of(replace(s, pv=pv))
+    if controller is not None and controller.name == "clock-offset":
+        late_s = controller.values["late_samples"] * s.dt_s
+        pv = shifted(pv, controller.values["late_samples"])
+    inputs = inputs_of(replace(s, pv=pv))
     tell("plain loop")
-    p, plain = prepared(scene, pv - scene.level, usable, brought, trace_clip(trace, pv))
-    found = Explanation(p, plain, plain, trace=trace, ruling=ruling, law=law, late_s=late_s)
-    if any(x is not None and x.name in ALONE for x in (trace, ruling)):
+    p, plain = prepared(inputs, pv - inputs.level, usable, brought, transmitter_end(recorder, pv))
+    found = Explanation(
+        p,
+        plain,
+        plain,
+        recorder=recorder,
+        controller=controller,
+        law=law,
+        late_s=late_s,
+    )
+    if any(x is not None and x.name in ALONE for x in (recorder, controller)):
         return found
     return carried_over(physics(found, tell, s.kind))
 
@@ -175,8 +186,8 @@ def carried_over(found: Explanation) -> Explanation:
 def first_effects(found: Explanation, count: int) -> Explanation:
     """The explanation with its first effects alone, the others given up and the rest fitted anew."""
     c = found.best.model.c
-    for rival in found.accepted[count:]:
-        c = cleared(c, rival.row)
+    for candidate in found.accepted[count:]:
+        c = cleared(c, candidate.row)
     names = {r.name for r in found.accepted[:count]}
     rows = tuple(r for r in found.best.model.rows if r.name in names)
     best = descend(found.p, Model(rows, c), FULL_STEPS)
@@ -185,17 +196,17 @@ def first_effects(found: Explanation, count: int) -> Explanation:
 
 def physics(found: Explanation, tell: Progress, kind: str = "") -> Explanation:
     """Add effects of the catalogue one by one, as long as one passes."""
-    p, best = unsettled(found.p, found.plain, kind)
+    p, best = integrating_or_first_order(found.p, found.plain, kind)
     found = replace(found, p=p, plain=best)
-    accepted: list[Rival] = []
+    accepted: list[Candidate] = []
     before: list[Fitted] = []
-    first: tuple[Rival, ...] = ()
-    rivals: list[Rival] = []
+    first: tuple[Candidate, ...] = ()
+    candidates: list[Candidate] = []
     for _ in range(ROUNDS):
-        x = excited(p, best, kind)
-        rivals = compete(x, best, CATALOGUE, tell)
-        first = first or tuple(rivals)
-        winner = proven(x.p, best, rivals)
+        x = candidate_inputs(p, best, kind)
+        candidates = compete(x, best, CATALOGUE, tell)
+        first = first or tuple(candidates)
+        winner = proven(x.p, best, candidates)
         if winner is None:
             break
         accepted.append(winner)
@@ -203,18 +214,20 @@ def physics(found: Explanation, tell: Progress, kind: str = "") -> Explanation:
         p, best = x.p, descend(x.p, winner.fit.model, FULL_STEPS)
     if len(accepted) > 1:
         tell("other sets of effects")
-        x = excited(p, best, kind)
-        best, accepted = exchanged(x, best, accepted, tell)
+        x = candidate_inputs(p, best, kind)
+        best, accepted = replacement_step(x, best, accepted, tell)
     won, weights = ceiling(p, best)
-    least = max(CEILING_PRICE, CEILING_SHARE * gain(best, found.plain))
+    least = max(CEILING_PENALTY, CEILING_SHARE * gain(best, found.plain))
     left = won - weights - least
-    if not accepted and any(r.name == "load-step" and r.net > 0 for r in rivals):
-        left = max(left, rivals[0].net)
+    if not accepted and any(r.name == "load-step" and r.penalised > 0 for r in candidates):
+        left = max(left, candidates[0].penalised)
     found = replace(found, p=p, best=best, accepted=tuple(accepted), before=tuple(before), first=first)
     return replace(found, left=left if left > 0 else 0.0)
 
 
-def exchanged(x: Excited, best: Fitted, accepted: list[Rival], tell: Progress) -> tuple[Fitted, list[Rival]]:
+def replacement_step(
+    x: CandidateInputs, best: Fitted, accepted: list[Candidate], tell: Progress
+) -> tuple[Fitted, list[Candidate]]:
     """The accepted effects, each given up once for whatever does better beside the others.
 
     Effects are added one at a time, so the first may have been taken in the place of two that act together.
@@ -222,13 +235,15 @@ def exchanged(x: Excited, best: Fitted, accepted: list[Rival], tell: Progress) -
     for i, old in enumerate(accepted):
         others = tuple(r for r in best.model.rows if r.name != old.name)
         near = descend(x.p, Model(others, cleared(best.model.c, old.row)), FULL_STEPS)
-        rivals = [r for r in compete(x, near, CATALOGUE, tell) if r.name != old.name]
-        if not rivals:
+        candidates = [r for r in compete(x, near, CATALOGUE, tell) if r.name != old.name]
+        if not candidates:
             continue
-        least = gain(best, near) - price(old.row) + TIE
-        if rivals[0].net > max(least, 0.0) and passes(x.p, near, rivals[0].fit, rivals[0].name):
-            best = descend(x.p, rivals[0].fit.model, FULL_STEPS)
-            accepted = [*accepted[:i], rivals[0], *accepted[i + 1 :]]
+        least = gain(best, near) - penalty(old.row) + TIE
+        if candidates[0].penalised > max(least, 0.0) and passes(
+            x.p, near, candidates[0].fit, candidates[0].name
+        ):
+            best = descend(x.p, candidates[0].fit.model, FULL_STEPS)
+            accepted = [*accepted[:i], candidates[0], *accepted[i + 1 :]]
     return best, accepted
 
 
@@ -240,13 +255,13 @@ def cleared(c: Floats, row: Row) -> Floats:
     return out
 
 
-def proven(p: Problem, near: Fitted, rivals: list[Rival]) -> Rival | None:
-    """The best rival with a gain left after its price that passes the proof."""
-    for rival in rivals[:PROVEN]:
-        if rival.net <= 0:
+def proven(p: Problem, near: Fitted, candidates: list[Candidate]) -> Candidate | None:
+    """The best candidate with a gain left after its penalty that passes the proof."""
+    for candidate in candidates[:PROVEN]:
+        if candidate.penalised <= 0:
             return None
-        if passes(p, near, rival.fit, rival.name):
-            return rival
+        if passes(p, near, candidate.fit, candidate.name):
+            return candidate
     return None
 
 
@@ -255,7 +270,7 @@ def alternatives(found: Explanation) -> tuple[str, ...]:
     if not found.accepted:
         return ()
     winner = found.accepted[0]
-    close = [r.name for r in found.first if r.net > max(winner.net - TIE, 0.0)]
+    close = [r.name for r in found.first if r.penalised > max(winner.penalised - TIE, 0.0)]
     names = dict.fromkeys((*close, *winner.row.likeness))
     return tuple(n for n in names if n != winner.name)
 

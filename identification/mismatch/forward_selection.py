@@ -1,4 +1,4 @@
-"""The rivals of a record: every row of the catalogue started, screened, followed, and ranked by what it gains."""
+"""The candidates of a record: every row of the catalogue started, screened, followed, and ranked by what it gains."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from identification.estimation.limits import (
     FOLLOWED,
     FULL_STEPS,
     OUTLIER,
-    PARAMETER_PRICE,
+    PARAMETER_PENALTY,
     SAME,
     SCREEN_STEPS,
-    SEARCH_PRICE,
+    SEARCH_PENALTY,
     SETTLES,
     STICKING_HINT,
 )
@@ -28,12 +28,12 @@ from identification.estimation.prediction_error import (
 )
 from identification.estimation.start_values import plain_processes
 from identification.mismatch.catalogue import CATALOGUE
-from identification.mismatch.starts.screening import Excited, candidates, screened, span_of
+from identification.mismatch.starts.screening import CandidateInputs, screened, span_of, start_models
 from identification.mismatch.starts.stick_slip import fit_sticking
 from identification.mismatch.starts.two_modes import OTHERS, mode_starts
 from identification.record import Floats, Mask
 from identification.simulation.effect import Row
-from identification.simulation.open_loop import Scene
+from identification.simulation.open_loop import ModelInputs
 from identification.simulation.parameters import Slot, neutral
 
 Progress = Callable[[str], None]
@@ -42,12 +42,12 @@ KNOWN_TYPES = ("flow", "pressure", "temperature", "level")
 
 
 @dataclass(frozen=True, slots=True)
-class Rival:
-    """A fitted rival: what it gains over the fit before, and what is left of that after its price."""
+class Candidate:
+    """A fitted candidate: what it gains over the fit before, and what is left of that after its penalty."""
 
     fit: Fitted
     gain: float
-    net: float
+    penalised: float
 
     @property
     def name(self) -> str:
@@ -81,18 +81,18 @@ def censored(p: Problem, clip: Clip) -> Problem:
 def plain(p: Problem, brought: Floats | None = None, clip: Clip | None = None) -> Fitted:
     """The plain loop at its optimum; a brought model (its constants) is one more start."""
     fits = [] if brought is None else [descend(p, Model((), brought.copy()), FULL_STEPS)]
-    for process in plain_processes(p.y, p.scene.op, p.usable, p.scene.dt_s):
+    for process in plain_processes(p.y, p.inputs.op, p.usable, p.inputs.dt_s):
         c = neutral()
         if clip is not None:
             c[Slot.CLIP_HI if clip.upper else Slot.CLIP_LO] = clip.value
         c[Slot.T], c[Slot.L], c[Slot.K] = process.time_constant_s, process.dead_time_s, process.gain
         c[Slot.START] = p.y[0]
-        c[Slot.BIAS] = float(np.mean(p.y)) - process.gain * float(np.mean(p.scene.op) - p.scene.middle)
+        c[Slot.BIAS] = float(np.mean(p.y)) - process.gain * float(np.mean(p.inputs.op) - p.inputs.middle)
         fits.append(descend(p, Model((), c), FULL_STEPS))
     return min(fits, key=lambda fit: fit.loss)
 
 
-def calmed(p: Problem, fit: Fitted) -> Problem:
+def robustly_weighted(p: Problem, fit: Fitted) -> Problem:
     """The problem with innovations beyond OUTLIER robust standard deviations counting less."""
     inside = p.weight > 0
     scale = float(np.median(np.abs(fit.e[inside]))) / 0.6745
@@ -100,7 +100,7 @@ def calmed(p: Problem, fit: Fitted) -> Problem:
     return replace(p, weight=np.where(inside, np.minimum(1.0, OUTLIER / np.maximum(size, OUTLIER)), 0.0))
 
 
-def applies(x: Excited, near: Fitted, row: Row) -> bool:
+def applies(x: CandidateInputs, near: Fitted, row: Row) -> bool:
     """Whether a row may be added: what it needs is there, and it is not in the model yet."""
     taken = {p.slot for r in near.model.rows for p in r.params}
     if row.name in near.names or taken & {p.slot for p in row.params}:
@@ -108,97 +108,97 @@ def applies(x: Excited, near: Fitted, row: Row) -> bool:
     if row.types and x.kind in KNOWN_TYPES and x.kind not in row.types:
         return False
     if row.needs == "neighbour":
-        return x.p.scene.neighbour is not None
+        return x.p.inputs.neighbour is not None
     return True
 
 
-def price(row: Row) -> float:
+def penalty(row: Row) -> float:
     """Doubled log likelihood that a row costs."""
-    return SEARCH_PRICE + PARAMETER_PRICE * max(len(row.params), 1) + row.price
+    return SEARCH_PENALTY + PARAMETER_PENALTY * max(len(row.params), 1) + row.penalty
 
 
-def rival(p: Problem, near: Fitted, models: list[Model], steps: int) -> Rival:
+def candidate(p: Problem, near: Fitted, models: list[Model], steps: int) -> Candidate:
     """The best of some starts, followed for some steps."""
     fit = min((descend(p, model, steps) for model in models), key=lambda f: f.loss)
     won = gain(fit, near)
-    return Rival(fit, won, won - price(fit.model.rows[-1]))
+    return Candidate(fit, won, won - penalty(fit.model.rows[-1]))
 
 
-def followed(p: Problem, near: Fitted, first: Rival, models: list[Model]) -> Rival:
-    """A rival of the first round followed to the end, from there and from its second and third start."""
+def followed(p: Problem, near: Fitted, first: Candidate, models: list[Model]) -> Candidate:
+    """A candidate of the first round followed to the end, from there and from its second and third start."""
     starts = [first.fit.model, *models[1:3]]
-    best = rival(p, near, starts, FULL_STEPS)
-    return best if best.net > first.net else first
+    best = candidate(p, near, starts, FULL_STEPS)
+    return best if best.penalised > first.penalised else first
 
 
 def compete(
-    x: Excited, near: Fitted, rows: tuple[Row, ...] = CATALOGUE, tell: Progress = silent
-) -> list[Rival]:
-    """All rows as rivals of a fit, best first; the better half followed to the end.
+    x: CandidateInputs, near: Fitted, rows: tuple[Row, ...] = CATALOGUE, tell: Progress = silent
+) -> list[Candidate]:
+    """All rows as candidates of a fit, best first; the better half followed to the end.
 
     Parameters
     ----------
-    x : Excited
+    x : CandidateInputs
     near : Fitted
         The fit to which each row is added.
     rows : tuple of Row
     tell : callable
         Is told each row's name before it is tried.
     """
-    tried: list[tuple[Rival, list[Model]]] = []
+    tried: list[tuple[Candidate, list[Model]]] = []
     span = span_of(x.p, near)
     for row in rows:
         if applies(x, near, row):
             tell(row.name)
-            models = candidates(x, near, row)
+            models = start_models(x, near, row)
             first = models
             if row.needs != "line":
                 models = screened(x.p, near, span, models)[:3]
                 first = models[:1]
             if row.name in OTHERS:
                 first += mode_starts(x.p, near, row)
-            tried.append((rival(x.p, near, first, SCREEN_STEPS), models))
-    tried.sort(key=lambda t: -t[0].net)
+            tried.append((candidate(x.p, near, first, SCREEN_STEPS), models))
+    tried.sort(key=lambda t: -t[0].penalised)
     ended = [followed(x.p, near, first, models) for first, models in tried[:FOLLOWED]]
-    ended += stuck(x, near, [first for first, _ in tried], rows, tell)
-    return sorted([*ended, *(first for first, _ in tried[FOLLOWED:])], key=lambda r: -r.net)
+    ended += stiction_candidates(x, near, [first for first, _ in tried], rows, tell)
+    return sorted([*ended, *(first for first, _ in tried[FOLLOWED:])], key=lambda r: -r.penalised)
 
 
 def prepared(
-    scene: Scene, y: Floats, usable: Mask, brought: Floats | None = None, clip: Clip | None = None
+    inputs: ModelInputs, y: Floats, usable: Mask, brought: Floats | None = None, clip: Clip | None = None
 ) -> tuple[Problem, Fitted]:
-    """A problem with its outliers calmed, and its plain fit."""
-    p = problem(scene, y, usable)
+    """A problem with its outliers robustly_weighted, and its plain fit."""
+    p = problem(inputs, y, usable)
     if clip is not None:
         p = censored(p, clip)
     first = plain(p, brought, clip)
-    calm = calmed(p, first)
+    calm = robustly_weighted(p, first)
     return calm, descend(calm, first.model, FULL_STEPS)
 
 
-def unsettled(p: Problem, free: Fitted, kind: str) -> tuple[Problem, Fitted]:
+def integrating_or_first_order(p: Problem, free: Fitted, kind: str) -> tuple[Problem, Fitted]:
     """Problem and plain fit, the time constant kept within the record where it might as well have no end.
 
     A plain loop whose time constant outlasts the record is an integrator under another name. Where an integrator
     does as well with one constant fewer, the plain loop is one that settles within the record.
     """
     rows = [r for r in CATALOGUE if r.name == "integrator"]
-    longest = SETTLES * p.scene.dt_s * p.y.size
-    if float(free.model.c[Slot.T]) <= longest or not applies(Excited(p, (), kind), free, rows[0]):
+    longest = SETTLES * p.inputs.dt_s * p.y.size
+    if float(free.model.c[Slot.T]) <= longest or not applies(CandidateInputs(p, (), kind), free, rows[0]):
         return p, free
-    ended = rival(p, free, candidates(Excited(p, (), kind), free, rows[0]), FULL_STEPS)
+    ended = candidate(p, free, start_models(CandidateInputs(p, (), kind), free, rows[0]), FULL_STEPS)
     if ended.gain < -SAME:
         return p, free
-    held = replace(p, scene=replace(p.scene, longest_s=longest))
+    held = replace(p, inputs=replace(p.inputs, longest_s=longest))
     c = free.model.c.copy()
     c[Slot.K] *= longest / c[Slot.T]
     c[Slot.T] = longest
     return held, descend(held, Model((), c), FULL_STEPS)
 
 
-def stuck(
-    x: Excited, near: Fitted, tried: list[Rival], rows: tuple[Row, ...], tell: Progress = silent
-) -> list[Rival]:
+def stiction_candidates(
+    x: CandidateInputs, near: Fitted, tried: list[Candidate], rows: tuple[Row, ...], tell: Progress = silent
+) -> list[Candidate]:
     """Sticking valves scanned about the best play, where a play or the like gains anything at all."""
     plays = [r for r in tried if r.name == "backlash"]
     hints = [r.gain for r in tried if r.name in ("backlash", "stiction", "positioner")]
@@ -210,5 +210,5 @@ def stuck(
         if row.name == "stiction":
             fit = fit_sticking(x.p, plays[0].fit, row, near.model.rows)
             won = gain(fit, near)
-            out.append(Rival(fit, won, won - price(row)))
+            out.append(Candidate(fit, won, won - penalty(row)))
     return out

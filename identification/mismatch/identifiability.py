@@ -11,12 +11,12 @@ from identification.estimation.prediction_error import Fitted, Problem, loss_of,
 from identification.simulation.parameters import Slot
 
 if TYPE_CHECKING:
-    from identification.mismatch.diagnosis import Explanation, Subject
+    from identification.mismatch.diagnosis import Explanation, Recording
 
 ANSWERS = 25.0
 """Doubled log likelihood that OP must bring for PV to answer it; ours: chance brings three constants under 17 in 999
 of 1,000 records, and the model without OP is not fitted to the end."""
-DEAF = "needs moves of OP that PV answers"
+INSENSITIVE = "needs moves of OP that PV answers"
 """What is said where PV does not answer OP."""
 ENOUGH = 5.0
 """Time constants that a recording of a process that settles must hold; the catalogue's need."""
@@ -39,10 +39,10 @@ def unanswered(found: Explanation) -> str:
     )  # a load is counted in terms of the gain
     if brings(found.p, found.plain if loaded else found.best) >= ANSWERS:
         return ""
-    return DEAF + "; without OP the fit is as good"
+    return INSENSITIVE + "; without OP the fit is as good"
 
 
-def too_short(found: Explanation, s: Subject) -> str:
+def too_short(found: Explanation, s: Recording) -> str:
     """What is needed where the record is short against the time constant; empty where it is not."""
     lag, length = float(found.plain.model.c[Slot.T]), s.pv.size * s.dt_s
     if s.kind in INTEGRATING or any(r.name == "integrator" for r in found.best.model.rows):
@@ -55,13 +55,13 @@ def too_short(found: Explanation, s: Subject) -> str:
     )
 
 
-def uninformed(found: Explanation, s: Subject) -> str:
+def uninformed(found: Explanation, s: Recording) -> str:
     """What the recording lacks for an answer, empty where it is enough.
 
     Parameters
     ----------
     found : Explanation
-    s : Subject
+    s : Recording
     """
     return unanswered(found) or too_short(found, s)
 

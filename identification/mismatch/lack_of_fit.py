@@ -22,7 +22,7 @@ FEWEST = 3.0
 
 def past_moves(p: Problem, through: Floats, length_s: float) -> list[Floats]:
     """OP's means over past stretches, each shape (n,)."""
-    width = max(round(length_s / BOXES / p.scene.dt_s), int(FEWEST))
+    width = max(round(length_s / BOXES / p.inputs.dt_s), int(FEWEST))
     total = np.concatenate(([0.0], np.cumsum(through - through.mean())))
     n = through.size
     k = np.arange(n)
@@ -37,15 +37,15 @@ def bent_moves(p: Problem, fit: Fitted, through: Floats) -> list[Floats]:
     """Responses to OP's fast part by size, to its square and to PV's square, each shape (n,)."""
     c = fit.model.c.copy()
     c[Slot.K], c[Slot.BIAS], c[Slot.START] = 1.0, 0.0, 0.0
-    scene = p.scene
+    dt_s = p.inputs.dt_s
     still = np.zeros(through.size)
-    inputs = []
+    moves = []
     for share in (0.1, 0.5):
-        fast = through - lagged(through, max(share * float(c[Slot.T]), scene.dt_s), scene.dt_s)
-        inputs += [fast * np.abs(fast), np.abs(fast)]
+        fast = through - lagged(through, max(share * float(c[Slot.T]), dt_s), dt_s)
+        moves += [fast * np.abs(fast), np.abs(fast)]
     level = through - through.mean()
-    inputs += [level**2, level**3]
-    return [plain_vessel(x - x[0], still, c, scene.dt_s, 0.0) for x in inputs]
+    moves += [level**2, level**3]
+    return [plain_vessel(x - x[0], still, c, dt_s, 0.0) for x in moves]
 
 
 def ceiling(p: Problem, fit: Fitted) -> tuple[float, int]:
@@ -54,13 +54,13 @@ def ceiling(p: Problem, fit: Fitted) -> tuple[float, int]:
     The fit's own constants and its noise model follow linearly, so the gain is of what they cannot give.
     """
     c = fit.model.c
-    through = flow(p.scene.op, c, p.scene.dt_s, p.scene.middle)
+    through = flow(p.inputs.op, c, p.inputs.dt_s, p.inputs.middle)
     length = REACH * float(c[Slot.T] + c[Slot.L])
-    free = past_moves(p, through, min(length, 0.2 * through.size * p.scene.dt_s)) + bent_moves(
+    free = past_moves(p, through, min(length, 0.2 * through.size * p.inputs.dt_s)) + bent_moves(
         p, fit, through
     )
     root = np.sqrt(p.weight)
-    r = p.y - simulate(p.scene, c)
+    r = p.y - simulate(p.inputs, c)
     own = np.concatenate((sensitivities(p, fit.model, fit.ar), lag_means(r, p.edges))) * root
     more = np.stack([whitened(x, fit.ar, p.edges) for x in free]) * root
     span = np.linalg.qr(own.T)[0]

@@ -11,7 +11,7 @@ from numba import njit
 from identification.controller.check import Stated
 from identification.errors import InputError
 from identification.record import Floats
-from identification.simulation.open_loop import Scene, simulate
+from identification.simulation.open_loop import ModelInputs, simulate
 from identification.simulation.parameters import KNOTS, STEPS, Slot, neutral
 
 VERSION = 1
@@ -31,7 +31,7 @@ NAMES = {int(s): s.name for s in Slot if s not in (Slot.STEP, Slot.HEAD)}
 
 
 def to_data(
-    loop: str, scene: Scene, c: Floats, names: tuple[str, ...], late_s: float, pv_scale: Any
+    loop: str, inputs: ModelInputs, c: Floats, names: tuple[str, ...], late_s: float, pv_scale: Any
 ) -> dict[str, Any]:
     """The model as a mapping that JSON can hold; constants at their neutral value are left out."""
     rest = neutral()
@@ -41,8 +41,8 @@ def to_data(
         "loop": loop,
         "effects": list(names),
         "constants": own,
-        "middle_op_pct": scene.middle,
-        "level_pv_pct": scene.level,
+        "middle_op_pct": inputs.middle,
+        "level_pv_pct": inputs.level,
         "late_s": late_s,
         "scale": pv_scale,
     }
@@ -78,14 +78,14 @@ def carried(data: dict[str, Any], op: Floats, pv: Floats, dt_s: float) -> Floats
     c = constants(data)
     level = float(data.get("level_pv_pct", np.mean(pv)))
     middle = float(data.get("middle_op_pct", np.mean(op)))
-    scene = Scene(op, dt_s, middle, level, (float(pv.min()), float(pv.max())))
+    inputs = ModelInputs(op, dt_s, middle, level, (float(pv.min()), float(pv.max())))
     bias, out = 0.0, pv
     for _ in range(BIAS_PASSES):
         free = c.copy()
         free[Slot.START] = float(pv[0]) - level - bias
         for clip in (Slot.CLIP_HI, Slot.CLIP_LO):
             free[clip] = math.copysign(math.inf, neutral()[clip])
-        out = level + simulate(scene, free)
+        out = level + simulate(inputs, free)
         bias = _bias(pv, out, c)
     out = np.clip(out + bias, c[Slot.CLIP_LO], c[Slot.CLIP_HI])
     late = float(data.get("late_s", 0.0)) / dt_s
@@ -123,8 +123,8 @@ def carried_closed(
     out = np.full(sp.size, float(pv[0]))
     for done in range(ahead, sp.size + ahead, ahead):
         now = _law(sp[:done] - out[:done], law.kp, law.ti, float(op[0]))
-        scene = Scene(now, dt_s, middle, level, (float(pv.min()), float(pv.max())))
-        out[: now.size] = level + simulate(scene, c)
+        inputs = ModelInputs(now, dt_s, middle, level, (float(pv.min()), float(pv.max())))
+        out[: now.size] = level + simulate(inputs, c)
         out[now.size : now.size + 1] = out[now.size - 1]
     return out, _law(sp - out, law.kp, law.ti, float(op[0]))
 

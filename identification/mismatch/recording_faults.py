@@ -19,7 +19,7 @@ from identification.record import Floats, Mask
 
 
 @dataclass(frozen=True, slots=True)
-class Trace:
+class RecorderFinding:
     """One finding about the recording: its name, the number that tells it, where it is (bool, shape (n,))."""
 
     name: str
@@ -50,16 +50,16 @@ def on_grid(gaps: Floats) -> bool:
     return float(np.mean(np.abs(gaps / unit - np.round(gaps / unit)) < 0.05)) > 0.6
 
 
-def compression(pv: Floats) -> Trace | None:
+def compression(pv: Floats) -> RecorderFinding | None:
     """Straight segments whose breaks stand on no grid (swinging door and the like)."""
     found = straight(pv)
     share = float(found.mean())
     if share < STRAIGHT or on_grid(level_gaps(pv)):
         return None
-    return Trace("compression", share, found)
+    return RecorderFinding("compression", share, found)
 
 
-def quantization(pv: Floats, ranged: bool) -> Trace | None:
+def quantization(pv: Floats, ranged: bool) -> RecorderFinding | None:
     """Values on a grid coarser than a historian's; `ranged` is False where percent is of the recorded range."""
     gaps = level_gaps(pv)
     least = GRID_STEP if ranged else GRID_STEP_OF_RANGE
@@ -67,10 +67,10 @@ def quantization(pv: Floats, ranged: bool) -> Trace | None:
         return None
     if float(gaps.max()) > 4.0 * float(gaps.mean()):
         return None
-    return Trace("quantization", float(gaps.mean()), np.ones(pv.size, dtype=bool))
+    return RecorderFinding("quantization", float(gaps.mean()), np.ones(pv.size, dtype=bool))
 
 
-def clipped(pv: Floats) -> Trace | None:
+def clipped(pv: Floats) -> RecorderFinding | None:
     """PV standing at exactly its highest or lowest value far more often than at those next to it."""
     levels, counts = np.unique(pv, return_counts=True)
     if levels.size < 12:
@@ -80,7 +80,7 @@ def clipped(pv: Floats) -> Trace | None:
         top = int(counts[end])
         enough = top >= CLIP_SAMPLES and top > CLIP_RATIO * float(near.mean())
         if enough and (best is None or top > best.where.sum()):
-            best = Trace("sensor-clipping", float(levels[end]), pv == levels[end])
+            best = RecorderFinding("sensor-clipping", float(levels[end]), pv == levels[end])
     return best
 
 
@@ -91,12 +91,12 @@ def jitter(stamp_s: Floats, dt_s: float) -> float:
     return float(np.std(spacing)) / np.sqrt(2.0) if spacing.size > 10 else 0.0
 
 
-def sampling(stamp_s: Floats, dt_s: float) -> Trace | None:
+def sampling(stamp_s: Floats, dt_s: float) -> RecorderFinding | None:
     """Polling that scatters by more than logging does."""
     found = jitter(stamp_s, dt_s)
     if found < JITTER:
         return None
-    return Trace("sampling", found, np.ones(stamp_s.size, dtype=bool))
+    return RecorderFinding("sampling", found, np.ones(stamp_s.size, dtype=bool))
 
 
 def unlogged(stamp_s: Floats, n: int, dt_s: float) -> Mask:

@@ -81,7 +81,7 @@ def _pairs(*rows: tuple[str, str, str]) -> dict[frozenset[str], str]:
     return {frozenset(row[:2]): row[2] for row in rows}
 
 
-TELLTALES = _pairs(
+DISCRIMINATING_TESTS = _pairs(
     (
         "second-lag",
         "sensor-lag",
@@ -202,9 +202,9 @@ LONGER = "A step of OP each way in manual, held for five time constants, at two 
 """What tells apart what has no line of its own."""
 
 
-def telltale(one: str, other: str) -> str:
+def discriminating_test(one: str, other: str) -> str:
     """Which experiment or signal would tell two names of the catalogue apart."""
-    return TELLTALES.get(frozenset((one, other)), LONGER)
+    return DISCRIMINATING_TESTS.get(frozenset((one, other)), LONGER)
 
 
 class _Spoken(dict[str, str]):

@@ -28,7 +28,7 @@ Start = Mapping[int, float]
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One piece of physics as a rival: its name, block, constants, and starts in units of their scales.
+    """One piece of physics as a candidate: its name, block, constants, and starts in units of their scales.
 
     delays : constants whose start is taken off the dead time, which stood for them in the plain loop.
     types : loop types that can have it, any where empty or the type is not known.
@@ -45,7 +45,7 @@ class Row:
     types: tuple[str, ...] = ()
     likeness: tuple[str, ...] = ()
     delays: tuple[int, ...] = ()
-    price: float = 0.0
+    penalty: float = 0.0
 
 
 def each(slot: int, *values: float) -> tuple[Start, ...]:

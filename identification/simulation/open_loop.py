@@ -1,4 +1,4 @@
-"""The loop model run open over a recorded OP: the one simulator of rivals, explanation and saved model."""
+"""The loop model run open over a recorded OP: the one simulator of candidates, explanation and saved model."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ RICH = (
 
 
 @dataclass(frozen=True, slots=True)
-class Scene:
+class ModelInputs:
     """What is recorded and not fitted.
 
     op : shape (n,) [% OP]; dt_s [s]; middle : OP that counts as zero [% OP]; level : PV that counts as zero
@@ -51,54 +51,54 @@ class Scene:
         return np.arange(self.op.size) / self.op.size - 0.5
 
 
-def head(scene: Scene, c: Floats) -> Floats:
+def head(inputs: ModelInputs, c: Floats) -> Floats:
     """Slow relative supply, shape (n,): straight lines between knots, mean zero."""
     knots = c[int(Slot.HEAD) : int(Slot.HEAD) + KNOTS]
     if not knots.any():
-        return np.zeros(scene.op.size)
-    line = np.interp(scene.clock, np.linspace(-0.5, 0.5, KNOTS), knots)
+        return np.zeros(inputs.op.size)
+    line = np.interp(inputs.clock, np.linspace(-0.5, 0.5, KNOTS), knots)
     return line - line.mean()
 
 
-def load(scene: Scene, c: Floats) -> Floats:
+def load(inputs: ModelInputs, c: Floats) -> Floats:
     """Load at the vessel's inlet, shape (n,) [% OP], as the constants say."""
-    act = np.zeros(scene.op.size)
-    for i, at in enumerate(scene.step_at[:STEPS]):
+    act = np.zeros(inputs.op.size)
+    for i, at in enumerate(inputs.step_at[:STEPS]):
         act[at:] += c[int(Slot.STEP) + i]
     if c[Slot.SINE] != 0 or c[Slot.COSINE] != 0:
-        angle = c[Slot.OMEGA] * scene.dt_s * np.arange(scene.op.size)
+        angle = c[Slot.OMEGA] * inputs.dt_s * np.arange(inputs.op.size)
         act += c[Slot.SINE] * np.sin(angle) + c[Slot.COSINE] * np.cos(angle)
-    if scene.neighbour is not None and c[Slot.NEIGHBOUR] != 0:
-        act += c[Slot.NEIGHBOUR] * lagged(scene.neighbour, c[Slot.NEIGHBOUR_T], scene.dt_s)
+    if inputs.neighbour is not None and c[Slot.NEIGHBOUR] != 0:
+        act += c[Slot.NEIGHBOUR] * lagged(inputs.neighbour, c[Slot.NEIGHBOUR_T], inputs.dt_s)
     return act
 
 
-def simulate(scene: Scene, c: Floats) -> Floats:
-    """PV's deviation from scene.level [% PV], shape (n,), that the model gives for the recorded OP.
+def simulate(inputs: ModelInputs, c: Floats) -> Floats:
+    """PV's deviation from inputs.level [% PV], shape (n,), that the model gives for the recorded OP.
 
     Parameters
     ----------
-    scene : Scene
+    inputs : ModelInputs
     c : ndarray of shape (SIZE,)
         Constants (slots.py).
     """
-    dt = scene.dt_s
-    through = flow(scene.op, c, dt, scene.middle)
-    act = load(scene, c)
+    dt = inputs.dt_s
+    through = flow(inputs.op, c, dt, inputs.middle)
+    act = load(inputs, c)
     rich = any(c[s] != 0 for s in RICH) or c[Slot.LEAK] != 1 or math.isfinite(c[Slot.CAP])
-    out = _rich(scene, c, through, act) if rich else plain_vessel(through, act, c, dt, scene.middle)
+    out = _rich(inputs, c, through, act) if rich else plain_vessel(through, act, c, dt, inputs.middle)
     if math.isfinite(c[Slot.CLIP_HI]) or math.isfinite(c[Slot.CLIP_LO]):
-        out = np.clip(out, c[Slot.CLIP_LO] - scene.level, c[Slot.CLIP_HI] - scene.level)
+        out = np.clip(out, c[Slot.CLIP_LO] - inputs.level, c[Slot.CLIP_HI] - inputs.level)
     return np.nan_to_num(out, nan=1e6, posinf=1e6, neginf=-1e6)
 
 
-def _rich(scene: Scene, c: Floats, through: Floats, act: Floats) -> Floats:
-    supply = head(scene, c)
-    gain = 1.0 + c[Slot.DRIFT] * scene.clock + supply
+def _rich(inputs: ModelInputs, c: Floats, through: Floats, act: Floats) -> Floats:
+    supply = head(inputs, c)
+    gain = 1.0 + c[Slot.DRIFT] * inputs.clock + supply
     act = act + c[Slot.HEAD_BIAS] * supply
     if c[Slot.PIPE] != 0:
-        through = transported(through, c[Slot.L], c[Slot.PIPE], max(scene.middle, 1e-3), scene.dt_s)
+        through = transported(through, c[Slot.L], c[Slot.PIPE], max(inputs.middle, 1e-3), inputs.dt_s)
     full = c.copy()
-    full[Slot.CAP] -= scene.level
-    empty = max(scene.level, 1.0) / c[Slot.ROOT] if c[Slot.ROOT] > 0 else 1.0
-    return vessel(through, act, gain, full, scene.dt_s, scene.middle, empty)
+    full[Slot.CAP] -= inputs.level
+    empty = max(inputs.level, 1.0) / c[Slot.ROOT] if c[Slot.ROOT] > 0 else 1.0
+    return vessel(through, act, gain, full, inputs.dt_s, inputs.middle, empty)

@@ -1,4 +1,4 @@
-"""The constants of the loop model that every rival shares: one place per constant, neutral unless freed."""
+"""The constants of the loop model that every candidate shares: one place per constant, neutral unless freed."""
 
 from __future__ import annotations
 

@@ -15,8 +15,8 @@ from identification.controller.check import judge
 from identification.estimation.prediction_error import Model, descend, gain
 from identification.mismatch.answer import answer
 from identification.mismatch.catalogue import CATALOGUE
-from identification.mismatch.diagnosis import Explanation, scene_of, trace_of
-from identification.mismatch.forward_selection import Rival, prepared
+from identification.mismatch.diagnosis import Explanation, inputs_of, recorder_finding_of
+from identification.mismatch.forward_selection import Candidate, prepared
 from identification.models import Backlash, Fopdt, Loop, Pid
 from identification.simulation.closed_loop import closed_loop
 from identification.simulation.parameters import Slot
@@ -57,8 +57,8 @@ def with_play(found: Explanation, width: float) -> Explanation:
     c[Slot.STICKBAND] = width
     best = descend(found.p, Model((row,), c), 8)
     won = gain(best, found.plain)
-    rival = Rival(best, won, won - 18.0)
-    return Explanation(found.p, found.plain, best, (rival,), (found.plain,), (rival,), law=found.law)
+    candidate = Candidate(best, won, won - 18.0)
+    return Explanation(found.p, found.plain, best, (candidate,), (found.plain,), (candidate,), law=found.law)
 
 
 @cache
@@ -69,12 +69,17 @@ def explanation(kind: str) -> Explained:
     s = asked.subject
     assert s.sp is not None
     assert s.stated is not None
-    scene = scene_of(s)
-    p, plain = prepared(scene, s.pv - scene.level, s.usable)
-    trace = trace_of(s) if kind == "quantization" else None
-    ruling, law = judge(s.sp, s.pv, s.op, s.usable, s.stated)
+    inputs = inputs_of(s)
+    p, plain = prepared(inputs, s.pv - inputs.level, s.usable)
+    recorder = recorder_finding_of(s) if kind == "quantization" else None
+    controller, law = judge(s.sp, s.pv, s.op, s.usable, s.stated)
     found = Explanation(
-        p, plain, plain, trace=trace, ruling=ruling if kind == "controller-settings" else None, law=law
+        p,
+        plain,
+        plain,
+        recorder=recorder,
+        controller=controller if kind == "controller-settings" else None,
+        law=law,
     )
     if kind == "backlash":
         found = with_play(found, 1.5)

@@ -12,7 +12,7 @@ from analyzer.explain.one_loop import plain_start, read_model, scale_of
 from analyzer.explain.user_model import compared, judged, within, wrong_units
 from analyzer.quality import Scale
 from identification.errors import InputError
-from identification.mismatch.diagnosis import Explanation, Subject, scene_of
+from identification.mismatch.diagnosis import Explanation, Recording, inputs_of
 from identification.mismatch.forward_selection import prepared
 from identification.models import Fopdt, Loop, Pid
 from identification.simulation.closed_loop import closed_loop
@@ -33,17 +33,17 @@ def model(gain: float = 1.2, lag_s: float = 20.0, dead_s: float = 3.0) -> dict:
 
 
 @pytest.fixture(scope="module")
-def asked() -> tuple[Explanation, Subject]:
+def asked() -> tuple[Explanation, Recording]:
     """A plain loop of gain 1.2, time constant 20 s and dead time 3 s, with its plain fit."""
     rng = np.random.default_rng(1)
     sp = 50 + np.repeat(rng.uniform(-7, 7, N // 150), 150)
     r = closed_loop(Loop(Fopdt(1.2, 20.0, 3.0), Pid(1.8, 20.0)), sp, rng.normal(0, 0.1, N))
-    s = Subject(r.sp, r.pv, r.op, np.ones(N, dtype=bool), 1.0, r.time_s)
-    p, plain = prepared(scene_of(s), r.pv - r.pv.mean(), s.usable)
+    s = Recording(r.sp, r.pv, r.op, np.ones(N, dtype=bool), 1.0, r.time_s)
+    p, plain = prepared(inputs_of(s), r.pv - r.pv.mean(), s.usable)
     return Explanation(p, plain, plain), s
 
 
-def test_right_model_does_as_well(asked: tuple[Explanation, Subject]) -> None:
+def test_right_model_does_as_well(asked: tuple[Explanation, Recording]) -> None:
     """The true model leaves the noise, 0.1 %, as the refitted plain loop does, and no unit is doubted."""
     own = judged(model(), *asked)
     assert own.held_out.rmse == pytest.approx(0.1, rel=0.1)
@@ -61,7 +61,7 @@ def test_right_model_does_as_well(asked: tuple[Explanation, Subject]) -> None:
         (model(gain=-1.2), "another sign"),
     ],
 )
-def test_wrong_units_are_told(asked: tuple[Explanation, Subject], wrong: dict, said: str) -> None:
+def test_wrong_units_are_told(asked: tuple[Explanation, Recording], wrong: dict, said: str) -> None:
     """Gain off by a hundred, minutes for seconds and a turned sign are each told in the one line."""
     assert said in judged(wrong, *asked).note
 

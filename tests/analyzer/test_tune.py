@@ -161,7 +161,7 @@ def test_unfit_records_are_refused_in_one_line(tmp_path, name):
 
 
 def test_compressed_trends_are_refused(tmp_path, tank):
-    """Trends on straight segments are refused: a play leaves no trace in them."""
+    """Trends on straight segments are refused: a play leaves no recorder in them."""
     at = np.arange(tank.pv.size)
     kept = at[::100]
     thinned = replace(tank, pv=np.interp(at, kept, tank.pv[kept]), op=np.interp(at, kept, tank.op[kept]))

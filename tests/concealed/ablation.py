@@ -28,12 +28,12 @@ from concealed.score import KIN, kin
 from analyzer.commands.options import opened
 from analyzer.config import Config
 from analyzer.explain.one_loop import Case, case, loop_of
-from identification.controller.pi_regression import found_law
+from identification.controller.pi_regression import recovered_law
 from identification.mismatch.catalogue import CATALOGUE
-from identification.mismatch.diagnosis import scene_of, without_spikes
-from identification.mismatch.forward_selection import Rival, compete, prepared, unsettled
+from identification.mismatch.diagnosis import inputs_of, without_spikes
+from identification.mismatch.forward_selection import Candidate, compete, integrating_or_first_order, prepared
 from identification.mismatch.model_file import carried, to_data
-from identification.mismatch.starts.screening import excited
+from identification.mismatch.starts.screening import candidate_inputs
 
 ALIKE = 1.02
 """Ratio of misfits up to which two models do alike: rows that hold the right one as a special case reach it."""
@@ -62,9 +62,9 @@ def tellable(truth: dict, rows: set[str]) -> bool:
     return named and "later_plain" in truth and "pair" not in truth
 
 
-def left_later(rival: Rival, p: object, later: Case) -> float:
-    """Misfit (rms, %) that a rival leaves on the later recording."""
-    data = to_data(later.spec.loop, p.scene, rival.fit.model.c, (), 0.0, {})  # type: ignore[attr-defined]
+def left_later(candidate: Candidate, p: object, later: Case) -> float:
+    """Misfit (rms, %) that a candidate leaves on the later recording."""
+    data = to_data(later.spec.loop, p.inputs, candidate.fit.model.c, (), 0.0, {})  # type: ignore[attr-defined]
     r = later.prepared.record
     return float(np.std(r.pv - carried(data, r.op, r.pv, r.dt_s)))
 
@@ -73,22 +73,26 @@ def compared(cases: pathlib.Path, truths: dict, tag: str) -> dict:
     """Right and best wrong effect of one case: gains and later misfits."""
     truth, fit, later = truths[tag], loaded(cases, tag, "fit"), loaded(cases, tag, "later")
     s = fit.subject
-    scene = scene_of(s)
-    p, plain = unsettled(*prepared(scene, s.pv - scene.level, without_spikes(s.pv, s.usable)), s.kind)
-    rivals = compete(excited(p, plain, s.kind), plain)
-    mine = [r for r in rivals if kin(r.name, truth["effect"], KIN)]
+    inputs = inputs_of(s)
+    p, plain = integrating_or_first_order(
+        *prepared(inputs, s.pv - inputs.level, without_spikes(s.pv, s.usable)), s.kind
+    )
+    candidates = compete(candidate_inputs(p, plain, s.kind), plain)
+    mine = [r for r in candidates if kin(r.name, truth["effect"], KIN)]
     wrong = [
-        r for r in rivals if not kin(r.name, truth["effect"], KIN) and truth["effect"] not in r.row.likeness
+        r
+        for r in candidates
+        if not kin(r.name, truth["effect"], KIN) and truth["effect"] not in r.row.likeness
     ]
-    law = found_law(s.sp, s.pv, s.op, s.usable & (s.op > 0.05) & (s.op < 99.95), s.stated.ti)
+    law = recovered_law(s.sp, s.pv, s.op, s.usable & (s.op > 0.05) & (s.op < 99.95), s.stated.ti)
     base = truth["base"]
     return {
         "loop": tag,
         "effect": truth["effect"],
         "level": truth["level"],
         "wrong": wrong[0].name,
-        "net_right": mine[0].net,
-        "net_wrong": wrong[0].net,
+        "net_right": mine[0].penalised,
+        "net_wrong": wrong[0].penalised,
         "later_right": left_later(mine[0], p, later),
         "later_wrong": left_later(wrong[0], p, later),
         "kp_error": law.kp / base["Kp"] - 1.0,
@@ -122,9 +126,9 @@ def section(rows: pd.DataFrame) -> str:
     parts = [
         "## Ablation: the best wrong effect in the right one's place",
         "`python tests/concealed/ablation.py CASES --out PROOF.md`. Every row is fitted whole and at its best\n"
-        "size, a harder opponent than a wrong effect of the right one's size. Gains are compared after the price of\n"
-        "constants and search. Some rows hold others as special cases (stick-slip a play, two valves a stop), so a\n"
-        "wrong one may do as well on later data; no worse is within 2 %.",
+        "size, a harder opponent than a wrong effect of the right one's size. Gains are compared after the penalty\n"
+        "of constants and search. Some rows hold others as special cases (stick-slip a play, two valves a stop), so\n"
+        "a wrong one may do as well on later data; no worse is within 2 %.",
         table(head, lines),
         f"Lost on the fitted recording: {worst or 'none'}.",
         f"The controller's Kp and Ti, found from SP, PV and OP of the same cases, are within 2 % in {settings}\n"

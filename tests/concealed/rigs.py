@@ -55,7 +55,7 @@ def misfit(c: Case, model: dict) -> float:
 def carried_over(step: Explained, loop: Case) -> str:
     """The duct's plain and improved model, of the step, on the PI loop."""
     best = saved_model(step.case, step.found, step.said)
-    plain = best | to_data("DUCT", step.found.p.scene, step.found.plain.model.c, (), 0.0, best["scale"])
+    plain = best | to_data("DUCT", step.found.p.inputs, step.found.plain.model.c, (), 0.0, best["scale"])
     return f"{misfit(loop, plain):.3f} → {misfit(loop, best):.3f}"
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from identification.controller.check import Stated
-from identification.mismatch.diagnosis import Subject
+from identification.mismatch.diagnosis import Recording
 from identification.models import Backlash, Fopdt, Loop, Pid, Stiction, Valve
 from identification.simulation.closed_loop import closed_loop
 
@@ -28,14 +28,14 @@ def noise(seed: int, n: int = N, load: float = 0.3, white: float = 0.08) -> np.n
     return slow + rng.normal(0, white, n)
 
 
-def subject(seed: int, valve: Valve = None, load: np.ndarray | None = None) -> Subject:
+def recording(seed: int, valve: Valve = None, load: np.ndarray | None = None) -> Recording:
     """A closed loop with gain 1.2, time constant 20 s and dead time 3.4 s, recorded with 0.01 % resolution."""
     law = Pid(1.8, 20.0)
     n = noise(seed)
     loop = Loop(Fopdt(1.2, 20.0, 3.4), law, valve)
     r = closed_loop(loop, setpoints(seed), n if load is None else n + load)
     pv, op = np.round(r.pv, 2), np.round(r.op, 2)
-    return Subject(r.sp, pv, op, np.ones(N, dtype=bool), 1.0, r.time_s, Stated(law.kp, law.ti_s))
+    return Recording(r.sp, pv, op, np.ones(N, dtype=bool), 1.0, r.time_s, Stated(law.kp, law.ti_s))
 
 
 PLAY, STICKING = Backlash(2.0), Stiction(2.0, 1.2, True)

@@ -1,4 +1,4 @@
-"""The catalogue of left-out physics that open-loop rivals are made of."""
+"""The catalogue of left-out physics that open-loop candidates are made of."""
 
 from __future__ import annotations
 

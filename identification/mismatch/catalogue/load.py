@@ -14,7 +14,7 @@ LOAD = (
             (dict.fromkeys((int(Slot.STEP) + i for i in range(count)), 0.0),),
             needs="steps",
             variant=f"{count}",
-            price=12.0 * count,
+            penalty=12.0 * count,
         )
         for count in (1, 2, 3)
     ),
@@ -47,6 +47,6 @@ LOAD = (
             *(Param(int(Slot.HEAD) + i, f"head_{i + 1}", "", -2.0, 2.0) for i in range(12)),
         ),
         ({Slot.HEAD_BIAS: 8.0},),
-        price=-10.0,
+        penalty=-10.0,
     ),
 )

@@ -81,7 +81,7 @@ PROCESS = (
         each(Slot.ROOT, 0.3, 1.0),
         types=("level",),
         likeness=("nonlinear-gain",),
-        price=-TIE,
+        penalty=-TIE,
     ),
     Row(
         "overflow",

@@ -6,14 +6,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from identification.controller.check import Ruling, Stated, runs
+from identification.controller.check import ControllerFinding, Stated, runs
 from identification.controller.pi_regression import shifted
 from identification.mismatch.curves.shape import Axis, Drawn, Shape
 from identification.record import Floats, Mask
 
 if TYPE_CHECKING:
-    from identification.mismatch.diagnosis import Subject
-    from identification.mismatch.recording_faults import Trace
+    from identification.mismatch.diagnosis import Recording
+    from identification.mismatch.recording_faults import RecorderFinding
 
 WINDOW = 240
 """Samples of a stretch that is drawn; ours: single samples can still be seen."""
@@ -120,7 +120,7 @@ def clip(pv: Floats, at: float, dt_s: float, where: Mask, model: Floats) -> Shap
     return Shape("sensor-clipping", "course", Axis("time", "s"), Axis("PV", "%"), curves)
 
 
-def trace_shape(t: Trace, s: Subject, model: Floats) -> Shape | None:
+def recorder_shape(t: RecorderFinding, s: Recording, model: Floats) -> Shape | None:
     """The shape of a finding about the recording; `model` is the simulated PV without its clip, shape (n,)."""
     match t.name:
         case "quantization":
@@ -163,12 +163,12 @@ def law_course(name: str, e: Floats, op: Floats, part: slice, dt_s: float, laws:
     return Shape(name, "course", Axis("time", "s"), Axis("OP", "%"), (*curves, Drawn("recorded", time, own)))
 
 
-def law_window(s: Subject, ti: float) -> int:
+def law_window(s: Recording, ti: float) -> int:
     """Samples of a stretch in which a law is drawn."""
     return int(np.clip(LAW_WINDOW * ti, WINDOW, min(MOST_WINDOW, s.pv.size)))
 
 
-def ruling_shape(r: Ruling, s: Subject) -> Shape | None:
+def controller_shape(r: ControllerFinding, s: Recording) -> Shape | None:
     """The shape of a finding about clock or controller; None without SP or settings."""
     if s.sp is None or s.stated is None:
         return None
@@ -188,7 +188,7 @@ def ruling_shape(r: Ruling, s: Subject) -> Shape | None:
     return None
 
 
-def clock_course(s: Subject, said: Stated, late: float) -> Shape:
+def clock_course(s: Recording, said: Stated, late: float) -> Shape:
     """OP about its busiest stretch, rebuilt with PV as stamped and with PV's clock set right."""
     assert s.sp is not None
     part = biggest_move(s.sp if float(np.ptp(s.sp)) > 0 else s.op, WINDOW // 4, s.usable)
@@ -200,7 +200,7 @@ def clock_course(s: Subject, said: Stated, late: float) -> Shape:
     )
 
 
-def obeyed(s: Subject) -> Shape | None:
+def obeyed(s: Recording) -> Shape | None:
     """OP rebuilt by the stated settings over its busiest stretch; None without SP or settings."""
     if s.sp is None or s.stated is None:
         return None

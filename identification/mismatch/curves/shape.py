@@ -14,7 +14,7 @@ import numpy as np
 
 from identification.models import Estimate
 from identification.record import Floats
-from identification.simulation.open_loop import Scene, head, load, simulate
+from identification.simulation.open_loop import ModelInputs, head, load, simulate
 from identification.simulation.parameters import STEPS, Slot, neutral
 from identification.simulation.valve_chain import curved, friction, positioned, second_valve, slewed
 
@@ -103,16 +103,16 @@ def banded(
     return here, here - np.sqrt(below), here + np.sqrt(above)
 
 
-def sweep(scene: Scene, width: float) -> Floats:
+def sweep(inputs: ModelInputs, width: float) -> Floats:
     """OP up and down twice about its middle, far enough to open a loop of that width, shape (m,)."""
     reach = SWEEP * max(width, 1e-3)
     one = np.concatenate((np.linspace(-1, 1, POINTS), np.linspace(1, -1, POINTS)))
-    return scene.middle + reach * np.concatenate((one, one))
+    return inputs.middle + reach * np.concatenate((one, one))
 
 
-def loop(scene: Scene, c: Floats, row: Row, known: Mapping[str, Estimate]) -> Shape:
+def loop(inputs: ModelInputs, c: Floats, row: Row, known: Mapping[str, Estimate]) -> Shape:
     """Stem over OP of a valve with play or stick-slip, with the loops of the narrowest and the widest band."""
-    op = sweep(scene, float(c[Slot.STICKBAND]))
+    op = sweep(inputs, float(c[Slot.STICKBAND]))
     last = slice(2 * POINTS, None)
     curves = [Drawn("found", op[last], friction(op, c)[last])]
     for name, i in (("least", 1), ("most", 2)):
@@ -125,22 +125,22 @@ def loop(scene: Scene, c: Floats, row: Row, known: Mapping[str, Estimate]) -> Sh
     return Shape(row.name, "loop", Axis("OP", "%"), Axis("stem", "% OP"), tuple(curves))
 
 
-def op_range(scene: Scene) -> Floats:
+def op_range(inputs: ModelInputs) -> Floats:
     """OP from its least to its greatest value, shape (POINTS,)."""
-    return np.linspace(float(scene.op.min()), float(scene.op.max()), POINTS)
+    return np.linspace(float(inputs.op.min()), float(inputs.op.max()), POINTS)
 
 
-def flow_curve(scene: Scene, c: Floats, row: Row, known: Mapping[str, Estimate]) -> Shape:
+def flow_curve(inputs: ModelInputs, c: Floats, row: Row, known: Mapping[str, Estimate]) -> Shape:
     """Flow over OP at rest: characteristic, stop or second valve."""
-    op = op_range(scene)
+    op = op_range(inputs)
 
     def read(k: Floats) -> Floats:
         z = np.clip(op, k[Slot.STOP_LO], k[Slot.STOP_HI])
         if np.isfinite(k[Slot.SPLIT]):
             at_rest = k.copy()
             at_rest[Slot.SPLIT_LAG] = 0.0
-            z = second_valve(z, at_rest, scene.dt_s)
-        return curved(z, float(k[Slot.BEND]), scene.middle)
+            z = second_valve(z, at_rest, inputs.dt_s)
+        return curved(z, float(k[Slot.BEND]), inputs.middle)
 
     y, low, high = banded(read, c, ends(row, known))
     places = tuple(float(c[s]) for s in (Slot.STOP_LO, Slot.STOP_HI, Slot.SPLIT) if np.isfinite(c[s]))
@@ -155,11 +155,11 @@ def _step(size: float, n: int, dt_s: float, back: bool) -> tuple[Floats, Floats]
     return time, np.where(on, size, 0.0)
 
 
-def stem_response(scene: Scene, c: Floats, row: Row, known: Mapping[str, Estimate]) -> Shape:
+def stem_response(inputs: ModelInputs, c: Floats, row: Row, known: Mapping[str, Estimate]) -> Shape:
     """Stem after a step of OP: slew or positioner."""
-    size = min(max(STEP_PCT, 0.5 * float(np.ptp(scene.op))), 50.0)
+    size = min(max(STEP_PCT, 0.5 * float(np.ptp(inputs.op))), 50.0)
     slow = size / c[Slot.RATE] if row.name == "rate-limit" else 8.0 * c[Slot.SERVO]
-    fine = max(float(slow) * 1.6, 4 * scene.dt_s) / POINTS
+    fine = max(float(slow) * 1.6, 4 * inputs.dt_s) / POINTS
     time, op = _step(size, POINTS, fine, False)
 
     def read(k: Floats) -> Floats:
@@ -184,19 +184,21 @@ PROCESS = (Slot.T, Slot.L, Slot.K, Slot.T2, Slot.T3, Slot.SHARE, Slot.MODE_T, Sl
 """Constants of the process's own dynamics."""
 
 
-def step_response(scene: Scene, c: Floats, row: Row, known: Mapping[str, Estimate], plain: Floats) -> Shape:
+def step_response(
+    inputs: ModelInputs, c: Floats, row: Row, known: Mapping[str, Estimate], plain: Floats
+) -> Shape:
     """PV after a step of OP up (and down again), of the plain and the improved process."""
     times = float(c[Slot.T] + c[Slot.L] + c[Slot.T2] + (c[Slot.MODE_T] if c[Slot.SHARE] != 0 else 0.0))
     if c[Slot.LEAK] == 0:
         times = float(plain[Slot.T] + plain[Slot.L])
-    length = min(LENGTHS * times, scene.dt_s * scene.op.size)
+    length = min(LENGTHS * times, inputs.dt_s * inputs.op.size)
     fast = float(c[Slot.L]) + 10.0 * min(_lags(c, row.name), default=length)
     length = fast if fast < EARLY * length else length
-    dt = min(length / POINTS, scene.dt_s) if length < POINTS * scene.dt_s else length / POINTS
+    dt = min(length / POINTS, inputs.dt_s) if length < POINTS * inputs.dt_s else length / POINTS
     n = min(int(length / dt), 4 * POINTS)
-    size = min(STEP_PCT, float(np.ptp(scene.op)))
+    size = min(STEP_PCT, float(np.ptp(inputs.op)))
     time, op = _step(size, n, dt, row.name == "direction-asymmetry")
-    drawn = Scene(op, dt, 0.0, scene.level, (0.0, 100.0))
+    drawn = ModelInputs(op, dt, 0.0, inputs.level, (0.0, 100.0))
 
     def read(k: Floats) -> Floats:
         return simulate(drawn, resting(k, ()))
@@ -206,13 +208,15 @@ def step_response(scene: Scene, c: Floats, row: Row, known: Mapping[str, Estimat
     return Shape(row.name, "response", Axis("time", "s"), Axis("PV", "% PV"), curves)
 
 
-def gain_curve(scene: Scene, c: Floats, row: Row, known: Mapping[str, Estimate], plain: Floats) -> Shape:
+def gain_curve(
+    inputs: ModelInputs, c: Floats, row: Row, known: Mapping[str, Estimate], plain: Floats
+) -> Shape:
     """Gain of the process over PV: by slope, by its speed, or as a vessel with a rooted outflow."""
-    pv = np.linspace(*scene.pv_range, POINTS)
-    x = pv - scene.level
+    pv = np.linspace(*inputs.pv_range, POINTS)
+    x = pv - inputs.level
 
     def read(k: Floats) -> Floats:
-        empty = max(scene.level, 1.0) / k[Slot.ROOT] if k[Slot.ROOT] > 0 else np.inf
+        empty = max(inputs.level, 1.0) / k[Slot.ROOT] if k[Slot.ROOT] > 0 else np.inf
         root = np.sqrt(np.maximum(1.0 + x / empty, 0.0))
         bent = np.maximum(1.0 + k[Slot.SLOPE] * x / 50.0, 0.05)
         scheduled = np.maximum(1.0 + k[Slot.GAIN_SLOPE] * x / 50.0, 0.05)
@@ -223,10 +227,12 @@ def gain_curve(scene: Scene, c: Floats, row: Row, known: Mapping[str, Estimate],
     return Shape(row.name, "curve", Axis("PV", "%"), Axis("gain", "% PV/% OP"), curves)
 
 
-def delay_curve(scene: Scene, c: Floats, row: Row, known: Mapping[str, Estimate], plain: Floats) -> Shape:
+def delay_curve(
+    inputs: ModelInputs, c: Floats, row: Row, known: Mapping[str, Estimate], plain: Floats
+) -> Shape:
     """Dead time over flow (OP), at a flow that stays."""
-    op = op_range(scene)
-    about = max(scene.middle, 1e-3)
+    op = op_range(inputs)
+    about = max(inputs.middle, 1e-3)
 
     def read(k: Floats) -> Floats:
         return np.asarray(k[Slot.L] / np.maximum(1.0 + k[Slot.PIPE] * (op / about - 1.0), 0.1))
@@ -236,45 +242,45 @@ def delay_curve(scene: Scene, c: Floats, row: Row, known: Mapping[str, Estimate]
     return Shape(row.name, "curve", Axis("OP (flow)", "%"), Axis("dead time", "s"), curves)
 
 
-def overflow_curve(scene: Scene, c: Floats, row: Row, known: Mapping[str, Estimate]) -> Shape:
+def overflow_curve(inputs: ModelInputs, c: Floats, row: Row, known: Mapping[str, Estimate]) -> Shape:
     """PV over what an unbounded vessel would show."""
-    low_pv, high_pv = scene.pv_range
+    low_pv, high_pv = inputs.pv_range
     free = np.linspace(low_pv, high_pv + 0.3 * (high_pv - low_pv), POINTS)
     y, low, high = banded(lambda k: np.minimum(free, k[Slot.CAP]), c, ends(row, known))
     curves = (Drawn("found", free, y, low, high), Drawn("plain", free, free))
     return Shape(row.name, "curve", Axis("PV of a vessel without overflow", "%"), Axis("PV", "%"), curves)
 
 
-def course(scene: Scene, c: Floats, row: Row, known: Mapping[str, Estimate], plain: Floats) -> Shape:
+def course(inputs: ModelInputs, c: Floats, row: Row, known: Mapping[str, Estimate], plain: Floats) -> Shape:
     """What acts over the recording: load, supply, or the gain as it drifts."""
-    n = scene.op.size
+    n = inputs.op.size
     at = np.unique(np.linspace(0, n - 1, min(COURSE_POINTS, n)).astype(int))
     if row.name == "load-oscillation":
-        at = at_few_periods(scene, c)
-    time = at * scene.dt_s
+        at = at_few_periods(inputs, c)
+    time = at * inputs.dt_s
     drifts = row.name == "gain-drift"
 
     def read(k: Floats) -> Floats:
         if drifts:
-            return np.asarray(k[Slot.K] * (1.0 + k[Slot.DRIFT] * scene.clock[at]))
+            return np.asarray(k[Slot.K] * (1.0 + k[Slot.DRIFT] * inputs.clock[at]))
         if row.name == "supply-variation":
-            return np.asarray(100.0 * head(scene, k)[at])
-        return np.asarray(load(scene, k)[at])
+            return np.asarray(100.0 * head(inputs, k)[at])
+        return np.asarray(load(inputs, k)[at])
 
     y, low, high = banded(read, c, ends(row, known))
     rest = np.full(at.size, float(plain[Slot.K]) if drifts else 0.0)
     axis = Axis("gain", "% PV/% OP") if drifts else Axis("load at the inlet", "% OP")
     axis = Axis("supply", "% of its mean") if row.name == "supply-variation" else axis
-    acting = [k for i, k in enumerate(scene.step_at[:STEPS]) if c[int(Slot.STEP) + i] != 0]
-    places = tuple(float(k * scene.dt_s) for k in acting) if row.name == "load-step" else ()
+    acting = [k for i, k in enumerate(inputs.step_at[:STEPS]) if c[int(Slot.STEP) + i] != 0]
+    places = tuple(float(k * inputs.dt_s) for k in acting) if row.name == "load-step" else ()
     curves = (Drawn("found", time, y, low, high), Drawn("plain", time, rest))
     return Shape(row.name, "course", Axis("time", "s"), axis, curves, places)
 
 
-def at_few_periods(scene: Scene, c: Floats) -> np.ndarray:
+def at_few_periods(inputs: ModelInputs, c: Floats) -> np.ndarray:
     """Samples of the first six periods of an oscillating load."""
-    samples = 6 * 2 * np.pi / max(float(c[Slot.OMEGA]) * scene.dt_s, 1e-9)
-    return np.unique(np.linspace(0, min(samples, scene.op.size - 1), COURSE_POINTS).astype(int))
+    samples = 6 * 2 * np.pi / max(float(c[Slot.OMEGA]) * inputs.dt_s, 1e-9)
+    return np.unique(np.linspace(0, min(samples, inputs.op.size - 1), COURSE_POINTS).astype(int))
 
 
 LOOPS = ("backlash", "stiction")
@@ -292,13 +298,13 @@ def _lags(c: Floats, name: str) -> list[float]:
 
 
 def shape_of(
-    scene: Scene, row: Row, known: Mapping[str, Estimate], best: Floats, plain: Floats
+    inputs: ModelInputs, row: Row, known: Mapping[str, Estimate], best: Floats, plain: Floats
 ) -> Shape | None:
     """The shape of one row of the physics; None of a row without one.
 
     Parameters
     ----------
-    scene : Scene
+    inputs : ModelInputs
     row : Row
     known : mapping of str to Estimate
         The row's constants with intervals, by their answered names.
@@ -306,19 +312,19 @@ def shape_of(
         Constants of the improved and of the plain model.
     """
     if row.name in LOOPS:
-        return loop(scene, best, row, known)
+        return loop(inputs, best, row, known)
     if row.name in FLOWS:
-        return flow_curve(scene, best, row, known)
+        return flow_curve(inputs, best, row, known)
     if row.name in STEMS:
-        return stem_response(scene, best, row, known)
+        return stem_response(inputs, best, row, known)
     if row.name in STEPPED:
-        return step_response(scene, best, row, known, plain)
+        return step_response(inputs, best, row, known, plain)
     if row.name in GAINS:
-        return gain_curve(scene, best, row, known, plain)
+        return gain_curve(inputs, best, row, known, plain)
     if row.name == "flow-dependent-delay":
-        return delay_curve(scene, best, row, known, plain)
+        return delay_curve(inputs, best, row, known, plain)
     if row.name == "overflow":
-        return overflow_curve(scene, best, row, known)
+        return overflow_curve(inputs, best, row, known)
     if row.block == "load" or row.name == "gain-drift":
-        return course(scene, best, row, known, plain)
+        return course(inputs, best, row, known, plain)
     return None

@@ -16,7 +16,7 @@ from identification.simulation.parameters import Slot
 
 if TYPE_CHECKING:
     from identification.estimation.prediction_error import Fitted, Problem
-    from identification.mismatch.diagnosis import Explanation, Subject
+    from identification.mismatch.diagnosis import Explanation, Recording
 
 PARTS = 40
 """Parts of the record that spans are made of."""
@@ -80,7 +80,7 @@ def band(difference: Floats, dt_s: float) -> list[float]:
     return [length / high, length / low]
 
 
-def located_in(p: Problem, fit: Fitted, s: Subject) -> Located:
+def located_in(p: Problem, fit: Fitted, s: Recording) -> Located:
     """Where a fit's innovations are large or keep one sign."""
     late_s, lag_s = float(fit.model.c[Slot.L]), float(fit.model.c[Slot.T])
     late = min(round(late_s / s.dt_s), s.pv.size // 4)
@@ -90,7 +90,7 @@ def located_in(p: Problem, fit: Fitted, s: Subject) -> Located:
 
 def won_over(p: Problem, plain: Fitted, best: Fitted) -> tuple[Floats, Floats]:
     """Squared innovations that the better model saves at each sample, and both simulations' difference, (n,)."""
-    before, after = simulate(p.scene, plain.model.c), simulate(p.scene, best.model.c)
+    before, after = simulate(p.inputs, plain.model.c), simulate(p.inputs, best.model.c)
     e0, e1 = (whitened(p.y - x, best.ar, p.edges) for x in (before, after))
     return p.weight * (e0**2 - e1**2), after - before
 
@@ -107,7 +107,7 @@ def _part(f: Feature) -> list[float]:
     return [] if f.low is None or f.high is None else [f.low, f.high]
 
 
-def where_of(found: Explanation, s: Subject, block: str, at: Located) -> dict[str, Any]:
+def where_of(found: Explanation, s: Recording, block: str, at: Located) -> dict[str, Any]:
     """Where the misfit is: signals, spans [s], ranges, direction of OP, periods [s] and the features that carry it.
 
     Of an effect of the physics it is where the plain model loses to the better one; of recorder and controller,
@@ -116,13 +116,13 @@ def where_of(found: Explanation, s: Subject, block: str, at: Located) -> dict[st
     Parameters
     ----------
     found : Explanation
-    s : Subject
+    s : Recording
     block : str
         Block of the verdict.
     at : Located
         Of the plain loop's innovations (of the last model's, where something is left over).
     """
-    marked = found.trace or found.ruling
+    marked = found.recorder or found.controller
     told: dict[str, Any] = {"features": features_said(at), "after_reversals": _carries(at, "after_reversals")}
     if marked is not None:
         spans = masked_spans(marked.where[: s.pv.size])

@@ -1,4 +1,4 @@
-"""Where a rival starts: steps and lines located in what a fit leaves, and each row's starts, the best first."""
+"""Where a candidate starts: steps and lines located in what a fit leaves, and each row's starts, the best first."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def step_pulse(p: Problem, fit: Fitted) -> Floats:
     for slot in (Slot.T, Slot.K):
         one[slot] = fit.model.c[slot]
     one[int(Slot.STEP)] = 1.0
-    quiet = replace(p.scene, op=np.full(n, p.scene.middle), step_at=(0,))
+    quiet = replace(p.inputs, op=np.full(n, p.inputs.middle), step_at=(0,))
     return whitened(np.concatenate((np.zeros(LEAD), simulate(quiet, one)))[:n], fit.ar, p.edges)[LEAD:]
 
 
@@ -66,7 +66,7 @@ def at_inlet(p: Problem, fit: Fitted) -> bool:
     through = step_pulse(p, fit)
     jump = whitened(np.concatenate((np.zeros(LEAD), np.ones(p.y.size - LEAD))), fit.ar, p.edges)[LEAD:]
     came, jumped = 0.0, 0.0
-    for at in dict.fromkeys(p.scene.step_at):
+    for at in dict.fromkeys(p.inputs.step_at):
         came += max(_share(e, through, at + i) for i in range(-NEAR, NEAR + 1))
         jumped += max(_share(e, jump, at + i) for i in range(-NEAR, DELAYED))
     return jumped < JUMPS * came
@@ -81,7 +81,7 @@ def _share(e: Floats, pulse: Floats, at: int) -> float:
 
 def after_gaps(p: Problem, fit: Fitted) -> Mask:
     """True in gaps and until what OP did in them has died away in PV, shape (n,): no step can be told there."""
-    held = round(float(fit.model.c[Slot.L] + FORGOTTEN * fit.model.c[Slot.T]) / p.scene.dt_s)
+    held = round(float(fit.model.c[Slot.L] + FORGOTTEN * fit.model.c[Slot.T]) / p.inputs.dt_s)
     gone = np.diff(np.concatenate(([0], (~p.usable).astype(np.int8), [0])))
     out = np.zeros(p.y.size, dtype=bool)
     for first, last in zip(np.flatnonzero(gone == 1), np.flatnonzero(gone == -1), strict=True):
@@ -113,13 +113,13 @@ def line_frequencies(p: Problem, fit: Fitted) -> tuple[float, ...]:
     found = []
     for _ in range(LINES):
         k = int(np.argmax(share))
-        found.append(math.pi * k / (e.size * p.scene.dt_s))
+        found.append(math.pi * k / (e.size * p.inputs.dt_s))
         share[max(k - 4, 0) : k + 5] = 0.0
     return tuple(found)
 
 
 @dataclass(frozen=True, slots=True)
-class Excited:
+class CandidateInputs:
     """A problem with the places and frequencies at which a load may act, and the loop's type where known."""
 
     p: Problem
@@ -127,13 +127,13 @@ class Excited:
     kind: str = ""
 
 
-def excited(p: Problem, fit: Fitted, kind: str = "") -> Excited:
+def candidate_inputs(p: Problem, fit: Fitted, kind: str = "") -> CandidateInputs:
     """Steps and a line located in what a fit leaves."""
-    held = p.scene.step_at if any(r.needs == "steps" for r in fit.model.rows) else step_places(p, fit)
-    return Excited(replace(p, scene=replace(p.scene, step_at=held)), line_frequencies(p, fit), kind)
+    held = p.inputs.step_at if any(r.needs == "steps" for r in fit.model.rows) else step_places(p, fit)
+    return CandidateInputs(replace(p, inputs=replace(p.inputs, step_at=held)), line_frequencies(p, fit), kind)
 
 
-def candidates(x: Excited, near: Fitted, row: Row) -> list[Model]:
+def start_models(x: CandidateInputs, near: Fitted, row: Row) -> list[Model]:
     """Starts of a row added to a fit."""
     if row.needs == "line":
         return lines(x, near, row)
@@ -143,7 +143,7 @@ def candidates(x: Excited, near: Fitted, row: Row) -> list[Model]:
         for slot, value in (row.fixed or {}).items():
             c[slot] = value
         for param in row.params:
-            offset, factor = scales(x.p.scene, near.model.c, param)
+            offset, factor = scales(x.p.inputs, near.model.c, param)
             c[param.slot] = offset + factor * start.get(int(param.slot), 0.0)
         stood = sum(c[slot] for slot in row.delays) + max(-c[Slot.SHARE] * c[Slot.T], 0.0)
         if row.name == "integrator":
@@ -157,7 +157,7 @@ def candidates(x: Excited, near: Fitted, row: Row) -> list[Model]:
     return out
 
 
-def lines(x: Excited, near: Fitted, row: Row) -> list[Model]:
+def lines(x: CandidateInputs, near: Fitted, row: Row) -> list[Model]:
     """Starts of an oscillating load, one a frequency."""
     out = []
     for omega in x.omegas:
@@ -180,6 +180,6 @@ def screened(p: Problem, near: Fitted, span: Floats, models: list[Model]) -> lis
     root = np.sqrt(p.weight)
     left = []
     for i, model in enumerate(models):
-        e = whitened(p.y - simulate(p.scene, model.c), near.ar, p.edges) * root
+        e = whitened(p.y - simulate(p.inputs, model.c), near.ar, p.edges) * root
         left.append((float(e @ e) - float(((e @ span) ** 2).sum()), i))
     return [models[i] for _, i in sorted(left)]

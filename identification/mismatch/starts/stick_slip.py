@@ -28,7 +28,7 @@ COMPASS = (0.02, 0.007, 0.0025)
 
 def quick_loss(p: Problem, c: Floats, ar: Floats) -> float:
     """Weighted mean square innovation under a given noise model."""
-    return loss_of(p, whitened(p.y - simulate(p.scene, c), ar, p.edges))
+    return loss_of(p, whitened(p.y - simulate(p.inputs, c), ar, p.edges))
 
 
 def own_loss(p: Problem, c: Floats) -> float:

@@ -39,14 +39,14 @@ class Point:
 
 def responses(p: Problem, near: Fitted, dead_s: float, times: set[float], ar: Floats) -> dict[float, Floats]:
     """Whitened unit responses, each shape (n,), of lags with these time constants [s]."""
-    scene, c = p.scene, near.model.c.copy()
-    through = flow(scene.op, c, scene.dt_s, scene.middle)
-    still = np.zeros(scene.op.size)
+    inputs, c = p.inputs, near.model.c.copy()
+    through = flow(inputs.op, c, inputs.dt_s, inputs.middle)
+    still = np.zeros(inputs.op.size)
     c[Slot.K], c[Slot.BIAS], c[Slot.START], c[Slot.L] = 1.0, 0.0, 0.0, dead_s
     out = {}
     for t in times:
-        c[Slot.T] = max(t, 0.1 * scene.dt_s)
-        out[t] = whitened(plain_vessel(through, still, c, scene.dt_s, scene.middle), ar, p.edges)
+        c[Slot.T] = max(t, 0.1 * inputs.dt_s)
+        out[t] = whitened(plain_vessel(through, still, c, inputs.dt_s, inputs.middle), ar, p.edges)
     return out
 
 
@@ -95,7 +95,7 @@ def mode_starts(p: Problem, near: Fitted, row: Row) -> list[Model]:
             c[Slot.T], c[Slot.L], c[Slot.MODE_T] = (
                 point.first_s,
                 point.dead_s,
-                max(point.other_s, 0.1 * p.scene.dt_s),
+                max(point.other_s, 0.1 * p.inputs.dt_s),
             )
             c[Slot.K] = sum(point.gains)
             c[Slot.SHARE] = point.gains[1] / c[Slot.K]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from identification.controller.check import Stated, judge
-from tests.identification.scenes import PLAY, N, subject
+from tests.identification.scenes import PLAY, N, recording
 
 pytestmark = pytest.mark.slow
 
@@ -26,7 +26,7 @@ def law(e: np.ndarray, kp: float, ti: float, gap: float = 0.0) -> np.ndarray:
 
 def test_true_settings_are_not_blamed() -> None:
     """A controller that does what is stated is not named."""
-    s = subject(1)
+    s = recording(1)
     assert s.stated is not None
     assert judge(s.sp, s.pv, s.op, GOOD, s.stated)[0] is None
 
@@ -34,7 +34,7 @@ def test_true_settings_are_not_blamed() -> None:
 @pytest.mark.parametrize(("kp", "ti"), [(2.1, 20.0), (1.8, 23.0)])
 def test_wrong_settings_are_found(kp: float, ti: float) -> None:
     """Settings stated 15 % wrong are named and the true ones given within 3 %."""
-    s = subject(2)
+    s = recording(2)
     found, _ = judge(s.sp, s.pv, s.op, GOOD, Stated(kp, ti))
     assert found is not None
     assert found.name == "controller-settings"
@@ -56,7 +56,7 @@ def test_wrong_integral_time_is_found_where_the_loop_seldom_moves() -> None:
 
 def test_thinned_recordings_blame_no_sound_controller() -> None:
     """Of every fifth sample, oscillation and all, neither clock nor settings within a fifth are blamed."""
-    s = subject(2, PLAY)
+    s = recording(2, PLAY)
     pv, op, sp = s.pv[::5], s.op[::5], s.sp[::5]
     good = np.ones(pv.size, dtype=bool)
     assert judge(sp, pv, op, good, Stated(1.8, 4.0, 5.0))[0] is None
@@ -67,7 +67,7 @@ def test_thinned_recordings_blame_no_sound_controller() -> None:
 
 def test_late_clock_is_found() -> None:
     """PV stamped three samples late is named with its shift."""
-    s = subject(3)
+    s = recording(3)
     late = np.concatenate((np.full(3, s.pv[0]), s.pv[:-3]))
     found, _ = judge(s.sp, late, s.op, GOOD, Stated(1.8, 20.0))
     assert found is not None
@@ -76,7 +76,7 @@ def test_late_clock_is_found() -> None:
 
 def test_gap_is_found() -> None:
     """An OP that stands while the error is under 0.4 % is a gap of that size."""
-    s = subject(4)
+    s = recording(4)
     op = law(s.sp - s.pv, 1.8, 20.0, 0.4)
     found, _ = judge(s.sp, s.pv, op, GOOD, Stated(1.8, 20.0))
     assert found is not None
@@ -86,7 +86,7 @@ def test_gap_is_found() -> None:
 
 def test_held_output_is_logic() -> None:
     """OP held for a twentieth of the record whatever the error is logic, not a gap."""
-    s = subject(5)
+    s = recording(5)
     op = s.op.copy()
     for first in (700, 2200, 3900):
         op[first : first + 90] = op[first]

@@ -8,7 +8,7 @@ import pytest
 from identification.estimation.backlash_stiction import better_linear, fit_linear, fit_play, fit_stick_slip
 from identification.estimation.gauss_newton import descend
 from identification.estimation.hammerstein import lag, process_of, stem_blocks, sticking, unit_lag
-from identification.estimation.likelihood_ratio import Rival, evidence, innovations
+from identification.estimation.likelihood_ratio import WindowFit, evidence, innovations
 from identification.estimation.window import Window, block_means
 from identification.models import Backlash, Fopdt, Loop, Pid
 from identification.simulation.closed_loop import closed_loop, open_loop
@@ -56,7 +56,7 @@ def test_ideal_valve_gives_no_evidence_of_play(seed):
     w = window(Fopdt(2.0, 30.0, 5.0), None, 10 + seed)
     linear = fit_linear(w, 120.0)
     found = fit_play(w, linear, 120.0)
-    assert evidence(Rival(w, found), Rival(w, better_linear(w, linear, found))) < 5.0
+    assert evidence(WindowFit(w, found), WindowFit(w, better_linear(w, linear, found))) < 5.0
 
 
 @pytest.mark.parametrize("width", [1.0, 2.5, 5.0])
@@ -66,7 +66,7 @@ def test_width_of_play_is_recovered(width):
     linear = fit_linear(w, 120.0)
     found = fit_play(w, linear, 120.0)
     assert found.valve.stickband == pytest.approx(width, abs=0.1)
-    assert evidence(Rival(w, found), Rival(w, better_linear(w, linear, found))) > 100
+    assert evidence(WindowFit(w, found), WindowFit(w, better_linear(w, linear, found))) > 100
 
 
 def test_play_is_recovered_from_its_limit_cycle():
@@ -108,7 +108,7 @@ def test_evidence_is_antisymmetric_about_nothing():
     """A fit has no evidence over itself."""
     w = window(Fopdt(2.0, 30.0, 5.0), None, 50)
     fit = fit_linear(w, 120.0)
-    assert evidence(Rival(w, fit), Rival(w, fit)) == 0.0
+    assert evidence(WindowFit(w, fit), WindowFit(w, fit)) == 0.0
 
 
 def test_unusable_samples_do_not_count():

@@ -10,7 +10,7 @@ from identification.mismatch.forward_selection import prepared
 from identification.models import Fopdt, Loop, Pid
 from identification.record import LoopRecord
 from identification.simulation.closed_loop import closed_loop
-from identification.simulation.open_loop import Scene
+from identification.simulation.open_loop import ModelInputs
 from identification.simulation.parameters import Slot
 
 pytestmark = pytest.mark.slow
@@ -42,8 +42,10 @@ def test_starts_hold_one_near_the_truth() -> None:
 def test_plain_loop_is_found_in_closed_loop() -> None:
     """Gain within 5 %, time constant within 5 % and dead time within a tenth of a sample, load and noise on."""
     s = recorded(12)
-    scene = Scene(s.op, 1.0, float(s.op.mean()), float(s.pv.mean()), (float(s.pv.min()), float(s.pv.max())))
-    _, fit = prepared(scene, s.pv - s.pv.mean(), np.ones(s.pv.size, dtype=bool))
+    inputs = ModelInputs(
+        s.op, 1.0, float(s.op.mean()), float(s.pv.mean()), (float(s.pv.min()), float(s.pv.max()))
+    )
+    _, fit = prepared(inputs, s.pv - s.pv.mean(), np.ones(s.pv.size, dtype=bool))
     c = fit.model.c
     assert c[Slot.K] == pytest.approx(1.2, rel=0.05)
     assert c[Slot.T] == pytest.approx(20.0, rel=0.05)

@@ -8,23 +8,23 @@ import numpy as np
 import pytest
 
 from identification.mismatch.answer import answer
-from identification.mismatch.diagnosis import Explanation, Subject, scene_of
+from identification.mismatch.diagnosis import Explanation, Recording, inputs_of
 from identification.mismatch.forward_selection import prepared
 from identification.mismatch.identifiability import ANSWERS, brings, too_short, unanswered, uninformed
 from identification.simulation.parameters import Slot
-from tests.identification.scenes import noise, subject
+from tests.identification.scenes import noise, recording
 
 
-def plainly(s: Subject) -> Explanation:
+def plainly(s: Recording) -> Explanation:
     """The plain fit alone."""
-    scene = scene_of(s)
-    p, plain = prepared(scene, s.pv - scene.level, s.usable)
+    inputs = inputs_of(s)
+    p, plain = prepared(inputs, s.pv - inputs.level, s.usable)
     return Explanation(p, plain, plain)
 
 
 def test_loop_with_moves_is_informed() -> None:
     """A loop of 20 s time constant over 5,000 s with set-point moves lacks nothing, and its verdict is none."""
-    s = subject(1)
+    s = recording(1)
     found = plainly(s)
     assert uninformed(found, s) == ""
     said = answer(found, s)
@@ -33,7 +33,7 @@ def test_loop_with_moves_is_informed() -> None:
 
 def test_output_that_pv_does_not_answer_is_an_abstention() -> None:
     """OP that wanders beside a PV of pure noise gives no gain, and the verdict says what is needed."""
-    s = subject(2)
+    s = recording(2)
     rng = np.random.default_rng(3)
     deaf = replace(s, pv=50 + noise(77), op=50 + np.cumsum(rng.normal(0, 0.2, s.pv.size)))
     found = plainly(deaf)
@@ -45,7 +45,7 @@ def test_output_that_pv_does_not_answer_is_an_abstention() -> None:
 
 def test_slow_level_answers_although_its_gain_is_open() -> None:
     """A near integrator, whose gain and time constant are known by their ratio alone, answers OP all the same."""
-    s = subject(5)
+    s = recording(5)
     found = plainly(s)
     assert brings(found.p, found.plain) > 10 * ANSWERS
 
@@ -53,7 +53,7 @@ def test_slow_level_answers_although_its_gain_is_open() -> None:
 @pytest.mark.parametrize(("kind", "told"), [("temperature", True), ("level", False)])
 def test_short_record_is_told_unless_it_may_integrate(kind: str, told: bool) -> None:
     """A record of 2.5 time constants is too short for a process that settles; a level need not settle."""
-    s = replace(subject(4), kind=kind)
+    s = replace(recording(4), kind=kind)
     found = plainly(s)
     slow = found.plain.model.c.copy()
     slow[Slot.T] = s.pv.size * s.dt_s / 2.5

@@ -9,10 +9,10 @@ import pytest
 
 from identification.controller.check import Stated
 from identification.mismatch.answer import answer
-from identification.mismatch.diagnosis import Subject, explain
+from identification.mismatch.diagnosis import Recording, explain
 from identification.models import Integrator, Loop, Pid
 from identification.simulation.closed_loop import closed_loop
-from tests.identification.scenes import PLAY, STICKING, N, noise, setpoints, subject
+from tests.identification.scenes import PLAY, STICKING, N, noise, recording, setpoints
 
 pytestmark = pytest.mark.slow
 
@@ -20,13 +20,13 @@ pytestmark = pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_plain_loop_is_none(seed: int) -> None:
     """A plain loop under load and noise is `none`."""
-    s = subject(seed)
+    s = recording(seed)
     assert answer(explain(s), s).verdict == "none"
 
 
 def test_one_outlier_and_a_gap_are_none() -> None:
     """One wild value and a hole in the recording are no physics."""
-    s = subject(4)
+    s = recording(4)
     pv, usable = s.pv.copy(), s.usable.copy()
     pv[2100] += 15.0
     usable[3000:3060] = False
@@ -37,7 +37,7 @@ def test_one_outlier_and_a_gap_are_none() -> None:
 
 def test_play_is_named_with_its_width() -> None:
     """Play of 2 % is named and its interval lies within 0.2 % of the truth."""
-    s = subject(5, PLAY)
+    s = recording(5, PLAY)
     said = answer(explain(s), s)
     assert said.verdict == "backlash"
     assert said.effects[0].parameters["backlash_pct"].value == pytest.approx(2.0, abs=0.2)
@@ -46,7 +46,7 @@ def test_play_is_named_with_its_width() -> None:
 
 def test_sticking_is_not_taken_for_play() -> None:
     """A stickband of 2 % with a jump of 1.2 % is stiction, not play."""
-    s = subject(6, STICKING)
+    s = recording(6, STICKING)
     said = answer(explain(s), s)
     assert said.verdict == "stiction"
     assert said.effects[0].parameters["slip_jump_pct"].value == pytest.approx(1.2, rel=0.15)
@@ -55,7 +55,7 @@ def test_sticking_is_not_taken_for_play() -> None:
 def test_load_step_is_named_where_it_is() -> None:
     """A step of the load is a load, and its span is where it came."""
     load = np.where(np.arange(N) > 2600, 2.5 * (1 - np.exp(-(np.arange(N) - 2600) / 20.0)), 0.0)
-    s = subject(7, load=np.nan_to_num(load))
+    s = recording(7, load=np.nan_to_num(load))
     said = answer(explain(s), s)
     assert said.verdict == "load-step"
     assert any(first <= 2600 <= last for first, last in said.where["spans"])
@@ -63,7 +63,7 @@ def test_load_step_is_named_where_it_is() -> None:
 
 def test_compressed_trends_end_at_the_recorder() -> None:
     """Straight segments off any grid are the finding; nothing of the valve is said."""
-    s = subject(8, PLAY)
+    s = recording(8, PLAY)
     kept = np.arange(0, N, 9)
     pv = np.interp(np.arange(N), kept, s.pv[kept] + 1e-3 * np.random.default_rng(0).normal(size=kept.size))
     s = replace(s, pv=pv)
@@ -78,7 +78,7 @@ def test_process_that_never_settles_is_an_integrator_of_its_kind() -> None:
     n = noise(9)
     r = closed_loop(Loop(Integrator(0.05, 5.0), law), setpoints(9), 0.3 * n)
     held = Stated(law.kp, law.ti_s)
-    s = Subject(
+    s = Recording(
         r.sp,
         np.round(r.pv, 2),
         np.round(r.op, 2),
@@ -95,7 +95,7 @@ def test_process_that_never_settles_is_an_integrator_of_its_kind() -> None:
 
 def test_bursts_of_a_sensor_are_no_load_steps() -> None:
     """One-sided bursts on PV itself are unexplained: they did not come through the process."""
-    s = subject(10)
+    s = recording(10)
     rng = np.random.default_rng(10)
     pv = s.pv.copy()
     for first in rng.integers(200, N - 200, 8):
@@ -106,7 +106,7 @@ def test_bursts_of_a_sensor_are_no_load_steps() -> None:
 
 def test_samples_held_over_a_hole_are_not_taken_for_a_load() -> None:
     """Where the stamps have a hole, the values held over it raise no load step though nobody marked them."""
-    s = subject(11)
+    s = recording(11)
     kept = np.ones(N, dtype=bool)
     kept[2300:2320] = kept[3600:3650] = False
     held = np.maximum.accumulate(np.where(kept, np.arange(N), 0))
@@ -116,7 +116,7 @@ def test_samples_held_over_a_hole_are_not_taken_for_a_load() -> None:
 
 def test_wrong_settings_do_not_hide_the_play() -> None:
     """Of wrongly stated settings and a play in the valve the settings are the verdict, and both are told."""
-    s = subject(12, PLAY)
+    s = recording(12, PLAY)
     s = replace(s, stated=Stated(3.0, 20.0))
     said = answer(explain(s), s)
     assert said.verdict == "controller-settings"

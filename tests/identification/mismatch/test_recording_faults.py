@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from identification.mismatch import recording_faults as recorder
-from tests.identification.scenes import subject
+from identification.mismatch import recording_faults
+from tests.identification.scenes import recording
 
 pytestmark = pytest.mark.slow
 
-PV = subject(1).pv
+PV = recording(1).pv
 TICKS = np.arange(PV.size, dtype=float)
 
 
@@ -18,30 +18,30 @@ def test_sound_recording_has_no_trace() -> None:
     """A trend rounded to 0.01 or 0.05 % is neither compressed, coarse, clipped nor badly sampled."""
     for step in (0.01, 0.05):
         pv = np.round(PV / step) * step
-        assert recorder.compression(pv) is None
-        assert recorder.quantization(pv, True) is None
-        assert recorder.clipped(pv) is None
-    assert recorder.sampling(TICKS + np.random.default_rng(0).normal(0, 0.01, PV.size), 1.0) is None
+        assert recording_faults.compression(pv) is None
+        assert recording_faults.quantization(pv, True) is None
+        assert recording_faults.clipped(pv) is None
+    assert recording_faults.sampling(TICKS + np.random.default_rng(0).normal(0, 0.01, PV.size), 1.0) is None
 
 
 def test_coarse_converter_is_found_under_rounding() -> None:
     """Steps of 0.13 % are found although the historian rounds them to 0.02 %."""
     pv = np.round(np.round(PV / 0.13) * 0.13 / 0.02) * 0.02
-    found = recorder.quantization(pv, True)
+    found = recording_faults.quantization(pv, True)
     assert found is not None
     assert abs(found.value - 0.13) < 0.01
 
 
 def test_clip_is_found_at_its_value() -> None:
     """A transmitter that ends at 54 % is found there, a peak that is only high is not."""
-    found = recorder.clipped(np.minimum(PV, 54.0))
+    found = recording_faults.clipped(np.minimum(PV, 54.0))
     assert found is not None
     assert found.value == 54.0
 
 
 def test_scattered_polling_is_found() -> None:
     """Stamps that scatter by 8 % of a sample are the polling's."""
-    found = recorder.sampling(TICKS + np.random.default_rng(0).normal(0, 0.08, PV.size), 1.0)
+    found = recording_faults.sampling(TICKS + np.random.default_rng(0).normal(0, 0.08, PV.size), 1.0)
     assert found is not None
     assert found.name == "sampling"
 
@@ -49,8 +49,8 @@ def test_scattered_polling_is_found() -> None:
 def test_samples_over_a_hole_are_unlogged() -> None:
     """Exactly the samples between two stamps that lie apart are marked, and none where the clock is full."""
     stamps = np.arange(100.0)[np.r_[0:40, 47:100]] * 2.0 + 7.0
-    found = recorder.unlogged(stamps, 100, 2.0)
+    found = recording_faults.unlogged(stamps, 100, 2.0)
     assert np.array_equal(np.flatnonzero(found), np.arange(40, 47))
-    assert not recorder.unlogged(
+    assert not recording_faults.unlogged(
         np.arange(100.0) * 2.0 + np.random.default_rng(0).normal(0, 0.3, 100), 100, 2.0
     ).any()

@@ -19,17 +19,17 @@ from identification.mismatch.curves.record_shape import (
 from identification.mismatch.curves.shape import Shape, banded, shape_of
 from identification.models import Estimate
 from identification.simulation.effect import Row
-from identification.simulation.open_loop import Scene
+from identification.simulation.open_loop import ModelInputs
 from identification.simulation.parameters import Slot, neutral
 from identification.simulation.valve import play
 
 N = 2000
 
 
-def scene() -> Scene:
+def inputs() -> ModelInputs:
     """OP between 20 and 80 % for 2,000 s, PV between 30 and 70 %."""
     op = 50 + 30 * np.sin(np.arange(N) / 50.0)
-    return Scene(op, 1.0, 50.0, 50.0, (30.0, 70.0), (500,))
+    return ModelInputs(op, 1.0, 50.0, 50.0, (30.0, 70.0), (500,))
 
 
 def row(name: str) -> Row:
@@ -48,7 +48,7 @@ def shape(name: str, spread: float = 0.1, **constants: float) -> Shape:
     for p in row(name).params:
         value = float(best[p.slot])
         known[p.name] = Estimate(value, *sorted((value * (1 - spread), value * (1 + spread))), p.unit)
-    found = shape_of(scene(), row(name), known, best, plain)
+    found = shape_of(inputs(), row(name), known, best, plain)
     assert found is not None
     return found
 

@@ -6,12 +6,12 @@ from identification.mismatch.catalogue import CATALOGUE
 from identification.mismatch.location.features import groups
 from identification.mismatch.words import (
     CHECKS,
+    DISCRIMINATING_TESTS,
     LONGER,
     PLACES,
     SENTENCES,
-    TELLTALES,
+    discriminating_test,
     located_sentence,
-    telltale,
 )
 
 
@@ -26,15 +26,15 @@ def test_look_alikes_have_a_test_of_their_own() -> None:
     """Names that the catalogue calls alike are told apart by a line of their own, whichever comes first."""
     for row in CATALOGUE:
         for other in row.likeness:
-            assert telltale(row.name, other) != LONGER
-            assert telltale(other, row.name) == telltale(row.name, other)
+            assert discriminating_test(row.name, other) != LONGER
+            assert discriminating_test(other, row.name) == discriminating_test(row.name, other)
 
 
 def test_table_names_the_catalogue_only() -> None:
     """No line of the table is about a name that nobody answers."""
     known = set(SENTENCES) | {"sensor-lag"}
-    assert {name for pair in TELLTALES for name in pair} <= known
-    assert all(len(pair) == 2 for pair in TELLTALES)
+    assert {name for pair in DISCRIMINATING_TESTS for name in pair} <= known
+    assert all(len(pair) == 2 for pair in DISCRIMINATING_TESTS)
 
 
 def test_every_feature_has_a_place() -> None:

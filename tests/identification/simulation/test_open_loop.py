@@ -1,4 +1,4 @@
-"""The rivals' simulator against closed forms and against the project's other simulator."""
+"""The candidates' simulator against closed forms and against the project's other simulator."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ import pytest
 
 from identification.models import Backlash, Fopdt
 from identification.simulation.closed_loop import open_loop
-from identification.simulation.open_loop import Scene, simulate
+from identification.simulation.open_loop import ModelInputs, simulate
 from identification.simulation.parameters import Slot, neutral
 from identification.simulation.valve import play
 
 pytestmark = pytest.mark.slow
 
 
-def scene(seed: int = 1, n: int = 600) -> Scene:
+def inputs(seed: int = 1, n: int = 600) -> ModelInputs:
     """OP that moves every thirty samples."""
     op = 50 + np.repeat(np.random.default_rng(seed).uniform(-5, 5, n // 30), 30)
-    return Scene(op, 2.0, float(op[0]), 50.0, (40.0, 60.0))
+    return ModelInputs(op, 2.0, float(op[0]), 50.0, (40.0, 60.0))
 
 
 def constants(**given: float) -> np.ndarray:
@@ -33,14 +33,14 @@ def constants(**given: float) -> np.ndarray:
 
 def test_plain_equals_exact_open_loop() -> None:
     """Without any effect the model is the exact first-order lag with fractional dead time."""
-    s = scene()
+    s = inputs()
     expected = open_loop(Fopdt(1.5, 40.0, 7.0), None, s.op, s.dt_s)
     assert np.allclose(simulate(s, constants()), expected, atol=1e-9)
 
 
 def test_play_equals_play_before_lag() -> None:
-    """The play of a rival is the project's own play before the same lag."""
-    s = scene()
+    """The play of a candidate is the project's own play before the same lag."""
+    s = inputs()
     got = simulate(s, constants(STICKBAND=3.0))
     expected = open_loop(Fopdt(1.5, 40.0, 7.0), Backlash(3.0), s.op, s.dt_s)
     assert np.allclose(got - got[0], expected, atol=1e-9)
@@ -60,14 +60,14 @@ def test_play_equals_play_before_lag() -> None:
 )
 def test_rich_vessel_without_strength_is_plain(neutral_effect: dict[str, float]) -> None:
     """An effect of no strength changes nothing."""
-    s = scene()
+    s = inputs()
     assert np.allclose(simulate(s, constants(**neutral_effect)), simulate(s, constants()), atol=1e-4)
 
 
 def test_second_lag_equals_two_lags() -> None:
     """A second lag gives the closed-form step response of two lags in series."""
     op = np.concatenate((np.full(5, 50.0), np.full(400, 51.0)))
-    s = Scene(op, 2.0, 50.0, 50.0, (40.0, 60.0))
+    s = ModelInputs(op, 2.0, 50.0, 50.0, (40.0, 60.0))
     y = simulate(s, constants(T2=15.0, L=0.0))
     t = 2.0 * (np.arange(405) - 5)
     step = 1.5 * (1 - (40 * np.exp(-t / 40) - 15 * np.exp(-t / 15)) / 25)
@@ -77,7 +77,7 @@ def test_second_lag_equals_two_lags() -> None:
 def test_opposing_mode_starts_the_wrong_way() -> None:
     """A fast mode of opposite sign moves PV down before it goes up."""
     op = np.concatenate((np.full(5, 50.0), np.full(200, 52.0)))
-    y = simulate(Scene(op, 1.0, 50.0, 50.0, (40.0, 60.0)), constants(SHARE=-0.3, MODE_T=2.0, L=0.0))
+    y = simulate(ModelInputs(op, 1.0, 50.0, 50.0, (40.0, 60.0)), constants(SHARE=-0.3, MODE_T=2.0, L=0.0))
     assert y[:20].min() < -0.2
     assert y[-1] > 2.5
 
@@ -85,7 +85,7 @@ def test_opposing_mode_starts_the_wrong_way() -> None:
 def test_pipe_delay_is_dead_time_at_rest_and_shorter_at_flow() -> None:
     """A pipe at its nominal flow is the plain dead time; with more flow PV answers sooner."""
     op = np.concatenate((np.full(50, 50.0), np.full(100, 50.2), np.full(100, 90.0), np.full(100, 90.2)))
-    s = Scene(op, 1.0, 50.0, 50.0, (40.0, 60.0))
+    s = ModelInputs(op, 1.0, 50.0, 50.0, (40.0, 60.0))
     plain, piped = (simulate(s, constants(L=20.0, PIPE=pipe)) for pipe in (0.0, 1.0))
     assert np.allclose(plain[:140], piped[:140], atol=2e-2)
     assert np.flatnonzero(piped > 5.0)[0] < np.flatnonzero(plain > 5.0)[0] - 3
@@ -93,7 +93,7 @@ def test_pipe_delay_is_dead_time_at_rest_and_shorter_at_flow() -> None:
 
 def test_overflow_is_flat_and_then_late() -> None:
     """Above its cap PV stands; a clipped sensor stands too but the vessel beneath goes on."""
-    s = scene()
+    s = inputs()
     top = float(simulate(s, constants()).max())
     wide = replace(s, pv_range=(0.0, 100.0))
     capped = simulate(wide, constants(CAP=50.0 + 0.5 * top))
