@@ -18,7 +18,7 @@ from identification.record import LoopRecord
 
 @dataclass(frozen=True, slots=True)
 class SettingsDiffer:
-    """Stated settings that are not those of the controller.
+    """StatedSettings settings that are not those of the controller.
 
     stated, recorded : in percent and seconds; explained_stated, explained_recorded : share of the variance of OP's
     increments that each explains [-].

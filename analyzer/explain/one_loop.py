@@ -17,11 +17,12 @@ from analyzer.history.series import Series
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import controller
 from analyzer.quality import Prepared, Scale, onto_clock, prepare
-from identification.controller.check import Stated
+from identification.controller.check import StatedSettings
 from identification.errors import InputError, NotAssessedError
 from identification.mismatch import diagnosis as mismatch
 from identification.mismatch.answer import Answer, answer
 from identification.mismatch.model_file import carried, carried_closed, constants, to_data
+from identification.mismatch.recording import Recording
 from identification.mismatch.words import sentence, unexplained_reason
 from identification.record import Floats
 from identification.simulation.parameters import Slot, neutral
@@ -36,7 +37,7 @@ class Case:
 
     spec: LoopSpec
     prepared: Prepared
-    subject: mismatch.Recording
+    subject: Recording
     shortened: str = ""
 
 
@@ -55,13 +56,13 @@ def loop_of(specs: tuple[LoopSpec, ...], tag: str) -> LoopSpec:
     raise InputError(f"no loop {tag}", f"one of {known}", "check --loop and --loops")
 
 
-def stated_law(spec: LoopSpec, prepared: Prepared) -> Stated | None:
+def stated_law(spec: LoopSpec, prepared: Prepared) -> StatedSettings | None:
     """The controller as stated, integral time in samples; None where it is not known or is no PI."""
     pid = controller(spec, prepared.scale.span)
     if pid is None or pid.td_s > 0 or not math.isfinite(pid.ti_s):
         return None
     dt_s = prepared.record.dt_s
-    return Stated(pid.kp, pid.ti_s / dt_s, dt_s / (spec.scan_s or dt_s))
+    return StatedSettings(pid.kp, pid.ti_s / dt_s, dt_s / (spec.scan_s or dt_s))
 
 
 def neighbours(
@@ -141,7 +142,7 @@ def case(
     if float(np.ptp(r.op)) == 0 or float(np.ptp(r.pv)) == 0:
         raise NotAssessedError(f"{spec.loop}: needs OP and PV that move, one of them stands still")
     stamps = raw.stamp_s[~raw.bad]
-    subject = mismatch.Recording(
+    subject = Recording(
         None if r.sp_estimated else r.sp,
         r.pv,
         r.op,
@@ -275,9 +276,9 @@ def saved_model(c: Case, found: mismatch.Explanation, said: Answer) -> dict[str,
     data = to_data(
         c.spec.loop, found.p.inputs, model.c, tuple(e.name for e in said.effects), found.late_s, scale
     )
-    if found.recorder is not None and found.recorder.name == "sensor-clipping":
-        side = "CLIP_HI" if found.recorder.value > float(np.median(c.subject.pv)) else "CLIP_LO"
-        data["constants"][side] = found.recorder.value
+    end = mismatch.transmitter_end(found.recorder, c.subject.pv)
+    if end is not None:
+        data["constants"]["CLIP_HI" if end.upper else "CLIP_LO"] = end.value
     return data
 
 

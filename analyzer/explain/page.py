@@ -18,7 +18,6 @@ from analyzer.explain.page_words import (
     carried_by,
     chance,
     change,
-    check,
     figure,
     interval,
     rms,
@@ -30,7 +29,7 @@ from analyzer.pages.words import duration, number, stamp
 from identification.estimation.limits import HELD_OUT
 from identification.mismatch.forward_selection import Candidate
 from identification.mismatch.location.where import located_in
-from identification.mismatch.words import discriminating_test, located_sentence
+from identification.mismatch.words import check, discriminating_test, located_sentence
 from reports.names import slug
 from reports.pages import Block, Cell, Column, Facts, Page, Section, Table, Text, Tiles
 

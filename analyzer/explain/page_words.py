@@ -7,60 +7,12 @@ from collections.abc import Mapping
 from typing import Any
 
 from analyzer.pages.words import duration, number
-from identification.mismatch.words import ALONG, CHECKS, place
+from identification.mismatch.catalogue import EFFECTS
+from identification.mismatch.words import ALONG, place
 
-PARAMETERS = {
-    "backlash_pct": "Play, full width",
-    "stickband_pct": "Stickband",
-    "slip_jump_pct": "Slip jump",
-    "rate_pct_per_s": "Fastest stem",
-    "limit_pct": "Upper limit",
-    "low_limit_pct": "Lower limit",
-    "curve": "Curve",
-    "positioner_lag_s": "Positioner lag",
-    "damping": "Positioner damping",
-    "deadband_pct": "Dead band",
-    "split_pct": "Split point",
-    "gain_ratio": "Gain above over below",
-    "dead_zone_pct": "Dead zone",
-    "second_valve_lag_s": "Lag of the second valve",
-    "second_lag_s": "Second lag",
-    "slow_share": "Slow share",
-    "slow_time_constant_s": "Slow time constant",
-    "opposing_share": "Opposing share",
-    "opposing_time_constant_s": "Opposing time constant",
-    "ratio_down_up": "Time constant down over up",
-    "gain_slope": "Gain slope",
-    "root": "Root",
-    "cap_pct": "Overflow at",
-    "flow_share": "Share of delay in flow",
-    "gain_drift": "Gain drift",
-    "step_pct": "Step of values",
-    "clip_pct": "Range ends at",
-    "straight_share": "Samples on straight lines",
-    "shift_s": "PV late by",
-    "jitter_samples": "Scatter of stamps",
-    "kp": "Kp",
-    "ti_s": "Ti",
-    "gap_pct": "Gap",
-    "share_pct": "Time outside the law",
-    "size_1_pct": "First load step",
-    "size_2_pct": "Second load step",
-    "size_3_pct": "Third load step",
-    "period_s": "Period",
-    "amplitude_pct": "Amplitude",
-    "coupling_gain": "Coupling gain",
-    "coupling_lag_s": "Coupling lag",
-    "flow_at_rest_pct": "Flow at rest",
-}
+PARAMETERS = {name: text for e in EFFECTS.values() for name, text in e.called.items()}
 """Parameters as they are called on a page; others by their own name."""
-HIDDEN = (
-    "log_ratio_down_up",
-    "sine_pct",
-    "cosine_pct",
-    "angular_frequency",
-    *(f"head_{i}" for i in range(1, 13)),
-)
+HIDDEN = frozenset(name for e in EFFECTS.values() for name in e.hidden)
 """Parameters whose meaning another one carries."""
 MOVED = {
     "gain": ("Gain", "% PV/% OP"),
@@ -112,18 +64,13 @@ SHAPES = {
     "response": "After a step of OP; the band is the interval of what was added.",
     "course": "Over the recording, or the stretch where it shows most.",
 }
-CAPTIONS = {
-    "quantization": "How often each value of PV was recorded: a coarse sensor leaves gaps between teeth.",
-    "compression": "Straight segments between few stored points: what happened between them is not known.",
-    "sampling": "Time between samples: a sound recorder has one narrow peak.",
-    "controller-settings": "OP recorded, and OP rebuilt from SP and PV by the settings found and by those stated.",
-    "controller-gap": "A plain controller moves OP at every error; under the gap it stands still.",
-    "controller-logic": "OP recorded, and OP as the stated settings would have moved it from there.",
-    "clock-offset": "OP recorded, and rebuilt with PV's clock set right (found) and as stamped.",
-    "sensor-clipping": "PV stands at the end of its range while the model goes on beyond it.",
-    "controller": "OP rebuilt from SP and PV by the stated settings lies on OP as recorded.",
-}
-"""What a picture shows, by effect where that says more than its kind."""
+OBEYED = "OP rebuilt from SP and PV by the stated settings lies on OP as recorded."
+"""What the picture of a controller without fault shows."""
+
+
+def caption(effect: str, kind: str) -> str:
+    """What a picture shows: by its effect where that says more than its kind."""
+    return (EFFECTS[effect].caption if effect in EFFECTS else OBEYED) or SHAPES.get(kind, "")
 
 
 def title(verdict: str) -> str:
@@ -192,8 +139,3 @@ def spans_said(spans: list[list[float]]) -> str:
     return ", ".join(f"{duration(a) or '0 s'} to {duration(b)}" for a, b in spans[:4]) + (
         " and more" if len(spans) > 4 else ""
     )
-
-
-def check(verdict: str) -> str:
-    """What to look at."""
-    return CHECKS.get(verdict, CHECKS["unexplained"])

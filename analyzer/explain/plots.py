@@ -8,12 +8,14 @@ import numpy as np
 from scipy.signal import welch
 
 from analyzer.explain.one_loop import Explained
-from analyzer.explain.page_words import AXES, BROUGHT, CAPTIONS, CURVES, FEATURES, KINDS, SHAPES
+from analyzer.explain.page_words import AXES, BROUGHT, CURVES, FEATURES, KINDS, caption
 from analyzer.pages.words import number
 from identification.estimation.prediction_error import Fitted, Problem
+from identification.mismatch.catalogue import EFFECTS, fault
 from identification.mismatch.cross_validation import anchored
-from identification.mismatch.curves.record_shape import busiest, controller_shape, obeyed, recorder_shape
-from identification.mismatch.curves.shape import Shape, shape_of
+from identification.mismatch.curves.controller import by_stated_law
+from identification.mismatch.curves.drawn import Drawing, Shape
+from identification.mismatch.curves.stretches import busiest
 from identification.mismatch.location.features import Group, groups
 from identification.mismatch.location.locate import Located, profile
 from identification.mismatch.location.where import won_over
@@ -213,16 +215,18 @@ def note_of(p: float, carries: bool) -> str:
 def found_shape(e: Explained) -> Shape | None:
     """The shape of the first effect found."""
     f, s = e.found, e.case.subject
-    if f.recorder is not None:
+    finding = f.recorder or f.controller
+    if finding is not None:
         free = f.plain.model.c.copy()
         free[Slot.CLIP_HI], free[Slot.CLIP_LO] = np.inf, -np.inf
-        return recorder_shape(f.recorder, s, f.p.inputs.level + simulate(f.p.inputs, free))
-    if f.controller is not None:
-        return controller_shape(f.controller, s)
+        drawn = fault(finding.name).drawn
+        return None if drawn is None else drawn(finding, s, f.p.inputs.level + simulate(f.p.inputs, free))
     if not f.accepted:
         return None
-    row, known = f.best.model.rows[0], e.said.effects[0].parameters
-    return shape_of(f.p.inputs, row, known, f.best.model.c, f.plain.model.c)
+    added, known = f.best.model.added[0], e.said.effects[0].parameters
+    curve = EFFECTS[added.name].curve
+    drawing = Drawing(f.p.inputs, added, known, f.best.model.c, f.plain.model.c)
+    return None if curve is None else curve(drawing)
 
 
 def shape_plot(shape: Shape, name: str = "shape") -> Plot:
@@ -245,13 +249,16 @@ def shape_plot(shape: Shape, name: str = "shape") -> Plot:
             areas.append(Area(d.x, d.low, d.high, kind))
     marks = tuple(Mark(x, number(x)) for x in shape.places)
     across, along = (f"{a.what} [{a.unit}]" if a.unit else a.what for a in (shape.x, shape.y))
-    caption = CAPTIONS.get(shape.effect, SHAPES.get(shape.kind, ""))
     what = f"{shape.y.what} over {shape.x.what}"
     title = what[:1].upper() + what[1:] if name == "shape" else "OP rebuilt and recorded"
-    return Plot(name, title, across, along, tuple(lines), marks, caption, tuple(areas))
+    return Plot(
+        name, title, across, along, tuple(lines), marks, caption(shape.effect, shape.kind), tuple(areas)
+    )
 
 
 def controller_plot(e: Explained) -> Plot | None:
     """OP rebuilt by the stated settings, where they are known and nothing is wrong with them."""
-    shape = obeyed(e.case.subject) if e.found.controller is None and e.found.law is not None else None
+    if e.found.controller is not None or e.found.law is None:
+        return None
+    shape = by_stated_law("controller", e.case.subject)
     return None if shape is None else shape_plot(shape, "law")

@@ -14,7 +14,6 @@ from analyzer.explain.page_words import (
     called,
     carried_by,
     chance,
-    check,
     figure,
     interval,
     rms,
@@ -23,7 +22,7 @@ from analyzer.explain.page_words import (
     title,
 )
 from analyzer.pages.words import number
-from identification.mismatch.words import discriminating_test
+from identification.mismatch.words import check, discriminating_test
 
 WIDTH = 110
 """Columns of text."""

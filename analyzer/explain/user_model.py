@@ -8,9 +8,10 @@ from typing import Any
 
 from identification.estimation.limits import HELD_OUT
 from identification.mismatch.cross_validation import Misfit, misfit
-from identification.mismatch.diagnosis import Explanation, Recording, restored
+from identification.mismatch.diagnosis import Explanation, restored
 from identification.mismatch.identifiability import unanswered
 from identification.mismatch.model_file import carried, constants
+from identification.mismatch.recording import Recording
 from identification.record import Floats
 from identification.simulation.open_loop import simulate
 from identification.simulation.parameters import Slot

@@ -8,12 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from analyzer.explain.page_words import check, title
+from analyzer.explain.page_words import title
 from analyzer.pages.reading import Thinned
 from analyzer.pages.rhythm import rhythm_plots
 from analyzer.pages.trends import trend_block
 from analyzer.pages.words import TITLES, duration, number
 from analyzer.units import row_settings
+from identification.mismatch.words import check
 from reports.names import slug
 from reports.pages import Block, Cell, Column, Facts, Line, Page, Plot, Section, Table, Text
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from enum import StrEnum
 
 import numpy as np
 from numba import njit
@@ -38,7 +39,7 @@ from identification.record import Floats, Mask
 
 
 @dataclass(frozen=True, slots=True)
-class Stated:
+class StatedSettings:
     """What the plant says of the controller: kp [% OP/% PV], ti [samples], and scans per sample of the recording."""
 
     kp: float
@@ -51,11 +52,24 @@ class Stated:
         return self.scans >= THINNED
 
 
+LATE_SAMPLES = "late_samples"
+"""Name of the number by which a finding says how late PV's clock is [samples]."""
+
+
+class ControllerFault(StrEnum):
+    """What may be wrong with clock or controller."""
+
+    CLOCK = "clock"
+    SETTINGS = "settings"
+    GAP = "gap"
+    LOGIC = "logic"
+
+
 @dataclass(frozen=True, slots=True)
 class ControllerFinding:
-    """One finding about the controller: its name, its numbers, where it is (bool, shape (n,))."""
+    """One finding about clock or controller: which, its numbers, where it is (bool, shape (n,))."""
 
-    name: str
+    fault: ControllerFault
     values: dict[str, float]
     where: Mask
 
@@ -66,7 +80,7 @@ def op_step(op: Floats) -> float:
     return float(np.quantile(gaps, 0.1)) if gaps.size else 0.0
 
 
-def due_moves(e: Floats, said: Stated) -> Floats:
+def due_moves(e: Floats, said: StatedSettings) -> Floats:
     """Moves of OP that the stated law asks for at each sample, shape (n,)."""
     return said.kp * (np.diff(e, prepend=e[0]) + e / said.ti)
 
@@ -89,7 +103,7 @@ def gapped(e: Floats, kp: float, ki: float, width: float, catches_up: bool) -> F
     return out
 
 
-def frozen_width(e: Floats, op: Floats, said: Stated, usable: Mask) -> float:
+def frozen_width(e: Floats, op: Floats, said: StatedSettings, usable: Mask) -> float:
     """Largest error [% PV] under which due moves of OP do not happen while those beyond do; 0 without one."""
     due = np.abs(due_moves(e, said)) > max(op_step(op), 1e-6)
     still = np.diff(op, prepend=op[0]) == 0
@@ -106,7 +120,7 @@ def frozen_width(e: Floats, op: Floats, said: Stated, usable: Mask) -> float:
     return float(size[good[-1]]) if good.size else 0.0
 
 
-def gap(e: Floats, op: Floats, said: Stated, usable: Mask) -> ControllerFinding | None:
+def gap(e: Floats, op: Floats, said: StatedSettings, usable: Mask) -> ControllerFinding | None:
     """OP standing still while the error is small: a law with a gap gives OP where the one without does not."""
     length = span_length(op.size, said.ti)
     n = (op.size // length) * length
@@ -125,7 +139,7 @@ def gap(e: Floats, op: Floats, said: Stated, usable: Mask) -> ControllerFinding 
     inside = still & (np.abs(e) < width)
     if inside.mean() < 0.02:
         return None
-    return ControllerFinding("controller-gap", {"gap_pct": width}, inside)
+    return ControllerFinding(ControllerFault.GAP, {"gap_pct": width}, inside)
 
 
 def runs(still: Mask) -> list[tuple[int, int]]:
@@ -150,15 +164,17 @@ def lawless(found: ControlLaw, usable: Mask, step: float) -> Mask:
     return out
 
 
-def ruled(e: Floats, op: Floats, said: Stated, usable: Mask, found: ControlLaw) -> ControllerFinding | None:
+def ruled(
+    e: Floats, op: Floats, said: StatedSettings, usable: Mask, found: ControlLaw
+) -> ControllerFinding | None:
     """Spans in which something other than the law moves OP, or keeps it."""
     off = lawless(found, usable, op_step(op))
     if float(off.mean()) > LAWLESS_SHARE and found.explained > 0.0:
-        return ControllerFinding("controller-logic", {"share": float(off.mean())}, off)
+        return ControllerFinding(ControllerFault.LOGIC, {"share": float(off.mean())}, off)
     return logic(e, op, said, usable)
 
 
-def logic(e: Floats, op: Floats, said: Stated, usable: Mask) -> ControllerFinding | None:
+def logic(e: Floats, op: Floats, said: StatedSettings, usable: Mask) -> ControllerFinding | None:
     """Stretches in which OP stands although the law asks it to go, whatever the error."""
     path = np.cumsum(due_moves(e, said))
     least = STUCK_MOVE * max(op_step(op), 0.02)
@@ -167,7 +183,7 @@ def logic(e: Floats, op: Floats, said: Stated, usable: Mask) -> ControllerFindin
         if last - first >= STUCK_RUN and float(np.ptp(path[first:last])) > least:
             where[first:last] = True
     share = float(where.mean())
-    return ControllerFinding("controller-logic", {"share": share}, where) if share > STUCK_SHARE else None
+    return ControllerFinding(ControllerFault.LOGIC, {"share": share}, where) if share > STUCK_SHARE else None
 
 
 def typical(residual: Floats, length: int) -> float:
@@ -175,7 +191,7 @@ def typical(residual: Floats, length: int) -> float:
     return float(np.median(np.sqrt((residual.reshape(-1, length) ** 2).mean(axis=1))))
 
 
-def obeys(sp: Floats, pv: Floats, op: Floats, said: Stated, found: ControlLaw) -> bool:
+def obeys(sp: Floats, pv: Floats, op: Floats, said: StatedSettings, found: ControlLaw) -> bool:
     """Whether the stated law gives OP nearly as well as the one found, in most spans and in those that move it."""
     n, length = found.residual.size, found.length
     e = (sp - shifted(pv, found.late))[:n]
@@ -185,7 +201,7 @@ def obeys(sp: Floats, pv: Floats, op: Floats, said: Stated, found: ControlLaw) -
     return whole and typical(left, length) < SAME_LAW * typical(found.residual, length)
 
 
-def settings(found: ControlLaw, said: Stated) -> ControllerFinding | None:
+def settings(found: ControlLaw, said: StatedSettings) -> ControllerFinding | None:
     """Settings that reproduce OP where the stated ones do not."""
     if found.explained < LAW_EXPLAINS or found.ki == 0 or found.kp / found.ki <= 0:
         return None
@@ -195,11 +211,11 @@ def settings(found: ControlLaw, said: Stated) -> ControllerFinding | None:
     if max(off_kp, off_ti) < (SETTING_THINNED if said.thinned else SETTING):
         return None
     values = {"kp": found.kp, "ti_samples": ti} if off_kp >= off_ti else {"ti_samples": ti, "kp": found.kp}
-    return ControllerFinding("controller-settings", values, np.ones(found.residual.size, dtype=bool))
+    return ControllerFinding(ControllerFault.SETTINGS, values, np.ones(found.residual.size, dtype=bool))
 
 
 def judge(
-    sp: Floats, pv: Floats, op: Floats, usable: Mask, said: Stated
+    sp: Floats, pv: Floats, op: Floats, usable: Mask, said: StatedSettings
 ) -> tuple[ControllerFinding | None, ControlLaw]:
     """The first thing that is wrong with clock or controller, and the law as found.
 
@@ -209,7 +225,7 @@ def judge(
         Trends [% of span].
     usable : ndarray of bool, shape (n,)
         False in gaps, in manual and at OP's limits.
-    said : Stated
+    said : StatedSettings
         Of a thinned recording nothing but settings plainly wrong is said: the law is not seen at work.
     """
     found = recovered_law(sp, pv, op, usable, said.ti, said.kp, late=not said.thinned)
@@ -219,9 +235,9 @@ def judge(
         return wrong, found
     if found.late >= LATE and found.explained > LAW_EXPLAINS:
         return ControllerFinding(
-            "clock-offset", {"late_samples": found.late}, np.ones(op.size, dtype=bool)
+            ControllerFault.CLOCK, {LATE_SAMPLES: found.late}, np.ones(op.size, dtype=bool)
         ), found
-    law_now = Stated(found.kp, found.kp / found.ki) if wrong is not None else said
+    law_now = StatedSettings(found.kp, found.kp / found.ki) if wrong is not None else said
     frozen, other = gap(e, op, law_now, usable), ruled(e, op, law_now, usable & ~asked(sp, op), found)
     if frozen is not None:
         return frozen, found

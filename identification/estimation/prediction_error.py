@@ -10,7 +10,7 @@ import numpy as np
 from identification.estimation.limits import BIAS_SCATTER, SETTLED, START_SCATTER
 from identification.estimation.noise import Edges, edges_for, fitted, judged, lag_means, whitened
 from identification.record import Floats, Mask
-from identification.simulation.effect import Param, Row
+from identification.simulation.effect import Param, Variant
 from identification.simulation.open_loop import ModelInputs, simulate
 from identification.simulation.parameters import Slot
 
@@ -56,17 +56,17 @@ def problem(inputs: ModelInputs, y: Floats, usable: Mask) -> Problem:
 
 @dataclass(frozen=True, slots=True)
 class Model:
-    """Rows added to the plain loop, and all constants, shape (SIZE,)."""
+    """What is added to the plain loop, and all constants, shape (SIZE,)."""
 
-    rows: tuple[Row, ...]
+    added: tuple[Variant, ...]
     c: Floats
 
     @property
     def params(self) -> tuple[Param, ...]:
-        """What is free: the plain loop's constants and the rows'."""
-        own = tuple(p for row in self.rows for p in row.params)
-        dead = any(row.name == "integrator" for row in self.rows)
-        return (*(p for p in BASE if not (dead and p.slot == Slot.K)), *own)
+        """What is free: the plain loop's constants that nothing replaces, and those of what is added."""
+        own = tuple(p for v in self.added for p in v.params)
+        replaced = {slot for v in self.added for slot in v.replaces}
+        return (*(p for p in BASE if p.slot not in replaced), *own)
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,8 +81,8 @@ class Fitted:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the rows."""
-        return tuple(row.name for row in self.model.rows)
+        """Names of what is added."""
+        return tuple(v.name for v in self.model.added)
 
 
 def gain(better: Fitted, worse: Fitted) -> float:

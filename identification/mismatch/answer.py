@@ -10,22 +10,18 @@ import numpy as np
 
 from identification.estimation.limits import Z90
 from identification.estimation.prediction_error import Fitted, deviations
+from identification.mismatch.catalogue import EFFECTS, fault
 from identification.mismatch.cross_validation import HeldOut, Misfit, held_out, misfit
-from identification.mismatch.diagnosis import Explanation, Recording, alternatives, restored
+from identification.mismatch.diagnosis import Explanation, alternatives, restored
+from identification.mismatch.effect import exact
 from identification.mismatch.identifiability import INSENSITIVE, uninformed
 from identification.mismatch.location.locate import Located
 from identification.mismatch.location.where import located_in, where_of
+from identification.mismatch.recording import Finding, Recording
 from identification.models import Estimate
-from identification.simulation.effect import Row
+from identification.simulation.effect import Variant
 from identification.simulation.open_loop import simulate
 
-BLOCKS = {
-    "compression": "recorder",
-    "sampling": "recorder",
-    "clock-offset": "recorder",
-    "quantization": "sensor",
-    "sensor-clipping": "sensor",
-}
 LIVES = {
     "op_level": "valve",
     "after_reversals": "valve",
@@ -41,7 +37,7 @@ ONE_MOVE_ONLY = "rests on one move of OP, of which nothing is left to prove it o
 
 
 @dataclass(frozen=True, slots=True)
-class Effect:
+class EffectFound:
     """One effect: name, block, parameters, the part of the held-out misfit it removes, and its alternatives."""
 
     name: str
@@ -60,7 +56,7 @@ class Answer:
 
     verdict: str
     block: str
-    effects: tuple[Effect, ...]
+    effects: tuple[EffectFound, ...]
     where: dict[str, Any]
     fit: dict[str, Any]
     moved: dict[str, tuple[float, float]]
@@ -69,45 +65,16 @@ class Answer:
     caution: str = field(default="")
 
 
-def exact(value: float, unit: str, half: float = 0.0) -> Estimate:
-    """An estimate with a symmetric interval."""
-    return Estimate(value, value - half, value + half, unit)
-
-
-def recorder_effect(found: Explanation, s: Recording) -> Effect | None:
-    """The finding about the recorder as an effect."""
-    t = found.recorder
-    if t is None:
+def finding_effect(finding: Finding | None, s: Recording) -> EffectFound | None:
+    """A finding about recorder or controller as an effect."""
+    if finding is None:
         return None
-    step = float(np.median(np.diff(np.unique(s.pv)))) if t.name == "sensor-clipping" else 0.0
-    shown = {
-        "compression": {"straight_share": exact(t.value, "")},
-        "sampling": {"jitter_samples": exact(t.value, "samples", 0.1 * t.value)},
-        "quantization": {"step_pct": exact(t.value, "% PV", 0.01 * t.value)},
-        "sensor-clipping": {"clip_pct": exact(t.value, "% PV", step)},
-    }[t.name]
-    return Effect(t.name, BLOCKS[t.name], shown, None)
+    about = fault(finding.name)
+    shown = about.numbers(finding, s) if about.numbers is not None else {}
+    return EffectFound(about.name, about.block, shown, None)
 
 
-def controller_effect(found: Explanation, s: Recording) -> Effect | None:
-    """The finding about clock or controller as an effect."""
-    r = found.controller
-    if r is None:
-        return None
-    v, dt = r.values, s.dt_s
-    if r.name == "clock-offset":
-        return Effect(r.name, "recorder", {"shift_s": exact(v["late_samples"] * dt, "s", 0.25 * dt)}, None)
-    if r.name == "controller-settings":
-        kp, ti = v["kp"], v["ti_samples"] * dt
-        shown = {"kp": exact(kp, "% OP/% PV", 0.02 * abs(kp)), "ti_s": exact(ti, "s", 0.02 * ti)}
-    elif r.name == "controller-gap":
-        shown = {"gap_pct": exact(v["gap_pct"], "% PV", 0.2 * v["gap_pct"])}
-    else:
-        shown = {"share_pct": exact(100 * v["share"], "%", 10 * v["share"])}
-    return Effect(r.name, "controller", shown, None)
-
-
-def parameters(found: Explanation, fit: Fitted, row: Row) -> dict[str, Estimate]:
+def parameters(found: Explanation, fit: Fitted, row: Variant) -> dict[str, Estimate]:
     """A row's constants with 90 % intervals from the curvature."""
     wide = dict(zip((p.slot for p in fit.model.params), deviations(found.p, fit), strict=True))
     out = {}
@@ -118,30 +85,16 @@ def parameters(found: Explanation, fit: Fitted, row: Row) -> dict[str, Estimate]
             out[p.name] = Estimate(value, value / spread, value * spread, p.unit)
         else:
             out[p.name] = exact(value, p.unit, half)
-    return out | _derived(row, out)
+    derived = EFFECTS[row.name].derived
+    return out | (derived(out) if derived is not None else {})
 
 
-def _derived(row: Row, own: dict[str, Estimate]) -> dict[str, Estimate]:
-    """Numbers that readers look for and that follow from a row's constants."""
-    if row.name == "load-oscillation":
-        w = own["angular_frequency"]
-        low, high = (2 * math.pi / max(x, 1e-9) for x in (w.high, w.low))
-        size = math.hypot(own["sine_pct"].value, own["cosine_pct"].value)
-        half = max(e.high - e.value for e in (own["sine_pct"], own["cosine_pct"]))
-        period = Estimate(2 * math.pi / max(w.value, 1e-9), low, high, "s")
-        return {"period_s": period, "amplitude_pct": exact(size, "% OP", half)}
-    if row.name == "direction-asymmetry":
-        r = own["log_ratio_down_up"]
-        return {"ratio_down_up": Estimate(math.exp(r.value), math.exp(r.low), math.exp(r.high), "")}
-    return {}
-
-
-def effects_of(found: Explanation, s: Recording, proof: HeldOut | None) -> tuple[Effect, ...]:
+def effects_of(found: Explanation, s: Recording, proof: HeldOut | None) -> tuple[EffectFound, ...]:
     """Every effect found, the likeliest first."""
-    gates = [e for e in (recorder_effect(found, s), controller_effect(found, s)) if e is not None]
-    rows = found.best.model.rows
+    gates = [e for e in (finding_effect(f, s) for f in (found.recorder, found.controller)) if e is not None]
+    rows = found.best.model.added
     physics = [
-        Effect(
+        EffectFound(
             row.name,
             row.block,
             parameters(found, found.best, row),
@@ -207,7 +160,9 @@ def answer(found: Explanation, s: Recording) -> Answer:
     )
 
 
-def verdict_of(found: Explanation, effects: tuple[Effect, ...], lacking: str, at: Located) -> tuple[str, str]:
+def verdict_of(
+    found: Explanation, effects: tuple[EffectFound, ...], lacking: str, at: Located
+) -> tuple[str, str]:
     """The verdict and its block; what is left over, and what a record cannot tell, has no name."""
     if found.refuted and not found.accepted and not any(found_first(found)):
         return "unexplained", "none"

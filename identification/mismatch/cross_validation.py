@@ -18,13 +18,12 @@ from identification.estimation.limits import (
 )
 from identification.estimation.noise import whitened
 from identification.estimation.prediction_error import Fitted, Model, Problem, descend, gain
+from identification.mismatch.effect import Effect
 from identification.mismatch.starts.screening import at_inlet
 from identification.record import Floats
 from identification.simulation.open_loop import simulate
 from identification.simulation.parameters import Slot
 
-TIMED = ("load-step", "gain-drift", "supply-variation", "load-oscillation")
-"""Effects bound to a time: what they will do later does not follow from what they did, so no span is held out."""
 BLOCKS = 20
 
 
@@ -144,12 +143,15 @@ def _refit(p: Problem, model: Model) -> Fitted:
     return descend(p, model, SCREEN_STEPS)
 
 
-def passes(p: Problem, worse: Fitted, better: Fitted, name: str) -> bool:
-    """Whether the effect stands: spread over the record and, where it is bound to no time, on held-out spans."""
-    if name == "load-step":
+def passes(p: Problem, worse: Fitted, better: Fitted, effect: Effect) -> bool:
+    """Whether the effect stands: spread over the record and, where it is bound to no time, on held-out spans.
+
+    What an effect that is bound to a time will do later does not follow from what it did, so no span is held out.
+    """
+    if effect.needs == "steps":
         return at_inlet(p, worse)
-    if name in TIMED:
+    if effect.timed:
         return True
-    if name not in ("saturation", "overflow") and not is_spread(p, better, worse):
+    if not effect.local and not is_spread(p, better, worse):
         return False
     return held_out(p, worse, better).gain > HELD_OUT_LOSS - HELD_OUT_SHARE * gain(better, worse)

@@ -6,13 +6,14 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from identification.controller.check import ControllerFinding, Stated, judge
+from identification.controller.check import LATE_SAMPLES, judge
 from identification.controller.pi_regression import ControlLaw, shifted
 from identification.estimation.limits import CEILING_PENALTY, CEILING_SHARE, FULL_STEPS, PROVEN, ROUNDS, TIE
 from identification.estimation.prediction_error import Fitted, Model, Problem, descend, gain
 from identification.mismatch import recording_faults
-from identification.mismatch.catalogue import CATALOGUE
-from identification.mismatch.cross_validation import TIMED, HeldOut, held_out, is_one_move, passes
+from identification.mismatch.catalogue import CANDIDATES, CONTROLLER_FAULTS, EFFECTS, RECORDER_FAULTS, fault
+from identification.mismatch.cross_validation import HeldOut, held_out, is_one_move, passes
+from identification.mismatch.effect import Ends
 from identification.mismatch.forward_selection import (
     Candidate,
     Clip,
@@ -24,33 +25,12 @@ from identification.mismatch.forward_selection import (
     silent,
 )
 from identification.mismatch.lack_of_fit import ceiling
+from identification.mismatch.recording import Finding, Recording
 from identification.mismatch.starts.screening import CandidateInputs, candidate_inputs
 from identification.record import Floats, Mask
-from identification.simulation.effect import Row
+from identification.simulation.effect import Variant
 from identification.simulation.open_loop import ModelInputs
 from identification.simulation.parameters import Slot, neutral
-
-
-@dataclass(frozen=True, slots=True)
-class Recording:
-    """One recording to be explained.
-
-    sp : shape (n,) [% PV], None where not recorded; pv, op : shape (n,) [% of span]; usable : bool, shape (n,);
-    dt_s [s]; stamp_s : stamps as logged [s]; stated : the controller as the plant states it; ranged : whether PV's
-    range is stated; neighbours : OPs of other loops on the same clock, each shape (n,);
-    kind : the loop's type as stated, lower case.
-    """
-
-    sp: Floats | None
-    pv: Floats
-    op: Floats
-    usable: Mask
-    dt_s: float
-    stamp_s: Floats
-    stated: Stated | None = None
-    ranged: bool = True
-    neighbours: tuple[Floats, ...] = ()
-    kind: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,8 +51,8 @@ class Explanation:
     accepted: tuple[Candidate, ...] = ()
     before: tuple[Fitted, ...] = ()
     first: tuple[Candidate, ...] = ()
-    recorder: recording_faults.RecorderFinding | None = None
-    controller: ControllerFinding | None = None
+    recorder: Finding | None = None
+    controller: Finding | None = None
     law: ControlLaw | None = None
     late_s: float = 0.0
     left: float = 0.0
@@ -81,26 +61,29 @@ class Explanation:
     unproven: bool = False
 
 
-def recorder_finding_of(s: Recording) -> recording_faults.RecorderFinding | None:
+def recorder_finding_of(s: Recording) -> Finding | None:
     """The first thing that the recorder did to the trends."""
-    found = recording_faults.compression(s.pv) or recording_faults.sampling(s.stamp_s, s.dt_s)
-    return found or recording_faults.quantization(s.pv, s.ranged) or recording_faults.clipped(s.pv)
+    for effect in RECORDER_FAULTS:
+        found = effect.find(s) if effect.find is not None else None
+        if found is not None:
+            return replace(found, name=effect.name)
+    return None
 
 
-def controller_finding_of(
-    s: Recording, recorder: recording_faults.RecorderFinding | None
-) -> tuple[ControllerFinding | None, ControlLaw | None]:
+def controller_finding_of(s: Recording, recorder: Finding | None) -> tuple[Finding | None, ControlLaw | None]:
     """What clock and controller did, where there is a controller to judge and a recording fit for it."""
-    if s.sp is None or s.stated is None or (recorder is not None and recorder.name in GATES):
+    if s.sp is None or s.stated is None or ends(recorder) is Ends.ALL:
         return None, None
-    return judge(s.sp, s.pv, s.op, s.usable & (s.op > 0.05) & (s.op < 99.95), s.stated)
+    found, law = judge(s.sp, s.pv, s.op, s.usable & (s.op > 0.05) & (s.op < 99.95), s.stated)
+    if found is None:
+        return None, law
+    return Finding(found.values, found.where, CONTROLLER_FAULTS[found.fault].name), law
 
 
-GATES = ("compression", "sampling")
-"""Findings about the recorder after which neither controller nor physics are judged."""
-ALONE = (*GATES, "quantization")
-"""Findings that are the whole answer; the physics is then fitted plain. After a finding about the controller the
-physics is still asked, for whatever made OP, PV answers it."""
+def ends(finding: Finding | None) -> Ends:
+    """What a finding leaves to be asked. After one about the controller the physics is still asked, for whatever made
+    OP, PV answers it."""
+    return Ends.NOTHING if finding is None else fault(finding.name).ends
 
 
 def inputs_of(s: Recording) -> ModelInputs:
@@ -122,11 +105,12 @@ def without_spikes(pv: Floats, usable: Mask) -> Mask:
     return usable & ~alone
 
 
-def transmitter_end(recorder: recording_faults.RecorderFinding | None, pv: Floats) -> Clip | None:
+def transmitter_end(recorder: Finding | None, pv: Floats) -> Clip | None:
     """Where a transmitter's range ends, if it does."""
-    if recorder is None or recorder.name != "sensor-clipping":
+    if recorder is None or not fault(recorder.name).censors:
         return None
-    return Clip(recorder.value, recorder.value > float(np.median(pv)), recorder.where)
+    (value,) = recorder.values.values()
+    return Clip(value, value > float(np.median(pv)), recorder.where)
 
 
 def explain(s: Recording, tell: Progress = silent, brought: Floats | None = None) -> Explanation:
@@ -150,9 +134,9 @@ def explain(s: Recording, tell: Progress = silent, brought: Floats | None = None
     usable = without_spikes(s.pv, s.usable)
     late_s = 0.0
     pv = s.pv
-    if controller is not None and controller.name == "clock-offset":
-        late_s = controller.values["late_samples"] * s.dt_s
-        pv = shifted(pv, controller.values["late_samples"])
+    late = 0.0 if controller is None else controller.values.get(LATE_SAMPLES, 0.0)
+    if late:
+        late_s, pv = late * s.dt_s, shifted(pv, late)
     inputs = inputs_of(replace(s, pv=pv))
     tell("plain loop")
     p, plain = prepared(inputs, pv - inputs.level, usable, brought, transmitter_end(recorder, pv))
@@ -165,7 +149,7 @@ def explain(s: Recording, tell: Progress = silent, brought: Floats | None = None
         law=law,
         late_s=late_s,
     )
-    if any(x is not None and x.name in ALONE for x in (recorder, controller)):
+    if any(ends(x) is not Ends.NOTHING for x in (recorder, controller)):
         return found
     return carried_over(physics(found, tell, s.kind))
 
@@ -177,7 +161,7 @@ def carried_over(found: Explanation) -> Explanation:
         kept = found if count == len(names) else first_effects(found, count)
         proof = held_out(kept.p, kept.plain, kept.best)
         unproven = not proof.carries and proof.falls and is_one_move(found.p)
-        if proof.carries or unproven or all(name in TIMED for name in names[:count]):
+        if proof.carries or unproven or all(EFFECTS[name].timed for name in names[:count]):
             return replace(kept, proof=proof, refuted=names[count:], unproven=unproven)
     proof = held_out(found.p, found.plain, found.plain)
     return replace(found, best=found.plain, accepted=(), before=(), proof=proof, refuted=names)
@@ -189,7 +173,7 @@ def first_effects(found: Explanation, count: int) -> Explanation:
     for candidate in found.accepted[count:]:
         c = cleared(c, candidate.row)
     names = {r.name for r in found.accepted[:count]}
-    rows = tuple(r for r in found.best.model.rows if r.name in names)
+    rows = tuple(r for r in found.best.model.added if r.name in names)
     best = descend(found.p, Model(rows, c), FULL_STEPS)
     return replace(found, best=best, accepted=found.accepted[:count], before=found.before[:count])
 
@@ -204,7 +188,7 @@ def physics(found: Explanation, tell: Progress, kind: str = "") -> Explanation:
     candidates: list[Candidate] = []
     for _ in range(ROUNDS):
         x = candidate_inputs(p, best, kind)
-        candidates = compete(x, best, CATALOGUE, tell)
+        candidates = compete(x, best, CANDIDATES, tell)
         first = first or tuple(candidates)
         winner = proven(x.p, best, candidates)
         if winner is None:
@@ -219,7 +203,7 @@ def physics(found: Explanation, tell: Progress, kind: str = "") -> Explanation:
     won, weights = ceiling(p, best)
     least = max(CEILING_PENALTY, CEILING_SHARE * gain(best, found.plain))
     left = won - weights - least
-    if not accepted and any(r.name == "load-step" and r.penalised > 0 for r in candidates):
+    if not accepted and any(r.row.needs == "steps" and r.penalised > 0 for r in candidates):
         left = max(left, candidates[0].penalised)
     found = replace(found, p=p, best=best, accepted=tuple(accepted), before=tuple(before), first=first)
     return replace(found, left=left if left > 0 else 0.0)
@@ -233,21 +217,20 @@ def replacement_step(
     Effects are added one at a time, so the first may have been taken in the place of two that act together.
     """
     for i, old in enumerate(accepted):
-        others = tuple(r for r in best.model.rows if r.name != old.name)
+        others = tuple(r for r in best.model.added if r.name != old.name)
         near = descend(x.p, Model(others, cleared(best.model.c, old.row)), FULL_STEPS)
-        candidates = [r for r in compete(x, near, CATALOGUE, tell) if r.name != old.name]
+        candidates = [r for r in compete(x, near, CANDIDATES, tell) if r.name != old.name]
         if not candidates:
             continue
         least = gain(best, near) - penalty(old.row) + TIE
-        if candidates[0].penalised > max(least, 0.0) and passes(
-            x.p, near, candidates[0].fit, candidates[0].name
-        ):
-            best = descend(x.p, candidates[0].fit.model, FULL_STEPS)
-            accepted = [*accepted[:i], candidates[0], *accepted[i + 1 :]]
+        first = candidates[0]
+        if first.penalised > max(least, 0.0) and passes(x.p, near, first.fit, EFFECTS[first.name]):
+            best = descend(x.p, first.fit.model, FULL_STEPS)
+            accepted = [*accepted[:i], first, *accepted[i + 1 :]]
     return best, accepted
 
 
-def cleared(c: Floats, row: Row) -> Floats:
+def cleared(c: Floats, row: Variant) -> Floats:
     """Constants with those of a row at rest, shape (SIZE,)."""
     out, rest = c.copy(), neutral()
     for slot in [p.slot for p in row.params] + [int(s) for s in row.fixed or {}]:
@@ -260,7 +243,7 @@ def proven(p: Problem, near: Fitted, candidates: list[Candidate]) -> Candidate |
     for candidate in candidates[:PROVEN]:
         if candidate.penalised <= 0:
             return None
-        if passes(p, near, candidate.fit, candidate.name):
+        if passes(p, near, candidate.fit, EFFECTS[candidate.name]):
             return candidate
     return None
 
@@ -271,7 +254,7 @@ def alternatives(found: Explanation) -> tuple[str, ...]:
         return ()
     winner = found.accepted[0]
     close = [r.name for r in found.first if r.penalised > max(winner.penalised - TIE, 0.0)]
-    names = dict.fromkeys((*close, *winner.row.likeness))
+    names = dict.fromkeys((*close, *EFFECTS[winner.name].indistinguishable))
     return tuple(n for n in names if n != winner.name)
 
 

@@ -27,12 +27,13 @@ from identification.estimation.prediction_error import (
     problem,
 )
 from identification.estimation.start_values import plain_processes
-from identification.mismatch.catalogue import CATALOGUE
+from identification.mismatch.catalogue import CANDIDATES, EFFECTS
+from identification.mismatch.effect import Friction
 from identification.mismatch.starts.screening import CandidateInputs, screened, span_of, start_models
 from identification.mismatch.starts.stick_slip import fit_sticking
-from identification.mismatch.starts.two_modes import OTHERS, mode_starts
+from identification.mismatch.starts.two_modes import mode_starts
 from identification.record import Floats, Mask
-from identification.simulation.effect import Row
+from identification.simulation.effect import Variant
 from identification.simulation.open_loop import ModelInputs
 from identification.simulation.parameters import Slot, neutral
 
@@ -55,9 +56,9 @@ class Candidate:
         return self.fit.names[-1]
 
     @property
-    def row(self) -> Row:
+    def row(self) -> Variant:
         """The row that it adds."""
-        return self.fit.model.rows[-1]
+        return self.fit.model.added[-1]
 
 
 def silent(_: str) -> None:
@@ -100,9 +101,9 @@ def robustly_weighted(p: Problem, fit: Fitted) -> Problem:
     return replace(p, weight=np.where(inside, np.minimum(1.0, OUTLIER / np.maximum(size, OUTLIER)), 0.0))
 
 
-def applies(x: CandidateInputs, near: Fitted, row: Row) -> bool:
+def applies(x: CandidateInputs, near: Fitted, row: Variant) -> bool:
     """Whether a row may be added: what it needs is there, and it is not in the model yet."""
-    taken = {p.slot for r in near.model.rows for p in r.params}
+    taken = {p.slot for r in near.model.added for p in r.params}
     if row.name in near.names or taken & {p.slot for p in row.params}:
         return False
     if row.types and x.kind in KNOWN_TYPES and x.kind not in row.types:
@@ -112,7 +113,7 @@ def applies(x: CandidateInputs, near: Fitted, row: Row) -> bool:
     return True
 
 
-def penalty(row: Row) -> float:
+def penalty(row: Variant) -> float:
     """Doubled log likelihood that a row costs."""
     return SEARCH_PENALTY + PARAMETER_PENALTY * max(len(row.params), 1) + row.penalty
 
@@ -121,7 +122,7 @@ def candidate(p: Problem, near: Fitted, models: list[Model], steps: int) -> Cand
     """The best of some starts, followed for some steps."""
     fit = min((descend(p, model, steps) for model in models), key=lambda f: f.loss)
     won = gain(fit, near)
-    return Candidate(fit, won, won - penalty(fit.model.rows[-1]))
+    return Candidate(fit, won, won - penalty(fit.model.added[-1]))
 
 
 def followed(p: Problem, near: Fitted, first: Candidate, models: list[Model]) -> Candidate:
@@ -132,7 +133,7 @@ def followed(p: Problem, near: Fitted, first: Candidate, models: list[Model]) ->
 
 
 def compete(
-    x: CandidateInputs, near: Fitted, rows: tuple[Row, ...] = CATALOGUE, tell: Progress = silent
+    x: CandidateInputs, near: Fitted, rows: tuple[Variant, ...] = CANDIDATES, tell: Progress = silent
 ) -> list[Candidate]:
     """All rows as candidates of a fit, best first; the better half followed to the end.
 
@@ -141,7 +142,7 @@ def compete(
     x : CandidateInputs
     near : Fitted
         The fit to which each row is added.
-    rows : tuple of Row
+    rows : tuple of Variant
     tell : callable
         Is told each row's name before it is tried.
     """
@@ -155,7 +156,7 @@ def compete(
             if row.needs != "line":
                 models = screened(x.p, near, span, models)[:3]
                 first = models[:1]
-            if row.name in OTHERS:
+            if row.modes:
                 first += mode_starts(x.p, near, row)
             tried.append((candidate(x.p, near, first, SCREEN_STEPS), models))
     tried.sort(key=lambda t: -t[0].penalised)
@@ -182,7 +183,7 @@ def integrating_or_first_order(p: Problem, free: Fitted, kind: str) -> tuple[Pro
     A plain loop whose time constant outlasts the record is an integrator under another name. Where an integrator
     does as well with one constant fewer, the plain loop is one that settles within the record.
     """
-    rows = [r for r in CATALOGUE if r.name == "integrator"]
+    rows = [v for v in CANDIDATES if v.replaces]
     longest = SETTLES * p.inputs.dt_s * p.y.size
     if float(free.model.c[Slot.T]) <= longest or not applies(CandidateInputs(p, (), kind), free, rows[0]):
         return p, free
@@ -197,18 +198,22 @@ def integrating_or_first_order(p: Problem, free: Fitted, kind: str) -> tuple[Pro
 
 
 def stiction_candidates(
-    x: CandidateInputs, near: Fitted, tried: list[Candidate], rows: tuple[Row, ...], tell: Progress = silent
+    x: CandidateInputs,
+    near: Fitted,
+    tried: list[Candidate],
+    rows: tuple[Variant, ...],
+    tell: Progress = silent,
 ) -> list[Candidate]:
     """Sticking valves scanned about the best play, where a play or the like gains anything at all."""
-    plays = [r for r in tried if r.name == "backlash"]
-    hints = [r.gain for r in tried if r.name in ("backlash", "stiction", "positioner")]
+    plays = [r for r in tried if EFFECTS[r.name].friction is Friction.PLAY]
+    hints = [r.gain for r in tried if EFFECTS[r.name].friction is not None]
     if not plays or max(hints) < STICKING_HINT:
         return []
-    tell("stiction")
     out = []
     for row in rows:
-        if row.name == "stiction":
-            fit = fit_sticking(x.p, plays[0].fit, row, near.model.rows)
+        if EFFECTS[row.name].friction is Friction.STICKS:
+            tell(row.name)
+            fit = fit_sticking(x.p, plays[0].fit, row, near.model.added)
             won = gain(fit, near)
             out.append(Candidate(fit, won, won - penalty(row)))
     return out

@@ -11,7 +11,8 @@ from identification.estimation.prediction_error import Fitted, Problem, loss_of,
 from identification.simulation.parameters import Slot
 
 if TYPE_CHECKING:
-    from identification.mismatch.diagnosis import Explanation, Recording
+    from identification.mismatch.diagnosis import Explanation
+    from identification.mismatch.recording import Recording
 
 ANSWERS = 25.0
 """Doubled log likelihood that OP must bring for PV to answer it; ours: chance brings three constants under 17 in 999
@@ -35,7 +36,7 @@ def brings(p: Problem, fit: Fitted) -> float:
 def unanswered(found: Explanation) -> str:
     """What is needed where PV does not answer OP; empty where it does."""
     loaded = any(
-        row.block == "load" for row in found.best.model.rows
+        row.block == "load" for row in found.best.model.added
     )  # a load is counted in terms of the gain
     if brings(found.p, found.plain if loaded else found.best) >= ANSWERS:
         return ""
@@ -45,7 +46,7 @@ def unanswered(found: Explanation) -> str:
 def too_short(found: Explanation, s: Recording) -> str:
     """What is needed where the record is short against the time constant; empty where it is not."""
     lag, length = float(found.plain.model.c[Slot.T]), s.pv.size * s.dt_s
-    if s.kind in INTEGRATING or any(r.name == "integrator" for r in found.best.model.rows):
+    if s.kind in INTEGRATING or any(v.replaces for v in found.best.model.added):
         return ""
     if length >= ENOUGH * lag:
         return ""

@@ -7,10 +7,10 @@ import numpy as np
 from identification.estimation.noise import lag_means, whitened
 from identification.estimation.prediction_error import Fitted, Problem, sensitivities
 from identification.record import Floats
-from identification.simulation.open_loop import simulate
+from identification.simulation.open_loop import simulate, through_valve
 from identification.simulation.parameters import Slot
 from identification.simulation.process import plain_vessel
-from identification.simulation.valve_chain import flow, lagged
+from identification.simulation.valve_chain import lagged
 
 BOXES = 32
 """Past stretches of OP that may act, each with a weight of its own."""
@@ -54,7 +54,7 @@ def ceiling(p: Problem, fit: Fitted) -> tuple[float, int]:
     The fit's own constants and its noise model follow linearly, so the gain is of what they cannot give.
     """
     c = fit.model.c
-    through = flow(p.inputs.op, c, p.inputs.dt_s, p.inputs.middle)
+    through = through_valve(p.inputs, c)
     length = REACH * float(c[Slot.T] + c[Slot.L])
     free = past_moves(p, through, min(length, 0.2 * through.size * p.inputs.dt_s)) + bent_moves(
         p, fit, through

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from identification.controller.check import Stated
+from identification.controller.check import StatedSettings
 from identification.errors import InputError
 from identification.record import Floats
 from identification.simulation.open_loop import ModelInputs, simulate
-from identification.simulation.parameters import KNOTS, STEPS, Slot, neutral
+from identification.simulation.parameters import KNOTS, STEPS, Slot, neutral, places
 
 VERSION = 1
 BIAS_PASSES = 4
@@ -27,7 +27,6 @@ TIMED = (
     *(Slot.HEAD + i for i in range(KNOTS)),
 )
 """Constants that belong to the recording that was fitted, not to the loop."""
-NAMES = {int(s): s.name for s in Slot if s not in (Slot.STEP, Slot.HEAD)}
 
 
 def to_data(
@@ -35,7 +34,7 @@ def to_data(
 ) -> dict[str, Any]:
     """The model as a mapping that JSON can hold; constants at their neutral value are left out."""
     rest = neutral()
-    own = {NAMES[i]: float(c[i]) for i in NAMES if c[i] != rest[i] and i not in TIMED}
+    own = {name: float(c[i]) for name, i in places().items() if c[i] != rest[i] and i not in TIMED}
     return {
         "version": VERSION,
         "loop": loop,
@@ -57,9 +56,9 @@ def constants(data: dict[str, Any]) -> Floats:
         The mapping is no model of this kind.
     """
     try:
-        c = neutral()
+        c, place = neutral(), places()
         for name, value in data["constants"].items():
-            c[Slot[name]] = float(value)
+            c[place[name]] = float(value)
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise InputError(
             f"a model without {error}", "a file that `triage explain --save-model` wrote", "save it anew"
@@ -109,7 +108,7 @@ def _law(e: Floats, kp: float, ti: float, start: float) -> Floats:
 
 
 def carried_closed(
-    data: dict[str, Any], sp: Floats, op: Floats, pv: Floats, dt_s: float, law: Stated
+    data: dict[str, Any], sp: Floats, op: Floats, pv: Floats, dt_s: float, law: StatedSettings
 ) -> tuple[Floats, Floats]:
     """PV and OP, each shape (n,), of a saved model under its PI controller, load and noise left out.
 

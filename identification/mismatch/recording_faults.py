@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from identification.estimation.limits import (
@@ -15,16 +13,8 @@ from identification.estimation.limits import (
     MISSED,
     STRAIGHT,
 )
+from identification.mismatch.recording import Finding
 from identification.record import Floats, Mask
-
-
-@dataclass(frozen=True, slots=True)
-class RecorderFinding:
-    """One finding about the recording: its name, the number that tells it, where it is (bool, shape (n,))."""
-
-    name: str
-    value: float
-    where: Mask
 
 
 def level_gaps(pv: Floats) -> Floats:
@@ -50,16 +40,16 @@ def on_grid(gaps: Floats) -> bool:
     return float(np.mean(np.abs(gaps / unit - np.round(gaps / unit)) < 0.05)) > 0.6
 
 
-def compression(pv: Floats) -> RecorderFinding | None:
+def compression(pv: Floats) -> Finding | None:
     """Straight segments whose breaks stand on no grid (swinging door and the like)."""
     found = straight(pv)
     share = float(found.mean())
     if share < STRAIGHT or on_grid(level_gaps(pv)):
         return None
-    return RecorderFinding("compression", share, found)
+    return Finding({"straight_share": share}, found)
 
 
-def quantization(pv: Floats, ranged: bool) -> RecorderFinding | None:
+def quantization(pv: Floats, ranged: bool) -> Finding | None:
     """Values on a grid coarser than a historian's; `ranged` is False where percent is of the recorded range."""
     gaps = level_gaps(pv)
     least = GRID_STEP if ranged else GRID_STEP_OF_RANGE
@@ -67,10 +57,10 @@ def quantization(pv: Floats, ranged: bool) -> RecorderFinding | None:
         return None
     if float(gaps.max()) > 4.0 * float(gaps.mean()):
         return None
-    return RecorderFinding("quantization", float(gaps.mean()), np.ones(pv.size, dtype=bool))
+    return Finding({"step_pct": float(gaps.mean())}, np.ones(pv.size, dtype=bool))
 
 
-def clipped(pv: Floats) -> RecorderFinding | None:
+def clipped(pv: Floats) -> Finding | None:
     """PV standing at exactly its highest or lowest value far more often than at those next to it."""
     levels, counts = np.unique(pv, return_counts=True)
     if levels.size < 12:
@@ -80,7 +70,7 @@ def clipped(pv: Floats) -> RecorderFinding | None:
         top = int(counts[end])
         enough = top >= CLIP_SAMPLES and top > CLIP_RATIO * float(near.mean())
         if enough and (best is None or top > best.where.sum()):
-            best = RecorderFinding("sensor-clipping", float(levels[end]), pv == levels[end])
+            best = Finding({"clip_pct": float(levels[end])}, pv == levels[end])
     return best
 
 
@@ -91,12 +81,12 @@ def jitter(stamp_s: Floats, dt_s: float) -> float:
     return float(np.std(spacing)) / np.sqrt(2.0) if spacing.size > 10 else 0.0
 
 
-def sampling(stamp_s: Floats, dt_s: float) -> RecorderFinding | None:
+def sampling(stamp_s: Floats, dt_s: float) -> Finding | None:
     """Polling that scatters by more than logging does."""
     found = jitter(stamp_s, dt_s)
     if found < JITTER:
         return None
-    return RecorderFinding("sampling", found, np.ones(stamp_s.size, dtype=bool))
+    return Finding({"jitter_samples": found}, np.ones(stamp_s.size, dtype=bool))
 
 
 def unlogged(stamp_s: Floats, n: int, dt_s: float) -> Mask:

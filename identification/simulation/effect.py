@@ -1,17 +1,22 @@
-"""What a piece of left-out physics is: a row of constants with starts, bounds, needs and look-alikes."""
+"""What an effect adds to the loop model: parameters that it frees, where their search begins, what they replace."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+
+from identification.record import Floats
+
+Start = Mapping[int, float]
 
 
 @dataclass(frozen=True, slots=True)
 class Param:
-    """A constant that a row frees.
+    """A parameter that an effect frees.
 
-    slot : its place; name, unit : as answered; low, high : bounds in its own unit, times the scale named by
-    `scale` (scales() in fitting.py); log : searched by its logarithm.
+    slot : its place among the model's parameters; name, unit : as answered; low, high : bounds in its own unit, times
+    the scale named by `scale` (scales() in prediction_error.py); log : searched by its logarithm; title : what pages
+    call it, its name where empty; hidden : whether another number, derived from it, is shown in its place.
     """
 
     slot: int
@@ -21,33 +26,38 @@ class Param:
     high: float
     scale: str = "1"
     log: bool = False
-
-
-Start = Mapping[int, float]
+    title: str = ""
+    hidden: bool = False
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
-    """One piece of physics as a candidate: its name, block, constants, and starts in units of their scales.
+class Variant:
+    """One way in which an effect may act, as a candidate: its parameters, and starts in units of their scales.
 
-    delays : constants whose start is taken off the dead time, which stood for them in the plain loop.
-    types : loop types that can have it, any where empty or the type is not known.
-    fixed : constants set, not searched; needs : what the record must hold (steps, neighbour) for it to be tried.
+    delays : parameters whose start is taken off the dead time, which stood for them in the plain loop; replaces :
+    parameters of the plain loop that the effect makes meaningless; fixed : parameters set, not searched; needs : what
+    is located in the recording before it can be tried (steps, line, neighbour); types : loop types that can have it,
+    any where empty or the type is not known; modes : time constants tried for a second mode, in that of the plain
+    loop, and the share that its gain may have; label : told apart by; penalty : added to that of the parameters;
+    enter : turns the plain loop's parameters, in place, where they change their meaning.
     """
 
-    name: str
-    block: str
     params: tuple[Param, ...]
     starts: tuple[Start, ...]
     fixed: Start | None = None
-    needs: str = ""
-    variant: str = ""
-    types: tuple[str, ...] = ()
-    likeness: tuple[str, ...] = ()
+    label: str = ""
     delays: tuple[int, ...] = ()
+    replaces: tuple[int, ...] = ()
+    modes: tuple[float, ...] = ()
+    mode_share: tuple[float, float] = (0.0, 0.0)
     penalty: float = 0.0
+    enter: Callable[[Floats], None] | None = None
+    name: str = ""
+    block: str = ""
+    needs: str = ""
+    types: tuple[str, ...] = ()
 
 
 def each(slot: int, *values: float) -> tuple[Start, ...]:
-    """Starts that differ in one constant."""
+    """Starts that differ in one parameter."""
     return tuple({int(slot): v} for v in values)

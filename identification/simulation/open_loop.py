@@ -8,23 +8,24 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from identification.record import Floats
-from identification.simulation.parameters import KNOTS, STEPS, Slot
+from identification.simulation.acts import Signal, acted
+from identification.simulation.parameters import KNOTS, SIZE, STEPS, Slot, neutral
 from identification.simulation.process import plain_vessel, transported, vessel
 from identification.simulation.valve_chain import flow, lagged
 
-RICH = (
-    Slot.T2,
-    Slot.T3,
-    Slot.SHARE,
-    Slot.ASYMMETRY,
-    Slot.SLOPE,
-    Slot.GAIN_SLOPE,
-    Slot.ROOT,
-    Slot.DRIFT,
-    Slot.PIPE,
-    *(Slot.HEAD + i for i in range(KNOTS)),
+OUTSIDE = (
+    *(Slot.T, Slot.L, Slot.K, Slot.BIAS, Slot.START, Slot.STICKBAND, Slot.JUMP, Slot.COAST, Slot.RATE),
+    *(Slot.STOP_HI, Slot.STOP_LO, Slot.BEND, Slot.SERVO, Slot.DAMPING, Slot.DEADBAND),
+    *(Slot.SPLIT, Slot.RATIO, Slot.SPLIT_DEAD, Slot.SPLIT_LAG, Slot.CLIP_HI, Slot.CLIP_LO),
+    *(Slot.SINE, Slot.COSINE, Slot.OMEGA, Slot.NEIGHBOUR, Slot.NEIGHBOUR_T),
+    *(int(Slot.STEP) + i for i in range(STEPS)),
+    *(Slot.MODE_T, Slot.SPILL, Slot.SPILL_T, Slot.SPEED, Slot.HEAD_BIAS),
 )
-"""Constants that are zero in a vessel of first order with constant gain."""
+"""Parameters that a vessel of first order with constant gain, and what stands before and behind it, take care of, and
+those that do nothing by themselves. Any other at work asks for the whole vessel, a new one too."""
+NEUTRAL = neutral()[:SIZE]
+WITHIN = np.setdiff1d(np.arange(SIZE), np.array([int(s) for s in OUTSIDE]))
+"""Places of all the others."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,6 +74,12 @@ def load(inputs: ModelInputs, c: Floats) -> Floats:
     return act
 
 
+def through_valve(inputs: ModelInputs, c: Floats) -> Floats:
+    """Flow through the valve during each sample [% OP], shape (n,), that the model gives for the recorded OP."""
+    op = acted(Signal.OP, inputs.op, c, inputs.dt_s)
+    return acted(Signal.FLOW, flow(op, c, inputs.dt_s, inputs.middle), c, inputs.dt_s)
+
+
 def simulate(inputs: ModelInputs, c: Floats) -> Floats:
     """PV's deviation from inputs.level [% PV], shape (n,), that the model gives for the recorded OP.
 
@@ -83,10 +90,11 @@ def simulate(inputs: ModelInputs, c: Floats) -> Floats:
         Constants (slots.py).
     """
     dt = inputs.dt_s
-    through = flow(inputs.op, c, dt, inputs.middle)
+    through = through_valve(inputs, c)
     act = load(inputs, c)
-    rich = any(c[s] != 0 for s in RICH) or c[Slot.LEAK] != 1 or math.isfinite(c[Slot.CAP])
+    rich = bool((c[WITHIN] != NEUTRAL[WITHIN]).any())
     out = _rich(inputs, c, through, act) if rich else plain_vessel(through, act, c, dt, inputs.middle)
+    out = acted(Signal.PV, out, c, dt)
     if math.isfinite(c[Slot.CLIP_HI]) or math.isfinite(c[Slot.CLIP_LO]):
         out = np.clip(out, c[Slot.CLIP_LO] - inputs.level, c[Slot.CLIP_HI] - inputs.level)
     return np.nan_to_num(out, nan=1e6, posinf=1e6, neginf=-1e6)

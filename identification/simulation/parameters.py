@@ -1,4 +1,4 @@
-"""The constants of the loop model that every candidate shares: one place per constant, neutral unless freed."""
+"""The parameters of the loop model that every candidate shares: one place each, neutral unless freed."""
 
 from __future__ import annotations
 
@@ -65,11 +65,34 @@ class Slot(IntEnum):
 
 
 SIZE = int(Slot.HEAD) + KNOTS
+_OWN: dict[str, float] = {}
+"""Parameters that effects bring along, by name, with their neutral values; their places follow those of Slot."""
+
+
+def own_slot(name: str, neutral_value: float = 0.0) -> int:
+    """A place for a parameter that no kernel knows, which an effect's own act reads.
+
+    Parameters
+    ----------
+    name : str
+        Its name in saved models, upper case, other than any in use.
+    neutral_value : float
+        Its value where the effect does not act.
+    """
+    if name in Slot.__members__ or name in _OWN:
+        raise ValueError(f"a parameter {name} is there already; expected a name of its own; choose another")
+    _OWN[name] = neutral_value
+    return SIZE + len(_OWN) - 1
+
+
+def places() -> dict[str, int]:
+    """Name and place of every parameter, those in a row by their first."""
+    return {s.name: int(s) for s in Slot} | {name: SIZE + i for i, name in enumerate(_OWN)}
 
 
 def neutral() -> Floats:
-    """Constants of the plain loop, shape (SIZE,): unit gain and a time constant of one second."""
-    c = np.zeros(SIZE)
+    """Parameters of the plain loop, shape (SIZE + own,): unit gain and a time constant of one second."""
+    c = np.concatenate((np.zeros(SIZE), np.fromiter(_OWN.values(), dtype=np.float64)))
     c[Slot.T], c[Slot.K], c[Slot.LEAK], c[Slot.RATIO] = 1.0, 1.0, 1.0, 1.0
     c[Slot.COAST] = -1.0
     c[Slot.MODE_T], c[Slot.NEIGHBOUR_T], c[Slot.OMEGA], c[Slot.SPILL_T] = 1.0, 1.0, 1.0, 1.0

@@ -14,8 +14,13 @@ from analyzer.loops.spec import LoopSpec
 from identification.controller.check import judge
 from identification.estimation.prediction_error import Model, descend, gain
 from identification.mismatch.answer import answer
-from identification.mismatch.catalogue import CATALOGUE
-from identification.mismatch.diagnosis import Explanation, inputs_of, recorder_finding_of
+from identification.mismatch.catalogue import CANDIDATES
+from identification.mismatch.diagnosis import (
+    Explanation,
+    controller_finding_of,
+    inputs_of,
+    recorder_finding_of,
+)
 from identification.mismatch.forward_selection import Candidate, prepared
 from identification.models import Backlash, Fopdt, Loop, Pid
 from identification.simulation.closed_loop import closed_loop
@@ -52,7 +57,7 @@ def of_loop(width: float, grid: float = 0.01, stated: float = 1.8) -> Case:
 
 def with_play(found: Explanation, width: float) -> Explanation:
     """The explanation with play taken as its effect."""
-    row = next(r for r in CATALOGUE if r.name == "backlash")
+    row = next(r for r in CANDIDATES if r.name == "backlash")
     c = found.plain.model.c.copy()
     c[Slot.STICKBAND] = width
     best = descend(found.p, Model((row,), c), 8)
@@ -72,13 +77,13 @@ def explanation(kind: str) -> Explained:
     inputs = inputs_of(s)
     p, plain = prepared(inputs, s.pv - inputs.level, s.usable)
     recorder = recorder_finding_of(s) if kind == "quantization" else None
-    controller, law = judge(s.sp, s.pv, s.op, s.usable, s.stated)
+    law = judge(s.sp, s.pv, s.op, s.usable, s.stated)[1]
     found = Explanation(
         p,
         plain,
         plain,
         recorder=recorder,
-        controller=controller if kind == "controller-settings" else None,
+        controller=controller_finding_of(s, None)[0] if kind == "controller-settings" else None,
         law=law,
     )
     if kind == "backlash":

@@ -245,7 +245,7 @@ def test_wrong_sign_is_told(pipe):
 
 
 def test_integral_off_is_told(pipe):
-    """Stated without integral action, a loop that cycles by it is sent to check its settings."""
+    """StatedSettings without integral action, a loop that cycles by it is sent to check its settings."""
     p = propose(pipe.verdict, replace(PIPE.controller, ti_s=math.inf), 100.0)
     assert (p.action, p.controller) == ("check settings", None)
     assert "check kp and ti" in p.reason

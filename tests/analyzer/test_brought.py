@@ -12,8 +12,9 @@ from analyzer.explain.one_loop import plain_start, read_model, scale_of
 from analyzer.explain.user_model import compared, judged, within, wrong_units
 from analyzer.quality import Scale
 from identification.errors import InputError
-from identification.mismatch.diagnosis import Explanation, Recording, inputs_of
+from identification.mismatch.diagnosis import Explanation, inputs_of
 from identification.mismatch.forward_selection import prepared
+from identification.mismatch.recording import Recording
 from identification.models import Fopdt, Loop, Pid
 from identification.simulation.closed_loop import closed_loop
 from identification.simulation.parameters import Slot, neutral

@@ -78,7 +78,7 @@ def test_settings_typed_in_calm_the_tank(tmp_path, tank):
 
 
 def test_settings_come_in_the_units_stated(tmp_path, tank):
-    """Stated in minutes, Ti comes in minutes: the same settings as in seconds over sixty."""
+    """StatedSettings in minutes, Ti comes in minutes: the same settings as in seconds over sixty."""
     seconds = clean(asked(tmp_path, tank), 0)
     (tmp_path / "loops.csv").write_text(f"loop,kp,ti,pv_lo,pv_hi,ti_unit\nL,0.9,{40 / 60},0,100,min\n")
     files = [str(tmp_path / "export.parquet"), "--loops", str(tmp_path / "loops.csv")]

@@ -29,7 +29,7 @@ from analyzer.commands.options import opened
 from analyzer.config import Config
 from analyzer.explain.one_loop import Case, case, loop_of
 from identification.controller.pi_regression import recovered_law
-from identification.mismatch.catalogue import CATALOGUE
+from identification.mismatch.catalogue import CANDIDATES, EFFECTS
 from identification.mismatch.diagnosis import inputs_of, without_spikes
 from identification.mismatch.forward_selection import Candidate, compete, integrating_or_first_order, prepared
 from identification.mismatch.model_file import carried, to_data
@@ -49,7 +49,7 @@ def loaded(cases: pathlib.Path, tag: str, which: str) -> Case:
 
 def chosen(truths: dict, count: int) -> list[str]:
     """Single effects graded by information whose later recording can tell, the levels in turn."""
-    rows = {r.name for r in CATALOGUE}
+    rows = {r.name for r in CANDIDATES}
     able = {
         level: [t for t, v in truths.items() if v["level"] == level and tellable(v, rows)] for level in LEVELS
     }
@@ -82,7 +82,7 @@ def compared(cases: pathlib.Path, truths: dict, tag: str) -> dict:
     wrong = [
         r
         for r in candidates
-        if not kin(r.name, truth["effect"], KIN) and truth["effect"] not in r.row.likeness
+        if not kin(r.name, truth["effect"], KIN) and truth["effect"] not in EFFECTS[r.name].indistinguishable
     ]
     law = recovered_law(s.sp, s.pv, s.op, s.usable & (s.op > 0.05) & (s.op < 99.95), s.stated.ti)
     base = truth["base"]

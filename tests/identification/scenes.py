@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from identification.controller.check import Stated
-from identification.mismatch.diagnosis import Recording
+from identification.controller.check import StatedSettings
+from identification.mismatch.recording import Recording
 from identification.models import Backlash, Fopdt, Loop, Pid, Stiction, Valve
 from identification.simulation.closed_loop import closed_loop
 
@@ -35,7 +35,7 @@ def recording(seed: int, valve: Valve = None, load: np.ndarray | None = None) ->
     loop = Loop(Fopdt(1.2, 20.0, 3.4), law, valve)
     r = closed_loop(loop, setpoints(seed), n if load is None else n + load)
     pv, op = np.round(r.pv, 2), np.round(r.op, 2)
-    return Recording(r.sp, pv, op, np.ones(N, dtype=bool), 1.0, r.time_s, Stated(law.kp, law.ti_s))
+    return Recording(r.sp, pv, op, np.ones(N, dtype=bool), 1.0, r.time_s, StatedSettings(law.kp, law.ti_s))
 
 
 PLAY, STICKING = Backlash(2.0), Stiction(2.0, 1.2, True)

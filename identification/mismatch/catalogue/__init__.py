@@ -1,9 +1,38 @@
-"""The catalogue of left-out physics that open-loop candidates are made of."""
+"""The catalogue of what a plain loop may lack: one file an effect, each with its EFFECT, read from this folder."""
 
 from __future__ import annotations
 
-from identification.mismatch.catalogue.load import LOAD
-from identification.mismatch.catalogue.process import PROCESS
-from identification.mismatch.catalogue.valve import VALVE
+import pkgutil
+from collections.abc import Mapping
+from importlib import import_module
 
-CATALOGUE = (*VALVE, *PROCESS, *LOAD)
+from identification.mismatch.effect import Block, Effect, Fault
+from identification.simulation.acts import bring
+from identification.simulation.effect import Variant
+
+
+def _read() -> dict[str, Effect]:
+    """Every effect of this folder by its name, in the order of the loop's blocks."""
+    names = sorted(m.name for m in pkgutil.iter_modules(__path__))
+    found: list[Effect] = [import_module(f"{__name__}.{name}").EFFECT for name in names]
+    blocks = list(Block)
+    return {e.name: e for e in sorted(found, key=lambda e: blocks.index(e.block))}
+
+
+EFFECTS: Mapping[str, Effect] = _read()
+"""All effects by name."""
+bring(tuple(act for e in EFFECTS.values() for act in e.acts))
+CANDIDATES: tuple[Variant, ...] = tuple(v for e in EFFECTS.values() for v in e.candidates)
+"""Everything that may be added to the plain loop."""
+_FAULTS = [e for e in EFFECTS.values() if isinstance(e, Fault)]
+RECORDER_FAULTS: tuple[Fault, ...] = tuple(sorted((e for e in _FAULTS if e.find), key=lambda e: e.order))
+"""What is looked for in the trends, in this order."""
+CONTROLLER_FAULTS: Mapping[str, Fault] = {e.finds: e for e in _FAULTS if e.finds}
+"""What the controller's check may find, by what it calls it."""
+
+
+def fault(name: str) -> Fault:
+    """The recorder's or controller's effect of that name."""
+    found = EFFECTS[name]
+    assert isinstance(found, Fault)
+    return found

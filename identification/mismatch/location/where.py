@@ -16,7 +16,8 @@ from identification.simulation.parameters import Slot
 
 if TYPE_CHECKING:
     from identification.estimation.prediction_error import Fitted, Problem
-    from identification.mismatch.diagnosis import Explanation, Recording
+    from identification.mismatch.diagnosis import Explanation
+    from identification.mismatch.recording import Recording
 
 PARTS = 40
 """Parts of the record that spans are made of."""

@@ -11,7 +11,7 @@ from scipy.ndimage import median_filter
 from identification.estimation.noise import whitened
 from identification.estimation.prediction_error import Fitted, Model, Problem, scales, sensitivities
 from identification.record import Floats, Mask
-from identification.simulation.effect import Row
+from identification.simulation.effect import Variant
 from identification.simulation.open_loop import simulate
 from identification.simulation.parameters import STEPS, Slot, neutral
 
@@ -129,11 +129,11 @@ class CandidateInputs:
 
 def candidate_inputs(p: Problem, fit: Fitted, kind: str = "") -> CandidateInputs:
     """Steps and a line located in what a fit leaves."""
-    held = p.inputs.step_at if any(r.needs == "steps" for r in fit.model.rows) else step_places(p, fit)
+    held = p.inputs.step_at if any(r.needs == "steps" for r in fit.model.added) else step_places(p, fit)
     return CandidateInputs(replace(p, inputs=replace(p.inputs, step_at=held)), line_frequencies(p, fit), kind)
 
 
-def start_models(x: CandidateInputs, near: Fitted, row: Row) -> list[Model]:
+def start_models(x: CandidateInputs, near: Fitted, row: Variant) -> list[Model]:
     """Starts of a row added to a fit."""
     if row.needs == "line":
         return lines(x, near, row)
@@ -146,24 +146,22 @@ def start_models(x: CandidateInputs, near: Fitted, row: Row) -> list[Model]:
             offset, factor = scales(x.p.inputs, near.model.c, param)
             c[param.slot] = offset + factor * start.get(int(param.slot), 0.0)
         stood = sum(c[slot] for slot in row.delays) + max(-c[Slot.SHARE] * c[Slot.T], 0.0)
-        if row.name == "integrator":
-            c[Slot.K] = 1.0
-            c[Slot.T] = near.model.c[Slot.T] / max(abs(near.model.c[Slot.K]), 1e-6)
-            c[Slot.BIAS] = 0.0
+        if row.enter is not None:
+            row.enter(c)
         for part in (0.4, 1.0) if stood > 0 else (0.0,):
             shorter = c.copy()
             shorter[Slot.L] = max(c[Slot.L] - part * stood, 0.2 * c[Slot.L])
-            out.append(Model((*near.model.rows, row), shorter))
+            out.append(Model((*near.model.added, row), shorter))
     return out
 
 
-def lines(x: CandidateInputs, near: Fitted, row: Row) -> list[Model]:
+def lines(x: CandidateInputs, near: Fitted, row: Variant) -> list[Model]:
     """Starts of an oscillating load, one a frequency."""
     out = []
     for omega in x.omegas:
         c = near.model.c.copy()
         c[Slot.OMEGA] = omega
-        out.append(Model((*near.model.rows, row), c))
+        out.append(Model((*near.model.added, row), c))
     return out
 
 

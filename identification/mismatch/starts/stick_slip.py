@@ -10,7 +10,7 @@ from identification.estimation.limits import SCREEN_STEPS
 from identification.estimation.noise import whitened
 from identification.estimation.prediction_error import Fitted, Model, Problem, descend, loss_of, residual_fit
 from identification.record import Floats
-from identification.simulation.effect import Row
+from identification.simulation.effect import Variant
 from identification.simulation.open_loop import simulate
 from identification.simulation.parameters import Slot
 
@@ -36,7 +36,7 @@ def own_loss(p: Problem, c: Floats) -> float:
     return loss_of(p, residual_fit(p, c)[3])
 
 
-def sticking(c: Floats, row: Row, stickband: float, jump: float) -> Floats:
+def sticking(c: Floats, row: Variant, stickband: float, jump: float) -> Floats:
     """Constants with that stickband and jump [% OP]."""
     out = c.copy()
     for slot, value in (row.fixed or {}).items():
@@ -45,7 +45,7 @@ def sticking(c: Floats, row: Row, stickband: float, jump: float) -> Floats:
     return out
 
 
-def scanned(p: Problem, play: Fitted, row: Row) -> list[Floats]:
+def scanned(p: Problem, play: Fitted, row: Variant) -> list[Floats]:
     """Constants of the best pairs of stickband and jump, best first."""
     width = float(play.model.c[Slot.STICKBAND])
     trials = [sticking(play.model.c, row, w * width, w * j * width) for w in WIDTHS for j in JUMPS]
@@ -54,7 +54,7 @@ def scanned(p: Problem, play: Fitted, row: Row) -> list[Floats]:
     return sorted(best, key=lambda c: own_loss(p, c))
 
 
-def settled(p: Problem, c: Floats, row: Row) -> Floats:
+def settled(p: Problem, c: Floats, row: Variant) -> Floats:
     """The bottom of the pit: stickband and jump moved by ever smaller steps."""
     least = own_loss(p, c)
     for step in COMPASS:
@@ -71,7 +71,7 @@ def settled(p: Problem, c: Floats, row: Row) -> Floats:
     return c
 
 
-def fit_sticking(p: Problem, play: Fitted, row: Row, rows: tuple[Row, ...]) -> Fitted:
+def fit_sticking(p: Problem, play: Fitted, row: Variant, rows: tuple[Variant, ...]) -> Fitted:
     """The best sticking valve about a fitted play.
 
     Parameters
@@ -79,9 +79,9 @@ def fit_sticking(p: Problem, play: Fitted, row: Row, rows: tuple[Row, ...]) -> F
     p : Problem
     play : Fitted
         A fit whose last row is a play.
-    row : Row
+    row : Variant
         The kind of sticking.
-    rows : tuple of Row
+    rows : tuple of Variant
         Rows that the fit holds beside it.
     """
     fits = []

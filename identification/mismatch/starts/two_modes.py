@@ -9,17 +9,15 @@ import numpy as np
 from identification.estimation.noise import whitened
 from identification.estimation.prediction_error import Fitted, Model, Problem
 from identification.record import Floats
-from identification.simulation.effect import Row
+from identification.simulation.effect import Variant
+from identification.simulation.open_loop import through_valve
 from identification.simulation.parameters import Slot
 from identification.simulation.process import plain_vessel
-from identification.simulation.valve_chain import flow
 
 SHORTER = (0.15, 0.35, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
 """Dead times tried, in that of the plain loop: a missing lag or zero has lengthened it."""
 LONGER = (0.7, 1.0, 1.4)
 """Time constants tried, in that of the plain loop."""
-OTHERS = {"inverse-response": (0.005, 0.02, 0.08, 0.25), "slow-mode": (3.0, 6.0, 15.0)}
-"""Time constants of the second mode, in that of the plain loop."""
 LEADING = 0.95
 """First coefficient of the noise model that knows nothing: nearly a difference."""
 KEPT = 2
@@ -40,7 +38,7 @@ class Point:
 def responses(p: Problem, near: Fitted, dead_s: float, times: set[float], ar: Floats) -> dict[float, Floats]:
     """Whitened unit responses, each shape (n,), of lags with these time constants [s]."""
     inputs, c = p.inputs, near.model.c.copy()
-    through = flow(inputs.op, c, inputs.dt_s, inputs.middle)
+    through = through_valve(inputs, c)
     still = np.zeros(inputs.op.size)
     c[Slot.K], c[Slot.BIAS], c[Slot.START], c[Slot.L] = 1.0, 0.0, 0.0, dead_s
     out = {}
@@ -60,11 +58,11 @@ def solved(
     return (float(beta[0]), float(beta[1])), float((weight * y) @ y - beta @ (weighted @ y))
 
 
-def grid(p: Problem, near: Fitted, row: Row, ar: Floats) -> list[Point]:
+def grid(p: Problem, near: Fitted, row: Variant, ar: Floats) -> list[Point]:
     """All points of the grid under one noise model, best first."""
     t0, dead0 = float(near.model.c[Slot.T]), float(near.model.c[Slot.L])
     y, level = whitened(p.y, ar, p.edges), whitened(np.ones(p.y.size), ar, p.edges)
-    firsts, others = [t0 * f for f in LONGER], [t0 * f for f in OTHERS[row.name]]
+    firsts, others = [t0 * f for f in LONGER], [t0 * f for f in row.modes]
     out = []
     for dead in {dead0 * f for f in SHORTER}:
         found = responses(p, near, dead, {*firsts, *others}, ar)
@@ -75,16 +73,15 @@ def grid(p: Problem, near: Fitted, row: Row, ar: Floats) -> list[Point]:
     return sorted(out, key=lambda point: point.left)
 
 
-def fits_row(point: Point, row: Row) -> bool:
+def fits_row(point: Point, row: Variant) -> bool:
     """Whether a point's second mode has the sign that the row is about."""
     a, b = point.gains
     if a + b == 0:
         return False
-    share = b / (a + b)
-    return -5.0 < share < -0.002 if row.name == "inverse-response" else 0.002 < share < 0.95
+    return row.mode_share[0] < b / (a + b) < row.mode_share[1]
 
 
-def mode_starts(p: Problem, near: Fitted, row: Row) -> list[Model]:
+def mode_starts(p: Problem, near: Fitted, row: Variant) -> list[Model]:
     """Starts of a two-mode row from the grid."""
     blind = np.zeros_like(near.ar)
     blind[0] = LEADING
@@ -99,5 +96,5 @@ def mode_starts(p: Problem, near: Fitted, row: Row) -> list[Model]:
             )
             c[Slot.K] = sum(point.gains)
             c[Slot.SHARE] = point.gains[1] / c[Slot.K]
-            out.append(Model((*near.model.rows, row), c))
+            out.append(Model((*near.model.added, row), c))
     return out

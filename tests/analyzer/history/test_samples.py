@@ -97,7 +97,7 @@ def test_quality_codes(tmp_path: Path, column: str, codes: list[str], bad: list[
 
 
 def test_stated_good_quality(tmp_path: Path) -> None:
-    """Stated codes count as good, and no others."""
+    """StatedSettings codes count as good, and no others."""
     options = ReadOptions(good_quality=("64", "192"))
     _, series = read(tmp_path / "x.csv", long([("1", "64"), ("1", "192"), ("1", "216")], "quality"), options)
     assert series.bad.tolist() == [False, False, True]

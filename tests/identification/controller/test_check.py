@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from identification.controller.check import Stated, judge
+from identification.controller.check import ControllerFault, StatedSettings, judge
 from tests.identification.scenes import PLAY, N, recording
 
 pytestmark = pytest.mark.slow
@@ -35,9 +35,9 @@ def test_true_settings_are_not_blamed() -> None:
 def test_wrong_settings_are_found(kp: float, ti: float) -> None:
     """Settings stated 15 % wrong are named and the true ones given within 3 %."""
     s = recording(2)
-    found, _ = judge(s.sp, s.pv, s.op, GOOD, Stated(kp, ti))
+    found, _ = judge(s.sp, s.pv, s.op, GOOD, StatedSettings(kp, ti))
     assert found is not None
-    assert found.name == "controller-settings"
+    assert found.fault is ControllerFault.SETTINGS
     assert found.values["kp"] == pytest.approx(1.8, rel=0.03)
     assert found.values["ti_samples"] == pytest.approx(20.0, rel=0.03)
 
@@ -48,9 +48,9 @@ def test_wrong_integral_time_is_found_where_the_loop_seldom_moves() -> None:
     e = rng.normal(0, 0.02, N)
     e[2500:2700] += 6 * np.exp(-np.arange(200) / 50.0)
     op = law(e, 1.8, 20.0) + np.round(rng.normal(0, 0.05, N), 2)
-    found, _ = judge(np.full(N, 50.0), 50.0 - e, op, GOOD, Stated(1.8, 32.0))
+    found, _ = judge(np.full(N, 50.0), 50.0 - e, op, GOOD, StatedSettings(1.8, 32.0))
     assert found is not None
-    assert found.name == "controller-settings"
+    assert found.fault is ControllerFault.SETTINGS
     assert found.values["ti_samples"] == pytest.approx(20.0, rel=0.05)
 
 
@@ -59,28 +59,28 @@ def test_thinned_recordings_blame_no_sound_controller() -> None:
     s = recording(2, PLAY)
     pv, op, sp = s.pv[::5], s.op[::5], s.sp[::5]
     good = np.ones(pv.size, dtype=bool)
-    assert judge(sp, pv, op, good, Stated(1.8, 4.0, 5.0))[0] is None
-    wrong, _ = judge(sp, pv, op, good, Stated(0.9, 4.0, 5.0))
+    assert judge(sp, pv, op, good, StatedSettings(1.8, 4.0, 5.0))[0] is None
+    wrong, _ = judge(sp, pv, op, good, StatedSettings(0.9, 4.0, 5.0))
     assert wrong is not None
-    assert wrong.name == "controller-settings"
+    assert wrong.fault is ControllerFault.SETTINGS
 
 
 def test_late_clock_is_found() -> None:
     """PV stamped three samples late is named with its shift."""
     s = recording(3)
     late = np.concatenate((np.full(3, s.pv[0]), s.pv[:-3]))
-    found, _ = judge(s.sp, late, s.op, GOOD, Stated(1.8, 20.0))
+    found, _ = judge(s.sp, late, s.op, GOOD, StatedSettings(1.8, 20.0))
     assert found is not None
-    assert (found.name, found.values["late_samples"]) == ("clock-offset", 3.0)
+    assert (found.fault, found.values["late_samples"]) == (ControllerFault.CLOCK, 3.0)
 
 
 def test_gap_is_found() -> None:
     """An OP that stands while the error is under 0.4 % is a gap of that size."""
     s = recording(4)
     op = law(s.sp - s.pv, 1.8, 20.0, 0.4)
-    found, _ = judge(s.sp, s.pv, op, GOOD, Stated(1.8, 20.0))
+    found, _ = judge(s.sp, s.pv, op, GOOD, StatedSettings(1.8, 20.0))
     assert found is not None
-    assert found.name == "controller-gap"
+    assert found.fault is ControllerFault.GAP
     assert found.values["gap_pct"] == pytest.approx(0.4, rel=0.3)
 
 
@@ -90,6 +90,6 @@ def test_held_output_is_logic() -> None:
     op = s.op.copy()
     for first in (700, 2200, 3900):
         op[first : first + 90] = op[first]
-    found, _ = judge(s.sp, s.pv, op, GOOD, Stated(1.8, 20.0))
+    found, _ = judge(s.sp, s.pv, op, GOOD, StatedSettings(1.8, 20.0))
     assert found is not None
-    assert found.name == "controller-logic"
+    assert found.fault is ControllerFault.LOGIC

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from identification.mismatch.answer import answer
-from identification.mismatch.diagnosis import Explanation, Recording, inputs_of
+from identification.mismatch.diagnosis import Explanation, inputs_of
 from identification.mismatch.forward_selection import prepared
 from identification.mismatch.identifiability import ANSWERS, brings, too_short, unanswered, uninformed
+from identification.mismatch.recording import Recording
 from identification.simulation.parameters import Slot
 from tests.identification.scenes import noise, recording
 

@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pytest
 
-from identification.controller.check import Stated
+from identification.controller.check import StatedSettings
 from identification.errors import InputError
 from identification.mismatch.model_file import carried, carried_closed, constants, to_data
 from identification.simulation.open_loop import ModelInputs, simulate
@@ -39,7 +39,7 @@ def test_closed_loop_settles_at_setpoint() -> None:
     c[Slot.STICKBAND] = 0.0
     data = to_data("A", inputs, c, (), 0.0, {})
     sp = np.where(np.arange(600) < 100, 48.0, 52.0)
-    pv, op = carried_closed(data, sp, np.full(600, 50.0), np.full(600, 48.0), 2.0, Stated(1.0, 20.0))
+    pv, op = carried_closed(data, sp, np.full(600, 50.0), np.full(600, 48.0), 2.0, StatedSettings(1.0, 20.0))
     assert pv[-1] == pytest.approx(52.0, abs=0.05)
     assert op[-1] == pytest.approx(50.0 + 4.0 / 1.5, abs=0.1)
 

@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.controller.check import Stated
+from identification.controller.check import StatedSettings
 from identification.mismatch.answer import answer
-from identification.mismatch.diagnosis import Recording, explain
+from identification.mismatch.diagnosis import explain
+from identification.mismatch.recording import Recording
 from identification.models import Integrator, Loop, Pid
 from identification.simulation.closed_loop import closed_loop
 from tests.identification.scenes import PLAY, STICKING, N, noise, recording, setpoints
@@ -77,7 +78,7 @@ def test_process_that_never_settles_is_an_integrator_of_its_kind() -> None:
     law = Pid(0.9, 23.0)
     n = noise(9)
     r = closed_loop(Loop(Integrator(0.05, 5.0), law), setpoints(9), 0.3 * n)
-    held = Stated(law.kp, law.ti_s)
+    held = StatedSettings(law.kp, law.ti_s)
     s = Recording(
         r.sp,
         np.round(r.pv, 2),
@@ -117,7 +118,7 @@ def test_samples_held_over_a_hole_are_not_taken_for_a_load() -> None:
 def test_wrong_settings_do_not_hide_the_play() -> None:
     """Of wrongly stated settings and a play in the valve the settings are the verdict, and both are told."""
     s = recording(12, PLAY)
-    s = replace(s, stated=Stated(3.0, 20.0))
+    s = replace(s, stated=StatedSettings(3.0, 20.0))
     said = answer(explain(s), s)
     assert said.verdict == "controller-settings"
     assert [e.name for e in said.effects] == ["controller-settings", "backlash"]

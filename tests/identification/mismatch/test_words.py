@@ -2,39 +2,31 @@
 
 from __future__ import annotations
 
-from identification.mismatch.catalogue import CATALOGUE
+from identification.mismatch.catalogue import EFFECTS
 from identification.mismatch.location.features import groups
-from identification.mismatch.words import (
-    CHECKS,
-    DISCRIMINATING_TESTS,
-    LONGER,
-    PLACES,
-    SENTENCES,
-    discriminating_test,
-    located_sentence,
-)
+from identification.mismatch.words import LONGER, PLACES, check, discriminating_test, located_sentence
+
+NAMED_ONLY = {"sensor-lag"}
+"""Names that are answered as alternatives alone: nothing in SP, PV and OP can find them."""
 
 
-def test_each_name_has_its_words() -> None:
-    """Each name of the catalogue has a sentence and something to look at."""
-    names = {row.name for row in CATALOGUE} | {"none"}
-    assert names <= set(SENTENCES)
-    assert set(SENTENCES) <= set(CHECKS)
-
-
-def test_look_alikes_have_a_test_of_their_own() -> None:
+def test_indistinguishable_effects_have_a_test_of_their_own() -> None:
     """Names that the catalogue calls alike are told apart by a line of their own, whichever comes first."""
-    for row in CATALOGUE:
-        for other in row.likeness:
-            assert discriminating_test(row.name, other) != LONGER
-            assert discriminating_test(other, row.name) == discriminating_test(row.name, other)
+    for effect in EFFECTS.values():
+        for other in effect.indistinguishable:
+            assert discriminating_test(effect.name, other) != LONGER
+            assert discriminating_test(other, effect.name) == discriminating_test(effect.name, other)
 
 
-def test_table_names_the_catalogue_only() -> None:
-    """No line of the table is about a name that nobody answers."""
-    known = set(SENTENCES) | {"sensor-lag"}
-    assert {name for pair in DISCRIMINATING_TESTS for name in pair} <= known
-    assert all(len(pair) == 2 for pair in DISCRIMINATING_TESTS)
+def test_tests_name_the_catalogue_only() -> None:
+    """No discriminating test is about a name that nobody answers, or about the effect itself."""
+    for effect in EFFECTS.values():
+        assert set(effect.tests) <= (set(EFFECTS) | NAMED_ONLY) - {effect.name}
+
+
+def test_verdicts_without_an_effect_say_what_to_do() -> None:
+    """`none`, `unexplained` and words nobody knows have something to look at as well."""
+    assert check("none") != check("unexplained") == check("no such verdict")
 
 
 def test_every_feature_has_a_place() -> None:

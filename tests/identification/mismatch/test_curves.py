@@ -7,18 +7,13 @@ import math
 import numpy as np
 import pytest
 
-from identification.mismatch.catalogue import CATALOGUE
-from identification.mismatch.curves.record_shape import (
-    around,
-    biggest_move,
-    busiest,
-    gap_profile,
-    grid,
-    rebuilt,
-)
-from identification.mismatch.curves.shape import Shape, banded, shape_of
+from identification.mismatch.catalogue import CANDIDATES, EFFECTS
+from identification.mismatch.curves.controller import gap_profile, rebuilt
+from identification.mismatch.curves.drawn import Drawing, Shape, banded
+from identification.mismatch.curves.recorder import grid
+from identification.mismatch.curves.stretches import around, biggest_move, busiest
 from identification.models import Estimate
-from identification.simulation.effect import Row
+from identification.simulation.effect import Param, Variant
 from identification.simulation.open_loop import ModelInputs
 from identification.simulation.parameters import Slot, neutral
 from identification.simulation.valve import play
@@ -32,9 +27,9 @@ def inputs() -> ModelInputs:
     return ModelInputs(op, 1.0, 50.0, 50.0, (30.0, 70.0), (500,))
 
 
-def row(name: str) -> Row:
+def row(name: str) -> Variant:
     """The catalogue's first row of that name."""
-    return next(r for r in CATALOGUE if r.name == name)
+    return next(r for r in CANDIDATES if r.name == name)
 
 
 def shape(name: str, spread: float = 0.1, **constants: float) -> Shape:
@@ -48,9 +43,9 @@ def shape(name: str, spread: float = 0.1, **constants: float) -> Shape:
     for p in row(name).params:
         value = float(best[p.slot])
         known[p.name] = Estimate(value, *sorted((value * (1 - spread), value * (1 + spread))), p.unit)
-    found = shape_of(inputs(), row(name), known, best, plain)
-    assert found is not None
-    return found
+    curve = EFFECTS[name].curve
+    assert curve is not None
+    return curve(Drawing(inputs(), row(name), known, best, plain))
 
 
 def test_play_is_drawn_as_a_loop_of_its_width() -> None:
@@ -139,7 +134,7 @@ def test_every_row_of_the_catalogue_has_a_shape() -> None:
         "OMEGA": 0.02,
     }
     alone |= {"SINE": 1.0, "SPLIT": 50.0, "STICKBAND": 2.0, "RATE": 1.0, "ROOT": 0.5, "HEAD": 0.1}
-    for r in CATALOGUE:
+    for r in CANDIDATES:
         slots = {Slot(p.slot).name for p in r.params if p.slot in set(Slot)}
         found = shape(r.name, **{k: v for k, v in alone.items() if k in slots})
         for curve in found.curves:
@@ -150,9 +145,10 @@ def test_every_row_of_the_catalogue_has_a_shape() -> None:
 def test_band_adds_deviations_as_squares() -> None:
     """Two constants that each move a value by 3 and 4 give a band of 5."""
     c = neutral()
-    y, low, high = banded(
-        lambda k: np.array([k[Slot.T] + k[Slot.L]]), c, ((Slot.T, c[0] - 3, c[0] + 3), (Slot.L, -4.0, 4.0))
-    )
+    params = (Param(Slot.T, "lag", "s", 0.0, 9.0), Param(Slot.L, "delay", "s", 0.0, 9.0))
+    known = {"lag": Estimate(c[0], c[0] - 3, c[0] + 3), "delay": Estimate(0.0, -4.0, 4.0)}
+    d = Drawing(inputs(), Variant(params, ()), known, c, c)
+    y, low, high = banded(lambda k: np.array([k[Slot.T] + k[Slot.L]]), d)
     assert (y[0] - low[0], high[0] - y[0]) == pytest.approx((5.0, 5.0))
 
 
@@ -183,10 +179,10 @@ def test_rebuilt_output_is_the_law() -> None:
 def test_grid_and_gap_are_seen_in_their_pictures() -> None:
     """Teeth stand a step apart; OP stands still under the gap alone."""
     rng = np.random.default_rng(2)
-    teeth = grid(np.round(rng.normal(50, 3, 5000) / 0.5) * 0.5, 0.5).curves[0]
+    teeth = grid("quantization", np.round(rng.normal(50, 3, 5000) / 0.5) * 0.5, 0.5).curves[0]
     np.testing.assert_allclose(np.diff(np.unique(teeth.x)), 0.5)
     e = rng.normal(0, 1, 5000)
     op = np.cumsum(np.where(np.abs(e) > 0.6, e, 0.0))
-    curve = gap_profile(e, op, 0.6, np.ones(5000, dtype=bool)).curves[0]
+    curve = gap_profile("controller-gap", e, op, 0.6, np.ones(5000, dtype=bool)).curves[0]
     assert curve.y[curve.x < 0.58].min() > 99
     assert curve.y[curve.x > 0.62].max() < 1

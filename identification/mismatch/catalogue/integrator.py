@@ -1,0 +1,26 @@
+"""A process that integrates: its gain over time constant is all there is to know."""
+
+from __future__ import annotations
+
+from identification.mismatch.curves.process import pv_response
+from identification.mismatch.effect import Block, Effect
+from identification.record import Floats
+from identification.simulation.effect import Variant
+from identification.simulation.parameters import Slot
+
+
+def from_settling(c: Floats) -> None:
+    """Turn a settling loop's parameters, in place, into the integrator of the same slope: unit gain, T over gain."""
+    c[Slot.T] /= max(abs(c[Slot.K]), 1e-6)
+    c[Slot.K], c[Slot.BIAS] = 1.0, 0.0
+
+
+EFFECT = Effect(
+    name="integrator",
+    block=Block.PROCESS,
+    sentence="The process integrates: it does not settle by itself.",
+    check="Tune as an integrating loop.",
+    types=("level", "pressure"),
+    curve=pv_response,
+    variants=(Variant((), ({},), {Slot.LEAK: 0.0}, replaces=(Slot.K,), enter=from_settling),),
+)

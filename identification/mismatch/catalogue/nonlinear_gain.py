@@ -1,0 +1,40 @@
+"""A process gain that changes with PV, by its outflow or by its inflow, with or without the speed."""
+
+from __future__ import annotations
+
+from identification.mismatch.curves.process import gain_over_pv
+from identification.mismatch.effect import Block, Effect
+from identification.simulation.effect import Param, Variant, each
+from identification.simulation.parameters import Slot
+
+SLOPE = ("gain_slope", "per 50 % PV", -1.9, 1.9, "1/pv")
+"""Name, unit, bounds and scale of the slope."""
+
+EFFECT = Effect(
+    name="nonlinear-gain",
+    block=Block.PROCESS,
+    sentence="The process gain changes with PV (by {gain_slope}).",
+    check="Schedule the controller's gain on PV, or tune for where the gain is highest.",
+    tests={
+        "gain-drift": (
+            "Go back to the PV of the start and step again: drift stays, a nonlinear gain returns."
+        ),
+        "sqrt-outflow": "Vary the inflow at one level: the root follows the level, geometry the place.",
+        "direction-asymmetry": "Steps up and down over the same span of PV.",
+        "flow-dependent-delay": "Steps at two flows at the same PV: the dead time moves, or the gain does.",
+    },
+    indistinguishable=("valve-characteristic",),
+    curve=gain_over_pv,
+    variants=(
+        Variant((Param(Slot.SLOPE, *SLOPE, title="Gain slope"),), each(Slot.SLOPE, -0.15, 0.15)),
+        *(
+            Variant(
+                (Param(Slot.GAIN_SLOPE, *SLOPE, title="Gain slope"),),
+                each(Slot.GAIN_SLOPE, -0.15, 0.15),
+                {Slot.SPEED: speed},
+                label=label,
+            )
+            for speed, label in ((0.0, "gain alone"), (-1.0, "faster with gain"))
+        ),
+    ),
+)

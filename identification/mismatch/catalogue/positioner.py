@@ -1,0 +1,51 @@
+"""A position loop of second order that rests within a dead band of its aim."""
+
+from __future__ import annotations
+
+from identification.mismatch.curves.drawn import Drawing, Shape
+from identification.mismatch.curves.valve import stem_response
+from identification.mismatch.effect import Block, Effect, Friction
+from identification.record import Floats
+from identification.simulation.effect import Param, Variant
+from identification.simulation.parameters import Slot
+from identification.simulation.valve_chain import SERVO_STEPS, positioned
+
+LENGTH = 8.0
+"""Length of the drawn response, in lags."""
+
+
+def stem_after_step(d: Drawing) -> Shape:
+    """Stem after a step of OP."""
+
+    def read(op: Floats, c: Floats, dt_s: float) -> Floats:
+        return positioned(op, c[Slot.SERVO], c[Slot.DAMPING], c[Slot.DEADBAND], dt_s, SERVO_STEPS)
+
+    return stem_response(d, LENGTH * float(d.best[Slot.SERVO]), read)
+
+
+EFFECT = Effect(
+    name="positioner",
+    block=Block.VALVE,
+    sentence=(
+        "The positioner answers late (lag {positioner_lag_s}) and rests within {deadband_pct} of its aim."
+    ),
+    check=("Look at the positioner's gain and dead band; a recorded stem position would settle it."),
+    indistinguishable=("stiction",),
+    friction=Friction.HINT,
+    curve=stem_after_step,
+    variants=(
+        Variant(
+            (
+                Param(Slot.SERVO, "positioner_lag_s", "s", 0.2, 200.0, "dt", True, title="Positioner lag"),
+                Param(Slot.DAMPING, "damping", "", 0.1, 1.2, title="Positioner damping"),
+                Param(Slot.DEADBAND, "deadband_pct", "% OP", 0.0, 0.5, "op", title="Dead band"),
+            ),
+            tuple(
+                {Slot.SERVO: w, Slot.DAMPING: 0.45, Slot.DEADBAND: d}
+                for w in (0.5, 2.0, 8.0)
+                for d in (0.02, 0.08)
+            ),
+            delays=(Slot.SERVO,),
+        ),
+    ),
+)

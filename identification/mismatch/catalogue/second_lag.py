@@ -1,0 +1,46 @@
+"""One lag more, or two: between valve and process, or in the transmitter, which the data cannot tell."""
+
+from __future__ import annotations
+
+from identification.mismatch.curves.drawn import Drawing, Shape
+from identification.mismatch.curves.process import pv_response
+from identification.mismatch.effect import Block, Effect
+from identification.simulation.effect import Param, Variant, each
+from identification.simulation.parameters import Slot
+
+SECOND = Param(Slot.T2, "second_lag_s", "s", 0.1, 1e4, "dt", True, title="Second lag")
+
+
+def pv_after_step(d: Drawing) -> Shape:
+    """PV after a step of OP, drawn to where the shorter lag's work is over."""
+    return pv_response(d, fast_s=float(min(d.best[Slot.T2], d.best[Slot.T])))
+
+
+EFFECT = Effect(
+    name="second-lag",
+    block=Block.PROCESS,
+    sentence=("Something adds a lag of {second_lag_s}; the transmitter's damping would look the same."),
+    check="Ask what lies between valve and transmitter; look at the transmitter's damping.",
+    tests={
+        "sensor-lag": (
+            "Nothing in SP, PV and OP does: a hand-held gauge or the transmitter's damping setting; "
+            "with the damping changed, a sensor's lag changes and the process's stays."
+        ),
+        "inverse-response": "One clean step of OP in manual, sampled at a tenth of the lag or faster.",
+        "slow-mode": "A step of OP held for five of the longer time constants.",
+        "rate-limit": ("A step of OP twice as large: a slewing valve takes twice as long, a lag does not."),
+        "positioner": "A recorded stem position; or steps of OP of several sizes, for a lag scales.",
+        "clock-offset": "The controller: does OP answer PV before PV moves?",
+    },
+    indistinguishable=("sensor-lag",),
+    curve=pv_after_step,
+    variants=(
+        Variant((SECOND,), each(Slot.T2, 0.7, 1.5, 3.0, 6.0, 12.0, 25.0, 50.0, 100.0), delays=(Slot.T2,)),
+        Variant(
+            (SECOND, Param(Slot.T3, "third_lag_s", "s", 0.1, 1e4, "dt", True)),
+            tuple({Slot.T2: t, Slot.T3: 0.5 * t} for t in (1.5, 4.0, 12.0, 40.0)),
+            label="and a third",
+            delays=(Slot.T2, Slot.T3),
+        ),
+    ),
+)

@@ -1,0 +1,24 @@
+"""A vessel whose outflow grows with the root of its level."""
+
+from __future__ import annotations
+
+from identification.estimation.limits import TIE
+from identification.mismatch.curves.process import gain_over_pv
+from identification.mismatch.effect import Block, Effect
+from identification.simulation.effect import Param, Variant, each
+from identification.simulation.parameters import Slot
+
+EFFECT = Effect(
+    name="sqrt-outflow",
+    block=Block.PROCESS,
+    sentence="The outflow grows with the root of the level, so gain and lag grow with it.",
+    check="Tune at the low level, where the vessel answers fastest for its gain.",
+    indistinguishable=("nonlinear-gain",),
+    types=("level",),
+    curve=gain_over_pv,
+    variants=(
+        Variant(
+            (Param(Slot.ROOT, "root", "", 0.05, 3.0, title="Root"),), each(Slot.ROOT, 0.3, 1.0), penalty=-TIE
+        ),
+    ),
+)

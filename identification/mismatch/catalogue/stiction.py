@@ -1,0 +1,37 @@
+"""Stiction: the stem holds through the stickband and then jumps; behind the jump it rests, halts or slides."""
+
+from __future__ import annotations
+
+from identification.mismatch.curves.valve import stem_over_op
+from identification.mismatch.effect import Block, Effect, Friction
+from identification.simulation.effect import Param, Variant
+from identification.simulation.parameters import Slot
+
+BAND = Param(Slot.STICKBAND, "stickband_pct", "% OP", 1e-4, 2.0, "op", True, title="Stickband")
+JUMP = Param(Slot.JUMP, "slip_jump_pct", "% OP", 1e-5, 2.0, "op", True, title="Slip jump")
+BANDS = (0.01, 0.03, 0.08, 0.2, 0.5)
+"""Stickbands that the search begins with, in OP's range."""
+
+EFFECT = Effect(
+    name="stiction",
+    block=Block.VALVE,
+    sentence=("The valve sticks: it holds through {stickband_pct} of travel and then jumps {slip_jump_pct}."),
+    check=("Look at packing and actuator; stroke the valve in steps under the stickband and watch the stem."),
+    tests={
+        "positioner": "A recorded stem position, or a stem watched by eye while OP ramps slowly.",
+    },
+    indistinguishable=("positioner",),
+    friction=Friction.STICKS,
+    curve=stem_over_op,
+    variants=(
+        *(
+            Variant(
+                (BAND, JUMP),
+                tuple({Slot.STICKBAND: s, Slot.JUMP: j * s} for s in BANDS for j in (0.4, 0.8)),
+                {Slot.COAST: coast},
+                label=label,
+            )
+            for coast, label in ((-1.0, "rests"), (-0.5, "halts"), (0.0, "slides"))
+        ),
+    ),
+)

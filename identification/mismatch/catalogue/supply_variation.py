@@ -1,0 +1,51 @@
+"""A supply to the valve that wanders slowly and changes gain and bias together."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from identification.mismatch.curves.course import course, over_record
+from identification.mismatch.curves.drawn import Axis, Drawing, Shape
+from identification.mismatch.effect import Block, Effect
+from identification.record import Floats
+from identification.simulation.effect import Param, Variant
+from identification.simulation.open_loop import head
+from identification.simulation.parameters import KNOTS, Slot
+
+
+def supply_over_time(d: Drawing) -> Shape:
+    """The supply as it wanders."""
+    at = over_record(d.inputs)
+
+    def read(c: Floats) -> Floats:
+        return np.asarray(100.0 * head(d.inputs, c)[at])
+
+    return course(d, at, read, Axis("supply", "% of its mean"))
+
+
+EFFECT = Effect(
+    name="supply-variation",
+    block=Block.LOAD,
+    sentence="The supply to the valve wanders and changes gain and bias together.",
+    check="Look at the supply's pressure or temperature over the same hours.",
+    tests={
+        "gain-drift": ("A longer recording: a supply comes back, fouling does not; other loops show it too."),
+        "load-step": "The supply's own pressure or temperature trend.",
+        "coupling": "The supply's own trend beside the other loop's OP.",
+    },
+    timed=True,
+    curve=supply_over_time,
+    variants=(
+        Variant(
+            (
+                Param(Slot.HEAD_BIAS, "flow_at_rest_pct", "% OP", -60.0, 60.0, title="Flow at rest"),
+                *(
+                    Param(int(Slot.HEAD) + i, f"head_{i + 1}", "", -2.0, 2.0, hidden=True)
+                    for i in range(KNOTS)
+                ),
+            ),
+            ({Slot.HEAD_BIAS: 8.0},),
+            penalty=-10.0,
+        ),
+    ),
+)

@@ -1,0 +1,31 @@
+"""A trim whose gain changes along the stroke: local gain exp(curve (z - middle)/100)."""
+
+from __future__ import annotations
+
+from identification.mismatch.curves.valve import flow_over_op
+from identification.mismatch.effect import Block, Effect
+from identification.simulation.effect import Param, Variant, each
+from identification.simulation.parameters import Slot
+
+EFFECT = Effect(
+    name="valve-characteristic",
+    block=Block.VALVE,
+    sentence="The valve's gain changes along its stroke (curve {curve}).",
+    check="Bend the signal back in the controller or positioner, or tune for the steepest part.",
+    tests={
+        "nonlinear-gain": (
+            "The same PV at another OP: move the load, or another stream, and step OP again at the same PV."
+        ),
+        "saturation": "Steps of OP near the end of the stroke: zero answer, or a smaller one.",
+        "split-range": "Steps on both sides of the suspected point: only a second valve changes the lag.",
+        "gain-drift": "Go back to the OP of the start and step again: drift stays, a curve returns.",
+    },
+    indistinguishable=("nonlinear-gain",),
+    curve=flow_over_op,
+    variants=(
+        Variant(
+            (Param(Slot.BEND, "curve", "ln gain per 100 % OP", -6.0, 6.0, "1/op", title="Curve"),),
+            each(Slot.BEND, -0.3, 0.3),
+        ),
+    ),
+)

@@ -1,0 +1,126 @@
+"""An effect of the catalogue, whole: what it frees in the model, how it is proven, drawn and said."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
+
+from identification.mismatch.curves.drawn import Drawing, Shape
+from identification.mismatch.recording import Finding, Recording
+from identification.models import Estimate
+from identification.record import Floats
+from identification.simulation.acts import Act
+from identification.simulation.effect import Variant
+
+Parameters = Mapping[str, Estimate]
+
+
+class Block(StrEnum):
+    """Where in the loop an effect sits."""
+
+    RECORDER = "recorder"
+    SENSOR = "sensor"
+    CONTROLLER = "controller"
+    VALVE = "valve"
+    PROCESS = "process"
+    LOAD = "load"
+    NONE = "none"
+
+
+class Friction(StrEnum):
+    """What an effect has to do with the search for a sticking valve."""
+
+    PLAY = "play"
+    """Its best fit is where the fine scan of stick-slip begins."""
+    STICKS = "sticks"
+    """It is scanned finely where a hint is found."""
+    HINT = "hint"
+    """A gain of it is a hint that a valve sticks."""
+
+
+class Ends(StrEnum):
+    """What a finding about the recorder leaves to be asked."""
+
+    ALL = "all"
+    """Neither controller nor physics is judged after it."""
+    PHYSICS = "physics"
+    """The controller is judged, the physics is fitted plain."""
+    NOTHING = "nothing"
+    """Both are judged."""
+
+
+@dataclass(frozen=True, slots=True)
+class Effect:
+    """One effect that a plain loop lacks.
+
+    name, block : as answered, contract; sentence : what a shift supervisor reads, with the parameters in braces;
+    check : what to look at; caption : what its picture shows, where the picture's kind does not say it; tests : for
+    each name that it can be taken for, the experiment or signal that tells the two apart; indistinguishable : names
+    that the same data would bear as well; types : loop types that can have it; needs : see Variant; variants : how it
+    may act; timed : bound to a time, so that nothing follows for data held out; local : its gain may lie in one part
+    of the recording; friction : see Friction; derived : further numbers from its parameters; spoken : names in the
+    sentence that stand for the first of several parameters; titles : what pages call numbers that no Param has;
+    acts : what it does to a signal of the loop in its own file, where the simulator has no lines for it; curve : its
+    picture.
+    """
+
+    name: str
+    block: Block
+    sentence: str
+    check: str
+    caption: str = ""
+    tests: Mapping[str, str] = field(default_factory=dict)
+    indistinguishable: tuple[str, ...] = ()
+    types: tuple[str, ...] = ()
+    needs: str = ""
+    variants: tuple[Variant, ...] = ()
+    timed: bool = False
+    local: bool = False
+    friction: Friction | None = None
+    derived: Callable[[Parameters], dict[str, Estimate]] | None = None
+    spoken: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    titles: Mapping[str, str] = field(default_factory=dict)
+    acts: tuple[Act, ...] = ()
+    curve: Callable[[Drawing], Shape] | None = None
+
+    @property
+    def candidates(self) -> tuple[Variant, ...]:
+        """Its variants, each with the effect's name, block and needs."""
+        own = {"name": self.name, "block": str(self.block), "needs": self.needs, "types": self.types}
+        return tuple(replace(v, **own) for v in self.variants)  # type: ignore[arg-type]
+
+    @property
+    def called(self) -> dict[str, str]:
+        """What pages call each of its numbers; none for those that another number stands for."""
+        params = {p.name: p.title for v in self.variants for p in v.params if p.title and not p.hidden}
+        return params | dict(self.titles)
+
+    @property
+    def hidden(self) -> frozenset[str]:
+        """Names of parameters whose meaning another number carries."""
+        return frozenset(p.name for v in self.variants for p in v.params if p.hidden)
+
+
+@dataclass(frozen=True, slots=True)
+class Fault(Effect):
+    """An effect of recorder or controller: it is found in the trends themselves, before any physics is fitted.
+
+    order : place among the questions; find : the finding in a recording, None of what the controller's check finds;
+    finds : what the controller's check calls it; ends : what is asked after it; censors : whether samples where it
+    is tell no more than that PV is beyond; numbers : the answer's parameters;
+    drawn : its picture, from the finding, the recording and the plain model's PV.
+    """
+
+    order: int = 0
+    find: Callable[[Recording], Finding | None] | None = None
+    finds: str = ""
+    ends: Ends = Ends.NOTHING
+    censors: bool = False
+    numbers: Callable[[Finding, Recording], dict[str, Estimate]] | None = None
+    drawn: Callable[[Finding, Recording, Floats], Shape | None] | None = None
+
+
+def exact(value: float, unit: str, half: float = 0.0) -> Estimate:
+    """An estimate with a symmetric interval."""
+    return Estimate(value, value - half, value + half, unit)

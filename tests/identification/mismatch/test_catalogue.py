@@ -1,0 +1,77 @@
+"""The catalogue is whole: every effect acts in the simulator, and is said, drawn and told apart."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from identification.estimation.prediction_error import scales
+from identification.mismatch.catalogue import CANDIDATES, CONTROLLER_FAULTS, EFFECTS, RECORDER_FAULTS
+from identification.mismatch.effect import Fault
+from identification.record import Floats
+from identification.simulation.effect import Param, Variant
+from identification.simulation.open_loop import ModelInputs, simulate
+from identification.simulation.parameters import Slot, neutral
+
+N = 1500
+NAMED_IN_CONTRACT, NEVER_FOUND = 30, 1
+"""Names of the contract's catalogue, and those of them that are answered as alternatives alone (sensor-lag)."""
+
+
+def inputs() -> ModelInputs:
+    """OP up and down over most of its range, with a neighbour and places for steps."""
+    k = np.arange(N)
+    op = 50 + 30 * np.sin(k / 40.0) + 8 * np.sign(np.sin(k / 7.0))
+    return ModelInputs(op, 1.0, 50.0, 50.0, (5.0, 95.0), (300, 700, 1100), np.cos(k / 25.0))
+
+
+def started(variant: Variant) -> Floats:
+    """Parameters of a settling loop with a variant at its first start, sizes that start at nothing at a tenth."""
+    c = neutral()
+    c[Slot.K], c[Slot.T], c[Slot.L] = 1.2, 20.0, 4.5
+    for slot, value in (variant.fixed or {}).items():
+        c[slot] = value
+    for i, p in enumerate(variant.params):
+        offset, factor = scales(inputs(), c, p)
+        c[p.slot] = offset + factor * (variant.starts[0].get(int(p.slot), 0.0) or 0.1 * (-1) ** i * p.high)
+    return c
+
+
+def other(c: Floats, p: Param) -> Floats:
+    """The same with one parameter moved by a part of itself."""
+    out = c.copy()
+    out[p.slot] *= 0.8
+    return out
+
+
+@pytest.mark.parametrize("variant", CANDIDATES, ids=lambda v: f"{v.name} {v.label}".strip())
+def test_every_parameter_acts(variant: Variant) -> None:
+    """What an effect frees changes the simulated PV: one that no kernel knows is not skipped in silence."""
+    plain = neutral()
+    plain[Slot.K], plain[Slot.T], plain[Slot.L] = 1.2, 20.0, 4.5
+    c = started(variant)
+    here = simulate(inputs(), c)
+    assert np.abs(here - simulate(inputs(), plain)).max() > 1e-3
+    for p in variant.params:
+        assert np.abs(here - simulate(inputs(), other(c, p))).max() > 1e-6, p.name
+
+
+def test_every_effect_is_either_added_or_found() -> None:
+    """An effect has variants that are fitted, or is found in the trends or by the controller's check; never both."""
+    for effect in EFFECTS.values():
+        faults = (effect in RECORDER_FAULTS) + (effect in CONTROLLER_FAULTS.values())
+        assert bool(effect.variants) + faults == 1, effect.name
+
+
+def test_every_effect_is_said_and_drawn() -> None:
+    """Each has a sentence whose numbers it can give, something to look at, and a picture."""
+    for effect in EFFECTS.values():
+        assert effect.sentence
+        assert effect.check
+        drawn = effect.drawn if isinstance(effect, Fault) else effect.curve
+        assert drawn is not None, effect.name
+
+
+def test_names_are_those_of_the_contract() -> None:
+    """The catalogue holds as many effects as its contract, and no two files one name."""
+    assert len(EFFECTS) == NAMED_IN_CONTRACT - NEVER_FOUND
