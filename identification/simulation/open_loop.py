@@ -97,12 +97,12 @@ def simulate(inputs: ModelInputs, c: Floats) -> Floats:
     out = acted(Signal.PV, out, c, dt)
     if math.isfinite(c[Slot.CLIP_HI]) or math.isfinite(c[Slot.CLIP_LO]):
         out = np.clip(out, c[Slot.CLIP_LO] - inputs.level, c[Slot.CLIP_HI] - inputs.level)
-    return np.nan_to_num(out, nan=1e6, posinf=1e6, neginf=-1e6)
+    return out if np.isfinite(out).all() else np.nan_to_num(out, nan=1e6, posinf=1e6, neginf=-1e6)
 
 
 def _rich(inputs: ModelInputs, c: Floats, through: Floats, act: Floats) -> Floats:
     supply = head(inputs, c)
-    gain = 1.0 + c[Slot.DRIFT] * inputs.clock + supply
+    gain = 1.0 + supply if c[Slot.DRIFT] == 0 else 1.0 + c[Slot.DRIFT] * inputs.clock + supply
     act = act + c[Slot.HEAD_BIAS] * supply
     if c[Slot.PIPE] != 0:
         through = transported(through, c[Slot.L], c[Slot.PIPE], max(inputs.middle, 1e-3), inputs.dt_s)

@@ -67,8 +67,15 @@ def scheduled(x: float, slope: float) -> float:
 
 
 @njit(cache=True, error_model="numpy")
+def share_filled(rise: float, h: float, t: float) -> float:
+    """Rise of a level over its net feed after h seconds, of an outflow with that derivative (exponential step)."""
+    z = rise * h / t
+    return h / t if z < 1e-9 else (1.0 - math.exp(-z)) / rise
+
+
+@njit(cache=True, error_model="numpy")
 def filled(x: float, feed: float, h: float, c: Floats, head: float, basin: float) -> tuple[float, float]:
-    """Level after h seconds of constant feed, and the spill meanwhile (exponential step, exact where linear)."""
+    """Level after h seconds of constant feed, and the spill meanwhile (exact where the vessel is linear)."""
     out, rise = outflow(x, head, c[SLOPE], c[LEAK], c[ROOT])
     over = max(x - c[CAP], 0.0)
     if over > 0.0:
@@ -79,16 +86,29 @@ def filled(x: float, feed: float, h: float, c: Floats, head: float, basin: float
         t *= scheduled(x, c[GAIN_SLOPE]) ** c[SPEED]
     if c[ASYM] != 0.0:
         t *= math.exp(-0.5 * c[ASYM] if net > 0.0 else 0.5 * c[ASYM])
-    z = rise * h / t
-    grown = h / t if z < 1e-9 else (1.0 - math.exp(-z)) / rise
-    return x + net * grown, WEIR * over
+    return x + net * share_filled(rise, h, t), WEIR * over
 
 
 @njit(cache=True, error_model="numpy")
-def eased(at: float, aim: float, lag_s: float, h: float) -> tuple[float, float]:
-    """A first-order lag after h seconds, and its mean meanwhile."""
+def shares_filled(c: Floats, parts: tuple[float, float]) -> Floats:
+    """The same of a linear outflow, shape (2, 2, 2): by part of a sample, rising or falling, under or over a cap."""
+    out = np.zeros((2, 2, 2))
+    for half in range(2):
+        for falling in range(2):
+            t = c[T] if c[ASYM] == 0.0 else c[T] * math.exp((falling - 0.5) * c[ASYM])
+            for over in range(2):
+                if parts[half] > 0.0:
+                    out[half, falling, over] = share_filled(c[LEAK] + over * WEIR, parts[half], t)
+    return out
+
+
+@njit(cache=True, error_model="numpy")
+def held(lag_s: float, h: float) -> tuple[float, float]:
+    """What is left of a first-order lag's distance from its aim after h seconds, and the mean of it meanwhile."""
+    if lag_s <= 0.0 or h <= 0.0:
+        return 0.0, 0.0
     pole = math.exp(-h / lag_s)
-    return aim + (at - aim) * pole, aim + (at - aim) * (1.0 - pole) * lag_s / h
+    return pole, (1.0 - pole) * lag_s / h
 
 
 @njit(cache=True, error_model="numpy")
@@ -99,10 +119,18 @@ def vessel(
 
     flow, act, gain : shape (n,), flow during each sample, load at the inlet [% OP] and relative gain; base : the
     flow that counts as zero; head : level deviation at which a rooted vessel would be empty, with its sign turned.
+    A sample has two parts, before and after the dead time's fraction; what is the same in each is worked out once.
     """
     n = flow.size
     delay = 0 if c[PIPE] != 0.0 else int(c[L] / dt_s)
     part = 0.0 if c[PIPE] != 0.0 else c[L] - delay * dt_s
+    parts = (part, dt_s - part)
+    linear = c[SLOPE] == 0.0 and c[ROOT] == 0.0 and c[GAIN_SLOPE] == 0.0
+    rises = shares_filled(c, parts)
+    second = (held(c[T2], parts[0]), held(c[T2], parts[1]))
+    third = (held(c[T3], parts[0]), held(c[T3], parts[1]))
+    other = (held(c[MODE_T], parts[0])[0], held(c[MODE_T], parts[1])[0])
+    caught = (held(c[SPILL_T], parts[0])[0], held(c[SPILL_T], parts[1])[0])
     out = np.empty(n)
     x, mode, basin = c[START], c[START], 0.0
     first = c[K] * (flow[0] - base) + c[BIAS]
@@ -110,8 +138,7 @@ def vessel(
     for k in range(n):
         out[k] = (1.0 - c[SHARE]) * x + c[SHARE] * mode
         for half in range(2):
-            h = part if half == 0 else dt_s - part
-            if h <= 0.0:
+            if parts[half] <= 0.0:
                 continue
             j = max(k - delay - 1 + half, 0)
             feed = gain[k] * (c[K] * (flow[j] - base) + c[BIAS])
@@ -119,14 +146,22 @@ def vessel(
                 feed *= scheduled(x, c[GAIN_SLOPE])
             feed += c[K] * act[k]
             if c[T2] > 0.0:
-                z2, feed = eased(z2, feed, c[T2], h)
+                left, mean = second[half]
+                z2, feed = feed + (z2 - feed) * left, feed + (z2 - feed) * mean
             if c[T3] > 0.0:
-                z3, feed = eased(z3, feed, c[T3], h)
-            x, spill = filled(x, feed, h, c, head, basin)
+                left, mean = third[half]
+                z3, feed = feed + (z3 - feed) * left, feed + (z3 - feed) * mean
+            if linear:
+                over = max(x - c[CAP], 0.0)
+                net = feed + c[SPILL] * basin - c[LEAK] * x - WEIR * over
+                spill = WEIR * over
+                x += net * rises[half, 0 if net > 0.0 else 1, 0 if over <= 0.0 else 1]
+            else:
+                x, spill = filled(x, feed, parts[half], c, head, basin)
             if c[SPILL] > 0.0:
-                basin += (spill - basin) * (1.0 - math.exp(-h / c[SPILL_T]))
+                basin += (spill - basin) * (1.0 - caught[half])
             if c[SHARE] != 0.0:
-                mode += (feed - mode) * (1.0 - math.exp(-h / c[MODE_T]))
+                mode += (feed - mode) * (1.0 - other[half])
     return out
 
 
