@@ -17,7 +17,9 @@ from analyzer.advice import (
     model_of,
     propose,
     sought_for,
+    tuned,
     uncertain,
+    valve_of,
 )
 from analyzer.assess import Assessment
 from analyzer.cause import Verdict
@@ -27,7 +29,7 @@ from identification.errors import NotAssessedError
 from identification.estimation.gauss_newton import covariance
 from identification.estimation.hammerstein import Fit, ValveTrial
 from identification.estimation.window import Window, block_means
-from identification.models import Estimate, Loop, Pid, Process
+from identification.models import Estimate, Loop, Pid, Process, Valve
 from identification.record import Floats
 from tuning.describing import describe
 from tuning.limit_cycle import Confirmed, confirm
@@ -143,6 +145,21 @@ def _model(verdict: Verdict, controller: Pid) -> tuple[Loop, Fit, tuple[Loop, ..
     fit, model = chosen_fit(verdict), model_of(verdict, controller)
     window = verdict.measured.window if verdict.measured else None
     return model, fit, uncertain(window, fit, model) if window else ()
+
+
+def identified(found: Assessment) -> tuple[Process, Valve, dict[str, Estimate]]:
+    """Process, valve and their parameters with 90 % intervals, as one assessed loop's verdict has them.
+
+    Raises
+    ------
+    NotAssessedError
+        Where the loop's trends give no model.
+    """
+    verdict = found.verdict
+    if verdict.measured is None:
+        raise NotAssessedError(verdict.needs or "needs trends from which a model can be identified")
+    window, fit, at_fault = verdict.measured.window, chosen_fit(verdict), verdict.cause == "valve"
+    return tuned(window, fit, at_fault), valve_of(verdict, fit), intervals(window, fit, at_fault)
 
 
 def tune(found: Assessment, controller: Pid, kept: Advice | None = None) -> Tuning:

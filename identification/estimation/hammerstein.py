@@ -53,8 +53,8 @@ class ValveTrial:
         if self.breakaway <= 0.0:
             return None
         if self.slip_jump <= 0.0:
-            return Backlash(self.stickband)
-        return Stiction(self.stickband, self.slip_jump, slides=self.slides)
+            return Backlash(float(self.stickband))
+        return Stiction(float(self.stickband), float(self.slip_jump), slides=self.slides)
 
 
 IDEAL = ValveTrial()

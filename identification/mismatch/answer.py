@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from identification.estimation.limits import Z90
-from identification.estimation.prediction_error import Fitted, deviations
+from identification.estimation.prediction_error import Fitted, Problem, deviations
 from identification.mismatch.catalogue import EFFECTS, fault
 from identification.mismatch.cross_validation import HeldOut, Misfit, held_out, misfit
 from identification.mismatch.diagnosis import Explanation, alternatives, restored
@@ -74,17 +74,17 @@ def finding_effect(finding: Finding | None, s: Recording) -> EffectFound | None:
     return EffectFound(about.name, about.block, shown, None)
 
 
-def parameters(found: Explanation, fit: Fitted, row: Variant) -> dict[str, Estimate]:
+def parameters_of(p: Problem, fit: Fitted, row: Variant) -> dict[str, Estimate]:
     """A row's constants with 90 % intervals from the curvature."""
-    wide = dict(zip((p.slot for p in fit.model.params), deviations(found.p, fit), strict=True))
+    wide = dict(zip((q.slot for q in fit.model.params), deviations(p, fit), strict=True))
     out = {}
-    for p in row.params:
-        value, half = float(fit.model.c[p.slot]), Z90 * float(wide[p.slot])
-        if p.log:
+    for q in row.params:
+        value, half = float(fit.model.c[q.slot]), Z90 * float(wide[q.slot])
+        if q.log:
             spread = math.exp(min(half, 5.0))
-            out[p.name] = Estimate(value, value / spread, value * spread, p.unit)
+            out[q.name] = Estimate(value, value / spread, value * spread, q.unit)
         else:
-            out[p.name] = exact(value, p.unit, half)
+            out[q.name] = exact(value, q.unit, half)
     derived = EFFECTS[row.name].derived
     return out | (derived(out) if derived is not None else {})
 
@@ -97,7 +97,7 @@ def effects_of(found: Explanation, s: Recording, proof: HeldOut | None) -> tuple
         EffectFound(
             row.name,
             row.block,
-            parameters(found, found.best, row),
+            parameters_of(found.p, found.best, row),
             proof.share if proof is not None and i == 0 and proof.share > 0.0 else None,
             alternatives(found) if i == 0 else (),
         )

@@ -1,0 +1,310 @@
+"""What a notebook needs: read an export, assess a loop, fit, simulate, tune, explain, read a store into pandas.
+
+Heavy parts are imported when they are used. From the project's folder:
+
+>>> from analyzer import api as triage
+>>> plant = triage.read("sample_data/mill.parquet", loops="sample_data/loops.csv", changes="sample_data/changes.csv")
+>>> len(plant.loops), plant.nights[0]
+(18, '2026-03-02')
+>>> loop = plant.loop("TIC2106", night="2026-03-03")
+>>> loop.record.dt_s, loop.controller.kp
+(10.0, 4.0)
+>>> found = triage.assess(loop)
+>>> found.verdict.cause, found.verdict.fault
+('valve', 'backlash')
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from identification.models import Estimate, Loop, Pid, Process, Valve
+from identification.record import Floats, LoopRecord
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from analyzer.assess import Assessment
+    from analyzer.config import Config
+    from analyzer.explain.one_loop import Explained
+    from analyzer.history.export import Export
+    from analyzer.loops.changes import TuningChange
+    from analyzer.loops.spec import LoopSpec
+    from analyzer.nights import Night
+    from analyzer.quality import Prepared
+    from analyzer.tune import Tuning
+
+Paths = str | Path | Sequence[str | Path]
+
+
+@dataclass(frozen=True)
+class PlantLoop:
+    """One loop over one night, or over all of an export.
+
+    spec : its row of loops.csv with the settings in force; prepared : its trends on one clock, with masks and notes;
+    plant : the export that it is of; night : None where it is the whole export.
+    """
+
+    spec: LoopSpec
+    prepared: Prepared
+    plant: Plant
+    night: Night | None = None
+
+    @property
+    def record(self) -> LoopRecord:
+        """SP, PV and OP on one clock [% of span], shape (n,) each."""
+        return self.prepared.record
+
+    @property
+    def controller(self) -> Pid | None:
+        """The stated settings in percent and seconds; None where loops.csv does not state them."""
+        from analyzer.loops.tags import controller
+
+        stated = controller(self.spec, self.prepared.scale.span)
+        return stated if stated is None or self.spec.scan_s else replace(stated, scan_s=self.record.dt_s)
+
+
+@dataclass(frozen=True)
+class Plant:
+    """An export, its loops and the changes of their settings, as `read` returns it."""
+
+    export: Export
+    specs: tuple[LoopSpec, ...]
+    changes: tuple[TuningChange, ...]
+    notes: tuple[str, ...]
+    config: Config
+
+    @property
+    def loops(self) -> tuple[str, ...]:
+        """Names of the loops."""
+        return tuple(spec.loop for spec in self.specs)
+
+    @cached_property
+    def spans(self) -> Mapping[str, Night]:
+        """Nights by name, oldest first."""
+        from analyzer.nights import nights_of
+
+        return {n.name: n for n in nights_of(self.export, list(self.specs))}
+
+    @property
+    def nights(self) -> tuple[str, ...]:
+        """Names of the nights, oldest first."""
+        return tuple(self.spans)
+
+    def loop(self, name: str, night: str | None = None) -> PlantLoop:
+        """One loop, over one night or over all that the export holds.
+
+        Raises
+        ------
+        InputError
+            There is no such loop or night, or the loop has no PV.
+        NotAssessedError
+            Its trends hold too little to be put on a clock.
+        """
+        from analyzer.loops.settings_in_force import in_force
+        from analyzer.nights import cut
+        from analyzer.quality import prepare
+        from analyzer.tune_loop import spec_of
+        from identification.errors import InputError
+
+        spec = spec_of(self.specs, name)
+        if night is not None and night not in self.spans:
+            raise InputError(f"night {night}", f"one of {', '.join(self.nights[-3:])}", "see Plant.nights")
+        span = None if night is None else self.spans[night]
+        spec = in_force(spec, self.changes, self.export.span()[1] if span is None else span.last_s)
+        series = self.export.read(spec.tags)
+        if span is not None:
+            series = {tag: cut(x, span) for tag, x in series.items()}
+        return PlantLoop(spec, prepare(spec, series, self.config.quality), self, span)
+
+
+def read(
+    export: Paths,
+    loops: str | Path | None = None,
+    changes: str | Path | None = None,
+    config: Config | None = None,
+    **reading: Any,
+) -> Plant:
+    """Open an export.
+
+    Parameters
+    ----------
+    export : path or sequence of paths
+        CSV or Parquet, wide or long, or folders of them.
+    loops, changes : path or None
+        loops.csv and changes.csv; without loops.csv loops are found by their tags' endings.
+    config : Config or None
+        Thresholds; the defaults where None.
+    **reading
+        How to read text: timezone, delimiter, decimal, encoding, day_first, date_format, time_column,
+        quality_column, good_quality.
+
+    Raises
+    ------
+    InputError
+        The export or a table cannot be used; the text says what was seen, what was expected and what to do.
+    """
+    from analyzer.commands.options import opened
+    from analyzer.config import Config as Defaults
+    from analyzer.loops.changes import read_changes
+
+    paths = [export] if isinstance(export, str | Path) else list(export)
+    source, specs, notes = opened([Path(p) for p in paths], None if loops is None else Path(loops), **reading)
+    dated = () if changes is None else read_changes(Path(changes))
+    return Plant(source, specs, dated, notes, config or Defaults())
+
+
+def assess(loop: PlantLoop) -> Assessment:
+    """What a night says of a loop: does it oscillate, why, and its figures.
+
+    Raises
+    ------
+    NotAssessedError
+        The record cannot support it; the text says what it needs.
+    """
+    from analyzer.assess import assess as assessed
+
+    return assessed(loop.prepared, loop.controller, loop.plant.config, loop.spec.type)
+
+
+@dataclass(frozen=True)
+class Identified:
+    """Process and valve as identified: the likeliest model, and its parameters with 90 % intervals by name."""
+
+    process: Process
+    valve: Valve
+    estimates: Mapping[str, Estimate]
+
+
+def fit(loop: PlantLoop) -> Identified:
+    """Process and valve from the trends of a loop.
+
+    >>> from analyzer import api as triage
+    >>> plant = triage.read("sample_data/mill.parquet", loops="sample_data/loops.csv")
+    >>> model = triage.fit(plant.loop("TIC2106", night="2026-03-03"))
+    >>> type(model.process).__name__, type(model.valve).__name__
+    ('Fopdt', 'Backlash')
+    >>> estimate = model.estimates["backlash_pct"]
+    >>> bool(estimate.low < estimate.value < estimate.high), estimate.unit
+    (True, '% of OP')
+
+    Raises
+    ------
+    NotAssessedError
+        The trends give no model; the text says what they lack.
+    """
+    from analyzer.tune import identified
+
+    return Identified(*identified(assess(loop)))
+
+
+def simulate(
+    process: Process, controller: Pid, sp: Floats, load: Floats, valve: Valve = None, op_start: float = 50.0
+) -> LoopRecord:
+    """A closed loop under set point and load, stepped at the controller's scan; see `closed_loop`.
+
+    >>> import numpy as np
+    >>> from analyzer import api as triage
+    >>> from identification.models import Backlash, Fopdt, Pid
+    >>> still = np.zeros(7200)
+    >>> load = np.where(np.arange(7200) < 10, 0.0, 5.0)
+    >>> worn, sound = (
+    ...     triage.simulate(Fopdt(1.5, 20.0, 3.0), Pid(3.0, 8.0), still, load, valve)
+    ...     for valve in (Backlash(2.0), None)
+    ... )
+    >>> [bool(np.ptp(r.pv[-3600:]) > 0.5) for r in (worn, sound)]
+    [True, False]
+
+    Parameters
+    ----------
+    process : Fopdt or Integrator
+    controller : Pid
+    sp, load : ndarray of shape (n,)
+        Set point, and load plus noise as they add to PV, at each scan [% PV].
+    valve : Backlash, Stiction or None
+    op_start : float
+        OP of the loop at rest [% OP].
+    """
+    from identification.simulation.closed_loop import closed_loop
+
+    return closed_loop(Loop(process, controller, valve), np.asarray(sp), np.asarray(load), op_start)
+
+
+def tune(loop: PlantLoop) -> Tuning:
+    """New settings for a loop, what they would do, and why.
+
+    Raises
+    ------
+    InputError
+        loops.csv does not state the present settings.
+    NotAssessedError
+        The trends give no model.
+    """
+    from analyzer.advice import withheld
+    from analyzer.tune import tune as tuned
+    from identification.errors import InputError, NotAssessedError
+
+    controller, found = loop.controller, assess(loop)
+    if controller is None:
+        raise InputError(f"{loop.spec.loop}: no kp and ti in loops.csv", "both", "state them")
+    if found.verdict.measured is None:
+        raise NotAssessedError(f"{loop.spec.loop}: {found.verdict.needs or 'no model can be identified'}")
+    keep = withheld(found, loop.spec, controller, loop.prepared.scale.span, loop.plant.config)
+    return tuned(found, controller, keep)
+
+
+def explain(loop: PlantLoop) -> Explained:
+    """What physics the loop's plain model lacks; `.data` is what `triage explain --format json` prints.
+
+    Raises
+    ------
+    NotAssessedError
+        OP or PV is missing or never moves.
+    """
+    from analyzer.explain.one_loop import case, explained
+    from analyzer.nights import cut
+
+    plant, spec = loop.plant, loop.spec
+    others = [s.op for s in plant.specs if s.loop != spec.loop and s.op][:8]
+    series = plant.export.read(list(dict.fromkeys([*spec.tags, *others])))
+    if loop.night is not None:
+        series = {tag: cut(x, loop.night) for tag, x in series.items()}
+    return explained(case(spec, plant.specs, series, plant.config), lambda _: None)
+
+
+def nights(store: str | Path, table: str = "nights") -> pd.DataFrame:
+    """Every night of a store as one frame, with the column `night`.
+
+    Parameters
+    ----------
+    store : path
+        A folder that `triage run` wrote.
+    table : str
+        nights (a row a loop), hours, trends or explained.
+
+    Raises
+    ------
+    InputError
+        There is no such store.
+    """
+    import pandas as pd
+
+    from analyzer.store import Store
+
+    kept = Store(Path(store))
+    kept.require()
+    found = {night: kept.read_if_there(table, night) for night in kept.nights()}
+    frames = [t.to_pandas().assign(night=night) for night, t in found.items() if t is not None]
+    return pd.concat(frames, ignore_index=True) if frames else pd.DataFrame({"night": []})
+
+
+def finite(estimates: Mapping[str, Estimate]) -> dict[str, tuple[float, float, float]]:
+    """Estimates as (value, low, high), those that are not known left out: what a data frame takes."""
+    return {k: (e.value, e.low, e.high) for k, e in estimates.items() if math.isfinite(e.value)}
