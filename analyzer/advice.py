@@ -15,6 +15,7 @@ from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import as_stated
 from analyzer.measure import Measured
 from analyzer.oscillation import counting
+from identification.estimation.covariance import NINETY
 from identification.estimation.gauss_newton import covariance
 from identification.estimation.hammerstein import Fit, disturbance, process_of
 from identification.estimation.window import Window
@@ -29,8 +30,6 @@ UNSTABLE = (
     "The identified loop would be unstable at the present settings, which the bounded cycle contradicts: the process "
     "is not known well enough for new settings."
 )
-NINETY = 1.645
-"""Standard deviations to the ends of a 90 % interval."""
 LONGEST_SHARE, MOST_FACTOR = 0.1, 2.0
 """Largest time constant, as a share of the window, and largest factor to its 90 % limits at which it counts as known;
 ours: beyond them a lag and an integrator explain the record alike."""

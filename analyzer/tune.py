@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from analyzer.advice import (
-    NINETY,
     Advice,
     chosen_fit,
     lag_factor,
@@ -26,6 +25,7 @@ from analyzer.cause import Verdict
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import as_stated
 from identification.errors import NotAssessedError
+from identification.estimation.covariance import LEAST_BAND, LEAST_JUMP, WIDER, half_width, reaching
 from identification.estimation.gauss_newton import covariance
 from identification.estimation.hammerstein import Fit, ValveTrial
 from identification.estimation.window import Window, block_means
@@ -48,14 +48,6 @@ SPREAD = 20.0
 """The map reaches this factor below and above the present settings."""
 LEAST_SCANS = 240
 """Scans of load that a forecast needs; ours: twenty for each block of its bootstrap."""
-ROUGH = 1.35
-"""Times that the errors of a valve's fit exceed what curvature and scores tell: a slip that OP's resolution hides or
-makes leaves the likelihood rough; ours: the 90 % quantile of their ratio over 58 simulated loops with play is 2.25
-for slope, dead time and width, where it should be 1.64 (tests/proofs/coverage.py, seed 9)."""
-LEAST_JUMP = 2.0
-"""Times that a slip jump may be smaller than found; ours: on simulated dry friction found ones are too small."""
-LEAST_BAND = 1.5
-"""Times that a stickband may be smaller than found; ours: on simulated dry friction up to 1.45."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,19 +76,19 @@ def intervals(window: Window, fit: Fit, valve: bool) -> dict[str, Estimate]:
     valve that jumps PV tells jump times slope; only slips beyond the first of a half cycle part the two, so both
     are told within wide limits. tests/proofs/coverage.md says how often the intervals hold the truth.
     """
-    rough = ROUGH if valve else 1.0
     spread = np.sqrt(np.maximum(np.diag(covariance(window, fit, free_width=valve)), 0.0))
     t = fit.time_constant_s
-    out = {"slope_pct_per_s": _slope(window, fit, valve, rough)}
+    out = {"slope_pct_per_s": _slope(window, fit, valve)}
     factor = lag_factor(window, fit, valve)
     if factor is not None:
-        out["gain"] = _around(fit.gain, NINETY * spread[3], "%/%")
-        out["time_constant_s"] = Estimate(t, t / factor, t * factor, "s")
+        wide = factor**WIDER
+        out["gain"] = _around(fit.gain, half_width(spread[3]), "%/%")
+        out["time_constant_s"] = Estimate(t, t / wide, t * wide, "s")
     dead_s = fit.dead_time_s + window.half_block_s
-    out["dead_time_s"] = _around(dead_s, NINETY * rough * spread[1], "s", least=0.0)
+    out["dead_time_s"] = _around(dead_s, half_width(spread[1]), "s", least=0.0)
     if valve:
         name = "backlash_pct" if fit.valve.slip_jump == 0 else "stickband_pct"
-        out[name] = _around(fit.valve.stickband, NINETY * rough * spread[2], "% of OP", least=0.0)
+        out[name] = _around(fit.valve.stickband, half_width(spread[2]), "% of OP", least=0.0)
         if fit.valve.slip_jump > 0:
             out |= _jumping(window, fit.valve, out)
     return out
@@ -112,26 +104,19 @@ def _jumping(window: Window, valve: ValveTrial, found: dict[str, Estimate]) -> d
     out = {"slip_jump_pct": Estimate(jump, jump / LEAST_JUMP, band, "% of OP")}
     for name in ("slope_pct_per_s", "gain"):
         if name in found:
-            out[name] = _reaching(
-                found[name], found[name].value * jump / band, found[name].value * LEAST_JUMP
-            )
-    out["stickband_pct"] = _reaching(found["stickband_pct"], band / LEAST_BAND)
+            out[name] = reaching(found[name], found[name].value * jump / band, found[name].value * LEAST_JUMP)
+    out["stickband_pct"] = reaching(found["stickband_pct"], band / LEAST_BAND)
     travel = float(np.abs(np.diff(block_means(window.op, window.factor))).sum())
     later_s = 0.5 * band * (1.0 - 1.0 / LEAST_BAND) * window.duration_s / max(travel, 1e-9)
-    out["dead_time_s"] = _reaching(found["dead_time_s"], found["dead_time_s"].value + later_s)
+    out["dead_time_s"] = reaching(found["dead_time_s"], found["dead_time_s"].value + later_s)
     return out
 
 
-def _reaching(e: Estimate, *ends: float) -> Estimate:
-    """An estimate whose interval holds some values too."""
-    return Estimate(e.value, min(e.low, *ends), max(e.high, *ends), e.unit)
-
-
-def _slope(window: Window, fit: Fit, valve: bool, rough: float = 1.0) -> Estimate:
+def _slope(window: Window, fit: Fit, valve: bool) -> Estimate:
     """Gain over time constant with its interval; the errors of the two are strongly correlated."""
     c = covariance(window, fit, free_width=valve)
     relative = c[3, 3] / fit.gain**2 + c[0, 0] - 2 * c[0, 3] / fit.gain
-    return _around(fit.slope, NINETY * rough * abs(fit.slope) * math.sqrt(max(relative, 0.0)), "%/(% s)")
+    return _around(fit.slope, half_width(abs(fit.slope) * math.sqrt(max(relative, 0.0))), "%/(% s)")
 
 
 def _around(value: float, half: float, unit: str, least: float = -math.inf) -> Estimate:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
+from identification.estimation.covariance import inverse, scattered
 from identification.estimation.hammerstein import (
     Fit,
     ValveTrial,
@@ -23,8 +24,6 @@ from identification.record import Floats
 
 ITERATIONS = 25
 """Gauss-Newton steps at most; ours: nine in ten fits stop before the fifteenth."""
-STRETCHES = 30
-"""Stretches whose scores are compared; ours: a window of 1,800 blocks holds thirty periods."""
 SETTLED = 0.01
 """Gain in log likelihood [nat] below which the steps stop."""
 
@@ -165,26 +164,17 @@ def _held(window: Window, free_width: bool) -> list[int]:
 
 
 def covariance(window: Window, fit: Fit, free_width: bool = False) -> Floats:
-    """Covariance of (log T, L, stickband, gain) at a fit, shape (4, 4).
+    """Covariance of (log T, L, stickband, gain) at a fit, shape (4, 4); zero for what was held.
 
-    The inverse of the Gauss-Newton matrix times the innovations variance (Ljung 1999, eq. 9.31), the noise model's
-    and the slow terms' share in it; zero for what was held. Where the scores of whole stretches scatter by more
-    than that (Huber 1967: the model is not the truth, and what it lacks lasts longer than a sample), the standard
-    deviations are those of the scatter.
+    The noise model's and the slow terms' share is in it (covariance.py).
     """
     y, theta, held = window.y - window.y.mean(), _theta(fit), _held(window, free_width)
     e, columns = _judged(window, y, theta, fit.valve, free_width)
     gram = columns.T @ columns
     free = np.array([j for j in range(gram.shape[0]) if j not in held and gram[j, j] > 0])
-    scale = np.sqrt(np.diag(gram)[free])
-    inside = np.linalg.pinv(gram[np.ix_(free, free)] / np.outer(scale, scale), rcond=1e-10)
-    inside /= np.outer(scale, scale)
-    stretches = np.array_split(columns[:, free] * e[:, None], STRETCHES)
-    moves = np.array([part.sum(axis=0) for part in stretches]) @ inside
-    usual = float(e @ e) / e.size * np.diag(inside)
-    wider = np.sqrt(np.maximum((moves**2).sum(axis=0) / np.maximum(usual, 1e-300), 1.0))
+    inside = inverse(gram[np.ix_(free, free)])
     out = np.zeros_like(gram)
-    out[np.ix_(free, free)] = float(e @ e) / e.size * inside * np.outer(wider, wider)
+    out[np.ix_(free, free)] = scattered(inside, columns[:, free] * e[:, None], float(e @ e) / e.size)
     return out[:4, :4]
 
 

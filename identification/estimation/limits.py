@@ -24,8 +24,6 @@ HELD_OUT = 0.35
 """Last part of the record that is held out when the winner is proven."""
 SPREAD = 0.15
 """Share of the gain that must remain when the best tenth of the record is left out (loads excepted)."""
-Z90 = 1.645
-"""Half width of a 90 % interval in standard deviations."""
 LAW_SPAN = 40
 """Fewest samples in a span of the controller's regression."""
 LAW_SPANS = 12

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from identification.estimation.covariance import inverse, scattered
 from identification.estimation.limits import BIAS_SCATTER, SETTLED, START_SCATTER
 from identification.estimation.noise import Edges, edges_for, fitted, judged, lag_means, whitened
 from identification.record import Floats, Mask
@@ -241,9 +242,13 @@ def descend(p: Problem, model: Model, steps: int) -> Fitted:
 
 
 def deviations(p: Problem, fit: Fitted) -> Floats:
-    """Standard deviations of the free constants (of logarithms where so searched), from the curvature."""
+    """Standard deviations of the free constants (of logarithms where so searched), shape (m,); see covariance.py."""
     _, columns, ar, e = residual_fit(p, fit.model.c)
     gram, _ = curvature(p, fit.model, ar, columns, e)
-    scale = np.sqrt(np.maximum(np.diag(gram), 1e-300))
-    inside = np.linalg.pinv(gram / np.outer(scale, scale), rcond=1e-10)
-    return np.sqrt(np.maximum(np.diag(inside), 0.0) * fit.loss) / scale
+    if not np.isfinite(gram).all():
+        return np.full(gram.shape[0], np.inf)
+    weighted = columns * p.weight
+    moves = sensitivities(p, fit.model, ar)
+    follow = np.linalg.lstsq(weighted @ columns.T, weighted @ moves.T, rcond=1e-13)[0]
+    scores = (moves - follow.T @ columns) * (p.weight * e)
+    return np.sqrt(np.maximum(np.diag(scattered(inverse(gram), scores.T, fit.loss)), 0.0))

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from identification.estimation.limits import Z90
+from identification.estimation.covariance import half_width
 from identification.estimation.prediction_error import Fitted, Problem, deviations
 from identification.mismatch.catalogue import EFFECTS, fault
 from identification.mismatch.cross_validation import HeldOut, Misfit, held_out, misfit
@@ -79,7 +79,7 @@ def parameters_of(p: Problem, fit: Fitted, row: Variant) -> dict[str, Estimate]:
     wide = dict(zip((q.slot for q in fit.model.params), deviations(p, fit), strict=True))
     out = {}
     for q in row.params:
-        value, half = float(fit.model.c[q.slot]), Z90 * float(wide[q.slot])
+        value, half = float(fit.model.c[q.slot]), half_width(float(wide[q.slot]))
         if q.log:
             spread = math.exp(min(half, 5.0))
             out[q.name] = Estimate(value, value / spread, value * spread, q.unit)

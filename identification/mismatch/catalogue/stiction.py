@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from identification.estimation.covariance import LEAST_BAND, LEAST_JUMP, reaching
 from identification.mismatch.curves.valve import stem_over_op
-from identification.mismatch.effect import Block, Effect, Friction
+from identification.mismatch.effect import Block, Effect, Friction, Parameters
+from identification.models import Estimate
 from identification.simulation.effect import Param, Variant
 from identification.simulation.parameters import Slot
 
@@ -11,6 +13,18 @@ BAND = Param(Slot.STICKBAND, "stickband_pct", "% OP", 1e-4, 2.0, "op", True, tit
 JUMP = Param(Slot.JUMP, "slip_jump_pct", "% OP", 1e-5, 2.0, "op", True, title="Slip jump")
 BANDS = (0.01, 0.03, 0.08, 0.2, 0.5)
 """Stickbands that the search begins with, in OP's range."""
+
+
+def as_friction_leaves_it(own: Parameters) -> dict[str, Estimate]:
+    """Both within what true friction does to them: it differs from slip to slip, and a slip more or less moves all
+    that follow, so the likelihood's own pit is much narrower than what is known."""
+    band, jump = own["stickband_pct"], own["slip_jump_pct"]
+    most = band.value * LEAST_BAND
+    return {
+        "stickband_pct": reaching(band, band.value / LEAST_BAND, most),
+        "slip_jump_pct": reaching(jump, jump.value / LEAST_JUMP, most),
+    }
+
 
 EFFECT = Effect(
     name="stiction",
@@ -21,6 +35,7 @@ EFFECT = Effect(
         "positioner": "A recorded stem position, or a stem watched by eye while OP ramps slowly.",
     },
     indistinguishable=("positioner",),
+    derived=as_friction_leaves_it,
     friction=Friction.STICKS,
     curve=stem_over_op,
     variants=(
