@@ -12,13 +12,23 @@ Edges = NDArray[np.int64]
 EDGES = np.array([0, 1, 2, 3, 4, 5, 6, 8, 10, 13, 17, 22, 29, 38, 50, 66, 88, 117], dtype=np.int64)
 """Lags between consecutive edges act together, by their mean; ours: single lags where noise is, a third of an
 octave where load is, reaching as far as a loop of 100 samples' time constant needs."""
+FEWEST = 4
+"""Fewest edges."""
+JUDGED = 0.5
+"""Share of the good samples that have to be judged; ours."""
 SHORTEST = 12
 """Records hold at least this many times the longest lag; ours."""
 
 
-def edges_for(samples: int) -> Edges:
-    """Edges of the lag groups for a record of so many samples."""
-    return EDGES[: max(int(np.searchsorted(EDGES, samples / SHORTEST, side="right")), 4)]
+def edges_for(usable: Mask) -> Edges:
+    """Edges of the lag groups for a record, as far back as half of its good samples have good ones before them.
+
+    Where single samples are missing all over a record, a noise model that looked back far would judge none.
+    """
+    count = max(int(np.searchsorted(EDGES, usable.size / SHORTEST, side="right")), FEWEST)
+    while count > FEWEST and judged(usable, int(EDGES[count - 1])).sum() < JUDGED * usable.sum():
+        count -= 1
+    return EDGES[:count]
 
 
 @njit(cache=True)

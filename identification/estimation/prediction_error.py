@@ -51,7 +51,7 @@ class Problem:
 
 def problem(inputs: ModelInputs, y: Floats, usable: Mask) -> Problem:
     """A problem whose usable samples all count alike."""
-    edges = edges_for(y.size)
+    edges = edges_for(usable)
     return Problem(inputs, y, usable, judged(usable, int(edges[-1])).astype(float), edges)
 
 

@@ -122,3 +122,14 @@ def test_wrong_settings_do_not_hide_the_play() -> None:
     said = answer(explain(s), s)
     assert said.verdict == "controller-settings"
     assert [e.name for e in said.effects] == ["controller-settings", "backlash"]
+
+
+def test_samples_missing_all_over_leave_a_verdict() -> None:
+    """Play of 2 % is named with its width where one sample in twelve is missing, as from a poll that fails."""
+    s = recording(5, PLAY)
+    lost = np.random.default_rng(0).random(s.pv.size) < 1 / 12
+    held = np.maximum.accumulate(np.where(lost, 0, np.arange(s.pv.size)))
+    s = replace(s, pv=s.pv[held], usable=~lost)
+    said = answer(explain(s), s)
+    assert said.verdict == "backlash"
+    assert said.effects[0].parameters["backlash_pct"].value == pytest.approx(2.0, abs=0.2)
