@@ -51,6 +51,17 @@ class Integrator:
 Process = Fopdt | Integrator
 
 
+class Motion(StrEnum):
+    """What a stem does once it has let go."""
+
+    RESTS = "rests"
+    """It rests again at once (He, Wang, Pottmann, Qin 2007)."""
+    HALTS = "halts"
+    """It follows OP until OP turns or stands still (Kano 2004); dry friction does so too."""
+    SLIDES = "slides"
+    """It follows OP until OP turns (Choudhury, Thornhill, Shah 2005)."""
+
+
 @dataclass(frozen=True, slots=True)
 class Backlash:
     """Play of full width `width` [% OP] (d of the describing function is half of it)."""
@@ -64,12 +75,12 @@ class Stiction:
 
     S is the whole of the travel that OP needs after a reversal before the stem moves (deadband plus
     stickband); 0 <= J <= S in what is met in plants, J = 0 being backlash (Choudhury, Thornhill, Shah 2005).
-    After a jump the stem rests, or with `slides` follows OP until OP turns.
+    After a jump the stem does as `motion` says.
     """
 
     stickband: float
     slip_jump: float
-    slides: bool = False
+    motion: Motion = Motion.RESTS
 
 
 Valve = Backlash | Stiction | None

@@ -11,7 +11,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from identification.models import Backlash, Stiction, Valve
+from identification.models import Backlash, Motion, Stiction, Valve
 from identification.record import Floats
 from identification.simulation.valve import stem_position, thresholds
 
@@ -142,7 +142,7 @@ def describe(valve: Valve, amplitude: float) -> complex:
         return 1.0 + 0.0j
     if isinstance(valve, Backlash) or is_play(valve):
         return complex(backlash(amplitude, band(valve)))
-    if valve.slides:
+    if valve.motion is not Motion.RESTS:
         return complex(sliding(amplitude, valve.stickband, valve.slip_jump))
     jumps = jumps_at(amplitude, valve)
     return complex(stick_slip(amplitude, valve.stickband, valve.slip_jump, jumps)) if jumps else 0j
@@ -167,7 +167,7 @@ def numeric(valve: Valve, amplitude: float, start: float | None = None, samples:
         From the last of three periods.
     """
     phase = 2.0 * np.pi * np.arange(3 * samples) / samples
-    if start is None and isinstance(valve, Stiction) and not (is_play(valve) or valve.slides):
+    if start is None and isinstance(valve, Stiction) and not is_play(valve) and valve.motion is Motion.RESTS:
         start = -0.5 * jumps_at(amplitude, valve) * valve.slip_jump
     stem = stem_position(-amplitude * np.cos(phase), valve, start)[-samples:]
     wave = np.exp(-1j * phase[-samples:])
@@ -219,7 +219,7 @@ def branches(valve: Valve) -> tuple[Branch, ...]:
         return ()
     if isinstance(valve, Backlash) or is_play(valve):
         return (_play_branch(width),)
-    if valve.slides:
+    if valve.motion is not Motion.RESTS:
         amplitude = width / (1.0 + np.cos(np.linspace(0.0, np.pi, TABLE_SIZE + 1)[:-1]))
         return (_branch(1, amplitude, sliding(amplitude * (1 + 1e-12), width, valve.slip_jump)),)
     return _jump_branches(valve)

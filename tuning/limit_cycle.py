@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identification.models import Fopdt, Integrator, Loop, Stiction
+from identification.models import Fopdt, Integrator, Loop, Motion, Stiction
 from identification.record import Floats, LoopRecord
 from identification.simulation.closed_loop import closed_loop, scan_step
 from tuning.balance import Balance, harmonic_balance, predicted_cycle
@@ -121,7 +121,7 @@ def kicked(loop: Loop, steps: int, kick: float) -> tuple[Floats, Floats, Floats,
     free, valve, half = _unlimited(loop), loop.valve, steps // 2
     load = np.full(steps, kick)
     load[0] = 0.0
-    if isinstance(valve, Stiction) and not valve.slides and isinstance(loop.process, Fopdt):
+    if isinstance(valve, Stiction) and valve.motion is Motion.RESTS and isinstance(loop.process, Fopdt):
         stem = _stem(closed_loop(free, np.zeros(half), load[:half], op_start=0.0))[-1]
         rests = -loop.process.gain * (stem + valve.slip_jump * np.array([-0.5, 0.5]))
         load[half:] = rests[np.argmin(np.abs(rests - kick))]
@@ -177,7 +177,9 @@ def confirm(loop: Loop, periods: int = PERIODS) -> Confirmed:
 
 def _jumps(loop: Loop) -> bool:
     """Whether the stem moves by whole jumps only, so that integral action never finds a place to rest."""
-    return isinstance(loop.valve, Stiction) and not loop.valve.slides and loop.valve.slip_jump > 0.0
+    return (
+        isinstance(loop.valve, Stiction) and loop.valve.motion is Motion.RESTS and loop.valve.slip_jump > 0.0
+    )
 
 
 def _ramp_s(loop: Loop) -> float:

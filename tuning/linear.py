@@ -9,7 +9,8 @@ import numpy as np
 
 from identification.models import Fopdt, Integrator, Loop, Pid, Process
 from identification.record import Floats, Mask
-from identification.simulation.closed_loop import discretize, scan_step
+from identification.simulation.closed_loop import scan_step
+from identification.simulation.discretization import discretize
 from tuning.describing import Complexes
 
 LOWEST = 1e-6

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identification.models import Backlash, Fopdt, Loop, Valve
+from identification.models import Backlash, Fopdt, Loop, Motion, Valve
 from identification.record import Floats, Mask
 from tuning.balance import Balance, harmonic_balance, reach
 from tuning.describing import (
@@ -76,7 +76,7 @@ def valve_curve(valve: Valve, points: int = 400) -> tuple[Floats, Complexes]:
     amplitude = 0.5 * width * (1.0 + np.geomspace(1e-4, 100.0, points))
     if isinstance(valve, Backlash) or is_play(valve):
         return amplitude, backlash(amplitude, width)
-    if valve.slides:
+    if valve.motion is not Motion.RESTS:
         return amplitude, sliding(amplitude, valve.stickband, valve.slip_jump)
     low, high = jump_range(valve, 1)
     amplitude = np.linspace(low, high, points)

@@ -11,7 +11,8 @@ import numpy as np
 
 from identification.models import Backlash, Fopdt, Integrator, Loop, Pid, Process, Valve
 from identification.record import Floats
-from identification.simulation.closed_loop import closed_loop, discretize, respond, scan_step
+from identification.simulation.closed_loop import closed_loop, scan_step
+from identification.simulation.discretization import discretize, respond
 from tuning.describing import band, is_play
 from tuning.limits import TuningLimits
 from tuning.linear import integral_s, margins, slowest_s

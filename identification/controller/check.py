@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
-from numba import njit
 
 from identification.controller.pi_regression import (
     ControlLaw,
@@ -36,6 +35,7 @@ from identification.estimation.limits import (
     THINNED,
 )
 from identification.record import Floats, Mask
+from identification.simulation.pi import due_moves, gapped
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,32 +80,9 @@ def op_step(op: Floats) -> float:
     return float(np.quantile(gaps, 0.1)) if gaps.size else 0.0
 
 
-def due_moves(e: Floats, said: StatedSettings) -> Floats:
-    """Moves of OP that the stated law asks for at each sample, shape (n,)."""
-    return said.kp * (np.diff(e, prepend=e[0]) + e / said.ti)
-
-
-@njit(cache=True)
-def gapped(e: Floats, kp: float, ki: float, width: float, catches_up: bool) -> Floats:
-    """Path of OP, shape (n,), of a PI that stands still while |e| < width.
-
-    catches_up : whether the proportional part, on leaving the gap, answers for what e did within.
-    """
-    out = np.empty_like(e)
-    u, last = 0.0, e[0]
-    for k in range(e.size):
-        if abs(e[k]) >= width:
-            u += kp * (e[k] - last) + ki * e[k]
-            last = e[k]
-        elif not catches_up:
-            last = e[k]
-        out[k] = u
-    return out
-
-
 def frozen_width(e: Floats, op: Floats, said: StatedSettings, usable: Mask) -> float:
     """Largest error [% PV] under which due moves of OP do not happen while those beyond do; 0 without one."""
-    due = np.abs(due_moves(e, said)) > max(op_step(op), 1e-6)
+    due = np.abs(due_moves(e, said.kp, said.ti)) > max(op_step(op), 1e-6)
     still = np.diff(op, prepend=op[0]) == 0
     size = np.maximum(np.abs(e), np.abs(np.concatenate((e[:1], e[:-1]))))
     use = due & usable
@@ -176,7 +153,7 @@ def ruled(
 
 def logic(e: Floats, op: Floats, said: StatedSettings, usable: Mask) -> ControllerFinding | None:
     """Stretches in which OP stands although the law asks it to go, whatever the error."""
-    path = np.cumsum(due_moves(e, said))
+    path = np.cumsum(due_moves(e, said.kp, said.ti))
     least = STUCK_MOVE * max(op_step(op), 0.02)
     where = np.zeros(op.size, dtype=bool)
     for first, last in runs((np.diff(op, prepend=op[0] + 1.0) == 0) & usable):

@@ -13,14 +13,13 @@ from identification.estimation.hammerstein import (
     Fit,
     ValveTrial,
     fine_stem,
-    lag_blocks,
     stem_of,
     sticking,
-    unit_lag,
 )
 from identification.estimation.innovations import judged_mask, whiten
 from identification.estimation.window import Window
 from identification.record import Floats
+from identification.simulation.discretization import respond_in_blocks, unit_lag
 
 ITERATIONS = 25
 """Gauss-Newton steps at most; ours: nine in ten fits stop before the fifteenth."""
@@ -47,15 +46,15 @@ def _sensitivities(
     fine = dt / factor
     t_s, dead = math.exp(theta[0]), theta[1] + 0.5 * (factor - 1) * fine
     pole, now, before, delay = unit_lag(t_s, dead, fine)
-    x = lag_blocks(stem, pole, now, before, delay, factor)
+    x = respond_in_blocks(stem, pole, now, before, delay, factor)
     pole2, now2, before2, delay2 = unit_lag(t_s * 1.01, dead, fine)
-    x_t = (lag_blocks(stem, pole2, now2, before2, delay2, factor) - x) / math.log(1.01)
+    x_t = (respond_in_blocks(stem, pole2, now2, before2, delay2, factor) - x) / math.log(1.01)
     step = 0.05 * dt
     pole3, now3, before3, delay3 = unit_lag(t_s, dead + step, fine)
-    x_l = (lag_blocks(stem, pole3, now3, before3, delay3, factor) - x) / step
+    x_l = (respond_in_blocks(stem, pole3, now3, before3, delay3, factor) - x) / step
     x_w = np.zeros(n)
     if width_step > 0:
-        x_w = (lag_blocks(wider, pole, now, before, delay, factor) - x) / width_step
+        x_w = (respond_in_blocks(wider, pole, now, before, delay, factor) - x) / width_step
     columns = np.zeros((n, 8 + order))
     r = np.empty(n)
     free, faded = 1.0, math.exp(-dt / t_s)

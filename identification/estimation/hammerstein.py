@@ -17,7 +17,8 @@ from numba import njit
 from identification.estimation.window import Window, block_means
 from identification.models import Backlash, Fopdt, Stiction, Valve
 from identification.record import Floats
-from identification.simulation.valve import RESTS, first_slip, stem_step, walk
+from identification.simulation.discretization import respond, respond_in_blocks, unit_lag
+from identification.simulation.valve import RESTS, first_slip, motion_of, stem_step, walk
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,18 +44,13 @@ class ValveTrial:
         return self.breakaway - self.sliding
 
     @property
-    def slides(self) -> bool:
-        """Whether the stem follows OP after a jump."""
-        return self.tolerance > RESTS
-
-    @property
     def valve(self) -> Valve:
         """The valve of models.py that these constants are: ideal, play or stick-slip."""
         if self.breakaway <= 0.0:
             return None
         if self.slip_jump <= 0.0:
             return Backlash(float(self.stickband))
-        return Stiction(float(self.stickband), float(self.slip_jump), slides=self.slides)
+        return Stiction(float(self.stickband), float(self.slip_jump), motion_of(self.tolerance))
 
 
 IDEAL = ValveTrial()
@@ -112,45 +108,6 @@ def stem_blocks(op: Floats, breakaway: float, sliding: float, tolerance: float, 
     return out
 
 
-@njit(cache=True)
-def lag(stem: Floats, pole: float, now: float, before: float, delay: int) -> Floats:
-    """Unit-gain response at rest at first, shape (n,)."""
-    n = stem.size
-    out = np.empty(n)
-    y = 0.0
-    for k in range(n):
-        out[k] = y
-        y = pole * y + now * stem[max(k - delay, 0)] + before * stem[max(k - delay - 1, 0)]
-    return out
-
-
-@njit(cache=True)
-def lag_blocks(stem: Floats, pole: float, now: float, before: float, delay: int, factor: int) -> Floats:
-    """The same as means of blocks of the stem's own samples, shape (n // factor,)."""
-    n = stem.size // factor
-    out = np.empty(n)
-    y, k = 0.0, 0
-    for block in range(n):
-        total = 0.0
-        for _ in range(factor):
-            total += y
-            y = pole * y + now * stem[max(k - delay, 0)] + before * stem[max(k - delay - 1, 0)]
-            k += 1
-        out[block] = total / factor
-    return out
-
-
-@njit(cache=True)
-def unit_lag(time_constant_s: float, dead_time_s: float, dt_s: float) -> tuple[float, float, float, int]:
-    """Exact zero-order hold of a unit-gain lag with fractional dead time: pole, now, before, delay."""
-    steps = dead_time_s / dt_s
-    delay = int(steps)
-    fraction = steps - delay
-    pole = math.exp(-dt_s / time_constant_s)
-    rest = math.exp(-dt_s * (1 - fraction) / time_constant_s)
-    return pole, 1 - rest, rest - pole, delay
-
-
 def stem_of(window: Window, valve: ValveTrial) -> Floats:
     """Stem in blocks less its mean [% OP], shape (n,): the recorded one behind a faulty valve, where there is one."""
     if valve.breakaway > 0.0 and window.position is not None:
@@ -182,9 +139,9 @@ def residual(window: Window, fit: Fit) -> Floats:
     if window.fine:
         fine = window.dt_s / window.factor
         steps = unit_lag(fit.time_constant_s, fit.dead_time_s + window.half_block_s, fine)
-        x = lag_blocks(fine_stem(window, fit.valve), *steps, window.factor)
+        x = respond_in_blocks(fine_stem(window, fit.valve), *steps, window.factor)
     else:
-        x = lag(stem_of(window, fit.valve), *unit_lag(fit.time_constant_s, fit.dead_time_s, window.dt_s))
+        x = respond(stem_of(window, fit.valve), *unit_lag(fit.time_constant_s, fit.dead_time_s, window.dt_s))
     return window.y - window.y.mean() - fit.gain * x
 
 

@@ -11,10 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from identification.estimation.hammerstein import ValveTrial, stem_blocks, stem_of, unit_lag
+from identification.estimation.hammerstein import ValveTrial, stem_blocks, stem_of
 from identification.estimation.innovations import judged_mask, notch, whiten
 from identification.estimation.window import Window
 from identification.record import Floats, Mask
+from identification.simulation.discretization import unit_lag
 
 AR_ORDER = 8
 """Order of the noise model; ours: on the simulated plants 12 gives innovations less than 1 % smaller."""

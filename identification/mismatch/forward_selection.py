@@ -34,8 +34,8 @@ from identification.mismatch.starts.stick_slip import fit_sticking
 from identification.mismatch.starts.two_modes import mode_starts
 from identification.record import Floats, Mask
 from identification.simulation.effect import Variant
-from identification.simulation.open_loop import ModelInputs
-from identification.simulation.parameters import Slot, neutral
+from identification.simulation.open_loop import ModelInputs, as_parameters
+from identification.simulation.parameters import Slot
 
 Progress = Callable[[str], None]
 KNOWN_TYPES = ("flow", "pressure", "temperature", "level")
@@ -83,10 +83,9 @@ def plain(p: Problem, brought: Floats | None = None, clip: Clip | None = None) -
     """The plain loop at its optimum; a brought model (its constants) is one more start."""
     fits = [] if brought is None else [descend(p, Model((), brought.copy()), FULL_STEPS)]
     for process in plain_processes(p.y, p.inputs.op, p.usable, p.inputs.dt_s):
-        c = neutral()
+        c = as_parameters(process)
         if clip is not None:
             c[Slot.CLIP_HI if clip.upper else Slot.CLIP_LO] = clip.value
-        c[Slot.T], c[Slot.L], c[Slot.K] = process.time_constant_s, process.dead_time_s, process.gain
         c[Slot.START] = p.y[0]
         c[Slot.BIAS] = float(np.mean(p.y)) - process.gain * float(np.mean(p.inputs.op) - p.inputs.middle)
         fits.append(descend(p, Model((), c), FULL_STEPS))

@@ -6,11 +6,11 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from identification.controller.check import StatedSettings
 from identification.errors import InputError
 from identification.record import Floats
+from identification.simulation.closed_model import closed_model
 from identification.simulation.open_loop import ModelInputs, simulate
 from identification.simulation.parameters import KNOTS, STEPS, Slot, neutral, places
 
@@ -94,38 +94,21 @@ def carried(data: dict[str, Any], op: Floats, pv: Floats, dt_s: float) -> Floats
     return out
 
 
-@njit(cache=True)
-def _law(e: Floats, kp: float, ti: float, start: float) -> Floats:
-    """OP, shape (n,), of a PI within 0 to 100 %, its integral standing at the limits."""
-    out = np.empty_like(e)
-    total = start - kp * e[0]
-    for k in range(e.size):
-        free = total + kp * e[k] / ti + kp * e[k]
-        out[k] = min(max(free, 0.0), 100.0)
-        if out[k] == free:
-            total += kp * e[k] / ti
-    return out
-
-
 def carried_closed(
-    data: dict[str, Any], sp: Floats, op: Floats, pv: Floats, dt_s: float, law: StatedSettings
+    data: dict[str, Any], sp: Floats, op: Floats, pv: Floats, dt_s: float, stated: StatedSettings
 ) -> tuple[Floats, Floats]:
     """PV and OP, each shape (n,), of a saved model under its PI controller, load and noise left out.
 
-    PV answers OP no sooner than a dead time and a sample later, so each pass over the recording makes that many
-    more samples exact; passes go on until all are.
+    Raises
+    ------
+    NotAssessedError
+        The model cannot be stepped sample by sample (closed_model).
     """
     c = constants(data)
     level, middle = float(data["level_pv_pct"]), float(data["middle_op_pct"])
     c[Slot.START] = float(pv[0]) - level
-    ahead = int(c[Slot.L] / dt_s) + 1
-    out = np.full(sp.size, float(pv[0]))
-    for done in range(ahead, sp.size + ahead, ahead):
-        now = _law(sp[:done] - out[:done], law.kp, law.ti, float(op[0]))
-        inputs = ModelInputs(now, dt_s, middle, level, (float(pv.min()), float(pv.max())))
-        out[: now.size] = level + simulate(inputs, c)
-        out[now.size : now.size + 1] = out[now.size - 1]
-    return out, _law(sp - out, law.kp, law.ti, float(op[0]))
+    inputs = ModelInputs(op, dt_s, middle, level, (float(pv.min()), float(pv.max())))
+    return closed_model(inputs, c, sp, stated.kp, stated.ti)
 
 
 def _bias(pv: Floats, out: Floats, c: Floats) -> float:

@@ -40,6 +40,11 @@ def bring(acts: tuple[Act, ...]) -> None:
     _ACTS.extend(acts)
 
 
+def acting(c: Floats) -> bool:
+    """Whether any act is at work in a model."""
+    return any(act.slot < c.size and c[act.slot] != act.neutral for act in _ACTS)
+
+
 def acted(signal: Signal, x: Floats, c: Floats, dt_s: float) -> Floats:
     """The signal, shape (n,), after every act on it whose parameter is not neutral."""
     for act in _ACTS:

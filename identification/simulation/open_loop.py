@@ -7,11 +7,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from identification.models import Backlash, Integrator, Process, Valve
 from identification.record import Floats
 from identification.simulation.acts import Signal, acted
 from identification.simulation.parameters import KNOTS, SIZE, STEPS, Slot, neutral
 from identification.simulation.process import plain_vessel, transported, vessel
-from identification.simulation.valve_chain import flow, lagged
+from identification.simulation.valve_chain import COASTS, flow, lagged
 
 OUTSIDE = (
     *(Slot.T, Slot.L, Slot.K, Slot.BIAS, Slot.START, Slot.STICKBAND, Slot.JUMP, Slot.COAST, Slot.RATE),
@@ -50,6 +51,23 @@ class ModelInputs:
     def clock(self) -> Floats:
         """Time from -0.5 to 0.5 over the record, shape (n,)."""
         return np.arange(self.op.size) / self.op.size - 0.5
+
+
+def as_parameters(process: Process, valve: Valve = None) -> Floats:
+    """A process and a valve of models.py as parameters of the loop model, shape (SIZE + own,); all else neutral."""
+    c = neutral()
+    if isinstance(process, Integrator):
+        c[Slot.LEAK], c[Slot.T] = 0.0, 1.0 / abs(process.slope)
+        c[Slot.K] = math.copysign(1.0, process.slope)
+    else:
+        c[Slot.K], c[Slot.T] = process.gain, process.time_constant_s
+    c[Slot.L] = process.dead_time_s
+    if isinstance(valve, Backlash):
+        c[Slot.STICKBAND] = valve.width
+    elif valve is not None:
+        c[Slot.STICKBAND], c[Slot.JUMP] = valve.stickband, valve.slip_jump
+        c[Slot.COAST] = COASTS[valve.motion]
+    return c
 
 
 def head(inputs: ModelInputs, c: Floats) -> Floats:
@@ -91,22 +109,39 @@ def simulate(inputs: ModelInputs, c: Floats) -> Floats:
     """
     dt = inputs.dt_s
     through = through_valve(inputs, c)
-    act = load(inputs, c)
     rich = bool((c[WITHIN] != NEUTRAL[WITHIN]).any())
-    out = _rich(inputs, c, through, act) if rich else plain_vessel(through, act, c, dt, inputs.middle)
+    vessel_of = _rich if rich else _plain
+    out = vessel_of(inputs, c, through)
     out = acted(Signal.PV, out, c, dt)
     if math.isfinite(c[Slot.CLIP_HI]) or math.isfinite(c[Slot.CLIP_LO]):
         out = np.clip(out, c[Slot.CLIP_LO] - inputs.level, c[Slot.CLIP_HI] - inputs.level)
     return out if np.isfinite(out).all() else np.nan_to_num(out, nan=1e6, posinf=1e6, neginf=-1e6)
 
 
-def _rich(inputs: ModelInputs, c: Floats, through: Floats, act: Floats) -> Floats:
+def gain_over_record(inputs: ModelInputs, c: Floats) -> Floats:
+    """Relative gain of the process over the recording, shape (n,): the supply, and drift."""
     supply = head(inputs, c)
-    gain = 1.0 + supply if c[Slot.DRIFT] == 0 else 1.0 + c[Slot.DRIFT] * inputs.clock + supply
-    act = act + c[Slot.HEAD_BIAS] * supply
+    return 1.0 + supply if c[Slot.DRIFT] == 0 else 1.0 + c[Slot.DRIFT] * inputs.clock + supply
+
+
+def load_over_record(inputs: ModelInputs, c: Floats) -> Floats:
+    """Load at the inlet with what the supply adds to it, shape (n,) [% OP]."""
+    return load(inputs, c) + c[Slot.HEAD_BIAS] * head(inputs, c)
+
+
+def outflow_head(inputs: ModelInputs, c: Floats) -> float:
+    """Level deviation at which a rooted vessel would be empty, with its sign turned [% PV]."""
+    return max(inputs.level, 1.0) / float(c[Slot.ROOT]) if c[Slot.ROOT] > 0 else 1.0
+
+
+def _plain(inputs: ModelInputs, c: Floats, through: Floats) -> Floats:
+    return plain_vessel(through, load(inputs, c), c, inputs.dt_s, inputs.middle)
+
+
+def _rich(inputs: ModelInputs, c: Floats, through: Floats) -> Floats:
     if c[Slot.PIPE] != 0:
         through = transported(through, c[Slot.L], c[Slot.PIPE], max(inputs.middle, 1e-3), inputs.dt_s)
     full = c.copy()
     full[Slot.CAP] -= inputs.level
-    empty = max(inputs.level, 1.0) / c[Slot.ROOT] if c[Slot.ROOT] > 0 else 1.0
-    return vessel(through, act, gain, full, inputs.dt_s, inputs.middle, empty)
+    act, gain = load_over_record(inputs, c), gain_over_record(inputs, c)
+    return vessel(through, act, gain, full, inputs.dt_s, inputs.middle, outflow_head(inputs, c))

@@ -16,6 +16,8 @@ SLOPE, ROOT, CAP, SPILL, SPILL_T = (
     int(s) for s in (Slot.SLOPE, Slot.ROOT, Slot.CAP, Slot.SPILL, Slot.SPILL_T)
 )
 LEAK, PIPE, GAIN_SLOPE, SPEED = (int(s) for s in (Slot.LEAK, Slot.PIPE, Slot.GAIN_SLOPE, Slot.SPEED))
+Memory = tuple[float, float, float, float, float]
+"""What a vessel remembers: level, second mode, spilled liquid, second and third lag."""
 WEIR = 25.0
 """Outflow over the cap per % of level, in terms of the vessel's own; ours: stiff against every vessel."""
 
@@ -112,16 +114,25 @@ def held(lag_s: float, h: float) -> tuple[float, float]:
 
 
 @njit(cache=True, error_model="numpy")
-def vessel(
-    flow: Floats, act: Floats, gain: Floats, c: Floats, dt_s: float, base: float, head: float
-) -> Floats:
-    """PV's deviation [% PV], shape (n,), of a vessel with any of the catalogue's physics.
+def vessel_span(
+    span: tuple[int, int],
+    m: Memory,
+    drive: tuple[Floats, Floats, Floats],
+    c: Floats,
+    dt_s: float,
+    base: float,
+    head: float,
+    out: Floats,
+) -> Memory:
+    """PV's deviation [% PV] over samples span[0] (included) to span[1] (excluded), put into `out`, shape (n,).
 
-    flow, act, gain : shape (n,), flow during each sample, load at the inlet [% OP] and relative gain; base : the
-    flow that counts as zero; head : level deviation at which a rooted vessel would be empty, with its sign turned.
-    A sample has two parts, before and after the dead time's fraction; what is the same in each is worked out once.
+    m : the vessel's memory before the span; returned as it is behind. drive : flow during each sample, load at the
+    inlet [% OP] and relative gain, shape (n,) each, known as far as the span goes; base : the flow that counts as
+    zero; head : level deviation at which a rooted vessel would be empty, with its sign turned. A sample has two
+    parts, before and after the dead time's fraction; what is the same in each is worked out once.
     """
-    n = flow.size
+    flow, act, gain = drive
+    x, mode, basin, z2, z3 = m
     delay = 0 if c[PIPE] != 0.0 else int(c[L] / dt_s)
     part = 0.0 if c[PIPE] != 0.0 else c[L] - delay * dt_s
     parts = (part, dt_s - part)
@@ -131,11 +142,7 @@ def vessel(
     third = (held(c[T3], parts[0]), held(c[T3], parts[1]))
     other = (held(c[MODE_T], parts[0])[0], held(c[MODE_T], parts[1])[0])
     caught = (held(c[SPILL_T], parts[0])[0], held(c[SPILL_T], parts[1])[0])
-    out = np.empty(n)
-    x, mode, basin = c[START], c[START], 0.0
-    first = c[K] * (flow[0] - base) + c[BIAS]
-    z2, z3 = first, first
-    for k in range(n):
+    for k in range(*span):
         out[k] = (1.0 - c[SHARE]) * x + c[SHARE] * mode
         for half in range(2):
             if parts[half] <= 0.0:
@@ -162,6 +169,24 @@ def vessel(
                 basin += (spill - basin) * (1.0 - caught[half])
             if c[SHARE] != 0.0:
                 mode += (feed - mode) * (1.0 - other[half])
+    return x, mode, basin, z2, z3
+
+
+@njit(cache=True, error_model="numpy")
+def at_start(first: float, c: Floats, base: float) -> Memory:
+    """The vessel's memory before the first sample, at the first flow [% OP]."""
+    feed = c[K] * (first - base) + c[BIAS]
+    return c[START], c[START], 0.0, feed, feed
+
+
+@njit(cache=True, error_model="numpy")
+def vessel(
+    flow: Floats, act: Floats, gain: Floats, c: Floats, dt_s: float, base: float, head: float
+) -> Floats:
+    """PV's deviation [% PV], shape (n,), of a vessel with any of the catalogue's physics; see vessel_span."""
+    out = np.empty(flow.size)
+    m = at_start(flow[0], c, base)
+    vessel_span((0, flow.size), m, (flow, act, gain), c, dt_s, base, head, out)
     return out
 
 

@@ -10,7 +10,7 @@ import math
 import numpy as np
 from numba import njit
 
-from identification.models import Backlash, Valve
+from identification.models import Backlash, Motion, Stiction, Valve
 from identification.record import Floats
 
 
@@ -75,6 +75,14 @@ SLIDES, HALTS, RESTS = 0.0, -1e-9, -math.inf
 """Tolerances [% OP] of a stem in motion: it follows OP until OP turns (Choudhury, Thornhill, Shah 2005), until OP
 turns or stands still (Kano 2004; dry friction does so too, tests/identification/simulation/test_valve.py), or not
 at all (He, Wang, Pottmann, Qin 2007)."""
+TOLERANCES = {Motion.SLIDES: SLIDES, Motion.HALTS: HALTS, Motion.RESTS: RESTS}
+
+
+def motion_of(tolerance: float) -> Motion:
+    """What a stem of that tolerance [% OP] does; one that ignores a little turning slides."""
+    if tolerance >= SLIDES:
+        return Motion.SLIDES
+    return Motion.RESTS if tolerance == RESTS else Motion.HALTS
 
 
 def thresholds(stickband: float, slip_jump: float) -> tuple[float, float]:
@@ -83,6 +91,15 @@ def thresholds(stickband: float, slip_jump: float) -> tuple[float, float]:
     (S + J)/2 and (S - J)/2: static and kinetic friction in units of OP (He, Wang, Pottmann, Qin 2007).
     """
     return 0.5 * (stickband + slip_jump), 0.5 * (stickband - slip_jump)
+
+
+def constants_of(valve: Valve) -> tuple[float, float, float]:
+    """Breakaway, sliding distance and tolerance [% OP] of any valve of models.py; breakaway 0 is an ideal one."""
+    if valve is None:
+        return 0.0, 0.0, RESTS
+    if isinstance(valve, Backlash):
+        return *thresholds(valve.width, 0.0), RESTS
+    return *thresholds(valve.stickband, valve.slip_jump), TOLERANCES[valve.motion]
 
 
 def play(op: Floats, width: float, start: float | None = None) -> Floats:
@@ -106,14 +123,14 @@ def play(op: Floats, width: float, start: float | None = None) -> Floats:
 
 
 def stick_slip(
-    op: Floats, stickband: float, slip_jump: float, start: float | None = None, slides: bool = False
+    op: Floats, stickband: float, slip_jump: float, start: float | None = None, motion: Motion = Motion.RESTS
 ) -> Floats:
     """Stem position of a sticking valve with stickband S and slip jump J.
 
-    The stem rests until |OP - stem| exceeds (S + J)/2, then moves at once to the distance (S - J)/2. It then
-    rests again (He, Wang, Pottmann, Qin 2007, with f_s = (S + J)/2 and f_d = (S - J)/2), or, with `slides`,
-    follows OP at that distance until OP turns (Choudhury, Thornhill, Shah 2005; Kano 2004). J = 0 is play
-    of width S in both; resting with S = J is the relay of the describing function, height and hysteresis S/2.
+    The stem rests until |OP - stem| exceeds (S + J)/2, then moves at once to the distance (S - J)/2. It then rests
+    again (f_s = (S + J)/2 and f_d = (S - J)/2 of He, Wang, Pottmann, Qin 2007), or follows OP at that distance, as
+    `motion` says. J = 0 is play of width S in all; resting with S = J is the relay of the describing function, height
+    and hysteresis S/2.
 
     Parameters
     ----------
@@ -123,19 +140,18 @@ def stick_slip(
         S and J [% OP], S >= 0 and 0 <= J.
     start : float or None
         Stem position before the first sample [% OP]; None: op[0].
-    slides : bool
-        Whether the stem follows OP after a jump.
+    motion : Motion
+        What the stem does after a jump.
 
     Returns
     -------
     ndarray of shape (n,)
         Stem position [% OP].
     """
-    breakaway, sliding = thresholds(stickband, slip_jump)
+    breakaway, sliding, tolerance = constants_of(Stiction(stickband, slip_jump, motion))
     if op.size == 0 or breakaway <= 0.0:
         return op.copy()
     first = float(op[0]) if start is None or math.isnan(start) else float(start)
-    tolerance = SLIDES if slides else RESTS
     return walk(np.ascontiguousarray(op, dtype=np.float64), breakaway, sliding, tolerance, first)
 
 
@@ -145,4 +161,4 @@ def stem_position(op: Floats, valve: Valve, start: float | None = None) -> Float
         return op.copy()
     if isinstance(valve, Backlash):
         return play(op, valve.width, start)
-    return stick_slip(op, valve.stickband, valve.slip_jump, start, valve.slides)
+    return stick_slip(op, valve.stickband, valve.slip_jump, start, valve.motion)

@@ -1,4 +1,8 @@
-"""From OP to what the valve lets through, sample by sample: slew, positioner, friction, stops, split, curve."""
+"""From OP to flow, sample by sample: slew, positioner, play or stick-slip, stops, second valve, trim.
+
+A step is given OP as it stands over one sample and returns the mean flow over it. The valve's memory is a row of
+numbers, so that a loop open from a recorded OP and a loop closed by its controller take the same steps.
+"""
 
 from __future__ import annotations
 
@@ -7,51 +11,58 @@ import math
 import numpy as np
 from numba import njit
 
+from identification.models import Motion
 from identification.record import Floats
 from identification.simulation.parameters import Slot
-from identification.simulation.valve import HALTS, RESTS, SLIDES, first_slip, thresholds, walk
+from identification.simulation.valve import SLIDES, TOLERANCES, first_slip, stem_step, thresholds, walk
 
-BEHAVIOUR = {-1.0: RESTS, -0.5: HALTS, 0.0: SLIDES}
-"""What a stem in motion does, by the constant COAST."""
+COASTS = {Motion.RESTS: -1.0, Motion.HALTS: -0.5, Motion.SLIDES: 0.0}
+"""The parameter COAST of what a stem in motion does."""
+BEHAVIOUR = {coast: TOLERANCES[motion] for motion, coast in COASTS.items()}
 SERVO_STEPS = 5
 """Steps of a positioner within one sample; ours: its period is never under four samples."""
+RATE, SERVO, DAMPING, DEADBAND = (int(s) for s in (Slot.RATE, Slot.SERVO, Slot.DAMPING, Slot.DEADBAND))
+STOP_HI, STOP_LO, BEND, SPLIT = (int(s) for s in (Slot.STOP_HI, Slot.STOP_LO, Slot.BEND, Slot.SPLIT))
+RATIO, SPLIT_DEAD, SPLIT_LAG = (int(s) for s in (Slot.RATIO, Slot.SPLIT_DEAD, Slot.SPLIT_LAG))
+STRAIGHT = 1e-9
+"""A bend under this is none."""
+SLEWED, SERVED, SPEED, STEM, MOVING, TURNED, SECOND = range(7)
+"""Places in the valve's memory: slewing stem, positioner and its speed, stem with its motion and OP's extreme, lag of
+the second valve."""
 
 
 @njit(cache=True)
-def slewed(op: Floats, rate: float, dt_s: float) -> Floats:
-    """Mean position over each sample, shape (n,), of a stem that moves at `rate` [%/s] at most."""
-    out = np.empty_like(op)
-    at = op[0]
-    most = rate * dt_s
-    for k in range(op.size):
-        gap = op[k] - at
-        if abs(gap) <= most:
-            out[k] = op[k] - 0.5 * gap * abs(gap) / most
-            at = op[k]
-        else:
-            step = math.copysign(most, gap)
-            out[k] = at + 0.5 * step
-            at += step
-    return out
+def slew_step(at: float, op: float, most: float) -> tuple[float, float]:
+    """Mean position over a sample, and position after it, of a stem that moves by `most` [%] a sample at most."""
+    gap = op - at
+    if abs(gap) <= most:
+        return op - 0.5 * gap * abs(gap) / most, op
+    way = math.copysign(most, gap)
+    return at + 0.5 * way, at + way
 
 
 @njit(cache=True)
-def positioned(op: Floats, lag_s: float, damping: float, band: float, dt_s: float, steps: int) -> Floats:
-    """Mean position over each sample, shape (n,), behind a position loop of second order with a dead band [%]."""
-    out = np.empty_like(op)
-    at, speed = op[0], 0.0
-    h = dt_s / steps
+def servo_step(
+    at: float, speed: float, op: float, lag_s: float, damping: float, band: float, dt_s: float
+) -> tuple[float, float, float]:
+    """Mean position over a sample, position and speed after it, of a position loop with a dead band [%]."""
+    h = dt_s / SERVO_STEPS
     w = min(1.0 / lag_s, 0.7 / h)
-    for k in range(op.size):
-        total = 0.0
-        for _ in range(steps):
-            gap = op[k] - at
-            gap -= min(max(gap, -0.5 * band), 0.5 * band)
-            speed += h * (w * w * gap - 2.0 * damping * w * speed)
-            at += h * speed
-            total += at
-        out[k] = total / steps
-    return out
+    total = 0.0
+    for _ in range(SERVO_STEPS):
+        gap = op - at
+        gap -= min(max(gap, -0.5 * band), 0.5 * band)
+        speed += h * (w * w * gap - 2.0 * damping * w * speed)
+        at += h * speed
+        total += at
+    return total / SERVO_STEPS, at, speed
+
+
+@njit(cache=True)
+def lag_step(at: float, x: float, lag_s: float, dt_s: float) -> tuple[float, float]:
+    """Mean over a sample, and value after it, of a first-order lag of a held signal."""
+    pole = math.exp(-dt_s / lag_s)
+    return x + (at - x) * ((1.0 - pole) * lag_s / dt_s), x + (at - x) * pole
 
 
 @njit(cache=True)
@@ -67,29 +78,86 @@ def lagged(x: Floats, lag_s: float, dt_s: float) -> Floats:
     return out
 
 
-def second_valve(stem: Floats, c: Floats, dt_s: float) -> Floats:
-    """Flow, shape (n,), where a second valve takes over above the split point after a dead zone."""
-    above = np.maximum(stem - c[Slot.SPLIT], 0.0)
-    extra = c[Slot.RATIO] * np.maximum(above - c[Slot.SPLIT_DEAD], 0.0) - above
-    if c[Slot.SPLIT_LAG] > 0:
-        extra = lagged(extra, c[Slot.SPLIT_LAG], dt_s)
-    return stem + extra
+@njit(cache=True)
+def second_valve(x: float, c: Floats) -> float:
+    """What a second valve adds to the flow at rest [% OP]: it takes over above the split point after a dead zone."""
+    above = max(x - c[SPLIT], 0.0)
+    return c[RATIO] * max(above - c[SPLIT_DEAD], 0.0) - above
 
 
-def curved(stem: Floats, bend: float, middle: float) -> Floats:
-    """Flow, shape (n,), of a trim whose local gain is exp(bend (z - middle)/100)."""
-    if abs(bend) < 1e-9:
-        return stem
-    return middle + np.expm1(np.clip(bend * (stem - middle) / 100.0, -30.0, 30.0)) * (100.0 / bend)
+@njit(cache=True)
+def curved(x: float, bend: float, middle: float) -> float:
+    """Flow of a trim whose local gain is exp(bend (x - middle)/100)."""
+    return middle + math.expm1(min(max(bend * (x - middle) / 100.0, -30.0), 30.0)) * (100.0 / bend)
 
 
-def friction(op: Floats, c: Floats) -> Floats:
-    """Stem, shape (n,), behind play or stick-slip; it starts where OP does, if it ever leaves there."""
-    away, sliding = thresholds(c[Slot.STICKBAND], c[Slot.JUMP])
-    coast = BEHAVIOUR.get(float(c[Slot.COAST]), SLIDES)
-    moves = float(np.abs(op - op[0]).max()) > away
-    start = float(op[0]) if moves else first_slip(op, away, sliding)
-    return walk(op, away, max(sliding, 0.0), coast, start)
+Friction = tuple[float, float, float]
+"""Breakaway, sliding distance and tolerance [% OP]; breakaway 0 is no friction."""
+
+
+@njit(cache=True)
+def flow_step(op: float, m: Floats, c: Floats, friction: Friction, dt_s: float, middle: float) -> float:
+    """Mean flow over a sample [% OP]; the valve's memory `m` is moved on."""
+    x = op
+    if not math.isinf(c[RATE]):
+        x, m[SLEWED] = slew_step(m[SLEWED], x, c[RATE] * dt_s)
+    if c[SERVO] > 0.0:
+        x, m[SERVED], m[SPEED] = servo_step(m[SERVED], m[SPEED], x, c[SERVO], c[DAMPING], c[DEADBAND], dt_s)
+    if friction[0] > 0.0:
+        m[STEM], m[MOVING], m[TURNED] = stem_step(m[STEM], m[MOVING], m[TURNED], x, *friction)
+        x = m[STEM]
+    x = min(max(x, c[STOP_LO]), c[STOP_HI])
+    if not math.isinf(c[SPLIT]):
+        extra = second_valve(x, c)
+        if c[SPLIT_LAG] > 0.0:
+            at = extra if math.isnan(m[SECOND]) else m[SECOND]
+            extra, m[SECOND] = lag_step(at, extra, c[SPLIT_LAG], dt_s)
+        x += extra
+    return x if abs(c[BEND]) < STRAIGHT else curved(x, c[BEND], middle)
+
+
+@njit(cache=True)
+def before_stem(op: Floats, c: Floats, dt_s: float) -> Floats:
+    """The same steps over a whole recording, shape (n,), as far as slew and positioner."""
+    x = op.copy()
+    if not math.isinf(c[RATE]):
+        at, most = op[0], c[RATE] * dt_s
+        for k in range(x.size):
+            x[k], at = slew_step(at, x[k], most)
+    if c[SERVO] > 0.0:
+        at, speed = op[0], 0.0
+        for k in range(x.size):
+            x[k], at, speed = servo_step(at, speed, x[k], c[SERVO], c[DAMPING], c[DEADBAND], dt_s)
+    return x
+
+
+@njit(cache=True)
+def behind_stem(x: Floats, c: Floats, dt_s: float, middle: float) -> Floats:
+    """And from the stem on: stops, second valve, trim."""
+    if not (math.isinf(c[STOP_HI]) and math.isinf(c[STOP_LO])):
+        x = np.minimum(np.maximum(x, c[STOP_LO]), c[STOP_HI])
+    if not math.isinf(c[SPLIT]):
+        extra = np.empty_like(x)
+        for k in range(x.size):
+            extra[k] = second_valve(x[k], c)
+        x = x + (lagged(extra, c[SPLIT_LAG], dt_s) if c[SPLIT_LAG] > 0.0 else extra)
+    if abs(c[BEND]) >= STRAIGHT:
+        out = np.empty_like(x)
+        for k in range(x.size):
+            out[k] = curved(x[k], c[BEND], middle)
+        return out
+    return x
+
+
+def friction_of(c: Floats) -> Friction:
+    """Friction of a model's valve."""
+    away, sliding = thresholds(float(c[Slot.STICKBAND]), float(c[Slot.JUMP]))
+    return away, max(sliding, 0.0), BEHAVIOUR.get(float(c[Slot.COAST]), SLIDES)
+
+
+def memory(op: float, stem: float | None = None) -> Floats:
+    """A valve at rest at an OP [% OP], shape (7,), its stem elsewhere where so given."""
+    return np.array([op, op, 0.0, op if stem is None else stem, 0.0, op, math.nan])
 
 
 def flow(op: Floats, c: Floats, dt_s: float, middle: float) -> Floats:
@@ -109,17 +177,13 @@ def flow(op: Floats, c: Floats, dt_s: float, middle: float) -> Floats:
     Returns
     -------
     ndarray of shape (n,)
-        Flow during each sample.
+        Flow during each sample. A stem with friction starts where OP does, if OP ever leaves there; else where it
+        stands once it has slipped.
     """
-    x = op
-    if math.isfinite(c[Slot.RATE]):
-        x = slewed(x, c[Slot.RATE], dt_s)
-    if c[Slot.SERVO] > 0:
-        x = positioned(x, c[Slot.SERVO], c[Slot.DAMPING], c[Slot.DEADBAND], dt_s, SERVO_STEPS)
-    if c[Slot.STICKBAND] > 0:
-        x = friction(x, c)
-    if math.isfinite(c[Slot.STOP_HI]) or math.isfinite(c[Slot.STOP_LO]):
-        x = np.clip(x, c[Slot.STOP_LO], c[Slot.STOP_HI])
-    if math.isfinite(c[Slot.SPLIT]):
-        x = second_valve(x, c, dt_s)
-    return curved(x, c[Slot.BEND], middle)
+    x = before_stem(np.ascontiguousarray(op, dtype=np.float64), c, dt_s)
+    breakaway, sliding, tolerance = friction_of(c)
+    if breakaway > 0:
+        moves = float(np.abs(x - x[0]).max()) > breakaway
+        start = float(x[0]) if moves else first_slip(x, breakaway, sliding)
+        x = walk(x, breakaway, sliding, tolerance, start)
+    return np.asarray(behind_stem(x, c, dt_s, middle))

@@ -6,7 +6,7 @@ import numpy as np
 
 from identification.controller.check import StatedSettings
 from identification.mismatch.recording import Recording
-from identification.models import Backlash, Fopdt, Loop, Pid, Stiction, Valve
+from identification.models import Backlash, Fopdt, Loop, Motion, Pid, Stiction, Valve
 from identification.simulation.closed_loop import closed_loop
 
 N = 5000
@@ -38,4 +38,4 @@ def recording(seed: int, valve: Valve = None, load: np.ndarray | None = None) ->
     return Recording(r.sp, pv, op, np.ones(N, dtype=bool), 1.0, r.time_s, StatedSettings(law.kp, law.ti_s))
 
 
-PLAY, STICKING = Backlash(2.0), Stiction(2.0, 1.2, True)
+PLAY, STICKING = Backlash(2.0), Stiction(2.0, 1.2, Motion.SLIDES)

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from identification.models import Backlash, Stiction
+from identification.models import Backlash, Motion, Stiction
 from tuning.describing import (
     backlash,
     branches,
@@ -48,7 +48,7 @@ def test_stick_slip_agrees_with_projection(jump, amplitude):
 @pytest.mark.parametrize("amplitude", [0.53, 0.617, 0.913, 1.873, 13.19])
 def test_sliding_stick_slip_agrees_with_projection(jump, amplitude):
     """The closed form for a stem that follows after its jump is the fundamental of the simulated operator."""
-    valve = Stiction(1.0, jump, slides=True)
+    valve = Stiction(1.0, jump, motion=Motion.SLIDES)
     assert numeric(valve, amplitude) == pytest.approx(describe(valve, amplitude), abs=2e-3)
 
 
@@ -101,7 +101,7 @@ def test_small_jumps_become_play(width, factor):
 
 
 @pytest.mark.parametrize(
-    "valve", [Backlash(1.0), Stiction(1.0, 1.0), Stiction(2.0, 0.4), Stiction(1.0, 0.5, True)]
+    "valve", [Backlash(1.0), Stiction(1.0, 1.0), Stiction(2.0, 0.4), Stiction(1.0, 0.5, Motion.SLIDES)]
 )
 def test_branches_rise_in_phase_and_agree_with_the_closed_form(valve):
     """On each branch the phase rises with the amplitude, and the table returns the closed form."""
@@ -112,7 +112,7 @@ def test_branches_rise_in_phase_and_agree_with_the_closed_form(valve):
         a = np.exp(log_a)
         if isinstance(valve, Backlash):
             exact = backlash(a, valve.width)
-        elif valve.slides:
+        elif valve.motion is Motion.SLIDES:
             exact = sliding(a, valve.stickband, valve.slip_jump)
         else:
             exact = stick_slip(a, valve.stickband, valve.slip_jump, branch.jumps)

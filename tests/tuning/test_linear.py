@@ -9,7 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from identification.models import Fopdt, Integrator, Loop, Pid
-from identification.simulation.closed_loop import closed_loop, open_loop
+from identification.simulation.closed_loop import closed_loop
+from tests.identification.responses import pv_of
 from tuning.linear import frequencies, is_stable, loop_response, margins, process_sampled, stable_gains
 
 
@@ -45,7 +46,7 @@ def test_sampled_response_is_the_gain_of_a_simulated_sine(process):
     """A sine held at the scan comes out with the gain and phase of the sampled response."""
     omega = 2 * math.pi / 40
     op = np.sin(omega * np.arange(4000))
-    y = open_loop(process, None, op, 1.0)[2000:]
+    y = pv_of(process, None, op, 1.0)[2000:]
     k = np.arange(2000, 4000)
     fundamental = 2j * np.mean((y - y.mean()) * np.exp(-1j * omega * k))
     assert complex(process_sampled(process, 1.0, np.array([omega]))[0]) == pytest.approx(

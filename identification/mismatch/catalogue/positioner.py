@@ -5,10 +5,8 @@ from __future__ import annotations
 from identification.mismatch.curves.drawn import Drawing, Shape
 from identification.mismatch.curves.valve import stem_response
 from identification.mismatch.effect import Block, Effect, Friction
-from identification.record import Floats
 from identification.simulation.effect import Param, Variant
 from identification.simulation.parameters import Slot
-from identification.simulation.valve_chain import SERVO_STEPS, positioned
 
 LENGTH = 8.0
 """Length of the drawn response, in lags."""
@@ -16,11 +14,7 @@ LENGTH = 8.0
 
 def stem_after_step(d: Drawing) -> Shape:
     """Stem after a step of OP."""
-
-    def read(op: Floats, c: Floats, dt_s: float) -> Floats:
-        return positioned(op, c[Slot.SERVO], c[Slot.DAMPING], c[Slot.DEADBAND], dt_s, SERVO_STEPS)
-
-    return stem_response(d, LENGTH * float(d.best[Slot.SERVO]), read)
+    return stem_response(d, LENGTH * float(d.best[Slot.SERVO]), (Slot.SERVO, Slot.DAMPING, Slot.DEADBAND))
 
 
 EFFECT = Effect(

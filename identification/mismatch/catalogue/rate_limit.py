@@ -5,19 +5,13 @@ from __future__ import annotations
 from identification.mismatch.curves.drawn import Drawing, Shape
 from identification.mismatch.curves.valve import stem_response, step_size
 from identification.mismatch.effect import Block, Effect
-from identification.record import Floats
 from identification.simulation.effect import Param, Variant, each
 from identification.simulation.parameters import Slot
-from identification.simulation.valve_chain import slewed
 
 
 def stem_after_step(d: Drawing) -> Shape:
     """Stem after a step of OP."""
-
-    def read(op: Floats, c: Floats, dt_s: float) -> Floats:
-        return slewed(op, float(c[Slot.RATE]), dt_s)
-
-    return stem_response(d, step_size(d) / float(d.best[Slot.RATE]), read)
+    return stem_response(d, step_size(d) / float(d.best[Slot.RATE]), (Slot.RATE,))
 
 
 EFFECT = Effect(

@@ -8,6 +8,7 @@ from identification.mismatch.effect import Block, Effect, Friction, Parameters
 from identification.models import Estimate
 from identification.simulation.effect import Param, Variant
 from identification.simulation.parameters import Slot
+from identification.simulation.valve_chain import COASTS
 
 BAND = Param(Slot.STICKBAND, "stickband_pct", "% OP", 1e-4, 2.0, "op", True, title="Stickband")
 JUMP = Param(Slot.JUMP, "slip_jump_pct", "% OP", 1e-5, 2.0, "op", True, title="Slip jump")
@@ -44,9 +45,9 @@ EFFECT = Effect(
                 (BAND, JUMP),
                 tuple({Slot.STICKBAND: s, Slot.JUMP: j * s} for s in BANDS for j in (0.4, 0.8)),
                 {Slot.COAST: coast},
-                label=label,
+                label=motion,
             )
-            for coast, label in ((-1.0, "rests"), (-0.5, "halts"), (0.0, "slides"))
+            for motion, coast in COASTS.items()
         ),
     ),
 )

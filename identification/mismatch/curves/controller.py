@@ -10,6 +10,7 @@ from identification.mismatch.curves.drawn import Axis, Drawn, Shape
 from identification.mismatch.curves.stretches import MOST_WINDOW, WINDOW, around, biggest_move, busiest
 from identification.mismatch.recording import Recording
 from identification.record import Floats, Mask
+from identification.simulation.pi import free_path
 
 LAW_WINDOW = 8.0
 """Length of a stretch that is drawn, in integral times; ours: a law that is off has drifted away by then."""
@@ -31,7 +32,7 @@ def rebuilt(e: Floats, op: Floats, kp: float, ti: float) -> Floats:
     kp, ti : float
         Gain [% OP/% PV] and integral time [samples].
     """
-    free = kp * (e + np.cumsum(e) / ti)
+    free = free_path(e, kp, ti)
     return np.asarray(free - free.mean() + op.mean())
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
 from identification.mismatch.curves.drawn import (
@@ -18,8 +16,8 @@ from identification.mismatch.curves.drawn import (
 )
 from identification.record import Floats
 from identification.simulation.open_loop import ModelInputs
-from identification.simulation.parameters import Slot
-from identification.simulation.valve_chain import curved, friction, second_valve
+from identification.simulation.parameters import Slot, neutral
+from identification.simulation.valve_chain import flow
 
 SWEEP = 2.5
 """Half height of the sweep that draws a valve's loop, in widths of its stickband; ours: both flanks show."""
@@ -28,6 +26,19 @@ STEP_PCT, MOST_STEP_PCT = 10.0, 50.0
 LENGTH = 1.6
 """Length of a response, in the time that the stem takes; at least so many samples as LEAST."""
 LEAST = 4
+
+
+FRICTION = (Slot.STICKBAND, Slot.JUMP, Slot.COAST)
+AT_REST = (Slot.STOP_LO, Slot.STOP_HI, Slot.SPLIT, Slot.RATIO, Slot.SPLIT_DEAD, Slot.BEND)
+"""Parameters of the valve's friction, and of its flow once everything has come to rest."""
+
+
+def alone(c: Floats, op: Floats, keep: tuple[int, ...], middle: float = 50.0, dt_s: float = 1.0) -> Floats:
+    """Flow [% OP], shape (m,), of a valve with some of a model's parameters alone."""
+    own = neutral()
+    for slot in keep:
+        own[slot] = c[slot]
+    return flow(op, own, dt_s, middle)
 
 
 def sweep(inputs: ModelInputs, width: float) -> Floats:
@@ -41,13 +52,13 @@ def stem_over_op(d: Drawing) -> Shape:
     """Stem over OP of a valve with play or stick-slip, with the loops of the narrowest and the widest band."""
     op = sweep(d.inputs, float(d.best[Slot.STICKBAND]))
     last = slice(2 * POINTS, None)
-    curves = [Drawn("found", op[last], friction(op, d.best)[last])]
+    curves = [Drawn("found", op[last], alone(d.best, op, FRICTION)[last])]
     for name, i in (("least", 1), ("most", 2)):
         other = d.best.copy()
         for place in d.ends:
             other[place[0]] = place[i]
         other[Slot.JUMP] = min(other[Slot.JUMP], other[Slot.STICKBAND])
-        curves.append(Drawn(name, op[last], friction(op, other)[last]))
+        curves.append(Drawn(name, op[last], alone(other, op, FRICTION)[last]))
     curves.append(Drawn("plain", op[last], op[last]))
     return Shape(d.name, "loop", Axis("OP", "%"), Axis("stem", "% OP"), tuple(curves))
 
@@ -57,12 +68,7 @@ def flow_over_op(d: Drawing) -> Shape:
     op, c = op_range(d.inputs), d.best
 
     def read(k: Floats) -> Floats:
-        z = np.clip(op, k[Slot.STOP_LO], k[Slot.STOP_HI])
-        if np.isfinite(k[Slot.SPLIT]):
-            at_rest = k.copy()
-            at_rest[Slot.SPLIT_LAG] = 0.0
-            z = second_valve(z, at_rest, d.inputs.dt_s)
-        return curved(z, float(k[Slot.BEND]), d.inputs.middle)
+        return alone(k, op, AT_REST, d.inputs.middle)
 
     y, low, high = banded(read, d)
     places = tuple(float(c[s]) for s in (Slot.STOP_LO, Slot.STOP_HI, Slot.SPLIT) if np.isfinite(c[s]))
@@ -75,7 +81,7 @@ def step_size(d: Drawing) -> float:
     return min(max(STEP_PCT, 0.5 * float(np.ptp(d.inputs.op))), MOST_STEP_PCT)
 
 
-def stem_response(d: Drawing, length_s: float, read: Callable[[Floats, Floats, float], Floats]) -> Shape:
+def stem_response(d: Drawing, length_s: float, keep: tuple[int, ...]) -> Shape:
     """Stem after a step of OP.
 
     Parameters
@@ -83,11 +89,11 @@ def stem_response(d: Drawing, length_s: float, read: Callable[[Floats, Floats, f
     d : Drawing
     length_s : float
         Time that the stem takes, about [s].
-    read : callable
-        Stem, shape (m,), of OP, the parameters and the sample interval [s].
+    keep : tuple of int
+        The parameters that are at work.
     """
     fine = max(length_s * LENGTH, LEAST * d.inputs.dt_s) / POINTS
     time, op = step(step_size(d), POINTS, fine)
-    y, low, high = banded(lambda c: read(op, c, fine), d)
+    y, low, high = banded(lambda c: alone(c, op, keep, dt_s=fine), d)
     curves = (Drawn("found", time, y, low, high), Drawn("plain", time, op))
     return Shape(d.name, "response", Axis("time", "s"), Axis("stem", "% OP"), curves)

@@ -7,11 +7,13 @@ import pytest
 
 from identification.estimation.backlash_stiction import better_linear, fit_linear, fit_play, fit_stick_slip
 from identification.estimation.gauss_newton import descend
-from identification.estimation.hammerstein import lag, process_of, stem_blocks, sticking, unit_lag
+from identification.estimation.hammerstein import process_of, stem_blocks, sticking
 from identification.estimation.likelihood_ratio import WindowFit, evidence, innovations
 from identification.estimation.window import Window, block_means
 from identification.models import Backlash, Fopdt, Loop, Pid
-from identification.simulation.closed_loop import closed_loop, open_loop
+from identification.simulation.closed_loop import closed_loop
+from identification.simulation.discretization import respond, unit_lag
+from tests.identification.responses import pv_of
 
 N = 3000
 
@@ -26,7 +28,7 @@ def steps(seed: int, n: int = N) -> np.ndarray:
 def window(process: Fopdt, valve: Backlash | None, seed: int, noise: float = 0.1) -> Window:
     """An open loop under moving OP with white noise on PV."""
     op = steps(seed)
-    pv = open_loop(process, valve, op, 1.0) + noise * np.random.default_rng(seed + 1).standard_normal(N)
+    pv = pv_of(process, valve, op, 1.0) + noise * np.random.default_rng(seed + 1).standard_normal(N)
     return Window(pv, op, np.ones(N, dtype=bool), 1.0)
 
 
@@ -129,7 +131,7 @@ def test_lag_agrees_with_slow_twin():
     for k in range(200):
         slow.append(y)
         y = pole * y + (1 - pole) * stem[max(k - 4, 0)]
-    assert lag(stem, *unit_lag(20.0, 4.0, 1.0)) == pytest.approx(np.array(slow), abs=1e-9)
+    assert respond(stem, *unit_lag(20.0, 4.0, 1.0)) == pytest.approx(np.array(slow), abs=1e-9)
 
 
 def test_stem_in_blocks_is_the_mean_of_the_stem():
@@ -195,7 +197,7 @@ def test_descent_and_disturbance_tell_one_story():
     """The innovations of what a fit leaves have the variance that the descent reports, in blocks of eight samples."""
     rng = np.random.default_rng(2)
     op = 50 + np.cumsum(rng.normal(0, 0.2, 8 * 600))
-    pv = block_means(lag(op - 50, *unit_lag(300.0, 12.0, 1.0)), 8) + rng.normal(0, 0.05, 600) + 3.0
+    pv = block_means(respond(op - 50, *unit_lag(300.0, 12.0, 1.0)), 8) + rng.normal(0, 0.05, 600) + 3.0
     for fine in (False, True):
         window = Window(pv, op, np.ones(600, dtype=bool), 8.0, 8, fine=fine)
         for fit in (fit_linear(window, 400.0), fit_play(window, fit_linear(window, 400.0), 400.0)):

@@ -13,8 +13,6 @@ from identification.mismatch.model_file import carried, carried_closed, constant
 from identification.simulation.open_loop import ModelInputs, simulate
 from identification.simulation.parameters import Slot, neutral
 
-pytestmark = pytest.mark.slow
-
 
 def model() -> tuple[ModelInputs, np.ndarray]:
     """A plain loop with play, and OP that moves."""

@@ -7,7 +7,8 @@ import pytest
 from scipy.signal import lsim
 
 from identification.models import Backlash, Fopdt, Integrator, Loop, Pid
-from identification.simulation.closed_loop import closed_loop, open_loop
+from identification.simulation.closed_loop import closed_loop
+from tests.identification.responses import pv_of
 
 
 def cycle(pv: np.ndarray, dt: float) -> tuple[float, float]:
@@ -45,7 +46,7 @@ def test_continuous_controller_of_the_study():
 def test_step_response_has_the_closed_form(dead, dt):
     """A step gives K(1 - exp(-(t-L)/T)) at every sample, dead time fractional or not."""
     op = np.where(np.arange(200) < 10, 40.0, 45.0)
-    y = open_loop(Fopdt(2.0, 13.0, dead), None, op, dt)
+    y = pv_of(Fopdt(2.0, 13.0, dead), None, op, dt)
     late = np.maximum((np.arange(200) - 10) * dt - dead, 0.0)
     assert y == pytest.approx(5.0 * 2.0 * (1 - np.exp(-late / 13.0)), abs=1e-9)
 
@@ -53,7 +54,7 @@ def test_step_response_has_the_closed_form(dead, dt):
 def test_integrator_ramps():
     """A step of 1 % on an integrator gives a ramp of the slope after the dead time."""
     op = np.where(np.arange(50) < 5, 40.0, 41.0)
-    y = open_loop(Integrator(0.02, 3.4), None, op, 1.0)
+    y = pv_of(Integrator(0.02, 3.4), None, op, 1.0)
     assert y == pytest.approx(0.02 * np.maximum(np.arange(50) - 5 - 3.4, 0.0), abs=1e-9)
 
 
@@ -63,7 +64,7 @@ def test_agrees_with_continuous_integration():
     op = np.repeat(rng.normal(size=30), 20)
     fine = np.repeat(op, 50)
     _, y, _ = lsim(([3.0], [9.0, 1.0]), fine - op[0], np.arange(fine.size) * 0.02, interp=False)
-    assert open_loop(Fopdt(3.0, 9.0, 0.0), None, op, 1.0) == pytest.approx(np.asarray(y)[::50], abs=1e-6)
+    assert pv_of(Fopdt(3.0, 9.0, 0.0), None, op, 1.0) == pytest.approx(np.asarray(y)[::50], abs=1e-6)
 
 
 def test_unforced_loop_stays_at_rest():

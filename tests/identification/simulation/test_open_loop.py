@@ -7,13 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.models import Backlash, Fopdt
-from identification.simulation.closed_loop import open_loop
-from identification.simulation.open_loop import ModelInputs, simulate
+from identification.models import Backlash, Fopdt, Integrator, Motion, Process, Stiction, Valve
+from identification.simulation.open_loop import ModelInputs, as_parameters, simulate
 from identification.simulation.parameters import Slot, neutral
 from identification.simulation.valve import play
-
-pytestmark = pytest.mark.slow
+from tests.identification.responses import pv_of
 
 
 def inputs(seed: int = 1, n: int = 600) -> ModelInputs:
@@ -34,15 +32,27 @@ def constants(**given: float) -> np.ndarray:
 def test_plain_equals_exact_open_loop() -> None:
     """Without any effect the model is the exact first-order lag with fractional dead time."""
     s = inputs()
-    expected = open_loop(Fopdt(1.5, 40.0, 7.0), None, s.op, s.dt_s)
+    expected = pv_of(Fopdt(1.5, 40.0, 7.0), None, s.op, s.dt_s)
     assert np.allclose(simulate(s, constants()), expected, atol=1e-9)
+
+
+@pytest.mark.parametrize("process", [Fopdt(1.5, 40.0, 7.0), Integrator(0.03, 5.2), Integrator(-0.03, 0.0)])
+@pytest.mark.parametrize(
+    "valve", [None, Backlash(3.0), *(Stiction(3.0, 1.2, motion) for motion in Motion), Stiction(2.0, 2.0)]
+)
+def test_models_become_parameters(process: Process, valve: Valve) -> None:
+    """Any process and valve of the project, turned into parameters, give the PV of stem and difference equation."""
+    s = inputs()
+    got = simulate(s, as_parameters(process, valve))
+    expected = pv_of(process, valve, s.op, s.dt_s)
+    assert np.allclose(got - got[0], expected - expected[0], atol=1e-9)
 
 
 def test_play_equals_play_before_lag() -> None:
     """The play of a candidate is the project's own play before the same lag."""
     s = inputs()
     got = simulate(s, constants(STICKBAND=3.0))
-    expected = open_loop(Fopdt(1.5, 40.0, 7.0), Backlash(3.0), s.op, s.dt_s)
+    expected = pv_of(Fopdt(1.5, 40.0, 7.0), Backlash(3.0), s.op, s.dt_s)
     assert np.allclose(got - got[0], expected, atol=1e-9)
     assert not np.allclose(play(s.op, 3.0), s.op)
 
