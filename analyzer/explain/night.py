@@ -1,7 +1,7 @@
 """The flagged loops of a night explained, one by one on worker processes, each answer kept as it comes.
 
 An error of one loop, a dead worker included, is that loop's answer. Kept in STORE/explained/NIGHT.parquet: a row a
-loop with verdict, block, reason and the whole answer as JSON.
+loop with verdict, block, reason, the whole answer as JSON and its page as it is to be drawn (reports/page_file.py).
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from analyzer.workers import Died, Workers
 from identification.errors import TriageError
 
 TABLE = "explained"
-COLUMNS = ("loop", "night", "verdict", "block", "reason", "answer")
+COLUMNS = ("loop", "night", "verdict", "block", "reason", "answer", "page")
 COUNTS_PCT = 50.0
 """A loop counts as oscillating from here [% of time]; contract of the ranking."""
 QUIET = ("none", "", None)
@@ -51,29 +51,34 @@ def answered(q: Question, began: Callable[[int], None] = lambda at: None) -> Row
     """The row of one loop, whatever happens; runs in a worker process."""
     from analyzer.explain.one_loop import abstained
 
+    page = ""
     try:
-        data = _explained(q)
+        data, page = _explained(q)
     except TriageError as error:
         data = abstained(q.spec.loop, str(error))
     except Exception as error:  # an error of one loop is that loop's answer, never the night's end
         data = abstained(q.spec.loop, f"not explained: {type(error).__name__}: {error}")
-    return row_of(data, q.night.name)
+    return row_of(data, q.night.name, page)
 
 
-def _explained(q: Question) -> dict[str, Any]:
+def _explained(q: Question) -> tuple[dict[str, Any], str]:
+    """The answer as data, and its page."""
     from analyzer.explain.one_loop import case, explained
+    from analyzer.explain.page import page
+    from reports.page_file import dumps
 
     with_source = [q.source.op] if q.source is not None and q.source.op else []
     tags = list(dict.fromkeys([*q.spec.tags, *with_source]))
     series = {tag: cut(s, q.night) for tag, s in q.export.read(tags).items()}
     specs = (q.spec,) if q.source is None else (q.spec, q.source)
-    return explained(case(q.spec, specs, series, q.config), lambda name: None).data
+    found = explained(case(q.spec, specs, series, q.config), lambda name: None)
+    return found.data, dumps(page(found))
 
 
-def row_of(data: Mapping[str, Any], night: str) -> Row:
+def row_of(data: Mapping[str, Any], night: str, page: str = "") -> Row:
     """An answer as a row of the store."""
     texts = {k: data[k] for k in ("loop", "verdict", "block", "reason")}
-    return {**texts, "night": night, "answer": json.dumps(data)}
+    return {**texts, "night": night, "answer": json.dumps(data), "page": page}
 
 
 def questions(

@@ -13,6 +13,7 @@ import numpy as np
 
 from analyzer.config import Config
 from analyzer.explain.user_model import Brought, judged
+from analyzer.explain.views import Views, views
 from analyzer.history.series import Series
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import controller
@@ -159,12 +160,14 @@ def case(
 
 @dataclass(frozen=True, slots=True)
 class Explained:
-    """One loop explained: what was asked, what was found, the answer in numbers and as data, the user's own model."""
+    """One loop explained: what was asked, what was found, the answer in numbers and as data, what a page draws of it,
+    and the user's own model."""
 
     case: Case
     found: mismatch.Explanation
     said: Answer
     data: dict[str, Any]
+    views: Views
     brought: Brought | None = None
 
     def model(self) -> dict[str, Any]:
@@ -178,8 +181,9 @@ def explained(c: Case, tell: Callable[[str], None], brought: Mapping[str, Any] |
     with np.errstate(all="ignore"):  # a candidate that runs away loses; its overflow is nobody's business
         found = mismatch.explain(c.subject, tell, start)
         said = answer(found, c.subject)
-    own = None if brought is None else judged(brought, found, c.subject, span_note(c, brought))
-    return Explained(c, found, said, as_data(c, said, own), own)
+        own = None if brought is None else judged(brought, found, c.subject, span_note(c, brought))
+        drawn = views(found, c.subject, said, own)
+    return Explained(c, found, said, as_data(c, said, own), drawn, own)
 
 
 def plain_start(brought: Mapping[str, Any]) -> Floats:

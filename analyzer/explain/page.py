@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import numpy as np
-
 from analyzer.explain import plots
 from analyzer.explain.one_loop import Explained
 from analyzer.explain.page_words import (
@@ -25,10 +23,9 @@ from analyzer.explain.page_words import (
     spans_said,
     title,
 )
+from analyzer.explain.views import Tried
 from analyzer.pages.words import duration, number, stamp
 from identification.estimation.limits import HELD_OUT
-from identification.mismatch.forward_selection import Candidate
-from identification.mismatch.location.where import located_in
 from identification.mismatch.words import check, discriminating_test, located_sentence
 from reports.names import slug
 from reports.pages import Block, Cell, Column, Facts, Page, Section, Table, Text, Tiles
@@ -36,8 +33,8 @@ from reports.pages import Block, Cell, Column, Facts, Page, Section, Table, Text
 HARDLY = 0.05
 """Relative change of the plain loop's constants under which they count as kept."""
 BENT = "What was left out had to be made up for by these; with it they move back."
-RIVALS = 12
-"""Candidates shown."""
+SHOWN = 12
+"""Names shown of those that were tried."""
 
 
 def page(e: Explained) -> Page:
@@ -47,15 +44,14 @@ def page(e: Explained) -> Page:
     ----------
     e : Explained
     """
-    at = located_in(e.found.p, e.found.plain, e.case.subject)
     sections = [
         Section("What it is", _verdict(e)),
-        Section("Recording and simulation", plots.trends(e, at)),
+        Section("Recording and simulation", plots.trends(e)),
         *_found(e),
-        Section("Where the misfit lives", (*_where(e.data["where"]), plots.misfit_panels(e, at))),
+        Section("Where the misfit lives", (*_where(e.data["where"]), plots.misfit_panels(e))),
         Section("How well it fits", _fit(e)),
         *_alternatives(e.data),
-        *_rivals(e),
+        *_tried(e),
         *_controller(e),
     ]
     spec = e.case.spec
@@ -99,8 +95,7 @@ def _verdict(e: Explained) -> tuple[Block, ...]:
 
 
 def _tiles(e: Explained) -> tuple[tuple[str, str, str], ...]:
-    d, recorded = e.data, e.found.p.inputs.level + e.found.p.y
-    size = {k: rms(float(np.std(recorded - x))) for k, x in plots.simulations(e).items()}
+    d, size = e.data, {k: rms(x) for k, x in e.views.misfit.items()}
     seat = "where to look first" if d["verdict"] == "unexplained" else "where it sits"
     tiles = [(d["block"], seat, "")] if d["block"] != "none" else []
     horizon = d["fit"]["horizon_s"]
@@ -121,8 +116,7 @@ def _tiles(e: Explained) -> tuple[tuple[str, str, str], ...]:
 
 
 def _found(e: Explained) -> list[Section]:
-    shape = plots.found_shape(e)
-    drawn = (plots.shape_plot(shape),) if shape is not None else ()
+    drawn = () if e.views.shape is None else (plots.shape_plot(e.views.shape),)
     blocks = (*drawn, *_parameters(e.data), *_moved(e.data["moved"]))
     return [Section("What was found", blocks)] if blocks else []
 
@@ -248,13 +242,8 @@ def _alternatives(data: Mapping[str, Any]) -> list[Section]:
     return [Section("What it could also be", (Table("alternatives", "", columns, rows),))]
 
 
-def _rivals(e: Explained) -> list[Section]:
-    best: dict[str, Candidate] = {}
-    for r in e.found.first:
-        if r.name not in best or r.penalised > best[r.name].penalised:
-            best[r.name] = r
-    ranked = sorted(best.values(), key=lambda r: -r.penalised)[:RIVALS]
-    if not ranked:
+def _tried(e: Explained) -> list[Section]:
+    if not e.views.tried:
         return []
     columns = (
         Column("name", "Added to the plain loop"),
@@ -262,27 +251,27 @@ def _rivals(e: Explained) -> list[Section]:
         Column("net", "After its penalty", True, "Less what its constants and the search cost"),
         Column("said", ""),
     )
-    taken = {r.name for r in e.found.accepted}
-    rows = tuple((Cell(r.name), *_gains(r), Cell(_standing(r.penalised, r.name in taken))) for r in ranked)
+    rows = tuple((Cell(r.name), *_gains(r), Cell(_standing(r))) for r in e.views.tried[:SHOWN])
     note = "Each name was fitted with all constants free; the best of so many gains about ten by chance."
     table = Table("candidates", "", columns, rows, note)
     return [Section("All that was tried", (table,), closed=bool(e.found.accepted))]
 
 
-def _gains(r: Candidate) -> tuple[Cell, Cell]:
+def _gains(r: Tried) -> tuple[Cell, Cell]:
     return Cell(str(round(r.gain)), r.gain), Cell(str(round(r.penalised)), r.penalised)
 
 
-def _standing(penalised: float, taken: bool) -> str:
-    if taken:
+def _standing(r: Tried) -> str:
+    if r.taken:
         return "taken"
-    return "does not pay" if penalised <= 0 else "less, or not proven"
+    return "does not pay" if r.penalised <= 0 else "less, or not proven"
 
 
 def _controller(e: Explained) -> list[Section]:
-    plot, said, law = plots.controller_plot(e), e.case.subject.stated, e.found.law
-    if plot is None or said is None or law is None:
+    drawn, said, law = e.views.obeyed, e.case.subject.stated, e.found.law
+    if drawn is None or said is None or law is None:
         return []
+    plot = plots.shape_plot(drawn, "law")
     ti = law.kp / law.ki * e.case.subject.dt_s if law.ki else None
     facts = Facts(
         (

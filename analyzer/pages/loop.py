@@ -196,7 +196,11 @@ def _explained(found: Row | None) -> list[Section]:
 
 
 def page(
-    rows: Sequence[Row], thin: Thinned | None, index: str = "index.html", explained: Row | None = None
+    rows: Sequence[Row],
+    thin: Thinned | None,
+    index: str = "index.html",
+    explained: Row | None = None,
+    more: Page | None = None,
 ) -> Page:
     """A loop's page.
 
@@ -209,7 +213,9 @@ def page(
     index : str
         The morning page.
     explained : mapping or None
-        The night's explanation of the loop (explain_night.COLUMNS).
+        The night's explanation of the loop (analyzer.explain.night.COLUMNS).
+    more : Page or None
+        The page of that explanation, which is linked.
     """
     row = rows[-1]
     figures = [
@@ -225,5 +231,5 @@ def page(
     ]
     sections.insert(-1, Section("Figures of the night", (Facts(tuple(figures)),)))
     known = [row["description"], row["type"], row["area"], f"night {row['night']}"]
-    links = (("All loops", index),)
+    links = (("All loops", index),) + (() if more is None else (("The explanation", f"{more.name}.html"),))
     return Page(slug(row["loop"]), row["loop"], ", ".join(k for k in known if k), tuple(sections), links)

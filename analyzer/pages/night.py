@@ -1,14 +1,16 @@
-"""All pages of a night: the morning page, then the worst loops one by one."""
+"""All pages of a night: the morning page, then the worst loops one by one, each with its explanation if any."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from typing import Any
 
 from analyzer.explain.night import known
 from analyzer.pages import loop, morning
 from analyzer.pages.reading import read_nights, read_trends
 from analyzer.pages.view import read_night
 from analyzer.store import Store
+from reports.page_file import PageFileError, loads
 from reports.pages import Page
 
 HISTORY = 60
@@ -32,4 +34,15 @@ def pages(store: Store, name: str | None = None, top: int = 50) -> Iterator[Page
     for worst in night.worst:
         tag = worst["loop"]
         own = [r for r in rows if r["loop"] == tag]
-        yield loop.page(own, trends.get(tag), explained=explained.get(tag))
+        drawn = explanation(explained.get(tag))
+        yield loop.page(own, trends.get(tag), explained=explained.get(tag), more=drawn)
+        if drawn is not None:
+            yield drawn
+
+
+def explanation(kept: Mapping[str, Any] | None) -> Page | None:
+    """The page of an explanation as the night kept it; None where it kept none, or one of another version."""
+    try:
+        return loads(kept["page"]) if kept is not None and kept.get("page") else None
+    except PageFileError:
+        return None

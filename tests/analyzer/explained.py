@@ -9,6 +9,7 @@ import numpy as np
 from analyzer.config import Config
 from analyzer.explain.one_loop import Case, Explained, as_data, case
 from analyzer.explain.user_model import judged
+from analyzer.explain.views import views
 from analyzer.history.series import Series
 from analyzer.loops.spec import LoopSpec
 from identification.controller.check import judge
@@ -98,4 +99,6 @@ def explanation(kind: str) -> Explained:
         "middle_op_pct": 50.0,
     }
     brought = judged(model, found, s) if kind == "backlash" else None
-    return Explained(asked, found, said, as_data(asked, said, brought), brought)
+    return Explained(
+        asked, found, said, as_data(asked, said, brought), views(found, s, said, brought), brought
+    )

@@ -20,7 +20,8 @@ from analyzer.store import Store
 from analyzer.workers import Died
 from identification.errors import NotAssessedError
 from reports.html import render
-from reports.pages import Text
+from reports.page_file import dumps
+from reports.pages import Page, Section, Text
 from tests.reports.small_store import NASTY, small_store, tags
 
 NIGHT = Night("2026-03-15", 0.0, 1.0)
@@ -35,13 +36,13 @@ def store(tmp_path: Path) -> Store:
     return small_store(tmp_path / "store", hours=False, buckets=50)
 
 
-def told(q: Question) -> dict[str, Any]:
-    """An answer that needs no recording; the second nasty loop fails, the third abstains."""
+def told(q: Question) -> tuple[dict[str, Any], str]:
+    """An answer that needs no recording, without a page; the second nasty loop fails, the third abstains."""
     if q.spec.loop == NASTY[1]:
         raise ZeroDivisionError("broken")
     if q.spec.loop == NASTY[2]:
         raise NotAssessedError("needs OP, has none")
-    return abstained(q.spec.loop, "said of " + q.spec.loop) | {"verdict": "backlash", "block": "valve"}
+    return abstained(q.spec.loop, "said of " + q.spec.loop) | {"verdict": "backlash", "block": "valve"}, ""
 
 
 class DyingWorkers:
@@ -153,3 +154,17 @@ def test_loop_page_shows_the_explanation(store: Store) -> None:
     assert evil in section.blocks[0].paragraphs[0]
     assert "linkage" in section.blocks[0].paragraphs[1]
     assert evil not in render(after[tag], True)
+
+
+def test_kept_page_is_drawn_with_the_night(store: Store) -> None:
+    """The page that a night kept of an explanation is written beside the loop's, which links it; a broken one not."""
+    name = store.nights()[-1]
+    tag = next(t for t in {p.title: p for p in night_pages.pages(store, name, 8)} if t in tags(30))
+    data = abstained(tag, "reason") | {"verdict": "backlash", "block": "valve"}
+    kept = Page(f"{tag}-explained", f"{tag}: backlash", "", (Section("What it is", (Text(("words",)),)),))
+    keep(store, name, [row_of(data, name, dumps(kept))])
+    after = {p.title: p for p in night_pages.pages(store, name, 8)}
+    assert after[kept.title] == kept
+    assert ("The explanation", f"{kept.name}.html") in after[tag].links
+    keep(store, name, [row_of(data, name, "{}")])
+    assert kept.title not in {p.title for p in night_pages.pages(store, name, 8)}

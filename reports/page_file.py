@@ -1,0 +1,92 @@
+"""A page as text that a store can keep, and text as a page: computed once, drawn whenever it is asked for.
+
+Every part is a mapping with its kind under "is"; arrays are base64, numbers that are times in full and others in
+single precision. Only the kinds of pages.py are known; nothing is executed.
+"""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import dataclasses
+import json
+from typing import Any
+
+import numpy as np
+
+from reports import pages
+
+KINDS = {
+    kind.__name__: kind
+    for kind in (
+        *(pages.Page, pages.Section, pages.Table, pages.Column, pages.Cell, pages.Sparkline, pages.Bars),
+        *(pages.IntervalChart, pages.IntervalBar, pages.Plot, pages.Line, pages.Area, pages.Mark),
+        *(pages.Panels, pages.Trend, pages.Band, pages.Text, pages.Listing, pages.Facts, pages.Tiles),
+    )
+}
+"""The parts of which pages are made."""
+FULL = 1e5
+"""Arrays that reach this are kept in double precision: they are times."""
+TYPES = {"f4": np.float32, "f8": np.float64, "b1": np.bool_}
+ENDS = {"inf": float("inf"), "-inf": float("-inf"), "nan": float("nan")}
+
+
+class PageFileError(ValueError):
+    """A text that holds no page."""
+
+
+def dumps(page: pages.Page) -> str:
+    """A page as text."""
+    return json.dumps(_data(page), separators=(",", ":"), allow_nan=False)
+
+
+def _data(x: Any) -> Any:
+    if dataclasses.is_dataclass(x):
+        own = {f.name: _data(getattr(x, f.name)) for f in dataclasses.fields(x)}
+        return {"is": type(x).__name__} | own
+    if isinstance(x, np.ndarray):
+        return {"is": "array"} | _array(x)
+    if isinstance(x, list | tuple):
+        return [_data(v) for v in x]
+    if isinstance(x, np.generic):
+        x = x.item()
+    if isinstance(x, float) and not np.isfinite(x):
+        return {"is": "number", "value": repr(x)}
+    return x
+
+
+def _array(x: np.ndarray) -> dict[str, str]:
+    large = x.dtype != np.bool_ and x.size > 0 and float(np.nanmax(np.abs(x), initial=0.0)) >= FULL
+    code = "b1" if x.dtype == np.bool_ else "f8" if large else "f4"
+    return {"type": code, "values": base64.b64encode(np.ascontiguousarray(x, TYPES[code]).tobytes()).decode()}
+
+
+def loads(text: str) -> pages.Page:
+    """A page of its text.
+
+    Raises
+    ------
+    PageFileError
+        The text holds no page.
+    """
+    try:
+        found = _part(json.loads(text))
+    except (ValueError, KeyError, TypeError, binascii.Error, RecursionError) as error:
+        raise PageFileError(f"no page: {error}") from error
+    if not isinstance(found, pages.Page):
+        raise PageFileError("no page: another part of one")
+    return found
+
+
+def _part(x: Any) -> Any:
+    if isinstance(x, list):
+        return tuple(_part(v) for v in x)
+    if not isinstance(x, dict):
+        return x
+    kind = x.pop("is")
+    if kind == "number":
+        return ENDS[x["value"]]
+    if kind == "array":
+        values: np.ndarray = np.frombuffer(base64.b64decode(x["values"], validate=True), TYPES[x["type"]])
+        return values.copy() if x["type"] == "b1" else values.astype(np.float64)
+    return KINDS[kind](**{k: _part(v) for k, v in x.items()})
