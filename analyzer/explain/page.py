@@ -247,12 +247,12 @@ def _tried(e: Explained) -> list[Section]:
         return []
     columns = (
         Column("name", "Added to the plain loop"),
-        Column("gain", "Gain", True, "Doubled log likelihood"),
+        Column("gain", "Gain", True, "Log likelihood [nat]"),
         Column("net", "After its penalty", True, "Less what its constants and the search cost"),
         Column("said", ""),
     )
     rows = tuple((Cell(r.name), *_gains(r), Cell(_standing(r))) for r in e.views.tried[:SHOWN])
-    note = "Each name was fitted with all constants free; the best of so many gains about ten by chance."
+    note = "Each name was fitted with all constants free; the best of so many gains about five nat by chance."
     table = Table("candidates", "", columns, rows, note)
     return [Section("All that was tried", (table,), closed=bool(e.found.accepted))]
 

@@ -86,7 +86,7 @@ class Spectrum:
 
 @dataclass(frozen=True, slots=True)
 class Tried:
-    """A name that was tried: doubled log likelihood that it gains, that less its penalty, whether it was taken."""
+    """A name that was tried: log likelihood [nat] that it gains, that less its penalty, whether it was taken."""
 
     name: str
     gain: float

@@ -1,10 +1,10 @@
-"""Every number that decides an answer, with its reason. Doubled log-likelihood gains are called `gain`."""
+"""Every number that decides an answer, with its reason. Gains are of log likelihood [nat]."""
 
 from __future__ import annotations
 
-PARAMETER_PENALTY = 6.0
-"""Gain that one more constant has to bring; ours: log(n) would be 9, chance brings 1."""
-SEARCH_PENALTY = 12.0
+PARAMETER_PENALTY = 3.0
+"""Gain that one more constant has to bring; ours: half of log(n) would be 4.5, chance brings a half."""
+SEARCH_PENALTY = 6.0
 """Gain that the choice among some forty candidates and their starts costs; ours: the largest of forty by chance."""
 OUTLIER = 5.0
 """Innovations beyond this many robust standard deviations count less: no single event decides a name."""
@@ -16,9 +16,9 @@ SCREEN_STEPS = 5
 """Gauss-Newton steps in the first round."""
 FULL_STEPS = 20
 """Gauss-Newton steps of those that are followed."""
-SETTLED = 0.05
+SETTLED = 0.025
 """Gain of a step below which the descent ends."""
-TIE = 4.0
+TIE = 2.0
 """Candidates within this gain of the winner cannot be told from it and are its alternatives."""
 HELD_OUT = 0.35
 """Last part of the record that is held out when the winner is proven."""
@@ -69,18 +69,18 @@ LAWLESS = 5.0
 """Residual of a span, in medians of all spans (plus a step of OP), from which the law does not hold there."""
 LAWLESS_SHARE = 0.03
 """Share of the record in such spans from which logic is named; ours: gaps and single outliers stay under it."""
-HELD_OUT_LOSS = -2.0
-"""Gain on the held-out part under which an effect falls; ours: chance moves it by about one."""
+HELD_OUT_LOSS = -1.0
+"""Gain on the held-out part under which an effect falls; ours: chance moves it by about a half."""
 PROVEN = 3
 """Candidates that are put to the proof, best first, until one passes."""
-CEILING_PENALTY = 45.0
-"""Gain beyond its number of weights that the flexible model needs over the last fit before something is said to be
-left; ours: with nothing hidden the largest of thirty was 37."""
+CEILING_PENALTY = 22.5
+"""Gain beyond half the number of its weights that the flexible model needs over the last fit before something is
+said to be left; ours: with nothing hidden the largest of thirty was 18."""
 CEILING_SHARE = 0.3
 """The same in terms of what the named effects gain: a name stands if little is left beside it."""
 START_SCATTER = 1.0
 """Standard deviation [% PV] of the model's first value about the recorded one, which short time constants need."""
-STICKING_HINT = 12.0
+STICKING_HINT = 6.0
 """Gain of a play, or of a sticking valve started coarsely, from which stiction is scanned finely."""
 ONE_MOVE = 0.8
 """Share of OP's travel in two parts of the record from which it is one experiment without spread."""
@@ -90,7 +90,7 @@ HELD_OUT_SHARE = 0.1
 """The same in terms of the whole gain: two thirds of a record know a slow effect's constants less well."""
 SETTLES = 0.1
 """Share of the record that a time constant may take if the loop is to be seen to settle."""
-SAME = 2.0
+SAME = 1.0
 """Gain that a model may lack beside one with a constant more and still count as good as that."""
 MISSED = 1.8
 """Spacing of stamps [samples] from which a sample is missing; ours: polling scatters by less."""

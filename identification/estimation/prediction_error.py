@@ -87,8 +87,8 @@ class Fitted:
 
 
 def gain(better: Fitted, worse: Fitted) -> float:
-    """Doubled gain in log likelihood."""
-    return worse.count * math.log(max(worse.loss, 1e-30) / max(better.loss, 1e-30))
+    """Gain in log likelihood [nat]."""
+    return 0.5 * worse.count * math.log(max(worse.loss, 1e-30) / max(better.loss, 1e-30))
 
 
 def scales(inputs: ModelInputs, c: Floats, param: Param) -> tuple[float, float]:
@@ -233,7 +233,7 @@ def descend(p: Problem, model: Model, steps: int) -> Fitted:
             damping, failed = damping * 20, failed + 1
         else:
             break
-        won = p.count * math.log(loss / max(less, 1e-300))
+        won = 0.5 * p.count * math.log(loss / max(less, 1e-300))
         model, columns, ar, e, loss = trial, columns2, ar2, e2, less
         damping, failed = max(damping / 10, 1e-7), 0
         if won < SETTLED:

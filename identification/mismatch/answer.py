@@ -189,5 +189,5 @@ def _note(found: Explanation) -> str:
         return ""
     return (
         "The loop does something that no known cause explains: a flexible model without a name does better "
-        f"(doubled log likelihood {found.left:.0f})."
+        f"(log likelihood +{found.left:.0f})."
     )

@@ -59,8 +59,8 @@ def misfit(y: Floats, simulated: Floats, window: int = 0) -> Misfit:
 
 
 def gains_by_block(p: Problem, better: Fitted, worse: Fitted) -> Floats:
-    """Doubled log-likelihood gain of each of BLOCKS parts of the record, shape (BLOCKS,)."""
-    won = p.weight * (worse.e**2 - better.e**2) / max(better.loss, 1e-30)
+    """Gain in log likelihood [nat] of each of BLOCKS parts of the record, shape (BLOCKS,)."""
+    won = 0.5 * p.weight * (worse.e**2 - better.e**2) / max(better.loss, 1e-30)
     return np.array([part.sum() for part in np.array_split(won, BLOCKS)])
 
 
@@ -122,7 +122,7 @@ def held_out(p: Problem, worse: Fitted, better: Fitted) -> HeldOut:
     late = p.weight[cut:]
     whitenings = [whitened(p.y - x, fit.ar, p.edges)[cut:] for x, fit in zip(simulated, fits, strict=True)]
     losses = [float((late * e) @ e) for e in whitenings]
-    won = (losses[0] - losses[1]) / max(fits[1].loss, 1e-30)
+    won = 0.5 * (losses[0] - losses[1]) / max(fits[1].loss, 1e-30)
     c = fits[0].model.c
     window = max(int(WINDOW_TIMES * float(c[Slot.T] + c[Slot.L]) / p.inputs.dt_s), WINDOW_SAMPLES)
     final = [simulate(p.inputs, m.model.c) for m in (worse, better)]

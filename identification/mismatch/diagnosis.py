@@ -202,7 +202,7 @@ def physics(found: Explanation, tell: Progress, kind: str = "") -> Explanation:
         best, accepted = replacement_step(x, best, accepted, tell)
     won, weights = ceiling(p, best)
     least = max(CEILING_PENALTY, CEILING_SHARE * gain(best, found.plain))
-    left = won - weights - least
+    left = won - 0.5 * weights - least
     if not accepted and any(r.row.needs == "steps" and r.penalised > 0 for r in candidates):
         left = max(left, candidates[0].penalised)
     found = replace(found, p=p, best=best, accepted=tuple(accepted), before=tuple(before), first=first)

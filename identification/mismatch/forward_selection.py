@@ -113,7 +113,7 @@ def applies(x: CandidateInputs, near: Fitted, row: Variant) -> bool:
 
 
 def penalty(row: Variant) -> float:
-    """Doubled log likelihood that a row costs."""
+    """Log likelihood [nat] that a variant costs."""
     return SEARCH_PENALTY + PARAMETER_PENALTY * max(len(row.params), 1) + row.penalty
 
 

@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from identification.mismatch.diagnosis import Explanation
     from identification.mismatch.recording import Recording
 
-ANSWERS = 25.0
-"""Doubled log likelihood that OP must bring for PV to answer it; ours: chance brings three constants under 17 in 999
+ANSWERS = 12.5
+"""Log likelihood [nat] that OP must bring for PV to answer it; ours: chance brings three constants under 8.5 in 999
 of 1,000 records, and the model without OP is not fitted to the end."""
 INSENSITIVE = "needs moves of OP that PV answers"
 """What is said where PV does not answer OP."""
@@ -26,11 +26,11 @@ INTEGRATING = ("level",)
 
 
 def brings(p: Problem, fit: Fitted) -> float:
-    """Doubled log likelihood that OP brings to a fit: over the same with no gain, its mean and start as recorded."""
+    """Log likelihood [nat] that OP brings to a fit: over the same with no gain, its mean and start as recorded."""
     c = fit.model.c.copy()
     c[Slot.K], c[Slot.BIAS], c[Slot.START] = 0.0, float(np.mean(p.y)), float(p.y[0])
     without = loss_of(p, residual_fit(p, c)[3])
-    return fit.count * math.log(max(without, 1e-300) / max(fit.loss, 1e-300))
+    return 0.5 * fit.count * math.log(max(without, 1e-300) / max(fit.loss, 1e-300))
 
 
 def unanswered(found: Explanation) -> str:

@@ -49,7 +49,7 @@ def bent_moves(p: Problem, fit: Fitted, through: Floats) -> list[Floats]:
 
 
 def ceiling(p: Problem, fit: Fitted) -> tuple[float, int]:
-    """Doubled log-likelihood gain that the flexible model has over a fit, and the number of its weights.
+    """Gain in log likelihood [nat] that the flexible model has over a fit, and the number of its weights.
 
     The fit's own constants and its noise model follow linearly, so the gain is of what they cannot give.
     """
@@ -69,5 +69,5 @@ def ceiling(p: Problem, fit: Fitted) -> tuple[float, int]:
     more = more.T - span @ (span.T @ more.T)
     q, scale = np.linalg.qr(more)
     kept = np.abs(np.diag(scale)) > 1e-8 * np.abs(np.diag(scale)).max()
-    won = float(((q[:, kept].T @ e) ** 2).sum()) / max(fit.loss, 1e-30)
+    won = 0.5 * float(((q[:, kept].T @ e) ** 2).sum()) / max(fit.loss, 1e-30)
     return won, int(kept.sum())

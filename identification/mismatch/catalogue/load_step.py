@@ -8,8 +8,8 @@ from identification.mismatch.effect import Block, Effect
 from identification.simulation.effect import Param, Variant
 from identification.simulation.parameters import STEPS, Slot
 
-PLACE = 12.0
-"""Doubled log likelihood that the choice of a step's place costs; ours: the largest of many by chance."""
+PLACE = 6.0
+"""Log likelihood [nat] that the choice of a step's place costs; ours: the largest of many by chance."""
 FREE = tuple(
     Param(int(Slot.STEP) + i, f"size_{i + 1}_pct", "% OP", -50.0, 50.0, title=title)
     for i, title in enumerate(("First load step", "Second load step", "Third load step"))

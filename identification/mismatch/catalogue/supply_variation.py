@@ -45,7 +45,7 @@ EFFECT = Effect(
                 ),
             ),
             ({Slot.HEAD_BIAS: 8.0},),
-            penalty=-10.0,
+            penalty=-5.0,
         ),
     ),
 )
