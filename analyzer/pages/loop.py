@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from analyzer.explain.agreement import agreement
 from analyzer.explain.page_words import title
 from analyzer.pages.reading import Thinned
 from analyzer.pages.rhythm import rhythm_plots
@@ -187,11 +188,13 @@ def _trends(thin: Thinned | None, row: Row) -> list[Section]:
     ]
 
 
-def _explained(found: Row | None) -> list[Section]:
-    """What the plain loop lacks, where the night was explained."""
+def _explained(found: Row | None, row: Row) -> list[Section]:
+    """What the plain loop lacks, where the night was explained, and how that goes with the night's verdict."""
     if found is None:
         return []
-    text = Text((f"{title(found['verdict']).capitalize()}: {found['reason']}", check(found["verdict"])))
+    together = agreement(row, found["verdict"], found["block"])
+    said = (f"{title(found['verdict']).capitalize()}: {found['reason']}", check(found["verdict"]))
+    text = Text((*said, together) if together else said)
     return [Section("What the plain loop lacks", (text,))]
 
 
@@ -223,7 +226,7 @@ def page(
     ]
     sections = [
         _verdict(row),
-        *_explained(explained),
+        *_explained(explained, row),
         _evidence(row),
         *_trends(thin, row),
         *_limit_cycle(row),

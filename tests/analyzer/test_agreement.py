@@ -1,0 +1,36 @@
+"""Verdict and explanation are told together: agreement, another kind, silence, contradiction, each by its sentence."""
+
+from __future__ import annotations
+
+import pytest
+
+from analyzer.explain.agreement import STROKE, agreement
+
+
+@pytest.mark.parametrize(
+    ("cause", "kind", "verdict", "block", "told"),
+    [
+        ("valve", "backlash", "backlash", "valve", "agree"),
+        ("valve", "undecided", "stiction", "valve", "agree"),
+        ("valve", "backlash", "positioner", "valve", STROKE),
+        ("valve", "stiction", "none", "none", "does not bear it out"),
+        ("valve", "stiction", "second-lag", "process", "does not bear it out"),
+        ("valve", "backlash", "quantization", "sensor", "neither bears out nor contradicts"),
+        ("load", "none", "backlash", "valve", "does not hold it"),
+        ("none", "none", "valve-characteristic", "valve", "does not hold it"),
+    ],
+)
+def test_each_pair_has_its_sentence(cause: str, kind: str, verdict: str, block: str, told: str) -> None:
+    """What one names and the other does not is said, with what would settle it."""
+    assert told in agreement({"cause": cause, "valve_fault": kind}, verdict, block)
+
+
+@pytest.mark.parametrize("verdict", ["none", "unexplained", "load-step", "second-lag"])
+def test_no_valve_no_sentence(verdict: str) -> None:
+    """Where neither speaks of a valve nothing is added."""
+    assert agreement({"cause": "tuning", "valve_fault": "none"}, verdict, "process") == ""
+
+
+def test_words_nobody_knows_do_no_harm() -> None:
+    """A store written by another version may hold a name that the catalogue lacks."""
+    assert agreement({"cause": "none", "valve_fault": "none"}, "no such effect", "none") == ""
