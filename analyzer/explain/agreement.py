@@ -1,10 +1,10 @@
 """Where the night's verdict and the explanation speak of the same valve, and what is said where they differ.
 
-They ask different questions. The verdict asks why a loop oscillates, from the whole night and with the controller
-in the loop; the explanation asks which physics a simulation of PV from the recorded OP lacks, proven on a part that it
+They ask different questions. The verdict asks why a loop oscillates, from the whole night with the controller in
+the loop; the explanation asks which physics a simulation of PV from the recorded OP lacks, proven on a part that it
 has not seen. The rule: a cause of the oscillation is the verdict's to name, a kind of fault the explanation's where
-it is proven on held-out data; where one names a valve fault and the other none, the page says so, and says what would
-settle it. Neither overrides the other's figures.
+it is proven on held-out data; where one names a valve fault and the other none, the page says so, and says what
+would settle it. Neither overrides the other's figures.
 """
 
 from __future__ import annotations

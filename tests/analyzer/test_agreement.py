@@ -1,4 +1,4 @@
-"""Verdict and explanation are told together: agreement, another kind, silence, contradiction, each by its sentence."""
+"""Verdict and explanation are told together: agreement, other kind, silence, contradiction, each in a sentence."""
 
 from __future__ import annotations
 
