@@ -16,7 +16,6 @@ Heavy parts are imported when they are used. From the project's folder:
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -268,7 +267,8 @@ def explain(loop: PlantLoop) -> Explained:
     NotAssessedError
         OP or PV is missing or never moves.
     """
-    from analyzer.explain.one_loop import case, explained
+    from analyzer.explain.case import case
+    from analyzer.explain.one_loop import explained
     from analyzer.nights import cut
 
     plant, spec = loop.plant, loop.spec
@@ -303,8 +303,3 @@ def nights(store: str | Path, table: str = "nights") -> pd.DataFrame:
     found = {night: kept.read_if_there(table, night) for night in kept.nights()}
     frames = [t.to_pandas().assign(night=night) for night, t in found.items() if t is not None]
     return pd.concat(frames, ignore_index=True) if frames else pd.DataFrame({"night": []})
-
-
-def finite(estimates: Mapping[str, Estimate]) -> dict[str, tuple[float, float, float]]:
-    """Estimates as (value, low, high), those that are not known left out: what a data frame takes."""
-    return {k: (e.value, e.low, e.high) for k, e in estimates.items() if math.isfinite(e.value)}

@@ -24,7 +24,7 @@ def _case(
     export: tuple[Path, ...], loops: Path | None, tag: str, reading: dict[str, Any], whole: bool = False
 ) -> Any:
     from analyzer.config import Config
-    from analyzer.explain.one_loop import MOST_SAMPLES, case, loop_of
+    from analyzer.explain.case import MOST_SAMPLES, case, loop_of
 
     source, specs, _ = opened(export, loops, **reading)
     spec = loop_of(specs, tag)
@@ -68,7 +68,9 @@ def explain(
 
     Example: triage explain export.parquet --loops loops.csv --loop FIC101
     """
-    from analyzer.explain.one_loop import abstained, explained, read_model, write_model
+    from analyzer.explain.answer_data import abstained
+    from analyzer.explain.one_loop import explained
+    from analyzer.explain.saved_model import read_model, write_model
     from identification.errors import NotAssessedError
 
     try:
@@ -135,7 +137,7 @@ def simulate(
 
     Example: triage simulate model.json week2.parquet --loops loops.csv --loop FIC101 --out week2-sim.parquet
     """
-    from analyzer.explain.one_loop import read_model, simulated
+    from analyzer.explain.saved_model import read_model, simulated
 
     case, raw = _case(export, loops, tag, reading, whole=True)
     pv, op = simulated(case, read_model(model, tag), raw.stamp_s, closed_loop)

@@ -49,7 +49,7 @@ def flagged(row: Mapping[str, Any]) -> bool:
 
 def answered(q: Question, began: Callable[[int], None] = lambda at: None) -> Row:
     """The row of one loop, whatever happens; runs in a worker process."""
-    from analyzer.explain.one_loop import abstained
+    from analyzer.explain.answer_data import abstained
 
     page = ""
     try:
@@ -63,7 +63,8 @@ def answered(q: Question, began: Callable[[int], None] = lambda at: None) -> Row
 
 def _explained(q: Question) -> tuple[dict[str, Any], str]:
     """The answer as data, and its page."""
-    from analyzer.explain.one_loop import case, explained
+    from analyzer.explain.case import case
+    from analyzer.explain.one_loop import explained
     from analyzer.explain.page import page
     from reports.page_file import dumps
 
@@ -95,7 +96,7 @@ def questions(
 
 
 def _rows(asked: Sequence[Question], jobs: int, config: Config) -> Iterator[Row]:
-    from analyzer.explain.one_loop import abstained
+    from analyzer.explain.answer_data import abstained
 
     if jobs == 0:
         yield from map(answered, asked)

@@ -28,6 +28,26 @@ SETTLED = 0.01
 
 
 @njit(cache=True)
+def _responses(
+    stem: Floats, wider: Floats, width_step: float, t_s: float, dead_s: float, dt: float, factor: int
+) -> tuple[Floats, Floats, Floats, Floats]:
+    """Response of a unit lag in blocks of `dt` [s], shape (n,), and its derivatives by log T, dead time and width."""
+    fine = dt / factor
+    dead = dead_s + 0.5 * (factor - 1) * fine
+    pole, now, before, delay = unit_lag(t_s, dead, fine)
+    x = respond_in_blocks(stem, pole, now, before, delay, factor)
+    pole2, now2, before2, delay2 = unit_lag(t_s * 1.01, dead, fine)
+    x_t = (respond_in_blocks(stem, pole2, now2, before2, delay2, factor) - x) / math.log(1.01)
+    step = 0.05 * dt
+    pole3, now3, before3, delay3 = unit_lag(t_s, dead + step, fine)
+    x_l = (respond_in_blocks(stem, pole3, now3, before3, delay3, factor) - x) / step
+    x_w = np.zeros(x.size)
+    if width_step > 0:
+        x_w = (respond_in_blocks(wider, pole, now, before, delay, factor) - x) / width_step
+    return x, x_t, x_l, x_w
+
+
+@njit(cache=True)
 def _sensitivities(
     y: Floats,
     stem: Floats,
@@ -43,18 +63,8 @@ def _sensitivities(
     decay, step, A; the derivative by the width is that of the given wider stem. Stems have `factor` samples a
     block of `dt` [s], and the response is averaged over the blocks, as PV was."""
     n = y.size
-    fine = dt / factor
-    t_s, dead = math.exp(theta[0]), theta[1] + 0.5 * (factor - 1) * fine
-    pole, now, before, delay = unit_lag(t_s, dead, fine)
-    x = respond_in_blocks(stem, pole, now, before, delay, factor)
-    pole2, now2, before2, delay2 = unit_lag(t_s * 1.01, dead, fine)
-    x_t = (respond_in_blocks(stem, pole2, now2, before2, delay2, factor) - x) / math.log(1.01)
-    step = 0.05 * dt
-    pole3, now3, before3, delay3 = unit_lag(t_s, dead + step, fine)
-    x_l = (respond_in_blocks(stem, pole3, now3, before3, delay3, factor) - x) / step
-    x_w = np.zeros(n)
-    if width_step > 0:
-        x_w = (respond_in_blocks(wider, pole, now, before, delay, factor) - x) / width_step
+    t_s = math.exp(theta[0])
+    x, x_t, x_l, x_w = _responses(stem, wider, width_step, t_s, theta[1], dt, factor)
     columns = np.zeros((n, 8 + order))
     r = np.empty(n)
     free, faded = 1.0, math.exp(-dt / t_s)

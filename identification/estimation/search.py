@@ -27,6 +27,16 @@ NOTCH_WIDTH = 0.15
 
 
 @njit(cache=True)
+def solved(gram: Floats, cross: Floats) -> Floats:
+    """Least squares of a matrix of products of which the upper half is filled, shape (4,)."""
+    for i in range(4):
+        gram[i, i] = gram[i, i] * (1 + 1e-9) + 1e-12
+        for j in range(i):
+            gram[i, j] = gram[j, i]
+    return np.linalg.solve(gram, cross)  # type: ignore[return-value]
+
+
+@njit(cache=True)
 def score(
     y: Floats,
     stem: Floats,
@@ -70,11 +80,7 @@ def score(
         x = pole * x + now * stem[max(k - delay, 0)] + before * stem[max(k - delay - 1, 0)]
         free *= pole
     gram[1, 1] = count
-    for i in range(4):
-        gram[i, i] = gram[i, i] * (1 + 1e-9) + 1e-12
-        for j in range(i):
-            gram[i, j] = gram[j, i]
-    beta = np.linalg.solve(gram, cross)
+    beta = solved(gram, cross)
     left = max((power - np.dot(beta, cross)) / max(count, 1), 1e-14)
     beta[1] /= level
     beta[2] /= level

@@ -114,6 +114,16 @@ def held(lag_s: float, h: float) -> tuple[float, float]:
 
 
 @njit(cache=True, error_model="numpy")
+def kept(c: Floats, parts: tuple[float, float]) -> tuple[Floats, Floats]:
+    """held() of second and third lag, second mode and spilled liquid, by part of a sample, shape (2, 4) each."""
+    left, mean = np.empty((2, 4)), np.empty((2, 4))
+    for half in range(2):
+        for i, lag_s in enumerate((c[T2], c[T3], c[MODE_T], c[SPILL_T])):
+            left[half, i], mean[half, i] = held(lag_s, parts[half])
+    return left, mean
+
+
+@njit(cache=True, error_model="numpy")
 def vessel_span(
     span: tuple[int, int],
     m: Memory,
@@ -138,10 +148,7 @@ def vessel_span(
     parts = (part, dt_s - part)
     linear = c[SLOPE] == 0.0 and c[ROOT] == 0.0 and c[GAIN_SLOPE] == 0.0
     rises = shares_filled(c, parts)
-    second = (held(c[T2], parts[0]), held(c[T2], parts[1]))
-    third = (held(c[T3], parts[0]), held(c[T3], parts[1]))
-    other = (held(c[MODE_T], parts[0])[0], held(c[MODE_T], parts[1])[0])
-    caught = (held(c[SPILL_T], parts[0])[0], held(c[SPILL_T], parts[1])[0])
+    left, mean = kept(c, parts)
     for k in range(*span):
         out[k] = (1.0 - c[SHARE]) * x + c[SHARE] * mode
         for half in range(2):
@@ -153,11 +160,9 @@ def vessel_span(
                 feed *= scheduled(x, c[GAIN_SLOPE])
             feed += c[K] * act[k]
             if c[T2] > 0.0:
-                left, mean = second[half]
-                z2, feed = feed + (z2 - feed) * left, feed + (z2 - feed) * mean
+                z2, feed = feed + (z2 - feed) * left[half, 0], feed + (z2 - feed) * mean[half, 0]
             if c[T3] > 0.0:
-                left, mean = third[half]
-                z3, feed = feed + (z3 - feed) * left, feed + (z3 - feed) * mean
+                z3, feed = feed + (z3 - feed) * left[half, 1], feed + (z3 - feed) * mean[half, 1]
             if linear:
                 over = max(x - c[CAP], 0.0)
                 net = feed + c[SPILL] * basin - c[LEAK] * x - WEIR * over
@@ -166,9 +171,9 @@ def vessel_span(
             else:
                 x, spill = filled(x, feed, parts[half], c, head, basin)
             if c[SPILL] > 0.0:
-                basin += (spill - basin) * (1.0 - caught[half])
+                basin += (spill - basin) * (1.0 - left[half, 3])
             if c[SHARE] != 0.0:
-                mode += (feed - mode) * (1.0 - other[half])
+                mode += (feed - mode) * (1.0 - left[half, 2])
     return x, mode, basin, z2, z3
 
 

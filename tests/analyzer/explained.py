@@ -7,7 +7,9 @@ from functools import cache
 import numpy as np
 
 from analyzer.config import Config
-from analyzer.explain.one_loop import Case, Explained, as_data, case
+from analyzer.explain.answer_data import as_data
+from analyzer.explain.case import Case, case
+from analyzer.explain.one_loop import Explained
 from analyzer.explain.user_model import judged
 from analyzer.explain.views import views
 from analyzer.history.series import Series

@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from analyzer.explain.one_loop import plain_start, read_model, scale_of
+from analyzer.explain.one_loop import plain_start
+from analyzer.explain.saved_model import read_model, scale_of
 from analyzer.explain.user_model import compared, judged, within, wrong_units
 from analyzer.quality import Scale
 from identification.errors import InputError

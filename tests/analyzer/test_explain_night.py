@@ -11,8 +11,8 @@ import pytest
 
 from analyzer.config import Config
 from analyzer.explain import night as explain_night
+from analyzer.explain.answer_data import abstained
 from analyzer.explain.night import Question, answered, flagged, keep, known, questions, row_of, run
-from analyzer.explain.one_loop import abstained
 from analyzer.loops.spec import LoopSpec
 from analyzer.nights import Night
 from analyzer.pages import night as night_pages

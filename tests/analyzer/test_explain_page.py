@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from analyzer.explain import page as pages
-from analyzer.explain.one_loop import abstained
+from analyzer.explain.answer_data import abstained
 from analyzer.explain.page_words import change, interval
 from analyzer.explain.plots import trends
 from analyzer.explain.text import columns, lines

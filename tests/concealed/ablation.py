@@ -27,7 +27,7 @@ from concealed.score import KIN, kin
 
 from analyzer.commands.options import opened
 from analyzer.config import Config
-from analyzer.explain.one_loop import Case, case, loop_of
+from analyzer.explain.case import Case, case, loop_of
 from identification.controller.pi_regression import recovered_law
 from identification.mismatch.catalogue import CANDIDATES, EFFECTS
 from identification.mismatch.diagnosis import inputs_of, without_spikes

@@ -26,7 +26,7 @@ from concealed.score import KIN, SHARED, kin, parameters
 
 from analyzer.commands.options import opened
 from analyzer.config import Config
-from analyzer.explain.one_loop import case, loop_of
+from analyzer.explain.case import case, loop_of
 from identification.estimation.limits import FULL_STEPS
 from identification.estimation.prediction_error import descend
 from identification.mismatch.answer import parameters_of

@@ -22,7 +22,9 @@ from concealed.proof import place_section, table
 
 from analyzer.commands.options import opened
 from analyzer.config import Config
-from analyzer.explain.one_loop import Case, Explained, case, explained, loop_of, saved_model, simulated
+from analyzer.explain.case import Case, case, loop_of
+from analyzer.explain.one_loop import Explained, explained
+from analyzer.explain.saved_model import saved_model, simulated
 from identification.mismatch.forward_selection import silent
 from identification.mismatch.model_file import to_data
 

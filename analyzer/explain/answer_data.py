@@ -1,0 +1,79 @@
+"""The answer as plain data that JSON can hold (contract of `triage explain --format json`), and its sentence."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from analyzer.explain.case import Case
+from analyzer.explain.user_model import Brought
+from identification.mismatch.answer import Answer
+from identification.mismatch.words import sentence, unexplained_reason
+
+
+def as_data(c: Case, said: Answer, brought: Brought | None = None) -> dict[str, Any]:
+    """The answer as data that JSON can hold."""
+    effects = [
+        {
+            "name": e.name,
+            "block": e.block,
+            "parameters": {
+                k: {"value": v.value, "low": v.low, "high": v.high, "unit": v.unit}
+                for k, v in e.parameters.items()
+            },
+            "held_out_share": e.held_out_share,
+            "alternatives": list(e.alternatives),
+        }
+        for e in said.effects
+    ]
+    fit = said.fit if brought is None else said.fit | {"brought": brought.as_data()}
+    data = {
+        "loop": c.spec.loop,
+        "verdict": said.verdict,
+        "block": said.block,
+        "effects": effects,
+        "where": said.where,
+        "fit": fit,
+        "moved": said.moved,
+        "remaining": said.remaining,
+        "reason": f"{reason_of(said)} {c.shortened}".strip(),
+    }
+    return json_ready(data)
+
+
+def reason_of(said: Answer) -> str:
+    """The verdict in words, with what the recording lacks."""
+    if said.verdict == "unexplained":
+        return unexplained_reason(said)
+    caution = f" The figures are rough: it {said.caution}." if said.caution else ""
+    return sentence(said) + caution
+
+
+def json_ready(x: Any) -> Any:
+    """The same with numbers that JSON knows: no NaN, no infinity, no numpy types."""
+    if isinstance(x, dict):
+        return {str(k): json_ready(v) for k, v in x.items()}
+    if isinstance(x, list | tuple):
+        return [json_ready(v) for v in x]
+    if isinstance(x, np.generic):
+        x = x.item()
+    if isinstance(x, float):
+        return float(f"{x:.6g}") if math.isfinite(x) else None
+    return x
+
+
+def abstained(loop: str, reason: str) -> dict[str, Any]:
+    """The answer where the question cannot be answered from the record."""
+    return {
+        "loop": loop,
+        "verdict": "unexplained",
+        "block": "none",
+        "effects": [],
+        "where": {},
+        "fit": {},
+        "moved": {},
+        "remaining": None,
+        "reason": reason,
+    }

@@ -1,0 +1,145 @@
+"""From an export's loop to a case to be explained: one clock, the telling stretch, controller and neighbours."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from analyzer.config import Config
+from analyzer.history.series import Series
+from analyzer.loops.spec import LoopSpec
+from analyzer.loops.tags import controller
+from analyzer.quality import Prepared, onto_clock, prepare
+from identification.controller.check import StatedSettings
+from identification.errors import InputError, NotAssessedError
+from identification.mismatch.recording import Recording
+from identification.record import Floats
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """One loop of an export, ready to be explained: its record, the subject made of it, and what was left aside."""
+
+    spec: LoopSpec
+    prepared: Prepared
+    subject: Recording
+    shortened: str = ""
+
+
+def loop_of(specs: tuple[LoopSpec, ...], tag: str) -> LoopSpec:
+    """The row of one loop.
+
+    Raises
+    ------
+    InputError
+        There is none of that name.
+    """
+    for spec in specs:
+        if spec.loop == tag:
+            return spec
+    known = ", ".join(s.loop for s in specs[:6])
+    raise InputError(f"no loop {tag}", f"one of {known}", "check --loop and --loops")
+
+
+def stated_law(spec: LoopSpec, prepared: Prepared) -> StatedSettings | None:
+    """The controller as stated, integral time in samples; None where it is not known or is no PI."""
+    pid = controller(spec, prepared.scale.span)
+    if pid is None or pid.td_s > 0 or not math.isfinite(pid.ti_s):
+        return None
+    dt_s = prepared.record.dt_s
+    return StatedSettings(pid.kp, pid.ti_s / dt_s, dt_s / (spec.scan_s or dt_s))
+
+
+def neighbours(
+    spec: LoopSpec, specs: tuple[LoopSpec, ...], series: Mapping[str, Series], p: Prepared
+) -> tuple[Floats, ...]:
+    """OPs of the export's other loops on this loop's clock."""
+    r = p.record
+    clock = r.start_s + r.time_s
+    out = []
+    for other in specs:
+        if other.loop != spec.loop and other.op and other.op in series:
+            op, gap = onto_clock(series[other.op], clock, r.dt_s, Config().quality)
+            if not gap.all() and float(np.ptp(op)) > 0:
+                out.append(op)
+    return tuple(out)
+
+
+def snapped(series: dict[str, Series], pv: str) -> dict[str, Series]:
+    """The same samples with stamps that scatter by less than half a sample put onto PV's uniform clock.
+
+    Holding values on a clock would repeat or lose a sample wherever a stamp is a little late.
+    """
+    stamp = series[pv].stamp_s
+    if stamp.size < 3:
+        return series
+    spacing = float(np.median(np.diff(stamp)))
+    index = np.concatenate(([0.0], np.cumsum(np.maximum(np.round(np.diff(stamp) / spacing), 1.0))))
+    dt, start = (float(v) for v in np.polyfit(index, stamp - stamp[0], 1))
+    out = {}
+    for tag, x in series.items():
+        at = np.round((x.stamp_s - stamp[0] - start) / dt)
+        near = bool(np.max(np.abs(x.stamp_s - stamp[0] - start - at * dt), initial=0.0) < 0.49 * dt)
+        if not near or (x.stamp_s.size > 1 and float(np.diff(at).min()) < 1.0):
+            return series
+        out[tag] = Series(stamp[0] + at * dt, x.value, x.bad, x.text)
+    return out
+
+
+MOST_SAMPLES, STRETCH_SAMPLES = 40_000, 15_000
+"""Samples up to which a recording is explained whole, and length of the most telling stretch of a longer one; ours:
+20 s of processor time either way, for a long recording holds more that asks for an effect."""
+
+
+def telling_stretch(prepared: Prepared, most: int | None) -> tuple[Prepared, str]:
+    """The stretch in which OP travels most of a recording of more than so many samples, and a sentence on it."""
+    r = prepared.record
+    if most is None or len(r) <= most:
+        return prepared, ""
+    most = min(most, STRETCH_SAMPLES)
+    travel = np.concatenate(([0.0], np.cumsum(np.abs(np.diff(r.op)))))
+    first = int(np.argmax(travel[most - 1 :] - travel[: len(r) - most + 1]))
+    days = f"{most * r.dt_s / 86400:.1f} of {len(r) * r.dt_s / 86400:.1f} days"
+    said = f"Judged on {most} of {len(r)} samples, the {days} in which OP moves most."
+    return replace(prepared, record=r.span(first, first + most)), said
+
+
+def case(
+    spec: LoopSpec,
+    specs: tuple[LoopSpec, ...],
+    series: dict[str, Series],
+    config: Config,
+    most: int | None = MOST_SAMPLES,
+) -> Case:
+    """Prepare one loop; of a recording of more than `most` samples the most telling stretch, None for all.
+
+    Raises
+    ------
+    NotAssessedError
+        Where PV or OP is missing or never moves.
+    """
+    raw = series[spec.pv or ""]
+    series = snapped(series, spec.pv or "")
+    prepared, shortened = telling_stretch(prepare(spec, series, config.quality), most)
+    r = prepared.record
+    if not prepared.op_known:
+        raise NotAssessedError(f"{spec.loop}: needs OP, has none")
+    if float(np.ptp(r.op)) == 0 or float(np.ptp(r.pv)) == 0:
+        raise NotAssessedError(f"{spec.loop}: needs OP and PV that move, one of them stands still")
+    stamps = raw.stamp_s[~raw.bad]
+    subject = Recording(
+        None if r.sp_estimated else r.sp,
+        r.pv,
+        r.op,
+        ~(r.bad | r.mask("gap")),
+        r.dt_s,
+        stamps[(stamps >= r.start_s - r.dt_s) & (stamps <= r.start_s + r.duration_s)],
+        stated_law(spec, prepared),
+        not prepared.scale.recorded,
+        neighbours(spec, specs, series, prepared),
+        spec.type.strip().lower(),
+    )
+    return Case(spec, prepared, subject, shortened)
