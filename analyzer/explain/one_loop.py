@@ -14,7 +14,8 @@ from analyzer.explain.saved_model import saved_model
 from analyzer.explain.user_model import Brought, judged
 from analyzer.explain.views import Views, views
 from identification.mismatch.answer import Answer, answer
-from identification.mismatch.diagnosis import Explanation, explain
+from identification.mismatch.diagnosis import explain
+from identification.mismatch.explanation import Explanation
 from identification.mismatch.model_file import constants
 from identification.record import Floats
 from identification.simulation.parameters import Slot, neutral

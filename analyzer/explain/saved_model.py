@@ -14,7 +14,8 @@ from analyzer.explain.case import Case
 from analyzer.quality import Scale
 from identification.errors import InputError
 from identification.mismatch.answer import Answer
-from identification.mismatch.diagnosis import Explanation, transmitter_end
+from identification.mismatch.diagnosis import transmitter_end
+from identification.mismatch.explanation import Explanation
 from identification.mismatch.model_file import carried, carried_closed, constants, to_data
 from identification.record import Floats
 

@@ -8,7 +8,8 @@ from typing import Any
 
 from identification.estimation.limits import HELD_OUT
 from identification.mismatch.cross_validation import Misfit, misfit
-from identification.mismatch.diagnosis import Explanation, restored
+from identification.mismatch.diagnosis import restored
+from identification.mismatch.explanation import Explanation
 from identification.mismatch.identifiability import unanswered
 from identification.mismatch.model_file import carried, constants
 from identification.mismatch.recording import Recording

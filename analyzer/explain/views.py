@@ -16,7 +16,7 @@ from identification.mismatch.cross_validation import anchored
 from identification.mismatch.curves.controller import by_stated_law
 from identification.mismatch.curves.drawn import Drawing, Shape
 from identification.mismatch.curves.stretches import busiest
-from identification.mismatch.diagnosis import Explanation
+from identification.mismatch.explanation import Explanation
 from identification.mismatch.location.features import Group, groups
 from identification.mismatch.location.locate import Located, profile
 from identification.mismatch.location.where import located_in, won_over

@@ -12,8 +12,9 @@ from identification.estimation.covariance import half_width
 from identification.estimation.prediction_error import Fitted, Problem, deviations
 from identification.mismatch.catalogue import EFFECTS, fault
 from identification.mismatch.cross_validation import HeldOut, Misfit, held_out, misfit
-from identification.mismatch.diagnosis import Explanation, alternatives, restored
+from identification.mismatch.diagnosis import alternatives, restored
 from identification.mismatch.effect import exact
+from identification.mismatch.explanation import Explanation
 from identification.mismatch.identifiability import INSENSITIVE, uninformed
 from identification.mismatch.location.locate import Located
 from identification.mismatch.location.where import located_in, where_of

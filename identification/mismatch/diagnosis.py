@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -12,8 +12,9 @@ from identification.estimation.limits import CEILING_PENALTY, CEILING_SHARE, FUL
 from identification.estimation.prediction_error import Fitted, Model, Problem, descend, gain
 from identification.mismatch import recording_faults
 from identification.mismatch.catalogue import CANDIDATES, CONTROLLER_FAULTS, EFFECTS, RECORDER_FAULTS, fault
-from identification.mismatch.cross_validation import HeldOut, held_out, is_one_move, passes
+from identification.mismatch.cross_validation import held_out, is_one_move, passes
 from identification.mismatch.effect import Ends
+from identification.mismatch.explanation import Explanation
 from identification.mismatch.forward_selection import (
     Candidate,
     Clip,
@@ -31,34 +32,6 @@ from identification.record import Floats, Mask
 from identification.simulation.effect import Variant
 from identification.simulation.open_loop import ModelInputs
 from identification.simulation.parameters import Slot, neutral
-
-
-@dataclass(frozen=True, slots=True)
-class Explanation:
-    """What was found.
-
-    recorder, controller : what was found about them; p : the problem that the fits solve; plain, best : fits without
-    and with the effects; accepted : the candidates taken, in order; before : the fit to which each was added; first :
-    the candidates of the first round; law : the control law recovered; late_s : PV's lateness that was taken out [s];
-    left : gain of a flexible model beyond its least, 0 where nothing is left; proof : plain and best on held-out
-    data; refuted : names of effects that explain the fitted part and not the rest; unproven : whether OP moved once,
-    so that nothing is left to prove the effects on.
-    """
-
-    p: Problem = field(repr=False)
-    plain: Fitted
-    best: Fitted
-    accepted: tuple[Candidate, ...] = ()
-    before: tuple[Fitted, ...] = ()
-    first: tuple[Candidate, ...] = ()
-    recorder: Finding | None = None
-    controller: Finding | None = None
-    law: ControlLaw | None = None
-    late_s: float = 0.0
-    left: float = 0.0
-    proof: HeldOut | None = None
-    refuted: tuple[str, ...] = ()
-    unproven: bool = False
 
 
 def recorder_finding_of(s: Recording) -> Finding | None:

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from identification.estimation.prediction_error import Fitted, Problem, loss_of, residual_fit
+from identification.mismatch.explanation import Explanation
+from identification.mismatch.recording import Recording
 from identification.simulation.parameters import Slot
-
-if TYPE_CHECKING:
-    from identification.mismatch.diagnosis import Explanation
-    from identification.mismatch.recording import Recording
 
 ANSWERS = 12.5
 """Log likelihood [nat] that OP must bring for PV to answer it; ours: chance brings three constants under 8.5 in 999

@@ -18,12 +18,8 @@ from identification.controller.check import judge
 from identification.estimation.prediction_error import Model, descend, gain
 from identification.mismatch.answer import answer
 from identification.mismatch.catalogue import CANDIDATES
-from identification.mismatch.diagnosis import (
-    Explanation,
-    controller_finding_of,
-    inputs_of,
-    recorder_finding_of,
-)
+from identification.mismatch.diagnosis import controller_finding_of, inputs_of, recorder_finding_of
+from identification.mismatch.explanation import Explanation
 from identification.mismatch.forward_selection import Candidate, prepared
 from identification.models import Backlash, Fopdt, Loop, Pid
 from identification.simulation.closed_loop import closed_loop

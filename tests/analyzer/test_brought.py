@@ -13,7 +13,8 @@ from analyzer.explain.saved_model import read_model, scale_of
 from analyzer.explain.user_model import compared, judged, within, wrong_units
 from analyzer.quality import Scale
 from identification.errors import InputError
-from identification.mismatch.diagnosis import Explanation, inputs_of
+from identification.mismatch.diagnosis import inputs_of
+from identification.mismatch.explanation import Explanation
 from identification.mismatch.forward_selection import prepared
 from identification.mismatch.recording import Recording
 from identification.models import Fopdt, Loop, Pid

@@ -4,20 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from identification.estimation.noise import whitened
+from identification.estimation.prediction_error import Fitted, Problem
+from identification.mismatch.explanation import Explanation
 from identification.mismatch.location.locate import Feature, Located, located
+from identification.mismatch.recording import Recording
 from identification.record import Floats, Mask
 from identification.simulation.open_loop import simulate
 from identification.simulation.parameters import Slot
-
-if TYPE_CHECKING:
-    from identification.estimation.prediction_error import Fitted, Problem
-    from identification.mismatch.diagnosis import Explanation
-    from identification.mismatch.recording import Recording
 
 PARTS = 40
 """Parts of the record that spans are made of."""

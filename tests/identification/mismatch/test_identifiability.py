@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from identification.mismatch.answer import answer
-from identification.mismatch.diagnosis import Explanation, inputs_of
+from identification.mismatch.diagnosis import inputs_of
+from identification.mismatch.explanation import Explanation
 from identification.mismatch.forward_selection import prepared
 from identification.mismatch.identifiability import ANSWERS, brings, too_short, unanswered, uninformed
 from identification.mismatch.recording import Recording

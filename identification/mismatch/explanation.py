@@ -1,0 +1,39 @@
+"""What was found in one recording: fits without and with effects, in which order, and how they are proven."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from identification.controller.pi_regression import ControlLaw
+from identification.estimation.prediction_error import Fitted, Problem
+from identification.mismatch.cross_validation import HeldOut
+from identification.mismatch.forward_selection import Candidate
+from identification.mismatch.recording import Finding
+
+
+@dataclass(frozen=True, slots=True)
+class Explanation:
+    """What was found.
+
+    recorder, controller : what was found about them; p : the problem that the fits solve; plain, best : fits without
+    and with the effects; accepted : the candidates taken, in order; before : the fit to which each was added; first :
+    the candidates of the first round; law : the control law recovered; late_s : PV's lateness that was taken out [s];
+    left : gain of a flexible model beyond its least, 0 where nothing is left; proof : plain and best on held-out
+    data; refuted : names of effects that explain the fitted part and not the rest; unproven : whether OP moved once,
+    so that nothing is left to prove the effects on.
+    """
+
+    p: Problem = field(repr=False)
+    plain: Fitted
+    best: Fitted
+    accepted: tuple[Candidate, ...] = ()
+    before: tuple[Fitted, ...] = ()
+    first: tuple[Candidate, ...] = ()
+    recorder: Finding | None = None
+    controller: Finding | None = None
+    law: ControlLaw | None = None
+    late_s: float = 0.0
+    left: float = 0.0
+    proof: HeldOut | None = None
+    refuted: tuple[str, ...] = ()
+    unproven: bool = False
