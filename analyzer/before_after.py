@@ -13,6 +13,7 @@ from enum import StrEnum
 import numpy as np
 
 from analyzer.block_bootstrap import Difference, difference
+from analyzer.columns.table import BY_NAME
 from analyzer.spans import HOUR_S, Hours, Span, gridded, mean
 
 
@@ -20,9 +21,9 @@ from analyzer.spans import HOUR_S, Hours, Span, gridded, mean
 class Measure:
     """A figure that is compared.
 
-    least : differences below this, in the figure's unit, are none; scale : factor from the hourly mean to
-    the unit shown; primary : one of the study's four; lower_is_better, largest : which way is better, and
-    its upper end.
+    name : its column in the table of hours; least : differences below this, in the figure's unit, are none; scale :
+    factor from the hourly mean to the unit shown, which is that of the column where scaled_unit is ''; primary : one
+    of the study's four; lower_is_better, largest : which way is better, and its upper end.
     """
 
     name: str
@@ -31,12 +32,28 @@ class Measure:
     scale: float = 1.0
     lower_is_better: bool = True
     largest: float = np.inf
+    scaled_unit: str = ""
+
+    @property
+    def title(self) -> str:
+        """The column's title."""
+        return BY_NAME[self.name].title
+
+    @property
+    def short_title(self) -> str:
+        """The title without what it says in brackets."""
+        return self.title.split(" (")[0]
+
+    @property
+    def unit(self) -> str:
+        """The unit that it is shown in."""
+        return self.scaled_unit or BY_NAME[self.name].unit
 
 
 MEASURES = (
     Measure("average_absolute_error_pct", 0.005, primary=True),
     Measure("valve_travel_pct_per_h", 0.2, primary=True),
-    Measure("oscillation_significance", 0.1, primary=True, scale=24.0),
+    Measure("oscillation_significance", 0.1, primary=True, scale=24.0, scaled_unit="% h a day"),
     Measure("variability_pct", 0.01, primary=True),
     Measure("reversals_per_h", 0.5),
     Measure("crossings_per_h", 0.5),

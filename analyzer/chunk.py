@@ -15,8 +15,7 @@ import pyarrow as pa
 
 from analyzer.advice import Advice, advise
 from analyzer.assess import Assessment, assess
-from analyzer.assessments import Assessments
-from analyzer.columns import ALL_COLUMNS, TEXT_COLUMNS
+from analyzer.columns.table import HOURS, NIGHTS
 from analyzer.config import Config
 from analyzer.history.export import Export
 from analyzer.history.series import Series
@@ -35,7 +34,6 @@ from tuning.recommend import Action
 
 HISTORY: dict[str, Action] = {"none": "none", "load": "none"}
 """Actions of nights that are not the last: settings are advised on for tomorrow, not for the week before."""
-HOUR_COLUMNS = ("loop", "night", "hour_s", "oscillation_significance", "oscillating_pct")
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,15 +151,14 @@ def lose(task: Task, reason: str) -> Done:
 def _write_pieces(task: Task, night: str, rows: list[dict[str, Any]], found: list[Assessment]) -> None:
     """The piece of the table of nights comes last: where it is, the chunk is whole."""
     hours = [row for a in found for row in hour_rows(a, night)]
-    columns = (*HOUR_COLUMNS, *Assessments(0.0).as_row())
     if hours:
-        write_table(rows_table(hours, columns, ("loop", "night")), task.store.part(night, "hours", task.key))
+        write_table(rows_table(hours, HOURS), task.store.part(night, "hours", task.key))
     if found:
         write_table(_trend_table(found), task.store.part(night, "trends", task.key))
     prints = [a.print for a in found if a.print is not None]
     if prints:
         write_table(_print_table(prints), task.store.part(night, "prints", task.key))
-    write_table(rows_table(rows, ALL_COLUMNS, TEXT_COLUMNS), task.store.part(night, "nights", task.key))
+    write_table(rows_table(rows, NIGHTS), task.store.part(night, "nights", task.key))
 
 
 def _trend_table(found: Sequence[Assessment]) -> pa.Table:

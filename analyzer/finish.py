@@ -13,7 +13,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from analyzer.columns import ALL_COLUMNS, TEXT_COLUMNS
+from analyzer.columns.table import BY_NAME, NIGHTS
 from analyzer.config import Config
 from analyzer.plantwide import Fingerprint, Peer, trace
 from analyzer.present import follower_row, root_row
@@ -109,14 +109,18 @@ def finish_night(
     for name, piece in pieces.items():
         before = None if replace else store.read_if_there(name, night)
         store.write(name, night, _joined(before, piece, mine))
-    store.write("nights", night, rows_table(joined, ALL_COLUMNS, TEXT_COLUMNS))
+    store.write("nights", night, rows_table(joined, NIGHTS))
     store.forget_explained(night, None if replace else mine)
     return _told(night, rows, old, kept, beside)
 
 
 def _known(store: Store, night: str) -> dict[str, Row]:
+    """The rows that the store has of a night, without columns that another version wrote."""
     table = store.read_if_there("nights", night)
-    return {} if table is None else {r["loop"]: r for r in table.to_pylist()}
+    if table is None:
+        return {}
+    declared = table.select([c for c in table.column_names if c in BY_NAME])
+    return {r["loop"]: r for r in declared.to_pylist()}
 
 
 def _joined(before: pa.Table | None, piece: pa.Table | None, mine: Sequence[str]) -> pa.Table | None:

@@ -6,7 +6,8 @@ import json
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from analyzer.units import gain_unit
+from analyzer.columns.table import BY_NAME
+from analyzer.units import duration, gain_unit
 
 if TYPE_CHECKING:
     from analyzer.advice import Advice
@@ -16,37 +17,40 @@ CAUSE_STYLES = {"valve": "red", "tuning": "yellow", "load": "cyan", "undecided":
 """Colours of causes on the terminal."""
 
 
-def _period(seconds: float) -> str:
-    if seconds < 120:
-        return f"{seconds:.3g} s"
-    return f"{seconds / 60:.3g} min" if seconds < 7200 else f"{seconds / 3600:.3g} h"
+SHOWN = (
+    *(
+        "loop",
+        "oscillation_significance",
+        "oscillating_pct",
+        "osc_valve_pct",
+        "osc_tuning_pct",
+        "osc_load_pct",
+    ),
+    *("average_absolute_error_pct", "valve_travel_pct_per_h", "period_s", "kp", "ti", "action", "reason"),
+)
+"""Columns for people, in their order; new settings stand in the cells of the old ones."""
+WHOLE = frozenset({"oscillating_pct", "osc_valve_pct", "osc_tuning_pct", "osc_load_pct"})
+"""Shares that are shown without decimals."""
+WITH_UNITS = frozenset({"period_s", "kp", "ti"})
+"""Numbers that are shown with their units, and so as texts."""
 
 
 def brief(row: Mapping[str, Any]) -> dict[str, str]:
-    """A row for the terminal: figures in few characters, settings as old and new in one cell."""
-    period = row["period_s"]
-    return {
-        "Loop": row["loop"],
-        "Signif.": figure(row["oscillation_significance"], ""),
-        "Osc %": figure(row["oscillating_pct"], "oscillating_pct"),
-        "Valve %": figure(row["osc_valve_pct"], "osc_valve_pct"),
-        "Tuning %": figure(row["osc_tuning_pct"], "osc_tuning_pct"),
-        "Load %": figure(row["osc_load_pct"], "osc_load_pct"),
-        "Error %": figure(row["average_absolute_error_pct"], ""),
-        "Travel %/h": figure(row["valve_travel_pct_per_h"], ""),
-        "Period": _period(period) if period else "",
-        "Kp": _settings(row["kp"], row["kp_new"], gain_unit(row.get("gain_unit"), row.get("pv_unit"))),
-        "Ti": _settings(row["ti"], row["ti_new"], row.get("ti_unit") or ""),
-        "Action": row["action"] or "",
-        "Reason": row["reason"] or "",
+    """A row for people, by column: figures in few characters, settings as old and new in one cell."""
+    gain = gain_unit(row.get("gain_unit"), row.get("pv_unit"))
+    special = {
+        "period_s": duration(row["period_s"]),
+        "kp": _settings(row["kp"], row["kp_new"], gain),
+        "ti": _settings(row["ti"], row["ti_new"], row.get("ti_unit") or ""),
     }
+    return {name: special[name] if name in special else figure(row[name], name) for name in SHOWN}
 
 
 def _settings(now: float | None, new: float | None, unit: str) -> str:
     """A setting and what to make of it, with its unit; empty where it is not known."""
     if now is None:
         return ""
-    return f"{figure(now, '')} {unit}" if new is None else f"{figure(now, '')} -> {figure(new, '')} {unit}"
+    return f"{figure(now)} {unit}" if new is None else f"{figure(now)} -> {figure(new)} {unit}"
 
 
 def _strongest(row: Mapping[str, Any], cause: str) -> str:
@@ -67,7 +71,7 @@ def _valve(row: Mapping[str, Any]) -> str:
 def reason_of(row: Mapping[str, Any], needs: str = "") -> str:
     """One sentence on what was found and why."""
     oscillates = (row["oscillating_pct"] or 0.0) >= 50.0 and row["period_s"]
-    cycle = f"cycles with {_period(row['period_s'])}" if oscillates else "does not oscillate"
+    cycle = f"cycles with {duration(row['period_s'])}" if oscillates else "does not oscillate"
     cause = row["cause"]
     if cause == "valve":
         return f"{cycle}; {_valve(row)}"
@@ -129,7 +133,7 @@ def follower_row(row: Mapping[str, Any], source: Source) -> dict[str, Any]:
         "advice": f"Look at {source.loop} first.",
         "signs": json.dumps(signs),
     }
-    changed["reason"] = f"cycles with {_period(row['period_s'])}; {text}"
+    changed["reason"] = f"cycles with {duration(row['period_s'])}; {text}"
     return changed
 
 
@@ -139,13 +143,13 @@ def root_row(row: Mapping[str, Any], followers: Sequence[str]) -> dict[str, Any]
     return {**row, "reason": f"{row['reason']}; also moves {names}: fix this one first"}
 
 
-def figure(value: Any, column: str) -> str:
+def figure(value: Any, column: str = "") -> str:
     """A cell for people: three digits, empty where not known."""
     if value is None:
         return ""
     if isinstance(value, str):
         return value
-    if column.endswith("_pct") and column.startswith("osc"):
+    if column in WHOLE:
         return f"{value:.0f}"
     return f"{value:.3g}" if abs(value) < 1000 else f"{value:.0f}"
 
@@ -154,10 +158,8 @@ def markdown_table(rows: Sequence[Mapping[str, Any]]) -> str:
     """Rows for people as a Markdown table: figures in few characters, settings with their units."""
     from reports.markdown import escaped
 
-    shown = [brief(row) for row in rows]
-    names = tuple(shown[0]) if shown else ("Loop",)
-    head = "| " + " | ".join(names) + " |"
+    names = SHOWN if rows else SHOWN[:1]
+    head = "| " + " | ".join(BY_NAME[name].heading for name in names) + " |"
     rule = "|" + "|".join("---" for _ in names) + "|"
-    return "\n".join(
-        [head, rule, *("| " + " | ".join(map(escaped, cells.values())) + " |" for cells in shown)]
-    )
+    body = ["| " + " | ".join(map(escaped, brief(row).values())) + " |" for row in rows]
+    return "\n".join([head, rule, *body])

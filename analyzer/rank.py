@@ -8,22 +8,14 @@ import json
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from analyzer.columns import RANK_COLUMNS, TEXT_COLUMNS
+from analyzer.columns.ranking import LISTED, RANKING
+from analyzer.columns.table import BY_NAME, names
 from analyzer.store import Store
 from identification.errors import InputError
 from reports.tables import harmless
 
-LIST_COLUMNS = (
-    *RANK_COLUMNS,
-    "area",
-    "description",
-    "importance",
-    "form",
-    "gain_unit",
-    "ti_unit",
-    "pv_unit",
-    "advice",
-)
+SORTABLE = names(RANKING)
+LIST_COLUMNS = names((*RANKING, *LISTED))
 """Columns of CSV and JSON: the contract's, then what says in which units settings stand, and the advice in full."""
 
 Row = Mapping[str, Any]
@@ -39,16 +31,16 @@ def ranked(
     InputError
         Where there is no such store, night or column.
     """
-    if column not in RANK_COLUMNS:
-        raise InputError(f"column {column!r}", "one of " + ", ".join(RANK_COLUMNS), "correct --by")
+    if column not in SORTABLE:
+        raise InputError(f"column {column!r}", "one of " + ", ".join(SORTABLE), "correct --by")
     name = night or store.require()
     rows = store.read("nights", name, LIST_COLUMNS).to_pylist()
     known = [r for r in rows if r[column] not in (None, "")]
     others = sorted((r for r in rows if r[column] in (None, "")), key=lambda r: r["loop"])
-    if column in TEXT_COLUMNS:
-        known.sort(key=lambda r: (r[column], r["loop"]))
-    else:
+    if BY_NAME[column].is_number:
         known.sort(key=lambda r: (r[column] if ascending else -r[column], r["loop"]))
+    else:
+        known.sort(key=lambda r: (r[column], r["loop"]))
     return (known + others)[:top], name
 
 
@@ -92,18 +84,20 @@ def as_table(rows: Sequence[Row], night: str) -> str:
     from rich.table import Table
     from rich.text import Text
 
-    from analyzer.present import CAUSE_STYLES, brief
+    from analyzer.present import CAUSE_STYLES, SHOWN, WITH_UNITS, brief
 
     table = Table(
         box=SIMPLE_HEAD, title=f"Night {night}", title_justify="left", pad_edge=False, padding=(0, 1, 0, 0)
     )
-    shown = [brief(r) for r in rows]
-    for name in shown[0] if shown else ():
-        texts = name in ("Loop", "Action", "Reason", "Period", "Kp", "Ti")
-        table.add_column(name, justify="left" if texts else "right", no_wrap=name != "Reason")
-    for r, cells in zip(rows, shown, strict=True):
-        style = CAUSE_STYLES.get(r["cause"], "")
-        table.add_row(*(Text(text, style=style if name == "Loop" else "") for name, text in cells.items()))
+    for column in (BY_NAME[name] for name in SHOWN) if rows else ():
+        right = column.is_number and column.name not in WITH_UNITS
+        table.add_column(
+            column.heading, justify="right" if right else "left", no_wrap=column.name != "reason"
+        )
+    for row in rows:
+        style = CAUSE_STYLES.get(row["cause"], "")
+        cells = brief(row).items()
+        table.add_row(*(Text(text, style=style if name == "loop" else "") for name, text in cells))
     console = Console(width=None if _interactive() else 180)
     with console.capture() as capture:
         console.print(table)

@@ -8,7 +8,7 @@ from typing import Any
 
 from analyzer.assess import Assessment
 from analyzer.cause import Verdict
-from analyzer.columns import ALL_COLUMNS
+from analyzer.columns.table import HOURS, row_of
 from analyzer.loops.spec import LoopSpec
 from identification.estimation.hammerstein import Fit
 from identification.estimation.window import Window
@@ -22,23 +22,22 @@ NOT_SHOWN = (
 
 def empty_row(spec: LoopSpec, night: str) -> dict[str, Any]:
     """A row in which nothing but the loop's own facts is known."""
-    row: dict[str, Any] = dict.fromkeys(ALL_COLUMNS)
-    row.update(
-        loop=spec.loop,
-        type=spec.type,
-        area=spec.area,
-        description=spec.description,
-        pv_unit=spec.pv_unit,
-        importance=spec.importance,
-        kp=spec.kp,
-        ti=spec.ti,
-        form=str(spec.form),
-        gain_unit=spec.gain_unit,
-        ti_unit=spec.ti_unit,
-        extra=json.dumps(dict(spec.extra)),
-        night=night,
-    )
-    return row
+    known = {
+        "loop": spec.loop,
+        "type": spec.type,
+        "area": spec.area,
+        "description": spec.description,
+        "pv_unit": spec.pv_unit,
+        "importance": spec.importance,
+        "kp": spec.kp,
+        "ti": spec.ti,
+        "form": str(spec.form),
+        "gain_unit": spec.gain_unit,
+        "ti_unit": spec.ti_unit,
+        "extra": json.dumps(dict(spec.extra)),
+        "night": night,
+    }
+    return row_of(known)
 
 
 def lost_row(spec: LoopSpec, night: str, status: str, reason: str) -> dict[str, Any]:
@@ -114,7 +113,7 @@ def night_row(a: Assessment, spec: LoopSpec, night: str) -> dict[str, Any]:
     }
     if a.needs:
         row.update(dict.fromkeys(NOT_SHOWN), cause="undecided", valve_fault="undecided")
-    return {k: _finite(row.get(k)) for k in ALL_COLUMNS}
+    return {k: _finite(v) for k, v in row_of(row).items()}
 
 
 def _finite(value: Any) -> Any:
@@ -127,13 +126,16 @@ def _finite(value: Any) -> Any:
 def hour_rows(a: Assessment, night: str) -> list[dict[str, Any]]:
     """Rows of the hourly table."""
     return [
-        {
-            "loop": a.loop,
-            "night": night,
-            "hour_s": h.start_s,
-            "oscillation_significance": h.oscillation_significance,
-            "oscillating_pct": h.oscillating_pct,
-            **{k: _finite(v) for k, v in h.figures.as_row().items()},
-        }
+        row_of(
+            {
+                "loop": a.loop,
+                "night": night,
+                "hour_s": h.start_s,
+                "oscillation_significance": h.oscillation_significance,
+                "oscillating_pct": h.oscillating_pct,
+                **{k: _finite(v) for k, v in h.figures.as_row().items()},
+            },
+            HOURS,
+        )
         for h in a.hours
     ]

@@ -1,8 +1,8 @@
 """Results kept as Parquet: nights, hours, trends; written under a temporary name and renamed.
 
-STORE/nights/NIGHT.parquet   one row a loop (rows.ALL_COLUMNS)
+STORE/nights/NIGHT.parquet   one row a loop (docs/columns.md)
 STORE/hours/NIGHT.parquet    one row a loop and hour
-STORE/explained/NIGHT.parquet  one row a loop that was explained (explain_night.COLUMNS)
+STORE/explained/NIGHT.parquet  one row a loop that was explained
 STORE/trends/NIGHT.parquet   thinned trends, one row a loop and bucket
 STORE/parts/NIGHT/...        the same in pieces while a night is being worked on; a resumed run reads them
 """
@@ -11,13 +11,15 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from analyzer.columns.column import Column
+from analyzer.columns.table import require_declared
 from identification.errors import InputError
 
 TABLES = ("nights", "hours", "trends", "prints")
@@ -31,10 +33,17 @@ def write_table(table: pa.Table, path: Path) -> None:
     os.replace(temporary, path)
 
 
-def rows_table(rows: Sequence[Mapping[str, Any]], columns: Sequence[str], texts: Iterable[str]) -> pa.Table:
-    """Rows as a table with fixed types: text or 64-bit float, empty where not known."""
-    text = set(texts)
-    fields = [pa.field(c, pa.string() if c in text else pa.float64()) for c in columns]
+def rows_table(rows: Sequence[Mapping[str, Any]], columns: Sequence[Column]) -> pa.Table:
+    """Rows as a table with the types that its columns declare, empty where not known.
+
+    Raises
+    ------
+    ValueError
+        For a cell whose column is declared nowhere.
+    """
+    for row in rows:
+        require_declared(row, columns)
+    fields = [pa.field(c.name, pa.float64() if c.is_number else pa.string()) for c in columns]
     arrays = [pa.array([row.get(f.name) for row in rows], type=f.type) for f in fields]
     return pa.Table.from_arrays(arrays, schema=pa.schema(fields))
 

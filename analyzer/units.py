@@ -1,9 +1,18 @@
-"""The units of controller settings in words; no settings stand anywhere without them."""
+"""Times and controller settings in words, with their units; no settings stand anywhere without them."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from typing import Any
+
+
+def duration(seconds: float | None) -> str:
+    """A length of time in the unit that reads best."""
+    if seconds is None:
+        return ""
+    if seconds < 120:
+        return f"{seconds:.3g} s"
+    return f"{seconds / 60:.3g} min" if seconds < 7200 else f"{seconds / 3600:.3g} h"
 
 
 def gain_unit(kind: str | None, pv_unit: str | None) -> str:

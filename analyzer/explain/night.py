@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from analyzer.columns.table import EXPLAINED
 from analyzer.config import Config
 from analyzer.history.export import Export
 from analyzer.loops.spec import LoopSpec
@@ -20,7 +21,6 @@ from analyzer.workers import Died, Workers
 from identification.errors import TriageError
 
 TABLE = "explained"
-COLUMNS = ("loop", "night", "verdict", "block", "reason", "answer", "page")
 COUNTS_PCT = 50.0
 """A loop counts as oscillating from here [% of time]; contract of the ranking."""
 QUIET = ("none", "", None)
@@ -121,7 +121,7 @@ def known(store: Store, night: str) -> list[Row]:
 
 def keep(store: Store, night: str, rows: Sequence[Row]) -> None:
     """Write what is explained so far."""
-    write_table(rows_table(rows, COLUMNS, COLUMNS), store.path / TABLE / f"{night}.parquet")
+    write_table(rows_table(rows, EXPLAINED), store.path / TABLE / f"{night}.parquet")
 
 
 def run(

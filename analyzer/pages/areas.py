@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from analyzer.pages.headings import heading
 from analyzer.pages.words import number
 from reports.pages import Cell, Column, Table
 
 Row = Mapping[str, Any]
 WORST = 5
 COLUMNS = (
-    Column("area", "Area"),
+    heading("area"),
     Column("score", "Score", True, "Share of the assessed loops, by importance, that need no touch"),
     Column("loops", "Loops", True),
     Column("assessed", "Assessed", True),

@@ -7,11 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analyzer.before_after import LIMITS, MEASURES, Change, LoopComparison, Verdict, grade
+from analyzer.before_after import LIMITS, MEASURES, Change, LoopComparison, Measure, Verdict, grade
 from analyzer.loops.changes import TuningChange
+from analyzer.pages.headings import heading
 from analyzer.pages.reading import Thinned
 from analyzer.pages.trends import trend_block
-from analyzer.pages.words import KINDS, TITLES, counted, interval, number, setting, signed, stamp
+from analyzer.pages.words import KINDS, counted, interval, number, setting, signed, stamp
 from reports.pages import (
     Block,
     Cell,
@@ -57,7 +58,7 @@ GRADES = {
 
 def named(changes: Sequence[Change]) -> str:
     """Names of assessments in a sentence."""
-    names = [TITLES[c.measure.name][0].split(" (")[0].lower() for c in changes]
+    names = [c.measure.short_title.lower() for c in changes]
     return names[0] if len(names) == 1 else ", ".join(names[:-1]) + " and " + names[-1]
 
 
@@ -93,8 +94,9 @@ def _bar(change: Change, group: str) -> IntervalBar:
     ends = change.interval_pct
     low, high = ends if ends else (None, None)
     text = f"{signed(change.value_pct)} %" if ends else change.verdict.value
-    label = TITLES[change.measure.name][0].split(" (")[0]
-    return IntervalBar(group, label, change.value_pct, low, high, KINDS[change.verdict], text)
+    return IntervalBar(
+        group, change.measure.short_title, change.value_pct, low, high, KINDS[change.verdict], text
+    )
 
 
 def per_loop_chart(cases: Sequence[Case]) -> IntervalChart:
@@ -104,14 +106,13 @@ def per_loop_chart(cases: Sequence[Case]) -> IntervalChart:
     return IntervalChart("change-per-loop", "Change per loop and assessment", "% of before", bars, caption)
 
 
-def _average(cases: Sequence[Case], name: str) -> IntervalBar:
+def _average(cases: Sequence[Case], measure: Measure) -> IntervalBar:
     """Mean of the comparable loops' changes; errors of different loops taken as independent."""
-    changes = [c for case in cases for c in case.found.primary if c.measure.name == name]
+    changes = [c for case in cases for c in case.found.primary if c.measure == measure]
     known = [c for c in changes if c.verdict is not Verdict.INCOMPARABLE and c.value_pct is not None]
-    title = TITLES[name][0].split(" (")[0]
     group = counted(len(known), "loop")
     if not known:
-        return IntervalBar(group, title, None, None, None, "incomparable", "nothing comparable")
+        return IntervalBar(group, measure.short_title, None, None, None, "incomparable", "nothing comparable")
     values = np.array([c.value_pct for c in known], float)
     ends = np.array([c.interval_pct for c in known], float)
     down, up = (float(np.sqrt(((ends[:, k] - values) ** 2).sum()) / len(known)) for k in (0, 1))
@@ -119,18 +120,18 @@ def _average(cases: Sequence[Case], name: str) -> IntervalBar:
     low, high = max(mean - down, -100.0), mean + up
     verdict = Verdict.UNCLEAR if low <= 0 <= high else Verdict.BETTER if mean < 0 else Verdict.WORSE
     text = f"{signed(mean)} %"
-    return IntervalBar(group, title, mean, low, high, KINDS[verdict], text)
+    return IntervalBar(group, measure.short_title, mean, low, high, KINDS[verdict], text)
 
 
 def average_chart(cases: Sequence[Case]) -> IntervalChart:
     """Average change of all comparable loops (the study's Figure 13)."""
-    bars = tuple(_average(cases, m.name) for m in PRIMARY)
+    bars = tuple(_average(cases, m) for m in PRIMARY)
     caption = "Mean over the loops that can be compared; loops that were not better count as they are."
     return IntervalChart("average-change", "Average change", "% of before", bars, caption)
 
 
 COLUMNS = (
-    Column("loop", "Loop"),
+    heading("loop"),
     Column("assessment", "Assessment"),
     Column("unit", "Unit"),
     Column("before", "Before", True, "Mean over the usable hours before the change"),
@@ -145,13 +146,12 @@ COLUMNS = (
 
 
 def _row(change: Change, found: LoopComparison) -> tuple[Cell, ...]:
-    title, unit = TITLES[change.measure.name]
     d = change.found
     remark = "; ".join(found.reasons) or (f"follows {found.source_loop}" if found.source_loop else "")
     return (
         Cell(found.loop),
-        Cell(title),
-        Cell(unit),
+        Cell(change.measure.title),
+        Cell(change.measure.unit),
         Cell(number(d.before), d.before),
         Cell(number(d.after), d.after),
         Cell(signed(change.value_pct), change.value_pct),

@@ -8,12 +8,14 @@ from typing import Any
 
 import numpy as np
 
+from analyzer.columns.table import BY_NAME
 from analyzer.explain.agreement import agreement
 from analyzer.explain.page_words import title
+from analyzer.pages.headings import heading, headings, titled
 from analyzer.pages.reading import Thinned
 from analyzer.pages.rhythm import rhythm_plots
 from analyzer.pages.trends import trend_block
-from analyzer.pages.words import TITLES, duration, number
+from analyzer.pages.words import duration, number
 from analyzer.units import row_settings
 from identification.mismatch.words import check
 from reports.names import slug
@@ -21,23 +23,6 @@ from reports.pages import Block, Cell, Column, Facts, Line, Page, Plot, Section,
 
 Row = Mapping[str, Any]
 WEEK = 7
-COLUMNS = (
-    *("loop", "type", "area", "description", "pv_unit", "status", "reason", "action", "cause", "valve_fault"),
-    *(
-        "source_loop",
-        "osc_valve_pct",
-        "osc_tuning_pct",
-        "osc_load_pct",
-        "kp",
-        "ti",
-        "kp_new",
-        "ti_new",
-        "form",
-    ),
-    *("gain_unit", "ti_unit", "gain", "time_constant_s", "slope_pct_per_s", "dead_time_s", "backlash_pct"),
-    *("stickband_pct", "slip_jump_pct", "signs", "notes", "advice", "start_s", *TITLES),
-    *("predicted_period_s", "predicted_pv_amplitude_pct", "expected_period_s", "expected_pv_amplitude_pct"),
-)
 FIGURES = (
     *("oscillation_significance", "oscillating_pct", "average_absolute_error_pct", "variability_pct"),
     *("valve_travel_pct_per_h", "reversals_per_h", "crossings_per_h", "noise_band_pct", "harris_index"),
@@ -45,27 +30,34 @@ FIGURES = (
     *("sp_mean_pct", "pv_mean_pct", "op_mean_pct"),
 )
 MODEL = (
-    ("gain", "Gain", "% PV per % OP"),
-    ("time_constant_s", "Time constant", "s"),
-    ("slope_pct_per_s", "Gain over time constant", "% per % and s"),
-    ("dead_time_s", "Dead time", "s"),
-    ("backlash_pct", "Backlash, full width", "% of OP"),
-    ("stickband_pct", "Stickband", "% of OP"),
-    ("slip_jump_pct", "Slip jump", "% of OP"),
+    *("gain", "time_constant_s", "slope_pct_per_s", "dead_time_s"),
+    *("backlash_pct", "stickband_pct", "slip_jump_pct"),
 )
+CYCLES = (
+    ("recorded", "period_s", "pv_amplitude_pct"),
+    ("predicted by the model", "predicted_period_s", "predicted_pv_amplitude_pct"),
+    ("expected with the new settings", "expected_period_s", "expected_pv_amplitude_pct"),
+)
+COLUMNS = (
+    *("loop", "type", "area", "description", "pv_unit", "status", "reason", "action", "cause", "valve_fault"),
+    *("source_loop", "osc_valve_pct", "osc_tuning_pct", "osc_load_pct", "kp", "ti", "kp_new", "ti_new"),
+    *("form", "gain_unit", "ti_unit", "signs", "notes", "advice", "start_s", *FIGURES, *MODEL),
+    *(name for _, period, amplitude in CYCLES for name in (period, amplitude)),
+)
+"""What a loop's page reads of the table of nights."""
 
 
 def _facts(row: Row) -> Facts:
-    facts = [("Action", row["action"] or "–"), ("Cause", row["cause"] or "not assessed")]
+    facts = [titled("action", row["action"] or "–"), titled("cause", row["cause"] or "not assessed")]
     shares = [(c, row[f"osc_{c}_pct"]) for c in CAUSES]
-    facts += [(f"Confidence in {c}", f"{share:.0f} %") for c, share in shares if share is not None]
+    facts += [titled(f"osc_{c}_pct", f"{share:.0f}") for c, share in shares if share is not None]
     if row["valve_fault"] not in (None, "", "none"):
-        facts.append(("Valve fault", row["valve_fault"]))
+        facts.append(titled("valve_fault", row["valve_fault"]))
     if row["source_loop"]:
-        facts.append(("Source loop", row["source_loop"]))
+        facts.append(titled("source_loop", row["source_loop"]))
     if row["period_s"] is not None:
         facts.append(("Period", duration(row["period_s"])))
-        facts.append(("Amplitude of PV", f"{number(row['pv_amplitude_pct'])} % of span"))
+        facts.append(titled("pv_amplitude_pct", number(row["pv_amplitude_pct"])))
     if row["kp"] is not None:
         facts.append(("Settings as stated", f"{row_settings(row)} ({row['form']} form)"))
     if row["kp_new"] is not None or row["ti_new"] is not None:
@@ -101,7 +93,7 @@ def _evidence(row: Row) -> Section:
         for s in signs
     )
     blocks: list[Block] = [Table("evidence", "", columns, rows)] if rows else [Text(("No sign of a fault.",))]
-    known = [(title, f"{number(row[k])} {unit}") for k, title, unit in MODEL if row[k] is not None]
+    known = [titled(k, number(row[k])) for k in MODEL if row[k] is not None]
     if known:
         blocks.append(Facts(tuple(known)))
     if row["notes"]:
@@ -117,17 +109,9 @@ def _pv_op(thin: Thinned) -> Plot:
 
 
 HISTORY = (
-    Column("night", "Night"),
-    Column("cause", "Cause"),
-    *(
-        Column(c, t, True)
-        for c, t in (("oscillation_significance", "Signif."), ("oscillating_pct", "Osc. %"))
-    ),
-    Column("period_s", "Period", True),
-    Column("average_absolute_error_pct", "Error %", True),
-    Column("valve_travel_pct_per_h", "Travel %/h", True),
-    Column("variability_pct", "Variab. %", True),
-    Column("action", "Action", wide=True),
+    *headings("night", "cause", "oscillation_significance", "oscillating_pct", "period_s"),
+    *headings("average_absolute_error_pct", "valve_travel_pct_per_h", "variability_pct"),
+    heading("action", wide=True),
 )
 
 
@@ -151,16 +135,10 @@ def _history(rows: Sequence[Row]) -> Section:
     blocks: list[Block] = [table]
     if len(points) > 2:
         line = Line("significance", points[:, 0], points[:, 1])
-        title = "Oscillation significance over the nights"
-        blocks.insert(0, Plot("nights", title, "nights before this one", "% h", (line,)))
+        shown = BY_NAME["oscillation_significance"]
+        title = f"{shown.title} over the nights"
+        blocks.insert(0, Plot("nights", title, "nights before this one", shown.unit, (line,)))
     return Section("Over the nights", tuple(blocks))
-
-
-CYCLES = (
-    ("recorded", "period_s", "pv_amplitude_pct"),
-    ("predicted by the model", "predicted_period_s", "predicted_pv_amplitude_pct"),
-    ("expected with the new settings", "expected_period_s", "expected_pv_amplitude_pct"),
-)
 
 
 def _limit_cycle(row: Row) -> list[Section]:
@@ -170,7 +148,7 @@ def _limit_cycle(row: Row) -> list[Section]:
         return []
     columns = (
         Column("cycle", "Limit cycle"),
-        Column("period_s", "Period", True),
+        heading("period_s"),
         Column("amplitude_pct", "PV amplitude %", True),
     )
     rows = tuple((Cell(name), Cell(duration(p), p), Cell(number(a), a)) for name, p, a in known)
@@ -216,14 +194,12 @@ def page(
     index : str
         The morning page.
     explained : mapping or None
-        The night's explanation of the loop (analyzer.explain.night.COLUMNS).
+        The night's explanation of the loop (analyzer.columns.table.EXPLAINED).
     more : Page or None
         The page of that explanation, which is linked.
     """
     row = rows[-1]
-    figures = [
-        (TITLES[k][0], f"{number(row[k])} {TITLES[k][1]}".strip()) for k in FIGURES if row[k] is not None
-    ]
+    figures = [titled(k, number(row[k])) for k in FIGURES if row[k] is not None]
     sections = [
         _verdict(row),
         *_explained(explained, row),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from analyzer.pages.areas import area_table
+from analyzer.pages.headings import heading, headings
 from analyzer.pages.news import since
 from analyzer.pages.trends import sparkline
 from analyzer.pages.view import Night, Row, linked, needs_a_look, oscillates, proposal
@@ -30,21 +31,14 @@ def _cause(row: Row) -> Cell:
 
 
 WORST = (
-    Column("loop", "Loop"),
-    Column("description", "Description", wide=True),
+    heading("loop"),
+    heading("description", wide=True),
     Column("trend", "PV that night"),
-    Column(
-        "oscillation_significance",
-        "Signif.",
-        True,
-        "Oscillation significance, % h: amplitude, regularity, hours",
-    ),
-    Column("oscillating_pct", "Osc. %", True, "Share of the night in which the loop oscillates"),
-    Column("period_s", "Period", True),
+    *headings("oscillation_significance", "oscillating_pct", "period_s"),
     Column("confidence", "V T L", hint="Confidence that valve, tuning or load is the cause, %"),
-    Column("cause", "Cause"),
-    Column("action", "Action", wide=True),
-    Column("reason", "Reason", wide=True),
+    heading("cause"),
+    heading("action", wide=True),
+    heading("reason", wide=True),
 )
 
 
@@ -71,21 +65,11 @@ def worst_table(night: Night) -> Table:
     return Table("worst", "", WORST, rows, note, searchable=len(rows) > 10, facet="cause")
 
 
-ALL = (
-    Column("loop", "Loop"),
-    Column("description", "Description"),
-    Column("type", "Type"),
-    Column("area", "Area"),
-    Column("oscillation_significance", "Signif.", True),
-    Column("oscillating_pct", "Osc. %", True),
-    Column("osc_valve_pct", "Valve %", True),
-    Column("osc_tuning_pct", "Tuning %", True),
-    Column("osc_load_pct", "Load %", True),
-    Column("cause", "Cause"),
-    Column("average_absolute_error_pct", "Error %", True, "Average absolute error, % of span"),
-    Column("valve_travel_pct_per_h", "Travel %/h", True),
-    Column("variability_pct", "Variab. %", True),
-    Column("action", "Action"),
+ALL_SHARES = ("oscillating_pct", "osc_valve_pct", "osc_tuning_pct", "osc_load_pct")
+ALL_COSTS = ("average_absolute_error_pct", "valve_travel_pct_per_h", "variability_pct")
+ALL = headings(
+    *("loop", "description", "type", "area", "oscillation_significance", *ALL_SHARES, "cause", *ALL_COSTS),
+    "action",
 )
 
 
@@ -95,10 +79,6 @@ def _all_row(night: Night, row: Row) -> tuple[Cell, ...]:
     costs = tuple(_value(row, c) for c in ALL_COSTS)
     first = (linked(night, row["loop"]), *texts, _value(row, "oscillation_significance"))
     return (*first, *shares, _cause(row), *costs, Cell(row["action"] or ""))
-
-
-ALL_SHARES = ("oscillating_pct", "osc_valve_pct", "osc_tuning_pct", "osc_load_pct")
-ALL_COSTS = ("average_absolute_error_pct", "valve_travel_pct_per_h", "variability_pct")
 
 
 def ranking(night: Night) -> Table:
@@ -118,7 +98,7 @@ def _tiles(night: Night) -> Tiles:
 
 def lost_table(night: Night) -> Table:
     """Loops that were not assessed, and why."""
-    columns = (Column("loop", "Loop"), Column("status", "Status"), Column("reason", "Why", wide=True))
+    columns = (*headings("loop", "status"), heading("reason", wide=True))
     lost = sorted((r for r in night.rows if r["status"] != "ok"), key=lambda r: r["loop"])
     rows = tuple((Cell(r["loop"]), Cell(r["status"] or ""), Cell(r["reason"] or "")) for r in lost)
     return Table("not-assessed", "", columns, rows, searchable=len(rows) > 12)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from analyzer.pages.headings import heading
 from analyzer.pages.view import Night, Row, linked, oscillates, proposal
 from analyzer.pages.words import number
 from reports.pages import Block, Cell, Column, Section, Table, Text
@@ -45,11 +46,11 @@ def _significance(row: Row) -> Cell:
 
 
 NEWS = (
-    Column("loop", "Loop"),
+    heading("loop"),
     Column("news", "Since the night before"),
     Column("before", "Signif. before", True),
     Column("now", "Signif. now", True),
-    Column("action", "Action", wide=True),
+    heading("action", wide=True),
 )
 
 

@@ -16,7 +16,7 @@ from plant import CONFIG, START_S, Sketch, Trends, simulate, write_export
 
 from analyzer import batch, chunk
 from analyzer.cli import main
-from analyzer.columns import ALL_COLUMNS
+from analyzer.columns.table import NIGHTS, names
 from analyzer.history.export import Export, open_export
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import find_loops
@@ -116,7 +116,7 @@ def test_every_cell_is_a_number_or_empty(whole):
 def test_a_row_has_all_columns_and_the_cycling_loops_are_found(whole):
     """The loops with play are found with their cause; those in noise have none."""
     rows = Store(whole).read("nights", Store(whole).require()).to_pylist()
-    assert tuple(rows[0]) == ALL_COLUMNS
+    assert tuple(rows[0]) == names(NIGHTS)
     causes = {r["loop"]: r["cause"] for r in rows if r["status"] == "ok"}
     assert all(causes[f"L{k:02d}"] == "valve" for k in range(0, LOOPS, 8))
     assert {cause for loop, cause in causes.items() if int(loop[1:]) % 8} == {"none"}

@@ -15,7 +15,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from analyzer.cli import main
-from analyzer.columns import ALL_COLUMNS, TEXT_COLUMNS
+from analyzer.columns.table import NIGHTS
 from analyzer.store import Store, rows_table, write_table
 
 LOOPS = 10_000
@@ -39,7 +39,7 @@ def rows(loops: int) -> list[dict[str, object]]:
         if k % 10 == 3:
             out.append({**row, "status": "not assessed", "reason": "needs 200 good PV samples, has 12"})
             continue
-        row |= {c: float(rng.uniform(0, 50)) for c in ALL_COLUMNS if c not in TEXT_COLUMNS}
+        row |= {c.name: float(rng.uniform(0, 50)) for c in NIGHTS if c.is_number}
         cycles = k % 5 == 0
         row |= {
             "cause": "valve" if cycles else "none",
@@ -59,7 +59,7 @@ def rows(loops: int) -> list[dict[str, object]]:
 
 def written(path: Path, loops: int) -> Path:
     """A store of one night of so many loops."""
-    write_table(rows_table(rows(loops), ALL_COLUMNS, TEXT_COLUMNS), path / "nights" / f"{NIGHT}.parquet")
+    write_table(rows_table(rows(loops), NIGHTS), path / "nights" / f"{NIGHT}.parquet")
     return path
 
 
@@ -166,7 +166,7 @@ def test_json_has_numbers_and_null(small):
 def test_text_of_the_plant_does_not_break_the_markdown(tmp_path):
     """Bars, line ends and tags in a loop's name stay text in the Markdown table."""
     odd = {**rows(1)[0], "loop": "FIC|1\n<b>", "reason": "a | b"}
-    table = rows_table([odd], ALL_COLUMNS, TEXT_COLUMNS)
+    table = rows_table([odd], NIGHTS)
     write_table(table, tmp_path / "nights" / f"{NIGHT}.parquet")
     found = asked(tmp_path, "--format", "markdown").stdout.splitlines()
     assert len(found) == 3
@@ -204,7 +204,7 @@ def test_no_store_is_one_line(tmp_path):
 def test_latest_night_is_the_default(small, tmp_path):
     """Without --night the latest complete night is shown, with it the one named."""
     for night, loop in (("2026-03-01", "OLD"), ("2026-03-02", "NEW")):
-        table = rows_table([{"loop": loop, "status": "ok"}], ALL_COLUMNS, TEXT_COLUMNS)
+        table = rows_table([{"loop": loop, "status": "ok"}], NIGHTS)
         write_table(table, tmp_path / "nights" / f"{night}.parquet")
     assert Store(tmp_path).nights() == ["2026-03-01", "2026-03-02"]
     assert "NEW" in asked(tmp_path).stdout
@@ -216,7 +216,7 @@ def test_csv_starts_no_formula(tmp_path):
     for k, tag in enumerate(("=HYPERLINK(1)", "+FIC1", "-FIC2", "@FIC3")):
         odd = {**rows(1)[0], "loop": tag, "reason": tag, "gain": -4.5}
         store = tmp_path / str(k)
-        write_table(rows_table([odd], ALL_COLUMNS, TEXT_COLUMNS), store / "nights" / f"{NIGHT}.parquet")
+        write_table(rows_table([odd], NIGHTS), store / "nights" / f"{NIGHT}.parquet")
         (row,) = csv.DictReader(io.StringIO(asked(store, "--format", "csv").stdout))
         assert (row["loop"], row["reason"], row["gain"]) == (f"'{tag}", f"'{tag}", "-4.5")
 
@@ -225,7 +225,7 @@ def test_markdown_makes_no_link_and_no_picture(tmp_path):
     """Links, pictures, addresses and calls of people in tags and texts stay text in the Markdown table."""
     text = "![x](http://a.example/b) [y](javascript:z) @all www.a.example"
     odd = {**rows(1)[0], "reason": text}
-    write_table(rows_table([odd], ALL_COLUMNS, TEXT_COLUMNS), tmp_path / "nights" / f"{NIGHT}.parquet")
+    write_table(rows_table([odd], NIGHTS), tmp_path / "nights" / f"{NIGHT}.parquet")
     shown = asked(tmp_path, "--format", "markdown").stdout.splitlines()[-1]
     assert not any(live in shown for live in ("http:", "@all", "www.a"))
     assert re.search(r"(?<!\\)[!\[\]]", shown) is None
@@ -242,7 +242,7 @@ def test_settings_stand_with_their_units(tmp_path):
         "gain_unit": "band",
         "ti_unit": "min",
     }
-    write_table(rows_table([odd], ALL_COLUMNS, TEXT_COLUMNS), tmp_path / "nights" / f"{NIGHT}.parquet")
+    write_table(rows_table([odd], NIGHTS), tmp_path / "nights" / f"{NIGHT}.parquet")
     for form in ("table", "markdown"):
         shown = asked(tmp_path, "--format", form).stdout
         assert "% band" in shown

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
-from analyzer.columns import ALL_COLUMNS, TEXT_COLUMNS
+from analyzer.columns.table import HOURS, NIGHTS, row_of
 from analyzer.store import Store, rows_table, write_table
 
 NASTY = (
@@ -45,7 +45,7 @@ def _night(name: str, day: int, loops: list[str], rng: np.random.Generator) -> l
     rows = []
     for i, loop in enumerate(loops):
         cause = ("valve", "tuning", "load", "none")[i % 4] if (i + day) % 7 else "none"
-        row: dict[str, Any] = dict.fromkeys(ALL_COLUMNS)
+        row: dict[str, Any] = row_of({})
         row.update(
             {"loop": loop, "night": name, "type": "flow", "area": f"Area {i % 3}", "description": loop}
         )
@@ -110,9 +110,7 @@ def small_store(
         rows = _night(name, day, names, rng)
         if hours:
             held = _hours(name, day, names, rng)
-            write_table(
-                rows_table(held, tuple(held[0]), ("loop", "night")), path / "hours" / f"{name}.parquet"
-            )
+            write_table(rows_table(held, HOURS), path / "hours" / f"{name}.parquet")
         write_table(_trends(day, names[:60], buckets, rng), path / "trends" / f"{name}.parquet")
-        write_table(rows_table(rows, ALL_COLUMNS, TEXT_COLUMNS), path / "nights" / f"{name}.parquet")
+        write_table(rows_table(rows, NIGHTS), path / "nights" / f"{name}.parquet")
     return Store(path)
