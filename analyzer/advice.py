@@ -11,6 +11,7 @@ from analyzer import words
 from analyzer.assess import Assessment
 from analyzer.cause import Verdict
 from analyzer.config import Config
+from analyzer.decisions import Action, Cause, Fault, Lack, Needs
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import as_stated
 from analyzer.measure import Measured
@@ -23,7 +24,7 @@ from identification.models import Fopdt, Integrator, Loop, Pid, Process, Valve
 from identification.record import Floats
 from tuning.limit_cycle import Cycle, confirm
 from tuning.linear import integral_s, is_stable
-from tuning.recommend import Action, Proposal, recommend
+from tuning.recommend import Proposal, recommend
 from tuning.search import rounded, scaled_valve
 
 UNSTABLE = (
@@ -51,7 +52,8 @@ class Advice:
 
     action as in the ranking; reason in words, empty where the finding says it all; kp_new and ti_new in the
     units and form that loops.csv states, None unless action is retune; before and after, the limit cycles that
-    simulation finds at the present and at the new settings, None where there is none.
+    simulation finds at the present and at the new settings, None where there is none; lack, what the record
+    lacks where the action is to get more data.
     """
 
     action: Action
@@ -60,14 +62,15 @@ class Advice:
     ti_new: float | None = None
     before: Cycle | None = None
     after: Cycle | None = None
+    lack: Lack | None = None
 
 
 def chosen_fit(verdict: Verdict) -> Fit:
     """The fit that a verdict rests on."""
     m = _measured(verdict)
-    if verdict.cause != "valve":
+    if verdict.cause is not Cause.VALVE:
         return m.linear
-    return m.stick_slip if verdict.fault == "stiction" and m.stick_slip is not None else m.play
+    return m.stick_slip if verdict.fault is Fault.STICTION and m.stick_slip is not None else m.play
 
 
 def _measured(verdict: Verdict) -> Measured:
@@ -78,7 +81,7 @@ def _measured(verdict: Verdict) -> Measured:
 
 def valve_of(verdict: Verdict, fit: Fit) -> Valve:
     """The valve of a verdict's model, None where it is not at fault."""
-    return fit.valve.valve if verdict.cause == "valve" else None
+    return fit.valve.valve if verdict.cause is Cause.VALVE else None
 
 
 def model_of(verdict: Verdict, controller: Pid) -> Loop:
@@ -188,18 +191,23 @@ def advise(
     config : Config
     """
     kept = withheld(found, spec, controller, pv_span, config)
-    oscillation = counting(found.oscillations, config.oscillation)
+    oscillation = counting(found.oscillations)
     if kept is not None or controller is None or oscillation is None:
         return kept or Advice(_without_settings(found.verdict))
     proposal = propose(found.verdict, controller, oscillation.period_s)
-    if proposal.action == "undecided":
+    if proposal.action is Action.UNDECIDED:
         proposal = replace(proposal, action=_without_settings(found.verdict))
     return _stated(proposal, spec, pv_span)
 
 
 def _without_settings(verdict: Verdict) -> Action:
     """What is left to do where no settings are told: a valve at fault is one all the same."""
-    return "repair valve" if verdict.cause == "valve" else "undecided"
+    return Action.REPAIR_VALVE if verdict.cause is Cause.VALVE else Action.UNDECIDED
+
+
+def _lacking(needs: Needs) -> Advice:
+    """The advice to get more data, with what is lacking."""
+    return Advice(Action.NEEDS_DATA, needs.text, lack=needs.lack)
 
 
 def withheld(
@@ -208,32 +216,32 @@ def withheld(
     """Why no settings are sought for a loop, and what to do instead; None where they are sought."""
     verdict = found.verdict
     if verdict.dead:
-        return Advice("repair valve")
+        return Advice(Action.REPAIR_VALVE)
     if found.settings is not None:
-        return Advice("check settings", words.settings_differ(found.settings, spec, pv_span))
-    if found.needs:
-        return Advice("needs data", found.needs)
-    if verdict.cause in ("none", "load"):
-        return Advice("none")
-    if counting(found.oscillations, config.oscillation) is None:
-        return Advice("none", CALM)
-    if verdict.cause == "undecided":
-        return Advice("undecided")
+        return Advice(Action.CHECK_SETTINGS, words.settings_differ(found.settings, spec, pv_span))
+    if found.needs is not None:
+        return _lacking(found.needs)
+    if verdict.cause in (Cause.NONE, Cause.LOAD):
+        return Advice(Action.NONE)
+    if counting(found.oscillations) is None:
+        return Advice(Action.NONE, CALM)
+    if verdict.cause is Cause.UNDECIDED:
+        return Advice(Action.UNDECIDED)
     return _unsupported(found, controller, config)
 
 
 def _unsupported(found: Assessment, controller: Pid | None, config: Config) -> Advice | None:
     """What a loop that oscillates for its valve or its tuning lacks for new settings; None where nothing."""
     verdict, m = found.verdict, found.verdict.measured
-    if m is None or (verdict.fault == "undecided" and m.play.gain == 0):
+    if m is None or (verdict.fault is Fault.UNDECIDED and m.play.gain == 0):
         return Advice(_without_settings(verdict))
     if controller is None:
         return Advice(_without_settings(verdict), "No new settings: loops.csv states no kp and ti.")
     if found.night.usable_h < config.advice.least_h:
-        return Advice("needs data", words.too_short(found.night.usable_h, config.advice.least_h))
+        return _lacking(Needs(Lack.LONGER, words.too_short(found.night.usable_h, config.advice.least_h)))
     dt_s, samples = m.window.dt_s / m.window.factor, config.settings.ti_samples
     if dt_s > controller.ti_s / samples:
-        return Advice("needs data", words.too_thin(dt_s, controller.ti_s, samples))
+        return _lacking(Needs(Lack.FASTER, words.too_thin(dt_s, controller.ti_s, samples)))
     return None
 
 
@@ -269,31 +277,31 @@ def propose(verdict: Verdict, controller: Pid, period_s: float | None) -> Propos
     """The tuning package's proposal on the model of a verdict, on its uncertainty, and on the load it leaves."""
     window, fit = _measured(verdict).window, chosen_fit(verdict)
     loop = model_of(verdict, controller)
-    if verdict.cause not in ("valve", "tuning"):
+    if verdict.cause not in (Cause.VALVE, Cause.TUNING):
         return recommend(loop, verdict.cause, source=verdict.source)
     if loop.controller.kp * loop.process.slope <= 0.0:
         return recommend(loop, verdict.cause)
     if loop.process.dead_time_s > BEYOND_RECORD * window.duration_s:
-        return Proposal("undecided", words.beyond_record(loop.process.dead_time_s, window.duration_s))
-    if verdict.cause == "tuning":
+        return Proposal(Action.UNDECIDED, words.beyond_record(loop.process.dead_time_s, window.duration_s))
+    if verdict.cause is Cause.TUNING:
         slow = replace(loop, process=cautious(process_of(window, fit), period_s))
         others = (loop, *uncertain(window, fit, loop)[:2])
         return recommend(slow, verdict.cause, others, load_of(window, fit, controller))
     if not is_stable(loop):
-        return Proposal("undecided", UNSTABLE)
+        return Proposal(Action.UNDECIDED, UNSTABLE)
     sought, fit, others = sought_for(verdict, controller)
     rests = confirm(sought).cycle is None
     if rests and period_s is None:
-        return Proposal("none", CALM)
+        return Proposal(Action.NONE, CALM)
     if rests and math.isinf(integral_s(controller)):
-        return Proposal("check settings", NO_INTEGRAL)
+        return Proposal(Action.CHECK_SETTINGS, NO_INTEGRAL)
     return recommend(sought, verdict.cause, others, load_of(window, fit, controller))
 
 
 def _stated(proposal: Proposal, spec: LoopSpec, pv_span: float) -> Advice:
     """A proposal in the units and form of the plant's controller."""
-    cycles = [c.cycle if c is not None else None for c in (proposal.before, proposal.after)]
+    before, after = (c.cycle if c is not None else None for c in (proposal.before, proposal.after))
     if proposal.controller is None:
-        return Advice(proposal.action, proposal.reason, before=cycles[0])
+        return Advice(proposal.action, proposal.reason, before=before)
     kp, ti = as_stated(proposal.controller, spec, pv_span)
-    return Advice(proposal.action, proposal.reason, rounded(kp), rounded(ti), *cycles)
+    return Advice(proposal.action, proposal.reason, rounded(kp), rounded(ti), before, after)

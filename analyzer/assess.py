@@ -11,6 +11,7 @@ import numpy as np
 from analyzer.assessments import Assessments, Hour, assess_span, hourly, settling_time, usable
 from analyzer.cause import NO_CAUSE, Verdict, as_hint, dead_valve, judge, not_assessed, with_dead_valve
 from analyzer.config import Config, QualityLimits
+from analyzer.decisions import Cause, Lack, LacksError, Needs
 from analyzer.measure import measure, time_scale
 from analyzer.oscillation import Oscillations, barely_seen, counting, detect
 from analyzer.plantwide import Fingerprint, fingerprint
@@ -34,8 +35,8 @@ class Assessment:
     loop; start_s, duration_s of the record [s]; night, the figures of the whole span; hours, of each clock
     hour; oscillations; verdict; settings, where the controller's are not the stated ones; harris index (1: minimum
     variance) and settling time [s] where known; print, its fingerprint for the plant-wide pass; trend, thinned;
-    notes, plain sentences about the data; needs, what it takes to tell whether the loop oscillates, empty where that
-    is told.
+    notes, plain sentences about the data; needs, what the record lacks to tell whether the loop oscillates, None
+    where that is told.
     """
 
     loop: str
@@ -51,57 +52,64 @@ class Assessment:
     print: Fingerprint | None = None
     trend: Mapping[str, np.ndarray] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
-    needs: str = ""
+    needs: Needs | None = None
 
 
-def assessable(record: LoopRecord, config: Config) -> None:
-    """Raise NotAssessedError where the record cannot support an assessment; the text says what it needs."""
+def unassessable(record: LoopRecord, config: Config) -> Needs | None:
+    """What the record lacks for an assessment; None where it can support one."""
     q = config.quality
     share = float(usable(record).mean())
     if len(record) < q.samples:
-        raise NotAssessedError(f"needs {q.samples} samples, has {len(record)}")
-    if share < q.usable_share:
-        manual, bad = float(record.mask("manual").mean()), float(record.bad.mean())
-        raise NotAssessedError(
-            f"needs {100 * q.usable_share:.0f} % good samples in automatic, has {100 * share:.0f} % "
-            f"(manual {100 * manual:.0f} %, gaps and stale {100 * bad:.0f} %)"
-        )
+        return Needs(Lack.SAMPLES, f"needs {q.samples} samples, has {len(record)}")
+    if share >= q.usable_share:
+        return None
+    manual, bad = float(record.mask("manual").mean()), float(record.bad.mean())
+    return Needs(
+        Lack.AUTOMATIC if manual >= bad else Lack.SAMPLES,
+        f"needs {100 * q.usable_share:.0f} % good samples in automatic, has {100 * share:.0f} % "
+        f"(manual {100 * manual:.0f} %, gaps and stale {100 * bad:.0f} %)",
+    )
 
 
-def unfit_for_cause(prepared: Prepared, config: Config) -> str:
-    """Why no cause can be told from these trends; empty where it can."""
+def unfit_for_cause(prepared: Prepared, config: Config) -> Needs | None:
+    """What these trends lack for a cause; None where one can be told."""
     record, q = prepared.record, config.quality
     if not prepared.op_known:
-        return "needs OP, which is not recorded"
+        return Needs(Lack.OP, "needs OP, which is not recorded")
     if float(np.ptp(record.op)) == 0.0:
-        return "needs OP that moves, it stands still"
-    if prepared.compressed_share > q.straight_share:
-        return f"needs trends without compression, {100 * prepared.compressed_share:.0f} % lie on straight segments"
-    scattered = _scattered(record, q)
-    if scattered:
-        return scattered
+        return Needs(Lack.MOVING_OP, "needs OP that moves, it stands still")
+    straight = prepared.compressed_share
+    if straight > q.straight_share:
+        text = f"needs trends without compression, {100 * straight:.0f} % lie on straight segments"
+        return Needs(Lack.UNCOMPRESSED, text)
+    return _scattered(record, q) or at_limits(record, q)
+
+
+def at_limits(record: LoopRecord, q: QualityLimits) -> Needs | None:
+    """What a record lacks whose OP is at a limit for most of the time; None where it is not."""
     saturated = float(record.mask("saturated").mean())
-    if saturated > q.saturated_share:
-        return f"needs OP within its limits, it is at one for {100 * saturated:.0f} % of the time"
-    return ""
+    if saturated <= q.saturated_share:
+        return None
+    text = f"needs OP within its limits, it is at one for {100 * saturated:.0f} % of the time"
+    return Needs(Lack.OP_OFF_LIMITS, text)
 
 
-def _scattered(record: LoopRecord, q: QualityLimits) -> str:
-    """Why the good samples are too scattered for a model; '' where enough of them follow each other."""
+def _scattered(record: LoopRecord, q: QualityLimits) -> Needs | None:
+    """What good samples lack that are too scattered for a model; None where enough of them follow each other."""
     good = ~record.bad
     length = run_lengths(good.astype(np.float64))
     share = float(good[np.repeat(length >= q.run_samples, length)].sum()) / max(len(record), 1)
     if share >= q.run_share:
-        return ""
+        return None
     wanted = f"{100 * q.run_share:.0f} % of the time in runs of {q.run_samples} good samples"
-    return f"needs {wanted}, has {100 * share:.0f} %"
+    return Needs(Lack.UNBROKEN, f"needs {wanted}, has {100 * share:.0f} %")
 
 
 def cause_of(
     prepared: Prepared, found: Oscillations, controller: Pid | None, config: Config, kind: str
 ) -> Verdict:
     """The verdict on one loop by itself; abstains where the trends cannot tell."""
-    record, oscillation = prepared.record, counting(found, config.oscillation)
+    record, oscillation = prepared.record, counting(found)
     dead = dead_valve(record, config.cause) if prepared.op_known else None
     needs = unfit_for_cause(prepared, config)
     if needs or float(np.ptp(record.pv)) == 0.0:
@@ -110,10 +118,10 @@ def cause_of(
     try:
         measured = measure(record, oscillation, controller, config.cause, found.spectrum, kind)
     except NotAssessedError as error:
-        verdict = not_assessed(str(error)) if oscillation is not None else NO_CAUSE
+        verdict = not_assessed(Needs(Lack.UNBROKEN, str(error))) if oscillation is not None else NO_CAUSE
         return with_dead_valve(verdict, dead) if dead else verdict
     verdict = judge(measured, oscillation, config.cause)
-    return with_dead_valve(verdict, dead) if dead and verdict.cause != "valve" else verdict
+    return with_dead_valve(verdict, dead) if dead and verdict.cause is not Cause.VALVE else verdict
 
 
 def _known(figures: Assessments, op: bool) -> Assessments:
@@ -128,16 +136,16 @@ def _is_coarse(record: LoopRecord, controller: Pid | None, config: Config) -> bo
     return controller is not None and record.dt_s > controller.ti_s / config.settings.ti_samples
 
 
-def _hidden(record: LoopRecord, found: Oscillations, controller: Pid | None, config: Config) -> str:
-    """Why silence says nothing: cycles of the loop would be too fast for the sampling; '' where they would show."""
+def _hidden(record: LoopRecord, found: Oscillations, controller: Pid | None, config: Config) -> Needs | None:
+    """Why silence says nothing: cycles of the loop would be too fast for the sampling; None where they would show."""
     if found.first is not None:
-        return ""
+        return None
     samples = config.oscillation.samples
     period = barely_seen(found, config.oscillation)
     if period is None and controller is not None and math.isfinite(controller.ti_s):
         expected = config.advice.cycle_per_ti * controller.ti_s
         period = expected if expected < samples * record.dt_s else None
-    return "" if period is None else too_coarse(record.dt_s, period, samples)
+    return None if period is None else Needs(Lack.FASTER, too_coarse(record.dt_s, period, samples))
 
 
 def _settings(
@@ -146,13 +154,13 @@ def _settings(
     """Where the controller works with other settings than the stated ones."""
     if stated is None or not prepared.op_known:
         return None
-    scale = time_scale(prepared.record, counting(found, config.oscillation), stated)
+    scale = time_scale(prepared.record, counting(found), stated)
     return differing(prepared.record, stated, scale, config.settings)
 
 
 def _dead_time(verdict: Verdict) -> float | None:
     m = verdict.measured
-    return None if m is None else (m.play if verdict.cause == "valve" else m.linear).dead_time_s
+    return None if m is None else (m.play if verdict.cause is Cause.VALVE else m.linear).dead_time_s
 
 
 def assess(prepared: Prepared, controller: Pid | None, config: Config, kind: str = "") -> Assessment:
@@ -174,7 +182,9 @@ def assess(prepared: Prepared, controller: Pid | None, config: Config, kind: str
         Where the record cannot support it.
     """
     record = prepared.record
-    assessable(record, config)
+    lacking = unassessable(record, config)
+    if lacking is not None:
+        raise LacksError(lacking)
     found = detect(record, config.oscillation)
     settings = _settings(prepared, found, controller, config)
     verdict = cause_of(prepared, found, settings.recorded if settings else controller, config, kind)
@@ -183,7 +193,7 @@ def assess(prepared: Prepared, controller: Pid | None, config: Config, kind: str
     if night.usable_h < config.advice.least_h or _is_coarse(record, controller, config):
         verdict = as_hint(verdict, config.advice.hint_pct)
     harris = harris_index(record.error, usable(record), record.dt_s, dead_time) if dead_time else None
-    first, s = counting(found, config.oscillation), found.spectrum
+    first, s = counting(found), found.spectrum
     return Assessment(
         record.tag,
         record.start_s,

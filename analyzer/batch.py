@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 from analyzer import chunk, run_identity
 from analyzer.chunk import Done, Task, assess_loop
 from analyzer.config import Config
+from analyzer.decisions import Status
 from analyzer.finish import finish_night, is_empty
 from analyzer.history.export import Export, counted
 from analyzer.loops.changes import TuningChange
@@ -84,11 +85,10 @@ def _mourned(workers: Workers[Task, Done], died: Died[Task]) -> Iterator[Done]:
     """The loop that was in hand is tried once alone, then given up with the reason; others go to other workers."""
     task, at = died.task, died.at
     others, hand = task.specs[:at] + task.specs[at + 1 :], task.specs[at : at + 1]
-    was_alone = task.key.endswith("-alone")
     if others:
         workers.submit(replace(task, specs=others, key=f"{task.key}-{len(others)}"))
-    if died.again and not was_alone:
-        workers.submit(replace(task, specs=hand, key=f"{task.key}-alone"), alone=True)
+    if died.again and not task.alone:
+        workers.submit(replace(task, specs=hand, key=f"{task.key}-alone", alone=True), alone=True)
     else:
         yield chunk.lose(replace(task, specs=hand, key=f"{task.key}-lost"), died.why)
 
@@ -197,8 +197,10 @@ def _outcome(store: Store, nights: Sequence[Night], order: Sequence[str], notes:
     wanted = set(order)
     table = store.read("nights", nights[-1].name, ["loop", "status", "reason"]).to_pylist()
     lost = [
-        (r["loop"], r["reason"], r["status"]) for r in table if r["loop"] in wanted and r["status"] != "ok"
+        (r["loop"], r["reason"], r["status"])
+        for r in table
+        if r["loop"] in wanted and r["status"] != Status.OK
     ]
-    unassessed = tuple((loop, why) for loop, why, status in lost if status == "not assessed")
-    failed = tuple((loop, why) for loop, why, status in lost if status != "not assessed")
+    unassessed = tuple((loop, why) for loop, why, status in lost if status == Status.NOT_ASSESSED)
+    failed = tuple((loop, why) for loop, why, status in lost if status != Status.NOT_ASSESSED)
     return Outcome(tuple(nights), unassessed, failed, tuple(notes))

@@ -107,6 +107,18 @@ class Verdict(StrEnum):
     INCOMPARABLE = "not comparable"
 
 
+class Grade(StrEnum):
+    """What became of a loop, from its four verdicts."""
+
+    CLEAR = "clear"
+    MODEST = "modest"
+    PARTIAL = "partial"
+    MIXED = "mixed"
+    WORSE = "worse"
+    NONE = "none"
+    INCOMPARABLE = "incomparable"
+
+
 @dataclass(frozen=True, slots=True)
 class Change:
     """One figure before and after; percent of before, None where before is zero; why not comparable, else
@@ -244,18 +256,18 @@ def compare(
     return LoopComparison(loop, before, after, held, known, reasons, source_loop)
 
 
-def grade(found: LoopComparison, limits: Limits = LIMITS) -> str:
-    """A loop's four verdicts as one: clear, modest, partial, mixed, worse, none or incomparable."""
+def grade(found: LoopComparison, limits: Limits = LIMITS) -> Grade:
+    """A loop's four verdicts as one."""
     verdicts = [c.verdict for c in found.primary]
     better = [c for c in found.primary if c.verdict is Verdict.BETTER]
     if found.reasons or not verdicts:
-        return "incomparable"
+        return Grade.INCOMPARABLE
     if Verdict.WORSE in verdicts:
-        return "mixed" if better else "worse"
+        return Grade.MIXED if better else Grade.WORSE
     if len(better) < len(verdicts):
-        return "partial" if better else "none"
+        return Grade.PARTIAL if better else Grade.NONE
     least = min(abs(c.value_pct or np.inf) for c in better)
-    return "modest" if least < limits.modest_pct else "clear"
+    return Grade.MODEST if least < limits.modest_pct else Grade.CLEAR
 
 
 def follows(sources: Sequence[str | None], oscillating: Sequence[bool], limits: Limits = LIMITS) -> str:

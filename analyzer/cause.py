@@ -24,11 +24,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analyzer.config import CauseLimits
+from analyzer.decisions import CAUSES, Cause, Fault, Needs
 from analyzer.measure import Measured
 from analyzer.oscillation import Oscillation
 from identification.record import LoopRecord
-
-CAUSES = ("valve", "tuning", "load")
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,27 +43,27 @@ class Sign:
 class Verdict:
     """The cause of one loop's oscillation.
 
-    cause : valve, tuning, load, none or undecided; confidence [%] of each cause; fault : backlash, stiction,
-    none or undecided; signs in words; source : the loop that leads, empty where none is known; measured; dead :
-    the valve no longer moves PV at all.
+    cause; confidence [%] of each cause; fault of the valve; signs in words; source : the loop that leads, empty where
+    none is known; needs : what the record lacks for a cause, None where it lacks nothing; measured; dead : the valve
+    no longer moves PV at all.
     """
 
-    cause: str
-    confidence: dict[str, float]
-    fault: str
+    cause: Cause
+    confidence: dict[Cause, float]
+    fault: Fault
     signs: tuple[Sign, ...] = ()
     source: str = ""
-    needs: str = ""
+    needs: Needs | None = None
     measured: Measured | None = None
     dead: bool = False
 
 
-NO_CAUSE = Verdict("none", dict.fromkeys(CAUSES, 0.0), "none")
+NO_CAUSE = Verdict(Cause.NONE, dict.fromkeys(CAUSES, 0.0), Fault.NONE)
 
 
-def not_assessed(needs: str) -> Verdict:
+def not_assessed(needs: Needs | None) -> Verdict:
     """The verdict that abstains and says what it needs."""
-    return Verdict("undecided", dict.fromkeys(CAUSES, 0.0), "undecided", needs=needs)
+    return Verdict(Cause.UNDECIDED, dict.fromkeys(CAUSES, 0.0), Fault.UNDECIDED, needs=needs)
 
 
 def _ramp(x: float, low: float, high: float) -> float:
@@ -169,7 +168,7 @@ def load_signs(m: Measured, o: Oscillation, limits: CauseLimits) -> list[Sign]:
     return signs
 
 
-def combined(signs: Iterable[Sign], cause: str) -> float:
+def combined(signs: Iterable[Sign], cause: Cause) -> float:
     """Confidence [%]: the signs taken as independent, none of them certain by itself (0.9 at most)."""
     doubt = 1.0
     for sign in signs:
@@ -178,15 +177,15 @@ def combined(signs: Iterable[Sign], cause: str) -> float:
     return 100.0 * (1.0 - doubt)
 
 
-def _fault(m: Measured, limits: CauseLimits) -> str:
+def _fault(m: Measured, limits: CauseLimits) -> Fault:
     """Backlash or stiction, by what a slip jump adds to a play."""
     if m.stick_slip is None:
-        return "backlash"
+        return Fault.BACKLASH
     share = m.stick_slip.valve.slip_jump / max(m.stick_slip.valve.stickband, 1e-9)
     clear = max(limits.evidence_jump, limits.jump_share * m.evidence)
     if m.jump > clear and share >= limits.least_jump:
-        return "stiction"
-    return "backlash" if m.jump < 0.5 * clear or share < limits.least_jump else "undecided"
+        return Fault.STICTION
+    return Fault.BACKLASH if m.jump < 0.5 * clear or share < limits.least_jump else Fault.UNDECIDED
 
 
 def judge(m: Measured, oscillation: Oscillation | None, limits: CauseLimits) -> Verdict:
@@ -197,8 +196,8 @@ def judge(m: Measured, oscillation: Oscillation | None, limits: CauseLimits) -> 
     rest on the process behind an ideal valve, are set aside.
     """
     signs = valve_signs(m, limits, oscillation is not None)
-    valve = combined(signs, "valve")
-    is_valve = sum(s.points_to == "valve" for s in signs) >= limits.signs
+    valve = combined(signs, Cause.VALVE)
+    is_valve = sum(s.points_to == Cause.VALVE for s in signs) >= limits.signs
     is_valve = is_valve and (m.size >= limits.size or m.cycles_alike)
     is_valve = (
         is_valve and valve >= limits.named_pct and m.evidence >= _needed(m, limits, oscillation is not None)
@@ -208,21 +207,23 @@ def judge(m: Measured, oscillation: Oscillation | None, limits: CauseLimits) -> 
     if oscillation is not None and not is_valve:
         signs += tuning_signs(m, oscillation, limits) + load_signs(m, oscillation, limits)
         valve = min(valve, 0.9 * limits.named_pct)
-    confidence = {"valve": valve, "tuning": combined(signs, "tuning"), "load": combined(signs, "load")}
-    cause = "valve" if is_valve else _named(signs, confidence, limits) if oscillation is not None else "none"
     if not is_valve and oscillation is None:
-        confidence["valve"] = min(confidence["valve"], 0.5 * limits.named_pct)
-    fault = _fault(m, limits) if is_valve else "none"
+        valve = min(valve, 0.5 * limits.named_pct)
+    rest = {c: combined(signs, c) for c in (Cause.TUNING, Cause.LOAD)}
+    confidence = {Cause.VALVE: valve, **rest}
+    cause = Cause.NONE if oscillation is None else _named(signs, confidence, limits)
+    cause = Cause.VALVE if is_valve else cause
+    fault = _fault(m, limits) if is_valve else Fault.NONE
     return Verdict(cause, confidence, fault, tuple(signs), measured=m)
 
 
-def _named(signs: list[Sign], confidence: dict[str, float], limits: CauseLimits) -> str:
+def _named(signs: list[Sign], confidence: dict[Cause, float], limits: CauseLimits) -> Cause:
     """Tuning or load, whichever is ahead by enough and has enough signs; else undecided."""
-    first, second = sorted(("tuning", "load"), key=lambda c: -confidence[c])
+    first, second = sorted((Cause.TUNING, Cause.LOAD), key=lambda c: -confidence[c])
     enough = sum(s.points_to == first for s in signs) >= limits.signs
     doubt = 100.0 - confidence[first]
     if confidence[first] < limits.named_pct or not enough or doubt > 0.75 * (100.0 - confidence[second]):
-        return "undecided"
+        return Cause.UNDECIDED
     return first
 
 
@@ -253,12 +254,12 @@ def dead_valve(record: LoopRecord, limits: CauseLimits) -> Sign | None:
 
 def with_dead_valve(verdict: Verdict, sign: Sign) -> Verdict:
     """A verdict of a valve that is plainly at fault without oscillation."""
-    confidence = {"valve": 90.0, "tuning": 0.0, "load": 0.0}
+    confidence = {Cause.VALVE: 90.0, Cause.TUNING: 0.0, Cause.LOAD: 0.0}
     return replace(
         verdict,
-        cause="valve",
+        cause=Cause.VALVE,
         confidence=confidence,
-        fault="undecided",
+        fault=Fault.UNDECIDED,
         signs=(sign, *verdict.signs),
         dead=True,
     )

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from analyzer.assess import assessable, unfit_for_cause
+from analyzer.assess import unassessable, unfit_for_cause
 from analyzer.config import Config
+from analyzer.decisions import Needs
 from analyzer.history.export import Export
 from analyzer.history.stray import stamp_text
 from analyzer.loops.spec import LoopSpec
 from analyzer.quality import Prepared, prepare
-from identification.errors import NotAssessedError, TriageError
+from identification.errors import TriageError
 
 
 def _tags(spec: LoopSpec) -> str:
@@ -18,18 +19,14 @@ def _tags(spec: LoopSpec) -> str:
     return ", ".join(f"{role.upper()} {tag}" for role, tag in found if tag)
 
 
-def _fit(prepared: Prepared, config: Config) -> str:
-    """Which questions the record is fit for."""
-    try:
-        assessable(prepared.record, config)
-    except NotAssessedError as error:
-        return f"fit for nothing: {error}"
+def _fit(lacking: Needs | None, prepared: Prepared, config: Config) -> str:
+    """Which questions the record is fit for, in words."""
+    if lacking is not None:
+        return f"fit for nothing: {lacking}"
     unfit = unfit_for_cause(prepared, config)
-    return (
-        f"fit for oscillation and assessments; not for the cause: {unfit}"
-        if unfit
-        else "fit for all questions"
-    )
+    if unfit is None:
+        return "fit for all questions"
+    return f"fit for oscillation and assessments; not for the cause: {unfit}"
 
 
 def loop_line(export: Export, spec: LoopSpec, config: Config) -> tuple[str, bool]:
@@ -41,9 +38,10 @@ def loop_line(export: Export, spec: LoopSpec, config: Config) -> tuple[str, bool
     except TriageError as error:
         return f"{spec.loop}: {_tags(spec)}; fit for nothing: {error}", True
     record = prepared.record
-    fit = _fit(prepared, config)
+    lacking = unassessable(record, config)
+    fit = _fit(lacking, prepared, config)
     parts = [_tags(spec), f"{len(record)} samples every {record.dt_s:g} s", *prepared.notes, fit]
-    return f"{spec.loop}: " + "; ".join(parts), fit.startswith("fit for nothing")
+    return f"{spec.loop}: " + "; ".join(parts), lacking is not None
 
 
 def lines(export: Export, specs: Sequence[LoopSpec], notes: Sequence[str]) -> Iterator[tuple[str, bool]]:

@@ -17,6 +17,7 @@ from analyzer.advice import Advice, advise
 from analyzer.assess import Assessment, assess
 from analyzer.columns.table import HOURS, NIGHTS
 from analyzer.config import Config
+from analyzer.decisions import Action, Cause, Lack, LacksError, Status
 from analyzer.history.export import Export
 from analyzer.history.series import Series
 from analyzer.loops.changes import TuningChange
@@ -27,18 +28,18 @@ from analyzer.nights import Night, cut
 from analyzer.plantwide import Fingerprint
 from analyzer.present import advised
 from analyzer.quality import interval, prepare
-from analyzer.rows import hour_rows, lost_row, night_row
+from analyzer.rows import Lost, hour_rows, lost_row, night_row
 from analyzer.store import Store, rows_table, write_table
 from identification.errors import NotAssessedError, TriageError
-from tuning.recommend import Action
 
-HISTORY: dict[str, Action] = {"none": "none", "load": "none"}
+HISTORY = {Cause.NONE: Action.NONE, Cause.LOAD: Action.NONE}
 """Actions of nights that are not the last: settings are advised on for tomorrow, not for the week before."""
 
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """One chunk of loops over some nights, small enough to send to a worker; `key` names its pieces."""
+    """One chunk of loops over some nights, small enough to send to a worker; `key` names its pieces, and `alone` says
+    that it is one loop's second try."""
 
     export: Export
     specs: tuple[LoopSpec, ...]
@@ -47,6 +48,7 @@ class Task:
     config: Config
     key: str
     changes: tuple[TuningChange, ...] = ()
+    alone: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +70,7 @@ def assess_loop(
         stated = replace(stated, scan_s=prepared.record.dt_s)
     found = assess(prepared, stated, config, spec.type)
     if not advising:
-        return found, Advice(HISTORY.get(found.verdict.cause, "undecided"))
+        return found, Advice(HISTORY.get(found.verdict.cause, Action.UNDECIDED))
     return found, advise(found, spec, stated, prepared.scale.span, config)
 
 
@@ -81,23 +83,23 @@ def _loop_row(
     try:
         found, advice = assess_loop(spec, part, config, advising)
     except Exception as error:  # an error of one loop is that loop's result, never the night's end
-        return {**lost_row(spec, night.name, *_told(error, config)), "good_h": good_h}, None
+        return {**lost_row(spec, night.name, _lost(error, config)), "good_h": good_h}, None
     row = {**night_row(found, spec, night.name), "good_h": good_h}
     return advised(row, found.verdict.needs, advice), found
 
 
-def _told(error: Exception, config: Config) -> tuple[str, str]:
-    """Status and reason of a loop that an error has ended."""
+def _lost(error: Exception, config: Config) -> Lost:
+    """What is left of a loop that an error has ended."""
+    if isinstance(error, LacksError):
+        return Lost(Status.NOT_ASSESSED, str(error), error.needs.lack)
     if isinstance(error, NotAssessedError):
-        return "not assessed", str(error)
+        return Lost(Status.NOT_ASSESSED, str(error))
     if isinstance(error, TriageError):
-        return "failed", str(error)
+        return Lost(Status.FAILED, str(error))
     if isinstance(error, MemoryError):
-        return (
-            "failed",
-            f"needs more memory than the {config.workers.memory_mb:.0f} MB that one loop may take",
-        )
-    return "failed", f"{type(error).__name__}: {error}"
+        most = config.workers.memory_mb
+        return Lost(Status.FAILED, f"needs more memory than the {most:.0f} MB that one loop may take")
+    return Lost(Status.FAILED, f"{type(error).__name__}: {error}")
 
 
 def _good_h(pv: Series | None) -> float:
@@ -108,14 +110,15 @@ def _good_h(pv: Series | None) -> float:
     return good * interval(pv.stamp_s) / 3600.0
 
 
-def _read(task: Task, spec: LoopSpec) -> dict[str, Series] | tuple[str, str]:
-    """The loop's raw samples, or status and reason where there are none."""
+def _read(task: Task, spec: LoopSpec) -> dict[str, Series] | Lost:
+    """The loop's raw samples, or why there are none."""
     if spec.pv is None:
-        return "not assessed", f"no PV tag {spec.wanted_pv or spec.loop + '.PV'} in the export"
+        wanted = spec.wanted_pv or f"{spec.loop}.PV"
+        return Lost(Status.NOT_ASSESSED, f"no PV tag {wanted} in the export", Lack.PV)
     try:
         return task.export.read(spec.tags)
     except Exception as error:  # a broken column is that loop's result
-        return _told(error, task.config)
+        return _lost(error, task.config)
 
 
 def work(task: Task, began: Callable[[int], None] = lambda at: None) -> Done:
@@ -126,8 +129,8 @@ def work(task: Task, began: Callable[[int], None] = lambda at: None) -> Done:
         began(at)
         series = _read(task, spec)
         for night in task.nights:
-            if isinstance(series, tuple):
-                row, assessment = lost_row(spec, night.name, *series), None
+            if isinstance(series, Lost):
+                row, assessment = lost_row(spec, night.name, series), None
             else:
                 advising = night is task.nights[-1]
                 stated = in_force(spec, task.changes, night.last_s)
@@ -142,8 +145,9 @@ def work(task: Task, began: Callable[[int], None] = lambda at: None) -> Done:
 
 def lose(task: Task, reason: str) -> Done:
     """Write the rows of a chunk that no worker could finish."""
+    lost = Lost(Status.FAILED, reason)
     for night in task.nights:
-        rows = [lost_row(spec, night.name, "failed", reason) for spec in task.specs]
+        rows = [lost_row(spec, night.name, lost) for spec in task.specs]
         _write_pieces(task, night.name, rows, [])
     return Done(task.key, len(task.specs))
 

@@ -38,8 +38,6 @@ class OscillationLimits:
     """Samples per period [-]: below it the clock, not the loop, may make the pattern."""
     envelope: float = 0.4
     """The loop oscillates where the envelope exceeds this share of its own upper level [-]."""
-    counts_pct: float = 50.0
-    """Share of time from which a loop counts as oscillating [%]; contract of the ranking."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,6 +166,10 @@ class CauseLimits:
     fewer, periods a few percent apart are coherent."""
     same_period: float = 0.06
     """Largest relative difference of periods that count as one [-]."""
+    follower_most_pct: float = 25.0
+    """Confidence at most in a follower's own valve or tuning [%]; ours: what they show comes from the source."""
+    follower_sign: float = 0.9
+    """Strength of the sign that a loop follows another [-]; ours: as strong as a valve's that is dead."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,14 +15,15 @@ import pyarrow.compute as pc
 
 from analyzer.columns.table import BY_NAME, NIGHTS
 from analyzer.config import Config
-from analyzer.plantwide import Fingerprint, Peer, trace
+from analyzer.decisions import CAUSES, Cause, Status
+from analyzer.plantwide import Fingerprint, Peer, follows, trace
 from analyzer.present import follower_row, root_row
 from analyzer.store import Store, rows_table
 
 FULLER_SHARE, FULLER_H = 1.02, 0.1
 """A record is fuller than another where it has this factor and so many hours more of good samples; ours: less is the
 edge of an export."""
-WORTH = {"ok": 2, "not assessed": 1}
+WORTH = {Status.OK: 2, Status.NOT_ASSESSED: 1}
 """What a status is worth when two records of one loop meet; a failure is worth nothing."""
 Row = Mapping[str, Any]
 
@@ -45,7 +46,7 @@ def _prints(table: pa.Table | None) -> list[Fingerprint]:
 def _traced(rows: dict[str, Row], prints: pa.Table | None, config: Config) -> dict[str, Row]:
     """The rows with those of followers changed."""
     peers = {
-        k: Peer(r["cause"] or "none", r["evidence"] or 0.0, r["osc_tuning_pct"] or 0.0)
+        k: Peer(Cause(r["cause"] or Cause.NONE), r["evidence"] or 0.0, r["osc_tuning_pct"] or 0.0)
         for k, r in rows.items()
     }
     followers = trace(_prints(prints), peers, config.cause)
@@ -53,7 +54,15 @@ def _traced(rows: dict[str, Row], prints: pa.Table | None, config: Config) -> di
     for loop, source in followers.items():
         moved.setdefault(source.loop, []).append(loop)
     roots = {loop: root_row(rows[loop], sorted(names)) for loop, names in moved.items()}
-    return rows | roots | {loop: follower_row(rows[loop], source) for loop, source in followers.items()}
+    verdicts = {
+        loop: follows(_confidence(rows[loop]), source, config.cause) for loop, source in followers.items()
+    }
+    return rows | roots | {loop: follower_row(rows[loop], verdict) for loop, verdict in verdicts.items()}
+
+
+def _confidence(row: Row) -> dict[Cause, float]:
+    """The confidences of a row [%], 0 where none is told."""
+    return {cause: row[f"osc_{cause}_pct"] or 0.0 for cause in CAUSES}
 
 
 def fuller(old: Row, new: Row) -> bool:
@@ -71,7 +80,7 @@ def is_empty(store: Store, night: str, keys: Sequence[str]) -> bool:
     if table is None:
         return False
     rows = table.select(["status", "good_h"]).to_pylist()
-    return all(r["status"] == "not assessed" and not r["good_h"] for r in rows)
+    return all(r["status"] == Status.NOT_ASSESSED and not r["good_h"] for r in rows)
 
 
 def finish_night(

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analyzer.config import OscillationLimits
+from analyzer.decisions import counts
 from identification.record import Floats, LoopRecord, Mask
 from identification.signals.setpoint_response import without_setpoint
 from identification.signals.spectrum import (
@@ -179,10 +180,10 @@ def _is_harmonic(o: Oscillation, other: Oscillation) -> bool:
     return 2 <= whole <= 7 and abs(ratio / whole - 1) < 0.02 and o.amplitude_pct < 0.6 * other.amplitude_pct
 
 
-def counting(found: Oscillations, limits: OscillationLimits) -> Oscillation | None:
+def counting(found: Oscillations) -> Oscillation | None:
     """The first oscillation where it fills enough of the time for the loop to count as oscillating, else None."""
     first = found.first
-    return first if first is not None and first.oscillating_pct >= limits.counts_pct else None
+    return first if first is not None and counts(first.oscillating_pct) else None
 
 
 def detect(record: LoopRecord, limits: OscillationLimits) -> Oscillations:

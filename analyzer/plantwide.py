@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from analyzer.config import CauseLimits
+from analyzer.decisions import Action, Cause, Fault
 from identification.signals.spectrum import Complex, Spectrum
 
 HALF_BAND = 0.08
@@ -85,16 +86,16 @@ class Peer:
     cause; evidence [nat] of its valve fault; tuning_pct, confidence of its tuning [%].
     """
 
-    cause: str
+    cause: Cause
     evidence: float
     tuning_pct: float
 
     @property
     def rank(self) -> float:
         """How much the loop can be a source: a valve at fault before a tuning, by the evidence."""
-        if self.cause == "valve":
+        if self.cause is Cause.VALVE:
             return 1000.0 + self.evidence
-        return self.tuning_pct if self.cause == "tuning" else 0.0
+        return self.tuning_pct if self.cause is Cause.TUNING else 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,6 +106,32 @@ class Source:
     coherence: float
 
 
+@dataclass(frozen=True, slots=True)
+class Follower:
+    """The verdict on a loop that follows another one, in place of its own.
+
+    source; confidence [%] of each cause; strength of the sign that says so (0 to 1); cause, fault and action are
+    those of every follower: a load from outside, and nothing to do here.
+    """
+
+    source: Source
+    confidence: Mapping[Cause, float]
+    strength: float
+    cause: Cause = Cause.LOAD
+    fault: Fault = Fault.NONE
+    action: Action = Action.SEE_SOURCE_LOOP
+
+
+def follows(own: Mapping[Cause, float], source: Source, limits: CauseLimits) -> Follower:
+    """The verdict on a follower, from its own confidences [%] and its source.
+
+    The load is at least as sure as the coherence; what else the loop shows comes from the source.
+    """
+    load = max(own[Cause.LOAD], 100.0 * source.coherence)
+    rest = {c: min(own[c], limits.follower_most_pct) for c in (Cause.VALVE, Cause.TUNING)}
+    return Follower(source, {Cause.LOAD: load, **rest}, limits.follower_sign)
+
+
 def _may_follow(own: Peer, other: Peer, level: float, limits: CauseLimits) -> bool:
     """Whether one loop can follow another at this coherence.
 
@@ -113,11 +140,11 @@ def _may_follow(own: Peer, other: Peer, level: float, limits: CauseLimits) -> bo
     """
     if other.rank <= own.rank or level < limits.coherent:
         return False
-    if own.cause != "valve":
+    if own.cause is not Cause.VALVE:
         return True
     factor = limits.outweighs_wave if level >= limits.one_wave else limits.outweighs
     outweighed = other.evidence >= factor * own.evidence
-    return other.cause == "valve" and level >= limits.follows and outweighed
+    return other.cause is Cause.VALVE and level >= limits.follows and outweighed
 
 
 def source_of(
@@ -139,7 +166,7 @@ def source_of(
 
 def trace(prints: Sequence[Fingerprint], peers: Mapping[str, Peer], limits: CauseLimits) -> dict[str, Source]:
     """Followers and their sources."""
-    known = [p for p in prints if p.loop in peers and peers[p.loop].cause != "none"]
+    known = [p for p in prints if p.loop in peers and peers[p.loop].cause is not Cause.NONE]
     found = {own.loop: source_of(own, known, peers, limits) for own in known}
     sources = {loop: source for loop, source in found.items() if source is not None}
     return {loop: _root(loop, sources) for loop in sources}

@@ -7,13 +7,19 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from analyzer.columns.table import BY_NAME
+from analyzer.decisions import Action, Cause, Fault, Needs, counts
 from analyzer.units import duration, gain_unit
 
 if TYPE_CHECKING:
     from analyzer.advice import Advice
-    from analyzer.plantwide import Source
+    from analyzer.plantwide import Follower
 
-CAUSE_STYLES = {"valve": "red", "tuning": "yellow", "load": "cyan", "undecided": "magenta"}
+CAUSE_STYLES = {
+    Cause.VALVE: "red",
+    Cause.TUNING: "yellow",
+    Cause.LOAD: "cyan",
+    Cause.UNDECIDED: "magenta",
+}
 """Colours of causes on the terminal."""
 
 
@@ -53,43 +59,46 @@ def _settings(now: float | None, new: float | None, unit: str) -> str:
     return f"{figure(now)} {unit}" if new is None else f"{figure(now)} -> {figure(new)} {unit}"
 
 
-def _strongest(row: Mapping[str, Any], cause: str) -> str:
+def _strongest(row: Mapping[str, Any], cause: Cause) -> str:
     signs = [s for s in json.loads(row.get("signs") or "[]") if s["points_to"] == cause]
     return "; ".join(s["text"] for s in sorted(signs, key=lambda s: -s["strength"])[:2])
 
 
+FAULT_NAMES = {Fault.BACKLASH: "backlash", Fault.STICTION: "stick-slip"}
+
+
 def _valve(row: Mapping[str, Any]) -> str:
     """What is wrong with the valve, in figures where there are any."""
-    fault = {"backlash": "backlash", "stiction": "stick-slip"}.get(row["valve_fault"], "a valve fault")
+    fault = FAULT_NAMES.get(row["valve_fault"], "a valve fault")
     width = row["stickband_pct"] or row["backlash_pct"]
     if not width or row["valve_size"] is None:
-        return f"{fault}: {_strongest(row, 'valve')}"
+        return f"{fault}: {_strongest(row, Cause.VALVE)}"
     share, gain = 100 * row["valve_size"], row["evidence"]
     return f"{fault} of {width:.2g} %, {share:.0f} % of OP's range (log likelihood +{gain:.0f})"
 
 
-def reason_of(row: Mapping[str, Any], needs: str = "") -> str:
+def reason_of(row: Mapping[str, Any], needs: Needs | None = None) -> str:
     """One sentence on what was found and why."""
-    oscillates = (row["oscillating_pct"] or 0.0) >= 50.0 and row["period_s"]
+    oscillates = counts(row["oscillating_pct"]) and row["period_s"]
     cycle = f"cycles with {duration(row['period_s'])}" if oscillates else "does not oscillate"
-    cause = row["cause"]
-    if cause == "valve":
+    cause = Cause(row["cause"])
+    if cause is Cause.VALVE:
         return f"{cycle}; {_valve(row)}"
-    if cause in ("tuning", "load"):
+    if cause in (Cause.TUNING, Cause.LOAD):
         return f"{cycle}; {cause}: {_strongest(row, cause)}"
-    if cause == "undecided":
+    if cause is Cause.UNDECIDED:
         return f"{cycle}; cause undecided: {needs or 'the signs do not agree'}"
     return cycle
 
 
 MOST_NAMES = 5
 """Followers that are named in a row."""
-SAID_AT_ONCE = ("check settings", "needs data")
+SAID_AT_ONCE = (Action.CHECK_SETTINGS, Action.NEEDS_DATA)
 """Actions whose reason belongs into the list."""
 
 
-def advised(row: dict[str, Any], needs: str, advice: Advice) -> dict[str, Any]:
-    """The row with action, new settings, advice and reason; `needs` says why no cause could be told, if so."""
+def advised(row: dict[str, Any], needs: Needs | None, advice: Advice) -> dict[str, Any]:
+    """The row with action, new settings, advice and reason; `needs` says what a cause lacks, if anything."""
     reason = reason_of(row, needs)
     if row["oscillating_pct"] is None:
         reason = f"not assessed: {advice.reason}"
@@ -98,6 +107,7 @@ def advised(row: dict[str, Any], needs: str, advice: Advice) -> dict[str, Any]:
     return {
         **row,
         "action": advice.action,
+        "lack": advice.lack or row["lack"],
         "kp_new": advice.kp_new,
         "ti_new": advice.ti_new,
         "advice": advice.reason,
@@ -115,26 +125,24 @@ def _cycles(advice: Advice) -> dict[str, float]:
     return out
 
 
-def follower_row(row: Mapping[str, Any], source: Source) -> dict[str, Any]:
+def follower_row(row: Mapping[str, Any], found: Follower) -> dict[str, Any]:
     """The row of a loop that follows another one's oscillation."""
+    source = found.source
     text = f"moves with {source.loop}, which has a fault of its own (coherence {source.coherence:.2f})"
-    signs = [{"points_to": "load", "strength": 0.9, "text": text}, *json.loads(row["signs"] or "[]")]
-    changed = {
+    sign = {"points_to": found.cause, "strength": found.strength, "text": text}
+    return {
         **row,
-        "cause": "load",
-        "valve_fault": "none",
+        **{f"osc_{cause}_pct": value for cause, value in found.confidence.items()},
+        "cause": found.cause,
+        "valve_fault": found.fault,
         "source_loop": source.loop,
-        "osc_load_pct": max(row["osc_load_pct"] or 0.0, 100.0 * source.coherence),
-        "osc_tuning_pct": min(row["osc_tuning_pct"] or 0.0, 25.0),
-        "osc_valve_pct": min(row["osc_valve_pct"] or 0.0, 25.0),
-        "action": "see source loop",
+        "action": found.action,
         "kp_new": None,
         "ti_new": None,
         "advice": f"Look at {source.loop} first.",
-        "signs": json.dumps(signs),
+        "signs": json.dumps([sign, *json.loads(row["signs"] or "[]")]),
+        "reason": f"cycles with {duration(row['period_s'])}; {text}",
     }
-    changed["reason"] = f"cycles with {duration(row['period_s'])}; {text}"
-    return changed
 
 
 def root_row(row: Mapping[str, Any], followers: Sequence[str]) -> dict[str, Any]:

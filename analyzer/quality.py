@@ -14,10 +14,10 @@ from types import MappingProxyType
 import numpy as np
 
 from analyzer.config import QualityLimits
+from analyzer.decisions import Lack, LacksError, Needs
 from analyzer.history.series import Series
 from analyzer.history.stray import main_span
 from analyzer.loops.spec import LoopSpec
-from identification.errors import NotAssessedError
 from identification.record import Floats, LoopRecord, Mask
 
 MANUAL_TEXTS = ("man", "iman", "lo", "manual", "hand", "local", "rout", "0", "off", "oos", "init")
@@ -202,7 +202,7 @@ def _clock(pv: Series, dt_s: float, limits: QualityLimits) -> Floats:
 
     Raises
     ------
-    NotAssessedError
+    LacksError
         The samples are spread so thinly that most of that clock would be gaps.
     """
     spacing = np.diff(pv.stamp_s)
@@ -211,21 +211,22 @@ def _clock(pv: Series, dt_s: float, limits: QualityLimits) -> Floats:
     count = int((pv.stamp_s[-1] - pv.stamp_s[0]) / dt_s + 1e-6) + 1
     if count > limits.ticks_per_sample * pv.stamp_s.size:
         share = 100 * pv.stamp_s.size / count
-        raise NotAssessedError(
+        text = (
             f"needs samples that follow each other, has {pv.stamp_s.size}, mostly {dt_s:g} s apart, spread over "
             f"{(pv.stamp_s[-1] - pv.stamp_s[0]) / 86400:.1f} days ({share:.1f} % of that time)"
         )
+        raise LacksError(Needs(Lack.SAMPLES, text))
     return pv.stamp_s[0] + dt_s * np.arange(count)
 
 
 def _enough(pv: Series | None, spec: LoopSpec, limits: QualityLimits) -> Series:
     if pv is None:
-        raise NotAssessedError(f"no PV tag {spec.pv or spec.loop + '.PV'} in the export")
+        raise LacksError(Needs(Lack.PV, f"no PV tag {spec.pv or spec.loop + '.PV'} in the export"))
     good = int((~pv.bad).sum())
     if pv.stamp_s.size == 0 or good == 0:
-        raise NotAssessedError("needs PV samples, has none that is good")
+        raise LacksError(Needs(Lack.SAMPLES, "needs PV samples, has none that is good"))
     if good < limits.samples:
-        raise NotAssessedError(f"needs {limits.samples} good PV samples, has {good}")
+        raise LacksError(Needs(Lack.SAMPLES, f"needs {limits.samples} good PV samples, has {good}"))
     return pv
 
 
@@ -241,7 +242,7 @@ def prepare(spec: LoopSpec, series: Mapping[str, Series], limits: QualityLimits)
 
     Raises
     ------
-    NotAssessedError
+    LacksError
         Where there is no PV, or too little of it; the text says what is needed and what there is.
     """
     series = _numeric(spec, series, limits)
@@ -249,7 +250,7 @@ def prepare(spec: LoopSpec, series: Mapping[str, Series], limits: QualityLimits)
     trimmed = _without_stray_ends(pv_raw)
     dt = interval(trimmed.stamp_s)
     if not dt > 0:
-        raise NotAssessedError("needs samples at different times, has one stamp")
+        raise LacksError(Needs(Lack.SAMPLES, "needs samples at different times, has one stamp"))
     clock = _clock(trimmed, dt, limits)
     pv, gap = onto_clock(trimmed, clock, dt, limits)
     scale = scale_of(spec, pv[~gap])
@@ -282,7 +283,7 @@ def _numeric(spec: LoopSpec, series: Mapping[str, Series], limits: QualityLimits
 
     Raises
     ------
-    NotAssessedError
+    LacksError
         Where many values of one of them were not understood: what is left would be another trend.
     """
     out = dict(series)
@@ -292,10 +293,11 @@ def _numeric(spec: LoopSpec, series: Mapping[str, Series], limits: QualityLimits
         if found is None:
             continue
         if found.unread > limits.unread_share * max(found.value.size, 1):
-            raise NotAssessedError(
+            text = (
                 f"{found.unread} values of {tag}, such as '{found.example}', are not understood as numbers; needs "
                 "plain numbers: export them so, or state --decimal and --delimiter"
             )
+            raise LacksError(Needs(Lack.READABLE, text))
         out[tag] = replace(found, bad=found.bad | ~np.isfinite(found.value), text=None)
     return out
 

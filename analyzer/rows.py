@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import dataclass
 from typing import Any
 
 from analyzer.assess import Assessment
 from analyzer.cause import Verdict
 from analyzer.columns.table import HOURS, row_of
+from analyzer.decisions import CAUSES, Cause, Fault, Lack, Status
 from analyzer.loops.spec import LoopSpec
 from identification.estimation.hammerstein import Fit
 from identification.estimation.window import Window
@@ -40,9 +42,18 @@ def empty_row(spec: LoopSpec, night: str) -> dict[str, Any]:
     return row_of(known)
 
 
-def lost_row(spec: LoopSpec, night: str, status: str, reason: str) -> dict[str, Any]:
+@dataclass(frozen=True, slots=True)
+class Lost:
+    """Why a loop has no results: its status, the reason in words, and what the record lacks where that is known."""
+
+    status: Status
+    reason: str
+    lack: Lack | None = None
+
+
+def lost_row(spec: LoopSpec, night: str, lost: Lost) -> dict[str, Any]:
     """The row of a loop that was not assessed or failed, with the reason."""
-    return {**empty_row(spec, night), "status": status, "reason": reason}
+    return {**empty_row(spec, night), "status": lost.status, "reason": lost.reason, "lack": lost.lack}
 
 
 def _process_columns(fit: Fit, window: Window) -> dict[str, float | None]:
@@ -58,11 +69,11 @@ def _process_columns(fit: Fit, window: Window) -> dict[str, float | None]:
 
 def _model_columns(verdict: Verdict) -> dict[str, float | None]:
     m = verdict.measured
-    if m is None or verdict.cause not in ("valve", "tuning"):
+    if m is None or verdict.cause not in (Cause.VALVE, Cause.TUNING):
         return {}
-    if verdict.cause == "tuning":
+    if verdict.cause is Cause.TUNING:
         return _process_columns(m.linear, m.window)
-    if verdict.fault == "stiction" and m.stick_slip is not None:
+    if verdict.fault is Fault.STICTION and m.stick_slip is not None:
         valve = m.stick_slip.valve
         columns = {"stickband_pct": valve.stickband, "slip_jump_pct": valve.slip_jump}
         return {**_process_columns(m.stick_slip, m.window), **columns}
@@ -89,16 +100,15 @@ def _oscillation_columns(a: Assessment) -> dict[str, Any]:
 def night_row(a: Assessment, spec: LoopSpec, night: str) -> dict[str, Any]:
     """The row of one loop and night, with every column."""
     v, m = a.verdict, a.verdict.measured
+    lacking = a.needs or v.needs
     signs = [{"points_to": s.points_to, "strength": round(s.strength, 3), "text": s.text} for s in v.signs]
     row = {
         **empty_row(spec, night),
         **a.night.as_row(),
         **_oscillation_columns(a),
         **_model_columns(v),
-        "status": "ok",
-        "osc_valve_pct": v.confidence["valve"],
-        "osc_tuning_pct": v.confidence["tuning"],
-        "osc_load_pct": v.confidence["load"],
+        "status": Status.OK,
+        **{f"osc_{c}_pct": v.confidence[c] for c in CAUSES},
         "cause": v.cause,
         "valve_fault": v.fault,
         "start_s": a.start_s,
@@ -109,10 +119,11 @@ def night_row(a: Assessment, spec: LoopSpec, night: str) -> dict[str, Any]:
         "harris_index": a.harris,
         "settling_time_s": a.settling_s,
         "signs": json.dumps(signs),
+        "lack": lacking.lack if lacking is not None else None,
         "notes": "; ".join((*a.notes, f"cause not assessed: {v.needs}") if v.needs else a.notes),
     }
-    if a.needs:
-        row.update(dict.fromkeys(NOT_SHOWN), cause="undecided", valve_fault="undecided")
+    if a.needs is not None:
+        row.update(dict.fromkeys(NOT_SHOWN), cause=Cause.UNDECIDED, valve_fault=Fault.UNDECIDED)
     return {k: _finite(v) for k, v in row_of(row).items()}
 
 

@@ -22,6 +22,7 @@ from analyzer.advice import (
 )
 from analyzer.assess import Assessment
 from analyzer.cause import Verdict
+from analyzer.decisions import Cause
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import as_stated
 from identification.errors import NotAssessedError
@@ -125,7 +126,7 @@ def _around(value: float, half: float, unit: str, least: float = -math.inf) -> E
 
 def _model(verdict: Verdict, controller: Pid) -> tuple[Loop, Fit, tuple[Loop, ...]]:
     """The loop that the forecast runs on, its fit, and what else it may be."""
-    if verdict.cause == "valve":
+    if verdict.cause is Cause.VALVE:
         return sought_for(verdict, controller)
     fit, model = chosen_fit(verdict), model_of(verdict, controller)
     window = verdict.measured.window if verdict.measured else None
@@ -165,7 +166,7 @@ def tune(found: Assessment, controller: Pid, kept: Advice | None = None) -> Tuni
     """
     verdict = found.verdict
     if verdict.measured is None:
-        raise NotAssessedError(verdict.needs or "needs trends from which a model can be identified")
+        raise NotAssessedError(str(verdict.needs or "needs trends from which a model can be identified"))
     first = found.oscillations.first
     period = first.period_s if first else None
     window = verdict.measured.window
@@ -178,7 +179,7 @@ def tune(found: Assessment, controller: Pid, kept: Advice | None = None) -> Tuni
     new = proposal.controller or proposal.meanwhile
     forecast = predict(model, new, load, others) if new and load.size >= LEAST_SCANS else None
     return Tuning(
-        intervals(window, fit, verdict.cause == "valve"),
+        intervals(window, fit, verdict.cause is Cause.VALVE),
         model,
         period,
         first.amplitude_pct if first else None,

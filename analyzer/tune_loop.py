@@ -8,8 +8,9 @@ from dataclasses import replace
 from difflib import get_close_matches
 
 from analyzer.advice import withheld
-from analyzer.assess import assess, unfit_for_cause
+from analyzer.assess import assess, at_limits, unfit_for_cause
 from analyzer.config import Config
+from analyzer.decisions import Action, Cause, Needs
 from analyzer.history.export import Export
 from analyzer.loops.changes import TuningChange
 from analyzer.loops.settings_in_force import in_force
@@ -40,12 +41,10 @@ def spec_of(specs: Sequence[LoopSpec], loop: str) -> LoopSpec:
     )
 
 
-def _unfit(prepared: Prepared, config: Config) -> str:
-    """Why the trends give no model, the nearest reason first; empty where none is known."""
-    at_limit = float(prepared.record.mask("saturated").mean())
-    if prepared.op_known and at_limit > config.quality.saturated_share:
-        return f"needs OP within its limits, it is at one for {100 * at_limit:.0f} % of the time"
-    return unfit_for_cause(prepared, config)
+def _unfit(prepared: Prepared, config: Config) -> Needs | None:
+    """What the trends lack for a model, the nearest first; None where nothing is known."""
+    limited = at_limits(prepared.record, config.quality) if prepared.op_known else None
+    return limited or unfit_for_cause(prepared, config)
 
 
 def proposal(
@@ -78,8 +77,8 @@ def proposal(
     head = [f"{loop}, night {night.name}: cause {found.verdict.cause}"]
     text = head + [f"sign of {s.points_to}: {s.text}" for s in found.verdict.signs]
     needs = _unfit(prepared, config)
-    if found.verdict.measured is None and found.verdict.cause == "valve":
-        return [*text, "action: repair valve", f"no settings: {needs or NO_MODEL}"], {}
+    if found.verdict.measured is None and found.verdict.cause is Cause.VALVE:
+        return [*text, f"action: {Action.REPAIR_VALVE}", f"no settings: {needs or NO_MODEL}"], {}
     if found.verdict.measured is None:
         raise NotAssessedError(f"{loop}: {needs or found.verdict.needs or NO_MODEL}")
     tuning = tune(found, stated, withheld(found, spec, stated, prepared.scale.span, config))

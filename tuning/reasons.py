@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from identification.models import Backlash, Integrator, Loop, Pid
+from tuning.decisions import Cause
 from tuning.describing import band, is_play
 from tuning.limit_cycle import Confirmed, Cycle
 from tuning.limits import TuningLimits
@@ -21,7 +22,7 @@ def load(source: str) -> str:
 
 def no_cause(cause: str) -> str:
     """Why a loop without a known cause is left alone."""
-    if cause == "none":
+    if cause == Cause.NONE:
         return "The loop is not in trouble; nothing to change."
     return "The cause is not decided; no settings are proposed on a guess."
 

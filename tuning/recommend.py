@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 
@@ -12,6 +11,7 @@ from identification.models import Fopdt, Loop, Pid
 from identification.record import Floats
 from identification.simulation.closed_loop import scan_step
 from tuning import reasons
+from tuning.decisions import Action, Cause
 from tuning.describing import band, is_play
 from tuning.limit_cycle import Confirmed, confirm
 from tuning.limits import LIMITS, TuningLimits
@@ -28,11 +28,6 @@ from tuning.search import (
     search,
     standard_load,
 )
-
-Action = Literal[
-    "retune", "repair valve", "see source loop", "check settings", "needs data", "none", "undecided"
-]
-CAUSES = ("valve", "tuning", "load", "none", "undecided")
 
 CONFIRMED = 15
 """Candidates whose limit cycle is simulated, from the best down, before the search gives up."""
@@ -51,14 +46,13 @@ ours: two shrinkings make the closed loop as slow as the dead time, SIMC's tight
 class Proposal:
     """What to do about a loop.
 
-    action : str
-        retune, repair valve, see source loop, check settings, none or undecided.
+    action : Action
     controller : Pid or None
         The new settings; None unless action is retune.
     reason : str
         Why, with figures.
     meanwhile : Pid or None
-        With action "repair valve": settings that are better than the present ones until then.
+        With the action to repair the valve: settings that are better than the present ones until then.
     before, after : Confirmed or None
         Simulated limit cycle without noise at the present and at the new settings.
     ms_before, ms : float or None
@@ -93,7 +87,7 @@ def recommend(
     loop : Loop
         Identified process and valve with the present controller.
     cause : str
-        Why the loop is in trouble: valve, tuning, load, none or undecided.
+        Why the loop is in trouble, one of tuning.decisions.Cause.
     uncertainty : sequence of Loop
         Other loops that the data allow; empty: corners around the loop (tuning.limits).
     load : ndarray of shape (n,) or None
@@ -112,39 +106,40 @@ def recommend(
     ValueError
         For a cause that is none of the five, and for a load that is not finite everywhere.
     """
-    if cause not in CAUSES:
-        raise ValueError(f"cause is one of {', '.join(CAUSES)}, got {cause!r}")
+    if cause not in tuple(Cause):
+        raise ValueError(f"cause is one of {', '.join(Cause)}, got {cause!r}")
     if load is not None and not np.all(np.isfinite(load)):
         raise ValueError(
             f"load must be finite, {np.sum(~np.isfinite(load))} of its {load.size} values are not"
         )
-    if cause == "load":
-        return Proposal("see source loop" if source else "none", reasons.load(source))
-    if cause in ("none", "undecided"):
-        return Proposal("none" if cause == "none" else "undecided", reasons.no_cause(cause))
+    if cause == Cause.LOAD:
+        return Proposal(Action.SEE_SOURCE_LOOP if source else Action.NONE, reasons.load(source))
+    if cause in (Cause.NONE, Cause.UNDECIDED):
+        action = Action.NONE if cause == Cause.NONE else Action.UNDECIDED
+        return Proposal(action, reasons.no_cause(cause))
     if loop.controller.kp * loop.process.slope <= 0.0:
-        return Proposal("check settings", reasons.wrong_sign(loop))
+        return Proposal(Action.CHECK_SETTINGS, reasons.wrong_sign(loop))
     others = tuple(uncertainty) or assumed_uncertainty(loop, limits)
     if load is not None and load.size < limits.least_steps:
         load = None
-    return (_tight if cause == "tuning" else _valve)(loop, others, load, limits)
+    return (_tight if cause == Cause.TUNING else _valve)(loop, others, load, limits)
 
 
 def _tight(loop: Loop, others: Sequence[Loop], load: Floats | None, limits: TuningLimits) -> Proposal:
     """SIMC for a loop that swings by its tuning: the nominal, or on a known load the one of least error."""
     now = margins(loop).ms
     if now <= limits.ms_most:
-        return Proposal("undecided", reasons.not_tight(now), ms_before=now)
+        return Proposal(Action.UNDECIDED, reasons.not_tight(now), ms_before=now)
     found = _simc_settings(loop, others, -FASTER if load is not None else 0, limits)
     if not found:
-        return Proposal("undecided", reasons.too_uncertain(limits), ms_before=now)
+        return Proposal(Action.UNDECIDED, reasons.too_uncertain(limits), ms_before=now)
     new, ms = found[0]
     if load is not None:
         new, ms = min(found, key=lambda pair: mean_error((loop, *others), pair[0], load))
         grown = max(mean_error((one,), new, load) / _error_now(one, load) for one in (loop, *others))
         if grown > limits.error_growth_sample:
-            return Proposal("undecided", reasons.more_error(grown, now), ms_before=now)
-    return Proposal("retune", reasons.tight(loop, new, now, ms), new, ms_before=now, ms=ms)
+            return Proposal(Action.UNDECIDED, reasons.more_error(grown, now), ms_before=now)
+    return Proposal(Action.RETUNE, reasons.tight(loop, new, now, ms), new, ms_before=now, ms=ms)
 
 
 def _error_now(loop: Loop, load: Floats) -> float:
@@ -182,26 +177,26 @@ def _shortest(others: Sequence[Loop], otherwise: float) -> float:
 def _valve(loop: Loop, others: Sequence[Loop], load: Floats | None, limits: TuningLimits) -> Proposal:
     """The least travel and error that the limits allow, for a loop with play or stick-slip."""
     if band(loop.valve) <= 0.0:
-        return Proposal("undecided", reasons.no_size())
+        return Proposal(Action.UNDECIDED, reasons.no_size())
     before = confirm(loop)
     if _is_short_and_sticks(loop, limits):
-        return Proposal("repair valve", reasons.sticks_on_short_lag(loop, before, limits), before=before)
+        return Proposal(Action.REPAIR_VALVE, reasons.sticks_on_short_lag(loop, before, limits), before=before)
     if load is None:
         load = standard_load(loop, limits.most_steps)
     table = bench(loop, others, load, limits)
     now = margins(loop).ms
     if table.travel[0] <= 0.0:
-        return Proposal("undecided", reasons.no_travel(loop), before=before, ms_before=now)
+        return Proposal(Action.UNDECIDED, reasons.no_travel(loop), before=before, ms_before=now)
     candidates = search(table)
     chosen = _confirmed(table, candidates, before)
     if chosen is None:
         why = reasons.nothing_better(loop, before, bool(candidates))
-        return Proposal("repair valve", why, before=before, ms_before=now, candidates=candidates)
+        return Proposal(Action.REPAIR_VALVE, why, before=before, ms_before=now, candidates=candidates)
     best, after = chosen
     why = reasons.valve(loop, best, before, after, now, table)
     beyond = band(loop.valve) >= limits.band_beyond
     return Proposal(
-        "repair valve" if beyond else "retune",
+        Action.REPAIR_VALVE if beyond else Action.RETUNE,
         reasons.beyond(loop, limits) + why if beyond else why,
         controller=None if beyond else best.controller,
         meanwhile=best.controller if beyond else None,

@@ -223,6 +223,14 @@ STORED = (
         Source.CAUSE,
         "What the cause rests on: what each sign points_to, its strength from 0 to 1, its text.",
     ),
+    Column(
+        "lack",
+        Kind.TEXT,
+        "Lack",
+        "",
+        Source.RUN,
+        "What the record lacks for an answer, in a word; reason, advice or notes say how much it needs and has.",
+    ),
     Column("notes", Kind.TEXT, "About the data", "", Source.EXPORT, "What was noticed about the trends."),
     Column(
         "extra",

@@ -13,6 +13,7 @@ from typing import Any
 
 from analyzer.columns.table import EXPLAINED
 from analyzer.config import Config
+from analyzer.decisions import Action, Cause, Status, counts
 from analyzer.history.export import Export
 from analyzer.loops.spec import LoopSpec
 from analyzer.nights import Night, cut
@@ -21,9 +22,7 @@ from analyzer.workers import Died, Workers
 from identification.errors import TriageError
 
 TABLE = "explained"
-COUNTS_PCT = 50.0
-"""A loop counts as oscillating from here [% of time]; contract of the ranking."""
-QUIET = ("none", "", None)
+QUIET = (Cause.NONE, Action.NONE, "", None)
 """Causes and actions that are none."""
 Row = dict[str, Any]
 
@@ -41,10 +40,9 @@ class Question:
 
 def flagged(row: Mapping[str, Any]) -> bool:
     """Whether a loop of a night is worth an explanation: it oscillates, or has a cause or an action."""
-    if row["status"] != "ok":
+    if row["status"] != Status.OK:
         return False
-    oscillates = (row["oscillating_pct"] or 0.0) >= COUNTS_PCT
-    return oscillates or row["cause"] not in QUIET or row["action"] not in QUIET
+    return counts(row["oscillating_pct"]) or row["cause"] not in QUIET or row["action"] not in QUIET
 
 
 def answered(q: Question, began: Callable[[int], None] = lambda at: None) -> Row:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from analyzer.decisions import CAUSES, Cause, Status
 from analyzer.pages.headings import heading
 from analyzer.pages.words import number
 from reports.pages import Cell, Column, Table
@@ -27,19 +28,22 @@ COLUMNS = (
 
 def score(rows: Sequence[Row]) -> float | None:
     """Share of assessed loops, by importance, with no fault found [%]; None where none is assessed."""
-    weights = [(r["importance"] or 1.0, r["cause"] in ("none", None)) for r in rows if r["status"] == "ok"]
+    weights = [
+        (r["importance"] or 1.0, r["cause"] in (Cause.NONE, None)) for r in rows if r["status"] == Status.OK
+    ]
     total = sum(w for w, _ in weights)
     return 100.0 * sum(w for w, good in weights if good) / total if total > 0 else None
 
 
 def _area(name: str, rows: Sequence[Row]) -> tuple[Cell, ...]:
-    assessed = [r for r in rows if r["status"] == "ok"]
+    assessed = [r for r in rows if r["status"] == Status.OK]
     worst = sorted(
-        (r for r in assessed if r["cause"] != "none"), key=lambda r: -(r["oscillation_significance"] or 0.0)
+        (r for r in assessed if r["cause"] != Cause.NONE),
+        key=lambda r: -(r["oscillation_significance"] or 0.0),
     )
     total = sum(r["oscillation_significance"] or 0.0 for r in assessed)
     points = score(rows)
-    counts = [sum(r["cause"] == c for r in assessed) for c in ("valve", "tuning", "load", "undecided")]
+    counts = [sum(r["cause"] == c for r in assessed) for c in (*CAUSES, Cause.UNDECIDED)]
     listed = ", ".join(f"{r['loop']} ({number(r['oscillation_significance'])})" for r in worst[:WORST])
     return (
         Cell(name or "no area stated"),

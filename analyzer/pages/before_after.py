@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analyzer.before_after import LIMITS, MEASURES, Change, LoopComparison, Measure, Verdict, grade
+from analyzer.before_after import LIMITS, MEASURES, Change, Grade, LoopComparison, Measure, Verdict, grade
 from analyzer.loops.changes import TuningChange
 from analyzer.pages.headings import heading
 from analyzer.pages.reading import Thinned
@@ -47,12 +47,12 @@ class Case:
 
 
 GRADES = {
-    "clear": "improved clearly in all four",
-    "modest": "improved modestly",
-    "mixed": "in part better, in part worse",
-    "worse": "worse",
-    "none": "no clear change",
-    "incomparable": "not comparable",
+    Grade.CLEAR: "improved clearly in all four",
+    Grade.MODEST: "improved modestly",
+    Grade.MIXED: "in part better, in part worse",
+    Grade.WORSE: "worse",
+    Grade.NONE: "no clear change",
+    Grade.INCOMPARABLE: "not comparable",
 }
 
 
@@ -65,9 +65,9 @@ def named(changes: Sequence[Change]) -> str:
 def outcome(found: LoopComparison) -> str:
     """A loop's outcome in one phrase."""
     kind = grade(found)
-    if kind == "partial":
+    if kind is Grade.PARTIAL:
         text = f"improved only in {named([c for c in found.primary if c.verdict is Verdict.BETTER])}"
-    elif kind == "incomparable":
+    elif kind is Grade.INCOMPARABLE:
         text = "not comparable: " + ("; ".join(found.reasons) or "no hourly figures on both sides")
     else:
         text = GRADES[kind]
@@ -79,12 +79,12 @@ def outcome(found: LoopComparison) -> str:
 def _tiles(cases: Sequence[Case]) -> Tiles:
     kinds = [grade(c.found) for c in cases]
     counts = (
-        (kinds.count("clear"), "improved clearly in all four", "better"),
-        (kinds.count("modest"), "improved modestly", "better"),
-        (kinds.count("partial"), "improved only in part", "unclear"),
-        (kinds.count("none"), "without clear change", "unclear"),
-        (kinds.count("mixed") + kinds.count("worse"), "worse in something", "worse"),
-        (kinds.count("incomparable"), "not comparable", "incomparable"),
+        (kinds.count(Grade.CLEAR), "improved clearly in all four", "better"),
+        (kinds.count(Grade.MODEST), "improved modestly", "better"),
+        (kinds.count(Grade.PARTIAL), "improved only in part", "unclear"),
+        (kinds.count(Grade.NONE), "without clear change", "unclear"),
+        (kinds.count(Grade.MIXED) + kinds.count(Grade.WORSE), "worse in something", "worse"),
+        (kinds.count(Grade.INCOMPARABLE), "not comparable", "incomparable"),
     )
     shown = tuple((str(n), what, tone) for n, what, tone in counts if n)
     return Tiles(((str(len(cases)), "changes looked at", ""), *shown))

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from analyzer.columns.table import BY_NAME
+from analyzer.decisions import CAUSES, Fault, Status
 from analyzer.explain.agreement import agreement
 from analyzer.explain.page_words import title
 from analyzer.pages.headings import heading, headings, titled
@@ -51,7 +52,7 @@ def _facts(row: Row) -> Facts:
     facts = [titled("action", row["action"] or "–"), titled("cause", row["cause"] or "not assessed")]
     shares = [(c, row[f"osc_{c}_pct"]) for c in CAUSES]
     facts += [titled(f"osc_{c}_pct", f"{share:.0f}") for c, share in shares if share is not None]
-    if row["valve_fault"] not in (None, "", "none"):
+    if row["valve_fault"] not in (None, "", Fault.NONE):
         facts.append(titled("valve_fault", row["valve_fault"]))
     if row["source_loop"]:
         facts.append(titled("source_loop", row["source_loop"]))
@@ -72,9 +73,6 @@ def _verdict(row: Row) -> Section:
     if row["advice"]:
         blocks.append(Text((row["advice"],)))
     return Section("What and why", tuple(blocks))
-
-
-CAUSES = ("valve", "tuning", "load")
 
 
 def _evidence(row: Row) -> Section:
@@ -123,7 +121,7 @@ def _history_row(row: Row) -> tuple[Cell, ...]:
             duration(value) if column.key == "period_s" else number(value) if column.numeric else value or ""
         )
         cells.append(Cell(text or "", value if column.numeric else None))
-    if row["status"] != "ok":
+    if row["status"] != Status.OK:
         cells[-1] = Cell(f"{row['status']}: {row['reason']}")
     return tuple(cells)
 

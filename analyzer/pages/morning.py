@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from analyzer.decisions import CAUSES, Cause, Status
 from analyzer.pages.areas import area_table
 from analyzer.pages.headings import heading, headings
 from analyzer.pages.news import since
@@ -16,7 +17,7 @@ def _share(row: Row, cause: str) -> float:
 
 
 def _bars(row: Row) -> Bars:
-    return Bars(tuple((c, _share(row, c)) for c in ("valve", "tuning", "load")))
+    return Bars(tuple((c, _share(row, c)) for c in CAUSES))
 
 
 def _value(row: Row, name: str, digits: str = "") -> Cell:
@@ -27,7 +28,7 @@ def _value(row: Row, name: str, digits: str = "") -> Cell:
 
 def _cause(row: Row) -> Cell:
     cause = row["cause"] or ""
-    return Cell(cause, kind=cause if cause in ("valve", "tuning", "load") else "")
+    return Cell(cause, kind=cause if cause in CAUSES else "")
 
 
 WORST = (
@@ -87,26 +88,26 @@ def ranking(night: Night) -> Table:
 
 
 def _tiles(night: Night) -> Tiles:
-    assessed = [r for r in night.rows if r["status"] == "ok"]
+    assessed = [r for r in night.rows if r["status"] == Status.OK]
     causes = [r["cause"] for r in assessed if needs_a_look(r)]
     items = [(f"{len(assessed)} of {len(night.rows)}", "loops assessed", "")]
     items.append((str(sum(oscillates(r) for r in assessed)), "oscillate", "worse"))
-    items += [(str(causes.count(c)), f"caused by {c}", c) for c in ("valve", "tuning", "load")]
-    items.append((str(causes.count("undecided")), "undecided", "unclear"))
+    items += [(str(causes.count(c)), f"caused by {c}", c) for c in CAUSES]
+    items.append((str(causes.count(Cause.UNDECIDED)), "undecided", "unclear"))
     return Tiles(tuple(items))
 
 
 def lost_table(night: Night) -> Table:
     """Loops that were not assessed, and why."""
     columns = (*headings("loop", "status"), heading("reason", wide=True))
-    lost = sorted((r for r in night.rows if r["status"] != "ok"), key=lambda r: r["loop"])
+    lost = sorted((r for r in night.rows if r["status"] != Status.OK), key=lambda r: r["loop"])
     rows = tuple((Cell(r["loop"]), Cell(r["status"] or ""), Cell(r["reason"] or "")) for r in lost)
     return Table("not-assessed", "", columns, rows, searchable=len(rows) > 12)
 
 
 def page(night: Night) -> Page:
     """The morning page of a night."""
-    lost = sum(r["status"] != "ok" for r in night.rows)
+    lost = sum(r["status"] != Status.OK for r in night.rows)
     sections = (
         Section("The night in short", (_tiles(night),)),
         Section("Loops worth a look", (worst_table(night),)),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from analyzer.decisions import Cause, Status
 from analyzer.pages.headings import heading
 from analyzer.pages.view import Night, Row, linked, oscillates, proposal
 from analyzer.pages.words import number
@@ -16,7 +17,7 @@ HALVED = 0.5
 def _news(night: Night, row: Row) -> tuple[str, str]:
     """What is new about a loop since the night before, and its colour; '' where nothing is."""
     old = night.before.get(row["loop"])
-    if old is None or old["status"] != "ok" or row["status"] != "ok":
+    if old is None or old["status"] != Status.OK or row["status"] != Status.OK:
         return "", ""
     now, then = (r["oscillation_significance"] or 0.0 for r in (row, old))
     if row["oscillating_pct"] is None or old["oscillating_pct"] is None:
@@ -27,16 +28,16 @@ def _news(night: Night, row: Row) -> tuple[str, str]:
         return "stopped oscillating", "better"
     if oscillates(old) and now < HALVED * then:
         return "oscillates less than half as much", "better"
-    return _cause_news(row["cause"] or "undecided", old["cause"] or "undecided")
+    return _cause_news(row["cause"] or Cause.UNDECIDED, old["cause"] or Cause.UNDECIDED)
 
 
 def _cause_news(now: str, then: str) -> tuple[str, str]:
     """What another cause than the night before's means: a fault gone, one come, or one told otherwise."""
     if now == then:
         return "", ""
-    if now == "none":
+    if now == Cause.NONE:
         return f"no fault is seen any more (cause was {then})", "better"
-    if then == "none":
+    if then == Cause.NONE:
         return f"a fault is seen: cause {now}", "worse"
     return f"the cause is now told as {now} (was {then})", "unclear"
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from analyzer.before_after import LoopComparison, Span, compare, follows
+from analyzer.decisions import counts
 from analyzer.loops.changes import TuningChange, behaviour_change, stated_changes
 from analyzer.pages.before_after import Case
 from analyzer.pages.reading import nights_within, read_hours, read_nights, read_trends
@@ -69,7 +70,7 @@ def _around(spans: Sequence[tuple[Span, Span]]) -> Span:
 
 
 def _source(rows: Sequence[dict[str, Any]]) -> str:
-    oscillating = [(r["oscillating_pct"] or 0.0) >= 50 for r in rows]
+    oscillating = [counts(r["oscillating_pct"]) for r in rows]
     return follows([r["source_loop"] for r in rows], oscillating)
 
 

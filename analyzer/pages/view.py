@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from analyzer.decisions import Cause, Status, counts
 from analyzer.pages.reading import Thinned, read_nights, read_trends
 from analyzer.store import Store
 from analyzer.units import row_settings
@@ -13,8 +14,6 @@ from reports.names import slug
 from reports.pages import Cell
 
 Row = Mapping[str, Any]
-COUNTS_PCT = 50.0
-"""A loop counts as oscillating from here [% of time]; contract of the ranking."""
 COLUMNS = (
     *("loop", "type", "area", "description", "importance", "status", "oscillation_significance"),
     *(
@@ -50,12 +49,12 @@ class Night:
 
 def oscillates(row: Row | None) -> bool:
     """Whether a loop counts as oscillating."""
-    return row is not None and (row["oscillating_pct"] or 0.0) >= COUNTS_PCT
+    return row is not None and counts(row["oscillating_pct"])
 
 
 def needs_a_look(row: Row) -> bool:
     """Whether a loop oscillates or has a valve at fault all the same."""
-    return row["status"] == "ok" and (oscillates(row) or row["cause"] not in ("none", None, ""))
+    return row["status"] == Status.OK and (oscillates(row) or row["cause"] not in (Cause.NONE, None, ""))
 
 
 def _worse_first(row: Row) -> tuple[bool, float, str]:

@@ -23,6 +23,7 @@ from analyzer.advice import (
 )
 from analyzer.assess import Assessment, assess
 from analyzer.cause import NO_CAUSE, not_assessed
+from analyzer.decisions import Lack, Needs
 from analyzer.oscillation import Oscillations
 from analyzer.quality import prepare
 from analyzer.rows import night_row
@@ -152,7 +153,7 @@ def test_load_is_left_alone():
 def test_no_cause_no_settings(pipe):
     """Verdicts without a cause and verdicts that abstain get no settings."""
     row = spec(kp=1.0, ti=10.0)
-    asked = [replace(pipe, verdict=v) for v in (NO_CAUSE, not_assessed("needs OP"))]
+    asked = [replace(pipe, verdict=v) for v in (NO_CAUSE, not_assessed(Needs(Lack.OP, "needs OP")))]
     assert [advise(a, row, Pid(1, 10), 100.0, CONFIG).action for a in asked] == ["none", "undecided"]
 
 
@@ -197,9 +198,9 @@ def test_cycles_too_fast_for_the_sampling_are_not_denied():
     }
     found = assess(prepare(spec("L"), thin, CONFIG.quality), TANK.controller, CONFIG)
     assert found.oscillations.first is None
-    assert "has one every 60 s" in found.needs
+    assert "has one every 60 s" in str(found.needs)
     advice = settings(found, TANK)
-    assert (advice.action, advice.reason) == ("needs data", found.needs)
+    assert (advice.action, advice.reason) == ("needs data", str(found.needs))
     row = night_row(found, spec("L"), "2026-03-02")
     assert row["oscillating_pct"] is None
     assert row["cause"] == "undecided"

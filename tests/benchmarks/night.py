@@ -25,6 +25,7 @@ import pyarrow.parquet as pq
 
 from analyzer.assess import Assessment, assess
 from analyzer.config import Config
+from analyzer.decisions import counts
 from analyzer.history.export import Export, open_export
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import controller, find_loops, match, read_loops
@@ -126,7 +127,7 @@ def measured(path: Path, export: Export, specs: Sequence[LoopSpec]) -> list[Cost
             continue
         floor_s, _ = fastest(lambda spec=spec: floor(path, spec.tags))
         first = made.oscillations.first
-        oscillates = first is not None and first.oscillating_pct >= config.oscillation.counts_pct
+        oscillates = first is not None and counts(first.oscillating_pct)
         found.append(Cost(spec.loop, floor_s, night_s, oscillates))
     return found[1:]
 

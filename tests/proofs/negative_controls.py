@@ -15,7 +15,7 @@ from analyzer.assess import cause_of
 from analyzer.config import Config
 from analyzer.history.series import Series
 from analyzer.loops.spec import LoopSpec
-from analyzer.oscillation import detect
+from analyzer.oscillation import counting, detect
 from analyzer.quality import prepare
 from tests.proofs.nulls import FAMILIES, record
 
@@ -35,7 +35,7 @@ def judged(case: tuple[str, int]) -> tuple[str, bool, bool]:
     prepared = prepare(spec, series, config.quality)
     found = detect(prepared.record, config.oscillation)
     verdict = cause_of(prepared, found, None, config, "")
-    claimed = found.first is not None and found.first.oscillating_pct >= config.oscillation.counts_pct
+    claimed = counting(found) is not None
     return family, claimed, verdict.cause == "valve"
 
 

@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from analyzer.assess import assess
+from analyzer.decisions import counts
 from analyzer.oscillation import detect
 from identification.errors import NotAssessedError
 from tests.analyzer.plant import CONFIG, Sketch, Trends, prepared, simulate
@@ -93,7 +94,7 @@ def judged(case: tuple[Cell, int]) -> tuple[bool, str]:
     except NotAssessedError:
         return False, "undecided"
     first = found.oscillations.first
-    return first is not None and first.oscillating_pct >= CONFIG.oscillation.counts_pct, found.verdict.cause
+    return first is not None and counts(first.oscillating_pct), found.verdict.cause
 
 
 def cells() -> list[Cell]:

@@ -41,7 +41,7 @@ def told(seed: int) -> list[list[bool]]:
             p = prepare(spec, export.read(spec.tags), config.quality)
             true = controller(spec, p.scale.span)
             assert true is not None
-            first = counting(detect(p.record, config.oscillation), config.oscillation)
+            first = counting(detect(p.record, config.oscillation))
             wrong = [replace(true, kp=true.kp * k, ti_s=true.ti_s * t) for k, t in STATED]
             scales = [time_scale(p.record, first, c) for c in wrong]
             found = [differing(p.record, c, s, config.settings) for c, s in zip(wrong, scales, strict=True)]

@@ -1,0 +1,81 @@
+"""What the analysis decides, as values that programs test; sentences about them are for people alone.
+
+The values are those of the store and of `triage rank`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+from identification.errors import NotAssessedError
+from tuning.decisions import Action, Cause
+
+__all__ = ["CAUSES", "Action", "Cause", "Fault", "Lack", "LacksError", "Needs", "Status", "counts"]
+
+CAUSES = (Cause.VALVE, Cause.TUNING, Cause.LOAD)
+"""Causes that have a confidence of their own."""
+COUNTS_PCT = 50.0
+"""A loop counts as oscillating from this share of the time on [%]; contract of the ranking."""
+
+
+class Fault(StrEnum):
+    """What is wrong with a valve."""
+
+    BACKLASH = "backlash"
+    STICTION = "stiction"
+    NONE = "none"
+    UNDECIDED = "undecided"
+
+
+class Status(StrEnum):
+    """What became of a loop in a night."""
+
+    OK = "ok"
+    NOT_ASSESSED = "not assessed"
+    FAILED = "failed"
+
+
+class Lack(StrEnum):
+    """What a record lacks for an answer."""
+
+    PV = "PV"
+    SAMPLES = "samples"
+    READABLE = "readable values"
+    AUTOMATIC = "time in automatic"
+    OP = "OP"
+    MOVING_OP = "moving OP"
+    OP_OFF_LIMITS = "OP off its limits"
+    UNCOMPRESSED = "uncompressed trends"
+    UNBROKEN = "unbroken samples"
+    FASTER = "faster samples"
+    LONGER = "longer record"
+
+
+@dataclass(frozen=True, slots=True)
+class Needs:
+    """What a record lacks, and in words what it needs and what it has."""
+
+    lack: Lack
+    text: str
+
+    def __str__(self) -> str:
+        """The words."""
+        return self.text
+
+
+class LacksError(NotAssessedError):
+    """A question cannot be answered from a record, and it is known what the record lacks."""
+
+    def __init__(self, needs: Needs) -> None:
+        self.needs = needs
+        super().__init__(needs.text)
+
+    def __reduce__(self) -> tuple[type[LacksError], tuple[Needs]]:
+        """How it travels between processes: by what it was made of."""
+        return type(self), (self.needs,)
+
+
+def counts(oscillating_pct: float | None) -> bool:
+    """Whether a loop that oscillates for so much of the time [%] counts as oscillating."""
+    return oscillating_pct is not None and oscillating_pct >= COUNTS_PCT
