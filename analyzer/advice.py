@@ -10,7 +10,7 @@ import numpy as np
 from analyzer import words
 from analyzer.assess import Assessment
 from analyzer.cause import Verdict
-from analyzer.config import Config
+from analyzer.config import AdviceLimits, Config
 from analyzer.decisions import Action, Cause, Fault, Lack, Needs
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import as_stated
@@ -31,9 +31,6 @@ UNSTABLE = (
     "The identified loop would be unstable at the present settings, which the bounded cycle contradicts: the process "
     "is not known well enough for new settings."
 )
-LONGEST_SHARE, MOST_FACTOR = 0.1, 2.0
-"""Largest time constant, as a share of the window, and largest factor to its 90 % limits at which it counts as known;
-ours: beyond them a lag and an integrator explain the record alike."""
 MOST_SCANS = 20_000
 """Scans of reconstructed load that settings are tried on at most."""
 NO_INTEGRAL = (
@@ -41,9 +38,6 @@ NO_INTEGRAL = (
     "check kp and ti before new settings are sought."
 )
 CALM = "At the settings in force the valve's fault makes no cycle: nothing to do now."
-BEYOND_RECORD = 0.25
-"""Dead time over the length of the window from which the record does not support the model [-]; ours: four dead times
-hold no answer and its aftermath twice."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,18 +85,23 @@ def model_of(verdict: Verdict, controller: Pid) -> Loop:
     return Loop(process, controller, valve_of(verdict, fit))
 
 
-def lag_factor(window: Window, fit: Fit, valve: bool) -> float | None:
+def lag_factor(window: Window, fit: Fit, valve: bool, limits: AdviceLimits) -> float | None:
     """Factor from the time constant to its 90 % limits [-]; None where the record tells gain over it alone."""
     spread = math.sqrt(max(float(covariance(window, fit, free_width=valve)[0, 0]), 0.0))
     factor = math.exp(min(NINETY * spread, 20.0))
-    known = fit.time_constant_s < LONGEST_SHARE * window.duration_s and factor < MOST_FACTOR
+    known = is_known(fit, window, limits) and factor < limits.most_factor
     return factor if known else None
 
 
-def tuned(window: Window, fit: Fit, valve: bool) -> Process:
+def is_known(fit: Fit, window: Window, limits: AdviceLimits) -> bool:
+    """Whether the time constant is well inside the window, so that it can be told from an integrator's."""
+    return fit.time_constant_s < limits.longest_share * window.duration_s
+
+
+def tuned(window: Window, fit: Fit, valve: bool, limits: AdviceLimits) -> Process:
     """The process that settings are sought for: an integrator where the time constant is not known."""
     process = process_of(window, fit)
-    if lag_factor(window, fit, valve) is None:
+    if lag_factor(window, fit, valve, limits) is None:
         return Integrator(process.slope, process.dead_time_s)
     return process
 
@@ -194,7 +193,7 @@ def advise(
     oscillation = counting(found.oscillations)
     if kept is not None or controller is None or oscillation is None:
         return kept or Advice(_without_settings(found.verdict))
-    proposal = propose(found.verdict, controller, oscillation.period_s)
+    proposal = propose(found.verdict, controller, oscillation.period_s, config)
     if proposal.action is Action.UNDECIDED:
         proposal = replace(proposal, action=_without_settings(found.verdict))
     return _stated(proposal, spec, pv_span)
@@ -245,12 +244,12 @@ def _unsupported(found: Assessment, controller: Pid | None, config: Config) -> A
     return None
 
 
-def _sticks(m: Measured, controller: Pid) -> Loop | None:
+def _sticks(m: Measured, controller: Pid, limits: AdviceLimits) -> Loop | None:
     """The loop with the stick-slip that was tried beside a play, None where none was."""
     fit = m.stick_slip
     if fit is None or fit.valve.slip_jump <= 0:
         return None
-    return Loop(tuned(m.window, fit, True), controller, fit.valve.valve)
+    return Loop(tuned(m.window, fit, True, limits), controller, fit.valve.valve)
 
 
 def _cycles_alone(one: Loop, other: Loop) -> bool:
@@ -258,44 +257,44 @@ def _cycles_alone(one: Loop, other: Loop) -> bool:
     return confirm(other).cycle is None and confirm(one).cycle is not None
 
 
-def sought_for(verdict: Verdict, controller: Pid) -> tuple[Loop, Fit, tuple[Loop, ...]]:
+def sought_for(verdict: Verdict, controller: Pid, limits: AdviceLimits) -> tuple[Loop, Fit, tuple[Loop, ...]]:
     """The loop that settings are sought for, its fit, and what else it may be, for a valve at fault.
 
     Where the loop with its play does not cycle, and with the stick-slip that was tried beside it does, the stem
     sticks: something must move it.
     """
     m, fit = _measured(verdict), chosen_fit(verdict)
-    loop = replace(model_of(verdict, controller), process=tuned(m.window, fit, True))
-    other = _sticks(m, controller) if fit is m.play else None
+    loop = replace(model_of(verdict, controller), process=tuned(m.window, fit, True, limits))
+    other = _sticks(m, controller, limits) if fit is m.play else None
     if other is None or m.stick_slip is None or not _cycles_alone(other, loop):
         return loop, fit, uncertain(m.window, fit, loop)
     samples = uncertain(m.window, m.stick_slip, other, 3), uncertain(m.window, fit, loop, 2)
     return other, m.stick_slip, (loop, *samples[0], *samples[1])
 
 
-def propose(verdict: Verdict, controller: Pid, period_s: float | None) -> Proposal:
+def propose(verdict: Verdict, controller: Pid, period_s: float | None, config: Config) -> Proposal:
     """The tuning package's proposal on the model of a verdict, on its uncertainty, and on the load it leaves."""
     window, fit = _measured(verdict).window, chosen_fit(verdict)
     loop = model_of(verdict, controller)
     if verdict.cause not in (Cause.VALVE, Cause.TUNING):
-        return recommend(loop, verdict.cause, source=verdict.source)
+        return recommend(loop, verdict.cause, limits=config.tuning, source=verdict.source)
     if loop.controller.kp * loop.process.slope <= 0.0:
-        return recommend(loop, verdict.cause)
-    if loop.process.dead_time_s > BEYOND_RECORD * window.duration_s:
+        return recommend(loop, verdict.cause, limits=config.tuning)
+    if loop.process.dead_time_s > config.advice.beyond_record * window.duration_s:
         return Proposal(Action.UNDECIDED, words.beyond_record(loop.process.dead_time_s, window.duration_s))
     if verdict.cause is Cause.TUNING:
         slow = replace(loop, process=cautious(process_of(window, fit), period_s))
         others = (loop, *uncertain(window, fit, loop)[:2])
-        return recommend(slow, verdict.cause, others, load_of(window, fit, controller))
+        return recommend(slow, verdict.cause, others, load_of(window, fit, controller), config.tuning)
     if not is_stable(loop):
         return Proposal(Action.UNDECIDED, UNSTABLE)
-    sought, fit, others = sought_for(verdict, controller)
+    sought, fit, others = sought_for(verdict, controller, config.advice)
     rests = confirm(sought).cycle is None
     if rests and period_s is None:
         return Proposal(Action.NONE, CALM)
     if rests and math.isinf(integral_s(controller)):
         return Proposal(Action.CHECK_SETTINGS, NO_INTEGRAL)
-    return recommend(sought, verdict.cause, others, load_of(window, fit, controller))
+    return recommend(sought, verdict.cause, others, load_of(window, fit, controller), config.tuning)
 
 
 def _stated(proposal: Proposal, spec: LoopSpec, pv_span: float) -> Advice:

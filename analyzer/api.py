@@ -90,7 +90,7 @@ class Plant:
         """Nights by name, oldest first."""
         from analyzer.nights import nights_of
 
-        return {n.name: n for n in nights_of(self.export, list(self.specs))}
+        return {n.name: n for n in nights_of(self.export, list(self.specs), self.config.nights)}
 
     @property
     def nights(self) -> tuple[str, ...]:
@@ -201,7 +201,7 @@ def fit(loop: PlantLoop) -> Identified:
     """
     from analyzer.tune import identified
 
-    return Identified(*identified(assess(loop)))
+    return Identified(*identified(assess(loop), loop.plant.config.advice))
 
 
 def simulate(
@@ -256,7 +256,7 @@ def tune(loop: PlantLoop) -> Tuning:
     if found.verdict.measured is None:
         raise NotAssessedError(f"{loop.spec.loop}: {found.verdict.needs or 'no model can be identified'}")
     keep = withheld(found, loop.spec, controller, loop.prepared.scale.span, loop.plant.config)
-    return tuned(found, controller, keep)
+    return tuned(found, controller, loop.plant.config, keep)
 
 
 def explain(loop: PlantLoop) -> Explained:

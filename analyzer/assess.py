@@ -189,7 +189,7 @@ def assess(prepared: Prepared, controller: Pid | None, config: Config, kind: str
     settings = _settings(prepared, found, controller, config)
     verdict = cause_of(prepared, found, settings.recorded if settings else controller, config, kind)
     dead_time = _dead_time(verdict)
-    night = _known(assess_span(record), prepared.op_known)
+    night = _known(assess_span(record, config.figures), prepared.op_known)
     if night.usable_h < config.advice.least_h or _is_coarse(record, controller, config):
         verdict = as_hint(verdict, config.advice.hint_pct)
     harris = harris_index(record.error, usable(record), record.dt_s, dead_time) if dead_time else None
@@ -199,7 +199,10 @@ def assess(prepared: Prepared, controller: Pid | None, config: Config, kind: str
         record.start_s,
         record.duration_s,
         night,
-        tuple(replace(h, figures=_known(h.figures, prepared.op_known)) for h in hourly(record, found)),
+        tuple(
+            replace(h, figures=_known(h.figures, prepared.op_known))
+            for h in hourly(record, found, config.figures)
+        ),
         found,
         verdict,
         settings,

@@ -12,20 +12,13 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
+from analyzer.config import FigureLimits
 from analyzer.oscillation import Oscillations
 from identification.record import Floats, LoopRecord, Mask
 from identification.simulation.valve import RESTS, walk
 
-TRAVEL_GRID_S = 10.0
-"""Travel is summed on this grid [s] or on the record's own where that is coarser; ours."""
-TRAVEL_DEADBAND_PCT = 0.1
-"""Moves within this band [% of OP] are not travel; ours: the resolution of common historians and outputs."""
 ROUNDING = 1e-9
 """Moves under this [% of OP] are rounding and turn nothing: a signal may stand exactly at the edge of the band."""
-SMALL_ERROR_PCT = 5.0
-"""A loop serves while abs(e) is below this [% of span]; FACTS: effective service factor."""
-LEAST_SHARE = 0.1
-"""Share of an hour that must be usable for its figures [-]; ours."""
 HOUR_S = 3600.0
 
 
@@ -110,25 +103,26 @@ def crossings(error: Floats, band: float) -> int:
     return int((side[1:] != side[:-1]).sum())
 
 
-def assess_span(record: LoopRecord, noise: float | None = None) -> Assessments:
+def assess_span(record: LoopRecord, limits: FigureLimits, noise: float | None = None) -> Assessments:
     """The figures of one span of a record.
 
     Parameters
     ----------
     record : LoopRecord
+    limits : FigureLimits
     noise : float or None
         Noise band of PV [% of span], measured here where None.
     """
     use = usable(record)
     hours = float(use.sum()) * record.dt_s / HOUR_S
     total = len(record) * record.dt_s / HOUR_S
-    if use.sum() < 2 or hours < LEAST_SHARE * min(total, 1.0):
+    if use.sum() < 2 or hours < limits.least_share * min(total, 1.0):
         return Assessments(hours)
     everything = bool(use.all())
     e, pv, op = (x if everything else x[use] for x in (record.error, record.pv, record.op))
     stem = record.op if record.position is None else record.position
-    step = max(round(TRAVEL_GRID_S / record.dt_s), 1)
-    path, turns = travel(_joined(stem[::step], use[::step]), TRAVEL_DEADBAND_PCT)
+    step = max(round(limits.travel_grid_s / record.dt_s), 1)
+    path, turns = travel(_joined(stem[::step], use[::step]), limits.travel_deadband_pct)
     band = noise_band(pv) if noise is None else noise
     mean_pv = float(pv.mean())
     good = ~record.bad
@@ -146,7 +140,7 @@ def assess_span(record: LoopRecord, noise: float | None = None) -> Assessments:
         noise_band_pct=band,
         normal_pct=automatic,
         at_limits_pct=100 * float(limit.mean()),
-        service_pct=automatic * float((~limit & (np.abs(e) < SMALL_ERROR_PCT)).mean()),
+        service_pct=automatic * float((~limit & (np.abs(e) < limits.small_error_pct)).mean()),
         sp_mean_pct=float((record.sp if everything else record.sp[use]).mean()),
         pv_mean_pct=mean_pv,
         op_mean_pct=float(op.mean()),
@@ -182,13 +176,13 @@ def _hourly_oscillation(
     return amplitude * max(found.first.rhythm.first, 0.0) * hours, 100 * float(on.mean())
 
 
-def hourly(record: LoopRecord, found: Oscillations) -> list[Hour]:
+def hourly(record: LoopRecord, found: Oscillations, limits: FigureLimits) -> list[Hour]:
     """The figures of each clock hour of a record."""
     band = noise_band(record.pv[usable(record)])
     rows = []
     for a, b, start in hour_edges(record):
         significance, share = _hourly_oscillation(found, record, start, a, b)
-        rows.append(Hour(start, assess_span(record.span(a, b), band), significance, share))
+        rows.append(Hour(start, assess_span(record.span(a, b), limits, band), significance, share))
     return rows
 
 

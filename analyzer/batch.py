@@ -156,7 +156,7 @@ def run(
             "no loops in the export", "tags such as LOOP.PV", "state them with --loops loops.csv"
         )
     with locked(store.path):
-        spans = nights_of(export, specs, since_s, until_s)
+        spans = nights_of(export, specs, config.nights, since_s, until_s)
         keys = _begun(
             store, spans, run_identity.identity(export, (*specs, *changes), since_s, until_s, config), resume
         )

@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 from analyzer.assess import unassessable, unfit_for_cause
 from analyzer.config import Config
 from analyzer.decisions import Needs
 from analyzer.history.export import Export
+from analyzer.history.series import Series
 from analyzer.history.stray import stamp_text
+from analyzer.loops.changes import TuningChange
 from analyzer.loops.spec import LoopSpec
 from analyzer.quality import Prepared, prepare
 from identification.errors import TriageError
+
+Within = Callable[[Mapping[str, Series]], dict[str, Series]]
+"""Cuts samples to a span of time."""
+MOST_NAMES = 5
+"""Loops that are named in a line."""
 
 
 def _tags(spec: LoopSpec) -> str:
@@ -29,12 +36,12 @@ def _fit(lacking: Needs | None, prepared: Prepared, config: Config) -> str:
     return f"fit for oscillation and assessments; not for the cause: {unfit}"
 
 
-def loop_line(export: Export, spec: LoopSpec, config: Config) -> tuple[str, bool]:
+def loop_line(export: Export, spec: LoopSpec, config: Config, within: Within) -> tuple[str, bool]:
     """One loop's line, and whether it cannot be assessed."""
     if spec.pv is None:
         return f"{spec.loop}: no PV tag {spec.wanted_pv or spec.loop + '.PV'} in the export", True
     try:
-        prepared = prepare(spec, export.read(spec.tags), config.quality)
+        prepared = prepare(spec, within(export.read(spec.tags)), config.quality)
     except TriageError as error:
         return f"{spec.loop}: {_tags(spec)}; fit for nothing: {error}", True
     record = prepared.record
@@ -44,16 +51,32 @@ def loop_line(export: Export, spec: LoopSpec, config: Config) -> tuple[str, bool
     return f"{spec.loop}: " + "; ".join(parts), lacking is not None
 
 
-def lines(export: Export, specs: Sequence[LoopSpec], notes: Sequence[str]) -> Iterator[tuple[str, bool]]:
+def _dated(changes: Sequence[TuningChange], specs: Sequence[LoopSpec]) -> str:
+    """What the changes of settings are of."""
+    here = {s.loop for s in specs}
+    others = sorted({c.loop for c in changes} - here)
+    text = f"{len(changes)} changes of settings, {sum(c.loop in here for c in changes)} of these loops"
+    return text + (f"; not of {', '.join(others[:MOST_NAMES])}" if others else "")
+
+
+def lines(
+    export: Export,
+    specs: Sequence[LoopSpec],
+    notes: Sequence[str],
+    config: Config,
+    within: Within,
+    changes: Sequence[TuningChange] = (),
+) -> Iterator[tuple[str, bool]]:
     """All lines, each with whether a loop of it cannot be assessed."""
-    config = Config()
     first, last = export.span()
     yield f"{len(export.tags)} tags, {len(specs)} loops, {stamp_text(first)} to {stamp_text(last)} UTC", False
     for note in notes:
         yield note, False
     if specs and specs[0].defaults:
         yield "assumed where loops.csv is silent: " + ", ".join(specs[0].defaults), False
+    if changes:
+        yield _dated(changes, specs), False
     for spec in specs:
-        yield loop_line(export, spec, config)
+        yield loop_line(export, spec, config, within)
     for note in export.notes:
         yield note, False

@@ -84,7 +84,7 @@ def _loop_row(
         found, advice = assess_loop(spec, part, config, advising)
     except Exception as error:  # an error of one loop is that loop's result, never the night's end
         return {**lost_row(spec, night.name, _lost(error, config)), "good_h": good_h}, None
-    row = {**night_row(found, spec, night.name), "good_h": good_h}
+    row = {**night_row(found, spec, night.name, config.advice), "good_h": good_h}
     return advised(row, found.verdict.needs, advice), found
 
 

@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import math
 import os
 import sys
 from copy import copy
-from datetime import datetime
 from pathlib import Path
-from typing import Any
 
 import click
 
 from analyzer.commands import explain as explain_cli
 from analyzer.commands import report as report_cli
 from analyzer.commands import run as run_cli
-from analyzer.commands.options import SOME_LOST, export_options, opened, told, utc_seconds
+from analyzer.commands.options import SOME_LOST, Asked, export_options, told
 
 for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
@@ -36,17 +33,16 @@ def main() -> None:
 
 @main.command()
 @export_options
-@told
-def check(export: tuple[Path, ...], loops: Path | None, **reading: Any) -> None:
+def check(asked: Asked) -> None:
     """What was read: loops, tags, gaps, quality, and which questions it is fit for.
 
     Example: triage check export.csv --loops loops.csv
     """
     from analyzer.check import lines
 
-    source, specs, notes = opened(export, loops, **reading)
+    source, specs, notes = asked.opened()
     lost = 0
-    for line, bad in lines(source, specs, notes):
+    for line, bad in lines(source, specs, notes, asked.config, asked.within, asked.changes):
         lost += bad
         click.echo(line)
     sys.exit(SOME_LOST if lost else 0)
@@ -84,31 +80,17 @@ def rank(store: Path, column: str, top: int | None, night: str | None, ascending
 @main.command()
 @export_options
 @click.option("--loop", "tag", required=True, help="The loop to tune.")
-@click.option(
-    "--changes", type=click.Path(path_type=Path), help="changes.csv: when settings were changed, old and new."
-)
-@click.option("--until", type=click.DateTime(), help="Day or time (UTC) before which samples are used.")
 @click.option("--out", type=click.Path(path_type=Path), help="Directory for the pictures.")
-@told
-def tune(
-    export: tuple[Path, ...],
-    loops: Path | None,
-    tag: str,
-    changes: Path | None,
-    until: datetime | None,
-    out: Path | None,
-    **reading: Any,
-) -> None:
+def tune(asked: Asked, tag: str, out: Path | None) -> None:
     """One loop: model, limit cycle predicted, new Kp and Ti with reasons, forecast, travel map.
 
     Example: triage tune export.parquet --loops loops.csv --loop LIC2107 --out pictures
     """
-    from analyzer.loops.changes import read_changes
     from analyzer.tune_loop import proposal
 
-    source, specs, _ = opened(export, loops, **reading)
-    dated = () if changes is None else read_changes(changes)
-    lines, pictures = proposal(source, specs, tag, utc_seconds(until, math.inf), out is not None, dated)
+    source, specs, _ = asked.opened()
+    span = asked.since_s, asked.until_s
+    lines, pictures = proposal(source, specs, tag, asked.config, span, out is not None, asked.changes)
     for line in lines:
         click.echo(line)
     if out is not None:
@@ -116,6 +98,19 @@ def tune(
         for name, picture in pictures.items():
             (out / name).write_bytes(picture)
             click.echo(f"written: {out / name}")
+
+
+@main.command()
+@told
+def config() -> None:
+    """All limits with their defaults as TOML: what each decides, its unit and range, and what set it.
+
+    Example: triage config > limits.toml; edit it; triage run export.parquet --config limits.toml --store store
+    """
+    from analyzer.config import Config
+    from analyzer.config_file import document
+
+    click.echo(document(Config()))
 
 
 def registered(command: click.Command) -> click.Command:

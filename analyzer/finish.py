@@ -14,15 +14,12 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from analyzer.columns.table import BY_NAME, NIGHTS
-from analyzer.config import Config
+from analyzer.config import Config, NightLimits
 from analyzer.decisions import CAUSES, Cause, Status
 from analyzer.plantwide import Fingerprint, Peer, follows, trace
 from analyzer.present import follower_row, root_row
 from analyzer.store import Store, rows_table
 
-FULLER_SHARE, FULLER_H = 1.02, 0.1
-"""A record is fuller than another where it has this factor and so many hours more of good samples; ours: less is the
-edge of an export."""
 WORTH = {Status.OK: 2, Status.NOT_ASSESSED: 1}
 """What a status is worth when two records of one loop meet; a failure is worth nothing."""
 Row = Mapping[str, Any]
@@ -65,13 +62,13 @@ def _confidence(row: Row) -> dict[Cause, float]:
     return {cause: row[f"osc_{cause}_pct"] or 0.0 for cause in CAUSES}
 
 
-def fuller(old: Row, new: Row) -> bool:
+def fuller(old: Row, new: Row, limits: NightLimits) -> bool:
     """Whether the record that the store has of a loop is worth more than the new one."""
     worth = [WORTH.get(r["status"], 0) for r in (old, new)]
     if worth[0] != worth[1]:
         return worth[0] > worth[1]
     had, has = (r.get("good_h") or 0.0 for r in (old, new))
-    return had > FULLER_SHARE * has + FULLER_H
+    return had > limits.fuller_share * has + limits.fuller_h
 
 
 def is_empty(store: Store, night: str, keys: Sequence[str]) -> bool:
@@ -110,7 +107,7 @@ def finish_night(
         return ()
     rows = _traced({r["loop"]: r for r in table.to_pylist()}, store.read_parts(night, "prints", keys), config)
     old = {} if replace else _known(store, night)
-    kept = {loop for loop, row in rows.items() if loop in old and fuller(old[loop], row)}
+    kept = {loop for loop, row in rows.items() if loop in old and fuller(old[loop], row, config.nights)}
     beside = [loop for loop in old if loop not in rows]
     joined = [old[k] if k in kept else rows[k] for k in order if k in rows] + [old[k] for k in beside]
     mine = [loop for loop in rows if loop not in kept]

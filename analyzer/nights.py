@@ -10,6 +10,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from analyzer.config import NightLimits
 from analyzer.history.export import Export
 from analyzer.history.series import Series
 from analyzer.history.stray import stamp_text
@@ -17,12 +18,6 @@ from analyzer.loops.spec import LoopSpec
 from identification.errors import InputError
 
 DAY_S = 86400.0
-WHOLE_H = 36.0
-"""Records up to this long [h] are one night; longer ones are cut at midnights (UTC)."""
-MOST_NIGHTS = 2000
-"""Nights of one run at most [-]; ours: five years of them."""
-LEAST_PIECE_S = 6 * 3600.0
-"""A first or last piece shorter than this [s] joins its neighbour."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,38 +34,39 @@ def _named(first_s: float, last_s: float) -> Night:
     return Night(middle.strftime("%Y-%m-%d"), first_s, last_s)
 
 
-def daily(first_s: float, last_s: float) -> list[Night]:
-    """Cut a span of time at midnights (UTC); a first or last piece of under 6 h joins its neighbour.
+def daily(first_s: float, last_s: float, limits: NightLimits) -> list[Night]:
+    """Cut a span of time at midnights (UTC); a short first or last piece joins its neighbour.
 
     Raises
     ------
     InputError
-        There would be more than MOST_NIGHTS of them.
+        There would be more of them than one run may have.
     """
-    if last_s - first_s > MOST_NIGHTS * DAY_S:
+    if last_s - first_s > limits.most * DAY_S:
         days, ends = (last_s - first_s) / DAY_S, f"{stamp_text(first_s)} to {stamp_text(last_s)} UTC"
         raise InputError(
             f"the export spans {days:.0f} days, {ends}",
-            f"at most {MOST_NIGHTS} nights in one run",
+            f"at most {limits.most} nights in one run",
             "state the part that is meant with --since and --until",
         )
     cuts = np.arange(math.floor(first_s / DAY_S) + 1, math.ceil(last_s / DAY_S)) * DAY_S
-    inner = [c for c in cuts if c - first_s >= LEAST_PIECE_S and last_s - c >= LEAST_PIECE_S]
+    least_s = 3600.0 * limits.least_piece_h
+    inner = [c for c in cuts if c - first_s >= least_s and last_s - c >= least_s]
     edges = [first_s, *inner, last_s + 1.0]
     return [_named(a, b) for a, b in pairwise(edges)]
 
 
-def nights(spans: Sequence[tuple[float, float]]) -> list[Night]:
+def nights(spans: Sequence[tuple[float, float]], limits: NightLimits) -> list[Night]:
     """The nights of an export from the spans of its loops [s].
 
-    Where the median loop has over 36 h, the export is cut into days; else each loop is assessed whole, in one
-    night, named by the date of the middle of the loop that ends last. Recordings of different days can so be
+    Where the median loop has over whole_h (36 h), the export is cut into days; else each loop is assessed whole, in
+    one night, named by the date of the middle of the loop that ends last. Recordings of different days can so be
     ranked together.
     """
     lengths = sorted(last - first for first, last in spans)
     first, last = min(s[0] for s in spans), max(s[1] for s in spans)
-    if lengths[len(lengths) // 2] > WHOLE_H * 3600.0:
-        return daily(first, last)
+    if lengths[len(lengths) // 2] > limits.whole_h * 3600.0:
+        return daily(first, last, limits)
     latest = max(spans, key=lambda s: s[1])
     return [replace(_named(*latest), first_s=first, last_s=last + 1.0)]
 
@@ -101,7 +97,11 @@ def cut(series: Series, night: Night) -> Series:
 
 
 def nights_of(
-    export: Export, specs: Sequence[LoopSpec], since_s: float = -math.inf, until_s: float = math.inf
+    export: Export,
+    specs: Sequence[LoopSpec],
+    limits: NightLimits,
+    since_s: float = -math.inf,
+    until_s: float = math.inf,
 ) -> list[Night]:
     """The nights of an export within a span of time.
 
@@ -114,4 +114,4 @@ def nights_of(
     if not present:
         wanted = specs[0].wanted_pv or f"{specs[0].loop}.PV"
         raise InputError("no PV tag of any loop is in the export", f"tags such as {wanted}", "check --loops")
-    return nights(clipped([export.span(tag) for tag in present], since_s, until_s))
+    return nights(clipped([export.span(tag) for tag in present], since_s, until_s), limits)

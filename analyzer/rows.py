@@ -7,9 +7,11 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
+from analyzer.advice import is_known
 from analyzer.assess import Assessment
 from analyzer.cause import Verdict
 from analyzer.columns.table import HOURS, row_of
+from analyzer.config import AdviceLimits
 from analyzer.decisions import CAUSES, Cause, Fault, Lack, Status
 from analyzer.loops.spec import LoopSpec
 from identification.estimation.hammerstein import Fit
@@ -56,9 +58,9 @@ def lost_row(spec: LoopSpec, night: str, lost: Lost) -> dict[str, Any]:
     return {**empty_row(spec, night), "status": lost.status, "reason": lost.reason, "lack": lost.lack}
 
 
-def _process_columns(fit: Fit, window: Window) -> dict[str, float | None]:
+def _process_columns(fit: Fit, window: Window, limits: AdviceLimits) -> dict[str, float | None]:
     """Process constants; gain and time constant apart only where the time constant is well inside the window."""
-    known = fit.time_constant_s < 0.1 * window.duration_s
+    known = is_known(fit, window, limits)
     return {
         "gain": fit.gain if known else None,
         "time_constant_s": fit.time_constant_s if known else None,
@@ -67,17 +69,17 @@ def _process_columns(fit: Fit, window: Window) -> dict[str, float | None]:
     }
 
 
-def _model_columns(verdict: Verdict) -> dict[str, float | None]:
+def _model_columns(verdict: Verdict, limits: AdviceLimits) -> dict[str, float | None]:
     m = verdict.measured
     if m is None or verdict.cause not in (Cause.VALVE, Cause.TUNING):
         return {}
     if verdict.cause is Cause.TUNING:
-        return _process_columns(m.linear, m.window)
+        return _process_columns(m.linear, m.window, limits)
     if verdict.fault is Fault.STICTION and m.stick_slip is not None:
         valve = m.stick_slip.valve
         columns = {"stickband_pct": valve.stickband, "slip_jump_pct": valve.slip_jump}
-        return {**_process_columns(m.stick_slip, m.window), **columns}
-    return {**_process_columns(m.play, m.window), "backlash_pct": m.play.valve.stickband}
+        return {**_process_columns(m.stick_slip, m.window, limits), **columns}
+    return {**_process_columns(m.play, m.window, limits), "backlash_pct": m.play.valve.stickband}
 
 
 def _oscillation_columns(a: Assessment) -> dict[str, Any]:
@@ -97,7 +99,7 @@ def _oscillation_columns(a: Assessment) -> dict[str, Any]:
     }
 
 
-def night_row(a: Assessment, spec: LoopSpec, night: str) -> dict[str, Any]:
+def night_row(a: Assessment, spec: LoopSpec, night: str, limits: AdviceLimits) -> dict[str, Any]:
     """The row of one loop and night, with every column."""
     v, m = a.verdict, a.verdict.measured
     lacking = a.needs or v.needs
@@ -106,7 +108,7 @@ def night_row(a: Assessment, spec: LoopSpec, night: str) -> dict[str, Any]:
         **empty_row(spec, night),
         **a.night.as_row(),
         **_oscillation_columns(a),
-        **_model_columns(v),
+        **_model_columns(v, limits),
         "status": Status.OK,
         **{f"osc_{c}_pct": v.confidence[c] for c in CAUSES},
         "cause": v.cause,

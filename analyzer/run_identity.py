@@ -74,6 +74,6 @@ def check_same(path: Path, run: RunIdentity) -> None:
         raise InputError(
             f"the run that was stopped read {stopped.export} ({stopped.loops} loops, begun {stopped.begun}), "
             f"this one reads {run.export} ({run.loops} loops)",
-            "--resume with the same EXPORT, --loops, --since, --until and version",
+            "--resume with the same EXPORT, --loops, --changes, --since, --until, --config and version",
             "give them again, or leave out --resume to give up what the stopped run had done",
         )

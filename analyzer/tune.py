@@ -22,6 +22,7 @@ from analyzer.advice import (
 )
 from analyzer.assess import Assessment
 from analyzer.cause import Verdict
+from analyzer.config import AdviceLimits, Config
 from analyzer.decisions import Cause
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import as_stated
@@ -45,10 +46,9 @@ if TYPE_CHECKING:
 
 MAP_POINTS = 36
 """Points of the map along each axis."""
+NO_MODEL = "needs trends from which a model can be identified"
 SPREAD = 20.0
 """The map reaches this factor below and above the present settings."""
-LEAST_SCANS = 240
-"""Scans of load that a forecast needs; ours: twenty for each block of its bootstrap."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +70,7 @@ class Tuning:
     load: Floats
 
 
-def intervals(window: Window, fit: Fit, valve: bool) -> dict[str, Estimate]:
+def intervals(window: Window, fit: Fit, valve: bool, limits: AdviceLimits) -> dict[str, Estimate]:
     """Estimates of a fit with 90 % intervals from the curvature of the likelihood and the scatter of its scores.
 
     Gain and time constant are left out where the record tells their ratio alone (analyzer.advice.lag_factor). Of a
@@ -80,7 +80,7 @@ def intervals(window: Window, fit: Fit, valve: bool) -> dict[str, Estimate]:
     spread = np.sqrt(np.maximum(np.diag(covariance(window, fit, free_width=valve)), 0.0))
     t = fit.time_constant_s
     out = {"slope_pct_per_s": _slope(window, fit, valve)}
-    factor = lag_factor(window, fit, valve)
+    factor = lag_factor(window, fit, valve, limits)
     if factor is not None:
         wide = factor**WIDER
         out["gain"] = _around(fit.gain, half_width(spread[3]), "%/%")
@@ -124,16 +124,16 @@ def _around(value: float, half: float, unit: str, least: float = -math.inf) -> E
     return Estimate(value, max(value - half, least), value + half, unit)
 
 
-def _model(verdict: Verdict, controller: Pid) -> tuple[Loop, Fit, tuple[Loop, ...]]:
+def _model(verdict: Verdict, controller: Pid, limits: AdviceLimits) -> tuple[Loop, Fit, tuple[Loop, ...]]:
     """The loop that the forecast runs on, its fit, and what else it may be."""
     if verdict.cause is Cause.VALVE:
-        return sought_for(verdict, controller)
+        return sought_for(verdict, controller, limits)
     fit, model = chosen_fit(verdict), model_of(verdict, controller)
     window = verdict.measured.window if verdict.measured else None
     return model, fit, uncertain(window, fit, model) if window else ()
 
 
-def identified(found: Assessment) -> tuple[Process, Valve, dict[str, Estimate]]:
+def identified(found: Assessment, limits: AdviceLimits) -> tuple[Process, Valve, dict[str, Estimate]]:
     """Process, valve and their parameters with 90 % intervals, as one assessed loop's verdict has them.
 
     Raises
@@ -143,12 +143,13 @@ def identified(found: Assessment) -> tuple[Process, Valve, dict[str, Estimate]]:
     """
     verdict = found.verdict
     if verdict.measured is None:
-        raise NotAssessedError(verdict.needs or "needs trends from which a model can be identified")
-    window, fit, at_fault = verdict.measured.window, chosen_fit(verdict), verdict.cause == "valve"
-    return tuned(window, fit, at_fault), valve_of(verdict, fit), intervals(window, fit, at_fault)
+        raise NotAssessedError(str(verdict.needs or NO_MODEL))
+    window, fit, at_fault = verdict.measured.window, chosen_fit(verdict), verdict.cause is Cause.VALVE
+    process = tuned(window, fit, at_fault, limits)
+    return process, valve_of(verdict, fit), intervals(window, fit, at_fault, limits)
 
 
-def tune(found: Assessment, controller: Pid, kept: Advice | None = None) -> Tuning:
+def tune(found: Assessment, controller: Pid, config: Config, kept: Advice | None = None) -> Tuning:
     """Propose settings for one assessed loop.
 
     Parameters
@@ -156,6 +157,7 @@ def tune(found: Assessment, controller: Pid, kept: Advice | None = None) -> Tuni
     found : Assessment
     controller : Pid
         The stated settings in percent and seconds.
+    config : Config
     kept : Advice or None
         Why none are to be proposed (analyzer.advice.withheld).
 
@@ -166,20 +168,22 @@ def tune(found: Assessment, controller: Pid, kept: Advice | None = None) -> Tuni
     """
     verdict = found.verdict
     if verdict.measured is None:
-        raise NotAssessedError(str(verdict.needs or "needs trends from which a model can be identified"))
+        raise NotAssessedError(str(verdict.needs or NO_MODEL))
     first = found.oscillations.first
     period = first.period_s if first else None
     window = verdict.measured.window
-    model, fit, others = _model(verdict, controller)
+    model, fit, others = _model(verdict, controller, config.advice)
     if kept is not None and kept.reason:
         proposal = Proposal(kept.action, kept.reason)
     else:
-        proposal = propose(verdict, controller, period)
+        proposal = propose(verdict, controller, period, config)
     load = load_of(window, fit, controller)
     new = proposal.controller or proposal.meanwhile
-    forecast = predict(model, new, load, others) if new and load.size >= LEAST_SCANS else None
+    forecast = (
+        predict(model, new, load, others) if new and load.size >= config.advice.forecast_scans else None
+    )
     return Tuning(
-        intervals(window, fit, verdict.cause is Cause.VALVE),
+        intervals(window, fit, verdict.cause is Cause.VALVE, config.advice),
         model,
         period,
         first.amplitude_pct if first else None,

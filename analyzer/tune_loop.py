@@ -51,19 +51,20 @@ def proposal(
     export: Export,
     specs: Sequence[LoopSpec],
     loop: str,
-    until_s: float = math.inf,
+    config: Config,
+    span: tuple[float, float] = (-math.inf, math.inf),
     drawn: bool = True,
     changes: Sequence[TuningChange] = (),
 ) -> tuple[list[str], dict[str, bytes]]:
-    """Lines of text and, if wanted, pictures by file name for one loop's last night.
+    """Lines of text and, if wanted, pictures by file name for one loop's last night within a span of time [s].
 
     Raises
     ------
     InputError, NotAssessedError
         Where the loop or its settings are not known, or its trends give no model.
     """
-    config, spec = Config(), spec_of(specs, loop)
-    night = nights_of(export, [spec], until_s=until_s)[-1]
+    spec = spec_of(specs, loop)
+    night = nights_of(export, [spec], config.nights, *span)[-1]
     spec = in_force(spec, changes, night.last_s)
     prepared = prepare(spec, {t: cut(s, night) for t, s in export.read(spec.tags).items()}, config.quality)
     stated = controller(spec, prepared.scale.span)
@@ -81,6 +82,6 @@ def proposal(
         return [*text, f"action: {Action.REPAIR_VALVE}", f"no settings: {needs or NO_MODEL}"], {}
     if found.verdict.measured is None:
         raise NotAssessedError(f"{loop}: {needs or found.verdict.needs or NO_MODEL}")
-    tuning = tune(found, stated, withheld(found, spec, stated, prepared.scale.span, config))
+    tuning = tune(found, stated, config, withheld(found, spec, stated, prepared.scale.span, config))
     text += lines(tuning, spec, prepared.scale.span)
     return text, pictures(tuning, loop) if drawn else {}

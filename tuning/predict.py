@@ -13,7 +13,7 @@ from identification.record import Floats, LoopRecord
 from identification.simulation.closed_loop import closed_loop, scan_step
 from tuning.describing import band, is_play
 from tuning.limit_cycle import KICK
-from tuning.limits import LIMITS
+from tuning.limits import WARM_UP
 from tuning.linear import slowest_s
 
 BLOCKS = 12
@@ -116,7 +116,7 @@ def assess(record: LoopRecord) -> Assessed:
 
 def settled(record: LoopRecord) -> LoopRecord:
     """The record without its warm-up."""
-    return record.span(int(LIMITS.warm_up * len(record)), len(record))
+    return record.span(int(WARM_UP * len(record)), len(record))
 
 
 def _blocks(record: LoopRecord) -> Floats:

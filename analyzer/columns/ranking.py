@@ -126,7 +126,7 @@ RANKING = (
         "Valve travel",
         "%/h",
         Source.FIGURES,
-        "Way of OP, or of the stem where it is recorded, an hour, moves within 0.1 % left out.",
+        "Way of OP, or of the stem where it is recorded, an hour, small moves left out.",
         short="Travel %/h",
         hourly=True,
     ),

@@ -136,7 +136,7 @@ STORED = (
         "Valve reversals",
         "1/h",
         Source.FIGURES,
-        "How often OP, or the stem, turns, moves within 0.1 % left out.",
+        "How often OP, or the stem, turns, small moves left out.",
         hourly=True,
     ),
     Column(
@@ -190,7 +190,7 @@ STORED = (
         "Effective service factor",
         "%",
         Source.FIGURES,
-        "Share of good time in automatic, OP off its limits and the error under 5 % of span.",
+        "Share of good time in automatic, OP off its limits and the error small.",
         hourly=True,
     ),
     Column(

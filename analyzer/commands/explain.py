@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from analyzer.commands.options import NOTHING_DONE, export_options, opened, told
+from analyzer.commands.options import NOTHING_DONE, Asked, export_options
+from identification.errors import InputError
 
 if TYPE_CHECKING:
     from analyzer.explain.one_loop import Explained
@@ -20,21 +21,21 @@ def main() -> None:
     """What physics a loop's plain model lacks, and the model carried to another recording."""
 
 
-def _case(
-    export: tuple[Path, ...], loops: Path | None, tag: str, reading: dict[str, Any], whole: bool = False
-) -> Any:
-    from analyzer.config import Config
+def _case(asked: Asked, tag: str, whole: bool = False) -> Any:
     from analyzer.explain.case import MOST_SAMPLES, case, loop_of
+    from analyzer.loops.settings_in_force import in_force
 
-    source, specs, _ = opened(export, loops, **reading)
+    source, specs, _ = asked.opened()
     spec = loop_of(specs, tag)
     if spec.pv is None:
-        from identification.errors import InputError
-
         raise InputError(f"{tag}: no PV tag in the export", f"{tag}.PV", "check --loops and the export")
     others = [s.op for s in specs if s.loop != tag and s.op][:8]
-    series = source.read(list(dict.fromkeys([*spec.tags, *others])))
-    return case(spec, specs, series, Config(), None if whole else MOST_SAMPLES), series[spec.pv]
+    series = asked.within(source.read(list(dict.fromkeys([*spec.tags, *others]))))
+    pv = series[spec.pv]
+    if pv.stamp_s.size == 0:
+        raise InputError(f"{tag}: no samples between --since and --until", "a span of the export", "widen it")
+    spec = in_force(spec, asked.changes, float(pv.stamp_s[-1]))
+    return case(spec, specs, series, asked.config, None if whole else MOST_SAMPLES), pv
 
 
 @main.command()
@@ -53,16 +54,13 @@ def _case(
     help="Output format; html is one file that needs no network.",
 )
 @click.option("--out", type=click.Path(path_type=Path), help="Folder for the page and Markdown's pictures.")
-@told
 def explain(
-    export: tuple[Path, ...],
-    loops: Path | None,
+    asked: Asked,
     tag: str,
     model: Path | None,
     save_model: Path | None,
     form: str,
     out: Path | None,
-    **reading: Any,
 ) -> None:
     """Where recording and plain simulation differ, which physics was left out, and how much it explains.
 
@@ -75,7 +73,7 @@ def explain(
 
     try:
         brought = read_model(model, tag) if model is not None else None
-        case, _ = _case(export, loops, tag, reading)
+        case, _ = _case(asked, tag)
         found = explained(case, _told_rival, brought)
     except NotAssessedError as error:
         _show(abstained(tag, str(error)), None, form, out)
@@ -123,15 +121,12 @@ def _show_page(data: dict[str, Any], found: Explained | None, form: str, out: Pa
 @click.option(
     "--closed-loop", is_flag=True, help="Run the stated controller from SP instead of the recorded OP."
 )
-@told
 def simulate(
     model: Path,
-    export: tuple[Path, ...],
-    loops: Path | None,
+    asked: Asked,
     tag: str,
     out: Path,
     closed_loop: bool,
-    **reading: Any,
 ) -> None:
     """Run a saved model over another recording of its loop; a constant bias is freed, nothing else.
 
@@ -139,7 +134,7 @@ def simulate(
     """
     from analyzer.explain.saved_model import read_model, simulated
 
-    case, raw = _case(export, loops, tag, reading, whole=True)
+    case, raw = _case(asked, tag, whole=True)
     pv, op = simulated(case, read_model(model, tag), raw.stamp_s, closed_loop)
     write_trends(out, raw.stamp_s, pv, op)
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import sys
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import wraps
 from pathlib import Path
@@ -12,10 +14,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from identification.errors import TriageError
+from identification.errors import InputError, TriageError
 
 if TYPE_CHECKING:
+    from analyzer.config import Config
     from analyzer.history.export import Export
+    from analyzer.history.series import Series
+    from analyzer.loops.changes import TuningChange
     from analyzer.loops.spec import LoopSpec
 
 NOTHING_DONE = 2
@@ -50,32 +55,108 @@ def utc_seconds(at: datetime | None, otherwise: float) -> float:
     return otherwise if at is None else at.replace(tzinfo=UTC).timestamp()
 
 
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """What the command line asks of an export: files, loops, changes of settings, span of time [s, UTC] and limits.
+
+    reading : how text exports are read, as in analyzer.history.options.
+    """
+
+    export: tuple[Path, ...]
+    loops: Path | None
+    changes: tuple[TuningChange, ...]
+    since_s: float
+    until_s: float
+    config: Config
+    reading: Mapping[str, Any]
+
+    def opened(self) -> tuple[Export, tuple[LoopSpec, ...], tuple[str, ...]]:
+        """The export, its loops with their tags, and what there is to say about them."""
+        return opened(self.export, self.loops, **self.reading)
+
+    def within(self, series: Mapping[str, Series]) -> dict[str, Series]:
+        """The samples within the span of time that is asked for."""
+        from analyzer.nights import Night, cut
+
+        span = Night("", self.since_s, self.until_s)
+        return {tag: cut(found, span) for tag, found in series.items()}
+
+
+def _asked(
+    export: tuple[Path, ...],
+    loops: Path | None,
+    changes: Path | None,
+    since: datetime | None,
+    until: datetime | None,
+    config: Path | None,
+    reading: Mapping[str, Any],
+) -> Asked:
+    """The command line's options read and checked."""
+    from analyzer.config_file import read_config
+    from analyzer.loops.changes import read_changes
+
+    dated = () if changes is None else tuple(read_changes(changes))
+    first, last = utc_seconds(since, -math.inf), utc_seconds(until, math.inf)
+    if last <= first:
+        raise InputError(f"--since {since} --until {until}", "an end after the start", "swap them")
+    return Asked(export, loops, dated, first, last, read_config(config), reading)
+
+
+def config_option(command: Callable[..., Any]) -> Callable[..., Any]:
+    """--config."""
+    text = "TOML with limits to change; 'triage config' prints all of them."
+    return click.option("--config", type=click.Path(path_type=Path), help=text)(command)
+
+
+OPTIONS = (
+    click.argument("export", nargs=-1, required=True, type=click.Path(path_type=Path)),
+    click.option(
+        "--loops", type=click.Path(path_type=Path), help="loops.csv; without it loops are found by tags."
+    ),
+    click.option(
+        "--changes",
+        type=click.Path(path_type=Path),
+        help="changes.csv: when settings were changed, old and new.",
+    ),
+    click.option("--since", type=click.DateTime(), help="First day or time (UTC) of samples that are used."),
+    click.option("--until", type=click.DateTime(), help="Day or time (UTC) before which samples are used."),
+    config_option,
+    click.option("--timezone", help="Time zone of stamps without one, e.g. Europe/Helsinki. Default UTC."),
+    click.option("--delimiter", help="Delimiter of text exports. Default: detected."),
+    click.option("--decimal", type=click.Choice([".", ","]), help="Decimal mark. Default: detected."),
+    click.option("--encoding", help="Encoding of text exports. Default: detected."),
+    click.option("--day-first/--month-first", default=None, help="Order in dates such as 03/04/2026."),
+    click.option("--date-format", help="Format of the stamps, e.g. '%d-%b-%y %H:%M:%S'."),
+    click.option("--time-column", help="Name of the column of stamps. Default: detected."),
+    click.option(
+        "--quality-column", help="Name of a long export's column of quality codes. Default: detected."
+    ),
+    click.option(
+        "--good-quality", multiple=True, help="Quality code or text that means good; may be repeated."
+    ),
+)
+"""What every command that reads an export takes."""
+READING = (
+    *("timezone", "delimiter", "decimal", "encoding", "day_first", "date_format", "time_column"),
+    *("quality_column", "good_quality"),
+)
+"""Options of theirs that say how text exports are read."""
+SPAN = ("export", "loops", "changes", "since", "until", "config")
+
+
 def export_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """EXPORT..., --loops and how to read text exports."""
-    options = [
-        click.argument("export", nargs=-1, required=True, type=click.Path(path_type=Path)),
-        click.option(
-            "--loops", type=click.Path(path_type=Path), help="loops.csv; without it loops are found by tags."
-        ),
-        click.option(
-            "--timezone", help="Time zone of stamps without one, e.g. Europe/Helsinki. Default UTC."
-        ),
-        click.option("--delimiter", help="Delimiter of text exports. Default: detected."),
-        click.option("--decimal", type=click.Choice([".", ","]), help="Decimal mark. Default: detected."),
-        click.option("--encoding", help="Encoding of text exports. Default: detected."),
-        click.option("--day-first/--month-first", default=None, help="Order in dates such as 03/04/2026."),
-        click.option("--date-format", help="Format of the stamps, e.g. '%d-%b-%y %H:%M:%S'."),
-        click.option("--time-column", help="Name of the column of stamps. Default: detected."),
-        click.option(
-            "--quality-column", help="Name of a long export's column of quality codes. Default: detected."
-        ),
-        click.option(
-            "--good-quality", multiple=True, help="Quality code or text that means good; may be repeated."
-        ),
-    ]
-    for option in reversed(options):
-        command = option(command)
-    return command
+    """EXPORT... and its options, handed over as one `asked`; errors told as by `told`."""
+
+    @wraps(command)
+    def collected(**given: Any) -> Any:
+        reading = {name: given.pop(name) for name in READING}
+        stated = {name: given.pop(name) for name in SPAN}
+        return command(asked=_asked(**stated, reading=reading), **given)
+
+    found: Callable[..., Any] = told(collected)
+    for option in reversed(OPTIONS):
+        found = option(found)
+    return found
 
 
 def opened(

@@ -2,24 +2,22 @@
 
 from __future__ import annotations
 
-import math
 import signal
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from datetime import datetime
 from pathlib import Path
 from types import FrameType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
-from analyzer.commands.options import NOTHING_DONE, SOME_LOST, export_options, opened, utc_seconds
+from analyzer.commands.options import NOTHING_DONE, SOME_LOST, Asked, export_options
 
 if TYPE_CHECKING:
     from analyzer.batch import Outcome
+    from analyzer.config import Config
     from analyzer.history.export import Export
-    from analyzer.loops.changes import TuningChange
     from analyzer.loops.spec import LoopSpec
     from analyzer.nights import Night
     from analyzer.store import Store
@@ -65,27 +63,17 @@ def stoppable() -> Iterator[None]:
 @click.option(
     "--store", required=True, type=click.Path(path_type=Path), help="Directory that keeps the results."
 )
-@click.option(
-    "--changes", type=click.Path(path_type=Path), help="changes.csv: when settings were changed, old and new."
-)
 @click.option("--jobs", default=1, show_default=True, type=click.IntRange(1), help="Worker processes.")
 @click.option("--resume", is_flag=True, help="Go on with a run that was stopped.")
 @click.option("--replace", "replacing", is_flag=True, help="Forget what the store has of these nights first.")
-@click.option("--since", type=click.DateTime(), help="First day or time assessed (UTC).")
-@click.option("--until", type=click.DateTime(), help="Day or time (UTC) before which samples are assessed.")
 @click.option("--explain", "explaining", is_flag=True, help="Explain the last night's flagged loops as well.")
 def run(
-    export: tuple[Path, ...],
-    loops: Path | None,
+    asked: Asked,
     store: Path,
-    changes: Path | None,
     jobs: int,
     resume: bool,
     replacing: bool,
-    since: datetime | None,
-    until: datetime | None,
     explaining: bool,
-    **reading: Any,
 ) -> None:
     """The nightly batch: assess every loop and keep the results in a store.
 
@@ -96,18 +84,15 @@ def run(
 
     Example: triage run export.parquet --loops loops.csv --store store --jobs 4
     """
-    from analyzer.loops.changes import read_changes
     from analyzer.store import Store
 
-    dated = () if changes is None else read_changes(changes)
     try:
         with stoppable():
-            source, specs, notes = _opened(export, loops, reading)
+            source, specs, notes = _opened(asked)
             _say(notes)
-            span = utc_seconds(since, -math.inf), utc_seconds(until, math.inf)
-            outcome = _assessed(source, specs, Store(store), jobs, resume, span, replacing, dated)
+            outcome = _assessed(source, specs, Store(store), asked, jobs, resume, replacing)
             if explaining and len(outcome.unassessed) + len(outcome.failed) < len(specs):
-                _explained(source, specs, Store(store), outcome.nights[-1], jobs, resume)
+                _explained(source, specs, Store(store), asked.config, outcome.nights[-1], jobs, resume)
     except StoppedError as stopped:
         kept = f"what is done is kept in {store}: go on with the same command and --resume"
         click.echo(f"triage: stopped by {stopped}; {kept}", err=True)
@@ -115,9 +100,7 @@ def run(
     sys.exit(_status(outcome, len(specs)))
 
 
-def _opened(
-    export: tuple[Path, ...], loops: Path | None, reading: dict[str, Any]
-) -> tuple[Export, Sequence[LoopSpec], Sequence[str]]:
+def _opened(asked: Asked) -> tuple[Export, Sequence[LoopSpec], Sequence[str]]:
     """The export found out about in a worker process: a damaged file may take memory or time without end.
 
     Raises
@@ -125,28 +108,24 @@ def _opened(
     InputError
         The export cannot be used, or the process that read it died.
     """
-    from analyzer.config import Config
     from analyzer.workers import Died, Workers
     from identification.errors import InputError
 
-    with Workers(1, find_out, Config().opening) as workers:
-        workers.submit((export, loops, reading))
+    with Workers(1, find_out, asked.config.opening) as workers:
+        workers.submit(asked)
         (found,) = workers.results()
     if isinstance(found, Died):
         raise InputError(
-            f"{export[0]}: reading it ended without a result ({found.why})",
+            f"{asked.export[0]}: reading it ended without a result ({found.why})",
             "files that are whole and fit into memory",
             "export them again or in parts; 'triage check FILE' on each finds the one",
         )
     return found
 
 
-def find_out(
-    asked: tuple[tuple[Path, ...], Path | None, dict[str, Any]], began: Callable[[int], None]
-) -> tuple[Export, Sequence[LoopSpec], Sequence[str]]:
+def find_out(asked: Asked, began: Callable[[int], None]) -> tuple[Export, Sequence[LoopSpec], Sequence[str]]:
     """What a worker finds out about an export, its span of time included."""
-    export, loops, reading = asked
-    source, specs, notes = opened(export, loops, **reading)
+    source, specs, notes = asked.opened()
     for spec in specs:
         if spec.pv is not None:
             source.span(spec.pv)
@@ -168,19 +147,20 @@ def _assessed(
     source: Export,
     specs: Sequence[LoopSpec],
     store: Store,
+    asked: Asked,
     jobs: int,
     resume: bool,
-    span: tuple[float, float],
     replacing: bool,
-    changes: Sequence[TuningChange],
 ) -> Outcome:
     """Run the batch with progress and say what came of it."""
     from analyzer import batch
     from analyzer.commands.progress import bar
-    from analyzer.config import Config
 
+    span = asked.since_s, asked.until_s
     with bar("loops") as progress:
-        outcome = batch.run(source, specs, store, Config(), jobs, resume, *span, progress, replacing, changes)
+        outcome = batch.run(
+            source, specs, store, asked.config, jobs, resume, *span, progress, replacing, asked.changes
+        )
     more = len(outcome.notes) - FEW
     _say(outcome.notes[:FEW])
     if more > 0:
@@ -196,14 +176,19 @@ def _assessed(
 
 
 def _explained(
-    source: Export, specs: Sequence[LoopSpec], store: Store, night: Night, jobs: int, resume: bool
+    source: Export,
+    specs: Sequence[LoopSpec],
+    store: Store,
+    config: Config,
+    night: Night,
+    jobs: int,
+    resume: bool,
 ) -> None:
     """Explain the flagged loops of a night, with progress, and say how many."""
     from analyzer.commands.progress import bar
-    from analyzer.config import Config
     from analyzer.explain import night as explain_night
 
     with bar("explained") as progress:
-        rows = explain_night.run(source, specs, store, night, Config(), jobs, resume, progress)
+        rows = explain_night.run(source, specs, store, night, config, jobs, resume, progress)
     named = sum(r["verdict"] not in ("none", "unexplained") for r in rows)
     click.echo(f"{len(rows)} flagged loops explained, {named} with a name", err=True)

@@ -72,8 +72,8 @@ def test_unknown_lag_is_sought_as_an_integrator(tank):
     """Where the record tells gain over time constant alone, settings are sought for an integrator of that slope."""
     m = tank.verdict.measured
     fit = chosen_fit(tank.verdict)
-    assert lag_factor(m.window, fit, True) is None
-    process = tuned(m.window, fit, True)
+    assert lag_factor(m.window, fit, True, CONFIG.advice) is None
+    process = tuned(m.window, fit, True, CONFIG.advice)
     assert isinstance(process, Integrator)
     assert process.slope == pytest.approx(TANK.process[0] / TANK.process[1], rel=0.1)
 
@@ -81,7 +81,7 @@ def test_unknown_lag_is_sought_as_an_integrator(tank):
 def test_known_lag_is_sought_as_a_lag(pipe):
     """Where the record tells the time constant, settings are sought for that lag, within a quarter."""
     m = pipe.verdict.measured
-    process = tuned(m.window, chosen_fit(pipe.verdict), True)
+    process = tuned(m.window, chosen_fit(pipe.verdict), True, CONFIG.advice)
     assert isinstance(process, Fopdt)
     assert process.time_constant_s == pytest.approx(PIPE.process[1], rel=0.25)
 
@@ -89,15 +89,15 @@ def test_known_lag_is_sought_as_a_lag(pipe):
 def test_proposal_is_stable_on_the_true_process(tank, pipe):
     """On the true process the proposal's Ms stays below 2.5."""
     for found, sketch in ((tank, TANK), (pipe, PIPE)):
-        new = propose(found.verdict, sketch.controller, found.oscillations.first.period_s).controller
-        loop = sought_for(found.verdict, sketch.controller)[0]
+        new = propose(found.verdict, sketch.controller, found.oscillations.first.period_s, CONFIG).controller
+        loop = sought_for(found.verdict, sketch.controller, CONFIG.advice)[0]
         true = replace(loop, process=Fopdt(*sketch.process), controller=new)
         assert margins(true).ms < LIMITS.ms_most_sample
 
 
 def test_samples_spread_about_the_fit(tank):
     """Samples keep the sign and kind of the process; their slopes spread no more than threefold about the fit's."""
-    loop, fit, _ = sought_for(tank.verdict, TANK.controller)
+    loop, fit, _ = sought_for(tank.verdict, TANK.controller, CONFIG.advice)
     samples = uncertain(tank.verdict.measured.window, fit, loop, 40)
     ratio = np.array([one.process.slope / loop.process.slope for one in samples])
     assert all(isinstance(one.process, Integrator) for one in samples)
@@ -147,7 +147,7 @@ def test_load_is_left_alone():
     advice = settings(found, SWUNG)
     assert found.verdict.cause == "load"
     assert (advice.action, advice.kp_new, advice.ti_new) == ("none", None, None)
-    assert propose(found.verdict, SWUNG.controller, 300.0).action == "none"
+    assert propose(found.verdict, SWUNG.controller, 300.0, CONFIG).action == "none"
 
 
 def test_no_cause_no_settings(pipe):
@@ -201,7 +201,7 @@ def test_cycles_too_fast_for_the_sampling_are_not_denied():
     assert "has one every 60 s" in str(found.needs)
     advice = settings(found, TANK)
     assert (advice.action, advice.reason) == ("needs data", str(found.needs))
-    row = night_row(found, spec("L"), "2026-03-02")
+    row = night_row(found, spec("L"), "2026-03-02", CONFIG.advice)
     assert row["oscillating_pct"] is None
     assert row["cause"] == "undecided"
 
@@ -225,7 +225,7 @@ def test_a_model_beyond_its_record_gets_no_advice(pipe):
     m = pipe.verdict.measured
     late = replace(m.play, dead_time_s=m.window.duration_s / 3)
     verdict = replace(pipe.verdict, measured=replace(m, play=late), fault="backlash")
-    p = propose(verdict, PIPE.controller, 100.0)
+    p = propose(verdict, PIPE.controller, 100.0, CONFIG)
     assert p.controller is None
     assert "dead time" in p.reason
 
@@ -240,20 +240,20 @@ def test_unstated_settings_are_asked_for(pipe):
 def test_wrong_sign_is_told(pipe):
     """A gain of the wrong sign gets no settings and says that the controller would act the wrong way."""
     turned = replace(PIPE.controller, kp=-PIPE.kp)
-    p = propose(pipe.verdict, turned, 100.0)
+    p = propose(pipe.verdict, turned, 100.0, CONFIG)
     assert (p.action, p.controller) == ("check settings", None)
     assert "wrong way" in p.reason
 
 
 def test_integral_off_is_told(pipe):
-    """StatedSettings without integral action, a loop that cycles by it is sent to check its settings."""
-    p = propose(pipe.verdict, replace(PIPE.controller, ti_s=math.inf), 100.0)
+    """Without integral action, as stated, a loop that cycles by it is sent to check its settings."""
+    p = propose(pipe.verdict, replace(PIPE.controller, ti_s=math.inf), 100.0, CONFIG)
     assert (p.action, p.controller) == ("check settings", None)
     assert "check kp and ti" in p.reason
 
 
 def test_play_is_the_model_where_it_cycles_by_itself(tank):
     """Where the loop with the identified play cycles, that play is the model, and so are its samples."""
-    loop, fit, others = sought_for(tank.verdict, TANK.controller)
+    loop, fit, others = sought_for(tank.verdict, TANK.controller, CONFIG.advice)
     assert loop.valve == Backlash(fit.valve.stickband)
     assert all(isinstance(one.valve, Backlash) for one in others)

@@ -14,8 +14,6 @@ from plant import CONFIG, START_S, record
 from analyzer.assess import assess, unassessable
 from analyzer.assessments import (
     HOUR_S,
-    TRAVEL_DEADBAND_PCT,
-    TRAVEL_GRID_S,
     assess_span,
     crossings,
     hour_edges,
@@ -30,6 +28,7 @@ from analyzer.oscillation import detect
 from analyzer.quality import Prepared, Scale
 from identification.record import LoopRecord
 
+FIGURES = CONFIG.figures
 N = 9000
 T = np.arange(N)
 
@@ -114,7 +113,7 @@ def slow_crossings(error: list[float], band: float) -> int:
 def test_figures_agree_with_slow_twin(seed, dt_s):
     """Error, variability and shares of time are those of a plain loop over the good samples in automatic."""
     r = night(seed, dt_s)
-    found = assess_span(r).as_row()
+    found = assess_span(r, FIGURES).as_row()
     for name, expected in slow_figures(r).items():
         assert found[name] == pytest.approx(expected, rel=1e-9), name
 
@@ -140,8 +139,8 @@ def test_crossings_agree_with_slow_twin(error, band):
 def test_travel_of_a_night_is_on_its_grid():
     """Travel per hour is that of every tenth second's OP beyond the deadband, over the hours."""
     r = record(50 + noise(3), op=50 + 5 * np.sin(T / 90) + 0.3 * noise(4))
-    path, turns = slow_travel(list(r.op[:: int(TRAVEL_GRID_S)]), TRAVEL_DEADBAND_PCT)
-    found = assess_span(r)
+    path, turns = slow_travel(list(r.op[:: int(FIGURES.travel_grid_s)]), FIGURES.travel_deadband_pct)
+    found = assess_span(r, FIGURES)
     assert found.valve_travel_pct_per_h == pytest.approx(path / (N / 3600))
     assert found.reversals_per_h == pytest.approx(turns / (N / 3600))
 
@@ -152,7 +151,7 @@ def test_travel_of_a_night_is_on_its_grid():
 def test_figures_of_a_sine_have_closed_forms():
     """An error A sin has mean absolute value 2A/pi, variability sqrt(2) A and two crossings a period."""
     period, size = 90.0, 3.0
-    found = assess_span(record(50 + size * np.sin(2 * np.pi * T / period)), noise=0.0)
+    found = assess_span(record(50 + size * np.sin(2 * np.pi * T / period)), FIGURES, noise=0.0)
     assert found.average_absolute_error_pct == pytest.approx(2 * size / np.pi, rel=1e-3)
     assert found.variability_pct == pytest.approx(math.sqrt(2) * size, rel=1e-6)
     assert found.crossings_per_h == pytest.approx(2 * 3600 / period, rel=0.01)
@@ -161,8 +160,8 @@ def test_figures_of_a_sine_have_closed_forms():
 def test_travel_of_a_sine_has_a_closed_form():
     """OP A sin travels 4A less two deadbands a period, but for the grid."""
     period = 900.0
-    found = assess_span(record(50 + noise(5), op=50 + 10 * np.sin(2 * np.pi * T / period)))
-    expected = (40 - 2 * TRAVEL_DEADBAND_PCT) * 3600 / period
+    found = assess_span(record(50 + noise(5), op=50 + 10 * np.sin(2 * np.pi * T / period)), FIGURES)
+    expected = (40 - 2 * FIGURES.travel_deadband_pct) * 3600 / period
     assert found.valve_travel_pct_per_h == pytest.approx(expected, rel=0.01)
     assert found.reversals_per_h == pytest.approx(2 * 3600 / period, rel=0.06)
 
@@ -176,8 +175,8 @@ def test_noise_band_is_the_deviation_of_white_noise():
 def test_travel_of_the_position_where_it_is_recorded():
     """Where the stem's position is recorded travel is the stem's and not OP's."""
     r = record(50 + noise(7), op=50 + 5 * np.sin(T / 90))
-    assert assess_span(replace(r, position=np.full(N, 50.0))).valve_travel_pct_per_h == 0.0
-    assert assess_span(r).valve_travel_pct_per_h > 50
+    assert assess_span(replace(r, position=np.full(N, 50.0)), FIGURES).valve_travel_pct_per_h == 0.0
+    assert assess_span(r, FIGURES).valve_travel_pct_per_h > 50
 
 
 # Gaps, constants and nothing at all
@@ -188,7 +187,8 @@ def test_time_without_samples_weighs_nothing():
     pv = 50 + 2 * np.sin(T / 70) + noise(8)
     bad = (T >= 3000) & (T < 5000)
     rows = [
-        assess_span(replace(record(np.where(bad, held, pv)), bad=bad)).as_row() for held in (50.0, 99.0, -1e6)
+        assess_span(replace(record(np.where(bad, held, pv)), bad=bad), FIGURES).as_row()
+        for held in (50.0, 99.0, -1e6)
     ]
     assert rows[0] == rows[1] == rows[2]
     assert rows[0]["usable_h"] == pytest.approx((N - 2000) / 3600)
@@ -196,7 +196,7 @@ def test_time_without_samples_weighs_nothing():
 
 def test_a_constant_loop_has_figures_and_no_nan():
     """A loop that stands still off its set point: its error, and zero of all that moves."""
-    found = assess_span(record(np.full(N, 47.0))).as_row()
+    found = assess_span(record(np.full(N, 47.0)), FIGURES).as_row()
     assert found["average_absolute_error_pct"] == pytest.approx(3.0)
     names = (
         "valve_travel_pct_per_h",
@@ -214,21 +214,21 @@ def test_next_to_nothing_gives_none_and_no_good_score(good):
     """With no sample, or hardly any, that is usable every figure is None, not zero."""
     bad = np.ones(N, dtype=bool)
     bad[:good] = False
-    found = assess_span(replace(record(50 + noise(9)), bad=bad)).as_row()
+    found = assess_span(replace(record(50 + noise(9)), bad=bad), FIGURES).as_row()
     assert all(value is None for name, value in found.items() if name != "usable_h")
 
 
 def test_relative_variability_is_not_told_about_zero():
     """Two sigma of PV over its mean is not told where the mean lies within the spread."""
-    assert assess_span(record(noise(10), 0.0)).pv_variability_pct is None
-    assert assess_span(record(50 + noise(10))).pv_variability_pct == pytest.approx(4.0, rel=0.05)
+    assert assess_span(record(noise(10), 0.0), FIGURES).pv_variability_pct is None
+    assert assess_span(record(50 + noise(10)), FIGURES).pv_variability_pct == pytest.approx(4.0, rel=0.05)
 
 
 def test_hours_add_up():
     """Usable hours, and error weighted by them, of the clock hours give the night's."""
     r = replace(night(31), start_s=START_S + 1500.0)
-    hours = hourly(r, detect(r, CONFIG.oscillation))
-    whole = assess_span(r)
+    hours = hourly(r, detect(r, CONFIG.oscillation), FIGURES)
+    whole = assess_span(r, FIGURES)
     assert [h.start_s for h in hours] == [START_S, START_S + HOUR_S, START_S + 2 * HOUR_S]
     assert sum(h.figures.usable_h for h in hours) == pytest.approx(whole.usable_h)
     weighted = sum(h.figures.average_absolute_error_pct * h.figures.usable_h for h in hours)

@@ -207,6 +207,18 @@ def test_pieces_of_two_exports_are_never_mixed(export, tmp_path):
     assert ran(export, store, "--resume").exit_code == 0
 
 
+def test_a_run_goes_on_with_its_own_limits_alone(export, tmp_path):
+    """--resume with other limits than the stopped run's is refused and names --config among what must be the same."""
+    store, limits = tmp_path / "store", tmp_path / "limits.toml"
+    limits.write_text("[oscillation]\nperiods = 3.5\n")
+    stopped(export, store, 1)
+    told = ran(export, store, "--resume", "--config", str(limits))
+    assert told.exit_code == 2
+    assert "--config" in told.stderr
+    limits.write_text("[oscillation]\nperiods = 3.0\n")
+    assert ran(export, store, "--resume", "--config", str(limits)).exit_code == 0
+
+
 @pytest.mark.parametrize("year", [1601, 1970, 2106])
 def test_a_stray_stamp_makes_no_nights(export, whole, tmp_path, year):
     """One stamp far from the rest is set aside and told; the night is what it is without it."""

@@ -52,7 +52,10 @@ def test_noise_does_not_oscillate(make, seed):
     night = record(50 + make(seed), dt_s=2.0)
     found = found_in(night)
     assert found.first is None
-    assert all(h.oscillation_significance == 0.0 and h.oscillating_pct == 0.0 for h in hourly(night, found))
+    assert all(
+        h.oscillation_significance == 0.0 and h.oscillating_pct == 0.0
+        for h in hourly(night, found, CONFIG.figures)
+    )
 
 
 @pytest.mark.parametrize(
@@ -190,7 +193,7 @@ def test_significance_adds_up_over_the_hours(begin_s, n):
     night = replace(night, start_s=START_S + begin_s)
     found = found_in(night)
     assert found.first is not None
-    hours = hourly(night, found)
+    hours = hourly(night, found, CONFIG.figures)
     assert sum(h.oscillation_significance for h in hours) == pytest.approx(
         found.first.significance, rel=0.005
     )

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from analyzer.assessments import assess_span
+from analyzer.config import FigureLimits
 from analyzer.quality import interval
 from identification.record import LoopRecord
 
@@ -15,7 +16,7 @@ def test_moves_during_a_gap_are_no_travel():
     op = np.repeat([20.0, 50.0, 80.0], 2000)
     bad = np.repeat([False, True, False], 2000)
     pv = np.full(6000, 50.0)
-    night = assess_span(LoopRecord("L", 0.0, 1.0, pv, pv, op, bad))
+    night = assess_span(LoopRecord("L", 0.0, 1.0, pv, pv, op, bad), FigureLimits())
     assert night.valve_travel_pct_per_h == 0.0
     assert night.usable_h == pytest.approx(4000 / 3600)
 

@@ -25,7 +25,7 @@ from concealed.scene import KINDS, Rng, draw_plant, load_path, noise_path, setpo
 
 from analyzer.advice import chosen_fit
 from analyzer.assess import Assessment, assess
-from analyzer.config import QualityLimits
+from analyzer.config import AdviceLimits, QualityLimits
 from analyzer.quality import prepare
 from analyzer.tune import intervals
 from identification.errors import NotAssessedError
@@ -155,7 +155,7 @@ def held(case: tuple[str, int]) -> list[Held] | str:
     ]
     if told != wanted or verdict.measured is None:
         return told
-    found = intervals(verdict.measured.window, chosen_fit(verdict), family != FAMILIES[2])
+    found = intervals(verdict.measured.window, chosen_fit(verdict), family != FAMILIES[2], AdviceLimits())
     return [compared(family, name, found[name], true) for name, true in m.truth.items() if name in found]
 
 

@@ -82,7 +82,7 @@ def hours_of(record: LoopRecord) -> dict[str, np.ndarray]:
     rows: list[dict[str, float | None]] = []
     for day in range(DAYS):
         night = record.span(day * DAY, (day + 1) * DAY)
-        for h in hourly(night, detect(night, Config().oscillation)):
+        for h in hourly(night, detect(night, Config().oscillation), Config().figures):
             found = {
                 "oscillation_significance": h.oscillation_significance,
                 "oscillating_pct": h.oscillating_pct,

@@ -1,0 +1,159 @@
+"""Limits come from one table, a file changes them, and what is wrong in it is told in one line."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from dataclasses import fields, replace
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+
+from analyzer.cli import main
+from analyzer.config import Config
+from analyzer.config_file import configured, document, limit_of, read_config
+from analyzer.store import Store
+from tests.analyzer.plant import Sketch, simulate, write_export
+
+TANK = Sketch("valve", (60.0, 1800.0, 9.0), 0.9, 40.0, backlash=2.5)
+"""A tank on a valve with play."""
+READERS = ("run", "check", "tune", "explain", "simulate")
+"""Commands that read an EXPORT (contract)."""
+CASES = [
+    ("[oscilation]\nperiods = 4", ["section [oscilation]", "oscillation"]),
+    ("[oscillation]\nperiodes = 4", ["[oscillation] periodes", "periods"]),
+    ("[oscillation]\nperiods = 'four'", ["periods is 'four'", "a number from 1 to 100"]),
+    ("[oscillation]\nperiods = true", ["periods is True", "a number from 1 to 100"]),
+    ("[oscillation]\nperiods = nan", ["periods is nan", "a number from 1 to 100"]),
+    ("[oscillation]\nperiods = 0", ["periods is 0", "a number from 1 to 100"]),
+    ("[quality]\nsamples = 200.5", ["samples is 200.5", "a whole number from 20"]),
+    ("[quality]\nstale_s = -1.0", ["stale_s is -1.0", "[s]"]),
+    ("[tuning]\nms_most = [2.0]", ["ms_most is [2.0]", "a number from 1.1 to 10"]),
+    ("[cause]\nfast_process = [['flow', 60.0]]", ["fast_process has ['flow', 60.0]", '["flow", 60.0, 30.0]']),
+    ("[cause]\nfast_process = [['flow', -1.0, 3.0]]", ["fast_process has ['flow', -1.0, 3.0]"]),
+    ("cause = 3", ["cause is 3", "a section [cause]"]),
+    ("[cause", ["TOML"]),
+]
+
+
+def asked(*arguments: str | Path) -> Result:
+    """What a command answers."""
+    return CliRunner().invoke(main, [*map(str, arguments)])
+
+
+@pytest.fixture(scope="module")
+def export(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Three hours of two tanks that cycle."""
+    folder = tmp_path_factory.mktemp("config")
+    trends = {name: simulate(TANK, 3.0, seed) for seed, name in enumerate(("LIC1", "LIC2"), 1)}
+    return write_export(folder / "export.parquet", trends)
+
+
+def test_the_printed_defaults_are_the_defaults():
+    """`triage config` prints TOML that, read back, is the table of defaults again, each number with its comment."""
+    printed = asked("config").stdout
+    stated = tomllib.loads(printed)
+    assert configured(stated, "printed") == Config()
+    names = {name for section in stated.values() for name in section}
+    for name in names:
+        assert re.search(rf"\n# .*\n{name} = ", printed), name
+    assert max(map(len, printed.splitlines())) <= 118
+
+
+def test_every_limit_has_unit_range_meaning_and_source():
+    """No limit is without unit, meaning and source, and every default lies in its range."""
+    for section in fields(Config()):
+        limits = getattr(Config(), section.name)
+        for field in fields(limits):
+            said, value = limit_of(field), getattr(limits, field.name)
+            assert all((said.unit, said.meaning, said.source)), field.name
+            numbers = [value] if isinstance(value, int | float) else [x for row in value for x in row[1:]]
+            assert all(said.least <= x <= said.most for x in numbers), field.name
+
+
+def test_a_file_changes_what_it_states_and_nothing_else(tmp_path: Path):
+    """A file with two limits gives the defaults but for these two; whole numbers stand for numbers."""
+    file = tmp_path / "limits.toml"
+    file.write_text("[oscillation]\nperiods = 4\n[tuning]\nms_most = 1.8\n")
+    found, default = read_config(file), Config()
+    wanted = replace(
+        default,
+        oscillation=replace(default.oscillation, periods=4.0),
+        tuning=replace(default.tuning, ms_most=1.8),
+    )
+    assert found == wanted
+    assert document(found).count("periods = 4.0") == 1
+
+
+@pytest.mark.parametrize(("text", "fragments"), CASES)
+def test_what_is_wrong_in_a_file_is_one_line(text, fragments, tmp_path: Path, export: Path):
+    """Unknown names, wrong types and values out of range are one line: seen, expected, remedy; exit status 2."""
+    file = tmp_path / "limits.toml"
+    file.write_text(text)
+    result = asked("check", export, "--config", file)
+    assert (result.exit_code, result.stdout) == (2, "")
+    assert len(result.stderr.splitlines()) == 1
+    assert "triage config" in result.stderr
+    assert all(fragment in result.stderr for fragment in (*fragments, "limits.toml", "expected")), (
+        result.stderr
+    )
+
+
+def test_a_file_that_is_not_there_is_one_line(tmp_path: Path, export: Path):
+    """A missing file of limits is named in one line, exit status 2."""
+    result = asked("check", export, "--config", tmp_path / "none.toml")
+    assert result.exit_code == 2
+    assert "none.toml" in result.stderr
+    assert len(result.stderr.splitlines()) == 1
+
+
+@pytest.mark.parametrize("name", READERS)
+def test_commands_that_read_an_export_take_the_same_options(name):
+    """Loops, changes, span, time zone and limits can be stated to every command that reads an export (contract)."""
+    options = {option for p in main.commands[name].params for option in p.opts}
+    assert {"--loops", "--changes", "--since", "--until", "--timezone", "--config"} <= options
+
+
+def test_the_limits_reach_every_part_of_a_run(tmp_path: Path, export: Path):
+    """Limits of each part change what that part says of one export: quality, figures, oscillation, cause, advice."""
+    plain = night(tmp_path, export, "")
+    assert (plain["cause"], plain["status"]) == ("valve", "ok")
+    assert night(tmp_path, export, "[quality]\nsamples = 100000")["status"] == "not assessed"
+    assert night(tmp_path, export, "[oscillation]\nperiods = 100.0")["oscillating_pct"] == 0.0
+    assert night(tmp_path, export, "[cause]\nevidence = 1e6")["cause"] != "valve"
+    wide = night(tmp_path, export, "[figures]\ntravel_deadband_pct = 3.0")
+    assert wide["valve_travel_pct_per_h"] < plain["valve_travel_pct_per_h"]
+    assert night(tmp_path, export, "[advice]\nleast_h = 4.0")["osc_valve_pct"] == 75.0
+
+
+def night(folder: Path, export: Path, text: str) -> dict[str, object]:
+    """The night's row of the first tank under some limits."""
+    file, store = folder / "limits.toml", folder / "store"
+    file.write_text(text)
+    asked("run", export, "--store", store, "--config", file, "--replace")
+    row: dict[str, object] = Store(store).read("nights", Store(store).require()).to_pylist()[0]
+    return row
+
+
+def test_tune_takes_its_limits(tmp_path: Path, export: Path):
+    """With a limit of play below what the valve has, tune says that it is beyond tuning; by default it is not."""
+    loops = tmp_path / "loops.csv"
+    loops.write_text("loop,type,pv_lo,pv_hi,kp,ti\nLIC1,level,0,100,0.9,40\n")
+    file = tmp_path / "limits.toml"
+    file.write_text("[tuning]\nband_beyond = 0.5\n")
+    command = ("tune", export, "--loops", loops, "--loop", "LIC1")
+    assert "beyond tuning" not in asked(*command).stdout
+    assert "beyond tuning" in asked(*command, "--config", file).stdout
+
+
+def test_check_and_tune_take_a_span_of_time(export: Path):
+    """Of an hour of an export, check sees the samples of that hour; of none, tune says so in one line."""
+    span = ("--since", "2026-03-02T00:00:00", "--until", "2026-03-02T01:00:00")
+    assert asked("check", export, *span).stdout.count("3600 samples every 1 s") == 2
+    nothing = asked("tune", export, "--loop", "LIC1", "--since", "2026-03-05")
+    assert nothing.exit_code == 2
+    assert "no samples between --since and --until" in nothing.stderr
+    turned = asked("check", export, "--since", "2026-03-05", "--until", "2026-03-04")
+    assert turned.exit_code == 2
+    assert "swap them" in turned.stderr
