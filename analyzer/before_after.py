@@ -14,6 +14,7 @@ import numpy as np
 
 from analyzer.block_bootstrap import Difference, difference
 from analyzer.columns.table import BY_NAME
+from analyzer.limits.comparison import ComparisonLimits
 from analyzer.spans import HOUR_S, Hours, Span, gridded, mean
 
 
@@ -66,36 +67,8 @@ MEASURES = (
 resolution of what a historian keeps."""
 
 
-@dataclass(frozen=True, slots=True)
-class Limits:
-    """When two spans can be compared and how sure a verdict is; ours, set on unchanged simulated plants."""
-
-    confidence: float = 0.95
-    """That none of the four (or of the others) is called better or worse where nothing changed [-]."""
-    least_days: float = 3.0
-    """Usable time each side [d]: fewer do not show how days differ."""
-    usable_share: float = 0.5
-    """Share of a span's hours that must be usable [-]."""
-    least_pct: float = 3.0
-    """A smaller change [% of before] is not called better or worse."""
-    modest_pct: float = 15.0
-    """A loop whose smallest improvement is below this [% of before] is called modestly improved."""
-    set_point_pct: float = 5.0
-    """Largest difference of mean SP or PV [% of span]."""
-    load_pct: float = 10.0
-    """Largest difference of mean OP [% of span]: the load and the valve's working point."""
-    sp_travel_ratio: float = 3.0
-    """Largest ratio of SP travel, where it is over sp_travel_floor [% of span per h]."""
-    sp_travel_floor: float = 1.0
-    mode_points: float = 20.0
-    """Largest difference of the share of time in automatic [points]."""
-    limit_points: float = 10.0
-    """Largest share of time at a limit [%]."""
-    source_share: float = 0.5
-    """A loop follows another one where this share of its oscillating nights names a source [-]."""
-
-
-LIMITS = Limits()
+LIMITS = ComparisonLimits()
+"""The limits in force where none are given."""
 
 
 class Verdict(StrEnum):
@@ -157,6 +130,7 @@ class LoopComparison:
     changes: tuple[Change, ...]
     reasons: tuple[str, ...]
     source_loop: str = ""
+    limits: ComparisonLimits = LIMITS
 
     @property
     def primary(self) -> tuple[Change, ...]:
@@ -164,7 +138,7 @@ class LoopComparison:
         return tuple(c for c in self.changes if c.measure.primary)
 
 
-def _too_little(hours: tuple[float, float], spans: tuple[Span, Span], limits: Limits) -> list[str]:
+def _too_little(hours: tuple[float, float], spans: tuple[Span, Span], limits: ComparisonLimits) -> list[str]:
     found = []
     for name, usable, span in zip(("before", "after"), hours, spans, strict=True):
         total = max((span.last_s - span.first_s) / HOUR_S, 0.0)
@@ -183,7 +157,9 @@ def _differs(name: str, a: float | None, b: float | None, most: float, unit: str
     return [f"different {name}: {a:.3g} {unit} before, {b:.3g} {unit} after"]
 
 
-def reasons_against(hours: Hours, before: Span, after: Span, limits: Limits = LIMITS) -> tuple[str, ...]:
+def reasons_against(
+    hours: Hours, before: Span, after: Span, limits: ComparisonLimits = LIMITS
+) -> tuple[str, ...]:
     """Why the two spans cannot be compared; empty where they can."""
 
     def pair(column: str) -> tuple[float | None, float | None]:
@@ -204,7 +180,7 @@ def reasons_against(hours: Hours, before: Span, after: Span, limits: Limits = LI
     return tuple(found)
 
 
-def _verdict(found: Difference, measure: Measure, limits: Limits) -> Verdict:
+def _verdict(found: Difference, measure: Measure, limits: ComparisonLimits) -> Verdict:
     small = abs(found.value) < max(measure.least, limits.least_pct / 100 * abs(found.before))
     if small or found.low <= 0 <= found.high:
         return Verdict.UNCLEAR
@@ -216,7 +192,11 @@ def _scaled(found: Difference, factor: float) -> Difference:
 
 
 def change_of(
-    hours: Hours, spans: tuple[Span, Span], measure: Measure, comparable: bool, limits: Limits = LIMITS
+    hours: Hours,
+    spans: tuple[Span, Span],
+    measure: Measure,
+    comparable: bool,
+    limits: ComparisonLimits = LIMITS,
 ) -> Change | None:
     """The change of one figure; None where it is not known on both sides."""
     before, after = (gridded(hours, s, measure.name) for s in spans)
@@ -228,7 +208,12 @@ def change_of(
 
 
 def compare(
-    loop: str, hours: Hours, before: Span, after: Span, source_loop: str = "", limits: Limits = LIMITS
+    loop: str,
+    hours: Hours,
+    before: Span,
+    after: Span,
+    source_loop: str = "",
+    limits: ComparisonLimits = LIMITS,
 ) -> LoopComparison:
     """Compare a loop's hourly figures of two spans.
 
@@ -240,7 +225,7 @@ def compare(
     before, after : Span
     source_loop : str
         The loop that this one follows, where the nights name one.
-    limits : Limits
+    limits : ComparisonLimits
 
     Returns
     -------
@@ -253,10 +238,10 @@ def compare(
     reasons = (*_too_little(held, spans, limits), *reasons_against(hours, before, after, limits))
     changes = [change_of(hours, spans, m, not reasons, limits) for m in MEASURES]
     known = tuple(c for c in changes if c is not None)
-    return LoopComparison(loop, before, after, held, known, reasons, source_loop)
+    return LoopComparison(loop, before, after, held, known, reasons, source_loop, limits)
 
 
-def grade(found: LoopComparison, limits: Limits = LIMITS) -> Grade:
+def grade(found: LoopComparison) -> Grade:
     """A loop's four verdicts as one."""
     verdicts = [c.verdict for c in found.primary]
     better = [c for c in found.primary if c.verdict is Verdict.BETTER]
@@ -267,10 +252,12 @@ def grade(found: LoopComparison, limits: Limits = LIMITS) -> Grade:
     if len(better) < len(verdicts):
         return Grade.PARTIAL if better else Grade.NONE
     least = min(abs(c.value_pct or np.inf) for c in better)
-    return Grade.MODEST if least < limits.modest_pct else Grade.CLEAR
+    return Grade.MODEST if least < found.limits.modest_pct else Grade.CLEAR
 
 
-def follows(sources: Sequence[str | None], oscillating: Sequence[bool], limits: Limits = LIMITS) -> str:
+def follows(
+    sources: Sequence[str | None], oscillating: Sequence[bool], limits: ComparisonLimits = LIMITS
+) -> str:
     """The source loop that most of the oscillating nights name, or ''."""
     named = [s for s, on in zip(sources, oscillating, strict=True) if s and on]
     if not named or len(named) < limits.source_share * sum(oscillating):

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 from analyzer.limits.advice import AdviceLimits, SettingsLimits
 from analyzer.limits.cause import CauseLimits
+from analyzer.limits.comparison import ChangeLimits, ComparisonLimits
 from analyzer.limits.figures import FigureLimits, NightLimits, WorkerLimits
 from analyzer.limits.oscillation import OscillationLimits
 from analyzer.limits.quality import QualityLimits
@@ -14,6 +15,8 @@ from tuning.limits import TuningLimits
 __all__ = [
     "AdviceLimits",
     "CauseLimits",
+    "ChangeLimits",
+    "ComparisonLimits",
     "Config",
     "FigureLimits",
     "NightLimits",
@@ -41,5 +44,7 @@ class Config:
     tuning: TuningLimits = field(default_factory=TuningLimits)
     figures: FigureLimits = field(default_factory=FigureLimits)
     nights: NightLimits = field(default_factory=NightLimits)
+    before_after: ComparisonLimits = field(default_factory=ComparisonLimits)
+    changes: ChangeLimits = field(default_factory=ChangeLimits)
     workers: WorkerLimits = field(default_factory=WorkerLimits)
     opening: WorkerLimits = field(default_factory=lambda: WorkerLimits(65_536.0, 3600.0, 7200.0))

@@ -9,9 +9,11 @@ from typing import TYPE_CHECKING
 
 import click
 
+from analyzer.commands.options import config_option
 from identification.errors import InputError
 
 if TYPE_CHECKING:
+    from analyzer.config import ChangeLimits
     from analyzer.loops.changes import TuningChange
     from analyzer.pages.report import Spans
     from analyzer.spans import Span
@@ -34,14 +36,19 @@ def _span(texts: Sequence[str] | None, option: str) -> Span | None:
 
 
 def _asked(
-    store: Store, changes: Path | None, loop: str | None, changed: str | None, find: bool
+    store: Store,
+    changes: Path | None,
+    loop: str | None,
+    changed: str | None,
+    find: bool,
+    limits: ChangeLimits,
 ) -> list[TuningChange]:
     """The changes that the command line names."""
     from analyzer.loops.changes import TuningChange, parse_time, read_changes
     from analyzer.pages.report import detected
 
     if find:
-        return detected(store, [loop] if loop else None)
+        return detected(store, [loop] if loop else None, limits)
     if changes is not None:
         return [c for c in read_changes(changes) if loop in (None, c.loop)]
     if loop is not None and changed is not None:
@@ -76,6 +83,7 @@ def _subtitle(spans: Spans, store: Path) -> str:
 @click.option("--format", "form", type=click.Choice(["html", "markdown"]), default="html", show_default=True)
 @click.option("--single-file", is_flag=True, help="Everything in the page itself.")
 @click.option("--out", required=True, type=click.Path(path_type=Path), help="Folder to write into.")
+@config_option
 def report(
     store: Path,
     changes: Path | None,
@@ -88,19 +96,22 @@ def report(
     form: str,
     single_file: bool,
     out: Path,
+    config: Path | None,
 ) -> None:
     """Before and after: what changes of controllers brought, with intervals and verdicts.
 
     Example: triage report store --changes changes.csv --out report
     """
+    from analyzer.config_file import read_config
     from analyzer.pages.before_after import page
     from analyzer.pages.report import Spans, cases
     from analyzer.store import Store
 
-    kept = Store(store)
+    kept, limits = Store(store), read_config(config)
     kept.require()
     spans = Spans(days, _span(before, "--before"), _span(after, "--after"))
-    found, missing = cases(kept, _asked(kept, changes, loop, changed, find), spans)
+    asked = _asked(kept, changes, loop, changed, find, limits.changes)
+    found, missing = cases(kept, asked, spans, limits.before_after)
     if not found:
         why = "; ".join(f"{tag}: {reason}" for tag, reason in missing) or "no change found"
         raise InputError(why, "loops and times that the store holds", "check the tags and times")

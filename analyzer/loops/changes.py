@@ -14,17 +14,12 @@ from typing import Any
 import numpy as np
 
 from analyzer.block_bootstrap import Floats
+from analyzer.config import ChangeLimits
 from analyzer.history.encoding import detect_encoding
 from identification.errors import InputError
 
 COLUMNS = ("loop", "time", "kp_old", "ti_old", "kp_new", "ti_new", "who")
 DAY_S = 86400.0
-LEAST_DAYS = 3
-"""Days that must stand on each side of a change that is offered [d]; ours."""
-LEAST_STEP = 0.3
-"""Smallest step of the logarithm of travel over variability that is offered [-]: a third; ours."""
-LEAST_RATIO = 4.0
-"""Smallest ratio of that step to the standard deviation of days within the sides [-]; ours."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,7 +125,7 @@ def _ratio(hours: Mapping[str, Floats]) -> tuple[Floats, Floats]:
     return np.log(travel[known] / spread[known]), hours["hour_s"][known]
 
 
-def behaviour_change(loop: str, hours: Mapping[str, Floats]) -> TuningChange | None:
+def behaviour_change(loop: str, hours: Mapping[str, Floats], limits: ChangeLimits) -> TuningChange | None:
     """The hour at which a loop's controller began to answer differently, or None.
 
     What a controller does to OP for a given error is its tuning's doing: valve travel over variability is
@@ -138,8 +133,8 @@ def behaviour_change(loop: str, hours: Mapping[str, Floats]) -> TuningChange | N
     offered where the step is large and clear against how days differ by themselves.
     """
     y, at = _ratio(hours)
-    first = np.searchsorted(at, at[0] + LEAST_DAYS * DAY_S) if y.size else 0
-    last = np.searchsorted(at, at[-1] - LEAST_DAYS * DAY_S) if y.size else 0
+    first = np.searchsorted(at, at[0] + limits.least_days * DAY_S) if y.size else 0
+    last = np.searchsorted(at, at[-1] - limits.least_days * DAY_S) if y.size else 0
     if last - first < 1:
         return None
     total, n = np.cumsum(y), np.arange(1, y.size + 1)
@@ -150,7 +145,7 @@ def behaviour_change(loop: str, hours: Mapping[str, Floats]) -> TuningChange | N
     cut = int(split[best])
     step = abs(float(right[best] - left[best]))
     spread = max(_daily_spread(y[:cut], at[:cut]), _daily_spread(y[cut:], at[cut:]))
-    if step < LEAST_STEP or step < LEAST_RATIO * spread:
+    if step < limits.least_step or step < limits.least_ratio * spread:
         return None
     factor = float(np.exp(right[best] - left[best]))
     return TuningChange(

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from analyzer.before_after import LIMITS, MEASURES, Change, Grade, LoopComparison, Measure, Verdict, grade
+from analyzer.config import ComparisonLimits
 from analyzer.loops.changes import TuningChange
 from analyzer.pages.headings import heading
 from analyzer.pages.reading import Thinned
@@ -218,8 +219,8 @@ METHOD = (
 )
 
 
-def _method() -> Section:
-    said = {"m": LIMITS, "error": 100 * (1 - LIMITS.confidence), "share": 100 * LIMITS.usable_share}
+def _method(limits: ComparisonLimits) -> Section:
+    said = {"m": limits, "error": 100 * (1 - limits.confidence), "share": 100 * limits.usable_share}
     return Section("How the figures are made", (Text(tuple(t.format(**said) for t in METHOD)),), closed=True)
 
 
@@ -241,6 +242,6 @@ def page(
         Section("Figures before and after", (figures(cases, True, "figures", ""),)),
         *(loop_section(c, i) for i, c in enumerate(cases)),
         Section("Other figures", (figures(cases, False, "other-figures", ""),), closed=True),
-        _method(),
+        _method(cases[0].found.limits if cases else LIMITS),
     )
     return Page("before-after", "What the changes brought", subtitle, sections)

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from analyzer.before_after import LoopComparison, Span, compare, follows
+from analyzer.before_after import LIMITS, LoopComparison, Span, compare, follows
+from analyzer.config import ChangeLimits, ComparisonLimits
 from analyzer.decisions import counts
 from analyzer.loops.changes import TuningChange, behaviour_change, stated_changes
 from analyzer.pages.before_after import Case
@@ -33,6 +34,8 @@ COLUMNS = (
     ),
     *("source_loop", "oscillating_pct", "extra"),
 )
+CHANGES = ChangeLimits()
+"""The limits in force where none are given."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +52,9 @@ class Spans:
         return self.before or before, self.after or after
 
 
-def detected(store: Store, loops: Sequence[str] | None = None) -> list[TuningChange]:
+def detected(
+    store: Store, loops: Sequence[str] | None = None, limits: ChangeLimits = CHANGES
+) -> list[TuningChange]:
     """Changes that nobody stated: settings that differ between nights, and steps of a controller's
     behaviour."""
     nights = store.nights()
@@ -59,7 +64,7 @@ def detected(store: Store, loops: Sequence[str] | None = None) -> list[TuningCha
     found = []
     for tag in tags:
         stated = stated_changes([r for r in rows if r["loop"] == tag])
-        seen = behaviour_change(tag, hours[tag]) if tag in hours else None
+        seen = behaviour_change(tag, hours[tag], limits) if tag in hours else None
         found += stated or ([seen] if seen else [])
     return found
 
@@ -69,9 +74,9 @@ def _around(spans: Sequence[tuple[Span, Span]]) -> Span:
     return Span(min(s.first_s for s in ends), max(s.last_s for s in ends))
 
 
-def _source(rows: Sequence[dict[str, Any]]) -> str:
+def _source(rows: Sequence[dict[str, Any]], limits: ComparisonLimits) -> str:
     oscillating = [counts(r["oscillating_pct"]) for r in rows]
-    return follows([r["source_loop"] for r in rows], oscillating)
+    return follows([r["source_loop"] for r in rows], oscillating, limits)
 
 
 def _units(row: dict[str, Any]) -> str:
@@ -80,7 +85,7 @@ def _units(row: dict[str, Any]) -> str:
 
 
 def cases(
-    store: Store, changes: Sequence[TuningChange], spans: Spans
+    store: Store, changes: Sequence[TuningChange], spans: Spans, limits: ComparisonLimits = LIMITS
 ) -> tuple[list[Case], list[tuple[str, str]]]:
     """Every change with what came of it, and those that could not be looked at, with the reason.
 
@@ -90,6 +95,7 @@ def cases(
     changes : sequence of TuningChange
         Several of one loop end each other's spans.
     spans : Spans
+    limits : ComparisonLimits
     """
     if not changes:
         return [], []
@@ -105,7 +111,7 @@ def cases(
         if change.loop not in hours or not own:
             missing.append((change.loop, "the store holds no hours of it around the change"))
             continue
-        result = compare(change.loop, hours[change.loop], before, after, _source(own))
+        result = compare(change.loop, hours[change.loop], before, after, _source(own, limits), limits)
         found.append(_case(change, result, own[-1], trends.get(change.loop)))
     return found, missing
 

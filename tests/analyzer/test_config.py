@@ -15,6 +15,7 @@ from analyzer.config import Config
 from analyzer.config_file import configured, document, limit_of, read_config
 from analyzer.store import Store
 from tests.analyzer.plant import Sketch, simulate, write_export
+from tests.reports.small_store import small_store
 
 TANK = Sketch("valve", (60.0, 1800.0, 9.0), 0.9, 40.0, backlash=2.5)
 """A tank on a valve with play."""
@@ -145,6 +146,18 @@ def test_tune_takes_its_limits(tmp_path: Path, export: Path):
     command = ("tune", export, "--loops", loops, "--loop", "LIC1")
     assert "beyond tuning" not in asked(*command).stdout
     assert "beyond tuning" in asked(*command, "--config", file).stdout
+
+
+def test_report_takes_its_limits(tmp_path: Path):
+    """The report names the limits that it was made with, in its sentence on what is not compared."""
+    store, file = small_store(tmp_path / "store", loops=8), tmp_path / "limits.toml"
+    file.write_text("[before_after]\nload_pct = 7.5\n")
+    change = ("--loop", "ТИК-1", "--changed", "2026-03-09T00:00Z", "--format", "markdown")
+    for name, more in (("plain", ()), ("own", ("--config", file))):
+        assert asked("report", store.path, *change, *more, "--out", tmp_path / name).exit_code == 0
+    plain, own = ((tmp_path / name / "before-after.md").read_text() for name in ("plain", "own"))
+    assert "mean OP by over 10 %" in plain
+    assert "mean OP by over 7.5 %" in own
 
 
 def test_check_and_tune_take_a_span_of_time(export: Path):
