@@ -11,10 +11,13 @@ import pytest
 from click.testing import CliRunner, Result
 
 from analyzer.cli import main
+from analyzer.commands.explain import _case
+from analyzer.commands.options import Asked
 from analyzer.config import Config
 from analyzer.config_file import configured, document, limit_of, read_config
+from analyzer.loops.changes import TuningChange
 from analyzer.store import Store
-from tests.analyzer.plant import Sketch, simulate, write_export
+from tests.analyzer.plant import START_S, Sketch, simulate, write_export
 from tests.reports.small_store import small_store
 
 TANK = Sketch("valve", (60.0, 1800.0, 9.0), 0.9, 40.0, backlash=2.5)
@@ -158,6 +161,20 @@ def test_report_takes_its_limits(tmp_path: Path):
     plain, own = ((tmp_path / name / "before-after.md").read_text() for name in ("plain", "own"))
     assert "mean OP by over 10 %" in plain
     assert "mean OP by over 7.5 %" in own
+
+
+def test_explain_and_simulate_work_on_the_span_with_its_settings(export: Path):
+    """Of the second hour, with new settings typed in before and after it, they see that hour and the first ones."""
+    hour = START_S + 3600.0, START_S + 7200.0
+    changes = (
+        TuningChange("LIC1", START_S + 60.0, kp_new=3.0),
+        TuningChange("LIC1", START_S + 9000.0, kp_new=9.0),
+    )
+    loops = export.with_name("loops.csv")
+    loops.write_text("loop,type,pv_lo,pv_hi,kp,ti\nLIC1,level,0,100,0.9,40\n")
+    case, pv = _case(Asked((export,), loops, changes, *hour, Config(), {}), "LIC1")
+    assert (pv.stamp_s[0], pv.stamp_s[-1]) == (hour[0], hour[1] - 1.0)
+    assert (case.spec.kp, case.spec.ti) == (3.0, 40.0)
 
 
 def test_check_and_tune_take_a_span_of_time(export: Path):
