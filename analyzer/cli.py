@@ -56,6 +56,8 @@ def check(asked: Asked) -> None:
 @click.option("--top", type=click.IntRange(1), help="Number of loops shown.")
 @click.option("--night", help="Night to show, e.g. 2026-03-08. Default: the latest.")
 @click.option("--ascending", is_flag=True, help="Smallest first.")
+@click.option("--area", help="Loops of this area alone.")
+@click.option("--wide", is_flag=True, help="All columns of the table, however narrow the terminal.")
 @click.option(
     "--format",
     "form",
@@ -65,7 +67,16 @@ def check(asked: Asked) -> None:
     help="Output format.",
 )
 @told
-def rank(store: Path, column: str, top: int | None, night: str | None, ascending: bool, form: str) -> None:
+def rank(
+    store: Path,
+    column: str,
+    top: int | None,
+    night: str | None,
+    ascending: bool,
+    area: str | None,
+    wide: bool,
+    form: str,
+) -> None:
     """The morning list: loops of one night, the worst first.
 
     Example: triage rank store --top 20 --format markdown
@@ -73,8 +84,8 @@ def rank(store: Path, column: str, top: int | None, night: str | None, ascending
     from analyzer.rank import ranked, rendered
     from analyzer.store import Store
 
-    rows, name = ranked(Store(store), column, top, night, ascending)
-    click.echo(rendered(rows, form, name))
+    rows, name = ranked(Store(store), column, top, night, ascending, area)
+    click.echo(rendered(rows, form, name, wide))
 
 
 @main.command()

@@ -52,6 +52,26 @@ def brief(row: Mapping[str, Any]) -> dict[str, str]:
     return {name: special[name] if name in special else figure(row[name], name) for name in SHOWN}
 
 
+WORTH_LEAST = (
+    *("osc_load_pct", "osc_tuning_pct", "osc_valve_pct", "valve_travel_pct_per_h", "oscillating_pct"),
+    *("average_absolute_error_pct", "ti", "kp", "period_s", "oscillation_significance"),
+)
+"""Columns that a narrow table leaves out, the first of them first; loop, action and reason stay."""
+LEAST_REASON = 24
+"""Characters of a line of the reason at least."""
+
+
+def fitting(shown: Sequence[Mapping[str, str]], width: int) -> tuple[str, ...]:
+    """The columns that fit into so many characters with all tags whole; none without rows."""
+    kept = list(SHOWN) if shown else []
+    size = {name: max(map(len, (BY_NAME[name].heading, *(row[name] for row in shown)))) + 1 for name in kept}
+    size |= {"reason": LEAST_REASON + 1} if shown else {}
+    for name in WORTH_LEAST:
+        if sum(size[n] for n in kept) + 1 > width:
+            kept.remove(name)
+    return tuple(kept)
+
+
 def _settings(now: float | None, new: float | None, unit: str) -> str:
     """A setting and what to make of it, with its unit; empty where it is not known."""
     if now is None:

@@ -15,7 +15,8 @@ import pytest
 from click.testing import CliRunner, Result
 
 from analyzer.cli import main
-from analyzer.columns.table import NIGHTS
+from analyzer.columns.table import NIGHTS, row_of
+from analyzer.rank import as_table
 from analyzer.store import Store, rows_table, write_table
 
 LOOPS = 10_000
@@ -172,6 +173,38 @@ def test_text_of_the_plant_does_not_break_the_markdown(tmp_path):
     assert len(found) == 3
     assert "<b>" not in found[2]
     assert found[2].replace("\\|", "").count("|") == found[0].count("|")
+
+
+@pytest.mark.parametrize("width", [80, 120])
+def test_a_narrow_table_keeps_tags_action_and_reason(tmp_path, width):
+    """At 80 and 120 columns no line is longer, every tag is whole, and action and reason are there."""
+    tags = [f"{k:02d}-UNIT-FIC{k:05d}.PID" for k in range(5)]
+    odd = [{**rows(1)[0], "loop": tag, "kp": 3.0, "kp_new": 2.61, "ti": 1.5, "ti_new": 13.4} for tag in tags]
+    text = as_table([row_of(row) for row in odd], NIGHT, width)
+    assert max(map(len, text.splitlines())) <= width
+    assert all(tag in text for tag in tags)
+    assert "Action" in text
+    assert "Reason" in text
+    assert ("Load %" in text) < ("Load %" in as_table([row_of(row) for row in odd], NIGHT, 240))
+
+
+def test_wide_has_every_column(small):
+    """--wide shows all columns of the table."""
+    head = asked(small, "--wide").stdout.splitlines()[2]
+    assert all(
+        title in head for title in ("Signif.", "Valve %", "Load %", "Travel %/h", "Kp", "Ti", "Reason")
+    )
+
+
+def test_an_area_alone(tmp_path):
+    """--area lists its loops alone, capitals aside; an unknown one is one line that names those there are."""
+    held = [{**row, "area": "Wet End" if k % 3 else "Dry end"} for k, row in enumerate(rows(9))]
+    write_table(rows_table(held, NIGHTS), tmp_path / "nights" / f"{NIGHT}.parquet")
+    found = json.loads(asked(tmp_path, "--area", "wet end", "--format", "json").stdout)
+    assert sorted(r["loop"] for r in found) == [f"FIC{k:05d}" for k in range(9) if k % 3]
+    refused = asked(tmp_path, "--area", "Boiler")
+    assert refused.exit_code == 2
+    assert "Dry end, Wet End" in refused.stderr
 
 
 # Refused
