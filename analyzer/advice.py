@@ -27,17 +27,8 @@ from tuning.linear import integral_s, is_stable
 from tuning.recommend import Proposal, recommend
 from tuning.search import rounded, scaled_valve
 
-UNSTABLE = (
-    "The identified loop would be unstable at the present settings, which the bounded cycle contradicts: the process "
-    "is not known well enough for new settings."
-)
 MOST_SCANS = 20_000
 """Scans of reconstructed load that settings are tried on at most."""
-NO_INTEGRAL = (
-    "Without integral action, as loops.csv states, the identified loop would come to rest, but the record cycles: "
-    "check kp and ti before new settings are sought."
-)
-CALM = "At the settings in force the valve's fault makes no cycle: nothing to do now."
 
 
 @dataclass(frozen=True, slots=True)
@@ -223,7 +214,7 @@ def withheld(
     if verdict.cause in (Cause.NONE, Cause.LOAD):
         return Advice(Action.NONE)
     if counting(found.oscillations) is None:
-        return Advice(Action.NONE, CALM)
+        return Advice(Action.NONE, words.CALM)
     if verdict.cause is Cause.UNDECIDED:
         return Advice(Action.UNDECIDED)
     return _unsupported(found, controller, config)
@@ -287,13 +278,13 @@ def propose(verdict: Verdict, controller: Pid, period_s: float | None, config: C
         others = (loop, *uncertain(window, fit, loop)[:2])
         return recommend(slow, verdict.cause, others, load_of(window, fit, controller), config.tuning)
     if not is_stable(loop):
-        return Proposal(Action.UNDECIDED, UNSTABLE)
+        return Proposal(Action.UNDECIDED, words.UNSTABLE)
     sought, fit, others = sought_for(verdict, controller, config.advice)
     rests = confirm(sought).cycle is None
     if rests and period_s is None:
-        return Proposal(Action.NONE, CALM)
+        return Proposal(Action.NONE, words.CALM)
     if rests and math.isinf(integral_s(controller)):
-        return Proposal(Action.CHECK_SETTINGS, NO_INTEGRAL)
+        return Proposal(Action.CHECK_SETTINGS, words.NO_INTEGRAL)
     return recommend(sought, verdict.cause, others, load_of(window, fit, controller), config.tuning)
 
 

@@ -8,6 +8,16 @@ from analyzer.settings_check import SettingsDiffer
 from analyzer.units import gain_unit, settings
 from identification.models import Pid
 
+UNSTABLE = (
+    "The identified loop would be unstable at the present settings, which the bounded cycle contradicts: the process "
+    "is not known well enough for new settings."
+)
+NO_INTEGRAL = (
+    "Without integral action, as loops.csv states, the identified loop would come to rest, but the record cycles: "
+    "check kp and ti before new settings are sought."
+)
+CALM = "At the settings in force the valve's fault makes no cycle: nothing to do now."
+
 
 def of_controller(pid: Pid, spec: LoopSpec, pv_span: float) -> str:
     """A controller's settings as they are typed into it."""
