@@ -1,8 +1,10 @@
 """Whether a loop oscillates: periods, amplitude, regularity, share of time, significance.
 
 A peak counts where three signs agree: it stands out of the spectrum about it, the autocorrelation of its band
-comes back after one period, and it carries a fair share of the error. What the set point explains is taken out
-first, so set point steps and a cascade's moving set point are not oscillation of the loop.
+comes back after one period, and it carries a fair share of the error. A cycle that is regular only in shape counts
+where it stands out most of the time and its half-cycles, none larger than the usual one, come back: see _in_shape.
+What the set point explains is taken out first, so set point steps and a cascade's moving set point are not
+oscillation of the loop.
 """
 
 from __future__ import annotations
@@ -15,6 +17,7 @@ import numpy as np
 from analyzer.config import OscillationLimits
 from analyzer.decisions import counts
 from identification.record import Floats, LoopRecord, Mask
+from identification.signals.half_cycles import half_cycles, levelled_correlation, shape, usual_prominence
 from identification.signals.setpoint_response import without_setpoint
 from identification.signals.spectrum import (
     WIDE_BAND,
@@ -40,7 +43,8 @@ class Oscillation:
     period_s [s]; amplitude_pct, half of peak to peak of the fundamental [% of PV span] while it oscillates;
     oscillating_pct, share of time [%]; significance [% h], amplitude times correlation summed over the hours
     of oscillation; rhythm, what the autocorrelation says; prominence and share as in OscillationLimits;
-    cycles, periods that the record holds; line, its frequency in lines of the spectrum.
+    cycles, periods that the record holds; line, its frequency in lines of the spectrum; scatter, spread of the
+    cycles' lengths about the period [-].
     """
 
     period_s: float
@@ -52,6 +56,7 @@ class Oscillation:
     share: float
     cycles: float
     line: float
+    scatter: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,11 +110,44 @@ def _agree(limits: OscillationLimits, cycles: float, prominence: float, correlat
     return correlation - scatter + limits.trade * math.log2(prominence / asked) >= 0
 
 
+def _in_shape(
+    s: Spectrum,
+    line: float,
+    x: Floats,
+    dt_s: float,
+    seen: tuple[float, float, float],
+    limits: OscillationLimits,
+) -> bool:
+    """Whether half-cycles that differ in length and size are yet more than noise of the same surroundings shows.
+
+    seen : cycles, prominence, correlation. Prominence in doublings (its mean over time and its median averaged)
+    and correlation (of the band and of its levelled half-cycles averaged) add up; noise of any colour, the closed
+    loop's included, reaches shape + shape_few / sqrt(cycles) in fewer than one of a thousand records. What swings
+    between limits, as Gaussian noise of no spectrum does, adds to that and stands alone where halves differ most.
+    """
+    cycles, prominence, correlation = seen
+    levelled = 0.5 * (correlation + levelled_correlation(x, dt_s, s.duration_s / line))
+    usual = 0.5 * math.log2(prominence * max(usual_prominence(s, line), 1e-3))
+    total, scatter = usual + limits.shape_trade * levelled, limits.shape_few / math.sqrt(cycles)
+    few = s.duration_s / line < limits.samples * s.dt_s
+    least = limits.shape_correlation_few if few else limits.shape_correlation
+    enough = total >= max(limits.shape + scatter, limits.shape_least) and levelled >= least
+    if prominence >= limits.least * limits.prominence and enough:
+        return True
+    if few or cycles < limits.swing_cycles or total + 2 * limits.swing_trade < limits.swing + scatter:
+        return False
+    found = shape(s, line)
+    total += limits.swing_trade * max(3.0 - found.kurtosis, 0.0)
+    even = found.spread <= limits.swing_spread and found.share >= limits.swing_share
+    turns = limits.swing_turns[0] <= found.turns <= limits.swing_turns[1]
+    return even and turns and total >= max(limits.swing + scatter, limits.swing_least)
+
+
 def _candidate(s: Spectrum, b: Bands, k: int, limits: OscillationLimits) -> Oscillation | None:
     """The oscillation about one trial frequency, None where the signs do not agree."""
     line = float(b.line[k])
     expected = s.duration_s / line
-    if expected < limits.samples * s.dt_s:
+    if expected < limits.samples_few * s.dt_s:
         return None
     x, dt = band_signal(s, line)
     above = float(np.sum(np.abs(s.lines[math.ceil(line / WIDE_BAND) :]) ** 2)) * 2 / s.n**2
@@ -118,10 +156,13 @@ def _candidate(s: Spectrum, b: Bands, k: int, limits: OscillationLimits) -> Osci
     cycles = s.duration_s / found.period_s
     if cycles < limits.periods or share < limits.share:
         return None
-    if not _agree(limits, cycles, float(b.prominence[k]), min(found.first, 1.5 * found.trough)):
+    prominence, correlation = float(b.prominence[k]), min(found.first, 1.5 * found.trough)
+    tonal = expected >= limits.samples * s.dt_s and _agree(limits, cycles, prominence, correlation)
+    if not tonal and not _in_shape(s, line, x, dt, (cycles, prominence, correlation), limits):
         return None
     amplitude = math.sqrt(2 * float(x @ x) / x.size)
-    return Oscillation(found.period_s, amplitude, 0, 0, found, float(b.prominence[k]), share, cycles, cycles)
+    scatter = half_cycles(x, dt).scatter
+    return Oscillation(found.period_s, amplitude, 0, 0, found, prominence, share, cycles, cycles, scatter)
 
 
 def _peaks(b: Bands, least: float) -> list[int]:
@@ -140,7 +181,7 @@ def barely_seen(found: Oscillations, limits: OscillationLimits) -> float | None:
     s, b = found.spectrum, found.bands
     if s is None or b is None:
         return None
-    few = replace(limits, samples=FEWEST)
+    few = replace(limits, samples=FEWEST, samples_few=FEWEST)
     peaks = [
         k for k in _peaks(b, limits.prominence) if s.duration_s / float(b.line[k]) < limits.samples * s.dt_s
     ]
@@ -206,7 +247,8 @@ def detect(record: LoopRecord, limits: OscillationLimits) -> Oscillations:
     b = bands(tapered_power(s), limits.periods)
     usable = ~record.bad[record.bad.size - s.n :]
     kept: list[Oscillation] = []
-    for k in _peaks(b, limits.prominence):
+    strong = _peaks(b, limits.prominence)
+    for k in strong + [k for k in _peaks(b, limits.shape_prominence) if k not in strong]:
         o = _candidate(s, b, k, limits)
         if o is None or any(abs(math.log(o.period_s / p.period_s)) < math.log(1.3) for p in kept):
             continue

@@ -11,6 +11,8 @@ STUDY = (
     "in each family"
 )
 
+UNTIDY = "ours: tests/proofs/untidy.py and tests/proofs/negative_controls.py"
+
 
 @dataclass(frozen=True, slots=True)
 class OscillationLimits:
@@ -91,9 +93,119 @@ class OscillationLimits:
         STUDY,
     )
     envelope: float = limit(
-        0.4,
+        0.3,
         "-",
         (0.0, 1.0),
         "The loop oscillates where the envelope exceeds this share of its own upper level",
         STUDY,
+    )
+    samples_few: float = limit(
+        3.0,
+        "-",
+        (0.0, 30.0),
+        "Samples per period from which halves that come back plainly (shape_correlation_few) are a cycle",
+        UNTIDY,
+    )
+    shape: float = limit(
+        1.4,
+        "-",
+        (0.0, 14.0),
+        "Prominence in doublings and shape_trade times the levelled correlation, added, of a cycle "
+        "that is regular only in shape; with shape_few above all of 1,500 noises of "
+        "tests/proofs/nulls and 265 healthy untidy loops",
+        UNTIDY,
+    )
+    shape_few: float = limit(
+        12.5,
+        "-",
+        (0.0, 125.0),
+        "Added to shape, over the square root of the cycles: the scatter of both signs in noise",
+        UNTIDY,
+    )
+    shape_least: float = limit(
+        3.6,
+        "-",
+        (0.0, 36.0),
+        "What they must add up to at least: a well tuned loop resonates a little however long it is watched",
+        UNTIDY,
+    )
+    shape_trade: float = limit(
+        4.0,
+        "-",
+        (0.0, 40.0),
+        "Doublings of the prominence that a levelled correlation of 1 is worth",
+        UNTIDY,
+    )
+    shape_correlation: float = limit(
+        0.08,
+        "-",
+        (0.0, 1.0),
+        "Levelled correlation that no prominence makes up for",
+        UNTIDY,
+    )
+    shape_correlation_few: float = limit(
+        0.45,
+        "-",
+        (0.0, 10.0),
+        "The same with fewer than `samples` a period: beside the edge of the spectrum every noise stands out",
+        UNTIDY,
+    )
+    shape_prominence: float = limit(
+        3.0,
+        "-",
+        (0.0, 30.0),
+        "Prominence from which a peak is looked at for its shape",
+        UNTIDY,
+    )
+    swing: float = limit(
+        1.75,
+        "-",
+        (0.0, 17.5),
+        "As shape, with swing_trade times what the kurtosis of the wide band lacks to 3 added; of "
+        "squares with halves of half to twice their length a quarter is found without it, four "
+        "fifths with it",
+        UNTIDY,
+    )
+    swing_trade: float = limit(
+        2.0,
+        "-",
+        (0.0, 20.0),
+        "Doublings of the prominence that a kurtosis less by 1 is worth",
+        UNTIDY,
+    )
+    swing_least: float = limit(
+        4.6,
+        "-",
+        (0.0, 46.0),
+        "What they must add up to at least",
+        UNTIDY,
+    )
+    swing_cycles: float = limit(
+        7.0,
+        "-",
+        (0.0, 70.0),
+        "Cycles from which a kurtosis tells anything",
+        UNTIDY,
+    )
+    swing_spread: float = limit(
+        0.62,
+        "-",
+        (0.0, 10.0),
+        "Standard deviation of the logarithm of the halves' lengths at most; halves from half to "
+        "twice have 0.4, what flips at random 1.28",
+        UNTIDY,
+    )
+    swing_turns: tuple[float, float] = limit(
+        (0.5, 1.6),
+        "-",
+        (0.0, 100.0),
+        "Half-cycles of the wide band over those of the period",
+        UNTIDY,
+    )
+    swing_share: float = limit(
+        0.3,
+        "-",
+        (0.0, 1.0),
+        "Share of the record's variance, drift included, in the wide band at least",
+        UNTIDY,
     )

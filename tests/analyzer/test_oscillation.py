@@ -12,8 +12,9 @@ from plant import CONFIG, START_S, record
 from scipy.signal import lfilter, square
 
 from analyzer.assessments import hourly
-from analyzer.oscillation import Oscillation, Oscillations, detect
+from analyzer.oscillation import Oscillation, Oscillations, counting, detect
 from identification.record import LoopRecord
+from tests.untidy.draw import draw
 
 N = 7200
 T = np.arange(N)
@@ -228,3 +229,45 @@ def test_what_is_marked_bad_does_not_count():
     one, other = (first_of(replace(record(x), bad=bad)) for x in (wild, zero))
     assert one.period_s == pytest.approx(97, rel=0.01)
     assert one.amplitude_pct == pytest.approx(other.amplitude_pct, rel=1e-6)
+
+
+# What is regular only in shape
+
+
+def slips(seed: int, halves: int, per_half: int) -> np.ndarray:
+    """A square whose halves last from half to twice their median and whose size changes from slip to slip [%]."""
+    rng = np.random.default_rng(seed)
+    lengths = np.maximum((per_half * 2 ** rng.uniform(-1, 1, halves)).astype(int), 1)
+    sizes = rng.uniform(0.6, 1.4, halves) * np.where(np.arange(halves) % 2, 1.0, -1.0)
+    return np.repeat(sizes, lengths)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_cycle_whose_halves_last_from_half_to_twice_is_found(seed):
+    """Sixty slips with halves of half to twice their median length, under half as much noise, are an oscillation."""
+    x = slips(seed, 60, 25)
+    found = first_of(record(50 + x + 0.5 * noise(seed, x.size)))
+    assert found.period_s == pytest.approx(2 * x.size / 60, rel=0.5)
+    assert found.scatter > 0.15
+    assert found.oscillating_pct > 50
+
+
+def test_the_scatter_of_the_period_is_told():
+    """A sine in little noise has a period that scatters by less than 3 %."""
+    assert first_of(record(50 + np.sin(2 * np.pi * T / 130) + 0.05 * noise(20))).scatter < 0.03
+
+
+def test_three_samples_a_cycle_are_enough_where_the_cycle_is_plain():
+    """A sine of 3.6 samples with a deviation 1.4 times the noise's is found, white noise there is not."""
+    t = np.arange(600)
+    assert first_of(record(50 + 2 * np.sin(2 * np.pi * t / 3.6) + noise(21, 600))).period_s == pytest.approx(
+        3.6, rel=0.03
+    )
+    assert all(found_in(record(50 + noise(s, 600))).first is None for s in range(22, 40))
+
+
+def test_healthy_untidy_loops_do_not_oscillate():
+    """Of 60 healthy loops under steps, ramps, masters and coloured noise at most one is called oscillating."""
+    drawn = (draw(seed, "healthy") for seed in range(60))
+    claimed = [counting(found_in(record(d.pv, d.sp, dt_s=d.step_s))) is not None for d in drawn]
+    assert sum(claimed) <= 1

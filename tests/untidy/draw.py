@@ -124,7 +124,9 @@ def _signals(
 def _period(cause: str, with_it: np.ndarray, sp: np.ndarray, guess: float) -> float:
     """True period [scans]: the load's own, two turns of the stem, or where the error comes back."""
     if cause == "tuning":
-        return _returning(with_it[0] - sp, int(12 * guess))[0] or guess
+        r = _correlations(with_it[0] - sp, int(12 * guess))
+        quarter = int(np.argmax(r < 0)) or 1
+        return float(2 * quarter + np.argmax(r[2 * quarter : 6 * quarter + 2]))
     turns = _turns(with_it[2], int(6 * guess)) if cause in ("stiction", "backlash") else 0
     return 2 * sp.size / turns if turns > 5 else guess
 

@@ -1,0 +1,151 @@
+"""Cycles half by half: signs of a cycle whose halves differ in length and size, as slips of a stem do.
+
+A line of the spectrum and a returning autocorrelation ask for one period. Where every half is as long as friction
+lets it, power still gathers about the mean period, all the time and not in one event, and the halves still alternate.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.fft import ifft, irfft, next_fast_len
+
+from identification.record import Floats
+from identification.signals.spectrum import HALF_BAND, SIDES, Rhythm, Spectrum, band_signal, rhythm
+
+LEVEL = 1.5
+"""Size to which every half-cycle is cut, in medians of the band's absolute value [-]; ours: a sine is cut by nothing
+(its top is 1.41 medians), so only what stands out of the loop's usual half-cycles is."""
+TURN = 0.25
+"""A half-cycle ends where the signal is beyond this share of its rms on the other side [-]; ours."""
+FIRM_TURN = 0.6
+"""The same in a wide band, where what is faster than the cycle wiggles about zero [-]; ours."""
+SHAPE_BAND = (4.0, 8.0)
+"""Shape is read from f/4 to 8 f: a square keeps its edges there, and halves of half to twice their length their
+fundamental; ours."""
+
+
+@dataclass(frozen=True, slots=True)
+class HalfCycles:
+    """Half-cycles of a band's signal.
+
+    duration_s, size : length [s] and largest value [% of PV span] of each, shape (h,).
+    """
+
+    duration_s: Floats
+    size: Floats
+
+    @property
+    def scatter(self) -> float:
+        """Spread of whole cycles' lengths [-]: 1.48 median absolute deviations of their logarithm."""
+        if self.duration_s.size < 3:
+            return 0.0
+        whole = np.log(self.duration_s[1:] + self.duration_s[:-1])
+        return 1.4826 * float(np.median(np.abs(whole - np.median(whole))))
+
+
+def half_cycles(x: Floats, dt_s: float, turn: float = TURN) -> HalfCycles:
+    """Half-cycles of a signal without drift, shape (n,), at interval dt_s [s]; those at the ends left out."""
+    beyond = turn * math.sqrt(float(x @ x) / max(x.size, 1))
+    side = np.where(x > beyond, 1, np.where(x < -beyond, -1, 0))
+    outside = np.flatnonzero(side)
+    turns = outside[np.flatnonzero(np.diff(side[outside])) + 1]
+    if turns.size < 2:
+        return HalfCycles(np.zeros(0), np.zeros(0))
+    size = np.maximum.reduceat(np.abs(x), turns)[:-1]
+    return HalfCycles(np.diff(turns) * dt_s, size)
+
+
+def levelled_correlation(x: Floats, dt_s: float, period_s: float) -> float:
+    """How well a band's signal comes back after a period once no half-cycle is larger than the usual one [-].
+
+    The lesser of the autocorrelation's first peak and 1.5 times the trough before it. One step of the load, through
+    the band a few large swings, hides a cycle of many halves from the plain autocorrelation; not from this one.
+    """
+    usual = float(np.median(np.abs(x)))
+    if usual <= 0.0:
+        return 0.0
+    found = rhythm(np.clip(x, -LEVEL * usual, LEVEL * usual), dt_s, period_s)
+    return min(found.first, 1.5 * found.trough)
+
+
+def _usual_power(s: Spectrum, low: float, high: float) -> float:
+    """Median over time of the power per line of a band, in lines low to high."""
+    first = min(max(math.ceil(low), 1), s.lines.size - 2)
+    last = max(min(int(high), s.lines.size - 2), first)
+    part = s.lines[first : last + 1]
+    size = next_fast_len(max(2 * part.size, 64))
+    z = ifft(part, size) * size
+    return float(np.median(z.real**2 + z.imag**2)) / part.size
+
+
+def usual_prominence(s: Spectrum, line: float) -> float:
+    """Power about a frequency over the geometric mean of the power on both sides, each its median over time [-].
+
+    As the prominence of spectrum.bands, whose mean over time one event can fill: a step in the surroundings, a burst
+    at the peak. For Gaussian noise median and mean have one ratio in every band, so both agree.
+    """
+    near = _usual_power(s, line / HALF_BAND, line * HALF_BAND)
+    low = _usual_power(s, line / SIDES[1], line / SIDES[0])
+    high = _usual_power(s, line * SIDES[0], min(line * SIDES[1], s.lines.size - 2))
+    return near / max(math.sqrt(low * high), 1e-12 * near + 1e-300)
+
+
+SIZE_BAND = 1.6
+"""Factor about a frequency within which a cycle's size is read; ours, as that of envelopes."""
+
+
+def size_kurtosis(s: Spectrum, line: float) -> float:
+    """Kurtosis of the band about a frequency [-]: 1.5 where every cycle is as large as the other.
+
+    Noise through a resonance is Gaussian, its envelope Rayleigh's, and has 3 (Rice 1945); a load from a machine, a
+    limit cycle, a loop between OP's limits keep their size.
+    """
+    x, _ = band_signal(s, line, SIZE_BAND)
+    power = float(x @ x) / x.size
+    return float(np.mean(x**4)) / power**2 if power > 0.0 else 3.0
+
+
+def independent_sizes(found: Rhythm, cycles: float) -> float:
+    """How many independent sizes a record holds if its cycles were noise through a resonance [-].
+
+    Such noise forgets its size as it forgets its phase: by the factor that the autocorrelation loses per period.
+    """
+    if found.first <= 0.0:
+        return cycles
+    kept = min(max(found.third / found.first, 0.0), 1.0)  # squared autocorrelation of one period
+    return cycles * (1.0 - kept) / (1.0 + kept)
+
+
+@dataclass(frozen=True, slots=True)
+class Shape:
+    """What the wide band about a period looks like.
+
+    kurtosis : fourth moment over the squared second [-]: Gaussian noise 3 however coloured, a triangle 1.8, a sine
+    1.5, a square 1, for a cycle swings between limits and noise does not; spread : standard deviation of the
+    logarithm of the half-cycles' lengths [-]; turns : half-cycles over those of the period [-]; share : of the
+    record's variance [-].
+    """
+
+    kurtosis: float
+    spread: float
+    turns: float
+    share: float
+
+
+def shape(s: Spectrum, line: float) -> Shape:
+    """Shape of the signal about a frequency, wide enough for halves that differ and for edges."""
+    first = max(math.ceil(line / SHAPE_BAND[0]), 1)
+    last = min(int(line * SHAPE_BAND[1]), s.lines.size - 1)
+    m = next_fast_len(max(int(line * 24), 2 * last + 2, 16), real=True)
+    cut = np.zeros(m // 2 + 1, dtype=np.complex128)
+    cut[first : last + 1] = s.lines[first : last + 1]
+    x = irfft(cut, m) * (m / s.n)
+    power = float(x @ x) / m
+    if power <= 0.0:
+        return Shape(3.0, 0.0, 0.0, 0.0)
+    halves = half_cycles(x, s.duration_s / m, FIRM_TURN).duration_s
+    spread = float(np.log(halves).std()) if halves.size > 2 else math.inf
+    return Shape(float(np.mean(x**4)) / power**2, spread, halves.size / (2 * line), power / s.variance)
