@@ -216,7 +216,7 @@ def withheld(
     if counting(found.oscillations) is None:
         return Advice(Action.NONE, words.CALM)
     if verdict.cause is Cause.UNDECIDED:
-        return Advice(Action.UNDECIDED)
+        return _too_thin(found, controller, config) or Advice(Action.UNDECIDED)
     return _unsupported(found, controller, config)
 
 
@@ -229,10 +229,18 @@ def _unsupported(found: Assessment, controller: Pid | None, config: Config) -> A
         return Advice(_without_settings(verdict), "No new settings: loops.csv states no kp and ti.")
     if found.night.usable_h < config.advice.least_h:
         return _lacking(Needs(Lack.LONGER, words.too_short(found.night.usable_h, config.advice.least_h)))
-    dt_s, samples = m.window.dt_s / m.window.factor, config.settings.ti_samples
-    if dt_s > controller.ti_s / samples:
-        return _lacking(Needs(Lack.FASTER, words.too_thin(dt_s, controller.ti_s, samples)))
-    return None
+    return _too_thin(found, controller, config)
+
+
+def _too_thin(found: Assessment, controller: Pid | None, config: Config) -> Advice | None:
+    """What sampling it takes, where the controller acts several times between two samples, unseen."""
+    m, samples = found.verdict.measured, config.settings.ti_samples
+    if m is None or controller is None:
+        return None
+    dt_s = m.window.dt_s / m.window.factor
+    if dt_s <= controller.ti_s / samples:
+        return None
+    return _lacking(Needs(Lack.FASTER, words.too_thin(dt_s, controller.ti_s, samples)))
 
 
 def _sticks(m: Measured, controller: Pid, limits: AdviceLimits) -> Loop | None:

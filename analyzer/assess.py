@@ -18,6 +18,7 @@ from analyzer.plantwide import Fingerprint, fingerprint
 from analyzer.quality import Prepared, run_lengths
 from analyzer.settings_check import SettingsDiffer, differing
 from analyzer.trends import BUCKETS, FINE_BUCKETS, thinned
+from analyzer.trial_signs import hidden_by_grid
 from analyzer.words import too_coarse
 from identification.errors import NotAssessedError
 from identification.models import Pid
@@ -120,6 +121,8 @@ def cause_of(
     except NotAssessedError as error:
         verdict = not_assessed(Needs(Lack.UNBROKEN, str(error))) if oscillation is not None else NO_CAUSE
         return with_dead_valve(verdict, dead) if dead else verdict
+    if hidden_by_grid(measured, prepared.pv_step, config.cause):
+        measured = replace(measured, evidence=0.0)
     verdict = judge(measured, oscillation, config.cause)
     return with_dead_valve(verdict, dead) if dead and verdict.cause is not Cause.VALVE else verdict
 

@@ -11,7 +11,10 @@
 5. Rhythm: a load from a machine keeps its period as by a clock; noise through a resonance does not.
 6. Wave: third harmonic locked to the phase of the fundamental (a triangle has 1/9, a square 1/3), after the
    idea of harmonics and bicoherence (Choudhury, Shah, Thornhill 2004); a sine points away from the valve.
-7. Oddness of the cross-correlation of OP and PV (Horch 1999), told but of little weight: with integral action
+7. Trials: each stretch between two turns of OP speaks for the valve or not; a fault is one that most of them show.
+8. Size: noise through a resonance forgets its size as it forgets its phase (Rice 1945), so a cycle whose phase
+   wanders and whose size is kept is no tuning's; and a linear loop's own period is a sine.
+9. Oddness of the cross-correlation of OP and PV (Horch 1999), told but of little weight: with integral action
    and constant set point the controller fixes it.
 """
 
@@ -27,6 +30,14 @@ from analyzer.config import CauseLimits
 from analyzer.decisions import CAUSES, Cause, Fault, Needs
 from analyzer.measure import Measured
 from analyzer.oscillation import Oscillation
+from analyzer.trial_signs import (
+    agree,
+    denied_by_trials,
+    foreign,
+    keeps_its_size,
+    repeats_itself,
+    shown_by_trials,
+)
 from identification.record import LoopRecord
 
 
@@ -96,6 +107,9 @@ def valve_signs(m: Measured, limits: CauseLimits, oscillating: bool) -> list[Sig
         signs.append(Sign("valve", 0.6 + 0.4 * _ramp(m.size, limits.size, 0.7), text))
     if not oscillating:
         return signs
+    if m.evidence >= needed and m.trials is not None and agree(m, limits):
+        text = f"{100 * m.trials.agreeing:.0f} % of {m.trials.count} stretches between turns of OP show it"
+        signs.append(Sign("valve", 0.5, text))
     if m.evidence >= needed and m.line_valve < 0.5 * max(m.line_linear, limits.line):
         text = f"with it the load has no peak at the period (prominence {m.line_valve:.1f})"
         signs.append(Sign("valve", 0.5, text))
@@ -112,7 +126,7 @@ def is_clockwork(m: Measured, o: Oscillation, limits: CauseLimits) -> bool:
     Noise through a resonance of damping z has an autocorrelation that decays as exp(-2 pi z k) over k periods,
     and z is about 1/(2 |S|) at the peak; a loop that runs from limit to limit keeps its period too.
     """
-    if m.saturated > limits.at_limits:
+    if m.saturated > limits.at_limits or m.kurtosis > limits.clock_kurtosis:
         return False
     decay = math.exp(-3 * math.pi / max(m.amplification or 1.0, 1e-3))
     return o.rhythm.third >= min(limits.narrow, max(decay + limits.steadier, limits.fairly_narrow))
@@ -122,7 +136,7 @@ def tuning_signs(m: Measured, o: Oscillation, limits: CauseLimits) -> list[Sign]
     """Signs for the tuning."""
     signs = []
     amplified = m.amplification is not None and (m.amplification >= limits.resonance or not m.stable)
-    amplified = amplified and not is_clockwork(m, o, limits)
+    amplified = amplified and not is_clockwork(m, o, limits) and not foreign(m, o, limits)
     if amplified:
         text = (
             "the identified loop is unstable"
@@ -159,9 +173,27 @@ def load_signs(m: Measured, o: Oscillation, limits: CauseLimits) -> list[Sign]:
         signs.append(
             Sign("load", 0.4, f"the loop does not amplify at the period (|S| = {m.amplification:.1f})")
         )
-    if is_clockwork(m, o, limits):
+    clockwork, free = is_clockwork(m, o, limits), m.saturated <= limits.at_limits
+    if clockwork:
         signs.append(Sign("load", 0.7, "the period is kept as by a clock"))
-    if m.consistency < limits.consistent:
+    hinted = m.evidence >= _needed(m, limits, True) and agree(m, limits)
+    if keeps_its_size(m, o, limits) and not hinted:
+        text = f"its phase wanders while its size is kept (kurtosis {m.kurtosis:.1f}, a resonance has 3)"
+        signs.append(Sign("load", 0.7, text))
+    elif clockwork and m.kurtosis <= limits.kept_size_clock:
+        signs.append(Sign("load", 0.4, f"so is its size (kurtosis {m.kurtosis:.1f})"))
+    if free and m.harmonic >= limits.edged:
+        text = (
+            f"the wave is no sine (third harmonic {100 * m.harmonic:.0f} %), as a linear loop's own would be"
+        )
+        signs.append(Sign("load", 0.4, text))
+    if foreign(m, o, limits) and m.evidence < _needed(m, limits, True) and not agree(m, limits):
+        signs.append(
+            Sign(
+                "load", 0.5, "no linear loop swings so, and at its turns PV follows OP as behind a free valve"
+            )
+        )
+    if m.consistency < (limits.same_process if free else limits.consistent):
         signs.append(Sign("load", 0.6, "away from the period another process is seen: OP follows"))
     if m.harmonic < 0.5 * limits.harmonic:
         signs.append(Sign("load", 0.25, f"the wave is a sine (third harmonic {100 * m.harmonic:.0f} %)"))
@@ -193,17 +225,21 @@ def judge(m: Measured, oscillation: Oscillation | None, limits: CauseLimits) -> 
 
     The valve's signs are the only ones that rest on a model of the fault itself, so where they are complete
     (likelihood and size) what is left cannot be tuning or load at the same period, and those signs, which
-    rest on the process behind an ideal valve, are set aside.
+    rest on the process behind an ideal valve, are set aside. Where all that shows the valve is one cycle again and
+    again, neither it nor a load is named: a machine's load and a limit cycle without noise look alike.
     """
     signs = valve_signs(m, limits, oscillation is not None)
     valve = combined(signs, Cause.VALVE)
     is_valve = sum(s.points_to == Cause.VALVE for s in signs) >= limits.signs
-    is_valve = is_valve and (m.size >= limits.size or m.cycles_alike)
+    is_valve = is_valve and (m.size >= limits.size or m.cycles_alike or shown_by_trials(m, limits))
+    is_valve = is_valve and not denied_by_trials(m, limits)
     is_valve = (
         is_valve and valve >= limits.named_pct and m.evidence >= _needed(m, limits, oscillation is not None)
     )
+    repeated = is_valve and oscillation is not None and repeats_itself(m, oscillation, limits)
+    is_valve = is_valve and not repeated
     if oscillation is not None and m.line_valve > limits.left * oscillation.prominence:
-        is_valve = False
+        is_valve = is_valve and m.line_valve < limits.left_of_load * m.line_linear
     if oscillation is not None and not is_valve:
         signs += tuning_signs(m, oscillation, limits) + load_signs(m, oscillation, limits)
         valve = min(valve, 0.9 * limits.named_pct)
@@ -212,7 +248,7 @@ def judge(m: Measured, oscillation: Oscillation | None, limits: CauseLimits) -> 
     rest = {c: combined(signs, c) for c in (Cause.TUNING, Cause.LOAD)}
     confidence = {Cause.VALVE: valve, **rest}
     cause = Cause.NONE if oscillation is None else _named(signs, confidence, limits)
-    cause = Cause.VALVE if is_valve else cause
+    cause = Cause.VALVE if is_valve else Cause.UNDECIDED if repeated else cause
     fault = _fault(m, limits) if is_valve else Fault.NONE
     return Verdict(cause, confidence, fault, tuple(signs), measured=m)
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from analyzer.assessments import noise_band
 from analyzer.config import CauseLimits
+from analyzer.cycles_alike import cycles_alike
 from analyzer.oscillation import Oscillation
 from identification.controller.settings import fit_pi
 from identification.errors import NotAssessedError
@@ -26,9 +27,11 @@ from identification.estimation.innovations import judged_mask
 from identification.estimation.likelihood_ratio import WindowFit, evidence, stem_moves, with_load_step
 from identification.estimation.search import AR_ORDER, prepare
 from identification.estimation.stem_position import Seen, seen
+from identification.estimation.trials import Trials, trials
 from identification.estimation.window import Window, block_means
 from identification.models import Fopdt, Loop, Pid
 from identification.record import Floats, LoopRecord, Mask
+from identification.signals.half_cycles import size_kurtosis
 from identification.signals.spectrum import (
     Spectrum,
     locked_harmonic,
@@ -36,12 +39,7 @@ from identification.signals.spectrum import (
     spectrum,
     tapered_power,
 )
-from tuning.limit_cycle import confirm
 from tuning.linear import is_stable, loop_response
-
-ALIKE_PERIOD, ALIKE_AMPLITUDE = 1.1, 1.3
-"""Largest ratios of a simulated to the recorded cycle that count as the same [-]; ours: identified loops of simulated
-tanks with play come within 1.04 and 1.12."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +53,8 @@ class Measured:
     locked third over the fundamental; saturated, share of time at limits [-]; moves, how often the stem of the
     better valve sets out; excited, whether set point moves drove the loop;
     cycles_alike, whether the identified loop with its valve, simulated, cycles by itself as recorded (looked at
-    only where the size leaves it open).
+    only where the size leaves it open); trials, how the stretches between OP's turns agree on the better valve,
+    None with too few; kurtosis [-] of the band at the period, 3 for noise, 1.5 where the size is kept.
     """
 
     linear: Fit
@@ -76,6 +75,8 @@ class Measured:
     moves: int
     excited: bool
     cycles_alike: bool
+    trials: Trials | None = None
+    kurtosis: float = 3.0
 
 
 def time_scale(record: LoopRecord, oscillation: Oscillation | None, controller: Pid | None) -> float:
@@ -193,6 +194,7 @@ def measure(
     saturated = float(record.mask("saturated").mean())
     harmonic = locked_harmonic(error, scale) if error is not None and oscillation is not None else 0.0
     told, (fine_linear, fine_play, fine_stick) = _refined(window, (linear, play, stick), best)
+    cycling = error is not None and oscillation is not None
     return Measured(
         fine_linear,
         fine_play,
@@ -214,7 +216,9 @@ def measure(
         limits.open_size <= size < limits.size
         and gained >= limits.evidence
         and oscillation is not None
-        and _cycles_alike(window, best, controller, oscillation),
+        and cycles_alike(window, best, controller, oscillation),
+        trials(WindowFit(window, best), WindowFit(window, linear), scale) if cycling else None,
+        size_kurtosis(error, error.duration_s / scale) if cycling and error is not None else 3.0,
     )
 
 
@@ -277,22 +281,6 @@ def _shown(
     best = play if stick is None else stick
     gained = evidence(WindowFit(window, best), with_load_step(window, linear, due, best.ar))
     return linear, play, stick, best, gained, 0.0 if stick is None else math.inf
-
-
-def _cycles_alike(window: Window, fit: Fit, controller: Pid | None, o: Oscillation) -> bool:
-    """Whether the identified loop, simulated without load, cycles with the recorded period and amplitude."""
-    if controller is None or fit.gain * controller.kp <= 0 or fit.valve.stickband <= 0:
-        return False
-    loop = Loop(process_of(window, fit), controller, fit.valve.valve)
-    if not is_stable(loop):
-        return False
-    cycle = confirm(loop).cycle
-    if cycle is None or o.amplitude_pct <= 0 or cycle.pv_amplitude <= 0:
-        return False
-    periods, sizes = cycle.period_s / o.period_s, cycle.pv_amplitude / o.amplitude_pct
-    return abs(math.log(periods)) < math.log(ALIKE_PERIOD) and abs(math.log(sizes)) < math.log(
-        ALIKE_AMPLITUDE
-    )
 
 
 def recovered(record: LoopRecord, scale_s: float) -> Pid | None:

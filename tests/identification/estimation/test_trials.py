@@ -1,0 +1,82 @@
+"""Trials between turns of OP, on loops whose valve is known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from identification.estimation.backlash_stiction import fit_linear, fit_play
+from identification.estimation.likelihood_ratio import WindowFit
+from identification.estimation.trials import Trials, gains, trials, turning_points, turns_of
+from identification.estimation.window import Window
+from identification.models import Backlash, Fopdt
+from tests.identification.responses import pv_of
+
+N = 4000
+PERIOD = 200.0
+
+
+def swinging(seed: int) -> np.ndarray:
+    """OP of a cycle whose size changes from half to half [% OP], shape (n,)."""
+    sizes = np.random.default_rng(seed).uniform(3, 7, int(2 * N / PERIOD) + 2)
+    corners = 50 + sizes * np.where(np.arange(sizes.size) % 2, 1.0, -1.0)
+    return np.interp(np.arange(N), np.arange(sizes.size) * PERIOD / 2, corners)
+
+
+def judged(valve: Backlash | None, seed: int) -> Trials:
+    """The trials of a play against an ideal valve behind such an OP."""
+    op = swinging(seed)
+    noise = 0.2 * np.random.default_rng(seed + 100).standard_normal(N)
+    pv = pv_of(Fopdt(1.5, 30.0, 5.0), valve, op, 1.0) + noise
+    window = Window(pv, op, np.ones(N, dtype=bool), 1.0)
+    linear = fit_linear(window, PERIOD)
+    found = trials(WindowFit(window, fit_play(window, linear, PERIOD)), WindowFit(window, linear), PERIOD)
+    assert found is not None
+    return found
+
+
+def test_turning_points_are_those_of_a_triangle():
+    """A triangle under noise smaller than the size asked turns at its corners, and nowhere else."""
+    x = 5 * np.abs((np.arange(1000) / 50) % 2 - 1) + 0.3 * np.random.default_rng(1).uniform(-1, 1, 1000)
+    found = turning_points(x, 2.0)
+    corners = np.arange(50, 950, 50)
+    assert all(np.abs(found - c).min() <= 5 for c in corners)
+    assert found.size == pytest.approx(corners.size, abs=2)
+
+
+def test_op_turns_twice_a_period():
+    """OP that cycles forty halves long turns about forty times, whatever the size of each half."""
+    assert turns_of(swinging(3), PERIOD).size == pytest.approx(2 * N / PERIOD, abs=4)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_trials_agree_on_a_play(seed):
+    """Behind a play of 3 % nine in ten stretches show it."""
+    found = judged(Backlash(3.0), seed)
+    assert found.count > 25
+    assert found.agreeing > 0.9
+    assert found.steadiness > 6
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_trials_do_not_agree_behind_an_ideal_valve(seed):
+    """Behind an ideal valve no more than two in three stretches happen to show a play."""
+    found = judged(None, seed)
+    assert found.agreeing < 0.67
+    assert found.steadiness < 2.5
+
+
+def test_gains_add_up_to_the_evidence_of_the_same_scale():
+    """A fit has no gain over itself."""
+    op = swinging(1)
+    window = Window(pv_of(Fopdt(1.5, 30.0, 5.0), None, op, 1.0), op, np.ones(N, dtype=bool), 1.0)
+    rival = WindowFit(window, fit_linear(window, PERIOD))
+    assert not gains(rival, rival).any()
+
+
+def test_too_few_turns_are_no_trials():
+    """A record with two turns of OP has none."""
+    op = swinging(1)[:300]
+    window = Window(op.copy(), op, np.ones(300, dtype=bool), 1.0)
+    rival = WindowFit(window, fit_linear(window, PERIOD))
+    assert trials(rival, rival, PERIOD) is None
