@@ -12,8 +12,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from analyzer.decisions import Fault
+from identification.mismatch import effect
 from identification.mismatch.catalogue import EFFECTS, fault
-from identification.mismatch.effect import Block, Ends, Fault
+from identification.mismatch.effect import Block, Ends
+from tuning.decisions import Cause
 
 STROKE = "stroke the valve both ways in steps of a quarter of its band and watch the stem"
 """What settles a question about a valve."""
@@ -26,7 +29,9 @@ def is_friction(name: str) -> bool:
 
 def ends_the_search(name: str) -> bool:
     """Whether a verdict of the explanation leaves the physics unasked."""
-    return name in EFFECTS and isinstance(EFFECTS[name], Fault) and fault(name).ends is not Ends.NOTHING
+    return (
+        name in EFFECTS and isinstance(EFFECTS[name], effect.Fault) and fault(name).ends is not Ends.NOTHING
+    )
 
 
 def agreement(row: Mapping[str, Any], verdict: str, block: str) -> str:
@@ -39,9 +44,9 @@ def agreement(row: Mapping[str, Any], verdict: str, block: str) -> str:
     verdict, block : str
         The explanation's name and block.
     """
-    valve, kind = row["cause"] == "valve", row.get("valve_fault") or "undecided"
+    valve, kind = row["cause"] == Cause.VALVE, row.get("valve_fault") or Fault.UNDECIDED
     if valve and is_friction(verdict):
-        if kind in (verdict, "undecided", "none"):
+        if kind in (verdict, Fault.UNDECIDED, Fault.NONE):
             return "Verdict and explanation agree on the valve."
         return (
             f"Both find the valve; the night's verdict calls it {kind}, the explanation {verdict}, which a sampling "

@@ -13,9 +13,9 @@ from identification.estimation.prediction_error import Fitted, Problem, deviatio
 from identification.mismatch.catalogue import EFFECTS, fault
 from identification.mismatch.cross_validation import HeldOut, Misfit, held_out, misfit
 from identification.mismatch.diagnosis import alternatives, restored
-from identification.mismatch.effect import exact
+from identification.mismatch.effect import Block, exact
 from identification.mismatch.explanation import Explanation
-from identification.mismatch.identifiability import INSENSITIVE, uninformed
+from identification.mismatch.identifiability import unanswered, uninformed
 from identification.mismatch.location.locate import Located
 from identification.mismatch.location.where import located_in, where_of
 from identification.mismatch.recording import Finding, Recording
@@ -145,9 +145,10 @@ def answer(found: Explanation, s: Recording) -> Answer:
     """
     proof = found.proof or held_out(found.p, found.plain, found.best)
     effects = effects_of(found, s, proof if found.accepted else None)
-    lacking = "" if any(found_first(found)) else uninformed(found, s)
+    asked = not any(found_first(found))
+    lacking = uninformed(found, s) if asked else ""
     at = located_in(found.p, found.best if found.left > 0 else found.plain, s)
-    verdict, block = verdict_of(found, effects, lacking, at)
+    verdict, block = verdict_of(found, effects, lacking, asked and bool(unanswered(found)), at)
     return Answer(
         verdict,
         block,
@@ -162,14 +163,14 @@ def answer(found: Explanation, s: Recording) -> Answer:
 
 
 def verdict_of(
-    found: Explanation, effects: tuple[EffectFound, ...], lacking: str, at: Located
+    found: Explanation, effects: tuple[EffectFound, ...], lacking: str, insensitive: bool, at: Located
 ) -> tuple[str, str]:
     """The verdict and its block; what is left over, and what a record cannot tell, has no name."""
     if found.refuted and not found.accepted and not any(found_first(found)):
         return "unexplained", "none"
     if found.left > 0 and not any(found_first(found)):
         return "unexplained", LIVES.get(at.carrying[0].name, "process") if at.carrying else "process"
-    if effects and not (lacking.startswith(INSENSITIVE) and effects[0].block in ("valve", "process")):
+    if effects and not (insensitive and effects[0].block in (Block.VALVE, Block.PROCESS)):
         return effects[0].name, effects[0].block
     return ("unexplained", "none") if lacking else ("none", "none")
 

@@ -14,7 +14,7 @@ from identification.simulation.parameters import Slot
 ANSWERS = 12.5
 """Log likelihood [nat] that OP must bring for PV to answer it; ours: chance brings three constants under 8.5 in 999
 of 1,000 records, and the model without OP is not fitted to the end."""
-INSENSITIVE = "needs moves of OP that PV answers"
+INSENSITIVE = "needs moves of OP that PV answers; without OP the fit is as good"
 """What is said where PV does not answer OP."""
 ENOUGH = 5.0
 """Time constants that a recording of a process that settles must hold; the catalogue's need."""
@@ -37,7 +37,7 @@ def unanswered(found: Explanation) -> str:
     )  # a load is counted in terms of the gain
     if brings(found.p, found.plain if loaded else found.best) >= ANSWERS:
         return ""
-    return INSENSITIVE + "; without OP the fit is as good"
+    return INSENSITIVE
 
 
 def too_short(found: Explanation, s: Recording) -> str:
