@@ -31,10 +31,12 @@ def denied_by_trials(m: Measured, limits: CauseLimits) -> bool:
 def repeats_itself(m: Measured, o: Oscillation, limits: CauseLimits) -> bool:
     """Whether every cycle is the one before again, and none shows the valve plainly by itself.
 
-    Then the trials are one trial, and what happened to fit once fits always.
+    Then the trials are one trial, and what happened to fit once fits always, unless it fits with hardly any scatter.
     """
-    alike = o.rhythm.third >= limits.narrow and m.kurtosis <= limits.kept_size
-    return alike and m.trials is not None and m.evidence < limits.trial_gain * m.trials.count
+    t = m.trials
+    if t is None or o.rhythm.third < limits.narrow or m.kurtosis > limits.kept_size:
+        return False
+    return m.evidence < limits.trial_gain * t.count and t.steadiness < 3 * limits.steadiness
 
 
 def shown_by_trials(m: Measured, limits: CauseLimits) -> bool:

@@ -356,7 +356,8 @@ class CauseLimits:
         5.0,
         "nat",
         (0.0, 50.0),
-        "Gain of a trial that is plain by itself, asked where every cycle is the one before again",
+        "Gain of a trial that is plain by itself, asked, or thrice the steadiness, where every cycle is "
+        "the one before again",
         UNTIDY,
     )
     kept_size: float = limit(
