@@ -10,7 +10,7 @@ Heavy parts are imported when they are used. From the project's folder:
 >>> loop.record.dt_s, loop.controller.kp
 (10.0, 4.0)
 >>> found = triage.assess(loop)
->>> found.verdict.cause, found.verdict.fault
+>>> str(found.verdict.cause), str(found.verdict.fault)
 ('valve', 'backlash')
 """
 
