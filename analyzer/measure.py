@@ -162,6 +162,12 @@ def _consistency(window: Window, fit: Fit, period_s: float) -> float:
     return gain / fit.gain if fit.gain else 0.0
 
 
+Candidates = tuple[Fit, Fit, Fit | None]
+"""Plain fit, play and stick-slip."""
+Fits = tuple[Fit, Fit, Fit | None, Fit, float, float]
+"""Plain fit, play, stick-slip if it was tried, the better valve, its evidence and that of the jump [nat]."""
+
+
 def measure(
     record: LoopRecord,
     oscillation: Oscillation | None,
@@ -170,7 +176,7 @@ def measure(
     error: Spectrum | None = None,
     kind: str = "",
 ) -> Measured:
-    """Fit the rivals and read what the signs need; see Measured.
+    """Fit the candidates and read what the signs need; see Measured.
 
     Raises
     ------
@@ -182,12 +188,7 @@ def measure(
     _check_judged(window, limits)
     controller = controller or recovered(record, scale)
     due = answering(record, window, scale)
-    shown = None if window.position is None else seen(window.op, window.position)
-    if shown is None:
-        window = replace(window, position=None)
-        fits = _rivals(window, scale, due, limits, oscillation)
-    else:
-        fits = _shown(window, shown, due, scale)
+    window, fits = _fits(window, scale, due, limits, oscillation)
     linear, play, stick, best, gained, jump = fits
     size = best.valve.stickband / max(_op_range(window, scale, oscillation is not None), 1e-9)
     amplification, stable = _amplification(process_of(window, linear), controller, scale)
@@ -222,6 +223,17 @@ def measure(
     )
 
 
+def _fits(
+    window: Window, scale: float, due: Mask, limits: CauseLimits, oscillation: Oscillation | None
+) -> tuple[Window, Fits]:
+    """The candidates' fits, by a recorded stem where one shows a fault, and the window that they are of."""
+    shown = None if window.position is None else seen(window.op, window.position)
+    if shown is not None:
+        return window, _shown(window, shown, due, scale)
+    window = replace(window, position=None)
+    return window, _candidates(window, scale, due, limits, oscillation)
+
+
 def _check_judged(window: Window, limits: CauseLimits) -> None:
     """Raise NotAssessedError where too few blocks follow on as many good ones as the noise model looks back."""
     judged = int(judged_mask(window.usable, AR_ORDER).sum())
@@ -231,11 +243,7 @@ def _check_judged(window: Window, limits: CauseLimits) -> None:
         )
 
 
-Rivals = tuple[Fit, Fit, Fit | None]
-"""Plain fit, play and stick-slip."""
-
-
-def _refined(window: Window, fits: Rivals, best: Fit) -> tuple[Window, Rivals]:
+def _refined(window: Window, fits: Candidates, best: Fit) -> tuple[Window, Candidates]:
     """Window and fits at the record's own interval, where the dead time is no shorter than a block."""
     if window.factor == 1 or best.dead_time_s + window.half_block_s < window.dt_s:
         return window, fits
@@ -248,9 +256,9 @@ def _refined(window: Window, fits: Rivals, best: Fit) -> tuple[Window, Rivals]:
     )
 
 
-def _rivals(
+def _candidates(
     window: Window, scale_s: float, due: Mask, limits: CauseLimits, oscillation: Oscillation | None
-) -> tuple[Fit, Fit, Fit | None, Fit, float, float]:
+) -> Fits:
     """Plain fit, play, stick-slip if it was tried, the better valve, its evidence and that of the jump [nat]."""
     linear = fit_linear(window, scale_s)
     play = fit_play(window, linear, scale_s)
@@ -270,9 +278,7 @@ def _rivals(
     return linear, play, stick, best, gained, jump
 
 
-def _shown(
-    window: Window, shown: Seen, due: Mask, scale_s: float
-) -> tuple[Fit, Fit, Fit | None, Fit, float, float]:
+def _shown(window: Window, shown: Seen, due: Mask, scale_s: float) -> Fits:
     """The same where the stem is recorded: its fault is seen, and PV answers the stem itself."""
     linear = fit_linear(window, scale_s)
     behind = window if window.position is None else replace(window, op=window.position)
