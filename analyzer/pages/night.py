@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from typing import Any
 
 from analyzer.explain.night import known
@@ -35,9 +36,10 @@ def pages(store: Store, name: str | None = None, top: int = 50) -> Iterator[Page
         tag = worst["loop"]
         own = [r for r in rows if r["loop"] == tag]
         drawn = explanation(explained.get(tag))
-        yield loop.page(own, trends.get(tag), explained=explained.get(tag), more=drawn)
+        about = loop.page(own, trends.get(tag), explained=explained.get(tag), more=drawn)
+        yield about
         if drawn is not None:
-            yield drawn
+            yield replace(drawn, links=(*about.links[:1], (tag, f"{about.name}.html")))
 
 
 def explanation(kept: Mapping[str, Any] | None) -> Page | None:
