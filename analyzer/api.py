@@ -108,9 +108,9 @@ class Plant:
             Its trends hold too little to be put on a clock.
         """
         from analyzer.loops.settings_in_force import in_force
+        from analyzer.loops.spec import spec_of
         from analyzer.nights import cut
         from analyzer.quality import prepare
-        from analyzer.tune_loop import spec_of
         from identification.errors import InputError
 
         spec = spec_of(self.specs, name)
@@ -267,13 +267,12 @@ def explain(loop: PlantLoop) -> Explained:
     NotAssessedError
         OP or PV is missing or never moves.
     """
-    from analyzer.explain.case import case
+    from analyzer.explain.case import case, tags_of
     from analyzer.explain.one_loop import explained
     from analyzer.nights import cut
 
     plant, spec = loop.plant, loop.spec
-    others = [s.op for s in plant.specs if s.loop != spec.loop and s.op][:8]
-    series = plant.export.read(list(dict.fromkeys([*spec.tags, *others])))
+    series = plant.export.read(tags_of(spec, plant.specs))
     if loop.night is not None:
         series = {tag: cut(x, loop.night) for tag, x in series.items()}
     return explained(case(spec, plant.specs, series, plant.config), lambda _: None)

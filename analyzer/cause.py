@@ -246,6 +246,8 @@ def judge(m: Measured, oscillation: Oscillation | None, limits: CauseLimits) -> 
     if not is_valve and oscillation is None:
         valve = min(valve, 0.5 * limits.named_pct)
     rest = {c: combined(signs, c) for c in (Cause.TUNING, Cause.LOAD)}
+    if repeated:
+        rest = {c: min(pct, 0.9 * limits.named_pct) for c, pct in rest.items()}
     confidence = {Cause.VALVE: valve, **rest}
     cause = Cause.NONE if oscillation is None else _named(signs, confidence, limits)
     cause = Cause.VALVE if is_valve else Cause.UNDECIDED if repeated else cause

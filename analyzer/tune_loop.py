@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from difflib import get_close_matches
 
 from analyzer.advice import withheld
 from analyzer.assess import assess, at_limits, unfit_for_cause
@@ -14,7 +13,7 @@ from analyzer.decisions import Action, Cause, Needs
 from analyzer.history.export import Export
 from analyzer.loops.changes import TuningChange
 from analyzer.loops.settings_in_force import in_force
-from analyzer.loops.spec import LoopSpec
+from analyzer.loops.spec import LoopSpec, spec_of
 from analyzer.loops.tags import controller
 from analyzer.nights import cut, nights_of
 from analyzer.quality import Prepared, prepare
@@ -22,23 +21,6 @@ from analyzer.tune import lines, pictures, tune
 from identification.errors import InputError, NotAssessedError
 
 NO_MODEL = "needs PV that moves with OP, so that a model can be identified"
-
-
-def spec_of(specs: Sequence[LoopSpec], loop: str) -> LoopSpec:
-    """The row of one loop.
-
-    Raises
-    ------
-    InputError
-        Where there is no such loop; the nearest names are told.
-    """
-    for spec in specs:
-        if spec.loop == loop:
-            return spec
-    near = ", ".join(get_close_matches(loop, [s.loop for s in specs], n=3)) or "none is near"
-    raise InputError(
-        f"loop {loop} is not among the {len(specs)} loops", f"one of them ({near})", "correct --loop"
-    )
 
 
 def _unfit(prepared: Prepared, config: Config) -> Needs | None:

@@ -22,15 +22,15 @@ def main() -> None:
 
 
 def _case(asked: Asked, tag: str, whole: bool = False) -> Any:
-    from analyzer.explain.case import MOST_SAMPLES, case, loop_of
+    from analyzer.explain.case import MOST_SAMPLES, case, tags_of
     from analyzer.loops.settings_in_force import in_force
+    from analyzer.loops.spec import spec_of
 
     source, specs, _ = asked.opened()
-    spec = loop_of(specs, tag)
+    spec = spec_of(specs, tag)
     if spec.pv is None:
         raise InputError(f"{tag}: no PV tag in the export", f"{tag}.PV", "check --loops and the export")
-    others = [s.op for s in specs if s.loop != tag and s.op][:8]
-    series = asked.within(source.read(list(dict.fromkeys([*spec.tags, *others]))))
+    series = asked.within(source.read(tags_of(spec, specs)))
     pv = series[spec.pv]
     if pv.stamp_s.size == 0:
         raise InputError(f"{tag}: no samples between --since and --until", "a span of the export", "widen it")
@@ -74,13 +74,13 @@ def explain(
     try:
         brought = read_model(model, tag) if model is not None else None
         case, _ = _case(asked, tag)
-        found = explained(case, _told_rival, brought)
+        found = explained(case, _told_candidate, brought)
     except NotAssessedError as error:
         _show(abstained(tag, str(error)), None, form, out)
         click.echo(f"triage: {error}", err=True)
         sys.exit(NOTHING_DONE)
     finally:
-        _told_rival("")
+        _told_candidate("")
     if save_model is not None:
         write_model(found.model(), save_model)
     _show(found.data, found, form, out)
@@ -139,7 +139,7 @@ def simulate(
     write_trends(out, raw.stamp_s, pv, op)
 
 
-def _told_rival(name: str) -> None:
+def _told_candidate(name: str) -> None:
     """Show on a terminal what is being tried; nothing wipes it out."""
     if sys.stderr.isatty():
         click.echo(f"\r\033[K{f'trying {name}' if name else ''}", nl=False, err=True)

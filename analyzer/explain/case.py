@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,7 +14,7 @@ from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import controller
 from analyzer.quality import Prepared, onto_clock, prepare
 from identification.controller.check import StatedSettings
-from identification.errors import InputError, NotAssessedError
+from identification.errors import NotAssessedError
 from identification.mismatch.recording import Recording
 from identification.record import Floats
 
@@ -29,19 +29,15 @@ class Case:
     shortened: str = ""
 
 
-def loop_of(specs: tuple[LoopSpec, ...], tag: str) -> LoopSpec:
-    """The row of one loop.
+MOST_NEIGHBOURS = 8
+"""Other loops whose OP is read beside a loop's own trends, in the order of loops.csv; ours: each is one more trend in
+memory, and the first that moves is the one that is tried."""
 
-    Raises
-    ------
-    InputError
-        There is none of that name.
-    """
-    for spec in specs:
-        if spec.loop == tag:
-            return spec
-    known = ", ".join(s.loop for s in specs[:6])
-    raise InputError(f"no loop {tag}", f"one of {known}", "check --loop and --loops")
+
+def tags_of(spec: LoopSpec, specs: Sequence[LoopSpec]) -> list[str]:
+    """Tags that explaining a loop reads: its own, and the OPs of some other loops."""
+    others = [s.op for s in specs if s.loop != spec.loop and s.op]
+    return list(dict.fromkeys([*spec.tags, *others[:MOST_NEIGHBOURS]]))
 
 
 def stated_law(spec: LoopSpec, prepared: Prepared) -> StatedSettings | None:

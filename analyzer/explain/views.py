@@ -33,8 +33,8 @@ LEAST_CLOSE = 240
 """Samples of the close look at least."""
 SEGMENTS = 8
 """Parts that a spectrum is averaged over."""
-LEAST_SEGMENT, SHORTEST_SEGMENT = 4096, 64
-"""Samples of such a part at least, and of one of a short recording."""
+LONGEST_SEGMENT, SHORTEST_SEGMENT = 4096, 64
+"""Samples of such a part at most and at least; ours."""
 SPECTRUM_POINTS = 120
 """Points of a spectrum."""
 POWERS = ("op_rate", "after_reversals")
@@ -152,7 +152,7 @@ def spectra(left: Mapping[str, Floats], dt_s: float) -> tuple[Spectrum, ...]:
     """Spectrum of what each simulation leaves."""
     out = []
     for kind, x in left.items():
-        segment = max(min(x.size // SEGMENTS, LEAST_SEGMENT), SHORTEST_SEGMENT)
+        segment = max(min(x.size // SEGMENTS, LONGEST_SEGMENT), SHORTEST_SEGMENT)
         f, power = welch(x, 1.0 / dt_s, nperseg=min(segment, x.size))
         size = np.sqrt(np.log(2.0) * f[1:] * power[1:])
         keep = np.unique(np.geomspace(1, size.size, SPECTRUM_POINTS).astype(int)) - 1

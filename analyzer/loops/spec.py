@@ -218,3 +218,20 @@ def _check_unique(path: Path, loops: Sequence[tuple[int, str]]) -> None:
         if len(places) > 1:
             where = ", ".join(str(place) for place in places)
             raise InputError(f"{path}: loop {loop} in rows {where}", "each loop once", "remove all but one")
+
+
+def spec_of(specs: Sequence[LoopSpec], loop: str) -> LoopSpec:
+    """The row of one loop.
+
+    Raises
+    ------
+    InputError
+        Where there is no such loop; the nearest names are told.
+    """
+    for spec in specs:
+        if spec.loop == loop:
+            return spec
+    near = ", ".join(get_close_matches(loop, [s.loop for s in specs], n=3)) or "none is near"
+    raise InputError(
+        f"loop {loop} is not among the {len(specs)} loops", f"one of them ({near})", "correct --loop"
+    )

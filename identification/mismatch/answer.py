@@ -15,7 +15,7 @@ from identification.mismatch.cross_validation import HeldOut, Misfit, held_out, 
 from identification.mismatch.diagnosis import alternatives, restored
 from identification.mismatch.effect import Block, exact
 from identification.mismatch.explanation import Explanation
-from identification.mismatch.identifiability import unanswered, uninformed
+from identification.mismatch.identifiability import too_short, unanswered
 from identification.mismatch.location.locate import Located
 from identification.mismatch.location.where import located_in, where_of
 from identification.mismatch.recording import Finding, Recording
@@ -76,7 +76,7 @@ def finding_effect(finding: Finding | None, s: Recording) -> EffectFound | None:
 
 
 def parameters_of(p: Problem, fit: Fitted, row: Variant) -> dict[str, Estimate]:
-    """A row's constants with 90 % intervals from the curvature."""
+    """A row's constants with 90 % intervals (covariance.py)."""
     wide = dict(zip((q.slot for q in fit.model.params), deviations(p, fit), strict=True))
     out = {}
     for q in row.params:
@@ -146,9 +146,10 @@ def answer(found: Explanation, s: Recording) -> Answer:
     proof = found.proof or held_out(found.p, found.plain, found.best)
     effects = effects_of(found, s, proof if found.accepted else None)
     asked = not any(found_first(found))
-    lacking = uninformed(found, s) if asked else ""
+    silent = unanswered(found) if asked else ""
+    lacking = silent or (too_short(found, s) if asked else "")
     at = located_in(found.p, found.best if found.left > 0 else found.plain, s)
-    verdict, block = verdict_of(found, effects, lacking, asked and bool(unanswered(found)), at)
+    verdict, block = verdict_of(found, effects, lacking, bool(silent), at)
     return Answer(
         verdict,
         block,

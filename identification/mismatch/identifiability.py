@@ -53,17 +53,6 @@ def too_short(found: Explanation, s: Recording) -> str:
     )
 
 
-def uninformed(found: Explanation, s: Recording) -> str:
-    """What the recording lacks for an answer, empty where it is enough.
-
-    Parameters
-    ----------
-    found : Explanation
-    s : Recording
-    """
-    return unanswered(found) or too_short(found, s)
-
-
 def _time(seconds: float) -> str:
     if seconds < 120:
         return f"{seconds:.3g} s"

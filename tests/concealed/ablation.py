@@ -27,7 +27,8 @@ from concealed.score import KIN, kin
 
 from analyzer.commands.options import opened
 from analyzer.config import Config
-from analyzer.explain.case import Case, case, loop_of
+from analyzer.explain.case import Case, case
+from analyzer.loops.spec import spec_of
 from identification.controller.pi_regression import recovered_law
 from identification.mismatch.catalogue import CANDIDATES, EFFECTS
 from identification.mismatch.diagnosis import inputs_of, without_spikes
@@ -43,7 +44,7 @@ LEVELS = ("plain", "masked", "concealed")
 def loaded(cases: pathlib.Path, tag: str, which: str) -> Case:
     """One recording of a case."""
     source, specs, _ = opened((cases / f"{tag}-{which}.parquet",), cases / "loops.csv")
-    spec = loop_of(specs, tag)
+    spec = spec_of(specs, tag)
     return case(spec, specs, source.read(list(spec.tags)), Config())
 
 

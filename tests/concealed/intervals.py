@@ -26,7 +26,8 @@ from concealed.score import KIN, SHARED, kin, parameters
 
 from analyzer.commands.options import opened
 from analyzer.config import Config
-from analyzer.explain.case import case, loop_of
+from analyzer.explain.case import case
+from analyzer.loops.spec import spec_of
 from identification.estimation.limits import FULL_STEPS
 from identification.estimation.prediction_error import descend
 from identification.mismatch.answer import parameters_of
@@ -47,7 +48,7 @@ def compared_names() -> list[str]:
 def fitted(cases: pathlib.Path, tag: str, effect: str):
     """Problem and fit of the right effect on one sealed case."""
     source, specs, _ = opened((cases / f"{tag}-fit.parquet",), cases / "loops.csv")
-    spec = loop_of(specs, tag)
+    spec = spec_of(specs, tag)
     s = case(spec, specs, source.read(list(spec.tags) + [t for o in specs for t in o.tags]), Config()).subject
     inputs = inputs_of(s)
     begun = prepared(inputs, s.pv - inputs.level, without_spikes(s.pv, s.usable))

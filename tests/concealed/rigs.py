@@ -22,9 +22,10 @@ from concealed.proof import place_section, table
 
 from analyzer.commands.options import opened
 from analyzer.config import Config
-from analyzer.explain.case import Case, case, loop_of
+from analyzer.explain.case import Case, case
 from analyzer.explain.one_loop import Explained, explained
 from analyzer.explain.saved_model import saved_model, simulated
+from analyzer.loops.spec import spec_of
 from identification.mismatch.forward_selection import silent
 from identification.mismatch.model_file import to_data
 
@@ -34,7 +35,7 @@ STEP, LOOP = "DUCT-03_air_step_1_5_90", "DUCT-09_pi_siso_full"
 def loaded(path: pathlib.Path) -> Case:
     """The only loop of an export."""
     source, specs, _ = opened((path,), None)
-    spec = loop_of(specs, path.stem.split("-")[0])
+    spec = spec_of(specs, path.stem.split("-")[0])
     return case(spec, specs, source.read(list(spec.tags)), Config())
 
 

@@ -11,7 +11,7 @@ from identification.mismatch.answer import answer
 from identification.mismatch.diagnosis import inputs_of
 from identification.mismatch.explanation import Explanation
 from identification.mismatch.forward_selection import prepared
-from identification.mismatch.identifiability import ANSWERS, brings, too_short, unanswered, uninformed
+from identification.mismatch.identifiability import ANSWERS, brings, too_short, unanswered
 from identification.mismatch.recording import Recording
 from identification.simulation.parameters import Slot
 from tests.identification.scenes import noise, recording
@@ -28,7 +28,7 @@ def test_loop_with_moves_is_informed() -> None:
     """A loop of 20 s time constant over 5,000 s with set-point moves lacks nothing, and its verdict is none."""
     s = recording(1)
     found = plainly(s)
-    assert uninformed(found, s) == ""
+    assert unanswered(found) == too_short(found, s) == ""
     said = answer(found, s)
     assert (said.verdict, said.caution) == ("none", "")
 
