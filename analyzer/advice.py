@@ -22,6 +22,7 @@ from identification.estimation.hammerstein import Fit, disturbance, process_of
 from identification.estimation.window import Window
 from identification.models import Fopdt, Integrator, Loop, Pid, Process, Valve
 from identification.record import Floats
+from identification.signals.robust import robust_deviation
 from tuning.limit_cycle import Cycle, confirm
 from tuning.linear import integral_s, is_stable
 from tuning.recommend import Proposal, recommend
@@ -152,7 +153,7 @@ def scan_noise(window: Window, controller: Pid) -> float:
     jumps = np.abs(np.diff(window.op, 2))
     if jumps.size == 0 or controller.kp == 0:
         return 0.0
-    return float(1.4826 * np.median(jumps) / math.sqrt(6.0) / abs(controller.kp))
+    return robust_deviation(jumps) / math.sqrt(6.0) / abs(controller.kp)
 
 
 def cautious(process: Fopdt, period_s: float | None) -> Fopdt:

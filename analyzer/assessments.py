@@ -15,6 +15,7 @@ import numpy as np
 from analyzer.config import FigureLimits
 from analyzer.oscillation import Oscillations
 from identification.record import Floats, LoopRecord, Mask
+from identification.signals.robust import robust_deviation
 from identification.simulation.valve import RESTS, walk
 
 ROUNDING = 1e-9
@@ -73,10 +74,10 @@ def usable(record: LoopRecord) -> Mask:
 
 
 def noise_band(pv: Floats) -> float:
-    """Standard deviation of the fast noise: 1.4826 times the median absolute difference over root 2."""
+    """Standard deviation of the fast noise: of the differences (robust.py) over root 2."""
     if pv.size < 3:
         return 0.0
-    return 1.4826 * float(np.median(np.abs(np.diff(pv)))) / math.sqrt(2)
+    return robust_deviation(np.diff(pv)) / math.sqrt(2)
 
 
 def travel(signal: Floats, deadband: float) -> tuple[float, int]:

@@ -23,8 +23,8 @@ from identification.estimation.backlash_stiction import (
 )
 from identification.estimation.gauss_newton import descend
 from identification.estimation.hammerstein import IDEAL, Fit, process_of, residual
-from identification.estimation.innovations import judged_mask
 from identification.estimation.likelihood_ratio import WindowFit, evidence, stem_moves, with_load_step
+from identification.estimation.noise import judged
 from identification.estimation.search import AR_ORDER, prepare
 from identification.estimation.stem_position import Seen, seen
 from identification.estimation.trials import Trials, trials
@@ -236,10 +236,10 @@ def _fits(
 
 def _check_judged(window: Window, limits: CauseLimits) -> None:
     """Raise NotAssessedError where too few blocks follow on as many good ones as the noise model looks back."""
-    judged = int(judged_mask(window.usable, AR_ORDER).sum())
-    if judged < limits.judged:
+    count = int(judged(window.usable, AR_ORDER).sum())
+    if count < limits.judged:
         raise NotAssessedError(
-            f"needs {limits.judged} stretches of {AR_ORDER + 1} good samples in a row, has {judged}"
+            f"needs {limits.judged} stretches of {AR_ORDER + 1} good samples in a row, has {count}"
         )
 
 

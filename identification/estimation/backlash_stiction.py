@@ -8,7 +8,7 @@ import numpy as np
 
 from identification.estimation.gauss_newton import descend
 from identification.estimation.hammerstein import IDEAL, Fit, ValveTrial, stem_of, sticking
-from identification.estimation.innovations import arx_noise
+from identification.estimation.noise import arx_noise
 from identification.estimation.search import (
     AR_ORDER,
     INPUT_LAGS,
@@ -56,7 +56,7 @@ FOLLOWED = 2
 
 CLEAR = 1.0
 """Gain in log likelihood [nat] from which one fit of the same model is preferred to another; ours."""
-GENERIC = -0.95
+GENERIC = 0.95
 """First coefficient of a noise model that knows nothing: nearly a difference. A noise model that was fitted with
 another valve takes that valve's side, so candidates are ranked by both."""
 

@@ -16,7 +16,7 @@ from identification.estimation.hammerstein import (
     stem_of,
     sticking,
 )
-from identification.estimation.innovations import judged_mask, whiten
+from identification.estimation.noise import every_lag, judged, whitened
 from identification.estimation.window import Window
 from identification.record import Floats
 from identification.simulation.discretization import respond_in_blocks, unit_lag
@@ -60,8 +60,8 @@ def _sensitivities(
     factor: int,
 ) -> tuple[Floats, Floats]:
     """Innovations, shape (n,), and their derivatives, shape (n, 8 + order), at theta = log T, L, width, K, 1, t,
-    decay, step, A; the derivative by the width is that of the given wider stem. Stems have `factor` samples a
-    block of `dt` [s], and the response is averaged over the blocks, as PV was."""
+    decay, step, noise model; the derivative by the width is that of the given wider stem. Stems have `factor` samples
+    a block of `dt` [s], and the response is averaged over the blocks, as PV was."""
     n = y.size
     t_s = math.exp(theta[0])
     x, x_t, x_l, x_w = _responses(stem, wider, width_step, t_s, theta[1], dt, factor)
@@ -83,12 +83,13 @@ def _sensitivities(
         columns[k, 6] = -d
         columns[k, 7] = -extra[k]
         free *= faded
-    e = whiten(r, theta[8:])
+    edges = every_lag(order)
+    e = whitened(r, theta[8:], edges)
     for j in range(8):
-        columns[:, j] = whiten(columns[:, j].copy(), theta[8:])
+        columns[:, j] = whitened(columns[:, j].copy(), theta[8:], edges)
     for k in range(order, n):
         for i in range(order):
-            columns[k, 8 + i] = r[k - 1 - i]
+            columns[k, 8 + i] = -r[k - 1 - i]
     return e, columns
 
 
@@ -131,8 +132,8 @@ def _judged(
     e, columns = _sensitivities(y, stem, wider, window.extra, step, theta, order, window.dt_s, factor)
     e, columns = e[order:], columns[order:]
     if not window.usable.all():
-        judged = judged_mask(window.usable, order)[order:]
-        e, columns = e[judged], columns[judged]
+        counts = judged(window.usable, order)[order:]
+        e, columns = e[counts], columns[counts]
     return e, columns
 
 

@@ -1,9 +1,10 @@
 """How well a valve fault followed by a lag explains PV from OP, judged by its innovations.
 
 The model is y = c0 + c1 t + c2 decay + K x + noise with A(q) noise = innovation: the stem is a valve operator on
-the recorded OP, x the response of a unit-gain lag with dead time, A an autoregression that makes the residual
-white. An integrator is the lag whose time constant outlasts the window; then only gain over time constant is
-known. Gain and the c are solved linearly, time constant and dead time are searched, the valve is scanned.
+the recorded OP, x the response of a unit-gain lag with dead time, A(q) = 1 - ar1 q^-1 - ... an autoregression
+that makes the residual white. An integrator is the lag whose time constant outlasts the window; then only gain over
+time constant is known. Gain and the c are solved linearly, time constant and dead time are searched, the valve is
+scanned.
 """
 
 from __future__ import annotations
@@ -66,7 +67,7 @@ class Fit:
     """A fitted model.
 
     gain [% PV/% OP], time_constant_s and dead_time_s [s], valve, sigma2 the innovations variance
-    [% PV squared], count the samples judged, ar the noise polynomial without its leading one, shape (p,), base
+    [% PV squared], count the samples judged, ar the noise model of single lags (noise.py), shape (p,), base
     the coefficients of 1, t, decay and the load's step, shape (4,).
     """
 

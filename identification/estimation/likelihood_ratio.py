@@ -8,19 +8,17 @@ import numpy as np
 
 from identification.estimation.gauss_newton import descend
 from identification.estimation.hammerstein import Fit, ValveTrial, disturbance, stem_of
-from identification.estimation.innovations import judged_mask, whiten
+from identification.estimation.noise import every_lag, judged, whitened
+from identification.estimation.outliers import clipped_gain
 from identification.estimation.window import Window
 from identification.record import Floats, Mask
-
-OUTLIER = 4.0
-"""Innovations count up to this many standard deviations [-]: beyond it one event (a step of the load, a spike), not
-the valve's repeated motion, would decide; ours: it leaves 0.006 % of Gaussian innovations cut."""
 
 
 def innovations(window: Window, fit: Fit) -> Floats:
     """Innovations of a fit at the samples judged [% PV]."""
-    white = whiten(np.ascontiguousarray(disturbance(window, fit)), fit.ar)
-    return white[judged_mask(window.usable, fit.ar.size)]
+    order = fit.ar.size
+    white = whitened(np.ascontiguousarray(disturbance(window, fit)), fit.ar, every_lag(order))
+    return white[judged(window.usable, order)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,17 +30,9 @@ class WindowFit:
 
 
 def evidence(ours: WindowFit, theirs: WindowFit) -> float:
-    """Gain in log likelihood [nat] of one fit over another, no innovation counting for more than OUTLIER.
-
-    The scale is the median absolute innovation of the first over 0.6745, which outliers leave alone.
-    """
+    """Gain in log likelihood [nat] of one fit over another, no innovation counting for more than outliers do."""
     mine, other = innovations(ours.window, ours.fit), innovations(theirs.window, theirs.fit)
-    scale = float(np.median(np.abs(mine))) / 0.6745
-    if scale <= 0:
-        return 0.0
-    top = (OUTLIER * scale) ** 2
-    gained = np.minimum(other**2, top).sum() - np.minimum(mine**2, top).sum()
-    return float(gained) / (2 * scale**2)
+    return float(clipped_gain(mine, other).sum())
 
 
 STEP_PENALTY = 6.0
@@ -64,11 +54,11 @@ def with_load_step(window: Window, fit: Fit, answering: Mask, noise: Floats) -> 
     bool, shape (n,)) its step is no load: a load does not wait for the operator. `noise` is the noise model of
     the candidate, shape (p,), a second start: one fitted across the step is nearly an integrator.
     """
-    judged = judged_mask(window.usable, fit.ar.size)
-    white = np.where(answering[judged], 0.0, np.abs(innovations(window, fit)))
+    counts = judged(window.usable, fit.ar.size)
+    white = np.where(answering[counts], 0.0, np.abs(innovations(window, fit)))
     if white.size < 50:
         return WindowFit(window, fit)
-    at = int(np.flatnonzero(judged)[int(np.argmax(white))])
+    at = int(np.flatnonzero(counts)[int(np.argmax(white))])
     stepped = replace(window, step_at=at)
     trial = max(
         (descend(stepped, start) for start in (fit, replace(fit, ar=noise))), key=lambda f: f.log_likelihood

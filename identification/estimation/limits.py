@@ -6,8 +6,6 @@ PARAMETER_PENALTY = 3.0
 """Gain that one more constant has to bring; ours: half of log(n) would be 4.5, chance brings a half."""
 SEARCH_PENALTY = 6.0
 """Gain that the choice among some forty candidates and their starts costs; ours: the largest of forty by chance."""
-OUTLIER = 5.0
-"""Innovations beyond this many robust standard deviations count less: no single event decides a name."""
 ROUNDS = 3
 """Effects named at most; a record seldom tells more."""
 FOLLOWED = 6

@@ -12,9 +12,10 @@ import numpy as np
 from numba import njit
 
 from identification.estimation.hammerstein import ValveTrial, stem_blocks, stem_of
-from identification.estimation.innovations import judged_mask, notch, whiten
+from identification.estimation.noise import every_lag, judged, whitened
 from identification.estimation.window import Window
 from identification.record import Floats, Mask
+from identification.signals.notch import notch
 from identification.simulation.discretization import unit_lag
 
 AR_ORDER = 8
@@ -107,7 +108,7 @@ class Prepared:
     @property
     def level(self) -> float:
         """A(1)."""
-        return max(1.0 + float(self.ar.sum()), 1e-6)
+        return max(1.0 - float(self.ar.sum()), 1e-6)
 
     def score(self, time_constant_s: float, dead_time_s: float) -> tuple[float, int, Floats]:
         """Innovations variance, count and coefficients for a time constant and a dead time [s]."""
@@ -116,8 +117,16 @@ class Prepared:
         return float(sigma2), int(count), np.asarray(beta, dtype=np.float64)
 
 
+@njit(cache=True)
+def _white(x: Floats, ar: Floats) -> Floats:
+    """Innovations, zero where they are not whole yet: a lag or a notch would ring from those."""
+    white = whitened(x, ar, every_lag(ar.size))
+    white[: ar.size] = 0.0
+    return white
+
+
 def _filtered(x: Floats, ar: Floats, notch_period: float) -> Floats:
-    white = whiten(np.ascontiguousarray(x), ar)
+    white = _white(np.ascontiguousarray(x), ar)
     return white if notch_period <= 0 else notch(white, notch_period, NOTCH_WIDTH)
 
 
@@ -129,7 +138,7 @@ def prepare(window: Window, valve: ValveTrial, ar: Floats, notch_period: float =
         ar,
         _filtered(window.y - window.y.mean(), ar, notch_period),
         _filtered(stem_of(window, valve), ar, notch_period),
-        judged_mask(window.usable, ar.size),
+        judged(window.usable, ar.size),
         ar.size + int(notch_period),
         notch_period,
     )
@@ -202,12 +211,12 @@ def _scan(
     tolerance: float,
     begins: Floats,
 ) -> Floats:
-    level = max(1.0 + ar.sum(), 1e-6)
+    level = max(1.0 - ar.sum(), 1e-6)
     out = np.empty(pairs.shape[0])
     for i in range(pairs.shape[0]):
         width, share = pairs[i, 0], pairs[i, 1]
         stem = stem_blocks(op, 0.5 * width * (1 + share), 0.5 * width * (1 - share), tolerance, factor)
-        white = whiten(stem - stem.mean(), ar)
+        white = _white(stem - stem.mean(), ar)
         out[i] = np.inf
         for j in range(begins.shape[0]):
             left = score(white_y, white, judged, level, ar.size, begins[j, 0], begins[j, 1], dt_s)[0]
@@ -235,10 +244,10 @@ def scan(window: Window, pairs: Floats, tolerance: float, ar: Floats, begins: li
     ndarray of shape (m,)
         Least innovations variance of each pair [% PV squared].
     """
-    white_y = whiten(np.ascontiguousarray(window.y - window.y.mean()), ar)
-    judged = judged_mask(window.usable, ar.size)
+    white_y = _white(np.ascontiguousarray(window.y - window.y.mean()), ar)
+    counts = judged(window.usable, ar.size)
     table = np.array(begins)
-    return _scan(window.op, white_y, judged, ar, window.dt_s, window.factor, pairs, tolerance, table)  # type: ignore[no-any-return]
+    return _scan(window.op, white_y, counts, ar, window.dt_s, window.factor, pairs, tolerance, table)  # type: ignore[no-any-return]
 
 
 def starts(window: Window, period_s: float) -> list[Dynamics]:

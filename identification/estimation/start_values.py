@@ -6,7 +6,7 @@ import numpy as np
 
 from identification.estimation.backlash_stiction import begin, generic_noise
 from identification.estimation.hammerstein import IDEAL, stem_of
-from identification.estimation.innovations import arx_noise
+from identification.estimation.noise import arx_noise
 from identification.estimation.search import AR_ORDER, INPUT_LAGS, Dynamics, prepare, search
 from identification.estimation.window import Window
 from identification.models import Fopdt

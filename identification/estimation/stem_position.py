@@ -9,6 +9,7 @@ import numpy as np
 
 from identification.estimation.hammerstein import ValveTrial, sticking
 from identification.record import Floats
+from identification.signals.robust import robust_deviation
 from identification.simulation.valve import RESTS, first_slip, walk
 
 WIDTHS = tuple(float(w) for w in np.geomspace(0.03, 1.2, 60))
@@ -59,7 +60,7 @@ def closed_in(op: Floats, position: Floats, width: float) -> ValveTrial:
 def least_move(position: Floats) -> float:
     """Move within a sample that stands above the stem's noise and resolution [% OP]."""
     step = np.diff(position)
-    noise = float(np.median(np.abs(step - np.median(step)))) / 0.6745 / np.sqrt(2.0)
+    noise = robust_deviation(step - np.median(step)) / np.sqrt(2.0)
     resolution = float(np.min(np.abs(step)[np.abs(step) > 0], initial=np.inf))
     return max(SLIP * noise, 2.5 * resolution)
 

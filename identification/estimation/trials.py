@@ -13,8 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from identification.estimation.innovations import judged_mask
-from identification.estimation.likelihood_ratio import OUTLIER, WindowFit, innovations
+from identification.estimation.likelihood_ratio import WindowFit, innovations
+from identification.estimation.noise import judged
+from identification.estimation.outliers import clipped_gain
 from identification.estimation.window import block_means
 from identification.record import Floats
 
@@ -73,13 +74,10 @@ def turns_of(op: Floats, period: float) -> np.ndarray:
 
 def gains(ours: WindowFit, theirs: WindowFit) -> Floats:
     """Gain in log likelihood of one fit over another at every block [nat], shape (n,), outliers cut."""
-    judged = judged_mask(ours.window.usable, ours.fit.ar.size)
+    counts = judged(ours.window.usable, ours.fit.ar.size)
     mine, other = innovations(ours.window, ours.fit), innovations(theirs.window, theirs.fit)
-    scale = float(np.median(np.abs(mine))) / 0.6745
     out = np.zeros(ours.window.y.size)
-    if scale > 0:
-        top = (OUTLIER * scale) ** 2
-        out[judged] = (np.minimum(other**2, top) - np.minimum(mine**2, top)) / (2 * scale**2)
+    out[counts] = clipped_gain(mine, other)
     return out
 
 

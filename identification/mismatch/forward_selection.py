@@ -10,7 +10,6 @@ import numpy as np
 from identification.estimation.limits import (
     FOLLOWED,
     FULL_STEPS,
-    OUTLIER,
     PARAMETER_PENALTY,
     SAME,
     SCREEN_STEPS,
@@ -18,6 +17,7 @@ from identification.estimation.limits import (
     SETTLES,
     STICKING_HINT,
 )
+from identification.estimation.outliers import robust_weights
 from identification.estimation.prediction_error import (
     Fitted,
     Model,
@@ -93,11 +93,8 @@ def plain(p: Problem, brought: Floats | None = None, clip: Clip | None = None) -
 
 
 def robustly_weighted(p: Problem, fit: Fitted) -> Problem:
-    """The problem with innovations beyond OUTLIER robust standard deviations counting less."""
-    inside = p.weight > 0
-    scale = float(np.median(np.abs(fit.e[inside]))) / 0.6745
-    size = np.abs(fit.e) / max(scale, 1e-12)
-    return replace(p, weight=np.where(inside, np.minimum(1.0, OUTLIER / np.maximum(size, OUTLIER)), 0.0))
+    """The problem with innovations that are too large to be noise counting less."""
+    return replace(p, weight=robust_weights(fit.e, p.weight > 0))
 
 
 def applies(x: CandidateInputs, near: Fitted, row: Variant) -> bool:

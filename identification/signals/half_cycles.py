@@ -13,6 +13,7 @@ import numpy as np
 from scipy.fft import ifft, irfft, next_fast_len
 
 from identification.record import Floats
+from identification.signals.robust import robust_deviation
 from identification.signals.spectrum import HALF_BAND, SIDES, Rhythm, Spectrum, band_signal, rhythm
 
 LEVEL = 1.5
@@ -43,7 +44,7 @@ class HalfCycles:
         if self.duration_s.size < 3:
             return 0.0
         whole = np.log(self.duration_s[1:] + self.duration_s[:-1])
-        return 1.4826 * float(np.median(np.abs(whole - np.median(whole))))
+        return robust_deviation(whole - np.median(whole))
 
 
 def half_cycles(x: Floats, dt_s: float, turn: float = TURN) -> HalfCycles:

@@ -9,6 +9,7 @@ from numba import njit
 from scipy.ndimage import binary_opening
 
 from identification.record import Floats, Mask
+from identification.signals.robust import robust_deviation
 
 PIECES = 4
 """Straight pieces over a level or over time; ours: a step at any place is followed, ten columns are not spent."""
@@ -75,7 +76,7 @@ def turns(op: Floats, least: float) -> tuple[Floats, Floats]:
 def least_turn(op: Floats) -> float:
     """Travel back that counts as a turn of OP [% OP]."""
     change = np.diff(op)
-    noise = float(np.median(np.abs(change - np.median(change)))) / 0.6745 if change.size else 0.0
+    noise = robust_deviation(change - np.median(change)) if change.size else 0.0
     low, high = np.quantile(op, [0.01, 0.99])
     return max(TURN_SHARE * float(high - low), TURN_NOISE * noise, 1e-6)
 
