@@ -14,7 +14,7 @@ from analyzer.config import Config, QualityLimits
 from analyzer.decisions import Cause, Lack, LacksError, Needs
 from analyzer.measure import measure, time_scale
 from analyzer.oscillation import Oscillations, barely_seen, counting, detect
-from analyzer.plantwide import Fingerprint, fingerprint
+from analyzer.plantwide.wave import Wave, waves_of
 from analyzer.quality import Prepared, run_lengths
 from analyzer.settings_check import SettingsDiffer, differing
 from analyzer.trends import BUCKETS, FINE_BUCKETS, thinned
@@ -35,7 +35,7 @@ class Assessment:
 
     loop; start_s, duration_s of the record [s]; night, the figures of the whole span; hours, of each clock
     hour; oscillations; verdict; settings, where the controller's are not the stated ones; harris index (1: minimum
-    variance) and settling time [s] where known; print, its fingerprint for the plant-wide pass; trend, thinned;
+    variance) and settling time [s] where known; waves, its part in the plant-wide pass; trend, thinned;
     notes, plain sentences about the data; needs, what the record lacks to tell whether the loop oscillates, None
     where that is told.
     """
@@ -50,7 +50,7 @@ class Assessment:
     settings: SettingsDiffer | None = None
     harris: float | None = None
     settling_s: float | None = None
-    print: Fingerprint | None = None
+    waves: tuple[Wave, ...] = ()
     trend: Mapping[str, np.ndarray] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     needs: Needs | None = None
@@ -196,7 +196,7 @@ def assess(prepared: Prepared, controller: Pid | None, config: Config, kind: str
     if night.usable_h < config.advice.least_h or _is_coarse(record, controller, config):
         verdict = as_hint(verdict, config.advice.hint_pct)
     harris = harris_index(record.error, usable(record), record.dt_s, dead_time) if dead_time else None
-    first, s = counting(found), found.spectrum
+    first = counting(found)
     return Assessment(
         record.tag,
         record.start_s,
@@ -211,7 +211,7 @@ def assess(prepared: Prepared, controller: Pid | None, config: Config, kind: str
         settings,
         harris,
         settling_time(record, night.noise_band_pct or 0.0),
-        fingerprint(record.tag, first.period_s, record.start_s, s) if first and s else None,
+        waves_of(record.tag, found, record.start_s + record.duration_s, config.plant),
         thinned(record, FINE_BUCKETS if first else BUCKETS),
         prepared.notes,
         _hidden(record, found, controller, config),

@@ -10,7 +10,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-import numpy as np
 import pyarrow as pa
 
 from analyzer.advice import Advice, advise
@@ -25,7 +24,7 @@ from analyzer.loops.settings_in_force import in_force
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import controller
 from analyzer.nights import Night, cut
-from analyzer.plantwide import Fingerprint
+from analyzer.plantwide.table import waves_table
 from analyzer.present import advised
 from analyzer.quality import interval, prepare
 from analyzer.rows import Lost, hour_rows, lost_row, night_row
@@ -159,9 +158,9 @@ def _write_pieces(task: Task, night: str, rows: list[dict[str, Any]], found: lis
         write_table(rows_table(hours, HOURS), task.store.part(night, "hours", task.key))
     if found:
         write_table(_trend_table(found), task.store.part(night, "trends", task.key))
-    prints = [a.print for a in found if a.print is not None]
-    if prints:
-        write_table(_print_table(prints), task.store.part(night, "prints", task.key))
+    waves = [wave for a in found for wave in a.waves]
+    if waves:
+        write_table(waves_table(waves), task.store.part(night, "waves", task.key))
     write_table(rows_table(rows, NIGHTS), task.store.part(night, "nights", task.key))
 
 
@@ -172,17 +171,3 @@ def _trend_table(found: Sequence[Assessment]) -> pa.Table:
         n = len(a.trend["time_s"])
         tables.append(pa.table({"loop": pa.array([a.loop] * n).dictionary_encode(), **columns}))
     return pa.concat_tables(tables).unify_dictionaries()
-
-
-def _print_table(prints: Sequence[Fingerprint]) -> pa.Table:
-    return pa.table(
-        {
-            "loop": [p.loop for p in prints],
-            "period_s": [p.period_s for p in prints],
-            "start_s": [p.start_s for p in prints],
-            "duration_s": [p.duration_s for p in prints],
-            "first": [p.first for p in prints],
-            "real": [p.lines.real.astype(np.float32) for p in prints],
-            "imag": [p.lines.imag.astype(np.float32) for p in prints],
-        }
-    )

@@ -9,6 +9,7 @@ from analyzer.limits.cause import CauseLimits
 from analyzer.limits.comparison import ChangeLimits, ComparisonLimits
 from analyzer.limits.figures import FigureLimits, NightLimits, WorkerLimits
 from analyzer.limits.oscillation import OscillationLimits
+from analyzer.limits.plant import PlantLimits
 from analyzer.limits.quality import QualityLimits
 from tuning.limits import TuningLimits
 
@@ -21,6 +22,7 @@ __all__ = [
     "FigureLimits",
     "NightLimits",
     "OscillationLimits",
+    "PlantLimits",
     "QualityLimits",
     "SettingsLimits",
     "TuningLimits",
@@ -39,6 +41,7 @@ class Config:
     oscillation: OscillationLimits = field(default_factory=OscillationLimits)
     quality: QualityLimits = field(default_factory=QualityLimits)
     cause: CauseLimits = field(default_factory=CauseLimits)
+    plant: PlantLimits = field(default_factory=PlantLimits)
     settings: SettingsLimits = field(default_factory=SettingsLimits)
     advice: AdviceLimits = field(default_factory=AdviceLimits)
     tuning: TuningLimits = field(default_factory=TuningLimits)

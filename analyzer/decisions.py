@@ -11,7 +11,18 @@ from enum import StrEnum
 from identification.errors import NotAssessedError
 from tuning.decisions import Action, Cause
 
-__all__ = ["CAUSES", "Action", "Cause", "Fault", "Lack", "LacksError", "Needs", "Status", "counts"]
+__all__ = [
+    "CAUSES",
+    "Action",
+    "Cause",
+    "Fault",
+    "GroupRole",
+    "Lack",
+    "LacksError",
+    "Needs",
+    "Status",
+    "counts",
+]
 
 CAUSES = (Cause.VALVE, Cause.TUNING, Cause.LOAD)
 """Causes that have a confidence of their own."""
@@ -26,6 +37,15 @@ class Fault(StrEnum):
     STICTION = "stiction"
     NONE = "none"
     UNDECIDED = "undecided"
+
+
+class GroupRole(StrEnum):
+    """What a loop is in a group that shares an oscillation."""
+
+    SOURCE = "source"
+    CANDIDATE = "candidate"
+    FOLLOWER = "follower"
+    SHARES = "shares"
 
 
 class Status(StrEnum):

@@ -7,16 +7,19 @@ newer of two that are alike, so that the same night twice replaces and a good ni
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from analyzer.columns.table import BY_NAME, NIGHTS
+from analyzer.columns.table import BY_NAME, GROUPS, NIGHTS, names
 from analyzer.config import Config, NightLimits
-from analyzer.decisions import CAUSES, Cause, Status
-from analyzer.plantwide import Fingerprint, Peer, follows, trace
+from analyzer.decisions import CAUSES, Cause, Status, counts
+from analyzer.plantwide.rows import group_rows, is_told, own_groups, wave_columns
+from analyzer.plantwide.source import Peer
+from analyzer.plantwide.table import waves_in
+from analyzer.plantwide.verdict import followers_of, follows, trace
 from analyzer.present import follower_row, root_row
 from analyzer.store import Store, rows_table
 
@@ -25,36 +28,46 @@ WORTH = {Status.OK: 2, Status.NOT_ASSESSED: 1}
 Row = Mapping[str, Any]
 
 
-def _prints(table: pa.Table | None) -> list[Fingerprint]:
-    rows = [] if table is None else table.to_pylist()
-    return [
-        Fingerprint(
-            r["loop"],
-            r["period_s"],
-            r["start_s"],
-            r["duration_s"],
-            int(r["first"]),
-            np.array(r["real"]) + 1j * np.array(r["imag"]),
-        )
-        for r in rows
-    ]
+@dataclass(frozen=True, slots=True)
+class _Traced:
+    """The rows of a night, those of followers and of their sources changed, and the rows of its groups."""
+
+    rows: dict[str, Row]
+    groups: Sequence[Row]
 
 
-def _traced(rows: dict[str, Row], prints: pa.Table | None, config: Config) -> dict[str, Row]:
-    """The rows with those of followers changed."""
-    peers = {
-        k: Peer(Cause(r["cause"] or Cause.NONE), r["evidence"] or 0.0, r["osc_tuning_pct"] or 0.0)
-        for k, r in rows.items()
-    }
-    followers = trace(_prints(prints), peers, config.cause)
+def _traced(rows: dict[str, Row], waves: pa.Table | None, config: Config, first: int) -> _Traced:
+    """What the plant-wide pass makes of the rows; `first` is the number of the first group."""
+    limits = config.plant
+    told = [t for t in trace(waves_in(waves), _peers(rows), limits) if is_told(t, rows)]
+    found = followers_of(told)
+    sources = {loop: source for loop, (source, _) in found.items()}
+    groups = [r for k, t in enumerate(told, first) for r in group_rows(k, t, sources, rows, limits)]
     moved: dict[str, list[str]] = {}
-    for loop, source in followers.items():
+    for loop, source in sources.items():
         moved.setdefault(source.loop, []).append(loop)
-    roots = {loop: root_row(rows[loop], sorted(names)) for loop, names in moved.items()}
-    verdicts = {
-        loop: follows(_confidence(rows[loop]), source, config.cause) for loop, source in followers.items()
+    changed = {loop: root_row(rows[loop], sorted(names)) for loop, names in moved.items()}
+    for loop, (source, wave) in found.items():
+        verdict = follows(_confidence(rows[loop]), source, limits, wave)
+        seen = {**rows[loop], **wave_columns(rows[loop], verdict, limits)}
+        if counts(seen["oscillating_pct"]):
+            changed[loop] = follower_row(seen, verdict)
+    own = own_groups(groups)
+    return _Traced({k: {**r, "group": own.get(k)} for k, r in (rows | changed).items()}, groups)
+
+
+def _peers(rows: Mapping[str, Row]) -> dict[str, Peer]:
+    """The verdicts of the loops that were assessed."""
+    return {
+        k: Peer(
+            Cause(r["cause"] or Cause.NONE),
+            r["evidence"] or 0.0,
+            r["osc_tuning_pct"] or 0.0,
+            r["master"] or "",
+        )
+        for k, r in rows.items()
+        if r["status"] == Status.OK
     }
-    return rows | roots | {loop: follower_row(rows[loop], verdict) for loop, verdict in verdicts.items()}
 
 
 def _confidence(row: Row) -> dict[Cause, float]:
@@ -105,7 +118,11 @@ def finish_night(
     table = store.read_parts(night, "nights", keys)
     if table is None:
         return ()
-    rows = _traced({r["loop"]: r for r in table.to_pylist()}, store.read_parts(night, "prints", keys), config)
+    fresh = {r["loop"]: r for r in table.to_pylist()}
+    other = [] if replace else _other_groups(store, night, fresh)
+    first = 1 + max((int(r["group"]) for r in other), default=0)
+    done = _traced(fresh, store.read_parts(night, "waves", keys), config, first)
+    rows = done.rows
     old = {} if replace else _known(store, night)
     kept = {loop for loop, row in rows.items() if loop in old and fuller(old[loop], row, config.nights)}
     beside = [loop for loop in old if loop not in rows]
@@ -115,9 +132,19 @@ def finish_night(
     for name, piece in pieces.items():
         before = None if replace else store.read_if_there(name, night)
         store.write(name, night, _joined(before, piece, mine))
+    groups = [*other, *done.groups]
+    store.write("groups", night, rows_table(groups, GROUPS) if groups else None)
     store.write("nights", night, rows_table(joined, NIGHTS))
     store.forget_explained(night, None if replace else mine)
     return _told(night, rows, old, kept, beside)
+
+
+def _other_groups(store: Store, night: str, mine: Mapping[str, Row]) -> list[Row]:
+    """The groups that the store has of a night and that hold none of these loops."""
+    table = store.read_if_there("groups", night)
+    rows = [] if table is None else table.select(names(GROUPS)).to_pylist()
+    gone = {r["group"] for r in rows if r["loop"] in mine}
+    return [r for r in rows if r["group"] not in gone]
 
 
 def _known(store: Store, night: str) -> dict[str, Row]:

@@ -165,7 +165,7 @@ def _candidate(s: Spectrum, b: Bands, k: int, limits: OscillationLimits) -> Osci
     return Oscillation(found.period_s, amplitude, 0, 0, found, prominence, share, cycles, cycles, scatter)
 
 
-def _peaks(b: Bands, least: float) -> list[int]:
+def peaks(b: Bands, least: float) -> list[int]:
     """Trial frequencies whose prominence is the highest within half an octave, the most power first."""
     p = b.prominence
     ks = [k for k in range(p.size) if p[k] >= least and p[k] >= p[max(k - 3, 0) : k + 4].max()]
@@ -182,10 +182,10 @@ def barely_seen(found: Oscillations, limits: OscillationLimits) -> float | None:
     if s is None or b is None:
         return None
     few = replace(limits, samples=FEWEST, samples_few=FEWEST)
-    peaks = [
-        k for k in _peaks(b, limits.prominence) if s.duration_s / float(b.line[k]) < limits.samples * s.dt_s
+    fast = [
+        k for k in peaks(b, limits.prominence) if s.duration_s / float(b.line[k]) < limits.samples * s.dt_s
     ]
-    seen = [o.period_s for k in peaks if (o := _candidate(s, b, k, few)) is not None]
+    seen = [o.period_s for k in fast if (o := _candidate(s, b, k, few)) is not None]
     return seen[0] if seen else None
 
 
@@ -247,8 +247,8 @@ def detect(record: LoopRecord, limits: OscillationLimits) -> Oscillations:
     b = bands(tapered_power(s), limits.periods)
     usable = ~record.bad[record.bad.size - s.n :]
     kept: list[Oscillation] = []
-    strong = _peaks(b, limits.prominence)
-    for k in strong + [k for k in _peaks(b, limits.shape_prominence) if k not in strong]:
+    strong = peaks(b, limits.prominence)
+    for k in strong + [k for k in peaks(b, limits.shape_prominence) if k not in strong]:
         o = _candidate(s, b, k, limits)
         if o is None or any(abs(math.log(o.period_s / p.period_s)) < math.log(1.3) for p in kept):
             continue

@@ -12,7 +12,7 @@ from analyzer.units import duration, gain_unit
 
 if TYPE_CHECKING:
     from analyzer.advice import Advice
-    from analyzer.plantwide import Follower
+    from analyzer.plantwide.verdict import Follower
 
 CAUSE_STYLES = {
     Cause.VALVE: "red",
@@ -148,7 +148,9 @@ def _cycles(advice: Advice) -> dict[str, float]:
 def follower_row(row: Mapping[str, Any], found: Follower) -> dict[str, Any]:
     """The row of a loop that follows another one's oscillation."""
     source = found.source
-    text = f"moves with {source.loop}, which has a fault of its own (coherence {source.coherence:.2f})"
+    later = f", {duration(abs(source.lag_s))} later" if source.lag_s is not None and source.lag_s > 0 else ""
+    sure = f"confidence {source.confidence_pct:.0f} %, coherence {source.coherence:.2f}"
+    text = f"moves with {source.loop}{later}, where the oscillation starts ({sure})"
     sign = {"points_to": found.cause, "strength": found.strength, "text": text}
     return {
         **row,

@@ -7,6 +7,8 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from analyzer.advice import is_known
 from analyzer.assess import Assessment
 from analyzer.cause import Verdict
@@ -14,6 +16,7 @@ from analyzer.columns.table import HOURS, row_of
 from analyzer.config import AdviceLimits
 from analyzer.decisions import CAUSES, Cause, Fault, Lack, Status
 from analyzer.loops.spec import LoopSpec
+from analyzer.oscillation import Oscillations
 from identification.estimation.hammerstein import Fit
 from identification.estimation.window import Window
 
@@ -30,6 +33,7 @@ def empty_row(spec: LoopSpec, night: str) -> dict[str, Any]:
         "loop": spec.loop,
         "type": spec.type,
         "area": spec.area,
+        "master": spec.master,
         "description": spec.description,
         "pv_unit": spec.pv_unit,
         "importance": spec.importance,
@@ -96,7 +100,17 @@ def _oscillation_columns(a: Assessment) -> dict[str, Any]:
         "prominence": first.prominence,
         "correlation": first.rhythm.first,
         "periods": json.dumps(periods),
+        "spectrum": _spectrum(a.oscillations),
     }
+
+
+def _spectrum(found: Oscillations) -> str | None:
+    """Power in sixths of an octave as the store keeps it."""
+    s, b = found.spectrum, found.bands
+    if s is None or b is None or not b.line.size:
+        return None
+    level = 10 * np.log10(np.maximum(b.power, 1e-30) * (2.0 / s.n) ** 2)
+    return json.dumps({"period_s": round(s.duration_s / float(b.line[0]), 3), "db": np.round(level).tolist()})
 
 
 def night_row(a: Assessment, spec: LoopSpec, night: str, limits: AdviceLimits) -> dict[str, Any]:

@@ -22,8 +22,6 @@ from analyzer.columns.column import Column
 from analyzer.columns.table import require_declared
 from identification.errors import InputError
 
-TABLES = ("nights", "hours", "trends", "prints")
-
 
 def write_table(table: pa.Table, path: Path) -> None:
     """Write a table so that a reader sees all of it or nothing."""

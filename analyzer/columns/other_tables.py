@@ -1,4 +1,4 @@
-"""Columns of the store's other tables: hours, and loops that were explained."""
+"""Columns of the store's other tables: hours, loops that were explained, groups that share an oscillation."""
 
 from __future__ import annotations
 
@@ -41,3 +41,81 @@ EXPLANATION = (
     ),
 )
 """Of a loop and night that was explained, beside its name and night."""
+GROUP = (
+    Column(
+        "group", Kind.TEXT, "Group", "", Source.PLANT, "Number of a group of loops that share an oscillation."
+    ),
+    Column(
+        "role",
+        Kind.TEXT,
+        "Role",
+        "",
+        Source.PLANT,
+        "source, candidate (it may start there), follower, or shares (its own verdict stands).",
+    ),
+    Column(
+        "source_pct",
+        Kind.NUMBER,
+        "Confidence as source",
+        "%",
+        Source.PLANT,
+        "Confidence that the shared oscillation starts at this loop.",
+    ),
+    Column(
+        "group_period_s",
+        Kind.NUMBER,
+        "Shared period",
+        "s",
+        Source.PLANT,
+        "Time of one cycle of what is shared.",
+    ),
+    Column(
+        "coherence",
+        Kind.NUMBER,
+        "Coherence",
+        "",
+        Source.PLANT,
+        "How far the loop moves with the likeliest source about the period, from 0 to 1.",
+    ),
+    Column(
+        "lag_s",
+        Kind.NUMBER,
+        "Lag",
+        "s",
+        Source.PLANT,
+        "How much later than the likeliest source the loop moves; empty where that cannot be told.",
+    ),
+    Column(
+        "wave_amplitude_pct",
+        Kind.NUMBER,
+        "Amplitude of the shared wave",
+        "% of span",
+        Source.PLANT,
+        "Half of peak to peak of the loop's error about the period, over the whole night.",
+    ),
+    Column(
+        "wave_share_pct",
+        Kind.NUMBER,
+        "Share of the error",
+        "%",
+        Source.PLANT,
+        "Share of the error's power, slow drift left out, that lies about the period.",
+    ),
+    Column(
+        "gain_pct",
+        Kind.NUMBER,
+        "Error that would go",
+        "% of span",
+        Source.PLANT,
+        "Part of the average absolute error that would go with the shared oscillation.",
+    ),
+    Column(
+        "group_signs",
+        Kind.JSON,
+        "Signs of a source",
+        "",
+        Source.PLANT,
+        "Each sign of a candidate with its strength, from 0 to 1.",
+    ),
+)
+"""Of a loop in a group, beside its name and night."""

@@ -203,69 +203,6 @@ class CauseLimits:
         "Independent signs that a named cause needs",
         STUDY,
     )
-    coherent: float = limit(
-        0.6,
-        "-",
-        (0.0, 1.0),
-        "Coherence at the period from which one loop follows another",
-        STUDY,
-    )
-    follows: float = limit(
-        0.8,
-        "-",
-        (0.0, 1.0),
-        "Coherence from which even a loop whose own valve seems at fault follows another",
-        "ours",
-    )
-    outweighs: float = limit(
-        4.0,
-        "-",
-        (1.0, 1000.0),
-        "Evidence of the other valve over its own from which it does",
-        "ours",
-    )
-    one_wave: float = limit(
-        0.98,
-        "-",
-        (0.0, 1.0),
-        "Coherence from which two loops share one wave, so that the valve with more evidence leads",
-        "ours",
-    )
-    outweighs_wave: float = limit(
-        1.5,
-        "-",
-        (1.0, 1000.0),
-        "Evidence of the other valve over its own from which it leads then",
-        "ours",
-    )
-    follow_cycles: float = limit(
-        30.0,
-        "-",
-        (1.0, 10000.0),
-        "Periods that a record must hold for loops to be told apart from others that happen to cycle alike",
-        "ours: in fewer, periods a few percent apart are coherent",
-    )
-    same_period: float = limit(
-        0.06,
-        "-",
-        (0.0, 1.0),
-        "Largest relative difference of periods that count as one",
-        STUDY,
-    )
-    follower_most_pct: float = limit(
-        25.0,
-        "%",
-        (0.0, 100.0),
-        "Confidence at most in a follower's own valve or tuning",
-        "ours: what they show comes from the source",
-    )
-    follower_sign: float = limit(
-        0.9,
-        "-",
-        (0.0, 1.0),
-        "Strength of the sign that a loop follows another",
-        "ours: as strong as that of a dead valve",
-    )
     left_of_load: float = limit(
         0.5,
         "-",

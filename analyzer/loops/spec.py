@@ -17,7 +17,7 @@ from analyzer.loops.endings import ROLES
 from identification.errors import InputError
 from identification.models import Form
 
-TEXTS = ("loop", "description", "type", "area", "pv_unit")
+TEXTS = ("loop", "description", "type", "area", "master", "pv_unit")
 NUMBERS = ("pv_lo", "pv_hi", "op_lo", "op_hi", "kp", "ti", "td", "scan_s", "importance")
 CHOICES: Mapping[str, tuple[str, ...]] = {
     "form": tuple(Form),
@@ -61,7 +61,8 @@ class LoopSpec:
     """One row of loops.csv, or one loop found by its tags.
 
     Tags are None where the row is silent, and after `tags.match` where the export lacks them; `wanted_pv` is
-    then the tag that was looked for. `kp`, `ti`, `td` are as stated, in `gain_unit`, `ti_unit` and `form`;
+    then the tag that was looked for. `master` is the loop whose output is this loop's set
+    point. `kp`, `ti`, `td` are as stated, in `gain_unit`, `ti_unit` and `form`;
     `pv_lo` and `pv_hi` in the PV's own unit, `op_lo` and `op_hi` in the OP's. `extra` holds columns of the
     plant's own, `stated` the names of the columns that the row fills.
     """
@@ -70,6 +71,7 @@ class LoopSpec:
     description: str = ""
     type: str = ""
     area: str = ""
+    master: str = ""
     sp: str | None = None
     pv: str | None = None
     op: str | None = None

@@ -12,7 +12,8 @@ from plant import CONFIG, START_S, Sketch, Trends, prepared, record, series, sim
 from analyzer.assess import Assessment, assess
 from analyzer.cause import dead_valve
 from analyzer.decisions import Lack
-from analyzer.plantwide import Peer, coherence, trace
+from analyzer.plantwide.source import Peer
+from analyzer.plantwide.verdict import followers_of, trace
 from analyzer.quality import prepare
 from identification.errors import NotAssessedError
 
@@ -205,8 +206,9 @@ def traced(*found: Assessment) -> dict[str, str]:
     for a in found:
         m = a.verdict.measured
         peers[a.loop] = Peer(a.verdict.cause, m.evidence if m else 0.0, a.verdict.confidence["tuning"])
-    prints = [a.print for a in found if a.print is not None]
-    return {loop: source.loop for loop, source in trace(prints, peers, CONFIG.cause).items()}
+    waves = [w for a in found for w in a.waves]
+    followers = followers_of(trace(waves, peers, CONFIG.plant))
+    return {loop: source.loop for loop, (source, _) in followers.items()}
 
 
 def test_a_follower_is_traced_to_its_source():
@@ -220,14 +222,6 @@ def test_loops_that_cycle_by_themselves_follow_nobody():
     """Two loops with play of their own, and one that a machine swings, follow nobody."""
     found = [assessed(name) for name in ("play, tank", "play, temperature", "swinging load, pressure")]
     assert traced(*found) == {}
-
-
-def test_coherence_of_a_loop_with_itself_is_one():
-    """A fingerprint has coherence 1 with itself and, at another time, 0."""
-    mark = assessed("play, tank").print
-    assert mark is not None
-    assert coherence(mark, mark) == pytest.approx(1.0)
-    assert coherence(mark, replace(mark, start_s=mark.start_s + 3600)) == 0.0
 
 
 # A valve that no longer moves

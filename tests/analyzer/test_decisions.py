@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from analyzer import chunk
-from analyzer.config import CauseLimits
+from analyzer.config import PlantLimits
 from analyzer.decisions import CAUSES, Action, Cause, Fault, Lack, LacksError, Needs, Status, counts
 from analyzer.nights import Night
-from analyzer.plantwide import Source, follows
+from analyzer.plantwide.verdict import Source, follows
 from tests.analyzer.plant import CONFIG, START_S, series, spec
 
 CONTRACT = {
@@ -41,7 +41,7 @@ def test_a_loop_counts_as_oscillating_from_half_of_the_time_on(share, expected):
 @pytest.mark.parametrize("own", [(0.0, 0.0, 0.0), (99.0, 80.0, 10.0), (10.0, 99.0, 96.0)])
 def test_a_follower_is_under_load_whatever_its_own_signs(own):
     """The load is at least as sure as the coherence and ahead of valve and tuning, and nothing is to be done here."""
-    found = follows(dict(zip(CAUSES, own, strict=True)), Source("FIC101", 0.9), CauseLimits())
+    found = follows(dict(zip(CAUSES, own, strict=True)), Source("FIC101", 0.9), PlantLimits())
     assert (found.cause, found.fault, found.action) == (Cause.LOAD, Fault.NONE, Action.SEE_SOURCE_LOOP)
     assert found.confidence[Cause.LOAD] >= max(90.0, own[2])
     assert max(found.confidence[Cause.VALVE], found.confidence[Cause.TUNING]) <= 25.0

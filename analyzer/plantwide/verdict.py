@@ -1,0 +1,192 @@
+"""What a shared oscillation means for each of its loops: the source leads, the others follow and are left alone."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.fft import ifft, next_fast_len
+
+from analyzer.config import PlantLimits
+from analyzer.decisions import Action, Cause, Fault
+from analyzer.plantwide.groups import Group, groups_of
+from analyzer.plantwide.source import Candidate, Peer, lag_between, ranked, signs_of
+from analyzer.plantwide.wave import Wave
+from identification.record import Floats
+
+LAG_KNOWN = 0.5
+"""Standard deviation of a lag over the lag up to which it is told; ours: two deviations from nothing."""
+ENVELOPE = 0.5
+"""A wave is on where its envelope is over half of what it exceeds a tenth of the time, as an oscillation's is."""
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """The loop that another one follows.
+
+    coherence of the two [-]; confidence_pct of the group in it [%]; lag_s, how much later the follower is [s], None
+    where that cannot be told.
+    """
+
+    loop: str
+    coherence: float
+    confidence_pct: float = 100.0
+    lag_s: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Follower:
+    """The verdict on a loop that follows another one, in place of its own.
+
+    source; confidence [%] of each cause; strength of the sign that says so (0 to 1); wave, the loop's part in what is
+    shared; cause, fault and action are those of every follower: a load from outside, and nothing to do here.
+    """
+
+    source: Source
+    confidence: Mapping[Cause, float]
+    strength: float
+    wave: Wave | None = None
+    cause: Cause = Cause.LOAD
+    fault: Fault = Fault.NONE
+    action: Action = Action.SEE_SOURCE_LOOP
+
+
+@dataclass(frozen=True, slots=True)
+class Traced:
+    """A group with its candidates, the likeliest first.
+
+    links, how each other loop goes with the likeliest source; followers, those of them that follow it.
+    """
+
+    group: Group
+    candidates: tuple[Candidate, ...]
+    links: Mapping[str, Source]
+    followers: frozenset[str]
+
+    @property
+    def source(self) -> str:
+        """The likeliest source."""
+        return self.candidates[0].loop
+
+    @property
+    def waves(self) -> dict[str, Wave]:
+        """The waves of the group by loop."""
+        return {m.wave.loop: m.wave for m in self.group.members}
+
+
+def follows(
+    own: Mapping[Cause, float], source: Source, limits: PlantLimits, wave: Wave | None = None
+) -> Follower:
+    """The verdict on a follower, from its own confidences [%] and its source.
+
+    The load is at least as sure as the coherence; what else the loop shows comes from the source.
+    """
+    load = max(own[Cause.LOAD], 100.0 * source.coherence)
+    rest = {c: min(own[c], limits.follower_most_pct) for c in (Cause.VALVE, Cause.TUNING)}
+    return Follower(source, {Cause.LOAD: load, **rest}, limits.follower_sign, wave)
+
+
+def may_follow(own: Peer, other: Peer, level: float, limits: PlantLimits) -> bool:
+    """Whether a loop can follow another at this coherence.
+
+    A loop whose own valve seems at fault follows only one whose valve is so by far more evidence: what comes from
+    a neighbour's stem looks like stem motion in the follower too, but explains it worse.
+    """
+    if level < limits.coherent:
+        return False
+    if own.cause is not Cause.VALVE:
+        return True
+    factor = limits.outweighs_wave if level >= limits.one_wave else limits.outweighs
+    outweighed = other.evidence >= factor * own.evidence
+    return other.cause is Cause.VALVE and level >= limits.follows and outweighed
+
+
+def traced(group: Group, peers: Mapping[str, Peer], limits: PlantLimits) -> Traced | None:
+    """A group with its candidates and followers; None where no verdict of its loops is known."""
+    found = signs_of(group, peers)
+    if not found:
+        return None
+    candidates = ranked(found, limits)
+    links = _links(group, candidates[0])
+    sure = candidates[0].confidence_pct >= limits.source_pct
+    followers = [
+        loop
+        for loop, link in links.items()
+        if sure and loop in peers and may_follow(peers[loop], peers[link.loop], link.coherence, limits)
+    ]
+    return Traced(group, candidates, links, frozenset(followers))
+
+
+def _links(group: Group, best: Candidate) -> dict[str, Source]:
+    """How the other loops of a group go with its likeliest source."""
+    leader = group.members[0].wave
+    first = next(m.wave for m in group.members if m.wave.loop == best.loop)
+    out = {}
+    for member in group.members:
+        if member.wave.loop == best.loop:
+            continue
+        lag = lag_between(first, member.wave)
+        level = max(lag.coherence, member.coherence if first is leader or lag.coherence == 0.0 else 0.0)
+        known = lag.lag_s if lag.deviation_s < LAG_KNOWN * abs(lag.lag_s) else None
+        out[member.wave.loop] = Source(best.loop, level, best.confidence_pct, known)
+    return out
+
+
+def trace(waves: Sequence[Wave], peers: Mapping[str, Peer], limits: PlantLimits) -> list[Traced]:
+    """The groups of a night, traced to their sources, those of more loops first."""
+    found = (traced(g, peers, limits) for g in groups_of(waves, limits))
+    return [t for t in found if t is not None]
+
+
+def followers_of(found: Sequence[Traced]) -> dict[str, tuple[Source, Wave]]:
+    """The source that each follower has, in its larger wave where it follows in two groups.
+
+    A loop that leads one group follows nobody in another where its wave is smaller.
+    """
+    out: dict[str, tuple[Source, Wave]] = {}
+    leads = {t.source: amplitude_pct(t.waves[t.source]) for t in found if t.followers}
+    for t in found:
+        waves = t.waves
+        for loop in t.followers:
+            size = amplitude_pct(waves[loop])
+            if leads.get(loop, 0.0) < size and (loop not in out or size > amplitude_pct(out[loop][1])):
+                out[loop] = t.links[loop], waves[loop]
+    return {loop: (_rooted(loop, out), wave) for loop, (_, wave) in out.items()}
+
+
+def _rooted(loop: str, found: Mapping[str, tuple[Source, Wave]]) -> Source:
+    """The source at the end of the chain: a follower's follower follows the loop that leads both."""
+    at, seen = found[loop][0], {loop}
+    while at.loop in found and at.loop not in seen:
+        seen.add(at.loop)
+        further = found[at.loop][0]
+        level = min(at.coherence, further.coherence)
+        at = Source(further.loop, level, min(at.confidence_pct, further.confidence_pct))
+    return at
+
+
+def amplitude_pct(wave: Wave) -> float:
+    """Half of peak to peak of a wave over the whole record [% of span]."""
+    line = wave.line
+    low, high = round(line / 1.2) - wave.first, round(line * 1.2) - wave.first
+    return float(np.sqrt(np.sum(np.abs(wave.lines[max(low, 0) : high + 1]) ** 2)))
+
+
+def envelope(wave: Wave) -> Floats:
+    """Amplitude of a wave over its record [% of span], shape (m,)."""
+    size = next_fast_len(max(4 * wave.lines.size, 16))
+    return np.asarray(np.abs(ifft(wave.lines, size)) * size)
+
+
+def oscillating_pct(wave: Wave) -> float:
+    """Share of the time that a wave is on [%]."""
+    level = envelope(wave)
+    width = max(round(2 * level.size / wave.cycles), 1)
+    smooth = np.sqrt(
+        np.convolve(np.pad(level**2, width, mode="reflect"), np.ones(width) / width, mode="same")
+    )
+    smooth = smooth[width:-width]
+    top = float(np.quantile(smooth, 0.9))
+    return 100.0 * float(np.mean(smooth >= ENVELOPE * top)) if top > 0 and math.isfinite(top) else 0.0

@@ -1,0 +1,124 @@
+"""What is kept of a loop for the plant-wide pass: the lines of its error about each period that it might share."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from analyzer.config import PlantLimits
+from analyzer.oscillation import Oscillations, peaks
+from identification.signals.spectrum import Complex, Spectrum, locked_harmonic, peak_prominence
+
+REACH = 1.35
+"""Lines kept about a period reach from f / REACH to f * REACH, for neighbours whose period differs."""
+BESIDE = 6
+"""Lines kept beyond that on either side."""
+HARMONICS = (2, 3)
+"""Harmonics that are looked at; ours: higher ones drown in noise."""
+APART = 1.2
+"""Ratio from which two peaks of one loop are two waves."""
+
+
+@dataclass(frozen=True, slots=True)
+class Wave:
+    """Lines of a loop's error about one period.
+
+    loop; period_s [s]; harmonic, 1 for a period of the loop's own, m for the m-th harmonic of one; own, whether the
+    loop is seen to oscillate with it by itself; start_s, duration_s of the record [s], line k being the frequency
+    k / duration_s; first, the number of the first line kept; prominence of the peak [-]; share of the error's power
+    above slow drift that the band has [-]; nonlinearity, size of the harmonics locked to the fundamental over its own
+    [-]; lines, complex, shape (m,), scaled so that a sine of amplitude a [% of span] has a line of size a.
+    """
+
+    loop: str
+    period_s: float
+    harmonic: int
+    own: bool
+    start_s: float
+    duration_s: float
+    first: int
+    prominence: float
+    share: float
+    nonlinearity: float
+    lines: Complex = field(repr=False)
+
+    @property
+    def line(self) -> float:
+        """The period's frequency in lines."""
+        return self.duration_s / self.period_s
+
+    @property
+    def cycles(self) -> float:
+        """Periods that the record holds."""
+        return self.duration_s / self.period_s
+
+
+def _centred(s: Spectrum, line: float) -> float:
+    """Period [s] at the centre of the power about a frequency [lines]."""
+    at = np.arange(math.floor(line / APART), min(math.ceil(line * APART), s.lines.size - 1) + 1)
+    power = np.abs(s.lines[at]) ** 2
+    return s.duration_s / float(power @ at / power.sum())
+
+
+def _nonlinearity(s: Spectrum, period_s: float) -> float:
+    """Size of the locked harmonics together, over that of the fundamental [-]."""
+    return math.hypot(*(locked_harmonic(s, period_s, m) for m in HARMONICS))
+
+
+def _cut(loop: str, s: Spectrum, period_s: float, start_s: float, harmonic: int, own: bool) -> Wave | None:
+    line = s.duration_s / period_s
+    low = max(math.floor(line / REACH) - BESIDE, 0)
+    high = min(math.ceil(line * REACH) + BESIDE, s.lines.size - 1)
+    if line * 1.1 > s.lines.size - 1 or high - low < 2 * BESIDE:
+        return None
+    near = slice(math.floor(line / APART), math.ceil(line * APART) + 1)
+    power = np.abs(s.lines) ** 2
+    above = float(power[max(math.ceil(line / (2 * APART)), 1) :].sum())
+    share = float(power[near].sum()) / above if above > 0 else 0.0
+    return Wave(
+        loop,
+        period_s,
+        harmonic,
+        own,
+        start_s,
+        s.duration_s,
+        low,
+        peak_prominence(power, line),
+        share,
+        _nonlinearity(s, period_s),
+        (s.lines[low : high + 1] * (2.0 / s.n)).astype(np.complex64),
+    )
+
+
+def waves_of(loop: str, found: Oscillations, end_s: float, limits: PlantLimits) -> tuple[Wave, ...]:
+    """The waves of a loop: its oscillations, the harmonics of the first, and weaker peaks of its spectrum.
+
+    Parameters
+    ----------
+    loop : str
+    found : Oscillations
+        With spectrum and bands.
+    end_s : float
+        End of the record [s since 1970-01-01 UTC]; the spectrum is of its last samples.
+    limits : PlantLimits
+    """
+    s, b = found.spectrum, found.bands
+    if s is None or b is None:
+        return ()
+    wanted: list[tuple[float, int, bool]] = []
+    for o in found.found:
+        wanted.append((o.period_s, 1, True))
+        if o is found.first:
+            sizes = [(m, locked_harmonic(s, o.period_s, m)) for m in HARMONICS]
+            wanted += [(o.period_s / m, m, False) for m, size in sizes if size > limits.locked_harmonic]
+    for k in peaks(b, limits.weak_prominence):
+        period = _centred(s, float(b.line[k]))
+        if all(abs(math.log(period / p)) > math.log(APART) for p, *_ in wanted):
+            wanted.append((period, 1, False))
+        if len(wanted) >= limits.waves:
+            break
+    start_s = end_s - s.duration_s
+    cut = (_cut(loop, s, p, start_s, m, own) for p, m, own in wanted)
+    return tuple(w for w in cut if w is not None)

@@ -1,0 +1,184 @@
+"""Two signals about one frequency: whether they move together, and which of them is later.
+
+Lines are compared in pieces of the band within which the phase may be taken as constant, so that a delay or a slow
+wandering of the phase does not hide what is shared, and after a Hann taper, so that a steady wave stays in its lines.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+from scipy.fft import ifft, next_fast_len
+from scipy.stats import beta
+
+from identification.record import Floats
+from identification.signals.spectrum import Complex
+
+HALF_BAND = 0.08
+"""Half width of the band that is compared, as a share of the frequency; ours."""
+PIECE, PIECE_LINES = 0.03, 8
+"""Width of the pieces of the band within which the phase may be taken as constant, as a share of the frequency and in
+lines at least: the delay from loop to loop turns it over the whole band; ours."""
+LEAST_LINES = 4
+"""Fewest lines on each side of the frequency."""
+HANN_WIDTH = 1.8
+"""Lines that a Hann taper makes one: neighbours correlate by 2/3, next ones by 1/6, and squares add up."""
+UNEVEN = 1.4
+"""Pieces that count as one, for those with more power count more: mean square over squared mean of the products."""
+DRIFT_STEPS = 20
+"""Steps of a line in which a drift is told."""
+Whole = NDArray[np.int64]
+
+
+def tapered(lines: Complex) -> Complex:
+    """Lines of the Hann-tapered signal from those of the signal, shape (m - 2,): those with both neighbours."""
+    return lines[1:-1] - 0.5 * (lines[:-2] + lines[2:])
+
+
+def band(line: float) -> tuple[int, int, int]:
+    """First line, line after the last and width of the pieces [lines] of the band about a frequency [lines]."""
+    half = max(HALF_BAND * line, LEAST_LINES)
+    return max(round(line - half), 1), round(line + half) + 1, max(PIECE_LINES, round(PIECE * line))
+
+
+@cache
+def chance_coherence(lines: int, width: int, chance: float) -> float:
+    """Coherence that two signals without anything in common reach with a probability of `chance` [-].
+
+    Of one piece it is distributed as Beta(1, d - 1), d the independent lines of the piece (Carter, Knapp, Nuttall
+    1973); of a mean over pieces as the beta of the same mean and a variance as many times smaller.
+
+    Parameters
+    ----------
+    lines, width : int
+        Lines of the band, and of one of its pieces.
+    chance : float
+    """
+    free = max(width / HANN_WIDTH, 1.5)
+    pieces = max(lines // width / UNEVEN, 1.0)
+    spread = pieces * (free + 1) - 1
+    return float(beta.isf(chance, spread / free, spread * (1 - 1 / free)))
+
+
+@njit(cache=True)
+def coherences(
+    flat: Complex, offset: Whole, first: Whole, count: Whole, one: int, others: Whole, span: Whole, shift: int
+) -> Floats:
+    """Coherence of one stretch of lines with others over a band [-].
+
+    Parameters
+    ----------
+    flat : complex ndarray
+        The lines of all stretches, one after the other.
+    offset, first, count : ndarray of shape (s,)
+        Where in `flat` each stretch begins, the number of its first line, and how many it has.
+    one : int
+        The stretch that is compared.
+    others : ndarray of shape (k,)
+        Those with which it is compared.
+    span : ndarray of shape (3,)
+        First line, line after the last and width of the pieces (`band`).
+    shift : int
+        Lines by which the others are shifted: shifted ones share nothing but the shape of their band.
+
+    Returns
+    -------
+    ndarray of shape (k,)
+        0 where a stretch does not hold the band.
+    """
+    out = np.zeros(others.size)
+    low, high = span[0], span[1]
+    pieces = max((high - low) // span[2], 1)
+    if low < first[one] or high > first[one] + count[one]:
+        return out
+    for q in range(others.size):
+        j = others[q]
+        if low + shift < first[j] or high + shift > first[j] + count[j]:
+            continue
+        shared, whole = 0.0, 0.0
+        for p in range(pieces):
+            begin, end = low + (high - low) * p // pieces, low + (high - low) * (p + 1) // pieces
+            cross_re, cross_im, mine, yours = 0.0, 0.0, 0.0, 0.0
+            for k in range(begin, end):
+                x = flat[offset[one] + k - first[one]]
+                y = flat[offset[j] + k + shift - first[j]]
+                cross_re += x.real * y.real + x.imag * y.imag
+                cross_im += x.imag * y.real - x.real * y.imag
+                mine += x.real * x.real + x.imag * x.imag
+                yours += y.real * y.real + y.imag * y.imag
+            shared += cross_re * cross_re + cross_im * cross_im
+            whole += mine * yours
+        if whole > 0:
+            out[q] = shared / whole
+    return out
+
+
+def drift(x: Complex, y: Complex) -> float:
+    """Lines by which a second signal's frequency seems to differ from that of a first one.
+
+    Two signals of one source keep step: their phases differ by no more at the end than at the beginning. Of two
+    others a Fourier line apart the difference turns once over the record.
+
+    Parameters
+    ----------
+    x, y : complex ndarray of shape (m,)
+        Lines of the same numbers, not tapered.
+    """
+    size = next_fast_len(max(4 * x.size, 32))
+    product = ifft(x, size) * np.conj(ifft(y, size))
+    fine = next_fast_len(DRIFT_STEPS * size)
+    found = np.abs(np.fft.fft(product, fine))
+    reach = 3 * DRIFT_STEPS
+    around = np.concatenate((found[-reach:], found[: reach + 1]))
+    return abs(int(np.argmax(around)) - reach) / DRIFT_STEPS * (DRIFT_STEPS * size / fine)
+
+
+@dataclass(frozen=True, slots=True)
+class Lag:
+    """How much later a second signal is: lag_s [s], its standard deviation [s], and the coherence at that lag [-]."""
+
+    lag_s: float
+    deviation_s: float
+    coherence: float
+
+
+def lag(x: Complex, y: Complex, duration_s: float, most_s: float) -> Lag:
+    """Group delay of a second signal behind a first one, by the slope of their phase over the band.
+
+    A steady wave tells no delay, for its phase is known up to whole turns alone; what tells is how its size and its
+    phase change over time, and the deviation says how well (Carter 1987).
+
+    Parameters
+    ----------
+    x, y : complex ndarray of shape (m,)
+        Lines of the same numbers.
+    duration_s : float
+        Line k is the frequency k / duration_s [s].
+    most_s : float
+        Largest lag looked for, either way [s].
+    """
+    cross = np.conj(x) * y
+    power = float(np.sqrt(np.sum(np.abs(x) ** 2) * np.sum(np.abs(y) ** 2)))
+    if power <= 0:
+        return Lag(0.0, math.inf, 0.0)
+    size = next_fast_len(max(16 * cross.size, 64))
+    step = duration_s / size
+    found = np.abs(ifft(cross, size)) * size / power
+    reach = min(max(int(most_s / step), 1), size // 2 - 1)
+    ahead = np.concatenate((found[-reach:], found[: reach + 1]))
+    # a delay of y turns the phase of conj(x) y backwards: its transform peaks where it is turned forward again
+    at = int(np.argmax(ahead)) - reach
+    best = min(float(ahead[at + reach]) ** 2, 1.0)
+    weight = np.abs(cross)
+    lines = np.arange(cross.size)
+    mean = float(weight @ lines / weight.sum())
+    width = math.sqrt(float(weight @ (lines - mean) ** 2 / weight.sum()))
+    free = float(weight.sum() ** 2 / (weight @ weight))
+    slope = 2 * math.pi * max(width, 1e-9) / duration_s
+    deviation = math.sqrt(max(1.0 - best, 1e-4) / (2 * max(best, 1e-9) * free)) / slope
+    return Lag(at * step, deviation, best)

@@ -1,0 +1,188 @@
+"""Loops that share a wave are one group, and loops that share nothing are none, whatever their periods."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from analyzer.decisions import Cause
+from analyzer.oscillation import detect
+from analyzer.plantwide.groups import Group, groups_of
+from analyzer.plantwide.source import Peer
+from analyzer.plantwide.table import waves_in, waves_table
+from analyzer.plantwide.verdict import Traced, followers_of, trace
+from analyzer.plantwide.wave import Wave, waves_of
+from tests.analyzer.plant import CONFIG, START_S, record
+
+HOURS_8 = 28_800
+LIMITS = CONFIG.plant
+
+
+def wave(
+    seed: int, n: int = HOURS_8, period: float = 200.0, walk: float = 0.01, square: bool = False
+) -> np.ndarray:
+    """A wave whose phase walks by `walk` rad a sample, so that no two are alike, shape (n,)."""
+    rng = np.random.default_rng(seed)
+    phase = 2 * np.pi * np.arange(n) / period + np.cumsum(walk * rng.standard_normal(n))
+    return np.sign(np.sin(phase)) if square else np.sin(phase)
+
+
+def late(x: np.ndarray, lag: float, delay: int = 0) -> np.ndarray:
+    """A signal behind a lag [samples] and a delay [samples]."""
+    pole = np.exp(-1.0 / lag)
+    return np.concatenate((np.zeros(delay), lfilter([1 - pole], [1, -pole], x)))[: x.size]
+
+
+def loop(
+    name: str,
+    error: np.ndarray,
+    noise: float = 0.1,
+    seed: int = 1,
+    dt_s: float = 1.0,
+    start_s: float = START_S,
+) -> tuple[Wave, ...]:
+    """The waves of a loop whose error is a signal with noise of its own."""
+    pv = 50.0 - error + noise * np.random.default_rng(seed).standard_normal(error.size)
+    own = replace(record(pv, dt_s=dt_s), start_s=start_s)
+    return waves_of(name, detect(own, CONFIG.oscillation), start_s + own.duration_s, LIMITS)
+
+
+def grouped(*loops: Sequence[Wave]) -> list[Group]:
+    """Groups of some loops."""
+    return groups_of([w for waves in loops for w in waves], LIMITS)
+
+
+def names(groups: Sequence[Group]) -> list[set[str]]:
+    """The loops of each group."""
+    return [set(g.loops) for g in groups]
+
+
+def traced(peers: dict[str, Peer], *loops: Sequence[Wave]) -> list[Traced]:
+    """Groups with their sources."""
+    return trace([w for waves in loops for w in waves], peers, LIMITS)
+
+
+def test_what_shares_a_wave_is_one_group():
+    """Three loops that pass one wave on through lags and delays are one group, and a stranger is not in it."""
+    x = wave(1)
+    found = grouped(
+        loop("A", x, seed=1),
+        loop("B", late(x, 60.0, 40), 0.05, seed=2),
+        loop("C", late(late(x, 60.0, 40), 90.0, 100), 0.05, seed=3),
+        loop("D", wave(2), seed=4),
+    )
+    assert names(found) == [{"A", "B", "C"}]
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_loops_that_happen_to_cycle_alike_are_no_group(seed):
+    """Five waves of periods within 2 % of each other, each with a walk of its own, share nothing."""
+    rng = np.random.default_rng(seed)
+    periods = 200.0 * (1 + 0.02 * rng.uniform(-1, 1, 5))
+    found = grouped(*(loop(f"L{k}", wave(100 * seed + k, period=p), seed=k) for k, p in enumerate(periods)))
+    assert found == []
+
+
+@pytest.mark.parametrize("kind", ["white", "drift", "constant", "ramp"])
+def test_what_does_not_oscillate_is_in_no_group(kind):
+    """Noise, drift, ramps and constants, though one and the same in all loops, are no shared oscillation."""
+    rng = np.random.default_rng(5)
+    x = {
+        "white": rng.standard_normal(HOURS_8),
+        "drift": np.cumsum(0.01 * rng.standard_normal(HOURS_8)),
+        "constant": np.zeros(HOURS_8),
+        "ramp": np.linspace(0, 20, HOURS_8),
+    }[kind]
+    noise = 0.0 if kind == "constant" else 0.1
+    assert grouped(*(loop(f"L{k}", x, noise, seed=k) for k in range(6))) == []
+
+
+def test_a_wave_too_weak_by_itself_is_found_with_others():
+    """A loop whose error is mostly its own load, and that is not seen to oscillate, joins the wave in it."""
+    x = wave(3, walk=0.03)
+    rng = np.random.default_rng(9)
+    load = lfilter([0.05], [1, -0.95], rng.standard_normal(HOURS_8))
+    weak = loop("weak", 0.1 * x + load, 0.02)
+    assert not any(w.own and abs(w.period_s / 200 - 1) < 0.1 for w in weak)
+    assert names(grouped(loop("A", x), weak)) == [{"A", "weak"}]
+
+
+def test_copies_of_one_tag_are_one_group_without_a_source():
+    """Ten loops with the same trends are one group in which no loop is told as the source."""
+    x = wave(4)
+    loops = [loop(f"L{k}", x, seed=1) for k in range(10)]
+    peers = {f"L{k}": Peer(Cause.LOAD) for k in range(10)}
+    (found,) = traced(peers, *loops)
+    assert len(found.group.loops) == 10
+    assert found.candidates[0].confidence_pct < LIMITS.source_pct
+    assert followers_of([found]) == {}
+
+
+def test_two_loops_alone_are_told():
+    """Of two loops with one wave, the one with a valve at fault leads and the other follows it later."""
+    x = wave(5, walk=0.03, square=True)
+    peers = {"valve": Peer(Cause.VALVE, 500.0), "fed": Peer(Cause.LOAD)}
+    found = traced(peers, loop("valve", x), loop("fed", late(x, 60.0, 120), seed=2))
+    assert {k: s.loop for k, (s, _) in followers_of(found).items()} == {"fed": "valve"}
+    slope = 60.0 / (1 + (2 * np.pi * 60.0 / 200.0) ** 2)  # group delay of the lag at the period
+    assert found[0].links["fed"].lag_s == pytest.approx(120.0 + slope, abs=25.0)
+
+
+def test_different_intervals_do_not_part_a_group():
+    """A loop sampled every 5 s is in the group of one sampled every second, though its record ends sooner."""
+    x = wave(6)
+    fed = late(x, 60.0, 40)
+    slow = loop("slow", fed[: HOURS_8 - 1000 : 5], 0.05, dt_s=5.0)
+    assert names(grouped(loop("A", x), slow)) == [{"A", "slow"}]
+
+
+@pytest.mark.parametrize("off_s", [-180.0, 240.0])
+def test_clocks_that_differ_by_minutes_do_not_part_a_group(off_s):
+    """A loop whose historian is minutes off is in the group, and the lag told is that between the clocks."""
+    x = wave(7, walk=0.02)
+    found = traced(
+        {"A": Peer(Cause.VALVE, 100.0), "off": Peer(Cause.LOAD)},
+        loop("A", x),
+        loop("off", late(x, 20.0), 0.05, start_s=START_S + off_s),
+    )
+    assert names([t.group for t in found]) == [{"A", "off"}]
+    told = {c.loop: found[0].links.get(c.loop) for c in found[0].candidates}
+    apart = [s.lag_s if k == "off" else -(s.lag_s or 0.0) for k, s in told.items() if s is not None]
+    assert apart == [pytest.approx(off_s, abs=40.0)]
+
+
+def test_records_of_other_hours_share_nothing():
+    """Two loops with the same trend at other hours of the day are no group."""
+    x = wave(8)
+    assert grouped(loop("A", x), loop("B", x, seed=2, start_s=START_S + HOURS_8)) == []
+
+
+def test_a_loop_may_follow_in_two_groups():
+    """A loop fed by two sources of different periods stands in the groups of both."""
+    x, y = wave(9, period=200.0), wave(10, period=520.0)
+    found = grouped(loop("A", x), loop("B", y, seed=2), loop("both", late(x, 30.0) + late(y, 30.0), seed=3))
+    assert sorted(map(sorted, names(found))) == [["A", "both"], ["B", "both"]]
+
+
+def test_harmonics_of_one_source_are_one_group():
+    """A loop that shows a square wave's third harmonic alone is in the group of the loop that has the square wave."""
+    x = wave(11, period=300.0, square=True, walk=0.005)
+    phase = np.unwrap(
+        np.angle(np.fft.ifft(np.fft.fft(x) * (np.abs(np.fft.fftfreq(x.size) - 1 / 300) < 4e-4)))
+    )
+    third = np.sin(3 * phase)
+    found = grouped(loop("A", x), loop("B", late(x, 30.0), seed=2), loop("third", third, seed=3))
+    assert names(found) == [{"A", "B", "third"}]
+
+
+def test_waves_survive_the_store():
+    """Waves written as a table and read back are the same to the last bit of their lines."""
+    waves = [*loop("A", wave(12)), *loop("B", wave(13, period=70.0), seed=2)]
+    back = waves_in(waves_table(waves))
+    assert [(w.loop, w.period_s, w.own) for w in back] == [(w.loop, w.period_s, w.own) for w in waves]
+    for old, new in zip(waves, back, strict=True):
+        np.testing.assert_array_equal(old.lines, new.lines)
