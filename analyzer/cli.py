@@ -57,6 +57,7 @@ def check(asked: Asked) -> None:
 @click.option("--night", help="Night to show, e.g. 2026-03-08. Default: the latest.")
 @click.option("--ascending", is_flag=True, help="Smallest first.")
 @click.option("--area", help="Loops of this area alone.")
+@click.option("--groups", is_flag=True, help="Loops that share an oscillation, and where each starts.")
 @click.option("--wide", is_flag=True, help="All columns of the table, however narrow the terminal.")
 @click.option(
     "--format",
@@ -74,6 +75,7 @@ def rank(
     night: str | None,
     ascending: bool,
     area: str | None,
+    groups: bool,
     wide: bool,
     form: str,
 ) -> None:
@@ -84,6 +86,12 @@ def rank(
     from analyzer.rank import ranked, rendered
     from analyzer.store import Store
 
+    if groups:
+        from analyzer import group_list
+
+        found, name = group_list.grouped(Store(store), night, top)
+        click.echo(group_list.rendered(found, form, name))
+        return
     rows, name = ranked(Store(store), column, top, night, ascending, area)
     click.echo(rendered(rows, form, name, wide))
 

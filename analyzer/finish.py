@@ -7,7 +7,6 @@ newer of two that are alike, so that the same night twice replaces and a good ni
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import pyarrow as pa
@@ -15,64 +14,14 @@ import pyarrow.compute as pc
 
 from analyzer.columns.table import BY_NAME, GROUPS, NIGHTS, names
 from analyzer.config import Config, NightLimits
-from analyzer.decisions import CAUSES, Cause, Status, counts
-from analyzer.plantwide.rows import group_rows, is_told, own_groups, wave_columns
-from analyzer.plantwide.source import Peer
+from analyzer.decisions import Status
+from analyzer.plantwide.night import traced_night
 from analyzer.plantwide.table import waves_in
-from analyzer.plantwide.verdict import followers_of, follows, trace
-from analyzer.present import follower_row, root_row
 from analyzer.store import Store, rows_table
 
 WORTH = {Status.OK: 2, Status.NOT_ASSESSED: 1}
 """What a status is worth when two records of one loop meet; a failure is worth nothing."""
 Row = Mapping[str, Any]
-
-
-@dataclass(frozen=True, slots=True)
-class _Traced:
-    """The rows of a night, those of followers and of their sources changed, and the rows of its groups."""
-
-    rows: dict[str, Row]
-    groups: Sequence[Row]
-
-
-def _traced(rows: dict[str, Row], waves: pa.Table | None, config: Config, first: int) -> _Traced:
-    """What the plant-wide pass makes of the rows; `first` is the number of the first group."""
-    limits = config.plant
-    told = [t for t in trace(waves_in(waves), _peers(rows), limits) if is_told(t, rows)]
-    found = followers_of(told)
-    sources = {loop: source for loop, (source, _) in found.items()}
-    groups = [r for k, t in enumerate(told, first) for r in group_rows(k, t, sources, rows, limits)]
-    moved: dict[str, list[str]] = {}
-    for loop, source in sources.items():
-        moved.setdefault(source.loop, []).append(loop)
-    changed = {loop: root_row(rows[loop], sorted(names)) for loop, names in moved.items()}
-    for loop, (source, wave) in found.items():
-        verdict = follows(_confidence(rows[loop]), source, limits, wave)
-        seen = {**rows[loop], **wave_columns(rows[loop], verdict, limits)}
-        if counts(seen["oscillating_pct"]):
-            changed[loop] = follower_row(seen, verdict)
-    own = own_groups(groups)
-    return _Traced({k: {**r, "group": own.get(k)} for k, r in (rows | changed).items()}, groups)
-
-
-def _peers(rows: Mapping[str, Row]) -> dict[str, Peer]:
-    """The verdicts of the loops that were assessed."""
-    return {
-        k: Peer(
-            Cause(r["cause"] or Cause.NONE),
-            r["evidence"] or 0.0,
-            r["osc_tuning_pct"] or 0.0,
-            r["master"] or "",
-        )
-        for k, r in rows.items()
-        if r["status"] == Status.OK
-    }
-
-
-def _confidence(row: Row) -> dict[Cause, float]:
-    """The confidences of a row [%], 0 where none is told."""
-    return {cause: row[f"osc_{cause}_pct"] or 0.0 for cause in CAUSES}
 
 
 def fuller(old: Row, new: Row, limits: NightLimits) -> bool:
@@ -121,7 +70,7 @@ def finish_night(
     fresh = {r["loop"]: r for r in table.to_pylist()}
     other = [] if replace else _other_groups(store, night, fresh)
     first = 1 + max((int(r["group"]) for r in other), default=0)
-    done = _traced(fresh, store.read_parts(night, "waves", keys), config, first)
+    done = traced_night(fresh, waves_in(store.read_parts(night, "waves", keys)), config.plant, first)
     rows = done.rows
     old = {} if replace else _known(store, night)
     kept = {loop for loop, row in rows.items() if loop in old and fuller(old[loop], row, config.nights)}

@@ -150,7 +150,7 @@ def follower_row(row: Mapping[str, Any], found: Follower) -> dict[str, Any]:
     source = found.source
     later = f", {duration(abs(source.lag_s))} later" if source.lag_s is not None and source.lag_s > 0 else ""
     sure = f"confidence {source.confidence_pct:.0f} %, coherence {source.coherence:.2f}"
-    text = f"moves with {source.loop}{later}, where the oscillation starts ({sure})"
+    text = f"moves with {source.loop}{later}, where the oscillation seems to start ({sure})"
     sign = {"points_to": found.cause, "strength": found.strength, "text": text}
     return {
         **row,

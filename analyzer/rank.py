@@ -111,7 +111,7 @@ def as_table(rows: Sequence[Row], night: str, width: int | None = None) -> str:
     table = Table(
         box=SIMPLE_HEAD, title=f"Night {night}", title_justify="left", pad_edge=False, padding=(0, 1, 0, 0)
     )
-    console = Console(width=width or (None if _interactive() else 180))
+    console = Console(width=width or (None if interactive() else 180))
     shown = [brief(row) for row in rows]
     kept = fitting(shown, console.width)
     for column in (BY_NAME[name] for name in kept):
@@ -127,7 +127,8 @@ def as_table(rows: Sequence[Row], night: str, width: int | None = None) -> str:
     return "\n".join(line.rstrip() for line in capture.get().rstrip().splitlines())
 
 
-def _interactive() -> bool:
+def interactive() -> bool:
+    """Whether the output is read on a terminal."""
     import sys
 
     return sys.stdout.isatty()

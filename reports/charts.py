@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from reports.pages import IntervalChart, Panels, Plot, Trend
+from reports import map_charts
+from reports.pages import Graph, HeatMap, IntervalChart, Panels, Plot, Trend
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -71,8 +72,12 @@ def _day(time_s: float) -> float:
     return time_s / 86400.0
 
 
-def draw(block: Trend | Plot | Panels | IntervalChart) -> bytes:
+def draw(block: Trend | Plot | Panels | IntervalChart | HeatMap | Graph) -> bytes:
     """A picture as PNG."""
+    if isinstance(block, HeatMap):
+        return map_charts.heat_map(block)
+    if isinstance(block, Graph):
+        return map_charts.graph(block)
     if isinstance(block, Trend):
         return trend(block)
     if isinstance(block, Panels):

@@ -16,7 +16,7 @@ import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from reports import svg
+from reports import maps, svg
 from reports.pages import Band, Bars, Cell, Floats, Page, Sparkline, Trend
 
 ASSETS = ("page.css", "uPlot.min.css", "uPlot.iife.min.js", "page.js")
@@ -89,6 +89,8 @@ def _environment() -> Environment:
         sort_key=sort_key,
         intervals=svg.intervals,
         plot=svg.plot,
+        heat_map=maps.heat_map,
+        graph=maps.graph,
         keys=svg.keys,
         trend_data=trend_data,
     )

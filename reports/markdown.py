@@ -10,6 +10,8 @@ from reports.pages import (
     Block,
     Cell,
     Facts,
+    Graph,
+    HeatMap,
     IntervalChart,
     Listing,
     Page,
@@ -70,7 +72,7 @@ def _block(block: Block, folder: str) -> list[str]:
             return [f"- {escaped(term)}: {escaped(detail)}" for term, detail in block.items]
         case Tiles():
             return [f"- **{escaped(figure)}** {escaped(what)}" for figure, what, _ in block.items]
-        case IntervalChart() | Plot() | Panels() | Trend():
+        case IntervalChart() | Plot() | Panels() | Trend() | HeatMap() | Graph():
             if not folder:
                 return []
             caption = ["", escaped(block.caption)] if block.caption else []
@@ -98,7 +100,7 @@ def render(page: Page, folder: str = "pictures") -> str:
     return "\n".join([*head, *body, *foot]).rstrip() + "\n"
 
 
-def pictures(page: Page) -> Sequence[IntervalChart | Plot | Panels | Trend]:
+def pictures(page: Page) -> Sequence[IntervalChart | Plot | Panels | Trend | HeatMap | Graph]:
     """The blocks that become pictures."""
-    kinds = IntervalChart | Plot | Panels | Trend
+    kinds = IntervalChart | Plot | Panels | Trend | HeatMap | Graph
     return [b for s in page.sections for b in s.blocks if isinstance(b, kinds)]

@@ -188,6 +188,54 @@ class Trend:
 
 
 @dataclass(frozen=True, slots=True)
+class HeatMap:
+    """Rows of shares as colours over one axis that counts in powers.
+
+    x : middle of each column, rising evenly in logarithms, shape (b,); rows : names; shares : 0 (nothing) to 1 (full
+    colour), NaN where there is none, shape (rows, b); marks lie on the axis
+    """
+
+    name: str
+    title: str
+    x_label: str
+    x: Floats
+    rows: tuple[str, ...]
+    shares: Floats
+    marks: tuple[Mark, ...] = ()
+    caption: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Node:
+    """A box of a graph: its name, a line under it, its colour, and in which column it stands (0 is the first)."""
+
+    name: str
+    text: str
+    kind: str
+    column: int
+
+
+@dataclass(frozen=True, slots=True)
+class Arrow:
+    """From one box to another, with a text."""
+
+    first: str
+    last: str
+    text: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Graph:
+    """Boxes with arrows between them, drawn from left to right."""
+
+    name: str
+    title: str
+    nodes: tuple[Node, ...]
+    arrows: tuple[Arrow, ...]
+    caption: str = ""
+
+
+@dataclass(frozen=True, slots=True)
 class Text:
     """Paragraphs."""
 
@@ -216,7 +264,7 @@ class Tiles:
     items: tuple[tuple[str, str, str], ...]
 
 
-Block = Table | IntervalChart | Plot | Panels | Trend | Text | Listing | Facts | Tiles
+Block = Table | IntervalChart | Plot | Panels | Trend | HeatMap | Graph | Text | Listing | Facts | Tiles
 
 
 @dataclass(frozen=True, slots=True)

@@ -35,17 +35,25 @@ MARGIN = (56.0, 12.0, 12.0, 42.0)
 MOST_POINTS = 1500
 
 
-def _n(x: float) -> str:
+def digits(x: float) -> str:
+    """A place in the picture, with as many digits as are seen."""
     return f"{x:.1f}".rstrip("0").rstrip(".")
 
 
-def _svg(width: float, height: float, body: Iterable[str], label: str, kind: str) -> Markup:
-    head = f'<svg class="{kind}" viewBox="0 0 {_n(width)} {_n(height)}" role="img" aria-label="'
+def picture(
+    width: float, height: float, body: Iterable[str], label: str, kind: str, natural: bool = False
+) -> Markup:
+    """Drawn parts as a picture with a text for who cannot see it; a `natural` one does not grow with the page."""
+    size = f' width="{digits(width)}"' if natural else ""
+    head = f'<svg class="{kind}"{size} viewBox="0 0 {digits(width)} {digits(height)}" role="img" aria-label="'
     return Markup(head) + escape(label) + Markup('">' + "".join(body) + "</svg>")
 
 
-def _text(x: float, y: float, text: str, anchor: str = "start", kind: str = "") -> str:
-    return f'<text x="{_n(x)}" y="{_n(y)}" text-anchor="{anchor}" class="{kind}">{escape(text)}</text>'
+def written(x: float, y: float, text: str, anchor: str = "start", kind: str = "") -> str:
+    """A text as SVG."""
+    return (
+        f'<text x="{digits(x)}" y="{digits(y)}" text-anchor="{anchor}" class="{kind}">{escape(text)}</text>'
+    )
 
 
 def sparkline(s: Sparkline) -> Markup:
@@ -57,15 +65,19 @@ def sparkline(s: Sparkline) -> Markup:
     low, high = float(s.low[known].min()), float(s.high[known].max())
     scale = (height - 4) / max(high - low, 1e-9)
     x = np.linspace(0, width, s.low.size)[known]
-    top = [f"{_n(a)},{_n(height - 2 - (b - low) * scale)}" for a, b in zip(x, s.high[known], strict=True)]
-    foot = [f"{_n(a)},{_n(height - 2 - (b - low) * scale)}" for a, b in zip(x, s.low[known], strict=True)]
+    top = [
+        f"{digits(a)},{digits(height - 2 - (b - low) * scale)}" for a, b in zip(x, s.high[known], strict=True)
+    ]
+    foot = [
+        f"{digits(a)},{digits(height - 2 - (b - low) * scale)}" for a, b in zip(x, s.low[known], strict=True)
+    ]
     path = "M" + "L".join(top) + "L" + "L".join(reversed(foot)) + "Z"
-    return _svg(width, height, [f'<path d="{path}"/>'], "PV of the night", "spark")
+    return picture(width, height, [f'<path d="{path}"/>'], "PV of the night", "spark")
 
 
 def _rail(name: str, share: float, y: float) -> str:
-    full = f'<rect class="rail" x="0" y="{_n(y)}" width="60" height="4"/>'
-    held = f'<rect class="{escape(name)}" x="0" y="{_n(y)}" width="{_n(0.6 * min(share, 100))}" height="4"/>'
+    full = f'<rect class="rail" x="0" y="{digits(y)}" width="60" height="4"/>'
+    held = f'<rect class="{escape(name)}" x="0" y="{digits(y)}" width="{digits(0.6 * min(share, 100))}" height="4"/>'
     return full + held
 
 
@@ -73,7 +85,7 @@ def bars(b: Bars) -> Markup:
     """Shares of 100, one thin bar each, under one another."""
     label = ", ".join(f"{name} {share:.0f} %" for name, share in b.shares)
     body = [_rail(name, share, 6 * i + 1) for i, (name, share) in enumerate(b.shares)]
-    return _svg(60, 6.0 * len(b.shares), body, label, "bars")
+    return picture(60, 6.0 * len(b.shares), body, label, "bars")
 
 
 def nice_ticks(low: float, high: float, most: int = 6) -> list[float]:
@@ -95,25 +107,25 @@ def _reach(chart: IntervalChart) -> tuple[float, float]:
 def _interval(bar: IntervalBar, y: float, at: Floats, reach: tuple[float, float, float]) -> str:
     """A bar from zero to the change, its interval as a line, both cut at the ends; the figure beside it."""
     if bar.value is None or bar.low is None or bar.high is None:
-        return _text(at[2] + PANEL[1], y + 4, "–", "end", "quiet")
+        return written(at[2] + PANEL[1], y + 4, "–", "end", "quiet")
     zero, value, low, high = np.interp([0.0, bar.value, bar.low, bar.high], reach, at)
     left, right = sorted((zero, value))
-    place = f'x="{_n(left)}" y="{_n(y - 6)}" width="{_n(right - left)}" height="12"'
+    place = f'x="{digits(left)}" y="{digits(y - 6)}" width="{digits(right - left)}" height="12"'
     body = f'<rect class="bar {bar.kind}" {place}/>'
-    ends = f"M{_n(low)},{_n(y - 4)}v8M{_n(high)},{_n(y - 4)}v8"
-    whisker = f'<path class="whisker" d="M{_n(low)},{_n(y)}H{_n(high)}{ends}"/>'
-    return body + whisker + _text(at[2] + PANEL[1], y + 4, bar.text, "end", bar.kind)
+    ends = f"M{digits(low)},{digits(y - 4)}v8M{digits(high)},{digits(y - 4)}v8"
+    whisker = f'<path class="whisker" d="M{digits(low)},{digits(y)}H{digits(high)}{ends}"/>'
+    return body + whisker + written(at[2] + PANEL[1], y + 4, bar.text, "end", bar.kind)
 
 
 def _panel(chart: IntervalChart, label: str, left: float, rows: list[str]) -> list[str]:
     low, high = _reach(chart)
     at = np.array([left, left + PANEL[0] * low / (low - high), left + PANEL[0]])
     foot = 26 + ROW * len(rows)
-    body = [_text(left, 14, label, "start", "strong")]
+    body = [written(left, 14, label, "start", "strong")]
     for tick in nice_ticks(low, high, 4):
         x = float(np.interp(tick, [low, 0, high], at))
-        body.append(f'<path class="{"zero" if tick == 0 else "grid"}" d="M{_n(x)},22V{_n(foot)}"/>')
-        body.append(_text(x, foot + 14, f"{tick:g}", "middle", "tick"))
+        body.append(f'<path class="{"zero" if tick == 0 else "grid"}" d="M{digits(x)},22V{digits(foot)}"/>')
+        body.append(written(x, foot + 14, f"{tick:g}", "middle", "tick"))
     bars_ = [b for b in chart.bars if b.label == label]
     return [*body, *(_interval(b, 38 + ROW * rows.index(b.group), at, (low, 0.0, high)) for b in bars_)]
 
@@ -122,10 +134,10 @@ def intervals(chart: IntervalChart) -> Markup:
     """Changes as bars with intervals: a panel for each label, a row for each group."""
     rows = list(dict.fromkeys(b.group for b in chart.bars))
     labels = list(dict.fromkeys(b.label for b in chart.bars))
-    body = [_text(0, 42 + ROW * i, row, "start", "") for i, row in enumerate(rows)]
+    body = [written(0, 42 + ROW * i, row, "start", "") for i, row in enumerate(rows)]
     for i, label in enumerate(labels):
         body += _panel(chart, label, LABELS + i * sum(PANEL), rows)
-    return _svg(
+    return picture(
         LABELS + len(labels) * sum(PANEL), 46 + ROW * len(rows), body, f"{chart.title}, {chart.unit}", "chart"
     )
 
@@ -142,7 +154,7 @@ def _extent(values: list[Floats], pad: float) -> tuple[float, float]:
 
 def _line(line: Line, x: Floats, y: Floats) -> str:
     pairs = zip(x, y, strict=True)
-    points = [f"{_n(a)},{_n(b)}" for a, b in pairs if math.isfinite(a) and math.isfinite(b)]
+    points = [f"{digits(a)},{digits(b)}" for a, b in pairs if math.isfinite(a) and math.isfinite(b)]
     if line.joined:
         return f'<path class="line {line.kind}" d="M{"L".join(points)}"/>' if points else ""
     return f'<path class="dots {line.kind}" d="{"".join(f"M{p}h0" for p in points)}"/>'
@@ -151,8 +163,8 @@ def _line(line: Line, x: Floats, y: Floats) -> str:
 def _area(a: Area, x: Floats, low: Floats, high: Floats) -> str:
     """What lies between two lines."""
     known = np.isfinite(x) & np.isfinite(low) & np.isfinite(high)
-    there = [f"{_n(p)},{_n(q)}" for p, q in zip(x[known], high[known], strict=True)]
-    back = [f"{_n(p)},{_n(q)}" for p, q in zip(x[known], low[known], strict=True)]
+    there = [f"{digits(p)},{digits(q)}" for p, q in zip(x[known], high[known], strict=True)]
+    back = [f"{digits(p)},{digits(q)}" for p, q in zip(x[known], low[known], strict=True)]
     return (
         f'<path class="area {a.kind}" d="M{"L".join(there)}L{"L".join(reversed(back))}Z"/>' if there else ""
     )
@@ -205,20 +217,20 @@ class _Frame:
         body = []
         for tick in self._ticks("x", self.x, 6):
             x = float(self.px(np.array(tick)))
-            body.append(f'<path class="grid" d="M{_n(x)},{_n(self.top)}V{_n(self.foot)}"/>')
-            body.append(_text(x, self.foot + 16, f"{tick:.6g}", "middle", "tick"))
+            body.append(f'<path class="grid" d="M{digits(x)},{digits(self.top)}V{digits(self.foot)}"/>')
+            body.append(written(x, self.foot + 16, f"{tick:.6g}", "middle", "tick"))
         for tick in self._ticks("y", self.y, 5):
             y = float(self.py(np.array(tick)))
-            body.append(f'<path class="grid" d="M{_n(self.left)},{_n(y)}H{_n(self.right)}"/>')
-            body.append(_text(self.left - 6, y + 4, f"{tick:.6g}", "end", "tick"))
+            body.append(f'<path class="grid" d="M{digits(self.left)},{digits(y)}H{digits(self.right)}"/>')
+            body.append(written(self.left - 6, y + 4, f"{tick:.6g}", "end", "tick"))
         return body
 
     def mark(self, mark: Mark) -> list[str]:
         """A marked place with its name, on the side where there is room."""
         x = float(self.px(np.array(mark.x)))
         anchor, aside = ("start", 4) if x < self.width * 0.6 else ("end", -4)
-        line = f'<path class="mark" d="M{_n(x)},{_n(self.top)}V{_n(self.foot)}"/>'
-        return [line, _text(x + aside, self.top + 12, mark.label, anchor, "marked")]
+        line = f'<path class="mark" d="M{digits(x)},{digits(self.top)}V{digits(self.foot)}"/>'
+        return [line, written(x + aside, self.top + 12, mark.label, anchor, "marked")]
 
 
 def plot(p: Plot) -> Markup:
@@ -234,10 +246,10 @@ def plot(p: Plot) -> Markup:
         body.append(_line(line, frame.px(line.x[::step]), frame.py(line.y[::step])))
     for mark in p.marks:
         body += frame.mark(mark)
-    body.append(_text((frame.left + frame.right) / 2, frame.height - 6, p.x_label, "middle", "axis"))
-    turned = f'<g transform="translate(13 {_n((frame.top + frame.foot) / 2)}) rotate(-90)">'
-    body.append(f"{turned}{_text(0, 0, p.y_label, 'middle', 'axis')}</g>")
-    return _svg(frame.width, frame.height, body, f"{p.title}: {p.y_label} over {p.x_label}", "plot")
+    body.append(written((frame.left + frame.right) / 2, frame.height - 6, p.x_label, "middle", "axis"))
+    turned = f'<g transform="translate(13 {digits((frame.top + frame.foot) / 2)}) rotate(-90)">'
+    body.append(f"{turned}{written(0, 0, p.y_label, 'middle', 'axis')}</g>")
+    return picture(frame.width, frame.height, body, f"{p.title}: {p.y_label} over {p.x_label}", "plot")
 
 
 def _named(block: Plot | Panels | Trend) -> dict[str, tuple[str, bool]]:

@@ -70,6 +70,14 @@ GROUP = (
         "Time of one cycle of what is shared.",
     ),
     Column(
+        "parent",
+        Kind.TEXT,
+        "Comes from",
+        "",
+        Source.PLANT,
+        "Loop of the group from which this one seems to have it, by coherence; empty for the likeliest source.",
+    ),
+    Column(
         "coherence",
         Kind.NUMBER,
         "Coherence",
@@ -119,3 +127,51 @@ GROUP = (
     ),
 )
 """Of a loop in a group, beside its name and night."""
+GROUP_LIST = (
+    *(c for c in GROUP if c.name in ("group", "group_period_s", "source_pct")),
+    Column("loops", Kind.NUMBER, "Loops", "", Source.PLANT, "Loops that share the oscillation."),
+    Column(
+        "fix_first",
+        Kind.TEXT,
+        "Fix first",
+        "",
+        Source.PLANT,
+        "Loop at which the oscillation starts; empty where that is not clear.",
+    ),
+    Column(
+        "candidates",
+        Kind.JSON,
+        "Candidates",
+        "",
+        Source.PLANT,
+        "Loops at which it may start, each with its confidence [%].",
+    ),
+    Column(
+        "unseen_pct",
+        Kind.NUMBER,
+        "Confidence that it starts elsewhere",
+        "%",
+        Source.PLANT,
+        "Probability that it starts at none of the loops.",
+    ),
+    Column("source_cause", Kind.TEXT, "Cause there", "", Source.CAUSE, "Cause of the loop to fix first."),
+    Column(
+        "source_action",
+        Kind.TEXT,
+        "Action there",
+        "",
+        Source.ADVICE,
+        "What to do at the loop to fix first, with new settings where there are any.",
+    ),
+    Column(
+        "others_gain_pct",
+        Kind.NUMBER,
+        "What the others gain",
+        "% of span",
+        Source.PLANT,
+        "Average absolute error that would go in the other loops, summed.",
+    ),
+    Column("members", Kind.JSON, "Members", "", Source.PLANT, "All loops of the group."),
+    Column("sentence", Kind.TEXT, "In a sentence", "", Source.PLANT, "The group in one sentence."),
+)
+"""Of a group, as `triage rank --groups` lists it."""

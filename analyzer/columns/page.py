@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from analyzer.columns.column import Column
-from analyzer.columns.other_tables import EXPLANATION, GROUP, HOUR
+from analyzer.columns.other_tables import EXPLANATION, GROUP, GROUP_LIST, HOUR
 from analyzer.columns.ranking import LISTED, RANKING
 from analyzer.columns.stored import STORED
 
@@ -23,6 +23,7 @@ PARTS: tuple[tuple[str, Sequence[Column]], ...] = (
     ("Further columns of the store: `nights/*.parquet`, a row a loop", STORED),
     ("Of the hours alone: `hours/*.parquet`, a row a loop and hour", (HOUR,)),
     ("Groups that share an oscillation: `groups/*.parquet`, a row a loop and group", GROUP),
+    ("Groups as listed: `triage rank --groups --format csv` and `json`, a row a group", GROUP_LIST),
     ("Explanations: `explained/*.parquet`, a row a loop that was explained", EXPLANATION),
 )
 TITLES = ("column", "holds", "title", "unit", "from", "h", "meaning")

@@ -41,7 +41,17 @@ CYCLES = (
 )
 COLUMNS = (
     *("loop", "type", "area", "description", "pv_unit", "status", "reason", "action", "cause", "valve_fault"),
-    *("source_loop", "osc_valve_pct", "osc_tuning_pct", "osc_load_pct", "kp", "ti", "kp_new", "ti_new"),
+    *(
+        "source_loop",
+        "group",
+        "osc_valve_pct",
+        "osc_tuning_pct",
+        "osc_load_pct",
+        "kp",
+        "ti",
+        "kp_new",
+        "ti_new",
+    ),
     *("form", "gain_unit", "ti_unit", "signs", "notes", "advice", "start_s", *FIGURES, *MODEL),
     *(name for _, period, amplitude in CYCLES for name in (period, amplitude)),
 )
@@ -180,6 +190,7 @@ def page(
     index: str = "index.html",
     explained: Row | None = None,
     more: Page | None = None,
+    shared: Section | None = None,
 ) -> Page:
     """A loop's page.
 
@@ -195,11 +206,14 @@ def page(
         The night's explanation of the loop (analyzer.columns.table.EXPLAINED).
     more : Page or None
         The page of that explanation, which is linked.
+    shared : Section or None
+        What it shares with other loops.
     """
     row = rows[-1]
     figures = [titled(k, number(row[k])) for k in FIGURES if row[k] is not None]
     sections = [
         _verdict(row),
+        *(() if shared is None else (shared,)),
         *_explained(explained, row),
         _evidence(row),
         *_trends(thin, row),
@@ -209,4 +223,6 @@ def page(
     sections.insert(-1, Section("Figures of the night", (Facts(tuple(figures)),)))
     known = [row["description"], row["type"], row["area"], f"night {row['night']}"]
     links = (("All loops", index),) + (() if more is None else (("The explanation", f"{more.name}.html"),))
+    if shared is not None and row["group"]:
+        links = (*links, ("Its group", f"group-{row['group']}.html"))
     return Page(slug(row["loop"]), row["loop"], ", ".join(k for k in known if k), tuple(sections), links)

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from analyzer.decisions import CAUSES, Cause, Status
 from analyzer.pages.areas import area_table
+from analyzer.pages.groups import morning_table
 from analyzer.pages.headings import heading, headings
 from analyzer.pages.news import since
 from analyzer.pages.trends import sparkline
 from analyzer.pages.view import Night, Row, linked, needs_a_look, oscillates, proposal
 from analyzer.pages.words import counted, duration, number
+from analyzer.plantwide.view import GroupView
 from reports.pages import Bars, Cell, Column, Page, Section, Table, Tiles
 
 
@@ -105,11 +109,12 @@ def lost_table(night: Night) -> Table:
     return Table("not-assessed", "", columns, rows, searchable=len(rows) > 12)
 
 
-def page(night: Night) -> Page:
-    """The morning page of a night."""
+def page(night: Night, groups: Sequence[GroupView] = ()) -> Page:
+    """The morning page of a night, with its groups that share an oscillation."""
     lost = sum(r["status"] != Status.OK for r in night.rows)
     sections = (
         Section("The night in short", (_tiles(night),)),
+        *((Section("One cause, several loops", (morning_table(night, groups),)),) if groups else ()),
         Section("Loops worth a look", (worst_table(night),)),
         since(night),
         Section("Areas", (area_table(night.rows),)),

@@ -7,9 +7,10 @@ from dataclasses import replace
 from typing import Any
 
 from analyzer.explain.night import known
-from analyzer.pages import loop, morning
+from analyzer.pages import group_pictures, groups, loop, morning
 from analyzer.pages.reading import read_nights, read_trends
 from analyzer.pages.view import read_night
+from analyzer.plantwide.view import read_groups
 from analyzer.store import Store
 from reports.page_file import PageFileError, loads
 from reports.pages import Page
@@ -27,16 +28,25 @@ def pages(store: Store, name: str | None = None, top: int = 50) -> Iterator[Page
         Where the store holds no such night.
     """
     night = read_night(store, name, top)
-    yield morning.page(night)
+    shared = read_groups(store, night.name)
+    yield morning.page(night, shared)
     nights = [n for n in store.nights() if n <= night.name][-HISTORY:]
     rows = read_nights(store, nights, loop.COLUMNS, night.paged)
     trends = read_trends(store, night.paged, nights[-loop.WEEK :])
+    beside = read_trends(
+        store, {r["loop"] for g in shared for r in g.rows[: group_pictures.MOST]}, [night.name]
+    )
+    by_number = {g.number: g for g in shared}
+    for g in shared:
+        yield groups.page(g, beside, night.name, night.paged)
     explained = {r["loop"]: r for r in known(store, night.name)}
     for worst in night.worst:
         tag = worst["loop"]
         own = [r for r in rows if r["loop"] == tag]
         drawn = explanation(explained.get(tag))
-        about = loop.page(own, trends.get(tag), explained=explained.get(tag), more=drawn)
+        group = by_number.get(own[-1]["group"] or "")
+        part = None if group is None else groups.of_loop(group, tag, {**beside, **night.trends})
+        about = loop.page(own, trends.get(tag), explained=explained.get(tag), more=drawn, shared=part)
         yield about
         if drawn is not None:
             yield replace(drawn, links=(*about.links[:1], (tag, f"{about.name}.html")))

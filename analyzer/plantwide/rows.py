@@ -57,6 +57,7 @@ def group_rows(
                 "role": _role(loop, found, followers, limits),
                 "source_pct": candidate.confidence_pct if candidate else 0.0,
                 "group_period_s": found.group.period_s,
+                "parent": found.parents.get(loop),
                 "coherence": link.coherence if link else 1.0,
                 "lag_s": link.lag_s if link else 0.0,
                 "wave_amplitude_pct": amplitude_pct(wave),

@@ -18,6 +18,10 @@ from identification.record import Floats
 
 LAG_KNOWN = 0.5
 """Standard deviation of a lag over the lag up to which it is told; ours: two deviations from nothing."""
+MOST_IN_TREE = 40
+"""Loops of a group up to which the way from loop to loop is told."""
+BY_WAY = 0.02
+"""Coherence by which a loop has to go better with another follower than with the source; ours: less is chance."""
 ENVELOPE = 0.5
 """A wave is on where its envelope is over half of what it exceeds a tenth of the time, as an oscillation's is."""
 
@@ -57,12 +61,14 @@ class Follower:
 class Traced:
     """A group with its candidates, the likeliest first.
 
-    links, how each other loop goes with the likeliest source; followers, those of them that follow it.
+    links, how each other loop goes with the likeliest source; parents, the loop from which each seems to have it;
+    followers, those of them that follow the source.
     """
 
     group: Group
     candidates: tuple[Candidate, ...]
     links: Mapping[str, Source]
+    parents: Mapping[str, str]
     followers: frozenset[str]
 
     @property
@@ -116,7 +122,7 @@ def traced(group: Group, peers: Mapping[str, Peer], limits: PlantLimits) -> Trac
         for loop, link in links.items()
         if sure and loop in peers and may_follow(peers[loop], peers[link.loop], link.coherence, limits)
     ]
-    return Traced(group, candidates, links, frozenset(followers))
+    return Traced(group, candidates, links, _parents(group, candidates[0].loop), frozenset(followers))
 
 
 def _links(group: Group, best: Candidate) -> dict[str, Source]:
@@ -131,6 +137,28 @@ def _links(group: Group, best: Candidate) -> dict[str, Source]:
         level = max(lag.coherence, member.coherence if first is leader or lag.coherence == 0.0 else 0.0)
         known = lag.lag_s if lag.deviation_s < LAG_KNOWN * abs(lag.lag_s) else None
         out[member.wave.loop] = Source(best.loop, level, best.confidence_pct, known)
+    return out
+
+
+def _parents(group: Group, source: str) -> dict[str, str]:
+    """The loop from which each other one seems to have the wave: the tree of greatest coherence from the source on.
+
+    Coherence falls along the way, for each loop adds something of its own; of large groups all hang on the source.
+    """
+    waves = {m.wave.loop: m.wave for m in group.members}
+    if len(waves) > MOST_IN_TREE:
+        return {loop: source for loop in waves if loop != source}
+    best = {
+        loop: (lag_between(waves[source], w).coherence, source) for loop, w in waves.items() if loop != source
+    }
+    out: dict[str, str] = {}
+    while best:
+        loop = max(best, key=lambda name: (best[name][0], name))
+        out[loop] = best.pop(loop)[1]
+        for other, (level, _) in list(best.items()):
+            found = lag_between(waves[loop], waves[other]).coherence
+            if found > level + BY_WAY:
+                best[other] = found, loop
     return out
 
 

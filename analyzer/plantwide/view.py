@@ -1,0 +1,97 @@
+"""The groups of a night as the list and the pages show them: where each starts, what to do there, what that gains."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from analyzer.columns.table import GROUPS, names
+from analyzer.decisions import Action, GroupRole
+from analyzer.store import Store
+
+Row = Mapping[str, Any]
+OF_LOOPS = (
+    *(
+        "loop",
+        "cause",
+        "valve_fault",
+        "action",
+        "kp_new",
+        "ti_new",
+        "kp",
+        "ti",
+        "form",
+        "gain_unit",
+        "ti_unit",
+    ),
+    *("pv_unit", "description", "area", "master", "spectrum", "average_absolute_error_pct", "start_s"),
+)
+"""What is read of the rows of the night."""
+
+
+@dataclass(frozen=True, slots=True)
+class GroupView:
+    """One group: its number, its rows (the likeliest source first), and the night's rows of its loops by name."""
+
+    number: str
+    rows: tuple[Row, ...]
+    loops: Mapping[str, Row]
+
+    @property
+    def period_s(self) -> float:
+        """Period that is shared [s]."""
+        return float(self.rows[0]["group_period_s"])
+
+    @property
+    def source(self) -> Row | None:
+        """The row of the source; None where it is not clear."""
+        first = self.rows[0]
+        return first if first["role"] == GroupRole.SOURCE else None
+
+    @property
+    def candidates(self) -> tuple[Row, ...]:
+        """The rows of the source and of what else it may be."""
+        wanted = (GroupRole.SOURCE, GroupRole.CANDIDATE)
+        return tuple(r for r in self.rows if r["role"] in wanted)
+
+    @property
+    def unseen_pct(self) -> float:
+        """Probability that it starts at none of the loops [%]."""
+        return max(100.0 - sum(r["source_pct"] for r in self.rows), 0.0)
+
+    @property
+    def gain_pct(self) -> float:
+        """Average absolute error that would go in the other loops together [% of span]."""
+        return sum(r["gain_pct"] or 0.0 for r in self.rows if r is not self.source)
+
+    @property
+    def action(self) -> str:
+        """What to do at the source; empty where it is not clear."""
+        source = self.source
+        if source is None:
+            return ""
+        action = self.loops[source["loop"]]["action"]
+        return "look for the load that enters here" if action in (Action.NONE, None, "") else str(action)
+
+
+def read_groups(store: Store, night: str) -> list[GroupView]:
+    """The groups of a night, those that cost most first; none where the store has no such table."""
+    table = store.read_if_there("groups", night)
+    if table is None:
+        return []
+    empty = dict.fromkeys(names(GROUPS))
+    rows = [empty | r for r in table.select([c for c in empty if c in table.column_names]).to_pylist()]
+    wanted = {r["loop"] for r in rows}
+    held = store.read("nights", night, list(OF_LOOPS))
+    loops = {r["loop"]: r for r in held.to_pylist() if r["loop"] in wanted}
+    by_number: dict[str, list[Row]] = {}
+    for row in rows:
+        by_number.setdefault(row["group"], []).append(row)
+    found = [GroupView(number, tuple(_sorted(own)), loops) for number, own in by_number.items()]
+    return sorted(found, key=lambda g: (-g.gain_pct, int(g.number)))
+
+
+def _sorted(rows: Sequence[Row]) -> list[Row]:
+    """The rows of a group, the likeliest source first."""
+    return sorted(rows, key=lambda r: (-r["source_pct"], -(r["wave_amplitude_pct"] or 0.0), r["loop"]))

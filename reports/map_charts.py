@@ -1,0 +1,84 @@
+"""Colour maps and graphs for Markdown and print, drawn with matplotlib from the same page data as HTML."""
+
+from __future__ import annotations
+
+import io
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from reports.maps import BOX, places
+from reports.pages import Graph, HeatMap
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+EDGES = {"source": "#b3361c", "follower": "#2b75a8", "candidate": "#b98900"}
+"""As the style sheet's in light."""
+
+
+def _figure(width: float, height: float) -> Figure:
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, height), layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def _png(figure: Figure) -> bytes:
+    out = io.BytesIO()
+    figure.savefig(out, format="png", dpi=110, metadata={"Software": None})
+    return out.getvalue()
+
+
+def _plain(text: str) -> str:
+    return text.replace("$", r"\$")
+
+
+def heat_map(m: HeatMap) -> bytes:
+    """Rows of colours over a logarithmic axis."""
+    figure = _figure(8.5, 1.2 + 0.28 * len(m.rows))
+    ax = figure.subplots()
+    step = (m.x[-1] / m.x[0]) ** (0.5 / max(m.x.size - 1, 1))
+    edges = np.concatenate((m.x / step, m.x[-1:] * step))
+    ax.pcolormesh(edges, np.arange(len(m.rows) + 1), m.shares, cmap="Blues", vmin=0, vmax=1)
+    ax.set_xscale("log")
+    ax.set_yticks(np.arange(len(m.rows)) + 0.5, [_plain(r) for r in m.rows], fontsize=8)
+    ax.invert_yaxis()
+    for mark in m.marks:
+        ax.axvline(mark.x, color=EDGES["source"], linestyle="--", linewidth=1)
+        ax.annotate(_plain(mark.label), (mark.x, 1.0), xycoords=("data", "axes fraction"), fontsize=8)
+    ax.set_xlabel(_plain(m.x_label), fontsize=8)
+    ax.set_title(_plain(m.title), fontsize=10, loc="left", pad=14)
+    return _png(figure)
+
+
+def graph(g: Graph) -> bytes:
+    """Boxes and arrows."""
+    at = places(g)
+    width = max((x for x, _ in at.values()), default=0.0) + BOX[0] + 8
+    height = max((y for _, y in at.values()), default=0.0) + BOX[1] + 8
+    figure = _figure(width / 90, height / 90 + 0.4)
+    ax = figure.subplots()
+    ax.set(xlim=(0, width), ylim=(height, 0))
+    ax.set_axis_off()
+    for arrow in g.arrows:
+        (x1, y1), (x2, y2) = at[arrow.first], at[arrow.last]
+        ends = (x1 + BOX[0], y1 + BOX[1] / 2), (x2, y2 + BOX[1] / 2)
+        ax.annotate("", ends[1], ends[0], arrowprops={"arrowstyle": "-|>", "color": "#5d6970"})
+        ax.text(ends[1][0] - 12, ends[1][1] - 4, _plain(arrow.text), fontsize=7, ha="right", color="#5d6970")
+    for node in g.nodes:
+        x, y = at[node.name]
+        style = {"edgecolor": EDGES.get(node.kind, "#9aa3a8"), "facecolor": "white", "linewidth": 1.4}
+        ax.add_patch(_rectangle(x, y, style))
+        ax.text(x + 8, y + 15, _plain(node.name), fontsize=8, weight="bold")
+        ax.text(x + 8, y + 30, _plain(node.text), fontsize=7, color="#5d6970")
+    ax.set_title(_plain(g.title), fontsize=10, loc="left")
+    return _png(figure)
+
+
+def _rectangle(x: float, y: float, style: dict[str, object]):  # type: ignore[no-untyped-def]
+    from matplotlib.patches import Rectangle
+
+    return Rectangle((x, y), BOX[0], BOX[1], **style)  # type: ignore[arg-type]
