@@ -67,6 +67,8 @@ def nights_within(store: Store, span: Span | None) -> list[str]:
 def _tables(
     store: Store, table: str, loops: Collection[str], nights: Sequence[str], columns: Sequence[str] | None
 ) -> list[pa.Table]:
+    if not loops:
+        return []
     paths = [store.path / table / f"{night}.parquet" for night in nights]
     where = [("loop", "in", sorted(loops))]
     return [

@@ -83,8 +83,9 @@ def read_groups(store: Store, night: str) -> list[GroupView]:
     empty = dict.fromkeys(names(GROUPS))
     rows = [empty | r for r in table.select([c for c in empty if c in table.column_names]).to_pylist()]
     wanted = {r["loop"] for r in rows}
-    held = store.read("nights", night, list(OF_LOOPS))
-    loops = {r["loop"]: r for r in held.to_pylist() if r["loop"] in wanted}
+    held = store.read("nights", night)
+    known = held.select([c for c in OF_LOOPS if c in held.column_names]).to_pylist()
+    loops = {r["loop"]: dict.fromkeys(OF_LOOPS) | r for r in known if r["loop"] in wanted}
     by_number: dict[str, list[Row]] = {}
     for row in rows:
         by_number.setdefault(row["group"], []).append(row)
