@@ -54,7 +54,10 @@ class Group:
 
 @dataclass(frozen=True, slots=True)
 class _Packed:
-    """Waves of one clock, tapered, one after the other as `coherences` takes them, by rising frequency."""
+    """Waves of one clock, tapered, one after the other as `coherences` takes them, by rising frequency.
+
+    loop numbers their loops; own_noise is the inverse of their prominences [-].
+    """
 
     waves: list[Wave]
     flat: np.ndarray
@@ -62,6 +65,8 @@ class _Packed:
     first: Whole
     count: Whole
     log_line: Floats
+    loop: Whole
+    own_noise: Floats
 
 
 def _packed(waves: Sequence[Wave]) -> _Packed:
@@ -71,7 +76,10 @@ def _packed(waves: Sequence[Wave]) -> _Packed:
     offset = np.concatenate(([0], np.cumsum(count)[:-1])).astype(np.int64)
     first = np.array([w.first + 1 for w in rising], dtype=np.int64)
     log_line = np.log(np.array([w.line for w in rising]))
-    return _Packed(rising, np.concatenate(lines), offset, first, count, log_line)
+    numbers = {name: i for i, name in enumerate(dict.fromkeys(w.loop for w in rising))}
+    loop = np.array([numbers[w.loop] for w in rising], dtype=np.int64)
+    own_noise = 1.0 / np.maximum([w.prominence for w in rising], 1.0)
+    return _Packed(rising, np.concatenate(lines), offset, first, count, log_line, loop, own_noise)
 
 
 def _coherent(p: _Packed, one: int, others: Whole, shift: int = 0) -> Floats:
@@ -90,23 +98,22 @@ def _by_chance(p: _Packed, one: int, others: Whole) -> Floats:
 
 def _expected(p: _Packed, one: int, others: Whole, limits: PlantLimits) -> Floats:
     """Coherence that two parts of one wave have at least, shape (k,): surroundings tell what each adds of its own."""
-    own = np.array([1.0 / max(p.waves[j].prominence, 1.0) for j in (one, *others)])
-    return 1.0 - limits.lost - limits.lost_to_noise * (own[0] + own[1:])
+    return 1.0 - limits.lost - limits.lost_to_noise * (p.own_noise[one] + p.own_noise[others])
 
 
 def _drift(one: Wave, other: Wave) -> float:
     """Turns over the record by which the phases of two waves drift apart, about the first one's period."""
     low, high, _ = band(one.line)
     x, y = (w.lines[low - w.first : high - w.first] for w in (one, other))
-    return drift(x, y)
+    return abs(drift(x, y))
 
 
 def _joining(p: _Packed, one: int, limits: PlantLimits) -> list[tuple[int, float]]:
     """Waves that move with one, by falling coherence; one wave a loop."""
     at = p.log_line[one]
     ends = np.searchsorted(p.log_line, (at - limits.same_period, at + limits.same_period))
-    name = p.waves[one].loop
-    near = np.array([j for j in range(*ends) if p.waves[j].loop != name], dtype=np.int64)
+    near = np.arange(*ends)
+    near = near[p.loop[near] != p.loop[one]]
     if not near.size:
         return []
     found = _coherent(p, one, near)
@@ -120,6 +127,8 @@ def _joining(p: _Packed, one: int, limits: PlantLimits) -> list[tuple[int, float
     if not near.size:
         return []
     over = found / np.maximum(_by_chance(p, one, near), 1e-9)
+    enough = over >= limits.over_chance
+    near, found, over = near[enough], found[enough], over[enough]
     drifts = np.array([_drift(p.waves[one], p.waves[j]) for j in near])
     sure = (found >= strict) & (over >= limits.over_chance) & (drifts <= limits.drift)
     sure |= (over >= limits.over_chance_in_step) & (drifts <= limits.drift_in_step)
@@ -169,7 +178,8 @@ def groups_of(waves: Sequence[Wave], limits: PlantLimits) -> list[Group]:
     if not known:
         return []
     p = _packed(known)
-    order = sorted(range(len(p.waves)), key=lambda i: (not p.waves[i].own, -p.waves[i].prominence))
+    leading = [i for i, w in enumerate(p.waves) if w.own or w.prominence >= limits.hint_prominence]
+    order = sorted(leading, key=lambda i: (not p.waves[i].own, -p.waves[i].prominence))
     taken: set[int] = set()
     found: list[Group] = []
     for i in order:

@@ -30,8 +30,10 @@ HANN_WIDTH = 1.8
 """Lines that a Hann taper makes one: neighbours correlate by 2/3, next ones by 1/6, and squares add up."""
 UNEVEN = 1.4
 """Pieces that count as one, for those with more power count more: mean square over squared mean of the products."""
-DRIFT_STEPS = 20
-"""Steps of a line in which a drift is told."""
+DRIFT_BLOCKS = 64
+"""Parts of a record whose phases are compared for a drift."""
+DRIFTS = np.arange(-60, 61) / 20.0
+"""Drifts tried [turns over the record]."""
 Whole = NDArray[np.int64]
 
 
@@ -119,7 +121,7 @@ def coherences(
 
 
 def drift(x: Complex, y: Complex) -> float:
-    """Lines by which a second signal's frequency seems to differ from that of a first one.
+    """Turns over the record by which the phases of two signals drift apart, of either sign, at most three.
 
     Two signals of one source keep step: their phases differ by no more at the end than at the beginning. Of two
     others a Fourier line apart the difference turns once over the record.
@@ -129,13 +131,18 @@ def drift(x: Complex, y: Complex) -> float:
     x, y : complex ndarray of shape (m,)
         Lines of the same numbers, not tapered.
     """
-    size = next_fast_len(max(4 * x.size, 32))
+    size = next_fast_len(max(4 * x.size, 4 * DRIFT_BLOCKS))
     product = ifft(x, size) * np.conj(ifft(y, size))
-    fine = next_fast_len(DRIFT_STEPS * size)
-    found = np.abs(np.fft.fft(product, fine))
-    reach = 3 * DRIFT_STEPS
-    around = np.concatenate((found[-reach:], found[: reach + 1]))
-    return abs(int(np.argmax(around)) - reach) / DRIFT_STEPS * (DRIFT_STEPS * size / fine)
+    edges = np.arange(DRIFT_BLOCKS) * size // DRIFT_BLOCKS
+    blocks = np.add.reduceat(product, edges)
+    return float(DRIFTS[int(np.argmax(np.abs(_turns() @ blocks)))])
+
+
+@cache
+def _turns() -> Complex:
+    """What turns each block's phase back by each drift, shape (drifts, blocks)."""
+    middle = (np.arange(DRIFT_BLOCKS) + 0.5) / DRIFT_BLOCKS
+    return np.exp(2j * np.pi * DRIFTS[:, None] * middle)
 
 
 @dataclass(frozen=True, slots=True)
