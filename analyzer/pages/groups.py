@@ -108,6 +108,7 @@ SIGN_WORDS = {
     "tuning": "its own tuning oscillates",
     "oscillates": "it oscillates by itself",
     "first": "it moves before the others",
+    "foresees": "its past foresees the others",
     "central": "the others go with it best",
     "clear": "its wave is the clearest",
     "share": "most of its error is the wave",

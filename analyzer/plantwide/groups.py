@@ -15,6 +15,7 @@ import numpy as np
 
 from analyzer.config import PlantLimits
 from analyzer.plantwide.clock import on_one_clock
+from analyzer.plantwide.foresight import foresight
 from analyzer.plantwide.wave import Wave
 from identification.record import Floats
 from identification.signals.cross_spectrum import Whole, band, chance_coherence, coherences, drift, tapered
@@ -23,6 +24,8 @@ HARMONIC = 0.03
 """Difference of a period from a whole part of another up to which it is a harmonic; ours."""
 ASKED = 12
 """Loops of a group that are asked whom they move with, the most coherent first; ours: more add nothing."""
+HEARD = 6
+"""Loops of a group that a loop beside it has to foresee, the clearest; ours."""
 SHIFTS = 12
 """Shifts of the lines by which chance coherence is told, at most."""
 
@@ -192,7 +195,8 @@ def groups_of(waves: Sequence[Wave], limits: PlantLimits) -> list[Group]:
             continue
         taken.update((i, *(j for j, _ in joined)))
         found.append(Group((Member(p.waves[i], 1.0), *(Member(p.waves[j], c) for j, c in joined))))
-    return sorted(_merged(found, limits), key=lambda g: (-len(g.members), g.loops))
+    merged = [_with_foresight(g, p.waves, limits) for g in _merged(found, limits)]
+    return sorted(merged, key=lambda g: (-len(g.members), g.loops))
 
 
 def _merged(groups: Sequence[Group], limits: PlantLimits) -> list[Group]:
@@ -228,3 +232,20 @@ def _is_harmonic(one: Group, other: Group, limits: PlantLimits) -> bool:
 def _joined(group: Group, more: Group) -> Group:
     """A group with the loops of another one that it lacks."""
     return Group((*group.members, *(m for m in more.members if m.wave.loop not in group.loops)))
+
+
+def _with_foresight(group: Group, waves: Sequence[Wave], limits: PlantLimits) -> Group:
+    """A group with loops that move with it too loosely to be coherent, and yet foresee it: a source that sticks and
+    slips without a rhythm moves others by what of it their filters let through."""
+    inside = {m.wave.loop: m.wave for m in group.members}
+    clearest = sorted(inside.values(), key=lambda w: -w.prominence)[:HEARD]
+    best: dict[str, tuple[float, Wave]] = {}
+    for wave in waves:
+        shows = wave.own or wave.prominence >= limits.hint_prominence
+        near = abs(math.log(wave.period_s / group.period_s)) <= limits.near_period
+        if wave.loop in inside or wave.harmonic != 1 or not (shows and near):
+            continue
+        level = foresight(wave, clearest)
+        if level >= limits.foresight and level > best.get(wave.loop, (0.0, wave))[0]:
+            best[wave.loop] = level, wave
+    return Group((*group.members, *(Member(wave, 0.0) for _, wave in best.values())))

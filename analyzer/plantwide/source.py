@@ -16,6 +16,7 @@ import numpy as np
 
 from analyzer.config import PlantLimits
 from analyzer.decisions import Cause
+from analyzer.plantwide.foresight import foresees
 from analyzer.plantwide.groups import Group
 from analyzer.plantwide.wave import Wave
 from identification.record import Floats
@@ -111,6 +112,7 @@ def signs_of(group: Group, peers: Mapping[str, Peer]) -> list[Candidate]:
     """
     waves = _first_guess(group, peers)
     ahead, shared = _leads(waves)
+    ahead_in_time = foresees(waves)
     known = {w.loop: peers[w.loop] for w in waves}
     clear = _relative(np.log(np.maximum([w.prominence for w in waves], 1.0)))
     bent = _relative(np.array([w.nonlinearity for w in waves]))
@@ -126,6 +128,7 @@ def signs_of(group: Group, peers: Mapping[str, Peer]) -> list[Candidate]:
             "tuning": float(peer.cause is Cause.TUNING) * peer.tuning_pct / 100.0,
             "oscillates": float(w.own and w.harmonic == 1),
             "first": float(ahead[i]),
+            "foresees": float(ahead_in_time[i]),
             "central": float(central[i]),
             "clear": float(clear[i]),
             "share": min(w.share, 1.0),

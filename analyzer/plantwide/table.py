@@ -11,7 +11,7 @@ from analyzer.plantwide.wave import Wave
 
 SCALARS = (
     *("loop", "period_s", "harmonic", "own", "start_s", "duration_s", "first"),
-    *("prominence", "share", "nonlinearity"),
+    *("prominence", "share", "nonlinearity", "step_s", "trend_first"),
 )
 
 
@@ -20,7 +20,8 @@ def waves_table(waves: Sequence[Wave]) -> pa.Table:
     columns = {name: [getattr(w, name) for w in waves] for name in SCALARS}
     real = [w.lines.real.astype(np.float32) for w in waves]
     imag = [w.lines.imag.astype(np.float32) for w in waves]
-    return pa.table({**columns, "real": real, "imag": imag})
+    trend = [w.trend.astype(np.float32) for w in waves]
+    return pa.table({**columns, "real": real, "imag": imag, "trend": trend})
 
 
 def waves_in(table: pa.Table | None) -> list[Wave]:
@@ -28,8 +29,8 @@ def waves_in(table: pa.Table | None) -> list[Wave]:
     if table is None or not table.num_rows:
         return []
     known = table.select(SCALARS).to_pylist()
-    real, imag = (_stretches(table.column(name)) for name in ("real", "imag"))
-    return [Wave(**s, lines=x + 1j * y) for s, x, y in zip(known, real, imag, strict=True)]
+    real, imag, trend = (_stretches(table.column(name)) for name in ("real", "imag", "trend"))
+    return [Wave(**s, lines=x + 1j * y, trend=t) for s, x, y, t in zip(known, real, imag, trend, strict=True)]
 
 
 def _stretches(column: pa.ChunkedArray) -> list[np.ndarray]:

@@ -127,14 +127,13 @@ def traced(group: Group, peers: Mapping[str, Peer], limits: PlantLimits) -> Trac
 
 def _links(group: Group, best: Candidate) -> dict[str, Source]:
     """How the other loops of a group go with its likeliest source."""
-    leader = group.members[0].wave
     first = next(m.wave for m in group.members if m.wave.loop == best.loop)
     out = {}
     for member in group.members:
         if member.wave.loop == best.loop:
             continue
         lag = lag_between(first, member.wave)
-        level = max(lag.coherence, member.coherence if first is leader or lag.coherence == 0.0 else 0.0)
+        level = max(lag.coherence, member.coherence)
         known = lag.lag_s if lag.deviation_s < LAG_KNOWN * abs(lag.lag_s) else None
         out[member.wave.loop] = Source(best.loop, level, best.confidence_pct, known)
     return out

@@ -6,15 +6,19 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
+from scipy.fft import irfft
 
 from analyzer.config import PlantLimits
 from analyzer.oscillation import Oscillations, peaks
+from identification.record import Floats
 from identification.signals.spectrum import Complex, Spectrum, locked_harmonic, peak_prominence
 
 REACH = 1.35
 """Lines kept about a period reach from f / REACH to f * REACH, for neighbours whose period differs."""
 BESIDE = 6
 """Lines kept beyond that on either side."""
+STEPS, TREND = 12, 2400
+"""Steps of a period at least, and steps of a trend at most; ours: a hundred periods tell who foresees whom."""
 HARMONICS = (2, 3)
 """Harmonics that are looked at; ours: higher ones drown in noise."""
 APART = 1.2
@@ -29,7 +33,8 @@ class Wave:
     loop is seen to oscillate with it by itself; start_s, duration_s of the record [s], line k being the frequency
     k / duration_s; first, the number of the first line kept; prominence of the peak [-]; share of the error's power
     above slow drift that the band has [-]; nonlinearity, size of the harmonics locked to the fundamental over its own
-    [-]; lines, complex, shape (m,), scaled so that a sine of amplitude a [% of span] has a line of size a.
+    [-]; lines, complex, shape (m,), scaled so that a sine of amplitude a [% of span] has a line of size a; trend, the
+    error in steps of step_s [s] at the record's end, shape (t,), its first step the number trend_first since 1970.
     """
 
     loop: str
@@ -43,6 +48,9 @@ class Wave:
     share: float
     nonlinearity: float
     lines: Complex = field(repr=False)
+    step_s: float = 1.0
+    trend_first: int = 0
+    trend: Floats = field(default_factory=lambda: np.zeros(0), repr=False)
 
     @property
     def line(self) -> float:
@@ -67,7 +75,23 @@ def _nonlinearity(s: Spectrum, period_s: float) -> float:
     return math.hypot(*(locked_harmonic(s, period_s, m) for m in HARMONICS))
 
 
-def _cut(loop: str, s: Spectrum, period_s: float, start_s: float, harmonic: int, own: bool) -> Wave | None:
+def _thinned(error: Floats, dt_s: float, start_s: float, period_s: float) -> tuple[float, int, Floats]:
+    """Step [s], number of the first step and means of an error at 12 to 24 steps a period, the last TREND of them.
+
+    Steps are the sample interval times a power of two and begin at whole multiples of themselves, so that those of
+    other loops with the same interval lie on them or join in pairs.
+    """
+    few = 2 ** max(math.floor(math.log2(max(period_s / (STEPS * dt_s), 1.0))), 0)
+    begin = round(start_s / dt_s)
+    skip = -begin % few
+    count = (error.size - skip) // few
+    means = error[skip : skip + count * few].reshape(count, few).mean(axis=1)[-TREND:]
+    return few * dt_s, (begin + skip) // few + count - means.size, means.astype(np.float32)
+
+
+def _cut(
+    loop: str, s: Spectrum, error: Floats, period_s: float, start_s: float, harmonic: int, own: bool
+) -> Wave | None:
     line = s.duration_s / period_s
     low = max(math.floor(line / REACH) - BESIDE, 0)
     high = min(math.ceil(line * REACH) + BESIDE, s.lines.size - 1)
@@ -89,6 +113,7 @@ def _cut(loop: str, s: Spectrum, period_s: float, start_s: float, harmonic: int,
         share,
         _nonlinearity(s, period_s),
         (s.lines[low : high + 1] * (2.0 / s.n)).astype(np.complex64),
+        *_thinned(error, s.dt_s, start_s, period_s),
     )
 
 
@@ -120,5 +145,6 @@ def waves_of(loop: str, found: Oscillations, end_s: float, limits: PlantLimits) 
         if len(wanted) >= limits.waves:
             break
     start_s = end_s - s.duration_s
-    cut = (_cut(loop, s, p, start_s, m, own) for p, m, own in wanted)
+    error = irfft(s.lines, s.n)
+    cut = (_cut(loop, s, error, p, start_s, m, own) for p, m, own in wanted)
     return tuple(w for w in cut if w is not None)

@@ -1,8 +1,8 @@
 """Which of two loops moves first, by lag and by Granger causality: python -m tests.proofs.direction [--plants 30]
 
 Pairs of a source and a follower that shows, of coupled plants (tests/coupled). Granger's test (statsmodels) asks
-whether the past of one error helps to foresee the other, both at twelve samples a period and with lags of one period; it
-is read by which way has the larger F. The lag is that of the plant-wide pass. Writes tests/proofs/direction.md.
+whether the past of one error helps to foresee the other, both at twelve samples a period and with lags of one period;
+it is read by which way has the larger F. The lag is that of the plant-wide pass. Writes tests/proofs/direction.md.
 """
 
 from __future__ import annotations
@@ -79,7 +79,7 @@ def main() -> None:
         "|---|--:|",
         f"| Granger's F, {A_PERIOD} samples a period | {100 * np.mean(by_granger):.0f} % |",
         f"| sign of the lag | {100 * np.mean(by_lag):.0f} % |",
-        f"| sign of the lag, of the {told.sum()} that are over two deviations | {100 * np.mean(np.array(by_lag)[told]):.0f} % |",
+        f"| … of the {told.sum()} that are over two deviations | {100 * np.mean(np.array(by_lag)[told]):.0f} % |",
         "",
     ]
     OUT.write_text("# Who moves first\n\n" + "\n".join(lines))

@@ -186,3 +186,19 @@ def test_waves_survive_the_store():
     assert [(w.loop, w.period_s, w.own) for w in back] == [(w.loop, w.period_s, w.own) for w in waves]
     for old, new in zip(waves, back, strict=True):
         np.testing.assert_array_equal(old.lines, new.lines)
+
+
+def test_a_source_without_a_rhythm_is_found_by_foresight():
+    """A loop whose wandering cycle moves two others through filters leads them, its own verdict unknown."""
+    rng = np.random.default_rng(21)
+    x = wave(21, period=200.0, walk=0.04)
+    mine = x + lfilter([0.25], [1, -0.97], rng.standard_normal(HOURS_8))
+    passed = late(late(mine, 40.0, 20), 40.0)
+    found = traced(
+        {"A": Peer(Cause.LOAD), "B": Peer(Cause.LOAD), "C": Peer(Cause.LOAD)},
+        loop("A", mine, 0.05),
+        loop("B", late(passed, 30.0), 0.02, seed=2),
+        loop("C", late(passed, 50.0, 30), 0.02, seed=3),
+    )
+    assert found[0].source == "A"
+    assert set(found[0].group.loops) == {"A", "B", "C"}

@@ -1,0 +1,61 @@
+"""Foresight of all pairs at once against statsmodels' test of one pair, and on signals whose direction is known."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import warnings
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+from scipy.stats import f as f_law
+from statsmodels.tsa.stattools import grangercausalitytests
+
+from identification.signals.granger import granger_f
+
+
+def coupled(seed: int, n: int = 1500) -> np.ndarray:
+    """A resonant signal, one that it drives two samples later, and one by itself, shape (3, n)."""
+    rng = np.random.default_rng(seed)
+    one = lfilter([1.0], [1.0, -1.6, 0.9], rng.standard_normal(n))
+    other = lfilter([0.0, 0.0, 0.5], [1.0, -0.7], one) + lfilter([1.0], [1.0, -0.5], rng.standard_normal(n))
+    return np.array([one, other, lfilter([1.0], [1.0, -1.6, 0.9], rng.standard_normal(n))])
+
+
+@pytest.mark.parametrize("lags", [1, 4, 12])
+def test_every_pair_is_statsmodels_test(lags):
+    """Each F is that of statsmodels' sum-of-squares test of the pair, within 1 in 10,000."""
+    signals = coupled(1)
+    found = granger_f(signals, lags)
+    for i in range(3):
+        for j in (k for k in range(3) if k != i):
+            with contextlib.redirect_stdout(io.StringIO()), warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                one = grangercausalitytests(np.column_stack((signals[j], signals[i])), [lags])
+            assert found[i, j] == pytest.approx(one[lags][0]["ssr_ftest"][0], rel=1e-4, abs=1e-4)
+
+
+def test_what_drives_foresees():
+    """The driving signal foresees the driven one plainly, and the driven one no more than chance foresees it."""
+    found = granger_f(coupled(2), 12)
+    assert found[0, 1] > 50
+    assert found[1, 0] < 3
+    assert max(found[2, :2].max(), found[:2, 2].max()) < 3
+
+
+def test_chance_keeps_the_law_of_f():
+    """Of pairs without anything in common one in twenty exceeds the F of 5 %."""
+    over = []
+    for seed in range(150):
+        found = granger_f(np.random.default_rng(seed).standard_normal((3, 400)), 4)
+        over += (found[~np.eye(3, dtype=bool)] > f_law.isf(0.05, 4, 400 - 4 - 9)).tolist()
+    assert 0.03 < np.mean(over) < 0.07
+
+
+@pytest.mark.parametrize("flat", [np.zeros(500), np.arange(500.0)])
+def test_flat_signals_and_short_ones_foresee_nothing(flat):
+    """Constants, ramps and records too short for so many constants give F of zero and no error."""
+    noise = np.random.default_rng(3).standard_normal(500)
+    assert np.isfinite(granger_f(np.array([flat, noise]), 12)).all()
+    assert granger_f(np.array([noise[:60], noise[100:160]]), 12).max() == 0.0
