@@ -28,7 +28,8 @@ def page_name(number: str) -> str:
 
 def _heading(name: str, wide: bool = False) -> Column:
     declared = DECLARED[name]
-    return Column(name, declared.heading, declared.is_number, declared.hint, wide)
+    unit = f" [{declared.unit}]" if declared.unit else ""
+    return Column(name, declared.heading + unit, declared.is_number, declared.hint, wide)
 
 
 MORNING = (
