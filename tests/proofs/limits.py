@@ -380,7 +380,8 @@ def main() -> None:
                 flush=True,
             )
     text = table(found)
-    options.out.write_text(f"# What each limit does\n\n`python -m tests.proofs.limits`: {text}")
+    asked = "" if options.sections == list(STAGES) else " --sections " + " ".join(options.sections)
+    options.out.write_text(f"# What each limit does\n\n`python -m tests.proofs.limits{asked}`: {text}")
     print("\n" + text)
 
 
