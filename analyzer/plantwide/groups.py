@@ -195,7 +195,7 @@ def groups_of(waves: Sequence[Wave], limits: PlantLimits) -> list[Group]:
             continue
         taken.update((i, *(j for j, _ in joined)))
         found.append(Group((Member(p.waves[i], 1.0), *(Member(p.waves[j], c) for j, c in joined))))
-    merged = [_with_foresight(g, p.waves, limits) for g in _merged(found, limits)]
+    merged = [_with_foresight(g, p, limits) for g in _merged(found, limits)]
     return sorted(merged, key=lambda g: (-len(g.members), g.loops))
 
 
@@ -234,16 +234,17 @@ def _joined(group: Group, more: Group) -> Group:
     return Group((*group.members, *(m for m in more.members if m.wave.loop not in group.loops)))
 
 
-def _with_foresight(group: Group, waves: Sequence[Wave], limits: PlantLimits) -> Group:
+def _with_foresight(group: Group, p: _Packed, limits: PlantLimits) -> Group:
     """A group with loops that move with it too loosely to be coherent, and yet foresee it: a source that sticks and
     slips without a rhythm moves others by what of it their filters let through."""
     inside = {m.wave.loop: m.wave for m in group.members}
     clearest = sorted(inside.values(), key=lambda w: -w.prominence)[:HEARD]
     best: dict[str, tuple[float, Wave]] = {}
-    for wave in waves:
+    at = math.log(group.members[0].wave.line)
+    begin, end = np.searchsorted(p.log_line, (at - limits.near_period, at + limits.near_period))
+    for wave in p.waves[begin:end]:
         shows = wave.own or wave.prominence >= limits.hint_prominence
-        near = abs(math.log(wave.period_s / group.period_s)) <= limits.near_period
-        if wave.loop in inside or wave.harmonic != 1 or not (shows and near):
+        if wave.loop in inside or wave.harmonic != 1 or not shows:
             continue
         level = foresight(wave, clearest)
         if level >= limits.foresight and level > best.get(wave.loop, (0.0, wave))[0]:
