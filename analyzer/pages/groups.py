@@ -35,7 +35,7 @@ def _heading(name: str, wide: bool = False) -> Column:
 MORNING = (
     Column("group", "Group"),
     Column("loops", "Loops", True),
-    _heading("group_period_s"),
+    Column("group_period_s", "Period", True, DECLARED["group_period_s"].hint),
     Column(
         "fix_first", "Fix first", wide=True, hint="Loop at which the oscillation starts, with its confidence."
     ),
