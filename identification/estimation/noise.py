@@ -63,16 +63,22 @@ def lag_means(r: Floats, edges: Edges) -> Floats:
 def whitened(x: Floats, ar: Floats, edges: Edges) -> Floats:
     """Innovations of x under a noise model, shape (n,); whole from the longest lag on."""
     n, groups = x.size, edges.size - 1
+    single = 0
+    while single < groups and edges[single + 1] == single + 1:
+        single += 1
+    out = np.empty(n)
+    for k in range(n):
+        left = x[k]
+        for i in range(min(single, k)):
+            left -= ar[i] * x[k - 1 - i]
+        out[k] = left
+    if single == groups:
+        return out
     total = np.zeros(n + 1)
     for k in range(n):
         total[k + 1] = total[k] + x[k]
-    out = x.copy()
-    for j in range(groups):
+    for j in range(single, groups):
         near, far = edges[j], edges[j + 1]
-        if far - near == 1:
-            for k in range(far, n):
-                out[k] -= ar[j] * x[k - far]
-            continue
         scale = ar[j] / (far - near)
         for k in range(far, n):
             out[k] -= (total[k - near] - total[k - far]) * scale
