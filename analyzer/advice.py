@@ -36,13 +36,13 @@ MOST_SCANS = 20_000
 class Advice:
     """A proposal in the loop's own units.
 
-    action as in the ranking; reason in words, empty where the finding says it all; kp_new and ti_new in the
-    units and form that loops.csv states, None unless action is retune; before and after, the limit cycles that
-    simulation finds at the present and at the new settings, None where there is none; lack, what the record
-    lacks where the action is to get more data.
+    action as in the ranking, None where none was sought; reason in words, empty where the finding says it all;
+    kp_new and ti_new in the units and form that loops.csv states, None unless action is retune; before and after, the
+    limit cycles that simulation finds at the present and at the new settings, None where there is none; lack, what
+    the record lacks where the action is to get more data.
     """
 
-    action: Action
+    action: Action | None
     reason: str = ""
     kp_new: float | None = None
     ti_new: float | None = None
@@ -184,16 +184,20 @@ def advise(
     kept = withheld(found, spec, controller, pv_span, config)
     oscillation = counting(found.oscillations)
     if kept is not None or controller is None or oscillation is None:
-        return kept or Advice(_without_settings(found.verdict))
+        return kept or _without_settings(found.verdict)
     proposal = propose(found.verdict, controller, oscillation.period_s, config)
-    if proposal.action is Action.UNDECIDED:
-        proposal = replace(proposal, action=_without_settings(found.verdict))
+    if proposal.action is Action.UNDECIDED and found.verdict.cause is Cause.VALVE:
+        proposal = replace(proposal, action=Action.REPAIR_VALVE)
+    elif proposal.action is Action.UNDECIDED:
+        return _lacking(Needs(Lack.LONGER, f"{words.MORE} {proposal.reason}"))
     return _stated(proposal, spec, pv_span)
 
 
-def _without_settings(verdict: Verdict) -> Action:
-    """What is left to do where no settings are told: a valve at fault is one all the same."""
-    return Action.REPAIR_VALVE if verdict.cause is Cause.VALVE else Action.UNDECIDED
+def _without_settings(verdict: Verdict) -> Advice:
+    """What is left to do where none are stated: a valve at fault is one all the same."""
+    if verdict.cause is Cause.VALVE:
+        return Advice(Action.REPAIR_VALVE, words.NOT_STATED)
+    return Advice(Action.CHECK_SETTINGS, words.NOT_STATED)
 
 
 def _lacking(needs: Needs) -> Advice:
@@ -217,17 +221,24 @@ def withheld(
     if counting(found.oscillations) is None:
         return Advice(Action.NONE, words.CALM)
     if verdict.cause is Cause.UNDECIDED:
-        return _too_thin(found, controller, config) or Advice(Action.UNDECIDED)
+        return _for_a_cause(found, controller, config)
     return _unsupported(found, controller, config)
+
+
+def _for_a_cause(found: Assessment, controller: Pid | None, config: Config) -> Advice:
+    """What a loop whose cause is not told lacks, if anything that is known."""
+    if found.verdict.needs is not None:
+        return _lacking(found.verdict.needs)
+    return _too_thin(found, controller, config) or Advice(Action.UNDECIDED)
 
 
 def _unsupported(found: Assessment, controller: Pid | None, config: Config) -> Advice | None:
     """What a loop that oscillates for its valve or its tuning lacks for new settings; None where nothing."""
     verdict, m = found.verdict, found.verdict.measured
     if m is None or (verdict.fault is Fault.UNDECIDED and m.play.gain == 0):
-        return Advice(_without_settings(verdict))
+        return Advice(Action.REPAIR_VALVE) if verdict.cause is Cause.VALVE else Advice(Action.UNDECIDED)
     if controller is None:
-        return Advice(_without_settings(verdict), "No new settings: loops.csv states no kp and ti.")
+        return _without_settings(verdict)
     if found.night.usable_h < config.advice.least_h:
         return _lacking(Needs(Lack.LONGER, words.too_short(found.night.usable_h, config.advice.least_h)))
     return _too_thin(found, controller, config)

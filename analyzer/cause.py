@@ -175,13 +175,13 @@ def load_signs(m: Measured, o: Oscillation, limits: CauseLimits) -> list[Sign]:
         )
     clockwork, free = is_clockwork(m, o, limits), m.saturated <= limits.at_limits
     if clockwork:
-        signs.append(Sign("load", 0.7, "the period is kept as by a clock"))
+        signs.append(Sign("load", 0.7, "its frequency is constant, as no resonance keeps it"))
     hinted = m.evidence >= _needed(m, limits, True) and agree(m, limits)
     if keeps_its_size(m, o, limits) and not hinted:
-        text = f"its size is kept as no resonance keeps it (kurtosis {m.kurtosis:.1f}, noise has 3)"
+        text = f"its size is constant, as no resonance keeps it (kurtosis {m.kurtosis:.1f}, noise has 3)"
         signs.append(Sign("load", 0.7, text))
     elif clockwork and m.kurtosis <= limits.kept_size_clock:
-        signs.append(Sign("load", 0.4, f"its size is kept (kurtosis {m.kurtosis:.1f})"))
+        signs.append(Sign("load", 0.4, f"its size is constant (kurtosis {m.kurtosis:.1f})"))
     if free and m.harmonic >= limits.edged:
         text = (
             f"the wave is no sine (third harmonic {100 * m.harmonic:.0f} %), as a linear loop's own would be"

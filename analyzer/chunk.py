@@ -19,6 +19,8 @@ from analyzer.config import Config
 from analyzer.decisions import Action, Cause, Lack, LacksError, Status
 from analyzer.history.export import Export
 from analyzer.history.series import Series
+from analyzer.lane_words import in_lanes
+from analyzer.lanes import standing
 from analyzer.loops.changes import TuningChange
 from analyzer.loops.settings_in_force import in_force
 from analyzer.loops.spec import LoopSpec
@@ -26,13 +28,15 @@ from analyzer.loops.tags import controller
 from analyzer.nights import Night, cut
 from analyzer.plantwide.table import waves_table
 from analyzer.present import advised
-from analyzer.quality import interval, prepare
+from analyzer.quality import Prepared, interval, prepare
 from analyzer.rows import Lost, hour_rows, lost_row, night_row
 from analyzer.store import Store, rows_table, write_table
 from identification.errors import NotAssessedError, TriageError
+from identification.models import Pid
 
-HISTORY = {Cause.NONE: Action.NONE, Cause.LOAD: Action.NONE}
-"""Actions of nights that are not the last: settings are advised on for tomorrow, not for the week before."""
+HISTORY = {Cause.NONE: Action.NONE, Cause.LOAD: Action.NONE, Cause.UNDECIDED: Action.UNDECIDED}
+"""Actions of nights that are not the last, empty for the others: settings are advised on for tomorrow, not for the
+week before."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,12 +68,23 @@ def assess_loop(
 ) -> tuple[Assessment, Advice]:
     """Prepare and assess one loop from its raw samples, and advise on it if wanted."""
     prepared = prepare(spec, series, config.quality)
+    return _assessed(spec, prepared, _stated(spec, prepared), config, advising)
+
+
+def _stated(spec: LoopSpec, prepared: Prepared) -> Pid | None:
+    """The controller that loops.csv states, its scan that of the record where it states none."""
     stated = controller(spec, prepared.scale.span)
-    if stated is not None and spec.scan_s is None:
-        stated = replace(stated, scan_s=prepared.record.dt_s)
+    if stated is None or spec.scan_s is not None:
+        return stated
+    return replace(stated, scan_s=prepared.record.dt_s)
+
+
+def _assessed(
+    spec: LoopSpec, prepared: Prepared, stated: Pid | None, config: Config, advising: bool
+) -> tuple[Assessment, Advice]:
     found = assess(prepared, stated, config, spec.type)
     if not advising:
-        return found, Advice(HISTORY.get(found.verdict.cause, Action.UNDECIDED))
+        return found, Advice(HISTORY.get(found.verdict.cause))
     return found, advise(found, spec, stated, prepared.scale.span, config)
 
 
@@ -78,13 +93,16 @@ def _loop_row(
 ) -> tuple[dict[str, Any], Assessment | None]:
     """The row of one loop and night, whatever happens."""
     part = {tag: cut(s, night) for tag, s in series.items()}
-    good_h = _good_h(part.get(spec.pv or ""))
+    known: dict[str, Any] = {"good_h": _good_h(part.get(spec.pv or ""))}
     try:
-        found, advice = assess_loop(spec, part, config, advising)
+        prepared = prepare(spec, part, config.quality)
+        stated = _stated(spec, prepared)
+        known |= standing(prepared, stated, spec.type, config).as_row()
+        found, advice = _assessed(spec, prepared, stated, config, advising)
     except Exception as error:  # an error of one loop is that loop's result, never the night's end
-        return {**lost_row(spec, night.name, _lost(error, config)), "good_h": good_h}, None
-    row = {**night_row(found, spec, night.name, config.advice), "good_h": good_h}
-    return advised(row, found.verdict.needs, advice), found
+        return in_lanes({**lost_row(spec, night.name, _lost(error, config)), **known}, config.lanes), None
+    row = {**night_row(found, spec, night.name, config.advice), **known}
+    return in_lanes(advised(row, found.verdict.needs, advice), config.lanes), found
 
 
 def _lost(error: Exception, config: Config) -> Lost:

@@ -13,11 +13,15 @@ from analyzer.commands import explain as explain_cli
 from analyzer.commands import report as report_cli
 from analyzer.commands import run as run_cli
 from analyzer.commands.options import SOME_LOST, Asked, export_options, told
+from analyzer.decisions import Lane
 
 for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
 """Loops run side by side, one a process, on matrices of a few columns: threads of linear algebra only get in their
 way. Set before numpy is imported."""
+
+
+LANES = [lane.replace(" ", "-") for lane in Lane]
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
@@ -51,12 +55,16 @@ def check(asked: Asked) -> None:
 @main.command()
 @click.argument("store", type=click.Path(path_type=Path))
 @click.option(
-    "--by", "column", default="oscillation_significance", show_default=True, help="Column to sort by."
+    "--by",
+    "column",
+    help="Column to sort by. Default: loops worth a look first, by loss where loops.csv states importance, else by "
+    "oscillation_significance.",
 )
 @click.option("--top", type=click.IntRange(1), help="Number of loops shown.")
 @click.option("--night", help="Night to show, e.g. 2026-03-08. Default: the latest.")
 @click.option("--ascending", is_flag=True, help="Smallest first.")
 @click.option("--area", help="Loops of this area alone.")
+@click.option("--lane", type=click.Choice(LANES), help="Loops of this lane alone, by its figure.")
 @click.option("--groups", is_flag=True, help="Loops that share an oscillation, and where each starts.")
 @click.option("--wide", is_flag=True, help="All columns of the table, however narrow the terminal.")
 @click.option(
@@ -70,11 +78,12 @@ def check(asked: Asked) -> None:
 @told
 def rank(
     store: Path,
-    column: str,
+    column: str | None,
     top: int | None,
     night: str | None,
     ascending: bool,
     area: str | None,
+    lane: str | None,
     groups: bool,
     wide: bool,
     form: str,
@@ -92,8 +101,9 @@ def rank(
         found, name = group_list.grouped(Store(store), night, top)
         click.echo(group_list.rendered(found, form, name))
         return
-    rows, name = ranked(Store(store), column, top, night, ascending, area)
-    click.echo(rendered(rows, form, name, wide))
+    asked = None if lane is None else Lane(lane.replace("-", " "))
+    rows, name = ranked(Store(store), column, top, night, ascending, area, asked)
+    click.echo(rendered(rows, form, name, wide, asked))
 
 
 @main.command()

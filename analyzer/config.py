@@ -8,6 +8,7 @@ from analyzer.limits.advice import AdviceLimits, SettingsLimits
 from analyzer.limits.cause import CauseLimits
 from analyzer.limits.comparison import ChangeLimits, ComparisonLimits
 from analyzer.limits.figures import FigureLimits, NightLimits, WorkerLimits
+from analyzer.limits.lanes import LaneLimits
 from analyzer.limits.oscillation import OscillationLimits
 from analyzer.limits.plant import PlantLimits
 from analyzer.limits.quality import QualityLimits
@@ -20,6 +21,7 @@ __all__ = [
     "ComparisonLimits",
     "Config",
     "FigureLimits",
+    "LaneLimits",
     "NightLimits",
     "OscillationLimits",
     "PlantLimits",
@@ -46,6 +48,7 @@ class Config:
     advice: AdviceLimits = field(default_factory=AdviceLimits)
     tuning: TuningLimits = field(default_factory=TuningLimits)
     figures: FigureLimits = field(default_factory=FigureLimits)
+    lanes: LaneLimits = field(default_factory=LaneLimits)
     nights: NightLimits = field(default_factory=NightLimits)
     before_after: ComparisonLimits = field(default_factory=ComparisonLimits)
     changes: ChangeLimits = field(default_factory=ChangeLimits)

@@ -19,6 +19,7 @@ __all__ = [
     "GroupRole",
     "Lack",
     "LacksError",
+    "Lane",
     "Needs",
     "Status",
     "counts",
@@ -54,6 +55,18 @@ class Status(StrEnum):
     OK = "ok"
     NOT_ASSESSED = "not assessed"
     FAILED = "failed"
+
+
+class Lane(StrEnum):
+    """Why a loop is worth a look, beside its oscillation too; in the order in which lanes are told."""
+
+    OSCILLATION = "oscillation"
+    MANUAL = "manual"
+    AT_LIMIT = "at limit"
+    LASTING_ERROR = "lasting error"
+    FROZEN = "frozen"
+    SLUGGISH = "sluggish"
+    TRAVEL = "valve travel"
 
 
 class Lack(StrEnum):

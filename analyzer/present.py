@@ -7,7 +7,8 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from analyzer.columns.table import BY_NAME
-from analyzer.decisions import Action, Cause, Fault, Needs, counts
+from analyzer.decisions import Action, Cause, Needs
+from analyzer.reason import reason_of, to_stroke
 from analyzer.units import duration, gain_unit
 
 if TYPE_CHECKING:
@@ -41,7 +42,16 @@ WITH_UNITS = frozenset({"period_s", "kp", "ti"})
 """Numbers that are shown with their units, and so as texts."""
 
 
-def brief(row: Mapping[str, Any]) -> dict[str, str]:
+def shown_of(rows: Sequence[Mapping[str, Any]], figure: str | None = None) -> tuple[str, ...]:
+    """The columns for people: a lane's figure in the place of the significance, the loss where there is one."""
+    lead = [] if figure is None or figure in SHOWN else [figure]
+    lead += ["loss"] if any(r["loss"] is not None for r in rows) else []
+    shares = ("osc_valve_pct", "osc_tuning_pct", "osc_load_pct")
+    rest = [name for name in SHOWN[1:] if figure in (None, *SHOWN) or name not in shares]
+    return (SHOWN[0], *lead, *rest)
+
+
+def brief(row: Mapping[str, Any], columns: Sequence[str] = SHOWN) -> dict[str, str]:
     """A row for people, by column: figures in few characters, settings as old and new in one cell."""
     gain = gain_unit(row.get("gain_unit"), row.get("pv_unit"))
     special = {
@@ -49,12 +59,12 @@ def brief(row: Mapping[str, Any]) -> dict[str, str]:
         "kp": _settings(row["kp"], row["kp_new"], gain),
         "ti": _settings(row["ti"], row["ti_new"], row.get("ti_unit") or ""),
     }
-    return {name: special[name] if name in special else figure(row[name], name) for name in SHOWN}
+    return {name: special[name] if name in special else figure(row[name], name) for name in columns}
 
 
 WORTH_LEAST = (
     *("osc_load_pct", "osc_tuning_pct", "osc_valve_pct", "valve_travel_pct_per_h", "oscillating_pct"),
-    *("average_absolute_error_pct", "ti", "kp", "period_s", "oscillation_significance"),
+    *("average_absolute_error_pct", "ti", "kp", "period_s", "loss", "oscillation_significance"),
 )
 """Columns that a narrow table leaves out, the first of them first; loop, action and reason stay."""
 LEAST_REASON = 24
@@ -63,11 +73,11 @@ LEAST_REASON = 24
 
 def fitting(shown: Sequence[Mapping[str, str]], width: int) -> tuple[str, ...]:
     """The columns that fit into so many characters with all tags whole; none without rows."""
-    kept = list(SHOWN) if shown else []
+    kept = list(shown[0]) if shown else []
     size = {name: max(map(len, (BY_NAME[name].heading, *(row[name] for row in shown)))) + 1 for name in kept}
     size |= {"reason": LEAST_REASON + 1} if shown else {}
     for name in WORTH_LEAST:
-        if sum(size[n] for n in kept) + 1 > width:
+        if name in kept and sum(size[n] for n in kept) + 1 > width:
             kept.remove(name)
     return tuple(kept)
 
@@ -77,38 +87,6 @@ def _settings(now: float | None, new: float | None, unit: str) -> str:
     if now is None:
         return ""
     return f"{figure(now)} {unit}" if new is None else f"{figure(now)} -> {figure(new)} {unit}"
-
-
-def _strongest(row: Mapping[str, Any], cause: Cause) -> str:
-    signs = [s for s in json.loads(row.get("signs") or "[]") if s["points_to"] == cause]
-    return "; ".join(s["text"] for s in sorted(signs, key=lambda s: -s["strength"])[:2])
-
-
-FAULT_NAMES = {Fault.BACKLASH: "backlash", Fault.STICTION: "stick-slip"}
-
-
-def _valve(row: Mapping[str, Any]) -> str:
-    """What is wrong with the valve, in figures where there are any."""
-    fault = FAULT_NAMES.get(row["valve_fault"], "a valve fault")
-    width = row["stickband_pct"] or row["backlash_pct"]
-    if not width or row["valve_size"] is None:
-        return f"{fault}: {_strongest(row, Cause.VALVE)}"
-    share, gain = 100 * row["valve_size"], row["evidence"]
-    return f"{fault} of {width:.2g} %, {share:.0f} % of OP's range (log likelihood +{gain:.0f})"
-
-
-def reason_of(row: Mapping[str, Any], needs: Needs | None = None) -> str:
-    """One sentence on what was found and why."""
-    oscillates = counts(row["oscillating_pct"]) and row["period_s"]
-    cycle = f"cycles with {duration(row['period_s'])}" if oscillates else "does not oscillate"
-    cause = Cause(row["cause"])
-    if cause is Cause.VALVE:
-        return f"{cycle}; {_valve(row)}"
-    if cause in (Cause.TUNING, Cause.LOAD):
-        return f"{cycle}; {cause}: {_strongest(row, cause)}"
-    if cause is Cause.UNDECIDED:
-        return f"{cycle}; cause undecided: {needs or 'the signs do not agree'}"
-    return cycle
 
 
 MOST_NAMES = 5
@@ -122,9 +100,9 @@ def advised(row: dict[str, Any], needs: Needs | None, advice: Advice) -> dict[st
     reason = reason_of(row, needs)
     if row["oscillating_pct"] is None:
         reason = f"not assessed: {advice.reason}"
-    elif advice.action in SAID_AT_ONCE:
+    elif advice.action in SAID_AT_ONCE and advice.reason not in (str(needs), ""):
         reason = f"{reason}; {advice.reason}"
-    return {
+    done = {
         **row,
         "action": advice.action,
         "lack": advice.lack or row["lack"],
@@ -132,8 +110,8 @@ def advised(row: dict[str, Any], needs: Needs | None, advice: Advice) -> dict[st
         "ti_new": advice.ti_new,
         "advice": advice.reason,
         **_cycles(advice),
-        "reason": reason,
     }
+    return {**done, "reason": reason + to_stroke(done)}
 
 
 def _cycles(advice: Advice) -> dict[str, float]:
@@ -148,9 +126,9 @@ def _cycles(advice: Advice) -> dict[str, float]:
 def follower_row(row: Mapping[str, Any], found: Follower) -> dict[str, Any]:
     """The row of a loop that follows another one's oscillation."""
     source = found.source
-    later = f", {duration(abs(source.lag_s))} later" if source.lag_s is not None and source.lag_s > 0 else ""
-    sure = f"confidence {source.confidence_pct:.0f} %, coherence {source.coherence:.2f}"
-    text = f"moves with {source.loop}{later}, where the oscillation seems to start ({sure})"
+    later = f" {duration(abs(source.lag_s))} later" if source.lag_s is not None and source.lag_s > 0 else ""
+    text = f"moves with {source.loop}{later}, where the oscillation seems to start (coherence {source.coherence:.2f})"
+    sure = f"fix that loop first (it starts there with {source.confidence_pct:.0f} %)"
     sign = {"points_to": found.cause, "strength": found.strength, "text": text}
     return {
         **row,
@@ -163,14 +141,14 @@ def follower_row(row: Mapping[str, Any], found: Follower) -> dict[str, Any]:
         "ti_new": None,
         "advice": f"Look at {source.loop} first.",
         "signs": json.dumps([sign, *json.loads(row["signs"] or "[]")]),
-        "reason": f"cycles with {duration(row['period_s'])}; {text}",
+        "reason": f"cycles every {duration(row['period_s'])}: follows {source.loop}{later}; {sure}",
     }
 
 
 def root_row(row: Mapping[str, Any], followers: Sequence[str]) -> dict[str, Any]:
     """The row of a loop that moves others: what is known of it, and whom it moves."""
     names = ", ".join(followers[:MOST_NAMES]) + (" ..." if len(followers) > MOST_NAMES else "")
-    return {**row, "reason": f"{row['reason']}; also moves {names}: fix this one first"}
+    return {**row, "reason": f"{row['reason']}; it also moves {names}: fix this one first"}
 
 
 def figure(value: Any, column: str = "") -> str:
@@ -184,12 +162,12 @@ def figure(value: Any, column: str = "") -> str:
     return f"{value:.3g}" if abs(value) < 1000 else f"{value:.0f}"
 
 
-def markdown_table(rows: Sequence[Mapping[str, Any]]) -> str:
+def markdown_table(rows: Sequence[Mapping[str, Any]], columns: Sequence[str] = SHOWN) -> str:
     """Rows for people as a Markdown table: figures in few characters, settings with their units."""
     from reports.markdown import escaped
 
-    names = SHOWN if rows else SHOWN[:1]
+    names = columns if rows else columns[:1]
     head = "| " + " | ".join(BY_NAME[name].heading for name in names) + " |"
     rule = "|" + "|".join("---" for _ in names) + "|"
-    body = ["| " + " | ".join(map(escaped, brief(row).values())) + " |" for row in rows]
+    body = ["| " + " | ".join(map(escaped, brief(row, names).values())) + " |" for row in rows]
     return "\n".join([head, rule, *body])

@@ -10,11 +10,17 @@ from typing import Any
 
 from analyzer.columns.ranking import LISTED, RANKING
 from analyzer.columns.table import BY_NAME, names
+from analyzer.decisions import Cause, Lane
+from analyzer.lane_figures import FIGURE
 from analyzer.store import Store
 from identification.errors import InputError
 from reports.tables import harmless
 
-SORTABLE = names(RANKING)
+DEFAULT = "oscillation_significance"
+LOSS = "loss"
+LANE_FIGURES = tuple(name for name in FIGURE.values() if name not in names(RANKING))
+"""Figures of lanes that the contract's columns do not hold."""
+SORTABLE = (*names(RANKING), "importance", LOSS, *LANE_FIGURES)
 LIST_COLUMNS = names((*RANKING, *LISTED))
 """Columns of CSV and JSON: the contract's, then what says in which units settings stand, and the advice in full."""
 MOST_NAMES = 10
@@ -26,30 +32,66 @@ Row = Mapping[str, Any]
 
 def ranked(
     store: Store,
-    column: str,
+    column: str | None = None,
     top: int | None = None,
     night: str | None = None,
     ascending: bool = False,
     area: str | None = None,
+    lane: Lane | None = None,
 ) -> tuple[list[dict[str, Any]], str]:
-    """Rows of a night, or of one of its areas, sorted; loops without a figure come last by name.
+    """Rows of a night, or of one of its areas or lanes, sorted; loops without a figure come last by name.
+
+    Without a column, loops that are worth a look come first: those of a lane by its figure; all by their loss where
+    loops.csv states importances, else by the significance of their oscillation.
 
     Raises
     ------
     InputError
         Where there is no such store, night, column or area.
     """
-    if column not in SORTABLE:
+    if column is not None and column not in SORTABLE:
         raise InputError(f"column {column!r}", "one of " + ", ".join(SORTABLE), "correct --by")
     name = night or store.require()
-    rows = _within(store.read("nights", name, LIST_COLUMNS).to_pylist(), area)
+    rows = _within(_read(store, name), area)
+    if lane is not None:
+        rows = [r for r in rows if lane in (r["lanes"] or "").split(", ")]
+    if column is None and not ascending:
+        return worst_first(rows, None if lane is None else FIGURE[lane])[:top], name
+    return _sorted(rows, column or DEFAULT, ascending)[:top], name
+
+
+def _read(store: Store, night: str) -> list[dict[str, Any]]:
+    """The night's rows; columns that an older version did not write are None."""
+    wanted = (*LIST_COLUMNS, *LANE_FIGURES)
+    held = set(store.columns("nights", night))
+    rows = store.read("nights", night, [c for c in wanted if c in held]).to_pylist()
+    return [{**dict.fromkeys(wanted), **row} for row in rows]
+
+
+def _sorted(rows: Sequence[dict[str, Any]], column: str, ascending: bool) -> list[dict[str, Any]]:
+    """Rows by a column, ties and loops without a figure by name."""
     known = [r for r in rows if r[column] not in (None, "")]
     others = sorted((r for r in rows if r[column] in (None, "")), key=lambda r: r["loop"])
     if BY_NAME[column].is_number:
         known.sort(key=lambda r: (r[column] if ascending else -r[column], r["loop"]))
     else:
         known.sort(key=lambda r: (r[column], r["loop"]))
-    return (known + others)[:top], name
+    return known + others
+
+
+def worst_first(rows: Sequence[dict[str, Any]], column: str | None = None) -> list[dict[str, Any]]:
+    """Rows as the morning reads them: what oscillates, then what stands in another lane, then the rest."""
+    lossy = any(r[LOSS] is not None for r in rows)
+    by = column or (LOSS if lossy else DEFAULT)
+    return sorted(_sorted(rows, by, False), key=lambda row: _worth(row, lossy))
+
+
+def _worth(row: Row, lossy: bool) -> int:
+    """0 for loops to be looked at first, 2 for those with nothing to look at; losses are compared across lanes."""
+    lanes = (row["lanes"] or "").split(", ")
+    if Lane.OSCILLATION in lanes or row["cause"] == Cause.VALVE:
+        return 0
+    return 2 if lanes == [""] else 0 if lossy else 1
 
 
 def _within(rows: list[dict[str, Any]], area: str | None) -> list[dict[str, Any]]:
@@ -64,11 +106,18 @@ def _within(rows: list[dict[str, Any]], area: str | None) -> list[dict[str, Any]
     return found
 
 
-def rendered(rows: Sequence[Row], form: str, night: str, wide: bool = False) -> str:
-    """Rows as text in one of the formats; a `wide` table keeps all its columns."""
-    if form == "table":
-        return as_table(rows, night, WIDEST if wide else None)
-    return {"csv": as_csv, "json": as_json, "markdown": as_markdown}[form](rows, night)
+def rendered(rows: Sequence[Row], form: str, night: str, wide: bool = False, lane: Lane | None = None) -> str:
+    """Rows as text in one of the formats; a `wide` table keeps all its columns, one of a lane shows its figure."""
+    if form in ("table", "markdown"):
+        from analyzer.present import markdown_table, shown_of
+
+        shown = shown_of(rows, None if lane is None else FIGURE[lane])
+        return (
+            as_table(rows, night, WIDEST if wide else None, shown)
+            if form == "table"
+            else markdown_table(rows, shown)
+        )
+    return {"csv": as_csv, "json": as_json}[form](rows, night)
 
 
 def as_csv(rows: Sequence[Row], night: str) -> str:
@@ -92,27 +141,22 @@ def as_json(rows: Sequence[Row], night: str) -> str:
     return json.dumps([{c: r[c] for c in LIST_COLUMNS} for r in rows], indent=1)
 
 
-def as_markdown(rows: Sequence[Row], night: str) -> str:
-    """The columns for people as a Markdown table."""
-    from analyzer.present import markdown_table
-
-    return markdown_table(rows)
-
-
-def as_table(rows: Sequence[Row], night: str, width: int | None = None) -> str:
+def as_table(
+    rows: Sequence[Row], night: str, width: int | None = None, columns: Sequence[str] | None = None
+) -> str:
     """The columns for people as a table; those worth least go where `width` (the terminal's by default) is short."""
     from rich.box import SIMPLE_HEAD
     from rich.console import Console
     from rich.table import Table
     from rich.text import Text
 
-    from analyzer.present import CAUSE_STYLES, WITH_UNITS, brief, fitting
+    from analyzer.present import CAUSE_STYLES, SHOWN, WITH_UNITS, brief, fitting
 
     table = Table(
         box=SIMPLE_HEAD, title=f"Night {night}", title_justify="left", pad_edge=False, padding=(0, 1, 0, 0)
     )
     console = Console(width=width or (None if interactive() else 180))
-    shown = [brief(row) for row in rows]
+    shown = [brief(row, columns or SHOWN) for row in rows]
     kept = fitting(shown, console.width)
     for column in (BY_NAME[name] for name in kept):
         right = column.is_number and column.name not in WITH_UNITS

@@ -118,9 +118,11 @@ def night_row(a: Assessment, spec: LoopSpec, night: str, limits: AdviceLimits) -
     v, m = a.verdict, a.verdict.measured
     lacking = a.needs or v.needs
     signs = [{"points_to": s.points_to, "strength": round(s.strength, 3), "text": s.text} for s in v.signs]
+    error = a.night.average_absolute_error_pct
     row = {
         **empty_row(spec, night),
         **a.night.as_row(),
+        "loss": None if error is None or spec.importance is None else error * spec.importance,
         **_oscillation_columns(a),
         **_model_columns(v, limits),
         "status": Status.OK,

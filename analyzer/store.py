@@ -87,6 +87,20 @@ class Store:
                 f"night {night} is not in {self.path}", f"one of {known}", "check --night"
             ) from error
 
+    def columns(self, table: str, night: str) -> list[str]:
+        """Names of the columns that one night of one table has.
+
+        Raises
+        ------
+        InputError
+            Where the store holds no such night.
+        """
+        try:
+            with pq.ParquetFile(self.path / table / f"{night}.parquet") as file:
+                return list(file.schema_arrow.names)
+        except FileNotFoundError:
+            return self.read(table, night).column_names
+
     def part(self, night: str, table: str, key: str) -> Path:
         """Where a piece of a night that is being worked on lies."""
         return self.path / "parts" / night / f"{table}-{key}.parquet"

@@ -173,7 +173,7 @@ def tune(found: Assessment, controller: Pid, config: Config, kept: Advice | None
     period = first.period_s if first else None
     window = verdict.measured.window
     model, fit, others = _model(verdict, controller, config.advice)
-    if kept is not None and kept.reason:
+    if kept is not None and kept.reason and kept.action is not None:
         proposal = Proposal(kept.action, kept.reason)
     else:
         proposal = propose(verdict, controller, period, config)

@@ -8,6 +8,8 @@ from analyzer.settings_check import SettingsDiffer
 from analyzer.units import gain_unit, settings
 from identification.models import Pid
 
+NOT_STATED = "no new settings: loops.csv states no kp and ti of this loop; add them"
+MORE = "needs a longer record, or one with set point moves, for new settings."
 UNSTABLE = (
     "The identified loop would be unstable at the present settings, which the bounded cycle contradicts: the process "
     "is not known well enough for new settings."

@@ -262,6 +262,23 @@ LISTED = (
     ),
     Column("ti_unit", Kind.TEXT, "Unit of Ti", "", Source.LOOPS, "s, min or repeats/min."),
     Column("pv_unit", Kind.TEXT, "Unit of PV", "", Source.LOOPS, "Engineering unit of PV."),
+    Column(
+        "lanes",
+        Kind.TEXT,
+        "Lanes",
+        "",
+        Source.FIGURES,
+        "Why the loop is worth a look, separated by commas: oscillation, manual, at limit, lasting error, frozen, "
+        "sluggish, valve travel.",
+    ),
+    Column(
+        "loss",
+        Kind.NUMBER,
+        "Loss",
+        "% of span times importance",
+        Source.FIGURES,
+        "Average absolute error times the importance that loops.csv states; empty where it states none.",
+    ),
     Column("advice", Kind.TEXT, "Advice", "", Source.ADVICE, "What to do and why in full, with figures."),
 )
 """Columns that follow in CSV and JSON: facts of the plant, the units that settings stand in, the advice in full."""

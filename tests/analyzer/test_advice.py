@@ -154,7 +154,7 @@ def test_no_cause_no_settings(pipe):
     """Verdicts without a cause and verdicts that abstain get no settings."""
     row = spec(kp=1.0, ti=10.0)
     asked = [replace(pipe, verdict=v) for v in (NO_CAUSE, not_assessed(Needs(Lack.OP, "needs OP")))]
-    assert [advise(a, row, Pid(1, 10), 100.0, CONFIG).action for a in asked] == ["none", "undecided"]
+    assert [advise(a, row, Pid(1, 10), 100.0, CONFIG).action for a in asked] == ["none", "needs data"]
 
 
 def test_a_calm_loop_is_left_alone(pipe):

@@ -47,7 +47,10 @@ def rows(loops: int) -> list[dict[str, object]]:
             "valve_fault": "backlash" if cycles else "none",
             "oscillation_significance": float(rng.uniform(0, 20)) if cycles else 0.0,
             "action": "retune" if cycles else "none",
-            "reason": "cycles with 38 s; backlash of 2 %, 80 % of OP's range"
+            "loss": None,
+            "importance": None,
+            "lanes": "oscillation" if cycles else None,
+            "reason": "cycles every 38 s: the valve has 2 % play (80 % of OP's range)"
             if cycles
             else "does not oscillate",
             "signs": json.dumps(

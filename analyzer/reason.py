@@ -1,0 +1,55 @@
+"""The reason of a loop's row: what was found and why, in one plain sentence; most figures stay in their columns."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+from analyzer.decisions import Action, Cause, Fault, Needs, counts
+from analyzer.units import duration
+
+Row = Mapping[str, Any]
+PLAIN = {
+    Fault.BACKLASH: "the valve has {width:.2g} % play ({share:.0f} % of OP's range)",
+    Fault.STICTION: "the valve sticks by {width:.2g} % ({share:.0f} % of OP's range)",
+}
+BY_HAND = "; stroke it in steps of {step:.2g} %"
+"""How a valve's fault is confirmed: steps of a quarter of its width, of which most must move nothing."""
+
+
+def reason_of(row: Row, needs: Needs | None = None) -> str:
+    """One sentence on what was found and why."""
+    oscillates = counts(row["oscillating_pct"]) and row["period_s"]
+    cycle = f"cycles every {duration(row['period_s'])}" if oscillates else "does not oscillate"
+    cause = Cause(row["cause"])
+    if cause is Cause.VALVE:
+        return f"{cycle}: {_valve(row)}"
+    if cause is Cause.TUNING:
+        return f"{cycle}: too tight for its process; {_strongest(row, cause, 1)}"
+    if cause is Cause.LOAD:
+        return f"{cycle}: driven from outside; {_strongest(row, cause, 1)}"
+    if cause is Cause.UNDECIDED:
+        return f"{cycle}; cause undecided: {needs or 'the signs do not agree'}"
+    return cycle
+
+
+def to_stroke(row: Row) -> str:
+    """The test that a valve's fault asks for; '' where its width is not known or the action is another."""
+    width = row["stickband_pct"] or row["backlash_pct"]
+    if row["action"] != Action.REPAIR_VALVE or not width:
+        return ""
+    return BY_HAND.format(step=width / 4)
+
+
+def _valve(row: Row) -> str:
+    """What is wrong with the valve, in figures where there are any."""
+    plain, width = PLAIN.get(row["valve_fault"]), row["stickband_pct"] or row["backlash_pct"]
+    if plain is None or not width or row["valve_size"] is None:
+        return f"the valve is at fault; {_strongest(row, Cause.VALVE, 2)}"
+    return plain.format(width=width, share=100 * row["valve_size"])
+
+
+def _strongest(row: Row, cause: Cause, most: int) -> str:
+    signs = [s for s in json.loads(row.get("signs") or "[]") if s["points_to"] == cause]
+    return "; ".join(s["text"] for s in sorted(signs, key=lambda s: -s["strength"])[:most])

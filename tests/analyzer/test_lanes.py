@@ -1,0 +1,145 @@
+"""Loops that need a look without oscillating: each lane with its figure, its clause and what it asks for."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from analyzer import chunk
+from analyzer.decisions import Action, Lane, Status
+from analyzer.lane_figures import FIGURE
+from analyzer.lane_words import in_lanes
+from analyzer.nights import Night
+from analyzer.rank import worst_first
+from tests.analyzer.plant import CONFIG, START_S, series, spec
+from tests.identification.signals import hand_loop
+
+NIGHT = Night("2026-03-02", START_S, START_S + 86400.0)
+HOURS = 6
+
+
+def trends(kp: float = 2.0, seed: int = 0) -> dict[str, np.ndarray]:
+    """Six hours of a PI loop (lag 60 s, dead time 10 s, Ti 60 s) under a load that wanders; OP from its own law."""
+    rng = np.random.default_rng(seed)
+    n = HOURS * 3600
+    walk = np.convolve(rng.normal(size=n + 599), np.ones(600) / 120.0, "valid")
+    error = hand_loop.error(kp, 60.0, 60.0, 10, walk, 0.1 * rng.normal(size=n))
+    op = 50.0 + kp * (error + np.cumsum(error) / 60.0)
+    return {"sp": np.full(n, 50.0), "pv": 50.0 - error, "op": op}
+
+
+def row_of(values: dict[str, np.ndarray], kp: float = 2.0, **extra: np.ndarray) -> dict[str, object]:
+    """The night's row of a loop of these trends."""
+    stamp = START_S + np.arange(values["pv"].size, dtype=float)
+    found = {f"L.{role.upper()}": series(stamp, x) for role, x in {**values, **extra}.items()}
+    stated = replace(spec(kp=kp, ti=60.0, type="flow"), mode="L.MODE" if "mode" in extra else None)
+    row, _ = chunk._loop_row(stated, found, NIGHT, CONFIG, True)
+    return row
+
+
+def lanes(row: dict[str, object]) -> set[str]:
+    """The lanes of a row."""
+    return set(str(row["lanes"] or "").split(", ")) - {""}
+
+
+def test_a_good_loop_stands_in_no_lane() -> None:
+    """Swift control of a wandering load is in no lane, whatever the noise."""
+    assert [lanes(row_of(trends(seed=s))) for s in range(4)] == [set()] * 4
+
+
+def test_a_small_gain_is_sluggish() -> None:
+    """The same loop at a tenth of the gain lets errors stand for integral times, and says so."""
+    row = row_of(trends(0.2), 0.2)
+    assert lanes(row) == {Lane.SLUGGISH}
+    assert "sluggish" in str(row["reason"])
+    assert row["kp_new"] is None
+
+
+def test_compression_is_not_sluggish() -> None:
+    """A trend that a historian drew straight is slow by its recorder, and is not called sluggish."""
+    good = trends()
+    kept = np.arange(0, good["pv"].size, 300)
+    pv = np.interp(np.arange(good["pv"].size), kept, good["pv"][kept])
+    assert Lane.SLUGGISH not in lanes(row_of({**good, "pv": pv}))
+
+
+def test_a_loop_in_manual_has_its_lane_though_it_is_not_assessed() -> None:
+    """In manual all night: not assessed, needs time in automatic, and found under `--lane manual`."""
+    good = trends()
+    row = row_of(good, mode=np.zeros(good["pv"].size))
+    assert (row["status"], row["action"]) == (Status.NOT_ASSESSED, Action.NEEDS_DATA)
+    assert (lanes(row), row["manual_pct"]) == ({Lane.MANUAL}, 100.0)
+
+
+def test_a_lasting_error_asks_for_the_measurement() -> None:
+    """PV 20 % of span beside SP in automatic with OP free: check the measurement, and on which side it lies."""
+    good = trends()
+    row = row_of({**good, "sp": good["sp"] + 20.0})
+    assert Lane.LASTING_ERROR in lanes(row)
+    assert row["lasting_error_pct"] == pytest.approx(20.0, abs=1.0)
+    assert row["action"] == Action.CHECK_MEASUREMENT
+    assert "below SP" in str(row["reason"])
+
+
+def test_op_at_its_limit_explains_the_error() -> None:
+    """With OP at 100 % all night the lasting error is the limit's, and the measurement is left alone."""
+    good = trends()
+    row = row_of({**good, "sp": good["sp"] + 20.0, "op": np.full(good["op"].size, 100.0)})
+    assert {Lane.AT_LIMIT, Lane.LASTING_ERROR} <= lanes(row)
+    assert row["action"] != Action.CHECK_MEASUREMENT
+    assert "upper limit" in str(row["reason"])
+
+
+def test_a_frozen_measurement_is_told() -> None:
+    """PV that stands for an hour while OP moves is frozen."""
+    good = trends()
+    pv = good["pv"].copy()
+    pv[7200:10800] = pv[7200]
+    row = row_of({**good, "pv": pv})
+    assert Lane.FROZEN in lanes(row)
+    assert row["frozen_pct"] == pytest.approx(100 / HOURS, abs=2.0)
+    assert row["action"] == Action.CHECK_MEASUREMENT
+
+
+def test_without_op_nothing_is_said_of_op() -> None:
+    """Without OP the lanes that rest on it are empty figures, no zeros."""
+    row = row_of({k: v for k, v in trends().items() if k != "op"})
+    assert [row[FIGURE[lane]] for lane in (Lane.MANUAL, Lane.AT_LIMIT, Lane.FROZEN, Lane.TRAVEL)] == [
+        None
+    ] * 4
+
+
+def made(loop: str, lanes: str, loss: float | None, significance: float = 0.0) -> dict[str, object]:
+    """A row as the list sorts it."""
+    figures = {"oscillation_significance": significance, "loss": loss, "cause": "none"}
+    return {"loop": loop, "lanes": lanes or None, **figures}
+
+
+def test_losses_order_the_list_where_importance_is_stated() -> None:
+    """A loop at its limit with the largest loss comes first; what needs no look comes last."""
+    rows = [
+        made("A", "oscillation", 5.0, 40.0),
+        made("B", "", 9.0),
+        made("C", "at limit, lasting error", 22.0),
+    ]
+    assert [r["loop"] for r in worst_first(rows)] == ["C", "A", "B"]
+
+
+def test_without_importance_oscillation_comes_first() -> None:
+    """Without importances: oscillating loops by significance, then the other lanes, then the rest."""
+    rows = [made("A", "manual", None), made("B", "", None), made("C", "oscillation", None, 3.0)]
+    assert [r["loop"] for r in worst_first([*rows, made("D", "oscillation", None, 8.0)])] == [
+        "D",
+        "C",
+        "A",
+        "B",
+    ]
+
+
+def test_a_failed_loop_asks_for_nothing() -> None:
+    """What failed has no action; its reason stands."""
+    row = dict.fromkeys((*FIGURE.values(), "oscillating_pct", "lack", "action", "sp_mean_pct", "pv_mean_pct"))
+    done = in_lanes({**row, "status": Status.FAILED, "reason": "ValueError: x"}, CONFIG.lanes)
+    assert (done["action"], done["reason"], done["lanes"]) == (None, "ValueError: x", None)
