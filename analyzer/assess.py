@@ -17,7 +17,7 @@ from analyzer.oscillation import Oscillations, barely_seen, counting, detect
 from analyzer.plantwide.wave import Wave, waves_of
 from analyzer.quality import Prepared, run_lengths
 from analyzer.settings_check import SettingsDiffer, differing
-from analyzer.trends import BUCKETS, FINE_BUCKETS, thinned
+from analyzer.trends import BUCKETS, FINE_BUCKETS, close_view, thinned
 from analyzer.trial_signs import hidden_by_grid
 from analyzer.words import too_coarse
 from identification.errors import NotAssessedError
@@ -37,7 +37,7 @@ class Assessment:
     hour; oscillations; verdict; settings, where the controller's are not the stated ones; harris index (1: minimum
     variance) and settling time [s] where known; waves, its part in the plant-wide pass; trend, thinned;
     notes, plain sentences about the data; needs, what the record lacks to tell whether the loop oscillates, None
-    where that is told.
+    where that is told; close_s, first and last time [s] of the last ten periods.
     """
 
     loop: str
@@ -54,6 +54,7 @@ class Assessment:
     trend: Mapping[str, np.ndarray] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     needs: Needs | None = None
+    close_s: tuple[float, ...] | None = None
 
 
 def unassessable(record: LoopRecord, config: Config) -> Needs | None:
@@ -196,7 +197,7 @@ def assess(prepared: Prepared, controller: Pid | None, config: Config, kind: str
     if night.usable_h < config.advice.least_h or _is_coarse(record, controller, config):
         verdict = as_hint(verdict, config.advice.hint_pct)
     harris = harris_index(record.error, usable(record), record.dt_s, dead_time) if dead_time else None
-    first = counting(found)
+    first, close = counting(found), close_view(record, found)
     return Assessment(
         record.tag,
         record.start_s,
@@ -212,7 +213,8 @@ def assess(prepared: Prepared, controller: Pid | None, config: Config, kind: str
         harris,
         settling_time(record, night.noise_band_pct or 0.0),
         waves_of(record.tag, found, record.start_s + record.duration_s, config.plant),
-        thinned(record, FINE_BUCKETS if first else BUCKETS),
+        thinned(record, FINE_BUCKETS if first else BUCKETS, close),
         prepared.notes,
         _hidden(record, found, controller, config),
+        None if close is None else tuple(record.start_s + at * record.dt_s for at in close),
     )

@@ -21,6 +21,7 @@ from analyzer.history.export import Export, counted
 from analyzer.loops.changes import TuningChange
 from analyzer.loops.spec import LoopSpec
 from analyzer.nights import Night, nights_of
+from analyzer.plant_clock import UTC_NAME
 from analyzer.store import Store
 from analyzer.store_lock import locked
 from analyzer.workers import Died, Workers
@@ -122,6 +123,7 @@ def run(
     progress: Callable[[int, int], None] = lambda done, total: None,
     replacing: bool = False,
     changes: Sequence[TuningChange] = (),
+    zone: str = UTC_NAME,
 ) -> Outcome:
     """Assess all loops of an export and keep the results.
 
@@ -145,6 +147,8 @@ def run(
         Forget what the store has of these nights, instead of adding to it.
     changes : sequence of TuningChange
         When settings were changed; each night has those in force at its end.
+    zone : str
+        The plant's time zone, whose days the nights are.
 
     Raises
     ------
@@ -156,9 +160,12 @@ def run(
             "no loops in the export", "tags such as LOOP.PV", "state them with --loops loops.csv"
         )
     with locked(store.path):
-        spans = nights_of(export, specs, config.nights, since_s, until_s)
+        spans = nights_of(export, specs, config.nights, since_s, until_s, zone)
         keys = _begun(
-            store, spans, run_identity.identity(export, (*specs, *changes), since_s, until_s, config), resume
+            store,
+            spans,
+            run_identity.identity(export, (*specs, *changes, zone), since_s, until_s, config),
+            resume,
         )
         known = _loops_in(store, spans[-1].name, keys)
         progress(len(known), len(specs))

@@ -9,9 +9,9 @@ from analyzer.config import Config
 from analyzer.decisions import Needs
 from analyzer.history.export import Export
 from analyzer.history.series import Series
-from analyzer.history.stray import stamp_text
 from analyzer.loops.changes import TuningChange
 from analyzer.loops.spec import LoopSpec
+from analyzer.plant_clock import UTC_NAME, stamp
 from analyzer.quality import Prepared, prepare
 from identification.errors import TriageError
 
@@ -66,10 +66,12 @@ def lines(
     config: Config,
     within: Within,
     changes: Sequence[TuningChange] = (),
+    zone: str = UTC_NAME,
 ) -> Iterator[tuple[str, bool]]:
     """All lines, each with whether a loop of it cannot be assessed."""
     first, last = export.span()
-    yield f"{len(export.tags)} tags, {len(specs)} loops, {stamp_text(first)} to {stamp_text(last)} UTC", False
+    span = f"{stamp(first, zone)} to {stamp(last, zone)} {zone}"
+    yield f"{len(export.tags)} tags, {len(specs)} loops, {span}", False
     for note in notes:
         yield note, False
     if specs and specs[0].defaults:

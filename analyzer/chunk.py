@@ -97,6 +97,7 @@ def _loop_row(
     try:
         prepared = prepare(spec, part, config.quality)
         stated = _stated(spec, prepared)
+        known |= {"pv_lo": prepared.scale.low, "pv_hi": prepared.scale.low + prepared.scale.span}
         known |= standing(prepared, stated, spec.type, config).as_row()
         found, advice = _assessed(spec, prepared, stated, config, advising)
     except Exception as error:  # an error of one loop is that loop's result, never the night's end
@@ -152,7 +153,7 @@ def work(task: Task, began: Callable[[int], None] = lambda at: None) -> Done:
                 advising = night is task.nights[-1]
                 stated = in_force(spec, task.changes, night.last_s)
                 row, assessment = _loop_row(stated, series, night, task.config, advising)
-            rows[night.name].append(row)
+            rows[night.name].append({**row, "timezone": night.zone})
             if assessment is not None:
                 found[night.name].append(assessment)
     for night in task.nights:
@@ -164,7 +165,7 @@ def lose(task: Task, reason: str) -> Done:
     """Write the rows of a chunk that no worker could finish."""
     lost = Lost(Status.FAILED, reason)
     for night in task.nights:
-        rows = [lost_row(spec, night.name, lost) for spec in task.specs]
+        rows = [{**lost_row(spec, night.name, lost), "timezone": night.zone} for spec in task.specs]
         _write_pieces(task, night.name, rows, [])
     return Done(task.key, len(task.specs))
 

@@ -46,7 +46,7 @@ def check(asked: Asked) -> None:
 
     source, specs, notes = asked.opened()
     lost = 0
-    for line, bad in lines(source, specs, notes, asked.config, asked.within, asked.changes):
+    for line, bad in lines(source, specs, notes, asked.config, asked.within, asked.changes, asked.zone):
         lost += bad
         click.echo(line)
     sys.exit(SOME_LOST if lost else 0)
@@ -119,7 +119,9 @@ def tune(asked: Asked, tag: str, out: Path | None) -> None:
 
     source, specs, _ = asked.opened()
     span = asked.since_s, asked.until_s
-    lines, pictures = proposal(source, specs, tag, asked.config, span, out is not None, asked.changes)
+    lines, pictures = proposal(
+        source, specs, tag, asked.config, span, out is not None, asked.changes, asked.zone
+    )
     for line in lines:
         click.echo(line)
     if out is not None:

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from datetime import UTC, datetime
 from itertools import pairwise
 
 import numpy as np
 
+from analyzer import plant_clock
 from analyzer.config import NightLimits
 from analyzer.history.export import Export
 from analyzer.history.series import Series
@@ -22,20 +22,23 @@ DAY_S = 86400.0
 
 @dataclass(frozen=True, slots=True)
 class Night:
-    """A span of time that is assessed as one: its name (date of its end) and its ends [s]."""
+    """A span of time that is assessed as one: its name (the plant's date of its middle), its ends [s], the plant's
+    time zone."""
 
     name: str
     first_s: float
     last_s: float
+    zone: str = plant_clock.UTC_NAME
 
 
-def _named(first_s: float, last_s: float) -> Night:
-    middle = datetime.fromtimestamp((first_s + last_s) / 2, UTC)
-    return Night(middle.strftime("%Y-%m-%d"), first_s, last_s)
+def _named(first_s: float, last_s: float, zone: str) -> Night:
+    return Night(plant_clock.date_of((first_s + last_s) / 2, zone), first_s, last_s, zone)
 
 
-def daily(first_s: float, last_s: float, limits: NightLimits) -> list[Night]:
-    """Cut a span of time at midnights (UTC); a short first or last piece joins its neighbour.
+def daily(
+    first_s: float, last_s: float, limits: NightLimits, zone: str = plant_clock.UTC_NAME
+) -> list[Night]:
+    """Cut a span of time at the plant's midnights; a short first or last piece joins its neighbour.
 
     Raises
     ------
@@ -49,14 +52,16 @@ def daily(first_s: float, last_s: float, limits: NightLimits) -> list[Night]:
             f"at most {limits.most} nights in one run",
             "state the part that is meant with --since and --until",
         )
-    cuts = np.arange(math.floor(first_s / DAY_S) + 1, math.ceil(last_s / DAY_S)) * DAY_S
     least_s = 3600.0 * limits.least_piece_h
+    cuts = plant_clock.midnights(first_s, last_s, zone)
     inner = [c for c in cuts if c - first_s >= least_s and last_s - c >= least_s]
     edges = [first_s, *inner, last_s + 1.0]
-    return [_named(a, b) for a, b in pairwise(edges)]
+    return [_named(a, b, zone) for a, b in pairwise(edges)]
 
 
-def nights(spans: Sequence[tuple[float, float]], limits: NightLimits) -> list[Night]:
+def nights(
+    spans: Sequence[tuple[float, float]], limits: NightLimits, zone: str = plant_clock.UTC_NAME
+) -> list[Night]:
     """The nights of an export from the spans of its loops [s].
 
     Where the median loop has over whole_h (36 h), the export is cut into days; else each loop is assessed whole, in
@@ -66,9 +71,9 @@ def nights(spans: Sequence[tuple[float, float]], limits: NightLimits) -> list[Ni
     lengths = sorted(last - first for first, last in spans)
     first, last = min(s[0] for s in spans), max(s[1] for s in spans)
     if lengths[len(lengths) // 2] > limits.whole_h * 3600.0:
-        return daily(first, last, limits)
+        return daily(first, last, limits, zone)
     latest = max(spans, key=lambda s: s[1])
-    return [replace(_named(*latest), first_s=first, last_s=last + 1.0)]
+    return [replace(_named(*latest, zone), first_s=first, last_s=last + 1.0)]
 
 
 def clipped(
@@ -102,8 +107,9 @@ def nights_of(
     limits: NightLimits,
     since_s: float = -math.inf,
     until_s: float = math.inf,
+    zone: str = plant_clock.UTC_NAME,
 ) -> list[Night]:
-    """The nights of an export within a span of time.
+    """The nights of an export within a span of time, cut at the plant's midnights.
 
     Raises
     ------
@@ -114,4 +120,4 @@ def nights_of(
     if not present:
         wanted = specs[0].wanted_pv or f"{specs[0].loop}.PV"
         raise InputError("no PV tag of any loop is in the export", f"tags such as {wanted}", "check --loops")
-    return nights(clipped([export.span(tag) for tag in present], since_s, until_s), limits)
+    return nights(clipped([export.span(tag) for tag in present], since_s, until_s), limits, zone)

@@ -140,6 +140,8 @@ def night_row(a: Assessment, spec: LoopSpec, night: str, limits: AdviceLimits) -
         "lack": lacking.lack if lacking is not None else None,
         "notes": "; ".join((*a.notes, f"cause not assessed: {v.needs}") if v.needs else a.notes),
     }
+    if a.close_s is not None:
+        row["close_first_s"], row["close_last_s"] = a.close_s
     if a.needs is not None:
         row.update(dict.fromkeys(NOT_SHOWN), cause=Cause.UNDECIDED, valve_fault=Fault.UNDECIDED)
     return {k: _finite(v) for k, v in row_of(row).items()}

@@ -56,6 +56,14 @@ class Store:
         """Names of the nights that are complete, oldest first."""
         return sorted(p.stem for p in (self.path / "nights").glob("*.parquet"))
 
+    def zone(self) -> str:
+        """The plant's time zone as the latest night states it, UTC where none does."""
+        name = self.nights()[-1:]
+        if not name or "timezone" not in self.columns("nights", name[0]):
+            return "UTC"
+        stated = self.read("nights", name[0], ["timezone"]).column(0).to_pylist()
+        return next((z for z in stated if z), "UTC")
+
     def require(self) -> str:
         """The latest night.
 

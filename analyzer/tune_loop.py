@@ -16,6 +16,7 @@ from analyzer.loops.settings_in_force import in_force
 from analyzer.loops.spec import LoopSpec, spec_of
 from analyzer.loops.tags import controller
 from analyzer.nights import cut, nights_of
+from analyzer.plant_clock import UTC_NAME
 from analyzer.quality import Prepared, prepare
 from analyzer.tune import lines, pictures, tune
 from identification.errors import InputError, NotAssessedError
@@ -37,6 +38,7 @@ def proposal(
     span: tuple[float, float] = (-math.inf, math.inf),
     drawn: bool = True,
     changes: Sequence[TuningChange] = (),
+    zone: str = UTC_NAME,
 ) -> tuple[list[str], dict[str, bytes]]:
     """Lines of text and, if wanted, pictures by file name for one loop's last night within a span of time [s].
 
@@ -46,7 +48,7 @@ def proposal(
         Where the loop or its settings are not known, or its trends give no model.
     """
     spec = spec_of(specs, loop)
-    night = nights_of(export, [spec], config.nights, *span)[-1]
+    night = nights_of(export, [spec], config.nights, *span, zone)[-1]
     spec = in_force(spec, changes, night.last_s)
     prepared = prepare(spec, {t: cut(s, night) for t, s in export.read(spec.tags).items()}, config.quality)
     stated = controller(spec, prepared.scale.span)

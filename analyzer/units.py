@@ -34,3 +34,33 @@ def row_settings(row: Mapping[str, Any], kp: str = "kp", ti: str = "ti") -> str:
     """The settings in two columns of a row of the night, with the units that the row states."""
     gain = gain_unit(row["gain_unit"], row["pv_unit"])
     return settings(row[kp], row[ti], gain, row["ti_unit"] or "s")
+
+
+SECONDS = {"s": 1.0, "min": 60.0}
+"""Seconds of a unit of integral time; repeats a minute are counted the other way round."""
+
+
+def seconds_of(ti: float, unit: str) -> float | None:
+    """An integral time in seconds; None without integral action."""
+    if ti == 0:
+        return None
+    return 60.0 / ti if unit == "repeats/min" else ti * SECONDS[unit or "s"]
+
+
+def changed_settings(row: Mapping[str, Any]) -> str:
+    """Old and new settings of a row with their units; a band in gain and other times in seconds too."""
+    gain, time = gain_unit(row["gain_unit"], row["pv_unit"]), row["ti_unit"] or "s"
+    old, new = (row["kp"], row["ti"]), (row["kp_new"], row["ti_new"])
+    kp = f"Kp {_arrow(old[0], new[0])} {gain}"
+    if row["gain_unit"] == "band" and old[0] and new[0]:
+        more = "more" if new[0] < old[0] else "less"
+        kp += f" ({more} gain: {_arrow(100 / old[0], 100 / new[0])} %/%)"
+    ti = f"Ti {_arrow(old[1], new[1])} {time}"
+    if time != "s" and new[1] is not None:
+        ti += f" ({_arrow(*(None if t is None else seconds_of(t, time) for t in (old[1], new[1])))} s)"
+    return f"{kp}, {ti}"
+
+
+def _arrow(old: float | None, new: float | None) -> str:
+    texts = ["none" if x is None else f"{x:.3g}" if abs(x) < 1000 else f"{x:.0f}" for x in (old, new)]
+    return f"{texts[0]} \u2192 {texts[1]}"

@@ -62,6 +62,8 @@ def trend_data(trend: Trend) -> Markup:
         "panels": list(trend.panels),
         "marks": [{"x": m.x, "label": m.label} for m in trend.marks],
         "spans": [list(s) for s in trend.spans],
+        "opening": None if trend.opening is None else list(trend.opening),
+        "least": list(trend.least),
     }
     return Markup(json.dumps(data).replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e"))
 

@@ -173,7 +173,8 @@ class Trend:
     """Signals over time on linked axes.
 
     time_s : start of each bucket [s since 1970-01-01 UTC], rising, shape (b,); gap : True where nothing is
-    shown; spans : first and last time [s] of spans that are marked
+    shown; spans : first and last time [s] of spans that are marked; opening : first and last time [s] shown at
+    first, all where None; least : height of each panel's axis at least [its unit], so that small things look small
     """
 
     name: str
@@ -185,6 +186,8 @@ class Trend:
     marks: tuple[Mark, ...] = ()
     caption: str = ""
     spans: tuple[tuple[float, float], ...] = ()
+    opening: tuple[float, float] | None = None
+    least: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -279,7 +282,10 @@ class Section:
 @dataclass(frozen=True, slots=True)
 class Page:
     """A page: its file name without ending, its title, one line under it, sections, and links (text,
-    href)."""
+    href).
+
+    made : what it was made of and when, shown small in its head; zone : time zone of the times on its axes
+    """
 
     name: str
     title: str
@@ -287,6 +293,8 @@ class Page:
     sections: tuple[Section, ...]
     links: tuple[tuple[str, str], ...] = ()
     footer: str = ""
+    made: str = ""
+    zone: str = "UTC"
 
     def tables(self) -> tuple[Table, ...]:
         """All tables of the page."""

@@ -42,6 +42,11 @@ def not_tight(ms: float) -> str:
     )
 
 
+def _seconds(x: float) -> str:
+    """A time without an exponent."""
+    return f"{x:.3g}" if x < 1000 else f"{x:.0f}"
+
+
 def too_uncertain(limits: TuningLimits) -> str:
     """Why no SIMC settings could be found."""
     return (
@@ -72,7 +77,7 @@ def no_travel(loop: Loop) -> str:
 def settings(controller: Pid) -> str:
     """Kp and Ti in words, in percent of spans and seconds."""
     ti = integral_s(controller)
-    return f"Kp {controller.kp:.3g} %/%, Ti {f'{ti:.3g} s' if math.isfinite(ti) else 'off'}"
+    return f"Kp {controller.kp:.3g} %/%, Ti {f'{_seconds(ti)} s' if math.isfinite(ti) else 'off'}"
 
 
 def tight(loop: Loop, new: Pid, before: float, ms: float) -> str:
@@ -94,7 +99,7 @@ def _fault(loop: Loop) -> str:
 def _cycle(cycle: Cycle | None) -> str:
     if cycle is None:
         return "no limit cycle"
-    return f"a cycle of {cycle.period_s:.3g} s and ±{cycle.pv_amplitude:.2g} % PV"
+    return f"a cycle of {_seconds(cycle.period_s)} s and ±{cycle.pv_amplitude:.2g} % PV"
 
 
 def _percent(ratio: float) -> str:

@@ -6,7 +6,15 @@ from analyzer.columns.column import Column, Kind, Source
 
 STORED = (
     Column(
-        "night", Kind.TEXT, "Night", "", Source.RUN, "Date of the middle of the time that was assessed (UTC)."
+        "night",
+        Kind.TEXT,
+        "Night",
+        "",
+        Source.RUN,
+        "The plant's date at the middle of the time that was assessed.",
+    ),
+    Column(
+        "timezone", Kind.TEXT, "Time zone", "", Source.RUN, "The plant's time zone, as --timezone states it."
     ),
     Column(
         "start_s",
@@ -17,6 +25,31 @@ STORED = (
         "First sample of the record.",
     ),
     Column("duration_s", Kind.NUMBER, "Duration", "s", Source.EXPORT, "Length of the record."),
+    Column(
+        "pv_lo",
+        Kind.NUMBER,
+        "PV at 0 %",
+        "as pv_unit",
+        Source.LOOPS,
+        "Lower end of the range that percent of span means; of the recorded range where none is stated.",
+    ),
+    Column("pv_hi", Kind.NUMBER, "PV at 100 %", "as pv_unit", Source.LOOPS, "Upper end of that range."),
+    Column(
+        "close_first_s",
+        Kind.NUMBER,
+        "Start of the close view",
+        "s since 1970-01-01 UTC",
+        Source.OSCILLATION,
+        "Start of the last ten periods, of which the trends keep finer buckets.",
+    ),
+    Column(
+        "close_last_s",
+        Kind.NUMBER,
+        "End of the close view",
+        "s since 1970-01-01 UTC",
+        Source.OSCILLATION,
+        "End of the last ten periods.",
+    ),
     Column(
         "good_h",
         Kind.NUMBER,

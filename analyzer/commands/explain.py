@@ -76,17 +76,17 @@ def explain(
         case, _ = _case(asked, tag)
         found = explained(case, _told_candidate, brought)
     except NotAssessedError as error:
-        _show(abstained(tag, str(error)), None, form, out)
+        _show(abstained(tag, str(error)), None, form, out, asked.zone)
         click.echo(f"triage: {error}", err=True)
         sys.exit(NOTHING_DONE)
     finally:
         _told_candidate("")
     if save_model is not None:
         write_model(found.model(), save_model)
-    _show(found.data, found, form, out)
+    _show(found.data, found, form, out, asked.zone)
 
 
-def _show(data: dict[str, Any], found: Explained | None, form: str, out: Path | None) -> None:
+def _show(data: dict[str, Any], found: Explained | None, form: str, out: Path | None, zone: str) -> None:
     """Print the answer in a format, or write its page into a folder."""
     if form == "json":
         click.echo(json.dumps(data))
@@ -95,14 +95,14 @@ def _show(data: dict[str, Any], found: Explained | None, form: str, out: Path | 
 
         click.echo("\n".join(lines(data)))
     else:
-        _show_page(data, found, form, out)
+        _show_page(data, found, form, out, zone)
 
 
-def _show_page(data: dict[str, Any], found: Explained | None, form: str, out: Path | None) -> None:
+def _show_page(data: dict[str, Any], found: Explained | None, form: str, out: Path | None, zone: str) -> None:
     from analyzer.explain import page as pages
     from reports import folder, html, markdown
 
-    page = pages.abstention(data) if found is None else pages.page(found)
+    page = pages.abstention(data) if found is None else pages.page(found, zone)
     if out is None:
         click.echo(html.render(page, True) if form == "html" else markdown.render(page, ""))
         return

@@ -7,13 +7,14 @@ import sys
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from datetime import UTC, datetime
+from datetime import datetime
 from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from analyzer.plant_clock import seconds, zone_of
 from identification.errors import InputError, TriageError
 
 if TYPE_CHECKING:
@@ -50,16 +51,17 @@ def told(command: Callable[..., Any]) -> Callable[..., Any]:
     return wrapped
 
 
-def utc_seconds(at: datetime | None, otherwise: float) -> float:
-    """A day or time of the command line as UTC [s since 1970-01-01]."""
-    return otherwise if at is None else at.replace(tzinfo=UTC).timestamp()
+def utc_seconds(at: datetime | None, zone: str, otherwise: float) -> float:
+    """A day or time of the plant's clock, as the command line states it [s since 1970-01-01 UTC]."""
+    return otherwise if at is None else seconds(at, zone)
 
 
 @dataclass(frozen=True, slots=True)
 class Asked:
     """What the command line asks of an export: files, loops, changes of settings, span of time [s, UTC] and limits.
 
-    reading : how text exports are read, as in analyzer.history.options.
+    zone : the plant's time zone, of nights, pages and options; reading : how text exports are read, as in
+    analyzer.history.options.
     """
 
     export: tuple[Path, ...]
@@ -68,6 +70,7 @@ class Asked:
     since_s: float
     until_s: float
     config: Config
+    zone: str
     reading: Mapping[str, Any]
 
     def opened(self) -> tuple[Export, tuple[LoopSpec, ...], tuple[str, ...]]:
@@ -95,11 +98,12 @@ def _asked(
     from analyzer.config_file import read_config
     from analyzer.loops.changes import read_changes
 
-    dated = () if changes is None else tuple(read_changes(changes))
-    first, last = utc_seconds(since, -math.inf), utc_seconds(until, math.inf)
+    zone = str(zone_of(reading["timezone"]))
+    dated = () if changes is None else tuple(read_changes(changes, zone))
+    first, last = utc_seconds(since, zone, -math.inf), utc_seconds(until, zone, math.inf)
     if last <= first:
         raise InputError(f"--since {since} --until {until}", "an end after the start", "swap them")
-    return Asked(export, loops, dated, first, last, read_config(config), reading)
+    return Asked(export, loops, dated, first, last, read_config(config), zone, reading)
 
 
 def config_option(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -108,6 +112,8 @@ def config_option(command: Callable[..., Any]) -> Callable[..., Any]:
     return click.option("--config", type=click.Path(path_type=Path), help=text)(command)
 
 
+TIMES = ("%Y-%m-%d", *(f"%Y-%m-%d{between}%H:%M{end}" for between in "T " for end in (":%S", "")))
+"""How --since and --until may be written."""
 OPTIONS = (
     click.argument("export", nargs=-1, required=True, type=click.Path(path_type=Path)),
     click.option(
@@ -118,10 +124,24 @@ OPTIONS = (
         type=click.Path(path_type=Path),
         help="changes.csv: when settings were changed, old and new.",
     ),
-    click.option("--since", type=click.DateTime(), help="First day or time (UTC) of samples that are used."),
-    click.option("--until", type=click.DateTime(), help="Day or time (UTC) before which samples are used."),
+    click.option(
+        "--since",
+        type=click.DateTime(TIMES),
+        metavar="TIME",
+        help="First day or time of samples that are used.",
+    ),
+    click.option(
+        "--until",
+        type=click.DateTime(TIMES),
+        metavar="TIME",
+        help="Day or time before which samples are used.",
+    ),
     config_option,
-    click.option("--timezone", help="Time zone of stamps without one, e.g. Europe/Helsinki. Default UTC."),
+    click.option(
+        "--timezone",
+        help="The plant's time zone, e.g. Europe/Helsinki: of stamps that state none, of nights, pages and "
+        "the times given here. Default UTC.",
+    ),
     click.option("--delimiter", help="Delimiter of text exports. Default: detected."),
     click.option("--decimal", type=click.Choice([".", ","]), help="Decimal mark. Default: detected."),
     click.option("--encoding", help="Encoding of text exports. Default: detected."),

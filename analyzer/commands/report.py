@@ -23,13 +23,13 @@ if TYPE_CHECKING:
 SOME_LOST = 1
 
 
-def _span(texts: Sequence[str] | None, option: str) -> Span | None:
+def _span(texts: Sequence[str] | None, option: str, zone: str) -> Span | None:
     from analyzer.loops.changes import parse_time
     from analyzer.spans import Span
 
     if not texts:
         return None
-    first, last = (parse_time(t, option) for t in texts)
+    first, last = (parse_time(t, option, zone) for t in texts)
     if last <= first:
         raise InputError(f"{option} {texts[0]} {texts[1]}", "an end after the start", "swap them")
     return Span(first, last)
@@ -50,15 +50,30 @@ def _asked(
     if find:
         return detected(store, [loop] if loop else None, limits)
     if changes is not None:
-        return [c for c in read_changes(changes) if loop in (None, c.loop)]
+        return [c for c in read_changes(changes, store.zone()) if loop in (None, c.loop)]
     if loop is not None and changed is not None:
-        return [TuningChange(loop, parse_time(changed, "--changed"))]
+        return [TuningChange(loop, parse_time(changed, "--changed", store.zone()))]
     raise InputError("no change named", "--changes FILE, --loop TAG --changed TIME, or --find", "name one")
 
 
-def _written(pages: Sequence[Page], form: str, out: Path, single_file: bool) -> None:
+def made(store: Store) -> str:
+    """What pages were made with, of what and when."""
+    import time
+    from importlib.metadata import version
+
+    from analyzer.plant_clock import stamp
+
+    zone, name = store.zone(), store.path.resolve().name
+    return f"triage {version('loop-triage')}, store {name}, made {stamp(time.time(), zone)}; times in {zone}"
+
+
+def _written(store: Store, pages: Sequence[Page], form: str, out: Path, single_file: bool) -> None:
+    from dataclasses import replace
+
     from reports.folder import write_csv, write_html, write_markdown
 
+    head, zone = made(store), store.zone()
+    pages = [replace(page, made=head, zone=zone) for page in pages]
     paths = write_html(pages, out, single_file) if form == "html" else write_markdown(pages, out)
     for page in pages:
         write_csv(page, out)
@@ -109,13 +124,14 @@ def report(
 
     kept, limits = Store(store), read_config(config)
     kept.require()
-    spans = Spans(days, _span(before, "--before"), _span(after, "--after"))
+    zone = kept.zone()
+    spans = Spans(days, _span(before, "--before", zone), _span(after, "--after", zone))
     asked = _asked(kept, changes, loop, changed, find, limits.changes)
     found, missing = cases(kept, asked, spans, limits.before_after)
     if not found:
         why = "; ".join(f"{tag}: {reason}" for tag, reason in missing) or "no change found"
         raise InputError(why, "loops and times that the store holds", "check the tags and times")
-    _written([page(found, missing, _subtitle(spans, store), find)], form, out, single_file)
+    _written(kept, [page(found, missing, _subtitle(spans, store), find, zone)], form, out, single_file)
     for tag, reason in missing:
         click.echo(f"{tag}: {reason}", err=True)
     sys.exit(SOME_LOST if missing else 0)
@@ -140,7 +156,7 @@ def pages(store: Path, night: str | None, top: int, form: str, single_file: bool
 
     kept = Store(store)
     kept.require()
-    _written(list(night_pages.pages(kept, night, top)), form, out, single_file)
+    _written(kept, list(night_pages.pages(kept, night, top)), form, out, single_file)
 
 
 COMMANDS = (report, pages)

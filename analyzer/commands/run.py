@@ -159,7 +159,17 @@ def _assessed(
     span = asked.since_s, asked.until_s
     with bar("loops") as progress:
         outcome = batch.run(
-            source, specs, store, asked.config, jobs, resume, *span, progress, replacing, asked.changes
+            source,
+            specs,
+            store,
+            asked.config,
+            jobs,
+            resume,
+            *span,
+            progress,
+            replacing,
+            asked.changes,
+            asked.zone,
         )
     more = len(outcome.notes) - FEW
     _say(outcome.notes[:FEW])

@@ -71,7 +71,7 @@ def _explained(q: Question) -> tuple[dict[str, Any], str]:
     series = {tag: cut(s, q.night) for tag, s in q.export.read(tags).items()}
     specs = (q.spec,) if q.source is None else (q.spec, q.source)
     found = explained(case(q.spec, specs, series, q.config), lambda name: None)
-    return found.data, dumps(page(found))
+    return found.data, dumps(page(found, q.night.zone))
 
 
 def row_of(data: Mapping[str, Any], night: str, page: str = "") -> Row:

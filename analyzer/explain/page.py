@@ -25,6 +25,7 @@ from analyzer.explain.page_words import (
 )
 from analyzer.explain.views import Tried
 from analyzer.pages.words import duration, number, stamp
+from analyzer.plant_clock import UTC_NAME
 from identification.estimation.limits import HELD_OUT
 from identification.mismatch.words import check, discriminating_test, located_sentence
 from reports.names import slug
@@ -37,13 +38,8 @@ SHOWN = 12
 """Names shown of those that were tried."""
 
 
-def page(e: Explained) -> Page:
-    """The page of one loop's explanation.
-
-    Parameters
-    ----------
-    e : Explained
-    """
+def page(e: Explained, zone: str = UTC_NAME) -> Page:
+    """The page of one loop's explanation, with times on the plant's clock."""
     sections = [
         Section("What it is", _verdict(e)),
         Section("Recording and simulation", plots.trends(e)),
@@ -55,15 +51,15 @@ def page(e: Explained) -> Page:
         *_controller(e),
     ]
     spec = e.case.spec
-    about = [spec.description, spec.type, spec.area, _recorded(e)]
+    about = [spec.description, spec.type, spec.area, _recorded(e, zone)]
     heading = f"{spec.loop}: {title(e.said.verdict)}"
     return Page(
         f"{slug(spec.loop)}-explained",
         heading,
         ", ".join(a for a in about if a),
         tuple(sections),
-        (),
-        _footer(e),
+        footer=_footer(e),
+        zone=zone,
     )
 
 
@@ -74,9 +70,11 @@ def abstention(data: Mapping[str, Any]) -> Page:
     return Page(name, f"{data['loop']}: not told", "", (Section("What is missing", (text,)),))
 
 
-def _recorded(e: Explained) -> str:
+def _recorded(e: Explained, zone: str) -> str:
     r = e.case.prepared.record
-    return f"{stamp(r.start_s)} UTC, {duration(len(r) * r.dt_s)}, a sample each {figure(r.dt_s, 's')}"
+    return (
+        f"{stamp(r.start_s, zone)} {zone}, {duration(len(r) * r.dt_s)}, a sample each {figure(r.dt_s, 's')}"
+    )
 
 
 def _footer(e: Explained) -> str:

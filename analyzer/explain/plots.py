@@ -54,7 +54,7 @@ def trend(e: Explained, name: str, title: str, part: slice, buckets: int, captio
 def trends(e: Explained) -> tuple[Trend, ...]:
     """The whole recording, and the stretch that tells most at full resolution."""
     marked = "Shaded: the spans that carry the misfit. " if e.said.where.get("spans") else ""
-    how = "Wheel or drag zooms, shift-drag or arrows move, double click shows all; UTC."
+    how = "Drag, or the wheel with Ctrl, zooms; shift-drag or arrows move, double click shows all."
     whole = slice(0, e.case.subject.pv.size)
     first = trend(e, "recording", "The whole recording", whole, WHOLE, marked + how)
     if e.views.close is None:

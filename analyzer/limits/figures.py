@@ -49,7 +49,7 @@ class NightLimits:
         36.0,
         "h",
         (1.0, 10000.0),
-        "Records up to this long are one night; longer ones are cut at midnights (UTC)",
+        "Records up to this long are one night; longer ones are cut at the plant's midnights",
         "ours",
     )
     least_piece_h: float = limit(

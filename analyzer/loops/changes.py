@@ -16,6 +16,7 @@ import numpy as np
 from analyzer.block_bootstrap import Floats
 from analyzer.config import ChangeLimits
 from analyzer.history.encoding import detect_encoding
+from analyzer.plant_clock import UTC_NAME, seconds
 from identification.errors import InputError
 
 COLUMNS = ("loop", "time", "kp_old", "ti_old", "kp_new", "ti_new", "who")
@@ -39,8 +40,8 @@ class TuningChange:
     seen: str = ""
 
 
-def parse_time(text: str, where: str) -> float:
-    """A time as seconds since 1970-01-01 UTC; without a zone it is UTC.
+def parse_time(text: str, where: str, zone: str = UTC_NAME) -> float:
+    """A time as seconds since 1970-01-01 UTC; one that states no zone is of the plant's clock.
 
     Raises
     ------
@@ -52,7 +53,7 @@ def parse_time(text: str, where: str) -> float:
     stamp: Any = pd.to_datetime([text.strip()], errors="coerce")[0]
     if stamp is pd.NaT:
         raise InputError(f"{where}: time {text!r}", "a time such as 2026-03-09T08:00:00Z", "correct the time")
-    return float(stamp.tz_localize("UTC").timestamp() if stamp.tz is None else stamp.timestamp())
+    return seconds(stamp.to_pydatetime(), zone)
 
 
 def _number(text: str, where: str, column: str) -> float | None:
@@ -67,8 +68,10 @@ def _number(text: str, where: str, column: str) -> float | None:
     return value
 
 
-def read_changes(path: Path) -> tuple[TuningChange, ...]:
+def read_changes(path: Path, zone: str = UTC_NAME) -> tuple[TuningChange, ...]:
     """Read changes.csv: loop and time are required, the settings and `who` are shown where they are given.
+
+    Times that state no zone are of the plant's clock, in `zone`.
 
     Raises
     ------
@@ -88,15 +91,17 @@ def read_changes(path: Path) -> tuple[TuningChange, ...]:
         if required not in names:
             raise InputError(f"{path}: no column {required!r}", "columns " + ", ".join(COLUMNS), "add it")
     rows = [{k: (row[n] or "") for k, n in names.items() if k in COLUMNS} for row in reader]
-    found = tuple(_change(row, f"{path}, row {i}") for i, row in enumerate(rows, 2) if row["loop"].strip())
+    found = tuple(
+        _change(row, f"{path}, row {i}", zone) for i, row in enumerate(rows, 2) if row["loop"].strip()
+    )
     if not found:
         raise InputError(f"{path}: no changes", "one row a change below the header", "add the changes")
     return found
 
 
-def _change(row: Mapping[str, str], where: str) -> TuningChange:
+def _change(row: Mapping[str, str], where: str, zone: str) -> TuningChange:
     kp_old, ti_old, kp_new, ti_new = (_number(row.get(c, ""), where, c) for c in COLUMNS[2:6])
-    time_s, who = parse_time(row["time"], where), row.get("who", "").strip()
+    time_s, who = parse_time(row["time"], where, zone), row.get("who", "").strip()
     return TuningChange(row["loop"].strip(), time_s, kp_old, ti_old, kp_new, ti_new, who)
 
 

@@ -14,6 +14,7 @@ from analyzer.pages.headings import heading
 from analyzer.pages.reading import Thinned
 from analyzer.pages.trends import trend_block
 from analyzer.pages.words import KINDS, counted, interval, number, setting, signed, stamp
+from analyzer.plant_clock import UTC_NAME
 from reports.pages import (
     Block,
     Cell,
@@ -177,18 +178,18 @@ def _settings(change: TuningChange, units: str) -> str:
     return f"{old} → Kp {setting(change.kp_new)}, Ti {setting(change.ti_new)} ({units})"
 
 
-def _span(first_s: float, last_s: float, usable_h: float) -> str:
-    return f"{stamp(first_s)} to {stamp(last_s)} UTC, {usable_h:.0f} usable hours"
+def _span(first_s: float, last_s: float, usable_h: float, zone: str) -> str:
+    return f"{stamp(first_s, zone)} to {stamp(last_s, zone)} {zone}, {usable_h:.0f} usable hours"
 
 
-def loop_section(case: Case, number_: int) -> Section:
+def loop_section(case: Case, number_: int, zone: str = UTC_NAME) -> Section:
     """What became of one loop: settings, spans, remarks, trends (the study's Figure 10)."""
     found, change = case.found, case.change
     facts = (
         ("Settings", _settings(change, case.units)),
-        ("Changed", f"{stamp(change.time_s)} UTC" + (f" by {change.who}" if change.who else "")),
-        ("Before", _span(found.before.first_s, found.before.last_s, found.hours[0])),
-        ("After", _span(found.after.first_s, found.after.last_s, found.hours[1])),
+        ("Changed", f"{stamp(change.time_s, zone)} {zone}" + (f" by {change.who}" if change.who else "")),
+        ("Before", _span(found.before.first_s, found.before.last_s, found.hours[0], zone)),
+        ("After", _span(found.after.first_s, found.after.last_s, found.hours[1], zone)),
     )
     text = outcome(found)
     blocks: list[Block] = [Text((text[:1].upper() + text[1:] + ".",), "lead"), Facts(facts)]
@@ -228,9 +229,13 @@ OFFERED = "These changes were not stated but seen in the loops' behaviour: confi
 
 
 def page(
-    cases: Sequence[Case], missing: Sequence[tuple[str, str]], subtitle: str, offered: bool = False
+    cases: Sequence[Case],
+    missing: Sequence[tuple[str, str]],
+    subtitle: str,
+    offered: bool = False,
+    zone: str = UTC_NAME,
 ) -> Page:
-    """The page of all changes; `missing` are changes that could not be looked at, with the reason."""
+    """The page of all changes on the plant's clock; `missing` could not be looked at, with the reason."""
     short: list[Block] = [Text((OFFERED,))] if offered else []
     short += [_tiles(cases), Listing(tuple((c.found.loop, outcome(c.found)) for c in cases))]
     if missing:
@@ -240,8 +245,8 @@ def page(
         Section("On average", (average_chart(cases),)),
         Section("Per loop and assessment", (per_loop_chart(cases),)),
         Section("Figures before and after", (figures(cases, True, "figures", ""),)),
-        *(loop_section(c, i) for i, c in enumerate(cases)),
+        *(loop_section(c, i, zone) for i, c in enumerate(cases)),
         Section("Other figures", (figures(cases, False, "other-figures", ""),), closed=True),
         _method(cases[0].found.limits if cases else LIMITS),
     )
-    return Page("before-after", "What the changes brought", subtitle, sections)
+    return Page("before-after", "What the changes brought", subtitle, sections, zone=zone)

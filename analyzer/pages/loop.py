@@ -12,15 +12,17 @@ from analyzer.columns.table import BY_NAME
 from analyzer.decisions import CAUSES, Fault, Status
 from analyzer.explain.agreement import agreement
 from analyzer.explain.page_words import title
+from analyzer.pages.engineering import Scale, beside, scale_of
 from analyzer.pages.headings import heading, headings, titled
 from analyzer.pages.reading import Thinned
 from analyzer.pages.rhythm import rhythm_plots
-from analyzer.pages.trends import trend_block
+from analyzer.pages.trends import LEAST_PCT, close_span, trend_block
 from analyzer.pages.words import duration, number
+from analyzer.pages.work_order import work_order
 from analyzer.units import row_settings
 from identification.mismatch.words import check
 from reports.names import slug
-from reports.pages import Block, Cell, Column, Facts, Line, Page, Plot, Section, Table, Text
+from reports.pages import Block, Cell, Column, Facts, Line, Listing, Page, Plot, Section, Table, Text
 
 Row = Mapping[str, Any]
 WEEK = 7
@@ -28,12 +30,16 @@ FIGURES = (
     *("oscillation_significance", "oscillating_pct", "average_absolute_error_pct", "variability_pct"),
     *("valve_travel_pct_per_h", "reversals_per_h", "crossings_per_h", "noise_band_pct", "harris_index"),
     *("settling_time_s", "regularity", "normal_pct", "at_limits_pct", "service_pct", "usable_h"),
-    *("sp_mean_pct", "pv_mean_pct", "op_mean_pct"),
+    *("sp_mean_pct", "pv_mean_pct", "op_mean_pct", "manual_pct", "frozen_pct", "lasting_error_pct"),
+    *("error_memory_ti", "loss"),
 )
 MODEL = (
     *("gain", "time_constant_s", "slope_pct_per_s", "dead_time_s"),
     *("backlash_pct", "stickband_pct", "slip_jump_pct"),
 )
+LEVELS = frozenset({"sp_mean_pct", "pv_mean_pct"})
+"""Figures that are places and no sizes: their own unit has another zero."""
+LIKELIHOOD = ("evidence", "valve_size")
 CYCLES = (
     ("recorded", "period_s", "pv_amplitude_pct"),
     ("predicted by the model", "predicted_period_s", "predicted_pv_amplitude_pct"),
@@ -41,6 +47,17 @@ CYCLES = (
 )
 COLUMNS = (
     *("loop", "type", "area", "description", "pv_unit", "status", "reason", "action", "cause", "valve_fault"),
+    *(
+        "pv_lo",
+        "pv_hi",
+        "close_first_s",
+        "close_last_s",
+        "lanes",
+        "evidence",
+        "valve_size",
+        "timezone",
+        "lack",
+    ),
     *(
         "source_loop",
         "group",
@@ -76,10 +93,23 @@ def _facts(row: Row) -> Facts:
     return Facts(tuple(facts))
 
 
-def _verdict(row: Row) -> Section:
-    """What is wrong, what to do, and what the advice promises, where the night holds it."""
+def _first(row: Row, thin: Thinned | None) -> Section:
+    """What is wrong, what to do in three lines, and ten periods of it."""
     reason = row["reason"] or "nothing was found"
-    blocks: list[Block] = [Text((reason[:1].upper() + reason[1:] + ".",), "lead"), _facts(row)]
+    blocks: list[Block] = [Text((reason[:1].upper() + reason[1:] + ".",), "lead")]
+    order = work_order(row)
+    if order:
+        blocks.append(Listing(tuple((f"{lead}:", text) for lead, text in order if text)))
+    if thin is not None and thin.time_s.size > 1:
+        opening = close_span(row, thin)
+        title = "SP, PV and OP" + (", the last ten periods" if opening else "")
+        blocks.append(trend_block("trend", title, thin, (), scale_of(row), opening))
+    return Section("What to do", tuple(blocks))
+
+
+def _verdict(row: Row) -> Section:
+    """What was found, and what the advice rests on, where the night holds it."""
+    blocks: list[Block] = [_facts(row)]
     if row["advice"]:
         blocks.append(Text((row["advice"],)))
     return Section("What and why", tuple(blocks))
@@ -101,7 +131,7 @@ def _evidence(row: Row) -> Section:
         for s in signs
     )
     blocks: list[Block] = [Table("evidence", "", columns, rows)] if rows else [Text(("No sign of a fault.",))]
-    known = [titled(k, number(row[k])) for k in MODEL if row[k] is not None]
+    known = [titled(k, number(row[k])) for k in (*MODEL, *LIKELIHOOD) if row[k] is not None]
     if known:
         blocks.append(Facts(tuple(known)))
     if row["notes"]:
@@ -109,11 +139,18 @@ def _evidence(row: Row) -> Section:
     return Section("Evidence", tuple(blocks))
 
 
-def _pv_op(thin: Thinned) -> Plot:
-    shown = ~thin.gap
-    line = Line("PV over OP", thin.middle("op")[shown], thin.middle("pv")[shown], joined=False)
+def _pv_op(thin: Thinned, row: Row) -> Plot:
+    scale = scale_of(row)
+    close = close_span(row, thin)
+    part = thin.between(*close) if close else thin
+    shown = ~part.gap
+    pv, op = scale.of(part.middle("pv")[shown]), part.middle("op")[shown]
+    line = Line("PV over OP", op, pv, joined=close is not None)
     caption = "A cloud along a line: a sound valve. An ellipse or a parallelogram: lag, play or stick-slip."
-    return Plot("pv-op", "PV over OP, the last night", "OP [%]", "PV [% of span]", (line,), (), caption)
+    middle, half = float(np.median(pv)) if pv.size else 0.0, 0.5 * LEAST_PCT * scale.span / 100.0
+    title = "PV over OP, " + ("the last ten periods" if close else "the last night")
+    reach = (middle - half, middle + half)
+    return Plot("pv-op", title, "OP [%]", f"PV [{scale.label}]", (line,), (), caption, reach=reach)
 
 
 HISTORY = (
@@ -145,8 +182,17 @@ def _history(rows: Sequence[Row]) -> Section:
         line = Line("significance", points[:, 0], points[:, 1])
         shown = BY_NAME["oscillation_significance"]
         title = f"{shown.title} over the nights"
-        blocks.insert(0, Plot("nights", title, "nights before this one", shown.unit, (line,)))
+        blocks.insert(
+            0, Plot("nights", title, "nights before this one", shown.unit, (line,), reach=(0.0, 1.0))
+        )
     return Section("Over the nights", tuple(blocks))
+
+
+def _figure(name: str, row: Row, scale: Scale) -> tuple[str, str]:
+    """A figure with its unit, and in the loop's own unit too where it is a percentage of span."""
+    term, text = titled(name, number(row[name]))
+    own = "" if name in LEVELS else beside(BY_NAME[name].unit, row[name], scale)
+    return term, text + own
 
 
 def _limit_cycle(row: Row) -> list[Section]:
@@ -167,11 +213,8 @@ def _trends(thin: Thinned | None, row: Row) -> list[Section]:
     if thin is None or thin.time_s.size < 2:
         return []
     last = thin.between(row["start_s"] or 0.0, float("inf"))
-    pictures = (_pv_op(last), *rhythm_plots(last, row["period_s"]))
-    return [
-        Section("Trends", (trend_block("trend", "SP, PV and OP", thin),)),
-        Section("PV over OP, and its rhythm", pictures),
-    ]
+    pictures = (_pv_op(last, row), *rhythm_plots(last, row["period_s"]))
+    return [Section("PV over OP, and its rhythm", pictures)]
 
 
 def _explained(found: Row | None, row: Row) -> list[Section]:
@@ -210,8 +253,10 @@ def page(
         What it shares with other loops.
     """
     row = rows[-1]
-    figures = [titled(k, number(row[k])) for k in FIGURES if row[k] is not None]
+    scale = scale_of(row)
+    figures = [_figure(k, row, scale) for k in FIGURES if row[k] is not None]
     sections = [
+        _first(row, thin),
         _verdict(row),
         *(() if shared is None else (shared,)),
         *_explained(explained, row),
@@ -220,7 +265,7 @@ def page(
         *_limit_cycle(row),
         _history(rows),
     ]
-    sections.insert(-1, Section("Figures of the night", (Facts(tuple(figures)),)))
+    sections.insert(-1, Section("Figures of the night, for experts", (Facts(tuple(figures)),), closed=True))
     known = [row["description"], row["type"], row["area"], f"night {row['night']}"]
     links = (("All loops", index),) + (() if more is None else (("The explanation", f"{more.name}.html"),))
     if shared is not None and row["group"]:

@@ -83,7 +83,7 @@ def read_nights(
 ) -> list[dict[str, Any]]:
     """Rows of several nights, oldest first; columns that a night lacks are None."""
     rows: list[dict[str, Any]] = []
-    for night in nights:
+    for night in nights if loops is None or loops else ():
         path = store.path / "nights" / f"{night}.parquet"
         held = [c for c in columns if c in set(pq.read_schema(path).names)]
         where = [("loop", "in", sorted(loops))] if loops is not None else None

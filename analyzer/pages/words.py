@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from datetime import UTC, datetime
 from typing import Any
 
 from analyzer.before_after import Change, Verdict
+from analyzer.plant_clock import stamp
 from analyzer.units import duration
 
 __all__ = ["KINDS", "counted", "duration", "interval", "number", "setting", "signed", "stamp"]
@@ -34,11 +34,6 @@ def signed(value: float | None) -> str:
         return "–"
     text = f"{value:+.1f}" if abs(value) < 9.95 else f"{value:+.0f}"
     return text.replace("-", "−")
-
-
-def stamp(time_s: float) -> str:
-    """A time to the minute, UTC."""
-    return datetime.fromtimestamp(time_s, UTC).strftime("%Y-%m-%d %H:%M")
 
 
 def interval(change: Change) -> str:

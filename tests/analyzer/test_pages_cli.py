@@ -9,8 +9,9 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner, Result
 
+from analyzer.columns.table import NIGHTS, row_of
 from analyzer.commands.report import pages, report
-from analyzer.store import Store
+from analyzer.store import Store, rows_table, write_table
 from identification.errors import InputError
 from tests.reports.small_store import NASTY, small_store
 
@@ -90,3 +91,12 @@ def test_commands_are_quick_to_import() -> None:
     code = f"import sys, analyzer.commands.report; print([m for m in {heavy} if m in sys.modules])"
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert found.stdout.strip() == "[]"
+
+
+def test_a_calm_night_has_its_page(tmp_path: Path) -> None:
+    """Where no loop is worth a look the morning page is written all the same, and no loop's page beside it."""
+    rows = [row_of({"loop": "FIC1", "night": "2026-03-02", "status": "ok", "cause": "none"})]
+    write_table(rows_table(rows, NIGHTS), tmp_path / "store" / "nights" / "2026-03-02.parquet")
+    found = CliRunner().invoke(pages, [str(tmp_path / "store"), "--out", str(tmp_path / "out")])
+    assert found.exit_code == 0, found.output
+    assert [p.name for p in sorted((tmp_path / "out").glob("*.html"))] == ["index.html"]

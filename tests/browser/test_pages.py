@@ -190,10 +190,12 @@ def test_zooming(browser: Any, folder: Path) -> None:
     assert width() == pytest.approx(whole / 4)
     figure.send_keys("0")
     assert width() == pytest.approx(whole)
-    wheel = (
-        "arguments[0].dispatchEvent(new WheelEvent('wheel', {deltaY: -100, clientX: 600, cancelable: true}))"
-    )
-    browser.execute_script(wheel, over)
+    wheel = """const sent = new WheelEvent('wheel',
+        {deltaY: -100, clientX: 600, cancelable: true, ctrlKey: arguments[1]});
+        arguments[0].dispatchEvent(sent); return sent.defaultPrevented;"""
+    assert not browser.execute_script(wheel, over, False)  # without Ctrl the page scrolls
+    assert width() == pytest.approx(whole)
+    assert browser.execute_script(wheel, over, True)
     assert width() == pytest.approx(0.75 * whole)
     figure.send_keys("0")
     chain = ActionChains(browser).move_to_element_with_offset(over, -200, 0).click_and_hold()

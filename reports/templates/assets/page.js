@@ -87,8 +87,23 @@
     return getComputedStyle(document.documentElement).getPropertyValue("--" + name).trim();
   }
 
+  const asked = document.documentElement.dataset.zone || "UTC";
+  const clock = clockOf(asked) || clockOf("UTC");
+  const zone = clock.resolvedOptions().timeZone;
+
+  function clockOf(name) {
+    try {
+      return new Intl.DateTimeFormat("en-GB", { timeZone: name, hourCycle: "h23", year: "numeric", month: "2-digit",
+        day: "2-digit", hour: "2-digit", minute: "2-digit", second: "2-digit" });
+    } catch (error) {
+      return null;
+    }
+  }
+
   function stamp(seconds) {
-    return new Date(seconds * 1000).toISOString().slice(0, 19).replace("T", " ");
+    const part = {};
+    clock.formatToParts(new Date(seconds * 1000)).forEach((p) => { part[p.type] = p.value; });
+    return part.year + "-" + part.month + "-" + part.day + " " + part.hour + ":" + part.minute + ":" + part.second;
   }
 
   function figureOf(value) {
@@ -167,7 +182,7 @@
     function told(index) {
       readout.replaceChildren();
       if (index === null || index === undefined) return;
-      readout.append(stamp(time[index]) + " UTC");
+      readout.append(stamp(time[index]) + " " + zone);
       data.bands.forEach((band, i) => {
         const low = values[i].low[index], high = values[i].high[index];
         if (low === null) return;
@@ -182,6 +197,7 @@
     function handlers(u) {
       const over = u.over;
       over.addEventListener("wheel", (event) => {
+        if (!event.ctrlKey && !event.metaKey) return; // the page scrolls, unless the trend is meant
         event.preventDefault();
         const box = over.getBoundingClientRect();
         zoom(event.deltaY < 0 ? 0.75 : 1 / 0.75, (event.clientX - box.left) / box.width);
@@ -203,6 +219,43 @@
         document.addEventListener("mouseup", drop);
       }, true);
       over.addEventListener("dblclick", () => show(whole.min, whole.max));
+      fingers(over);
+    }
+
+    /* Two fingers zoom and move; one scrolls the page. */
+    function fingers(over) {
+      const at = new Map();
+      let from = null;
+      over.style.touchAction = "pan-y";
+      over.addEventListener("pointerdown", (event) => {
+        if (event.pointerType !== "touch") return;
+        at.set(event.pointerId, event.clientX);
+        from = at.size === 2 ? { x: Array.from(at.values()), now: { ...now } } : null;
+      });
+      over.addEventListener("pointermove", (event) => {
+        if (!at.has(event.pointerId)) return;
+        at.set(event.pointerId, event.clientX);
+        if (!from || at.size !== 2) return;
+        const box = over.getBoundingClientRect(), x = Array.from(at.values());
+        const time = from.x.map((p) => from.now.min + (p - box.left) / box.width * (from.now.max - from.now.min));
+        if (Math.abs(x[1] - x[0]) < 10 || (x[1] - x[0]) * (time[1] - time[0]) <= 0) return;
+        const rate = (time[1] - time[0]) / (x[1] - x[0]), min = time[0] - (x[0] - box.left) * rate;
+        show(min, min + box.width * rate);
+      });
+      ["pointerup", "pointercancel", "pointerleave"].forEach((kind) => over.addEventListener(kind, (event) => {
+        at.delete(event.pointerId);
+        from = null;
+      }));
+    }
+
+    function reached(panel) {
+      const least = (data.least || [])[panel] || 0;
+      return (u, min, max) => {
+        if (min === null || max === null) return [0, 1];
+        const wanted = Math.max(max - min, least), spare = (wanted - (max - min)) / 2;
+        const pad = 0.05 * (wanted || 1);
+        return [min - spare - pad, max + spare + pad];
+      };
     }
 
     function axis(extra) {
@@ -211,8 +264,11 @@
     }
 
     function ticks(u, splits, axisIndex, space, step) {
-      return splits.map((s) => (s === null ? "" : step >= 86400 || s % 86400 === 0 ? stamp(s).slice(5, 10)
-        : stamp(s).slice(11, step < 60 ? 19 : 16)));
+      return splits.map((s) => {
+        if (s === null) return "";
+        const text = stamp(s);
+        return step >= 86400 || text.endsWith("00:00:00") ? text.slice(5, 10) : text.slice(11, step < 60 ? 19 : 16);
+      });
     }
 
     const sync = uPlot.sync(figure.id);
@@ -227,9 +283,10 @@
       });
       const options = {
         width: Math.max(holders[panel].clientWidth, 200), height: panel === 0 ? 240 : 150,
-        tzDate: (ts) => uPlot.tzDate(new Date(ts * 1000), "Etc/UTC"),
+        tzDate: (ts) => uPlot.tzDate(new Date(ts * 1000), zone),
         legend: { show: false }, series, bands,
-        scales: { x: { time: true, auto: false, min: whole.min, max: whole.max, range: () => [now.min, now.max] } },
+        scales: { x: { time: true, auto: false, min: whole.min, max: whole.max, range: () => [now.min, now.max] },
+          y: { range: reached(panel) } },
         axes: [axis({ space: 70, values: ticks }), axis({ label, labelSize: 18, labelFont: "11px sans-serif", size: 48 })],
         cursor: { sync: { key: sync.key }, drag: { x: true, y: false, setScale: false }, y: false, focus: { prox: -1 } },
         hooks: {
@@ -274,7 +331,7 @@
     ["(prefers-color-scheme: dark)", "print"].forEach((query) => {
       matchMedia(query).addEventListener("change", () => plots.forEach((u) => u.redraw()));
     });
-    show(whole.min, whole.max);
+    show(...(data.opening || [whole.min, whole.max]));
     figure.dataset.ready = "yes";
   }
 

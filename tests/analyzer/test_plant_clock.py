@@ -1,0 +1,92 @@
+"""Nights are the plant's days, through both clock changes; times given without a zone are the plant's."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+from click.testing import CliRunner
+
+from analyzer import plant_clock
+from analyzer.cli import main
+from analyzer.config import Config
+from analyzer.loops.changes import parse_time
+from analyzer.nights import nights
+from analyzer.store import Store
+from identification.errors import InputError
+
+HELSINKI = "Europe/Helsinki"
+
+
+def at(text: str) -> float:
+    """A UTC time [s]."""
+    return datetime.fromisoformat(text).replace(tzinfo=UTC).timestamp()
+
+
+@pytest.mark.parametrize(("first", "hours"), [("2026-03-28T22:00", [23, 24]), ("2026-10-24T21:00", [25, 24])])
+def test_a_local_day_is_one_night_through_both_clock_changes(first: str, hours: list[int]) -> None:
+    """The Sundays on which Helsinki's clock changes are one night each, of 23 and 25 hours, named by their date."""
+    start = at(first)
+    found = nights([(start, start + 3600.0 * sum(hours) - 1.0)], Config().nights, HELSINKI)
+    assert [round((n.last_s - n.first_s) / 3600) for n in found] == hours
+    local = [plant_clock.local(n.first_s, HELSINKI) for n in found]
+    assert [(t.hour, t.minute) for t in local] == [(0, 0)] * 2
+    assert [n.name for n in found] == [t.strftime("%Y-%m-%d") for t in local]
+
+
+def test_utc_is_the_default() -> None:
+    """Without a zone the nights are those of UTC."""
+    start = at("2026-03-28T00:00")
+    found = nights([(start, start + 2 * 86400.0 - 1)], Config().nights)
+    assert [n.first_s for n in found] == [start, start + 86400.0]
+
+
+@pytest.mark.parametrize(
+    ("text", "utc"),
+    [("2026-07-01 08:00", "2026-07-01T05:00"), ("2026-01-01 08:00", "2026-01-01T06:00")],
+)
+def test_times_without_a_zone_are_the_plants(text: str, utc: str) -> None:
+    """08:00 in changes.csv is 05:00 UTC in summer and 06:00 in winter; a time with a zone is what it says."""
+    assert parse_time(text, "here", HELSINKI) == at(utc)
+    assert parse_time(text + "Z", "here", HELSINKI) == at(text.replace(" ", "T"))
+
+
+def test_an_unknown_zone_is_one_line() -> None:
+    """A zone that does not exist is told with an example."""
+    with pytest.raises(InputError, match="Europe/Berlin"):
+        plant_clock.zone_of("Europe/Nowhere")
+
+
+def test_the_store_and_its_pages_keep_the_zone(tmp_path: Path) -> None:
+    """`run --timezone` cuts at the plant's midnight, --since is the plant's, and the page's axis has that zone."""
+    start = at("2026-07-01T00:00")
+    n = 86400 // 10
+    stamp = (start + 10.0 * np.arange(n)) * 1e6
+    rng = np.random.default_rng(0)
+    table = {"timestamp": pa.array(stamp.astype("int64"), pa.timestamp("us", tz="UTC"))}
+    table |= {f"FIC1.{r}": pa.array(50 + rng.normal(size=n)) for r in ("SP", "PV", "OP")}
+    pq.write_table(pa.table(table), tmp_path / "export.parquet")
+    asked = [
+        "run",
+        str(tmp_path / "export.parquet"),
+        "--store",
+        str(tmp_path / "store"),
+        "--timezone",
+        HELSINKI,
+    ]
+    result = CliRunner().invoke(main, [*asked, "--since", "2026-07-01T12:00", "--until", "2026-07-01T20:00"])
+    assert result.exit_code == 0, result.output
+    store = Store(tmp_path / "store")
+    row = store.read("nights", "2026-07-01").to_pylist()[0]
+    assert (row["timezone"], store.zone()) == (HELSINKI, HELSINKI)
+    assert row["start_s"] == at("2026-07-01T09:00")
+    assert row["duration_s"] == pytest.approx(8 * 3600.0, abs=20.0)
+    drawn = CliRunner().invoke(main, ["pages", str(tmp_path / "store"), "--out", str(tmp_path / "pages")])
+    assert drawn.exit_code == 0, drawn.output
+    page = (tmp_path / "pages" / "index.html").read_text(encoding="utf-8")
+    assert f'data-zone="{HELSINKI}"' in page
+    assert f"times in {HELSINKI}" in page
