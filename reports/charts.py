@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from reports import map_charts
-from reports.pages import Graph, HeatMap, IntervalChart, Panels, Plot, Trend
+from reports.pages import Graph, HeatMap, IntervalChart, Panels, Picture, Plot, TreeMap, Trend
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -72,10 +72,12 @@ def _day(time_s: float) -> float:
     return time_s / 86400.0
 
 
-def draw(block: Trend | Plot | Panels | IntervalChart | HeatMap | Graph) -> bytes:
+def draw(block: Picture) -> bytes:
     """A picture as PNG."""
     if isinstance(block, HeatMap):
         return map_charts.heat_map(block)
+    if isinstance(block, TreeMap):
+        return map_charts.tree_map(block)
     if isinstance(block, Graph):
         return map_charts.graph(block)
     if isinstance(block, Trend):

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import os
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable, Sequence
 from pathlib import Path
 
 from reports import charts, html, markdown
@@ -18,6 +19,33 @@ def write_text(path: Path, text: str) -> Path:
     temporary.write_text(text, "utf-8", newline="\n")
     os.replace(temporary, path)
     return path
+
+
+WRITTEN = "pages.json"
+"""Where a folder keeps the names of the pages that were written into it."""
+
+
+def forget_stale(out: Path, names: Sequence[str], kept_names: Collection[str] = ()) -> list[str]:
+    """Delete pages that an earlier writing left in a folder and this one did not write; nothing else is touched.
+
+    Parameters
+    ----------
+    out : Path
+    names : sequence of str
+        Files that this writing wrote.
+    kept_names : collection of str
+        Files that stay though this writing did not write them.
+    """
+    try:
+        before = json.loads((out / WRITTEN).read_text("utf-8"))
+    except (OSError, ValueError):
+        before = []
+    known = [n for n in before if isinstance(n, str) and Path(n).name == n and n.endswith(".html")]
+    stale = [n for n in known if n not in names and n not in kept_names]
+    for name in stale:
+        (out / name).unlink(missing_ok=True)
+    write_text(out / WRITTEN, json.dumps(sorted({*names, *(set(known) - set(stale))})))
+    return stale
 
 
 def write_csv(page: Page, out: Path) -> list[Path]:

@@ -16,7 +16,7 @@ import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from reports import maps, svg
+from reports import maps, svg, treemap
 from reports.pages import Band, Bars, Cell, Floats, Page, Sparkline, Trend
 
 ASSETS = ("page.css", "uPlot.min.css", "uPlot.iife.min.js", "page.js")
@@ -92,6 +92,7 @@ def _environment() -> Environment:
         intervals=svg.intervals,
         plot=svg.plot,
         heat_map=maps.heat_map,
+        tree_map=treemap.tree_map,
         graph=maps.graph,
         keys=svg.keys,
         trend_data=trend_data,

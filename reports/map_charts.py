@@ -8,13 +8,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from reports.maps import BOX, places
-from reports.pages import Graph, HeatMap
+from reports.pages import Graph, HeatMap, TreeMap
+from reports.treemap import HEIGHT, WIDTH, fitting, laid_out
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 EDGES = {"source": "#b3361c", "follower": "#2b75a8", "candidate": "#b98900"}
 """As the style sheet's in light."""
+FILLS = {"valve": "#c2511b", "tuning": "#b98900", "load": "#2b75a8", "unclear": "#6d777d", "calm": "#dfe7e3"}
 
 
 def _figure(width: float, height: float) -> Figure:
@@ -82,3 +84,32 @@ def _rectangle(x: float, y: float, style: dict[str, object]):  # type: ignore[no
     from matplotlib.patches import Rectangle
 
     return Rectangle((x, y), BOX[0], BOX[1], **style)  # type: ignore[arg-type]
+
+
+def tree_map(m: TreeMap) -> bytes:
+    """Rectangles in groups, with the names that fit."""
+    from matplotlib.patches import Rectangle
+
+    figure = _figure(10.0, 4.0)
+    ax = figure.subplots()
+    for name, room, tiles in laid_out(m, WIDTH, HEIGHT):
+        ax.text(room.x + 3, room.y + 13, _plain(fitting(name, room.w)), fontsize=8, weight="bold")
+        for tile, at in tiles:
+            fill = FILLS.get(tile.kind, FILLS["unclear"])
+            ax.add_patch(Rectangle((at.x, at.y), at.w, at.h, facecolor=fill, edgecolor="white", linewidth=1))
+            if at.h >= 16:
+                colour = "#1d2429" if tile.kind == "calm" else "white"
+                ax.text(at.x + 4, at.y + 12, _plain(fitting(tile.name, at.w)), fontsize=6.5, color=colour)
+    ax.set(xlim=(0, WIDTH), ylim=(HEIGHT, 0))
+    ax.axis("off")
+    ax.set_title(_plain(m.title), fontsize=10, loc="left")
+    ax.legend(
+        [Rectangle((0, 0), 1, 1, facecolor=FILLS.get(k, FILLS["unclear"])) for k, _ in m.keys],
+        [_plain(text) for _, text in m.keys],
+        loc="upper center",
+        bbox_to_anchor=(0.5, 0.0),
+        ncols=5,
+        fontsize=7,
+        frameon=False,
+    )
+    return _png(figure)

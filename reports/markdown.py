@@ -16,11 +16,13 @@ from reports.pages import (
     Listing,
     Page,
     Panels,
+    Picture,
     Plot,
     Section,
     Table,
     Text,
     Tiles,
+    TreeMap,
     Trend,
 )
 
@@ -72,7 +74,7 @@ def _block(block: Block, folder: str) -> list[str]:
             return [f"- {escaped(term)}: {escaped(detail)}" for term, detail in block.items]
         case Tiles():
             return [f"- **{escaped(figure)}** {escaped(what)}" for figure, what, _ in block.items]
-        case IntervalChart() | Plot() | Panels() | Trend() | HeatMap() | Graph():
+        case IntervalChart() | Plot() | Panels() | Trend() | HeatMap() | Graph() | TreeMap():
             if not folder:
                 return []
             caption = ["", escaped(block.caption)] if block.caption else []
@@ -100,7 +102,6 @@ def render(page: Page, folder: str = "pictures") -> str:
     return "\n".join([*head, *body, *foot]).rstrip() + "\n"
 
 
-def pictures(page: Page) -> Sequence[IntervalChart | Plot | Panels | Trend | HeatMap | Graph]:
+def pictures(page: Page) -> Sequence[Picture]:
     """The blocks that become pictures."""
-    kinds = IntervalChart | Plot | Panels | Trend | HeatMap | Graph
-    return [b for s in page.sections for b in s.blocks if isinstance(b, kinds)]
+    return [b for s in page.sections for b in s.blocks if isinstance(b, Picture)]

@@ -21,7 +21,7 @@ KINDS = {
     for kind in (
         *(pages.Page, pages.Section, pages.Table, pages.Column, pages.Cell, pages.Sparkline, pages.Bars),
         *(pages.IntervalChart, pages.IntervalBar, pages.Plot, pages.Line, pages.Area, pages.Mark),
-        *(pages.HeatMap, pages.Graph, pages.Node, pages.Arrow),
+        *(pages.HeatMap, pages.TreeMap, pages.TileGroup, pages.Tile, pages.Graph, pages.Node, pages.Arrow),
         *(pages.Panels, pages.Trend, pages.Band, pages.Text, pages.Listing, pages.Facts, pages.Tiles),
     )
 }

@@ -63,7 +63,7 @@ class Column:
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """A table; `facet` is the key of the column whose values filter it, '' for none."""
+    """A table; `facet`: key of the column whose values filter it, '' for none; `cards`: on a phone a card a row."""
 
     name: str
     title: str
@@ -72,6 +72,7 @@ class Table:
     note: str = ""
     searchable: bool = False
     facet: str = ""
+    cards: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -239,6 +240,36 @@ class Graph:
 
 
 @dataclass(frozen=True, slots=True)
+class Tile:
+    """A rectangle of a map: its name, size [any unit] and colour, a text for who points at it, where it leads."""
+
+    name: str
+    size: float
+    kind: str
+    text: str
+    href: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class TileGroup:
+    """Rectangles that lie together, under a name."""
+
+    name: str
+    tiles: tuple[Tile, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class TreeMap:
+    """Groups of rectangles as large as what they stand for; `keys` names the colours: (kind, what it is)."""
+
+    name: str
+    title: str
+    groups: tuple[TileGroup, ...]
+    keys: tuple[tuple[str, str], ...] = ()
+    caption: str = ""
+
+
+@dataclass(frozen=True, slots=True)
 class Text:
     """Paragraphs."""
 
@@ -267,7 +298,11 @@ class Tiles:
     items: tuple[tuple[str, str, str], ...]
 
 
-Block = Table | IntervalChart | Plot | Panels | Trend | HeatMap | Graph | Text | Listing | Facts | Tiles
+Picture = IntervalChart | Plot | Panels | Trend | HeatMap | Graph | TreeMap
+"""Blocks that are drawn."""
+Block = (
+    Table | IntervalChart | Plot | Panels | Trend | HeatMap | Graph | TreeMap | Text | Listing | Facts | Tiles
+)
 
 
 @dataclass(frozen=True, slots=True)

@@ -156,7 +156,28 @@ def pages(store: Path, night: str | None, top: int, form: str, single_file: bool
 
     kept = Store(store)
     kept.require()
-    _written(kept, list(night_pages.pages(kept, night, top)), form, out, single_file)
+    found = list(night_pages.pages(kept, night, top))
+    if form == "html":
+        found += night_pages.dated_pages(kept, night, lambda name: _stands(kept, out, name))
+    _written(kept, found, form, out, single_file)
+    if form == "html":
+        from reports.folder import forget_stale
+
+        forget_stale(out, [f"{page.name}.html" for page in found], kept_names=_dated(kept))
+
+
+def _dated(store: Store) -> set[str]:
+    from analyzer.pages.archive import name_of
+
+    return {f"{name_of(night)}.html" for night in store.nights()}
+
+
+def _stands(store: Store, out: Path, night: str) -> bool:
+    """Whether a night's dated page was written after its results."""
+    from analyzer.pages.archive import name_of
+
+    page, results = out / f"{name_of(night)}.html", store.path / "nights" / f"{night}.parquet"
+    return page.exists() and page.stat().st_mtime > results.stat().st_mtime
 
 
 COMMANDS = (report, pages)

@@ -3,25 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from analyzer.decisions import CAUSES, Cause, Status
+from analyzer.lead import first_things
+from analyzer.pages import maintenance
 from analyzer.pages.areas import area_table
 from analyzer.pages.groups import morning_table
 from analyzer.pages.headings import heading, headings
 from analyzer.pages.news import since
-from analyzer.pages.trends import sparkline
-from analyzer.pages.view import Night, Row, linked, needs_a_look, oscillates, proposal
+from analyzer.pages.plant_history import NightSum, history
+from analyzer.pages.plant_map import plant_map
+from analyzer.pages.trends import close_span, sparkline
+from analyzer.pages.view import Night, Row, linked, needs_a_look, oscillates
 from analyzer.pages.words import counted, duration, number
 from analyzer.plantwide.view import GroupView
-from reports.pages import Bars, Cell, Column, Page, Section, Table, Tiles
-
-
-def _share(row: Row, cause: str) -> float:
-    return float(row[f"osc_{cause}_pct"] or 0.0)
-
-
-def _bars(row: Row) -> Bars:
-    return Bars(tuple((c, _share(row, c)) for c in CAUSES))
+from analyzer.units import changed_settings, row_settings
+from reports.pages import Cell, Column, Listing, Page, Section, Sparkline, Table, Tiles
 
 
 def _value(row: Row, name: str, digits: str = "") -> Cell:
@@ -38,36 +36,50 @@ def _cause(row: Row) -> Cell:
 WORST = (
     heading("loop"),
     heading("description", wide=True),
-    Column("trend", "PV that night"),
-    *headings("oscillation_significance", "oscillating_pct", "period_s"),
-    Column("confidence", "V T L", hint="Confidence that valve, tuning or load is the cause, %"),
+    Column("trend", "Ten periods of PV"),
+    Column("cost", "Loss", True, "Average absolute error times importance, or oscillation significance"),
+    heading("period_s"),
     heading("cause"),
-    heading("action", wide=True),
     heading("reason", wide=True),
+    heading("action"),
+    Column("settings", "Settings, now and new", wide=True),
 )
+FOLLOWER = "\u2514 "
+"""Before the name of a loop that stands under the one it follows."""
 
 
-def _worst_row(night: Night, row: Row) -> tuple[Cell, ...]:
+def _spark(night: Night, row: Row) -> Sparkline | None:
     trend = night.trends.get(row["loop"])
+    return None if trend is None else sparkline(trend, close_span(row, trend))
+
+
+def _settings(row: Row) -> str:
+    if row["kp_new"] is not None or row["ti_new"] is not None:
+        return changed_settings(row)
+    return row_settings(row)
+
+
+def _worst_row(night: Night, row: Row, follows: bool) -> tuple[Cell, ...]:
+    name = linked(night, row["loop"])
+    cost = row["loss"] if row["loss"] is not None else row["oscillation_significance"]
     return (
-        linked(night, row["loop"]),
+        replace(name, text=FOLLOWER + name.text) if follows else name,
         Cell(row["description"] or ""),
-        Cell("", figure=sparkline(trend) if trend is not None else None),
-        _value(row, "oscillation_significance"),
-        _value(row, "oscillating_pct", ".0f"),
+        Cell("", figure=_spark(night, row)),
+        Cell(number(cost), cost),
         Cell(duration(row["period_s"]), row["period_s"]),
-        Cell("", _share(row, "valve"), figure=_bars(row)),
         _cause(row),
-        Cell(proposal(row)),
         Cell(row["reason"] or ""),
+        Cell(row["action"] or ""),
+        Cell(_settings(row)),
     )
 
 
 def worst_table(night: Night) -> Table:
-    """The loops to touch, the worst first."""
-    rows = tuple(_worst_row(night, r) for r in night.worst)
-    note = "V T L: confidence in valve, tuning and load as the cause; they need not sum to 100."
-    return Table("worst", "", WORST, rows, note, searchable=len(rows) > 10, facet="cause")
+    """The loops to touch, the worst first, followers under the loop that moves them."""
+    here = {r["loop"] for r in night.worst}
+    rows = tuple(_worst_row(night, r, r["source_loop"] in here) for r in night.worst)
+    return Table("worst", "", WORST, rows, "", searchable=len(rows) > 10, facet="cause", cards=True)
 
 
 ALL_SHARES = ("oscillating_pct", "osc_valve_pct", "osc_tuning_pct", "osc_load_pct")
@@ -109,17 +121,35 @@ def lost_table(night: Night) -> Table:
     return Table("not-assessed", "", columns, rows, searchable=len(rows) > 12)
 
 
-def page(night: Night, groups: Sequence[GroupView] = ()) -> Page:
-    """The morning page of a night, with its groups that share an oscillation."""
+LINKS = (
+    ("Hand-over to maintenance", f"{maintenance.NAME}.html"),
+    ("All loops as CSV", "csv/index-ranking.csv"),
+)
+
+
+def page(
+    night: Night,
+    groups: Sequence[GroupView] = (),
+    sums: Sequence[NightSum] = (),
+    links: Sequence[tuple[str, str]] = (),
+) -> Page:
+    """The morning page of a night, with its groups that share an oscillation and the plant's figures over the nights.
+
+    links : to other nights, after those to the sheet and the CSV.
+    """
     lost = sum(r["status"] != Status.OK for r in night.rows)
+    first = Listing(tuple(("", text) for text in first_things(night.rows, groups)))
+    drawn = plant_map(night)
     sections = (
-        Section("The night in short", (_tiles(night),)),
-        *((Section("One cause, several loops", (morning_table(night, groups),)),) if groups else ()),
-        Section("Loops worth a look", (worst_table(night),)),
+        Section("First", (first, _tiles(night))),
         since(night),
+        Section("Loops worth a look", (worst_table(night),)),
+        *((Section("One cause, several loops", (morning_table(night, groups),)),) if groups else ()),
+        *((Section("The plant", (drawn, *history(sums))),) if drawn is not None else ()),
         Section("Areas", (area_table(night.rows),)),
         Section("All loops", (ranking(night),)),
         Section(f"Not assessed ({lost})", (lost_table(night),)),
     )
-    subtitle = f"{counted(len(night.rows), 'loop')}, the worst first by oscillation significance."
-    return Page("index", f"Loops in the morning of {night.name}", subtitle, sections)
+    by = "loss" if any(r["loss"] is not None for r in night.rows) else "oscillation significance"
+    subtitle = f"{counted(len(night.rows), 'loop')}, the worst first by {by}."
+    return Page("index", f"Loops in the morning of {night.name}", subtitle, sections, (*LINKS, *links))

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
 from analyzer.explain.night import known
-from analyzer.pages import group_pictures, groups, loop, morning
+from analyzer.pages import archive, group_pictures, groups, loop, maintenance, morning
+from analyzer.pages.plant_history import read_sums
 from analyzer.pages.reading import read_nights, read_trends
 from analyzer.pages.view import read_night
 from analyzer.plantwide.view import read_groups
@@ -29,7 +30,9 @@ def pages(store: Store, name: str | None = None, top: int = 50) -> Iterator[Page
     """
     night = read_night(store, name, top)
     shared = read_groups(store, night.name)
-    yield morning.page(night, shared)
+    dated = [n for n in store.nights() if n <= night.name][-archive.MOST :]
+    yield morning.page(night, shared, read_sums(store, night.name), archive.neighbours(dated, night.name))
+    yield maintenance.page(night)
     nights = [n for n in store.nights() if n <= night.name][-HISTORY:]
     rows = read_nights(store, nights, loop.COLUMNS, night.paged)
     trends = read_trends(store, night.paged, nights[-loop.WEEK :])
@@ -50,6 +53,24 @@ def pages(store: Store, name: str | None = None, top: int = 50) -> Iterator[Page
         yield about
         if drawn is not None:
             yield replace(drawn, links=(*about.links[:1], (tag, f"{about.name}.html")))
+
+
+def dated_pages(store: Store, name: str | None, written: Callable[[str], bool]) -> Iterator[Page]:
+    """Morning pages under their dates, up to a night (the latest by default); those that stand already are left out.
+
+    Parameters
+    ----------
+    store : Store
+    name : str or None
+    written : callable
+        Told a night; True where its page was written after its results.
+    """
+    last = name or store.require()
+    nights = [n for n in store.nights() if n <= last][-archive.MOST :]
+    sums = read_sums(store, last)
+    for night in nights:
+        if night in nights[-2:] or not written(night):
+            yield archive.page(store, night, nights, sums)
 
 
 def explanation(kept: Mapping[str, Any] | None) -> Page | None:

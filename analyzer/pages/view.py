@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 from analyzer.decisions import Cause, Status, counts
 from analyzer.pages.reading import Thinned, read_nights, read_trends
+from analyzer.rank import worst_first
 from analyzer.store import Store
 from analyzer.units import row_settings
 from reports.names import slug
@@ -27,6 +28,8 @@ COLUMNS = (
     ),
     *("source_loop", "average_absolute_error_pct", "valve_travel_pct_per_h", "variability_pct", "kp", "ti"),
     *("kp_new", "ti_new", "action", "reason", "form", "gain_unit", "ti_unit", "pv_unit"),
+    *("lanes", "loss", "close_first_s", "close_last_s", "group", "timezone", "backlash_pct", "stickband_pct"),
+    "advice",
 )
 
 
@@ -42,6 +45,11 @@ class Night:
     trends: Mapping[str, Thinned] = field(default_factory=dict)
 
     @property
+    def zone(self) -> str:
+        """The plant's time zone."""
+        return next((r["timezone"] for r in self.rows if r["timezone"]), "UTC")
+
+    @property
     def paged(self) -> frozenset[str]:
         """Loops that have a page of their own."""
         return frozenset(r["loop"] for r in self.worst)
@@ -53,12 +61,26 @@ def oscillates(row: Row | None) -> bool:
 
 
 def needs_a_look(row: Row) -> bool:
-    """Whether a loop oscillates or has a valve at fault all the same."""
-    return row["status"] == Status.OK and (oscillates(row) or row["cause"] not in (Cause.NONE, None, ""))
+    """Whether a loop oscillates, has a valve at fault all the same, or stands in another lane."""
+    if row["status"] == Status.FAILED:
+        return False
+    return bool(row["lanes"]) or (
+        row["status"] == Status.OK and (oscillates(row) or row["cause"] not in (Cause.NONE, None, ""))
+    )
 
 
-def _worse_first(row: Row) -> tuple[bool, float, str]:
-    return (not needs_a_look(row), -(row["oscillation_significance"] or 0.0), row["loop"])
+def followers_under(rows: Sequence[Row]) -> list[Row]:
+    """Rows in their order, each loop that follows another one right under it."""
+    present = {r["loop"] for r in rows}
+    under: dict[str, list[Row]] = {}
+    for row in rows:
+        if row["source_loop"] in present:
+            under.setdefault(row["source_loop"], []).append(row)
+    tops = [r for r in rows if r["source_loop"] not in present]
+    out: list[Row] = []
+    for row in tops:
+        out += [row, *under.pop(row["loop"], [])]
+    return out + [r for rest in under.values() for r in rest]
 
 
 def read_night(store: Store, name: str | None, top: int) -> Night:
@@ -67,9 +89,9 @@ def read_night(store: Store, name: str | None, top: int) -> Night:
     night = name or store.require()
     store.read("nights", night, ["loop"])
     earlier = [n for n in known if n < night]
-    rows = sorted(read_nights(store, [night], COLUMNS), key=_worse_first)
+    rows = worst_first(read_nights(store, [night], COLUMNS))
     before = {r["loop"]: r for r in read_nights(store, earlier[-1:], COLUMNS)}
-    worst = tuple(r for r in rows if needs_a_look(r))[:top]
+    worst = tuple(followers_under([r for r in rows if needs_a_look(r)])[:top])
     trends = read_trends(store, {r["loop"] for r in worst}, [night])
     return Night(night, tuple(rows), before, earlier[-1] if earlier else "", worst, trends)
 

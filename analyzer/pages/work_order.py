@@ -57,6 +57,14 @@ def _valve(row: Row) -> Lines:
     return _order(STROKE.format(step=width / STEPS), kind.format(width=width) + WEAR, after)
 
 
+def valve_test(row: Row) -> str:
+    """The stroke test of a valve at fault in a few words; STROKE says how it is done."""
+    width, kind = row["stickband_pct"] or row["backlash_pct"], BY_HAND.get(row["valve_fault"])
+    if not width or kind is None:
+        return "steps of 5 %: PV, or the stem, does not answer"
+    return f"steps of {width / STEPS:.2g} %: {kind.format(width=width)}"
+
+
 def _source(row: Row) -> Lines:
     source = row["source_loop"] or "the loop that it follows"
     do = f"leave this loop's valve and settings alone; work on {source} first"

@@ -79,10 +79,34 @@ def test_what_cannot_be_done_is_said(
 
 
 def test_pages_of_a_night(store: Store, tmp_path: Path) -> None:
-    """The command pages writes the morning page and as many loop pages as asked for."""
+    """The command writes the morning page, the hand-over sheet, a page a night and as many loops' as asked for."""
     found = CliRunner().invoke(pages, [str(store.path), "--top", "3", "--out", str(tmp_path)])
     assert found.exit_code == 0
-    assert len(list(tmp_path.glob("*.html"))) == 4
+    names = [p.name for p in tmp_path.glob("*.html")]
+    dated = [n for n in names if n.startswith("morning-")]
+    assert {"index.html", "maintenance.html"} <= set(names)
+    assert (len(dated), len(names)) == (14, 14 + 2 + 3)
+
+
+def test_nights_are_linked_and_stale_pages_go(tmp_path: Path) -> None:
+    """Each dated page leads to the one before and after; pages of loops that are calm by now are deleted, no more."""
+    kept = small_store(tmp_path / "store", loops=8, nights=3)
+    out = tmp_path / "out"
+    assert CliRunner().invoke(pages, [str(kept.path), "--out", str(out)]).exit_code == 0
+    before = {p.name for p in out.glob("*.html")}
+    (out / "mine.html").write_text("my own", encoding="utf-8")
+    assert CliRunner().invoke(pages, [str(kept.path), "--top", "1", "--out", str(out)]).exit_code == 0
+    after = {p.name for p in out.glob("*.html")}
+    assert "mine.html" in after
+    assert len([n for n in before if n not in after]) == len(before) - 2 - 3 - 1
+    middle = (out / "morning-2026-03-03.html").read_text(encoding="utf-8")
+    assert 'href="morning-2026-03-02.html"' in middle
+    assert 'href="morning-2026-03-04.html"' in middle
+    assert 'href="index.html"' in middle
+    loops = [
+        n for n in before if n not in ("index.html", "maintenance.html") and not n.startswith("morning-")
+    ]
+    assert not any(f'href="{name}"' in middle for name in loops)
 
 
 def test_commands_are_quick_to_import() -> None:
@@ -99,4 +123,6 @@ def test_a_calm_night_has_its_page(tmp_path: Path) -> None:
     write_table(rows_table(rows, NIGHTS), tmp_path / "store" / "nights" / "2026-03-02.parquet")
     found = CliRunner().invoke(pages, [str(tmp_path / "store"), "--out", str(tmp_path / "out")])
     assert found.exit_code == 0, found.output
-    assert [p.name for p in sorted((tmp_path / "out").glob("*.html"))] == ["index.html"]
+    assert [p.name for p in sorted((tmp_path / "out").glob("*.html"))] == [
+        *("index.html", "maintenance.html", "morning-2026-03-02.html"),
+    ]

@@ -105,7 +105,7 @@ def head(browser: Any, table: str, key: str) -> Any:
 def test_no_page_complains(browser: Any, folder: Path) -> None:
     """Every page loads from disk without an error in the console and without asking any network."""
     paths = every_page(folder)
-    assert len(paths) == 20
+    assert len(paths) == 22
     for path in paths:
         opened(browser, path)
         assert [e for e in browser.get_log("browser") if e["level"] == "SEVERE"] == [], path.name

@@ -1,0 +1,115 @@
+"""What a shift leader does first: at most three sentences from a night's rows, those that gain most first."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from analyzer.decisions import Action, Cause, Fault, Lane
+from analyzer.plantwide.view import GroupView
+from analyzer.units import duration
+
+Row = Mapping[str, Any]
+MOST = 3
+NAMED = 3
+"""Loops that a sentence names; the rest is counted."""
+CALM = "No loop needs a touch this morning."
+
+
+def listed(names: Sequence[str]) -> str:
+    """Names in a sentence, the first few of them."""
+    shown, more = list(names[:NAMED]), len(names) - NAMED
+    if more > 0:
+        return ", ".join(shown) + f" and {more} more"
+    return shown[0] if len(shown) == 1 else ", ".join(shown[:-1]) + " and " + shown[-1]
+
+
+def weight(row: Row) -> float:
+    """What a loop costs: its loss where importance is stated, else the significance of its oscillation."""
+    for name in ("loss", "oscillation_significance"):
+        if row.get(name) is not None:
+            return float(row[name])
+    return 0.0
+
+
+def first_things(rows: Sequence[Row], groups: Sequence[GroupView] = ()) -> tuple[str, ...]:
+    """At most three sentences, the one that gains most first; one that says so where there is nothing to do."""
+    by_loop = {r["loop"]: r for r in rows}
+    told: set[str] = set()
+    found: list[tuple[float, str]] = []
+    for group in groups:
+        if group.source is None:
+            continue
+        members = [r["loop"] for r in group.rows if r["loop"] in by_loop]
+        source = by_loop.get(group.source["loop"])
+        others = [m for m in members if source is not None and m != source["loop"]]
+        if source is None or not others:
+            continue
+        told |= set(members)
+        found.append((sum(weight(by_loop[m]) for m in members), _of_group(source, others)))
+    left = sorted((r for r in rows if r["loop"] not in told), key=lambda r: (-weight(r), r["loop"]))
+    found += _by_work(left)
+    ordered = sorted(found, key=lambda pair: -pair[0])
+    return tuple(text for _, text in ordered[:MOST]) or (CALM,)
+
+
+def _of_group(source: Row, others: Sequence[str]) -> str:
+    name, moved = source["loop"], f"it also moves {listed(others)}"
+    if source["action"] == Action.REPAIR_VALVE:
+        return f"Fix {name}'s valve: {moved}."
+    if source["action"] == Action.RETUNE:
+        return f"Type new settings into {name}: {moved}."
+    if source["cause"] == Cause.LOAD:
+        return f"Find what moves {name} every {duration(source['period_s'])} from outside: {moved}."
+    return f"Look at {name} first: {moved}."
+
+
+def _by_work(rows: Sequence[Row]) -> list[tuple[float, str]]:
+    """One sentence for each kind of work that several loops ask for."""
+    kinds = (
+        (lambda r: r["action"] == Action.RETUNE and r["cause"] == Cause.VALVE, _retune_valve),
+        (lambda r: r["action"] == Action.RETUNE and r["cause"] != Cause.VALVE, _retune_tight),
+        (lambda r: r["action"] == Action.REPAIR_VALVE, _stroke),
+        (lambda r: r["action"] == Action.CHECK_MEASUREMENT, _measurement),
+        (lambda r: r["action"] == Action.CHECK_SETTINGS, _settings),
+        (lambda r: Lane.AT_LIMIT in (r["lanes"] or "").split(", "), _limit),
+    )
+    out = []
+    for asks, say in kinds:
+        mine = [r for r in rows if asks(r)]
+        if mine:
+            out.append((sum(map(weight, mine)), say(mine)))
+    return out
+
+
+def _names(rows: Sequence[Row]) -> str:
+    return listed([r["loop"] for r in rows])
+
+
+def _retune_valve(rows: Sequence[Row]) -> str:
+    it = "its valve has play" if len(rows) == 1 else "their valves have play"
+    return f"Type new settings into {_names(rows)}: {it}, and new settings calm what a repair can wait for."
+
+
+def _retune_tight(rows: Sequence[Row]) -> str:
+    return f"Type new settings into {_names(rows)}: too tight for the process."
+
+
+def _stroke(rows: Sequence[Row]) -> str:
+    sticks = sum(r["valve_fault"] == Fault.STICTION for r in rows)
+    kind = "sticks" if sticks == len(rows) else "has play" if sticks == 0 else "sticks or has play"
+    if len(rows) == 1:
+        return f"Stroke the valve of {_names(rows)}: it {kind}."
+    return f"Stroke the valves of {_names(rows)}: each {kind}."
+
+
+def _measurement(rows: Sequence[Row]) -> str:
+    return f"Check the measurement of {_names(rows)}: frozen, or far from its set point with OP free."
+
+
+def _settings(rows: Sequence[Row]) -> str:
+    return f"Compare the settings of {_names(rows)} with loops.csv: the trends show others."
+
+
+def _limit(rows: Sequence[Row]) -> str:
+    return f"See why OP of {_names(rows)} rests at its limit: valve size, or what feeds it."

@@ -1,0 +1,75 @@
+"""Three sentences that a shift leader can act on."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from analyzer.lead import CALM, first_things, listed
+from analyzer.plantwide.view import GroupView
+
+ROW: dict[str, Any] = {
+    **{"loss": None, "oscillation_significance": 0.0, "action": "none", "cause": "none", "lanes": None},
+    **{"valve_fault": "none", "period_s": 600.0},
+}
+
+
+def row(loop: str, significance: float, **values: Any) -> dict[str, Any]:
+    """A row of the night."""
+    return {**ROW, "loop": loop, "oscillation_significance": significance, **values}
+
+
+VALVE = {"action": "repair valve", "cause": "valve", "valve_fault": "stiction"}
+FOLLOWS = {"action": "see source loop", "cause": "load"}
+
+
+def test_a_source_is_named_with_whom_it_moves() -> None:
+    """The source of a group comes first, for it gains most, and its followers have no sentence of their own."""
+    rows = [row("FIC2110", 60.0, **VALVE), row("LIC2103", 75.0, **FOLLOWS), row("TIC2111", 20.0, **FOLLOWS)]
+    rows.append(row("LIC1", 90.0, **VALVE))
+    members = tuple(
+        {"loop": r["loop"], "role": "source" if i == 0 else "follower"} for i, r in enumerate(rows[:3])
+    )
+    group = GroupView("1", members, {r["loop"]: r for r in rows[:3]})
+    assert first_things(rows, [group]) == (
+        "Fix FIC2110's valve: it also moves LIC2103 and TIC2111.",
+        "Stroke the valve of LIC1: it sticks.",
+    )
+
+
+def test_three_at_most_by_what_they_gain() -> None:
+    """Of five kinds of work the three that gain most are told; importance counts where it is stated."""
+    rows = [
+        row("A", 1.0, action="retune", cause="valve", loss=9.0),
+        row("B", 50.0, action="retune", cause="tuning", loss=1.0),
+        row("C", 2.0, action="check measurement", loss=8.0),
+        row("D", 0.0, lanes="at limit", loss=20.0),
+        row("E", 99.0, action="check settings", loss=0.5),
+    ]
+    found = first_things(rows)
+    assert [text.split(":")[0] for text in found] == [
+        "See why OP of D rests at its limit",
+        "Type new settings into A",
+        "Check the measurement of C",
+    ]
+
+
+def test_a_calm_night_says_so() -> None:
+    """Nothing to do is a sentence too."""
+    assert first_things([row("A", 0.0)]) == (CALM,)
+    assert first_things([]) == (CALM,)
+
+
+@pytest.mark.parametrize(
+    ("names", "text"),
+    [
+        (["A"], "A"),
+        (["A", "B"], "A and B"),
+        (["A", "B", "C"], "A, B and C"),
+        (list("ABCDE"), "A, B, C and 2 more"),
+    ],
+)
+def test_names_read_as_a_list(names: list[str], text: str) -> None:
+    """A few names are told, the rest counted."""
+    assert listed(names) == text
