@@ -10,6 +10,7 @@ from pathlib import Path
 import click
 
 from analyzer.commands import explain as explain_cli
+from analyzer.commands import notes as notes_cli
 from analyzer.commands import report as report_cli
 from analyzer.commands import run as run_cli
 from analyzer.commands.options import SOME_LOST, Asked, export_options, told
@@ -66,6 +67,7 @@ def check(asked: Asked) -> None:
 @click.option("--area", help="Loops of this area alone.")
 @click.option("--lane", type=click.Choice(LANES), help="Loops of this lane alone, by its figure.")
 @click.option("--groups", is_flag=True, help="Loops that share an oscillation, and where each starts.")
+@click.option("--all", "everything", is_flag=True, help="Loops that notes hide from the table, too.")
 @click.option("--wide", is_flag=True, help="All columns of the table, however narrow the terminal.")
 @click.option(
     "--format",
@@ -85,6 +87,7 @@ def rank(
     area: str | None,
     lane: str | None,
     groups: bool,
+    everything: bool,
     wide: bool,
     form: str,
 ) -> None:
@@ -92,7 +95,7 @@ def rank(
 
     Example: triage rank store --top 20 --format markdown
     """
-    from analyzer.rank import ranked, rendered
+    from analyzer.rank import hidden_loops, ranked, rendered
     from analyzer.store import Store
 
     if groups:
@@ -102,8 +105,12 @@ def rank(
         click.echo(group_list.rendered(found, form, name))
         return
     asked = None if lane is None else Lane(lane.replace("-", " "))
-    rows, name = ranked(Store(store), column, top, night, ascending, area, asked)
-    click.echo(rendered(rows, form, name, wide, asked))
+    rows, name = ranked(Store(store), column, None, night, ascending, area, asked)
+    hidden = () if everything or form in ("csv", "json") else hidden_loops(rows, name)
+    shown = [r for r in rows if r["loop"] not in hidden][:top]
+    click.echo(rendered(shown, form, name, wide, asked))
+    if hidden:
+        click.echo(f"hidden by their notes (--all shows them): {', '.join(hidden)}", err=True)
 
 
 @main.command()
@@ -152,7 +159,7 @@ def registered(command: click.Command) -> click.Command:
     return own
 
 
-for page_command in (run_cli.run, *report_cli.COMMANDS):
+for page_command in (run_cli.run, *report_cli.COMMANDS, *notes_cli.COMMANDS):
     main.add_command(registered(page_command))
 for model_command in explain_cli.main.commands.values():
     main.add_command(model_command)

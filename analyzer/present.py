@@ -59,6 +59,8 @@ def brief(row: Mapping[str, Any], columns: Sequence[str] = SHOWN) -> dict[str, s
         "kp": _settings(row["kp"], row["kp_new"], gain),
         "ti": _settings(row["ti"], row["ti_new"], row.get("ti_unit") or ""),
     }
+    if row.get("note"):
+        special["reason"] = f"{row['reason'] or ''} [note: {row['note']}]"
     return {name: special[name] if name in special else figure(row[name], name) for name in columns}
 
 

@@ -8,10 +8,13 @@ import json
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from analyzer import notes
+from analyzer.columns.other_tables import NOTED
 from analyzer.columns.ranking import LISTED, RANKING
 from analyzer.columns.table import BY_NAME, names
 from analyzer.decisions import Cause, Lane
 from analyzer.lane_figures import FIGURE
+from analyzer.notes import Note
 from analyzer.store import Store
 from identification.errors import InputError
 from reports.tables import harmless
@@ -21,7 +24,8 @@ LOSS = "loss"
 LANE_FIGURES = tuple(name for name in FIGURE.values() if name not in names(RANKING))
 """Figures of lanes that the contract's columns do not hold."""
 SORTABLE = (*names(RANKING), "importance", LOSS, *LANE_FIGURES)
-LIST_COLUMNS = names((*RANKING, *LISTED))
+KEPT = names((*RANKING, *LISTED))
+LIST_COLUMNS = (*KEPT, *names(NOTED))
 """Columns of CSV and JSON: the contract's, then what says in which units settings stand, and the advice in full."""
 MOST_NAMES = 10
 """Areas that are named in an error."""
@@ -62,10 +66,24 @@ def ranked(
 
 def _read(store: Store, night: str) -> list[dict[str, Any]]:
     """The night's rows; columns that an older version did not write are None."""
-    wanted = (*LIST_COLUMNS, *LANE_FIGURES)
+    wanted = (*KEPT, *LANE_FIGURES, "timezone")
     held = set(store.columns("nights", night))
     rows = store.read("nights", night, [c for c in wanted if c in held]).to_pylist()
-    return [{**dict.fromkeys(wanted), **row} for row in rows]
+    known = notes.read(store.path)
+    return [_noted({**dict.fromkeys(wanted), **row}, known) for row in rows]
+
+
+def _noted(row: dict[str, Any], known: Mapping[str, tuple[Note, ...]]) -> dict[str, Any]:
+    """A row with the newest note of its loop."""
+    found = notes.last(known, row["loop"])
+    if found is None:
+        return {**row, "note": None, "hidden_until": None}
+    return {**row, "note": found.said(row["timezone"]), "hidden_until": found.hidden_until or None}
+
+
+def hidden_loops(rows: Sequence[Row], night: str) -> tuple[str, ...]:
+    """Loops that their notes keep out of a night's list."""
+    return tuple(r["loop"] for r in rows if r["hidden_until"] and night < r["hidden_until"])
 
 
 def _sorted(rows: Sequence[dict[str, Any]], column: str, ascending: bool) -> list[dict[str, Any]]:

@@ -27,6 +27,7 @@ class Source(StrEnum):
     PLANT = "plant-wide pass"
     ADVICE = "advice"
     EXPLAIN = "explain"
+    NOTES = "triage note"
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,6 +4,18 @@ from __future__ import annotations
 
 from analyzer.columns.column import Column, Kind, Source
 
+NOTED = (
+    Column("note", Kind.TEXT, "Note", "", Source.NOTES, "Newest note on the loop, by whom and when."),
+    Column(
+        "hidden_until",
+        Kind.TEXT,
+        "Hidden until",
+        "",
+        Source.NOTES,
+        "Night from which the loop is listed again; empty where no note hides it.",
+    ),
+)
+"""What `triage note` keeps, joined when a night is listed."""
 HOUR = Column("hour_s", Kind.NUMBER, "Hour", "s since 1970-01-01 UTC", Source.RUN, "Start of the clock hour.")
 EXPLANATION = (
     Column(

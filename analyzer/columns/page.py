@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from analyzer.columns.column import Column
-from analyzer.columns.other_tables import EXPLANATION, GROUP, GROUP_LIST, HOUR
+from analyzer.columns.other_tables import EXPLANATION, GROUP, GROUP_LIST, HOUR, NOTED
 from analyzer.columns.ranking import LISTED, RANKING
 from analyzer.columns.stored import STORED
 
@@ -20,6 +20,7 @@ OP's. Columns marked h stand in the table of hours too.
 PARTS: tuple[tuple[str, Sequence[Column]], ...] = (
     ("The ranking: `triage rank`, names and order a contract", RANKING),
     ("Further columns of `triage rank --format csv` and `json`", LISTED),
+    ("Notes, last in `triage rank --format csv` and `json`", NOTED),
     ("Further columns of the store: `nights/*.parquet`, a row a loop", STORED),
     ("Of the hours alone: `hours/*.parquet`, a row a loop and hour", (HOUR,)),
     ("Groups that share an oscillation: `groups/*.parquet`, a row a loop and group", GROUP),

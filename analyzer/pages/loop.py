@@ -234,6 +234,7 @@ def page(
     explained: Row | None = None,
     more: Page | None = None,
     shared: Section | None = None,
+    notes: Sequence[str] = (),
 ) -> Page:
     """A loop's page.
 
@@ -251,12 +252,15 @@ def page(
         The page of that explanation, which is linked.
     shared : Section or None
         What it shares with other loops.
+    notes : sequence of str
+        What people wrote about it, oldest first.
     """
     row = rows[-1]
     scale = scale_of(row)
     figures = [_figure(k, row, scale) for k in FIGURES if row[k] is not None]
     sections = [
         _first(row, thin),
+        *((Section("Notes", (Listing(tuple(("", n) for n in reversed(notes))),)),) if notes else ()),
         _verdict(row),
         *(() if shared is None else (shared,)),
         *_explained(explained, row),

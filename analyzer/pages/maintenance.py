@@ -47,8 +47,9 @@ def faulty(night: Night) -> Table:
         key=lambda r: (r["action"] != Action.REPAIR_VALVE, -(r["stickband_pct"] or r["backlash_pct"] or 0.0))
     )
     note = (
-        "Test: in manual, with the process calm, move OP in steps, four up and four down, and wait each time; then "
-        "look at positioner feedback, linkage, packing and actuator. Loops with new settings can wait for the shutdown."
+        "Test: in manual, with the process calm, move OP in steps, four up and four down, and wait each time; "
+        "then look at positioner feedback, linkage, packing and actuator. "
+        "With new settings a loop can wait for the shutdown."
     )
     return Table("valves", "", FAULTY, tuple(_cells(night, r) for r in rows), note, cards=True)
 

@@ -43,6 +43,7 @@ WORST = (
     heading("reason", wide=True),
     heading("action"),
     Column("settings", "Settings, now and new", wide=True),
+    Column("note", "Note", wide=True, hint="Newest note: triage note STORE LOOP TEXT"),
 )
 FOLLOWER = "\u2514 "
 """Before the name of a loop that stands under the one it follows."""
@@ -72,6 +73,7 @@ def _worst_row(night: Night, row: Row, follows: bool) -> tuple[Cell, ...]:
         Cell(row["reason"] or ""),
         Cell(row["action"] or ""),
         Cell(_settings(row)),
+        Cell(night.note(row["loop"])),
     )
 
 
@@ -79,7 +81,12 @@ def worst_table(night: Night) -> Table:
     """The loops to touch, the worst first, followers under the loop that moves them."""
     here = {r["loop"] for r in night.worst}
     rows = tuple(_worst_row(night, r, r["source_loop"] in here) for r in night.worst)
-    return Table("worst", "", WORST, rows, "", searchable=len(rows) > 10, facet="cause", cards=True)
+    hidden = sorted(night.hidden & {r["loop"] for r in night.rows if needs_a_look(r)})
+    said = f"Hidden by their notes: {', '.join(hidden)}." if hidden else ""
+    noted = any(row[-1].text for row in rows)
+    columns = WORST if noted else WORST[:-1]
+    rows = tuple(row[: len(columns)] for row in rows)
+    return Table("worst", "", columns, rows, said, searchable=len(rows) > 10, facet="cause", cards=True)
 
 
 ALL_SHARES = ("oscillating_pct", "osc_valve_pct", "osc_tuning_pct", "osc_load_pct")
@@ -138,7 +145,8 @@ def page(
     links : to other nights, after those to the sheet and the CSV.
     """
     lost = sum(r["status"] != Status.OK for r in night.rows)
-    first = Listing(tuple(("", text) for text in first_things(night.rows, groups)))
+    seen = [r for r in night.rows if r["loop"] not in night.hidden]
+    first = Listing(tuple(("", text) for text in first_things(seen, groups)))
     drawn = plant_map(night)
     sections = (
         Section("First", (first, _tiles(night))),

@@ -42,6 +42,14 @@ def _cause_news(now: str, then: str) -> tuple[str, str]:
     return f"the cause is now told as {now} (was {then})", "unclear"
 
 
+def news_lines(night: Night) -> list[str]:
+    """What is new since the night before, a line a loop, what got worse first."""
+    found = [(row["loop"], *_news(night, row)) for row in night.rows]
+    order = {"worse": 0, "unclear": 1, "better": 2}
+    told = sorted((order[tone], loop, text) for loop, text, tone in found if text)
+    return [f"{loop} {text}" for _, loop, text in told]
+
+
 def _significance(row: Row) -> Cell:
     return Cell(number(row["oscillation_significance"]), row["oscillation_significance"])
 

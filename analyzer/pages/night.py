@@ -48,8 +48,11 @@ def pages(store: Store, name: str | None = None, top: int = 50) -> Iterator[Page
         own = [r for r in rows if r["loop"] == tag]
         drawn = explanation(explained.get(tag))
         group = by_number.get(own[-1]["group"] or "")
+        said = [n.said(night.zone) for n in night.notes.get(tag, ())]
         part = None if group is None else groups.of_loop(group, tag, {**beside, **night.trends})
-        about = loop.page(own, trends.get(tag), explained=explained.get(tag), more=drawn, shared=part)
+        about = loop.page(
+            own, trends.get(tag), explained=explained.get(tag), more=drawn, shared=part, notes=said
+        )
         yield about
         if drawn is not None:
             yield replace(drawn, links=(*about.links[:1], (tag, f"{about.name}.html")))

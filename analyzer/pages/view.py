@@ -6,7 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from analyzer import notes
 from analyzer.decisions import Cause, Status, counts
+from analyzer.notes import Note, is_hidden, last
 from analyzer.pages.reading import Thinned, read_nights, read_trends
 from analyzer.rank import worst_first
 from analyzer.store import Store
@@ -43,11 +45,22 @@ class Night:
     before_name: str
     worst: tuple[Row, ...]
     trends: Mapping[str, Thinned] = field(default_factory=dict)
+    notes: Mapping[str, tuple[Note, ...]] = field(default_factory=dict)
 
     @property
     def zone(self) -> str:
         """The plant's time zone."""
         return next((r["timezone"] for r in self.rows if r["timezone"]), "UTC")
+
+    @property
+    def hidden(self) -> frozenset[str]:
+        """Loops that a note keeps out of the list."""
+        return frozenset(loop for loop in self.notes if is_hidden(last(self.notes, loop), self.name))
+
+    def note(self, loop: str) -> str:
+        """The newest note of a loop, '' where there is none."""
+        found = last(self.notes, loop)
+        return "" if found is None else found.said(self.zone)
 
     @property
     def paged(self) -> frozenset[str]:
@@ -83,17 +96,19 @@ def followers_under(rows: Sequence[Row]) -> list[Row]:
     return out + [r for rest in under.values() for r in rest]
 
 
-def read_night(store: Store, name: str | None, top: int) -> Night:
-    """What the morning page of a night needs."""
-    known = store.nights()
+def read_night(store: Store, name: str | None, top: int, drawn: bool = True) -> Night:
+    """What the morning page of a night needs, with trends of the worst loops if they are to be drawn."""
+    nights = store.nights()
     night = name or store.require()
     store.read("nights", night, ["loop"])
-    earlier = [n for n in known if n < night]
+    earlier = [n for n in nights if n < night]
     rows = worst_first(read_nights(store, [night], COLUMNS))
     before = {r["loop"]: r for r in read_nights(store, earlier[-1:], COLUMNS)}
-    worst = tuple(followers_under([r for r in rows if needs_a_look(r)])[:top])
-    trends = read_trends(store, {r["loop"] for r in worst}, [night])
-    return Night(night, tuple(rows), before, earlier[-1] if earlier else "", worst, trends)
+    known = notes.read(store.path)
+    looked = [r for r in rows if needs_a_look(r) and not is_hidden(last(known, r["loop"]), night)]
+    worst = tuple(followers_under(looked)[:top])
+    trends = read_trends(store, {r["loop"] for r in worst}, [night]) if drawn else {}
+    return Night(night, tuple(rows), before, earlier[-1] if earlier else "", worst, trends, known)
 
 
 def linked(night: Night, loop: str) -> Cell:

@@ -1,0 +1,128 @@
+"""Notes on loops: kept line by line, shown where the loop is, hiding it only while they say so."""
+
+from __future__ import annotations
+
+import csv
+import io
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+
+from analyzer import notes
+from analyzer.cli import main
+from analyzer.store import Store
+from tests.reports.small_store import NASTY, small_store
+
+
+@pytest.fixture
+def store(tmp_path: Path) -> Store:
+    """Three nights of twelve loops."""
+    return small_store(tmp_path / "store", loops=12, nights=3)
+
+
+def asked(*arguments: object) -> Result:
+    """An answer of the command line."""
+    return CliRunner().invoke(main, [str(a) for a in arguments])
+
+
+def listed(store: Store, *options: str) -> list[dict[str, str]]:
+    """Rows of the list as CSV."""
+    return list(csv.DictReader(io.StringIO(asked("rank", store.path, "--format", "csv", *options).stdout)))
+
+
+def test_a_note_is_shown_in_list_and_pages(store: Store, tmp_path: Path) -> None:
+    """What was noted stands in the list, in the CSV's own column, on the morning page and the loop's page."""
+    assert asked("note", store.path, NASTY[0], "seen <b>it</b>", "--owner", "Laine").exit_code == 0
+    row = next(r for r in listed(store) if r["loop"] == NASTY[0])
+    assert row["note"].startswith("seen <b>it</b> (Laine, ")
+    assert "note: seen &lt;b&gt;it" in asked("rank", store.path, "--format", "markdown").stdout
+    asked("pages", store.path, "--out", tmp_path / "out")
+    pages = [p.read_text("utf-8") for p in (tmp_path / "out").glob("*.html")]
+    holding = [p for p in pages if "seen &lt;b&gt;it" in p]
+    assert len(holding) >= 2
+    assert not any("seen <b>it" in p for p in pages)
+
+
+def test_the_newest_note_counts_and_all_are_printed(store: Store) -> None:
+    """A second note takes the place of the first in the list; without a text all are printed, oldest first."""
+    for text in ("first", "second"):
+        asked("note", store.path, "FIC0000", text, "--owner", "a")
+    assert next(r for r in listed(store) if r["loop"] == "FIC0000")["note"].startswith("second")
+    assert [line.split()[0] for line in asked("note", store.path, "FIC0000").stdout.splitlines()] == [
+        "first",
+        "second",
+    ]
+
+
+def test_a_hidden_loop_comes_back(store: Store) -> None:
+    """A loop is hidden from table and summary before its date and is there from that night on; the CSV has it."""
+    first = listed(store)[0]["loop"]
+    asked("note", store.path, first, "waits for the shutdown", "--hide-until", "2026-03-05")
+    table = asked("rank", store.path, "--wide")
+    assert f"hidden by their notes (--all shows them): {first}" in table.stderr
+    assert listed(store)[0]["loop"] == first
+    assert first in asked("rank", store.path, "--wide", "--all").stdout
+    asked("note", store.path, first, "waits for the shutdown", "--hide-until", "2026-03-04")
+    assert asked("rank", store.path, "--wide").stderr == ""
+
+
+def test_hidden_loops_do_not_shorten_the_list(store: Store) -> None:
+    """--top 3 shows three loops though the first of all is hidden."""
+    order = [r["loop"] for r in listed(store)]
+    asked("note", store.path, order[0], "later", "--hide-until", "2030-01-01")
+    shown = asked("rank", store.path, "--top", "3", "--format", "markdown").stdout.splitlines()[2:]
+    assert len(shown) == 3
+
+
+@pytest.mark.parametrize(
+    ("loop", "text", "said"),
+    [
+        ("FIC000", "x", "one of its loops (FIC"),
+        ("FIC0000", "   ", "an empty note"),
+        ("nothing", "x", "is not in"),
+    ],
+)
+def test_mistakes_are_one_line(store: Store, loop: str, text: str, said: str) -> None:
+    """A loop that is not there and a note that says nothing are told in one line and write nothing."""
+    result = asked("note", store.path, loop, text)
+    assert result.exit_code == 2
+    assert said in result.stderr
+    assert len(result.stderr.splitlines()) == 1
+    assert not (store.path / notes.FILE).exists()
+
+
+def test_many_writers_lose_nothing(tmp_path: Path) -> None:
+    """Forty notes written at once by eight threads are all there, each whole."""
+
+    def write(k: int) -> None:
+        notes.add(tmp_path, notes.Note("L", float(k), "x" * 200 + str(k), "me"))
+
+    with ThreadPoolExecutor(8) as pool:
+        list(pool.map(write, range(40)))
+    assert [n.time_s for n in notes.read(tmp_path)["L"]] == [float(k) for k in range(40)]
+
+
+def test_a_broken_line_costs_itself_alone(tmp_path: Path) -> None:
+    """Half a line from a machine that died is passed over; the notes around it stay."""
+    notes.add(tmp_path, notes.Note("L", 1.0, "one"))
+    with (tmp_path / notes.FILE).open("a", encoding="utf-8") as file:
+        file.write('{"loop": "L", "ti\n[]\n')
+    notes.add(tmp_path, notes.Note("L", 2.0, "two"))
+    assert [n.text for n in notes.read(tmp_path)["L"]] == ["one", "two"]
+
+
+@pytest.mark.parametrize("form", ["text", "html", "markdown"])
+def test_the_summary_is_small_and_says_the_same(store: Store, form: str) -> None:
+    """One screen in three formats: the first things, the worst loops; a mail without scripts and under 100 kB."""
+    result = asked("summary", store.path, "--format", form)
+    assert result.exit_code == 0
+    assert len(result.stdout.encode()) < 100_000
+    worst = next(r["loop"] for r in listed(store) if r["loop"].startswith("FIC"))
+    assert worst in result.stdout
+    assert "<script" not in result.stdout.lower().replace("&lt;script", "").replace("<script>alert", "")
+    if form == "html":
+        assert "<script" not in result.stdout.lower()
+        assert "src=" not in result.stdout
+        assert "href=" not in result.stdout
