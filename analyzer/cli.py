@@ -15,6 +15,7 @@ from analyzer.commands import report as report_cli
 from analyzer.commands import run as run_cli
 from analyzer.commands.options import SOME_LOST, Asked, export_options, told
 from analyzer.decisions import Lane
+from identification.errors import InputError
 
 for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
@@ -47,6 +48,11 @@ def check(asked: Asked) -> None:
 
     source, specs, notes = asked.opened()
     lost = 0
+    if not specs:
+        click.echo("\n".join(line for line, _ in lines(source, specs, notes, asked.config, asked.within)))
+        raise InputError(
+            "no loops in the export", "tags such as LOOP.PV", "state them with --loops loops.csv"
+        )
     for line, bad in lines(source, specs, notes, asked.config, asked.within, asked.changes, asked.zone):
         lost += bad
         click.echo(line)

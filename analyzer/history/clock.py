@@ -116,7 +116,14 @@ class Clock:
         parts = stamps.fields(texts)
         if parts is None:
             return np.full(len(texts), np.nan), True
-        return stamps.seconds(parts, bool(self.day_first)), not parts.zoned
+        return stamps.seconds(parts, self._order(parts)), not parts.zoned
+
+    def _order(self, parts: stamps.Fields) -> bool:
+        """Whether these stamps are read day first; where the head left nothing open and these do, they decide."""
+        if self.day_first is not None or not parts.is_open:
+            return bool(self.day_first)
+        seen = stamps.days_seen(parts)
+        return bool(stamps.days_by_gaps(parts) if seen is None else seen)
 
 
 def scale_of(column: pa.Array, unit: str = "") -> Scale | None:

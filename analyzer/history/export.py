@@ -17,7 +17,7 @@ from pathlib import Path
 import pyarrow as pa
 
 from analyzer.history.dialects import source_of
-from analyzer.history.files import export_files, is_parquet
+from analyzer.history.files import export_files, is_parquet, packed_beside
 from analyzer.history.options import ReadOptions
 from analyzer.history.parquet import open_parquet
 from analyzer.history.raw import Raw, settle
@@ -149,7 +149,7 @@ def open_export(paths: Sequence[Path], options: ReadOptions | None = None) -> Ex
     homes: dict[str, tuple[int, ...]] = {}
     for i, source in enumerate(sources):
         homes.update({tag: (*homes.get(tag, ()), i) for tag in source.tags})
-    return Export(sources, tuple(homes), homes, skipped=tuple(skipped))
+    return Export(sources, tuple(homes), homes, skipped=(*skipped, *packed_beside(paths)))
 
 
 def _readable(paths: Sequence[Path], options: ReadOptions) -> tuple[list[Source], list[str]]:

@@ -9,8 +9,21 @@ from identification.errors import InputError
 
 TEXT_ENDINGS = frozenset({".csv", ".txt", ".tsv"})
 PARQUET_ENDINGS = frozenset({".parquet", ".pq"})
+PACKED_ENDINGS = frozenset({".gz", ".bz2", ".xz", ".zip", ".7z", ".xls", ".xlsx", ".xlsm"})
 NO_EXPORTS = frozenset({"loops.csv", "labels.csv", "changes.csv"})
 MAGIC = b"PAR1"
+PACKED = {
+    b"PK\x03\x04": (
+        "a workbook or a zip archive",
+        "save the sheet as CSV, or unpack the archive, and name that file",
+    ),
+    b"\xd0\xcf\x11\xe0": ("an old Excel workbook", "save the sheet as CSV and name that file"),
+    b"\x1f\x8b": ("packed with gzip", "unpack it (gunzip FILE) and name what comes out"),
+    b"BZh": ("packed with bzip2", "unpack it (bunzip2 FILE) and name what comes out"),
+    b"\xfd7zX": ("packed with xz", "unpack it (unxz FILE) and name what comes out"),
+    b"7z\xbc\xaf": ("a 7z archive", "unpack it and name what comes out"),
+}
+"""First bytes of files that hold an export in another wrapping: what they are, and what to do."""
 
 
 def export_files(paths: Sequence[Path]) -> list[Path]:
@@ -39,12 +52,25 @@ def is_parquet(path: Path) -> bool:
     """
     try:
         with path.open("rb") as file:
-            start = file.read(len(MAGIC))
+            start = file.read(4)
     except OSError as error:
         raise _closed(path, error) from error
     if not start:
         raise InputError(f"{path}: empty file", "a table with a header and samples", "export it again")
+    for magic, (what, remedy) in PACKED.items():
+        if start.startswith(magic):
+            raise InputError(f"{path}: {what}", "delimited text or Parquet", remedy)
     return start == MAGIC or path.suffix.lower() in PARQUET_ENDINGS
+
+
+def packed_beside(paths: Sequence[Path]) -> list[str]:
+    """Sentences on files of the folders given that hold an export in a wrapping that is not read."""
+    said = []
+    for folder in (Path(p) for p in paths if Path(p).is_dir()):
+        found = sorted(p.name for p in folder.iterdir() if p.suffix.lower() in PACKED_ENDINGS)
+        if found:
+            said.append(f"{folder}: {', '.join(found[:5])} not read: unpack it, or save it as CSV")
+    return said
 
 
 def _within(path: Path) -> list[Path]:
@@ -62,8 +88,9 @@ def _listed(folder: Path) -> list[Path]:
     files = [path for path in sorted(folder.iterdir()) if path.is_file() and _is_export(path)]
     files = files or [path for path in sorted(folder.rglob("*")) if path.suffix.lower() in PARQUET_ENDINGS]
     if not files:
+        packed = packed_beside([folder])
         raise InputError(
-            f"{folder}: a folder without exports",
+            packed[0] if packed else f"{folder}: a folder without exports",
             "files ending in .csv, .txt, .tsv, .parquet or .pq",
             "name the folder that holds the exports",
         )

@@ -9,9 +9,11 @@ import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 from analyzer.history.encoding import detect_encoding
+from analyzer.history.names import is_stamp
 from analyzer.history.options import ReadOptions
 from analyzer.history.sheet import Sheet
 from identification.errors import InputError
@@ -24,6 +26,8 @@ NO_DATA_LINE = re.compile(r"^\s*(?:#.*|\[\w+\]|sep=.|)\s*$", re.IGNORECASE)
 COMMA_NUMBER = re.compile(r"^[+-]?\d+,\d+(?:[eE][+-]?\d+)?$")
 POINT_NUMBER = re.compile(r"^[+-]?\d*\.\d+(?:[eE][+-]?\d+)?$")
 NUMBER = re.compile(r"^[+-]?\d*[.,]?\d+(?:[eE][+-]?\d+)?$")
+PREAMBLE = 30
+"""Lines of a preamble at most under which a header is looked for; ours."""
 STAMP = re.compile(r"^\d{1,4}[-/.]\w{1,9}[-/.]\d{1,4}\b|^\d{1,2}:\d\d\b")
 
 
@@ -118,8 +122,28 @@ def _header(path: Path, lines: Sequence[str], delimiter: str) -> tuple[int, list
         cells = next(iter(_split([line], delimiter)), [])
         if NO_DATA_LINE.match(line) or len(cells) < max(2, width - 1):
             continue
-        return (place, cells) if not _is_data(cells) else _commented(path, lines, place, delimiter)
+        if not _is_data(cells):
+            return place, cells
+        below = _header_below(lines, place, delimiter, width)
+        return below if below is not None else _commented(path, lines, place, delimiter)
     raise InputError(f"{path}: no header", f"a line of {width} names above the samples", "add a header line")
+
+
+def _header_below(
+    lines: Sequence[str], start: int, delimiter: str, width: int
+) -> tuple[int, list[str]] | None:
+    """A header under lines of a preamble that look like data: as wide as the table, no data, over a row of data.
+
+    Within a few lines, with a name of a time column among its cells; a table without a header has none.
+    """
+    rows = [(k, next(iter(_split([lines[k]], delimiter)), [])) for k in range(start + 1, len(lines))][
+        :PREAMBLE
+    ]
+    for (place, cells), (_, after) in pairwise(rows):
+        named = any(is_stamp(cell.strip()) for cell in cells)
+        if len(cells) >= width - 1 and named and not _is_data(cells) and _is_data(after):
+            return place, cells
+    return None
 
 
 def _commented(path: Path, lines: Sequence[str], data: int, delimiter: str) -> tuple[int, list[str]]:

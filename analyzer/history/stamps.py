@@ -96,6 +96,18 @@ def days_seen(parts: Fields) -> bool | None:
     return None if first == second else bool(first)
 
 
+def days_by_gaps(parts: Fields) -> bool | None:
+    """True where read day first the stamps run without a leap, False where month first they do, None where alike."""
+    day, month = (_largest_gap(parts, first) for first in (True, False))
+    return None if day == month else day < month
+
+
+def _largest_gap(parts: Fields, day_first: bool) -> float:
+    second = np.unique(seconds(parts, day_first))
+    steps = np.diff(second[np.isfinite(second)])
+    return float(steps.max()) if len(steps) else 0.0
+
+
 def _written_order(part: dict[str, pa.Array]) -> NDArray[np.int8]:
     """The order of each stamp, as far as its writing tells."""
     digits_a, digits_b = (pc.utf8_is_digit(part[name]).to_numpy(zero_copy_only=False) for name in "ab")

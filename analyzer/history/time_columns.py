@@ -199,9 +199,9 @@ def _decided(clock: Clock, parts: stamps.Fields | None, head: pa.Array) -> Clock
     if seen is not None:
         which = "first" if seen else "second"
         return replace(clock, day_first=seen, why=f"the {which} number exceeds 12")
-    gap = {first: _largest_gap(parts, first) for first in (True, False)}
-    if gap[True] != gap[False]:
-        return replace(clock, day_first=gap[True] < gap[False], why="so read, the stamps run without a leap")
+    running = stamps.days_by_gaps(parts)
+    if running is not None:
+        return replace(clock, day_first=running, why="so read, the stamps run without a leap")
     if "." in str(head[0].as_py()).split(" ")[0]:
         return replace(clock, day_first=True, why="dates with points; no day above 12 occurs")
     either = "every date fits both orders; state the order if it is not so"
@@ -215,9 +215,3 @@ def agreed(sources: Sequence[Source]) -> tuple[Source, ...]:
         return tuple(sources)
     order = {"day_first": sure.clock.day_first, "ambiguous": False, "why": f"as in {sure.path.name}"}
     return tuple(s.with_clock(replace(s.clock, **order)) if s.clock.ambiguous else s for s in sources)  # type: ignore[arg-type]
-
-
-def _largest_gap(parts: stamps.Fields, day_first: bool) -> float:
-    second = np.unique(stamps.seconds(parts, day_first))
-    steps = np.diff(second[np.isfinite(second)])
-    return float(steps.max()) if len(steps) else 0.0

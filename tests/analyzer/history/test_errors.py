@@ -38,7 +38,12 @@ ROW = "2024-11-21 08:00:00"
             b"timestamp,FIC1.PV\nsoon,1\nlater,2\n",
             ["column 'timestamp'", "row 2", "'soon'", "state the date format"],
         ),
-        (b"PK\x03\x04\x00\x00\x08\x00binary\x00\x00\x00stuff,\x00\n" * 20, ["binary content"]),
+        (
+            b"PK\x03\x04\x00\x00\x08\x00binary\x00\x00\x00stuff,\x00\n" * 20,
+            ["a workbook or a zip archive", "save the sheet as CSV"],
+        ),
+        (b"\x1f\x8b\x08\x00" + b"x" * 40, ["packed with gzip", "gunzip"]),
+        (b"\x00timestamp,FIC1.PV\n" * 20, ["binary content"]),
     ],
 )
 def test_text_that_is_no_export(tmp_path: Path, content: bytes, fragments: list[str]) -> None:
