@@ -191,7 +191,7 @@ def opened(
     source = open_export(list(export), ReadOptions(**reading))
     if loops is None:
         return source, find_loops(source.tags), ()
-    stated = read_loops(loops)
+    stated = read_loops(loops, str(zone_of(reading.get("timezone"))))
     specs, notes = match(stated, source.tags)
     own = unknown_columns(stated)
     if own:

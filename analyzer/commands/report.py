@@ -24,7 +24,7 @@ SOME_LOST = 1
 
 
 def _span(texts: Sequence[str] | None, option: str, zone: str) -> Span | None:
-    from analyzer.loops.changes import parse_time
+    from analyzer.plant_clock import parse_time
     from analyzer.spans import Span
 
     if not texts:
@@ -44,8 +44,9 @@ def _asked(
     limits: ChangeLimits,
 ) -> list[TuningChange]:
     """The changes that the command line names."""
-    from analyzer.loops.changes import TuningChange, parse_time, read_changes
+    from analyzer.loops.changes import TuningChange, read_changes
     from analyzer.pages.report import detected
+    from analyzer.plant_clock import parse_time
 
     if find:
         return detected(store, [loop] if loop else None, limits)

@@ -16,7 +16,7 @@ import numpy as np
 from analyzer.block_bootstrap import Floats
 from analyzer.config import ChangeLimits
 from analyzer.history.encoding import detect_encoding
-from analyzer.plant_clock import UTC_NAME, seconds
+from analyzer.plant_clock import UTC_NAME, parse_time
 from identification.errors import InputError
 
 COLUMNS = ("loop", "time", "kp_old", "ti_old", "kp_new", "ti_new", "who")
@@ -38,22 +38,6 @@ class TuningChange:
     ti_new: float | None = None
     who: str = ""
     seen: str = ""
-
-
-def parse_time(text: str, where: str, zone: str = UTC_NAME) -> float:
-    """A time as seconds since 1970-01-01 UTC; one that states no zone is of the plant's clock.
-
-    Raises
-    ------
-    InputError
-        Where it is no time; `where` names the place in the message.
-    """
-    import pandas as pd
-
-    stamp: Any = pd.to_datetime([text.strip()], errors="coerce")[0]
-    if stamp is pd.NaT:
-        raise InputError(f"{where}: time {text!r}", "a time such as 2026-03-09T08:00:00Z", "correct the time")
-    return seconds(stamp.to_pydatetime(), zone)
 
 
 def _number(text: str, where: str, column: str) -> float | None:

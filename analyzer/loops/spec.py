@@ -7,13 +7,14 @@ import io
 import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
 from analyzer.history.encoding import detect_encoding
 from analyzer.loops.endings import ROLES
+from analyzer.plant_clock import UTC_NAME, parse_time
 from identification.errors import InputError
 from identification.models import Form
 
@@ -24,7 +25,8 @@ CHOICES: Mapping[str, tuple[str, ...]] = {
     "gain_unit": ("percent", "engineering", "band"),
     "ti_unit": ("s", "min", "repeats/min"),
 }
-COLUMNS = (*TEXTS, *ROLES, *NUMBERS, *CHOICES)
+VALID_FROM = "valid_from"
+COLUMNS = (*TEXTS, *ROLES, *NUMBERS, *CHOICES, VALID_FROM)
 OWN_COLUMNS = ("op_unit", "sp_unit")  # near to a known name, and yet none misspelt
 MISSPELT = 0.75
 OTHER_NAMES: Mapping[str, str] = {
@@ -64,7 +66,9 @@ class LoopSpec:
     then the tag that was looked for. `master` is the loop whose output is this loop's set
     point. `kp`, `ti`, `td` are as stated, in `gain_unit`, `ti_unit` and `form`;
     `pv_lo` and `pv_hi` in the PV's own unit, `op_lo` and `op_hi` in the OP's. `extra` holds columns of the
-    plant's own, `stated` the names of the columns that the row fills.
+    plant's own, `stated` the names of the columns that the row fills. `valid_from_s` is when the row's settings came
+    into force [s since 1970-01-01 UTC], None where it does not say; `earlier` holds the loop's rows before it, the
+    oldest first.
     """
 
     loop: str
@@ -93,6 +97,8 @@ class LoopSpec:
     extra: Mapping[str, str] = field(default_factory=dict)
     stated: frozenset[str] = frozenset()
     wanted_pv: str = ""
+    valid_from_s: float | None = None
+    earlier: tuple[LoopSpec, ...] = ()
 
     @property
     def tags(self) -> tuple[str, ...]:
@@ -105,22 +111,37 @@ class LoopSpec:
         return tuple(text for column, text in DEFAULTS.items() if column not in self.stated)
 
 
-def read_loops(path: Path) -> tuple[LoopSpec, ...]:
+def read_loops(path: Path, zone: str = UTC_NAME) -> tuple[LoopSpec, ...]:
     """Read loops.csv: one loop a row, decimal point or comma, columns in any order.
+
+    A loop may have several rows where each but the first says with `valid_from` when its settings came into force, on
+    the plant's clock where it states no zone; its last row is returned, with the `earlier` ones.
 
     Raises
     ------
     InputError
-        The file is missing or empty, lacks the column `loop`, misspells a column, names a loop twice, or
-        holds what is no number, no known form or unit, or a range that does not rise.
+        The file is missing or empty, lacks the column `loop`, misspells a column, names a loop twice at one
+        time, or holds what is no number, no known form or unit, or a range that does not rise.
     """
     header, rows = _table(Path(path))
     _check_header(path, header)
-    specs = tuple(_spec(path, row, dict(zip(header, cells, strict=False))) for row, cells in rows)
+    specs = tuple(_spec(path, row, dict(zip(header, cells, strict=False)), zone) for row, cells in rows)
     if not specs:
         raise InputError(f"{path}: no loops", "one row a loop below the header", "add the loops")
-    _check_unique(path, [(row, spec.loop) for (row, _), spec in zip(rows, specs, strict=True)])
-    return specs
+    _check_unique(path, [(row, spec) for (row, _), spec in zip(rows, specs, strict=True)])
+    return _dated(specs)
+
+
+def _dated(specs: Sequence[LoopSpec]) -> tuple[LoopSpec, ...]:
+    """Each loop once, its latest row with those before it."""
+    rows: dict[str, list[LoopSpec]] = {}
+    for spec in specs:
+        rows.setdefault(spec.loop, []).append(spec)
+    ordered = (
+        sorted(own, key=lambda s: -math.inf if s.valid_from_s is None else s.valid_from_s)
+        for own in rows.values()
+    )
+    return tuple(replace(own[-1], earlier=tuple(own[:-1])) if len(own) > 1 else own[0] for own in ordered)
 
 
 def unknown_columns(specs: Sequence[LoopSpec]) -> tuple[str, ...]:
@@ -168,13 +189,16 @@ def _check_header(path: Path, header: Sequence[str]) -> None:
         raise InputError(f"{path}: column '{twice[0]}' stands twice", "each column once", "remove one")
 
 
-def _spec(path: Path, row: int, cells: Mapping[str, str]) -> LoopSpec:
+def _spec(path: Path, row: int, cells: Mapping[str, str], zone: str) -> LoopSpec:
     filled = {name: cell for name, cell in cells.items() if cell}
     if "loop" not in filled:
         raise InputError(f"{path}, row {row}: no loop name", "a name in column 'loop'", "name the loop")
     given: dict[str, Any] = {name: filled[name] for name in (*TEXTS, *ROLES) if name in filled}
     given |= {name: _number(path, row, name, filled[name]) for name in NUMBERS if name in filled}
     given |= {name: _choice(path, row, name, filled[name]) for name in CHOICES if name in filled}
+    if VALID_FROM in filled:
+        where = f"{path}, row {row}, column '{VALID_FROM}'"
+        given["valid_from_s"] = parse_time(filled[VALID_FROM], where, zone)
     extra = {name: cell for name, cell in cells.items() if name and name not in COLUMNS}
     spec = LoopSpec(**given, extra=extra, stated=frozenset(given))
     _check_range(path, row, "pv", spec.pv_lo, spec.pv_hi)
@@ -212,14 +236,18 @@ def _check_range(path: Path, row: int, signal: str, low: float | None, high: flo
         raise InputError(seen, f"{signal}_hi above {signal}_lo, both or neither", "correct the range")
 
 
-def _check_unique(path: Path, loops: Sequence[tuple[int, str]]) -> None:
-    rows: dict[str, list[int]] = {}
-    for row, loop in loops:
-        rows.setdefault(loop, []).append(row)
-    for loop, places in rows.items():
+def _check_unique(path: Path, loops: Sequence[tuple[int, LoopSpec]]) -> None:
+    rows: dict[tuple[str, float | None], list[int]] = {}
+    for row, spec in loops:
+        rows.setdefault((spec.loop, spec.valid_from_s), []).append(row)
+    for (loop, _), places in rows.items():
         if len(places) > 1:
             where = ", ".join(str(place) for place in places)
-            raise InputError(f"{path}: loop {loop} in rows {where}", "each loop once", "remove all but one")
+            raise InputError(
+                f"{path}: loop {loop} in rows {where}",
+                "each loop once, or its rows with different times in valid_from",
+                "remove all but one, or date them",
+            )
 
 
 def spec_of(specs: Sequence[LoopSpec], loop: str) -> LoopSpec:

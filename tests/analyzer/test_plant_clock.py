@@ -14,8 +14,8 @@ from click.testing import CliRunner
 from analyzer import plant_clock
 from analyzer.cli import main
 from analyzer.config import Config
-from analyzer.loops.changes import parse_time
 from analyzer.nights import nights
+from analyzer.plant_clock import parse_time
 from analyzer.store import Store
 from identification.errors import InputError
 

@@ -12,8 +12,10 @@ from analyzer.config import Config
 from analyzer.history.export import open_export
 from analyzer.loops.changes import TuningChange
 from analyzer.loops.settings_in_force import in_force
-from analyzer.loops.tags import match
+from analyzer.loops.tags import match, read_loops
+from analyzer.plant_clock import parse_time
 from analyzer.store import Store
+from identification.errors import InputError
 
 LOOP = spec("L", kp=1.0, ti=10.0)
 FIRST = TuningChange("L", 100.0, 1.0, 10.0, 2.0, 20.0)
@@ -57,3 +59,38 @@ def test_a_run_advises_on_the_settings_in_force(tmp_path):
         rows.append(row)
     assert [r["action"] for r in rows] == ["check settings", "retune"]
     assert (rows[1]["kp"], rows[1]["ti"]) == (0.65, 30.0)
+
+
+DATED = """loop,kp,ti,gain_unit,valid_from
+L,1,10,percent,
+L,50,20,band,2026-03-09 08:00
+L,40,30,band,2026-03-12T08:00:00Z
+M,5,50,percent,
+"""
+
+
+@pytest.mark.parametrize(
+    ("at", "expected"),
+    [
+        ("2026-03-01", (1.0, 10.0, "percent")),
+        ("2026-03-09 05:59", (1.0, 10.0, "percent")),
+        ("2026-03-09 06:00", (50.0, 20.0, "band")),
+        ("2026-03-20", (40.0, 30.0, "band")),
+    ],
+)
+def test_dated_rows_of_loops_csv(tmp_path, at, expected):
+    """Each row counts from its valid_from on, 08:00 of the plant's clock without a zone, with the units it states."""
+    path = tmp_path / "loops.csv"
+    path.write_text(DATED, encoding="utf-8")
+    loops = read_loops(path, "Europe/Helsinki")
+    assert [s.loop for s in loops] == ["L", "M"]
+    found = in_force(loops[0], (), parse_time(at, "here"))
+    assert (found.kp, found.ti, found.gain_unit) == expected
+
+
+def test_two_rows_at_one_time_are_told(tmp_path):
+    """A loop twice without dates is no dated loop."""
+    path = tmp_path / "loops.csv"
+    path.write_text("loop,kp,valid_from\nL,1,\nL,2,\n", encoding="utf-8")
+    with pytest.raises(InputError, match="different times in valid_from"):
+        read_loops(path)
