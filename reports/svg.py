@@ -131,15 +131,17 @@ def _panel(chart: IntervalChart, label: str, left: float, rows: list[str]) -> li
 
 
 def intervals(chart: IntervalChart) -> Markup:
-    """Changes as bars with intervals: a panel for each label, a row for each group."""
+    """Changes as bars with intervals: a picture for each label, side by side as room allows, a row for each group;
+    labels of which nothing is known are left out."""
     rows = list(dict.fromkeys(b.group for b in chart.bars))
-    labels = list(dict.fromkeys(b.label for b in chart.bars))
-    body = [written(0, 42 + ROW * i, row, "start", "") for i, row in enumerate(rows)]
-    for i, label in enumerate(labels):
-        body += _panel(chart, label, LABELS + i * sum(PANEL), rows)
-    return picture(
-        LABELS + len(labels) * sum(PANEL), 46 + ROW * len(rows), body, f"{chart.title}, {chart.unit}", "chart"
-    )
+    known = [b.label for b in chart.bars if b.value is not None]
+    names = [written(0, 42 + ROW * i, row, "start", "") for i, row in enumerate(rows)]
+    size = LABELS + sum(PANEL), 46 + ROW * len(rows)
+    drawn = [
+        picture(*size, [*names, *_panel(chart, label, LABELS, rows)], f"{label}, {chart.unit}", "chart small")
+        for label in dict.fromkeys(known)
+    ]
+    return Markup("").join(drawn)
 
 
 def _extent(values: list[Floats], pad: float) -> tuple[float, float]:

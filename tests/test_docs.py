@@ -11,6 +11,8 @@ import pytest
 from click.testing import CliRunner
 
 from analyzer.cli import main
+from analyzer.decisions import Action, Lane
+from analyzer.loops import changes, spec
 
 ROOT = Path(__file__).resolve().parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -59,3 +61,36 @@ def test_main_job_of_the_readme_on_one_day(tmp_path):
     ).stdout
     loops = re.findall(r"^ ([A-Z]{3}\d{4})", ranked, flags=re.MULTILINE)
     assert set(loops[:11]) >= {"LIC2102", "LIC2105", "LIC2107", "TIC2104", "TIC2106", "FIC2110", "PIC2112"}
+
+
+def cells(path: str) -> list[list[str]]:
+    """Rows of all tables of a page, their cells without back quotes."""
+    lines = (ROOT / path).read_text("utf-8").splitlines()
+    rows = [
+        [c.strip().strip("`") for c in line.strip("|").split("|")] for line in lines if line.startswith("|")
+    ]
+    return [row for row in rows if set(row[0]) - set("-")]
+
+
+def test_loops_csv_is_documented_column_by_column() -> None:
+    """docs/loops-csv.md names every column that the reader knows and no other, of changes.csv too."""
+    named = [row[0] for row in cells("docs/loops-csv.md") if len(row) in (2, 3) and row[0] != "column"]
+    assert sorted(named) == sorted([*spec.COLUMNS, *changes.COLUMNS[1:], "loop"])
+
+
+def test_ten_systems_are_stated_in_words_that_loops_csv_takes() -> None:
+    """Each of the ten systems has a gain unit, a time unit and a form that loops.csv allows."""
+    rows = [row for row in cells("docs/loops-csv.md") if len(row) == 7][1:]
+    assert len(rows) == 10
+    for row in rows:
+        for column, cell in zip(("gain_unit", "ti_unit", "form"), row[4:], strict=True):
+            assert cell in [str(choice) for choice in spec.CHOICES[column]], row
+
+
+def test_pages_are_documented_with_the_words_they_use() -> None:
+    """docs/reading-a-page.md has every action, and every lane by its name."""
+    text = (ROOT / "docs" / "reading-a-page.md").read_text("utf-8")
+    actions = [row[0] for row in cells("docs/reading-a-page.md") if len(row) == 2]
+    assert set(Action) <= set(actions)
+    plain = text.lower().replace("in manual", "manual").replace("op at a limit", "at limit")
+    assert all(lane in plain for lane in Lane)

@@ -10,6 +10,7 @@ import numpy as np
 from analyzer.before_after import LIMITS, MEASURES, Change, Grade, LoopComparison, Measure, Verdict, grade
 from analyzer.config import ComparisonLimits
 from analyzer.loops.changes import TuningChange
+from analyzer.pages.engineering import PLAIN, Scale
 from analyzer.pages.headings import heading
 from analyzer.pages.reading import Thinned
 from analyzer.pages.trends import trend_block
@@ -46,6 +47,7 @@ class Case:
     units: str
     trend: Thinned | None
     wear: tuple[str, ...] = ()
+    scale: Scale = PLAIN
 
 
 GRADES = {
@@ -56,6 +58,18 @@ GRADES = {
     Grade.NONE: "no clear change",
     Grade.INCOMPARABLE: "not comparable",
 }
+
+
+TONES = {
+    Grade.CLEAR: "better",
+    Grade.MODEST: "better",
+    Grade.PARTIAL: "unclear",
+    Grade.NONE: "unclear",
+    Grade.MIXED: "worse",
+    Grade.WORSE: "worse",
+    Grade.INCOMPARABLE: "incomparable",
+}
+"""Colours of outcomes."""
 
 
 def named(changes: Sequence[Change]) -> str:
@@ -174,8 +188,47 @@ def figures(cases: Sequence[Case], primary: bool, name: str, title: str) -> Tabl
 def _settings(change: TuningChange, units: str) -> str:
     if change.kp_new is None and change.ti_new is None:
         return change.seen or "not stated"
-    old = f"Kp {setting(change.kp_old)}, Ti {setting(change.ti_old)}"
-    return f"{old} → Kp {setting(change.kp_new)}, Ti {setting(change.ti_new)} ({units})"
+    pairs = (("Kp", change.kp_old, change.kp_new), ("Ti", change.ti_old, change.ti_new))
+    said = ", ".join(f"{name} {setting(old)} → {setting(new)}" for name, old, new in pairs)
+    return f"{said} ({units})"
+
+
+IN_SHORT = (
+    heading("loop"),
+    Column("description", "Description", wide=True),
+    Column("settings", "Settings", wide=True),
+    *(
+        Column(m.name, f"{m.short_title}, % of before", True, "Change, with its interval", True)
+        for m in PRIMARY
+    ),
+    Column("outcome", "Outcome", wide=True),
+)
+
+
+def _in_short(case: Case) -> tuple[Cell, ...]:
+    """A loop in one row: what was typed in, the four changes, and what to make of them."""
+    by_name = {c.measure.name: c for c in case.found.primary}
+    kind = TONES[grade(case.found)]
+    return (
+        Cell(case.found.loop, kind="strong"),
+        Cell(case.description),
+        Cell(_settings(case.change, case.units)),
+        *(_change_cell(by_name.get(m.name)) for m in PRIMARY),
+        Cell(outcome(case.found), kind=kind),
+    )
+
+
+def _change_cell(change: Change | None) -> Cell:
+    if change is None or change.verdict is Verdict.INCOMPARABLE or change.interval_pct is None:
+        return Cell("–")
+    low, high = (signed(x) for x in change.interval_pct)
+    return Cell(f"{signed(change.value_pct)} ({low} … {high})", change.value_pct, KINDS[change.verdict])
+
+
+def in_short(cases: Sequence[Case]) -> Table:
+    """A row a loop."""
+    note = "Change of each figure in % of what it was before, with its interval; less is better in all four."
+    return Table("loops", "", IN_SHORT, tuple(map(_in_short, cases)), note, cards=True)
 
 
 def _span(first_s: float, last_s: float, usable_h: float, zone: str) -> str:
@@ -199,7 +252,7 @@ def loop_section(case: Case, number_: int, zone: str = UTC_NAME) -> Section:
         thin = case.trend.between(found.before.first_s, found.after.last_s).coarser(TREND_BUCKETS)
         marks = (Mark(change.time_s, "changed"),)
         title = f"{found.loop}: before and after on one scale"
-        blocks.append(trend_block(f"trend-{number_}", title, thin, marks))
+        blocks.append(trend_block(f"trend-{number_}", title, thin, marks, case.scale))
     title = f"{found.loop} {case.description}".strip()
     return Section(title, tuple(blocks))
 
@@ -237,15 +290,16 @@ def page(
 ) -> Page:
     """The page of all changes on the plant's clock; `missing` could not be looked at, with the reason."""
     short: list[Block] = [Text((OFFERED,))] if offered else []
-    short += [_tiles(cases), Listing(tuple((c.found.loop, outcome(c.found)) for c in cases))]
+    short += [_tiles(cases), in_short(cases)]
     if missing:
         short.append(Listing(tuple((loop, f"not looked at: {why}") for loop, why in missing)))
+    comparable = [c for c in cases if any(x.verdict is not Verdict.INCOMPARABLE for x in c.found.primary)]
+    charts = (average_chart(cases), per_loop_chart(comparable)) if len(comparable) > 1 else ()
     sections = (
         Section("In short", tuple(short)),
-        Section("On average", (average_chart(cases),)),
-        Section("Per loop and assessment", (per_loop_chart(cases),)),
-        Section("Figures before and after", (figures(cases, True, "figures", ""),)),
+        *((Section("In pictures", charts),) if charts else ()),
         *(loop_section(c, i, zone) for i, c in enumerate(cases)),
+        Section("Figures before and after", (figures(cases, True, "figures", ""),), closed=True),
         Section("Other figures", (figures(cases, False, "other-figures", ""),), closed=True),
         _method(cases[0].found.limits if cases else LIMITS),
     )

@@ -11,6 +11,7 @@ from analyzer.config import ChangeLimits, ComparisonLimits
 from analyzer.decisions import counts
 from analyzer.loops.changes import TuningChange, behaviour_change, stated_changes
 from analyzer.pages.before_after import Case
+from analyzer.pages.engineering import scale_of
 from analyzer.pages.reading import nights_within, read_hours, read_nights, read_trends
 from analyzer.pages.wear import wear_texts
 from analyzer.spans import spans_around
@@ -32,7 +33,7 @@ COLUMNS = (
         "start_s",
         "status",
     ),
-    *("source_loop", "oscillating_pct", "extra"),
+    *("source_loop", "oscillating_pct", "extra", "pv_lo", "pv_hi"),
 )
 CHANGES = ChangeLimits()
 """The limits in force where none are given."""
@@ -117,4 +118,6 @@ def cases(
 
 
 def _case(change: TuningChange, result: LoopComparison, row: dict[str, Any], trend: Any) -> Case:
-    return Case(change, result, row["description"] or "", _units(row), trend, wear_texts(result, row))
+    return Case(
+        change, result, row["description"] or "", _units(row), trend, wear_texts(result, row), scale_of(row)
+    )
