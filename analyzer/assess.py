@@ -19,12 +19,14 @@ from analyzer.quality import Prepared, run_lengths
 from analyzer.settings_check import SettingsDiffer, differing
 from analyzer.trends import BUCKETS, FINE_BUCKETS, close_view, thinned
 from analyzer.trial_signs import hidden_by_grid
-from analyzer.words import too_coarse
+from analyzer.words import FOLDED, too_coarse
 from identification.errors import NotAssessedError
 from identification.models import Pid
 from identification.record import LoopRecord
 from identification.signals.harris import harris_index
 
+NYQUIST = 2.0
+"""Samples a period below which a cycle is seen as a slower one."""
 OF_OP = ("valve_travel_pct_per_h", "reversals_per_h", "at_limits_pct", "service_pct", "op_mean_pct")
 """Figures that rest on OP."""
 
@@ -141,10 +143,13 @@ def _is_coarse(record: LoopRecord, controller: Pid | None, config: Config) -> bo
 
 
 def _hidden(record: LoopRecord, found: Oscillations, controller: Pid | None, config: Config) -> Needs | None:
-    """Why silence says nothing: cycles of the loop would be too fast for the sampling; None where they would show."""
-    if found.first is not None:
-        return None
+    """Why what is seen, or not seen, says nothing: the loop's cycles are too fast for the sampling; None where not."""
     samples = config.oscillation.samples
+    if found.first is not None:
+        folded = None if controller is None else config.advice.cycle_per_ti * controller.ti_s
+        if folded is None or folded >= NYQUIST * record.dt_s:
+            return None
+        return Needs(Lack.FASTER, f"{too_coarse(record.dt_s, folded, samples)}; {FOLDED}")
     period = barely_seen(found, config.oscillation)
     if period is None and controller is not None and math.isfinite(controller.ti_s):
         expected = config.advice.cycle_per_ti * controller.ti_s

@@ -55,7 +55,8 @@ def first_things(rows: Sequence[Row], groups: Sequence[GroupView] = ()) -> tuple
 
 def _of_group(source: Row, others: Sequence[str]) -> str:
     name, moved = source["loop"], f"it also moves {listed(others)}"
-    if source["action"] == Action.REPAIR_VALVE:
+    unasked = source["action"] is None and source["cause"] == Cause.VALVE  # of a night that got no advice
+    if source["action"] == Action.REPAIR_VALVE or unasked:
         return f"Fix {name}'s valve: {moved}."
     if source["action"] == Action.RETUNE:
         return f"Type new settings into {name}: {moved}."

@@ -162,6 +162,11 @@ def _consistency(window: Window, fit: Fit, period_s: float) -> float:
     return gain / fit.gain if fit.gain else 0.0
 
 
+def is_plain(t: Trials, limits: CauseLimits) -> bool:
+    """Whether nearly every stretch between OP's turns shows the valve, with hardly any scatter."""
+    return t.agreeing >= limits.plain_agreeing and t.steadiness >= limits.plain_steadiness
+
+
 Candidates = tuple[Fit, Fit, Fit | None]
 """Plain fit, play and stick-slip."""
 Fits = tuple[Fit, Fit, Fit | None, Fit, float, float]
@@ -196,6 +201,8 @@ def measure(
     harmonic = locked_harmonic(error, scale) if error is not None and oscillation is not None else 0.0
     told, (fine_linear, fine_play, fine_stick) = _refined(window, (linear, play, stick), best)
     cycling = error is not None and oscillation is not None
+    shown = trials(WindowFit(window, best), WindowFit(window, linear), scale) if cycling else None
+    least = limits.plain_size if shown is not None and is_plain(shown, limits) else limits.open_size
     return Measured(
         fine_linear,
         fine_play,
@@ -214,11 +221,11 @@ def measure(
         told,
         stem_moves(window, best.valve),
         bool(due.any()),
-        limits.open_size <= size < limits.size
+        least <= size < limits.size
         and gained >= limits.evidence
         and oscillation is not None
         and cycles_alike(window, best, controller, oscillation),
-        trials(WindowFit(window, best), WindowFit(window, linear), scale) if cycling else None,
+        shown,
         size_kurtosis(error, error.duration_s / scale) if cycling and error is not None else 3.0,
     )
 

@@ -69,7 +69,7 @@ WORTH_LEAST = (
     *("average_absolute_error_pct", "ti", "kp", "period_s", "loss", "oscillation_significance"),
 )
 """Columns that a narrow table leaves out, the first of them first; loop, action and reason stay."""
-LEAST_REASON = 24
+LEAST_REASON = 44
 """Characters of a line of the reason at least."""
 
 

@@ -41,11 +41,22 @@ def digits(x: float) -> str:
 
 
 def picture(
-    width: float, height: float, body: Iterable[str], label: str, kind: str, natural: bool = False
+    width: float,
+    height: float,
+    body: Iterable[str],
+    label: str,
+    kind: str,
+    natural: bool = False,
+    role: str = "img",
 ) -> Markup:
-    """Drawn parts as a picture with a text for who cannot see it; a `natural` one does not grow with the page."""
+    """Drawn parts as a picture with a text for who cannot see it; a `natural` one does not grow with the page.
+
+    role : img, or group for one whose parts are links
+    """
     size = f' width="{digits(width)}"' if natural else ""
-    head = f'<svg class="{kind}"{size} viewBox="0 0 {digits(width)} {digits(height)}" role="img" aria-label="'
+    head = (
+        f'<svg class="{kind}"{size} viewBox="0 0 {digits(width)} {digits(height)}" role="{role}" aria-label="'
+    )
     return Markup(head) + escape(label) + Markup('">' + "".join(body) + "</svg>")
 
 

@@ -94,7 +94,7 @@ def tree_map(m: TreeMap) -> Markup:
     for name, room, tiles in laid_out(m, WIDTH, HEIGHT):
         body.append(written(room.x + 3, room.y + 13, fitting(name, room.w), kind="strong"))
         body += [_tile(t, p) for t, p in tiles]
-    return picture(WIDTH, HEIGHT, body, m.title, "chart treemap")
+    return picture(WIDTH, HEIGHT, body, m.title, "chart treemap", role="group")
 
 
 def _tile(t: Tile, p: Place) -> str:

@@ -125,6 +125,27 @@ class CauseLimits:
         "Travel of OP without any answer of PV from which the valve is dead",
         STUDY,
     )
+    plain_size: float = limit(
+        0.2,
+        "-",
+        (0.0, 1.0),
+        "The same where nearly every stretch between OP's turns shows it",
+        "ours: integrating processes under PI of little damping cycle with a play of 0.2 to 0.35 of OP's range",
+    )
+    plain_agreeing: float = limit(
+        0.95,
+        "-",
+        (0.0, 1.0),
+        "Share of the stretches that this takes",
+        "ours: loads and neighbours, on simulated plants, show it in 0.9 at most",
+    )
+    plain_steadiness: float = limit(
+        12.5,
+        "-",
+        (0.0, 125.0),
+        "Mean gain of the stretches over its standard error that this takes",
+        "ours: loads and neighbours, on simulated plants, have 9.5 at most, such valves 20 and more",
+    )
     size: float = limit(
         0.45,
         "-",

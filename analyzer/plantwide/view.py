@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from analyzer.columns.table import GROUPS, names
-from analyzer.decisions import Action, GroupRole
+from analyzer.decisions import Action, Cause, GroupRole
 from analyzer.store import Store
 
 Row = Mapping[str, Any]
@@ -71,8 +71,10 @@ class GroupView:
         source = self.source
         if source is None:
             return ""
-        action = self.loops[source["loop"]]["action"]
-        return "look for the load that enters here" if action in (Action.NONE, None, "") else str(action)
+        own = self.loops[source["loop"]]
+        if own["action"] in (Action.NONE, None, "") and own["cause"] == Cause.LOAD:
+            return "look for the load that enters here"
+        return str(own["action"] or "")
 
 
 def read_groups(store: Store, night: str) -> list[GroupView]:

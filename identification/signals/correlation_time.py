@@ -12,6 +12,10 @@ SMOOTHING = 0.1
 """The error is averaged over this share of the loop's own time first, for noise is not swiftness [-]."""
 
 
+COARSEST = 0.2
+"""Interval of samples beyond which, in the loop's own time, one sample's noise passes for memory [-]; ours."""
+
+
 def correlation_time(error: Floats, good: Mask, dt_s: float, scale_s: float) -> float | None:
     """The time [s] after which the autocorrelation of the averaged error is under 1/e.
 
@@ -34,9 +38,10 @@ def correlation_time(error: Floats, good: Mask, dt_s: float, scale_s: float) -> 
     Returns
     -------
     float or None
-        None where the record holds fewer than ten of `scale_s`, or nothing moves.
+        None where the record holds fewer than ten of `scale_s`, samples are coarser than a fifth of it, or nothing
+        moves.
     """
-    if not math.isfinite(scale_s):
+    if not math.isfinite(scale_s) or dt_s > COARSEST * scale_s:
         return None
     width = max(round(SMOOTHING * scale_s / dt_s), 1)
     blocks = error.size // width

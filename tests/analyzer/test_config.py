@@ -172,7 +172,7 @@ def test_explain_and_simulate_work_on_the_span_with_its_settings(export: Path):
     )
     loops = export.with_name("loops.csv")
     loops.write_text("loop,type,pv_lo,pv_hi,kp,ti\nLIC1,level,0,100,0.9,40\n")
-    case, pv = _case(Asked((export,), loops, changes, *hour, Config(), {}), "LIC1")
+    case, pv = _case(Asked((export,), loops, changes, *hour, Config(), "UTC", {}), "LIC1")
     assert (pv.stamp_s[0], pv.stamp_s[-1]) == (hour[0], hour[1] - 1.0)
     assert (case.spec.kp, case.spec.ti) == (3.0, 40.0)
 

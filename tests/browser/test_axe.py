@@ -1,0 +1,48 @@
+"""Nobody is locked out: axe-core finds nothing serious on any kind of page, in light, in dark and on a phone."""
+
+from __future__ import annotations
+
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.browser.test_pages import browser, folder, opened, pytestmark, wait
+
+__all__ = ["browser", "folder", "pytestmark"]
+axe = pytest.importorskip("axe_core_python", reason="needs axe-core-python, of the test extra")
+SCRIPT = (files("axe_core_python") / "axe.min.js").read_text(encoding="utf-8")
+RUN = """const done = arguments[arguments.length - 1];
+  axe.run(document, {resultTypes: ['violations']}).then((r) => done(r.violations
+    .filter((v) => v.impact === 'serious' || v.impact === 'critical')
+    .map((v) => v.id + ': ' + v.nodes.length + ' of ' + v.nodes[0].html.slice(0, 160))));"""
+
+
+def kinds(folder: Path) -> list[Path]:
+    """One page of each kind: morning, hand-over, a loop's, before and after."""
+    here = folder / "folder"
+    loop = next(p for p in sorted(here.glob("FIC*.html")))
+    return [here / "index.html", here / "maintenance.html", loop, here / "before-after.html"]
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("width", [390, 1280])
+def test_nothing_serious(browser: Any, folder: Path, scheme: str, width: int) -> None:
+    """No serious or critical violation on any page."""
+    size = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": width < 500}
+    browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+    media = {"features": [{"name": "prefers-color-scheme", "value": scheme}]}
+    browser.execute_cdp_cmd("Emulation.setEmulatedMedia", media)
+    try:
+        for page in kinds(folder):
+            opened(browser, page)
+            wait(
+                browser,
+                "return Array.from(document.querySelectorAll('.trend')).every((t) => t.dataset.ready)",
+            )
+            browser.execute_cdp_cmd("Runtime.evaluate", {"expression": SCRIPT})
+            assert browser.execute_async_script(RUN) == [], page.name
+    finally:
+        browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+        browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": []})
