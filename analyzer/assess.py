@@ -143,7 +143,7 @@ def _is_coarse(record: LoopRecord, controller: Pid | None, config: Config) -> bo
 
 
 def _hidden(record: LoopRecord, found: Oscillations, controller: Pid | None, config: Config) -> Needs | None:
-    """Why what is seen, or not seen, says nothing: the loop's cycles are too fast for the sampling; None where not."""
+    """Why what is seen, or not, says nothing: the loop's cycles are too fast for the sampling; None where not."""
     samples = config.oscillation.samples
     if found.first is not None:
         folded = None if controller is None else config.advice.cycle_per_ti * controller.ti_s

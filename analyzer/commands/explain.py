@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -71,16 +72,17 @@ def explain(
     from analyzer.explain.saved_model import read_model, write_model
     from identification.errors import NotAssessedError
 
+    tell = _Candidates()
     try:
         brought = read_model(model, tag) if model is not None else None
         case, _ = _case(asked, tag)
-        found = explained(case, _told_candidate, brought)
+        found = explained(case, tell, brought)
     except NotAssessedError as error:
         _show(abstained(tag, str(error)), None, form, out, asked.zone)
         click.echo(f"triage: {error}", err=True)
         sys.exit(NOTHING_DONE)
     finally:
-        _told_candidate("")
+        tell("")
     if save_model is not None:
         write_model(found.model(), save_model)
     _show(found.data, found, form, out, asked.zone)
@@ -139,10 +141,24 @@ def simulate(
     write_trends(out, raw.stamp_s, pv, op)
 
 
-def _told_candidate(name: str) -> None:
-    """Show on a terminal what is being tried; nothing wipes it out."""
-    if sys.stderr.isatty():
-        click.echo(f"\r\033[K{f'trying {name}' if name else ''}", nl=False, err=True)
+QUIET_S = 5.0
+"""Seconds between two lines on what is being tried, where nobody looks at a terminal [s]."""
+
+
+class _Candidates:
+    """Tells what is being tried: in a line that wipes itself out on a terminal, in one now and then elsewhere."""
+
+    def __init__(self) -> None:
+        self.begun = self.said = time.monotonic()
+        if not sys.stderr.isatty():
+            click.echo("explain: reading the export, fitting the plain loop", err=True)
+
+    def __call__(self, name: str) -> None:
+        if sys.stderr.isatty():
+            click.echo(f"\r\033[K{f'trying {name}' if name else ''}", nl=False, err=True)
+        elif name and time.monotonic() - self.said >= QUIET_S:
+            self.said = time.monotonic()
+            click.echo(f"explain: {self.said - self.begun:.0f} s, trying {name}", err=True)
 
 
 def write_trends(out: Path, stamps: Any, pv: Any, op: Any) -> None:

@@ -28,7 +28,19 @@ def _news(night: Night, row: Row) -> tuple[str, str]:
         return "stopped oscillating", "better"
     if oscillates(old) and now < HALVED * then:
         return "oscillates less than half as much", "better"
-    return _cause_news(row["cause"] or Cause.UNDECIDED, old["cause"] or Cause.UNDECIDED)
+    told = _cause_news(row["cause"] or Cause.UNDECIDED, old["cause"] or Cause.UNDECIDED)
+    return told if told[0] else _lane_news(row, old)
+
+
+def _lane_news(row: Row, old: Row) -> tuple[str, str]:
+    """Lanes beside oscillation that a loop came into or left; '' for a night that knew of no lanes."""
+    if "lanes" not in row or "lanes" not in old:
+        return "", ""
+    now, then = ([x for x in (r["lanes"] or "").split(", ") if x] for r in (row, old))
+    came, left = [x for x in now if x not in then], [x for x in then if x not in now]
+    if came:
+        return f"new: {', '.join(came)}", "worse"
+    return (f"no more: {', '.join(left)}", "better") if left else ("", "")
 
 
 def _cause_news(now: str, then: str) -> tuple[str, str]:

@@ -35,3 +35,16 @@ def told(before: dict[str, object], now: dict[str, object]) -> tuple[list[str], 
 def test_news_stand_where_they_belong(before, now, new, better):
     """A cured loop is good news, a fault that comes is new, and a night that could not tell is no news."""
     assert told(before, now) == (new, better)
+
+
+@pytest.mark.parametrize(
+    ("before", "now", "new", "better"),
+    [
+        ({"lanes": None}, {"lanes": "manual"}, ["new: manual"], []),
+        ({"lanes": "at limit, lasting error"}, {"lanes": "at limit"}, [], ["no more: lasting error"]),
+        ({"lanes": "sluggish"}, {"lanes": "sluggish"}, [], []),
+    ],
+)
+def test_lanes_are_news_too(before, now, new, better):
+    """A loop that came to rest at its limit is new, one that left a lane is better."""
+    assert told(before, now) == (new, better)

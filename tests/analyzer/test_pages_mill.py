@@ -18,7 +18,7 @@ from reports.markdown import render
 
 MILL = Path(__file__).parents[2] / "sample_data"
 RETUNED = ("LIC2101", "LIC2102", "LIC2103", "TIC2104", "LIC2105", "TIC2106", "LIC2107")
-OTHERS = ("FIC2110", "TIC2111", "PIC2112", "FIC2113", "PIC2114", "PIC2116")
+OTHERS = ("FIC2110", "FIC2113", "PIC2116")
 
 
 @pytest.fixture(scope="module")

@@ -8,9 +8,10 @@ from typing import Any
 
 import pytest
 
+from tests.browser.test_explanations import explained
 from tests.browser.test_pages import browser, folder, opened, pytestmark, wait
 
-__all__ = ["browser", "folder", "pytestmark"]
+__all__ = ["browser", "explained", "folder", "pytestmark"]
 axe = pytest.importorskip("axe_core_python", reason="needs axe-core-python, of the test extra")
 SCRIPT = (files("axe_core_python") / "axe.min.js").read_text(encoding="utf-8")
 RUN = """const done = arguments[arguments.length - 1];
@@ -46,3 +47,11 @@ def test_nothing_serious(browser: Any, folder: Path, scheme: str, width: int) ->
     finally:
         browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
         browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": []})
+
+
+def test_nothing_serious_in_an_explanation(browser: Any, explained: list[Path]) -> None:
+    """Nor on the page of an explanation."""
+    opened(browser, explained[0])
+    wait(browser, "return Array.from(document.querySelectorAll('.trend')).every((t) => t.dataset.ready)")
+    browser.execute_cdp_cmd("Runtime.evaluate", {"expression": SCRIPT})
+    assert browser.execute_async_script(RUN) == []

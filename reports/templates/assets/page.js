@@ -31,7 +31,9 @@
   function sortable(table) {
     const heads = Array.from(table.tHead.rows[0].cells);
     heads.forEach((head, index) => {
-      head.querySelector("button").addEventListener("click", () => {
+      const button = head.querySelector("button");
+      if (!button) return; // a column without a heading
+      button.addEventListener("click", () => {
         const first = head.classList.contains("n") ? "descending" : "ascending";
         const other = first === "ascending" ? "descending" : "ascending";
         const next = head.getAttribute("aria-sort") === first ? other : first;
