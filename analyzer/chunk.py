@@ -31,6 +31,7 @@ from analyzer.present import advised
 from analyzer.quality import Prepared, interval, prepare
 from analyzer.rows import Lost, hour_rows, lost_row, night_row
 from analyzer.store import Store, rows_table, write_table
+from analyzer.turn_events import turn_events
 from identification.errors import NotAssessedError, TriageError
 from identification.models import Pid
 
@@ -100,9 +101,10 @@ def _loop_row(
         known |= {"pv_lo": prepared.scale.low, "pv_hi": prepared.scale.low + prepared.scale.span}
         known |= standing(prepared, stated, spec.type, config).as_row()
         found, advice = _assessed(spec, prepared, stated, config, advising)
+        turns = turn_events(prepared, found) if advising else None
     except Exception as error:  # an error of one loop is that loop's result, never the night's end
         return in_lanes({**lost_row(spec, night.name, _lost(error, config)), **known}, config.lanes), None
-    row = {**night_row(found, spec, night.name, config.advice), **known}
+    row = {**night_row(found, spec, night.name, config.advice), **known, "turns": turns}
     return in_lanes(advised(row, found.verdict.needs, advice), config.lanes), found
 
 

@@ -26,6 +26,7 @@ COLOURS = {
     "baseline": "#d97706",
     "model": "#1f6fb4",
     "brought": "#8e44ad",
+    "stuck": "#b3361c",
     "edge": "#7fa9cd",
 }
 """As the style sheet's in light."""

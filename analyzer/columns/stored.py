@@ -51,6 +51,14 @@ STORED = (
         "End of the last ten periods.",
     ),
     Column(
+        "turns",
+        Kind.JSON,
+        "Half-cycles",
+        "",
+        Source.OSCILLATION,
+        "The last ten half-cycles from each turn of OP: OP and PV in percent, and how long the stem stands.",
+    ),
+    Column(
         "good_h",
         Kind.NUMBER,
         "Good samples",

@@ -261,7 +261,7 @@ class CauseLimits:
         UNTIDY,
     )
     trial_size: float = limit(
-        0.25,
+        0.2,
         "-",
         (0.0, 10.0),
         "Stickband over OP's range from which agreeing trials show a fault",

@@ -17,6 +17,7 @@ from analyzer.pages.headings import heading, headings, titled
 from analyzer.pages.reading import Thinned
 from analyzer.pages.rhythm import rhythm_plots
 from analyzer.pages.trends import LEAST_PCT, close_span, trend_block
+from analyzer.pages.turns import turn_panels
 from analyzer.pages.words import duration, number
 from analyzer.pages.work_order import work_order
 from analyzer.units import row_settings
@@ -57,6 +58,7 @@ COLUMNS = (
         "valve_size",
         "timezone",
         "lack",
+        "turns",
     ),
     *(
         "source_loop",
@@ -104,6 +106,9 @@ def _first(row: Row, thin: Thinned | None) -> Section:
         opening = close_span(row, thin)
         title = "SP, PV and OP" + (", the last ten periods" if opening else "")
         blocks.append(trend_block("trend", title, thin, (), scale_of(row), opening))
+    events = turn_panels(row, scale_of(row))
+    if events is not None:
+        blocks.append(events)
     return Section("What to do", tuple(blocks))
 
 

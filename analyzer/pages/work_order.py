@@ -53,7 +53,7 @@ def _valve(row: Row) -> Lines:
         do = "in manual, with the process calm, move OP by 5 % up and down"
         look = "PV, or the stem, does not answer: air supply, positioner, linkage, a closed hand valve"
         return _order(do, look, NEXT_NIGHT)
-    after = row["advice"] or "Until it is repaired the loop goes on cycling at these settings."
+    after = "Until it is repaired the loop goes on cycling; what was tried is told below."
     return _order(STROKE.format(step=width / STEPS), kind.format(width=width) + WEAR, after)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -11,9 +12,11 @@ import pytest
 from analyzer.loops.changes import TuningChange
 from analyzer.pages import before_after, morning, night
 from analyzer.pages.areas import score
+from analyzer.pages.engineering import Scale
 from analyzer.pages.reading import read_hours, read_trends
 from analyzer.pages.report import Spans, cases, detected
 from analyzer.pages.rhythm import autocorrelation, rhythm_plots
+from analyzer.pages.turns import turn_panels
 from analyzer.pages.view import read_night
 from analyzer.pages.wear import wear_texts
 from analyzer.store import Store
@@ -205,3 +208,28 @@ def test_a_big_plant_is_small(tmp_path: Path) -> None:
     assets = sum(len(html.asset(name)) for name in html.ASSETS)
     assert written[0].stat().st_size - assets < 1e6
     assert max(p.stat().st_size for p in written[1:]) < 1.5e6
+
+
+def test_half_cycles_are_drawn_in_the_loops_unit() -> None:
+    """Stored half-cycles become three pictures: falling ones turned over, in the loop's unit, stuck parts marked."""
+    up = {
+        "start_s": 0.0,
+        "op": [10, 12, 14, 16],
+        "pv": [50, 50, 50, 52],
+        "late": [50, 50, 52, 54],
+        "stuck": [0, 3],
+    }
+    down = {**up, "op": [16, 14, 12, 10], "pv": [52, 52, 52, 50], "late": [52, 52, 50, 48]}
+    row = {"turns": json.dumps({"step_s": 6.0, "dead_s": 6.0, "halves": [up, down]}), "cause": "valve"}
+    drawn = turn_panels(row, Scale(0.0, 200.0, "m3/h"))
+    assert drawn is not None
+    over_op, over_pv, plane = drawn.plots
+    assert [line.y.tolist() for line in over_op.lines if line.kind == "pv"] == [[0, 2, 4, 6]] * 2
+    assert [line.y.tolist() for line in over_pv.lines if line.kind == "pv"] == [[0, 0, 0, 4]] * 2
+    assert [line.y.tolist() for line in over_pv.lines if line.kind == "stuck"] == [[0, 0, 0, 4]] * 2
+    assert [line.x.tolist() for line in plane.lines if line.kind == "stuck"] == [
+        [10, 12, 14, 16],
+        [16, 14, 12, 10],
+    ]
+    assert "m3/h" in plane.y_label
+    assert turn_panels({"turns": None, "cause": "valve"}, Scale(0.0, 1.0, "")) is None

@@ -1,0 +1,101 @@
+"""What follows each turn of OP: half-cycles laid over one another, with the part in which the stem stands."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from identification.record import Floats, Mask
+
+POINTS = 40
+"""Points of a half-cycle of usual length; ours: enough to see a corner."""
+LONGEST = 2.0
+"""Half-cycles are cut at this many usual lengths [-]; ours."""
+
+
+@dataclass(frozen=True, slots=True)
+class Half:
+    """One half-cycle from a turn of OP on.
+
+    start_s : time of the turn, from the record's start [s]; op, pv, late : OP, PV, and PV the dead time later, every
+    `step_s` after the turn [% of OP, % of span], shape (k,) each; stuck : first and last (excluded) of these points
+    at which OP has not yet moved by the stickband and PV has come to rest from what was before.
+    """
+
+    start_s: float
+    step_s: float
+    op: Floats
+    pv: Floats
+    late: Floats
+    stuck: tuple[int, int]
+
+
+@dataclass(frozen=True, slots=True)
+class Valve:
+    """What is known of valve and process: stickband [% of OP], 0 for a sound valve; dead time, and the time after
+    which PV has answered what was before [s]."""
+
+    stickband: float
+    dead_s: float
+    answered_s: float
+
+
+def halves(
+    op: Floats,
+    pv: Floats,
+    good: Mask,
+    turns: np.ndarray,
+    dt_s: float,
+    period_s: float,
+    valve: Valve,
+    most: int,
+) -> tuple[Half, ...]:
+    """The last half-cycles of a record that are good throughout.
+
+    Parameters
+    ----------
+    op, pv : ndarray of shape (n,)
+        [% of OP, % of span].
+    good : ndarray of bool, shape (n,)
+        True where samples may be used.
+    turns : ndarray of int, shape (t,)
+        Samples at which OP turns.
+    dt_s, period_s : float
+        Sample interval and period of the cycle [s].
+    valve : Valve
+    most : int
+        Half-cycles wanted.
+
+    Returns
+    -------
+    tuple of Half
+        Oldest first; none where OP does not turn twice.
+    """
+    step = max(0.5 * period_s / POINTS, dt_s)
+    found: list[Half] = []
+    clock = np.arange(op.size)
+    for first, last in reversed(list(pairwise(turns))):
+        if len(found) == most:
+            break
+        if last - first < 3 or not good[first : last + 1].all():
+            continue
+        at = np.arange(first, min(last, first + LONGEST * 0.5 * period_s / dt_s) + 1e-9, step / dt_s)
+        o, p, later = (
+            np.interp(at, clock, op),
+            np.interp(at, clock, pv),
+            np.interp(at + valve.dead_s / dt_s, clock, pv),
+        )
+        found.append(Half(float(first) * dt_s, step, o, p, later, _stuck(o, step, valve)))
+    return tuple(reversed(found))
+
+
+def _stuck(op: Floats, step_s: float, valve: Valve) -> tuple[int, int]:
+    """Points from where PV has answered what was before to where OP has moved the stickband; (0, 0) for none."""
+    if valve.stickband <= 0:
+        return 0, 0
+    moved = np.abs(op - op[0]) >= valve.stickband
+    end = int(np.argmax(moved)) if moved.any() else op.size
+    begin = round(valve.answered_s / step_s)
+    return (begin, end) if end - begin >= 2 else (0, end) if end >= 2 else (0, 0)
