@@ -15,6 +15,7 @@ from analyzer.decisions import Action, Cause, Fault, Lack, Needs
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import as_stated
 from analyzer.measure import Measured
+from analyzer.model_samples import uncertain
 from analyzer.oscillation import counting
 from identification.estimation.covariance import NINETY
 from identification.estimation.gauss_newton import covariance
@@ -26,7 +27,7 @@ from identification.signals.robust import robust_deviation
 from tuning.limit_cycle import Cycle, confirm
 from tuning.linear import integral_s, is_stable
 from tuning.recommend import Proposal, recommend
-from tuning.search import rounded, scaled_valve
+from tuning.search import rounded
 
 MOST_SCANS = 20_000
 """Scans of reconstructed load that settings are tried on at most."""
@@ -96,38 +97,6 @@ def tuned(window: Window, fit: Fit, valve: bool, limits: AdviceLimits) -> Proces
     if lag_factor(window, fit, valve, limits) is None:
         return Integrator(process.slope, process.dead_time_s)
     return process
-
-
-def uncertain(window: Window, fit: Fit, loop: Loop, samples: int = 6, seed: int = 0) -> tuple[Loop, ...]:
-    """Loops drawn from the fit's covariance, of the same controller and the same kind of process."""
-    dead_time_s = fit.dead_time_s + window.half_block_s
-    lag, gain = math.log(fit.time_constant_s), math.log(abs(fit.gain))
-    mean = np.array([lag, dead_time_s, fit.valve.stickband, gain])
-    relative = np.array([1.0, 1.0, 1.0, 1.0 / fit.gain])
-    spread = covariance(window, fit, free_width=loop.valve is not None) * np.outer(relative, relative)
-    scale = np.sqrt(np.maximum(np.diag(spread), 1e-24))
-    unit = spread / np.outer(scale, scale) + 1e-9 * np.eye(mean.size)
-    # not by singular vectors, whose signs are a matter of rounding
-    root = scale[:, None] * np.linalg.cholesky(unit)
-    draws = mean + np.random.default_rng(seed).normal(size=(samples, mean.size)) @ root.T
-    return tuple(_drawn(draw, fit, loop) for draw in draws)
-
-
-def _drawn(draw: Floats, fit: Fit, loop: Loop) -> Loop:
-    """The loop at one draw of log time constant, dead time, stickband and log gain.
-
-    The lag stays within a factor of ten, slope and dead time within three. Gain over time constant is drawn well
-    where the two by themselves are not: their errors go together.
-    """
-    log_t = min(max(draw[0], math.log(fit.time_constant_s) - 2.3), math.log(fit.time_constant_s) + 2.3)
-    off = draw[3] - draw[0] - math.log(abs(fit.slope))
-    slope = fit.slope * math.exp(min(max(off, -math.log(3.0)), math.log(3.0)))
-    longest = 3.0 * max(loop.process.dead_time_s, loop.controller.scan_s)
-    dead, t = min(max(float(draw[1]), 0.0), longest), math.exp(log_t)
-    is_ramp = isinstance(loop.process, Integrator)
-    process: Process = Integrator(slope, dead) if is_ramp else Fopdt(slope * t, t, dead)
-    factor = max(float(draw[2]), 0.2 * fit.valve.stickband) / max(fit.valve.stickband, 1e-9)
-    return Loop(process, loop.controller, scaled_valve(loop.valve, factor))
 
 
 def load_of(window: Window, fit: Fit, controller: Pid, seed: int = 0) -> Floats:

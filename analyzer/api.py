@@ -1,7 +1,6 @@
 """What a notebook needs: read an export, assess a loop, fit, simulate, tune, explain, read a store into pandas.
 
 Heavy parts are imported when they are used. From the project's folder:
-
 >>> from analyzer import api as triage
 >>> plant = triage.read("sample_data/mill.parquet", loops="sample_data/loops.csv", changes="sample_data/changes.csv")
 >>> len(plant.loops), plant.nights[0]
@@ -48,8 +47,7 @@ class PlantLoop:
     """One loop over one night, or over all of an export.
 
     spec : its row of loops.csv with the settings in force; prepared : its trends on one clock, with masks and notes;
-    plant : the export that it is of; night : None where it is the whole export.
-    """
+    plant : the export that it is of; night : None where it is the whole export."""
 
     spec: LoopSpec
     prepared: Prepared
@@ -88,9 +86,9 @@ class Plant:
     @cached_property
     def spans(self) -> Mapping[str, Night]:
         """Nights by name, oldest first."""
-        from analyzer.nights import nights_of
+        from analyzer import nights
 
-        return {n.name: n for n in nights_of(self.export, list(self.specs), self.config.nights)}
+        return {n.name: n for n in nights.nights_of(self.export, list(self.specs), self.config.nights)}
 
     @property
     def nights(self) -> tuple[str, ...]:
@@ -105,8 +103,7 @@ class Plant:
         InputError
             There is no such loop or night, or the loop has no PV.
         NotAssessedError
-            Its trends hold too little to be put on a clock.
-        """
+            Its trends hold too little to be put on a clock."""
         from analyzer.loops.settings_in_force import in_force
         from analyzer.loops.spec import spec_of
         from analyzer.nights import cut
@@ -118,9 +115,8 @@ class Plant:
             raise InputError(f"night {night}", f"one of {', '.join(self.nights[-3:])}", "see Plant.nights")
         span = None if night is None else self.spans[night]
         spec = in_force(spec, self.changes, self.export.span()[1] if span is None else span.last_s)
-        series = self.export.read(spec.tags)
-        if span is not None:
-            series = {tag: cut(x, span) for tag, x in series.items()}
+        whole = self.export.read(spec.tags)
+        series = whole if span is None else {tag: cut(x, span) for tag, x in whole.items()}
         return PlantLoop(spec, prepare(spec, series, self.config.quality), self, span)
 
 
@@ -286,7 +282,7 @@ def nights(store: str | Path, table: str = "nights") -> pd.DataFrame:
     store : path
         A folder that `triage run` wrote.
     table : str
-        nights (a row a loop), hours, trends or explained.
+        nights (a row a loop), hours, trends, groups or explained.
 
     Raises
     ------

@@ -9,13 +9,15 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from analyzer.assessments import Assessments, Hour, assess_span, hourly, settling_time, usable
-from analyzer.cause import NO_CAUSE, Verdict, as_hint, dead_valve, judge, not_assessed, with_dead_valve
+from analyzer.cause import NO_CAUSE, Verdict, as_hint, judge, not_assessed
 from analyzer.config import Config, QualityLimits
+from analyzer.dead_valve import dead_valve, with_dead_valve
 from analyzer.decisions import Cause, Lack, LacksError, Needs
 from analyzer.measure import measure, time_scale
 from analyzer.oscillation import Oscillations, barely_seen, counting, detect
 from analyzer.plantwide.wave import Wave, waves_of
-from analyzer.quality import Prepared, run_lengths
+from analyzer.quality import Prepared
+from analyzer.sample_clock import run_lengths
 from analyzer.settings_check import SettingsDiffer, differing
 from analyzer.trends import BUCKETS, FINE_BUCKETS, close_view, thinned
 from analyzer.trial_signs import hidden_by_grid

@@ -24,8 +24,6 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from analyzer.config import CauseLimits
 from analyzer.decisions import CAUSES, Cause, Fault, Needs
 from analyzer.measure import Measured
@@ -38,7 +36,6 @@ from analyzer.trial_signs import (
     repeats_itself,
     shown_by_trials,
 )
-from identification.record import LoopRecord
 
 
 @dataclass(frozen=True, slots=True)
@@ -268,36 +265,3 @@ def _named(signs: list[Sign], confidence: dict[Cause, float], limits: CauseLimit
 def as_hint(verdict: Verdict, most_pct: float) -> Verdict:
     """A verdict that rests on little: no confidence above `most_pct` [%]."""
     return replace(verdict, confidence={k: min(v, most_pct) for k, v in verdict.confidence.items()})
-
-
-def dead_valve(record: LoopRecord, limits: CauseLimits) -> Sign | None:
-    """A valve that no longer moves PV: OP winds over much of its range, the error stays on one side, PV is still.
-
-    Returns
-    -------
-    Sign or None
-    """
-    good = ~(record.mask("gap") | record.mask("manual"))
-    if record.sp_estimated or good.sum() < 100:
-        return None
-    op, pv, e = record.op[good], record.pv[good], record.error[good]
-    wound = float(np.ptp(op))
-    low, high = np.quantile(pv, [0.05, 0.95])
-    still = float(high - low) <= 0.1 * float(np.median(np.abs(e)))
-    one_sided = max(float((e > 0).mean()), float((e < 0).mean()))
-    if wound < limits.wound_pct or not still or one_sided < 0.95:
-        return None
-    return Sign("valve", 0.9, f"OP winds over {wound:.0f} % while PV stands still off the set point")
-
-
-def with_dead_valve(verdict: Verdict, sign: Sign) -> Verdict:
-    """A verdict of a valve that is plainly at fault without oscillation."""
-    confidence = {Cause.VALVE: 90.0, Cause.TUNING: 0.0, Cause.LOAD: 0.0}
-    return replace(
-        verdict,
-        cause=Cause.VALVE,
-        confidence=confidence,
-        fault=Fault.UNDECIDED,
-        signs=(sign, *verdict.signs),
-        dead=True,
-    )

@@ -28,8 +28,9 @@ from analyzer.loops.tags import controller
 from analyzer.nights import Night, cut
 from analyzer.plantwide.table import waves_table
 from analyzer.present import advised
-from analyzer.quality import Prepared, interval, prepare
+from analyzer.quality import Prepared, prepare
 from analyzer.rows import Lost, hour_rows, lost_row, night_row
+from analyzer.sample_clock import interval
 from analyzer.store import Store, rows_table, write_table
 from analyzer.turn_events import turn_events
 from identification.errors import NotAssessedError, TriageError

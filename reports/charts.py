@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from reports import map_charts
-from reports.pages import Graph, HeatMap, IntervalChart, Panels, Picture, Plot, TreeMap, Trend
+from reports.map_blocks import Graph, HeatMap, TreeMap
+from reports.pages import IntervalChart, Panels, Picture, Plot, Trend
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

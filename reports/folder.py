@@ -40,7 +40,7 @@ def forget_stale(out: Path, names: Sequence[str], kept_names: Collection[str] = 
         before = json.loads((out / WRITTEN).read_text("utf-8"))
     except (OSError, ValueError):
         before = []
-    known = [n for n in before if isinstance(n, str) and Path(n).name == n and n.endswith(".html")]
+    known = [n for n in before if isinstance(n, str) and Path(n).name == n and Path(n).suffix == ".html"]
     stale = [n for n in known if n not in names and n not in kept_names]
     for name in stale:
         (out / name).unlink(missing_ok=True)

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from reports.map_blocks import Graph, HeatMap, TreeMap
 from reports.maps import BOX, places
-from reports.pages import Graph, HeatMap, TreeMap
 from reports.treemap import HEIGHT, WIDTH, fitting, laid_out
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from markupsafe import Markup
 
-from reports.pages import Graph, HeatMap, Node
+from reports.map_blocks import Graph, HeatMap, Node
 from reports.svg import digits, picture, written
 
 NAMES, WIDTH, ROW, FOOT = 120.0, 640.0, 20.0, 44.0

@@ -5,13 +5,12 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
+from reports.map_blocks import Graph, HeatMap, TreeMap
 from reports.pages import (
     Bars,
     Block,
     Cell,
     Facts,
-    Graph,
-    HeatMap,
     IntervalChart,
     Listing,
     Page,
@@ -22,7 +21,6 @@ from reports.pages import (
     Table,
     Text,
     Tiles,
-    TreeMap,
     Trend,
 )
 

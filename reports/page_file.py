@@ -14,14 +14,22 @@ from typing import Any
 
 import numpy as np
 
-from reports import pages
+from reports import map_blocks, pages
 
 KINDS = {
     kind.__name__: kind
     for kind in (
         *(pages.Page, pages.Section, pages.Table, pages.Column, pages.Cell, pages.Sparkline, pages.Bars),
-        *(pages.IntervalChart, pages.IntervalBar, pages.Plot, pages.Line, pages.Area, pages.Mark),
-        *(pages.HeatMap, pages.TreeMap, pages.TileGroup, pages.Tile, pages.Graph, pages.Node, pages.Arrow),
+        *(pages.IntervalChart, pages.IntervalBar, pages.Plot, pages.Line, pages.Area, map_blocks.Mark),
+        *(
+            map_blocks.HeatMap,
+            map_blocks.TreeMap,
+            map_blocks.TileGroup,
+            map_blocks.Tile,
+            map_blocks.Graph,
+            map_blocks.Node,
+            map_blocks.Arrow,
+        ),
         *(pages.Panels, pages.Trend, pages.Band, pages.Text, pages.Listing, pages.Facts, pages.Tiles),
     )
 }

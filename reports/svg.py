@@ -11,19 +11,8 @@ from collections.abc import Iterable
 import numpy as np
 from markupsafe import Markup, escape
 
-from reports.pages import (
-    Area,
-    Bars,
-    Floats,
-    IntervalBar,
-    IntervalChart,
-    Line,
-    Mark,
-    Panels,
-    Plot,
-    Sparkline,
-    Trend,
-)
+from reports.map_blocks import Mark
+from reports.pages import Area, Bars, Floats, IntervalBar, IntervalChart, Line, Panels, Plot, Sparkline, Trend
 
 SPARK = (120.0, 26.0)
 ROW = 24.0

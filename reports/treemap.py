@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from markupsafe import Markup, escape
 
-from reports.pages import Tile, TreeMap
+from reports.map_blocks import Tile, TreeMap
 from reports.svg import digits, picture, written
 
 WIDTH, HEIGHT = 1000.0, 360.0

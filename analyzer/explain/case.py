@@ -12,7 +12,8 @@ from analyzer.config import Config
 from analyzer.history.series import Series
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import controller
-from analyzer.quality import Prepared, onto_clock, prepare
+from analyzer.quality import Prepared, prepare
+from analyzer.sample_clock import onto_clock
 from identification.controller.check import StatedSettings
 from identification.errors import NotAssessedError
 from identification.mismatch.recording import Recording

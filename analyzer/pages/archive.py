@@ -10,7 +10,8 @@ from analyzer.pages.plant_history import NightSum
 from analyzer.pages.view import read_night
 from analyzer.plantwide.view import read_groups
 from analyzer.store import Store
-from reports.pages import Block, Page, Section, Table, TreeMap
+from reports.map_blocks import TreeMap
+from reports.pages import Block, Page, Section, Table
 
 MOST = 31
 """Nights that have a page; the store has the others."""

@@ -3,28 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
-import numpy as np
-
-from analyzer.before_after import LIMITS, MEASURES, Change, Grade, LoopComparison, Measure, Verdict, grade
+from analyzer.before_after import LIMITS, Change, Grade, LoopComparison, Verdict, grade
 from analyzer.config import ComparisonLimits
 from analyzer.loops.changes import TuningChange
-from analyzer.pages.engineering import PLAIN, Scale
+from analyzer.pages.change_case import TONES, Case, outcome
+from analyzer.pages.change_charts import PRIMARY, average_chart, per_loop_chart
 from analyzer.pages.headings import heading
-from analyzer.pages.reading import Thinned
 from analyzer.pages.trends import trend_block
-from analyzer.pages.words import KINDS, counted, interval, number, setting, signed, stamp
+from analyzer.pages.words import KINDS, interval, number, setting, signed, stamp
 from analyzer.plant_clock import UTC_NAME
+from reports.map_blocks import Mark
 from reports.pages import (
     Block,
     Cell,
     Column,
     Facts,
-    IntervalBar,
-    IntervalChart,
     Listing,
-    Mark,
     Page,
     Section,
     Table,
@@ -34,62 +29,6 @@ from reports.pages import (
 
 TREND_BUCKETS = 4000
 """Buckets of a trend on this page: two weeks at two pixels a bucket, 64 kB a loop; ours."""
-PRIMARY = tuple(m for m in MEASURES if m.primary)
-
-
-@dataclass(frozen=True, slots=True)
-class Case:
-    """A change with what came of it."""
-
-    change: TuningChange
-    found: LoopComparison
-    description: str
-    units: str
-    trend: Thinned | None
-    wear: tuple[str, ...] = ()
-    scale: Scale = PLAIN
-
-
-GRADES = {
-    Grade.CLEAR: "improved clearly in all four",
-    Grade.MODEST: "improved modestly",
-    Grade.MIXED: "in part better, in part worse",
-    Grade.WORSE: "worse",
-    Grade.NONE: "no clear change",
-    Grade.INCOMPARABLE: "not comparable",
-}
-
-
-TONES = {
-    Grade.CLEAR: "better",
-    Grade.MODEST: "better",
-    Grade.PARTIAL: "unclear",
-    Grade.NONE: "unclear",
-    Grade.MIXED: "worse",
-    Grade.WORSE: "worse",
-    Grade.INCOMPARABLE: "incomparable",
-}
-"""Colours of outcomes."""
-
-
-def named(changes: Sequence[Change]) -> str:
-    """Names of assessments in a sentence."""
-    names = [c.measure.short_title.lower() for c in changes]
-    return names[0] if len(names) == 1 else ", ".join(names[:-1]) + " and " + names[-1]
-
-
-def outcome(found: LoopComparison) -> str:
-    """A loop's outcome in one phrase."""
-    kind = grade(found)
-    if kind is Grade.PARTIAL:
-        text = f"improved only in {named([c for c in found.primary if c.verdict is Verdict.BETTER])}"
-    elif kind is Grade.INCOMPARABLE:
-        text = "not comparable: " + ("; ".join(found.reasons) or "no hourly figures on both sides")
-    else:
-        text = GRADES[kind]
-    if found.source_loop:
-        text += f"; the cause lies in the neighbour {found.source_loop}, whose oscillation it follows"
-    return text
 
 
 def _tiles(cases: Sequence[Case]) -> Tiles:
@@ -104,46 +43,6 @@ def _tiles(cases: Sequence[Case]) -> Tiles:
     )
     shown = tuple((str(n), what, tone) for n, what, tone in counts if n)
     return Tiles(((str(len(cases)), "changes looked at", ""), *shown))
-
-
-def _bar(change: Change, group: str) -> IntervalBar:
-    ends = change.interval_pct
-    low, high = ends if ends else (None, None)
-    text = f"{signed(change.value_pct)} %" if ends else change.verdict.value
-    return IntervalBar(
-        group, change.measure.short_title, change.value_pct, low, high, KINDS[change.verdict], text
-    )
-
-
-def per_loop_chart(cases: Sequence[Case]) -> IntervalChart:
-    """Change per loop and assessment (the study's Figure 12)."""
-    bars = tuple(_bar(c, case.found.loop) for case in cases for c in case.found.primary)
-    caption = "Bars: change in % of the span before; lines: its interval. Less is better in all four."
-    return IntervalChart("change-per-loop", "Change per loop and assessment", "% of before", bars, caption)
-
-
-def _average(cases: Sequence[Case], measure: Measure) -> IntervalBar:
-    """Mean of the comparable loops' changes; errors of different loops taken as independent."""
-    changes = [c for case in cases for c in case.found.primary if c.measure == measure]
-    known = [c for c in changes if c.verdict is not Verdict.INCOMPARABLE and c.value_pct is not None]
-    group = counted(len(known), "loop")
-    if not known:
-        return IntervalBar(group, measure.short_title, None, None, None, "incomparable", "nothing comparable")
-    values = np.array([c.value_pct for c in known], float)
-    ends = np.array([c.interval_pct for c in known], float)
-    down, up = (float(np.sqrt(((ends[:, k] - values) ** 2).sum()) / len(known)) for k in (0, 1))
-    mean = float(values.mean())
-    low, high = max(mean - down, -100.0), mean + up
-    verdict = Verdict.UNCLEAR if low <= 0 <= high else Verdict.BETTER if mean < 0 else Verdict.WORSE
-    text = f"{signed(mean)} %"
-    return IntervalBar(group, measure.short_title, mean, low, high, KINDS[verdict], text)
-
-
-def average_chart(cases: Sequence[Case]) -> IntervalChart:
-    """Average change of all comparable loops (the study's Figure 13)."""
-    bars = tuple(_average(cases, m) for m in PRIMARY)
-    caption = "Mean over the loops that can be compared; loops that were not better count as they are."
-    return IntervalChart("average-change", "Average change", "% of before", bars, caption)
 
 
 COLUMNS = (

@@ -13,7 +13,8 @@ from analyzer.pages.reading import Thinned
 from analyzer.pages.words import duration, number
 from analyzer.plantwide.view import GroupView
 from identification.signals.spectrum import PER_OCTAVE
-from reports.pages import Arrow, Band, Graph, HeatMap, Mark, Node, Trend
+from reports.map_blocks import Arrow, Graph, HeatMap, Mark, Node
+from reports.pages import Band, Trend
 
 Row = Mapping[str, Any]
 MOST = 12

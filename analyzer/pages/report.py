@@ -10,7 +10,7 @@ from analyzer.before_after import LIMITS, LoopComparison, Span, compare, follows
 from analyzer.config import ChangeLimits, ComparisonLimits
 from analyzer.decisions import counts
 from analyzer.loops.changes import TuningChange, behaviour_change, stated_changes
-from analyzer.pages.before_after import Case
+from analyzer.pages.change_case import Case
 from analyzer.pages.engineering import scale_of
 from analyzer.pages.reading import nights_within, read_hours, read_nights, read_trends
 from analyzer.pages.wear import wear_texts

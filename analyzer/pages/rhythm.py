@@ -8,7 +8,8 @@ from scipy.signal import welch
 from analyzer.block_bootstrap import Floats
 from analyzer.pages.reading import Thinned
 from analyzer.pages.words import duration
-from reports.pages import Line, Mark, Plot, Text
+from reports.map_blocks import Mark
+from reports.pages import Line, Plot, Text
 
 LEAST_BUCKETS = 2.5
 """Buckets a period needs to be seen in a thinned trend [-]; below 2 it is folded (Nyquist)."""

@@ -10,7 +10,7 @@ import pytest
 from plant import CONFIG, START_S, Sketch, Trends, prepared, record, series, simulate, spec
 
 from analyzer.assess import Assessment, assess
-from analyzer.cause import dead_valve
+from analyzer.dead_valve import dead_valve
 from analyzer.decisions import Lack
 from analyzer.plantwide.source import Peer
 from analyzer.plantwide.verdict import followers_of, trace

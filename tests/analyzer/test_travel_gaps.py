@@ -7,7 +7,7 @@ import pytest
 
 from analyzer.assessments import assess_span
 from analyzer.config import FigureLimits
-from analyzer.quality import interval
+from analyzer.sample_clock import interval
 from identification.record import LoopRecord
 
 

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-HOURS = 6
+HOURS = 3
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from reports.html import render
+from reports.map_blocks import Mark
 from reports.markdown import escaped
 from reports.markdown import render as render_markdown
 from reports.names import slug
@@ -27,7 +28,6 @@ from reports.pages import (
     IntervalChart,
     Line,
     Listing,
-    Mark,
     Page,
     Plot,
     Section,

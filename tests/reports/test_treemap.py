@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from reports.pages import Tile, TileGroup, TreeMap
+from reports.map_blocks import Tile, TileGroup, TreeMap
 from reports.treemap import HEAD, Place, fitting, laid_out, squarified, tree_map
 
 SIZES = st.lists(st.floats(0.01, 1e4), min_size=1, max_size=40).map(lambda x: sorted(x, reverse=True))

@@ -18,7 +18,8 @@ from analyzer.pages.night import pages
 from analyzer.store import Store
 from reports.charts import draw as drawn
 from reports.html import render
-from reports.pages import Graph, HeatMap, Trend
+from reports.map_blocks import Graph, HeatMap
+from reports.pages import Trend
 from tests.analyzer.plantwide.conftest import RunPlant
 
 Row = Mapping[str, Any]
