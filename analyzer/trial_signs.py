@@ -36,7 +36,7 @@ def repeats_itself(m: Measured, o: Oscillation, limits: CauseLimits) -> bool:
     t = m.trials
     if t is None or o.rhythm.third < limits.narrow or m.kurtosis > limits.kept_size:
         return False
-    return m.evidence < limits.trial_gain * t.count and t.steadiness < 3 * limits.steadiness
+    return m.evidence < limits.trial_gain * t.count and t.steadiness < limits.repeated_steadiness
 
 
 def shown_by_trials(m: Measured, limits: CauseLimits) -> bool:
