@@ -8,20 +8,20 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from analyzer import words
 from analyzer.assessments import Assessments, Hour, assess_span, hourly, settling_time, usable
 from analyzer.cause import NO_CAUSE, Verdict, as_hint, judge, not_assessed
 from analyzer.config import Config, QualityLimits
 from analyzer.dead_valve import dead_valve, with_dead_valve
 from analyzer.decisions import Cause, Lack, LacksError, Needs
 from analyzer.measure import measure, time_scale
-from analyzer.oscillation import Oscillations, barely_seen, counting, detect
+from analyzer.oscillation import Oscillation, Oscillations, barely_seen, counting, detect
 from analyzer.plantwide.wave import Wave, waves_of
 from analyzer.quality import Prepared
 from analyzer.sample_clock import run_lengths
 from analyzer.settings_check import SettingsDiffer, differing
 from analyzer.trends import BUCKETS, FINE_BUCKETS, close_view, thinned
 from analyzer.trial_signs import hidden_by_grid
-from analyzer.words import FOLDED, too_coarse
 from identification.errors import NotAssessedError
 from identification.models import Pid
 from identification.record import LoopRecord
@@ -128,8 +128,27 @@ def cause_of(
         return with_dead_valve(verdict, dead) if dead else verdict
     if hidden_by_grid(measured, prepared.pv_step, config.cause):
         measured = replace(measured, evidence=0.0)
-    verdict = judge(measured, oscillation, config.cause)
+    verdict = told_apart(judge(measured, oscillation, config.cause), prepared, oscillation, config)
     return with_dead_valve(verdict, dead) if dead and verdict.cause is not Cause.VALVE else verdict
+
+
+def told_apart(
+    verdict: Verdict, prepared: Prepared, oscillation: Oscillation | None, config: Config
+) -> Verdict:
+    """The verdict, or none where so few samples a cycle, or so coarse a grid, make other causes look like it."""
+    if oscillation is None or verdict.cause not in (Cause.LOAD, Cause.TUNING):
+        return verdict
+    samples = oscillation.period_s / prepared.record.dt_s
+    steps = oscillation.amplitude_pct / max(prepared.pv_step, 1e-12)
+    lacking = None
+    if steps < config.cause.steps_told:
+        lacking = Needs(Lack.FINER, words.too_rough(prepared.pv_step, oscillation.amplitude_pct))
+    elif verdict.cause is Cause.LOAD and samples < config.cause.samples_told:
+        lacking = Needs(Lack.FASTER, words.too_few(samples, config.cause.samples_told))
+    if lacking is None:
+        return verdict
+    most = 0.9 * config.cause.named_pct
+    return replace(as_hint(verdict, most), cause=Cause.UNDECIDED, needs=lacking)
 
 
 def _known(figures: Assessments, op: bool) -> Assessments:
@@ -151,12 +170,12 @@ def _hidden(record: LoopRecord, found: Oscillations, controller: Pid | None, con
         folded = None if controller is None else config.advice.cycle_per_ti * controller.ti_s
         if folded is None or folded >= NYQUIST * record.dt_s:
             return None
-        return Needs(Lack.FASTER, f"{too_coarse(record.dt_s, folded, samples)}; {FOLDED}")
+        return Needs(Lack.FASTER, f"{words.too_coarse(record.dt_s, folded, samples)}; {words.FOLDED}")
     period = barely_seen(found, config.oscillation)
     if period is None and controller is not None and math.isfinite(controller.ti_s):
         expected = config.advice.cycle_per_ti * controller.ti_s
         period = expected if expected < samples * record.dt_s else None
-    return None if period is None else Needs(Lack.FASTER, too_coarse(record.dt_s, period, samples))
+    return None if period is None else Needs(Lack.FASTER, words.too_coarse(record.dt_s, period, samples))
 
 
 def _settings(

@@ -82,6 +82,7 @@ class Lack(StrEnum):
     UNCOMPRESSED = "uncompressed trends"
     UNBROKEN = "unbroken samples"
     FASTER = "faster samples"
+    FINER = "finer values"
     LONGER = "longer record"
 
 

@@ -64,3 +64,18 @@ def beyond_record(dead_time_s: float, duration_s: float) -> str:
         f"No settings: the model found has a dead time of {dead_time_s:.3g} s, more than a record of "
         f"{duration_s / 3600:.2g} h can show."
     )
+
+
+def too_few(samples: float, needed: float) -> str:
+    """Why so few samples a cycle tell no load."""
+    return (
+        f"a load from outside needs {needed:g} samples a cycle to be told from a valve or the tuning, there are "
+        f"{samples:.2g}"
+    )
+
+
+def too_rough(step_pct: float, amplitude_pct: float) -> str:
+    """Why a coarse grid tells no cause."""
+    return (
+        f"needs finer values: PV is recorded in steps of {step_pct:.2g} % and swings by {amplitude_pct:.2g} %"
+    )

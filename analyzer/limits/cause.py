@@ -117,6 +117,20 @@ class CauseLimits(TrialLimits):
         "Gain outside the period's band over gain with it, from which both see one process",
         STUDY,
     )
+    samples_told: float = limit(
+        10.0,
+        "-",
+        (2.0, 1000.0),
+        "Samples a cycle below which no load is told: what is fast in a valve's cycle or a resonance is not seen",
+        "ours: below it 9 of 22 loads told on untidy loops are none (tests/proofs/recorded.md)",
+    )
+    steps_told: float = limit(
+        3.0,
+        "-",
+        (0.0, 1000.0),
+        "Steps of PV's grid in an amplitude below which neither load nor tuning is told",
+        "ours: at 2.5 steps a play is called a load (tests/proofs/recorded.md)",
+    )
     wound_pct: float = limit(
         20.0,
         "% of span",

@@ -18,9 +18,10 @@ import numpy as np
 
 from analyzer.assess import assess
 from analyzer.decisions import Cause, counts
+from analyzer.oscillation import detect
 from analyzer.quality import prepare
 from identification.errors import NotAssessedError
-from tests.analyzer.plant import CONFIG, START_S, Sketch, Trends, series, simulate, spec
+from tests.analyzer.plant import CONFIG, START_S, Sketch, Trends, prepared, series, simulate, spec
 from tests.untidy.recorder import swinging_door
 
 OUT = Path(__file__).with_suffix(".md")
@@ -66,11 +67,10 @@ class Answer:
 
 @cache
 def drawn(name: str, seed: int) -> tuple[Trends, float]:
-    """Trends at 1 s and the period of their cycle [s], by the spectrum of OP."""
+    """Trends at 1 s and the period of their cycle [s], as it is found in them."""
     trends = simulate(SKETCHES[name], HOURS, seed)
-    power = np.abs(np.fft.rfft(trends.op - trends.op.mean())) ** 2
-    at = 10 + int(np.argmax(power[10:]))
-    return trends, trends.op.size / at
+    found = detect(prepared(trends).record, CONFIG.oscillation).first
+    return trends, found.period_s if found is not None else 300.0
 
 
 def recorded(cell: Cell, seed: int) -> tuple[np.ndarray, list[np.ndarray]]:
@@ -95,8 +95,7 @@ def answered(job: tuple[Cell, int]) -> Answer:
     found = {f"L.{role}": series(stamp, x) for role, x in zip(("SP", "PV", "OP"), kept, strict=True)}
     sketch = SKETCHES[cell.name]
     try:
-        prepared = prepare(spec("L"), found, CONFIG.quality)
-        a = assess(prepared, sketch.controller, CONFIG)
+        a = assess(prepare(spec("L"), found, CONFIG.quality), sketch.controller, CONFIG)
     except NotAssessedError:
         return Answer(False, False, "", None)
     first = a.oscillations.first
@@ -140,6 +139,8 @@ def draw(results: dict[Cell, list[Answer]]) -> None:
             ax.plot(levels, right, "o-", color=COLOURS[name], label=name, markersize=3)
             ax.plot(levels, wrong, "x:", color=COLOURS[name], markersize=4)
         ax.set(xscale="log", xlabel=way, ylim=(-4, 104))
+        ax.set_xticks(levels[::2], [f"{x:g}" for x in levels[::2]])
+        ax.minorticks_off()
         ax.grid(color="#dddddd", linewidth=0.6)
     figure.axes[0].set_ylabel("right cause % (dots), wrong cause % (crosses)")
     figure.axes[0].legend(fontsize=8, frameon=False)
