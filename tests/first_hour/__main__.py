@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import csv
 import io
-import os
-import subprocess
-import sys
 import tempfile
 from pathlib import Path
 
+from click.testing import CliRunner
+
+from analyzer.cli import main as triage
 from reports.markdown import escaped
 from tests.first_hour.cases import MISTAKES, Mistake
 
@@ -25,24 +25,18 @@ written, whose list then says what the trends can show.
 
 def answered(mistake: Mistake, folder: Path) -> tuple[int, str, str, str]:
     """Exit status, the last line that is said, and action and reason in the list; '' where there is no list."""
-    command = [sys.executable, "-m", "analyzer.cli"]
-    environment = {**os.environ, "COLUMNS": "200"}
-    done = subprocess.run(
-        [*command, *mistake.made(folder)], capture_output=True, text=True, env=environment, check=False
-    )
+    command = mistake.made(folder)
+    done = CliRunner(env={"COLUMNS": "200"}).invoke(triage, command)
+    if done.exception is not None and not isinstance(done.exception, SystemExit):
+        raise done.exception
     lines = [line for line in (done.stderr + done.stdout).splitlines() if line.strip()]
     told = [line for line in lines if mistake.said in line] or lines[-1:]
     action = reason = ""
-    if done.returncode == 0 and "run" in mistake.made(folder)[:1]:
-        listed = subprocess.run(
-            [*command, "rank", str(folder / "store"), "--format", "csv"],
-            capture_output=True,
-            text=True,
-            check=True,
-        )
+    if done.exit_code == 0 and command[0] == "run":
+        listed = CliRunner().invoke(triage, ["rank", str(folder / "store"), "--format", "csv"])
         row = next(csv.DictReader(io.StringIO(listed.stdout)))
         action, reason = row["action"], row["reason"]
-    return done.returncode, told[-1].replace(str(folder), "."), action, reason
+    return done.exit_code, told[-1].replace(str(folder), "."), action, reason
 
 
 def main() -> None:
