@@ -4,6 +4,10 @@ import os
 
 from hypothesis import HealthCheck, settings
 
+for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ.setdefault(_name, "1")
+"""As on the command line: the suite's processes stand side by side, threads of linear algebra would crowd them."""
+
 settings.register_profile(
     "suite", deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow]
 )
