@@ -19,7 +19,6 @@ from analyzer.config import Config
 from analyzer.decisions import Action, Cause, Lack, LacksError, Status
 from analyzer.history.export import Export
 from analyzer.history.series import Series
-from analyzer.lane_words import in_lanes
 from analyzer.lanes import standing
 from analyzer.loops.changes import TuningChange
 from analyzer.loops.settings_in_force import in_force
@@ -104,9 +103,9 @@ def _loop_row(
         found, advice = _assessed(spec, prepared, stated, config, advising)
         turns = turn_events(prepared, found) if advising else None
     except Exception as error:  # an error of one loop is that loop's result, never the night's end
-        return in_lanes({**lost_row(spec, night.name, _lost(error, config)), **known}, config.lanes), None
+        return {**lost_row(spec, night.name, _lost(error, config)), **known}, None
     row = {**night_row(found, spec, night.name, config.advice), **known, "turns": turns}
-    return in_lanes(advised(row, found.verdict.needs, advice), config.lanes), found
+    return advised(row, found.verdict.needs, advice), found
 
 
 def _lost(error: Exception, config: Config) -> Lost:

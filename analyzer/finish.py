@@ -1,4 +1,4 @@
-"""A night put together: the plant-wide pass over its pieces, then one table, joined with what the store has of it.
+"""A night put together: the plant-wide pass over its pieces, lanes, then one table, joined with what the store has.
 
 A second export of the same night adds its loops. Of a loop that stands in both the fuller record is kept, and the
 newer of two that are alike, so that the same night twice replaces and a good night is never lost to an empty one.
@@ -15,6 +15,7 @@ import pyarrow.compute as pc
 from analyzer.columns.table import BY_NAME, GROUPS, NIGHTS, names
 from analyzer.config import Config, NightLimits
 from analyzer.decisions import Status
+from analyzer.lane_words import in_lanes
 from analyzer.plantwide.night import traced_night
 from analyzer.plantwide.table import waves_in
 from analyzer.store import Store, rows_table
@@ -71,7 +72,7 @@ def finish_night(
     other = [] if replace else _other_groups(store, night, fresh)
     first = 1 + max((int(r["group"]) for r in other), default=0)
     done = traced_night(fresh, waves_in(store.read_parts(night, "waves", keys)), config.plant, first)
-    rows = done.rows
+    rows = {loop: in_lanes(row, config.lanes) for loop, row in done.rows.items()}
     old = {} if replace else _known(store, night)
     kept = {loop for loop, row in rows.items() if loop in old and fuller(old[loop], row, config.nights)}
     beside = [loop for loop in old if loop not in rows]

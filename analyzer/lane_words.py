@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from analyzer.decisions import Action, Lane, Status
+from analyzer.decisions import Action, Lack, Lane, Status
+from analyzer.lane_figures import lanes_in
 from analyzer.lanes import lanes_of
 from analyzer.limits.lanes import LaneLimits
 
@@ -16,7 +17,7 @@ def _lasting(row: Row) -> str:
     sp, pv = row["sp_mean_pct"], row["pv_mean_pct"]
     side = "off" if sp is None or pv is None else "below" if pv < sp else "above"
     text = f"PV stays {row['lasting_error_pct']:.3g} % of span {side} SP"
-    if Lane.AT_LIMIT in row["lanes"].split(", "):
+    if Lane.AT_LIMIT in lanes_in(row):
         return text
     return (
         f"{text} though the loop is in automatic and OP off its limits: do tags and ranges belong together?"
@@ -42,8 +43,6 @@ SAID: Mapping[Lane, Callable[[Row], str]] = {
 """One clause a lane; oscillation has the reason itself."""
 OF_MEASUREMENT = (Lane.FROZEN, Lane.LASTING_ERROR)
 """Lanes that ask for a look at the measurement."""
-
-
 NOTHING_SURER = (None, Action.NONE, Action.NEEDS_DATA, Action.CHECK_SETTINGS)
 """Actions in whose place a doubtful measurement is looked at first: what rests on it is doubtful too."""
 
@@ -64,6 +63,7 @@ def in_lanes(row: Row, limits: LaneLimits) -> dict[str, Any]:
     """The row with its lanes, the clauses they add to the reason, and the action they ask for."""
     lanes = lanes_of(row, limits)
     named = {**row, "lanes": ", ".join(lanes) or None}
-    said = [SAID[lane](named) for lane in lanes if lane in SAID and not (lane is Lane.MANUAL and row["lack"])]
+    known = {Lane.MANUAL} if row["lack"] == Lack.AUTOMATIC else set()  # the reason has said so already
+    said = [SAID[lane](named) for lane in lanes if lane in SAID and lane not in known]
     reason = "; ".join((row["reason"], *said)) if row["reason"] else "; ".join(said)
     return {**named, "reason": reason, "action": action_of(row, lanes)}

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from analyzer.decisions import Action, Cause, Fault, Lane
+from analyzer.lane_figures import lanes_in
 from analyzer.plantwide.view import GroupView
 from analyzer.units import duration
 
@@ -73,7 +74,7 @@ def _by_work(rows: Sequence[Row]) -> list[tuple[float, str]]:
         (lambda r: r["action"] == Action.REPAIR_VALVE, _stroke),
         (lambda r: r["action"] == Action.CHECK_MEASUREMENT, _measurement),
         (lambda r: r["action"] == Action.CHECK_SETTINGS, _settings),
-        (lambda r: Lane.AT_LIMIT in (r["lanes"] or "").split(", "), _limit),
+        (lambda r: Lane.AT_LIMIT in lanes_in(r), _limit),
     )
     out = []
     for asks, say in kinds:

@@ -13,7 +13,7 @@ from analyzer.columns.other_tables import NOTED
 from analyzer.columns.ranking import LISTED, RANKING
 from analyzer.columns.table import BY_NAME, names
 from analyzer.decisions import Cause, Lane
-from analyzer.lane_figures import FIGURE
+from analyzer.lane_figures import FIGURE, lanes_in
 from analyzer.notes import Note
 from analyzer.store import Store
 from identification.errors import InputError
@@ -58,7 +58,7 @@ def ranked(
     name = night or store.require()
     rows = _within(_read(store, name), area)
     if lane is not None:
-        rows = [r for r in rows if lane in (r["lanes"] or "").split(", ")]
+        rows = [r for r in rows if lane in lanes_in(r)]
     if column is None and not ascending:
         return worst_first(rows, None if lane is None else FIGURE[lane])[:top], name
     return _sorted(rows, column or DEFAULT, ascending)[:top], name
@@ -106,10 +106,10 @@ def worst_first(rows: Sequence[dict[str, Any]], column: str | None = None) -> li
 
 def _worth(row: Row, lossy: bool) -> int:
     """0 for loops to be looked at first, 2 for those with nothing to look at; losses are compared across lanes."""
-    lanes = (row["lanes"] or "").split(", ")
+    lanes = lanes_in(row)
     if Lane.OSCILLATION in lanes or row["cause"] == Cause.VALVE:
         return 0
-    return 2 if lanes == [""] else 0 if lossy else 1
+    return 2 if not lanes else 0 if lossy else 1
 
 
 def _within(rows: list[dict[str, Any]], area: str | None) -> list[dict[str, Any]]:

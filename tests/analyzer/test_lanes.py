@@ -36,7 +36,7 @@ def row_of(values: dict[str, np.ndarray], kp: float = 2.0, **extra: np.ndarray) 
     found = {f"L.{role.upper()}": series(stamp, x) for role, x in {**values, **extra}.items()}
     stated = replace(spec(kp=kp, ti=60.0, type="flow"), mode="L.MODE" if "mode" in extra else None)
     row, _ = chunk._loop_row(stated, found, NIGHT, CONFIG, True)
-    return row
+    return in_lanes(row, CONFIG.lanes)
 
 
 def lanes(row: dict[str, object]) -> set[str]:

@@ -14,6 +14,8 @@ from click.testing import CliRunner
 from analyzer.cli import main
 from analyzer.columns.other_tables import GROUP_LIST
 from analyzer.columns.table import names
+from analyzer.decisions import counts
+from analyzer.lane_figures import lanes_in
 from analyzer.pages.night import pages
 from analyzer.store import Store
 from reports.charts import draw as drawn
@@ -61,6 +63,15 @@ def test_the_source_leads_those_that_it_moves(run_plant: RunPlant):
     assert by_name[lead]["cause"] == "valve"
     assert by_name[lead]["source_loop"] is None
     assert "fix this one first" in by_name[lead]["reason"]
+
+
+def test_whoever_oscillates_stands_in_that_lane(run_plant: RunPlant):
+    """Lanes are told after the plant-wide pass: a loop that it finds oscillating is in the lane, and nobody else."""
+    found = rows(run_plant)
+    assert {r["loop"] for r in found if "oscillation" in lanes_in(r)} == {
+        r["loop"] for r in found if counts(r["oscillating_pct"])
+    }
+    assert any(r["source_loop"] for r in found)
 
 
 def test_no_follower_is_told_to_retune(run_plant: RunPlant):
