@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from analyzer.decisions import Cause, Status
+from analyzer.decisions import Cause, Lane, Status
+from analyzer.lane_figures import FIGURE, lanes_in
 from analyzer.pages.headings import heading
 from analyzer.pages.view import Night, Row, linked, oscillates, proposal
 from analyzer.pages.words import number
@@ -12,41 +13,49 @@ from reports.pages import Block, Cell, Column, Section, Table, Text
 
 HALVED = 0.5
 """A loop got better where its significance fell to this share of the night before [-]; ours."""
+NOTHING = ("", "")
+"""No news, in no colour."""
 
 
 def _news(night: Night, row: Row) -> tuple[str, str]:
     """What is new about a loop since the night before, and its colour; '' where nothing is."""
     old = night.before.get(row["loop"])
-    if old is None or old["status"] != Status.OK or row["status"] != Status.OK:
-        return "", ""
+    if old is None:
+        return NOTHING
+    told = _swing_news(row, old)
+    return _lane_news(row, old) if told == NOTHING else told
+
+
+def _swing_news(row: Row, old: Row) -> tuple[str, str]:
+    """What oscillation and cause have become, where both nights tell."""
+    unknown = any(r["status"] != Status.OK or r["oscillating_pct"] is None for r in (row, old))
+    if unknown:
+        return NOTHING
     now, then = (r["oscillation_significance"] or 0.0 for r in (row, old))
-    if row["oscillating_pct"] is None or old["oscillating_pct"] is None:
-        return "", ""
     if oscillates(row) and not oscillates(old):
         return "began to oscillate", "worse"
     if oscillates(old) and not oscillates(row):
         return "stopped oscillating", "better"
     if oscillates(old) and now < HALVED * then:
         return "oscillates less than half as much", "better"
-    told = _cause_news(row["cause"] or Cause.UNDECIDED, old["cause"] or Cause.UNDECIDED)
-    return told if told[0] else _lane_news(row, old)
+    return _cause_news(row["cause"] or Cause.UNDECIDED, old["cause"] or Cause.UNDECIDED)
 
 
 def _lane_news(row: Row, old: Row) -> tuple[str, str]:
-    """Lanes beside oscillation that a loop came into or left; '' for a night that knew of no lanes."""
-    if "lanes" not in row or "lanes" not in old:
-        return "", ""
-    now, then = ([x for x in (r["lanes"] or "").split(", ") if x] for r in (row, old))
-    came, left = [x for x in now if x not in then], [x for x in then if x not in now]
+    """Lanes beside oscillation that a loop came into or left, of those whose figures both nights know."""
+    known = [x for x in Lane if x is not Lane.OSCILLATION and None not in (old[FIGURE[x]], row[FIGURE[x]])]
+    now, then = lanes_in(row), lanes_in(old)
+    came = [x for x in known if x in now and x not in then]
+    left = [x for x in known if x in then and x not in now]
     if came:
         return f"new: {', '.join(came)}", "worse"
-    return (f"no more: {', '.join(left)}", "better") if left else ("", "")
+    return (f"no more: {', '.join(left)}", "better") if left else NOTHING
 
 
 def _cause_news(now: str, then: str) -> tuple[str, str]:
     """What another cause than the night before's means: a fault gone, one come, or one told otherwise."""
     if now == then:
-        return "", ""
+        return NOTHING
     if now == Cause.NONE:
         return f"no fault is seen any more (cause was {then})", "better"
     if then == Cause.NONE:

@@ -8,6 +8,7 @@ from typing import Any
 
 from analyzer import notes
 from analyzer.decisions import Cause, Status, counts
+from analyzer.lane_figures import FIGURE
 from analyzer.notes import Note, is_hidden, last
 from analyzer.pages.reading import Thinned, read_nights, read_trends
 from analyzer.rank import worst_first
@@ -31,7 +32,7 @@ COLUMNS = (
     *("source_loop", "average_absolute_error_pct", "valve_travel_pct_per_h", "variability_pct", "kp", "ti"),
     *("kp_new", "ti_new", "action", "reason", "form", "gain_unit", "ti_unit", "pv_unit"),
     *("lanes", "loss", "close_first_s", "close_last_s", "group", "timezone", "backlash_pct", "stickband_pct"),
-    "advice",
+    *("advice", *FIGURE.values()),
 )
 
 

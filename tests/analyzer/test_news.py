@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import pytest
 
+from analyzer.lane_figures import FIGURE
 from analyzer.pages.news import news_table
 from analyzer.pages.view import Night
 
+NO_LANES: dict[str, object] = {"lanes": None, **dict.fromkeys(FIGURE.values(), 0.0)}
 CALM = {"loop": "L", "status": "ok", "oscillating_pct": 0.0, "oscillation_significance": 0.0, "cause": "none"}
-ROW = CALM | {"kp_new": None, "ti_new": None, "action": "none"}
+ROW = NO_LANES | CALM | {"kp_new": None, "ti_new": None, "action": "none"}
+LOST = {"status": "not assessed", "oscillating_pct": None, "oscillation_significance": None}
 CYCLING = {"oscillating_pct": 95.0, "oscillation_significance": 20.0, "cause": "valve"}
 
 
@@ -43,8 +46,12 @@ def test_news_stand_where_they_belong(before, now, new, better):
         ({"lanes": None}, {"lanes": "manual"}, ["new: manual"], []),
         ({"lanes": "at limit, lasting error"}, {"lanes": "at limit"}, [], ["no more: lasting error"]),
         ({"lanes": "sluggish"}, {"lanes": "sluggish"}, [], []),
+        ({}, LOST | {"lanes": "manual", "manual_pct": 100.0}, ["new: manual"], []),
+        ({"lanes": "valve travel"}, LOST | {"valve_travel_pct_per_h": None}, [], []),
+        (LOST | {"frozen_pct": None}, {"lanes": "frozen", "frozen_pct": 9.0}, [], []),
+        (LOST | {"lanes": "manual", "manual_pct": 100.0}, {}, [], ["no more: manual"]),
     ],
 )
 def test_lanes_are_news_too(before, now, new, better):
-    """A loop that came to rest at its limit is new, one that left a lane is better."""
+    """A loop at its limit or in manual is new, one that left a lane better; what a night cannot tell is neither."""
     assert told(before, now) == (new, better)
