@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from analyzer.cost import cost, cost_column
 from analyzer.decisions import Action, Cause, Fault, Lane
 from analyzer.lane_figures import lanes_in
 from analyzer.plantwide.view import GroupView
@@ -25,17 +26,9 @@ def listed(names: Sequence[str]) -> str:
     return shown[0] if len(shown) == 1 else ", ".join(shown[:-1]) + " and " + shown[-1]
 
 
-def weight(row: Row) -> float:
-    """What a loop costs: its loss where importance is stated, else the significance of its oscillation."""
-    for name in ("loss", "oscillation_significance"):
-        if row.get(name) is not None:
-            return float(row[name])
-    return 0.0
-
-
 def first_things(rows: Sequence[Row], groups: Sequence[GroupView] = ()) -> tuple[str, ...]:
     """At most three sentences, the one that gains most first; one that says so where there is nothing to do."""
-    by_loop = {r["loop"]: r for r in rows}
+    by_loop, by = {r["loop"]: r for r in rows}, cost_column(rows)
     told: set[str] = set()
     found: list[tuple[float, str]] = []
     for group in groups:
@@ -47,9 +40,9 @@ def first_things(rows: Sequence[Row], groups: Sequence[GroupView] = ()) -> tuple
         if source is None or not others:
             continue
         told |= set(members)
-        found.append((sum(weight(by_loop[m]) for m in members), _of_group(source, others)))
-    left = sorted((r for r in rows if r["loop"] not in told), key=lambda r: (-weight(r), r["loop"]))
-    found += _by_work(left)
+        found.append((sum(cost(by_loop[m], by) for m in members), _of_group(source, others)))
+    left = sorted((r for r in rows if r["loop"] not in told), key=lambda r: (-cost(r, by), r["loop"]))
+    found += _by_work(left, by)
     ordered = sorted(found, key=lambda pair: -pair[0])
     return tuple(text for _, text in ordered[:MOST]) or (CALM,)
 
@@ -66,22 +59,27 @@ def _of_group(source: Row, others: Sequence[str]) -> str:
     return f"Look at {name} first: {moved}."
 
 
-def _by_work(rows: Sequence[Row]) -> list[tuple[float, str]]:
-    """One sentence for each kind of work that several loops ask for."""
+def _by_work(rows: Sequence[Row], by: str) -> list[tuple[float, str]]:
+    """One sentence for each kind of work that several loops ask for, with what they cost by a column."""
     kinds = (
         (lambda r: r["action"] == Action.RETUNE and r["cause"] == Cause.VALVE, _retune_valve),
         (lambda r: r["action"] == Action.RETUNE and r["cause"] != Cause.VALVE, _retune_tight),
         (lambda r: r["action"] == Action.REPAIR_VALVE, _stroke),
         (lambda r: r["action"] == Action.CHECK_MEASUREMENT, _measurement),
-        (lambda r: r["action"] == Action.CHECK_SETTINGS, _settings),
+        (lambda r: r["action"] == Action.CHECK_SETTINGS and _stated(r), _settings),
+        (lambda r: r["action"] == Action.CHECK_SETTINGS and not _stated(r), _unstated),
         (lambda r: Lane.AT_LIMIT in lanes_in(r), _limit),
     )
     out = []
     for asks, say in kinds:
         mine = [r for r in rows if asks(r)]
         if mine:
-            out.append((sum(map(weight, mine)), say(mine)))
+            out.append((sum(cost(r, by) for r in mine), say(mine)))
     return out
+
+
+def _stated(row: Row) -> bool:
+    return row["kp"] is not None and row["ti"] is not None
 
 
 def _names(rows: Sequence[Row]) -> str:
@@ -111,6 +109,11 @@ def _measurement(rows: Sequence[Row]) -> str:
 
 def _settings(rows: Sequence[Row]) -> str:
     return f"Compare the settings of {_names(rows)} with loops.csv: the trends show others."
+
+
+def _unstated(rows: Sequence[Row]) -> str:
+    it = "its controller has" if len(rows) == 1 else "their controllers have"
+    return f"State Kp and Ti of {_names(rows)} in loops.csv, as {it} them: new settings wait for that."
 
 
 def _limit(rows: Sequence[Row]) -> str:

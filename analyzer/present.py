@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from analyzer.columns.table import BY_NAME
+from analyzer.cost import LOSS, cost_column
 from analyzer.decisions import Action, Cause, Needs
 from analyzer.reason import reason_of, to_stroke
 from analyzer.units import duration, gain_unit
@@ -45,7 +46,7 @@ WITH_UNITS = frozenset({"period_s", "kp", "ti"})
 def shown_of(rows: Sequence[Mapping[str, Any]], figure: str | None = None) -> tuple[str, ...]:
     """The columns for people: a lane's figure in the place of the significance, the loss where there is one."""
     lead = [] if figure is None or figure in SHOWN else [figure]
-    lead += ["loss"] if any(r["loss"] is not None for r in rows) else []
+    lead += [LOSS] if cost_column(rows) == LOSS else []
     shares = ("osc_valve_pct", "osc_tuning_pct", "osc_load_pct")
     rest = [name for name in SHOWN[1:] if figure in (None, *SHOWN) or name not in shares]
     return (SHOWN[0], *lead, *rest)

@@ -12,6 +12,7 @@ from analyzer import notes
 from analyzer.columns.other_tables import NOTED
 from analyzer.columns.ranking import LISTED, RANKING
 from analyzer.columns.table import BY_NAME, names
+from analyzer.cost import LOSS, SIGNIFICANCE, cost_column
 from analyzer.decisions import Cause, Lane
 from analyzer.lane_figures import FIGURE, lanes_in
 from analyzer.notes import Note
@@ -19,8 +20,6 @@ from analyzer.store import Store
 from identification.errors import InputError
 from reports.tables import harmless
 
-DEFAULT = "oscillation_significance"
-LOSS = "loss"
 LANE_FIGURES = tuple(name for name in FIGURE.values() if name not in names(RANKING))
 """Figures of lanes that the contract's columns do not hold."""
 SORTABLE = (*names(RANKING), "importance", LOSS, *LANE_FIGURES)
@@ -61,7 +60,7 @@ def ranked(
         rows = [r for r in rows if lane in lanes_in(r)]
     if column is None and not ascending:
         return worst_first(rows, None if lane is None else FIGURE[lane])[:top], name
-    return _sorted(rows, column or DEFAULT, ascending)[:top], name
+    return _sorted(rows, column or SIGNIFICANCE, ascending)[:top], name
 
 
 def _read(store: Store, night: str) -> list[dict[str, Any]]:
@@ -83,7 +82,7 @@ def _noted(row: dict[str, Any], known: Mapping[str, tuple[Note, ...]]) -> dict[s
 
 def hidden_loops(rows: Sequence[Row], night: str) -> tuple[str, ...]:
     """Loops that their notes keep out of a night's list."""
-    return tuple(r["loop"] for r in rows if r["hidden_until"] and night < r["hidden_until"])
+    return tuple(r["loop"] for r in rows if notes.hides(r["hidden_until"], night))
 
 
 def _sorted(rows: Sequence[dict[str, Any]], column: str, ascending: bool) -> list[dict[str, Any]]:
@@ -99,9 +98,8 @@ def _sorted(rows: Sequence[dict[str, Any]], column: str, ascending: bool) -> lis
 
 def worst_first(rows: Sequence[dict[str, Any]], column: str | None = None) -> list[dict[str, Any]]:
     """Rows as the morning reads them: what oscillates, then what stands in another lane, then the rest."""
-    lossy = any(r[LOSS] is not None for r in rows)
-    by = column or (LOSS if lossy else DEFAULT)
-    return sorted(_sorted(rows, by, False), key=lambda row: _worth(row, lossy))
+    by = cost_column(rows)
+    return sorted(_sorted(rows, column or by, False), key=lambda row: _worth(row, by == LOSS))
 
 
 def _worth(row: Row, lossy: bool) -> int:

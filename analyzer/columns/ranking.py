@@ -249,7 +249,7 @@ LISTED = (
         "Importance",
         "",
         Source.LOOPS,
-        "Weight of the loop in its area's score; 1 where it is not stated.",
+        "Weight of the loop in its loss and in its area's score; counts as 1 where it is not stated.",
     ),
     Column("form", Kind.TEXT, "Form", "", Source.LOOPS, "Form of the controller: ideal, series or parallel."),
     Column(
@@ -277,7 +277,7 @@ LISTED = (
         "Loss",
         "% of span times importance",
         Source.FIGURES,
-        "Average absolute error times the importance that loops.csv states; empty where it states none.",
+        "Average absolute error times importance; orders the list where loops.csv states importances.",
     ),
     Column("advice", Kind.TEXT, "Advice", "", Source.ADVICE, "What to do and why in full, with figures."),
 )

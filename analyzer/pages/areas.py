@@ -29,7 +29,9 @@ COLUMNS = (
 def score(rows: Sequence[Row]) -> float | None:
     """Share of assessed loops, by importance, with no fault found [%]; None where none is assessed."""
     weights = [
-        (r["importance"] or 1.0, r["cause"] in (Cause.NONE, None)) for r in rows if r["status"] == Status.OK
+        (1.0 if r["importance"] is None else r["importance"], r["cause"] in (Cause.NONE, None))
+        for r in rows
+        if r["status"] == Status.OK
     ]
     total = sum(w for w, _ in weights)
     return 100.0 * sum(w for w, good in weights if good) / total if total > 0 else None

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+from analyzer.columns.table import BY_NAME
+from analyzer.cost import cost_column
 from analyzer.decisions import CAUSES, Cause, Status
 from analyzer.lead import first_things
 from analyzer.pages import maintenance
@@ -33,11 +35,12 @@ def _cause(row: Row) -> Cell:
     return Cell(cause, kind=cause if cause in CAUSES else "")
 
 
-WORST = (
+BEFORE_COST = (
     heading("loop"),
     heading("description", wide=True),
     Column("trend", "Ten periods of PV"),
-    Column("cost", "Loss", True, "Average absolute error times importance, or oscillation significance"),
+)
+AFTER_COST = (
     heading("period_s"),
     heading("cause"),
     heading("reason", wide=True),
@@ -60,14 +63,13 @@ def _settings(row: Row) -> str:
     return row_settings(row)
 
 
-def _worst_row(night: Night, row: Row, follows: bool) -> tuple[Cell, ...]:
+def _worst_row(night: Night, row: Row, follows: bool, by: str) -> tuple[Cell, ...]:
     name = linked(night, row["loop"])
-    cost = row["loss"] if row["loss"] is not None else row["oscillation_significance"]
     return (
         replace(name, text=FOLLOWER + name.text) if follows else name,
         Cell(row["description"] or ""),
         Cell("", figure=_spark(night, row)),
-        Cell(number(cost), cost),
+        Cell(number(row[by]), row[by]),
         Cell(duration(row["period_s"]), row["period_s"]),
         _cause(row),
         Cell(row["reason"] or ""),
@@ -79,12 +81,12 @@ def _worst_row(night: Night, row: Row, follows: bool) -> tuple[Cell, ...]:
 
 def worst_table(night: Night) -> Table:
     """The loops to touch, the worst first, followers under the loop that moves them."""
-    here = {r["loop"] for r in night.worst}
-    rows = tuple(_worst_row(night, r, r["source_loop"] in here) for r in night.worst)
+    here, by = {r["loop"] for r in night.worst}, cost_column(night.rows)
+    rows = tuple(_worst_row(night, r, r["source_loop"] in here, by) for r in night.worst)
     hidden = sorted(night.hidden & {r["loop"] for r in night.rows if needs_a_look(r)})
     said = f"Hidden by their notes: {', '.join(hidden)}." if hidden else ""
     noted = any(row[-1].text for row in rows)
-    columns = WORST if noted else WORST[:-1]
+    columns = (*BEFORE_COST, heading(by), *(AFTER_COST if noted else AFTER_COST[:-1]))
     rows = tuple(row[: len(columns)] for row in rows)
     return Table("worst", "", columns, rows, said, searchable=len(rows) > 10, facet="cause", cards=True)
 
@@ -158,6 +160,6 @@ def page(
         Section("All loops", (ranking(night),)),
         Section(f"Not assessed ({lost})", (lost_table(night),)),
     )
-    by = "loss" if any(r["loss"] is not None for r in night.rows) else "oscillation significance"
+    by = BY_NAME[cost_column(night.rows)].title.lower()
     subtitle = f"{counted(len(night.rows), 'loop')}, the worst first by {by}."
     return Page("index", f"Loops in the morning of {night.name}", subtitle, sections, (*LINKS, *links))

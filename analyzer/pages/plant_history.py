@@ -9,16 +9,15 @@ from typing import Any
 
 import numpy as np
 
+from analyzer.columns.table import BY_NAME
+from analyzer.cost import LOSS, SIGNIFICANCE, cost, cost_column
 from analyzer.decisions import CAUSES, Cause, counts
 from analyzer.pages.reading import read_nights
 from analyzer.pages.words import number
 from analyzer.store import Store
-from reports.pages import Block, Line, Panels, Plot
+from reports.pages import Block, Floats, Line, Panels, Plot
 
-COLUMNS = (
-    *("loop", "status", "oscillating_pct", "cause", "loss", "average_absolute_error_pct"),
-    "oscillation_significance",
-)
+COLUMNS = (*("loop", "status", "oscillating_pct", "cause", "importance", LOSS, SIGNIFICANCE),)
 MOST = 60
 """Nights that are shown."""
 LEAST = 3
@@ -27,21 +26,21 @@ LEAST = 3
 
 @dataclass(frozen=True, slots=True)
 class NightSum:
-    """One night of the plant: its name, loops that oscillate, those of each cause, and what all loops lose."""
+    """One night of the plant: its name, loops that oscillate, those of each cause, and what all cost by a column."""
 
     name: str
     oscillate: int
     causes: Mapping[Cause, int]
-    loss: float
+    cost: float
+    by: str = LOSS
 
 
 def summed(name: str, rows: Sequence[Mapping[str, Any]]) -> NightSum:
     """The sums of one night's rows."""
     swinging = [r for r in rows if counts(r["oscillating_pct"])]
     of = {c: sum(r["cause"] == c for r in swinging) for c in (*CAUSES, Cause.UNDECIDED)}
-    lossy = any(r["loss"] is not None for r in rows)
-    key = "loss" if lossy else "oscillation_significance"
-    return NightSum(name, len(swinging), of, sum(r[key] or 0.0 for r in rows))
+    by = cost_column(rows)
+    return NightSum(name, len(swinging), of, sum(cost(r, by) for r in rows), by)
 
 
 def read_sums(store: Store, night: str) -> list[NightSum]:
@@ -62,7 +61,13 @@ def history(sums: Sequence[NightSum]) -> tuple[Block, ...]:
     axis = "days before this night"
     most = max(s.oscillate for s in sums)
     loops = Plot("oscillating", "Loops that oscillate", axis, "loops", tuple(lines), reach=(0.0, most + 1.0))
-    lost = np.array([s.loss for s in sums])
-    title = f"What the loops lose together, now {number(float(lost[-1]))}"
-    loss = Plot("loss", title, axis, "loss", (Line("loss", day, lost, kind="recorded"),), reach=(0.0, 1.0))
-    return (Panels("over-the-nights", "The plant over the nights", (loops, loss)),)
+    return (Panels("over-the-nights", "The plant over the nights", (loops, _costs(sums, day, axis))),)
+
+
+def _costs(sums: Sequence[NightSum], day: Floats, axis: str) -> Plot:
+    """What all loops cost together, of the nights whose figure is that of the last one."""
+    by = sums[-1].by
+    cost = np.array([s.cost if s.by == by else np.nan for s in sums])
+    named = BY_NAME[by].heading.lower()
+    title = f"The loops' {named} together, now {number(float(cost[-1]))}"
+    return Plot("loss", title, axis, named, (Line(named, day, cost, kind="recorded"),), reach=(0.0, 1.0))

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from analyzer.cost import LOSS, cost, cost_column
 from analyzer.decisions import CAUSES, Status
-from analyzer.lead import weight
 from analyzer.pages.view import Night, linked, needs_a_look
 from analyzer.pages.words import number
 from reports.map_blocks import Tile, TileGroup, TreeMap
@@ -29,17 +29,17 @@ def _kind(row: Row) -> str:
     return row["cause"] if row["cause"] in CAUSES else "unclear"
 
 
-def _tile(night: Night, row: Row) -> Tile:
-    text = f"{row['loop']}: {number(weight(row))}. {row['reason'] or ''}"
-    return Tile(row["loop"], weight(row), _kind(row), text, linked(night, row["loop"]).href)
+def _tile(night: Night, row: Row, by: str) -> Tile:
+    text = f"{row['loop']}: {number(cost(row, by))}. {row['reason'] or ''}"
+    return Tile(row["loop"], cost(row, by), _kind(row), text, linked(night, row["loop"]).href)
 
 
-def _area(night: Night, name: str, rows: Sequence[Row]) -> TileGroup:
-    ordered = sorted(rows, key=lambda r: (-weight(r), r["loop"]))
-    tiles = [_tile(night, r) for r in ordered[:MOST]]
+def _area(night: Night, name: str, rows: Sequence[Row], by: str) -> TileGroup:
+    ordered = sorted(rows, key=lambda r: (-cost(r, by), r["loop"]))
+    tiles = [_tile(night, r, by) for r in ordered[:MOST]]
     rest = ordered[MOST:]
     if rest:
-        total = sum(map(weight, rest))
+        total = sum(cost(r, by) for r in rest)
         tiles.append(Tile(f"{len(rest)} more", total, "calm", f"{len(rest)} more loops: {number(total)}"))
     return TileGroup(name or "no area stated", tuple(tiles))
 
@@ -47,10 +47,10 @@ def _area(night: Night, name: str, rows: Sequence[Row]) -> TileGroup:
 def plant_map(night: Night) -> TreeMap | None:
     """The map of the assessed loops; None where nothing is lost anywhere."""
     rows = [r for r in night.rows if r["status"] == Status.OK]
-    if not any(weight(r) > 0 for r in rows):
+    by = cost_column(rows)
+    if not any(cost(r, by) > 0 for r in rows):
         return None
-    lossy = any(r["loss"] is not None for r in rows)
-    what = "average absolute error times importance" if lossy else "oscillation significance"
+    what = "average absolute error times importance" if by == LOSS else "oscillation significance"
     areas = sorted({r["area"] or "" for r in rows})
-    groups = tuple(_area(night, a, [r for r in rows if (r["area"] or "") == a]) for a in areas)
+    groups = tuple(_area(night, a, [r for r in rows if (r["area"] or "") == a], by) for a in areas)
     return TreeMap("plant", f"The plant by area: size is {what}", groups, KEYS)

@@ -113,7 +113,7 @@ def test_without_op_nothing_is_said_of_op() -> None:
 
 def made(loop: str, lanes: str, loss: float | None, significance: float = 0.0) -> dict[str, object]:
     """A row as the list sorts it."""
-    figures = {"oscillation_significance": significance, "loss": loss, "cause": "none"}
+    figures = {"oscillation_significance": significance, "loss": loss, "importance": loss, "cause": "none"}
     return {"loop": loop, "lanes": lanes or None, **figures}
 
 

@@ -11,7 +11,7 @@ from analyzer.plantwide.view import GroupView
 
 ROW: dict[str, Any] = {
     **{"loss": None, "oscillation_significance": 0.0, "action": "none", "cause": "none", "lanes": None},
-    **{"valve_fault": "none", "period_s": 600.0},
+    **{"valve_fault": "none", "period_s": 600.0, "importance": None, "kp": 1.0, "ti": 60.0},
 }
 
 
@@ -41,7 +41,7 @@ def test_a_source_is_named_with_whom_it_moves() -> None:
 def test_three_at_most_by_what_they_gain() -> None:
     """Of five kinds of work the three that gain most are told; importance counts where it is stated."""
     rows = [
-        row("A", 1.0, action="retune", cause="valve", loss=9.0),
+        row("A", 1.0, action="retune", cause="valve", loss=9.0, importance=3.0),
         row("B", 50.0, action="retune", cause="tuning", loss=1.0),
         row("C", 2.0, action="check measurement", loss=8.0),
         row("D", 0.0, lanes="at limit", loss=20.0),
@@ -53,6 +53,25 @@ def test_three_at_most_by_what_they_gain() -> None:
         "Type new settings into A",
         "Check the measurement of C",
     ]
+
+
+def test_what_is_not_stated_is_not_compared() -> None:
+    """Settings that loops.csv does not state are asked for; nothing is said of trends that show others."""
+    ask = {"action": "check settings", "cause": "tuning"}
+    rows = [row("A", 9.0, **ask), row("B", 5.0, **ask, kp=None), row("C", 4.0, **ask, ti=None)]
+    assert first_things(rows) == (
+        "Compare the settings of A with loops.csv: the trends show others.",
+        "State Kp and Ti of B and C in loops.csv, as their controllers have them: new settings wait for that.",
+    )
+
+
+def test_one_figure_compares_all_loops() -> None:
+    """Where one importance is stated, loops without one count by their error too, and not by their significance."""
+    rows = [
+        row("A", 90.0, action="retune", cause="tuning", loss=0.2),
+        row("B", 1.0, action="repair valve", cause="valve", valve_fault="stiction", loss=3.0, importance=2.0),
+    ]
+    assert [text.split()[0] for text in first_things(rows)] == ["Stroke", "Type"]
 
 
 def test_a_calm_night_says_so() -> None:
