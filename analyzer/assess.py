@@ -58,7 +58,7 @@ class Assessment:
     trend: Mapping[str, np.ndarray] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     needs: Needs | None = None
-    close_s: tuple[float, ...] | None = None
+    close_s: tuple[float, float] | None = None
 
 
 def unassessable(record: LoopRecord, config: Config) -> Needs | None:
@@ -242,5 +242,7 @@ def assess(prepared: Prepared, controller: Pid | None, config: Config, kind: str
         thinned(record, FINE_BUCKETS if first else BUCKETS, close),
         prepared.notes,
         _hidden(record, found, controller, config),
-        None if close is None else tuple(record.start_s + at * record.dt_s for at in close),
+        None
+        if close is None
+        else (record.start_s + close[0] * record.dt_s, record.start_s + close[1] * record.dt_s),
     )

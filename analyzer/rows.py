@@ -14,6 +14,7 @@ from analyzer.assess import Assessment
 from analyzer.cause import Verdict
 from analyzer.columns.table import HOURS, row_of
 from analyzer.config import AdviceLimits
+from analyzer.cost import loss
 from analyzer.decisions import CAUSES, Cause, Fault, Lack, Status
 from analyzer.loops.spec import LoopSpec
 from analyzer.oscillation import Oscillations
@@ -23,6 +24,7 @@ from identification.estimation.window import Window
 NOT_SHOWN = (
     *("oscillation_significance", "oscillating_pct", "osc_valve_pct", "osc_tuning_pct", "osc_load_pct"),
     *("regularity", "prominence", "correlation", "period_s", "pv_amplitude_pct"),
+    *("close_first_s", "close_last_s"),
 )
 """Columns that stay empty where the record cannot show whether the loop oscillates."""
 
@@ -118,11 +120,10 @@ def night_row(a: Assessment, spec: LoopSpec, night: str, limits: AdviceLimits) -
     v, m = a.verdict, a.verdict.measured
     lacking = a.needs or v.needs
     signs = [{"points_to": s.points_to, "strength": round(s.strength, 3), "text": s.text} for s in v.signs]
-    error = a.night.average_absolute_error_pct
     row = {
         **empty_row(spec, night),
         **a.night.as_row(),
-        "loss": None if error is None or spec.importance is None else error * spec.importance,
+        "loss": loss(a.night.average_absolute_error_pct, spec.importance),
         **_oscillation_columns(a),
         **_model_columns(v, limits),
         "status": Status.OK,

@@ -12,7 +12,7 @@ from analyzer.oscillation import counting
 from analyzer.quality import Prepared
 from identification.estimation.hammerstein import Fit
 from identification.estimation.trials import turns_of
-from identification.signals.turns import Valve, halves
+from identification.signals.turns import StemMarks, halves
 
 HALVES = 10
 """Half-cycles that are kept."""
@@ -34,35 +34,35 @@ QUICK = 0.2
 """Time constant over a half-cycle up to which PV comes to rest within it and can be seen to stand [-]; ours."""
 
 
-def _valve(faulty: Fit | None, fit: Fit | None, period_s: float) -> Valve:
+def _marks(faulty: Fit | None, fit: Fit | None, period_s: float) -> StemMarks:
     """What the marks need: of a slow process PV does not come to rest, and the mark begins at the turn."""
     if fit is None:
-        return Valve(0.0, 0.0, 0.0)
+        return StemMarks(0.0, 0.0, 0.0)
     quick = fit.time_constant_s <= QUICK * 0.5 * period_s
     answered = fit.dead_time_s + 2.0 * fit.time_constant_s if quick else 0.0
-    return Valve(0.0 if faulty is None else float(faulty.valve.stickband), fit.dead_time_s, answered)
+    return StemMarks(0.0 if faulty is None else float(faulty.valve.stickband), fit.dead_time_s, answered)
 
 
 def turn_events(prepared: Prepared, found: Assessment) -> str | None:
     """Half-cycles as JSON: step_s, dead_s, of each start_s (of the epoch), op, pv, late and stuck; None without."""
     record, first = prepared.record, counting(found.oscillations)
-    if first is None or not prepared.op_known or found.close_s is None:
+    if first is None or not prepared.op_known or found.close_s is None or found.needs is not None:
         return None
     end = round((found.close_s[1] - record.start_s) / record.dt_s)
     begin = max(end - round(PERIODS * first.period_s / record.dt_s), 0)
     part = slice(begin, end)
     fit = _fit(found)
-    valve = _valve(fit if found.verdict.cause is Cause.VALVE else None, fit, first.period_s)
+    marks = _marks(fit if found.verdict.cause is Cause.VALVE else None, fit, first.period_s)
     turns = turns_of(record.op[part], first.period_s / record.dt_s)
     good = ~(record.bad | record.mask("manual"))[part]
-    kept = halves(record.op[part], record.pv[part], good, turns, record.dt_s, first.period_s, valve, HALVES)
+    kept = halves(record.op[part], record.pv[part], good, turns, record.dt_s, first.period_s, marks, HALVES)
     if len(kept) < 2:
         return None
     start = record.start_s + begin * record.dt_s
     return json.dumps(
         {
             "step_s": kept[0].step_s,
-            "dead_s": round(valve.dead_s, 3),
+            "dead_s": round(marks.dead_s, 3),
             "halves": [
                 {
                     "start_s": round(start + h.start_s, 3),

@@ -1,0 +1,31 @@
+"""Cycles that the sampling may have folded: nothing is told of them, and nothing is drawn."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from analyzer import chunk
+from analyzer.decisions import Lack
+from analyzer.nights import Night
+from tests.analyzer.plant import CONFIG, START_S, series, spec
+
+
+def night_row(ti_s: float) -> dict[str, object]:
+    """A loop in a plain swing of 100 s, logged every 10 s, whose controller has this integral time."""
+    stamp = START_S + 10.0 * np.arange(2160)
+    swing = np.sin(2 * np.pi * stamp / 100.0) + 0.05 * np.random.default_rng(1).normal(size=stamp.size)
+    found = {"L.SP": np.full(stamp.size, 50.0), "L.PV": 50.0 + swing, "L.OP": 50.0 - swing}
+    trends = {tag: series(stamp, x) for tag, x in found.items()}
+    night = Night("2026-03-02", START_S, START_S + 86400.0)
+    row, _ = chunk._loop_row(spec(kp=1.0, ti=ti_s), trends, night, CONFIG, True)
+    return row
+
+
+@pytest.mark.parametrize(("ti_s", "told"), [(1.0, False), (60.0, True)])
+def test_a_folded_cycle_has_no_figures_and_no_picture(ti_s: float, told: bool) -> None:
+    """With Ti of 1 s a cycle of some seconds may look like one of 100 s: no period, no close view, no half-cycles."""
+    row = night_row(ti_s)
+    figures = ("period_s", "oscillating_pct", "close_first_s", "close_last_s", "turns")
+    assert [row[name] is not None for name in figures] == [told] * len(figures)
+    assert (row["lack"] == Lack.FASTER) is not told
