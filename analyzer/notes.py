@@ -5,12 +5,14 @@ A line is one JSON object; lines are only ever added, so that two writers lose n
 
 from __future__ import annotations
 
+import errno
 import getpass
 import json
 import os
 import time
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
+from io import FileIO
 from pathlib import Path
 
 from analyzer.plant_clock import stamp
@@ -18,6 +20,8 @@ from identification.errors import InputError
 
 FILE = "notes.jsonl"
 """Name within the store."""
+LATEST_S = 32503680000.0
+"""Times of notes beyond the year 3000 are none [s since 1970-01-01 UTC]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,13 +49,24 @@ def user() -> str:
 
 
 def add(store: Path, note: Note) -> None:
-    """Add a note to a store, written whole or not at all."""
-    line = json.dumps(asdict(note), ensure_ascii=False) + "\n"
-    handle = os.open(store / FILE, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
-    try:
-        os.write(handle, line.encode("utf-8"))
-    finally:
-        os.close(handle)
+    """Add a note to a store, on a line of its own whatever stands before it.
+
+    Raises
+    ------
+    OSError
+        It could not be written whole, on a full disk for example.
+    """
+    line = (json.dumps(asdict(note), ensure_ascii=False) + "\n").encode("utf-8")
+    with (store / FILE).open("ab+", buffering=0) as kept:
+        if kept.tell() and not _ends_a_line(kept):
+            line = b"\n" + line
+        if kept.write(line) != len(line):
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(store / FILE))
+
+
+def _ends_a_line(kept: FileIO) -> bool:
+    kept.seek(-1, os.SEEK_END)
+    return kept.read(1) == b"\n"
 
 
 def new(loop: str, text: str, owner: str | None, hidden_until: str) -> Note:
@@ -62,7 +77,7 @@ def new(loop: str, text: str, owner: str | None, hidden_until: str) -> Note:
     InputError
         The text says nothing.
     """
-    told = " ".join(text.split())
+    told = " ".join(visible(text).split())
     if not told:
         raise InputError(
             f"an empty note on {loop}", "what was seen or done", 'say it: triage note STORE LOOP "..."'
@@ -73,17 +88,33 @@ def new(loop: str, text: str, owner: str | None, hidden_until: str) -> Note:
 def read(store: Path) -> dict[str, tuple[Note, ...]]:
     """The notes of a store by loop, oldest first; lines that are none are passed over."""
     try:
-        lines = (store / FILE).read_text(encoding="utf-8", errors="replace").splitlines()
+        lines = (store / FILE).read_text(encoding="utf-8", errors="replace").split("\n")
     except OSError:
         return {}
     out: dict[str, list[Note]] = {}
     for line in lines:
-        try:
-            found = Note(**json.loads(line))
-        except (ValueError, TypeError):
-            continue
-        out.setdefault(found.loop, []).append(found)
+        found = _parsed(line)
+        if found is not None:
+            out.setdefault(found.loop, []).append(found)
     return {loop: tuple(sorted(own, key=lambda n: n.time_s)) for loop, own in out.items()}
+
+
+def _parsed(line: str) -> Note | None:
+    """The note of a line; None where it is none, whatever else it is."""
+    try:
+        kept = json.loads(line)
+        loop, text, owner, until = (kept.get(k, "") for k in ("loop", "text", "owner", "hidden_until"))
+        at_s = float(kept["time_s"])
+    except (ValueError, TypeError, KeyError, AttributeError, OverflowError, RecursionError):
+        return None
+    if not all(isinstance(x, str) for x in (loop, text, owner, until)) or not 0.0 <= at_s <= LATEST_S:
+        return None
+    return Note(loop, at_s, visible(text), visible(owner), visible(until))
+
+
+def visible(text: str) -> str:
+    """The text without characters that steer a terminal or turn the direction of writing."""
+    return "".join(c if c.isprintable() else " " for c in text)
 
 
 def last(notes: Mapping[str, tuple[Note, ...]], loop: str) -> Note | None:
@@ -94,4 +125,9 @@ def last(notes: Mapping[str, tuple[Note, ...]], loop: str) -> Note | None:
 
 def is_hidden(note: Note | None, night: str) -> bool:
     """Whether a note keeps its loop out of the list of a night."""
-    return note is not None and bool(note.hidden_until) and night < note.hidden_until
+    return note is not None and hides(note.hidden_until, night)
+
+
+def hides(until: str | None, night: str) -> bool:
+    """Whether a night lies before the date until which a loop is hidden, if any."""
+    return bool(until) and night < str(until)

@@ -113,6 +113,43 @@ def test_a_broken_line_costs_itself_alone(tmp_path: Path) -> None:
     assert [n.text for n in notes.read(tmp_path)["L"]] == ["one", "two"]
 
 
+def test_half_a_line_swallows_no_note(tmp_path: Path) -> None:
+    """Half a line that a full disk left at the end costs itself, and not the note that comes next."""
+    (tmp_path / notes.FILE).write_text('{"loop": "L", "time_s": 1.0, "te', encoding="utf-8")
+    notes.add(tmp_path, notes.Note("L", 2.0, "two"))
+    assert [n.text for n in notes.read(tmp_path)["L"]] == ["two"]
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        '{"loop": "L", "time_s": "1", "text": 3}',
+        '{"loop": ["L"], "time_s": 1.0, "text": "x"}',
+        '{"loop": "L", "time_s": 1e400, "text": "x"}',
+        '{"loop": "L", "time_s": NaN, "text": "x"}',
+        '{"loop": "L", "time_s": null, "text": "x"}',
+        '{"loop": "L", "time_s": 1.0, "text": "x", "hidden_until": 20300101}',
+        '{"loop": "L"}',
+        "[1, 2]",
+        "null",
+        "[" * 100_000,
+    ],
+)
+def test_what_is_no_note_is_passed_over(tmp_path: Path, line: str) -> None:
+    """Lines of JSON that are no notes cost nothing but themselves."""
+    (tmp_path / notes.FILE).write_text(line + "\n", encoding="utf-8")
+    notes.add(tmp_path, notes.Note("L", 2.0, "two"))
+    assert {k: [n.text for n in own] for k, own in notes.read(tmp_path).items()} == {"L": ["two"]}
+
+
+def test_a_note_steers_no_terminal(tmp_path: Path) -> None:
+    """Escape sequences and marks that turn the writing are blanks, whether typed or found in the file."""
+    assert notes.new("L", "a\x1b[2Jb\u202ec", "me", "").text == "a [2Jb c"
+    notes.add(tmp_path, notes.Note("L", 1.0, "a\x1b]0;b\u2066", "m\x07e"))
+    (found,) = notes.read(tmp_path)["L"]
+    assert (found.text, found.owner) == ("a ]0;b ", "m e")
+
+
 @pytest.mark.parametrize("form", ["text", "html", "markdown"])
 def test_the_summary_is_small_and_says_the_same(store: Store, form: str) -> None:
     """One screen in three formats: the first things, the worst loops; a mail without scripts and under 100 kB."""
