@@ -15,7 +15,9 @@ PLAIN = {
     Fault.STICTION: "the valve sticks by {width:.2g} % ({share:.0f} % of OP's range)",
 }
 BY_HAND = "; stroke it in steps of {step:.2g} %"
-"""How a valve's fault is confirmed: steps of a quarter of its width, of which most must move nothing."""
+"""How a valve's fault is confirmed."""
+STEPS = 4.0
+"""Steps of a stroke test to the width of what is looked for; ours: the first three must then move nothing."""
 
 
 def reason_of(row: Row, needs: Needs | None = None) -> str:
@@ -39,7 +41,7 @@ def to_stroke(row: Row) -> str:
     width = row["stickband_pct"] or row["backlash_pct"]
     if row["action"] != Action.REPAIR_VALVE or not width:
         return ""
-    return BY_HAND.format(step=width / 4)
+    return BY_HAND.format(step=width / STEPS)
 
 
 def _valve(row: Row) -> str:

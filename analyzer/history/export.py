@@ -26,7 +26,7 @@ from analyzer.history.sniff import open_sheet
 from analyzer.history.stray import MainSpan
 from analyzer.history.table import Source, Table
 from analyzer.history.time_columns import agreed
-from analyzer.history.zone import check_zone
+from analyzer.plant_clock import zone_of
 from identification.errors import InputError
 
 __all__ = ["Export", "ReadOptions", "open_export"]
@@ -143,7 +143,7 @@ def open_export(paths: Sequence[Path], options: ReadOptions | None = None) -> Ex
     """
     options = options or ReadOptions()
     if options.timezone is not None:
-        check_zone(options.timezone)
+        zone_of(options.timezone)
     opened, skipped = _readable(paths, options)
     sources = agreed(opened)
     homes: dict[str, tuple[int, ...]] = {}

@@ -3,26 +3,13 @@
 from __future__ import annotations
 
 from collections import Counter
-from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from identification.errors import InputError
-
 MISSING_HOUR = "samples stand in the hour that the time zone leaves out in spring and are left out"
 REPEATED_HOUR = "samples stand in the hour that the time zone repeats in autumn; told apart by their order"
-
-
-def check_zone(name: str) -> None:
-    """Raise InputError unless `name` is a time zone that is known here."""
-    try:
-        ZoneInfo(name)
-    except (ZoneInfoNotFoundError, ValueError, OSError) as error:
-        raise InputError(
-            f"time zone '{name}'", "an IANA name such as Europe/Berlin", "correct the name of the time zone"
-        ) from error
 
 
 def to_utc(local_s: NDArray[np.float64], zone: str) -> tuple[NDArray[np.float64], Counter[str]]:

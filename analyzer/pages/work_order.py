@@ -6,15 +6,14 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from analyzer.decisions import Action, Cause, Fault
+from analyzer.reason import STEPS
 from analyzer.units import changed_settings, duration
 
 Row = Mapping[str, Any]
 Lines = tuple[tuple[str, str], ...]
-PROVE = "After a week, triage report {store} --loop {loop} --changed TIME shows whether it helped."
-STEPS = 4.0
-"""Steps of a stroke test to the width of what is looked for; ours: the first three must then move nothing."""
-
-
+PROVE = (
+    "After a week, triage report {store} --loop {loop} --changed TIME --out report shows whether it helped."
+)
 NEXT_NIGHT = "Look at this loop again the night after."
 STROKE = (
     "in manual, with the process calm, move OP in steps of {step:.2g} %, four times up and four times down, and wait "
