@@ -10,8 +10,6 @@ from identification.record import Floats, Mask
 
 SMOOTHING = 0.1
 """The error is averaged over this share of the loop's own time first, for noise is not swiftness [-]."""
-
-
 COARSEST = 0.2
 """Interval of samples beyond which, in the loop's own time, one sample's noise passes for memory [-]; ours."""
 
@@ -22,7 +20,7 @@ def correlation_time(error: Floats, good: Mask, dt_s: float, scale_s: float) -> 
     After a load has moved PV, the error of a PI loop dies with its slowest pole. Where Kp times the process gain is
     under one, that is about Ti/(Kp K), longer than Ti: a correlation time of several integral times is a controller
     that lets errors stand. With Kp K of 1.2 to 3 it is 0.5 to 1.7 Ti, with 0.45 and less 2 to 12 Ti, whether the load
-    steps or wanders (tests/identification/test_correlation_time.py).
+    steps or wanders (tests/identification/signals/test_correlation_time.py).
 
     Parameters
     ----------

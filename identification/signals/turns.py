@@ -33,9 +33,9 @@ class Half:
 
 
 @dataclass(frozen=True, slots=True)
-class Valve:
-    """What is known of valve and process: stickband [% of OP], 0 for a sound valve; dead time, and the time after
-    which PV has answered what was before [s]."""
+class StemMarks:
+    """What marks the time in which a stem stands: stickband [% of OP], 0 for a sound valve; dead time, and the time
+    after which PV has answered what was before [s]."""
 
     stickband: float
     dead_s: float
@@ -49,7 +49,7 @@ def halves(
     turns: np.ndarray,
     dt_s: float,
     period_s: float,
-    valve: Valve,
+    marks: StemMarks,
     most: int,
 ) -> tuple[Half, ...]:
     """The last half-cycles of a record that are good throughout.
@@ -64,7 +64,7 @@ def halves(
         Samples at which OP turns.
     dt_s, period_s : float
         Sample interval and period of the cycle [s].
-    valve : Valve
+    marks : StemMarks
     most : int
         Half-cycles wanted.
 
@@ -85,17 +85,17 @@ def halves(
         o, p, later = (
             np.interp(at, clock, op),
             np.interp(at, clock, pv),
-            np.interp(at + valve.dead_s / dt_s, clock, pv),
+            np.interp(at + marks.dead_s / dt_s, clock, pv),
         )
-        found.append(Half(float(first) * dt_s, step, o, p, later, _stuck(o, step, valve)))
+        found.append(Half(float(first) * dt_s, step, o, p, later, _stuck(o, step, marks)))
     return tuple(reversed(found))
 
 
-def _stuck(op: Floats, step_s: float, valve: Valve) -> tuple[int, int]:
+def _stuck(op: Floats, step_s: float, marks: StemMarks) -> tuple[int, int]:
     """Points from where PV has answered what was before to where OP has moved the stickband; (0, 0) for none."""
-    if valve.stickband <= 0:
+    if marks.stickband <= 0:
         return 0, 0
-    moved = np.abs(op - op[0]) >= valve.stickband
+    moved = np.abs(op - op[0]) >= marks.stickband
     end = int(np.argmax(moved)) if moved.any() else op.size
-    begin = round(valve.answered_s / step_s)
+    begin = round(marks.answered_s / step_s)
     return (begin, end) if end - begin >= 2 else (0, end) if end >= 2 else (0, 0)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from identification.signals.turns import Valve, halves
+from identification.signals.turns import StemMarks, halves
 
 PERIOD = 100
 
@@ -29,7 +29,7 @@ def found(width: float, dead: int = 0, most: int = 10):
     op = triangle(1001)
     pv = np.roll(play(op, width), dead)
     turns = np.arange(50, 1001, 50)
-    known = Valve(width, float(dead), float(dead))
+    known = StemMarks(width, float(dead), float(dead))
     return halves(op, pv, np.ones(op.size, bool), turns, 1.0, float(PERIOD), known, most)
 
 
@@ -65,7 +65,7 @@ def test_gaps_cost_their_half_alone() -> None:
     op = triangle(1001)
     good = np.ones(op.size, bool)
     good[820] = False
-    kept = halves(op, op, good, np.arange(50, 1001, 50), 1.0, float(PERIOD), Valve(0.0, 0.0, 0.0), 4)
+    kept = halves(op, op, good, np.arange(50, 1001, 50), 1.0, float(PERIOD), StemMarks(0.0, 0.0, 0.0), 4)
     assert [h.start_s for h in kept] == [750.0, 850.0, 900.0, 950.0]
 
 
@@ -74,6 +74,6 @@ def test_without_turns_there_is_nothing() -> None:
     op = np.linspace(0, 10, 100)
     for turns in ([], [50]):
         assert (
-            halves(op, op, np.ones(100, bool), np.array(turns, int), 1.0, 10.0, Valve(1.0, 0.0, 0.0), 10)
+            halves(op, op, np.ones(100, bool), np.array(turns, int), 1.0, 10.0, StemMarks(1.0, 0.0, 0.0), 10)
             == ()
         )
