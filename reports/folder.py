@@ -44,8 +44,17 @@ def forget_stale(out: Path, names: Sequence[str], kept_names: Collection[str] = 
     stale = [n for n in known if n not in names and n not in kept_names]
     for name in stale:
         (out / name).unlink(missing_ok=True)
+    _forget_tables(out / "csv", {Path(n).stem for n in stale}, {Path(n).stem for n in (*names, *kept_names)})
     write_text(out / WRITTEN, json.dumps(sorted({*names, *(set(known) - set(stale))})))
     return stale
+
+
+def _forget_tables(folder: Path, stale: Collection[str], kept: Collection[str]) -> None:
+    """Delete the tables of stale pages; of names that begin alike a table is that of the longest."""
+    for table in sorted(folder.glob("*.csv")) if stale else ():
+        owners = [s for s in (*stale, *kept) if table.name.startswith(f"{s}-")]
+        if owners and max(owners, key=len) in stale:
+            table.unlink(missing_ok=True)
 
 
 def write_csv(page: Page, out: Path) -> list[Path]:
