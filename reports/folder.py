@@ -52,7 +52,7 @@ def forget_stale(out: Path, names: Sequence[str], kept_names: Collection[str] = 
 def _forget_tables(folder: Path, stale: Collection[str], kept: Collection[str]) -> None:
     """Delete the tables of stale pages; of names that begin alike a table is that of the longest."""
     for table in sorted(folder.glob("*.csv")) if stale else ():
-        owners = [s for s in (*stale, *kept) if table.name.startswith(f"{s}-")]
+        owners = [s for s in (*stale, *kept) if table.name[: len(s) + 1] == f"{s}-"]
         if owners and max(owners, key=len) in stale:
             table.unlink(missing_ok=True)
 
