@@ -6,7 +6,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from identification.estimation.covariance import inverse, scattered
 from identification.estimation.hammerstein import (
@@ -16,10 +15,10 @@ from identification.estimation.hammerstein import (
     stem_of,
     sticking,
 )
-from identification.estimation.noise import every_lag, judged, whitened
+from identification.estimation.noise import judged
+from identification.estimation.sensitivities import BASE, damped_step, innovations, sensitivities
 from identification.estimation.window import Window
-from identification.record import Floats
-from identification.simulation.discretization import respond_in_blocks, unit_lag
+from identification.record import Floats, Mask
 
 ITERATIONS = 25
 """Gauss-Newton steps at most; ours: nine in ten fits stop before the fifteenth."""
@@ -27,119 +26,68 @@ SETTLED = 0.01
 """Gain in log likelihood [nat] below which the steps stop."""
 
 
-@njit(cache=True)
-def _responses(
-    stem: Floats, wider: Floats, width_step: float, t_s: float, dead_s: float, dt: float, factor: int
-) -> tuple[Floats, Floats, Floats, Floats]:
-    """Response of a unit lag in blocks of `dt` [s], shape (n,), and its derivatives by log T, dead time and width."""
-    fine = dt / factor
-    dead = dead_s + 0.5 * (factor - 1) * fine
-    pole, now, before, delay = unit_lag(t_s, dead, fine)
-    x = respond_in_blocks(stem, pole, now, before, delay, factor)
-    pole2, now2, before2, delay2 = unit_lag(t_s * 1.01, dead, fine)
-    x_t = (respond_in_blocks(stem, pole2, now2, before2, delay2, factor) - x) / math.log(1.01)
-    step = 0.05 * dt
-    pole3, now3, before3, delay3 = unit_lag(t_s, dead + step, fine)
-    x_l = (respond_in_blocks(stem, pole3, now3, before3, delay3, factor) - x) / step
-    x_w = np.zeros(x.size)
-    if width_step > 0:
-        x_w = (respond_in_blocks(wider, pole, now, before, delay, factor) - x) / width_step
-    return x, x_t, x_l, x_w
+@dataclass(frozen=True, slots=True)
+class _Bench:
+    """What all trials of a descent share: the window, PV less its mean, the load's step, the samples judged, None
+    where all are, what is held, and whether the stickband is free."""
+
+    window: Window
+    y: Floats
+    extra: Floats
+    counts: Mask | None
+    held: Mask
+    free_width: bool
+
+    @property
+    def factor(self) -> int:
+        """Samples of a stem in a block."""
+        return self.window.factor if self.window.fine else 1
+
+    def stem(self, valve: ValveTrial) -> Floats:
+        """The stem behind a valve, at the interval at which responses are stepped."""
+        return (fine_stem if self.window.fine else stem_of)(self.window, valve)
+
+    def of_judged(self, rows: Floats, order: int) -> Floats:
+        """Columns of the samples judged."""
+        return rows[..., order:] if self.counts is None else rows[..., order:][..., self.counts]
 
 
-@njit(cache=True)
-def _sensitivities(
-    y: Floats,
-    stem: Floats,
-    wider: Floats,
-    extra: Floats,
-    width_step: float,
-    theta: Floats,
-    order: int,
-    dt: float,
-    factor: int,
-) -> tuple[Floats, Floats]:
-    """Innovations, shape (n,), and their derivatives, shape (n, 8 + order), at theta = log T, L, width, K, 1, t,
-    decay, step, noise model; the derivative by the width is that of the given wider stem. Stems have `factor` samples
-    a block of `dt` [s], and the response is averaged over the blocks, as PV was."""
-    n = y.size
-    t_s = math.exp(theta[0])
-    x, x_t, x_l, x_w = _responses(stem, wider, width_step, t_s, theta[1], dt, factor)
-    columns = np.zeros((n, 8 + order))
-    r = np.empty(n)
-    free, faded = 1.0, math.exp(-dt / t_s)
-    outlasts = t_s > 0.5 * n * dt
-    gain = theta[3]
-    for k in range(n):
-        t = 2.0 * k / n - 1.0
-        d = 0.0 if outlasts else free
-        r[k] = y[k] - gain * x[k] - theta[4] - theta[5] * t - theta[6] * d - theta[7] * extra[k]
-        columns[k, 0] = -gain * x_t[k]
-        columns[k, 1] = -gain * x_l[k]
-        columns[k, 2] = -gain * x_w[k]
-        columns[k, 3] = -x[k]
-        columns[k, 4] = -1.0
-        columns[k, 5] = -t
-        columns[k, 6] = -d
-        columns[k, 7] = -extra[k]
-        free *= faded
-    edges = every_lag(order)
-    e = whitened(r, theta[8:], edges)
-    for j in range(8):
-        columns[:, j] = whitened(columns[:, j].copy(), theta[8:], edges)
-    for k in range(order, n):
-        for i in range(order):
-            columns[k, 8 + i] = -r[k - 1 - i]
-    return e, columns
-
-
-def _steps(gram: Floats, slope: Floats, damping: float, frozen: list[int]) -> Floats:
-    """A damped Gauss-Newton step; frozen parameters stay."""
-    scale = np.diag(gram) + 1e-12 * np.trace(gram) + 1e-300
-    damped = gram + damping * np.diag(scale)
-    for j in frozen:
-        damped[j, :], damped[:, j], damped[j, j] = 0.0, 0.0, 1.0
-        slope = slope.copy()
-        slope[j] = 0.0
-    root = np.sqrt(scale)
-    level = damped / np.outer(root, root)
-    level[np.diag_indices_from(level)] += 1e-12
-    return np.asarray(np.linalg.solve(level, slope / root) / root, dtype=np.float64)
+def _bench(window: Window, order: int, free_width: bool) -> _Bench:
+    held = np.zeros(BASE + order, dtype=bool)
+    held[2], held[7] = not free_width, window.step_at <= 0
+    counts = None if window.usable.all() else judged(window.usable, order)[order:]
+    return _Bench(window, window.y - window.y.mean(), window.extra, counts, held, free_width)
 
 
 @dataclass(frozen=True, slots=True)
 class _Trial:
-    """One point of the Gauss-Newton descent."""
+    """One point of the descent: constants, stem, unit response, residual, innovations judged, their mean square."""
 
     theta: Floats
     valve: ValveTrial
+    stem: Floats
+    x: Floats
+    r: Floats
+    e: Floats
     loss: float
-    count: int
-    gram: Floats
-    slope: Floats
 
 
-def _judged(
-    window: Window, y: Floats, theta: Floats, valve: ValveTrial, free_width: bool
-) -> tuple[Floats, Floats]:
-    """Innovations and their derivatives at the samples judged."""
-    order = theta.size - 8
-    stems = fine_stem if window.fine else stem_of
-    stem = stems(window, valve)
-    step = 0.01 * valve.stickband if free_width else 0.0
-    wider = stems(window, _widened(valve, step)) if free_width else stem
-    factor = window.factor if window.fine else 1
-    e, columns = _sensitivities(y, stem, wider, window.extra, step, theta, order, window.dt_s, factor)
-    e, columns = e[order:], columns[order:]
-    if not window.usable.all():
-        counts = judged(window.usable, order)[order:]
-        e, columns = e[counts], columns[counts]
-    return e, columns
+def _trial(bench: _Bench, theta: Floats, valve: ValveTrial) -> _Trial:
+    stem, window = bench.stem(valve), bench.window
+    x, r, white = innovations(bench.y, stem, bench.extra, theta, window.dt_s, bench.factor)
+    e = bench.of_judged(white, theta.size - BASE)
+    return _Trial(theta, valve, stem, x, r, e, float(e @ e) / e.size)
 
 
-def _trial(window: Window, y: Floats, theta: Floats, valve: ValveTrial, free_width: bool) -> _Trial:
-    e, columns = _judged(window, y, theta, valve, free_width)
-    return _Trial(theta, valve, float(e @ e) / e.size, e.size, columns.T @ columns, -(columns.T @ e))
+def _slopes(bench: _Bench, trial: _Trial) -> Floats:
+    """Derivatives of the innovations judged, shape (8 + order, m)."""
+    width_step = 0.01 * trial.valve.stickband if bench.free_width else 0.0
+    wider = bench.stem(_widened(trial.valve, width_step)) if bench.free_width else trial.stem
+    stems, theta = (trial.stem, wider), trial.theta
+    rows = sensitivities(
+        trial.x, trial.r, stems, width_step, bench.extra, theta, bench.window.dt_s, bench.factor
+    )
+    return bench.of_judged(rows, theta.size - BASE)
 
 
 def _widened(valve: ValveTrial, step: float) -> ValveTrial:
@@ -148,13 +96,13 @@ def _widened(valve: ValveTrial, step: float) -> ValveTrial:
     return sticking(valve.stickband + step, share, valve.tolerance)
 
 
-def _moved(window: Window, trial: _Trial, step: Floats, free_width: bool) -> tuple[Floats, ValveTrial] | None:
+def _moved(bench: _Bench, trial: _Trial, step: Floats) -> tuple[Floats, ValveTrial] | None:
     """Parameters after a step, None where it leaves what is searched."""
-    theta = trial.theta + step
+    window, theta = bench.window, trial.theta + step
     most_t, most_dead = window.bounds
     theta[0] = min(max(theta[0], math.log(0.05 * window.dt_s)), math.log(most_t))
     theta[1] = min(max(theta[1], -window.half_block_s if window.fine else 0.0), most_dead)
-    if not free_width:
+    if not bench.free_width:
         return theta, trial.valve
     width = trial.valve.stickband + step[2]
     if width <= 0.2 * trial.valve.stickband:
@@ -168,23 +116,19 @@ def _theta(fit: Fit) -> Floats:
     return np.concatenate((head, fit.base, fit.ar))
 
 
-def _held(window: Window, free_width: bool) -> list[int]:
-    """Places in theta that do not move."""
-    return ([] if free_width else [2]) + ([] if window.step_at > 0 else [7])
-
-
 def covariance(window: Window, fit: Fit, free_width: bool = False) -> Floats:
     """Covariance of (log T, L, stickband, gain) at a fit, shape (4, 4); zero for what was held.
 
     The noise model's and the slow terms' share is in it (covariance.py).
     """
-    y, theta, held = window.y - window.y.mean(), _theta(fit), _held(window, free_width)
-    e, columns = _judged(window, y, theta, fit.valve, free_width)
-    gram = columns.T @ columns
-    free = np.array([j for j in range(gram.shape[0]) if j not in held and gram[j, j] > 0])
+    bench = _bench(window, fit.ar.size, free_width)
+    trial = _trial(bench, _theta(fit), fit.valve)
+    slopes = _slopes(bench, trial)
+    gram = slopes @ slopes.T
+    free = np.array([j for j in range(gram.shape[0]) if not bench.held[j] and gram[j, j] > 0])
     inside = inverse(gram[np.ix_(free, free)])
     out = np.zeros_like(gram)
-    out[np.ix_(free, free)] = scattered(inside, columns[:, free] * e[:, None], float(e @ e) / e.size)
+    out[np.ix_(free, free)] = scattered(inside, (slopes[free] * trial.e).T, trial.loss)
     return out[:4, :4]
 
 
@@ -194,20 +138,22 @@ def descend(window: Window, fit: Fit, free_width: bool = False) -> Fit:
     Time constant, dead time, gain, slow terms and the noise model, and with `free_width` the stickband, move at
     once, because they trade against each other along narrow valleys.
     """
-    y = window.y - window.y.mean()
-    best = _trial(window, y, _theta(fit), fit.valve, free_width)
-    damping = 1e-3
-    frozen = _held(window, free_width)
+    bench = _bench(window, fit.ar.size, free_width)
+    best = _trial(bench, _theta(fit), fit.valve)
+    damping, gram, slope = 1e-3, np.empty((0, 0)), np.empty(0)
     for _ in range(ITERATIONS):
-        moved = _moved(window, best, _steps(best.gram, best.slope, damping, frozen), free_width)
-        trial = _trial(window, y, *moved, free_width) if moved is not None else None
+        if not slope.size:
+            slopes = _slopes(bench, best)
+            gram, slope = slopes @ slopes.T, -(slopes @ best.e)
+        moved = _moved(bench, best, damped_step(gram, slope, damping, bench.held))
+        trial = _trial(bench, *moved) if moved is not None else None
         if trial is None or not trial.loss < best.loss:
             damping *= 10
             if damping > 1e4:
                 break
             continue
-        gained = 0.5 * best.count * math.log(best.loss / max(trial.loss, 1e-300))
-        best, damping = trial, max(damping / 5, 1e-7)
+        gained = 0.5 * best.e.size * math.log(best.loss / max(trial.loss, 1e-300))
+        best, damping, slope = trial, max(damping / 5, 1e-7), np.empty(0)
         if gained < SETTLED:
             break
     return _fitted(best)
@@ -221,7 +167,7 @@ def _fitted(trial: _Trial) -> Fit:
         float(t[1]),
         trial.valve,
         max(trial.loss, 1e-14),
-        trial.count,
-        t[8:].copy(),
-        t[4:8].copy(),
+        trial.e.size,
+        t[BASE:].copy(),
+        t[4:BASE].copy(),
     )

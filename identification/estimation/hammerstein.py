@@ -92,8 +92,29 @@ class Fit:
 
 
 @njit(cache=True)
+def _resting_blocks(op: Floats, breakaway: float, sliding: float, factor: int) -> Floats:
+    """The same of a stem that rests after each move, where the direction of motion need not be remembered."""
+    n = op.size // factor
+    out = np.empty(n)
+    stem = first_slip(op, breakaway, sliding)
+    for k in range(n):
+        total = 0.0
+        for i in range(k * factor, (k + 1) * factor):
+            gap = op[i] - stem
+            if gap > breakaway:
+                stem = op[i] - sliding
+            elif gap < -breakaway:
+                stem = op[i] + sliding
+            total += stem
+        out[k] = total / factor
+    return out
+
+
+@njit(cache=True)
 def stem_blocks(op: Floats, breakaway: float, sliding: float, tolerance: float, factor: int) -> Floats:
     """Stem behind OP as means of blocks, shape (n // factor,); breakaway 0 is an ideal valve."""
+    if breakaway > 0.0 and tolerance == RESTS:
+        return _resting_blocks(op, breakaway, sliding, factor)
     n = op.size // factor
     out = np.empty(n)
     stem, moving, turned = first_slip(op, breakaway, sliding), 0.0, op[0]

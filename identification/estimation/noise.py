@@ -66,12 +66,11 @@ def whitened(x: Floats, ar: Floats, edges: Edges) -> Floats:
     single = 0
     while single < groups and edges[single + 1] == single + 1:
         single += 1
-    out = np.empty(n)
-    for k in range(n):
-        left = x[k]
-        for i in range(min(single, k)):
-            left -= ar[i] * x[k - 1 - i]
-        out[k] = left
+    out = x.copy()
+    for i in range(single):  # lag by lag, for whole vectors at a time
+        factor = ar[i]
+        for k in range(i + 1, n):
+            out[k] -= factor * x[k - 1 - i]
     if single == groups:
         return out
     total = np.zeros(n + 1)

@@ -16,13 +16,15 @@ from identification.estimation.noise import every_lag, judged, whitened
 from identification.estimation.window import Window
 from identification.record import Floats, Mask
 from identification.signals.notch import notch
-from identification.simulation.discretization import unit_lag
+from identification.simulation.discretization import respond, unit_lag
 
 AR_ORDER = 8
 """Order of the noise model; ours: on the simulated plants 12 gives innovations less than 1 % smaller."""
 INPUT_LAGS = 10
 """Lags of OP in the unstructured model that gives the first noise model; ours, as AR_ORDER."""
 
+FADED = 1e-17
+"""A decay under this share of its start is over; numbers have sixteen digits."""
 NOTCH_WIDTH = 0.15
 """Width of the band that is left out when the process is wanted in spite of a load with a line; ours."""
 
@@ -38,54 +40,76 @@ def solved(gram: Floats, cross: Floats) -> Floats:
 
 
 @njit(cache=True)
+def _known(y: Floats, judged: Mask, first: int) -> tuple[Floats, Floats]:
+    """What does not depend on dynamics: PV, weight and weight times t, shape (3, n), zero where nothing is judged,
+    and the sums over PV squared, PV, PV t, 1, t and t squared, shape (6,)."""
+    n = y.size
+    rows, sums = np.zeros((3, n)), np.zeros(6)
+    for k in range(first, n):
+        if judged[k]:
+            t, v = 2.0 * k / n - 1.0, y[k]
+            rows[0, k], rows[1, k], rows[2, k] = v, 1.0, t
+            sums += np.array((v * v, v, t * v, 1.0, t, t * t))
+    return rows, sums
+
+
+@njit(cache=True, fastmath={"reassoc", "contract", "nsz"})
+def _products(x: Floats, rows: Floats) -> tuple[float, float, float, float]:
+    """Sums of a response times PV, 1, t and itself over the samples judged; in any order, for whole vectors."""
+    v, w, t = rows[0], rows[1], rows[2]
+    xv, x1, xt, xx = 0.0, 0.0, 0.0, 0.0
+    for k in range(x.size):
+        xv += x[k] * v[k]
+        x1 += x[k] * w[k]
+        xt += x[k] * t[k]
+        xx += x[k] * x[k] * w[k]
+    return xv, x1, xt, xx
+
+
+@njit(cache=True)
+def _left(
+    x: Floats, rows: Floats, sums: Floats, level: float, pole: float, outlasts: bool
+) -> tuple[float, int, Floats]:
+    """Innovations variance, samples judged and coefficients (gain, 1, t, decay) of one response; see `score`."""
+    gram, cross = np.zeros((4, 4)), np.zeros(4)
+    cross[0], gram[0, 1], gram[0, 2], gram[0, 0] = _products(x, rows)
+    power, cross[1], cross[2], gram[1, 1], gram[1, 2], gram[2, 2] = sums
+    free, k = 0.0 if outlasts else 1.0, 0
+    while k < x.size and free > FADED:
+        w, t, faded = rows[1, k], rows[2, k], free
+        cross[3] += faded * rows[0, k]
+        gram[0, 3] += faded * x[k] * w
+        gram[1, 3] += faded * w
+        gram[2, 3] += faded * t
+        gram[3, 3] += faded * faded * w
+        free *= pole
+        k += 1
+    beta = solved(gram, cross)
+    count = int(sums[3])
+    left = max((power - np.dot(beta, cross)) / max(count, 1), 1e-14)
+    beta[1] /= level
+    beta[2] /= level
+    return left, count, beta  # type: ignore[return-value]
+
+
+@njit(cache=True)
 def score(
-    y: Floats,
+    rows: Floats,
+    sums: Floats,
     stem: Floats,
-    judged: Mask,
     level: float,
-    first: int,
     time_constant_s: float,
     dead_time_s: float,
     dt_s: float,
 ) -> tuple[float, int, Floats]:
     """Innovations variance, samples judged and coefficients (gain, 1, t, decay) of one candidate.
 
-    `y` and `stem` are whitened already (a lag and A(q) commute), `level` is A(1), `first` the first sample judged.
+    `rows` and `sums` are those of PV (`_known`); it and `stem` are whitened already (a lag and A(q) commute), `level`
+    is A(1).
     """
-    n = y.size
     pole, now, before, delay = unit_lag(time_constant_s, dead_time_s, dt_s)
-    gram = np.zeros((4, 4))
-    cross = np.zeros(4)
-    power, count, x, free = 0.0, 0, 0.0, 1.0
-    outlasts = time_constant_s > 0.5 * n * dt_s
-    for k in range(n):
-        if judged[k] and k >= first:
-            t = 2.0 * k / n - 1.0
-            d = 0.0 if outlasts else free
-            v = y[k]
-            count += 1
-            power += v * v
-            cross[0] += x * v
-            cross[1] += v
-            cross[2] += t * v
-            cross[3] += d * v
-            gram[0, 0] += x * x
-            gram[0, 1] += x
-            gram[0, 2] += x * t
-            gram[0, 3] += x * d
-            gram[1, 2] += t
-            gram[1, 3] += d
-            gram[2, 2] += t * t
-            gram[2, 3] += t * d
-            gram[3, 3] += d * d
-        x = pole * x + now * stem[max(k - delay, 0)] + before * stem[max(k - delay - 1, 0)]
-        free *= pole
-    gram[1, 1] = count
-    beta = solved(gram, cross)
-    left = max((power - np.dot(beta, cross)) / max(count, 1), 1e-14)
-    beta[1] /= level
-    beta[2] /= level
-    return left, count, beta  # type: ignore[return-value]
+    x = respond(stem, pole, now, before, delay)
+    return _left(x, rows, sums, level, pole, time_constant_s > 0.5 * x.size * dt_s)
 
 
 Dynamics = tuple[float, float]
@@ -99,11 +123,9 @@ class Prepared:
     window: Window
     valve: ValveTrial
     ar: Floats
-    white_y: Floats
+    rows: Floats
+    sums: Floats
     white_stem: Floats
-    judged: Mask
-    first: int
-    notch_period: float
 
     @property
     def level(self) -> float:
@@ -112,7 +134,7 @@ class Prepared:
 
     def score(self, time_constant_s: float, dead_time_s: float) -> tuple[float, int, Floats]:
         """Innovations variance, count and coefficients for a time constant and a dead time [s]."""
-        args = (self.white_y, self.white_stem, self.judged, self.level, self.first)
+        args = (self.rows, self.sums, self.white_stem, self.level)
         sigma2, count, beta = score(*args, time_constant_s, dead_time_s, self.window.dt_s)
         return float(sigma2), int(count), np.asarray(beta, dtype=np.float64)
 
@@ -132,25 +154,17 @@ def _filtered(x: Floats, ar: Floats, notch_period: float) -> Floats:
 
 def prepare(window: Window, valve: ValveTrial, ar: Floats, notch_period: float = 0.0) -> Prepared:
     """Whiten PV and the stem with one noise model; notch_period in blocks, 0: none."""
-    return Prepared(
-        window,
-        valve,
-        ar,
-        _filtered(window.y - window.y.mean(), ar, notch_period),
-        _filtered(stem_of(window, valve), ar, notch_period),
-        judged(window.usable, ar.size),
-        ar.size + int(notch_period),
-        notch_period,
-    )
+    y = _filtered(window.y - window.y.mean(), ar, notch_period)
+    rows, sums = _known(y, judged(window.usable, ar.size), ar.size + int(notch_period))
+    return Prepared(window, valve, ar, rows, sums, _filtered(stem_of(window, valve), ar, notch_period))
 
 
 @njit(cache=True)
 def _least(
-    y: Floats,
+    rows: Floats,
+    sums: Floats,
     stem: Floats,
-    judged: Mask,
     level: float,
-    first: int,
     dt: float,
     begins: Floats,
     bounds: tuple[float, float],
@@ -159,7 +173,7 @@ def _least(
     """Best of the starts (rows of log time constant and dead time), then compass search from there."""
     best_t, best_d, least = begins[0, 0], begins[0, 1], np.inf
     for i in range(begins.shape[0]):
-        found = score(y, stem, judged, level, first, math.exp(begins[i, 0]), begins[i, 1], dt)[0]
+        found = score(rows, sums, stem, level, math.exp(begins[i, 0]), begins[i, 1], dt)[0]
         if found < least:
             best_t, best_d, least = begins[i, 0], begins[i, 1], found
     low_t, high_t = math.log(0.05 * dt), math.log(bounds[0])
@@ -173,7 +187,7 @@ def _least(
                 t, d = best_t + m_t * step_t, best_d + m_d * step_d
                 if d < 0 or d > bounds[1] or t < low_t or t > high_t:
                     continue
-                found = score(y, stem, judged, level, first, math.exp(t), d, dt)[0]
+                found = score(rows, sums, stem, level, math.exp(t), d, dt)[0]
                 if found < least * (1 - 1e-6):
                     best_t, best_d, least, moved = t, d, found, True
         step_t, step_d = step_t / 2, step_d / 2
@@ -184,15 +198,16 @@ def search(prepared: Prepared, begins: list[Dynamics], halvings: int = 3) -> Dyn
     """Time constant and dead time [s] of least innovations variance: the best start, then compass search."""
     most_t, most_dead = prepared.window.bounds
     dt = prepared.window.dt_s
-    rows = np.array([[math.log(min(max(t, 0.06 * dt), 0.95 * most_t)), min(d, most_dead)] for t, d in begins])
+    first = np.array(
+        [[math.log(min(max(t, 0.06 * dt), 0.95 * most_t)), min(d, most_dead)] for t, d in begins]
+    )
     t, dead, _ = _least(
-        prepared.white_y,
+        prepared.rows,
+        prepared.sums,
         prepared.white_stem,
-        prepared.judged,
         prepared.level,
-        prepared.first,
         dt,
-        rows,
+        first,
         (most_t, most_dead),
         halvings,
     )
@@ -202,8 +217,8 @@ def search(prepared: Prepared, begins: list[Dynamics], halvings: int = 3) -> Dyn
 @njit(cache=True)
 def _scan(
     op: Floats,
-    white_y: Floats,
-    judged: Mask,
+    rows: Floats,
+    sums: Floats,
     ar: Floats,
     dt_s: float,
     factor: int,
@@ -211,17 +226,32 @@ def _scan(
     tolerance: float,
     begins: Floats,
 ) -> Floats:
-    level = max(1.0 - ar.sum(), 1e-6)
-    out = np.empty(pairs.shape[0])
+    level, tries, n = max(1.0 - ar.sum(), 1e-6), begins.shape[0], rows.shape[1]
+    out, x = np.empty(pairs.shape[0]), np.empty(n)
     for i in range(pairs.shape[0]):
         width, share = pairs[i, 0], pairs[i, 1]
         stem = stem_blocks(op, 0.5 * width * (1 + share), 0.5 * width * (1 - share), tolerance, factor)
         white = _white(stem - stem.mean(), ar)
-        out[i] = np.inf
-        for j in range(begins.shape[0]):
-            left = score(white_y, white, judged, level, ar.size, begins[j, 0], begins[j, 1], dt_s)[0]
+        out[i], whole, known = np.inf, white, 0.0
+        for j in range(tries):
+            pole, now, before, delay = unit_lag(begins[j, 0], begins[j, 1], dt_s)
+            if begins[j, 0] != known:
+                whole, known = respond(white, pole, 1.0, 0.0, 0), begins[j, 0]
+            _later(whole, now, before, delay, x)
+            left = _left(x, rows, sums, level, pole, begins[j, 0] > 0.5 * n * dt_s)[0]
             out[i] = min(out[i], left)
     return out
+
+
+@njit(cache=True)
+def _later(whole: Floats, now: float, before: float, delay: int, out: Floats) -> None:
+    """The response at one dead time into `out`, from that without any; the stem is taken to rest at first."""
+    n = out.size
+    out[: min(delay, n)] = 0.0
+    if delay < n:
+        out[delay] = now * whole[0]
+    for k in range(delay + 1, n):
+        out[k] = now * whole[k - delay] + before * whole[k - delay - 1]
 
 
 def scan(window: Window, pairs: Floats, tolerance: float, ar: Floats, begins: list[Dynamics]) -> Floats:
@@ -245,9 +275,9 @@ def scan(window: Window, pairs: Floats, tolerance: float, ar: Floats, begins: li
         Least innovations variance of each pair [% PV squared].
     """
     white_y = _white(np.ascontiguousarray(window.y - window.y.mean()), ar)
-    counts = judged(window.usable, ar.size)
+    rows, sums = _known(white_y, judged(window.usable, ar.size), ar.size)
     table = np.array(begins)
-    return _scan(window.op, white_y, counts, ar, window.dt_s, window.factor, pairs, tolerance, table)  # type: ignore[no-any-return]
+    return _scan(window.op, rows, sums, ar, window.dt_s, window.factor, pairs, tolerance, table)  # type: ignore[no-any-return]
 
 
 def starts(window: Window, period_s: float) -> list[Dynamics]:

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from identification.models import Integrator, Process
 from identification.record import Floats
@@ -65,6 +66,31 @@ def respond_in_blocks(
             y = pole * y + now * stem[max(k - delay, 0)] + before * stem[max(k - delay - 1, 0)]
             k += 1
         out[block] = total / factor
+    return out
+
+
+@njit(cache=True)
+def respond_together(
+    stems: tuple[Floats, Floats, Floats], lags: Floats, delays: NDArray[np.int64], factor: int
+) -> Floats:
+    """Three of these at once, shape (3, n // factor); `lags` are rows of pole, now and before, shape (3, 3).
+
+    Each step waits for the one before, so three side by side take hardly longer than one.
+    """
+    s0, s1, s2 = stems
+    n = s0.size // factor
+    out = np.empty((3, n))
+    y0, y1, y2, k = 0.0, 0.0, 0.0, 0
+    for block in range(n):
+        t0, t1, t2 = 0.0, 0.0, 0.0
+        for _ in range(factor):
+            t0, t1, t2 = t0 + y0, t1 + y1, t2 + y2
+            i0, i1, i2 = k - delays[0], k - delays[1], k - delays[2]
+            y0 = lags[0, 0] * y0 + lags[0, 1] * s0[max(i0, 0)] + lags[0, 2] * s0[max(i0 - 1, 0)]
+            y1 = lags[1, 0] * y1 + lags[1, 1] * s1[max(i1, 0)] + lags[1, 2] * s1[max(i1 - 1, 0)]
+            y2 = lags[2, 0] * y2 + lags[2, 1] * s2[max(i2, 0)] + lags[2, 2] * s2[max(i2 - 1, 0)]
+            k += 1
+        out[0, block], out[1, block], out[2, block] = t0 / factor, t1 / factor, t2 / factor
     return out
 
 
