@@ -22,12 +22,14 @@ def dead_valve(record: LoopRecord, limits: CauseLimits) -> Sign | None:
     good = ~(record.mask("gap") | record.mask("manual"))
     if record.sp_estimated or good.sum() < 100:
         return None
-    op, pv, e = record.op[good], record.pv[good], record.error[good]
-    wound = float(np.ptp(op))
+    wound = float(np.ptp(record.op[good]))
+    if wound < limits.wound_pct:
+        return None
+    pv, e = record.pv[good], record.error[good]
     low, high = np.quantile(pv, [0.05, 0.95])
     still = float(high - low) <= 0.1 * float(np.median(np.abs(e)))
     one_sided = max(float((e > 0).mean()), float((e < 0).mean()))
-    if wound < limits.wound_pct or not still or one_sided < 0.95:
+    if not still or one_sided < 0.95:
         return None
     return Sign("valve", 0.9, f"OP winds over {wound:.0f} % while PV stands still off the set point")
 

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 
 from identification.models import Fopdt, Integrator, Loop, Pid, Process
 from identification.record import Floats, Mask
@@ -112,24 +113,45 @@ def frequencies(loop: Loop, points: int = POINTS, lowest: float = LOWEST) -> Flo
     return np.geomspace(lowest / slowest_s(loop), top, points)
 
 
-def _characteristic(loop: Loop, points: int) -> tuple[Complexes, Complexes]:
-    """Characteristic polynomial in 1/z along the upper unit circle: the fixed part, and the part times kp.
+@njit(cache=True)
+def _phase(
+    pole: float,
+    now: float,
+    before: float,
+    delay: int,
+    kp: float,
+    rate: float,
+    td: float,
+    low: float,
+    points: int,
+) -> float:
+    """Phase [rad] that the characteristic polynomial in 1/z goes through along the upper unit circle.
 
-    A controller without integral leaves a factor 1 - 1/z on the circle, which is taken out.
+    Its points are `points` even ones and as many in even ratios from `low` [rad] on. `rate` is the scan over the
+    integral time, `td` the derivative time over the scan. A controller without integral leaves a factor 1 - 1/z on
+    the circle, which is taken out.
     """
-    h = max(scan_step(loop), loop.process.dead_time_s / MOST_DELAY)
-    d, c = discretize(loop.process, h), loop.controller
-    w = np.exp(-1j * _angles(loop, h, points + 8 * d.delay))
-    step, rate = 1.0 - w, _rate(c) * h
-    late = (d.now + d.before * w) * w ** (d.delay + 1)
-    if rate == 0.0:
-        return 1.0 - d.pole * w, (1.0 + c.td_s / h * step) * late
-    return step * (1.0 - d.pole * w), (step + rate + c.td_s / h * step**2) * late
-
-
-def _angles(loop: Loop, h: float, points: int) -> Floats:
-    low = 1e-3 * h / max(slowest_s(loop), h)
-    return np.sort(np.concatenate((np.linspace(0.0, np.pi, points), np.geomspace(low, np.pi, points))))
+    total, last, i, j = 0.0, 0.0, 0, 0
+    ratio = math.log(math.pi / low) / (points - 1)
+    while i < points or j < points:
+        even = math.pi * i / (points - 1) if i < points else math.inf
+        spread = low * math.exp(ratio * j) if j < points else math.inf
+        angle = min(even, spread)
+        i, j = (i + 1, j) if even <= spread else (i, j + 1)
+        w = complex(math.cos(angle), -math.sin(angle))
+        step = 1.0 - w
+        turned = angle * (delay + 1)
+        late = (now + before * w) * complex(math.cos(turned), -math.sin(turned))
+        if rate == 0.0:
+            value = 1.0 - pole * w + kp * (1.0 + td * step) * late
+        else:
+            value = step * (1.0 - pole * w) + kp * (step + rate + td * step * step) * late
+        here = math.atan2(value.imag, value.real)
+        if i + j > 1:
+            moved = here - last
+            total += moved - 2.0 * math.pi * np.round(moved / (2.0 * math.pi))
+        last = here
+    return total
 
 
 def stable_gains(loop: Loop, kp: Floats, points: int = 500) -> Mask:
@@ -151,10 +173,12 @@ def stable_gains(loop: Loop, kp: Floats, points: int = 500) -> Mask:
     -------
     ndarray of bool, shape (n,)
     """
-    fixed, scaled = _characteristic(loop, points)
-    phase = np.unwrap(np.angle(fixed + np.asarray(kp)[:, None] * scaled), axis=1)
-    stable: Mask = np.abs(phase[:, -1] - phase[:, 0]) < 0.5 * np.pi
-    return stable
+    h = max(scan_step(loop), loop.process.dead_time_s / MOST_DELAY)
+    d, c = discretize(loop.process, h), loop.controller
+    process = d.pole, d.now, d.before, d.delay
+    law = _rate(c) * h, c.td_s / h, 1e-3 * h / max(slowest_s(loop), h), points + 8 * d.delay
+    turned = np.array([_phase(*process, float(k), *law) for k in np.asarray(kp)])
+    return np.abs(turned) < 0.5 * np.pi
 
 
 def is_stable(loop: Loop, points: int = 500) -> bool:
@@ -178,5 +202,25 @@ def margins(loop: Loop, points: int = 400) -> Margins:
     """
     if not is_stable(loop):
         return Margins(False, math.inf)
-    response = loop_response(loop, frequencies(loop, points, lowest=1e-2))
-    return Margins(True, float(np.max(1.0 / np.abs(1.0 + response))))
+    omega, c = frequencies(loop, points, lowest=1e-2), loop.controller
+    if c.scan_s <= 0:
+        return Margins(True, float(np.max(1.0 / np.abs(1.0 + loop_response(loop, omega)))))
+    d = discretize(loop.process, c.scan_s)
+    process, law = (d.pole, d.now, d.before, d.delay), (c.kp, _rate(c) * c.scan_s, c.td_s / c.scan_s)
+    return Margins(True, 1.0 / _least_distance(process, law, omega * c.scan_s))
+
+
+@njit(cache=True)
+def _least_distance(
+    process: tuple[float, float, float, int], law: tuple[float, float, float], angles: Floats
+) -> float:
+    """Least distance of the sampled loop's response to -1 over some angles [rad] of z, shape (m,)."""
+    pole, now, before, delay = process
+    kp, rate, td = law
+    least = math.inf
+    for k in range(angles.size):
+        w = complex(math.cos(angles[k]), -math.sin(angles[k]))
+        step, turned = 1.0 - w, angles[k] * (delay + 1)
+        g = (now + before * w) * complex(math.cos(turned), -math.sin(turned)) / (1.0 - pole * w)
+        least = min(least, abs(1.0 + g * kp * (1.0 + rate / step + td * step)))
+    return least

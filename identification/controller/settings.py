@@ -47,8 +47,12 @@ def _regression(record: LoopRecord, period_s: float) -> tuple[Floats, Floats] | 
     use = _usable(record, step)
     e = record.error
     total = np.concatenate(([0.0], np.cumsum(e))) * record.dt_s
-    rows = np.stack([_increments(e, step), total[step + 1 :] - total[1:-step]])[:, use]
-    moved = _increments(record.op, step)[use]
+    rows, moved = (
+        np.stack([_increments(e, step), total[step + 1 :] - total[1:-step]]),
+        _increments(record.op, step),
+    )
+    if not use.all():
+        rows, moved = rows[:, use], moved[use]
     if use.sum() < 50 or float(moved @ moved) <= 0 or float(np.ptp(e)) == 0.0:
         return None
     return rows, moved
