@@ -12,7 +12,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
-from analyzer import chunk, run_identity
+from analyzer import chunk, run_identity, store_version
 from analyzer.chunk import Done, Task, assess_loop
 from analyzer.config import Config
 from analyzer.decisions import Status
@@ -160,7 +160,9 @@ def run(
             "no loops in the export", "tags such as LOOP.PV", "state them with --loops loops.csv"
         )
     with locked(store.path):
+        store_version.upgrade(store.path)
         spans = nights_of(export, specs, config.nights, since_s, until_s, zone)
+        said = [line for span in spans for line in store.set_aside_damaged(span.name)]
         keys = _begun(
             store,
             spans,
@@ -176,8 +178,8 @@ def run(
             met.update(result.met)
             progress(done, len(specs))
         order = [s.loop for s in specs]
-        written, said = _finished(store, spans, order, config, keys, replacing)
-        return _outcome(store, written, order, (*export.file_notes, *counted(met), *said))
+        written, more = _finished(store, spans, order, config, keys, replacing)
+        return _outcome(store, written, order, (*export.file_notes, *counted(met), *said, *more))
 
 
 def _finished(

@@ -13,6 +13,7 @@ from analyzer.commands import explain as explain_cli
 from analyzer.commands import notes as notes_cli
 from analyzer.commands import report as report_cli
 from analyzer.commands import run as run_cli
+from analyzer.commands import store as store_cli
 from analyzer.commands.options import SOME_LOST, Asked, export_options, told
 from analyzer.decisions import Lane
 from identification.errors import InputError
@@ -167,6 +168,7 @@ def registered(command: click.Command) -> click.Command:
 
 for page_command in (run_cli.run, *report_cli.COMMANDS, *notes_cli.COMMANDS):
     main.add_command(registered(page_command))
+main.add_command(store_cli.store)
 for model_command in explain_cli.main.commands.values():
     main.add_command(model_command)
 

@@ -117,6 +117,15 @@ def visible(text: str) -> str:
     return "".join(c if c.isprintable() else " " for c in text)
 
 
+def broken(store: Path) -> int:
+    """Lines of a store's notes that are none."""
+    try:
+        lines = (store / FILE).read_text(encoding="utf-8", errors="replace").split("\n")
+    except OSError:
+        return 0
+    return sum(bool(line.strip()) and _parsed(line) is None for line in lines)
+
+
 def last(notes: Mapping[str, tuple[Note, ...]], loop: str) -> Note | None:
     """The newest note of a loop."""
     own = notes.get(loop, ())

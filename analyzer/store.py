@@ -5,30 +5,25 @@ STORE/hours/NIGHT.parquet    one row a loop and hour
 STORE/explained/NIGHT.parquet  one row a loop that was explained
 STORE/trends/NIGHT.parquet   thinned trends, one row a loop and bucket
 STORE/parts/NIGHT/...        the same in pieces while a night is being worked on; a resumed run reads them
+STORE/notes.jsonl            what people wrote; STORE/store.json the version of the tables
 """
 
 from __future__ import annotations
 
-import os
+import secrets
 import shutil
 from collections.abc import Mapping, Sequence
+from datetime import date
 from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
-import pyarrow.parquet as pq
 
+from analyzer import store_version
 from analyzer.columns.column import Column
 from analyzer.columns.table import require_declared
+from analyzer.stored_table import read_stored, stored_names, write_table
 from identification.errors import InputError
-
-
-def write_table(table: pa.Table, path: Path) -> None:
-    """Write a table so that a reader sees all of it or nothing."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    pq.write_table(table, temporary, compression="zstd")
-    os.replace(temporary, path)
 
 
 def rows_table(rows: Sequence[Mapping[str, Any]], columns: Sequence[Column]) -> pa.Table:
@@ -46,6 +41,18 @@ def rows_table(rows: Sequence[Mapping[str, Any]], columns: Sequence[Column]) -> 
     return pa.Table.from_arrays(arrays, schema=pa.schema(fields))
 
 
+TABLES = ("nights", "hours", "trends", "groups", "explained")
+"""Tables of a night."""
+
+
+def is_night(name: str) -> bool:
+    """Whether a name is that of a night: a date."""
+    try:
+        return name == date.fromisoformat(name).isoformat()
+    except ValueError:
+        return False
+
+
 class Store:
     """A directory of results."""
 
@@ -53,8 +60,8 @@ class Store:
         self.path = path
 
     def nights(self) -> list[str]:
-        """Names of the nights that are complete, oldest first."""
-        return sorted(p.stem for p in (self.path / "nights").glob("*.parquet"))
+        """Names of the nights that are complete, oldest first; files of other names are nobody's nights."""
+        return sorted(p.stem for p in (self.path / "nights").glob("*.parquet") if is_night(p.stem))
 
     def zone(self) -> str:
         """The plant's time zone as the latest night states it, UTC where none does."""
@@ -70,8 +77,9 @@ class Store:
         Raises
         ------
         InputError
-            Where the path is no store or holds no complete night.
+            Where the path is no store, is one of a newer version, or holds no complete night.
         """
+        store_version.require_known(self.path)
         nights = self.nights()
         if not nights:
             seen = "no such directory" if not self.path.exists() else "no complete night in it"
@@ -80,15 +88,9 @@ class Store:
 
     def read(self, table: str, night: str, columns: Sequence[str] | None = None, **where: str) -> pa.Table:
         """One night of one table; `where` filters on equality (loop="...")."""
-        path = self.path / table / f"{night}.parquet"
+        filters = [(k, "=", v) for k, v in where.items()] or None
         try:
-            if where:
-                filters = [(k, "=", v) for k, v in where.items()]
-                return pq.read_table(path, columns=list(columns) if columns else None, filters=filters)
-            with pq.ParquetFile(
-                path
-            ) as file:  # read_table would import pandas, which takes longer than the rest
-                return file.read(columns=list(columns) if columns else None)
+            return read_stored(self.path / table / f"{night}.parquet", columns, filters)
         except FileNotFoundError as error:
             known = ", ".join(self.nights()[-3:]) or "none"
             raise InputError(
@@ -104,8 +106,7 @@ class Store:
             Where the store holds no such night.
         """
         try:
-            with pq.ParquetFile(self.path / table / f"{night}.parquet") as file:
-                return list(file.schema_arrow.names)
+            return stored_names(self.path / table / f"{night}.parquet")
         except FileNotFoundError:
             return self.read(table, night).column_names
 
@@ -133,7 +134,7 @@ class Store:
     def read_parts(self, night: str, table: str, keys: Sequence[str]) -> pa.Table | None:
         """The pieces of one table of a night that some chunks have written, None where there are none."""
         paths = [self.part(night, table, key) for key in keys]
-        found = [pq.read_table(p) for p in paths if p.exists()]
+        found = [read_stored(p) for p in paths if p.exists()]
         return pa.concat_tables(found) if found else None
 
     def read_if_there(self, table: str, night: str) -> pa.Table | None:
@@ -147,6 +148,19 @@ class Store:
             path.unlink(missing_ok=True)
         else:
             write_table(rows, path)
+
+    def set_aside_damaged(self, night: str) -> list[str]:
+        """Rename the tables of a night that cannot be read, so that it can be written anew; sentences on them."""
+        said = []
+        for table in TABLES:
+            path = self.path / table / f"{night}.parquet"
+            try:
+                self.read_if_there(table, night)
+            except InputError as error:
+                aside = path.with_name(f"{path.name}.{secrets.token_hex(4)}.damaged")
+                path.rename(aside)
+                said.append(f"{error.seen}; set aside as {aside.name}, and written anew")
+        return said
 
     def forget_explained(self, night: str, loops: Sequence[str] | None) -> None:
         """Drop the explanations of some loops of a night, of all where None: their records have been replaced."""

@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Collection, Iterable, Sequence
 from pathlib import Path
 
 from reports import charts, html, markdown
 from reports.pages import Page
 from reports.tables import as_csv
+from reports.whole_file import whole_file
 
 
 def write_text(path: Path, text: str) -> Path:
     """Write a file so that a reader sees all of it or the one before."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    temporary.write_text(text, "utf-8", newline="\n")
-    os.replace(temporary, path)
+    with whole_file(path) as temporary:
+        temporary.write_text(text, "utf-8", newline="\n")
     return path
 
 
@@ -76,8 +74,7 @@ def write_markdown(pages: Iterable[Page], out: Path) -> list[Path]:
     for page in pages:
         folder = f"{page.name}-pictures"
         for block in markdown.pictures(page):
-            path = out / folder / f"{block.name}.png"
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_bytes(charts.draw(block))
+            with whole_file(out / folder / f"{block.name}.png") as temporary:
+                temporary.write_bytes(charts.draw(block))
         written.append(write_text(out / f"{page.name}.md", markdown.render(page, folder)))
     return written

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
-import pyarrow.parquet as pq
 
 from analyzer.block_bootstrap import Floats
 from analyzer.spans import Span
 from analyzer.store import Store
+from analyzer.stored_table import read_stored, stored_names
 
 SIGNALS = ("sp", "pv", "op")
 AROUND_D = 2
@@ -71,11 +71,7 @@ def _tables(
         return []
     paths = [store.path / table / f"{night}.parquet" for night in nights]
     where = [("loop", "in", sorted(loops))]
-    return [
-        pq.read_table(p, columns=list(columns) if columns else None, filters=where)
-        for p in paths
-        if p.exists()
-    ]
+    return [read_stored(p, columns, where) for p in paths if p.exists()]
 
 
 def read_nights(
@@ -85,9 +81,10 @@ def read_nights(
     rows: list[dict[str, Any]] = []
     for night in nights if loops is None or loops else ():
         path = store.path / "nights" / f"{night}.parquet"
-        held = [c for c in columns if c in set(pq.read_schema(path).names)]
+        names = set(stored_names(path))
+        held = [c for c in columns if c in names]
         where = [("loop", "in", sorted(loops))] if loops is not None else None
-        found = pq.read_table(path, columns=held, filters=where).to_pylist()
+        found = read_stored(path, held, where).to_pylist()
         rows += [{**dict.fromkeys(columns), **row, "night": night} for row in found]
     return rows
 

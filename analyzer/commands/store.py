@@ -1,0 +1,90 @@
+"""The commands that look after a store: parse, call, say what was found or done."""
+
+from __future__ import annotations
+
+import re
+import sys
+from pathlib import Path
+
+import click
+
+from analyzer.commands.options import told
+from identification.errors import InputError
+
+SOME_WRONG = 1
+DAYS = {"d": 1, "w": 7, "y": 365}
+SHOWN = 20
+"""Files that are named; the rest is counted."""
+
+
+def days(text: str, option: str) -> int:
+    """Days that a text such as 400d, 26w or 2y states.
+
+    Raises
+    ------
+    InputError
+        It states none.
+    """
+    found = re.fullmatch(r"(\d{1,5})([dwy])", text.strip())
+    if found is None or int(found[1]) == 0:
+        raise InputError(
+            f"{option} {text}", "a number of days, weeks or years such as 400d, 26w or 2y", "correct it"
+        )
+    return int(found[1]) * DAYS[found[2]]
+
+
+@click.group()
+def store() -> None:
+    """Look after a store: check it, delete what is old."""
+
+
+@store.command()
+@click.argument("path", metavar="STORE", type=click.Path(path_type=Path))
+@told
+def check(path: Path) -> None:
+    """Read every table of a store and say what is damaged, left over or not finished.
+
+    Exit status: 0 nothing is wrong, 1 something is, 2 there is no store.
+
+    Example: triage store check store
+    """
+    from analyzer import store_care
+    from analyzer.store import Store
+
+    kept = Store(path)
+    found = 0
+    for problem in store_care.problems(kept):
+        found += 1
+        click.echo(f"{problem.seen}: {problem.remedy}")
+    held = store_care.sizes(kept)
+    size = f"{held.nights} nights, {held.tables} tables, {held.bytes / 1e6:.1f} MB"
+    click.echo(f"{path}: {size}; " + (f"{found} to look at" if found else "all whole"))
+    sys.exit(SOME_WRONG if found else 0)
+
+
+@store.command()
+@click.argument("path", metavar="STORE", type=click.Path(path_type=Path))
+@click.option("--keep", required=True, help="How long nights are kept, before the latest: 400d, 60w, 2y.")
+@click.option("--keep-trends", help="How long trends and hours are kept. Default: as long as nights.")
+@click.option("--dry-run", is_flag=True, help="Only say what would be deleted.")
+@told
+def prune(path: Path, keep: str, keep_trends: str | None, dry_run: bool) -> None:
+    """Delete nights older than some time before the latest, and what dead processes left. Notes stay.
+
+    Example: triage store prune store --keep 400d --keep-trends 90d
+    """
+    from analyzer import store_care
+    from analyzer.store import Store
+    from analyzer.store_lock import locked
+
+    kept = Store(path)
+    kept.require()
+    detail = None if keep_trends is None else days(keep_trends, "--keep-trends")
+    with locked(path):
+        gone = store_care.pruned(kept, days(keep, "--keep"), detail, dry_run)
+    done = "would be deleted" if dry_run else "deleted"
+    for file in gone[:SHOWN]:
+        click.echo(f"{done}: {file.relative_to(path)}")
+    if len(gone) > SHOWN:
+        click.echo(f"and {len(gone) - SHOWN} more")
+    click.echo(f"{path}: {len(gone)} files {done}, {len(kept.nights())} nights kept")

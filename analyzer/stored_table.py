@@ -1,0 +1,93 @@
+"""A table of the store as a file: read and checked, or one line on what is wrong with it; written whole."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from analyzer.columns.table import BY_NAME, EXPLAINED, GROUPS, HOURS
+from identification.errors import InputError
+from reports.whole_file import whole_file
+
+DECLARED = {**{c.name: c for c in (*HOURS, *EXPLAINED, *GROUPS)}, **BY_NAME}
+"""Every column that a table of results may have, by name; those of trends are numbers and are not declared."""
+REMEDY = (
+    "'triage store check' names all such: restore them from a backup, or delete them and run the night anew"
+)
+
+
+def write_table(table: pa.Table, path: Path) -> None:
+    """Write a table so that a reader sees all of it or nothing."""
+    with whole_file(path, kept=True) as temporary:
+        pq.write_table(table, temporary, compression="zstd", write_page_checksum=True)
+
+
+def read_stored(
+    path: Path, columns: Sequence[str] | None = None, filters: list[tuple[str, str, Any]] | None = None
+) -> pa.Table:
+    """A table of the store, or some of its columns and rows.
+
+    Raises
+    ------
+    FileNotFoundError
+        There is none.
+    InputError
+        The file is damaged, or holds other columns than results have.
+    """
+    wanted = list(columns) if columns else None
+    try:
+        if filters is not None:
+            table = pq.read_table(path, columns=wanted, filters=filters, page_checksum_verification=True)
+        else:
+            with pq.ParquetFile(
+                path, page_checksum_verification=True
+            ) as file:  # read_table would import pandas, which takes longer than the rest
+                table = file.read(columns=wanted)
+    except FileNotFoundError:
+        raise
+    except (pa.ArrowException, OSError, ValueError) as error:
+        raise _damaged(path, error) from error
+    _require_declared(path, table.schema, wanted)
+    return table
+
+
+def stored_names(path: Path) -> list[str]:
+    """Names of the columns of a table of the store; errors as of `read_stored`."""
+    try:
+        with pq.ParquetFile(path, page_checksum_verification=True) as file:
+            schema = file.schema_arrow
+    except FileNotFoundError:
+        raise
+    except (pa.ArrowException, OSError, ValueError) as error:
+        raise _damaged(path, error) from error
+    _require_declared(path, schema, None)
+    return list(schema.names)
+
+
+def _damaged(path: Path, error: Exception) -> InputError:
+    seen = " ".join(str(error).split())[:100] or type(error).__name__
+    return InputError(f"{path}: damaged ({seen})", "a table that 'triage run' wrote", REMEDY)
+
+
+def _require_declared(path: Path, schema: pa.Schema, wanted: list[str] | None) -> None:
+    """Raise InputError where a table has no loops, or a declared column is of another kind."""
+    if (wanted is None or "loop" in wanted) and "loop" not in schema.names:
+        raise InputError(f"{path}: no column loop", "a table that 'triage run' wrote", REMEDY)
+    for field in schema:
+        declared = DECLARED.get(field.name)
+        if declared is not None and not _holds(field.type, declared.is_number):
+            kind = "numbers" if declared.is_number else "text"
+            raise InputError(f"{path}: column {field.name} holds {field.type}", kind, REMEDY)
+
+
+def _holds(kind: pa.DataType, numbers: bool) -> bool:
+    if pa.types.is_null(kind):
+        return True
+    if numbers:
+        return bool(pa.types.is_floating(kind) or pa.types.is_integer(kind))
+    own = kind.value_type if pa.types.is_dictionary(kind) else kind
+    return bool(pa.types.is_string(own) or pa.types.is_large_string(own))

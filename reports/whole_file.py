@@ -1,0 +1,45 @@
+"""Files that a reader sees whole or not at all."""
+
+from __future__ import annotations
+
+import os
+import secrets
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+SUFFIX = ".tmp"
+"""Ending of what is being written; such files of a process that died may be deleted."""
+
+
+@contextmanager
+def whole_file(path: Path, kept: bool = False) -> Iterator[Path]:
+    """A path to write to that takes the place of `path` at the end, and is gone where an error came first.
+
+    Parameters
+    ----------
+    path : Path
+        Its folder is made where there is none.
+    kept : bool
+        Wait until the disk has it, so that it is whole after a loss of power too.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_name(f".{path.name[:80]}.{secrets.token_hex(8)}{SUFFIX}")
+    flags = os.O_CREAT | os.O_EXCL | os.O_WRONLY  # a link laid in the way is not followed
+    os.close(os.open(temporary, flags, 0o666))
+    try:
+        yield temporary
+        if kept:
+            _to_disk(temporary)
+        os.replace(temporary, path)
+    except BaseException:
+        temporary.unlink(missing_ok=True)
+        raise
+
+
+def _to_disk(path: Path) -> None:
+    handle = os.open(path, os.O_RDWR)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)

@@ -1,0 +1,193 @@
+"""A store over the years: checked, thinned, brought up to date, and never the reason that a night is lost."""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+from pathlib import Path
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+from click.testing import CliRunner, Result
+
+from analyzer import store_version
+from analyzer.cli import main
+from analyzer.columns.table import NIGHTS
+from analyzer.store import Store
+from analyzer.store_care import problems
+from tests.analyzer.plant import Sketch, simulate, write_export
+from tests.reports.small_store import small_store
+
+
+@pytest.fixture
+def store(tmp_path: Path) -> Store:
+    """Five nights of six loops, by this version."""
+    kept = small_store(tmp_path / "store", loops=6, nights=5)
+    store_version.upgrade(kept.path)
+    return kept
+
+
+def asked(*arguments: object) -> Result:
+    """An answer of the command line."""
+    return CliRunner().invoke(main, [str(a) for a in arguments])
+
+
+def damage(path: Path, how: str) -> None:
+    """Break a file."""
+    data = path.read_bytes()
+    if how == "directory":
+        path.unlink()
+        path.mkdir()
+        return
+    broken = {
+        "empty": b"",
+        "cut": data[: len(data) // 2],
+        "garbage": b"\x00garbage" * 100,
+        "middle": data[: len(data) // 3] + b"\xff" * 64 + data[len(data) // 3 + 64 :],
+    }
+    path.write_bytes(broken[how])
+
+
+READERS = (
+    *(("rank", form) for form in ("table", "csv", "json", "markdown")),
+    *(("groups", form) for form in ("table", "csv")),
+    *(("pages", ""), ("report", ""), ("summary", ""), ("note", ""), ("store check", "")),
+)
+
+
+def answer(store: Store, command: str, form: str, out: Path) -> Result:
+    """What a command says of a store."""
+    more: dict[str, tuple[object, ...]] = {
+        "rank": ("rank", store.path, "--format", form),
+        "groups": ("rank", store.path, "--groups", "--format", form),
+        "pages": ("pages", store.path, "--out", out),
+        "report": ("report", store.path, "--loop", "FIC0000", "--changed", "2026-03-04T00:00", "--out", out),
+        "summary": ("summary", store.path),
+        "note": ("note", store.path, "FIC0000", "seen"),
+        "store check": ("store", "check", store.path),
+    }
+    return asked(*more[command])
+
+
+@pytest.mark.parametrize("how", ["empty", "cut", "garbage", "middle", "directory"])
+@pytest.mark.parametrize("table", ["nights", "trends", "hours", "groups"])
+def test_a_damaged_table_is_one_line(store: Store, tmp_path: Path, table: str, how: str) -> None:
+    """Whatever is broken in a store, no command ends in a traceback: it does not need the file, or names it."""
+    night = store.nights()[-1]
+    path = store.path / table / f"{night}.parquet"
+    if not path.exists():
+        path.parent.mkdir(exist_ok=True)
+        pq.write_table(pa.table({"loop": ["FIC0000"], "night": [night]}), path)
+    sound = {reader: answer(store, *reader, tmp_path / "out").stderr for reader in READERS}
+    damage(path, how)
+    for command, form in READERS:
+        result = answer(store, command, form, tmp_path / "out")
+        assert result.exception is None or isinstance(result.exception, SystemExit), (command, form)
+        if result.exit_code == 2:
+            assert result.stderr.count("\n") == 1
+            assert str(path) in result.stderr or result.stderr == sound[command, form]
+    assert any(str(path) in p.seen for p in problems(store))
+    assert asked("store", "check", store.path).exit_code == 1
+
+
+@pytest.mark.parametrize(
+    "columns",
+    [
+        {"x": [1.0]},
+        {"loop": ["A"], "oscillation_significance": ["much"]},
+        {"loop": [1.0], "oscillation_significance": [1.0]},
+    ],
+)
+def test_a_table_of_other_columns_is_named(store: Store, columns: dict[str, list[object]]) -> None:
+    """A Parquet file that is no table of results is told in one line, with what it holds and what it should."""
+    path = store.path / "nights" / f"{store.nights()[-1]}.parquet"
+    pq.write_table(pa.table(columns), path)
+    result = asked("rank", store.path)
+    assert result.exit_code == 2
+    assert str(path) in result.stderr
+    assert result.stderr.count("\n") == 1
+
+
+def test_a_whole_store_has_nothing_wrong(store: Store) -> None:
+    """A sound store is told to be whole, with its size."""
+    result = asked("store", "check", store.path)
+    assert (result.exit_code, list(problems(store))) == (0, [])
+    assert "5 nights" in result.stdout
+
+
+def test_what_is_left_over_is_found_and_pruned(store: Store) -> None:
+    """What a dead process left is named, and goes after a day; a younger one may be in work and stays."""
+    old, young = (store.path / "nights" / f".2026-03-02.parquet.{k}.tmp" for k in ("a", "b"))
+    for path in (old, young):
+        path.write_bytes(b"x")
+    os.utime(old, (time.time() - 2 * 86_400,) * 2)
+    assert sum("left over" in p.seen for p in problems(store)) == 2
+    assert asked("store", "prune", store.path, "--keep", "400d").exit_code == 0
+    assert (old.exists(), young.exists()) == (False, True)
+
+
+def test_prune_keeps_what_is_asked(store: Store) -> None:
+    """Nights older than asked go with all their tables, trends sooner where asked; the dry run deletes nothing."""
+    before = sorted(p.as_posix() for p in store.path.rglob("*.parquet"))
+    nights = store.nights()
+    dry = asked("store", "prune", store.path, "--keep", "2d", "--keep-trends", "1d", "--dry-run")
+    assert "would be deleted" in dry.stdout
+    assert sorted(p.as_posix() for p in store.path.rglob("*.parquet")) == before
+    assert asked("store", "prune", store.path, "--keep", "2d", "--keep-trends", "1d").exit_code == 0
+    assert store.nights() == nights[-3:]
+    assert sorted(p.stem for p in (store.path / "trends").glob("*.parquet")) == nights[-2:]
+    assert asked("rank", store.path).exit_code == 0
+
+
+@pytest.mark.parametrize("text", ["", "400", "0d", "-1d", "1e9d", "ten days"])
+def test_prune_without_a_time_deletes_nothing(store: Store, text: str) -> None:
+    """A time that is none is one line, and all nights stay."""
+    result = asked("store", "prune", store.path, "--keep", text)
+    assert result.exit_code == 2
+    assert len(store.nights()) == 5
+
+
+def test_an_older_store_is_brought_up_to_date(store: Store) -> None:
+    """A store without a version and without newer columns gets both in place, once, and keeps its figures."""
+    path = store.path / "nights" / f"{store.nights()[0]}.parquet"
+    table = pq.read_table(path)
+    pq.write_table(table.drop_columns(["lanes", "turns"]), path)
+    (store.path / store_version.FILE).unlink()
+    assert store_version.version_of(store.path) == 1
+    assert (store_version.upgrade(store.path), store_version.upgrade(store.path)) == (1, 0)
+    again = pq.read_table(path)
+    assert set(again.column_names) >= {c.name for c in NIGHTS}
+    assert again.column("loop").to_pylist() == table.column("loop").to_pylist()
+    assert again.column("lanes").null_count == table.num_rows
+
+
+def test_a_newer_store_is_left_alone(store: Store, tmp_path: Path) -> None:
+    """A store that a newer version wrote is neither read nor written, and the line says what to install."""
+    (store.path / store_version.FILE).write_text(json.dumps({"schema": 99}))
+    export = write_export(
+        tmp_path / "x.parquet", {"L0": simulate(Sketch("none", (1.0, 20.0, 3.0), 1.0, 20.0), 0.2)}
+    )
+    for arguments in (("rank", store.path), ("run", export, "--store", store.path)):
+        result = asked(*arguments)
+        assert result.exit_code == 2
+        assert "tables of version 99; expected version" in result.stderr
+        assert "install a newer triage" in result.stderr
+
+
+def test_a_damaged_night_is_written_anew(tmp_path: Path) -> None:
+    """A night whose table is broken does not stop its run: the broken file is set aside and named."""
+    trends = simulate(Sketch("none", (1.0, 20.0, 3.0), 1.0, 20.0), 1.0)
+    export, path = write_export(tmp_path / "x.parquet", {"L0": trends}), tmp_path / "store"
+    assert asked("run", export, "--store", path).exit_code == 0
+    store = Store(path)
+    table = path / "nights" / f"{store.nights()[0]}.parquet"
+    good = pq.read_table(table)
+    damage(table, "cut")
+    (path / store_version.FILE).unlink()
+    result = asked("run", export, "--store", path)
+    assert result.exit_code == 0, result.stderr
+    assert "set aside as" in result.stderr
+    assert pq.read_table(table).equals(good)
+    assert len(list((path / "nights").glob("*.damaged"))) == 1
