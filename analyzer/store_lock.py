@@ -17,9 +17,24 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from identification.errors import InputError
+from reports.whole_file import whole_file
 
 LOCK, OWNER = "run.lock", "run.owner.json"
 """Names within the store."""
+
+
+def require_writable(store: Path) -> None:
+    """Make the store's directory and try to write in it, before any work is done for it.
+
+    Raises
+    ------
+    OSError
+        It cannot be made or written.
+    """
+    store.mkdir(parents=True, exist_ok=True)
+    with whole_file(store / "writable") as trial:
+        trial.write_bytes(b"x")
+    (store / "writable").unlink()
 
 
 @contextmanager

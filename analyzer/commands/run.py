@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import signal
 import sys
+import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -13,6 +14,7 @@ from typing import TYPE_CHECKING
 import click
 
 from analyzer.commands.options import NOTHING_DONE, SOME_LOST, Asked, export_options
+from identification.errors import TriageError
 
 if TYPE_CHECKING:
     from analyzer.batch import Outcome
@@ -20,6 +22,7 @@ if TYPE_CHECKING:
     from analyzer.history.export import Export
     from analyzer.loops.spec import LoopSpec
     from analyzer.nights import Night
+    from analyzer.run_log import RunLog
     from analyzer.store import Store
 
 STOPPED = 128
@@ -66,6 +69,12 @@ def stoppable() -> Iterator[None]:
 @click.option("--jobs", default=1, show_default=True, type=click.IntRange(1), help="Worker processes.")
 @click.option("--resume", is_flag=True, help="Go on with a run that was stopped.")
 @click.option("--replace", "replacing", is_flag=True, help="Forget what the store has of these nights first.")
+@click.option(
+    "--log",
+    "log_file",
+    type=click.Path(dir_okay=False, path_type=Path),
+    help="File to which a line is appended for each thing that happened.",
+)
 @click.option("--explain", "explaining", is_flag=True, help="Explain the last night's flagged loops as well.")
 def run(
     asked: Asked,
@@ -74,6 +83,7 @@ def run(
     resume: bool,
     replacing: bool,
     explaining: bool,
+    log_file: Path | None,
 ) -> None:
     """The nightly batch: assess every loop and keep the results in a store.
 
@@ -84,20 +94,39 @@ def run(
 
     Example: triage run export.parquet --loops loops.csv --store store --jobs 4
     """
-    from analyzer.store import Store
+    from importlib.metadata import version
 
+    from analyzer.run_log import RunLog
+    from analyzer.store import Store
+    from analyzer.store_lock import require_writable
+
+    log, begun_s = RunLog(log_file), time.monotonic()
+    log.say(
+        "begin",
+        version=version("loop-triage"),
+        store=store,
+        export=" ".join(map(str, asked.export)),
+        jobs=jobs,
+    )
     try:
         with stoppable():
+            require_writable(store)
             source, specs, notes = _opened(asked)
-            _say(notes)
-            outcome = _assessed(source, specs, Store(store), asked, jobs, resume, replacing)
+            _say(notes, log)
+            outcome = _assessed(source, specs, Store(store), asked, jobs, resume, replacing, log)
             if explaining and len(outcome.unassessed) + len(outcome.failed) < len(specs):
                 _explained(source, specs, Store(store), asked.config, outcome.nights[-1], jobs, resume)
     except StoppedError as stopped:
         kept = f"what is done is kept in {store}: go on with the same command and --resume"
         click.echo(f"triage: stopped by {stopped}; {kept}", err=True)
+        log.say("stopped", signal=stopped, status=STOPPED + stopped.number)
         sys.exit(STOPPED + stopped.number)
-    sys.exit(_status(outcome, len(specs)))
+    except (TriageError, OSError) as error:
+        log.say("nothing done", error=error, status=NOTHING_DONE)
+        raise
+    status = _status(outcome, len(specs))
+    log.say("end", status=status, night=outcome.nights[-1].name, seconds=time.monotonic() - begun_s)
+    sys.exit(status)
 
 
 def _opened(asked: Asked) -> tuple[Export, Sequence[LoopSpec], Sequence[str]]:
@@ -138,9 +167,10 @@ def _status(outcome: Outcome, loops: int) -> int:
     return SOME_LOST if outcome.failed else 0
 
 
-def _say(notes: Sequence[str]) -> None:
+def _say(notes: Sequence[str], log: RunLog) -> None:
     for note in notes:
         click.echo(f"triage: {note}", err=True)
+        log.say("note", text=note)
 
 
 def _assessed(
@@ -151,6 +181,7 @@ def _assessed(
     jobs: int,
     resume: bool,
     replacing: bool,
+    log: RunLog,
 ) -> Outcome:
     """Run the batch with progress and say what came of it."""
     from analyzer import batch
@@ -172,15 +203,20 @@ def _assessed(
             asked.zone,
         )
     more = len(outcome.notes) - FEW
-    _say(outcome.notes[:FEW])
+    _say(outcome.notes[:FEW], log)
     if more > 0:
-        _say([f"{more} further notes on what was read; 'triage check' prints them all"])
-    for loop, reason in (*outcome.unassessed, *outcome.failed):
-        click.echo(f"{loop}: {reason}", err=True)
+        _say([f"{more} further notes on what was read; 'triage check' prints them all"], log)
+    for status, lost_loops in (("not assessed", outcome.unassessed), ("failed", outcome.failed)):
+        for loop, reason in lost_loops:
+            click.echo(f"{loop}: {reason}", err=True)
+            log.say("lost", loop=loop, status=status, reason=reason)
     nights, lost = outcome.nights, len(outcome.unassessed) + len(outcome.failed)
     several = f" ({len(nights)} nights from {nights[0].name})" if len(nights) > 1 else ""
     failed = f", {len(outcome.failed)} failed" if outcome.failed else ""
     done = f"{len(specs) - lost} of {len(specs)} loops assessed{failed}"
+    log.say(
+        "assessed", loops=len(specs) - lost, of=len(specs), failed=len(outcome.failed), nights=len(nights)
+    )
     click.echo(f"{done}, night {nights[-1].name}{several}, in {store.path}", err=True)
     return outcome
 

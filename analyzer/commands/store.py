@@ -35,7 +35,10 @@ def days(text: str, option: str) -> int:
 
 @click.group()
 def store() -> None:
-    """Look after a store: check it, delete what is old."""
+    """Look after a store: check it, delete what is old.
+
+    Example: triage store check store
+    """
 
 
 @store.command()
