@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
@@ -30,6 +30,8 @@ class Scale:
     local: bool = False
 
 
+IN_DAYS = frozenset({"Excel days", "days since year 0", "Julian days"})
+"""Scales whose numbers hardly change over an export."""
 SINCE_START_MOST = 1e8
 """Largest number of a clock that counts from the start of the export; above it are the seconds since 1970."""
 EXCEL_MOST_SPAN = 4000.0
@@ -44,10 +46,15 @@ SINCE_START = {
 """Clocks that count from the start, by the unit that the column's name states; seconds where it states none."""
 SCALES = (
     Scale("Excel days", 2e4, 8e4, 86400.0, EXCEL_ORIGIN_S, local=True),
-    Scale("seconds since 1970", 1e8, 4e9, 1.0),
+    Scale("days since year 0", 7.1e5, 7.7e5, 86400.0, -719529 * 86400.0, local=True),
+    Scale("Julian days", 2.43e6, 2.49e6, 86400.0, -2440587.5 * 86400.0),
+    Scale("seconds since 1970", 1e8, 3e9, 1.0),
+    Scale("seconds since 1904", 3e9, 4.1e9, 1.0, -2082844800.0),
     Scale("millions of Excel days", 2e10, 8e10, 0.0864, EXCEL_ORIGIN_S, local=True),
     Scale("milliseconds since 1970", 1e11, 4e12, 1e-3),
     Scale("microseconds since 1970", 1e14, 4e15, 1e-6),
+    Scale("hundreds of nanoseconds since 1601", 1.1e17, 1.7e17, 1e-7, -11644473600.0),
+    Scale("hundreds of nanoseconds since year 1", 6.2e17, 6.7e17, 1e-7, -62135596800.0),
     Scale("nanoseconds since 1970", 1e17, 4e18, 1e-9),
 )
 
@@ -72,6 +79,12 @@ class Clock:
         As in `ReadOptions`.
     local : bool
         True where the stamps state no zone.
+    below_s : float
+        Unit [s] of the last of the columns, which holds what is below the second; 0 where none does.
+    offset_s : float or None
+        What the column's name states of its zone [s east of Greenwich].
+    year_first : bool
+        True where a year of two digits stands first.
     """
 
     columns: tuple[int, ...]
@@ -82,9 +95,18 @@ class Clock:
     date_format: str | None = None
     timezone: str | None = None
     local: bool = False
+    below_s: float = 0.0
+    offset_s: float | None = None
+    year_first: bool = False
 
     def seconds(self, arrays: Sequence[pa.Array]) -> tuple[NDArray[np.float64], bool]:
         """Seconds since 1970-01-01 on the file's clock, NaN where unreadable; True where that is local."""
+        if self.below_s > 0:
+            second, local = replace(self, below_s=0.0).seconds(arrays[:-1])
+            rest = pc.fill_null(pc.cast(arrays[-1], pa.float64(), safe=False), 0.0).to_numpy(
+                zero_copy_only=False
+            )
+            return second + rest * self.below_s, local
         column = arrays[0] if len(arrays) == 1 else joined(arrays)
         if pa.types.is_date(column.type):
             column = pc.cast(column, pa.timestamp("s"))
@@ -96,6 +118,8 @@ class Clock:
 
     def utc(self, second: NDArray[np.float64], local: bool) -> tuple[NDArray[np.float64], Counter[str]]:
         """Seconds of UTC from seconds of the file's clock, in the order of the file."""
+        if local and self.offset_s is not None:
+            return second - self.offset_s, Counter()
         if not local or self.timezone is None:
             return second, Counter()
         return zone.to_utc(second, self.timezone)
@@ -105,8 +129,11 @@ class Clock:
         """How the stamps are read, where that is not plain from their writing."""
         notes = [] if self.scale is None else [f"stamps are numbers, read as {self.scale.name}"]
         if self.why:
-            notes.append(f"dates are read {'day' if self.day_first else 'month'} first: {self.why}")
-        if self.local:
+            first = "year" if self.year_first else "day" if self.day_first else "month"
+            notes.append(f"dates are read {first} first: {self.why}")
+        if self.local and self.offset_s is not None:
+            notes.append(f"stamps are {self.offset_s / 3600.0:+g} h from UTC, as their column's name states")
+        elif self.local:
             notes.append(f"stamps state no time zone, taken as {self.timezone or 'UTC'}")
         return tuple(notes)
 
@@ -116,7 +143,7 @@ class Clock:
         parts = stamps.fields(texts)
         if parts is None:
             return np.full(len(texts), np.nan), True
-        return stamps.seconds(parts, self._order(parts)), not parts.zoned
+        return stamps.seconds(parts, self._order(parts), self.year_first), not parts.zoned
 
     def _order(self, parts: stamps.Fields) -> bool:
         """Whether these stamps are read day first; where the head left nothing open and these do, they decide."""
@@ -134,8 +161,8 @@ def scale_of(column: pa.Array, unit: str = "") -> Scale | None:
         return None
     middle, reach = float(np.median(number)), float(np.ptp(number))
     found = next((scale for scale in SCALES if scale.low <= middle < scale.high), None)
-    is_excel = found is not None and found.name == "Excel days"
-    if found is not None and not (is_excel and (unit in ("ms", "s", "min", "h") or reach > EXCEL_MOST_SPAN)):
+    in_days = found is not None and found.name in IN_DAYS
+    if found is not None and not (in_days and (unit in ("ms", "s", "min", "h") or reach > EXCEL_MOST_SPAN)):
         return found
     since = SINCE_START[unit or "s"]
     return since if since.low <= middle < since.high else None
@@ -175,7 +202,7 @@ def _from_timestamps(column: pa.Array) -> NDArray[np.float64]:
 
 def _from_numbers(column: pa.Array, scale: Scale) -> NDArray[np.float64]:
     number = pc.cast(column, pa.float64(), safe=False).to_numpy(zero_copy_only=False)
-    digits = 3 if scale.local else 6
+    digits = 3 if scale.name == "Excel days" else 6
     return np.round(number * scale.unit_s + scale.origin_s, digits)
 
 

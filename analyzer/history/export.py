@@ -16,6 +16,7 @@ from pathlib import Path
 
 import pyarrow as pa
 
+from analyzer.history.day_order import agreed
 from analyzer.history.dialects import source_of
 from analyzer.history.files import export_files, is_parquet, packed_beside
 from analyzer.history.options import ReadOptions
@@ -25,7 +26,6 @@ from analyzer.history.series import Series
 from analyzer.history.sniff import open_sheet
 from analyzer.history.stray import MainSpan
 from analyzer.history.table import Source, Table
-from analyzer.history.time_columns import agreed
 from analyzer.plant_clock import zone_of
 from identification.errors import InputError
 

@@ -26,7 +26,10 @@ from analyzer.history.values import values
 TIME_WORDS = re.compile(
     r"[ ._:/-]*\(?(?:time ?stamp|date ?time|time|date|zeitstempel|zeit|ts)\)?(?:[ ._]\d+)?$", re.IGNORECASE
 )
-VALUE_WORDS = re.compile(r"[ ._:/-]*\(?(?:value|val|wert)\)?(?:[ ._]\d+)?$", re.IGNORECASE)
+TIME_FIRST = re.compile(
+    r"^(?:time ?stamp|date ?time|time|zeitstempel|zeit|aika|heure|czas|tijd)[ ._:/-]+", re.IGNORECASE
+)
+VALUE_WORDS = re.compile(r"(?:^|[ ._:/-])\(?(?:value|val|wert)\)?(?:[ ._]\d+)?$", re.IGNORECASE)
 NUMBERED = re.compile(r"[ ._]\d+$")
 
 
@@ -73,6 +76,7 @@ class PairSource:
     def with_clock(self, clock: Clock) -> Self:
         """The same file, all its stamps read in the order of day and month of another clock."""
         order = {"day_first": clock.day_first, "ambiguous": clock.ambiguous, "why": clock.why}
+        order |= {"year_first": clock.year_first}
         pairs = tuple(replace(p, clock=replace(p.clock, **order)) for p in self.pairs)  # type: ignore[arg-type]
         return replace(self, pairs=pairs)
 
@@ -135,7 +139,7 @@ def _groups(table: Table) -> list[tuple[int, list[int]]]:
     if len(likely) < 2:
         return []
     heads = dict(zip(likely, table.head(likely), strict=True))
-    times = [i for i in likely if holds_stamps(_time_name(table, i), heads[i])]
+    times = [i for i in likely if holds_stamps(_time_name(table, i), heads[i], _is_time(table.names[i]))]
     if len(times) < 2 or times[0] != 0:
         return []
     empty = {i for i in range(len(table.names)) if pa.types.is_null(table.types[i])}
@@ -146,11 +150,21 @@ def _groups(table: Table) -> list[tuple[int, list[int]]]:
     return groups if all(beside for _, beside in groups) else []
 
 
+def _is_time(name: str) -> bool:
+    """Whether a column's own name is that of stamps."""
+    bare = NUMBERED.sub("", name)
+    return (
+        plain(bare) in STAMP_NAMES
+        or TIME_WORDS.search(bare) is not None
+        or TIME_FIRST.match(bare) is not None
+    )
+
+
 def _time_name(table: Table, i: int) -> str:
     """A name under which numbers of a column may count as stamps: its own, or 'time' before a column without one."""
-    name = NUMBERED.sub("", table.names[i])
-    if plain(name) in STAMP_NAMES or TIME_WORDS.search(name):
+    if _is_time(table.names[i]):
         return "time"
+    name = NUMBERED.sub("", table.names[i])
     unnamed = i + 1 < len(table.names) and table.names[i + 1] == "" and name != ""
     return "time" if unnamed else ""
 

@@ -13,6 +13,7 @@ from itertools import pairwise
 from pathlib import Path
 
 from analyzer.history.encoding import detect_encoding
+from analyzer.history.headerless import taken_as
 from analyzer.history.names import is_stamp
 from analyzer.history.options import ReadOptions
 from analyzer.history.sheet import Sheet
@@ -26,6 +27,8 @@ NO_DATA_LINE = re.compile(r"^\s*(?:#.*|\[\w+\]|sep=.|)\s*$", re.IGNORECASE)
 COMMA_NUMBER = re.compile(r"^[+-]?\d+,\d+(?:[eE][+-]?\d+)?$")
 POINT_NUMBER = re.compile(r"^[+-]?\d*\.\d+(?:[eE][+-]?\d+)?$")
 NUMBER = re.compile(r"^[+-]?\d*[.,]?\d+(?:[eE][+-]?\d+)?$")
+DATA_MARK = re.compile(r"^\s*\[data\]\s*$", re.IGNORECASE)
+JSON = re.compile(r"^(?:\{\s*[\"}]|\[\s*[\[{\"])")
 PREAMBLE = 30
 """Lines of a preamble at most under which a header is looked for; ours."""
 STAMP = re.compile(r"^\d{1,4}[-/.]\w{1,9}[-/.]\d{1,4}\b|^\d{1,2}:\d\d\b")
@@ -41,17 +44,20 @@ def open_sheet(path: Path, options: ReadOptions) -> Sheet:
     """
     head = _head(path)
     encoding = options.encoding or detect_encoding(head)
-    lines = _lines(path, head, encoding)
+    lines, above = _after_data_mark(_lines(path, head, encoding))
     delimiter = options.delimiter or _delimiter(path, lines)
-    place, header = _header(path, lines, delimiter)
+    guessed = taken_as(lines, delimiter)
+    place, header = (-1, list(guessed)) if guessed is not None else _header(path, lines, delimiter)
     rows = _split([line for line in lines[place + 1 :] if not NO_DATA_LINE.match(line)], delimiter)
     if not rows:
         raise InputError(f"{path}: a header and no rows", "at least one sample", "export a period with data")
     names = _padded(tuple(name.strip() for name in header), rows)
     decimal = options.decimal or detect_decimal(rows, delimiter)
     stat = path.stat()
-    sheet = Sheet(path, stat.st_mtime_ns, stat.st_size, encoding, delimiter, decimal, place + 1, names)
-    return _described(replace(sheet, as_written=options.date_format is not None))
+    skipped = place + 1 + above
+    sheet = Sheet(path, stat.st_mtime_ns, stat.st_size, encoding, delimiter, decimal, skipped, names)
+    said = () if guessed is None else (f"no header: columns are taken as {', '.join(guessed)}",)
+    return _described(replace(sheet, as_written=options.date_format is not None), said)
 
 
 def detect_decimal(rows: Sequence[Sequence[str]], delimiter: str) -> str:
@@ -81,7 +87,16 @@ def _lines(path: Path, head: bytes, encoding: str) -> list[str]:
         raise InputError(f"{path}: binary content", "delimited text or Parquet", "export as CSV or Parquet")
     lines = re.split(r"\r\n|\n|\r", text)
     whole = lines if len(head) < HEAD_BYTES else lines[:-1]
-    return whole[:HEAD_LINES]
+    if JSON.match(text.lstrip()):
+        raise InputError(f"{path}: a JSON document", "delimited text or Parquet", "export as CSV or Parquet")
+    return whole
+
+
+def _after_data_mark(lines: list[str]) -> tuple[list[str], int]:
+    """The first lines behind a mark such as [Data], where there is one, and how many lines stand above them."""
+    marks = [k for k, line in enumerate(lines) if DATA_MARK.match(line)]
+    above = marks[-1] + 1 if marks else 0
+    return lines[above : above + HEAD_LINES], above
 
 
 def _split(lines: Sequence[str], delimiter: str) -> list[list[str]]:
@@ -174,9 +189,9 @@ def _padded(names: tuple[str, ...], rows: Sequence[Sequence[str]]) -> tuple[str,
     return names + ("",) * (width - len(names))
 
 
-def _described(sheet: Sheet) -> Sheet:
+def _described(sheet: Sheet, said: tuple[str, ...] = ()) -> Sheet:
     types = tuple(array.type for array in sheet.head(range(len(sheet.names))))
     named = DELIMITER_NAMES.get(sheet.delimiter, repr(sheet.delimiter))
     mark = "comma" if sheet.decimal == "," else "point"
     note = f"delimited text: {named} between columns, decimal {mark}, encoding {sheet.encoding}"
-    return replace(sheet, types=types, found=(note,))
+    return replace(sheet, types=types, found=(note, *said))

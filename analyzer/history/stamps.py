@@ -9,20 +9,29 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
+from analyzer.history.zone_names import ZONE_OFFSETS_H
+
 PATTERN = (
     r"^\s*(?:(?:Mon|Tue|Wed|Thu|Fri|Sat|Sun)[a-z]*\.?,?\s+)?"
-    r"(?P<a>\d{1,4}|\p{L}{3,10})\.?[-/. ]\s*(?P<b>\d{1,2}|\p{L}{3,10})\.?[-/. ,]\s*(?P<c>\d{4}|\d{2}|\d)"
-    r"(?:[T ,]+(?P<h>\d{1,2}):(?P<m>\d\d)(?::(?P<s>\d\d)(?:[.,:](?P<f>\d+))?)?"
+    r"(?P<a>\d{1,4}|\p{L}{3,12})\.?[-/. ]\s*(?P<b>\d{1,2}|\p{L}{3,12})\.?[-/. ,]\s*(?P<c>\d{4}|\d{2}|\d)"
+    r"(?:[T ,]+(?:klo )?(?P<h>\d{1,2})[:.](?P<m>\d\d)(?:[:.](?P<s>\d\d)(?:[.,:;](?P<f>\d+))?)?"
     r"\s*(?P<p>[AaPp])?(?:\.?[Mm]\.?)?)?"
-    r"\s*(?P<z>Z|UTC|GMT|[+-]\d\d(?::?\d\d)?)?\s*$"
+    r"\s*\(?(?:UTC|GMT)?\s*(?P<z>[A-Z]{1,4}|[+-]\d\d(?::?\d\d)?)?\)?\s*$"
 )
 COMPACT = r"^(\d{4})(\d\d)(\d\d)[T ]?(\d\d):?(\d\d):?(\d\d)"
-MONTHS = pa.array(  # three letters each: English, German, French, Spanish
+MONTHS = pa.array(  # three letters each: English, German, French, Spanish, Italian, Portuguese, Dutch, Swedish, ...
     [
         *("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec"),
         *("jan", "feb", "mär", "apr", "mai", "jun", "jul", "aug", "sep", "okt", "nov", "dez"),
         *("jan", "fév", "mar", "avr", "mai", "jui", "jul", "aoû", "sep", "oct", "nov", "déc"),
         *("ene", "feb", "mar", "abr", "may", "jun", "jul", "ago", "sep", "oct", "nov", "dic"),
+        *("gen", "feb", "mar", "apr", "mag", "giu", "lug", "ago", "set", "ott", "nov", "dic"),
+        *("jan", "fev", "mar", "abr", "mai", "jun", "jul", "ago", "set", "out", "nov", "dez"),
+        *("jan", "feb", "mrt", "apr", "mei", "jun", "jul", "aug", "sep", "okt", "nov", "dec"),
+        *("jan", "feb", "mar", "apr", "maj", "jun", "jul", "aou", "sep", "okt", "nov", "des"),
+        *("tam", "hel", "maa", "huh", "tou", "kes", "hei", "elo", "syy", "lok", "marras", "jou"),  # Finnish
+        *("sty", "lut", "mar", "kwi", "maj", "cze", "lip", "sie", "wrz", "paź", "lis", "gru"),  # Polish
+        *("led", "úno", "bře", "dub", "kvě", "čer", "čvc", "srp", "zář", "říj", "lis", "pro"),  # Czech
     ]
 )
 CENTURY_TURN = 70
@@ -47,6 +56,7 @@ class Fields:
     readable: NDArray[np.bool_]
     zoned: bool
     order: NDArray[np.int8]
+    short_year: bool = False
 
     @property
     def is_open(self) -> bool:
@@ -69,15 +79,26 @@ def fields(texts: pa.Array) -> Fields | None:
         _number(part["c"]),
         _clock(part),
         _offset(part["z"]),
-        pc.is_valid(parts).to_numpy(zero_copy_only=False),
+        _readable(parts, part["z"]),
         bool(pc.any(pc.not_equal(part["z"], "")).as_py()),
         _written_order(part),
+        bool(pc.all(pc.less_equal(pc.utf8_length(part["c"]), 2)).as_py()),
     )
 
 
-def seconds(parts: Fields, day_first: bool) -> NDArray[np.float64]:
+def _readable(parts: pa.Array, zone: pa.Array) -> NDArray[np.bool_]:
+    """Stamps that the pattern knows, and whose zone is none of letters that mean nothing."""
+    letters = pc.match_substring_regex(zone, "^[A-Z]+$")
+    known = pc.is_in(pc.utf8_lower(zone), value_set=pa.array(ZONE_OFFSETS_H))
+    return np.asarray(
+        pc.and_(pc.is_valid(parts), pc.or_(pc.invert(letters), known)).to_numpy(zero_copy_only=False)
+    )
+
+
+def seconds(parts: Fields, day_first: bool, year_first: bool = False) -> NDArray[np.float64]:
     """Seconds since 1970-01-01 of the stamps, offsets removed; NaN where unreadable or no such date."""
-    order = np.where(parts.order == OPEN, DMY if day_first else MDY, parts.order)
+    undecided = DMY if day_first else MDY
+    order = np.where(parts.order == OPEN, YMD if year_first else undecided, parts.order)
     year = np.where(order == YMD, parts.a, parts.c)
     month = np.where(order == MDY, parts.a, parts.b)
     day = np.select([order == YMD, order == DMY], [parts.c, parts.a], parts.b)
@@ -87,6 +108,16 @@ def seconds(parts: Fields, day_first: bool) -> NDArray[np.float64]:
     days = first.astype("datetime64[D]").astype(np.int64) + day - 1
     next_first = (first + 1).astype("datetime64[D]").astype(np.int64)
     return np.where(valid & (days < next_first), days * 86400.0 + parts.clock_s - parts.offset_s, np.nan)
+
+
+def may_be_year_first(parts: Fields) -> bool:
+    """Whether all dates may have a year of two digits in front: 24-11-21 as 21 November 2024."""
+    either = parts.readable & (parts.order == OPEN)
+    b, c = parts.b[either], parts.c[either]
+    short = (c < 100).all() and bool(parts.short_year)
+    return bool(
+        either.any() and short and (b >= 1).all() and (b <= 12).all() and (c >= 1).all() and (c <= 31).all()
+    )
 
 
 def days_seen(parts: Fields) -> bool | None:
@@ -128,6 +159,10 @@ def _number_or_month(texts: pa.Array) -> NDArray[np.int64]:
         return numbers
     short = pc.replace_substring_regex(pc.utf8_lower(texts), "^jui[ln].*", "jul")
     short = pc.if_else(pc.starts_with(pc.utf8_lower(texts), "juin"), "jun", short)
+    short = pc.replace_substring_regex(short, "^červenec.*", "čvc")
+    short = pc.replace_substring_regex(
+        short, "^marras.*", "nov"
+    )  # Finnish; three letters of it are March elsewhere
     place = pc.index_in(pc.utf8_slice_codeunits(short, 0, 3), MONTHS)
     months = pc.fill_null(place, -1).to_numpy(zero_copy_only=False).astype(np.int64)
     return np.where(months < 0, numbers, months % 12 + 1)
@@ -147,10 +182,15 @@ def _clock(part: dict[str, pa.Array]) -> NDArray[np.float64]:
 
 def _offset(zone: pa.Array) -> NDArray[np.float64]:
     """Offset from UTC [s]; 0 where none is written."""
-    digits = pc.replace_substring_regex(zone, r"^(?:Z|UTC|GMT)$|[+:-]", "")
+    place = pc.index_in(pc.utf8_lower(zone), value_set=pa.array(ZONE_OFFSETS_H)).to_numpy(
+        zero_copy_only=False
+    )
+    hours = np.array([*ZONE_OFFSETS_H.values(), 0.0])
+    named = hours[np.where(np.isnan(place), len(ZONE_OFFSETS_H), np.nan_to_num(place)).astype(int)]
+    digits = pc.replace_substring_regex(zone, r"^[A-Z]+$|[+:-]", "")
     hour, minute = (
         _number(pc.utf8_slice_codeunits(digits, 0, 2)),
         _number(pc.utf8_slice_codeunits(digits, 2, 4)),
     )
     west = pc.starts_with(zone, "-").to_numpy(zero_copy_only=False)
-    return np.where(west, -1.0, 1.0) * (3600 * hour + 60 * minute)
+    return 3600.0 * named + np.where(west, -1.0, 1.0) * (3600 * hour + 60 * minute)

@@ -10,14 +10,26 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from analyzer.history import stamps
-from analyzer.history.clock import Clock, as_text, is_count, is_text, joined, scale_of
-from analyzer.history.names import CLOCK_NAMES, STAMP_NAMES, is_stamp, plain, time_unit, without_unit
+from analyzer.history.clock import SINCE_START, Clock, as_text, is_count, is_text, scale_of
+from analyzer.history.day_order import with_day_order
+from analyzer.history.names import (
+    CLOCK_NAMES,
+    FRACTIONS,
+    STAMP_NAMES,
+    is_stamp,
+    plain,
+    time_unit,
+    without_unit,
+)
 from analyzer.history.options import ReadOptions
-from analyzer.history.table import Source, Table
+from analyzer.history.table import Table
+from analyzer.history.zone_names import header_offset_s
 from identification.errors import InputError
 
-TIME_OF_DAY = r"^\s*\d{1,2}:\d\d(:\d\d([.,]\d+)?)?\s*([AaPp]\.?[Mm]\.?)?\s*$"
+TIME_OF_DAY = r"^\s*\d{1,2}(:\d\d(:\d\d([.,;]\d+)?)?|\.\d\d\.\d\d([.,]\d+)?)\s*([AaPp]\.?[Mm]\.?)?\s*$"
 UNREADABLE_SHARE = 0.5
+FINER = "timems"
+"""Column of WinCC that holds its text's stamp to the microsecond, in millions of Excel days."""
 
 
 def find_clock(table: Table, options: ReadOptions) -> Clock:
@@ -34,11 +46,23 @@ def find_clock(table: Table, options: ReadOptions) -> Clock:
     clock = _chosen(table, kinds, options)
     if clock is None or _is_doubtful(table, clock, kinds, heads):
         raise _no_time(table, columns)
-    clock = _with_day_order(table, clock, options)
+    clock = _with_fraction(table, with_day_order(table, clock, options))
     second, local = clock.seconds(table.head(clock.columns))
     if np.isnan(second).all():
         raise _unreadable(table, clock.columns[0])
-    return replace(clock, local=local)
+    return replace(clock, local=local, offset_s=header_offset_s(table.names[clock.columns[0]]))
+
+
+def _with_fraction(table: Table, clock: Clock) -> Clock:
+    """The clock with a column beside it that holds what is below the second, where one is named so."""
+    for i, name in enumerate(table.names):
+        unit, kind = FRACTIONS.get(plain(name), 0.0), table.types[i]
+        if i in clock.columns or unit == 0.0 or not (pa.types.is_integer(kind) or pa.types.is_floating(kind)):
+            continue
+        head = table.head([i])[0].drop_null()
+        if len(head) and pc.min(head).as_py() >= 0 and pc.max(head).as_py() * unit < 1.0:
+            return replace(clock, columns=(*clock.columns, i), below_s=unit)
+    return clock
 
 
 def clock_of(table: Table, column: int, options: ReadOptions) -> Clock:
@@ -47,17 +71,21 @@ def clock_of(table: Table, column: int, options: ReadOptions) -> Clock:
     is_number = pa.types.is_integer(head.type) or pa.types.is_floating(head.type)
     scale = scale_of(head, time_unit(table.names[column])) if is_number else None
     clock = Clock((column,), timezone=options.timezone, scale=scale)
-    clock = _with_day_order(table, clock, options)
+    clock = with_day_order(table, clock, options)
     return replace(clock, local=clock.seconds([head])[1])
 
 
-def holds_stamps(name: str, head: pa.Array) -> bool:
-    """Whether the first rows of a column are stamps; numbers only where the column is named as stamps are."""
+def holds_stamps(name: str, head: pa.Array, since_start: bool = True) -> bool:
+    """Whether the first rows of a column are stamps; numbers only where the column is named as stamps are.
+
+    With `since_start` numbers may count from the start of the export; else they must lie in our time.
+    """
     filled = head.drop_null()
     if len(filled) == 0 or pa.types.is_boolean(head.type):
         return False
     if pa.types.is_integer(head.type) or pa.types.is_floating(head.type):
-        return name != "" and scale_of(filled) is not None
+        scale = scale_of(filled)
+        return name != "" and scale is not None and (since_start or scale not in SINCE_START.values())
     return _kind(name, filled) == "full"
 
 
@@ -137,6 +165,9 @@ def _chosen(table: Table, kinds: dict[int, str], options: ReadOptions) -> Clock 
         return replace(clock, columns=(named[0],)) if named else None
     if "date" in by_kind and "time of day" in by_kind:
         return replace(clock, columns=(by_kind["date"][0], by_kind["time of day"][0]))
+    finer = next((i for i in by_kind.get("number", ()) if plain(table.names[i]) == FINER), None)
+    if finer is not None and (scale := scale_of(table.head([finer])[0])) is not None:
+        return replace(clock, columns=(finer,), scale=scale)
     if "full" in by_kind:
         return replace(clock, columns=(by_kind["full"][0],))
     if "number" in by_kind:
@@ -172,46 +203,3 @@ def _unreadable(table: Table, column: int) -> InputError:
         "stamps such as 2024-11-21 08:00:00 or 21.11.2024 08:00:00",
         "state the date format",
     )
-
-
-def _with_day_order(table: Table, clock: Clock, options: ReadOptions) -> Clock:
-    """Decide whether day or month stands first, from as much of the column as it takes."""
-    if options.day_first is not None:
-        return replace(clock, day_first=options.day_first, why="as stated")
-    if clock.date_format is not None or clock.scale is not None:
-        return clock
-    head = _texts(table.head(clock.columns))
-    parts = None if head is None else stamps.fields(head)
-    if parts is None or not parts.is_open:
-        return clock
-    return _decided(clock, stamps.fields(_texts(table.read(clock.columns))), head)
-
-
-def _texts(arrays: Sequence[pa.Array]) -> pa.Array | None:
-    column = arrays[0] if len(arrays) == 1 else joined(arrays)
-    return as_text(column) if is_text(column.type) else None
-
-
-def _decided(clock: Clock, parts: stamps.Fields | None, head: pa.Array) -> Clock:
-    if parts is None:
-        return clock
-    seen = stamps.days_seen(parts)
-    if seen is not None:
-        which = "first" if seen else "second"
-        return replace(clock, day_first=seen, why=f"the {which} number exceeds 12")
-    running = stamps.days_by_gaps(parts)
-    if running is not None:
-        return replace(clock, day_first=running, why="so read, the stamps run without a leap")
-    if "." in str(head[0].as_py()).split(" ")[0]:
-        return replace(clock, day_first=True, why="dates with points; no day above 12 occurs")
-    either = "every date fits both orders; state the order if it is not so"
-    return replace(clock, day_first=False, ambiguous=True, why=either)
-
-
-def agreed(sources: Sequence[Source]) -> tuple[Source, ...]:
-    """Files whose dates read either way follow a file of the same export whose dates do not."""
-    sure = next((s for s in sources if s.clock.why and not s.clock.ambiguous), None)
-    if sure is None:
-        return tuple(sources)
-    order = {"day_first": sure.clock.day_first, "ambiguous": False, "why": f"as in {sure.path.name}"}
-    return tuple(s.with_clock(replace(s.clock, **order)) if s.clock.ambiguous else s for s in sources)  # type: ignore[arg-type]

@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 
 from analyzer.history.clock import Clock, is_text
 from analyzer.history.codes import not_good, scheme_of
-from analyzer.history.names import check_once, quality_partners, with_loop
+from analyzer.history.names import REMARKS, check_once, plain, with_loop
 from analyzer.history.options import ReadOptions
+from analyzer.history.quality_columns import quality_columns
 from analyzer.history.raw import Raw
 from analyzer.history.stray import MainSpan, main_span
 from analyzer.history.table import Table
@@ -26,7 +27,8 @@ from identification.errors import InputError
 
 @dataclass(frozen=True, slots=True)
 class WideSource:
-    """A wide table; see `table.Source`. `columns` and `quality` are columns of each tag, -1 for none."""
+    """A wide table; see `table.Source`. `columns` and `quality` are columns of each tag, -1 for none;
+    `said` what of the layout is worth a warning."""
 
     table: Table
     clock: Clock
@@ -34,6 +36,7 @@ class WideSource:
     columns: tuple[int, ...]
     quality: tuple[int, ...]
     good_quality: tuple[str, ...] | None = None
+    said: tuple[str, ...] = ()
 
     @property
     def path(self) -> Path:
@@ -43,7 +46,11 @@ class WideSource:
     @property
     def notes(self) -> tuple[str, ...]:
         """Format and layout of the file."""
-        return (*self.table.notes, f"wide table, {len(self.tags)} tags", *self.clock.notes)
+        used = sorted({self.table.names[i] for i in self.quality if i >= 0})
+        more = f" and {len(used) - 1} more" if len(used) > 1 else ""
+        quality = [f"quality in column '{used[0]}'{more}"] if used else []
+        layout = f"wide table, {len(self.tags)} tags"
+        return (*self.table.notes, layout, *quality, *self.said, *self.clock.notes)
 
     def with_clock(self, clock: Clock) -> Self:
         """The same file, its stamps read by another clock."""
@@ -56,7 +63,7 @@ class WideSource:
         if not wanted:
             return {}
         columns = [*self.clock.columns, *(self.columns[i] for i in wanted)]
-        columns += [self.quality[i] for i in wanted if self.quality[i] >= 0]
+        columns += sorted({self.quality[i] for i in wanted if self.quality[i] >= 0})
         arrays = dict(zip(columns, self.table.read(columns), strict=True))
         stamp_s, found = self.clock.utc(*self.clock.seconds([arrays[i] for i in self.clock.columns]))
         return {self.tags[i]: self._raw(i, arrays, stamp_s, found) for i in wanted}
@@ -88,11 +95,10 @@ def open_wide(table: Table, options: ReadOptions) -> WideSource:
         There is no time column, or no column of values beside it.
     """
     clock = find_clock(table, options)
-    partner = quality_partners(table.names)
-    beside = {*partner.values()}
-    columns = [i for i in range(len(table.names)) if i not in clock.columns and _holds_values(table, i)]
-    columns = [i for i in columns if table.names[i] not in beside]
-    if not columns:
+    free = [i for i in range(len(table.names)) if i not in clock.columns and _holds_values(table, i)]
+    partner, said = quality_columns(table, free)
+    columns = [i for i in free if i not in partner.values()]
+    if not columns or not _any_number(table, columns):
         raise InputError(
             f"{table.path}: no values beside the time column '{table.names[clock.columns[0]]}'",
             "a column of values for each tag, named as the tag",
@@ -100,13 +106,25 @@ def open_wide(table: Table, options: ReadOptions) -> WideSource:
         )
     names = [table.names[i] for i in columns]
     check_once(table.path, names)
-    quality = tuple(table.names.index(partner[name]) if name in partner else -1 for name in names)
+    quality = tuple(partner.get(i, -1) for i in columns)
     tags = with_loop(names, table.path.stem)
-    return WideSource(table, clock, tags, tuple(columns), quality, options.good_quality)
+    return WideSource(table, clock, tags, tuple(columns), quality, options.good_quality, tuple(said))
+
+
+def _any_number(table: Table, columns: Sequence[int]) -> bool:
+    """Whether the first rows of any column hold a number, or nothing yet; a list of alarms holds none.
+
+    Columns of a controller's modes are texts too: they are named for their loop.
+    """
+    if any(mark in table.names[i] for i in columns for mark in ".:/_"):
+        return True
+    heads = table.head(columns)
+    texts = [h for h in heads if is_text(h.type) and h.null_count < len(h)]
+    return len(texts) < len(heads) or any(np.isfinite(values(h, table.decimal).value).any() for h in texts)
 
 
 def _holds_values(table: Table, i: int) -> bool:
     name, kind = table.names[i], table.types[i]
-    unnamed = not name or name.startswith(("Unnamed:", "__index_level_"))
+    unnamed = not name or name.startswith(("Unnamed:", "__index_level_")) or plain(name) in REMARKS
     number = pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_decimal(kind)
     return not unnamed and (number or is_text(kind) or pa.types.is_boolean(kind) or pa.types.is_null(kind))
