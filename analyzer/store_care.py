@@ -10,12 +10,11 @@ from pathlib import Path
 
 from analyzer import notes, store_version
 from analyzer.store import TABLES, Store, is_night
+from analyzer.store_lock import LEFT_OVER_S
 from analyzer.stored_table import read_stored
 from identification.errors import InputError
 from reports.whole_file import SUFFIX
 
-LEFT_OVER_S = 86_400.0
-"""Age from which a file that was being written is left over from a process that died [s]; ours."""
 BULKY = ("hours", "trends")
 """Tables that pages of recent nights draw from; the longest part of a store."""
 

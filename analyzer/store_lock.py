@@ -10,31 +10,43 @@ import contextlib
 import getpass
 import json
 import os
+import shutil
 import socket
+import tempfile
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
 
 from identification.errors import InputError
-from reports.whole_file import whole_file
 
 LOCK, OWNER = "run.lock", "run.owner.json"
 """Names within the store."""
+SCRATCH = ".copies-"
+"""Beginning of the names of directories of copies."""
+LEFT_OVER_S = 86_400.0
+"""Age from which something half done is left over from a process that died [s]; ours."""
 
 
-def require_writable(store: Path) -> None:
-    """Make the store's directory and try to write in it, before any work is done for it.
+@contextmanager
+def scratch(store: Path) -> Iterator[Path]:
+    """A directory in the store for the copies that a run makes of packed exports, gone with the run.
+
+    That it can be made shows, before any work is done, that the store can be written; those of runs that were killed
+    go after a day.
 
     Raises
     ------
     OSError
-        It cannot be made or written.
+        The store cannot be made or written.
     """
     store.mkdir(parents=True, exist_ok=True)
-    with whole_file(store / "writable") as trial:
-        trial.write_bytes(b"x")
-    (store / "writable").unlink()
+    for left in store.glob(f"{SCRATCH}*"):
+        if time.time() - left.stat().st_mtime > LEFT_OVER_S:
+            shutil.rmtree(left, ignore_errors=True)
+    with tempfile.TemporaryDirectory(prefix=SCRATCH, dir=store, ignore_cleanup_errors=True) as made:
+        yield Path(made)
 
 
 @contextmanager

@@ -7,6 +7,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING
@@ -98,7 +99,7 @@ def run(
 
     from analyzer.run_log import RunLog
     from analyzer.store import Store
-    from analyzer.store_lock import require_writable
+    from analyzer.store_lock import scratch
 
     log, begun_s = RunLog(log_file), time.monotonic()
     log.say(
@@ -109,9 +110,8 @@ def run(
         jobs=jobs,
     )
     try:
-        with stoppable():
-            require_writable(store)
-            source, specs, notes = _opened(asked)
+        with stoppable(), scratch(store) as copies:
+            source, specs, notes = _opened(replace(asked, reading={**asked.reading, "scratch": copies}))
             _say(notes, log)
             outcome = _assessed(source, specs, Store(store), asked, jobs, resume, replacing, log)
             if explaining and len(outcome.unassessed) + len(outcome.failed) < len(specs):

@@ -26,6 +26,7 @@ from analyzer.history.series import Series
 from analyzer.history.sniff import open_sheet
 from analyzer.history.stray import MainSpan
 from analyzer.history.table import Source, Table
+from analyzer.history.unpacked import unpacked
 from analyzer.plant_clock import zone_of
 from identification.errors import InputError
 
@@ -180,7 +181,8 @@ def _some(names: Sequence[str]) -> str:
 
 def _opened(path: Path, options: ReadOptions) -> Source:
     with _told(path):
-        table: Table = open_parquet(path) if is_parquet(path) else open_sheet(path, options)
+        plain = unpacked(path, options.scratch)
+        table: Table = open_parquet(plain) if is_parquet(plain) else open_sheet(plain, options)
         return source_of(table, options)
 
 

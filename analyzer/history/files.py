@@ -9,18 +9,12 @@ from identification.errors import InputError
 
 TEXT_ENDINGS = frozenset({".csv", ".txt", ".tsv"})
 PARQUET_ENDINGS = frozenset({".parquet", ".pq"})
-PACKED_ENDINGS = frozenset({".gz", ".bz2", ".xz", ".zip", ".7z", ".xls", ".xlsx", ".xlsm"})
+READ_PACKED = frozenset({".gz", ".bz2", ".xz", ".zip"})
+PACKED_ENDINGS = frozenset({".7z", ".xls", ".xlsx", ".xlsm"})
 NO_EXPORTS = frozenset({"loops.csv", "labels.csv", "changes.csv"})
 MAGIC = b"PAR1"
 PACKED = {
-    b"PK\x03\x04": (
-        "a workbook or a zip archive",
-        "save the sheet as CSV, or unpack the archive, and name that file",
-    ),
     b"\xd0\xcf\x11\xe0": ("an old Excel workbook", "save the sheet as CSV and name that file"),
-    b"\x1f\x8b": ("packed with gzip", "unpack it (gunzip FILE) and name what comes out"),
-    b"BZh": ("packed with bzip2", "unpack it (bunzip2 FILE) and name what comes out"),
-    b"\xfd7zX": ("packed with xz", "unpack it (unxz FILE) and name what comes out"),
     b"7z\xbc\xaf": ("a 7z archive", "unpack it and name what comes out"),
 }
 """First bytes of files that hold an export in another wrapping: what they are, and what to do."""
@@ -98,7 +92,7 @@ def _listed(folder: Path) -> list[Path]:
 
 
 def _is_export(path: Path) -> bool:
-    known = path.suffix.lower() in TEXT_ENDINGS | PARQUET_ENDINGS
+    known = path.suffix.lower() in TEXT_ENDINGS | PARQUET_ENDINGS | READ_PACKED
     return known and path.name.lower() not in NO_EXPORTS and not path.name.startswith(".")
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,6 +24,8 @@ class ReadOptions:
         Names of the columns of stamps and, in long tables, of quality codes as they stand in the header.
     good_quality : tuple of str or None
         Quality codes or texts that count as good, in place of the detected scheme.
+    scratch : Path or None
+        Directory for plain copies of packed files; None: this process's own, gone with it.
     """
 
     delimiter: str | None = None
@@ -34,3 +37,4 @@ class ReadOptions:
     good_quality: tuple[str, ...] | None = None
     time_column: str | None = None
     quality_column: str | None = None
+    scratch: Path | None = None

@@ -16,6 +16,7 @@ from analyzer.history.encoding import detect_encoding
 from analyzer.history.headerless import taken_as
 from analyzer.history.names import is_stamp
 from analyzer.history.options import ReadOptions
+from analyzer.history.rewritten import rewritten
 from analyzer.history.sheet import Sheet
 from identification.errors import InputError
 
@@ -44,7 +45,13 @@ def open_sheet(path: Path, options: ReadOptions) -> Sheet:
     """
     head = _head(path)
     encoding = options.encoding or detect_encoding(head)
-    lines, above = _after_data_mark(_lines(path, head, encoding))
+    first = _lines(path, head, encoding)
+    plain = (
+        rewritten(path, encoding, first[:HEAD_LINES], options.scratch) if options.delimiter is None else None
+    )
+    if plain is not None:
+        return open_sheet(plain, replace(options, delimiter="\t", encoding="utf-8"))
+    lines, above = _after_data_mark(first)
     delimiter = options.delimiter or _delimiter(path, lines)
     guessed = taken_as(lines, delimiter)
     place, header = (-1, list(guessed)) if guessed is not None else _header(path, lines, delimiter)

@@ -40,9 +40,9 @@ ROW = "2024-11-21 08:00:00"
         ),
         (
             b"PK\x03\x04\x00\x00\x08\x00binary\x00\x00\x00stuff,\x00\n" * 20,
-            ["a workbook or a zip archive", "save the sheet as CSV"],
+            ["cannot be unpacked", "a whole archive"],
         ),
-        (b"\x1f\x8b\x08\x00" + b"x" * 40, ["packed with gzip", "gunzip"]),
+        (b"\x1f\x8b\x08\x00" + b"x" * 40, ["cannot be unpacked", "a whole archive"]),
         (b"\x00timestamp,FIC1.PV\n" * 20, ["binary content"]),
     ],
 )

@@ -1,0 +1,116 @@
+"""Layouts that no table is: blocks of one tag after another, and columns of blanks, laid beside as plain tables."""
+
+from __future__ import annotations
+
+import re
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+
+from analyzer.history.unpacked import own_scratch
+
+DELIMITERS = (";", "\t", "|", ",")
+TITLE = re.compile(
+    r"^\W*(?:tag ?name|tag|point ?name|point|item|variable|channel|signal|messstelle|name)\s*[:=]\s*"
+    r"(?P<tag>\S.*?)\W*$",
+    re.IGNORECASE,
+)
+BARE_TITLE = re.compile(r"^\"?(?P<tag>[^\s\",;|]*[A-Za-z][^\s\",;|]*[._:/-][^\s\",;|]*)\"?$")
+STAMPED = re.compile(r"^\s*\"?\d{1,4}[-/. ]\w{1,10}[-/. ]\d{1,4}\b")
+GAP = re.compile(r"\s{2,}")
+RULE = re.compile(r"^\s*-{3,}(?:\s+-{3,})+\s*$")
+FIRST = 12
+"""Lines within which a layout shows itself."""
+
+Rewrite = Callable[[Iterator[str]], Iterator[Sequence[str]]]
+
+
+def rewritten(path: Path, encoding: str, lines: Sequence[str], scratch: Path | None) -> Path | None:
+    """A plain table of a file in one of these layouts, separated by tabs, in UTF-8; None for any other file.
+
+    Parameters
+    ----------
+    path, encoding
+        The file.
+    lines : sequence of str
+        Its first lines.
+    scratch : Path or None
+        Where the copy is laid; None: this process's own directory.
+    """
+    rewrite = _blocks(lines) or _columns(lines)
+    if rewrite is None:
+        return None
+    out = Path(tempfile.mkdtemp(prefix="rewritten-", dir=scratch or own_scratch())) / path.name
+    with (
+        path.open(encoding=encoding, errors="replace", newline=None) as source,
+        out.open("w", encoding="utf-8") as file,
+    ):
+        for cells in rewrite(source):
+            file.write("\t".join(cell.replace("\t", " ") for cell in cells) + "\n")
+    return out
+
+
+def _title(line: str) -> str:
+    """The tag that a line stands for as a title over its samples; '' for any other line."""
+    found = TITLE.match(line) or BARE_TITLE.match(line.strip())
+    if found is None or STAMPED.match(line):
+        return ""
+    return found["tag"].strip().strip('"')
+
+
+def _blocks(lines: Sequence[str]) -> Rewrite | None:
+    """How blocks of one tag after another are read, where the first lines are such a block's."""
+    filled = [line for line in lines if line.strip()]
+    at = next((k for k, line in enumerate(filled[:FIRST]) if _title(line)), None)
+    if at is None:
+        return None
+    below = filled[at + 1 : at + 4]
+    first = next((k for k, line in enumerate(below) if STAMPED.match(line)), None)
+    if first is None or len(filled) < at + first + 4 or any(_title(line) for line in below[:first]):
+        return None
+    delimiter = next((d for d in DELIMITERS if d in below[first]), None)
+    if delimiter is None or not 2 <= len(below[first].split(delimiter)) <= 4 or first > 1:
+        return None
+
+    def rows(source: Iterator[str]) -> Iterator[Sequence[str]]:
+        yield "tag", "timestamp", "value", "quality"
+        tag = ""
+        for line in source:
+            if STAMPED.match(line):
+                cells = [cell.strip().strip('"') for cell in line.rstrip("\n").split(delimiter)]
+                if tag:
+                    yield (
+                        [tag, *cells, *[""] * (3 - len(cells))][:4]
+                        if len(cells) > 2
+                        else [tag, *cells, "good"]
+                    )
+            elif _title(line):
+                tag = _title(line)
+
+    return rows
+
+
+def _columns(lines: Sequence[str]) -> Rewrite | None:
+    """How columns that blanks part are read, where the first lines are such columns and hold no delimiter."""
+    filled = [line for line in lines if line.strip()][: 4 * FIRST]
+    if len(filled) < 4 or any(d in line for d in DELIMITERS for line in filled[:4]):
+        return None
+    rule = next((line for line in filled[:FIRST] if RULE.match(line)), None)
+    edges = [m.start() for m in re.finditer(r"(?<!\S)-", rule)] if rule is not None else []
+
+    def cells(line: str) -> list[str]:
+        if edges:
+            return [line[a:b].strip() for a, b in zip(edges, [*edges[1:], None], strict=True)]
+        return GAP.split(line.strip())
+
+    widths = [len(cells(line)) for line in filled if not RULE.match(line)]
+    if widths[0] < 2 or sum(w == widths[0] for w in widths) < 0.9 * len(widths):
+        return None
+
+    def rows(source: Iterator[str]) -> Iterator[Sequence[str]]:
+        for line in source:
+            found = cells(line) if line.strip() and not RULE.match(line) else []
+            if len(found) == widths[0]:
+                yield found
+
+    return rows

@@ -1,0 +1,76 @@
+"""Packed exports are read as what is in them, and bombs are refused before they burst."""
+
+from __future__ import annotations
+
+import bz2
+import gzip
+import lzma
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from analyzer.history.export import open_export
+from analyzer.history.options import ReadOptions
+from identification.errors import InputError
+
+ROWS = [f"2026-03-02 00:00:{k:02d},{20 + k},50" for k in range(60)]
+TEXT = "timestamp,FIC1.PV,FIC1.OP\n" + "\n".join(ROWS) + "\n"
+
+
+def zipped(data: bytes) -> bytes:
+    """A zip archive of one file in a folder."""
+    import io
+
+    out = io.BytesIO()
+    with zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("../deep/export.csv", data)
+    return out.getvalue()
+
+
+@pytest.mark.parametrize(
+    ("ending", "pack"),
+    [(".csv.gz", gzip.compress), (".csv.bz2", bz2.compress), (".csv.xz", lzma.compress), (".zip", zipped)],
+)
+def test_packed_reads_as_plain(tmp_path: Path, ending: str, pack: Callable[[bytes], bytes]) -> None:
+    """A packed CSV has the samples of the plain one; nothing is written outside the scratch directory."""
+    folder, scratch = tmp_path / "in", tmp_path / "scratch"
+    folder.mkdir()
+    scratch.mkdir()
+    (folder / f"export{ending}").write_bytes(pack(TEXT.encode()))
+    for path in (folder / f"export{ending}", folder):
+        found = open_export([path], ReadOptions(scratch=scratch)).read(["FIC1.PV"])["FIC1.PV"]
+        assert np.array_equal(found.value, np.arange(20.0, 80.0))
+    assert [p.name for p in folder.iterdir()] == [f"export{ending}"]
+    assert {p.relative_to(tmp_path).parts[0] for p in tmp_path.rglob("*")} == {"in", "scratch"}
+
+
+def test_a_bomb_is_refused_before_it_bursts(tmp_path: Path) -> None:
+    """Two hundred megabytes of nothing in some hundred kilobytes are refused in one line and leave no such file."""
+    path, scratch = tmp_path / "bomb.csv.gz", tmp_path / "scratch"
+    scratch.mkdir()
+    with gzip.open(path, "wb", compresslevel=6) as file:
+        for _ in range(200):
+            file.write(b"0" * 1_000_000)
+    with pytest.raises(InputError, match="unpack to more than"):
+        open_export([path], ReadOptions(scratch=scratch))
+    assert sum(p.stat().st_size for p in scratch.rglob("*") if p.is_file()) < 110_000_000
+
+
+def test_an_archive_of_several_files_is_refused(tmp_path: Path) -> None:
+    """Which of several files is meant cannot be known: the line says what to do."""
+    with zipfile.ZipFile(tmp_path / "two.zip", "w") as archive:
+        archive.writestr("a.csv", TEXT)
+        archive.writestr("b.csv", TEXT)
+    with pytest.raises(InputError, match="an archive of 2 files"):
+        open_export([tmp_path / "two.zip"])
+
+
+@pytest.mark.parametrize("keep", [10, 60, 200])
+def test_a_cut_archive_is_one_line(tmp_path: Path, keep: int) -> None:
+    """An archive that was cut off is told as such, never read in part."""
+    (tmp_path / "cut.csv.gz").write_bytes(gzip.compress(TEXT.encode())[:keep])
+    with pytest.raises(InputError, match="cannot be unpacked"):
+        open_export([tmp_path / "cut.csv.gz"])
