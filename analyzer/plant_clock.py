@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from datetime import UTC, datetime, timedelta
-from typing import Any
 from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
 
 from identification.errors import InputError
@@ -56,19 +55,3 @@ def midnights(first_s: float, last_s: float, zone: str | None) -> list[float]:
         out += [at] if at > first_s else []
         day += timedelta(days=1)
     return out
-
-
-def parse_time(text: str, where: str, zone: str = UTC_NAME) -> float:
-    """A time as seconds since 1970-01-01 UTC; one that states no zone is of the plant's clock.
-
-    Raises
-    ------
-    InputError
-        Where it is no time; `where` names the place in the message.
-    """
-    import pandas as pd
-
-    stamp: Any = pd.to_datetime([text.strip()], errors="coerce")[0]
-    if stamp is pd.NaT:
-        raise InputError(f"{where}: time {text!r}", "a time such as 2026-03-09T08:00:00Z", "correct the time")
-    return seconds(stamp.to_pydatetime(), zone)

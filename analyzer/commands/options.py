@@ -99,7 +99,7 @@ def _asked(
     from analyzer.loops.changes import read_changes
 
     zone = str(zone_of(reading["timezone"]))
-    dated = () if changes is None else tuple(read_changes(changes, zone))
+    dated = () if changes is None else tuple(read_changes(changes, zone, reading["day_first"]))
     first, last = utc_seconds(since, zone, -math.inf), utc_seconds(until, zone, math.inf)
     if last <= first:
         raise InputError(f"--since {since} --until {until}", "an end after the start", "swap them")
@@ -191,7 +191,7 @@ def opened(
     source = open_export(list(export), ReadOptions(**reading))
     if loops is None:
         return source, find_loops(source.tags), ()
-    stated = read_loops(loops, str(zone_of(reading.get("timezone"))))
+    stated = read_loops(loops, str(zone_of(reading.get("timezone"))), reading.get("day_first"))
     specs, notes = match(stated, source.tags)
     own = unknown_columns(stated)
     if own:

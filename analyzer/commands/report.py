@@ -24,8 +24,8 @@ SOME_LOST = 1
 
 
 def _span(texts: Sequence[str] | None, option: str, zone: str) -> Span | None:
-    from analyzer.plant_clock import parse_time
     from analyzer.spans import Span
+    from analyzer.stated_time import parse_time
 
     if not texts:
         return None
@@ -46,7 +46,7 @@ def _asked(
     """The changes that the command line names."""
     from analyzer.loops.changes import TuningChange, read_changes
     from analyzer.pages.report import detected
-    from analyzer.plant_clock import parse_time
+    from analyzer.stated_time import parse_time
 
     if find:
         return detected(store, [loop] if loop else None, limits)

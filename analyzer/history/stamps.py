@@ -45,7 +45,8 @@ YMD, DMY, MDY, OPEN = 0, 1, 2, 3
 class Fields:
     """Parts of written stamps, arrays of shape (n,); `a`, `b`, `c` the date's parts in the order written.
 
-    `order` is each stamp's own: one file may hold stamps of several writings.
+    `order` is each stamp's own: one file may hold stamps of several writings. `short` is True where a year that
+    stands last has two digits at most.
     """
 
     a: NDArray[np.int64]
@@ -56,7 +57,12 @@ class Fields:
     readable: NDArray[np.bool_]
     zoned: bool
     order: NDArray[np.int8]
-    short_year: bool = False
+    short: NDArray[np.bool_]
+
+    @property
+    def short_year(self) -> bool:
+        """Whether no year, if it stands last, has more than two digits."""
+        return bool(self.short.all())
 
     @property
     def is_open(self) -> bool:
@@ -82,7 +88,7 @@ def fields(texts: pa.Array) -> Fields | None:
         _readable(parts, part["z"]),
         bool(pc.any(pc.not_equal(part["z"], "")).as_py()),
         _written_order(part),
-        bool(pc.all(pc.less_equal(pc.utf8_length(part["c"]), 2)).as_py()),
+        pc.less_equal(pc.utf8_length(part["c"]), 2).to_numpy(zero_copy_only=False),
     )
 
 
@@ -102,7 +108,9 @@ def seconds(parts: Fields, day_first: bool, year_first: bool = False) -> NDArray
     year = np.where(order == YMD, parts.a, parts.c)
     month = np.where(order == MDY, parts.a, parts.b)
     day = np.select([order == YMD, order == DMY], [parts.c, parts.a], parts.b)
-    year = np.where(year < CENTURY_TURN, year + 2000, np.where(year < 100, year + 1900, year))
+    short = np.where(order == YMD, parts.order == OPEN, parts.short)
+    century = np.where(year < CENTURY_TURN, 2000, 1900)
+    year = np.where(short & (year < 100), year + century, year)
     valid = parts.readable & (month >= 1) & (month <= 12) & (day >= 1)
     first = ((year - 1970) * 12 + np.clip(month, 1, 12) - 1).astype("datetime64[M]")
     days = first.astype("datetime64[D]").astype(np.int64) + day - 1
@@ -114,7 +122,7 @@ def may_be_year_first(parts: Fields) -> bool:
     """Whether all dates may have a year of two digits in front: 24-11-21 as 21 November 2024."""
     either = parts.readable & (parts.order == OPEN)
     b, c = parts.b[either], parts.c[either]
-    short = (c < 100).all() and bool(parts.short_year)
+    short = (c < 100).all() and parts.short_year
     return bool(
         either.any() and short and (b >= 1).all() and (b <= 12).all() and (c >= 1).all() and (c <= 31).all()
     )

@@ -32,6 +32,8 @@ STREAMS: dict[bytes, Callable[..., Any]] = {
 }
 """How files that begin so are opened."""
 ZIP = b"PK\x03\x04"
+WORKBOOKS = frozenset({".xls", ".xlsx", ".xlsm"})
+SAVE = "save the sheet as CSV and name that file"
 PACKED_ENDINGS = frozenset({".gz", ".bz2", ".xz", ".zip"})
 
 
@@ -53,6 +55,8 @@ def unpacked(path: Path, scratch: Path | None) -> Path:
     """
     with path.open("rb") as file:
         start = file.read(5)
+    if path.suffix.lower() in WORKBOOKS:
+        raise InputError(f"{path}: a workbook", "delimited text or Parquet", SAVE)
     stream = next((STREAMS[magic] for magic in STREAMS if start.startswith(magic)), None)
     if stream is None and not start.startswith(ZIP):
         return path
@@ -76,9 +80,7 @@ def _member(path: Path, folder: Path) -> Path:
     with zipfile.ZipFile(path) as archive:
         held = [info for info in archive.infolist() if not info.is_dir()]
         if any(info.filename.startswith("xl/") for info in held):
-            raise InputError(
-                f"{path}: a workbook", "delimited text or Parquet", "save the sheet as CSV and name that"
-            )
+            raise InputError(f"{path}: a workbook", "delimited text or Parquet", SAVE)
         if len(held) != 1:
             seen = f"{path}: an archive of {len(held)} files"
             raise InputError(seen, "an archive of one file", "unpack it and name the folder")

@@ -16,7 +16,8 @@ import numpy as np
 from analyzer.block_bootstrap import Floats
 from analyzer.config import ChangeLimits
 from analyzer.history.encoding import detect_encoding
-from analyzer.plant_clock import UTC_NAME, parse_time
+from analyzer.plant_clock import UTC_NAME
+from analyzer.stated_time import parse_time
 from identification.errors import InputError
 
 COLUMNS = ("loop", "time", "kp_old", "ti_old", "kp_new", "ti_new", "who")
@@ -47,15 +48,16 @@ def _number(text: str, where: str, column: str) -> float | None:
         value = float(text.strip().replace(",", "."))
     except ValueError:
         value = math.nan
-    if not math.isfinite(value):
-        raise InputError(f"{where}: {column} {text!r}", "a number or nothing", "correct the cell")
+    if not math.isfinite(value) or (column.startswith("ti") and value < 0):
+        raise InputError(f"{where}: {column} {text[:40]!r}", "a number or nothing", "correct the cell")
     return value
 
 
-def read_changes(path: Path, zone: str = UTC_NAME) -> tuple[TuningChange, ...]:
+def read_changes(path: Path, zone: str = UTC_NAME, day_first: bool | None = None) -> tuple[TuningChange, ...]:
     """Read changes.csv: loop and time are required, the settings and `who` are shown where they are given.
 
-    Times that state no zone are of the plant's clock, in `zone`.
+    Times that state no zone are of the plant's clock, in `zone`; dates such as 03/04/2026 are read as `day_first`
+    says, and refused where it says nothing.
 
     Raises
     ------
@@ -69,6 +71,8 @@ def read_changes(path: Path, zone: str = UTC_NAME) -> tuple[TuningChange, ...]:
         raise InputError(f"{path}: cannot be opened", "a CSV of changes", "correct --changes") from error
     text = data.decode(detect_encoding(data), errors="replace").lstrip("\ufeff")
     first = text.split("\n", 1)[0]
+    if max(map(len, text.split("\n"))) > csv.field_size_limit():
+        raise InputError(f"{path}: a line of more than 128 kB", "one row a change", "correct the file")
     reader = csv.DictReader(io.StringIO(text, newline=""), delimiter=max(",;\t", key=first.count))
     names = {(n or "").strip().lower(): n for n in reader.fieldnames or ()}
     for required in ("loop", "time"):
@@ -76,16 +80,18 @@ def read_changes(path: Path, zone: str = UTC_NAME) -> tuple[TuningChange, ...]:
             raise InputError(f"{path}: no column {required!r}", "columns " + ", ".join(COLUMNS), "add it")
     rows = [{k: (row[n] or "") for k, n in names.items() if k in COLUMNS} for row in reader]
     found = tuple(
-        _change(row, f"{path}, row {i}", zone) for i, row in enumerate(rows, 2) if row["loop"].strip()
+        _change(row, f"{path}, row {i}", zone, day_first)
+        for i, row in enumerate(rows, 2)
+        if row["loop"].strip()
     )
     if not found:
         raise InputError(f"{path}: no changes", "one row a change below the header", "add the changes")
     return found
 
 
-def _change(row: Mapping[str, str], where: str, zone: str) -> TuningChange:
+def _change(row: Mapping[str, str], where: str, zone: str, day_first: bool | None) -> TuningChange:
     kp_old, ti_old, kp_new, ti_new = (_number(row.get(c, ""), where, c) for c in COLUMNS[2:6])
-    time_s, who = parse_time(row["time"], where, zone), row.get("who", "").strip()
+    time_s, who = parse_time(row["time"], where, zone, day_first), row.get("who", "").strip()
     return TuningChange(row["loop"].strip(), time_s, kp_old, ti_old, kp_new, ti_new, who)
 
 

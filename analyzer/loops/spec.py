@@ -14,12 +14,24 @@ from typing import Any
 
 from analyzer.history.encoding import detect_encoding
 from analyzer.loops.endings import ROLES
-from analyzer.plant_clock import UTC_NAME, parse_time
+from analyzer.plant_clock import UTC_NAME
+from analyzer.stated_time import parse_time
 from identification.errors import InputError
 from identification.models import Form
 
 TEXTS = ("loop", "description", "type", "area", "master", "pv_unit")
 NUMBERS = ("pv_lo", "pv_hi", "op_lo", "op_hi", "kp", "ti", "td", "scan_s", "importance")
+MEANT: Mapping[str, tuple[float, float, bool]] = {
+    **dict.fromkeys(("pv_lo", "pv_hi", "op_lo", "op_hi"), (1e-9, 1e12, True)),
+    "kp": (1e-6, 1e6, False),
+    "ti": (1e-3, 1e7, True),
+    "td": (1e-6, 1e6, True),
+    "scan_s": (1e-3, 1e5, False),
+    "importance": (1e-6, 1e6, True),
+}
+"""Least and largest size of a number that is meant, and whether it may be 0; ours: beyond them a cell is a slip."""
+SIGNED = ("pv_lo", "pv_hi", "op_lo", "op_hi", "kp")
+"""Numbers that may be below 0."""
 CHOICES: Mapping[str, tuple[str, ...]] = {
     "form": tuple(Form),
     "gain_unit": ("percent", "engineering", "band"),
@@ -111,7 +123,7 @@ class LoopSpec:
         return tuple(text for column, text in DEFAULTS.items() if column not in self.stated)
 
 
-def read_loops(path: Path, zone: str = UTC_NAME) -> tuple[LoopSpec, ...]:
+def read_loops(path: Path, zone: str = UTC_NAME, day_first: bool | None = None) -> tuple[LoopSpec, ...]:
     """Read loops.csv: one loop a row, decimal point or comma, columns in any order.
 
     A loop may have several rows where each but the first says with `valid_from` when its settings came into force, on
@@ -125,7 +137,9 @@ def read_loops(path: Path, zone: str = UTC_NAME) -> tuple[LoopSpec, ...]:
     """
     header, rows = _table(Path(path))
     _check_header(path, header)
-    specs = tuple(_spec(path, row, dict(zip(header, cells, strict=False)), zone) for row, cells in rows)
+    specs = tuple(
+        _spec(path, row, dict(zip(header, cells, strict=False)), zone, day_first) for row, cells in rows
+    )
     if not specs:
         raise InputError(f"{path}: no loops", "one row a loop below the header", "add the loops")
     _check_unique(path, [(row, spec) for (row, _), spec in zip(rows, specs, strict=True)])
@@ -158,6 +172,8 @@ def _table(path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
             f"{path}: cannot be opened ({error.strerror or error})", "a CSV of loops", "correct --loops"
         ) from error
     text = data.decode(detect_encoding(data), errors="replace")
+    if max(map(len, text.split("\n"))) > csv.field_size_limit():
+        raise InputError(f"{path}: a line of more than 128 kB", "one row a loop", "correct the file")
     first = next((line for line in text.splitlines() if line.strip()), "")
     reader = csv.reader(io.StringIO(text, newline=""), delimiter=max(",;\t", key=first.count))
     rows = [(reader.line_num, [cell.strip() for cell in cells]) for cells in reader]
@@ -189,7 +205,7 @@ def _check_header(path: Path, header: Sequence[str]) -> None:
         raise InputError(f"{path}: column '{twice[0]}' stands twice", "each column once", "remove one")
 
 
-def _spec(path: Path, row: int, cells: Mapping[str, str], zone: str) -> LoopSpec:
+def _spec(path: Path, row: int, cells: Mapping[str, str], zone: str, day_first: bool | None) -> LoopSpec:
     filled = {name: cell for name, cell in cells.items() if cell}
     if "loop" not in filled:
         raise InputError(f"{path}, row {row}: no loop name", "a name in column 'loop'", "name the loop")
@@ -198,7 +214,7 @@ def _spec(path: Path, row: int, cells: Mapping[str, str], zone: str) -> LoopSpec
     given |= {name: _choice(path, row, name, filled[name]) for name in CHOICES if name in filled}
     if VALID_FROM in filled:
         where = f"{path}, row {row}, column '{VALID_FROM}'"
-        given["valid_from_s"] = parse_time(filled[VALID_FROM], where, zone)
+        given["valid_from_s"] = parse_time(filled[VALID_FROM], where, zone, day_first)
     extra = {name: cell for name, cell in cells.items() if name and name not in COLUMNS}
     spec = LoopSpec(**given, extra=extra, stated=frozenset(given))
     _check_range(path, row, "pv", spec.pv_lo, spec.pv_hi)
@@ -211,13 +227,14 @@ def _number(path: Path, row: int, name: str, cell: str) -> float:
         number = float(cell if "." in cell else cell.replace(",", "."))
     except ValueError:
         number = math.nan
-    lowest = 0.0 if name in ("ti", "td", "scan_s") else -math.inf
-    if math.isnan(number) or number < lowest:
-        expected = "a number" if lowest < 0 else "a number, not below 0"
-        raise InputError(
-            f"{path}, row {row}, column '{name}': '{cell}'", expected, "correct the cell or empty it"
-        )
-    return number
+    least, most, zero = MEANT[name]
+    sized = least <= abs(number) <= most or (zero and number == 0.0)  # false of NaN and inf
+    if sized and (number >= 0.0 or name in SIGNED):
+        return number
+    expected = f"a number{'' if name in SIGNED else ', not below 0'}, of {least:g} to {most:g} in size"
+    raise InputError(
+        f"{path}, row {row}, column '{name}': '{cell[:40]}'", expected, "correct the cell or empty it"
+    )
 
 
 def _choice(path: Path, row: int, name: str, cell: str) -> str:
@@ -231,7 +248,7 @@ def _choice(path: Path, row: int, name: str, cell: str) -> str:
 def _check_range(path: Path, row: int, signal: str, low: float | None, high: float | None) -> None:
     if low is None and high is None:
         return
-    if low is None or high is None or not low < high:
+    if low is None or high is None or not high - low > 1e-9 * max(abs(low), abs(high), 1.0):
         seen = f"{path}, row {row}: {signal}_lo {low} and {signal}_hi {high}"
         raise InputError(seen, f"{signal}_hi above {signal}_lo, both or neither", "correct the range")
 

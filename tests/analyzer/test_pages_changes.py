@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from analyzer.loops.changes import TuningChange, read_changes, stated_changes
-from analyzer.plant_clock import parse_time
+from analyzer.stated_time import parse_time
 from identification.errors import InputError
 
 T = 1773043200.0

@@ -15,7 +15,7 @@ from analyzer import plant_clock
 from analyzer.cli import main
 from analyzer.config import Config
 from analyzer.nights import nights
-from analyzer.plant_clock import parse_time
+from analyzer.stated_time import parse_time
 from analyzer.store import Store
 from identification.errors import InputError
 

@@ -13,7 +13,7 @@ from analyzer.history.export import open_export
 from analyzer.loops.changes import TuningChange
 from analyzer.loops.settings_in_force import in_force
 from analyzer.loops.tags import match, read_loops
-from analyzer.plant_clock import parse_time
+from analyzer.stated_time import parse_time
 from analyzer.store import Store
 from identification.errors import InputError
 

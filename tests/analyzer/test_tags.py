@@ -206,3 +206,30 @@ def test_real_loops_csv(name: str) -> None:
     """Every loops.csv at hand is read and has as many loops as rows."""
     path = SHARED / name / "loops.csv"
     assert len(read_loops(path)) == len(path.read_text().split()) - 1
+
+
+@pytest.mark.parametrize(
+    ("column", "cell"),
+    [
+        *(("kp", cell) for cell in ("inf", "1e400", "nan", "0", "1e-300", "1e9")),
+        *(("ti", cell) for cell in ("inf", "-1", "1e-300", "1e300")),
+        *(("scan_s", cell) for cell in ("0", "1e-300", "inf", "-1")),
+        *(("importance", cell) for cell in ("inf", "-5")),
+        *(("td", cell) for cell in ("inf", "1e-320")),
+    ],
+)
+def test_numbers_that_nobody_means_are_refused(tmp_path, column, cell):
+    """Infinite, vanishing and absurd settings are slips: one line names row and column."""
+    stated = {"kp": "1", "ti": "10", "td": "0", "scan_s": "1", "importance": "1", column: cell}
+    text = f"loop,{','.join(stated)}\nFIC1,{','.join(stated.values())}\n"
+    with pytest.raises(InputError, match=f"row 2, column '{column}'"):
+        read_loops(written(tmp_path, text))
+
+
+@pytest.mark.parametrize(
+    ("low", "high"), [("0", "inf"), ("0", "1e-320"), ("5", "5"), ("100", "0"), ("1e15", "2e15")]
+)
+def test_ranges_that_nobody_means_are_refused(tmp_path, low, high):
+    """A range has a width that numbers can tell."""
+    with pytest.raises(InputError, match="row 2"):
+        read_loops(written(tmp_path, f"loop,op_lo,op_hi\nFIC1,{low},{high}\n"))

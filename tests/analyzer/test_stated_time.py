@@ -1,0 +1,85 @@
+"""A time that a person wrote is read one way or refused; never the other way round without a word."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+from pathlib import Path
+
+import pytest
+
+from analyzer.loops.changes import read_changes
+from analyzer.stated_time import parse_time
+from identification.errors import InputError
+
+
+def at(text: str) -> float:
+    """A UTC time [s]."""
+    return datetime.fromisoformat(text).replace(tzinfo=UTC).timestamp()
+
+
+@pytest.mark.parametrize(
+    ("text", "utc"),
+    [
+        ("2026-05-12", "2026-05-12"),
+        ("12.5.2026", "2026-05-12"),
+        ("13.5.2026", "2026-05-13"),
+        ("01.05.2026 08:00", "2026-05-01T08:00"),
+        ("13/05/2026 08:00", "2026-05-13T08:00"),
+        ("05/13/2026 08:00 PM", "2026-05-13T20:00"),
+        ("12-May-26 08:00:00", "2026-05-12T08:00"),
+        ("May 12, 2026", "2026-05-12"),
+        ("2026-05-12T08:00:00Z", "2026-05-12T08:00"),
+        ("2026-05-12 08:00:00+02:00", "2026-05-12T06:00"),
+        ("20260512 080000", "2026-05-12T08:00"),
+    ],
+)
+def test_a_time_is_what_it_says(text: str, utc: str) -> None:
+    """ISO, points, names of months and days above twelve are plain: dates with points have the day first."""
+    assert parse_time(text, "here") == at(utc)
+
+
+@pytest.mark.parametrize("text", ["05/12/2026", "5/12/2026 08:00", "05-12-2026", "10-11-12"])
+def test_what_reads_two_ways_is_refused(text: str) -> None:
+    """A date that fits both orders is refused, unless the order is stated."""
+    with pytest.raises(InputError, match="reads two ways"):
+        parse_time(text, "here")
+    first, second = parse_time(text, "here", day_first=True), parse_time(text, "here", day_first=False)
+    assert first != second
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        *(
+            "now",
+            "today",
+            "10:00",
+            "March",
+            "5s",
+            "1,5",
+            "1.000,5",
+            "2026",
+            "",
+            "-0",
+            "31.02.2026",
+            "0001-01-01",
+        ),
+        *("9999-12-31", "1601-01-01", "8:00 9.3.2026", "x" * 100_000, "\u202e2026-05-12"),
+    ],
+)
+def test_what_is_no_time_is_refused(text: str) -> None:
+    """Words, numbers, clocks without a day and days outside our time are one short line."""
+    with pytest.raises(InputError) as told:
+        parse_time(text, "changes.csv, row 2")
+    assert len(str(told.value)) < 200
+
+
+def test_changes_are_read_in_one_order(tmp_path: Path) -> None:
+    """A file of changes with points is day first in each row; strokes need the order stated."""
+    path = tmp_path / "changes.csv"
+    path.write_text("loop;time\nA;12.5.2026\nB;13.5.2026\n")
+    assert [c.time_s for c in read_changes(path)] == [at("2026-05-12"), at("2026-05-13")]
+    path.write_text("loop;time\nA;12/5/2026\n")
+    with pytest.raises(InputError, match="row 2"):
+        read_changes(path)
+    assert [c.time_s for c in read_changes(path, day_first=True)] == [at("2026-05-12")]
