@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 from analyzer.history import stamps, zone
 
 TICKS_PER_S = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
+EARLIEST_S, LATEST_S = -11_676_096_000.0, 10_413_792_000.0
+"""Stamps before 1600 and from 2300 on are none [s since 1970-01-01]; those between that stray are told."""
 EXCEL_ORIGIN_S = -25569 * 86400.0
 
 
@@ -101,6 +103,11 @@ class Clock:
 
     def seconds(self, arrays: Sequence[pa.Array]) -> tuple[NDArray[np.float64], bool]:
         """Seconds since 1970-01-01 on the file's clock, NaN where unreadable; True where that is local."""
+        second, local = self._seconds(arrays)
+        with np.errstate(invalid="ignore"):
+            return np.where((second >= EARLIEST_S) & (second < LATEST_S), second, np.nan), local
+
+    def _seconds(self, arrays: Sequence[pa.Array]) -> tuple[NDArray[np.float64], bool]:
         if self.below_s > 0:
             second, local = replace(self, below_s=0.0).seconds(arrays[:-1])
             rest = pc.fill_null(pc.cast(arrays[-1], pa.float64(), safe=False), 0.0).to_numpy(

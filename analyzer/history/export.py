@@ -6,11 +6,14 @@ series = export.read(["FIC101.PV", "FIC101.OP"])["FIC101.PV"]
 
 from __future__ import annotations
 
+import codecs
 import csv
+import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from datetime import datetime
 from difflib import get_close_matches
 from pathlib import Path
 
@@ -24,7 +27,7 @@ from analyzer.history.parquet import open_parquet
 from analyzer.history.raw import Raw, settle
 from analyzer.history.series import Series
 from analyzer.history.sniff import open_sheet
-from analyzer.history.stray import MainSpan
+from analyzer.history.stray import MainSpan, NoStampError
 from analyzer.history.table import Source, Table
 from analyzer.history.unpacked import unpacked
 from analyzer.plant_clock import zone_of
@@ -84,7 +87,8 @@ class Export:
     def _span(self, home: int) -> MainSpan:
         """Where the samples of one file lie, found out once."""
         if home not in self._spans:
-            self._spans[home] = self.sources[home].span()
+            with _told(self.sources[home].path):
+                self._spans[home] = self.sources[home].span()
         return self._spans[home]
 
     @property
@@ -143,14 +147,45 @@ def open_export(paths: Sequence[Path], options: ReadOptions | None = None) -> Ex
         A file is missing, closed, empty, or no export.
     """
     options = options or ReadOptions()
-    if options.timezone is not None:
-        zone_of(options.timezone)
+    _check_stated(options)
     opened, skipped = _readable(paths, options)
     sources = agreed(opened)
     homes: dict[str, tuple[int, ...]] = {}
     for i, source in enumerate(sources):
         homes.update({tag: (*homes.get(tag, ()), i) for tag in source.tags})
     return Export(sources, tuple(homes), homes, skipped=(*skipped, *packed_beside(paths)))
+
+
+def _check_stated(options: ReadOptions) -> None:
+    """Raise InputError for options that no file could be read with."""
+    if options.timezone is not None:
+        zone_of(options.timezone or "nowhere")
+    mark = options.delimiter
+    if mark is not None and (len(mark) != 1 or mark in '\r\n"\0'):
+        raise InputError(f"--delimiter {mark!r}", "one character, no quote and no end of line", "correct it")
+    if options.encoding is not None:
+        _check_encoding(options.encoding)
+    if options.date_format is not None:
+        _check_format(options.date_format)
+
+
+def _check_encoding(name: str) -> None:
+    try:
+        known = codecs.lookup(name)._is_text_encoding
+    except LookupError:
+        known = False
+    if not known:
+        raise InputError(f"--encoding {name!r}", "an encoding of text such as utf-8 or cp1252", "correct it")
+
+
+def _check_format(written: str) -> None:
+    try:
+        again = datetime.strptime(datetime(2026, 5, 12, 8, 9, 10).strftime(written), written)
+        known = again.year > 1900 or "%y" in written.lower()
+    except (ValueError, re.error):
+        known = False
+    if not known:
+        raise InputError(f"--date-format {written!r}", "a format such as '%d-%b-%y %H:%M:%S'", "correct it")
 
 
 def _readable(paths: Sequence[Path], options: ReadOptions) -> tuple[list[Source], list[str]]:
@@ -193,9 +228,16 @@ def _read(source: Source, tags: Sequence[str]) -> dict[str, Raw]:
 
 @contextmanager
 def _told(path: Path) -> Iterator[None]:
-    """Faults of a file that show only when it is read: gone, cut short, damaged."""
+    """Faults of a file that show only when it is read: gone, cut short, damaged, too large, without a stamp."""
     try:
         yield
+    except MemoryError as error:
+        raise InputError(
+            f"{path}: takes more memory than there is", "files that fit", "export it in parts"
+        ) from error
+    except NoStampError as error:
+        expected = "stamps of our time that the time zone has"
+        raise InputError(f"{path}: no readable time stamp", expected, "check dates and --timezone") from error
     except (OSError, pa.ArrowException, UnicodeError, csv.Error) as error:
         why = str(error).splitlines()[0][:120] if str(error) else type(error).__name__
         raise InputError(f"{path}: {why}", "a whole file", "export it again") from error

@@ -59,6 +59,8 @@ QUALITY_ENDING = re.compile(rf"^(?P<tag>.+?)[ ._:/|#-]?\(?(?:{_QUALITIES})\)?$",
 QUALITY_BEGINNING = re.compile(
     rf"^(?:{_QUALITIES})(?: of)?[ ._:/|#-]*[(\[]?(?P<tag>.+?)[)\]]?$", re.IGNORECASE
 )
+LONGEST = 200
+"""Characters of a name that are looked at: no tag has more, and patterns take the square of a name's length."""
 UNIT_IN_NAME = re.compile(
     r"[\s_(\[.,-]+(?P<unit>ms|msec|s|sec|secs|seconds?|sek|sekunden|min|mins|minutes?|minuten|h|hr|hrs|hours?|std"
     r"|stunden|d|days?|tage)[)\].]*$",
@@ -85,12 +87,12 @@ BARE_ENDINGS = frozenset({"pv", "sp", "op", "mv", "out", "mode", "pos", "positio
 
 def plain(name: str) -> str:
     """Name without case, units in brackets, blanks and underscores: ' Time_Stamp (UTC)' is 'timestamp'."""
-    return re.sub(r"\(.*?\)|\[.*?\]|[\s_\-\"']", "", name).lower()
+    return re.sub(r"\([^()]*\)|\[[^\[\]]*\]|[\s_\-\"']", "", name[:LONGEST]).lower()
 
 
 def time_unit(name: str) -> str:
     """The unit that a time column's name states, as in 'Time (min)' or 't_h': ms, s, min, h or d; '' where none."""
-    found = UNIT_IN_NAME.search(name)
+    found = UNIT_IN_NAME.search(name[:LONGEST])
     if found is None:
         return ""
     unit = found["unit"].lower()
@@ -99,7 +101,7 @@ def time_unit(name: str) -> str:
 
 def without_unit(name: str) -> str:
     """A time column's name without the unit that stands behind it."""
-    return UNIT_IN_NAME.sub("", name)
+    return UNIT_IN_NAME.sub("", name[:LONGEST])
 
 
 def is_stamp(name: str) -> bool:

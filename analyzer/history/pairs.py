@@ -15,7 +15,7 @@ import pyarrow.compute as pc
 
 from analyzer.history.clock import Clock, is_text
 from analyzer.history.codes import not_good, scheme_of
-from analyzer.history.names import QUALITY_NAMES, STAMP_NAMES, VALUE_NAMES, check_once, plain
+from analyzer.history.names import LONGEST, QUALITY_NAMES, STAMP_NAMES, VALUE_NAMES, check_once, plain
 from analyzer.history.options import ReadOptions
 from analyzer.history.raw import Raw
 from analyzer.history.stray import MainSpan, main_span
@@ -152,7 +152,7 @@ def _groups(table: Table) -> list[tuple[int, list[int]]]:
 
 def _is_time(name: str) -> bool:
     """Whether a column's own name is that of stamps."""
-    bare = NUMBERED.sub("", name)
+    bare = NUMBERED.sub("", name[:LONGEST])
     return (
         plain(bare) in STAMP_NAMES
         or TIME_WORDS.search(bare) is not None
@@ -164,7 +164,7 @@ def _time_name(table: Table, i: int) -> str:
     """A name under which numbers of a column may count as stamps: its own, or 'time' before a column without one."""
     if _is_time(table.names[i]):
         return "time"
-    name = NUMBERED.sub("", table.names[i])
+    name = NUMBERED.sub("", table.names[i][:LONGEST])
     unnamed = i + 1 < len(table.names) and table.names[i + 1] == "" and name != ""
     return "time" if unnamed else ""
 
@@ -182,5 +182,5 @@ def _tag(table: Table, time: int, value: int) -> str:
     """The tag's name: above its values, or where that says nothing above its stamps."""
     own, other = table.names[value], table.names[time]
     if plain(NUMBERED.sub("", own)) in VALUE_NAMES or own == "":
-        return TIME_WORDS.sub("", other) or other
-    return VALUE_WORDS.sub("", own) or own
+        return TIME_WORDS.sub("", other[:LONGEST]) or other
+    return VALUE_WORDS.sub("", own[:LONGEST]) or own

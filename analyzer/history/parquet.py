@@ -17,6 +17,9 @@ from identification.errors import InputError
 MAGIC = b"PAR1"
 HEAD_ROWS = 1000
 CACHED_FOOTERS = 4
+MANY_ROWS, ROWS_A_BYTE = 5e6, 20.0
+"""Files of more rows than both are not read; ours: where any value moves there are 3 rows a byte at most, in whatever
+encoding; a file of nothing but constants may have 90."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +38,12 @@ class ParquetTable:
         """First rows of some columns."""
         names = [self.names[i] for i in columns]
         with _file(self) as file:
-            batch = next(file.iter_batches(batch_size=HEAD_ROWS, columns=names))
+            batches = file.iter_batches(batch_size=HEAD_ROWS, columns=names)
+            batch = next((b for b in batches if b.num_rows), None)
+        if batch is None:
+            raise InputError(
+                f"{self.path}: rows that its pages do not hold", "a whole Parquet file", "export it again"
+            )
         return [batch.column(name) for name in names]
 
     def read(self, columns: Sequence[int], where: tuple[int, Sequence[str]] | None = None) -> list[pa.Array]:
@@ -67,6 +75,12 @@ def open_parquet(path: Path) -> ParquetTable:
             "export it again, or give it the ending .csv if it is text",
         ) from error
     check_once(path, schema.names)
+    if rows > MANY_ROWS and rows > ROWS_A_BYTE * path.stat().st_size:
+        raise InputError(
+            f"{path}: {rows} rows in {path.stat().st_size} bytes",
+            f"at most {ROWS_A_BYTE:g} rows a byte",
+            "export it again; a file that unpacks to so much more is not read",
+        )
     if rows == 0:
         raise InputError(f"{path}: Parquet without rows", "at least one sample", "export a period with data")
     return ParquetTable(path, path.stat().st_mtime_ns, tuple(schema.names), tuple(schema.types))

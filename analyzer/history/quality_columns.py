@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import pyarrow as pa
 
 from analyzer.history.codes import is_understood, scheme_of
-from analyzer.history.names import QUALITY_BEGINNING, QUALITY_ENDING, QUALITY_NAMES, plain
+from analyzer.history.names import LONGEST, QUALITY_BEGINNING, QUALITY_ENDING, QUALITY_NAMES, plain
 from analyzer.history.table import Table
 
 
@@ -47,7 +47,7 @@ def quality_columns(table: Table, free: Sequence[int]) -> tuple[dict[int, int], 
 def _tag_of(name: str, others: Mapping[str, int]) -> str | None:
     """The other column that a quality column is named for."""
     for pattern in (QUALITY_ENDING, QUALITY_BEGINNING):
-        match = pattern.match(name)
+        match = pattern.match(name) if len(name) <= LONGEST else None
         if match is not None and match["tag"] in others and match["tag"] != name:
             return match["tag"]
     return None

@@ -24,7 +24,7 @@ HEAD_BYTES = 1_000_000
 HEAD_LINES = 200
 DELIMITERS = (",", ";", "\t", "|")
 DELIMITER_NAMES = {",": "comma", ";": "semicolon", "\t": "tab", "|": "bar"}
-NO_DATA_LINE = re.compile(r"^\s*(?:#.*|\[\w+\]|sep=.|)\s*$", re.IGNORECASE)
+NO_DATA_LINE = re.compile(r"^(?:#.*|\[\w+\]|sep=.?|)$", re.IGNORECASE)
 COMMA_NUMBER = re.compile(r"^[+-]?\d+,\d+(?:[eE][+-]?\d+)?$")
 POINT_NUMBER = re.compile(r"^[+-]?\d*\.\d+(?:[eE][+-]?\d+)?$")
 NUMBER = re.compile(r"^[+-]?\d*[.,]?\d+(?:[eE][+-]?\d+)?$")
@@ -55,7 +55,7 @@ def open_sheet(path: Path, options: ReadOptions) -> Sheet:
     delimiter = options.delimiter or _delimiter(path, lines)
     guessed = taken_as(lines, delimiter)
     place, header = (-1, list(guessed)) if guessed is not None else _header(path, lines, delimiter)
-    rows = _split([line for line in lines[place + 1 :] if not NO_DATA_LINE.match(line)], delimiter)
+    rows = _split([line for line in lines[place + 1 :] if not NO_DATA_LINE.match(line.strip())], delimiter)
     if not rows:
         raise InputError(f"{path}: a header and no rows", "at least one sample", "export a period with data")
     names = _padded(tuple(name.strip() for name in header), rows)
@@ -116,7 +116,7 @@ def _widths(lines: Sequence[str], delimiter: str) -> Counter[int]:
 
 def _delimiter(path: Path, lines: Sequence[str]) -> str:
     """The delimiter that splits most lines into the same number of columns, the header among them."""
-    body = [line for line in lines if not NO_DATA_LINE.match(line)]
+    body = [line for line in lines if not NO_DATA_LINE.match(line.strip())]
     scores = {mark: _score(body, mark) for mark in DELIMITERS}
     best = max(DELIMITERS, key=lambda mark: scores[mark])
     if scores[best] == (0, 0):
@@ -138,11 +138,11 @@ def _score(body: Sequence[str], mark: str) -> tuple[int, int]:
 
 def _header(path: Path, lines: Sequence[str], delimiter: str) -> tuple[int, list[str]]:
     """Line number (from 0) and cells of the header: the first line as wide as the table, and no data."""
-    body = [line for line in lines if not NO_DATA_LINE.match(line)]
+    body = [line for line in lines if not NO_DATA_LINE.match(line.strip())]
     width = _widths(body, delimiter).most_common(1)[0][0]
     for place, line in enumerate(lines):
         cells = next(iter(_split([line], delimiter)), [])
-        if NO_DATA_LINE.match(line) or len(cells) < max(2, width - 1):
+        if NO_DATA_LINE.match(line.strip()) or len(cells) < max(2, width - 1):
             continue
         if not _is_data(cells):
             return place, cells

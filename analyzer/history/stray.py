@@ -19,6 +19,10 @@ LEAST_SHARE = 0.01
 hour beside a day, or four hours beside two weeks."""
 
 
+class NoStampError(ValueError):
+    """Not one stamp of a file can be read."""
+
+
 @dataclass(frozen=True, slots=True)
 class MainSpan:
     """First and last stamp of the samples that belong together [s], and how many lie before and after."""
@@ -38,12 +42,12 @@ def main_span(stamp_s: NDArray[np.float64]) -> MainSpan:
 
     Raises
     ------
-    ValueError
+    NoStampError
         No stamp is finite.
     """
     known = stamp_s[np.isfinite(stamp_s)]
     if known.size == 0:
-        raise ValueError("no readable stamp")
+        raise NoStampError
     first, last = float(known.min()), float(known.max())
     if last - first <= APART_S:
         return MainSpan(first, last, 0)

@@ -22,7 +22,7 @@ def header_offset_s(name: str) -> float | None:
     """The offset from UTC that a time column's name states, as in 'Time (UTC+01:00)' [s]; None where none."""
     if plain(name) in ("utc", "timeutc", "utctime"):
         return 0.0
-    found = HEADER_ZONE.search(name)
+    found = HEADER_ZONE.search(name[-40:])
     if found is None or not (found["name"] or found["offset"]):
         return None
     if found["offset"] is None:

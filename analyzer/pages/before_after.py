@@ -151,7 +151,8 @@ def loop_section(case: Case, number_: int, zone: str = UTC_NAME) -> Section:
         thin = case.trend.between(found.before.first_s, found.after.last_s).coarser(TREND_BUCKETS)
         marks = (Mark(change.time_s, "changed"),)
         title = f"{found.loop}: before and after on one scale"
-        blocks.append(trend_block(f"trend-{number_}", title, thin, marks, case.scale))
+        if thin.time_s.size > 1:  # trends may have been pruned where hours were kept
+            blocks.append(trend_block(f"trend-{number_}", title, thin, marks, case.scale))
     title = f"{found.loop} {case.description}".strip()
     return Section(title, tuple(blocks))
 

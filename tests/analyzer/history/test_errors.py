@@ -157,7 +157,7 @@ def test_options_that_do_not_fit(tmp_path: Path) -> None:
     path.write_text(f"timestamp,a\n{ROW},1\n")
     with pytest.raises(InputError, match=r"time zone 'Mars/Olympus'.*IANA"):
         open_export([path], ReadOptions(timezone="Mars/Olympus"))
-    with pytest.raises(InputError, match="not readable as klingon"):
+    with pytest.raises(InputError, match="encoding 'klingon'"):
         open_export([path], ReadOptions(encoding="klingon"))
     with pytest.raises(InputError, match=f"row 2: '{ROW}'"):
         open_export([path], ReadOptions(date_format="%d.%m.%Y"))
