@@ -98,12 +98,23 @@ def _begun(store: Store, nights: Sequence[Night], mine: run_identity.RunIdentity
     """Keys of the chunks that a stopped run left whole; all else of it is forgotten."""
     if resume:
         run_identity.check_same(store.run_file, mine)
-        keys = store.whole_chunks(nights[-1].name)
+        keys = [key for key in store.whole_chunks(nights[-1].name) if _is_readable(store, nights, key)]
     else:
         store.drop_parts()
         keys = []
     run_identity.write(store.run_file, mine)
     return keys
+
+
+def _is_readable(store: Store, nights: Sequence[Night], key: str) -> bool:
+    """Whether a chunk's pieces can be read; a damaged one is not done, and is worked on again."""
+    try:
+        for night in nights:
+            for table in ("nights", "hours", "trends", "waves"):
+                store.read_parts(night.name, table, [key])
+    except InputError:
+        return False
+    return True
 
 
 def _loops_in(store: Store, night: str, keys: Sequence[str]) -> set[str]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import textwrap
 import tomllib
 from collections.abc import Mapping
@@ -32,7 +31,7 @@ def read_config(path: Path | None) -> Config:
         return Config()
     try:
         stated = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except (ValueError, RecursionError) as error:  # of the decoder, of the encoding, of numbers without end
         raise InputError(
             f"{path}: {error}", "TOML in UTF-8", "begin with what 'triage config' prints"
         ) from error
@@ -89,7 +88,7 @@ def _is_number(value: Any, said: Limit, whole: bool = False) -> bool:
     """Whether a value is a number of the kind that is wanted, within its range."""
     if isinstance(value, bool) or not isinstance(value, int if whole else (int, float)):
         return False
-    return math.isfinite(value) and said.least <= value <= said.most
+    return bool(said.least <= value <= said.most)  # false of NaN
 
 
 def _table(said: Limit, value: Any, where: str) -> tuple[tuple[str, float, float], ...]:

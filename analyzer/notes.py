@@ -17,6 +17,7 @@ from pathlib import Path
 
 from analyzer.plant_clock import stamp
 from identification.errors import InputError
+from reports.tables import visible
 
 FILE = "notes.jsonl"
 """Name within the store."""
@@ -82,7 +83,7 @@ def new(loop: str, text: str, owner: str | None, hidden_until: str) -> Note:
         raise InputError(
             f"an empty note on {loop}", "what was seen or done", 'say it: triage note STORE LOOP "..."'
         )
-    return Note(loop, time.time(), told, user() if owner is None else owner, hidden_until)
+    return Note(loop, time.time(), told, visible(user() if owner is None else owner), hidden_until)
 
 
 def read(store: Path) -> dict[str, tuple[Note, ...]]:
@@ -110,11 +111,6 @@ def _parsed(line: str) -> Note | None:
     if not all(isinstance(x, str) for x in (loop, text, owner, until)) or not 0.0 <= at_s <= LATEST_S:
         return None
     return Note(loop, at_s, visible(text), visible(owner), visible(until))
-
-
-def visible(text: str) -> str:
-    """The text without characters that steer a terminal or turn the direction of writing."""
-    return "".join(c if c.isprintable() else " " for c in text)
 
 
 def broken(store: Path) -> int:

@@ -11,6 +11,7 @@ from analyzer.cost import LOSS, cost_column
 from analyzer.decisions import Action, Cause, Needs
 from analyzer.reason import reason_of, to_stroke
 from analyzer.units import duration, gain_unit
+from reports.tables import visible
 
 if TYPE_CHECKING:
     from analyzer.advice import Advice
@@ -62,7 +63,7 @@ def brief(row: Mapping[str, Any], columns: Sequence[str] = SHOWN) -> dict[str, s
     }
     if row.get("note"):
         special["reason"] = f"{row['reason'] or ''} [note: {row['note']}]"
-    return {name: special[name] if name in special else figure(row[name], name) for name in columns}
+    return {name: visible(special.get(name, "") or figure(row[name], name)) for name in columns}
 
 
 WORTH_LEAST = (

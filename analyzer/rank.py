@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -18,7 +19,7 @@ from analyzer.lane_figures import FIGURE, lanes_in
 from analyzer.notes import Note
 from analyzer.store import Store
 from identification.errors import InputError
-from reports.tables import harmless
+from reports.tables import harmless, visible
 
 LANE_FIGURES = tuple(name for name in FIGURE.values() if name not in names(RANKING))
 """Figures of lanes that the contract's columns do not hold."""
@@ -73,7 +74,8 @@ def _read(store: Store, night: str) -> list[dict[str, Any]]:
 
 
 def _noted(row: dict[str, Any], known: Mapping[str, tuple[Note, ...]]) -> dict[str, Any]:
-    """A row with the newest note of its loop."""
+    """A row with the newest note of its loop; numbers that are none are not known."""
+    row = {k: None if isinstance(v, float) and not math.isfinite(v) else v for k, v in row.items()}
     found = notes.last(known, row["loop"])
     if found is None:
         return {**row, "note": None, "hidden_until": None}
@@ -149,7 +151,7 @@ def _cell(value: Any) -> Any:
     """A cell that no spreadsheet takes for a formula; empty where nothing is known."""
     if value is None:
         return ""
-    return harmless(value) if isinstance(value, str) else value
+    return harmless(visible(value)) if isinstance(value, str) else value
 
 
 def as_json(rows: Sequence[Row], night: str) -> str:

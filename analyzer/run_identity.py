@@ -68,7 +68,7 @@ def check_same(path: Path, run: RunIdentity) -> None:
     """Raise InputError where the pieces at `path` are of another run; nothing where there are none."""
     try:
         stopped = RunIdentity(**json.loads(path.read_text(encoding="utf-8")))
-    except (OSError, ValueError, TypeError):
+    except (OSError, ValueError, TypeError, RecursionError):
         return
     if stopped.fingerprint != run.fingerprint:
         raise InputError(

@@ -30,6 +30,9 @@ Began = Callable[[int], None]
 POLL_S = 0.5
 """How often the clocks of the items in hand are looked at [s]."""
 MEGABYTE = 2**20
+MOST_OF_MACHINE = 0.8
+"""Share of the machine's memory that one process may take, whatever the limits say [-]; ours: the system needs the
+rest, and ends whom it likes where there is none."""
 OUT_OF_TIME = -int(getattr(signal, "SIGXCPU", 24))
 """Exit status of a worker that used up its processor time."""
 
@@ -232,10 +235,20 @@ def _limit_memory(megabytes: float) -> None:
     import resource
 
     with contextlib.suppress(OSError, ValueError):
-        most = _held_bytes() + int(megabytes * MEGABYTE)
+        most = min(_held_bytes() + int(megabytes * MEGABYTE), int(MOST_OF_MACHINE * _machine_bytes()))
         _, hard = resource.getrlimit(resource.RLIMIT_DATA)
         limit = most if hard == resource.RLIM_INFINITY else min(most, hard)
         resource.setrlimit(resource.RLIMIT_DATA, (limit, hard))
+
+
+def _machine_bytes() -> float:
+    """Memory of this machine, or of the container that it is [bytes]."""
+    own = float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
+    try:
+        with open("/sys/fs/cgroup/memory.max", encoding="ascii") as limit:
+            return min(own, float(limit.read()))
+    except (OSError, ValueError):  # none, or "max"
+        return own
 
 
 def _held_bytes() -> int:

@@ -40,7 +40,8 @@ def note(store: Path, loop: str, text: str | None, owner: str | None, hide_until
         raise InputError(f"loop {loop} is not in night {night}", f"one of its loops ({near})", "correct LOOP")
     if text is None:
         own = notes.read(store).get(loop, ())
-        click.echo("\n".join(n.said(kept.zone()) for n in own) or f"{loop}: no notes")
+        zone = kept.zone()
+        click.echo("\n".join(n.said(zone) for n in own) or f"{loop}: no notes")
         return
     until = "" if hide_until is None else hide_until.strftime("%Y-%m-%d")
     written = notes.new(loop, text, owner, until)

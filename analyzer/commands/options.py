@@ -16,6 +16,7 @@ import click
 
 from analyzer.plant_clock import seconds, zone_of
 from identification.errors import InputError, TriageError
+from reports.tables import visible
 
 if TYPE_CHECKING:
     from analyzer.config import Config
@@ -39,16 +40,29 @@ def told(command: Callable[..., Any]) -> Callable[..., Any]:
                     warnings.simplefilter("ignore")  # a library's warning says nothing to an engineer
                 return command(*args, **kwargs)
         except TriageError as error:
-            click.echo(f"triage: {error}", err=True)
+            click.echo(f"triage: {one_line(str(error))}", err=True)
+        except MemoryError:
+            click.echo("triage: takes more memory than there is; give fewer loops, nights or files", err=True)
         except BrokenPipeError:
             sys.stderr.close()
         except OSError as error:
-            click.echo(
-                f"triage: {error.filename or ''}: {error.strerror}; check path and permissions", err=True
-            )
+            seen = f"{error.filename}: {error.strerror}" if error.filename else str(error)
+            click.echo(f"triage: {one_line(seen)}; check path and permissions", err=True)
         sys.exit(NOTHING_DONE)
 
     return wrapped
+
+
+MOST_SAID = 600
+"""Characters of a line that says what is wrong."""
+
+
+def one_line(text: str) -> str:
+    """A message as one line of printable characters, its middle left out where it is very long."""
+    shown = " ".join(visible(text).split())
+    if len(shown) <= MOST_SAID:
+        return shown
+    return f"{shown[: MOST_SAID // 2]} ... {shown[-MOST_SAID // 2 :]}"
 
 
 def utc_seconds(at: datetime | None, zone: str, otherwise: float) -> float:

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from reports.pages import Page
 
 SOME_LOST = 1
+MOST_DAYS = 3660
+"""Longest span that is compared [d]: ten years."""
 
 
 def _span(texts: Sequence[str] | None, option: str, zone: str) -> Span | None:
@@ -32,6 +34,10 @@ def _span(texts: Sequence[str] | None, option: str, zone: str) -> Span | None:
     first, last = (parse_time(t, option, zone) for t in texts)
     if last <= first:
         raise InputError(f"{option} {texts[0]} {texts[1]}", "an end after the start", "swap them")
+    if last - first > MOST_DAYS * 86400.0:
+        raise InputError(
+            f"{option} {texts[0]} {texts[1]}", f"at most {MOST_DAYS} days", "give a shorter span"
+        )
     return Span(first, last)
 
 
@@ -93,7 +99,9 @@ def _subtitle(spans: Spans, store: Path) -> str:
 @click.option("--loop", help="One loop's tag.")
 @click.option("--changed", help="When that loop was changed, e.g. 2026-03-09T08:00Z.")
 @click.option("--find", is_flag=True, help="Offer changes seen in the loops' behaviour, for confirmation.")
-@click.option("--days", default=7.0, show_default=True, type=click.FloatRange(1), help="Days each side.")
+@click.option(
+    "--days", default=7.0, show_default=True, type=click.FloatRange(1, MOST_DAYS), help="Days each side."
+)
 @click.option("--before", nargs=2, help="Span before, start and end, instead of --days.")
 @click.option("--after", nargs=2, help="Span after, start and end, instead of --days.")
 @click.option("--format", "form", type=click.Choice(["html", "markdown"]), default="html", show_default=True)
@@ -126,6 +134,8 @@ def report(
     kept, limits = Store(store), read_config(config)
     kept.require()
     zone = kept.zone()
+    if not days <= MOST_DAYS:  # NaN passes the range that the option states
+        raise InputError(f"--days {days}", f"1 to {MOST_DAYS}", "correct it")
     spans = Spans(days, _span(before, "--before", zone), _span(after, "--after", zone))
     asked = _asked(kept, changes, loop, changed, find, limits.changes)
     found, missing = cases(kept, asked, spans, limits.before_after)

@@ -105,7 +105,8 @@ def carried_closed(
         The model cannot be stepped sample by sample (closed_model).
     """
     c = constants(data)
-    level, middle = float(data["level_pv_pct"]), float(data["middle_op_pct"])
+    level = float(data.get("level_pv_pct", np.mean(pv)))
+    middle = float(data.get("middle_op_pct", np.mean(op)))
     c[Slot.START] = float(pv[0]) - level
     inputs = ModelInputs(op, dt_s, middle, level, (float(pv.min()), float(pv.max())))
     return closed_model(inputs, c, sp, stated.kp, stated.ti)
