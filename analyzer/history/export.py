@@ -19,20 +19,24 @@ from pathlib import Path
 
 import pyarrow as pa
 
+from analyzer.history.converted import converted
 from analyzer.history.day_order import agreed
 from analyzer.history.dialects import source_of
 from analyzer.history.files import export_files, is_parquet, packed_beside
+from analyzer.history.long import tag_column
 from analyzer.history.options import ReadOptions
 from analyzer.history.parquet import open_parquet
 from analyzer.history.raw import Raw, settle
 from analyzer.history.series import Series
 from analyzer.history.sniff import open_sheet
 from analyzer.history.stray import MainSpan, NoStampError
-from analyzer.history.table import Source, Table
+from analyzer.history.table import Source
 from analyzer.history.unpacked import unpacked
 from analyzer.plant_clock import zone_of
 from identification.errors import InputError
 
+CONVERTED_BYTES = 64_000_000
+"""Size from which delimited text is streamed into Parquet once, instead of read for each loop anew [bytes]."""
 __all__ = ["Export", "ReadOptions", "open_export"]
 
 
@@ -217,8 +221,11 @@ def _some(names: Sequence[str]) -> str:
 def _opened(path: Path, options: ReadOptions) -> Source:
     with _told(path):
         plain = unpacked(path, options.scratch)
-        table: Table = open_parquet(plain) if is_parquet(plain) else open_sheet(plain, options)
-        return source_of(table, options)
+        if is_parquet(plain):
+            return source_of(open_parquet(plain), options)
+        sheet = open_sheet(plain, options)
+        big = sheet.bytes >= CONVERTED_BYTES
+        return source_of(converted(sheet, tag_column(sheet), options.scratch) if big else sheet, options)
 
 
 def _read(source: Source, tags: Sequence[str]) -> dict[str, Raw]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Self
@@ -14,10 +14,11 @@ from numpy.typing import NDArray
 
 from analyzer.history.clock import Clock, as_text
 from analyzer.history.codes import Scheme, not_good, scheme_of
+from analyzer.history.converted import Converted
 from analyzer.history.names import QUALITY_NAMES, STAMP_NAMES, TAG_NAMES, VALUE_NAMES, first_named, plain
 from analyzer.history.options import ReadOptions
 from analyzer.history.raw import Raw
-from analyzer.history.stray import MainSpan, main_span
+from analyzer.history.stray import MainSpan, NoStampError, main_span
 from analyzer.history.table import Table
 from analyzer.history.time_columns import find_clock
 from analyzer.history.values import values
@@ -70,7 +71,15 @@ class LongSource:
 
     def span(self) -> MainSpan:
         """Where the samples lie in time, stray ones apart [s since 1970-01-01 UTC]."""
-        return main_span(self.clock.utc(*self.clock.seconds(self.table.read(self.clock.columns)))[0])
+        spans = [
+            main_span(stamp_s)
+            for arrays in pieces(self.table, self.clock.columns)
+            if np.isfinite(stamp_s := self.clock.utc(*self.clock.seconds(arrays))[0]).any()
+        ]
+        if not spans:
+            raise NoStampError
+        first, last = min(s.first_s for s in spans), max(s.last_s for s in spans)
+        return MainSpan(first, last, sum(s.stray for s in spans))
 
     def _raw(self, second: NDArray[np.float64], local: bool, data: list[pa.Array]) -> Raw:
         stamp_s, found = self.clock.utc(second, local)
@@ -82,6 +91,26 @@ class LongSource:
         return Raw(stamp_s, read.value, bad, read.text, found + read.found, read.unread, read.example)
 
 
+def pieces(table: Table, columns: Sequence[int]) -> Iterator[list[pa.Array]]:
+    """Whole columns, in one piece or, of a table that lies in several files, file by file."""
+    if isinstance(table, Converted):
+        yield from table.each(columns)
+    else:
+        yield table.read(columns)
+
+
+def _kinds(table: Table, column: int) -> pa.Array:
+    """The distinct cells of a column."""
+    found = [pc.unique(arrays[0]) for arrays in pieces(table, [column])]
+    return pc.unique(pa.concat_arrays(found))
+
+
+def tag_column(table: Table) -> int:
+    """The column of tags of a long table, -1 of any other."""
+    tag = first_named(table.names, TAG_NAMES)
+    return -1 if tag is None or _value_column(table) is None else tag
+
+
 def open_long(table: Table, options: ReadOptions) -> LongSource | None:
     """Take a table as long where it has columns for tag and value; else None."""
     tag = first_named(table.names, TAG_NAMES)
@@ -89,11 +118,12 @@ def open_long(table: Table, options: ReadOptions) -> LongSource | None:
     if tag is None or value is None:
         return None
     clock = find_clock(table, options)
-    tags = tuple(str(name) for name in pc.unique(table.read([tag])[0]).to_pylist() if name not in (None, ""))
+    met = table.tags if isinstance(table, Converted) else _kinds(table, tag).to_pylist()
+    tags = tuple(str(name) for name in met if name not in (None, ""))
     quality = _quality_column(table, options)
     if quality is None:
         return LongSource(table, clock, tags, tag, value)
-    scheme = scheme_of(table.names[quality], pc.unique(table.read([quality])[0]))
+    scheme = scheme_of(table.names[quality], _kinds(table, quality))
     return LongSource(table, clock, tags, tag, value, quality, scheme, options.good_quality)
 
 

@@ -104,7 +104,7 @@ def _loaded(sheet: Sheet, columns: tuple[int, ...]) -> Loaded:
         more = len(again.columns[columns[0]]) > rows
         return replace(again, unquoted=True) if more else loaded
     except (UnicodeError, OSError, pa.ArrowInvalid) as error:
-        raise _unreadable(sheet.path, error) from error
+        raise unreadable(sheet.path, error) from error
 
 
 def _as_far_as_numbers_go(sheet: Sheet, columns: tuple[int, ...]) -> Loaded:
@@ -123,6 +123,11 @@ def _as_far_as_numbers_go(sheet: Sheet, columns: tuple[int, ...]) -> Loaded:
                 raise
 
 
+def lines_of(sheet: Sheet) -> int:
+    """Lines of a sheet's file that hold anything, within one."""
+    return _lines(sheet.path, sheet.changed_ns)
+
+
 @lru_cache(maxsize=KEPT_READS)
 def _lines(path: Path, changed_ns: int) -> int:
     """Lines of a file that hold anything, within one."""
@@ -134,7 +139,7 @@ def _lines(path: Path, changed_ns: int) -> int:
     return count
 
 
-def _unreadable(path: Path, error: Exception) -> InputError:
+def unreadable(path: Path, error: Exception) -> InputError:
     return InputError(
         f"{path}: {str(error)[:120]}",
         "delimited text in one encoding",
@@ -144,7 +149,7 @@ def _unreadable(path: Path, error: Exception) -> InputError:
 
 def _parsed(sheet: Sheet, columns: tuple[int, ...], encoding: str, texts: Collection[int]) -> Loaded:
     left_out: list[int] = []
-    table = csv.read_csv(sheet.path, **_how(sheet, columns, encoding, left_out, texts))
+    table = csv.read_csv(sheet.path, **reading(sheet, columns, encoding, left_out, texts))
     return Loaded({i: _tidy(table.column(str(i)), sheet.unquoted) for i in columns}, len(left_out))
 
 
@@ -152,12 +157,12 @@ def _parsed(sheet: Sheet, columns: tuple[int, ...], encoding: str, texts: Collec
 def _first_block(sheet: Sheet) -> dict[int, pa.Array]:
     """First rows of all columns, without reading further."""
     columns = tuple(range(len(sheet.names)))
-    with csv.open_csv(sheet.path, **_how(sheet, columns, sheet.encoding, [], ())) as reader:
+    with csv.open_csv(sheet.path, **reading(sheet, columns, sheet.encoding, [], ())) as reader:
         batch = reader.read_next_batch().slice(0, HEAD_ROWS)
     return {i: _tidy(pa.chunked_array([batch.column(i)]), sheet.unquoted) for i in columns}
 
 
-def _how(
+def reading(
     sheet: Sheet, columns: tuple[int, ...], encoding: str, left_out: list[int], texts: Collection[int]
 ) -> dict[str, Any]:
     """Options of the parser; it adds to `left_out` for each line that does not fit.

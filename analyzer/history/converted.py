@@ -1,0 +1,243 @@
+"""Delimited text too big to be read for each loop anew: streamed once into Parquet, in bounded memory.
+
+A wide table becomes one file, of which each loop reads its columns. Of a long one, whose tags may be interleaved line
+by line, the rows go into some dozens of files by tag, so that a loop's tags are read from a few of them.
+"""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+import zlib
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+import pyarrow.parquet as pq
+from pyarrow import csv
+
+from analyzer.history.sheet import HEAD_ROWS, LATE_TEXT, WHOLE_SHARE, Sheet, lines_of, reading, unreadable
+from analyzer.history.unpacked import own_scratch
+from identification.errors import InputError
+
+BUCKETS = 64
+"""Files of a long table; ours: of 4,500 tags each holds seventy, and a loop's four lie in a sixteenth of all."""
+HELD_ROWS = 32_768
+"""Rows of a file that are held before they are written: 64 files of 50 bytes a row hold 100 MB."""
+
+
+@dataclass(frozen=True, slots=True)
+class Converted:
+    """A table as it was streamed; see `table.Table`.
+
+    `folder` holds `count` files; `tag` is the column whose text says in which of them a row is, -1 for one file;
+    `tags` are the texts of it, in the order in which they were met; with `unquoted` quotes are no quotes.
+    """
+
+    path: Path
+    folder: Path
+    count: int
+    names: tuple[str, ...]
+    types: tuple[pa.DataType, ...]
+    notes: tuple[str, ...]
+    decimal: str
+    first_row: int
+    tag: int = -1
+    tags: tuple[str, ...] = ()
+    unquoted: bool = False
+
+    def head(self, columns: Sequence[int]) -> list[pa.Array]:
+        """First rows of some columns."""
+        with pq.ParquetFile(self._largest()) as file:
+            batch = next(file.iter_batches(batch_size=HEAD_ROWS, columns=[str(i) for i in columns]))
+        return [self._tidy(batch.column(str(i))) for i in columns]
+
+    def read(self, columns: Sequence[int], where: tuple[int, Sequence[str]] | None = None) -> list[pa.Array]:
+        """Whole columns, or the rows where the tag's column holds one of some texts.
+
+        Without `where`, of a long table the rows of one file stand for all: they are of all times.
+        """
+        if where is None:
+            return self._columns(self._largest(), columns)
+        files = sorted({_bucket(tag, self.count) for tag in where[1]})
+        parts = [self._columns(self._file(k), [*columns, where[0]]) for k in files if self._file(k).exists()]
+        wanted = pa.array(where[1], pa.string())
+        kept = [[a.filter(pc.is_in(part[-1], value_set=wanted)) for a in part[:-1]] for part in parts]
+        empty = [pa.array([], self.types[i]) for i in columns]
+        return [pa.concat_arrays(list(same)) for same in zip(*kept, strict=True)] if kept else empty
+
+    def each(self, columns: Sequence[int]) -> Iterator[list[pa.Array]]:
+        """Whole columns, file by file."""
+        for k in range(self.count):
+            if self._file(k).exists():
+                yield self._columns(self._file(k), columns)
+
+    def _columns(self, path: Path, columns: Sequence[int]) -> list[pa.Array]:
+        with pq.ParquetFile(path) as file:
+            table = file.read(columns=sorted({str(i) for i in columns}))
+        return [self._tidy(table.column(str(i))) for i in columns]
+
+    def _tidy(self, column: pa.Array | pa.ChunkedArray) -> pa.Array:
+        """One array; texts trimmed, of quotes too where those were taken as they stand."""
+        array = column.combine_chunks() if isinstance(column, pa.ChunkedArray) else column
+        array = pa.concat_arrays(array.chunks) if isinstance(array, pa.ChunkedArray) else array
+        if not pa.types.is_string(array.type):
+            return array
+        return pc.utf8_trim(array, ' \t"') if self.unquoted else pc.utf8_trim_whitespace(array)
+
+    def _file(self, k: int) -> Path:
+        return self.folder / f"{k:03d}.parquet"
+
+    def _largest(self) -> Path:
+        return max(self.folder.glob("*.parquet"), key=lambda p: (p.stat().st_size, p.name))
+
+
+def _bucket(tag: str, count: int) -> int:
+    return zlib.crc32(tag.encode("utf-8")) % count
+
+
+def converted(sheet: Sheet, tag: int, scratch: Path | None) -> Converted:
+    """Stream a sheet into Parquet.
+
+    Parameters
+    ----------
+    sheet : Sheet
+    tag : int
+        Column of the tags of a long table, -1 for a wide one.
+    scratch : Path or None
+        Where the files are laid; None: this process's own directory.
+
+    Raises
+    ------
+    InputError
+        The disk has no room, or the text cannot be read.
+    """
+    place = scratch or own_scratch()
+    if shutil.disk_usage(place).free < sheet.bytes:
+        raise InputError(
+            f"{sheet.path}: no room for a copy of {sheet.bytes / 1e9:.1f} GB in {place}",
+            "free disk",
+            "make room",
+        )
+    folder = Path(tempfile.mkdtemp(prefix="converted-", dir=place))
+    try:
+        done = _as_far_as_numbers_go(sheet, tag, folder)
+        rows = pq_rows(folder) + done.left_out
+        if rows < WHOLE_SHARE * (lines_of(sheet) - sheet.skip_rows) - 1 and not sheet.unquoted:
+            sheet = replace(sheet, unquoted=True)
+            done = _as_far_as_numbers_go(sheet, tag, folder)
+            done.notes.append("a quote is not closed: quotes are taken as they stand")
+    except (UnicodeError, pa.ArrowInvalid) as error:
+        raise unreadable(sheet.path, error) from error
+    if done.left_out:
+        lost = f"{done.left_out} lines do not have as many columns as the header and are left out"
+        done.notes.append(lost)
+    count = 1 if tag < 0 else BUCKETS
+    notes = (*sheet.found, *done.notes)
+    return Converted(
+        sheet.path,
+        folder,
+        count,
+        sheet.names,
+        tuple(done.types),
+        notes,
+        sheet.decimal,
+        sheet.first_row,
+        tag,
+        tuple(done.tags),
+        sheet.unquoted,
+    )
+
+
+def pq_rows(folder: Path) -> int:
+    """Rows of all files of a folder."""
+    return sum(pq.read_metadata(path).num_rows for path in folder.glob("*.parquet"))
+
+
+class _Stream:
+    """One pass over a sheet: files, lines left out, the tags met."""
+
+    def __init__(self, folder: Path, tag: int) -> None:
+        self.folder, self.tag = folder, tag
+        self.left_out, self.notes, self.types = 0, list[str](), list[pa.DataType]()
+        self.tags: dict[str, int] = {}
+        self._held: dict[int, list[pa.RecordBatch]] = {}
+        self._rows: dict[int, int] = {}
+        self._writers: dict[int, pq.ParquetWriter] = {}
+
+    def take(self, batch: pa.RecordBatch) -> None:
+        """Hand a batch's rows to their files."""
+        if self.tag < 0:
+            self._put(0, batch)
+            return
+        names = pc.utf8_trim(pc.cast(batch.column(self.tag), pa.string()), ' \t"')
+        coded = pc.dictionary_encode(pc.fill_null(names, ""))
+        for name in coded.dictionary.to_pylist():
+            if name and name not in self.tags:
+                self.tags[name] = _bucket(name, BUCKETS)
+        of_kind = np.array([_bucket(name, BUCKETS) for name in coded.dictionary.to_pylist()])
+        bucket = of_kind[coded.indices.to_numpy(zero_copy_only=False)]
+        order = np.argsort(bucket, kind="stable")
+        sorted_batch, cuts = (
+            batch.take(pa.array(order)),
+            np.searchsorted(bucket[order], np.arange(BUCKETS + 1)),
+        )
+        for k in np.unique(bucket):
+            self._put(int(k), sorted_batch.slice(cuts[k], cuts[k + 1] - cuts[k]))
+
+    def _put(self, k: int, batch: pa.RecordBatch) -> None:
+        self._held.setdefault(k, []).append(batch)
+        self._rows[k] = self._rows.get(k, 0) + batch.num_rows
+        if self._rows[k] >= HELD_ROWS:
+            self._write(k)
+
+    def _write(self, k: int) -> None:
+        table = pa.Table.from_batches(self._held.pop(k))
+        if k not in self._writers:
+            path = self.folder / f"{k:03d}.parquet"
+            self._writers[k] = pq.ParquetWriter(path, table.schema, compression="snappy")
+        self._writers[k].write_table(table.combine_chunks())
+        self._rows[k] = 0
+
+    def close(self) -> None:
+        """Write what is held and close all files."""
+        for k in list(self._held):
+            self._write(k)
+        for writer in self._writers.values():
+            writer.close()
+
+
+def _as_far_as_numbers_go(sheet: Sheet, tag: int, folder: Path) -> _Stream:
+    """One pass, begun anew with a column as text where only its first block is all numbers."""
+    encoding, texts = sheet.encoding, set[int]()
+    while True:
+        for left in folder.glob("*.parquet"):
+            left.unlink()
+        try:
+            return _pass(sheet, tag, folder, encoding, texts)
+        except pa.ArrowInvalid as error:
+            late = LATE_TEXT.search(str(error))
+            if "UTF8" in str(error) and encoding != "cp1252":
+                encoding = "cp1252"
+            elif late is not None and int(late["column"]) not in texts:
+                texts.add(int(late["column"]))
+            else:
+                raise
+
+
+def _pass(sheet: Sheet, tag: int, folder: Path, encoding: str, texts: Collection[int]) -> _Stream:
+    left_out: list[int] = []
+    stream = _Stream(folder, tag)
+    columns = tuple(range(len(sheet.names)))
+    as_text = {*texts, tag} - {-1}
+    with csv.open_csv(sheet.path, **reading(sheet, columns, encoding, left_out, as_text)) as reader:
+        stream.types = list(reader.schema.types)
+        for batch in reader:
+            if batch.num_rows:
+                stream.take(batch)
+    stream.close()
+    stream.left_out = len(left_out)
+    return stream

@@ -1,0 +1,120 @@
+"""Exports too big for memory are streamed once and read as if they had been read whole."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from analyzer.history.converted import Converted
+from analyzer.history.export import Export, open_export
+from analyzer.history.options import ReadOptions
+
+TAGS = [f"FIC{k:03d}.{role}" for k in range(40) for role in ("PV", "OP")]
+ROWS = 300
+
+
+def stamp(k: int) -> str:
+    """A stamp at 10 s."""
+    return f"21.11.2024 {8 + k // 360:02d}:{k // 6 % 60:02d}:{10 * (k % 6):02d}"
+
+
+def wide(path: Path) -> Path:
+    """A wide CSV in the German manner, with a text late in one column, a mode, and a line that does not fit."""
+    rng = np.random.default_rng(1)
+    lines = [";".join(["Zeit", *TAGS, "FIC000.MODE"])]
+    for k in range(ROWS):
+        cells = [f"{x:.3f}".replace(".", ",") for x in rng.normal(50, 5, len(TAGS))]
+        cells[3] = "Bad Input" if k > ROWS - 20 else cells[3]
+        lines.append(";".join([stamp(k), *cells, "AUTO" if k % 7 else "MAN"]))
+    lines.insert(200, "cut;short")
+    path.write_text("\n".join(lines) + "\n", encoding="cp1252")
+    return path
+
+
+def long(path: Path, umlaut: bool = False) -> Path:
+    """A long CSV in the order of time, 80 tags interleaved, with quality."""
+    rng = np.random.default_rng(2)
+    lines = ["Tag,Time,Value,Quality"]
+    for k in range(ROWS):
+        for tag in TAGS:
+            good = "192" if rng.random() > 0.02 else "0"
+            value = "Bad" if k == ROWS - 1 and tag == TAGS[5] else f"{rng.normal(50, 5):.3f}"
+            lines.append(f"{tag},{stamp(k)},{value},{good}")
+    if umlaut:
+        lines.append(f"FIC000.\u00fc,{stamp(0)},1.5,192")
+    path.write_bytes(("\n".join(lines) + "\n").encode("cp1252"))
+    return path
+
+
+def both(path: Path, monkeypatch: pytest.MonkeyPatch, scratch: Path) -> tuple[Export, Export]:
+    """The export read whole, and streamed."""
+    whole = open_export([path])
+    monkeypatch.setattr("analyzer.history.export.CONVERTED_BYTES", 100)
+    monkeypatch.setattr("analyzer.history.sheet.BLOCK_BYTES", 1 << 14)
+    streamed = open_export([path], ReadOptions(scratch=scratch))
+    assert isinstance(streamed.sources[0].table, Converted)  # type: ignore[attr-defined]
+    return whole, streamed
+
+
+@pytest.mark.parametrize("kind", ["wide", "long", "long, umlaut late"])
+def test_streamed_is_read_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str) -> None:
+    """Tags, samples, quality, texts, span, notes on what was met: all as of the file that is read at once."""
+    path = wide(tmp_path / "x.csv") if kind == "wide" else long(tmp_path / "x.csv", "umlaut" in kind)
+    whole, streamed = both(path, monkeypatch, tmp_path)
+    assert streamed.tags == whole.tags
+    assert streamed.span() == whole.span()
+    for tags in (list(whole.tags[:7]), list(whole.tags[-3:])):
+        a, b = whole.read(tags), streamed.read(tags)
+        for tag in tags:
+            np.testing.assert_array_equal(a[tag].stamp_s, b[tag].stamp_s)
+            np.testing.assert_array_equal(a[tag].value, b[tag].value)
+            np.testing.assert_array_equal(a[tag].bad, b[tag].bad)
+            assert (a[tag].text is None) == (b[tag].text is None)
+    assert whole.met(whole.tags[:7]) == streamed.met(whole.tags[:7])
+    assert [n for n in whole.notes if "left out" in n] == [n for n in streamed.notes if "left out" in n]
+
+
+def test_an_open_quote_costs_no_rows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A quote that is not closed does not swallow the rest of the file."""
+    path = wide(tmp_path / "x.csv")
+    text = path.read_text(encoding="cp1252").replace(stamp(5), '"' + stamp(5), 1)
+    path.write_text(text, encoding="cp1252")
+    whole, streamed = both(path, monkeypatch, tmp_path)
+    a, b = (e.read([TAGS[0]])[TAGS[0]] for e in (whole, streamed))
+    np.testing.assert_array_equal(a.value, b.value)
+    assert any("a quote is not closed" in note for note in streamed.notes)
+
+
+MEASURE = """
+import json, resource, sys
+from pathlib import Path
+import analyzer.history.export as export
+export.CONVERTED_BYTES = 1
+from analyzer.history.options import ReadOptions
+found = export.open_export([Path(sys.argv[1])], ReadOptions(scratch=Path(sys.argv[2])))
+found.read(list(found.tags[:4]))
+print(json.dumps(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss))
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no resource module")
+def test_memory_does_not_grow_with_the_file(tmp_path: Path) -> None:
+    """A long file three times as large, 75 MB, takes at most a quarter more memory to open and to read a loop of."""
+    peak = {}
+    for times in (30, 90):
+        path = tmp_path / f"{times}.csv"
+        head, *rows = long(tmp_path / "part.csv").read_text().splitlines()
+        with path.open("w") as file:
+            file.write(head + "\n")
+            for _ in range(times):
+                file.write("\n".join(rows) + "\n")
+        (tmp_path / str(times)).mkdir()
+        command = [sys.executable, "-c", MEASURE, str(path), str(tmp_path / str(times))]
+        done = subprocess.run(command, capture_output=True, text=True, check=True)
+        peak[times] = json.loads(done.stdout)
+    assert peak[90] < 1.25 * peak[30], peak
