@@ -17,7 +17,7 @@ from pathlib import Path
 
 from analyzer.plant_clock import stamp
 from identification.errors import InputError
-from reports.tables import visible
+from reports.visible import visible
 
 FILE = "notes.jsonl"
 """Name within the store."""

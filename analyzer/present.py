@@ -11,7 +11,7 @@ from analyzer.cost import LOSS, cost_column
 from analyzer.decisions import Action, Cause, Needs
 from analyzer.reason import reason_of, to_stroke
 from analyzer.units import duration, gain_unit
-from reports.tables import visible
+from reports.visible import visible
 
 if TYPE_CHECKING:
     from analyzer.advice import Advice

@@ -19,7 +19,8 @@ from analyzer.lane_figures import FIGURE, lanes_in
 from analyzer.notes import Note
 from analyzer.store import Store
 from identification.errors import InputError
-from reports.tables import harmless, visible
+from reports.tables import harmless
+from reports.visible import visible
 
 LANE_FIGURES = tuple(name for name in FIGURE.values() if name not in names(RANKING))
 """Figures of lanes that the contract's columns do not hold."""

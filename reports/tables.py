@@ -33,8 +33,3 @@ def as_csv(table: Table) -> str:
     for row in table.rows:
         writer.writerow([_cell(cell, col.numeric) for cell, col in zip(row, table.columns, strict=True)])
     return out.getvalue()
-
-
-def visible(text: str) -> str:
-    """The text without characters that steer a terminal or turn the direction of writing."""
-    return "".join(c if c.isprintable() else " " for c in text)

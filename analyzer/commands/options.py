@@ -16,7 +16,7 @@ import click
 
 from analyzer.plant_clock import seconds, zone_of
 from identification.errors import InputError, TriageError
-from reports.tables import visible
+from reports.visible import visible
 
 if TYPE_CHECKING:
     from analyzer.config import Config

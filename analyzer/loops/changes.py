@@ -48,7 +48,7 @@ def _number(text: str, where: str, column: str) -> float | None:
         value = float(text.strip().replace(",", "."))
     except ValueError:
         value = math.nan
-    if not math.isfinite(value) or (column.startswith("ti") and value < 0):
+    if not math.isfinite(value) or (column in ("ti_old", "ti_new") and value < 0):
         raise InputError(f"{where}: {column} {text[:40]!r}", "a number or nothing", "correct the cell")
     return value
 

@@ -1,0 +1,92 @@
+"""A night killed at random points and gone on with: python -m tests.proofs.kills [--kills 50]
+
+A run of 24 loops over two nights is killed with signal 9, parent and workers, after a random share of the time that
+an undisturbed one takes, and begun again with --resume until it ends; its store must be that of the undisturbed run,
+table by table and cell by cell. Writes kills.md here.
+"""
+
+from __future__ import annotations
+
+import argparse
+import random
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections import Counter
+from pathlib import Path
+
+from tests.analyzer.plant import Sketch, simulate, write_export
+from tests.analyzer.test_batch import tables
+
+OUT = Path(__file__).with_suffix(".md")
+LOOPS, HOURS = 24, 40.0
+
+
+def command(export: Path, store: Path, *more: str) -> list[str]:
+    """The batch as a process of its own."""
+    said = [sys.executable, "-m", "analyzer.cli", "run", str(export), "--store", str(store), "--jobs", "2"]
+    return [*said, *more]
+
+
+def stage(store: Path) -> str:
+    """How far a killed run had come."""
+    if not (store / "parts" / "run.json").exists():
+        return "before the first piece" if not list(store.glob("nights/*.parquet")) else "after the end"
+    done = list(store.glob("parts/*/nights-*.parquet"))
+    if not done:
+        return "in the first loops"
+    return "putting the nights together" if list(store.glob("nights/*.parquet")) else "among the loops"
+
+
+def killed(export: Path, store: Path, after_s: float) -> str:
+    """Run, kill after a time, and go on until it ends; the stage at which it was killed, or 'not killed'."""
+    run = subprocess.Popen(command(export, store), stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
+    try:
+        run.wait(after_s)
+        return "not killed"
+    except subprocess.TimeoutExpired:
+        run.send_signal(signal.SIGKILL)
+        run.wait()
+    where = stage(store)
+    again = subprocess.run(command(export, store, "--resume"), capture_output=True, text=True, check=False)
+    if again.returncode != 0 or "Traceback" in again.stderr:
+        raise SystemExit(f"killed {where}: {again.stderr}")
+    return where
+
+
+def main() -> None:
+    """Kill, compare, print and write the table beside this file."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--kills", type=int, default=50)
+    wanted = parser.parse_args().kills
+    draw, at, same = random.Random(1), Counter[str](), 0
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        sketch = Sketch("none", (1.0, 60.0, 10.0), 1.0, 60.0)
+        loops = {f"L{k:02d}": simulate(sketch, HOURS, k) for k in range(LOOPS)}
+        export = write_export(folder / "x.parquet", loops)
+        begun = time.monotonic()
+        subprocess.run(command(export, folder / "whole"), check=True, capture_output=True)
+        takes_s = time.monotonic() - begun
+        whole = tables(folder / "whole")
+        while sum(at.values()) < wanted:
+            store = folder / f"store{sum(at.values())}"
+            where = killed(export, store, draw.uniform(0.0, takes_s))
+            if where == "not killed":
+                continue
+            at[where] += 1
+            same += tables(store) == whole
+    lines = ["| killed | times |", "|---|--:|", *(f"| {where} | {n} |" for where, n in sorted(at.items()))]
+    text = "\n".join([*lines, "", f"{same} of {wanted} stores are those of the undisturbed run."])
+    print(text)
+    about = f"{LOOPS} loops of {HOURS:g} h at 1 s, two workers; signal 9 to the parent, whose workers end with it."
+    head = f"# A night killed at random points\n\n`python -m tests.proofs.kills --kills {wanted}`"
+    OUT.write_text(f"{head}\n\n{about}\n\n{text}\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
