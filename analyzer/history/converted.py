@@ -1,4 +1,4 @@
-"""Delimited text too big to be read for each loop anew: streamed once into Parquet, in bounded memory.
+"""Exports too big to be read for each loop anew: streamed once into Parquet by loop, in bounded memory.
 
 A wide table becomes one file, of which each loop reads its columns. Of a long one, whose tags may be interleaved line
 by line, the rows go into some dozens of files by tag, so that a loop's tags are read from a few of them.
@@ -19,12 +19,15 @@ import pyarrow.compute as pc
 import pyarrow.parquet as pq
 from pyarrow import csv
 
+from analyzer.history.parquet import ParquetTable
 from analyzer.history.sheet import HEAD_ROWS, LATE_TEXT, WHOLE_SHARE, Sheet, lines_of, reading, unreadable
 from analyzer.history.unpacked import own_scratch
 from identification.errors import InputError
 
 BUCKETS = 64
 """Files of a long table; ours: of 4,500 tags each holds seventy, and a loop's four lie in a sixteenth of all."""
+BATCH_ROWS = 500_000
+"""Rows of a Parquet file that are handed on at a time."""
 HELD_ROWS = 32_768
 """Rows of a file that are held before they are written: 64 files of 50 bytes a row hold 100 MB."""
 
@@ -44,7 +47,7 @@ class Converted:
     types: tuple[pa.DataType, ...]
     notes: tuple[str, ...]
     decimal: str
-    first_row: int
+    first_row: int | None
     tag: int = -1
     tags: tuple[str, ...] = ()
     unquoted: bool = False
@@ -96,7 +99,9 @@ class Converted:
 
 
 def _bucket(tag: str, count: int) -> int:
-    return zlib.crc32(tag.encode("utf-8")) % count
+    """The file of a tag: that of its loop, which is what stands before its last point, stroke or colon."""
+    loop = tag[: max(tag.rfind(mark) for mark in "./:|")] or tag
+    return zlib.crc32(loop.encode("utf-8")) % count
 
 
 def converted(sheet: Sheet, tag: int, scratch: Path | None) -> Converted:
@@ -152,6 +157,35 @@ def converted(sheet: Sheet, tag: int, scratch: Path | None) -> Converted:
     )
 
 
+def converted_parquet(table: ParquetTable, tag: int, scratch: Path | None) -> Converted:
+    """The same of a long Parquet file, of which each loop's read would decode all.
+
+    Raises
+    ------
+    InputError
+        The disk has no room.
+    """
+    place = scratch or own_scratch()
+    if shutil.disk_usage(place).free < 4 * table.path.stat().st_size:
+        raise InputError(f"{table.path}: no room for a copy in {place}", "free disk", "make room")
+    folder = Path(tempfile.mkdtemp(prefix="converted-", dir=place))
+    stream = _Stream(folder, tag)
+    names = [str(i) for i in range(len(table.names))]
+    with pq.ParquetFile(table.path) as file:
+        for batch in file.iter_batches(batch_size=BATCH_ROWS):
+            if batch.num_rows:
+                stream.take(pa.RecordBatch.from_arrays([_plain(a) for a in batch.columns], names=names))
+    stream.close()
+    return Converted(
+        table.path, folder, BUCKETS, table.names, table.types, table.notes, ".", None, tag, tuple(stream.tags)
+    )
+
+
+def _plain(array: pa.Array) -> pa.Array:
+    """An array whose batches are of one type, dictionaries decoded."""
+    return array.dictionary_decode() if pa.types.is_dictionary(array.type) else array
+
+
 def pq_rows(folder: Path) -> int:
     """Rows of all files of a folder."""
     return sum(pq.read_metadata(path).num_rows for path in folder.glob("*.parquet"))
@@ -173,12 +207,14 @@ class _Stream:
         if self.tag < 0:
             self._put(0, batch)
             return
-        names = pc.utf8_trim(pc.cast(batch.column(self.tag), pa.string()), ' \t"')
-        coded = pc.dictionary_encode(pc.fill_null(names, ""))
-        for name in coded.dictionary.to_pylist():
+        coded = pc.dictionary_encode(batch.column(self.tag), null_encoding="encode")
+        names = [str(name or "").strip(' \t"') for name in coded.dictionary.to_pylist()]
+        for name in names:
             if name and name not in self.tags:
                 self.tags[name] = _bucket(name, BUCKETS)
-        of_kind = np.array([_bucket(name, BUCKETS) for name in coded.dictionary.to_pylist()])
+        of_kind = np.array(
+            [_bucket(name, BUCKETS) for name in names], dtype=np.uint8
+        )  # small, for a quick sort
         bucket = of_kind[coded.indices.to_numpy(zero_copy_only=False)]
         order = np.argsort(bucket, kind="stable")
         sorted_batch, cuts = (

@@ -19,7 +19,7 @@ from pathlib import Path
 
 import pyarrow as pa
 
-from analyzer.history.converted import converted
+from analyzer.history.converted import converted, converted_parquet
 from analyzer.history.day_order import agreed
 from analyzer.history.dialects import source_of
 from analyzer.history.files import export_files, is_parquet, packed_beside
@@ -37,6 +37,8 @@ from identification.errors import InputError
 
 CONVERTED_BYTES = 64_000_000
 """Size from which delimited text is streamed into Parquet once, instead of read for each loop anew [bytes]."""
+CONVERTED_ROWS = 2_000_000
+"""Rows from which a long Parquet file is parted by loop once, instead of being searched for each loop anew."""
 __all__ = ["Export", "ReadOptions", "open_export"]
 
 
@@ -222,7 +224,9 @@ def _opened(path: Path, options: ReadOptions) -> Source:
     with _told(path):
         plain = unpacked(path, options.scratch)
         if is_parquet(plain):
-            return source_of(open_parquet(plain), options)
+            table = open_parquet(plain)
+            tag = tag_column(table) if table.rows >= CONVERTED_ROWS else -1
+            return source_of(table if tag < 0 else converted_parquet(table, tag, options.scratch), options)
         sheet = open_sheet(plain, options)
         big = sheet.bytes >= CONVERTED_BYTES
         return source_of(converted(sheet, tag_column(sheet), options.scratch) if big else sheet, options)

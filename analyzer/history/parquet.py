@@ -33,6 +33,7 @@ class ParquetTable:
     notes: tuple[str, ...] = ()
     decimal: str = "."
     first_row: int | None = None
+    rows: int = 0
 
     def head(self, columns: Sequence[int]) -> list[pa.Array]:
         """First rows of some columns."""
@@ -83,7 +84,7 @@ def open_parquet(path: Path) -> ParquetTable:
         )
     if rows == 0:
         raise InputError(f"{path}: Parquet without rows", "at least one sample", "export a period with data")
-    return ParquetTable(path, path.stat().st_mtime_ns, tuple(schema.names), tuple(schema.types))
+    return ParquetTable(path, path.stat().st_mtime_ns, tuple(schema.names), tuple(schema.types), rows=rows)
 
 
 def _first_line(error: Exception) -> str:

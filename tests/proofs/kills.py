@@ -17,11 +17,25 @@ import time
 from collections import Counter
 from pathlib import Path
 
+import pyarrow.parquet as pq
+
 from tests.analyzer.plant import Sketch, simulate, write_export
-from tests.analyzer.test_batch import tables
 
 OUT = Path(__file__).with_suffix(".md")
 LOOPS, HOURS = 24, 40.0
+
+
+def tables(store: Path) -> dict[str, list[dict[str, object]]]:
+    """All rows of a store's tables, in the order of loops and time."""
+    paths = sorted(p for p in store.rglob("*.parquet") if "parts" not in p.parts)
+    rows = {p.relative_to(store).as_posix(): pq.read_table(p).to_pylist() for p in paths}
+    order = ("loop", "time_s", "hour_s", "group")
+    return {
+        name: sorted(
+            found, key=lambda r: [str(r.get(k)) if k in ("loop", "group") else r.get(k) or 0 for k in order]
+        )
+        for name, found in rows.items()
+    }
 
 
 def command(export: Path, store: Path, *more: str) -> list[str]:

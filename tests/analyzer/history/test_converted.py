@@ -8,6 +8,8 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
 from analyzer.history.converted import Converted
@@ -77,6 +79,31 @@ def test_streamed_is_read_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
             assert (a[tag].text is None) == (b[tag].text is None)
     assert whole.met(whole.tags[:7]) == streamed.met(whole.tags[:7])
     assert [n for n in whole.notes if "left out" in n] == [n for n in streamed.notes if "left out" in n]
+
+
+def test_a_long_parquet_is_parted_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A long Parquet file, its tags a dictionary, reads alike whether it is searched or parted by loop."""
+    n, stamps = ROWS * len(TAGS), np.arange(ROWS) * 1_000_000 + 1_772_409_600_000_000
+    table = pa.table(
+        {
+            "TagName": pa.DictionaryArray.from_arrays(
+                np.tile(np.arange(len(TAGS), dtype=np.int32), ROWS), TAGS
+            ),
+            "DateTime": np.repeat(stamps, len(TAGS)).astype("datetime64[us]"),
+            "Value": np.random.default_rng(3).normal(50, 5, n),
+            "Quality": np.where(np.arange(n) % 50, 192, 0),
+        }
+    )
+    pq.write_table(table, tmp_path / "x.parquet", row_group_size=1000)
+    whole = open_export([tmp_path / "x.parquet"])
+    monkeypatch.setattr("analyzer.history.export.CONVERTED_ROWS", 100)
+    parted = open_export([tmp_path / "x.parquet"], ReadOptions(scratch=tmp_path))
+    assert isinstance(parted.sources[0].table, Converted)  # type: ignore[attr-defined]
+    assert (parted.tags, parted.span()) == (whole.tags, whole.span())
+    a, b = whole.read(TAGS[:9]), parted.read(TAGS[:9])
+    for tag in TAGS[:9]:
+        np.testing.assert_array_equal(a[tag].value, b[tag].value)
+        np.testing.assert_array_equal(a[tag].bad, b[tag].bad)
 
 
 def test_an_open_quote_costs_no_rows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
