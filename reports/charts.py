@@ -163,7 +163,7 @@ def _onto(ax: Axes, p: Plot) -> None:
     for mark in p.marks:
         ax.axvline(mark.x, color=COLOURS["worse"], linestyle="--", linewidth=1)
         ax.annotate(plain(mark.label), (mark.x, 1.0), xycoords=("data", "axes fraction"), fontsize=8)
-    if p.reach:
+    if p.reach and p.lines and len(p.lines[0].x):
         ax.update_datalim([(p.lines[0].x[0], y) for y in p.reach], updatex=False)
         ax.autoscale_view()
     if "x" in p.log:

@@ -26,12 +26,16 @@ def _case(asked: Asked, tag: str, whole: bool = False) -> Any:
     from analyzer.explain.case import MOST_SAMPLES, case, tags_of
     from analyzer.loops.settings_in_force import in_force
     from analyzer.loops.spec import spec_of
+    from analyzer.nights import Night, cut
 
     source, specs, _ = asked.opened()
     spec = spec_of(specs, tag)
     if spec.pv is None:
         raise InputError(f"{tag}: no PV tag in the export", f"{tag}.PV", "check --loops and the export")
-    series = asked.within(source.read(tags_of(spec, specs)))
+    first, last = source.span(spec.pv)  # without stray stamps, which would stretch a record over centuries
+    whole_span = Night("", first, last + 1.0)
+    series = {tag: cut(x, whole_span) for tag, x in source.read(tags_of(spec, specs)).items()}
+    series = asked.within(series)
     pv = series[spec.pv]
     if pv.stamp_s.size == 0:
         raise InputError(f"{tag}: no samples between --since and --until", "a span of the export", "widen it")

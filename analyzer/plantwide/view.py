@@ -90,7 +90,8 @@ def read_groups(store: Store, night: str) -> list[GroupView]:
     loops = {r["loop"]: dict.fromkeys(OF_LOOPS) | r for r in known if r["loop"] in wanted}
     by_number: dict[str, list[Row]] = {}
     for row in rows:
-        by_number.setdefault(row["group"], []).append(row)
+        if row["loop"] in loops:  # a store that was put together by hand may lack some
+            by_number.setdefault(row["group"], []).append(row)
     found = [GroupView(number, tuple(_sorted(own)), loops) for number, own in by_number.items()]
     return sorted(found, key=lambda g: (-g.gain_pct, int(g.number)))
 

@@ -60,6 +60,21 @@ def test_a_sound_model_is_run(export: Path, tmp_path: Path) -> None:
     assert pq.read_table(out).column("PV").null_count == 0
 
 
+def test_a_stray_stamp_is_not_simulated(export: Path, tmp_path: Path) -> None:
+    """A stamp of 1601 beside the rest is set aside before a model is run, not written into its output."""
+    table = pq.read_table(export)
+    first = table.slice(0, 1)
+    stray = pa.array(["1601-01-05 00:00:00"]).cast(table.schema.field("timestamp").type)
+    pq.write_table(
+        pa.concat_tables([first.set_column(0, "timestamp", stray), table]), tmp_path / "stray.parquet"
+    )
+    (tmp_path / "m.json").write_text(json.dumps(MODEL))
+    out = tmp_path / "out.parquet"
+    given = ("simulate", tmp_path / "m.json", tmp_path / "stray.parquet", "--loop", "L0", "--out", out)
+    assert asked(*given).exit_code == 0
+    assert pq.read_table(out).num_rows == table.num_rows
+
+
 @pytest.mark.parametrize(
     "change",
     [
@@ -195,3 +210,21 @@ def test_a_message_is_one_line() -> None:
     text = one_line("a\nb\x1b[2J\u202e" + "x" * 100_000)
     assert text.isprintable()
     assert len(text) < MOST_SAID + 20
+
+
+def test_a_group_of_loops_that_are_not_there(tmp_path: Path) -> None:
+    """A group that names a loop which the night lacks is told without it."""
+    store = small_store(tmp_path / "store", loops=3, nights=1)
+    night = store.nights()[0]
+    row = {
+        "loop": "GONE",
+        "night": night,
+        "group": "1",
+        "role": "source",
+        "source_pct": 90.0,
+        "group_period_s": 60.0,
+    }
+    (store.path / "groups").mkdir(exist_ok=True)
+    pq.write_table(pa.Table.from_pylist([row]), store.path / "groups" / f"{night}.parquet")
+    for arguments in (("rank", store.path, "--groups"), ("pages", store.path, "--out", tmp_path / "out")):
+        assert asked(*arguments).exit_code == 0
