@@ -94,3 +94,15 @@ def test_pages_are_documented_with_the_words_they_use() -> None:
     assert set(Action) <= set(actions)
     plain = text.lower().replace("in manual", "manual").replace("op at a limit", "at limit")
     assert all(lane in plain for lane in Lane)
+
+
+def test_the_table_of_faults_names_tests_that_exist():
+    """Each line of RELIABILITY.md names a file, a command or a test that there is."""
+    page = (ROOT / "docs" / "RELIABILITY.md").read_text(encoding="utf-8")
+    code = "\n".join(p.read_text(encoding="utf-8") for p in (ROOT / "tests").rglob("test_*.py"))
+    for name in re.findall(r"\btest_[a-z0-9_]+\b(?!\.py)", page):
+        assert f"def {name}" in code, name
+    for path in re.findall(r"\b(?:tests|analyzer)/[\w/]+\.(?:py|md)\b", page):
+        assert (ROOT / path).exists(), path
+    for module in re.findall(r"python -m (tests\.[\w.]+)", page):
+        assert (ROOT / (module.replace(".", "/") + ".py")).exists(), module

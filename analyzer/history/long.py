@@ -152,7 +152,10 @@ def _value_column(table: Table) -> int | None:
     if named is not None:
         return named
     floating = [i for i, kind in enumerate(table.types) if pa.types.is_floating(kind)]
-    free = [i for i in floating if plain(table.names[i]) not in (*STAMP_NAMES, *QUALITY_NAMES)]
+    taken = {*STAMP_NAMES, *QUALITY_NAMES} - {
+        "data"
+    }  # a date in Italian, but numbers of that name are values
+    free = [i for i in floating if plain(table.names[i]) not in taken]
     return free[0] if len(free) == 1 else None
 
 

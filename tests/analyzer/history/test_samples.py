@@ -166,3 +166,23 @@ def test_stamps_with_an_offset_need_no_zone(tmp_path: Path) -> None:
     _, series = read(tmp_path / "x.csv", text, ReadOptions(timezone="Asia/Tokyo"))
     assert series.stamp_s[0] == pd.Timestamp("2024-07-01 08:00").timestamp()
     assert series.stamp_s[1] == pd.Timestamp("2024-07-01 08:30").timestamp()
+
+
+def test_a_flow_called_q_is_no_quality(tmp_path):
+    """A tag that ends like a quality column, and holds values, is a tag; its neighbour loses no sample to it."""
+    rows = "".join(
+        f"2026-03-02 00:{k // 60:02d}:{k % 60:02d},{50 + k / 10:.1f},{200 + k / 7:.3f}\n" for k in range(300)
+    )
+    (tmp_path / "x.csv").write_text("timestamp,FIC101,FIC101.Q\n" + rows)
+    export = open_export([tmp_path / "x.csv"])
+    assert export.tags == ("FIC101", "FIC101.Q")
+    assert not export.read(["FIC101"])["FIC101"].bad.any()
+
+
+def test_values_called_data_are_values(tmp_path):
+    """Data is a date in Italian and a value in English: floats of that name are values of a long table."""
+    rows = "".join(f"FIC1.PV,2026-03-02 00:00:{k:02d},{50 + k / 10:.1f}\n" for k in range(60))
+    (tmp_path / "x.csv").write_text("Tag,Time,Data\n" + rows)
+    export = open_export([tmp_path / "x.csv"])
+    assert export.tags == ("FIC1.PV",)
+    assert export.read(["FIC1.PV"])["FIC1.PV"].value[-1] == 55.9
