@@ -12,7 +12,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
-from analyzer import chunk, run_identity, store_version
+from analyzer import chunk, cluster, run_identity, store_version
 from analyzer.chunk import Done, Task, assess_loop
 from analyzer.config import Config
 from analyzer.decisions import Status
@@ -67,8 +67,11 @@ def _tasks(
     ]
 
 
-def _results(tasks: Sequence[Task], jobs: int, config: Config) -> Iterator[Done]:
-    """What the chunks give, on worker processes or, with no jobs, in this process and without its protection."""
+def _results(tasks: Sequence[Task], jobs: int, config: Config, scheduler: str | None) -> Iterator[Done]:
+    """What the chunks give, on a cluster, on worker processes or, with no jobs, in this process, unprotected."""
+    if scheduler is not None:
+        yield from cluster.results(scheduler, tasks)
+        return
     if jobs == 0:
         yield from map(chunk.work, tasks)
         return
@@ -135,6 +138,7 @@ def run(
     replacing: bool = False,
     changes: Sequence[TuningChange] = (),
     zone: str = UTC_NAME,
+    scheduler: str | None = None,
 ) -> Outcome:
     """Assess all loops of an export and keep the results.
 
@@ -160,6 +164,8 @@ def run(
         When settings were changed; each night has those in force at its end.
     zone : str
         The plant's time zone, whose days the nights are.
+    scheduler : str or None
+        Address of a Dask scheduler whose workers do the loops, instead of processes of this machine.
 
     Raises
     ------
@@ -183,7 +189,8 @@ def run(
         known = _loops_in(store, spans[-1].name, keys)
         progress(len(known), len(specs))
         done, met = len(known), Counter[str]()
-        for result in _results(_tasks(export, specs, spans, store, config, known, changes), jobs, config):
+        tasks = _tasks(export, specs, spans, store, config, known, changes)
+        for result in _results(tasks, jobs, config, scheduler):
             keys.append(result.key)
             done += result.loops
             met.update(result.met)

@@ -68,6 +68,9 @@ def stoppable() -> Iterator[None]:
     "--store", required=True, type=click.Path(path_type=Path), help="Directory that keeps the results."
 )
 @click.option("--jobs", default=1, show_default=True, type=click.IntRange(1), help="Worker processes.")
+@click.option(
+    "--scheduler", help="Dask scheduler, tcp://HOST:PORT, whose workers do the loops instead of --jobs."
+)
 @click.option("--resume", is_flag=True, help="Go on with a run that was stopped.")
 @click.option("--replace", "replacing", is_flag=True, help="Forget what the store has of these nights first.")
 @click.option(
@@ -85,6 +88,7 @@ def run(
     replacing: bool,
     explaining: bool,
     log_file: Path | None,
+    scheduler: str | None,
 ) -> None:
     """The nightly batch: assess every loop and keep the results in a store.
 
@@ -113,7 +117,7 @@ def run(
         with stoppable(), scratch(store) as copies:
             source, specs, notes = _opened(replace(asked, reading={**asked.reading, "scratch": copies}))
             _say(notes, log)
-            outcome = _assessed(source, specs, Store(store), asked, jobs, resume, replacing, log)
+            outcome = _assessed(source, specs, Store(store), asked, jobs, resume, replacing, log, scheduler)
             if explaining and len(outcome.unassessed) + len(outcome.failed) < len(specs):
                 _explained(source, specs, Store(store), asked.config, outcome.nights[-1], jobs, resume)
     except StoppedError as stopped:
@@ -182,6 +186,7 @@ def _assessed(
     resume: bool,
     replacing: bool,
     log: RunLog,
+    scheduler: str | None,
 ) -> Outcome:
     """Run the batch with progress and say what came of it."""
     from analyzer import batch
@@ -201,6 +206,7 @@ def _assessed(
             replacing,
             asked.changes,
             asked.zone,
+            scheduler,
         )
     more = len(outcome.notes) - FEW
     _say(outcome.notes[:FEW], log)
