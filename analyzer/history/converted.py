@@ -11,6 +11,7 @@ import tempfile
 import zlib
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +21,15 @@ import pyarrow.parquet as pq
 from pyarrow import csv
 
 from analyzer.history.parquet import ParquetTable
-from analyzer.history.sheet import HEAD_ROWS, LATE_TEXT, WHOLE_SHARE, Sheet, lines_of, reading, unreadable
+from analyzer.history.sheet import (
+    HEAD_ROWS,
+    WHOLE_SHARE,
+    Sheet,
+    as_far_as_numbers_go,
+    lines_of,
+    reading,
+    unreadable,
+)
 from analyzer.history.unpacked import own_scratch
 from identification.errors import InputError
 
@@ -129,11 +138,11 @@ def converted(sheet: Sheet, tag: int, scratch: Path | None) -> Converted:
         )
     folder = Path(tempfile.mkdtemp(prefix="converted-", dir=place))
     try:
-        done = _as_far_as_numbers_go(sheet, tag, folder)
+        done = as_far_as_numbers_go(sheet.encoding, partial(_pass, sheet, tag, folder))
         rows = pq_rows(folder) + done.left_out
         if rows < WHOLE_SHARE * (lines_of(sheet) - sheet.skip_rows) - 1 and not sheet.unquoted:
             sheet = replace(sheet, unquoted=True)
-            done = _as_far_as_numbers_go(sheet, tag, folder)
+            done = as_far_as_numbers_go(sheet.encoding, partial(_pass, sheet, tag, folder))
             done.notes.append("a quote is not closed: quotes are taken as they stand")
     except (UnicodeError, pa.ArrowInvalid) as error:
         raise unreadable(sheet.path, error) from error
@@ -246,25 +255,9 @@ class _Stream:
             writer.close()
 
 
-def _as_far_as_numbers_go(sheet: Sheet, tag: int, folder: Path) -> _Stream:
-    """One pass, begun anew with a column as text where only its first block is all numbers."""
-    encoding, texts = sheet.encoding, set[int]()
-    while True:
-        for left in folder.glob("*.parquet"):
-            left.unlink()
-        try:
-            return _pass(sheet, tag, folder, encoding, texts)
-        except pa.ArrowInvalid as error:
-            late = LATE_TEXT.search(str(error))
-            if "UTF8" in str(error) and encoding != "cp1252":
-                encoding = "cp1252"
-            elif late is not None and int(late["column"]) not in texts:
-                texts.add(int(late["column"]))
-            else:
-                raise
-
-
 def _pass(sheet: Sheet, tag: int, folder: Path, encoding: str, texts: Collection[int]) -> _Stream:
+    for left in folder.glob("*.parquet"):  # of a pass that was begun anew
+        left.unlink()
     left_out: list[int] = []
     stream = _Stream(folder, tag)
     columns = tuple(range(len(sheet.names)))

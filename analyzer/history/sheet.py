@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import pyarrow as pa
 import pyarrow.compute as pc
@@ -21,6 +21,7 @@ HEAD_ROWS = 1000
 BLOCK_BYTES = 1 << 24
 WHOLE_SHARE = 0.95
 """Share of a file's lines that must come back as rows [-]; where fewer do, an open quote has swallowed the rest."""
+Read = TypeVar("Read")
 LATE_TEXT = re.compile(r"In CSV column #(?P<column>\d+): CSV conversion error")
 
 
@@ -95,24 +96,26 @@ class Loaded:
 def _loaded(sheet: Sheet, columns: tuple[int, ...]) -> Loaded:
     """Some columns of the whole file."""
     try:
-        loaded = _as_far_as_numbers_go(sheet, columns)
+        loaded = as_far_as_numbers_go(sheet.encoding, partial(_parsed, sheet, columns))
         lines = _lines(sheet.path, sheet.changed_ns) - sheet.skip_rows
         rows = len(loaded.columns[columns[0]]) + loaded.left_out
         if rows >= WHOLE_SHARE * lines - 1 or sheet.unquoted:
             return loaded
-        again = _as_far_as_numbers_go(replace(sheet, unquoted=True), columns)
+        plain = replace(sheet, unquoted=True)
+        again = as_far_as_numbers_go(sheet.encoding, partial(_parsed, plain, columns))
         more = len(again.columns[columns[0]]) > rows
         return replace(again, unquoted=True) if more else loaded
     except (UnicodeError, OSError, pa.ArrowInvalid) as error:
         raise unreadable(sheet.path, error) from error
 
 
-def _as_far_as_numbers_go(sheet: Sheet, columns: tuple[int, ...]) -> Loaded:
-    """Columns as numbers, or as text where the first block holds only numbers and a later one does not."""
-    encoding, texts = sheet.encoding, set[int]()
+def as_far_as_numbers_go(encoding: str, read: Callable[[str, Collection[int]], Read]) -> Read:
+    """What `read` gives, begun anew with a column as text where only its first block is all numbers, or in another
+    encoding where a letter late in the file shows it."""
+    texts = set[int]()
     while True:
         try:
-            return _parsed(sheet, columns, encoding, texts)
+            return read(encoding, texts)
         except pa.ArrowInvalid as error:
             late = LATE_TEXT.search(str(error))
             if "UTF8" in str(error) and encoding != "cp1252":
