@@ -15,6 +15,8 @@ from analyzer.stored_table import read_stored
 from identification.errors import InputError
 from reports.whole_file import SUFFIX
 
+NEVER = "1900-01-01"
+"""A day before all nights."""
 BULKY = ("hours", "trends")
 """Tables that pages of recent nights draw from; the longest part of a store."""
 
@@ -107,7 +109,9 @@ def _notes(store: Path) -> Iterator[Problem]:
 def pruned(store: Store, keep_d: int, detail_d: int | None, dry: bool = False) -> list[Path]:
     """Delete nights that lie more than `keep_d` days before the latest, and files left over; what was deleted.
 
-    The table of nights goes first, so that no reader meets half of one. Notes stay. The caller holds the store.
+    A night ahead of this machine's clock, of a historian whose clock was wrong, is no measure of what is old: without
+    an earlier one nothing goes. The table of nights goes first, so that no reader meets half of one. Notes stay. The
+    caller holds the store.
 
     Parameters
     ----------
@@ -119,9 +123,10 @@ def pruned(store: Store, keep_d: int, detail_d: int | None, dry: bool = False) -
     dry : bool
         Only say what would go.
     """
-    latest = date.fromisoformat(store.require())
-    first = (latest - timedelta(days=keep_d)).isoformat()
-    detailed = first if detail_d is None else (latest - timedelta(days=detail_d)).isoformat()
+    tomorrow = (date.today() + timedelta(days=1)).isoformat()
+    latest = date.fromisoformat(max((n for n in store.nights() if n <= tomorrow), default=NEVER))
+    first = _days_before(latest, keep_d)
+    detailed = first if detail_d is None else _days_before(latest, detail_d)
     gone = []
     for table in TABLES:
         oldest = max(first, detailed) if table in BULKY else first
@@ -136,3 +141,8 @@ def pruned(store: Store, keep_d: int, detail_d: int | None, dry: bool = False) -
         for path in gone:
             path.unlink(missing_ok=True)
     return gone
+
+
+def _days_before(day: date, days: int) -> str:
+    """A day so many days earlier, the first of all where there is none."""
+    return (day - timedelta(days=min(days, day.toordinal() - 1))).isoformat()

@@ -141,6 +141,19 @@ def test_prune_keeps_what_is_asked(store: Store) -> None:
     assert asked("rank", store.path).exit_code == 0
 
 
+def test_a_night_ahead_of_us_makes_nothing_old(store: Store) -> None:
+    """One night of a historian whose clock was a century wrong does not let all the others go."""
+    nights = store.nights()
+    first = store.path / "nights" / f"{nights[0]}.parquet"
+    (store.path / "nights" / "2126-03-02.parquet").write_bytes(first.read_bytes())
+    assert asked("store", "prune", store.path, "--keep", "400d").exit_code == 0
+    assert store.nights() == [*nights, "2126-03-02"]
+    for night in nights:
+        (store.path / "nights" / f"{night}.parquet").unlink()
+    assert asked("store", "prune", store.path, "--keep", "99999y").exit_code == 0
+    assert store.nights() == ["2126-03-02"]
+
+
 @pytest.mark.parametrize("text", ["", "400", "0d", "-1d", "1e9d", "ten days"])
 def test_prune_without_a_time_deletes_nothing(store: Store, text: str) -> None:
     """A time that is none is one line, and all nights stay."""
