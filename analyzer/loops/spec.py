@@ -23,13 +23,15 @@ TEXTS = ("loop", "description", "type", "area", "master", "pv_unit")
 NUMBERS = ("pv_lo", "pv_hi", "op_lo", "op_hi", "kp", "ti", "td", "scan_s", "importance")
 MEANT: Mapping[str, tuple[float, float, bool]] = {
     **dict.fromkeys(("pv_lo", "pv_hi", "op_lo", "op_hi"), (1e-9, 1e12, True)),
-    "kp": (1e-6, 1e6, False),
-    "ti": (1e-3, 1e7, True),
+    "kp": (1e-6, 1e6, True),
+    "ti": (1e-3, 1e12, True),  # no integral is written as 0 or as many nines
     "td": (1e-6, 1e6, True),
-    "scan_s": (1e-3, 1e5, False),
+    "scan_s": (1e-3, 1e5, True),
     "importance": (1e-6, 1e6, True),
 }
 """Least and largest size of a number that is meant, and whether it may be 0; ours: beyond them a cell is a slip."""
+OFF_IS_EMPTY = ("kp", "scan_s")
+"""Numbers that control systems export as 0 where there is none: a cell that says nothing."""
 SIGNED = ("pv_lo", "pv_hi", "op_lo", "op_hi", "kp")
 """Numbers that may be below 0."""
 CHOICES: Mapping[str, tuple[str, ...]] = {
@@ -210,7 +212,8 @@ def _spec(path: Path, row: int, cells: Mapping[str, str], zone: str, day_first: 
     if "loop" not in filled:
         raise InputError(f"{path}, row {row}: no loop name", "a name in column 'loop'", "name the loop")
     given: dict[str, Any] = {name: filled[name] for name in (*TEXTS, *ROLES) if name in filled}
-    given |= {name: _number(path, row, name, filled[name]) for name in NUMBERS if name in filled}
+    numbers = {name: _number(path, row, name, filled[name]) for name in NUMBERS if name in filled}
+    given |= {name: value for name, value in numbers.items() if value != 0.0 or name not in OFF_IS_EMPTY}
     given |= {name: _choice(path, row, name, filled[name]) for name in CHOICES if name in filled}
     if VALID_FROM in filled:
         where = f"{path}, row {row}, column '{VALID_FROM}'"

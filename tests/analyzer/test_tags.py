@@ -211,9 +211,9 @@ def test_real_loops_csv(name: str) -> None:
 @pytest.mark.parametrize(
     ("column", "cell"),
     [
-        *(("kp", cell) for cell in ("inf", "1e400", "nan", "0", "1e-300", "1e9")),
+        *(("kp", cell) for cell in ("inf", "1e400", "nan", "1e-300", "1e9")),
         *(("ti", cell) for cell in ("inf", "-1", "1e-300", "1e300")),
-        *(("scan_s", cell) for cell in ("0", "1e-300", "inf", "-1")),
+        *(("scan_s", cell) for cell in ("1e-300", "inf", "-1")),
         *(("importance", cell) for cell in ("inf", "-5")),
         *(("td", cell) for cell in ("inf", "1e-320")),
     ],
@@ -233,3 +233,10 @@ def test_ranges_that_nobody_means_are_refused(tmp_path, low, high):
     """A range has a width that numbers can tell."""
     with pytest.raises(InputError, match="row 2"):
         read_loops(written(tmp_path, f"loop,op_lo,op_hi\nFIC1,{low},{high}\n"))
+
+
+def test_a_zero_that_says_nothing_ends_no_night(tmp_path):
+    """Gains and scans of 0, as control systems export them for loops without, are empty cells."""
+    (loop,) = read_loops(written(tmp_path, "loop,kp,ti,scan_s\nFIC1,0,10,0\n"))
+    assert (loop.kp, loop.ti, loop.scan_s) == (None, 10.0, None)
+    assert not loop.stated & {"kp", "scan_s"}
