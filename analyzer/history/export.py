@@ -28,6 +28,7 @@ from analyzer.history.options import ReadOptions
 from analyzer.history.parquet import open_parquet
 from analyzer.history.raw import Raw, settle
 from analyzer.history.series import Series
+from analyzer.history.sheet import WHOLE_FILE_BYTES
 from analyzer.history.sniff import open_sheet
 from analyzer.history.stray import MainSpan, NoStampError
 from analyzer.history.table import Source
@@ -35,7 +36,7 @@ from analyzer.history.unpacked import unpacked
 from analyzer.plant_clock import zone_of
 from identification.errors import InputError
 
-CONVERTED_BYTES = 64_000_000
+CONVERTED_BYTES = WHOLE_FILE_BYTES
 """Size from which delimited text is streamed into Parquet once, instead of read for each loop anew [bytes]."""
 CONVERTED_ROWS = 2_000_000
 """Rows from which a long Parquet file is parted by loop once, instead of being searched for each loop anew."""
@@ -187,7 +188,7 @@ def _check_encoding(name: str) -> None:
 def _check_format(written: str) -> None:
     try:
         again = datetime.strptime(datetime(2026, 5, 12, 8, 9, 10).strftime(written), written)
-        known = again.year > 1900 or "%y" in written.lower()
+        known = again.year == 2026  # a format without a year reads as 1900
     except (ValueError, re.error):
         known = False
     if not known:

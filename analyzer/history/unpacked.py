@@ -24,7 +24,7 @@ shrink to a hundredth, and what shrinks further is made to fill a disk."""
 ALWAYS_BYTES = 100e6
 """Size up to which anything is unpacked [bytes]."""
 MOST_OF_DISK = 0.8
-"""Share of the free disk that an unpacked file may take [-]."""
+"""Share of the disk's room that an unpacked file may take [-]; ours: the night needs the rest."""
 STREAMS: dict[bytes, Callable[..., Any]] = {
     b"\x1f\x8b": gzip.open,
     b"BZh": bz2.open,
@@ -88,7 +88,7 @@ def _member(path: Path, folder: Path) -> Path:
             raise InputError(
                 f"{path}: an archive with a password", "one without", "unpack it and name the file"
             )
-        _check_size(path, float(held[0].file_size))
+        _check_size(path, held[0].file_size, 0, folder)
         out = folder / Path(held[0].filename.replace("\\", "/")).name
         with archive.open(held[0]) as source:
             _copied(source, out, path)
@@ -101,11 +101,13 @@ def _copied(source: IO[Any], out: Path, path: Path) -> None:
     with out.open("wb") as file:
         while block := source.read(BLOCK_BYTES):
             done += len(block)
-            _check_size(path, float(done))
+            _check_size(path, done, done, out.parent)
             file.write(block)
 
 
-def _check_size(path: Path, size: float) -> None:
+def _check_size(path: Path, size: int, written: int, folder: Path) -> None:
+    """Raise InputError where a file of `size` bytes, of which some are `written` to a folder, is beyond all measure or
+    beyond the disk's room."""
     packed = path.stat().st_size
     if size > max(MOST_TIMES * packed, ALWAYS_BYTES):
         raise InputError(
@@ -113,7 +115,7 @@ def _check_size(path: Path, size: float) -> None:
             f"at most {MOST_TIMES:g} times as much",
             "unpack it where there is room, and name what comes out",
         )
-    if size > ALWAYS_BYTES and size > MOST_OF_DISK * shutil.disk_usage(tempfile.gettempdir()).free:
+    if size > ALWAYS_BYTES and size > MOST_OF_DISK * (shutil.disk_usage(folder).free + written):
         raise InputError(
             f"{path}: no room to unpack it", "free disk", "unpack it elsewhere and name what comes out"
         )

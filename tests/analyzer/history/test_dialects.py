@@ -228,3 +228,15 @@ def test_a_latin_letter_late_in_the_file(tmp_path: Path) -> None:
     rows = "".join(f"{line},{'ü' if i == 60_000 else 'x'}\n" for i, line in enumerate(text.splitlines()))
     (tmp_path / "x.csv").write_bytes(rows.encode("cp1252"))
     assert_read(tmp_path / "x.csv", table)
+
+
+@pytest.mark.parametrize(
+    ("zone", "hours"), [("PST", -8), ("MST", -7), ("MET", 1), ("MEZ", 1), ("MSK", 3), ("CEST", 2), ("UTC", 0)]
+)
+def test_letters_of_a_zone_are_no_half_of_the_day(tmp_path: Path, zone: str, hours: int) -> None:
+    """PST is a zone and not an afternoon; AM and PM before a zone stay what they are."""
+    table = day()
+    for clock in ("%H:%M:%S", "%I:%M:%S %p", "%I:%M:%S%p"):
+        local = (table["Timestamp"] + pd.Timedelta(hours=hours)).dt.strftime(f"%Y-%m-%d {clock} {zone}")
+        table.assign(Timestamp=local).to_csv(tmp_path / "x.csv", index=False)
+        assert_read(tmp_path / "x.csv", table)
