@@ -106,8 +106,8 @@ def _copied(source: IO[Any], out: Path, path: Path) -> None:
 
 
 def _check_size(path: Path, size: int, written: int, folder: Path) -> None:
-    """Raise InputError where a file of `size` bytes, of which some are `written` to a folder, is beyond all measure or
-    beyond the disk's room."""
+    """Raise InputError where a file of `size` bytes, some of them `written` to a folder, is beyond all measure or the
+    disk's room."""
     packed = path.stat().st_size
     if size > max(MOST_TIMES * packed, ALWAYS_BYTES):
         raise InputError(
