@@ -12,7 +12,7 @@ from identification.controller.pi_regression import (
     ControlLaw,
     centred,
     recovered_law,
-    shifted,
+    smooth,
     span_length,
     trusted,
 )
@@ -26,6 +26,7 @@ from identification.estimation.limits import (
     LAW_EXPLAINS,
     LAWLESS,
     LAWLESS_SHARE,
+    LEAST_TI,
     SAME_LAW,
     SETTING,
     SETTING_THINNED,
@@ -33,6 +34,7 @@ from identification.estimation.limits import (
     STUCK_RUN,
     STUCK_SHARE,
     THINNED,
+    THINNED_LEAVES,
 )
 from identification.record import Floats, Mask
 from identification.simulation.pi import due_moves, gapped
@@ -169,11 +171,15 @@ def typical(residual: Floats, length: int) -> float:
 
 
 def obeys(sp: Floats, pv: Floats, op: Floats, said: StatedSettings, found: ControlLaw) -> bool:
-    """Whether the stated law gives OP nearly as well as the one found, in most spans and in those that move it."""
+    """Whether the stated law gives OP nearly as well as the one found, in most spans and in those that move it; on a
+    thinned recording, whether it gives most of OP."""
     n, length = found.residual.size, found.length
-    e = (sp - shifted(pv, found.late))[:n]
+    e = found.error(sp, pv)[:n]
     left = centred(op[:n], length) - said.kp * (centred(e, length) + centred(np.cumsum(e), length) / said.ti)
     lawful = trusted(found.residual, length)
+    moved = float(np.mean(centred(op[:n], length)[lawful] ** 2))
+    if said.thinned and float(np.mean(left[lawful] ** 2)) < THINNED_LEAVES * moved:
+        return True
     whole = float(np.mean(left[lawful] ** 2)) < SAME_LAW**2 * float(np.mean(found.residual[lawful] ** 2))
     return whole and typical(left, length) < SAME_LAW * typical(found.residual, length)
 
@@ -193,7 +199,7 @@ def settings(found: ControlLaw, said: StatedSettings) -> ControllerFinding | Non
 
 def judge(
     sp: Floats, pv: Floats, op: Floats, usable: Mask, said: StatedSettings
-) -> tuple[ControllerFinding | None, ControlLaw]:
+) -> tuple[ControllerFinding | None, ControlLaw | None]:
     """The first thing that is wrong with clock or controller, and the law as found.
 
     Parameters
@@ -203,10 +209,13 @@ def judge(
     usable : ndarray of bool, shape (n,)
         False in gaps, in manual and at OP's limits.
     said : StatedSettings
-        Of a thinned recording nothing but settings plainly wrong is said: the law is not seen at work.
+        Of a thinned recording nothing but settings plainly wrong is said: the law is not seen at work; nothing at all
+        where its integral acts between the samples.
     """
+    if said.thinned and said.ti < LEAST_TI:
+        return None, None
     found = recovered_law(sp, pv, op, usable, said.ti, said.kp, late=not said.thinned)
-    e = sp - pv
+    e = sp - smooth(pv, found.smoothed)
     wrong = None if obeys(sp, pv, op, said, found) else settings(found, said)
     if said.thinned:
         return wrong, found

@@ -1,4 +1,4 @@
-"""The PI law that gives OP from SP and PV, with the lateness of PV's clock.
+"""The PI law that gives OP from SP and PV, with the lateness of PV's clock and the filter that PV passes first.
 
 On a span where the law holds OP = kp (e + integral of e / Ti) + constant, so a level regression over short spans,
 each with a constant of its own, gives kp and Ti without the bias that increments of rounded trends bring.
@@ -10,19 +10,26 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
+from scipy.signal import lfilter
 
 from identification.estimation.limits import (
+    FILTER_GAINS,
+    FILTERS,
     LAW_SPAN,
     LAW_SPANS,
     SHIFTS,
 )
 from identification.record import Floats, Mask
 
+LATE_STEP = 0.25
+"""Lateness is told to this part of a sample."""
+
 
 @dataclass(frozen=True, slots=True)
 class ControlLaw:
     """A PI law as found: kp [% OP/% PV], ki [% OP/(% PV sample)], the PV's lateness in samples, the residual of OP
-    (scatter, in % OP, and per sample, shape (n,), less each span's constant) and the share that the law explains."""
+    (scatter, in % OP, and per sample, shape (n,), less each span's constant), the share that the law explains, and
+    the time constant of the filter that PV passes before the controller [samples]."""
 
     kp: float
     ki: float
@@ -31,6 +38,19 @@ class ControlLaw:
     explained: float
     length: int
     residual: Floats = field(repr=False)
+    smoothed: float = 0.0
+
+    def error(self, sp: Floats, pv: Floats) -> Floats:
+        """The error that the controller acts on, shape (n,)."""
+        return sp - smooth(shifted(pv, self.late), self.smoothed)
+
+
+def smooth(x: Floats, samples: float) -> Floats:
+    """The signal behind a filter of first order, shape (n,); its time constant in samples, 0 is none."""
+    if samples <= 0:
+        return x
+    pole = math.exp(-1.0 / samples)
+    return np.asarray(lfilter([1.0 - pole], [1.0, -pole], x - x[0])) + x[0]
 
 
 def shifted(x: Floats, late: float) -> Floats:
@@ -76,9 +96,12 @@ def unbroken(usable: Mask, length: int) -> Mask:
     return whole if whole.sum() >= LAW_SPANS * length else usable.copy()
 
 
-def law(sp: Floats, pv: Floats, op: Floats, usable: Mask, length: int, late: float) -> ControlLaw:
-    """The PI law at a given lateness of PV, spans that do not obey it left out twice."""
-    e = sp - shifted(pv, late)
+def law(
+    sp: Floats, pv: Floats, op: Floats, usable: Mask, length: int, late: float, smoothed: float = 0.0
+) -> ControlLaw:
+    """The PI law at a given lateness of PV and a filter's time constant [samples], spans that do not obey it left
+    out twice."""
+    e = sp - smooth(shifted(pv, late), smoothed)
     n = (e.size // length) * length
     fit = unbroken(usable[:n], length)
     keep = fit
@@ -88,7 +111,9 @@ def law(sp: Floats, pv: Floats, op: Floats, usable: Mask, length: int, late: flo
     moved = centred(op[:n], length)
     left = float((residual[keep] ** 2).mean()) if keep.any() else math.inf
     power = float((moved[keep] ** 2).mean()) if keep.any() else 1.0
-    return ControlLaw(kp, ki, late, math.sqrt(left), 1.0 - left / max(power, 1e-12), length, residual)
+    return ControlLaw(
+        kp, ki, late, math.sqrt(left), 1.0 - left / max(power, 1e-12), length, residual, smoothed
+    )
 
 
 def span_length(n: int, ti_samples: float) -> int:
@@ -108,19 +133,25 @@ def recovered_law(
     """The PI law, with PV's lateness searched in whole samples and then between them.
 
     Under an oscillation a law of the wrong sign, half a period late, gives OP as well; only laws whose gain has the
-    stated one's sign are looked for. late : whether PV's clock may be late at all.
+    stated one's sign are looked for. late : whether PV's clock may be late at all. A filter before the controller
+    makes OP late too, so lateness is searched beside filters as well, up to what it is without one.
     """
     length = span_length(op.size, ti_samples)
 
-    def at(shift: float) -> ControlLaw:
-        return law(sp, pv, op, usable, length, shift)
+    def at(shift: float, smoothed: float = 0.0) -> ControlLaw:
+        return law(sp, pv, op, usable, length, shift, smoothed)
 
     def scatter(x: ControlLaw) -> float:
         return x.scatter if x.kp * stated_kp > 0 and x.kp * x.ki > 0 else math.inf
 
-    best = min((at(s) for s in (SHIFTS if late else (0.0,))), key=scatter)
-    if not late or math.isinf(scatter(best)):
+    shifts = SHIFTS if late else (0.0,)
+    plain = min((at(s) for s in shifts), key=scatter)
+    filtered = min((at(s, f) for f in FILTERS for s in shifts if s <= max(plain.late, 0.0)), key=scatter)
+    best = filtered if scatter(filtered) < FILTER_GAINS * scatter(plain) else plain
+    if math.isinf(scatter(best)):
         return at(0.0)
-    for step in (0.5, 0.25):
-        best = min([best, at(best.late - step), at(best.late + step)], key=scatter)
+    for step in (0.5, 0.25, 0.125, 0.06) if best.smoothed else (0.5, 0.25):
+        later = [at(best.late + way * step, best.smoothed) for way in (-1, 1) if late and step >= LATE_STEP]
+        slower = [at(best.late, best.smoothed * (1 + way * step)) for way in (-1, 1) if best.smoothed]
+        best = min([best, *later, *slower], key=scatter)
     return best

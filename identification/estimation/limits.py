@@ -28,13 +28,23 @@ LAW_SPANS = 12
 """Fewest spans in it."""
 SHIFTS = (-2.0, -1.0, 0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0)
 """Latenesses of PV that are tried [samples]."""
+FILTERS = (0.5, 1.0, 2.0, 4.0, 8.0)
+"""Time constants of a filter between PV and the controller that are tried [samples]."""
+FILTER_GAINS = 0.9
+"""Residual with such a filter, in terms of that without, from which it is believed; ours."""
 STRAIGHT = 0.3
 """Share of samples on straight slopes from which a trend counts as compressed; ours: rounding alone leaves under
 0.27."""
+STRAIGHT_LAW = 0.1
+"""The same from which the controller is not judged: its law acted on what was not stored; ours: trends on a grid have
+no such lines, and a law found on drawn ones was off by half in Ti."""
 GRID_STEP = 0.06
 """Step of values [% of span] from which it is the sensor's and not the historian's, which keeps 0.05 or finer."""
 GRID_STEP_OF_RANGE = 2.0
 """The same where percent is of the recorded range."""
+GRID_MARK = 1.0
+"""Standard deviation of what an effect changes in PV, in steps of PV's grid, from which the grid does not hide it;
+ours: rounding has 0.29, and healthy untidy loops with effects that are not there had 0.13."""
 CLIP_SAMPLES = 15
 """Fewest samples at one extreme that count as clipped."""
 CLIP_RATIO = 4.0
@@ -94,8 +104,16 @@ MISSED = 1.8
 """Spacing of stamps [samples] from which a sample is missing; ours: polling scatters by less."""
 ASKED = 0.5
 """Move of SP within a sample [% PV] from which the kick of OP, not the law, is seen; ours: ramps are slower."""
+LEAST_CYCLE = 20
+"""Fewest samples of a window in which the stem is placed anew: a line and the place are three numbers."""
+LEAST_TI = 4.0
+"""Integral time [samples] from which the law is judged on a thinned recording; ours: under it found settings of sound
+loops are off by up to half."""
 THINNED = 1.5
 """Scans per sample from which a recording is thinned."""
+THINNED_LEAVES = 0.1
+"""Share of OP's variance that stated settings may leave on a thinned recording: the sum of a few values of a noisy
+error is not its integral, and a Kp a third off leaves that much; ours."""
 SETTING_THINNED = 0.3
 """SETTING on thinned recordings: values of PV that were not kept moved OP, which biases a found law; ours: at ten
 scans a sample sound loops of the sample mill reach 0.26."""

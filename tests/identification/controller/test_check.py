@@ -54,6 +54,42 @@ def test_wrong_integral_time_is_found_where_the_loop_seldom_moves() -> None:
     assert found.values["ti_samples"] == pytest.approx(20.0, rel=0.05)
 
 
+def filtered_loop(seed: int, lag: float, step: float) -> tuple[np.ndarray, np.ndarray]:
+    """PV with coarse noise, and OP in steps of a PI that acts on PV behind a filter of that lag [samples], (N,)."""
+    rng = np.random.default_rng(seed)
+    slow = np.convolve(rng.normal(0, 0.6, N + 200), np.ones(200) / np.sqrt(200), mode="valid")[:N]
+    pv = 50.0 + slow + rng.normal(0, 0.15, N)
+    seen, at = np.empty(N), pv[0]
+    for k in range(N):
+        at += (pv[k] - at) * (1.0 - np.exp(-1.0 / lag))
+        seen[k] = at
+    return pv, np.round(law(50.0 - seen, 1.8, 20.0) / step) * step
+
+
+@pytest.mark.parametrize(("lag", "step"), [(1.5, 0.1), (3.0, 0.2), (6.0, 0.1)])
+def test_filter_of_pv_is_no_fault(lag: float, step: float) -> None:
+    """A controller that acts on a filtered PV has neither other settings nor a gap nor a late clock."""
+    pv, op = filtered_loop(7, lag, step)
+    assert judge(np.full(N, 50.0), pv, op, GOOD, StatedSettings(1.8, 20.0))[0] is None
+
+
+def test_wrong_settings_show_behind_a_filter() -> None:
+    """With the filter recovered beside them the true settings are given within 5 %."""
+    pv, op = filtered_loop(8, 3.0, 0.01)
+    found, _ = judge(np.full(N, 50.0), pv, op, GOOD, StatedSettings(1.8, 30.0))
+    assert found is not None
+    assert found.fault is ControllerFault.SETTINGS
+    assert found.values["ti_samples"] == pytest.approx(20.0, rel=0.05)
+    assert found.values["kp"] == pytest.approx(1.8, rel=0.05)
+
+
+def test_integral_within_a_sample_is_not_judged() -> None:
+    """Of a thinned recording with an integral time of two samples nothing is said."""
+    s = recording(2, PLAY)
+    pv, op, sp = s.pv[::10], s.op[::10], s.sp[::10]
+    assert judge(sp, pv, op, GOOD[::10], StatedSettings(0.9, 2.0, 10.0)) == (None, None)
+
+
 def test_thinned_recordings_blame_no_sound_controller() -> None:
     """Of every fifth sample, oscillation and all, neither clock nor settings within a fifth are blamed."""
     s = recording(2, PLAY)
