@@ -48,7 +48,7 @@ def reason_of(said: Answer) -> str:
     if said.verdict == "unexplained":
         return unexplained_reason(said)
     caution = f" The figures are rough: it {said.caution}." if said.caution else ""
-    return sentence(said) + caution
+    return " ".join(part for part in (sentence(said) + caution, said.shown) if part)
 
 
 def json_ready(x: Any) -> Any:

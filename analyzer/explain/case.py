@@ -8,15 +8,21 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from analyzer.assess import cause_of
+from analyzer.cause import NO_CAUSE, Verdict
 from analyzer.config import Config
+from analyzer.decisions import Cause, Fault
 from analyzer.history.series import Series
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import controller
+from analyzer.oscillation import counting, detect
 from analyzer.quality import Prepared, prepare
 from analyzer.sample_clock import onto_clock
 from identification.controller.check import StatedSettings
 from identification.errors import NotAssessedError
-from identification.mismatch.recording import Recording
+from identification.estimation.hammerstein import process_of
+from identification.mismatch.recording import Recording, SeenInCycles
+from identification.models import Pid
 from identification.record import Floats
 
 
@@ -86,6 +92,35 @@ def snapped(series: dict[str, Series], pv: str) -> dict[str, Series]:
     return out
 
 
+def seen_in_cycles(verdict: Verdict) -> SeenInCycles | None:
+    """The faulty valve that a night's verdict on this very recording rests on; None where it blames none.
+
+    The verdict asks each stretch between two turns of OP by itself, so it stands where friction changes from slip to
+    slip; what the explanation simulates begins from there.
+    """
+    m = verdict.measured
+    if verdict.cause is not Cause.VALVE or m is None or m.trials is None:
+        return None
+    fit = m.stick_slip if verdict.fault is Fault.STICTION and m.stick_slip is not None else m.play
+    valve = fit.valve.valve
+    if valve is None:
+        return None
+    return SeenInCycles(process_of(m.window, fit), valve, m.trials.count, m.trials.agreeing)
+
+
+def verdict_on(spec: LoopSpec, prepared: Prepared, config: Config) -> Verdict:
+    """What a night would say of this very recording: why it oscillates, if it does."""
+    found = detect(prepared.record, config.oscillation)
+    if counting(found) is None:
+        return NO_CAUSE
+    return cause_of(prepared, found, pid_of(spec, prepared), config, spec.type)
+
+
+def pid_of(spec: LoopSpec, prepared: Prepared) -> Pid | None:
+    """The stated controller in percent and seconds; None where it is not known."""
+    return controller(spec, prepared.scale.span)
+
+
 MOST_SAMPLES, STRETCH_SAMPLES = 40_000, 15_000
 """Samples up to which a recording is explained whole, and length of the most telling stretch of a longer one; ours:
 20 s of processor time either way, for a long recording holds more that asks for an effect."""
@@ -127,6 +162,7 @@ def case(
     if float(np.ptp(r.op)) == 0 or float(np.ptp(r.pv)) == 0:
         raise NotAssessedError(f"{spec.loop}: needs OP and PV that move, one of them stands still")
     stamps = raw.stamp_s[~raw.bad]
+    verdict = verdict_on(spec, prepared, config)
     subject = Recording(
         None if r.sp_estimated else r.sp,
         r.pv,
@@ -138,5 +174,7 @@ def case(
         not prepared.scale.recorded,
         neighbours(spec, specs, series, prepared),
         spec.type.strip().lower(),
+        seen_in_cycles(verdict),
+        verdict.measured is not None and verdict.cause is not Cause.VALVE,
     )
     return Case(spec, prepared, subject, shortened)

@@ -12,7 +12,7 @@ from analyzer.explain.user_model import Brought
 from identification.estimation.prediction_error import Fitted
 from identification.mismatch.answer import Answer
 from identification.mismatch.catalogue import EFFECTS, fault
-from identification.mismatch.cross_validation import anchored
+from identification.mismatch.cross_validation import course
 from identification.mismatch.curves.controller import by_stated_law
 from identification.mismatch.curves.drawn import Drawing, Shape
 from identification.mismatch.curves.stretches import busiest
@@ -119,18 +119,15 @@ def simulations(found: Explanation, brought: Brought | None) -> dict[str, Floats
     """PV as simulated [% of span], anchored as for the proof, shape (n,) each."""
     p = found.p
     fits = {"baseline": found.plain} | ({"model": found.best} if found.accepted else {})
-    window = found.proof.window if found.proof is not None else 0
-    out = {
-        kind: p.inputs.level + anchored(p.y, simulate(p.inputs, fit.model.c), window)
-        for kind, fit in fits.items()
-    }
+    window, placed = (0, False) if found.proof is None else (found.proof.window, found.proof.placed)
+    out = {kind: p.inputs.level + course(p, fit.model.c, window, placed) for kind, fit in fits.items()}
     return out if brought is None else out | {"brought": brought.simulated}
 
 
 def weight(found: Explanation, s: Recording, at: Located) -> Floats:
     """How much each sample matters for the verdict, shape (n,)."""
     n = s.pv.size
-    marked = found.recorder or found.controller
+    marked = found.finding
     if marked is not None and not marked.where.all():
         return np.concatenate((marked.where.astype(float), np.zeros(n)))[:n]
     if found.accepted:
@@ -194,7 +191,7 @@ def feature_views(found: Explanation, s: Recording, at: Located) -> tuple[Featur
 
 def found_shape(found: Explanation, s: Recording, said: Answer) -> Shape | None:
     """The picture of the first effect found."""
-    inputs, finding = found.p.inputs, found.recorder or found.controller
+    inputs, finding = found.p.inputs, found.finding
     if finding is not None:
         free = found.plain.model.c.copy()
         free[Slot.CLIP_HI], free[Slot.CLIP_LO] = np.inf, -np.inf

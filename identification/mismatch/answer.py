@@ -19,6 +19,7 @@ from identification.mismatch.identifiability import too_short, unanswered
 from identification.mismatch.location.locate import Located
 from identification.mismatch.location.where import located_in, where_of
 from identification.mismatch.recording import Finding, Recording
+from identification.mismatch.starts.from_cycles import is_friction
 from identification.models import Estimate
 from identification.simulation.effect import Variant
 from identification.simulation.open_loop import simulate
@@ -33,6 +34,11 @@ LIVES = {
 """Block in which a misfit without a name is looked for first, by the feature that carries it; else the process."""
 
 
+STRAYS = (
+    "Simulated with one constant friction PV strays all the same, for the friction differs from slip to slip: the "
+    "stretches are the proof, not the misfit."
+)
+"""What is said of a valve that the cycles show and a simulation with constant friction does not."""
 ONE_MOVE_ONLY = "rests on one move of OP, of which nothing is left to prove it on; another recording would"
 """What a recording of one experiment lacks."""
 
@@ -52,7 +58,8 @@ class EffectFound:
 class Answer:
     """What `triage explain` says of one loop, in numbers.
 
-    note : why there is no name; caution : what the recording lacks although there is one.
+    note : why there is no name; caution : what the recording lacks although there is one; shown : what shows the
+    first effect beside the fit.
     """
 
     verdict: str
@@ -64,6 +71,7 @@ class Answer:
     remaining: float | None
     note: str = field(default="")
     caution: str = field(default="")
+    shown: str = field(default="")
 
 
 def finding_effect(finding: Finding | None, s: Recording) -> EffectFound | None:
@@ -91,7 +99,7 @@ def parameters_of(p: Problem, fit: Fitted, row: Variant) -> dict[str, Estimate]:
 
 
 def effects_of(found: Explanation, s: Recording, proof: HeldOut | None) -> tuple[EffectFound, ...]:
-    """Every effect found, the likeliest first."""
+    """Every effect found, the likeliest first: what is larger than a grid before the grid."""
     gates = [e for e in (finding_effect(f, s) for f in (found.recorder, found.controller)) if e is not None]
     rows = found.best.model.added
     physics = [
@@ -104,7 +112,7 @@ def effects_of(found: Explanation, s: Recording, proof: HeldOut | None) -> tuple
         )
         for i, row in enumerate(rows)
     ]
-    return (*gates, *physics)
+    return (*physics, *gates) if found.finding is None else (*gates, *physics)
 
 
 def fit_of(proof: HeldOut, dt_s: float) -> dict[str, Any]:
@@ -160,6 +168,7 @@ def answer(found: Explanation, s: Recording) -> Answer:
         remaining(found),
         f"Not told: {lacking}." if lacking and (verdict, block) == ("unexplained", "none") else _note(found),
         (lacking or (ONE_MOVE_ONLY if found.unproven else "")) if effects else "",
+        shown_by(found),
     )
 
 
@@ -169,11 +178,28 @@ def verdict_of(
     """The verdict and its block; what is left over, and what a record cannot tell, has no name."""
     if found.refuted and not found.accepted and not any(found_first(found)):
         return "unexplained", "none"
-    if found.left > 0 and not any(found_first(found)):
+    if found.left > 0 and not any(found_first(found)) and not by_cycles(found):
         return "unexplained", LIVES.get(at.carrying[0].name, "process") if at.carrying else "process"
     if effects and not (insensitive and effects[0].block in (Block.VALVE, Block.PROCESS)):
         return effects[0].name, effects[0].block
     return ("unexplained", "none") if lacking else ("none", "none")
+
+
+def by_cycles(found: Explanation) -> bool:
+    """Whether the first effect is a faulty valve that the loop's cycles show."""
+    return found.cycles is not None and bool(found.accepted) and is_friction(found.accepted[0].name)
+
+
+def shown_by(found: Explanation) -> str:
+    """What the cycles show of the first effect, in a sentence; empty where they are not asked."""
+    if not by_cycles(found) or found.cycles is None:
+        return ""
+    seen = found.cycles
+    text = (
+        f"In {100 * seen.agreeing:.0f} % of {seen.stretches} stretches between two turns of OP, PV goes as behind "
+        "this valve and not as behind a free one."
+    )
+    return text if found.proof is None or found.proof.carries else f"{text} {STRAYS}"
 
 
 def found_first(found: Explanation) -> tuple[bool, bool]:

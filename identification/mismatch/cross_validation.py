@@ -17,14 +17,21 @@ from identification.estimation.limits import (
     WINDOW_TIMES,
 )
 from identification.estimation.noise import whitened
-from identification.estimation.prediction_error import Fitted, Model, Problem, descend, gain
+from identification.estimation.prediction_error import Fitted, Model, Problem, bounds, descend, gain
 from identification.mismatch.effect import Effect
+from identification.mismatch.restarts import simulated_anew
 from identification.mismatch.starts.screening import at_inlet
 from identification.record import Floats
 from identification.simulation.open_loop import simulate
 from identification.simulation.parameters import Slot
 
 BLOCKS = 20
+LEAST_FIT = 1.0
+"""Fit on held-out data [%] from which a model goes with PV; ours: a stem that never moves has 0."""
+BOUND_SHARE = 0.005
+"""Part of a constant's range within which it stands at the end of it; ours."""
+ENDS_OF_SIGNAL = ("opspan", "pvspan")
+"""Scales of constants that are places in a signal's range."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,7 +90,8 @@ class HeldOut:
     """Before and after on the held-out part: gain of the innovations, and misfit of the simulations.
 
     overall : misfit over the whole record of the models fitted to all of it, which is what pages draw; window :
-    samples after which the simulations begin anew, 0 for one run over all.
+    samples after which the simulations begin anew, 0 for one run over all; placed : whether the stem of a valve with
+    friction is then placed anew too (restarts.py).
     """
 
     gain: float
@@ -91,6 +99,7 @@ class HeldOut:
     held: tuple[Misfit, Misfit]
     overall: tuple[Misfit, Misfit]
     window: int = 0
+    placed: bool = False
 
     @property
     def falls(self) -> bool:
@@ -98,9 +107,14 @@ class HeldOut:
         return self.overall[1].rmse < self.overall[0].rmse
 
     @property
+    def follows(self) -> bool:
+        """Whether the better model goes with PV at all on held-out data, and not merely less far astray."""
+        return self.held[1].fit_pct >= LEAST_FIT
+
+    @property
     def carries(self) -> bool:
-        """Whether the misfit falls, on held-out data and over the whole."""
-        return self.share > 0.0 and self.falls
+        """Whether the misfit falls, on held-out data and over the whole, to less than PV's own motion."""
+        return self.share > 0.0 and self.falls and self.follows
 
     @property
     def share(self) -> float:
@@ -109,8 +123,11 @@ class HeldOut:
         return 1.0 - after / max(before, 1e-30)
 
 
-def held_out(p: Problem, worse: Fitted, better: Fitted) -> HeldOut:
+def held_out(p: Problem, worse: Fitted, better: Fitted, cycle: int = 0) -> HeldOut:
     """Both models fitted anew to the first part of the record and compared on the rest.
+
+    cycle : samples of a cycle of a loop whose cycles show a valve with friction, 0 for any other; they are compared
+    over such windows too, the stem placed anew in each.
 
     A model's START is of the first sample, so the rest is simulated from the beginning. They are compared over the
     whole rest, and where load drowns the difference there, over windows of some time constants of the plain loop.
@@ -127,7 +144,40 @@ def held_out(p: Problem, worse: Fitted, better: Fitted) -> HeldOut:
     window = max(int(WINDOW_TIMES * float(c[Slot.T] + c[Slot.L]) / p.inputs.dt_s), WINDOW_SAMPLES)
     final = [simulate(p.inputs, m.model.c) for m in (worse, better)]
     whole, windowed = (_compared(p.y, simulated, final, cut, won, size) for size in (0, window))
-    return windowed if windowed.carries and not whole.carries else whole
+    if whole.carries:
+        return whole
+    if cycle:
+        anew = _by_cycle(p, [worse, better], fits, cut, won, cycle)
+        return windowed if windowed.carries and windowed.share > anew.share else anew
+    return windowed if windowed.carries else whole
+
+
+def course(p: Problem, c: Floats, window: int, placed: bool) -> Floats:
+    """PV's deviation [% PV], shape (n,), as drawn and judged: anchored in windows, the stem placed anew or not."""
+    return anchored(p.y, simulated_anew(p, c, window) if placed else simulate(p.inputs, c), window)
+
+
+def _part_misfit(left: Floats, still: Floats) -> Misfit:
+    """Misfit of what a simulation leaves of a part of PV, and of what a straight line of load alone leaves."""
+    rmse = float(np.std(left))
+    return Misfit(rmse, 100.0 * (1.0 - rmse / max(float(np.std(still)), 1e-12)))
+
+
+def _by_cycle(
+    p: Problem, final: list[Fitted], early: list[Fitted], cut: int, won: float, window: int
+) -> HeldOut:
+    """Compared from cycle to cycle, the stem placed anew in each."""
+
+    still = p.y - anchored(p.y, np.zeros(p.y.size), window)
+    parts = (slice(cut), slice(cut, None), slice(None))
+
+    def misfits(fit: Fitted) -> list[Misfit]:
+        left = p.y - course(p, fit.model.c, window, True)
+        return [_part_misfit(left[part], still[part]) for part in parts]
+
+    (seen0, unseen0, _), (seen1, unseen1, _) = misfits(early[0]), misfits(early[1])
+    drawn = (misfits(final[0])[2], misfits(final[1])[2])
+    return HeldOut(won, (seen0, seen1), (unseen0, unseen1), drawn, window, True)
 
 
 def _compared(
@@ -143,11 +193,31 @@ def _refit(p: Problem, model: Model) -> Fitted:
     return descend(p, model, SCREEN_STEPS)
 
 
+def runs_out(p: Problem, fit: Fitted) -> bool:
+    """Whether a constant of the effect added last ran to the far end of what it may be: the data want another name.
+
+    A bound at zero, and one that is an end of a signal's range, is where an effect begins, and no far end.
+    """
+    for q in fit.model.added[-1].params:
+        if q.scale in ENDS_OF_SIGNAL:
+            continue
+        value, (low, high) = float(fit.model.c[q.slot]), bounds(p.inputs, fit.model.c, q)
+        near = BOUND_SHARE * (high - low)
+        at_high = high != 0.0 and value > (high * (1.0 - BOUND_SHARE) if q.log else high - near)
+        at_low = not q.log and low != 0.0 and value < low + near
+        if at_high or at_low:
+            return True
+    return False
+
+
 def passes(p: Problem, worse: Fitted, better: Fitted, effect: Effect) -> bool:
-    """Whether the effect stands: spread over the record and, where it is bound to no time, on held-out spans.
+    """Whether the effect stands: its constants within their range, spread over the record and, where it is bound to
+    no time, on held-out spans.
 
     What an effect that is bound to a time will do later does not follow from what it did, so no span is held out.
     """
+    if runs_out(p, better):
+        return False
     if effect.needs == "steps":
         return at_inlet(p, worse)
     if effect.timed:

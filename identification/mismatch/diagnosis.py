@@ -8,12 +8,22 @@ import numpy as np
 
 from identification.controller.check import LATE_SAMPLES, judge
 from identification.controller.pi_regression import ControlLaw, shifted
-from identification.estimation.limits import CEILING_PENALTY, CEILING_SHARE, FULL_STEPS, PROVEN, ROUNDS, TIE
+from identification.estimation.limits import (
+    CEILING_PENALTY,
+    CEILING_SHARE,
+    FULL_STEPS,
+    GRID_MARK,
+    LEAST_CYCLE,
+    PROVEN,
+    ROUNDS,
+    STRAIGHT_LAW,
+    TIE,
+)
 from identification.estimation.prediction_error import Fitted, Model, Problem, descend, gain
 from identification.mismatch import recording_faults
 from identification.mismatch.catalogue import CANDIDATES, CONTROLLER_FAULTS, EFFECTS, RECORDER_FAULTS, fault
 from identification.mismatch.cross_validation import held_out, is_one_move, passes
-from identification.mismatch.effect import Ends
+from identification.mismatch.effect import Ends, Friction
 from identification.mismatch.explanation import Explanation
 from identification.mismatch.forward_selection import (
     Candidate,
@@ -26,11 +36,13 @@ from identification.mismatch.forward_selection import (
     silent,
 )
 from identification.mismatch.lack_of_fit import ceiling
-from identification.mismatch.recording import Finding, Recording
+from identification.mismatch.recording import STEP, Finding, Recording, SeenInCycles
+from identification.mismatch.starts.from_cycles import from_cycles, is_friction
 from identification.mismatch.starts.screening import CandidateInputs, candidate_inputs
+from identification.models import Stiction
 from identification.record import Floats, Mask
 from identification.simulation.effect import Variant
-from identification.simulation.open_loop import ModelInputs
+from identification.simulation.open_loop import ModelInputs, simulate
 from identification.simulation.parameters import Slot, neutral
 
 
@@ -46,6 +58,8 @@ def recorder_finding_of(s: Recording) -> Finding | None:
 def controller_finding_of(s: Recording, recorder: Finding | None) -> tuple[Finding | None, ControlLaw | None]:
     """What clock and controller did, where there is a controller to judge and a recording fit for it."""
     if s.sp is None or s.stated is None or ends(recorder) is Ends.ALL:
+        return None, None
+    if any(recording_faults.straightened(x, STRAIGHT_LAW) for x in (s.pv, s.op)):
         return None, None
     found, law = judge(s.sp, s.pv, s.op, s.usable & (s.op > 0.05) & (s.op < 99.95), s.stated)
     if found is None:
@@ -118,26 +132,58 @@ def explain(s: Recording, tell: Progress = silent, brought: Floats | None = None
         plain,
         plain,
         recorder=recorder,
+        cycles=s.cycles,
         controller=controller,
         law=law,
         late_s=late_s,
     )
-    if any(ends(x) is not Ends.NOTHING for x in (recorder, controller)):
+    if any(ends(x) is Ends.ALL for x in (recorder, controller)):
         return found
-    return carried_over(physics(found, tell, s.kind))
+    return carried_over(beyond_the_grid(physics(found, tell, s)))
+
+
+def beyond_the_grid(found: Explanation) -> Explanation:
+    """The explanation without effects that move PV by less than the steps in which a recorder left it."""
+    step = 0.0 if found.recorder is None else found.recorder.values.get(STEP, 0.0)
+    count = len(found.accepted)
+    told = int(count > 0 and found.cycles is not None and is_friction(found.accepted[0].name))
+    while (
+        count > told
+        and step > 0
+        and mark(found if count == len(found.accepted) else first_effects(found, count)) < (GRID_MARK * step)
+    ):
+        count -= 1
+    return found if count == len(found.accepted) else first_effects(found, count)
+
+
+def mark(found: Explanation) -> float:
+    """Standard deviation of what the effects together change in the simulated PV [% PV]."""
+    plain, best = (simulate(found.p.inputs, fit.model.c) for fit in (found.plain, found.best))
+    return float(np.std(best - plain))
 
 
 def carried_over(found: Explanation) -> Explanation:
-    """The explanation with its proof: as many effects, in the order taken, as carry over to held-out data."""
+    """The explanation with its proof: as many effects, in the order taken, as carry over to held-out data.
+
+    A valve that the loop's cycles show is proven by them.
+    """
     names = tuple(r.name for r in found.accepted)
     for count in range(len(names), 0, -1):
         kept = found if count == len(names) else first_effects(found, count)
-        proof = held_out(kept.p, kept.plain, kept.best)
+        by_cycles = count == 1 and found.cycles is not None and is_friction(names[0])
+        proof = held_out(kept.p, kept.plain, kept.best, cycle_of(found) if by_cycles else 0)
         unproven = not proof.carries and proof.falls and is_one_move(found.p)
-        if proof.carries or unproven or all(EFFECTS[name].timed for name in names[:count]):
+        timed = proof.falls and all(EFFECTS[name].timed for name in names[:count])
+        if proof.carries or unproven or by_cycles or timed:
             return replace(kept, proof=proof, refuted=names[count:], unproven=unproven)
     proof = held_out(found.p, found.plain, found.plain)
     return replace(found, best=found.plain, accepted=(), before=(), proof=proof, refuted=names)
+
+
+def cycle_of(found: Explanation) -> int:
+    """Samples of one cycle of a loop whose cycles show a faulty valve: two stretches between turns of OP."""
+    stretches = 0 if found.cycles is None else found.cycles.stretches
+    return max(2 * found.p.y.size // max(stretches, 1), LEAST_CYCLE)
 
 
 def first_effects(found: Explanation, count: int) -> Explanation:
@@ -151,27 +197,31 @@ def first_effects(found: Explanation, count: int) -> Explanation:
     return replace(found, best=best, accepted=found.accepted[:count], before=found.before[:count])
 
 
-def physics(found: Explanation, tell: Progress, kind: str = "") -> Explanation:
-    """Add effects of the catalogue one by one, as long as one passes."""
-    p, best = integrating_or_first_order(found.p, found.plain, kind)
+def physics(found: Explanation, tell: Progress, s: Recording) -> Explanation:
+    """Add effects of the catalogue one by one, as long as one passes; first a valve that the cycles show."""
+    p, best = integrating_or_first_order(found.p, found.plain, s.kind)
     found = replace(found, p=p, plain=best)
     accepted: list[Candidate] = []
     before: list[Fitted] = []
     first: tuple[Candidate, ...] = ()
     candidates: list[Candidate] = []
     for _ in range(ROUNDS):
-        x = candidate_inputs(p, best, kind)
+        x = candidate_inputs(p, best, s.circumstances)
         candidates = compete(x, best, CANDIDATES, tell)
+        if s.cycles is not None and not accepted:
+            candidates = with_cycles(x.p, best, s.cycles, candidates)
         first = first or tuple(candidates)
-        winner = proven(x.p, best, candidates)
+        winner = shown_by_cycles(s, candidates) if not accepted else None
+        winner = winner or proven(x.p, best, candidates)
         if winner is None:
             break
         accepted.append(winner)
         before.append(best)
         p, best = x.p, descend(x.p, winner.fit.model, FULL_STEPS)
-    if len(accepted) > 1:
+    told = accepted and shown_by_cycles(s, [accepted[0]]) is not None
+    if len(accepted) > 1 and not told:
         tell("other sets of effects")
-        x = candidate_inputs(p, best, kind)
+        x = candidate_inputs(p, best, s.circumstances)
         best, accepted = replacement_step(x, best, accepted, tell)
     won, weights = ceiling(p, best)
     least = max(CEILING_PENALTY, CEILING_SHARE * gain(best, found.plain))
@@ -180,6 +230,31 @@ def physics(found: Explanation, tell: Progress, kind: str = "") -> Explanation:
         left = max(left, candidates[0].penalised)
     found = replace(found, p=p, best=best, accepted=tuple(accepted), before=tuple(before), first=first)
     return replace(found, left=left if left > 0 else 0.0)
+
+
+def with_cycles(p: Problem, near: Fitted, seen: SeenInCycles, candidates: list[Candidate]) -> list[Candidate]:
+    """The candidates and those begun where the cycles show a valve, best first; of each name the better."""
+    begun = []
+    for fit in from_cycles(p, near, seen, CANDIDATES):
+        won = gain(fit, near)
+        begun.append(Candidate(fit, won, won - penalty(fit.model.added[-1])))
+    best: dict[str, Candidate] = {}
+    for c in sorted([*candidates, *begun], key=lambda c: -c.penalised):
+        best.setdefault(f"{c.name} {c.row.label}", c)
+    return list(best.values())
+
+
+def shown_by_cycles(s: Recording, candidates: list[Candidate]) -> Candidate | None:
+    """The best play or stick-slip, where the loop's cycles show a faulty valve; None where they do not.
+
+    Cycles that show a jump are believed: a slip now and then late hides it from one constant friction.
+    """
+    if s.cycles is None:
+        return None
+    rubs = [c for c in candidates if is_friction(c.name)]
+    jumps = [c for c in rubs if EFFECTS[c.name].friction is Friction.STICKS]
+    first = jumps if isinstance(s.cycles.valve, Stiction) and jumps else rubs
+    return first[0] if first else None
 
 
 def replacement_step(

@@ -44,8 +44,8 @@ class Ends(StrEnum):
 
     ALL = "all"
     """Neither controller nor physics is judged after it."""
-    PHYSICS = "physics"
-    """The controller is judged, the physics is fitted plain."""
+    SMALLER = "smaller"
+    """Both are judged; an effect smaller than what the finding leaves is not told."""
     NOTHING = "nothing"
     """Both are judged."""
 

@@ -6,9 +6,11 @@ from dataclasses import dataclass, field
 
 from identification.controller.pi_regression import ControlLaw
 from identification.estimation.prediction_error import Fitted, Problem
+from identification.mismatch.catalogue import fault
 from identification.mismatch.cross_validation import HeldOut
+from identification.mismatch.effect import Ends
 from identification.mismatch.forward_selection import Candidate
-from identification.mismatch.recording import Finding
+from identification.mismatch.recording import Finding, SeenInCycles
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,7 +22,7 @@ class Explanation:
     the candidates of the first round; law : the control law recovered; late_s : PV's lateness that was taken out [s];
     left : gain of a flexible model beyond its least, 0 where nothing is left; proof : plain and best on held-out
     data; refuted : names of effects that explain the fitted part and not the rest; unproven : whether OP moved once,
-    so that nothing is left to prove the effects on.
+    so that nothing is left to prove the effects on; cycles : the faulty valve that the loop's cycles show.
     """
 
     p: Problem = field(repr=False)
@@ -37,3 +39,13 @@ class Explanation:
     proof: HeldOut | None = None
     refuted: tuple[str, ...] = ()
     unproven: bool = False
+    cycles: SeenInCycles | None = None
+
+    @property
+    def finding(self) -> Finding | None:
+        """The finding about recorder or controller that is named first; None where an effect stands before it, as one
+        does that is larger than the steps of PV's grid."""
+        ends = Ends.NOTHING if self.recorder is None else fault(self.recorder.name).ends
+        if self.accepted and self.controller is None and ends is Ends.SMALLER:
+            return None
+        return self.recorder or self.controller

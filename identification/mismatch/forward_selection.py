@@ -29,6 +29,7 @@ from identification.estimation.prediction_error import (
 from identification.estimation.start_values import plain_processes
 from identification.mismatch.catalogue import CANDIDATES, EFFECTS
 from identification.mismatch.effect import Friction
+from identification.mismatch.recording import Circumstances
 from identification.mismatch.starts.screening import CandidateInputs, screened, span_of, start_models
 from identification.mismatch.starts.stick_slip import fit_sticking
 from identification.mismatch.starts.two_modes import mode_starts
@@ -102,7 +103,11 @@ def applies(x: CandidateInputs, near: Fitted, row: Variant) -> bool:
     taken = {p.slot for r in near.model.added for p in r.params}
     if row.name in near.names or taken & {p.slot for p in row.params}:
         return False
-    if row.types and x.kind in KNOWN_TYPES and x.kind not in row.types:
+    if row.types and x.known.kind in KNOWN_TYPES and x.known.kind not in row.types:
+        return False
+    if row.needs == "every scan" and not x.known.every_scan:
+        return False
+    if x.known.free_valve and EFFECTS[row.name].friction is not None:
         return False
     if row.needs == "neighbour":
         return x.p.inputs.neighbour is not None
@@ -180,10 +185,11 @@ def integrating_or_first_order(p: Problem, free: Fitted, kind: str) -> tuple[Pro
     does as well with one constant fewer, the plain loop is one that settles within the record.
     """
     rows = [v for v in CANDIDATES if v.replaces]
+    x = CandidateInputs(p, (), Circumstances(kind))
     longest = SETTLES * p.inputs.dt_s * p.y.size
-    if float(free.model.c[Slot.T]) <= longest or not applies(CandidateInputs(p, (), kind), free, rows[0]):
+    if float(free.model.c[Slot.T]) <= longest or not applies(x, free, rows[0]):
         return p, free
-    ended = candidate(p, free, start_models(CandidateInputs(p, (), kind), free, rows[0]), FULL_STEPS)
+    ended = candidate(p, free, start_models(x, free, rows[0]), FULL_STEPS)
     if ended.gain < -SAME:
         return p, free
     held = replace(p, inputs=replace(p.inputs, longest_s=longest))

@@ -6,7 +6,39 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from identification.controller.check import StatedSettings
+from identification.estimation.limits import THINNED
+from identification.models import Backlash, Fopdt, Stiction
 from identification.record import Floats, Mask
+
+TYPICAL_SCAN_S = 1.0
+"""Scan of a controller that is not stated [s]; most control systems execute loops at 0.25 to 1 s."""
+
+
+@dataclass(frozen=True, slots=True)
+class SeenInCycles:
+    """A faulty valve that the loop's own cycles show, with the process behind it.
+
+    stretches : between two turns of OP, each a trial of its own; agreeing : share of them in which PV goes as behind
+    this valve and not as behind a free one [-].
+    """
+
+    process: Fopdt
+    valve: Backlash | Stiction
+    stretches: int
+    agreeing: float
+
+
+@dataclass(frozen=True, slots=True)
+class Circumstances:
+    """What is known of a recording beside its trends, by which effects are asked about or not.
+
+    kind : the loop's type, lower case; every_scan : whether every scan of the controller is recorded; free_valve :
+    whether the loop cycles and its cycles do not convict the valve.
+    """
+
+    kind: str = ""
+    every_scan: bool = True
+    free_valve: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -16,7 +48,8 @@ class Recording:
     sp : shape (n,) [% PV], None where not recorded; pv, op : shape (n,) [% of span]; usable : bool, shape (n,);
     dt_s [s]; stamp_s : stamps as logged [s]; stated : the controller as the plant states it; ranged : whether PV's
     range is stated; neighbours : OPs of other loops on the same clock, each shape (n,);
-    kind : the loop's type as stated, lower case.
+    kind : the loop's type as stated, lower case; cycles : the faulty valve that its cycles show, None where they show
+    none; free_valve : whether it cycles and its cycles convict no valve.
     """
 
     sp: Floats | None
@@ -29,6 +62,18 @@ class Recording:
     ranged: bool = True
     neighbours: tuple[Floats, ...] = ()
     kind: str = ""
+    cycles: SeenInCycles | None = None
+    free_valve: bool = False
+
+    @property
+    def circumstances(self) -> Circumstances:
+        """By which effects are asked about or not; a controller that is not stated has TYPICAL_SCAN_S."""
+        thinned = self.dt_s >= THINNED * TYPICAL_SCAN_S if self.stated is None else self.stated.thinned
+        return Circumstances(self.kind, not thinned, self.free_valve)
+
+
+STEP = "step_pct"
+"""Name of the number that says in which steps a finding leaves PV [% PV]."""
 
 
 @dataclass(frozen=True, slots=True)

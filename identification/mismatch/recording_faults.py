@@ -13,7 +13,7 @@ from identification.estimation.limits import (
     MISSED,
     STRAIGHT,
 )
-from identification.mismatch.recording import Finding
+from identification.mismatch.recording import STEP, Finding
 from identification.record import Floats, Mask
 
 
@@ -40,13 +40,17 @@ def on_grid(gaps: Floats) -> bool:
     return float(np.mean(np.abs(gaps / unit - np.round(gaps / unit)) < 0.05)) > 0.6
 
 
+def straightened(x: Floats, share: float) -> bool:
+    """Whether at least that share of a trend lies on straight lines that no grid makes."""
+    return float(straight(x).mean()) >= share and not on_grid(level_gaps(x))
+
+
 def compression(pv: Floats) -> Finding | None:
     """Straight segments whose breaks stand on no grid (swinging door and the like)."""
-    found = straight(pv)
-    share = float(found.mean())
-    if share < STRAIGHT or on_grid(level_gaps(pv)):
+    if not straightened(pv, STRAIGHT):
         return None
-    return Finding({"straight_share": share}, found)
+    found = straight(pv)
+    return Finding({"straight_share": float(found.mean())}, found)
 
 
 def quantization(pv: Floats, ranged: bool) -> Finding | None:
@@ -57,7 +61,7 @@ def quantization(pv: Floats, ranged: bool) -> Finding | None:
         return None
     if float(gaps.max()) > 4.0 * float(gaps.mean()):
         return None
-    return Finding({"step_pct": float(gaps.mean())}, np.ones(pv.size, dtype=bool))
+    return Finding({STEP: float(gaps.mean())}, np.ones(pv.size, dtype=bool))
 
 
 def clipped(pv: Floats) -> Finding | None:

@@ -36,9 +36,10 @@ class Variant:
 
     delays : parameters whose start is taken off the dead time, which stood for them in the plain loop; replaces :
     parameters of the plain loop that the effect makes meaningless; fixed : parameters set, not searched; needs : what
-    is located in the recording before it can be tried (steps, line, neighbour); types : loop types that can have it,
-    any where empty or the type is not known; modes : time constants tried for a second mode, in that of the plain
-    loop, and the share that its gain may have; label : told apart by; penalty : added to that of the parameters;
+    has to be in the recording before it can be tried (steps, line, neighbour, every scan of the controller); types :
+    loop types that can have it, any where empty or the type is not known; modes : time constants tried for a second
+    mode, in that of the plain loop, and the share that its gain may have; label : told apart by; penalty : added to
+    that of the parameters;
     enter : turns the plain loop's parameters, in place, where they change their meaning.
     """
 

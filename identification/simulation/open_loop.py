@@ -107,8 +107,12 @@ def simulate(inputs: ModelInputs, c: Floats) -> Floats:
     c : ndarray of shape (SIZE,)
         Constants (slots.py).
     """
+    return from_flow(inputs, c, through_valve(inputs, c))
+
+
+def from_flow(inputs: ModelInputs, c: Floats, through: Floats) -> Floats:
+    """The same for a flow through the valve during each sample, shape (n,) [% OP]."""
     dt = inputs.dt_s
-    through = through_valve(inputs, c)
     rich = bool((c[WITHIN] != NEUTRAL[WITHIN]).any())
     vessel_of = _rich if rich else _plain
     out = vessel_of(inputs, c, through)

@@ -53,7 +53,7 @@ def fitted(cases: pathlib.Path, tag: str, effect: str):
     inputs = inputs_of(s)
     begun = prepared(inputs, s.pv - inputs.level, without_spikes(s.pv, s.usable))
     p, plain = integrating_or_first_order(*begun, s.kind)
-    x = candidate_inputs(p, plain, s.kind)
+    x = candidate_inputs(p, plain, s.circumstances)
     rows = tuple(v for v in CANDIDATES if kin(v.name, effect, KIN))
     best = compete(x, plain, rows)[0]
     return x.p, descend(x.p, best.fit.model, FULL_STEPS)

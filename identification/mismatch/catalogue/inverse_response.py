@@ -17,6 +17,7 @@ def pv_after_step(d: Drawing) -> Shape:
 EFFECT = Effect(
     name="inverse-response",
     block=Block.PROCESS,
+    needs="every scan",
     sentence="After a move of OP, PV first goes the wrong way.",
     check=("Expected of boilers, reboilers and the like; tune slower than the wrong-way part lasts."),
     tests={

@@ -41,7 +41,7 @@ EFFECT = Fault(
     },
     order=2,
     find=find,
-    ends=Ends.PHYSICS,
+    ends=Ends.SMALLER,
     numbers=numbers,
     drawn=drawn,
     titles={"step_pct": "Step of values"},

@@ -121,7 +121,7 @@ def where_of(found: Explanation, s: Recording, block: str, at: Located) -> dict[
     at : Located
         Of the plain loop's innovations (of the last model's, where something is left over).
     """
-    marked = found.recorder or found.controller
+    marked = found.finding
     told: dict[str, Any] = {"features": features_said(at), "after_reversals": _carries(at, "after_reversals")}
     if marked is not None:
         spans = masked_spans(marked.where[: s.pv.size])

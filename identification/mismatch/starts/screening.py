@@ -10,11 +10,14 @@ from scipy.ndimage import median_filter
 
 from identification.estimation.noise import whitened
 from identification.estimation.prediction_error import Fitted, Model, Problem, scales, sensitivities
+from identification.mismatch.recording import Circumstances
 from identification.record import Floats, Mask
 from identification.simulation.effect import Variant
 from identification.simulation.open_loop import simulate
 from identification.simulation.parameters import STEPS, Slot, neutral
 
+ANY = Circumstances()
+"""Nothing that would leave an effect out."""
 LINES = 4
 """Lines that are tried."""
 LEAD = 200
@@ -120,17 +123,18 @@ def line_frequencies(p: Problem, fit: Fitted) -> tuple[float, ...]:
 
 @dataclass(frozen=True, slots=True)
 class CandidateInputs:
-    """A problem with the places and frequencies at which a load may act, and the loop's type where known."""
+    """A problem with the places and frequencies at which a load may act, and the circumstances of its recording."""
 
     p: Problem
     omegas: tuple[float, ...]
-    kind: str = ""
+    known: Circumstances = ANY
 
 
-def candidate_inputs(p: Problem, fit: Fitted, kind: str = "") -> CandidateInputs:
+def candidate_inputs(p: Problem, fit: Fitted, known: Circumstances = ANY) -> CandidateInputs:
     """Steps and a line located in what a fit leaves."""
     held = p.inputs.step_at if any(r.needs == "steps" for r in fit.model.added) else step_places(p, fit)
-    return CandidateInputs(replace(p, inputs=replace(p.inputs, step_at=held)), line_frequencies(p, fit), kind)
+    located = replace(p, inputs=replace(p.inputs, step_at=held))
+    return CandidateInputs(located, line_frequencies(p, fit), known)
 
 
 def start_models(x: CandidateInputs, near: Fitted, row: Variant) -> list[Model]:

@@ -1,0 +1,171 @@
+"""Worn valves as they are: friction that differs from slip to slip, seen through coarse grids and few samples."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from identification.estimation.prediction_error import Fitted, Model, Problem, problem
+from identification.mismatch.answer import Answer, answer
+from identification.mismatch.catalogue import EFFECTS
+from identification.mismatch.cross_validation import HeldOut, Misfit, runs_out
+from identification.mismatch.diagnosis import explain, inputs_of
+from identification.mismatch.forward_selection import applies
+from identification.mismatch.recording import Circumstances, Recording, SeenInCycles
+from identification.mismatch.restarts import simulated_anew, window_ends
+from identification.mismatch.starts.screening import CandidateInputs
+from identification.models import Fopdt, Stiction
+from identification.record import Floats
+from identification.simulation.open_loop import as_parameters, simulate
+from identification.simulation.parameters import Slot
+
+N, GAIN, LAG, DEAD, STUCK, JUMP = 4000, 1.5, 20, 4, 3.0, 2.0
+
+
+def worn_loop(seed: int, scatter: float, stuck: float = STUCK) -> tuple[Floats, Floats]:
+    """PV and OP [%], shape (N,) each, of a PI loop with a stem that lets go at another force each time.
+
+    Written out step by step, with none of the estimator's own code: the stem holds until OP is a stickband away,
+    jumps, and holds again; each stickband and jump is drawn anew.
+    """
+    rng = np.random.default_rng(seed)
+    stem, pv, total = 50.0, 50.0, 50.0
+    pipe = [50.0] * DEAD
+    hold, leap, load = stuck, JUMP / STUCK * stuck, 0.0
+    out = np.empty((2, N))
+    for k in range(N):
+        load += -load / 60 + rng.normal(0.0, 0.04)
+        seen = pv + load + rng.normal(0.0, 0.08)
+        e = 50.0 - seen
+        total += 0.8 * e / 20.0
+        op = 0.8 * e + total
+        away = op - stem
+        if abs(away) > 0.5 * (hold + leap):
+            stem = op - np.sign(away) * 0.5 * (hold - leap)
+            hold = stuck * rng.uniform(1 - scatter, 1 + scatter)
+            leap = JUMP / STUCK * hold
+        pipe.append(stem)
+        pv += (50.0 + GAIN * (pipe.pop(0) - 50.0) - pv) / LAG
+        out[:, k] = seen, op
+    return out[0], out[1]
+
+
+def seen_valve(agreeing: float = 0.8, stuck: float = STUCK) -> SeenInCycles:
+    """What a night's verdict would bring along, not quite right."""
+    valve = Stiction(1.1 * stuck, 0.5 * stuck)
+    return SeenInCycles(Fopdt(1.2 * GAIN, 1.2 * LAG, DEAD), valve, 100, agreeing)
+
+
+def recorded(
+    seed: int, scatter: float, grid: float, cycles: SeenInCycles | None, stuck: float = STUCK
+) -> Recording:
+    """The loop as recorded in steps of a grid."""
+    pv, op = worn_loop(seed, scatter, stuck)
+    pv, op = np.round(pv / grid) * grid, np.round(op, 2)
+    stamp = np.arange(N, dtype=np.float64)
+    return Recording(None, pv, op, np.ones(N, dtype=bool), 1.0, stamp, cycles=cycles)
+
+
+def told(s: Recording) -> Answer:
+    """The answer for a recording."""
+    return answer(explain(s), s)
+
+
+def test_coarse_grid_does_not_hide_a_jump() -> None:
+    """A grid of 0.2 % hides no jump of 3 %: the valve is named, the grid beside it."""
+    said = told(recorded(1, 0.3, 0.2, seen_valve()))
+    assert said.verdict in ("stiction", "backlash")
+    assert [e.name for e in said.effects][-1] == "quantization"
+    assert "stretches between two turns of OP" in said.shown
+
+
+def test_grid_alone_is_named_where_the_valve_is_free() -> None:
+    """A sound valve behind the same grid gets no fault."""
+    said = told(recorded(2, 0.0, 0.2, None, stuck=0.0))
+    assert {e.block for e in said.effects} <= {"sensor", "load"}
+    assert said.verdict == "quantization"
+
+
+def test_free_valve_is_asked_for_no_friction() -> None:
+    """Where the cycles convict no valve, no effect of friction is tried, and all others are."""
+    s = recorded(3, 0.3, 0.01, None)
+    p = problem(inputs_of(s), s.pv - s.pv.mean(), s.usable)
+    near = Fitted(Model((), as_parameters(Fopdt(GAIN, LAG, DEAD))), 1.0, N, np.zeros(3), np.zeros(N))
+    asked = {
+        free: {r.name for e in EFFECTS.values() for r in e.candidates if applies(x, near, r)}
+        for free in (False, True)
+        for x in [CandidateInputs(p, (), Circumstances(free_valve=free))]
+    }
+    friction = {name for name, e in EFFECTS.items() if e.friction is not None}
+    assert asked[False] - asked[True] == friction
+
+
+def test_unseen_scans_leave_the_inverse_response_open() -> None:
+    """A controller that answers within a sample looks like a PV that goes the wrong way first: not asked there."""
+    s = recorded(4, 0.3, 0.01, None)
+    assert s.circumstances.every_scan
+    assert not replace(s, dt_s=5.0).circumstances.every_scan
+
+
+def as_problem(seed: int, scatter: float) -> Problem:
+    """The recording as the fits see it."""
+    s = recorded(seed, scatter, 0.01, None)
+    inputs = inputs_of(s)
+    return problem(inputs, s.pv - inputs.level, s.usable)
+
+
+def parts_left(p: Problem, simulated: Floats, window: int) -> float:
+    """Standard deviation of what a simulation leaves about a line in each window."""
+    ends, left = window_ends(p.y.size, window), p.y - simulated
+    for a, b in pairwise(ends):
+        k = np.arange(b - a)
+        left[a:b] -= np.polyval(np.polyfit(k, left[a:b], 1), k)
+    return float(left.std())
+
+
+@pytest.mark.parametrize("seed", [5, 6])
+def test_stem_placed_anew_follows_a_worn_valve(seed: int) -> None:
+    """From where the stem stood, the right constants follow a cycle that they lose when run over hours."""
+    p, c = as_problem(seed, 0.3), as_parameters(Fopdt(GAIN, LAG, DEAD), Stiction(STUCK, JUMP))
+    window = 80
+    open_run, anew = simulate(p.inputs, c), simulated_anew(p, c, window)
+    free = simulate(p.inputs, as_parameters(Fopdt(GAIN, LAG, DEAD)))
+    assert parts_left(p, anew, window) < 0.8 * parts_left(p, open_run, window)
+    assert parts_left(p, anew, window) < 0.8 * parts_left(p, free, window)
+
+
+def test_stem_is_left_alone_without_friction() -> None:
+    """Without friction there is no stem to place: the simulation is the usual one to the last bit."""
+    p, c = as_problem(7, 0.0), as_parameters(Fopdt(GAIN, LAG, DEAD))
+    np.testing.assert_array_equal(simulated_anew(p, c, 80), simulate(p.inputs, c))
+
+
+@pytest.mark.parametrize(
+    ("name", "slot", "value", "out"),
+    [
+        ("inverse-response", Slot.SHARE, -4.99, True),
+        ("inverse-response", Slot.SHARE, -0.001, False),
+        ("flow-dependent-delay", Slot.PIPE, 3.0, True),
+        ("flow-dependent-delay", Slot.PIPE, 0.3, False),
+        ("saturation", Slot.STOP_HI, 0.0, False),
+    ],
+)
+def test_constant_at_its_far_end_is_no_finding(name: str, slot: Slot, value: float, out: bool) -> None:
+    """A constant at the far end of its range asks for another name; one near zero, or within, does not."""
+    p = as_problem(8, 0.0)
+    row = EFFECTS[name].candidates[0]
+    c = as_parameters(Fopdt(GAIN, LAG, DEAD))
+    for q in row.params:
+        c[q.slot] = 5.0 if q.log else -0.5
+    c[slot] = value if name != "saturation" else float(p.inputs.op.max())
+    assert runs_out(p, Fitted(Model((row,), c), 1.0, N, np.zeros(3), np.zeros(N))) is out
+
+
+@pytest.mark.parametrize(("fit_pct", "carries"), [(-20.0, False), (0.0, False), (30.0, True)])
+def test_less_far_astray_is_no_proof(fit_pct: float, carries: bool) -> None:
+    """A model that leaves more than PV's own motion proves nothing by leaving less than a worse one."""
+    plain, better = Misfit(2.0, -100.0), Misfit(1.0, fit_pct)
+    assert HeldOut(5.0, (plain, better), (plain, better), (plain, better)).carries is carries
