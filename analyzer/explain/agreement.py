@@ -2,10 +2,11 @@
 
 They ask different questions. The verdict asks why a loop oscillates, from the whole night with the controller in
 the loop; the explanation asks which physics a simulation of PV from the recorded OP lacks, proven on a part that it
-has not seen. The rule: a cause of the oscillation is the verdict's to name, so the explanation asks the verdict on its
-own recording first (case.py): a valve that the cycles convict is where its search begins, and friction is not looked
-for where they convict none. A kind of fault is the explanation's where it is proven on held-out data. What still
-differs, for the night and the recording explained need not be the same, the page says, with what would settle it.
+has not seen. The rule: a cause of the oscillation is the verdict's to name, so the explanation asks the verdict on
+its own recording first (case.py): a valve that the cycles convict is where its search begins, and friction is not
+looked for where they convict none. A kind of fault is the explanation's where it is proven on held-out data. What
+still differs, for the night and the recording explained need not be the same, the page says, with what would settle
+it.
 """
 
 from __future__ import annotations

@@ -10,6 +10,8 @@ SMOOTHING = 0.1
 """Half width of the band over which a frequency response is taken as constant, as a share of its frequency."""
 FEWEST = 4
 """Fewest lines on each side over which it is averaged."""
+SMALLEST = 1e-200
+"""Power of a set point that stands still but for rounding."""
 
 
 def _running(x: Complex, first: np.ndarray, last: np.ndarray) -> Complex:
@@ -33,5 +35,5 @@ def without_setpoint(error: Complex, sp: Complex) -> Complex:
     first, last = np.maximum(k - half, 0), np.minimum(k + half, error.size - 1)
     auto = _running((sp.real**2 + sp.imag**2).astype(np.complex128), first, last).real
     cross = _running(error * sp.conj(), first, last)
-    floor = 1e-9 * max(float(auto.max(initial=0.0)), 1e-300)
-    return error - np.where(auto > floor, cross / np.maximum(auto, floor), 0.0) * sp
+    floor = 1e-9 * max(float(auto.max(initial=0.0)), SMALLEST)
+    return error - np.divide(cross, auto, out=np.zeros_like(cross), where=auto > floor) * sp

@@ -40,18 +40,17 @@ def clear(t: Mapping[str, Any]) -> bool:
     return shows(t) and t["swell"] >= 2 and t["samples_a_cycle"] >= 8 and not t["packed"]
 
 
-def asked(task: tuple[Path, str, str]) -> Row:
-    """One loop explained."""
-    folder, name, cause = task
+def asked(task: tuple[Path, str, str, bool]) -> Row:
+    """One loop explained; that a process integrates is no fault of one that does."""
+    folder, name, cause, integrating = task
     begun = time.process_time()
     try:
         loop = api.read(folder / f"{name}.parquet", loops=folder / "loops.csv").loop(name)
         said = api.explain(loop).said
     except NotAssessedError:
         return cause, "abstained", frozenset(), time.process_time() - begun
-    blocks = (
-        frozenset() if said.verdict in ("unexplained", "none") else frozenset(e.block for e in said.effects)
-    )
+    told = () if said.verdict in ("unexplained", "none") else said.effects
+    blocks = frozenset(e.block for e in told if not (integrating and e.name == "integrator"))
     return cause, said.verdict, blocks, time.process_time() - begun
 
 
@@ -86,9 +85,9 @@ def judged(folder: Path, jobs: int) -> list[Row]:
     """All loops of a folder that are healthy or show their cause clearly."""
     truth = json.loads((folder / "truth.json").read_text())
     tasks = [
-        (folder, n, t["cause"])
+        (folder, n, t["cause"], bool(t["plant"].get("integrating")))
         for n, t in truth.items()
-        if (clear(t) if t["cause"] != "healthy" else shows(t))
+        if (shows(t) if t["cause"] == "healthy" else clear(t))
     ]
     with Pool(jobs) as pool:
         return pool.map(asked, tasks, chunksize=1)
