@@ -177,7 +177,7 @@ def carried_over(found: Explanation) -> Explanation:
         if proof.carries or unproven or by_cycles or timed:
             return replace(kept, proof=proof, refuted=names[count:], unproven=unproven)
     proof = held_out(found.p, found.plain, found.plain)
-    return replace(found, best=found.plain, accepted=(), before=(), proof=proof, refuted=names)
+    return replace(found, best=found.plain, accepted=(), proof=proof, refuted=names)
 
 
 def cycle_of(found: Explanation) -> int:
@@ -194,7 +194,7 @@ def first_effects(found: Explanation, count: int) -> Explanation:
     names = {r.name for r in found.accepted[:count]}
     rows = tuple(r for r in found.best.model.added if r.name in names)
     best = descend(found.p, Model(rows, c), FULL_STEPS)
-    return replace(found, best=best, accepted=found.accepted[:count], before=found.before[:count])
+    return replace(found, best=best, accepted=found.accepted[:count])
 
 
 def physics(found: Explanation, tell: Progress, s: Recording) -> Explanation:
@@ -202,7 +202,6 @@ def physics(found: Explanation, tell: Progress, s: Recording) -> Explanation:
     p, best = integrating_or_first_order(found.p, found.plain, s.kind)
     found = replace(found, p=p, plain=best)
     accepted: list[Candidate] = []
-    before: list[Fitted] = []
     first: tuple[Candidate, ...] = ()
     candidates: list[Candidate] = []
     for _ in range(ROUNDS):
@@ -216,19 +215,20 @@ def physics(found: Explanation, tell: Progress, s: Recording) -> Explanation:
         if winner is None:
             break
         accepted.append(winner)
-        before.append(best)
         p, best = x.p, descend(x.p, winner.fit.model, FULL_STEPS)
-    told = accepted and shown_by_cycles(s, [accepted[0]]) is not None
-    if len(accepted) > 1 and not told:
-        tell("other sets of effects")
-        x = candidate_inputs(p, best, s.circumstances)
-        best, accepted = replacement_step(x, best, accepted, tell)
+    if len(accepted) > 1:
+        told = shown_by_cycles(s, [accepted[0]]) is not None
+        if not told:
+            tell("other sets of effects")
+            x = candidate_inputs(p, best, s.circumstances)
+            best, accepted = replacement_step(x, best, accepted, tell)
+        best, accepted = without_the_idle(p, best, accepted, int(told))
     won, weights = ceiling(p, best)
     least = max(CEILING_PENALTY, CEILING_SHARE * gain(best, found.plain))
     left = won - 0.5 * weights - least
     if not accepted and any(r.row.needs == "steps" and r.penalised > 0 for r in candidates):
         left = max(left, candidates[0].penalised)
-    found = replace(found, p=p, best=best, accepted=tuple(accepted), before=tuple(before), first=first)
+    found = replace(found, p=p, best=best, accepted=tuple(accepted), first=first)
     return replace(found, left=left if left > 0 else 0.0)
 
 
@@ -275,6 +275,23 @@ def replacement_step(
         if first.penalised > max(least, 0.0) and passes(x.p, near, first.fit, EFFECTS[first.name]):
             best = descend(x.p, first.fit.model, FULL_STEPS)
             accepted = [*accepted[:i], first, *accepted[i + 1 :]]
+    return best, accepted
+
+
+def without_the_idle(
+    p: Problem, best: Fitted, accepted: list[Candidate], kept: int
+) -> tuple[Fitted, list[Candidate]]:
+    """The accepted effects less those that the others have made idle, the first `kept` of them left alone.
+
+    An effect may have been taken in the place of one that came after it.
+    """
+    for old in accepted[kept:]:
+        if len(accepted) == 1:
+            break
+        others = tuple(r for r in best.model.added if r.name != old.name)
+        near = descend(p, Model(others, cleared(best.model.c, old.row)), FULL_STEPS)
+        if gain(best, near) < penalty(old.row):
+            best, accepted = near, [c for c in accepted if c.name != old.name]
     return best, accepted
 
 

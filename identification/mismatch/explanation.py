@@ -18,18 +18,17 @@ class Explanation:
     """What was found.
 
     recorder, controller : what was found about them; p : the problem that the fits solve; plain, best : fits without
-    and with the effects; accepted : the candidates taken, in order; before : the fit to which each was added; first :
-    the candidates of the first round; law : the control law recovered; late_s : PV's lateness that was taken out [s];
-    left : gain of a flexible model beyond its least, 0 where nothing is left; proof : plain and best on held-out
-    data; refuted : names of effects that explain the fitted part and not the rest; unproven : whether OP moved once,
-    so that nothing is left to prove the effects on; cycles : the faulty valve that the loop's cycles show.
+    and with the effects; accepted : the candidates taken, in order; first : the candidates of the first round; law :
+    the control law recovered; late_s : PV's lateness that was taken out [s]; left : gain of a flexible model beyond
+    its least, 0 where nothing is left; proof : plain and best on held-out data; refuted : names of effects that
+    explain the fitted part and not the rest; unproven : whether OP moved once, so that nothing is left to prove the
+    effects on; cycles : the faulty valve that the loop's cycles show.
     """
 
     p: Problem = field(repr=False)
     plain: Fitted
     best: Fitted
     accepted: tuple[Candidate, ...] = ()
-    before: tuple[Fitted, ...] = ()
     first: tuple[Candidate, ...] = ()
     recorder: Finding | None = None
     controller: Finding | None = None

@@ -62,7 +62,7 @@ def with_play(found: Explanation, width: float) -> Explanation:
     best = descend(found.p, Model((row,), c), 8)
     won = gain(best, found.plain)
     candidate = Candidate(best, won, won - 9.0)
-    return Explanation(found.p, found.plain, best, (candidate,), (found.plain,), (candidate,), law=found.law)
+    return Explanation(found.p, found.plain, best, (candidate,), (candidate,), law=found.law)
 
 
 @cache

@@ -8,12 +8,12 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from identification.estimation.prediction_error import Fitted, Model, Problem, problem
+from identification.estimation.prediction_error import Fitted, Model, Problem, descend, problem
 from identification.mismatch.answer import Answer, answer
 from identification.mismatch.catalogue import EFFECTS
 from identification.mismatch.cross_validation import HeldOut, Misfit, runs_out
-from identification.mismatch.diagnosis import explain, inputs_of
-from identification.mismatch.forward_selection import applies
+from identification.mismatch.diagnosis import explain, inputs_of, without_the_idle
+from identification.mismatch.forward_selection import Candidate, applies
 from identification.mismatch.recording import Circumstances, Recording, SeenInCycles
 from identification.mismatch.restarts import simulated_anew, window_ends
 from identification.mismatch.starts.screening import CandidateInputs
@@ -21,6 +21,7 @@ from identification.models import Fopdt, Stiction
 from identification.record import Floats
 from identification.simulation.open_loop import as_parameters, simulate
 from identification.simulation.parameters import Slot
+from tests.identification.scenes import PLAY, recording
 
 N, GAIN, LAG, DEAD, STUCK, JUMP = 4000, 1.5, 20, 4, 3.0, 2.0
 
@@ -169,3 +170,20 @@ def test_less_far_astray_is_no_proof(fit_pct: float, carries: bool) -> None:
     """A model that leaves more than PV's own motion proves nothing by leaving less than a worse one."""
     plain, better = Misfit(2.0, -100.0), Misfit(1.0, fit_pct)
     assert HeldOut(5.0, (plain, better), (plain, better), (plain, better)).carries is carries
+
+
+def test_idle_effect_goes_again() -> None:
+    """An effect taken before the one that makes it idle is given up once that one is there; the other stays."""
+    s = recording(9, PLAY)
+    inputs = inputs_of(s)
+    p = problem(inputs, s.pv - inputs.level, s.usable)
+    rows = {name: EFFECTS[name].candidates[0] for name in ("backlash", "gain-drift")}
+    fit = descend(p, Model((), as_parameters(Fopdt(1.2, 20.0, 3.4))), 20)
+    taken = []
+    for name, value in (("gain-drift", 0.01), ("backlash", PLAY.width)):
+        c = fit.model.c.copy()
+        c[rows[name].params[0].slot] = value
+        fit = descend(p, Model((*fit.model.added, rows[name]), c), 20)
+        taken.append(Candidate(fit, 0.0, 0.0))
+    best, left = without_the_idle(p, fit, taken, 0)
+    assert [c.name for c in left] == ["backlash"] == list(best.names)
