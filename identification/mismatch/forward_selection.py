@@ -107,8 +107,11 @@ def applies(x: CandidateInputs, near: Fitted, row: Variant) -> bool:
         return False
     if row.needs == "every scan" and not x.known.every_scan:
         return False
-    if x.known.free_valve and EFFECTS[row.name].friction is not None:
-        return False
+    rubs = EFFECTS[row.name].friction is not None
+    if rubs and (x.known.free_valve or any(EFFECTS[r.name].friction is not None for r in near.model.added)):
+        return (
+            False  # behind one friction a second of the same stem cannot be told without the stem's position
+        )
     if row.needs == "neighbour":
         return x.p.inputs.neighbour is not None
     return True

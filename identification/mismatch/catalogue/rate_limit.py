@@ -17,6 +17,7 @@ def stem_after_step(d: Drawing) -> Shape:
 EFFECT = Effect(
     name="rate-limit",
     block=Block.VALVE,
+    needs="every scan",
     sentence=("The valve moves no faster than {rate_pct_per_s}, so large moves of OP arrive as ramps."),
     check="Look at air supply, booster and positioner; time a full stroke.",
     tests={
