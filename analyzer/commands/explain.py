@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import math
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,12 +24,15 @@ def main() -> None:
     """What physics a loop's plain model lacks, and the model carried to another recording."""
 
 
-def _case(asked: Asked, tag: str, whole: bool = False) -> Any:
+def _case(asked: Asked, tag: str, whole: bool = False, of: tuple[Path, ...] = ()) -> Any:
+    """The loop's case and its PV; `of` are other exports to read it from, over all of their time."""
     from analyzer.explain.case import MOST_SAMPLES, case, tags_of
     from analyzer.loops.settings_in_force import in_force
     from analyzer.loops.spec import spec_of
     from analyzer.nights import Night, cut
 
+    if of:
+        asked = replace(asked, export=of, since_s=-math.inf, until_s=math.inf)
     source, specs, _ = asked.opened()
     spec = spec_of(specs, tag)
     if spec.pv is None:
@@ -49,6 +54,12 @@ def _case(asked: Asked, tag: str, whole: bool = False) -> Any:
 @click.option(
     "--model", type=click.Path(path_type=Path), help="Your own saved model: judged beside the refitted one."
 )
+@click.option(
+    "--held-out",
+    multiple=True,
+    type=click.Path(path_type=Path),
+    help="Another recording of the loop, on which the explanation is proven; may be given again.",
+)
 @click.option("--save-model", type=click.Path(path_type=Path), help="Write the model found, for `simulate`.")
 @click.option(
     "--format",
@@ -63,6 +74,7 @@ def explain(
     asked: Asked,
     tag: str,
     model: Path | None,
+    held_out: tuple[Path, ...],
     save_model: Path | None,
     form: str,
     out: Path | None,
@@ -80,7 +92,8 @@ def explain(
     try:
         brought = read_model(model, tag) if model is not None else None
         case, _ = _case(asked, tag)
-        found = explained(case, tell, brought)
+        others = {path.name: _case(asked, tag, whole=True, of=(path,))[0] for path in held_out}
+        found = explained(case, tell, brought, others)
     except NotAssessedError as error:
         _show(abstained(tag, str(error)), None, form, out, asked.zone)
         click.echo(f"triage: {error}", err=True)

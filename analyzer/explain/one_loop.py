@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -17,6 +17,8 @@ from identification.mismatch.answer import Answer, answer
 from identification.mismatch.diagnosis import explain
 from identification.mismatch.explanation import Explanation
 from identification.mismatch.model_file import constants
+from identification.mismatch.other_recordings import proven_on
+from identification.mismatch.recording import Recording
 from identification.record import Floats
 from identification.simulation.parameters import Slot, neutral
 
@@ -27,7 +29,7 @@ SPAN_DIFFERS = 0.01
 @dataclass(frozen=True, slots=True)
 class Explained:
     """One loop explained: what was asked, what was found, the answer in numbers and as data, what a page draws of it,
-    and the user's own model."""
+    the user's own model, and the names of other recordings that were held out."""
 
     case: Case
     found: Explanation
@@ -35,21 +37,61 @@ class Explained:
     data: dict[str, Any]
     views: Views
     brought: Brought | None = None
+    held_out: tuple[str, ...] = ()
 
     def model(self) -> dict[str, Any]:
         """The model found, the plain loop where nothing was, as data to be written."""
         return saved_model(self.case, self.found, self.said)
 
 
-def explained(c: Case, tell: Callable[[str], None], brought: Mapping[str, Any] | None = None) -> Explained:
-    """Explain one loop; `brought` is the user's own model, which is judged and is one more start of the search."""
+def explained(
+    c: Case,
+    tell: Callable[[str], None],
+    brought: Mapping[str, Any] | None = None,
+    held_out: Mapping[str, Case] | None = None,
+) -> Explained:
+    """Explain one loop.
+
+    Parameters
+    ----------
+    c : Case
+    tell : callable
+        Is told what is tried.
+    brought : mapping or None
+        The user's own model, which is judged and is one more start of the search.
+    held_out : mapping or None
+        Other recordings of the loop by name, on which the explanation is proven.
+    """
     start = None if brought is None else plain_start(brought)
     with np.errstate(all="ignore"):  # a candidate that runs away loses; its overflow is nobody's business
-        found = explain(c.subject, tell, start)
+        others = {} if held_out is None else dict(held_out)
+        found = proven_on(explain(c.subject, tell, start), [in_percent_of(c, x) for x in others.values()])
         said = answer(found, c.subject)
         own = None if brought is None else judged(brought, found, c.subject, span_note(c, brought))
         drawn = views(found, c.subject, said, own)
-    return Explained(c, found, said, as_data(c, said, own), drawn, own)
+    data = as_data(c, said, own) | ({"held_out_on": on_others(found, tuple(others))} if others else {})
+    return Explained(c, found, said, data, drawn, own, tuple(others))
+
+
+def in_percent_of(c: Case, other: Case) -> Recording:
+    """Another recording in the percent of the one that is fitted; without stated ranges theirs differ."""
+    then, now, s = c.prepared.scale, other.prepared.scale, other.subject
+    pv = then.pv_pct(now.low + s.pv * now.span / 100.0)
+    op = then.op_pct(now.op_low + s.op * now.op_span / 100.0)
+    return replace(s, pv=pv, op=op, sp=None)
+
+
+def on_others(found: Explanation, names: tuple[str, ...]) -> list[dict[str, Any]]:
+    """Misfits on each recording held out, as data; none where nothing was found that could be held against them."""
+    return [
+        {
+            "recording": name,
+            "baseline": {"rmse": x.baseline.rmse, "fit_pct": x.baseline.fit_pct},
+            "explained": {"rmse": x.explained.rmse, "fit_pct": x.explained.fit_pct},
+            "share": x.share,
+        }
+        for name, x in zip(names, found.others, strict=False)
+    ]
 
 
 def plain_start(brought: Mapping[str, Any]) -> Floats:

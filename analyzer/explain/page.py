@@ -100,7 +100,8 @@ def _tiles(e: Explained) -> tuple[tuple[str, str, str], ...]:
     over = f"within windows of {duration(horizon)}" if horizon else "over the recording"
     if e.found.accepted:
         what = f"rms misfit {over}, plain and improved"
-        tiles.append((f"{size['baseline']} → {size['model']}", what, "better"))
+        less = e.views.misfit["model"] < e.views.misfit["baseline"]
+        tiles.append((f"{size['baseline']} → {size['model']}", what, "better" if less else ""))
     else:
         rest = ": load and noise" if d["verdict"] == "none" else ""
         tiles.append((size["baseline"], f"rms misfit of the plain simulation{rest}", ""))
@@ -174,9 +175,9 @@ def _fit(e: Explained) -> tuple[Block, ...]:
             m = e.data["fit"][key][part]
             cells += [Cell(rms(m["rmse"]), m["rmse"]), Cell(f"{m['fit_pct']:.1f}", m["fit_pct"])]
         rows.append(tuple(cells))
-    late, horizon = f"{100 * HELD_OUT:.0f} %", e.data["fit"]["horizon_s"]
+    horizon = e.data["fit"]["horizon_s"]
     note = (
-        f"Held out: the last {late} of the recording, on which models fitted to the first part are judged. "
+        f"Held out: {_held(e)}. "
         "Fit % is 100 where the simulation is exact and 0 where the mean does as well; load and noise keep it lower."
         + (
             f" The simulations begin anew every {duration(horizon)}, so that slow load does not drown them."
@@ -184,7 +185,32 @@ def _fit(e: Explained) -> tuple[Block, ...]:
             else ""
         )
     )
-    return (Table("fit", "", columns, tuple(rows), note),)
+    return (Table("fit", "", columns, tuple(rows), note), *_others(e.data))
+
+
+def _held(e: Explained) -> str:
+    if e.found.others:
+        return "the other recordings below, on which nothing but a constant bias was fitted"
+    return f"the last {100 * HELD_OUT:.0f} % of the recording, on which models fitted to the first part are judged"
+
+
+def _others(data: Mapping[str, Any]) -> tuple[Block, ...]:
+    columns = (
+        Column("recording", "Held out"),
+        Column("plain", "rms, plain", True),
+        Column("improved", "rms, improved", True),
+        Column("removed", "Misfit removed", True),
+    )
+    rows = [
+        (
+            Cell(x["recording"]),
+            Cell(rms(x["baseline"]["rmse"]), x["baseline"]["rmse"]),
+            Cell(rms(x["explained"]["rmse"]), x["explained"]["rmse"]),
+            Cell(share(x["share"]), x["share"]),
+        )
+        for x in data.get("held_out_on", [])
+    ]
+    return (Table("others", "On the recordings held out", columns, tuple(rows)),) if rows else ()
 
 
 def _parameters(data: Mapping[str, Any]) -> tuple[Block, ...]:

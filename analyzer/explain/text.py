@@ -70,6 +70,14 @@ def _fit(data: Mapping[str, Any]) -> Rows:
     return [("", "fitted", "fit %", "held out", "fit %", ""), *rows] if rows else []
 
 
+def _others(data: Mapping[str, Any]) -> Rows:
+    rows = [
+        (x["recording"], rms(x["baseline"]["rmse"]), "→", rms(x["explained"]["rmse"]), share(x["share"]))
+        for x in data.get("held_out_on", [])
+    ]
+    return [("", "plain", "", "improved", "removed"), *rows] if rows else []
+
+
 def _misfit(m: Mapping[str, float]) -> tuple[str, str]:
     return rms(m["rmse"]), f"{m['fit_pct']:.1f}"
 
@@ -106,6 +114,7 @@ def lines(data: Mapping[str, Any]) -> list[str]:
     out = [head + block, *wrap(data["reason"], WIDTH), *wrap(check(data["verdict"]), WIDTH)]
     out += _part("Parameters (90 % intervals)", _parameters(data), (2,))
     out += _part("Misfit, rms in % of span", _fit(data), (1, 2, 3, 4))
+    out += _part("On the recordings held out", _others(data), (1, 3, 4))
     if "brought" in data["fit"]:
         out += ["", *wrap(data["fit"]["brought"]["note"], WIDTH)]
     first = data["effects"][0] if data["effects"] else None

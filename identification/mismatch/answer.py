@@ -210,9 +210,12 @@ def found_first(found: Explanation) -> tuple[bool, bool]:
 def _note(found: Explanation) -> str:
     if found.refuted and not found.accepted:
         names = " and ".join(found.refuted)
+        seen, rest = (
+            ("the recording", "the other recordings") if found.others else ("its first part", "the rest")
+        )
         return (
-            f"What explains the first part of the recording ({names}) does not carry over to the rest, so nothing is "
-            "told as found: another recording of this loop is needed."
+            f"What explains {seen} ({names}) does not carry over to {rest}, so nothing is told as found: another "
+            "recording of this loop is needed."
         )
     if found.left <= 0:
         return ""

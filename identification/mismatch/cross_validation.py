@@ -42,6 +42,25 @@ class Misfit:
     fit_pct: float
 
 
+@dataclass(frozen=True, slots=True)
+class OnOther:
+    """Misfit of models on one other recording, over the same windows, and its samples.
+
+    baseline, explained : of the plain and the better model; without : of the better one with its effects taken out
+    and the rest as it is, which tells whether the effects are there too, or only the better constants beside them.
+    """
+
+    baseline: Misfit
+    explained: Misfit
+    without: Misfit
+    samples: int
+
+    @property
+    def share(self) -> float:
+        """Part of the misfit (mean square) that the effects remove there."""
+        return 1.0 - self.explained.rmse**2 / max(self.baseline.rmse**2, 1e-30)
+
+
 def anchored(y: Floats, simulated: Floats, window: int) -> Floats:
     """A simulation begun anew in each window of so many samples: a straight line of load is added there, shape (n,).
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from identification.controller.pi_regression import ControlLaw
 from identification.estimation.prediction_error import Fitted, Problem
 from identification.mismatch.catalogue import fault
-from identification.mismatch.cross_validation import HeldOut
+from identification.mismatch.cross_validation import HeldOut, OnOther
 from identification.mismatch.effect import Ends
 from identification.mismatch.forward_selection import Candidate
 from identification.mismatch.recording import Finding, SeenInCycles
@@ -22,7 +22,8 @@ class Explanation:
     the control law recovered; late_s : PV's lateness that was taken out [s]; left : gain of a flexible model beyond
     its least, 0 where nothing is left; proof : plain and best on held-out data; refuted : names of effects that
     explain the fitted part and not the rest; unproven : whether OP moved once, so that nothing is left to prove the
-    effects on; cycles : the faulty valve that the loop's cycles show.
+    effects on; cycles : the faulty valve that the loop's cycles show; others : misfits on other recordings, where
+    some were held out whole.
     """
 
     p: Problem = field(repr=False)
@@ -39,6 +40,7 @@ class Explanation:
     refuted: tuple[str, ...] = ()
     unproven: bool = False
     cycles: SeenInCycles | None = None
+    others: tuple[OnOther, ...] = ()
 
     @property
     def finding(self) -> Finding | None:

@@ -39,7 +39,7 @@ def export(folder: Path, name: str, seed: int, width: float) -> Path:
 def asked(*words: str | Path) -> tuple[int, str]:
     """Exit status and output of a command."""
     done = CliRunner().invoke(main, [str(w) for w in words])
-    return done.exit_code, done.output
+    return done.exit_code, done.output if done.exit_code else done.stdout
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,109 @@
+"""An explanation put to the proof on other recordings of the same loop, on which nothing was fitted but a bias."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from identification.estimation.limits import WINDOW_SAMPLES, WINDOW_TIMES
+from identification.estimation.prediction_error import Fitted, problem
+from identification.mismatch.catalogue import EFFECTS
+from identification.mismatch.cross_validation import HeldOut, Misfit, OnOther, anchored, course, misfit
+from identification.mismatch.diagnosis import cleared
+from identification.mismatch.explanation import Explanation
+from identification.mismatch.model_file import carried, constants, to_data
+from identification.mismatch.recording import Recording
+from identification.mismatch.starts.from_cycles import is_friction
+from identification.record import Floats
+from identification.simulation.open_loop import ModelInputs
+from identification.simulation.parameters import Slot
+
+
+def simulated_there(found: Explanation, fit: Fitted, s: Recording, window: int) -> Floats:
+    """PV [% PV], shape (n,), that a fit gives for another recording's OP, anchored in windows."""
+    data = to_data("", found.p.inputs, fit.model.c, fit.names, found.late_s, None)
+    if window and found.proof is not None and found.proof.placed:
+        inputs = found.p.inputs
+        here = ModelInputs(s.op, s.dt_s, inputs.middle, inputs.level, (float(s.pv.min()), float(s.pv.max())))
+        c = constants(data)
+        c[Slot.START] = float(s.pv[0]) - inputs.level
+        return inputs.level + course(problem(here, s.pv - inputs.level, s.usable), c, window, True)
+    return anchored(s.pv, carried(data, s.op, s.pv, s.dt_s), window)
+
+
+def on_other(found: Explanation, s: Recording, window: int) -> OnOther:
+    """Both models on one other recording, and the better one without its effects."""
+    c = found.best.model.c
+    for row in found.best.model.added:
+        c = cleared(c, row)
+    bare = replace(found.best, model=replace(found.best.model, c=c))
+    courses = [simulated_there(found, fit, s, window) for fit in (found.plain, found.best, bare)]
+    plain, better, without = (misfit(s.pv, x, window) for x in courses)
+    return OnOther(plain, better, without, s.pv.size)
+
+
+def together(parts: Sequence[Misfit], samples: Sequence[int]) -> Misfit:
+    """Misfits of several recordings as one, each sample counting alike."""
+    n = np.array(samples, dtype=np.float64)
+    rmse = np.array([m.rmse for m in parts])
+    moves = np.array([m.rmse / max(1.0 - m.fit_pct / 100.0, 1e-9) for m in parts])
+    left, own = (float(np.sqrt(np.sum(n * x**2) / n.sum())) for x in (rmse, moves))
+    return Misfit(left, 100.0 * (1.0 - left / max(own, 1e-12)))
+
+
+def windows_of(found: Explanation, s: Recording) -> tuple[int, ...]:
+    """Windows in which models are compared there [samples]: the whole, and what own proof or loop ask for."""
+    if found.proof is not None and found.proof.window:
+        return 0, max(round(found.proof.window * found.p.inputs.dt_s / s.dt_s), 1)
+    c = found.plain.model.c
+    memory = WINDOW_TIMES * float(c[Slot.T] + c[Slot.L]) / s.dt_s
+    return 0, max(math.ceil(min(memory, 1e9)), WINDOW_SAMPLES)
+
+
+def compared(found: Explanation, others: Sequence[Recording]) -> tuple[HeldOut, tuple[OnOther, ...]]:
+    """The proof on other recordings: over the whole of each, or over windows where the whole shows the load alone."""
+    proofs = []
+    overall = found.proof.overall if found.proof is not None else None
+    for at in (0, 1):
+        each = tuple(on_other(found, s, windows_of(found, s)[at]) for s in others)
+        samples = [x.samples for x in each]
+        held = tuple(together([getattr(x, k) for x in each], samples) for k in ("baseline", "explained"))
+        seen = overall or (held[0], held[1])
+        window = round(windows_of(found, others[0])[at] * others[0].dt_s / found.p.inputs.dt_s)
+        placed = bool(at and found.proof is not None and found.proof.placed)
+        proofs.append((HeldOut(0.0, seen, (held[0], held[1]), seen, window, placed), each))
+    whole, windowed = proofs
+    return windowed if windowed[0].carries and not whole[0].carries else whole
+
+
+def proven_on(found: Explanation, others: Sequence[Recording]) -> Explanation:
+    """The explanation, kept where it carries over to other recordings, given up where it does not.
+
+    An effect bound to a time says nothing of another recording; a valve that the cycles there show too keeps its
+    name.
+
+    Parameters
+    ----------
+    found : Explanation
+    others : sequence of Recording
+        Of the same loop, in the percent of the recording that was fitted.
+    """
+    if not others or not found.accepted:
+        return found
+    proof, each = compared(found, others)
+    names = tuple(c.name for c in found.accepted)
+    by_cycles = (
+        found.cycles is not None and is_friction(names[0]) and any(s.cycles is not None for s in others)
+    )
+    samples = [x.samples for x in each]
+    there, bare = (together([getattr(x, k) for x in each], samples).rmse for k in ("explained", "without"))
+    if (proof.share > 0.0 and proof.follows and there < bare) or by_cycles:
+        return replace(found, proof=proof, others=each, unproven=False)
+    if all(EFFECTS[name].timed for name in names):
+        return replace(found, others=each)
+    plain = replace(found, best=found.plain, accepted=(), refuted=names, unproven=False)
+    proof, _ = compared(plain, others)
+    return replace(plain, proof=proof, others=each)
