@@ -16,7 +16,10 @@ from analyzer.commands.options import NOTHING_DONE, Asked, export_options
 from identification.errors import InputError
 
 if TYPE_CHECKING:
+    from analyzer.explain.case import Case
     from analyzer.explain.one_loop import Explained
+    from analyzer.history.series import Series
+    from analyzer.loops.spec import LoopSpec
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
@@ -24,15 +27,16 @@ def main() -> None:
     """What physics a loop's plain model lacks, and the model carried to another recording."""
 
 
-def _case(asked: Asked, tag: str, whole: bool = False, of: tuple[Path, ...] = ()) -> Any:
-    """The loop's case and its PV; `of` are other exports to read it from, over all of their time."""
-    from analyzer.explain.case import MOST_SAMPLES, case, tags_of
-    from analyzer.loops.settings_in_force import in_force
+Trends = tuple["LoopSpec", tuple["LoopSpec", ...], dict[str, "Series"]]
+"""A loop, all loops of its export, and the trends that explaining it reads."""
+
+
+def _read(asked: Asked, tag: str) -> Trends:
+    """A loop of an export with its trends."""
+    from analyzer.explain.case import tags_of
     from analyzer.loops.spec import spec_of
     from analyzer.nights import Night, cut
 
-    if of:
-        asked = replace(asked, export=of, since_s=-math.inf, until_s=math.inf)
     source, specs, _ = asked.opened()
     spec = spec_of(specs, tag)
     if spec.pv is None:
@@ -41,11 +45,36 @@ def _case(asked: Asked, tag: str, whole: bool = False, of: tuple[Path, ...] = ()
     whole_span = Night("", first, last + 1.0)
     series = {tag: cut(x, whole_span) for tag, x in source.read(tags_of(spec, specs)).items()}
     series = asked.within(series)
-    pv = series[spec.pv]
-    if pv.stamp_s.size == 0:
+    if series[spec.pv].stamp_s.size == 0:
         raise InputError(f"{tag}: no samples between --since and --until", "a span of the export", "widen it")
+    return spec, specs, series
+
+
+def _whole(asked: Asked, tag: str) -> tuple[Case, Series]:
+    """A loop's case over all of an export, and its PV."""
+    from analyzer.explain.case import case
+    from analyzer.loops.settings_in_force import in_force
+
+    spec, specs, series = _read(asked, tag)
+    pv = series[spec.pv or ""]
     spec = in_force(spec, asked.changes, float(pv.stamp_s[-1]))
-    return case(spec, specs, series, asked.config, None if whole else MOST_SAMPLES), pv
+    return case(spec, specs, series, asked.config, None), pv
+
+
+def _cases(asked: Asked, tag: str, held_out: tuple[Path, ...]) -> tuple[Case, dict[str, Case]]:
+    """The case to be explained, and those held out by name: parts under other settings, and other exports."""
+    from analyzer.explain.case import case
+    from analyzer.explain.parts import parts, said_of
+
+    spec, specs, series = _read(asked, tag)
+    judged = parts(spec, series, asked.changes, asked.zone)
+    first = case(judged[0].spec, specs, dict(judged[0].series), asked.config)
+    first = replace(first, shortened=f"{said_of(judged)} {first.shortened}".strip())
+    others = {p.name: case(p.spec, specs, dict(p.series), asked.config, None) for p in judged[1:]}
+    for path in held_out:
+        elsewhere = replace(asked, export=(path,), since_s=-math.inf, until_s=math.inf)
+        others[path.name] = _whole(elsewhere, tag)[0]
+    return first, others
 
 
 @main.command()
@@ -91,8 +120,7 @@ def explain(
     tell = _Candidates()
     try:
         brought = read_model(model, tag) if model is not None else None
-        case, _ = _case(asked, tag)
-        others = {path.name: _case(asked, tag, whole=True, of=(path,))[0] for path in held_out}
+        case, others = _cases(asked, tag, held_out)
         found = explained(case, tell, brought, others)
     except NotAssessedError as error:
         _show(abstained(tag, str(error)), None, form, out, asked.zone)
@@ -153,7 +181,7 @@ def simulate(
     """
     from analyzer.explain.saved_model import read_model, simulated
 
-    case, raw = _case(asked, tag, whole=True)
+    case, raw = _whole(asked, tag)
     pv, op = simulated(case, read_model(model, tag), raw.stamp_s, closed_loop)
     write_trends(out, raw.stamp_s, pv, op)
 

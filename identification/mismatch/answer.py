@@ -35,8 +35,8 @@ LIVES = {
 
 
 STRAYS = (
-    "Simulated with one constant friction PV strays all the same, for the friction differs from slip to slip: the "
-    "stretches are the proof, not the misfit."
+    "Simulated with one constant friction PV strays all the same, as it does where friction differs from slip to "
+    "slip: the stretches are the proof, not the misfit."
 )
 """What is said of a valve that the cycles show and a simulation with constant friction does not."""
 ONE_MOVE_ONLY = "rests on one move of OP, of which nothing is left to prove it on; another recording would"

@@ -65,18 +65,23 @@ def windows_of(found: Explanation, s: Recording) -> tuple[int, ...]:
 
 def compared(found: Explanation, others: Sequence[Recording]) -> tuple[HeldOut, tuple[OnOther, ...]]:
     """The proof on other recordings: over the whole of each, or over windows where the whole shows the load alone."""
-    proofs = []
-    overall = found.proof.overall if found.proof is not None else None
-    for at in (0, 1):
-        each = tuple(on_other(found, s, windows_of(found, s)[at]) for s in others)
-        samples = [x.samples for x in each]
-        held = tuple(together([getattr(x, k) for x in each], samples) for k in ("baseline", "explained"))
-        seen = overall or (held[0], held[1])
-        window = round(windows_of(found, others[0])[at] * others[0].dt_s / found.p.inputs.dt_s)
-        placed = bool(at and found.proof is not None and found.proof.placed)
-        proofs.append((HeldOut(0.0, seen, (held[0], held[1]), seen, window, placed), each))
-    whole, windowed = proofs
-    return windowed if windowed[0].carries and not whole[0].carries else whole
+    whole, windowed = (_compared(found, others, at) for at in (0, 1))
+    return whole if whole[0].carries else windowed
+
+
+def _compared(
+    found: Explanation, others: Sequence[Recording], at: int
+) -> tuple[HeldOut, tuple[OnOther, ...]]:
+    """The same over the whole (0) or over windows (1)."""
+    p = found.p
+    each = tuple(on_other(found, s, windows_of(found, s)[at]) for s in others)
+    samples = [x.samples for x in each]
+    held = together([x.baseline for x in each], samples), together([x.explained for x in each], samples)
+    window = round(windows_of(found, others[0])[at] * others[0].dt_s / p.inputs.dt_s)
+    placed = bool(at and found.proof is not None and found.proof.placed)
+    courses = [course(p, fit.model.c, window, placed) for fit in (found.plain, found.best)]
+    seen = misfit(p.y, courses[0], window), misfit(p.y, courses[1], window)
+    return HeldOut(0.0, seen, held, seen, window, placed), each
 
 
 def proven_on(found: Explanation, others: Sequence[Recording]) -> Explanation:
