@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 from identification.controller.pi_regression import ControlLaw
 from identification.estimation.prediction_error import Fitted, Problem
-from identification.mismatch.catalogue import fault
+from identification.mismatch.catalogue import EFFECTS, fault
 from identification.mismatch.cross_validation import HeldOut, OnOther
 from identification.mismatch.effect import Ends
 from identification.mismatch.forward_selection import Candidate
@@ -45,8 +45,9 @@ class Explanation:
     @property
     def finding(self) -> Finding | None:
         """The finding about recorder or controller that is named first; None where an effect stands before it, as one
-        does that is larger than the steps of PV's grid."""
+        of valve or process does that is larger than the steps of PV's grid. A load says nothing against the grid."""
         ends = Ends.NOTHING if self.recorder is None else fault(self.recorder.name).ends
-        if self.accepted and self.controller is None and ends is Ends.SMALLER:
+        lasting = bool(self.accepted) and not EFFECTS[self.accepted[0].name].timed
+        if lasting and self.controller is None and ends is Ends.SMALLER:
             return None
         return self.recorder or self.controller

@@ -13,8 +13,9 @@ from identification.mismatch.answer import Answer, answer
 from identification.mismatch.catalogue import EFFECTS
 from identification.mismatch.cross_validation import HeldOut, Misfit, runs_out
 from identification.mismatch.diagnosis import explain, inputs_of, without_the_idle
+from identification.mismatch.explanation import Explanation
 from identification.mismatch.forward_selection import Candidate, applies
-from identification.mismatch.recording import Circumstances, Recording, SeenInCycles
+from identification.mismatch.recording import Circumstances, Finding, Recording, SeenInCycles
 from identification.mismatch.restarts import simulated_anew, window_ends
 from identification.mismatch.starts.screening import CandidateInputs
 from identification.models import Fopdt, Stiction
@@ -187,3 +188,17 @@ def test_idle_effect_goes_again() -> None:
         taken.append(Candidate(fit, 0.0, 0.0))
     best, left = without_the_idle(p, fit, taken, 0)
     assert [c.name for c in left] == ["backlash"] == list(best.names)
+
+
+@pytest.mark.parametrize(
+    ("name", "first"), [("backlash", False), ("inverse-response", False), ("load-step", True)]
+)
+def test_grid_yields_to_what_lasts_and_not_to_a_load(name: str, first: bool) -> None:
+    """An effect of valve or process that the grid cannot hide stands before it; a load says nothing against it."""
+    p = as_problem(10, 0.0)
+    plain = Fitted(Model((), as_parameters(Fopdt(GAIN, LAG, DEAD))), 1.0, N, np.zeros(3), np.zeros(N))
+    row = EFFECTS[name].candidates[0]
+    best = Fitted(Model((row,), plain.model.c), 0.5, N, np.zeros(3), np.zeros(N))
+    grid = Finding({"step_pct": 0.2}, np.ones(N, dtype=bool), "quantization")
+    found = Explanation(p, plain, best, (Candidate(best, 20.0, 10.0),), recorder=grid)
+    assert (found.finding is grid) is first
