@@ -77,7 +77,7 @@ def assert_read(path: Path, table: pd.DataFrame, options: ReadOptions | None = N
     return export.notes
 
 
-@settings(max_examples=300, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     written=st.sampled_from(STAMP_FORMATS),
     dialect=st.sampled_from([(",", "."), (";", "."), (";", ","), ("\t", "."), ("\t", ","), ("|", ".")]),
