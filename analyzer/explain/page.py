@@ -6,12 +6,12 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from analyzer.explain import plots
+from analyzer.explain.fit_tables import fit_tables
 from analyzer.explain.one_loop import Explained
 from analyzer.explain.page_words import (
     FEATURES,
     HIDDEN,
     MOVED,
-    ROWS,
     called,
     carried_by,
     chance,
@@ -26,7 +26,6 @@ from analyzer.explain.page_words import (
 from analyzer.explain.views import Tried
 from analyzer.pages.words import duration, number, stamp
 from analyzer.plant_clock import UTC_NAME
-from identification.estimation.limits import HELD_OUT
 from identification.mismatch.words import check, discriminating_test, located_sentence
 from reports.names import slug
 from reports.pages import Block, Cell, Column, Facts, Page, Section, Table, Text, Tiles
@@ -45,7 +44,7 @@ def page(e: Explained, zone: str = UTC_NAME) -> Page:
         Section("Recording and simulation", plots.trends(e)),
         *_found(e),
         Section("Where the misfit lives", (*_where(e.data["where"]), plots.misfit_panels(e))),
-        Section("How well it fits", _fit(e)),
+        Section("How well it fits", fit_tables(e)),
         *_alternatives(e.data),
         *_tried(e),
         *_controller(e),
@@ -157,60 +156,6 @@ def _where(where: Mapping[str, Any]) -> tuple[Block, ...]:
         "from blocks in other orders."
     )
     return (*blocks, Table("where", "", columns, rows, note))
-
-
-def _fit(e: Explained) -> tuple[Block, ...]:
-    columns = (
-        Column("model", "Simulation"),
-        Column("fitted", "rms, fitted", True),
-        Column("fitted_fit", "Fit %", True),
-        Column("held", "rms, held out", True),
-        Column("held_fit", "Fit %", True),
-    )
-    shown = [k for k in ROWS if k in e.data["fit"] and (k != "explained" or e.found.accepted)]
-    rows = []
-    for key in shown:
-        cells = [Cell(ROWS[key])]
-        for part in ("fitted", "held_out"):
-            m = e.data["fit"][key][part]
-            cells += [Cell(rms(m["rmse"]), m["rmse"]), Cell(f"{m['fit_pct']:.1f}", m["fit_pct"])]
-        rows.append(tuple(cells))
-    horizon = e.data["fit"]["horizon_s"]
-    note = (
-        f"Held out: {_held(e)}. "
-        "Fit % is 100 where the simulation is exact and 0 where the mean does as well; load and noise keep it lower."
-        + (
-            f" The simulations begin anew every {duration(horizon)}, so that slow load does not drown them."
-            if horizon
-            else ""
-        )
-    )
-    return (Table("fit", "", columns, tuple(rows), note), *_others(e.data))
-
-
-def _held(e: Explained) -> str:
-    if e.found.others:
-        return "the other recordings below, on which nothing but a constant bias was fitted"
-    return f"the last {100 * HELD_OUT:.0f} % of the recording, on which models fitted to the first part are judged"
-
-
-def _others(data: Mapping[str, Any]) -> tuple[Block, ...]:
-    columns = (
-        Column("recording", "Held out"),
-        Column("plain", "rms, plain", True),
-        Column("improved", "rms, improved", True),
-        Column("removed", "Misfit removed", True),
-    )
-    rows = [
-        (
-            Cell(x["recording"]),
-            Cell(rms(x["baseline"]["rmse"]), x["baseline"]["rmse"]),
-            Cell(rms(x["explained"]["rmse"]), x["explained"]["rmse"]),
-            Cell(share(x["share"]), x["share"]),
-        )
-        for x in data.get("held_out_on", [])
-    ]
-    return (Table("others", "On the recordings held out", columns, tuple(rows)),) if rows else ()
 
 
 def _parameters(data: Mapping[str, Any]) -> tuple[Block, ...]:

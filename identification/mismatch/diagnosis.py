@@ -37,13 +37,13 @@ from identification.mismatch.forward_selection import (
 )
 from identification.mismatch.lack_of_fit import ceiling
 from identification.mismatch.recording import STEP, Finding, Recording, SeenInCycles
+from identification.mismatch.sets_of_effects import cleared, replacement_step, without_the_idle
 from identification.mismatch.starts.from_cycles import from_cycles, is_friction
-from identification.mismatch.starts.screening import CandidateInputs, candidate_inputs
+from identification.mismatch.starts.screening import candidate_inputs
 from identification.models import Stiction
 from identification.record import Floats, Mask
-from identification.simulation.effect import Variant
 from identification.simulation.open_loop import ModelInputs, simulate
-from identification.simulation.parameters import Slot, neutral
+from identification.simulation.parameters import Slot
 
 
 def recorder_finding_of(s: Recording) -> Finding | None:
@@ -255,52 +255,6 @@ def shown_by_cycles(s: Recording, candidates: list[Candidate]) -> Candidate | No
     jumps = [c for c in rubs if EFFECTS[c.name].friction is Friction.STICKS]
     first = jumps if isinstance(s.cycles.valve, Stiction) and jumps else rubs
     return first[0] if first else None
-
-
-def replacement_step(
-    x: CandidateInputs, best: Fitted, accepted: list[Candidate], tell: Progress
-) -> tuple[Fitted, list[Candidate]]:
-    """The accepted effects, each given up once for whatever does better beside the others.
-
-    Effects are added one at a time, so the first may have been taken in the place of two that act together.
-    """
-    for i, old in enumerate(accepted):
-        others = tuple(r for r in best.model.added if r.name != old.name)
-        near = descend(x.p, Model(others, cleared(best.model.c, old.row)), FULL_STEPS)
-        candidates = [r for r in compete(x, near, CANDIDATES, tell) if r.name != old.name]
-        if not candidates:
-            continue
-        least = gain(best, near) - penalty(old.row) + TIE
-        first = candidates[0]
-        if first.penalised > max(least, 0.0) and passes(x.p, near, first.fit, EFFECTS[first.name]):
-            best = descend(x.p, first.fit.model, FULL_STEPS)
-            accepted = [*accepted[:i], first, *accepted[i + 1 :]]
-    return best, accepted
-
-
-def without_the_idle(
-    p: Problem, best: Fitted, accepted: list[Candidate], kept: int
-) -> tuple[Fitted, list[Candidate]]:
-    """The accepted effects less those that the others have made idle, the first `kept` of them left alone.
-
-    An effect may have been taken in the place of one that came after it.
-    """
-    for old in accepted[kept:]:
-        if len(accepted) == 1:
-            break
-        others = tuple(r for r in best.model.added if r.name != old.name)
-        near = descend(p, Model(others, cleared(best.model.c, old.row)), FULL_STEPS)
-        if gain(best, near) < penalty(old.row):
-            best, accepted = near, [c for c in accepted if c.name != old.name]
-    return best, accepted
-
-
-def cleared(c: Floats, row: Variant) -> Floats:
-    """Constants with those of a row at rest, shape (SIZE,)."""
-    out, rest = c.copy(), neutral()
-    for slot in [p.slot for p in row.params] + [int(s) for s in row.fixed or {}]:
-        out[slot] = rest[slot]
-    return out
 
 
 def proven(p: Problem, near: Fitted, candidates: list[Candidate]) -> Candidate | None:

@@ -12,10 +12,10 @@ from identification.estimation.limits import WINDOW_SAMPLES, WINDOW_TIMES
 from identification.estimation.prediction_error import Fitted, problem
 from identification.mismatch.catalogue import EFFECTS
 from identification.mismatch.cross_validation import HeldOut, Misfit, OnOther, anchored, course, misfit
-from identification.mismatch.diagnosis import cleared
 from identification.mismatch.explanation import Explanation
 from identification.mismatch.model_file import carried, constants, to_data
 from identification.mismatch.recording import Recording
+from identification.mismatch.sets_of_effects import cleared
 from identification.mismatch.starts.from_cycles import is_friction
 from identification.record import Floats
 from identification.simulation.open_loop import ModelInputs

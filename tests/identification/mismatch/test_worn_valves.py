@@ -12,11 +12,12 @@ from identification.estimation.prediction_error import Fitted, Model, Problem, d
 from identification.mismatch.answer import Answer, answer
 from identification.mismatch.catalogue import EFFECTS
 from identification.mismatch.cross_validation import HeldOut, Misfit, runs_out
-from identification.mismatch.diagnosis import explain, inputs_of, without_the_idle
+from identification.mismatch.diagnosis import explain, inputs_of
 from identification.mismatch.explanation import Explanation
 from identification.mismatch.forward_selection import Candidate, applies
 from identification.mismatch.recording import Circumstances, Finding, Recording, SeenInCycles
 from identification.mismatch.restarts import simulated_anew, window_ends
+from identification.mismatch.sets_of_effects import without_the_idle
 from identification.mismatch.starts.screening import CandidateInputs
 from identification.models import Fopdt, Stiction
 from identification.record import Floats
