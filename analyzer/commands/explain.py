@@ -6,6 +6,7 @@ import json
 import math
 import sys
 import time
+from contextlib import nullcontext, suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,11 +14,12 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from analyzer.commands.options import NOTHING_DONE, Asked, export_options
-from identification.errors import InputError
+from identification.errors import InputError, NotAssessedError
 
 if TYPE_CHECKING:
     from analyzer.explain.case import Case
     from analyzer.explain.one_loop import Explained
+    from analyzer.explain.parts import Part
     from analyzer.history.series import Series
     from analyzer.loops.spec import LoopSpec
 
@@ -63,17 +65,24 @@ def _whole(asked: Asked, tag: str) -> tuple[Case, Series]:
 
 def _cases(asked: Asked, tag: str, held_out: tuple[Path, ...]) -> tuple[Case, dict[str, Case]]:
     """The case to be explained, and those held out by name: parts under other settings, and other exports."""
-    from analyzer.explain.case import case
+    from analyzer.explain.case import MOST_SAMPLES, case
     from analyzer.explain.parts import parts, said_of
 
     spec, specs, series = _read(asked, tag)
     judged = parts(spec, series, asked.changes, asked.zone)
-    first = case(judged[0].spec, specs, dict(judged[0].series), asked.config)
-    first = replace(first, shortened=f"{said_of(judged)} {first.shortened}".strip())
-    others = {p.name: case(p.spec, specs, dict(p.series), asked.config, None) for p in judged[1:]}
+    kept: list[tuple[Part, Case]] = []
+    for part in judged:
+        with nullcontext() if len(judged) == 1 else suppress(NotAssessedError):  # OP stands still in it
+            most = None if kept else MOST_SAMPLES
+            kept.append((part, case(part.spec, specs, dict(part.series), asked.config, most)))
+    if not kept:
+        raise NotAssessedError(f"{tag}: needs OP and PV that move in one part of its settings, has none")
+    first = kept[0][1]
+    first = replace(first, shortened=f"{said_of([part for part, _ in kept])} {first.shortened}".strip())
+    others = {part.name: c for part, c in kept[1:]}
     for path in held_out:
         elsewhere = replace(asked, export=(path,), since_s=-math.inf, until_s=math.inf)
-        others[path.name] = _whole(elsewhere, tag)[0]
+        others[path.name if path.name not in others else str(path)] = _whole(elsewhere, tag)[0]
     return first, others
 
 
@@ -115,7 +124,6 @@ def explain(
     from analyzer.explain.answer_data import abstained
     from analyzer.explain.one_loop import explained
     from analyzer.explain.saved_model import read_model, write_model
-    from identification.errors import NotAssessedError
 
     tell = _Candidates()
     try:

@@ -105,7 +105,8 @@ def seen_in_cycles(verdict: Verdict) -> SeenInCycles | None:
     valve = fit.valve.valve
     if valve is None:
         return None
-    return SeenInCycles(process_of(m.window, fit), valve, m.trials.count, m.trials.agreeing)
+    cycle_s = 2.0 * m.window.duration_s / m.trials.count
+    return SeenInCycles(process_of(m.window, fit), valve, m.trials.count, m.trials.agreeing, cycle_s)
 
 
 def verdict_on(spec: LoopSpec, prepared: Prepared, config: Config) -> Verdict:

@@ -29,7 +29,7 @@ SPAN_DIFFERS = 0.01
 @dataclass(frozen=True, slots=True)
 class Explained:
     """One loop explained: what was asked, what was found, the answer in numbers and as data, what a page draws of it,
-    the user's own model, and the names of other recordings that were held out."""
+    and the user's own model."""
 
     case: Case
     found: Explanation
@@ -37,7 +37,6 @@ class Explained:
     data: dict[str, Any]
     views: Views
     brought: Brought | None = None
-    held_out: tuple[str, ...] = ()
 
     def model(self) -> dict[str, Any]:
         """The model found, the plain loop where nothing was, as data to be written."""
@@ -70,7 +69,7 @@ def explained(
         own = None if brought is None else judged(brought, found, c.subject, span_note(c, brought))
         drawn = views(found, c.subject, said, own)
     data = as_data(c, said, own) | ({"held_out_on": on_others(found, tuple(others))} if others else {})
-    return Explained(c, found, said, data, drawn, own, tuple(others))
+    return Explained(c, found, said, data, drawn, own)
 
 
 def in_percent_of(c: Case, other: Case) -> Recording:

@@ -181,9 +181,9 @@ def carried_over(found: Explanation) -> Explanation:
 
 
 def cycle_of(found: Explanation) -> int:
-    """Samples of one cycle of a loop whose cycles show a faulty valve: two stretches between turns of OP."""
-    stretches = 0 if found.cycles is None else found.cycles.stretches
-    return max(2 * found.p.y.size // max(stretches, 1), LEAST_CYCLE)
+    """Samples of one cycle of a loop whose cycles show a faulty valve."""
+    cycle_s = 0.0 if found.cycles is None else found.cycles.cycle_s
+    return max(round(cycle_s / found.p.inputs.dt_s), LEAST_CYCLE)
 
 
 def first_effects(found: Explanation, count: int) -> Explanation:

@@ -19,13 +19,14 @@ class SeenInCycles:
     """A faulty valve that the loop's own cycles show, with the process behind it.
 
     stretches : between two turns of OP, each a trial of its own; agreeing : share of them in which PV goes as behind
-    this valve and not as behind a free one [-].
+    this valve and not as behind a free one [-]; cycle_s : mean length of two of them [s].
     """
 
     process: Fopdt
     valve: Backlash | Stiction
     stretches: int
     agreeing: float
+    cycle_s: float
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,6 +11,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from analyzer.commands.explain import _cases
+from analyzer.commands.options import Asked
+from analyzer.config import Config
 from analyzer.explain.parts import FEWEST, parts, said_of
 from analyzer.history.series import Series
 from analyzer.loops.changes import TuningChange
@@ -61,6 +65,22 @@ def test_dated_rows_of_loops_part_too() -> None:
     spec = replace(SPEC, valid_from_s=2000.0, earlier=(replace(SPEC, kp=0.7),))
     found = parts(spec, trends(), (), "UTC")
     assert [(p.samples, p.spec.kp) for p in found] == [(3000, 2.0), (2000, 0.7)]
+
+
+@pytest.mark.parametrize("still", [0, 1, 2])
+def test_part_in_which_op_stands_still_is_left_out(tmp_path: Path, still: int) -> None:
+    """Of three parts the one with a still OP is neither explained nor held out, be it the longest; the rest are."""
+    lengths, rng = (2500, 1500, 1000), np.random.default_rng(1)
+    op = np.concatenate([np.cumsum(rng.normal(0, 0.1, n)) * (i != still) + 50 for i, n in enumerate(lengths)])
+    stamp = pd.Timestamp("2026-03-02", tz="UTC") + pd.to_timedelta(np.arange(op.size), unit="s")
+    frame = pd.DataFrame({"timestamp": stamp, "A.PV": 50 + rng.normal(0, 0.1, op.size), "A.OP": op})
+    frame.to_parquet(tmp_path / "x.parquet", index=False)
+    start = stamp[0].timestamp()
+    changes = (changed(start + 2500, 1.0, 1.5), changed(start + 4000, 1.5, 2.0))
+    request = Asked((tmp_path / "x.parquet",), None, changes, -math.inf, math.inf, Config(), "UTC", {})
+    explained, others = _cases(request, "A", ())
+    moving = [n for i, n in enumerate(lengths) if i != still]
+    assert [len(c.prepared.record) for c in (explained, *others.values())] == moving
 
 
 @pytest.mark.slow

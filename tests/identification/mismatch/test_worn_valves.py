@@ -59,7 +59,7 @@ def worn_loop(seed: int, scatter: float, stuck: float = STUCK) -> tuple[Floats, 
 def seen_valve(agreeing: float = 0.8, stuck: float = STUCK) -> SeenInCycles:
     """What a night's verdict would bring along, not quite right."""
     valve = Stiction(1.1 * stuck, 0.5 * stuck)
-    return SeenInCycles(Fopdt(1.2 * GAIN, 1.2 * LAG, DEAD), valve, 100, agreeing)
+    return SeenInCycles(Fopdt(1.2 * GAIN, 1.2 * LAG, DEAD), valve, 100, agreeing, 80.0)
 
 
 def recorded(
