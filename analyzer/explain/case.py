@@ -21,6 +21,8 @@ from analyzer.sample_clock import onto_clock
 from identification.controller.check import StatedSettings
 from identification.errors import NotAssessedError
 from identification.estimation.hammerstein import process_of
+from identification.estimation.likelihood_ratio import WindowFit
+from identification.estimation.trials import trials_between_moves
 from identification.mismatch.recording import Recording, SeenInCycles
 from identification.models import Pid
 from identification.record import Floats
@@ -99,22 +101,23 @@ def seen_in_cycles(verdict: Verdict) -> SeenInCycles | None:
     slip; what the explanation simulates begins from there.
     """
     m = verdict.measured
-    if verdict.cause is not Cause.VALVE or m is None or m.trials is None:
+    if verdict.cause is not Cause.VALVE or m is None:
         return None
     fit = m.stick_slip if verdict.fault is Fault.STICTION and m.stick_slip is not None else m.play
     valve = fit.valve.valve
-    if valve is None:
+    shown = m.trials or trials_between_moves(WindowFit(m.window, fit), WindowFit(m.window, m.linear))
+    if valve is None or shown is None:
         return None
-    cycle_s = 2.0 * m.window.duration_s / m.trials.count
-    return SeenInCycles(process_of(m.window, fit), valve, m.trials.count, m.trials.agreeing, cycle_s)
+    cycle_s = 2.0 * m.window.duration_s / shown.count
+    process = process_of(m.window, fit)
+    return SeenInCycles(process, valve, shown.count, shown.agreeing, cycle_s, m.trials is not None)
 
 
 def verdict_on(spec: LoopSpec, prepared: Prepared, config: Config) -> Verdict:
-    """What a night would say of this very recording: why it oscillates, if it does."""
+    """What a night would say of this very recording: why it oscillates, or of which valve it rests."""
     found = detect(prepared.record, config.oscillation)
-    if counting(found) is None:
-        return NO_CAUSE
-    return cause_of(prepared, found, pid_of(spec, prepared), config, spec.type)
+    said = cause_of(prepared, found, pid_of(spec, prepared), config, spec.type)
+    return said if counting(found) is not None or said.cause is Cause.VALVE else NO_CAUSE
 
 
 def pid_of(spec: LoopSpec, prepared: Prepared) -> Pid | None:

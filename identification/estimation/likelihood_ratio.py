@@ -39,11 +39,16 @@ STEP_PENALTY = 6.0
 """Gain in log likelihood [nat] that one step of the load at any time costs: log of the blocks, nearly."""
 
 
-def stem_moves(window: Window, valve: ValveTrial) -> int:
-    """How often the stem of a valve sets out or turns: stretches of motion in one direction with rest between."""
+def moves_begun(window: Window, valve: ValveTrial) -> np.ndarray:
+    """Blocks at which the stem of a valve sets out or turns, shape (m,)."""
     moved = np.sign(np.diff(stem_of(window, valve)))
     set_out = np.concatenate(([0.0], moved))
-    return int(((set_out[1:] != set_out[:-1]) & (set_out[1:] != 0)).sum())
+    return np.flatnonzero((set_out[1:] != set_out[:-1]) & (set_out[1:] != 0))
+
+
+def stem_moves(window: Window, valve: ValveTrial) -> int:
+    """How often the stem of a valve sets out or turns: stretches of motion in one direction with rest between."""
+    return int(moves_begun(window, valve).size)
 
 
 def with_load_step(window: Window, fit: Fit, answering: Mask, noise: Floats) -> WindowFit:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from identification.estimation.likelihood_ratio import WindowFit, innovations
+from identification.estimation.likelihood_ratio import WindowFit, innovations, moves_begun
 from identification.estimation.noise import judged
 from identification.estimation.outliers import clipped_gain
 from identification.estimation.window import block_means
@@ -87,6 +87,18 @@ def trials(ours: WindowFit, theirs: WindowFit, period_s: float) -> Trials | None
     at = turns_of(block_means(window.op, window.factor), period_s / window.dt_s)
     if at.size < 5:
         return None
-    gained = np.add.reduceat(gains(ours, theirs), at)[:-1]
+    return _agreement(np.add.reduceat(gains(ours, theirs), at)[:-1])
+
+
+def _agreement(gained: Floats) -> Trials:
+    """How stretches agree of their gains, shape (t,), t > 1."""
     spread = float(gained.std(ddof=1)) / math.sqrt(gained.size)
     return Trials(gained.size, float((gained > 0).mean()), float(gained.mean()) / max(spread, 1e-9))
+
+
+def trials_between_moves(ours: WindowFit, theirs: WindowFit) -> Trials | None:
+    """The same of the stretches that the moves of our valve's stem part, for a loop without cycles; None without a
+    move."""
+    at = moves_begun(ours.window, ours.fit.valve)
+    at = at[at > 0]
+    return _agreement(np.add.reduceat(gains(ours, theirs), np.append(0, at))) if at.size else None

@@ -153,7 +153,7 @@ def answer(found: Explanation, s: Recording) -> Answer:
     """
     proof = found.proof or held_out(found.p, found.plain, found.best)
     effects = effects_of(found, s, proof if found.accepted else None)
-    asked = not any(found_first(found))
+    asked = not any(found_first(found)) and not by_cycles(found)
     silent = unanswered(found) if asked else ""
     lacking = silent or (too_short(found, s) if asked else "")
     at = located_in(found.p, found.best if found.left > 0 else found.plain, s)
@@ -195,9 +195,10 @@ def shown_by(found: Explanation) -> str:
     if not by_cycles(found) or found.cycles is None:
         return ""
     seen = found.cycles
+    between = "turns of OP" if seen.cycling else "moves of the stem"
     text = (
-        f"In {100 * seen.agreeing:.0f} % of {seen.stretches} stretches between two turns of OP, PV goes as behind "
-        "this valve and not as behind a free one."
+        f"In {100 * seen.agreeing:.0f} % of {seen.stretches} stretches between {between}, PV goes as behind this "
+        "valve and not as behind a free one."
     )
     return text if found.proof is None or found.proof.carries else f"{text} {STRAYS}"
 

@@ -247,14 +247,15 @@ def with_cycles(p: Problem, near: Fitted, seen: SeenInCycles, candidates: list[C
 def shown_by_cycles(s: Recording, candidates: list[Candidate]) -> Candidate | None:
     """The best play or stick-slip, where the loop's cycles show a faulty valve; None where they do not.
 
-    Cycles that show a jump are believed: a slip now and then late hides it from one constant friction.
+    Cycles that show a jump, or none, are believed: a slip now and then late hides it from one constant friction, and
+    a jump makes up for what else is not constant.
     """
     if s.cycles is None:
         return None
     rubs = [c for c in candidates if is_friction(c.name)]
-    jumps = [c for c in rubs if EFFECTS[c.name].friction is Friction.STICKS]
-    first = jumps if isinstance(s.cycles.valve, Stiction) and jumps else rubs
-    return first[0] if first else None
+    wanted = Friction.STICKS if isinstance(s.cycles.valve, Stiction) else Friction.PLAY
+    alike = [c for c in rubs if EFFECTS[c.name].friction is wanted]
+    return next(iter((*alike, *rubs)), None)
 
 
 def proven(p: Problem, near: Fitted, candidates: list[Candidate]) -> Candidate | None:

@@ -16,10 +16,11 @@ TYPICAL_SCAN_S = 1.0
 
 @dataclass(frozen=True, slots=True)
 class SeenInCycles:
-    """A faulty valve that the loop's own cycles show, with the process behind it.
+    """A faulty valve that the loop's own cycles, or slips, show, with the process behind it.
 
-    stretches : between two turns of OP, each a trial of its own; agreeing : share of them in which PV goes as behind
-    this valve and not as behind a free one [-]; cycle_s : mean length of two of them [s].
+    stretches : between two turns of OP, or in a loop that does not cycle between moves of the stem, each a trial by
+    itself; agreeing : share of them in which PV goes as behind this valve and not as behind a free one [-]; cycle_s :
+    mean length of two of them [s]; cycling : whether they lie between turns of OP.
     """
 
     process: Fopdt
@@ -27,6 +28,7 @@ class SeenInCycles:
     stretches: int
     agreeing: float
     cycle_s: float
+    cycling: bool = True
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,14 +2,25 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from identification.estimation.backlash_stiction import fit_linear, fit_play
+from identification.estimation.hammerstein import ValveTrial
 from identification.estimation.likelihood_ratio import WindowFit
-from identification.estimation.trials import Trials, gains, trials, turning_points, turns_of
+from identification.estimation.trials import (
+    Trials,
+    gains,
+    trials,
+    trials_between_moves,
+    turning_points,
+    turns_of,
+)
 from identification.estimation.window import Window
 from identification.models import Backlash, Fopdt
+from identification.simulation.valve import RESTS
 from tests.identification.responses import pv_of
 
 N = 4000
@@ -80,3 +91,28 @@ def test_too_few_turns_are_no_trials():
     window = Window(op.copy(), op, np.ones(300, dtype=bool), 1.0)
     rival = WindowFit(window, fit_linear(window, PERIOD))
     assert trials(rival, rival, PERIOD) is None
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_moves_of_a_stem_are_trials_where_nothing_cycles(seed):
+    """Behind a play of 3 % nine in ten stretches between moves of the stem show it; OP turns as often as it moves."""
+    op = swinging(seed)
+    noise = 0.2 * np.random.default_rng(seed + 100).standard_normal(N)
+    window = Window(
+        pv_of(Fopdt(1.5, 30.0, 5.0), Backlash(3.0), op, 1.0) + noise, op, np.ones(N, dtype=bool), 1.0
+    )
+    linear = fit_linear(window, PERIOD)
+    play = WindowFit(window, fit_play(window, linear, PERIOD))
+    found = trials_between_moves(play, WindowFit(window, linear))
+    assert found is not None
+    assert found.count == pytest.approx(2 * N / PERIOD, abs=3)
+    assert found.agreeing > 0.9
+
+
+def test_a_stem_that_never_moves_is_no_trial():
+    """A play wider than OP's range leaves no move, and so no trial."""
+    op = 50 + np.sin(np.arange(N) / 50.0)
+    window = Window(0.1 * np.random.default_rng(1).standard_normal(N), op, np.ones(N, dtype=bool), 1.0)
+    plain = fit_linear(window, PERIOD)
+    still = replace(plain, valve=ValveTrial(5.0, 5.0, RESTS))
+    assert trials_between_moves(WindowFit(window, still), WindowFit(window, plain)) is None
