@@ -10,7 +10,7 @@ import numpy as np
 
 from analyzer import words
 from analyzer.assessments import Assessments, Hour, assess_span, hourly, settling_time, usable
-from analyzer.cause import NO_CAUSE, Verdict, as_hint, judge, not_assessed
+from analyzer.cause import NO_CAUSE, Verdict, as_hint, hidden_by_grid, judge, not_assessed
 from analyzer.config import Config, QualityLimits
 from analyzer.dead_valve import dead_valve, with_dead_valve
 from analyzer.decisions import Cause, Lack, LacksError, Needs
@@ -21,7 +21,6 @@ from analyzer.quality import Prepared
 from analyzer.sample_clock import run_lengths
 from analyzer.settings_check import SettingsDiffer, differing
 from analyzer.trends import BUCKETS, FINE_BUCKETS, close_view, thinned
-from analyzer.trial_signs import hidden_by_grid
 from identification.errors import NotAssessedError
 from identification.models import Pid
 from identification.record import LoopRecord

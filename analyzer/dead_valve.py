@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from analyzer.cause import Sign, Verdict
+from analyzer.cause import Verdict
+from analyzer.cause_signs import Sign
 from analyzer.config import CauseLimits
 from analyzer.decisions import Cause, Fault
 from identification.record import LoopRecord

@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analyzer.config import CauseLimits
-from analyzer.cycles_alike import cycles_alike
 from analyzer.fit_window import answering, time_scale, window_of
 from analyzer.oscillation import Oscillation
 from identification.controller.settings import fit_pi
@@ -51,10 +50,9 @@ class Measured:
     load that the plain model and the valve model leave [-]; amplification |S| there [-], None without settings;
     stable, the identified loop; consistency [-], gain outside the period's band over gain with it; harmonic [-],
     locked third over the fundamental; saturated, share of time at limits [-]; moves, how often the stem of the
-    better valve sets out; excited, whether set point moves drove the loop;
-    cycles_alike, whether the identified loop with its valve, simulated, cycles by itself as recorded (looked at
-    only where the size leaves it open); trials, how the stretches between OP's turns agree on the better valve,
-    None with too few; kurtosis [-] of the band at the period, 3 for noise, 1.5 where the size is kept.
+    better valve sets out; excited, whether set point moves drove the loop; trials, how the stretches between OP's
+    turns agree on the better valve, None with too few; kurtosis [-] of the band at the period, 3 for noise, 1.5 where
+    the size is kept.
     """
 
     linear: Fit
@@ -74,7 +72,6 @@ class Measured:
     window: Window
     moves: int
     excited: bool
-    cycles_alike: bool
     trials: Trials | None = None
     kurtosis: float = 3.0
 
@@ -102,11 +99,6 @@ def _consistency(window: Window, fit: Fit, period_s: float) -> float:
     prepared = prepare(window, IDEAL, fit.ar, period_s / window.dt_s)
     gain = float(prepared.score(fit.time_constant_s, fit.dead_time_s)[2][0])
     return gain / fit.gain if fit.gain else 0.0
-
-
-def is_plain(t: Trials, limits: CauseLimits) -> bool:
-    """Whether nearly every stretch between OP's turns shows the valve, with hardly any scatter."""
-    return t.agreeing >= limits.plain_agreeing and t.steadiness >= limits.plain_steadiness
 
 
 Candidates = tuple[Fit, Fit, Fit | None]
@@ -144,7 +136,6 @@ def measure(
     told, (fine_linear, fine_play, fine_stick) = _refined(window, (linear, play, stick), best)
     cycling = error is not None and oscillation is not None
     shown = trials(WindowFit(window, best), WindowFit(window, linear), scale) if cycling else None
-    least = limits.plain_size if shown is not None and is_plain(shown, limits) else limits.open_size
     return Measured(
         fine_linear,
         fine_play,
@@ -163,10 +154,6 @@ def measure(
         told,
         stem_moves(window, best.valve),
         bool(due.any()),
-        least <= size < limits.size
-        and gained >= limits.evidence
-        and oscillation is not None
-        and cycles_alike(window, best, controller, oscillation),
         shown,
         size_kurtosis(error, error.duration_s / scale) if cycling and error is not None else 3.0,
     )

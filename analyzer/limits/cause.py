@@ -1,17 +1,17 @@
-"""Limits of the cause; what trials of the valve and the size of cycles say has a file of its own."""
+"""Limits of the cause; what its signs weigh is a table of its own (analyzer/cause_weights.py)."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from analyzer.limits.trials import UNTIDY, TrialLimits
 from tuning.declare import limit
 
+UNTIDY = "ours: tests/proofs/untidy.py and tests/proofs/negative_controls.py"
 STUDY = "ours: tests/proofs/negative_controls.py and the healthy loops of a simulated plant"
 
 
 @dataclass(frozen=True, slots=True)
-class CauseLimits(TrialLimits):
+class CauseLimits:
     """When a cause is named."""
 
     judged: int = limit(
@@ -79,15 +79,6 @@ class CauseLimits(TrialLimits):
         "Further gain that a slip jump needs, for its two more constants and wider search",
         STUDY,
     )
-    open_size: float = limit(
-        0.35,
-        "-",
-        (0.0, 1.0),
-        "Stickband over the range of OP from which it can drive a cycle where simulation of the "
-        "identified loop shows that it does",
-        "ours: below it a loop that a neighbour swings passes the simulation too, for its feedback was "
-        "identified with the rest",
-    )
     moves: int = limit(
         3,
         "-",
@@ -108,13 +99,6 @@ class CauseLimits(TrialLimits):
         "-",
         (0.0, 1.0),
         "Slip jump over stickband below which the fault is a play",
-        STUDY,
-    )
-    consistent: float = limit(
-        0.35,
-        "-",
-        (0.0, 1.0),
-        "Gain outside the period's band over gain with it, from which both see one process",
         STUDY,
     )
     samples_told: float = limit(
@@ -138,69 +122,61 @@ class CauseLimits(TrialLimits):
         "Travel of OP without any answer of PV from which the valve is dead",
         STUDY,
     )
+    least_size: float = limit(
+        0.2,
+        "-",
+        (0.0, 1.0),
+        "Stickband over the range of OP below which the valve is not named in a loop that cycles",
+        "ours: integrating processes under PI of little damping cycle with a play of 0.2 to 0.35 of OP's range",
+    )
+    small_size: float = limit(
+        0.35,
+        "-",
+        (0.0, 1.0),
+        "The same below which it must be likelier, small_pct",
+        "ours: a neighbour's cycle through a free valve looks like a play of up to a third of OP's range",
+    )
+    small_pct: float = limit(
+        78.0,
+        "%",
+        (0.0, 100.0),
+        "Confidence from which a valve with so small a stickband is named",
+        "ours: loops that a tank with play feeds reach 73, plays of tests/analyzer/test_small_play.py 79 and more",
+    )
+    changing_pct: float = limit(
+        65.0,
+        "%",
+        (0.0, 100.0),
+        "The same where the cycle is none that a machine brings: its size changes and its wave is no square",
+        UNTIDY,
+    )
+    changing: float = limit(
+        1.7,
+        "-",
+        (0.0, 17.0),
+        "Kurtosis at the period from which the size changes; a sine has 1.5, noise 3",
+        UNTIDY,
+    )
+    square: float = limit(
+        0.15,
+        "-",
+        (0.0, 10.0),
+        "Locked third harmonic up to which the wave is no square, which has 1/3",
+        UNTIDY,
+    )
     size: float = limit(
         0.45,
         "-",
         (0.0, 1.0),
-        "Stickband over the range of OP from which it can drive a cycle",
+        "Stickband over the range of OP from which a valve is at fault in a loop that does not cycle",
         "below it the describing function of play is within 15 degrees of a gain",
     )
-    line: float = limit(
-        6.0,
-        "-",
-        (1.0, 1000.0),
-        "Prominence of the reconstructed load's spectrum at the period from which the load itself oscillates",
-        STUDY,
-    )
-    resonance: float = limit(
-        2.0,
-        "-",
-        (1.0, 100.0),
-        "Amplification of load by the loop at its period, |S|, from which the tuning is to blame",
-        "Ms of 2 is the usual upper bound of good tuning (Astrom, Hagglund 2006)",
-    )
-    narrow: float = limit(
-        0.93,
-        "-",
-        (0.0, 1.0),
-        "Correlation after three periods from which the frequency is constant",
-        STUDY,
-    )
-    fairly_narrow: float = limit(
-        0.85,
-        "-",
-        (0.0, 1.0),
-        "The same where it also exceeds by steadier what the identified resonance would give",
-        STUDY,
-    )
-    steadier: float = limit(
-        0.3,
-        "-",
-        (0.0, 1.0),
-        "The same above what the loop's own resonance would give",
-        "ours: the scatter over 50 periods is 0.1",
-    )
-    at_limits: float = limit(
-        0.02,
-        "-",
-        (0.0, 1.0),
-        "Share of time at a limit of OP from which a loop may run from limit to limit",
-        STUDY,
-    )
-    left: float = limit(
-        0.75,
-        "-",
+    valve_pct: float = limit(
+        55.0,
+        "%",
         (0.0, 100.0),
-        "Prominence of the load that a valve model leaves over that of the error, from which it explains "
-        "nothing",
-        STUDY,
-    )
-    harmonic: float = limit(
-        0.08,
-        "-",
-        (0.0, 1.0),
-        "Phase-locked third harmonic over the fundamental from which a wave is not a sine; a triangle has 0.11",
-        STUDY,
+        "The same for the valve, for one that is blamed is taken out",
+        "ours: tests/proofs/cause_weights.py, where of the valves named from here on one of 40 is sound",
     )
     named_pct: float = limit(
         50.0,
@@ -216,10 +192,10 @@ class CauseLimits(TrialLimits):
         "Independent signs that a named cause needs",
         STUDY,
     )
-    left_of_load: float = limit(
-        0.5,
+    grid_steps: float = limit(
+        3.0,
         "-",
-        (0.0, 10.0),
-        "The same over that of the load that an ideal valve leaves, below which it explains something",
+        (0.0, 100.0),
+        "Steps of PV's grid that a stickband must move PV by: a grid holds PV still for one of them",
         UNTIDY,
     )

@@ -14,7 +14,7 @@ from scipy.fft import ifft, irfft, next_fast_len
 
 from identification.record import Floats
 from identification.signals.robust import robust_deviation
-from identification.signals.spectrum import HALF_BAND, SIDES, Rhythm, Spectrum, band_signal, rhythm
+from identification.signals.spectrum import HALF_BAND, SIDES, Spectrum, band_signal, rhythm
 
 LEVEL = 1.5
 """Size to which every half-cycle is cut, in medians of the band's absolute value [-]; ours: a sine is cut by nothing
@@ -107,17 +107,6 @@ def size_kurtosis(s: Spectrum, line: float) -> float:
     x, _ = band_signal(s, line, SIZE_BAND)
     power = float(x @ x) / x.size
     return float(np.mean(x**4)) / power**2 if power > 0.0 else 3.0
-
-
-def independent_sizes(found: Rhythm, cycles: float) -> float:
-    """How many independent sizes a record holds if its cycles were noise through a resonance [-].
-
-    Such noise forgets its size as it forgets its phase: by the factor that the autocorrelation loses per period.
-    """
-    if found.first <= 0.0:
-        return cycles
-    kept = min(max(found.third / found.first, 0.0), 1.0)  # squared autocorrelation of one period
-    return cycles * (1.0 - kept) / (1.0 + kept)
 
 
 @dataclass(frozen=True, slots=True)

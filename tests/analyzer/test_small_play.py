@@ -51,7 +51,7 @@ def test_little_damping_cycles_with_a_small_play(rate: float, kp: float, ti: flo
     """Under PI with Kp k Ti of a fifth a play of a quarter of OP's range drives the cycle, and is blamed."""
     found = tank(rate, kp, ti, half, wandering(0), 0)
     assert found.verdict.measured is not None
-    assert found.verdict.measured.size < CONFIG.cause.open_size
+    assert found.verdict.measured.size < CONFIG.cause.size
     assert (found.verdict.cause, found.verdict.fault) == ("valve", "backlash")
 
 

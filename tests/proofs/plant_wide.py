@@ -36,14 +36,20 @@ CLEAR, SHOWS = 1.5, 1.25
 Truth = Mapping[str, Any]
 
 
-def assessed(x: Recorded, config: Config) -> tuple[dict[str, Any], tuple[Any, ...]] | None:
-    """Row and waves of one loop; None where it cannot be assessed."""
+def recorded(x: Recorded) -> tuple[LoopSpec, dict[str, Series]]:
+    """One loop as loops.csv and the export have it."""
     stamp = START_S + x.stamp_s
     none = np.zeros(stamp.size, dtype=bool)
     series = {f"{x.name}.{n}": Series(stamp, v, none) for n, v in (("SP", x.sp), ("PV", x.pv), ("OP", x.op))}
     tags = {n: f"{x.name}.{n.upper()}" for n in ("sp", "pv", "op")}
     stated = {"pv_lo": 0.0, "pv_hi": 100.0, "kp": x.kp, "ti": x.ti, "scan_s": x.dt, "master": x.master}
     spec = LoopSpec(x.name, type=x.kind, area=x.area, **tags, **stated, stated=frozenset(stated))  # type: ignore[arg-type]
+    return spec, series
+
+
+def assessed(x: Recorded, config: Config) -> tuple[dict[str, Any], tuple[Any, ...]] | None:
+    """Row and waves of one loop; None where it cannot be assessed."""
+    spec, series = recorded(x)
     try:
         found, _ = assess_loop(spec, series, config, advising=False)
     except TriageError:

@@ -20,7 +20,7 @@ from analyzer.config import Config
 from analyzer.history.series import Series
 from analyzer.loops.spec import LoopSpec
 from analyzer.oscillation import counting, detect
-from analyzer.quality import prepare
+from analyzer.quality import Prepared, prepare
 from identification.models import Pid
 from tests.untidy.draw import CAUSES, Drawn, draw
 
@@ -45,6 +45,14 @@ def clear(drawn: Drawn) -> bool:
 def judged(seed: int) -> tuple[str, bool, bool, bool, str]:
     """Cause, whether it shows, whether it is clear, whether oscillation is found, cause named."""
     drawn, config = draw(seed), Config()
+    prepared, stated = recorded(drawn, config)
+    found = detect(prepared.record, config.oscillation)
+    said = cause_of(prepared, found, stated, config, drawn.kind).cause
+    return drawn.truth["cause"], shows(drawn), clear(drawn), counting(found) is not None, said
+
+
+def recorded(drawn: Drawn, config: Config) -> tuple[Prepared, Pid | None]:
+    """A drawn loop as a night has it, with its controller where that is stated."""
     t = drawn.truth
     stamp = drawn.step_s * np.arange(drawn.pv.size)
     fine = np.zeros(drawn.pv.size, dtype=bool)
@@ -54,10 +62,7 @@ def judged(seed: int) -> tuple[str, bool, bool, bool, str]:
     spec = LoopSpec("L", pv="L.PV", op="L.OP", sp="L.SP" if t["sp_known"] else None)
     spec = replace(spec, pv_lo=0.0, pv_hi=100.0) if t["known"] else spec
     stated = Pid(drawn.plant.kp, drawn.plant.ti, scan_s=1.0) if t["known"] else None
-    prepared = prepare(spec, series, config.quality)
-    found = detect(prepared.record, config.oscillation)
-    said = cause_of(prepared, found, stated, config, drawn.kind).cause
-    return t["cause"], shows(drawn), clear(drawn), counting(found) is not None, said
+    return prepare(spec, series, config.quality), stated
 
 
 def table(results: list[tuple[str, bool, bool, bool, str]]) -> str:

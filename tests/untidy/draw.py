@@ -154,8 +154,14 @@ def _turns(stem: np.ndarray, window: int) -> int:
     return turns
 
 
-def draw(seed: int, cause: str | None = None) -> Drawn:
-    """One recorded loop."""
+CYCLES = (4.0, 160.0)
+"""Least and most cycles that a loop records."""
+
+
+def draw(
+    seed: int, cause: str | None = None, lengths: tuple[float, float] = CYCLES, worn: bool = False
+) -> Drawn:
+    """One recorded loop; `worn`: behind a load too the stem has a play that shows."""
     rng = np.random.default_rng([4711, seed])
     cause = cause or str(rng.choice(CAUSES, p=SHARES))
     kind = (
@@ -166,8 +172,9 @@ def draw(seed: int, cause: str | None = None) -> Drawn:
     plant = sound = _plant(rng, kind)
     if cause == "tuning":
         plant = replace(plant, kp=critical_gain(plant) * rng.uniform(0.85, 1.1))
-    cycles = float(np.exp(rng.uniform(math.log(4), math.log(160))))
+    cycles = float(np.exp(rng.uniform(*np.log(lengths))))
     stem, back = _stem(rng, cause), None
+    stem = Stem(lag=stem.lag, play=rng.uniform(0.3, 2.5)) if worn else stem
     if cause in ("stiction", "backlash"):
         plant = sound = replace(plant, kp=plant.kp * rng.uniform(1, 2.5), ti=plant.ti * rng.uniform(0.5, 1))
     period = _natural(plant, stem)

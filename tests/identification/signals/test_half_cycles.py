@@ -8,13 +8,12 @@ from scipy.signal import lfilter
 
 from identification.signals.half_cycles import (
     half_cycles,
-    independent_sizes,
     levelled_correlation,
     shape,
     size_kurtosis,
     usual_prominence,
 )
-from identification.signals.spectrum import Rhythm, band_signal, bands, rhythm, spectrum, tapered_power
+from identification.signals.spectrum import band_signal, bands, rhythm, spectrum, tapered_power
 
 N = 6000
 T = np.arange(N)
@@ -118,9 +117,3 @@ def test_a_sine_keeps_its_size_and_noise_through_a_resonance_does_not():
         swung = lfilter([1], [1, -2 * radius * np.cos(turn), radius**2], noise)
         told.append(size_kurtosis(spectrum(swung, 1.0), N / 60))
     assert np.mean(told) == pytest.approx(3.0, abs=0.4)
-
-
-def test_sizes_are_as_many_as_a_resonance_forgets_them():
-    """A resonance that keeps 0.8 of its autocorrelation over two periods holds a ninth of the cycles as sizes."""
-    assert independent_sizes(Rhythm(60.0, 0.9, 0.8, 0.72, 0.9, 1.0), 90.0) == pytest.approx(10.0)
-    assert independent_sizes(Rhythm(60.0, 0.9, 0.9, 0.9, 0.9, 1.0), 90.0) == 0.0

@@ -1,0 +1,123 @@
+"""Signs of a cause in words with figures, each with the cause to which it moves the odds most."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from analyzer.cause_measures import measures
+from analyzer.cause_weights import pushes
+from analyzer.decisions import CAUSES
+from analyzer.measure import Measured
+from analyzer.oscillation import Oscillation
+
+LEAST_NAT = 0.1
+"""Push [nat] below which a sign is not worth a line: it moves the odds by a tenth."""
+
+
+@dataclass(frozen=True, slots=True)
+class Sign:
+    """One sign: which cause it points to, how strongly (0 to 1), and in words with figures."""
+
+    points_to: str
+    strength: float
+    text: str
+
+
+def likelihood_text(evidence: float) -> str:
+    """How a faulty valve explains PV against an ideal one."""
+    if evidence <= 0:
+        return "play or stick-slip explains PV no better than an ideal valve"
+    return f"play or stick-slip explains PV better than an ideal valve, log likelihood +{evidence:.0f}"
+
+
+def width_text(size: float) -> str:
+    """The width of the valve's fault."""
+    return f"its width is {100 * size:.0f} % of OP's range"
+
+
+def _likelihood(m: Measured, o: Oscillation) -> str:
+    t = m.trials
+    if t is None or m.evidence <= 0:
+        return likelihood_text(m.evidence)
+    return f"{likelihood_text(m.evidence)}, in {100 * t.agreeing:.0f} % of {t.count} stretches between turns of OP"
+
+
+def _width(m: Measured, o: Oscillation) -> str:
+    if m.evidence <= 0:
+        return "no play or stick-slip is seen in PV"
+    return f"the fault that fits best is {100 * m.size:.0f} % of OP's range wide"
+
+
+def _left(m: Measured, o: Oscillation) -> str:
+    plain = f"the load that is left has {'a' if m.line_linear >= 1.0 else 'no'} peak at the period"
+    return f"{plain} (prominence {m.line_linear:.1f}, behind a faulty valve {m.line_valve:.1f})"
+
+
+def _amplification(m: Measured, o: Oscillation) -> str:
+    if not m.stable:
+        return "the identified loop is unstable"
+    if m.amplification is None:
+        return "how the loop amplifies at the period is not known, for want of its settings"
+    verb = "amplifies" if m.amplification > 1.0 else "weakens"
+    times = m.amplification if m.amplification > 1.0 else 1.0 / max(m.amplification, 1e-3)
+    return f"at the period the loop {verb} load {times:.1f} times"
+
+
+def _process(m: Measured, o: Oscillation) -> str:
+    if m.consistency >= 0.5:
+        return f"outside the period's band the same process is seen ({m.consistency:.1f} times its gain)"
+    return f"away from the period another process is seen ({m.consistency:.1f} times the gain)"
+
+
+def _wave(m: Measured, o: Oscillation) -> str:
+    return f"the wave has a phase-locked third harmonic of {100 * m.harmonic:.0f} %"
+
+
+def _size(m: Measured, o: Oscillation) -> str:
+    size = "keeps its size" if m.kurtosis < 2.0 else "changes its size"
+    rhythm = "its rhythm" if o.rhythm.third >= 0.5 else "no rhythm for long"
+    return (
+        f"the cycle {size} (kurtosis {m.kurtosis:.1f}, noise has 3) and keeps {rhythm} ({o.rhythm.third:.1f})"
+    )
+
+
+def _limits(m: Measured, o: Oscillation) -> str:
+    share = 100 * m.saturated
+    return f"OP is at a limit {share:.0f} % of the time" if share >= 1 else "OP stays off its limits"
+
+
+def _dead_time(m: Measured, o: Oscillation) -> str:
+    if o.period_s > 50 * m.linear.dead_time_s:
+        return "the period is long against the dead time"
+    return f"the period is {o.period_s / m.linear.dead_time_s:.0f} dead times"
+
+
+GROUPS: tuple[tuple[tuple[str, ...], Callable[[Measured, Oscillation], str]], ...] = (
+    (("evidence", "evidence_per_cycle", "agreeing", "steadiness", "jump"), _likelihood),
+    (("size",), _width),
+    (("line_linear", "line_valve"), _left),
+    (("amplification", "loop_gain"), _amplification),
+    (("consistency",), _process),
+    (("harmonic",), _wave),
+    (("kurtosis", "rhythm"), _size),
+    (("saturated",), _limits),
+    (("dead_time_share",), _dead_time),
+)
+"""Measures that are one sign together, with its words."""
+
+
+def signs_of(m: Measured, o: Oscillation) -> tuple[Sign, ...]:
+    """The signs of one oscillating loop; strength is one less the share to which a sign brings the odds against its
+    cause."""
+    moved = pushes(measures(m, o))
+    out = []
+    for names, text in GROUPS:
+        push = np.sum([moved[n] for n in names], axis=0)
+        k = int(np.argmax(push))
+        if push[k] >= LEAST_NAT:
+            out.append(Sign(CAUSES[k], 1.0 - math.exp(-float(push[k])), text(m, o)))
+    return tuple(out)
