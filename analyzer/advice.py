@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
-
-import numpy as np
+from dataclasses import dataclass, field, replace
 
 from analyzer import words
 from analyzer.assess import Assessment
 from analyzer.cause import Verdict
+from analyzer.compared import Comparison, compared
 from analyzer.config import AdviceLimits, Config
 from analyzer.decisions import Action, Cause, Fault, Lack, Needs
 from analyzer.loops.spec import LoopSpec
@@ -17,20 +16,17 @@ from analyzer.loops.tags import as_stated
 from analyzer.measure import Measured
 from analyzer.model_samples import uncertain
 from analyzer.oscillation import counting
+from analyzer.reconstructed_load import load_of
 from identification.estimation.covariance import NINETY
 from identification.estimation.gauss_newton import covariance
-from identification.estimation.hammerstein import Fit, disturbance, process_of
+from identification.estimation.hammerstein import Fit, process_of
 from identification.estimation.window import Window
 from identification.models import Fopdt, Integrator, Loop, Pid, Process, Valve
 from identification.record import Floats
-from identification.signals.robust import robust_deviation
 from tuning.limit_cycle import Cycle, confirm
 from tuning.linear import integral_s, is_stable
 from tuning.recommend import Proposal, recommend
 from tuning.search import rounded
-
-MOST_SCANS = 20_000
-"""Scans of reconstructed load that settings are tried on at most."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +36,8 @@ class Advice:
     action as in the ranking, None where none was sought; reason in words, empty where the finding says it all;
     kp_new and ti_new in the units and form that loops.csv states, None unless action is retune; before and after, the
     limit cycles that simulation finds at the present and at the new settings, None where there is none; lack, what
-    the record lacks where the action is to get more data.
+    the record lacks where the action is to get more data; compared, present, new and textbook settings on the load,
+    None where no settings were sought.
     """
 
     action: Action | None
@@ -50,6 +47,16 @@ class Advice:
     before: Cycle | None = None
     after: Cycle | None = None
     lack: Lack | None = None
+    compared: Comparison | None = field(default=None, compare=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Proposed:
+    """A proposal, and the loop and load [% PV] that it was sought on, None where none was sought."""
+
+    proposal: Proposal
+    loop: Loop | None = None
+    load: Floats | None = None
 
 
 def chosen_fit(verdict: Verdict) -> Fit:
@@ -99,32 +106,6 @@ def tuned(window: Window, fit: Fit, valve: bool, limits: AdviceLimits) -> Proces
     return process
 
 
-def load_of(window: Window, fit: Fit, controller: Pid, seed: int = 0) -> Floats:
-    """Load and noise [% PV] that the model leaves, on the scan's clock, the latest `MOST_SCANS`, shape (m,).
-
-    The window's blocks have lost the noise from scan to scan. OP still has it, times the gain, and it dithers the
-    stem; white noise of that size is added.
-    """
-    scan_s = controller.scan_s or window.dt_s
-    left = disturbance(window, fit)
-    clock = np.arange(int(window.duration_s / scan_s)) * scan_s
-    load = np.interp(clock, np.arange(left.size) * window.dt_s, left)[-MOST_SCANS:]
-    if window.factor > 1:
-        load += scan_noise(window, controller) * np.random.default_rng(seed).normal(size=load.size)
-    return np.asarray(load, dtype=np.float64)
-
-
-def scan_noise(window: Window, controller: Pid) -> float:
-    """Standard deviation of PV's noise from sample to sample [% PV], read from OP's second differences.
-
-    Those of white noise have sqrt(6) times its deviation; the median leaves steps aside (Rousseeuw, Croux 1993).
-    """
-    jumps = np.abs(np.diff(window.op, 2))
-    if jumps.size == 0 or controller.kp == 0:
-        return 0.0
-    return robust_deviation(jumps) / math.sqrt(6.0) / abs(controller.kp)
-
-
 def cautious(process: Fopdt, period_s: float | None) -> Fopdt:
     """A process with its time constant raised to two periods at the same slope.
 
@@ -154,12 +135,18 @@ def advise(
     oscillation = counting(found.oscillations)
     if kept is not None or controller is None or oscillation is None:
         return kept or _without_settings(found.verdict)
-    proposal = propose(found.verdict, controller, oscillation.period_s, config)
+    proposed = propose(found.verdict, controller, oscillation.period_s, config)
+    proposal = proposed.proposal
     if proposal.action is Action.UNDECIDED and found.verdict.cause is Cause.VALVE:
         proposal = replace(proposal, action=Action.REPAIR_VALVE)
     elif proposal.action is Action.UNDECIDED:
         return _lacking(Needs(Lack.LONGER, f"{words.MORE} {proposal.reason}"))
-    return _stated(proposal, spec, pv_span)
+    beside = None
+    if proposed.loop is not None and proposed.load is not None:
+        new = proposal.controller or proposal.meanwhile
+        period_s = oscillation.period_s
+        beside = compared(proposed.loop, proposed.load, new, period_s, spec, pv_span, config.advice)
+    return replace(_stated(proposal, spec, pv_span), compared=beside)
 
 
 def _without_settings(verdict: Verdict) -> Advice:
@@ -252,29 +239,32 @@ def sought_for(verdict: Verdict, controller: Pid, limits: AdviceLimits) -> tuple
     return other, m.stick_slip, (loop, *samples[0], *samples[1])
 
 
-def propose(verdict: Verdict, controller: Pid, period_s: float | None, config: Config) -> Proposal:
+def propose(verdict: Verdict, controller: Pid, period_s: float | None, config: Config) -> Proposed:
     """The tuning package's proposal on the model of a verdict, on its uncertainty, and on the load it leaves."""
     window, fit = _measured(verdict).window, chosen_fit(verdict)
     loop = model_of(verdict, controller)
     if verdict.cause not in (Cause.VALVE, Cause.TUNING):
-        return recommend(loop, verdict.cause, limits=config.tuning, source=verdict.source)
+        return Proposed(recommend(loop, verdict.cause, limits=config.tuning, source=verdict.source))
     if loop.controller.kp * loop.process.slope <= 0.0:
-        return recommend(loop, verdict.cause, limits=config.tuning)
+        return Proposed(recommend(loop, verdict.cause, limits=config.tuning))
     if loop.process.dead_time_s > config.advice.beyond_record * window.duration_s:
-        return Proposal(Action.UNDECIDED, words.beyond_record(loop.process.dead_time_s, window.duration_s))
+        why = words.beyond_record(loop.process.dead_time_s, window.duration_s)
+        return Proposed(Proposal(Action.UNDECIDED, why))
     if verdict.cause is Cause.TUNING:
         slow = replace(loop, process=cautious(process_of(window, fit), period_s))
         others = (loop, *uncertain(window, fit, loop)[:2])
-        return recommend(slow, verdict.cause, others, load_of(window, fit, controller), config.tuning)
+        load = load_of(window, fit, controller)
+        return Proposed(recommend(slow, verdict.cause, others, load, config.tuning), loop, load)
     if not is_stable(loop):
-        return Proposal(Action.UNDECIDED, words.UNSTABLE)
+        return Proposed(Proposal(Action.UNDECIDED, words.UNSTABLE))
     sought, fit, others = sought_for(verdict, controller, config.advice)
     rests = confirm(sought).cycle is None
     if rests and period_s is None:
-        return Proposal(Action.NONE, words.CALM)
+        return Proposed(Proposal(Action.NONE, words.CALM))
     if rests and math.isinf(integral_s(controller)):
-        return Proposal(Action.CHECK_SETTINGS, words.NO_INTEGRAL)
-    return recommend(sought, verdict.cause, others, load_of(window, fit, controller), config.tuning)
+        return Proposed(Proposal(Action.CHECK_SETTINGS, words.NO_INTEGRAL))
+    load = load_of(window, fit, controller)
+    return Proposed(recommend(sought, verdict.cause, others, load, config.tuning), sought, load)
 
 
 def _stated(proposal: Proposal, spec: LoopSpec, pv_span: float) -> Advice:

@@ -21,6 +21,7 @@ valve at fault, by the first two questions.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
@@ -127,13 +128,17 @@ def judge(m: Measured, oscillation: Oscillation | None, limits: CauseLimits) -> 
 
 
 def _least(cause: Cause, m: Measured, limits: CauseLimits) -> float:
-    """Confidence [%] from which a cause is named."""
+    """Confidence [%] from which a cause is named.
+
+    A stickband that is small beside OP's range makes no square of PV, and a cycle that keeps its size may be brought.
+    """
     if cause is not Cause.VALVE:
         return limits.named_pct
     if m.size >= limits.small_size:
         return limits.valve_pct
-    brought = m.kurtosis < limits.changing or m.harmonic > limits.square
-    return limits.small_pct if brought else limits.changing_pct
+    if m.harmonic > limits.square:
+        return math.inf
+    return limits.small_pct if m.kurtosis < limits.changing else limits.changing_pct
 
 
 def _quiet(m: Measured, limits: CauseLimits) -> Verdict:

@@ -10,21 +10,26 @@ import numpy as np
 
 from analyzer.cause_measures import measures
 from analyzer.cause_weights import pushes
-from analyzer.decisions import CAUSES
+from analyzer.decisions import CAUSES, Cause
 from analyzer.measure import Measured
 from analyzer.oscillation import Oscillation
 
+AMPLIFICATION = "amplification"
+"""Name of the sign that tells a loop too tight by what it does, whatever else weighs more."""
+AMPLIFIES = 1.5
+"""|S| at the period from which that is told [-]; ours: SIMC loops reach it nowhere near their own period."""
 LEAST_NAT = 0.1
 """Push [nat] below which a sign is not worth a line: it moves the odds by a tenth."""
 
 
 @dataclass(frozen=True, slots=True)
 class Sign:
-    """One sign: which cause it points to, how strongly (0 to 1), and in words with figures."""
+    """One sign: which cause it points to, how strongly (0 to 1), in words with figures, and its name."""
 
     points_to: str
     strength: float
     text: str
+    name: str = ""
 
 
 def likelihood_text(evidence: float) -> str:
@@ -67,6 +72,12 @@ def _amplification(m: Measured, o: Oscillation) -> str:
     return f"at the period the loop {verb} load {times:.1f} times"
 
 
+def _loop_gain(m: Measured, o: Oscillation) -> str:
+    if m.controller is None:
+        return "the gain of process and controller together is not known, for want of settings"
+    return f"process and controller together have a gain of {abs(m.linear.gain * m.controller.kp):.2g}"
+
+
 def _process(m: Measured, o: Oscillation) -> str:
     if m.consistency >= 0.5:
         return f"outside the period's band the same process is seen ({m.consistency:.1f} times its gain)"
@@ -78,11 +89,12 @@ def _wave(m: Measured, o: Oscillation) -> str:
 
 
 def _size(m: Measured, o: Oscillation) -> str:
-    size = "keeps its size" if m.kurtosis < 2.0 else "changes its size"
-    rhythm = "its rhythm" if o.rhythm.third >= 0.5 else "no rhythm for long"
-    return (
-        f"the cycle {size} (kurtosis {m.kurtosis:.1f}, noise has 3) and keeps {rhythm} ({o.rhythm.third:.1f})"
-    )
+    size, rhythm = m.kurtosis < 2.0, o.rhythm.third >= 0.5
+    figures = f"(kurtosis {m.kurtosis:.1f}, noise has 3; rhythm {o.rhythm.third:.1f})"
+    if size == rhythm:
+        return f"the cycle {'keeps' if size else 'changes'} its size and its rhythm {figures}"
+    kept, changed = ("size", "rhythm") if size else ("rhythm", "size")
+    return f"the cycle keeps its {kept} and changes its {changed} {figures}"
 
 
 def _limits(m: Measured, o: Oscillation) -> str:
@@ -100,7 +112,8 @@ GROUPS: tuple[tuple[tuple[str, ...], Callable[[Measured, Oscillation], str]], ..
     (("evidence", "evidence_per_cycle", "agreeing", "steadiness", "jump"), _likelihood),
     (("size",), _width),
     (("line_linear", "line_valve"), _left),
-    (("amplification", "loop_gain"), _amplification),
+    ((AMPLIFICATION,), _amplification),
+    (("loop_gain",), _loop_gain),
     (("consistency",), _process),
     (("harmonic",), _wave),
     (("kurtosis", "rhythm"), _size),
@@ -119,5 +132,8 @@ def signs_of(m: Measured, o: Oscillation) -> tuple[Sign, ...]:
         push = np.sum([moved[n] for n in names], axis=0)
         k = int(np.argmax(push))
         if push[k] >= LEAST_NAT:
-            out.append(Sign(CAUSES[k], 1.0 - math.exp(-float(push[k])), text(m, o)))
+            out.append(Sign(CAUSES[k], 1.0 - math.exp(-float(push[k])), text(m, o), names[0]))
+    if not m.stable or (m.amplification or 0.0) >= AMPLIFIES:
+        told = [s for s in out if s.name != AMPLIFICATION]
+        return (*told, Sign(Cause.TUNING, 0.05, _amplification(m, o), AMPLIFICATION))
     return tuple(out)

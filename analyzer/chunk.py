@@ -14,7 +14,7 @@ import pyarrow as pa
 
 from analyzer.advice import Advice, advise
 from analyzer.assess import Assessment, assess
-from analyzer.columns.table import HOURS, NIGHTS
+from analyzer.columns.table import HOURS, NIGHTS, SETTINGS
 from analyzer.config import Config
 from analyzer.decisions import Action, Cause, Lack, LacksError, Status
 from analyzer.history.export import Export
@@ -25,6 +25,7 @@ from analyzer.loops.settings_in_force import in_force
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import controller
 from analyzer.nights import Night, cut
+from analyzer.pages import compared as settings_page
 from analyzer.plantwide.table import waves_table
 from analyzer.present import advised
 from analyzer.quality import Prepared, prepare
@@ -34,6 +35,7 @@ from analyzer.store import Store, rows_table, write_table
 from analyzer.turn_events import turn_events
 from identification.errors import NotAssessedError, TriageError
 from identification.models import Pid
+from reports.page_file import dumps
 
 HISTORY = {Cause.NONE: Action.NONE, Cause.LOAD: Action.NONE, Cause.UNDECIDED: Action.UNDECIDED}
 """Actions of nights that are not the last, empty for the others: settings are advised on for tomorrow, not for the
@@ -89,12 +91,21 @@ def _assessed(
     return found, advise(found, spec, stated, prepared.scale.span, config)
 
 
+@dataclass(slots=True)
+class Rows:
+    """What is kept of the loops of one night: rows of three tables, and assessments."""
+
+    nights: list[dict[str, Any]] = field(default_factory=list)
+    compared: list[dict[str, Any]] = field(default_factory=list)
+    found: list[Assessment] = field(default_factory=list)
+
+
 def _loop_row(
-    spec: LoopSpec, series: dict[str, Series], night: Night, config: Config, advising: bool
-) -> tuple[dict[str, Any], Assessment | None]:
-    """The row of one loop and night, whatever happens."""
+    spec: LoopSpec, series: dict[str, Series], night: Night, config: Config, advising: bool, kept: Rows
+) -> None:
+    """Keep the row of one loop and night, whatever happens, and its assessment where there is one."""
     part = {tag: cut(s, night) for tag, s in series.items()}
-    known: dict[str, Any] = {"good_h": _good_h(part.get(spec.pv or ""))}
+    known: dict[str, Any] = {"good_h": _good_h(part.get(spec.pv or "")), "timezone": night.zone}
     try:
         prepared = prepare(spec, part, config.quality)
         stated = _stated(spec, prepared)
@@ -102,10 +113,22 @@ def _loop_row(
         known |= standing(prepared, stated, spec.type, config).as_row()
         found, advice = _assessed(spec, prepared, stated, config, advising)
         turns = turn_events(prepared, found) if advising else None
+        row = {**night_row(found, spec, night.name, config.advice), **known, "turns": turns}
+        row, drawn = advised(row, found.verdict.needs, advice), _settings_row(spec, night.name, advice)
     except Exception as error:  # an error of one loop is that loop's result, never the night's end
-        return {**lost_row(spec, night.name, _lost(error, config)), **known}, None
-    row = {**night_row(found, spec, night.name, config.advice), **known, "turns": turns}
-    return advised(row, found.verdict.needs, advice), found
+        kept.nights.append({**lost_row(spec, night.name, _lost(error, config)), **known})
+        return
+    kept.nights.append(row)
+    kept.compared += drawn
+    kept.found.append(found)
+
+
+def _settings_row(spec: LoopSpec, night: str, advice: Advice) -> list[dict[str, Any]]:
+    """The page on which settings are compared, as a row, none where none were sought."""
+    if advice.compared is None:
+        return []
+    page = settings_page.page(spec.loop, night, advice.compared, spec)
+    return [{"loop": spec.loop, "night": night, "settings_page": dumps(page)}]
 
 
 def _lost(error: Exception, config: Config) -> Lost:
@@ -143,23 +166,20 @@ def _read(task: Task, spec: LoopSpec) -> dict[str, Series] | Lost:
 
 def work(task: Task, began: Callable[[int], None] = lambda at: None) -> Done:
     """Assess a chunk and write its pieces; `began` is told the number of each loop that is begun with."""
-    rows: dict[str, list[dict[str, Any]]] = {n.name: [] for n in task.nights}
-    found: dict[str, list[Assessment]] = {n.name: [] for n in task.nights}
+    kept = {n.name: Rows() for n in task.nights}
     for at, spec in enumerate(task.specs):
         began(at)
         series = _read(task, spec)
         for night in task.nights:
             if isinstance(series, Lost):
-                row, assessment = lost_row(spec, night.name, series), None
-            else:
-                advising = night is task.nights[-1]
-                stated = in_force(spec, task.changes, night.last_s)
-                row, assessment = _loop_row(stated, series, night, task.config, advising)
-            rows[night.name].append({**row, "timezone": night.zone})
-            if assessment is not None:
-                found[night.name].append(assessment)
+                row = {**lost_row(spec, night.name, series), "timezone": night.zone}
+                kept[night.name].nights.append(row)
+                continue
+            advising = night is task.nights[-1]
+            stated = in_force(spec, task.changes, night.last_s)
+            _loop_row(stated, series, night, task.config, advising, kept[night.name])
     for night in task.nights:
-        _write_pieces(task, night.name, rows[night.name], found[night.name])
+        _write_pieces(task, night.name, kept[night.name])
     return Done(task.key, len(task.specs), task.export.met(tag for spec in task.specs for tag in spec.tags))
 
 
@@ -168,21 +188,23 @@ def lose(task: Task, reason: str) -> Done:
     lost = Lost(Status.FAILED, reason)
     for night in task.nights:
         rows = [{**lost_row(spec, night.name, lost), "timezone": night.zone} for spec in task.specs]
-        _write_pieces(task, night.name, rows, [])
+        _write_pieces(task, night.name, Rows(nights=rows))
     return Done(task.key, len(task.specs))
 
 
-def _write_pieces(task: Task, night: str, rows: list[dict[str, Any]], found: list[Assessment]) -> None:
+def _write_pieces(task: Task, night: str, kept: Rows) -> None:
     """The piece of the table of nights comes last: where it is, the chunk is whole."""
-    hours = [row for a in found for row in hour_rows(a, night)]
+    hours = [row for a in kept.found for row in hour_rows(a, night)]
     if hours:
         write_table(rows_table(hours, HOURS), task.store.part(night, "hours", task.key))
-    if found:
-        write_table(_trend_table(found), task.store.part(night, "trends", task.key))
-    waves = [wave for a in found for wave in a.waves]
+    if kept.found:
+        write_table(_trend_table(kept.found), task.store.part(night, "trends", task.key))
+    waves = [wave for a in kept.found for wave in a.waves]
     if waves:
         write_table(waves_table(waves), task.store.part(night, "waves", task.key))
-    write_table(rows_table(rows, NIGHTS), task.store.part(night, "nights", task.key))
+    if kept.compared:
+        write_table(rows_table(kept.compared, SETTINGS), task.store.part(night, "compared", task.key))
+    write_table(rows_table(kept.nights, NIGHTS), task.store.part(night, "nights", task.key))
 
 
 def _trend_table(found: Sequence[Assessment]) -> pa.Table:

@@ -123,7 +123,9 @@ def rank(
 @main.command()
 @export_options
 @click.option("--loop", "tag", required=True, help="The loop to tune.")
-@click.option("--out", type=click.Path(path_type=Path), help="Directory for the pictures.")
+@click.option(
+    "--out", type=click.Path(path_type=Path), help="Directory for pictures, and a page to try settings on."
+)
 def tune(asked: Asked, tag: str, out: Path | None) -> None:
     """One loop: model, limit cycle predicted, new Kp and Ti with reasons, forecast, travel map.
 

@@ -78,7 +78,7 @@ def finish_night(
     beside = [loop for loop in old if loop not in rows]
     joined = [old[k] if k in kept else rows[k] for k in order if k in rows] + [old[k] for k in beside]
     mine = [loop for loop in rows if loop not in kept]
-    pieces = {name: store.read_parts(night, name, keys) for name in ("hours", "trends")}
+    pieces = {name: store.read_parts(night, name, keys) for name in ("hours", "trends", "compared")}
     for name, piece in pieces.items():
         before = None if replace else store.read_if_there(name, night)
         store.write(name, night, _joined(before, piece, mine))
@@ -86,6 +86,7 @@ def finish_night(
     store.write("groups", night, rows_table(groups, GROUPS) if groups else None)
     store.write("nights", night, rows_table(joined, NIGHTS))
     store.forget_explained(night, None if replace else mine)
+    store.forget_compared()
     return _told(night, rows, old, kept, beside)
 
 

@@ -6,6 +6,7 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
+from analyzer.cause_signs import AMPLIFICATION
 from analyzer.decisions import Action, Cause, Fault, Needs, counts
 from analyzer.units import duration
 
@@ -28,7 +29,7 @@ def reason_of(row: Row, needs: Needs | None = None) -> str:
     if cause is Cause.VALVE:
         return f"{cycle}: {_valve(row)}"
     if cause is Cause.TUNING:
-        return f"{cycle}: too tight for its process; {_strongest(row, cause, 1)}"
+        return f"{cycle}: too tight for its process; {_strongest(row, cause, 1, AMPLIFICATION)}"
     if cause is Cause.LOAD:
         return f"{cycle}: driven from outside; {_strongest(row, cause, 1)}"
     if cause is Cause.UNDECIDED:
@@ -52,6 +53,8 @@ def _valve(row: Row) -> str:
     return plain.format(width=width, share=100 * row["valve_size"])
 
 
-def _strongest(row: Row, cause: Cause, most: int) -> str:
+def _strongest(row: Row, cause: Cause, most: int, first: str = "") -> str:
+    """The strongest signs of a cause, one of a name before all others."""
     signs = [s for s in json.loads(row.get("signs") or "[]") if s["points_to"] == cause]
-    return "; ".join(s["text"] for s in sorted(signs, key=lambda s: -s["strength"])[:most])
+    order = sorted(signs, key=lambda s: (s.get("name", "") != first, -s["strength"]))
+    return "; ".join(s["text"] for s in order[:most])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -119,7 +119,7 @@ def night_row(a: Assessment, spec: LoopSpec, night: str, limits: AdviceLimits) -
     """The row of one loop and night, with every column."""
     v, m = a.verdict, a.verdict.measured
     lacking = a.needs or v.needs
-    signs = [{"points_to": s.points_to, "strength": round(s.strength, 3), "text": s.text} for s in v.signs]
+    signs = [asdict(replace(s, strength=round(s.strength, 3))) for s in v.signs]
     row = {
         **empty_row(spec, night),
         **a.night.as_row(),

@@ -3,6 +3,7 @@
 STORE/nights/NIGHT.parquet   one row a loop (docs/columns.md)
 STORE/hours/NIGHT.parquet    one row a loop and hour
 STORE/explained/NIGHT.parquet  one row a loop that was explained
+STORE/compared/NIGHT.parquet  one row a loop for which settings were sought, of the newest night alone
 STORE/trends/NIGHT.parquet   thinned trends, one row a loop and bucket
 STORE/parts/NIGHT/...        the same in pieces while a night is being worked on; a resumed run reads them
 STORE/notes.jsonl            what people wrote; STORE/store.json the version of the tables
@@ -41,7 +42,7 @@ def rows_table(rows: Sequence[Mapping[str, Any]], columns: Sequence[Column]) -> 
     return pa.Table.from_arrays(arrays, schema=pa.schema(fields))
 
 
-TABLES = ("nights", "hours", "trends", "groups", "explained")
+TABLES = ("nights", "hours", "trends", "groups", "explained", "compared")
 """Tables of a night."""
 
 
@@ -170,6 +171,13 @@ class Store:
         gone = set(table.column("loop").to_pylist() if loops is None else loops)
         stay = table.filter(pa.array([name not in gone for name in table.column("loop").to_pylist()]))
         self.write("explained", night, stay if stay.num_rows else None)
+
+    def forget_compared(self) -> None:
+        """Drop the settings compared of all nights but the newest: they are for tomorrow, and large."""
+        newest = self.nights()[-1:]
+        for path in (self.path / "compared").glob("*.parquet"):
+            if is_night(path.stem) and path.stem not in newest:
+                path.unlink(missing_ok=True)
 
     def drop_parts(self) -> None:
         """Forget all pieces, and the run that they are of."""

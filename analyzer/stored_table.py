@@ -9,11 +9,11 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from analyzer.columns.table import BY_NAME, EXPLAINED, GROUPS, HOURS
+from analyzer.columns.table import BY_NAME, EXPLAINED, GROUPS, HOURS, SETTINGS
 from identification.errors import InputError
 from reports.whole_file import whole_file
 
-DECLARED = {**{c.name: c for c in (*HOURS, *EXPLAINED, *GROUPS)}, **BY_NAME}
+DECLARED = {**{c.name: c for c in (*HOURS, *EXPLAINED, *GROUPS, *SETTINGS)}, **BY_NAME}
 """Every column that a table of results may have, by name; those of trends are numbers and are not declared."""
 REMEDY = (
     "'triage store check' names all such: restore them from a backup, or delete them and run the night anew"

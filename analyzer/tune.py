@@ -12,7 +12,6 @@ from analyzer.advice import (
     Advice,
     chosen_fit,
     lag_factor,
-    load_of,
     model_of,
     propose,
     sought_for,
@@ -26,6 +25,7 @@ from analyzer.config import AdviceLimits, Config
 from analyzer.decisions import Cause
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import as_stated
+from analyzer.reconstructed_load import load_of
 from identification.errors import NotAssessedError
 from identification.estimation.covariance import LEAST_BAND, LEAST_JUMP, WIDER, half_width, reaching
 from identification.estimation.gauss_newton import covariance
@@ -176,7 +176,7 @@ def tune(found: Assessment, controller: Pid, config: Config, kept: Advice | None
     if kept is not None and kept.reason and kept.action is not None:
         proposal = Proposal(kept.action, kept.reason)
     else:
-        proposal = propose(verdict, controller, period, config)
+        proposal = propose(verdict, controller, period, config).proposal
     load = load_of(window, fit, controller)
     new = proposal.controller or proposal.meanwhile
     forecast = (

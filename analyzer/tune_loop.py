@@ -18,8 +18,9 @@ from analyzer.loops.tags import controller
 from analyzer.nights import cut, nights_of
 from analyzer.plant_clock import UTC_NAME
 from analyzer.quality import Prepared, prepare
-from analyzer.tune import lines, pictures, tune
+from analyzer.tune import Tuning, lines, pictures, tune
 from identification.errors import InputError, NotAssessedError
+from tuning.linear import slowest_s
 
 NO_MODEL = "needs PV that moves with OP, so that a model can be identified"
 
@@ -68,4 +69,19 @@ def proposal(
         raise NotAssessedError(f"{loop}: {needs or found.verdict.needs or NO_MODEL}")
     tuning = tune(found, stated, config, withheld(found, spec, stated, prepared.scale.span, config))
     text += lines(tuning, spec, prepared.scale.span)
-    return text, pictures(tuning, loop) if drawn else {}
+    return text, _drawn(tuning, spec, prepared.scale.span, config, night.name) if drawn else {}
+
+
+def _drawn(t: Tuning, spec: LoopSpec, pv_span: float, config: Config, night: str) -> dict[str, bytes]:
+    """Pictures by file name, and the page on which settings are compared and tried."""
+    from analyzer.compared import compared
+    from analyzer.pages.compared import page
+    from reports.html import render
+
+    new = t.proposal.controller or t.proposal.meanwhile
+    period_s = t.period_s or 10.0 * slowest_s(t.model)
+    found = compared(t.model, t.load, new, period_s, spec, pv_span, config.advice)
+    tried = (
+        {} if found is None else {"settings.html": render(page(spec.loop, night, found, spec), True).encode()}
+    )
+    return pictures(t, spec.loop) | tried

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from reports import map_charts
-from reports.map_blocks import Graph, HeatMap, TreeMap
+from reports.map_blocks import Field, Graph, HeatMap, TreeMap
 from reports.pages import IntervalChart, Panels, Picture, Plot, Trend
 
 if TYPE_CHECKING:
@@ -78,6 +78,8 @@ def draw(block: Picture) -> bytes:
     """A picture as PNG."""
     if isinstance(block, HeatMap):
         return map_charts.heat_map(block)
+    if isinstance(block, Field):
+        return map_charts.field(block)
     if isinstance(block, TreeMap):
         return map_charts.tree_map(block)
     if isinstance(block, Graph):

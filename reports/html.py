@@ -16,10 +16,10 @@ import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from reports import maps, svg, treemap
-from reports.pages import Band, Bars, Cell, Floats, Page, Sparkline, Trend
+from reports import fields, maps, svg, treemap
+from reports.pages import Band, Bars, Cell, Floats, Page, Sparkline, Trend, WhatIf
 
-ASSETS = ("page.css", "uPlot.min.css", "uPlot.iife.min.js", "page.js")
+ASSETS = ("page.css", "uPlot.min.css", "uPlot.iife.min.js", "page.js", "what_if.js")
 LICENCE = "uPlot.LICENSE.txt"
 FINE_S = 1e-3
 """Step of times that are no whole seconds [s]."""
@@ -65,6 +65,17 @@ def trend_data(trend: Trend) -> Markup:
         "opening": None if trend.opening is None else list(trend.opening),
         "least": list(trend.least),
     }
+    return _for_script(data)
+
+
+def what_if_data(block: WhatIf) -> Markup:
+    """Model and load as JSON for the page's script, escaped as trends are."""
+    data = {**json.loads(block.model), "load": _coded(block.load, np.zeros(block.load.size, dtype=bool))}
+    return _for_script(data)
+
+
+def _for_script(data: dict[str, object]) -> Markup:
+    """JSON of which no text can end the script that holds it."""
     return Markup(json.dumps(data).replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e"))
 
 
@@ -95,7 +106,9 @@ def _environment() -> Environment:
         tree_map=treemap.tree_map,
         graph=maps.graph,
         keys=svg.keys,
+        field=fields.field,
         trend_data=trend_data,
+        what_if_data=what_if_data,
     )
     env.filters["block"] = lambda block: type(block).__name__
     return env

@@ -37,6 +37,38 @@ class HeatMap:
 
 
 @dataclass(frozen=True, slots=True)
+class Place:
+    """A point of a field with its name; `kind` names its colour."""
+
+    x: float
+    y: float
+    label: str
+    kind: str
+
+
+@dataclass(frozen=True, slots=True)
+class Field:
+    """A value over two axes that count in powers.
+
+    x, shape (n,), and y, shape (m,), rising evenly in logarithms; value, shape (m, n), coloured by its logarithm, 0
+    where there is none; calm and unstable, bool, shape (m, n), with colours of their own; keys names the colours
+    """
+
+    name: str
+    title: str
+    x_label: str
+    y_label: str
+    x: Floats
+    y: Floats
+    value: Floats
+    calm: NDArray[np.bool_]
+    unstable: NDArray[np.bool_]
+    places: tuple[Place, ...] = ()
+    keys: tuple[tuple[str, str], ...] = ()
+    caption: str = ""
+
+
+@dataclass(frozen=True, slots=True)
 class Node:
     """A box of a graph: its name, a line under it, its colour, and in which column it stands (0 is the first)."""
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from reports.map_blocks import Graph, HeatMap, TreeMap
+from reports.map_blocks import Field, Graph, HeatMap, TreeMap
 from reports.maps import BOX, places
 from reports.treemap import HEIGHT, WIDTH, fitting, laid_out
 
@@ -53,6 +53,32 @@ def heat_map(m: HeatMap) -> bytes:
         ax.annotate(_plain(mark.label), (mark.x, 1.0), xycoords=("data", "axes fraction"), fontsize=8)
     ax.set_xlabel(_plain(m.x_label), fontsize=8)
     ax.set_title(_plain(m.title), fontsize=10, loc="left", pad=14)
+    return _png(figure)
+
+
+def field(f: Field) -> bytes:
+    """Colours over two logarithmic axes, with named points."""
+    from matplotlib.colors import ListedColormap, LogNorm
+
+    figure = _figure(6.0, 4.4)
+    ax = figure.subplots()
+    known = f.value[f.value > 0]
+    low, high = (float(v) for v in np.quantile(known, [0.02, 0.98])) if known.size else (1.0, 10.0)
+    norm = LogNorm(max(low, 1e-9), max(high, 2.0 * low, 1e-8))
+    shown = np.where(f.value > 0, f.value, np.nan)
+    ax.pcolormesh(f.x, f.y, shown, cmap="YlOrBr", shading="nearest", norm=norm)
+    for mask, colour in ((f.calm, "#bfe3c6"), (f.unstable, FILLS["valve"])):
+        ax.pcolormesh(f.x, f.y, np.where(mask, 1.0, np.nan), cmap=ListedColormap([colour]), shading="nearest")
+    for place in f.places:
+        ax.plot(place.x, place.y, "o", color="#2a3238", markersize=5)
+        ax.annotate(
+            _plain(place.label), (place.x, place.y), xytext=(6, 4), textcoords="offset points", fontsize=8
+        )
+    ax.set_xscale("log")
+    ax.set_yscale("log")
+    ax.set_xlabel(_plain(f.x_label), fontsize=8)
+    ax.set_ylabel(_plain(f.y_label), fontsize=8)
+    ax.set_title(_plain(f.title), fontsize=10, loc="left", pad=14)
     return _png(figure)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-from reports.map_blocks import Graph, HeatMap, TreeMap
+from reports.map_blocks import Field, Graph, HeatMap, TreeMap
 from reports.pages import (
     Bars,
     Block,
@@ -22,6 +22,7 @@ from reports.pages import (
     Text,
     Tiles,
     Trend,
+    WhatIf,
 )
 
 MARKS = re.compile(r"([\\`*_\[\]#!|~$])")
@@ -72,7 +73,9 @@ def _block(block: Block, folder: str) -> list[str]:
             return [f"- {escaped(term)}: {escaped(detail)}" for term, detail in block.items]
         case Tiles():
             return [f"- **{escaped(figure)}** {escaped(what)}" for figure, what, _ in block.items]
-        case IntervalChart() | Plot() | Panels() | Trend() | HeatMap() | Graph() | TreeMap():
+        case WhatIf():
+            return []
+        case IntervalChart() | Plot() | Panels() | Trend() | HeatMap() | Field() | Graph() | TreeMap():
             if not folder:
                 return []
             caption = ["", escaped(block.caption)] if block.caption else []

@@ -23,6 +23,8 @@ KINDS = {
         *(pages.IntervalChart, pages.IntervalBar, pages.Plot, pages.Line, pages.Area, map_blocks.Mark),
         *(
             map_blocks.HeatMap,
+            map_blocks.Field,
+            map_blocks.Place,
             map_blocks.TreeMap,
             map_blocks.TileGroup,
             map_blocks.Tile,
@@ -30,7 +32,16 @@ KINDS = {
             map_blocks.Node,
             map_blocks.Arrow,
         ),
-        *(pages.Panels, pages.Trend, pages.Band, pages.Text, pages.Listing, pages.Facts, pages.Tiles),
+        *(
+            pages.Panels,
+            pages.Trend,
+            pages.Band,
+            pages.Text,
+            pages.Listing,
+            pages.Facts,
+            pages.Tiles,
+            pages.WhatIf,
+        ),
     )
 }
 """The parts of which pages are made."""
@@ -64,10 +75,14 @@ def _data(x: Any) -> Any:
     return x
 
 
-def _array(x: np.ndarray) -> dict[str, str]:
+def _array(x: np.ndarray) -> dict[str, Any]:
     large = x.dtype != np.bool_ and x.size > 0 and float(np.nanmax(np.abs(x), initial=0.0)) >= FULL
     code = "b1" if x.dtype == np.bool_ else "f8" if large else "f4"
-    return {"type": code, "values": base64.b64encode(np.ascontiguousarray(x, TYPES[code]).tobytes()).decode()}
+    shape = {"shape": list(x.shape)} if x.ndim > 1 else {}
+    return shape | {
+        "type": code,
+        "values": base64.b64encode(np.ascontiguousarray(x, TYPES[code]).tobytes()).decode(),
+    }
 
 
 def loads(text: str) -> pages.Page:
@@ -97,5 +112,6 @@ def _part(x: Any) -> Any:
         return ENDS[x["value"]]
     if kind == "array":
         values: np.ndarray = np.frombuffer(base64.b64decode(x["values"], validate=True), TYPES[x["type"]])
+        values = values.reshape(x.get("shape", -1))
         return values.copy() if x["type"] == "b1" else values.astype(np.float64)
     return KINDS[kind](**{k: _part(v) for k, v in x.items()})

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from reports.map_blocks import Graph, HeatMap, Mark, TreeMap
+from reports.map_blocks import Field, Graph, HeatMap, Mark, TreeMap
 
 Floats = NDArray[np.float64]
 Masks = NDArray[np.bool_]
@@ -186,6 +186,21 @@ class Trend:
 
 
 @dataclass(frozen=True, slots=True)
+class WhatIf:
+    """A loop to be tried with other settings in the page itself.
+
+    model : process, valve, law, units and named settings as JSON (analyzer.pages.compared); load : what adds to PV at
+    each scan [% PV], shape (n,)
+    """
+
+    name: str
+    title: str
+    model: str
+    load: Floats
+    caption: str = ""
+
+
+@dataclass(frozen=True, slots=True)
 class Text:
     """Paragraphs."""
 
@@ -214,11 +229,9 @@ class Tiles:
     items: tuple[tuple[str, str, str], ...]
 
 
-Picture = IntervalChart | Plot | Panels | Trend | HeatMap | Graph | TreeMap
+Picture = IntervalChart | Plot | Panels | Trend | HeatMap | Field | Graph | TreeMap
 """Blocks that are drawn."""
-Block = (
-    Table | IntervalChart | Plot | Panels | Trend | HeatMap | Graph | TreeMap | Text | Listing | Facts | Tiles
-)
+Block = Table | Picture | WhatIf | Text | Listing | Facts | Tiles
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,8 +18,8 @@ from tuning.linear import slowest_s
 
 BLOCKS = 12
 """Blocks that a record is cut into for the bootstrap; ours: a block holds cycles enough to be counted."""
-PRELUDE = 6.0
-"""Length of the time between kick and record over the loop's slowest time; ours."""
+PRELUDE, LEAST_PRELUDE = 6.0, 300
+"""Length of the time between kick and record over the loop's slowest time, and scans at least; ours."""
 DRAWS = 200
 """Bootstrap draws over all loops together."""
 
@@ -77,7 +77,7 @@ def _prelude(loop: Loop, load: Floats) -> Floats:
     width = band(loop.valve)
     if not is_play(loop.valve) or width <= 0.0 or load.size == 0:
         return np.empty(0)
-    hold = int(min(max(PRELUDE * slowest_s(loop) / scan_step(loop), 300), load.size))
+    hold = int(min(max(PRELUDE * slowest_s(loop) / scan_step(loop), LEAST_PRELUDE), load.size))
     kick = KICK * width / abs(loop.controller.kp)
     return load[0] + kick * np.repeat([0.0, 1.0, 0.0], [1, hold // 2, hold])
 

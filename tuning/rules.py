@@ -58,6 +58,40 @@ def simc(process: Process, tau_c: float | None = None, scan_s: float = 0.0) -> P
     return Pid(1.0 / (slope * sum_s), min(slowest, 4.0 * sum_s), scan_s=scan_s)
 
 
+LAMBDA_PER_LAG, LAMBDA_PER_DELAY = 1.0, 3.0
+"""Closed-loop time constant of the lambda rule over the time constant, and over the dead time at least (Dahlin 1968;
+three dead times keep the loop robust, as mills use it: Olsen, Bialkowski 2002)."""
+
+
+def lambda_settings(process: Process, scan_s: float = 0.0) -> Pid:
+    """Lambda settings of a PI controller: Kp = T/(K (lambda + L)), Ti = T (Dahlin 1968).
+
+    lambda is the time constant, three dead times at least. For an integrator lambda is three dead times, Ti = 2
+    lambda + L and Kp = Ti/(slope (lambda + L)^2) (Chien, Fruehauf 1990).
+
+    Parameters
+    ----------
+    process : Fopdt or Integrator
+    scan_s : float
+        Scan [s]; half of it counts as dead time.
+
+    Raises
+    ------
+    ValueError
+        For a process without gain, or an integrator without dead time and scan.
+    """
+    delay, slope = effective_delay(process, scan_s), process.slope
+    if slope == 0.0 or delay <= 0.0:
+        raise ValueError(f"the lambda rule needs gain and delay, has slope {slope:g} and L {delay:g} s")
+    if isinstance(process, Integrator):
+        aim = LAMBDA_PER_DELAY * delay
+        ti = 2.0 * aim + delay
+        return Pid(ti / (slope * (aim + delay) ** 2), ti, scan_s=scan_s)
+    lag = process.time_constant_s
+    aim = max(LAMBDA_PER_LAG * lag, LAMBDA_PER_DELAY * delay)
+    return Pid(1.0 / (slope * (aim + delay)), lag, scan_s=scan_s)
+
+
 def backlash_rule(process: Process, controller: Pid) -> Pid:
     """The source study's Eq. (6): Ti at least the time constant, gain kept.
 

@@ -53,6 +53,17 @@ EXPLANATION = (
     ),
 )
 """Of a loop and night that was explained, beside its name and night."""
+COMPARED = (
+    Column(
+        "settings_page",
+        Kind.JSON,
+        "Settings page",
+        "",
+        Source.ADVICE,
+        "Settings compared and tried on the night's load, as the page is to be drawn.",
+    ),
+)
+"""Of a loop of the newest night for which settings were sought, beside its name and night."""
 GROUP = (
     Column(
         "group", Kind.TEXT, "Group", "", Source.PLANT, "Number of a group of loops that share an oscillation."

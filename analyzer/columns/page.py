@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from analyzer.columns.column import Column
-from analyzer.columns.other_tables import EXPLANATION, GROUP, GROUP_LIST, HOUR, NOTED
+from analyzer.columns.other_tables import COMPARED, EXPLANATION, GROUP, GROUP_LIST, HOUR, NOTED
 from analyzer.columns.ranking import LISTED, RANKING
 from analyzer.columns.stored import STORED
 
@@ -25,6 +25,10 @@ PARTS: tuple[tuple[str, Sequence[Column]], ...] = (
     ("Of the hours alone: `hours/*.parquet`, a row a loop and hour", (HOUR,)),
     ("Groups that share an oscillation: `groups/*.parquet`, a row a loop and group", GROUP),
     ("Groups as listed: `triage rank --groups --format csv` and `json`, a row a group", GROUP_LIST),
+    (
+        "Settings compared: `compared/*.parquet`, a row a loop for which they were sought, newest night",
+        COMPARED,
+    ),
     ("Explanations: `explained/*.parquet`, a row a loop that was explained", EXPLANATION),
 )
 TITLES = ("column", "holds", "title", "unit", "from", "h", "meaning")

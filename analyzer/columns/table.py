@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from analyzer.columns.column import Column
-from analyzer.columns.other_tables import EXPLANATION, GROUP, HOUR
+from analyzer.columns.other_tables import COMPARED, EXPLANATION, GROUP, HOUR
 from analyzer.columns.ranking import LISTED, RANKING
 from analyzer.columns.stored import STORED
 
@@ -17,6 +17,8 @@ HOURS = (BY_NAME["loop"], BY_NAME["night"], HOUR, *(c for c in NIGHTS if c.hourl
 """Of the table of hours: a row a loop and hour."""
 EXPLAINED = (BY_NAME["loop"], BY_NAME["night"], *EXPLANATION)
 """Of the table of explanations: a row a loop that was explained."""
+SETTINGS = (BY_NAME["loop"], BY_NAME["night"], *COMPARED)
+"""Of the table of settings compared: a row a loop."""
 GROUPS = (BY_NAME["loop"], BY_NAME["night"], *GROUP)
 """Of the table of groups: a row a loop and group."""
 

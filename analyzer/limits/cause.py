@@ -147,7 +147,7 @@ class CauseLimits:
         65.0,
         "%",
         (0.0, 100.0),
-        "The same where the cycle is none that a machine brings: its size changes and its wave is no square",
+        "The same where the cycle changes its size, as none does that a machine brings",
         UNTIDY,
     )
     changing: float = limit(
@@ -161,7 +161,7 @@ class CauseLimits:
         0.15,
         "-",
         (0.0, 10.0),
-        "Locked third harmonic up to which the wave is no square, which has 1/3",
+        "Locked third harmonic above which a small stickband is never named: a square has 1/3, a triangle 1/9",
         UNTIDY,
     )
     size: float = limit(

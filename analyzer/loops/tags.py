@@ -86,7 +86,7 @@ def controller(spec: LoopSpec, pv_span: float | None) -> Pid | None:
     gain = 100 / spec.kp if spec.gain_unit == "band" else spec.kp
     ti_s, td_s = _seconds(spec.ti, spec.ti_unit), _derivative_s(spec)
     kp, ti_s, td_s = _to_ideal(spec.form, gain, ti_s, td_s)
-    return Pid(kp * _percent_ratio(spec, pv_span), ti_s, td_s, **_scan(spec))
+    return Pid(kp * unit_ratio(spec, pv_span), ti_s, td_s, **_scan(spec))
 
 
 def as_stated(pid: Pid, spec: LoopSpec, pv_span: float | None) -> tuple[float, float]:
@@ -95,7 +95,7 @@ def as_stated(pid: Pid, spec: LoopSpec, pv_span: float | None) -> tuple[float, f
     The inverse of `controller`. No integral action is stated as 0. The series form knows no Ti < 4 Td; there
     it gets the nearest, both its times alike.
     """
-    gain = pid.kp / _percent_ratio(spec, pv_span)
+    gain = pid.kp / unit_ratio(spec, pv_span)
     gain, ti_s = _from_ideal(spec.form, gain, pid.ti_s, pid.td_s)
     kp = 100 / gain if spec.gain_unit == "band" else gain
     return kp, _stated_time(ti_s, spec.ti_unit)
@@ -105,7 +105,7 @@ def _scan(spec: LoopSpec) -> dict[str, float]:
     return {} if spec.scan_s is None else {"scan_s": spec.scan_s}
 
 
-def _percent_ratio(spec: LoopSpec, pv_span: float | None) -> float:
+def unit_ratio(spec: LoopSpec, pv_span: float | None) -> float:
     """Percent of OP per percent of PV, for one unit of the stated gain."""
     if spec.gain_unit != "engineering":
         return 1.0

@@ -235,11 +235,12 @@ def _explained(found: Row | None, row: Row) -> list[Section]:
 def page(
     rows: Sequence[Row],
     thin: Thinned | None,
-    index: str = "index.html",
     explained: Row | None = None,
     more: Page | None = None,
     shared: Section | None = None,
     notes: Sequence[str] = (),
+    settings: Page | None = None,
+    index: str = "index.html",
 ) -> Page:
     """A loop's page.
 
@@ -249,8 +250,6 @@ def page(
         The loop's nights, oldest first; the last is the night that the page is about.
     thin : Thinned or None
         Its trends of the last week.
-    index : str
-        The morning page.
     explained : mapping or None
         The night's explanation of the loop (analyzer.columns.table.EXPLAINED).
     more : Page or None
@@ -259,6 +258,10 @@ def page(
         What it shares with other loops.
     notes : sequence of str
         What people wrote about it, oldest first.
+    settings : Page or None
+        The page on which settings are compared and tried, which is linked; its first section stands here too.
+    index : str
+        The morning page.
     """
     row = rows[-1]
     scale = scale_of(row)
@@ -272,11 +275,14 @@ def page(
         _evidence(row),
         *_trends(thin, row),
         *_limit_cycle(row),
+        *(() if settings is None else settings.sections[:1]),
         _history(rows),
     ]
     sections.insert(-1, Section("Figures of the night, for experts", (Facts(tuple(figures)),), closed=True))
     known = [row["description"], row["type"], row["area"], f"night {row['night']}"]
     links = (("All loops", index),) + (() if more is None else (("The explanation", f"{more.name}.html"),))
+    if settings is not None:
+        links = (*links, ("Try settings", f"{settings.name}.html"))
     if shared is not None and row["group"]:
         links = (*links, ("Its group", f"group-{row['group']}.html"))
     return Page(slug(row["loop"]), row["loop"], ", ".join(k for k in known if k), tuple(sections), links)

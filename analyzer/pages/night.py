@@ -43,17 +43,19 @@ def pages(store: Store, name: str | None = None, top: int = 50) -> Iterator[Page
     for g in shared:
         yield groups.page(g, beside, night.name, night.paged)
     explained = {r["loop"]: r for r in known(store, night.name)}
+    compared = _compared(store, night.name)
     for worst in night.worst:
         tag = worst["loop"]
         own = [r for r in rows if r["loop"] == tag]
         drawn = explanation(explained.get(tag))
+        settings = kept_page(compared.get(tag))
         group = by_number.get(own[-1]["group"] or "")
         said = [n.said(night.zone) for n in night.notes.get(tag, ())]
         part = None if group is None else groups.of_loop(group, tag, {**beside, **night.trends})
-        about = loop.page(
-            own, trends.get(tag), explained=explained.get(tag), more=drawn, shared=part, notes=said
-        )
+        about = loop.page(own, trends.get(tag), explained.get(tag), drawn, part, said, settings)
         yield about
+        if settings is not None:
+            yield replace(settings, links=(*about.links[:1], (tag, f"{about.name}.html")))
         if drawn is not None:
             yield replace(drawn, links=(*about.links[:1], (tag, f"{about.name}.html")))
 
@@ -76,9 +78,21 @@ def dated_pages(store: Store, name: str | None, written: Callable[[str], bool]) 
             yield archive.page(store, night, nights, sums)
 
 
+def _compared(store: Store, night: str) -> dict[str, str]:
+    """Pages of settings that a night kept, by loop."""
+    table = store.read_if_there("compared", night)
+    rows = [] if table is None else table.select(["loop", "settings_page"]).to_pylist()
+    return {r["loop"]: r["settings_page"] for r in rows}
+
+
 def explanation(kept: Mapping[str, Any] | None) -> Page | None:
     """The page of an explanation as the night kept it; None where it kept none, or one of another version."""
+    return None if kept is None else kept_page(kept.get("page"))
+
+
+def kept_page(text: str | None) -> Page | None:
+    """A page as a night kept it; None where it kept none, or one of another version."""
     try:
-        return loads(kept["page"]) if kept is not None and kept.get("page") else None
+        return loads(text) if text else None
     except PageFileError:
         return None

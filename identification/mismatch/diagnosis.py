@@ -247,15 +247,16 @@ def with_cycles(p: Problem, near: Fitted, seen: SeenInCycles, candidates: list[C
 def shown_by_cycles(s: Recording, candidates: list[Candidate]) -> Candidate | None:
     """The best play or stick-slip, where the loop's cycles show a faulty valve; None where they do not.
 
-    Cycles that show a jump, or none, are believed: a slip now and then late hides it from one constant friction, and
-    a jump makes up for what else is not constant.
+    Cycles that show a jump are believed: a slip now and then late hides it from one constant friction. Where there is
+    no cycle, a slip or two say no more than run read from them.
     """
     if s.cycles is None:
         return None
     rubs = [c for c in candidates if is_friction(c.name)]
-    wanted = Friction.STICKS if isinstance(s.cycles.valve, Stiction) else Friction.PLAY
-    alike = [c for c in rubs if EFFECTS[c.name].friction is wanted]
-    return next(iter((*alike, *rubs)), None)
+    if isinstance(s.cycles.valve, Stiction) or not s.cycles.cycling:
+        wanted = Friction.STICKS if isinstance(s.cycles.valve, Stiction) else Friction.PLAY
+        rubs = [*(c for c in rubs if EFFECTS[c.name].friction is wanted), *rubs]
+    return rubs[0] if rubs else None
 
 
 def proven(p: Problem, near: Fitted, candidates: list[Candidate]) -> Candidate | None:

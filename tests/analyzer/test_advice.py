@@ -14,9 +14,7 @@ from analyzer.advice import (
     advise,
     chosen_fit,
     lag_factor,
-    load_of,
     propose,
-    scan_noise,
     sought_for,
     tuned,
     uncertain,
@@ -26,6 +24,7 @@ from analyzer.cause import NO_CAUSE, not_assessed
 from analyzer.decisions import Lack, Needs
 from analyzer.oscillation import Oscillations
 from analyzer.quality import prepare
+from analyzer.reconstructed_load import load_of, scan_noise
 from analyzer.rows import night_row
 from identification.models import Backlash, Fopdt, Integrator, Pid
 from tuning.limits import LIMITS
@@ -89,7 +88,9 @@ def test_known_lag_is_sought_as_a_lag(pipe):
 def test_proposal_is_stable_on_the_true_process(tank, pipe):
     """On the true process the proposal's Ms stays below 2.5."""
     for found, sketch in ((tank, TANK), (pipe, PIPE)):
-        new = propose(found.verdict, sketch.controller, found.oscillations.first.period_s, CONFIG).controller
+        new = propose(
+            found.verdict, sketch.controller, found.oscillations.first.period_s, CONFIG
+        ).proposal.controller
         loop = sought_for(found.verdict, sketch.controller, CONFIG.advice)[0]
         true = replace(loop, process=Fopdt(*sketch.process), controller=new)
         assert margins(true).ms < LIMITS.ms_most_sample
@@ -147,7 +148,7 @@ def test_load_is_left_alone():
     advice = settings(found, SWUNG)
     assert found.verdict.cause == "load"
     assert (advice.action, advice.kp_new, advice.ti_new) == ("none", None, None)
-    assert propose(found.verdict, SWUNG.controller, 300.0, CONFIG).action == "none"
+    assert propose(found.verdict, SWUNG.controller, 300.0, CONFIG).proposal.action == "none"
 
 
 def test_no_cause_no_settings(pipe):
@@ -225,7 +226,7 @@ def test_a_model_beyond_its_record_gets_no_advice(pipe):
     m = pipe.verdict.measured
     late = replace(m.play, dead_time_s=m.window.duration_s / 3)
     verdict = replace(pipe.verdict, measured=replace(m, play=late), fault="backlash")
-    p = propose(verdict, PIPE.controller, 100.0, CONFIG)
+    p = propose(verdict, PIPE.controller, 100.0, CONFIG).proposal
     assert p.controller is None
     assert "dead time" in p.reason
 
@@ -240,14 +241,14 @@ def test_unstated_settings_are_asked_for(pipe):
 def test_wrong_sign_is_told(pipe):
     """A gain of the wrong sign gets no settings and says that the controller would act the wrong way."""
     turned = replace(PIPE.controller, kp=-PIPE.kp)
-    p = propose(pipe.verdict, turned, 100.0, CONFIG)
+    p = propose(pipe.verdict, turned, 100.0, CONFIG).proposal
     assert (p.action, p.controller) == ("check settings", None)
     assert "wrong way" in p.reason
 
 
 def test_integral_off_is_told(pipe):
     """Without integral action, as stated, a loop that cycles by it is sent to check its settings."""
-    p = propose(pipe.verdict, replace(PIPE.controller, ti_s=math.inf), 100.0, CONFIG)
+    p = propose(pipe.verdict, replace(PIPE.controller, ti_s=math.inf), 100.0, CONFIG).proposal
     assert (p.action, p.controller) == ("check settings", None)
     assert "check kp and ti" in p.reason
 

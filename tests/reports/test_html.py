@@ -61,7 +61,7 @@ def test_single_file_asks_for_nothing() -> None:
     scripts = re.findall(r"<script>(.*?)</script>", text, re.S) + re.findall(
         r"<style>(.*?)</style>", text, re.S
     )
-    assert len(scripts) == 4
+    assert len(scripts) == 5
     for body in scripts:
         assert base64.b64encode(hashlib.sha256(body.encode()).digest()).decode() in policy
 

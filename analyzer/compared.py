@@ -1,0 +1,123 @@
+"""Present, recommended and textbook settings of one flagged loop on the load that its night leaves."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from analyzer.config import AdviceLimits
+from analyzer.loops.spec import LoopSpec
+from analyzer.loops.tags import as_stated
+from identification.models import Loop, Pid
+from identification.record import Floats
+from tuning.compared import Tried, rivals, tried
+from tuning.linear import integral_s
+from tuning.maps import TravelMap, travel_map
+from tuning.predict import run, settled
+from tuning.rules import simc
+
+MAP_POINTS, SPREAD = 24, 12.0
+"""Points of the travel map along each axis, and how far it reaches about the present settings; ours."""
+BEYOND = 1.5
+"""How far the map reaches beyond the outermost settings [-]; ours."""
+SHOWN_PERIODS, SHOWN_POINTS = 8.0, 240
+"""Periods of each simulation that a picture shows, and its points at most; ours."""
+
+
+@dataclass(frozen=True, slots=True)
+class Shown:
+    """A piece of one simulation: seconds, error and OP, shape (n,) each [s, % PV, % OP]."""
+
+    time_s: Floats
+    error: Floats
+    op: Floats
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """Settings of one loop beside each other.
+
+    loop, the identified one with its present controller; load [% PV] on the controller's clock, shape (n,); tried, in
+    the order in which they are told; shown, a piece of each simulation by name; travel, the map of the limit cycle's
+    travel, None where the valve is free; stated, Kp and Ti by name in the plant's units.
+    """
+
+    loop: Loop
+    load: Floats
+    tried: tuple[Tried, ...]
+    shown: Mapping[str, Shown]
+    travel: TravelMap | None
+    stated: Mapping[str, tuple[float, float]]
+    pv_span: float
+
+
+def _piece(loop: Loop, controller: Pid, load: Floats, period_s: float) -> Shown:
+    """The end of a simulation, thinned."""
+    record = settled(run(replace(loop, controller=controller), load))
+    count = min(len(record), max(round(SHOWN_PERIODS * period_s / record.dt_s), 20))
+    every = max(count // SHOWN_POINTS, 1)
+    part = record.span(len(record) - count, len(record))
+    return Shown(part.time_s[::every] - part.time_s[0], part.error[::every], part.op[::every])
+
+
+def _map(loop: Loop, settings: Sequence[Pid]) -> TravelMap | None:
+    """The travel map about the present settings, reaching to the others."""
+    if loop.valve is None:
+        return None
+    c = loop.controller
+    now_s = integral_s(c)
+    now_s = now_s if math.isfinite(now_s) else simc(loop.process, scan_s=max(c.scan_s, 1.0)).ti_s
+    gains = np.array([abs(pid.kp / c.kp) for pid in settings])
+    times = np.array([pid.ti_s for pid in settings if math.isfinite(pid.ti_s)])
+    low, high = min(1.0 / SPREAD, gains.min() / BEYOND), max(SPREAD, gains.max() * BEYOND)
+    kp = c.kp * np.geomspace(low, high, MAP_POINTS)
+    first, last = min(now_s / 4.0, times.min() / BEYOND), max(SPREAD * now_s, times.max() * BEYOND)
+    return travel_map(loop, kp, np.geomspace(first, last, MAP_POINTS))
+
+
+def compared(
+    loop: Loop,
+    load: Floats,
+    new: Pid | None,
+    period_s: float,
+    spec: LoopSpec,
+    pv_span: float,
+    limits: AdviceLimits,
+) -> Comparison | None:
+    """The settings side by side.
+
+    Parameters
+    ----------
+    loop : Loop
+        Identified, with its present controller.
+    load : ndarray of shape (n,)
+        Load and noise on the controller's clock [% PV].
+    new : Pid or None
+        The recommended settings.
+    period_s : float
+        Of the recorded cycle [s].
+    spec : LoopSpec
+    pv_span : float
+        Span of PV in its own unit.
+    limits : AdviceLimits
+
+    Returns
+    -------
+    Comparison or None
+        None where the load is too short to compare on.
+    """
+    if load.size < limits.forecast_scans or loop.process.slope * loop.controller.kp <= 0.0:
+        return None
+    settings = rivals(loop, new)
+    return Comparison(
+        loop,
+        load,
+        tried(loop, load, settings),
+        {name: _piece(loop, pid, load, period_s) for name, pid in settings.items()},
+        _map(loop, tuple(settings.values())),
+        {name: as_stated(pid, spec, pv_span) for name, pid in settings.items()},
+        pv_span,
+    )

@@ -1,0 +1,131 @@
+"""The page on which settings are tried simulates as the analysis does, in the units of the plant's controller."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from test_pages import CHROMIUM, DRIVER, opened, wait
+from test_pages import browser as _browser
+
+from analyzer.compared import compared
+from analyzer.config import Config
+from analyzer.loops.spec import LoopSpec
+from analyzer.loops.tags import controller
+from analyzer.pages.compared import page
+from identification.models import Backlash, Fopdt, Form, Loop, Motion, Stiction
+from reports.folder import write_html
+from tuning.compared import tried
+
+pytestmark = pytest.mark.skipif(not (CHROMIUM and DRIVER), reason="needs chromium and chromedriver")
+browser = _browser
+SPAN = 250.0
+BAND = LoopSpec(
+    "FIC1",
+    kp=120.0,
+    ti=0.4,
+    gain_unit="band",
+    ti_unit="min",
+    pv_unit="m3/h",
+    pv_lo=0.0,
+    pv_hi=SPAN,
+    scan_s=1.0,
+)
+PARALLEL = replace(BAND, loop="FIC2", kp=0.5, ti=40.0, gain_unit="percent", ti_unit="s", form=Form.PARALLEL)
+ENGINEERING = replace(BAND, loop="FIC3", kp=0.3, ti=2.5, gain_unit="engineering", ti_unit="repeats/min")
+CASES = {
+    "play": (BAND, Backlash(3.0)),
+    "stick-slip": (PARALLEL, Stiction(4.0, 2.0, Motion.RESTS)),
+    "dry friction": (ENGINEERING, Stiction(3.0, 1.0, Motion.HALTS)),
+    "free": (BAND, None),
+}
+
+
+def loop_of(name: str) -> Loop:
+    """The loop of a case, with the controller that its row of loops.csv states."""
+    spec, valve = CASES[name]
+    stated = controller(spec, SPAN)
+    assert stated is not None
+    return Loop(Fopdt(1.2, 30.0, 3.0), stated, valve)
+
+
+def load() -> np.ndarray:
+    """A load that wanders, with noise [% PV]."""
+    rng = np.random.default_rng(5)
+    return 0.3 * np.sin(np.arange(9000) / 700.0) + 0.05 * rng.standard_normal(9000)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The page of every case, in one file each."""
+    out = tmp_path_factory.mktemp("settings")
+    for name, (spec, _) in CASES.items():
+        new = replace(loop_of(name).controller, kp=0.4, ti_s=60.0)
+        found = compared(loop_of(name), load(), new, 120.0, spec, SPAN, Config().advice)
+        assert found is not None
+        write_html([replace(page(spec.loop, "2026-03-08", found, spec), name=name)], out, single_file=True)
+    return out
+
+
+def shown(browser: Any) -> tuple[float, float]:
+    """Travel [%/h] and error [own unit] that the page shows."""
+    script = (
+        "const f = document.querySelector('.whatif').dataset; return [Number(f.travel), Number(f.error)];"
+    )
+    travel, error = browser.execute_script(script)
+    return float(travel), float(error)
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_page_simulates_as_the_analysis_does(browser: Any, folder: Path, name: str) -> None:
+    """Recommended settings give in the page the travel and error that the analysis gives, within two percent."""
+    opened(browser, folder / f"{name}.html")
+    wait(browser, "return document.querySelector('.whatif').dataset.ready === 'yes'")
+    assert [e for e in browser.get_log("browser") if e["level"] == "SEVERE"] == []
+    loop = loop_of(name)
+    (ours,) = tried(loop, load(), {"x": replace(loop.controller, kp=0.4, ti_s=60.0)})
+    travel, error = shown(browser)
+    assert travel == pytest.approx(ours.stem_travel, rel=0.02, abs=0.5)
+    assert error == pytest.approx(ours.error * SPAN / 100.0, rel=0.02)
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_settings_typed_in_are_those_of_the_controller(browser: Any, folder: Path, name: str) -> None:
+    """What loops.csv states, typed in, is the present loop again, whatever form and units the controller has."""
+    opened(browser, folder / f"{name}.html")
+    wait(browser, "return document.querySelector('.whatif').dataset.ready === 'yes'")
+    spec = CASES[name][0]
+    browser.execute_script(
+        """const f = document.querySelector('.whatif');
+        const box = (of) => f.querySelector('input[type="number"][data-of="' + of + '"]');
+        box('kp').value = arguments[0]; box('ti').value = arguments[1];
+        delete f.dataset.travel; box('ti').dispatchEvent(new Event('change'));""",
+        spec.kp,
+        spec.ti,
+    )
+    wait(browser, "return document.querySelector('.whatif').dataset.travel !== undefined")
+    cells = browser.execute_script(
+        "return Array.from(document.querySelectorAll('.whatif td'), (c) => c.textContent)"
+    )
+    assert cells[0] == cells[1]
+    assert cells[2] in ("0 %", "–")
+
+
+def test_sliders_move_the_loop(browser: Any, folder: Path) -> None:
+    """A longer Ti by the slider cuts the travel of a loop with play, and says so for those who do not see it."""
+    opened(browser, folder / "play.html")
+    wait(browser, "return document.querySelector('.whatif').dataset.ready === 'yes'")
+    browser.execute_script("Array.from(document.querySelectorAll('.choices button'))[0].click()")
+    wait(browser, "return document.querySelectorAll('.whatif td')[2].textContent === '0 %'")
+    before, _ = shown(browser)
+    browser.execute_script(
+        """const s = document.querySelector('.whatif input[type="range"][data-of="ti"]');
+        s.value = 900; s.dispatchEvent(new Event('input'));"""
+    )
+    wait(browser, "return document.querySelectorAll('.whatif td')[2].textContent !== '0 %'")
+    after, _ = shown(browser)
+    assert after < 0.7 * before
+    assert "travel" in browser.execute_script("return document.querySelector('.whatif output').textContent")

@@ -1,0 +1,66 @@
+"""Settings beside each other: the lambda rule by theory, and what each does on a load by a plain simulation."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from identification.models import Backlash, Fopdt, Integrator, Loop, Pid, Process
+from identification.simulation.closed_loop import closed_loop
+from tuning.compared import LAMBDA, LONGER, NOW, RECOMMENDED, SIMC, rivals, tried
+from tuning.linear import margins
+from tuning.predict import run, settled
+from tuning.rules import lambda_settings
+
+PIPE = Loop(Fopdt(1.5, 40.0, 4.0), Pid(1.2, 15.0), Backlash(2.0))
+
+
+def test_lambda_makes_the_loop_as_slow_as_lambda() -> None:
+    """After a step of the set point PV has gone 63 % of the way at lambda plus the dead time, here 40 and 4 s."""
+    process = Fopdt(1.5, 40.0, 4.0)
+    loop = Loop(process, replace(lambda_settings(process), scan_s=0.2))
+    sp = np.where(np.arange(2000) < 10, 0.0, 1.0)
+    pv = closed_loop(loop, sp, np.zeros(2000)).pv
+    reached = 0.2 * (int(np.argmax(pv >= 1.0 - math.exp(-1.0))) - 10)
+    assert reached == pytest.approx(44.0, rel=0.03)
+
+
+def test_lambda_keeps_three_dead_times() -> None:
+    """A process of mostly dead time, and a level, get lambda of three dead times: as robust as SIMC (Ms 1.7)."""
+    for process in (Fopdt(2.0, 5.0, 10.0), Integrator(0.01, 10.0)):
+        assert margins(Loop(process, replace(lambda_settings(process), scan_s=0.5))).ms < 1.7
+
+
+@pytest.mark.parametrize("process", [Fopdt(0.0, 10.0, 1.0), Integrator(0.1, 0.0)])
+def test_lambda_says_what_it_lacks(process: Process) -> None:
+    """Without gain, or an integrator without delay, there is no rule, and the error says what was seen."""
+    with pytest.raises(ValueError, match="needs gain and delay"):
+        lambda_settings(process)
+
+
+def test_present_settings_come_first_and_none_twice() -> None:
+    """The present settings lead, the recommended follow, and a rule that says the same as another is left out."""
+    assert list(rivals(PIPE, Pid(0.5, 60.0))) == [NOW, RECOMMENDED, SIMC, LAMBDA, LONGER]
+    long = replace(PIPE, controller=Pid(1.2, 90.0))
+    assert LONGER not in rivals(long, None)
+    assert RECOMMENDED not in rivals(long, None)
+    assert LONGER not in rivals(replace(PIPE, process=Integrator(0.04, 4.0)), None)
+
+
+def test_figures_are_those_of_a_plain_simulation() -> None:
+    """Travel, error and peak are sums over the simulated record, and the present settings' cycle shows in them."""
+    load = 0.1 * np.random.default_rng(2).standard_normal(6000)
+    found = {t.name: t for t in tried(PIPE, load, rivals(PIPE, Pid(0.5, 60.0)))}
+    record = settled(run(PIPE, load))
+    stem, error = record.position, record.sp - record.pv
+    assert stem is not None
+    hours = len(record) * record.dt_s / 3600.0
+    assert found[NOW].stem_travel == pytest.approx(sum(abs(b - a) for a, b in pairwise(stem)) / hours)
+    assert found[NOW].error == pytest.approx(sum(abs(e) for e in error) / len(error))
+    assert found[NOW].peak == pytest.approx(max(abs(e) for e in error))
+    assert found[NOW].integral_s == pytest.approx(12.5)
+    assert found[LONGER].stem_travel < 0.5 * found[NOW].stem_travel
