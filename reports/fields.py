@@ -74,4 +74,4 @@ def field(f: Field) -> Markup:
         body.append(f'<circle class="place {place.kind}" cx="{digits(x)}" cy="{digits(y)}" r="4.5"/>')
         end = x > LEFT + 0.75 * WIDTH
         body.append(written(x - 8 if end else x + 8, y + 4, place.label, "end" if end else "start", "placed"))
-    return picture(LEFT + WIDTH + 10, HEIGHT + FOOT, body, f.title, "chart")
+    return picture(LEFT + WIDTH + 10, HEIGHT + FOOT, body, f.title, "graph", natural=True)

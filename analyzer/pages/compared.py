@@ -50,12 +50,16 @@ COLUMNS = (
     Column("peak", "Largest error", True),
     Column(
         "rejection",
-        "After a load step",
+        "After a load step, times now",
         True,
         "Integral of the error that a step of the load leaves, Ti/Kp, over that of the present settings",
     ),
     Column("ms", "Ms", True, "Maximum sensitivity of the linear loop: 1.4 to 2 is robust"),
     Column("meaning", "What it is", wide=True),
+)
+CAUTION = (
+    "Recommended are only settings that keep robustness, load rejection and error on everything that the night's data "
+    "allow, with little more gain: a valve that jumps looks like one with play behind a process of less gain."
 )
 HINT = "Move a slider, or begin from one of the settings; drag over a trend to zoom, double click for all."
 BETTER, WORSE = 0.97, 1.03
@@ -71,7 +75,7 @@ def _rejection(t: Tried, now: Tried) -> Cell:
     if not (math.isfinite(t.integral_s) and math.isfinite(now.integral_s)):
         return Cell("–")
     ratio = t.integral_s / now.integral_s
-    return Cell(f"{ratio:.2g} times", ratio, _against(ratio, 1.0))
+    return Cell(number(ratio), ratio, _against(ratio, 1.0))
 
 
 def _ti(seconds_or_none: float, unit: str) -> str:
@@ -102,7 +106,7 @@ def table(c: Comparison, spec: LoopSpec, unit: str) -> Table:
         )
     note = (
         f"Each simulated on the {duration(c.load.size * scan_step(c.loop))} of load that the night leaves behind the "
-        "identified loop."
+        f"identified loop. {CAUTION}"
     )
     return Table("settings", "", COLUMNS, tuple(rows), note)
 

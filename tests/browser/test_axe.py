@@ -10,8 +10,9 @@ import pytest
 
 from tests.browser.test_explanations import explained
 from tests.browser.test_pages import browser, folder, opened, pytestmark, wait
+from tests.browser.test_settings import settings
 
-__all__ = ["browser", "explained", "folder", "pytestmark"]
+__all__ = ["browser", "explained", "folder", "pytestmark", "settings"]
 axe = pytest.importorskip("axe_core_python", reason="needs axe-core-python, of the test extra")
 SCRIPT = (files("axe_core_python") / "axe.min.js").read_text(encoding="utf-8")
 RUN = """const done = arguments[arguments.length - 1];
@@ -55,3 +56,25 @@ def test_nothing_serious_in_an_explanation(browser: Any, explained: list[Path]) 
     wait(browser, "return Array.from(document.querySelectorAll('.trend')).every((t) => t.dataset.ready)")
     browser.execute_cdp_cmd("Runtime.evaluate", {"expression": SCRIPT})
     assert browser.execute_async_script(RUN) == []
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("width", [390, 1280])
+def test_nothing_serious_where_settings_are_tried(
+    browser: Any, settings: Path, scheme: str, width: int
+) -> None:
+    """Nor on the page with sliders, on a phone, in light and in dark; nothing is wider than the phone."""
+    size = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": width < 500}
+    browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+    browser.execute_cdp_cmd(
+        "Emulation.setEmulatedMedia", {"features": [{"name": "prefers-color-scheme", "value": scheme}]}
+    )
+    try:
+        opened(browser, settings / "play.html")
+        wait(browser, "return document.querySelector('.whatif').dataset.ready === 'yes'")
+        assert browser.execute_script("return document.documentElement.scrollWidth") <= width
+        browser.execute_cdp_cmd("Runtime.evaluate", {"expression": SCRIPT})
+        assert browser.execute_async_script(RUN) == []
+    finally:
+        browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+        browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": []})

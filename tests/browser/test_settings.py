@@ -8,8 +8,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from test_pages import CHROMIUM, DRIVER, opened, wait
-from test_pages import browser as _browser
 
 from analyzer.compared import compared
 from analyzer.config import Config
@@ -18,10 +16,11 @@ from analyzer.loops.tags import controller
 from analyzer.pages.compared import page
 from identification.models import Backlash, Fopdt, Form, Loop, Motion, Stiction
 from reports.folder import write_html
+from tests.browser.test_pages import CHROMIUM, DRIVER, browser, opened, wait
 from tuning.compared import tried
 
 pytestmark = pytest.mark.skipif(not (CHROMIUM and DRIVER), reason="needs chromium and chromedriver")
-browser = _browser
+__all__ = ["browser"]
 SPAN = 250.0
 BAND = LoopSpec(
     "FIC1",
@@ -59,7 +58,7 @@ def load() -> np.ndarray:
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def settings(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The page of every case, in one file each."""
     out = tmp_path_factory.mktemp("settings")
     for name, (spec, _) in CASES.items():
@@ -80,9 +79,9 @@ def shown(browser: Any) -> tuple[float, float]:
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_page_simulates_as_the_analysis_does(browser: Any, folder: Path, name: str) -> None:
+def test_page_simulates_as_the_analysis_does(browser: Any, settings: Path, name: str) -> None:
     """Recommended settings give in the page the travel and error that the analysis gives, within two percent."""
-    opened(browser, folder / f"{name}.html")
+    opened(browser, settings / f"{name}.html")
     wait(browser, "return document.querySelector('.whatif').dataset.ready === 'yes'")
     assert [e for e in browser.get_log("browser") if e["level"] == "SEVERE"] == []
     loop = loop_of(name)
@@ -93,9 +92,9 @@ def test_page_simulates_as_the_analysis_does(browser: Any, folder: Path, name: s
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_settings_typed_in_are_those_of_the_controller(browser: Any, folder: Path, name: str) -> None:
+def test_settings_typed_in_are_those_of_the_controller(browser: Any, settings: Path, name: str) -> None:
     """What loops.csv states, typed in, is the present loop again, whatever form and units the controller has."""
-    opened(browser, folder / f"{name}.html")
+    opened(browser, settings / f"{name}.html")
     wait(browser, "return document.querySelector('.whatif').dataset.ready === 'yes'")
     spec = CASES[name][0]
     browser.execute_script(
@@ -114,9 +113,9 @@ def test_settings_typed_in_are_those_of_the_controller(browser: Any, folder: Pat
     assert cells[2] in ("0 %", "–")
 
 
-def test_sliders_move_the_loop(browser: Any, folder: Path) -> None:
+def test_sliders_move_the_loop(browser: Any, settings: Path) -> None:
     """A longer Ti by the slider cuts the travel of a loop with play, and says so for those who do not see it."""
-    opened(browser, folder / "play.html")
+    opened(browser, settings / "play.html")
     wait(browser, "return document.querySelector('.whatif').dataset.ready === 'yes'")
     browser.execute_script("Array.from(document.querySelectorAll('.choices button'))[0].click()")
     wait(browser, "return document.querySelectorAll('.whatif td')[2].textContent === '0 %'")

@@ -209,8 +209,8 @@
     const line = (label, name, dash) => ({ label, stroke: () => colour(name), width: 1.2, dash, points: { show: false } });
     const sync = uPlot.sync(figure.id);
     const panels = [
-      { label: "SP − PV [" + model.pv_unit + "]", height: 220, series: [line("now", "sp"), line("with these settings", "pv")] },
-      { label: "OP and stem [%]", height: 170, series: [line("now", "sp"), line("with these settings", "op"), line("stem", "stuck", [5, 3])] },
+      { label: "SP − PV [" + model.pv_unit + "]", height: 220, series: [line("now", "quiet"), line("with these settings", "pv")] },
+      { label: "OP and stem [%]", height: 170, series: [line("now", "quiet"), line("with these settings", "op"), line("stem", "stuck", [5, 3])] },
     ];
     panels.forEach((panel, i) => {
       const options = {
@@ -235,7 +235,7 @@
       plots.push(u);
     });
     const legend = figure.querySelector(".legend");
-    [["now", "key-sp"], ["with these settings: error", "key-pv"], ["OP", "key-op"], ["stem", "key-stuck"]].forEach(([text, kind]) => {
+    [["now", "key-now"], ["with these settings: error", "key-pv"], ["OP", "key-op"], ["stem", "key-stuck"]].forEach(([text, kind]) => {
       const key = document.createElement("span");
       key.className = kind;
       key.textContent = text;
