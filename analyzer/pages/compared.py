@@ -58,7 +58,7 @@ COLUMNS = (
     Column("meaning", "What it is", wide=True),
 )
 CAUTION = (
-    "Recommended are only settings that keep robustness, load rejection and error on everything that the night's data "
+    "Recommended are only settings that keep robustness, load rejection and error on all that the night's data "
     "allow, with little more gain: a valve that jumps looks like one with play behind a process of less gain."
 )
 HINT = "Move a slider, or begin from one of the settings; drag over a trend to zoom, double click for all."
