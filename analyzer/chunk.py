@@ -21,7 +21,7 @@ from analyzer.history.export import Export
 from analyzer.history.series import Series
 from analyzer.lanes import standing
 from analyzer.loops.changes import TuningChange
-from analyzer.loops.settings_in_force import in_force
+from analyzer.loops.settings_in_force import in_force, settings_from
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import controller
 from analyzer.nights import Night, cut
@@ -177,7 +177,9 @@ def work(task: Task, began: Callable[[int], None] = lambda at: None) -> Done:
                 continue
             advising = night is task.nights[-1]
             stated = in_force(spec, task.changes, night.last_s)
+            since = settings_from(spec, task.changes, night.last_s, night.zone)
             _loop_row(stated, series, night, task.config, advising, kept[night.name])
+            kept[night.name].nights[-1]["settings_from"] = since
     for night in task.nights:
         _write_pieces(task, night.name, kept[night.name])
     return Done(task.key, len(task.specs), task.export.met(tag for spec in task.specs for tag in spec.tags))

@@ -251,6 +251,14 @@ LISTED = (
         Source.LOOPS,
         "Weight of the loop in its loss and in its area's score; counts as 1 where it is not stated.",
     ),
+    Column(
+        "settings_from",
+        Kind.TEXT,
+        "Settings from",
+        "",
+        Source.LOOPS,
+        "Where the settings in force at the night's end stand, loops.csv or changes.csv, and since which day.",
+    ),
     Column("form", Kind.TEXT, "Form", "", Source.LOOPS, "Form of the controller: ideal, series or parallel."),
     Column(
         "gain_unit",

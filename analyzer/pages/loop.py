@@ -71,7 +71,18 @@ COLUMNS = (
         "kp_new",
         "ti_new",
     ),
-    *("form", "gain_unit", "ti_unit", "signs", "notes", "advice", "start_s", *FIGURES, *MODEL),
+    *(
+        "settings_from",
+        "form",
+        "gain_unit",
+        "ti_unit",
+        "signs",
+        "notes",
+        "advice",
+        "start_s",
+        *FIGURES,
+        *MODEL,
+    ),
     *(name for _, period, amplitude in CYCLES for name in (period, amplitude)),
 )
 """What a loop's page reads of the table of nights."""
@@ -89,7 +100,8 @@ def _facts(row: Row) -> Facts:
         facts.append(("Period", duration(row["period_s"])))
         facts.append(titled("pv_amplitude_pct", number(row["pv_amplitude_pct"])))
     if row["kp"] is not None:
-        facts.append(("Settings as stated", f"{row_settings(row)} ({row['form']} form)"))
+        source = f", of {row['settings_from']}" if row["settings_from"] else ""
+        facts.append(("Settings in force", f"{row_settings(row)} ({row['form']} form{source})"))
     if row["kp_new"] is not None or row["ti_new"] is not None:
         facts.append(("Settings to type in", row_settings(row, "kp_new", "ti_new")))
     return Facts(tuple(facts))

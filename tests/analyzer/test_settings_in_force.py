@@ -11,7 +11,7 @@ from analyzer import batch
 from analyzer.config import Config
 from analyzer.history.export import open_export
 from analyzer.loops.changes import TuningChange
-from analyzer.loops.settings_in_force import in_force
+from analyzer.loops.settings_in_force import in_force, settings_from
 from analyzer.loops.tags import match, read_loops
 from analyzer.stated_time import parse_time
 from analyzer.store import Store
@@ -94,3 +94,25 @@ def test_two_rows_at_one_time_are_told(tmp_path):
     path.write_text("loop,kp,valid_from\nL,1,\nL,2,\n", encoding="utf-8")
     with pytest.raises(InputError, match="different times in valid_from"):
         read_loops(path)
+
+
+@pytest.mark.parametrize(
+    ("at_s", "expected"),
+    [
+        (50.0, "changes.csv, before 1970-01-01"),
+        (100_000.0, "changes.csv, from 1970-01-01"),
+        (200_000.0, "changes.csv, from 1970-01-03"),
+    ],
+)
+def test_the_page_says_where_settings_come_from(at_s, expected):
+    """Settings of changes.csv are told with the day of the change, in the plant's own days."""
+    first = TuningChange("L", 100.0, 0.5, 5.0, 2.0, 20.0)
+    second = TuningChange("L", 2 * 86400.0 - 3600.0, kp_new=3.0)
+    assert settings_from(LOOP, (second, first), at_s, "Europe/Helsinki") == expected
+
+
+def test_loops_csv_is_named_where_no_change_says_otherwise():
+    """Without changes the settings are those of loops.csv; where none are stated nothing is said."""
+    assert settings_from(LOOP, (), 50.0, "UTC") == "loops.csv"
+    assert settings_from(LOOP, (TuningChange("L", 10.0, who="me"),), 50.0, "UTC") == "loops.csv"
+    assert settings_from(spec("M", kp=None, ti=None), (), 50.0, "UTC") == ""
