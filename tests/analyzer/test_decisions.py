@@ -61,7 +61,9 @@ def row_without(n: int, *roles: str) -> dict[str, object]:
     if "sp" in found:
         found["L.SP"] = series(stamp, np.full(n, 50.0))
     stated = spec(**dict.fromkeys(roles))
-    row, _ = chunk._loop_row(stated, found, NIGHT, CONFIG, True)
+    kept = chunk.Rows()
+    chunk._loop_row(stated, found, NIGHT, CONFIG, True, kept)
+    (row,) = kept.nights
     return row
 
 

@@ -18,7 +18,9 @@ def night_row(ti_s: float) -> dict[str, object]:
     found = {"L.SP": np.full(stamp.size, 50.0), "L.PV": 50.0 + swing, "L.OP": 50.0 - swing}
     trends = {tag: series(stamp, x) for tag, x in found.items()}
     night = Night("2026-03-02", START_S, START_S + 86400.0)
-    row, _ = chunk._loop_row(spec(kp=1.0, ti=ti_s), trends, night, CONFIG, True)
+    kept = chunk.Rows()
+    chunk._loop_row(spec(kp=1.0, ti=ti_s), trends, night, CONFIG, True, kept)
+    (row,) = kept.nights
     return row
 
 

@@ -35,7 +35,9 @@ def row_of(values: dict[str, np.ndarray], kp: float = 2.0, **extra: np.ndarray) 
     stamp = START_S + np.arange(values["pv"].size, dtype=float)
     found = {f"L.{role.upper()}": series(stamp, x) for role, x in {**values, **extra}.items()}
     stated = replace(spec(kp=kp, ti=60.0, type="flow"), mode="L.MODE" if "mode" in extra else None)
-    row, _ = chunk._loop_row(stated, found, NIGHT, CONFIG, True)
+    kept = chunk.Rows()
+    chunk._loop_row(stated, found, NIGHT, CONFIG, True, kept)
+    (row,) = kept.nights
     return in_lanes(row, CONFIG.lanes)
 
 

@@ -62,8 +62,11 @@ def test_play_gets_settings_and_three_pictures(tmp_path, tank):
     assert play == pytest.approx(TANK.backlash, rel=0.1)
     assert re.search(r"stem travel: .* -\d\d %", out)
     made = {p.name: p.read_bytes() for p in (tmp_path / "pictures").iterdir()}
+    page = made.pop("settings.html").decode()
     assert set(made) == {"limit-cycle.png", "travel-map.png", "forecast.png"}
     assert all(picture.startswith(PNG) for picture in made.values())
+    assert "Try settings" in page
+    assert "SIMC" in page
 
 
 def test_settings_typed_in_calm_the_tank(tmp_path, tank):

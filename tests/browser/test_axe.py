@@ -10,7 +10,7 @@ import pytest
 
 from tests.browser.test_explanations import explained
 from tests.browser.test_pages import browser, folder, opened, pytestmark, wait
-from tests.browser.test_settings import settings
+from tests.browser.test_settings_page import settings
 
 __all__ = ["browser", "explained", "folder", "pytestmark", "settings"]
 axe = pytest.importorskip("axe_core_python", reason="needs axe-core-python, of the test extra")
