@@ -16,8 +16,9 @@ from analyzer.oscillation import Oscillation
 
 AMPLIFICATION = "amplification"
 """Name of the sign that tells a loop too tight by what it does, whatever else weighs more."""
-AMPLIFIES = 1.5
-"""|S| at the period from which that is told [-]; ours: SIMC loops reach it nowhere near their own period."""
+AMPLIFIES = 1.7
+"""|S| at the period from which that is told [-]: SIMC settings have 1.6 to 1.7 at their peak (Grimholt, Skogestad
+2012)."""
 LEAST_NAT = 0.1
 """Push [nat] below which a sign is not worth a line: it moves the odds by a tenth."""
 

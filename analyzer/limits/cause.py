@@ -176,7 +176,7 @@ class CauseLimits:
         "%",
         (0.0, 100.0),
         "The same for the valve, for one that is blamed is taken out",
-        "ours: tests/proofs/cause_weights.py, where of the valves named from here on one of 40 is sound",
+        UNTIDY,
     )
     named_pct: float = limit(
         50.0,
