@@ -25,6 +25,8 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from analyzer.cause_measures import measures
 from analyzer.cause_signs import Sign, likelihood_text, signs_of, width_text
 from analyzer.cause_weights import chances
@@ -113,11 +115,15 @@ def judge(m: Measured, oscillation: Oscillation | None, limits: CauseLimits) -> 
     """The verdict on one loop.
 
     Of a loop that oscillates the likeliest cause is named where its probability is high enough; the valve's more so,
-    and only where PV speaks for its fault, for a valve that is blamed is taken out.
+    and only where PV speaks for its fault, for a valve that is blamed is taken out. Where a
+    sign is not known none is.
     """
     if oscillation is None:
         return _quiet(m, limits)
-    found = chances(measures(m, oscillation))
+    seen = measures(m, oscillation)
+    if not np.isfinite(seen).all():
+        return replace(not_assessed(None), measured=m)
+    found = chances(seen)
     first = max(found, key=lambda c: found[c])
     confidence = {c: 100.0 * p for c, p in found.items()}
     if first is Cause.VALVE and (m.size < limits.least_size or not speaks(m, limits, True)):

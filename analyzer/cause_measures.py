@@ -51,7 +51,7 @@ NAMES = (
 
 
 def measures(m: Measured, o: Oscillation) -> Floats:
-    """The signs of one oscillating loop as numbers, shape (len(NAMES),), each within fixed bounds.
+    """The signs of one oscillating loop as numbers, shape (len(NAMES),), within fixed bounds; NaN where not known.
 
     Gains in log likelihood in logarithms; agreeing and steadiness of the trials, 0 without; stickband over range of
     OP; prominences, amplification at the period and K Kp in logarithms; dead time over period; gain outside the
@@ -64,7 +64,7 @@ def measures(m: Measured, o: Oscillation) -> Floats:
         _signed_log(m.evidence / cycles / SMALL_GAIN_CYCLE),
         0.0 if t is None else t.agreeing - 0.5,
         0.0 if t is None else min(max(t.steadiness, -2.0), 15.0),
-        _signed_log(max(m.jump, -1e6) / SMALL_GAIN if math.isfinite(m.jump) else 1e3),
+        _signed_log(max(m.jump, -1e6) / SMALL_GAIN if not math.isinf(m.jump) else 1e3),
         min(max(m.size, 0.0), 1.5),
         _log(m.line_linear, 0.05, 1e4),
         _log(m.line_valve, 0.05, 1e4),
@@ -77,4 +77,4 @@ def measures(m: Measured, o: Oscillation) -> Floats:
         min(max(o.rhythm.third, -0.2), KEPT),
         m.saturated,
     )
-    return np.nan_to_num(np.array(found, dtype=np.float64))
+    return np.array(found, dtype=np.float64)

@@ -10,6 +10,7 @@ import pytest
 from plant import CONFIG, START_S, Sketch, Trends, prepared, record, series, simulate, spec
 
 from analyzer.assess import Assessment, assess
+from analyzer.cause import judge
 from analyzer.dead_valve import dead_valve
 from analyzer.decisions import Lack
 from analyzer.plantwide.source import Peer
@@ -254,3 +255,17 @@ def test_a_loop_at_rest_has_no_dead_valve():
     noise = 0.1 * np.random.default_rng(8).standard_normal(n)
     assert dead_valve(record(50 + noise, op=np.linspace(20, 80, n)), CONFIG.cause) is None
     assert dead_valve(record(30 + noise, op=np.full(n, 100.0)), CONFIG.cause) is None
+
+
+@pytest.mark.parametrize(
+    "name", ["evidence", "jump", "size", "line_valve", "consistency", "harmonic", "kurtosis"]
+)
+def test_a_sign_that_is_not_known_names_no_cause(name):
+    """A measure that is not a number abstains, and never counts as one."""
+    found = assessed("play, tank")
+    first = found.oscillations.first
+    assert first is not None
+    assert found.verdict.measured is not None
+    assert judge(found.verdict.measured, first, CONFIG.cause).cause == "valve"
+    broken = replace(found.verdict.measured, **{name: float("nan")})
+    assert judge(broken, first, CONFIG.cause).cause == "undecided"
