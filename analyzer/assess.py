@@ -18,7 +18,7 @@ from analyzer.measure import measure, time_scale
 from analyzer.oscillation import Oscillation, Oscillations, barely_seen, counting, detect
 from analyzer.plantwide.wave import Wave, waves_of
 from analyzer.quality import Prepared
-from analyzer.sample_clock import run_lengths
+from analyzer.sample_clock import constant_for
 from analyzer.settings_check import SettingsDiffer, differing
 from analyzer.trends import BUCKETS, FINE_BUCKETS, close_view, thinned
 from identification.errors import NotAssessedError
@@ -102,8 +102,7 @@ def at_limits(record: LoopRecord, q: QualityLimits) -> Needs | None:
 def _scattered(record: LoopRecord, q: QualityLimits) -> Needs | None:
     """What good samples lack that are too scattered for a model; None where enough of them follow each other."""
     good = ~record.bad
-    length = run_lengths(good.astype(np.float64))
-    share = float(good[np.repeat(length >= q.run_samples, length)].sum()) / max(len(record), 1)
+    share = float((good & constant_for(good.astype(np.float64), q.run_samples)).sum()) / max(len(record), 1)
     if share >= q.run_share:
         return None
     wanted = f"{100 * q.run_share:.0f} % of the time in runs of {q.run_samples} good samples"
@@ -230,7 +229,7 @@ def assess(prepared: Prepared, controller: Pid | None, config: Config, kind: str
         night,
         tuple(
             replace(h, figures=_known(h.figures, prepared.op_known))
-            for h in hourly(record, found, config.figures)
+            for h in hourly(record, found, config.figures, night.noise_band_pct)
         ),
         found,
         verdict,

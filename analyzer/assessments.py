@@ -14,12 +14,10 @@ import numpy as np
 
 from analyzer.config import FigureLimits
 from analyzer.oscillation import Oscillations
+from analyzer.span_sums import Trends, crossings_of, sums_of, travel_of
 from identification.record import Floats, LoopRecord, Mask
 from identification.signals.robust import robust_deviation
-from identification.simulation.valve import RESTS, walk
 
-ROUNDING = 1e-9
-"""Moves under this [% of OP] are rounding and turn nothing: a signal may stand exactly at the edge of the band."""
 HOUR_S = 3600.0
 
 
@@ -82,26 +80,12 @@ def noise_band(pv: Floats) -> float:
 
 def travel(signal: Floats, deadband: float) -> tuple[float, int]:
     """Travel and reversals of a signal beyond a deadband, both over its whole length."""
-    if signal.size < 2:
-        return 0.0, 0
-    moved = np.diff(
-        walk(np.ascontiguousarray(signal), 0.5 * deadband, 0.5 * deadband, RESTS, float(signal[0]))
-    )
-    turns = np.sign(moved[np.abs(moved) > ROUNDING])
-    return float(np.abs(moved).sum()), int((turns[1:] != turns[:-1]).sum())
-
-
-def _joined(signal: Floats, use: Mask) -> Floats:
-    """The signal's moves between usable neighbours as one path: what it moved during a gap is not known."""
-    moves = np.diff(signal)
-    moves[~(use[1:] & use[:-1])] = 0.0
-    return np.concatenate(([0.0], np.cumsum(moves)))
+    return travel_of(signal, np.ones(signal.size, dtype=bool), 1, deadband)  # type: ignore[no-any-return]
 
 
 def crossings(error: Floats, band: float) -> int:
     """How often the error goes from beyond one side of a band to beyond the other."""
-    side = np.sign(error[np.abs(error) > band])
-    return int((side[1:] != side[:-1]).sum())
+    return crossings_of(error, np.ones(error.size, dtype=bool), band)  # type: ignore[no-any-return]
 
 
 def assess_span(record: LoopRecord, limits: FigureLimits, noise: float | None = None) -> Assessments:
@@ -115,37 +99,35 @@ def assess_span(record: LoopRecord, limits: FigureLimits, noise: float | None = 
         Noise band of PV [% of span], measured here where None.
     """
     use = usable(record)
-    hours = float(use.sum()) * record.dt_s / HOUR_S
+    count = int(use.sum())
+    hours = count * record.dt_s / HOUR_S
     total = len(record) * record.dt_s / HOUR_S
-    if use.sum() < 2 or hours < limits.least_share * min(total, 1.0):
+    if count < 2 or hours < limits.least_share * min(total, 1.0):
         return Assessments(hours)
-    everything = bool(use.all())
-    e, pv, op = (x if everything else x[use] for x in (record.error, record.pv, record.op))
     stem = record.op if record.position is None else record.position
     step = max(round(limits.travel_grid_s / record.dt_s), 1)
-    path, turns = travel(_joined(stem[::step], use[::step]), limits.travel_deadband_pct)
-    band = noise_band(pv) if noise is None else noise
-    mean_pv = float(pv.mean())
-    good = ~record.bad
-    limit = record.mask("saturated")[use]
-    spread = 2 * float(pv.std())
-    automatic = 100 * float(use.sum()) / max(float(good.sum()), 1.0)
+    path, turns = travel_of(stem, use, step, limits.travel_deadband_pct)
+    band = noise_band(record.pv[use]) if noise is None else noise
+    trends = Trends(record.sp, record.pv, record.op, record.mask("saturated"))
+    sums = sums_of(trends, use, limits.small_error_pct, 2 * band)
+    spread = 2 * sums.pv_deviation
+    automatic = 100 * count / max(float((~record.bad).sum()), 1.0)
     return Assessments(
         usable_h=hours,
-        average_absolute_error_pct=float(np.abs(e).mean()),
+        average_absolute_error_pct=sums.absolute_error,
         valve_travel_pct_per_h=path / hours,
         reversals_per_h=turns / hours,
-        variability_pct=2 * float(e.std()),
-        pv_variability_pct=100 * spread / abs(mean_pv) if abs(mean_pv) > spread else None,
-        crossings_per_h=crossings(e, 2 * band) / hours,
+        variability_pct=2 * sums.error_deviation,
+        pv_variability_pct=100 * spread / abs(sums.pv) if abs(sums.pv) > spread else None,
+        crossings_per_h=sums.crossings / hours,
         noise_band_pct=band,
         normal_pct=automatic,
-        at_limits_pct=100 * float(limit.mean()),
-        service_pct=automatic * float((~limit & (np.abs(e) < limits.small_error_pct)).mean()),
-        sp_mean_pct=float((record.sp if everything else record.sp[use]).mean()),
-        pv_mean_pct=mean_pv,
-        op_mean_pct=float(op.mean()),
-        sp_travel_pct=float(np.abs(np.diff(record.sp)).sum()),
+        at_limits_pct=100 * sums.at_limits,
+        service_pct=automatic * sums.service,
+        sp_mean_pct=sums.sp,
+        pv_mean_pct=sums.pv,
+        op_mean_pct=sums.op,
+        sp_travel_pct=sums.sp_travel,
     )
 
 
@@ -177,9 +159,11 @@ def _hourly_oscillation(
     return amplitude * max(found.first.rhythm.first, 0.0) * hours, 100 * float(on.mean())
 
 
-def hourly(record: LoopRecord, found: Oscillations, limits: FigureLimits) -> list[Hour]:
-    """The figures of each clock hour of a record."""
-    band = noise_band(record.pv[usable(record)])
+def hourly(
+    record: LoopRecord, found: Oscillations, limits: FigureLimits, noise: float | None = None
+) -> list[Hour]:
+    """The figures of each clock hour of a record; `noise`, the noise band of PV, measured here where None."""
+    band = noise_band(record.pv[usable(record)]) if noise is None else noise
     rows = []
     for a, b, start in hour_edges(record):
         significance, share = _hourly_oscillation(found, record, start, a, b)

@@ -126,7 +126,8 @@ def prepare(spec: LoopSpec, series: Mapping[str, Series], limits: QualityLimits)
     op = scale.op_pct(op) if spec.op and not op_gap.all() else np.full(clock.size, math.nan)
     position, _ = _signal(series, spec.position, clock, dt, limits)
     has_position = bool(spec.position and spec.position in series)
-    masks = _masks(spec, series, limits, clock, dt, pv, sp, op, gap | (op_gap if spec.op else False))
+    step = resolution(pv)
+    masks = _masks(spec, series, limits, clock, dt, pv, sp, op, gap | (op_gap if spec.op else False), step)
     record = LoopRecord(
         spec.loop,
         float(clock[0]),
@@ -139,7 +140,7 @@ def prepare(spec: LoopSpec, series: Mapping[str, Series], limits: QualityLimits)
         not sp_known,
         MappingProxyType(masks),
     )
-    return _described(record, scale, op, limits)
+    return _described(record, scale, op, step, limits)
 
 
 def _numeric(spec: LoopSpec, series: Mapping[str, Series], limits: QualityLimits) -> dict[str, Series]:
@@ -199,6 +200,7 @@ def _masks(
     sp: Floats,
     op: Floats,
     gap: Mask,
+    pv_step: float,
 ) -> dict[str, Mask]:
     none = np.zeros(clock.size, dtype=bool)
     known_op = bool(np.isfinite(op).all())
@@ -209,7 +211,7 @@ def _masks(
     saturated = (op <= q.limit_pct) | (op >= 100 - q.limit_pct) if ranged else none
     mode = series.get(spec.mode or "")
     manual = manual_mask(mode, clock, dt, op, sp - pv, q) if known_op else none
-    coarse = none if resolution(pv) == 0 else np.ones(clock.size, dtype=bool)
+    coarse = none if pv_step == 0 else np.ones(clock.size, dtype=bool)
     return {
         "gap": gap,
         "stale": stale,
@@ -220,7 +222,9 @@ def _masks(
     }
 
 
-def _described(record: LoopRecord, scale: Scale, op: Floats, limits: QualityLimits) -> Prepared:
+def _described(
+    record: LoopRecord, scale: Scale, op: Floats, pv_step: float, limits: QualityLimits
+) -> Prepared:
     known_op = bool(np.isfinite(op).all())
     compressed = float(record.mask("compressed").mean())
     notes = []
@@ -238,8 +242,7 @@ def _described(record: LoopRecord, scale: Scale, op: Floats, limits: QualityLimi
             notes.append(f"{name} {100 * share:.0f} % of the time")
     if compressed > 0.3:
         notes.append(f"compressed: {100 * compressed:.0f} % of the samples lie on straight segments")
-    step = resolution(record.pv)
     op_step = resolution(record.op) if known_op else 0.0
-    if step > 0:
-        notes.append(f"PV on a grid of {step:.3g} % of span")
-    return Prepared(record, scale, step, op_step, compressed, tuple(notes), known_op)
+    if pv_step > 0:
+        notes.append(f"PV on a grid of {pv_step:.3g} % of span")
+    return Prepared(record, scale, pv_step, op_step, compressed, tuple(notes), known_op)

@@ -5,12 +5,18 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numba import njit
 
 from analyzer.config import QualityLimits
 from analyzer.decisions import Lack, LacksError, Needs
 from analyzer.history.series import Series
 from analyzer.history.stray import main_span
 from identification.record import Floats, Mask
+
+LOOKED_AT = 20_000
+"""Samples that are searched for a grid; ours."""
+PER_LEVEL = 10
+"""Samples a level that tell a grid from values that happen to repeat; ours."""
 
 
 def interval(stamp_s: Floats) -> float:
@@ -53,43 +59,52 @@ def _held(value: Floats, good: Mask) -> tuple[Floats, Mask]:
     return value[np.where(at < 0, int(np.argmax(good)), at)], ~good
 
 
-def run_lengths(value: Floats) -> np.ndarray:
-    """Length of each run of equal values."""
-    first = np.flatnonzero(np.concatenate(([True], value[1:] != value[:-1])))
-    return np.diff(np.concatenate((first, [value.size])))
+@njit(cache=True)
+def constant_for(value: Floats, samples: float) -> Mask:
+    """True where a value stands unchanged for at least so many samples, shape (n,)."""
+    out = np.zeros(value.size, dtype=np.bool_)
+    first = 0
+    for k in range(1, value.size + 1):
+        if k < value.size and value[k] == value[k - 1]:
+            continue
+        if k - first >= samples:
+            out[first:k] = True
+        first = k
+    return out
 
 
 def constant_stretches(value: Floats, dt_s: float, seconds: float, samples: int) -> Mask:
-    """True where a value stands unchanged for so long and so many samples, shape (n,)."""
-    length = run_lengths(value)
-    enough = (length >= samples) & (length * dt_s >= seconds)
-    return np.repeat(enough, length)
+    """True where a value stands unchanged for so long [s] and so many samples, shape (n,)."""
+    return constant_for(value, max(samples, seconds / dt_s))  # type: ignore[no-any-return]
 
 
+@njit(cache=True)
 def straight(value: Floats) -> Mask:
     """True where a sample lies on the line between its neighbours while the trend moves, shape (n,).
 
     Swinging-door compression leaves straight, sloping segments; steps of a coarse resolution and constants
     are straight too, but level.
     """
-    out = np.zeros(value.size, dtype=bool)
-    if value.size < 3:
-        return out
-    rise = np.diff(value)
-    scale = np.abs(rise).max() * 1e-4
-    out[1:-1] = (np.abs(np.diff(rise)) <= np.maximum(scale, 1e-3 * np.abs(rise[:-1]))) & (
-        np.abs(rise[:-1]) > 0
-    )
+    out = np.zeros(value.size, dtype=np.bool_)
+    largest = 0.0
+    for k in range(1, value.size):
+        largest = max(largest, abs(value[k] - value[k - 1]))
+    for k in range(1, value.size - 1):
+        before, after = value[k] - value[k - 1], value[k + 1] - value[k]
+        out[k] = before != 0 and abs(after - before) <= max(1e-4 * largest, 1e-3 * abs(before))
     return out
 
 
 def resolution(value: Floats) -> float:
     """The step of the grid that values stand on, in their unit; 0 where there is none.
 
-    The smallest difference between values that occur; a grid is told by over ten samples a level.
+    The usual difference between values that occur; a grid is told by so many samples a level.
     """
-    levels = np.unique(value[:20000])
-    if levels.size < 2 or levels.size * 10 > min(value.size, 20000):
+    most = min(value.size, LOOKED_AT) / PER_LEVEL
+    if np.unique(value[: int(most) + 2 * PER_LEVEL]).size > most:
+        return 0.0
+    levels = np.unique(value[:LOOKED_AT])
+    if levels.size < 2 or levels.size > most:
         return 0.0
     return float(np.median(np.diff(levels)))
 

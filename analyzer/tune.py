@@ -30,7 +30,7 @@ from identification.errors import NotAssessedError
 from identification.estimation.covariance import LEAST_BAND, LEAST_JUMP, WIDER, half_width, reaching
 from identification.estimation.gauss_newton import covariance
 from identification.estimation.hammerstein import Fit, ValveTrial
-from identification.estimation.window import Window, block_means
+from identification.estimation.window import Window
 from identification.models import Estimate, Loop, Pid, Process, Valve
 from identification.record import Floats
 from tuning.describing import describe
@@ -107,7 +107,7 @@ def _jumping(window: Window, valve: ValveTrial, found: dict[str, Estimate]) -> d
         if name in found:
             out[name] = reaching(found[name], found[name].value * jump / band, found[name].value * LEAST_JUMP)
     out["stickband_pct"] = reaching(found["stickband_pct"], band / LEAST_BAND)
-    travel = float(np.abs(np.diff(block_means(window.op, window.factor))).sum())
+    travel = float(np.abs(np.diff(window.op_blocks)).sum())
     later_s = 0.5 * band * (1.0 - 1.0 / LEAST_BAND) * window.duration_s / max(travel, 1e-9)
     out["dead_time_s"] = reaching(found["dead_time_s"], found["dead_time_s"].value + later_s)
     return out

@@ -90,15 +90,22 @@ def _thinned(error: Floats, dt_s: float, start_s: float, period_s: float) -> tup
 
 
 def _cut(
-    loop: str, s: Spectrum, error: Floats, period_s: float, start_s: float, harmonic: int, own: bool
+    loop: str,
+    s: Spectrum,
+    power: Floats,
+    error: Floats,
+    period_s: float,
+    start_s: float,
+    harmonic: int,
+    own: bool,
 ) -> Wave | None:
+    """The wave about one period; `power` of each line and `error` over time are those of the spectrum."""
     line = s.duration_s / period_s
     low = max(math.floor(line / REACH) - BESIDE, 0)
     high = min(math.ceil(line * REACH) + BESIDE, s.lines.size - 1)
     if line * 1.1 > s.lines.size - 1 or high - low < 2 * BESIDE:
         return None
     near = slice(math.floor(line / APART), math.ceil(line * APART) + 1)
-    power = np.abs(s.lines) ** 2
     above = float(power[max(math.ceil(line / (2 * APART)), 1) :].sum())
     share = float(power[near].sum()) / above if above > 0 else 0.0
     return Wave(
@@ -145,6 +152,6 @@ def waves_of(loop: str, found: Oscillations, end_s: float, limits: PlantLimits) 
         if len(wanted) >= limits.waves:
             break
     start_s = end_s - s.duration_s
-    error = irfft(s.lines, s.n)
-    cut = (_cut(loop, s, error, p, start_s, m, own) for p, m, own in wanted)
+    error, power = irfft(s.lines, s.n), s.lines.real**2 + s.lines.imag**2
+    cut = (_cut(loop, s, power, error, p, start_s, m, own) for p, m, own in wanted)
     return tuple(w for w in cut if w is not None)

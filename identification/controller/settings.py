@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 from scipy.signal import lfilter
 
 from identification.record import Floats, LoopRecord, Mask
@@ -25,37 +27,58 @@ class ControllerFit:
     count: int
 
 
-def _increments(x: Floats, step: int) -> Floats:
-    return x[step:] - x[:-step]
+class _Products(NamedTuple):
+    """Sums over the increments used of products of those of the error (e), of its integral (s) and of OP (m)."""
+
+    ee: float
+    es: float
+    ss: float
+    em: float
+    sm: float
+    mm: float
+    used: int
+
+    def explained(self, kp: float, ki: float) -> float:
+        """Share of the variance of OP's increments that a law gives [-]."""
+        given = kp * self.em + ki * self.sm
+        squared = kp * kp * self.ee + 2 * kp * ki * self.es + ki * ki * self.ss
+        return (2 * given - squared) / self.mm
 
 
-def _usable(record: LoopRecord, step: int) -> Mask:
-    """True where an increment spans only good, automatic, unsaturated samples, shape (n - step,)."""
-    out_of_law = record.bad | record.mask("manual") | record.mask("saturated")
-    seen = np.concatenate(([0], np.cumsum(out_of_law)))
-    return seen[step + 1 :] == seen[: -step - 1]
+@njit(cache=True)
+def _summed(
+    e: Floats, op: Floats, out_of_law: Mask, dt_s: float, step: int
+) -> tuple[float, float, float, float, float, float, int]:
+    """The sums of `_Products` over increments of `step` samples that span none that is out of the law."""
+    ee, es, ss, em, sm, mm, count = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0
+    since, total, mean = 0, 0.0, e.mean()
+    for k in range(e.size):
+        since = 0 if out_of_law[k] else since + 1
+        total += e[k] - mean
+        if k < step:
+            continue
+        total -= e[k - step] - mean
+        if since <= step:
+            continue
+        d, i, m = e[k] - e[k - step], (total + step * mean) * dt_s, op[k] - op[k - step]
+        ee, es, ss = ee + d * d, es + d * i, ss + i * i
+        em, sm, mm, count = em + d * m, sm + i * m, mm + m * m, count + 1
+    return ee, es, ss, em, sm, mm, count
 
 
-def _regression(record: LoopRecord, period_s: float) -> tuple[Floats, Floats] | None:
-    """Increments of the error and its integral, shape (2, m), and of OP, shape (m,), over an eighth of a period.
+def _regression(record: LoopRecord, error: Floats, period_s: float) -> _Products | None:
+    """Increments of the error and its integral beside those of OP, over an eighth of a period.
 
     None where OP or the error never moves, or too little of the record is in automatic.
     """
     step = max(round(period_s / 8 / record.dt_s), 1)
     if len(record) < 10 * step + 50:
         return None
-    use = _usable(record, step)
-    e = record.error
-    total = np.concatenate(([0.0], np.cumsum(e))) * record.dt_s
-    rows, moved = (
-        np.stack([_increments(e, step), total[step + 1 :] - total[1:-step]]),
-        _increments(record.op, step),
-    )
-    if not use.all():
-        rows, moved = rows[:, use], moved[use]
-    if use.sum() < 50 or float(moved @ moved) <= 0 or float(np.ptp(e)) == 0.0:
+    out_of_law = record.bad | record.mask("manual") | record.mask("saturated")
+    found = _Products(*_summed(error, record.op, out_of_law, record.dt_s, step))
+    if found.used < 50 or found.mm <= 0 or float(np.ptp(error)) == 0.0:
         return None
-    return rows, moved
+    return found
 
 
 def fit_pi(record: LoopRecord, period_s: float) -> ControllerFit | None:
@@ -75,17 +98,16 @@ def fit_pi(record: LoopRecord, period_s: float) -> ControllerFit | None:
     ControllerFit or None
         None where OP or the error never moves, or too little of the record is in automatic.
     """
-    found = _regression(record, period_s)
-    return None if found is None else _least_squares(*found)
+    found = _regression(record, record.error, period_s)
+    return None if found is None else _least_squares(found)
 
 
-def _least_squares(rows: Floats, moved: Floats) -> ControllerFit:
-    scale = np.sqrt((rows**2).mean(axis=1)) + 1e-300
-    scaled = rows / scale[:, None]
-    coefficients = np.linalg.lstsq(scaled @ scaled.T, scaled @ moved, rcond=None)[0] / scale
-    kp, ki = (float(c) for c in coefficients)
+def _least_squares(x: _Products) -> ControllerFit:
+    scale = np.sqrt(np.array([x.ee, x.ss]) / x.used) + 1e-300
+    gram = np.array([[x.ee, x.es], [x.es, x.ss]]) / np.outer(scale, scale)
+    kp, ki = (float(c) for c in np.linalg.lstsq(gram, np.array([x.em, x.sm]) / scale, rcond=None)[0] / scale)
     ti = kp / ki if ki != 0 and kp / ki > 0 else math.inf
-    return ControllerFit(kp, ti, _explained(rows, moved, coefficients), moved.size)
+    return ControllerFit(kp, ti, x.explained(kp, ki), x.used)
 
 
 FILTERS = (0.0, 1.0, 2.0, 3.0, 5.0, 8.0, 13.0, 21.0)
@@ -133,31 +155,25 @@ def compare_laws(
     LawsCompared or None
         None where the record tells no settings.
     """
-    best, given = None, -math.inf
+    best, given, error = None, -math.inf, record.error
     for samples in FILTERS:
         if samples * record.dt_s > LONGEST_FILTER * period_s:
             break
-        found = _regression(_filtered(record, samples), period_s)
+        found = _regression(record, _filtered(error, samples), period_s)
         if found is None:
             return None
-        free = _least_squares(*found)
+        free = _least_squares(found)
         needed = -math.inf if best is None else best.explained + FILTER_WORTH
         best = free if best is None or free.explained > needed else best
-        given = max(given, _explained(*found, np.array([kp, kp / ti_s])))
+        given = max(given, found.explained(kp, kp / ti_s))
         if best.explained - given < alike:
             break
     return None if best is None else LawsCompared(best.kp, best.ti_s, best.explained, given)
 
 
-def _filtered(record: LoopRecord, samples: float) -> LoopRecord:
-    """The record with its error behind a first-order filter of so many samples."""
+def _filtered(error: Floats, samples: float) -> Floats:
+    """The error behind a first-order filter of so many samples."""
     if samples == 0.0:
-        return record
+        return error
     keep = math.exp(-1.0 / samples)
-    e = record.error
-    return replace(record, sp=lfilter([1.0 - keep], [1.0, -keep], e - e[0]) + e[0] + record.pv)
-
-
-def _explained(rows: Floats, moved: Floats, coefficients: Floats) -> float:
-    left = moved - coefficients @ rows
-    return 1.0 - float(left @ left) / float(moved @ moved)
+    return np.asarray(lfilter([1.0 - keep], [1.0, -keep], error - error[0]) + error[0], dtype=np.float64)

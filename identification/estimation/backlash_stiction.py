@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from identification.estimation.gauss_newton import descend
-from identification.estimation.hammerstein import IDEAL, Fit, ValveTrial, stem_of, sticking
+from identification.estimation.hammerstein import IDEAL, Fit, ValveTrial, sticking
 from identification.estimation.noise import arx_noise
 from identification.estimation.search import (
     AR_ORDER,
@@ -18,6 +18,7 @@ from identification.estimation.search import (
     scan,
     search,
     starts,
+    white_pv,
 )
 from identification.estimation.window import Window
 from identification.record import Floats
@@ -78,8 +79,8 @@ def fit_linear(window: Window, period_s: float) -> Fit:
     period_s : float
         Period of the oscillation, or other scale of the loop [s], about which the search begins.
     """
-    stem = stem_of(window, IDEAL)
-    learnt = arx_noise(window.y - window.y.mean(), stem, window.usable, AR_ORDER, INPUT_LAGS)
+    stem = window.stems_in_blocks.ideal
+    learnt = arx_noise(window.centred, stem, window.usable, AR_ORDER, INPUT_LAGS)
     fits = []
     for ar in (learnt, generic_noise()):
         prepared = prepare(window, IDEAL, ar)
@@ -96,9 +97,9 @@ def generic_noise() -> Floats:
 
 def _ranked(window: Window, ar: Floats, valves: list[ValveTrial], begins: list[Dynamics]) -> list[Fit]:
     """Valves with dynamics searched anew under one noise model, best first."""
-    trials = []
+    trials, pv = [], white_pv(window, ar)
     for valve in valves:
-        prepared = prepare(window, valve, ar)
+        prepared = pv.behind(valve)
         trials.append(begin(prepared, search(prepared, begins, 2)))
     return sorted(trials, key=lambda fit: fit.sigma2)
 
@@ -196,7 +197,7 @@ def _finely(window: Window, play: Fit) -> list[Fit]:
 def _bottom(window: Window, fit: Fit) -> Fit:
     """Stickband and jump moved by ever smaller steps to the least innovations, the rest following at the end."""
     valve, least = fit.valve, fit.sigma2
-    dynamics = fit.time_constant_s, fit.dead_time_s
+    dynamics, pv = (fit.time_constant_s, fit.dead_time_s), white_pv(window, fit.ar)
     for step in COMPASS:
         moved = True
         while moved:
@@ -205,7 +206,7 @@ def _bottom(window: Window, fit: Fit) -> Fit:
                 width = valve.stickband * (1 + wider * step)
                 jump = min(valve.slip_jump * (1 + 2 * jumpier * step), width)
                 trial = sticking(width, jump / width, valve.tolerance)
-                found = prepare(window, trial, fit.ar).score(*dynamics)[0]
+                found = pv.behind(trial).score(*dynamics)[0]
                 if found < least * (1 - 1e-7):
                     valve, least, moved = trial, found, True
     return descend(window, replace(fit, valve=valve))

@@ -15,11 +15,11 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from identification.estimation.window import Window, block_means
+from identification.estimation.window import Stems, Window
 from identification.models import Backlash, Fopdt, Stiction, Valve
 from identification.record import Floats
 from identification.simulation.discretization import respond, respond_in_blocks, unit_lag
-from identification.simulation.valve import RESTS, first_slip, motion_of, stem_step, walk
+from identification.simulation.valve import RESTS, first_slip, motion_of, stem_step
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,12 +92,16 @@ class Fit:
 
 
 @njit(cache=True)
-def _resting_blocks(op: Floats, breakaway: float, sliding: float, factor: int) -> Floats:
+def _resting_blocks(
+    op: Floats, low: Floats, high: Floats, breakaway: float, sliding: float, factor: int
+) -> Floats:
     """The same of a stem that rests after each move, where the direction of motion need not be remembered."""
-    n = op.size // factor
-    out = np.empty(n)
+    out = np.empty(low.size)
     stem = first_slip(op, breakaway, sliding)
-    for k in range(n):
+    for k in range(low.size):
+        if high[k] - stem <= breakaway and stem - low[k] <= breakaway:
+            out[k] = stem
+            continue
         total = 0.0
         for i in range(k * factor, (k + 1) * factor):
             gap = op[i] - stem
@@ -111,46 +115,44 @@ def _resting_blocks(op: Floats, breakaway: float, sliding: float, factor: int) -
 
 
 @njit(cache=True)
-def stem_blocks(op: Floats, breakaway: float, sliding: float, tolerance: float, factor: int) -> Floats:
-    """Stem behind OP as means of blocks, shape (n // factor,); breakaway 0 is an ideal valve."""
-    if breakaway > 0.0 and tolerance == RESTS:
-        return _resting_blocks(op, breakaway, sliding, factor)
-    n = op.size // factor
-    out = np.empty(n)
+def stem_blocks(
+    op: Floats, low: Floats, high: Floats, breakaway: float, sliding: float, tolerance: float, factor: int
+) -> Floats:
+    """Stem behind OP as means of blocks, shape (n // factor,), of a valve with breakaway > 0.
+
+    `low` and `high` are OP's extremes in each block: a stem at rest that lies within reach of both rests on.
+    """
+    if tolerance == RESTS:
+        return _resting_blocks(op, low, high, breakaway, sliding, factor)
+    out = np.empty(low.size)
     stem, moving, turned = first_slip(op, breakaway, sliding), 0.0, op[0]
-    for k in range(n):
+    for k in range(low.size):
+        if moving == 0.0 and high[k] - stem <= breakaway and stem - low[k] <= breakaway:
+            out[k] = stem
+            continue
         total = 0.0
         for i in range(k * factor, (k + 1) * factor):
-            if breakaway > 0.0:
-                stem, moving, turned = stem_step(stem, moving, turned, op[i], breakaway, sliding, tolerance)
-            else:
-                stem = op[i]
+            stem, moving, turned = stem_step(stem, moving, turned, op[i], breakaway, sliding, tolerance)
             total += stem
         out[k] = total / factor
     return out
 
 
-def stem_of(window: Window, valve: ValveTrial) -> Floats:
-    """Stem in blocks less its mean [% OP], shape (n,): the recorded one behind a faulty valve, where there is one."""
-    if valve.breakaway > 0.0 and window.position is not None:
-        stem = block_means(window.position, window.factor)
-        return stem - stem.mean()
-    if valve.breakaway <= 0.0:
-        stem = block_means(window.op, window.factor)
-    else:
-        stem = stem_blocks(window.op, valve.breakaway, valve.sliding, valve.tolerance, window.factor)
+@njit(cache=True)
+def stem_behind(stems: Stems, breakaway: float, sliding: float, tolerance: float) -> Floats:
+    """Stem less its mean [% OP] behind a valve's constants: the recorded one where there is one."""
+    if breakaway <= 0.0:
+        return stems.ideal
+    if stems.recorded.size:
+        return stems.recorded
+    stem = stem_blocks(stems.op, stems.low, stems.high, breakaway, sliding, tolerance, stems.factor)
     return stem - stem.mean()
 
 
-def fine_stem(window: Window, valve: ValveTrial) -> Floats:
-    """Stem at the record's own interval less its mean [% OP], shape (n * factor,); as stem_of."""
-    if valve.breakaway > 0.0 and window.position is not None:
-        return window.position - window.position.mean()
-    if valve.breakaway <= 0.0:
-        return window.op - window.op.mean()
-    start = first_slip(window.op, valve.breakaway, valve.sliding)
-    stem = walk(window.op, valve.breakaway, valve.sliding, valve.tolerance, start)
-    return np.asarray(stem - stem.mean(), dtype=np.float64)
+def stem_of(stems: Stems, valve: ValveTrial) -> Floats:
+    """Stem less its mean [% OP], shape (m,), of the stems of a window."""
+    found = stem_behind(stems, valve.breakaway, valve.sliding, valve.tolerance)
+    return np.asarray(found, dtype=np.float64)
 
 
 def residual(window: Window, fit: Fit) -> Floats:
@@ -158,13 +160,14 @@ def residual(window: Window, fit: Fit) -> Floats:
 
     In a fine window the response is stepped at the record's own interval and then averaged over blocks, as PV was.
     """
+    stem = stem_of(window.stems, fit.valve)
     if window.fine:
         fine = window.dt_s / window.factor
         steps = unit_lag(fit.time_constant_s, fit.dead_time_s + window.half_block_s, fine)
-        x = respond_in_blocks(fine_stem(window, fit.valve), *steps, window.factor)
+        x = respond_in_blocks(stem, *steps, window.factor)
     else:
-        x = respond(stem_of(window, fit.valve), *unit_lag(fit.time_constant_s, fit.dead_time_s, window.dt_s))
-    return window.y - window.y.mean() - fit.gain * x
+        x = respond(stem, *unit_lag(fit.time_constant_s, fit.dead_time_s, window.dt_s))
+    return window.centred - fit.gain * x
 
 
 def process_of(window: Window, fit: Fit) -> Fopdt:

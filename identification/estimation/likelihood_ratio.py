@@ -41,7 +41,7 @@ STEP_PENALTY = 6.0
 
 def moves_begun(window: Window, valve: ValveTrial) -> np.ndarray:
     """Blocks at which the stem of a valve sets out or turns, shape (m,)."""
-    moved = np.sign(np.diff(stem_of(window, valve)))
+    moved = np.sign(np.diff(stem_of(window.stems_in_blocks, valve)))
     set_out = np.concatenate(([0.0], moved))
     return np.flatnonzero((set_out[1:] != set_out[:-1]) & (set_out[1:] != 0))
 

@@ -13,7 +13,7 @@ from numba import njit
 
 from identification.estimation.hammerstein import ValveTrial, stem_blocks, stem_of
 from identification.estimation.noise import every_lag, judged, whitened
-from identification.estimation.window import Window
+from identification.estimation.window import Stems, Window
 from identification.record import Floats, Mask
 from identification.signals.notch import notch
 from identification.simulation.discretization import respond, unit_lag
@@ -44,35 +44,43 @@ def _known(y: Floats, judged: Mask, first: int) -> tuple[Floats, Floats]:
     """What does not depend on dynamics: PV, weight and weight times t, shape (3, n), zero where nothing is judged,
     and the sums over PV squared, PV, PV t, 1, t and t squared, shape (6,)."""
     n = y.size
-    rows, sums = np.zeros((3, n)), np.zeros(6)
+    rows = np.zeros((3, n))
+    vv, v1, vt, count, t1, tt = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for k in range(first, n):
         if judged[k]:
             t, v = 2.0 * k / n - 1.0, y[k]
             rows[0, k], rows[1, k], rows[2, k] = v, 1.0, t
-            sums += np.array((v * v, v, t * v, 1.0, t, t * t))
-    return rows, sums
+            vv, v1, vt = vv + v * v, v1 + v, vt + t * v
+            count, t1, tt = count + 1.0, t1 + t, tt + t * t
+    return rows, np.array((vv, v1, vt, count, t1, tt))
 
 
-@njit(cache=True, fastmath={"reassoc", "contract", "nsz"})
-def _products(x: Floats, rows: Floats) -> tuple[float, float, float, float]:
-    """Sums of a response times PV, 1, t and itself over the samples judged; in any order, for whole vectors."""
-    v, w, t = rows[0], rows[1], rows[2]
-    xv, x1, xt, xx = 0.0, 0.0, 0.0, 0.0
-    for k in range(x.size):
-        xv += x[k] * v[k]
-        x1 += x[k] * w[k]
-        xt += x[k] * t[k]
-        xx += x[k] * x[k] * w[k]
+Products = tuple[float, float, float, float]
+"""Sums of a response times PV, 1, t and itself over the samples judged."""
+
+
+@njit(cache=True)
+def _response(
+    stem: Floats, pole: float, now: float, before: float, delay: int, rows: Floats, out: Floats
+) -> Products:
+    """The response of a lag into `out`, as `respond`, and its products; each step of it waits for the one before, and
+    the sums are made meanwhile."""
+    y, xv, x1, xt, xx = 0.0, 0.0, 0.0, 0.0, 0.0
+    for k in range(stem.size):
+        out[k] = y
+        weighted = y * rows[1, k]
+        xv, x1, xt, xx = xv + y * rows[0, k], x1 + weighted, xt + y * rows[2, k], xx + y * weighted
+        y = pole * y + now * stem[max(k - delay, 0)] + before * stem[max(k - delay - 1, 0)]
     return xv, x1, xt, xx
 
 
 @njit(cache=True)
 def _left(
-    x: Floats, rows: Floats, sums: Floats, level: float, pole: float, outlasts: bool
+    x: Floats, products: Products, rows: Floats, sums: Floats, level: float, pole: float, outlasts: bool
 ) -> tuple[float, int, Floats]:
     """Innovations variance, samples judged and coefficients (gain, 1, t, decay) of one response; see `score`."""
     gram, cross = np.zeros((4, 4)), np.zeros(4)
-    cross[0], gram[0, 1], gram[0, 2], gram[0, 0] = _products(x, rows)
+    cross[0], gram[0, 1], gram[0, 2], gram[0, 0] = products
     power, cross[1], cross[2], gram[1, 1], gram[1, 2], gram[2, 2] = sums
     free, k = 0.0 if outlasts else 1.0, 0
     while k < x.size and free > FADED:
@@ -108,12 +116,32 @@ def score(
     is A(1).
     """
     pole, now, before, delay = unit_lag(time_constant_s, dead_time_s, dt_s)
-    x = respond(stem, pole, now, before, delay)
-    return _left(x, rows, sums, level, pole, time_constant_s > 0.5 * x.size * dt_s)
+    x = np.empty_like(stem)
+    products = _response(stem, pole, now, before, delay, rows, x)
+    return _left(x, products, rows, sums, level, pole, time_constant_s > 0.5 * x.size * dt_s)
 
 
 Dynamics = tuple[float, float]
 """Time constant and dead time [s]."""
+
+
+@dataclass(frozen=True, slots=True)
+class WhitePv:
+    """PV of a window under one noise model, whitened once for many valves.
+
+    rows, shape (3, n), and sums, shape (6,): see `_known`; notch_period in blocks, 0: none.
+    """
+
+    window: Window
+    ar: Floats
+    rows: Floats
+    sums: Floats
+    notch_period: float
+
+    def behind(self, valve: ValveTrial) -> Prepared:
+        """The same with the stem behind one valve."""
+        stem = _filtered(stem_of(self.window.stems_in_blocks, valve), self.ar, self.notch_period)
+        return Prepared(self.window, valve, self.ar, self.rows, self.sums, stem)
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,11 +180,16 @@ def _filtered(x: Floats, ar: Floats, notch_period: float) -> Floats:
     return white if notch_period <= 0 else notch(white, notch_period, NOTCH_WIDTH)
 
 
+def white_pv(window: Window, ar: Floats, notch_period: float = 0.0) -> WhitePv:
+    """Whiten PV with one noise model; notch_period in blocks, 0: none."""
+    y = _filtered(window.centred, ar, notch_period)
+    rows, sums = _known(y, judged(window.usable, ar.size), ar.size + int(notch_period))
+    return WhitePv(window, ar, rows, sums, notch_period)
+
+
 def prepare(window: Window, valve: ValveTrial, ar: Floats, notch_period: float = 0.0) -> Prepared:
     """Whiten PV and the stem with one noise model; notch_period in blocks, 0: none."""
-    y = _filtered(window.y - window.y.mean(), ar, notch_period)
-    rows, sums = _known(y, judged(window.usable, ar.size), ar.size + int(notch_period))
-    return Prepared(window, valve, ar, rows, sums, _filtered(stem_of(window, valve), ar, notch_period))
+    return white_pv(window, ar, notch_period).behind(valve)
 
 
 @njit(cache=True)
@@ -216,12 +249,11 @@ def search(prepared: Prepared, begins: list[Dynamics], halvings: int = 3) -> Dyn
 
 @njit(cache=True)
 def _scan(
-    op: Floats,
+    stems: Stems,
     rows: Floats,
     sums: Floats,
     ar: Floats,
     dt_s: float,
-    factor: int,
     pairs: Floats,
     tolerance: float,
     begins: Floats,
@@ -230,28 +262,40 @@ def _scan(
     out, x = np.empty(pairs.shape[0]), np.empty(n)
     for i in range(pairs.shape[0]):
         width, share = pairs[i, 0], pairs[i, 1]
-        stem = stem_blocks(op, 0.5 * width * (1 + share), 0.5 * width * (1 - share), tolerance, factor)
+        breakaway, sliding = 0.5 * width * (1 + share), 0.5 * width * (1 - share)
+        stem = stem_blocks(stems.op, stems.low, stems.high, breakaway, sliding, tolerance, stems.factor)
         white = _white(stem - stem.mean(), ar)
         out[i], whole, known = np.inf, white, 0.0
         for j in range(tries):
             pole, now, before, delay = unit_lag(begins[j, 0], begins[j, 1], dt_s)
             if begins[j, 0] != known:
                 whole, known = respond(white, pole, 1.0, 0.0, 0), begins[j, 0]
-            _later(whole, now, before, delay, x)
-            left = _left(x, rows, sums, level, pole, begins[j, 0] > 0.5 * n * dt_s)[0]
+            products = _later(whole, now, before, delay, rows, x)
+            left = _left(x, products, rows, sums, level, pole, begins[j, 0] > 0.5 * n * dt_s)[0]
             out[i] = min(out[i], left)
     return out
 
 
-@njit(cache=True)
-def _later(whole: Floats, now: float, before: float, delay: int, out: Floats) -> None:
-    """The response at one dead time into `out`, from that without any; the stem is taken to rest at first."""
+@njit(cache=True, fastmath={"reassoc", "contract", "nsz"})
+def _later(whole: Floats, now: float, before: float, delay: int, rows: Floats, out: Floats) -> Products:
+    """The response at one dead time into `out`, from that without any, and its products, summed in any order.
+
+    The stem is taken to rest at first."""
     n = out.size
     out[: min(delay, n)] = 0.0
-    if delay < n:
-        out[delay] = now * whole[0]
-    for k in range(delay + 1, n):
-        out[k] = now * whole[k - delay] + before * whole[k - delay - 1]
+    if delay >= n:
+        return 0.0, 0.0, 0.0, 0.0
+    x = now * whole[0]
+    out[delay], xv, x1, xt = x, x * rows[0, delay], x * rows[1, delay], x * rows[2, delay]
+    xx = x * x1
+    v, w, t = rows[0, delay + 1 :], rows[1, delay + 1 :], rows[2, delay + 1 :]
+    late, earlier, later = whole[1 : n - delay], whole[: n - delay - 1], out[delay + 1 :]
+    for k in range(v.size):
+        x = now * late[k] + before * earlier[k]
+        weighted = x * w[k]
+        later[k] = x
+        xv, x1, xt, xx = xv + x * v[k], x1 + weighted, xt + x * t[k], xx + x * weighted
+    return xv, x1, xt, xx
 
 
 def scan(window: Window, pairs: Floats, tolerance: float, ar: Floats, begins: list[Dynamics]) -> Floats:
@@ -274,10 +318,8 @@ def scan(window: Window, pairs: Floats, tolerance: float, ar: Floats, begins: li
     ndarray of shape (m,)
         Least innovations variance of each pair [% PV squared].
     """
-    white_y = _white(np.ascontiguousarray(window.y - window.y.mean()), ar)
-    rows, sums = _known(white_y, judged(window.usable, ar.size), ar.size)
-    table = np.array(begins)
-    return _scan(window.op, rows, sums, ar, window.dt_s, window.factor, pairs, tolerance, table)  # type: ignore[no-any-return]
+    pv, table = white_pv(window, ar), np.array(begins)
+    return _scan(window.stems_in_blocks, pv.rows, pv.sums, ar, window.dt_s, pairs, tolerance, table)  # type: ignore[no-any-return]
 
 
 def starts(window: Window, period_s: float) -> list[Dynamics]:

@@ -11,11 +11,13 @@ import math
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from identification.estimation.noise import every_lag, whitened
 from identification.record import Floats, Mask
 from identification.simulation.discretization import respond_in_blocks, respond_together, unit_lag
 
+Indices = NDArray[np.int64]
 BASE = 8
 """Constants before the noise model."""
 STEP_T = 1.01
@@ -72,6 +74,28 @@ def _responses(
 
 
 @njit(cache=True)
+def _of_slow_terms(theta: Floats, n: int, dt: float, at: Indices, out: Floats) -> None:
+    """Derivatives by the coefficients of 1, t and decay into `out`, shape (3, m): their innovations have closed forms
+    from the order of the noise model on."""
+    ar, order = theta[BASE:], theta.size - BASE
+    level, back = 1.0, 0.0
+    for i in range(order):
+        level -= ar[i]
+        back += ar[i] * (i + 1)
+    free, faded = _decays(theta, n, dt)
+    decay = faded**order
+    for i in range(order):
+        decay -= ar[i] * faded ** (order - 1 - i)
+    decay, seen = free * decay, order
+    for i in range(at.size):
+        while seen < at[i]:
+            decay, seen = decay * faded, seen + 1
+        out[0, i] = -level
+        out[1, i] = -((2.0 * at[i] / n - 1.0) * level + 2.0 / n * back)
+        out[2, i] = -decay
+
+
+@njit(cache=True)
 def sensitivities(
     x: Floats,
     r: Floats,
@@ -81,28 +105,28 @@ def sensitivities(
     theta: Floats,
     dt: float,
     factor: int,
+    at: Indices,
 ) -> Floats:
-    """Derivatives of the innovations, shape (m, n), by theta.
+    """Derivatives of the innovations judged, shape (8 + order, m), by theta.
 
     `x` and `r` are those of `innovations`; `stems` the stem and one whose valve is wider by `width_step`, 0 where the
-    width is held.
+    width is held; `at` are the samples judged, none of them before the order of the noise model.
     """
     n, order = x.size, theta.size - BASE
-    gain = theta[3]
-    rows = np.zeros((BASE + order, n))
-    rows[:3] = -gain * _responses(x, stems[0], stems[1], width_step, theta, dt, factor)
-    rows[3], rows[4], rows[7] = -x, -1.0, -extra
-    free, faded = _decays(theta, n, dt)
-    for k in range(n):
-        rows[5, k] = -(2.0 * k / n - 1.0)
-        rows[6, k] = -free
-        free *= faded
-    edges = every_lag(order)
-    for j in range(BASE):
-        rows[j] = whitened(rows[j], theta[BASE:], edges)
+    out, edges = np.zeros((BASE + order, at.size)), every_lag(order)
+    responses = -theta[3] * _responses(x, stems[0], stems[1], width_step, theta, dt, factor)
+    for j in range(5):
+        if (j == 2 and width_step == 0.0) or (j == 4 and extra[-1] == 0.0):
+            continue
+        row = responses[j] if j < 3 else -x if j == 3 else -extra
+        white, to = whitened(row, theta[BASE:], edges), j if j < 4 else 7
+        for k in range(at.size):
+            out[to, k] = white[at[k]]
+    _of_slow_terms(theta, n, dt, at, out[4:7])
     for i in range(order):
-        rows[BASE + i, i + 1 :] = -r[: n - 1 - i]
-    return rows
+        for k in range(at.size):
+            out[BASE + i, k] = -r[at[k] - 1 - i]
+    return out
 
 
 @njit(cache=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from identification.estimation.backlash_stiction import begin, generic_noise
-from identification.estimation.hammerstein import IDEAL, stem_of
+from identification.estimation.hammerstein import IDEAL
 from identification.estimation.noise import arx_noise
 from identification.estimation.search import AR_ORDER, INPUT_LAGS, Dynamics, prepare, search
 from identification.estimation.window import Window
@@ -44,8 +44,8 @@ def plain_processes(y: Floats, op: Floats, usable: Mask, dt_s: float) -> list[Fo
         Starts for a descent; where the record is too short for one, the other alone.
     """
     window = Window(y, op, usable, dt_s)
-    stem = stem_of(window, IDEAL)
-    learnt = arx_noise(y - y.mean(), stem, usable, AR_ORDER, INPUT_LAGS)
+    stem = window.stems_in_blocks.ideal
+    learnt = arx_noise(window.centred, stem, usable, AR_ORDER, INPUT_LAGS)
     found = []
     for ar in (learnt, generic_noise()):
         prepared = prepare(window, IDEAL, np.ascontiguousarray(ar))

@@ -16,7 +16,6 @@ from numba import njit
 from identification.estimation.likelihood_ratio import WindowFit, innovations, moves_begun
 from identification.estimation.noise import judged
 from identification.estimation.outliers import clipped_gain
-from identification.estimation.window import block_means
 from identification.record import Floats
 
 TURN = 0.4
@@ -84,7 +83,7 @@ def gains(ours: WindowFit, theirs: WindowFit) -> Floats:
 def trials(ours: WindowFit, theirs: WindowFit, period_s: float) -> Trials | None:
     """Agreement of the stretches between OP's turns that one fit explains PV better; None with fewer than four."""
     window = ours.window
-    at = turns_of(block_means(window.op, window.factor), period_s / window.dt_s)
+    at = turns_of(window.op_blocks, period_s / window.dt_s)
     if at.size < 5:
         return None
     return _agreement(np.add.reduceat(gains(ours, theirs), at)[:-1])

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,9 +17,27 @@ LONGEST_TIME_CONSTANT = 3.0
 """Largest time constant searched, in windows; beyond it a lag and an integrator are one (PHYSICS: integrator)."""
 
 
-@dataclass(frozen=True, slots=True)
+class Stems(NamedTuple):
+    """What the stem of any valve follows from [% OP]: OP at the record's own interval, its extremes in each block of
+    `factor` samples, and in means of such blocks, less their mean, the stem of an ideal valve and the recorded one
+    (of no length where none is)."""
+
+    op: Floats
+    low: Floats
+    high: Floats
+    ideal: Floats
+    recorded: Floats
+    factor: int
+
+
+def less_mean(x: Floats) -> Floats:
+    """x less its mean; nothing of nothing."""
+    return x - x.mean() if x.size else x
+
+
+@dataclass(frozen=True)
 class Window:
-    """A stretch of a record prepared for fitting.
+    """A stretch of a record prepared for fitting; what follows from it alone is computed once.
 
     y : PV [% PV] in blocks, shape (n,); op : OP [% OP] at the record's own interval, shape (n * factor,);
     usable : bool, shape (n,), False at gaps; dt_s : interval of the blocks [s]; most_time_constant_s and
@@ -39,7 +59,7 @@ class Window:
     position: Floats | None = None
     fine: bool = False
 
-    @property
+    @cached_property
     def extra(self) -> Floats:
         """A further regressor, shape (n,): a step of the load at block `step_at`; zero where that is 0."""
         out = np.zeros(self.y.size)
@@ -47,7 +67,34 @@ class Window:
             out[self.step_at :] = 1.0
         return out
 
-    @property
+    @cached_property
+    def centred(self) -> Floats:
+        """PV less its mean [% PV], shape (n,)."""
+        return less_mean(self.y)
+
+    @cached_property
+    def op_blocks(self) -> Floats:
+        """OP in blocks [% OP], shape (n,)."""
+        return block_means(self.op, self.factor)
+
+    @cached_property
+    def stems_in_blocks(self) -> Stems:
+        """Stems that are known beforehand, in blocks."""
+        recorded = np.empty(0) if self.position is None else block_means(self.position, self.factor)
+        n = self.op.size // self.factor
+        blocks = self.op[: n * self.factor].reshape(n, self.factor)
+        low, high = blocks.min(axis=1), blocks.max(axis=1)
+        return Stems(self.op, low, high, less_mean(self.op_blocks), less_mean(recorded), self.factor)
+
+    @cached_property
+    def stems(self) -> Stems:
+        """The same at the interval at which responses are stepped."""
+        if not self.fine:
+            return self.stems_in_blocks
+        recorded = np.empty(0) if self.position is None else self.position
+        return Stems(self.op, self.op, self.op, less_mean(self.op), less_mean(recorded), 1)
+
+    @cached_property
     def bounds(self) -> tuple[float, float]:
         """Largest time constant and dead time that are searched [s]."""
         longest = LONGEST_TIME_CONSTANT * self.duration_s, LONGEST_DEAD_TIME * self.duration_s
@@ -65,7 +112,7 @@ class Window:
         from which the search, whose model knows blocks alone, counts."""
         return 0.5 * (self.factor - 1) * self.dt_s / self.factor
 
-    @property
+    @cached_property
     def op_range(self) -> float:
         """Range of OP without its 2 % tails [% OP]."""
         low, high = np.quantile(self.op, [0.02, 0.98])

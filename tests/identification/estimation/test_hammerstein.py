@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 import pytest
 
@@ -13,6 +15,7 @@ from identification.estimation.window import Window, block_means
 from identification.models import Backlash, Fopdt, Loop, Pid
 from identification.simulation.closed_loop import closed_loop
 from identification.simulation.discretization import respond, unit_lag
+from identification.simulation.valve import HALTS, RESTS, SLIDES, first_slip, walk
 from tests.identification.responses import pv_of
 
 N = 3000
@@ -135,10 +138,13 @@ def test_lag_agrees_with_slow_twin():
 
 
 def test_stem_in_blocks_is_the_mean_of_the_stem():
-    """Stem positions of blocks are means of the stem walked at the record's own interval."""
-    op = steps(80, 1200)
-    fine = stem_blocks(op, 1.0, 1.0, -1.0, 1)
-    assert stem_blocks(op, 1.0, 1.0, -1.0, 6) == pytest.approx(block_means(fine, 6))
+    """Stem positions of blocks are means of the stem walked sample by sample, whatever it does in motion."""
+    op = steps(80, 1200) + np.cumsum(np.random.default_rng(81).normal(0, 0.1, 1200))
+    blocks = op.reshape(200, 6)
+    for breakaway, sliding, tolerance in product((0.4, 1.0, 4.0), (0.2, 0.4), (RESTS, HALTS, SLIDES, 0.15)):
+        slow = walk(op, breakaway, sliding, tolerance, first_slip(op, breakaway, sliding))
+        quick = stem_blocks(op, blocks.min(1), blocks.max(1), breakaway, sliding, tolerance, 6)
+        assert quick == pytest.approx(block_means(slow, 6))
 
 
 class KanoValve:
