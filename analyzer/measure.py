@@ -204,7 +204,8 @@ def _candidates(
         return linear, play, None, play, gained, 0.0
     linear = better_linear(window, linear, play)
     best, stick, jump = play, None, 0.0
-    if short or play.valve.stickband > 0.25 * window.op_range:
+    wide = play.valve.stickband > 0.25 * window.op_range
+    if short or (wide and (oscillation is not None or gained >= limits.evidence)):
         stick = fit_stick_slip(window, play, scale_s)
         jump = evidence(WindowFit(window, stick), WindowFit(window, play))
         jump -= max(play.log_likelihood - stick.log_likelihood, 0.0)
