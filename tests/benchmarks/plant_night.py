@@ -1,10 +1,10 @@
-"""A plant's whole night over reading it: python -m tests.benchmarks.plant_night [--loops 1500] [--hours 24] [--jobs 2]
+"""A plant's whole night over reading it: python -m tests.benchmarks.plant_night [--loops 1500] [--hours 24]
 
-A plant is simulated and written as exports of areas with its loops.csv; `triage run` then does everything that it does
-of a night: opening, screening, cause, advice, groups, the store. Three plants: loops that do not oscillate, one loop in
-ten flagged, and half of the valves worn. Processor time is that of all processes of the run; the floor, before and
-after it, is that of pyarrow reading the same columns and numpy taking one rfft of each. `--growth` runs plants of
-100, 1,000 and 10,000 loops of 2 h at 5 s instead. Writes plant_night.md or plant_growth.md here.
+A plant is simulated and written as exports of areas with its loops.csv; `triage run` then does everything that it
+does of a night: opening, screening, cause, advice, groups, the store. Three plants: loops that do not oscillate, one
+loop in ten flagged, and half of the valves worn. Processor time is that of all processes of the run; the floor,
+before and after it, is that of pyarrow reading the same columns and numpy taking one rfft of each. `--growth` runs
+plants of 100, 1,000 and 10,000 loops of 2 h at 5 s instead. Writes plant_night.md or plant_growth.md here.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ class Plant:
 
 @dataclass(frozen=True)
 class Night:
-    """What a run took: processor and wall time [s], largest memory of a process [MB], the floor [s], loops flagged."""
+    """What a run took: processor and wall time [s], largest memory of a process [MB], floor [s], loops flagged."""
 
     loops: int
     processor_s: float
