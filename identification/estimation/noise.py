@@ -22,6 +22,8 @@ FEWEST = 4
 """Fewest edges."""
 JUDGED = 0.5
 """Share of the good samples that have to be judged; ours."""
+TILE = 1024
+"""Samples that are whitened at a time."""
 SHORTEST = 12
 """Records hold at least this many times the longest lag; ours."""
 
@@ -54,8 +56,9 @@ def lag_means(r: Floats, edges: Edges) -> Floats:
     for j in range(groups):
         near, far = edges[j], edges[j + 1]
         scale = 1.0 / (far - near)
-        for k in range(far, n):
-            out[j, k] = (total[k - near] - total[k - far]) * scale
+        part, newer, older = out[j, far:], total[far - near : n - near], total[: n - far]
+        for k in range(part.size):
+            part[k] = (newer[k] - older[k]) * scale
     return out
 
 
@@ -66,21 +69,25 @@ def whitened(x: Floats, ar: Floats, edges: Edges) -> Floats:
     single = 0
     while single < groups and edges[single + 1] == single + 1:
         single += 1
-    out = x.copy()
-    for i in range(single):  # lag by lag, for whole vectors at a time
-        factor = ar[i]
-        for k in range(i + 1, n):
-            out[k] -= factor * x[k - 1 - i]
-    if single == groups:
-        return out
     total = np.zeros(n + 1)
-    for k in range(n):
-        total[k + 1] = total[k] + x[k]
-    for j in range(single, groups):
-        near, far = edges[j], edges[j + 1]
-        scale = ar[j] / (far - near)
-        for k in range(far, n):
-            out[k] -= (total[k - near] - total[k - far]) * scale
+    if single < groups:
+        for k in range(n):
+            total[k + 1] = total[k] + x[k]
+    out = x.copy()
+    for first in range(0, n, TILE):  # a stretch at a time, lag by lag, for whole vectors that stay at hand
+        last = min(first + TILE, n)
+        for i in range(single):
+            begin = max(first, i + 1)
+            factor, part, past = ar[i], out[begin:last], x[begin - 1 - i : last - 1 - i]
+            for k in range(part.size):
+                part[k] -= factor * past[k]
+        for j in range(single, groups):
+            near, far = edges[j], edges[j + 1]
+            begin = max(first, far)
+            factor, part = ar[j] / (far - near), out[begin:last]
+            newer, older = total[begin - near : last - near], total[begin - far : last - far]
+            for k in range(part.size):
+                part[k] -= (newer[k] - older[k]) * factor
     return out
 
 
@@ -92,12 +99,14 @@ def judged(usable: Mask, reach: int) -> Mask:
     return out
 
 
-def fitted(columns: Floats, r: Floats, weight: Floats) -> Floats:
-    """Noise model, shape (groups,), of least weighted innovations; columns from lag_means."""
-    w = columns * weight
-    gram = w @ columns.T
+def fitted(columns: Floats, r: Floats) -> tuple[Floats, Floats]:
+    """Noise model, shape (groups,), of least innovations, and the products of the columns, shape (groups, groups).
+
+    `columns` from lag_means, shape (groups, n), and `r`, shape (n,), both times the root of what each sample counts.
+    """
+    gram = columns @ columns.T
     ridge = 1e-10 * np.trace(gram) / gram.shape[0] + 1e-300
-    return np.linalg.lstsq(gram + ridge * np.eye(gram.shape[0]), w @ r, rcond=1e-13)[0]
+    return np.linalg.lstsq(gram + ridge * np.eye(gram.shape[0]), columns @ r, rcond=1e-13)[0], gram
 
 
 def arx_noise(y: Floats, u: Floats, usable: Mask, order: int, lags: int) -> Floats:

@@ -126,15 +126,36 @@ def bounds(inputs: ModelInputs, c: Floats, param: Param) -> tuple[float, float]:
     return offset + factor * param.low, offset + factor * param.high
 
 
-def residual_fit(p: Problem, c: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-    """Residual, its lag means, noise model and innovations at given constants."""
-    r = p.y - simulate(p.inputs, c)
+@dataclass(frozen=True, slots=True)
+class Residual:
+    """What given constants leave, and the noise model that suits it best.
+
+    simulated : what they give [% PV], shape (n,); ar : noise model, shape (groups,). What each sample counts is in
+    the rest: columns, lag means of the residual, shape (groups, n), gram, their products, white, the innovations,
+    shape (n,), and loss, their mean square.
+    """
+
+    simulated: Floats
+    columns: Floats
+    gram: Floats
+    ar: Floats
+    white: Floats
+    loss: float
+
+
+def residual_fit(p: Problem, c: Floats) -> Residual:
+    """Residual, noise model and innovations at given constants."""
+    simulated = simulate(p.inputs, c)
+    r = p.y - simulated
+    groups, root, total = p.edges.size - 1, np.sqrt(p.weight), float(p.weight.sum())
     if not float(np.abs(r).max()) < FAR:
-        groups = p.edges.size - 1
-        return r, np.zeros((groups, r.size)), np.zeros(groups), np.full(r.size, FAR)
-    columns = lag_means(r, p.edges)
-    ar = fitted(columns, r, p.weight)
-    return r, columns, ar, r - ar @ columns
+        none = np.zeros((groups, r.size)), np.zeros((groups, groups)), np.zeros(groups)
+        return Residual(simulated, *none, FAR * root, FAR**2)
+    columns, weighted = lag_means(r, p.edges), r * root
+    columns *= root
+    ar, gram = fitted(columns, weighted)
+    white = weighted - ar @ columns
+    return Residual(simulated, columns, gram, ar, white, float(white @ white) / total)
 
 
 def loss_of(p: Problem, e: Floats) -> float:
@@ -155,9 +176,12 @@ def step_of(inputs: ModelInputs, c: Floats, param: Param) -> float:
     return 0.01 * max(abs(float(c[param.slot])), 0.1)
 
 
-def sensitivities(p: Problem, model: Model, ar: Floats) -> Floats:
-    """Whitened derivatives of the simulation by the free constants (logarithms where so searched), (m, n)."""
-    here = simulate(p.inputs, model.c)
+def sensitivities(p: Problem, model: Model, ar: Floats, here: Floats | None = None) -> Floats:
+    """Whitened derivatives of the simulation by the free constants (logarithms where so searched), (m, n).
+
+    `here` is what the model simulates, to the last digit, where that is known: a constant that does nothing yet must
+    have no slope at all."""
+    here = simulate(p.inputs, model.c) if here is None else here
     out = np.empty((len(model.params), p.y.size))
     for i, param in enumerate(model.params):
         c, h = model.c.copy(), step_of(p.inputs, model.c, param)
@@ -191,19 +215,19 @@ def newton(gram: Floats, slope: Floats, damping: float) -> Floats:
     return np.linalg.lstsq(unit + damping * np.eye(scale.size), slope / scale, rcond=1e-11)[0] / scale
 
 
-def curvature(p: Problem, model: Model, ar: Floats, columns: Floats, e: Floats) -> tuple[Floats, Floats]:
+def curvature(p: Problem, model: Model, found: Residual) -> tuple[Floats, Floats]:
     """Gauss-Newton matrix of the constants with the noise model eliminated, and the slope."""
-    j = np.concatenate((sensitivities(p, model, ar), columns))
-    weighted = j * p.weight
-    gram, slope = weighted @ j.T, weighted @ e
-    m = len(model.params)
-    inner = gram[m:, m:] + 1e-10 * np.trace(gram[m:, m:]) / (gram.shape[0] - m) * np.eye(gram.shape[0] - m)
-    cross = np.linalg.lstsq(inner, np.column_stack((gram[m:, :m], slope[m:])), rcond=1e-13)[0]
-    gram, slope = gram[:m, :m] - gram[:m, m:] @ cross[:, :-1], slope[:m] - gram[:m, m:] @ cross[:, -1]
+    moves = sensitivities(p, model, found.ar, found.simulated) * np.sqrt(p.weight)
+    own, groups = found.columns, found.ar.size
+    inner = found.gram + 1e-10 * np.trace(found.gram) / groups * np.eye(groups)
+    beside = own @ moves.T
+    cross = np.linalg.lstsq(inner, np.column_stack((beside, own @ found.white)), rcond=1e-13)[0]
+    gram = moves @ moves.T - beside.T @ cross[:, :-1]
+    slope = moves @ found.white - beside.T @ cross[:, -1]
     for i, param in enumerate(model.params):
         if param.slot in PRIOR:
             aim, scatter = (p.y[0], START_SCATTER) if param.slot == Slot.START else (0.0, BIAS_SCATTER)
-            held = loss_of(p, e) / scatter**2
+            held = found.loss / scatter**2
             gram[i, i] += held
             slope[i] += held * (aim - model.c[param.slot])
     return gram, slope
@@ -220,35 +244,39 @@ def descend(p: Problem, model: Model, steps: int) -> Fitted:
     steps : int
         Steps at most.
     """
-    _, columns, ar, e = residual_fit(p, model.c)
-    loss, damping, failed = loss_of(p, e), 1e-3, 0
+    best, damping, failed = residual_fit(p, model.c), 1e-3, 0
     for _ in range(steps):
-        gram, slope = curvature(p, model, ar, columns, e)
+        gram, slope = curvature(p, model, best)
         while failed < 5:
             trial = moved(p, model, newton(gram, slope, damping))
-            _, columns2, ar2, e2 = residual_fit(p, trial.c)
-            less = loss_of(p, e2)
-            if less < loss:
+            found = residual_fit(p, trial.c)
+            if found.loss < best.loss:
                 break
             damping, failed = damping * 20, failed + 1
         else:
             break
-        won = 0.5 * p.count * math.log(loss / max(less, 1e-300))
-        model, columns, ar, e, loss = trial, columns2, ar2, e2, less
+        won = 0.5 * p.count * math.log(best.loss / max(found.loss, 1e-300))
+        model, best = trial, found
         damping, failed = max(damping / 10, 1e-7), 0
         if won < SETTLED:
             break
-    return Fitted(model, loss, p.count, ar, e)
+    return Fitted(model, best.loss, p.count, best.ar, innovations_of(p, best))
+
+
+def innovations_of(p: Problem, found: Residual) -> Floats:
+    """Innovations [% PV], shape (n,), also where they count nothing."""
+    if not found.loss < FAR**2:
+        return np.full(p.y.size, FAR)
+    return whitened(p.y - found.simulated, found.ar, p.edges)  # type: ignore[no-any-return]
 
 
 def deviations(p: Problem, fit: Fitted) -> Floats:
     """Standard deviations of the free constants (of logarithms where so searched), shape (m,); see covariance.py."""
-    _, columns, ar, e = residual_fit(p, fit.model.c)
-    gram, _ = curvature(p, fit.model, ar, columns, e)
+    found = residual_fit(p, fit.model.c)
+    gram, _ = curvature(p, fit.model, found)
     if not np.isfinite(gram).all():
         return np.full(gram.shape[0], np.inf)
-    weighted = columns * p.weight
-    moves = sensitivities(p, fit.model, ar)
-    follow = np.linalg.lstsq(weighted @ columns.T, weighted @ moves.T, rcond=1e-13)[0]
-    scores = (moves - follow.T @ columns) * (p.weight * e)
+    moves = sensitivities(p, fit.model, found.ar, found.simulated) * np.sqrt(p.weight)
+    follow = np.linalg.lstsq(found.gram, found.columns @ moves.T, rcond=1e-13)[0]
+    scores = (moves - follow.T @ found.columns) * found.white
     return np.sqrt(np.maximum(np.diag(scattered(inverse(gram), scores.T, fit.loss)), 0.0))

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from identification.estimation.prediction_error import Fitted, Problem, loss_of, residual_fit
+from identification.estimation.prediction_error import Fitted, Problem, residual_fit
 from identification.mismatch.explanation import Explanation
 from identification.mismatch.recording import Recording
 from identification.simulation.parameters import Slot
@@ -26,7 +26,7 @@ def brings(p: Problem, fit: Fitted) -> float:
     """Log likelihood [nat] that OP brings to a fit: over the same with no gain, its mean and start as recorded."""
     c = fit.model.c.copy()
     c[Slot.K], c[Slot.BIAS], c[Slot.START] = 0.0, float(np.mean(p.y)), float(p.y[0])
-    without = loss_of(p, residual_fit(p, c)[3])
+    without = residual_fit(p, c).loss
     return 0.5 * fit.count * math.log(max(without, 1e-300) / max(fit.loss, 1e-300))
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -18,6 +19,10 @@ SLOPE, ROOT, CAP, SPILL, SPILL_T = (
 LEAK, PIPE, GAIN_SLOPE, SPEED = (int(s) for s in (Slot.LEAK, Slot.PIPE, Slot.GAIN_SLOPE, Slot.SPEED))
 Memory = tuple[float, float, float, float, float]
 """What a vessel remembers: level, second mode, spilled liquid, second and third lag."""
+SHORT = 0.03
+"""Step, in terms of an outflow's own time, below which the exponential step is summed: the next term is 5e-16."""
+C1, C2, C3, C4, C5, C6 = ((-1.0) ** k / math.factorial(k + 1) for k in range(1, 7))
+"""Coefficients of (1 - exp(-z)) / z."""
 WEIR = 25.0
 """Outflow over the cap per % of level, in terms of the vessel's own; ours: stiff against every vessel."""
 
@@ -50,57 +55,97 @@ def transported(flow: Floats, delay_s: float, pipe: float, middle: float, dt_s: 
     return out
 
 
+class Outflow(NamedTuple):
+    """How a vessel's outflow and its pace depend on its level and on the way it goes.
+
+    slope : bend of the outflow [per % PV]; leak : outflow per level of a linear vessel [-]; root : nonzero where
+    the outflow goes with the root of the level; head : level deviation at which a rooted vessel would be empty, with
+    its sign turned [% PV]; cap [% PV] and spill [-] : overflow; gain_slope [per % PV], speed : gain that goes with
+    the level, and its power in the time constant; up, down : pace of a rising and of a falling level [-].
+    """
+
+    slope: float
+    leak: float
+    root: float
+    head: float
+    cap: float
+    spill: float
+    gain_slope: float
+    speed: float
+    up: float
+    down: float
+
+
 @njit(cache=True, error_model="numpy")
-def outflow(x: float, head: float, slope: float, leak: float, root: float) -> tuple[float, float]:
+def outflow_of(c: Floats, head: float) -> Outflow:
+    """The outflow that the constants say."""
+    pace = math.exp(0.5 * c[ASYM])
+    return Outflow(
+        c[SLOPE] / 50.0,
+        c[LEAK],
+        c[ROOT],
+        head,
+        c[CAP],
+        c[SPILL],
+        c[GAIN_SLOPE] / 50.0,
+        c[SPEED],
+        pace,
+        1.0 / pace,
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def outflow(x: float, o: Outflow) -> tuple[float, float]:
     """Outflow at level x [% PV] and its derivative, for the plain, the rooted and the bent vessel."""
-    if root != 0.0:
-        inside = max(1.0 + x / head, 1e-3)
-        return 2.0 * head * (math.sqrt(inside) - 1.0), 1.0 / math.sqrt(inside)
-    if slope != 0.0:
-        inside = max(1.0 + slope * x / 50.0, 0.05)
-        return 50.0 / slope * math.log(inside), 1.0 / inside
-    return leak * x, leak
+    if o.root != 0.0:
+        root = math.sqrt(max(1.0 + x / o.head, 1e-3))
+        return 2.0 * o.head * (root - 1.0), 1.0 / root
+    if o.slope != 0.0:
+        inside = max(1.0 + o.slope * x, 0.05)
+        return math.log(inside) / o.slope, 1.0 / inside
+    return o.leak * x, o.leak
 
 
 @njit(cache=True, error_model="numpy")
 def scheduled(x: float, slope: float) -> float:
-    """Relative gain at level x [% PV]; `slope` is its change over 50 %."""
-    return max(1.0 + slope * x / 50.0, 0.05)
+    """Relative gain at level x [% PV]; `slope` is its change [per % PV]."""
+    return max(1.0 + slope * x, 0.05)
 
 
 @njit(cache=True, error_model="numpy")
-def share_filled(rise: float, h: float, t: float) -> float:
-    """Rise of a level over its net feed after h seconds, of an outflow with that derivative (exponential step)."""
-    z = rise * h / t
-    return h / t if z < 1e-9 else (1.0 - math.exp(-z)) / rise
+def share_filled(rise: float, time: float) -> float:
+    """Rise of a level over its net feed after some time [time constants], of an outflow with that derivative
+    (exponential step)."""
+    z = rise * time
+    if z < SHORT:  # to sixteen digits, without the exponential that most of the time would go to
+        return time * (1.0 + z * (C1 + z * (C2 + z * (C3 + z * (C4 + z * (C5 + z * C6))))))
+    return (1.0 - math.exp(-z)) / rise
 
 
 @njit(cache=True, error_model="numpy")
-def filled(x: float, feed: float, h: float, c: Floats, head: float, basin: float) -> tuple[float, float]:
-    """Level after h seconds of constant feed, and the spill meanwhile (exact where the vessel is linear)."""
-    out, rise = outflow(x, head, c[SLOPE], c[LEAK], c[ROOT])
-    over = max(x - c[CAP], 0.0)
+def filled(x: float, feed: float, basin: float, time: float, o: Outflow) -> tuple[float, float]:
+    """Level after some time [time constants] of constant feed, and the spill meanwhile (exact where the vessel is
+    linear)."""
+    out, rise = outflow(x, o)
+    over = max(x - o.cap, 0.0)
     if over > 0.0:
         rise += WEIR
-    net = feed + c[SPILL] * basin - out - WEIR * over
-    t = c[T]
-    if c[GAIN_SLOPE] != 0.0:
-        t *= scheduled(x, c[GAIN_SLOPE]) ** c[SPEED]
-    if c[ASYM] != 0.0:
-        t *= math.exp(-0.5 * c[ASYM] if net > 0.0 else 0.5 * c[ASYM])
-    return x + net * share_filled(rise, h, t), WEIR * over
+    net = feed + o.spill * basin - out - WEIR * over
+    if o.gain_slope != 0.0 and o.speed != 0.0:
+        time /= scheduled(x, o.gain_slope) ** o.speed
+    return x + net * share_filled(rise, time * (o.up if net > 0.0 else o.down)), WEIR * over
 
 
 @njit(cache=True, error_model="numpy")
-def shares_filled(c: Floats, parts: tuple[float, float]) -> Floats:
+def shares_filled(o: Outflow, times: tuple[float, float]) -> Floats:
     """The same of a linear outflow, shape (2, 2, 2): by part of a sample, rising or falling, under or over a cap."""
     out = np.zeros((2, 2, 2))
     for half in range(2):
         for falling in range(2):
-            t = c[T] if c[ASYM] == 0.0 else c[T] * math.exp((falling - 0.5) * c[ASYM])
             for over in range(2):
-                if parts[half] > 0.0:
-                    out[half, falling, over] = share_filled(c[LEAK] + over * WEIR, parts[half], t)
+                if times[half] > 0.0:
+                    pace = o.down if falling else o.up
+                    out[half, falling, over] = share_filled(o.leak + over * WEIR, times[half] * pace)
     return out
 
 
@@ -147,32 +192,39 @@ def vessel_span(
     part = 0.0 if c[PIPE] != 0.0 else c[L] - delay * dt_s
     parts = (part, dt_s - part)
     linear = c[SLOPE] == 0.0 and c[ROOT] == 0.0 and c[GAIN_SLOPE] == 0.0
-    rises = shares_filled(c, parts)
+    times, o = (parts[0] / c[T], parts[1] / c[T]), outflow_of(c, head)
+    rises = shares_filled(o, times)
     left, mean = kept(c, parts)
+    # what a loop over samples asks for stands in locals: entries of c might be written by it, for all it knows
+    k_gain, bias, share, second, third = c[K], c[BIAS], c[SHARE], c[T2] > 0.0, c[T3] > 0.0
     for k in range(*span):
-        out[k] = (1.0 - c[SHARE]) * x + c[SHARE] * mode
+        out[k] = (1.0 - share) * x + share * mode
+        factor, added = gain[k], k_gain * act[k]
         for half in range(2):
             if parts[half] <= 0.0:
                 continue
-            j = max(k - delay - 1 + half, 0)
-            feed = gain[k] * (c[K] * (flow[j] - base) + c[BIAS])
-            if c[GAIN_SLOPE] != 0.0:
-                feed *= scheduled(x, c[GAIN_SLOPE])
-            feed += c[K] * act[k]
-            if c[T2] > 0.0:
+            feed = factor * (k_gain * (flow[max(k - delay - 1 + half, 0)] - base) + bias)
+            if o.gain_slope != 0.0:
+                feed *= scheduled(x, o.gain_slope)
+            feed += added
+            if second:
                 z2, feed = feed + (z2 - feed) * left[half, 0], feed + (z2 - feed) * mean[half, 0]
-            if c[T3] > 0.0:
+            if third:
                 z3, feed = feed + (z3 - feed) * left[half, 1], feed + (z3 - feed) * mean[half, 1]
+            spill = 0.0
             if linear:
-                over = max(x - c[CAP], 0.0)
-                net = feed + c[SPILL] * basin - c[LEAK] * x - WEIR * over
-                spill = WEIR * over
-                x += net * rises[half, 0 if net > 0.0 else 1, 0 if over <= 0.0 else 1]
+                net = feed + o.spill * basin - o.leak * x
+                if x > o.cap:
+                    spill = WEIR * (x - o.cap)
+                    net -= spill
+                    x += net * rises[half, 0 if net > 0.0 else 1, 1]
+                else:
+                    x += net * rises[half, 0 if net > 0.0 else 1, 0]
             else:
-                x, spill = filled(x, feed, parts[half], c, head, basin)
-            if c[SPILL] > 0.0:
+                x, spill = filled(x, feed, basin, times[half], o)
+            if o.spill > 0.0:
                 basin += (spill - basin) * (1.0 - left[half, 3])
-            if c[SHARE] != 0.0:
+            if share != 0.0:
                 mode += (feed - mode) * (1.0 - left[half, 2])
     return x, mode, basin, z2, z3
 

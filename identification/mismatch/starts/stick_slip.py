@@ -33,7 +33,7 @@ def quick_loss(p: Problem, c: Floats, ar: Floats) -> float:
 
 def own_loss(p: Problem, c: Floats) -> float:
     """The same under the noise model that suits it best."""
-    return loss_of(p, residual_fit(p, c)[3])
+    return residual_fit(p, c).loss
 
 
 def sticking(c: Floats, row: Variant, stickband: float, jump: float) -> Floats:
