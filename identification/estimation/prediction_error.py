@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from identification.estimation.covariance import inverse, scattered
-from identification.estimation.limits import BIAS_SCATTER, SETTLED, START_SCATTER
+from identification.estimation.limits import BIAS_SCATTER, PROMISES, SETTLED, START_SCATTER
 from identification.estimation.noise import Edges, edges_for, fitted, judged, lag_means, whitened
 from identification.record import Floats, Mask
 from identification.simulation.effect import Param, Variant
@@ -233,7 +233,15 @@ def curvature(p: Problem, model: Model, found: Residual) -> tuple[Floats, Floats
     return gram, slope
 
 
-def descend(p: Problem, model: Model, steps: int) -> Fitted:
+def is_out_of_reach(p: Problem, found: Residual, gram: Floats, slope: Floats, aim: float) -> bool:
+    """Whether steps that win several times what the next one promises would not come to the loss aimed at."""
+    if math.isinf(aim):
+        return False
+    promised = float(slope @ newton(gram, slope, 1e-6)) / max(float(found.white @ found.white), 1e-300)
+    return math.log(max(found.loss, 1e-300) / aim) > PROMISES * max(promised, 0.0)
+
+
+def descend(p: Problem, model: Model, steps: int, aim: float = math.inf) -> Fitted:
     """Follow a model to the least innovations by damped Gauss-Newton steps.
 
     Parameters
@@ -243,10 +251,14 @@ def descend(p: Problem, model: Model, steps: int) -> Fitted:
         Where to start.
     steps : int
         Steps at most.
+    aim : float
+        Loss that is worth anything; from the second step on a descent that will not come to it ends.
     """
     best, damping, failed = residual_fit(p, model.c), 1e-3, 0
-    for _ in range(steps):
+    for step in range(steps):
         gram, slope = curvature(p, model, best)
+        if step > 0 and is_out_of_reach(p, best, gram, slope, aim):
+            break
         while failed < 5:
             trial = moved(p, model, newton(gram, slope, damping))
             found = residual_fit(p, trial.c)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -16,6 +17,7 @@ from identification.estimation.limits import (
     SEARCH_PENALTY,
     SETTLES,
     STICKING_HINT,
+    WORTH_FOLLOWING,
 )
 from identification.estimation.outliers import robust_weights
 from identification.estimation.prediction_error import (
@@ -124,13 +126,26 @@ def penalty(row: Variant) -> float:
 
 def candidate(p: Problem, near: Fitted, models: list[Model], steps: int) -> Candidate:
     """The best of some starts, followed for some steps."""
-    fit = min((descend(p, model, steps) for model in models), key=lambda f: f.loss)
+    return _of_fits(near, [descend(p, model, steps) for model in models])
+
+
+def screened_candidate(p: Problem, near: Fitted, models: list[Model]) -> Candidate:
+    """The same in the first round, where a start that will not come to anything worth following is left."""
+    worth = penalty(models[0].added[-1]) + WORTH_FOLLOWING
+    aim = near.loss * math.exp(-2.0 * worth / near.count)
+    return _of_fits(near, [descend(p, model, SCREEN_STEPS, aim) for model in models])
+
+
+def _of_fits(near: Fitted, fits: list[Fitted]) -> Candidate:
+    fit = min(fits, key=lambda f: f.loss)
     won = gain(fit, near)
     return Candidate(fit, won, won - penalty(fit.model.added[-1]))
 
 
 def followed(p: Problem, near: Fitted, first: Candidate, models: list[Model]) -> Candidate:
     """A candidate of the first round followed to the end, from there and from its second and third start."""
+    if first.penalised < WORTH_FOLLOWING:
+        return first
     starts = [first.fit.model, *models[1:3]]
     best = candidate(p, near, starts, FULL_STEPS)
     return best if best.penalised > first.penalised else first
@@ -162,7 +177,7 @@ def compete(
                 first = models[:1]
             if row.modes:
                 first += mode_starts(x.p, near, row)
-            tried.append((candidate(x.p, near, first, SCREEN_STEPS), models))
+            tried.append((screened_candidate(x.p, near, first), models))
     tried.sort(key=lambda t: -t[0].penalised)
     ended = [followed(x.p, near, first, models) for first, models in tried[:FOLLOWED]]
     ended += stiction_candidates(x, near, [first for first, _ in tried], rows, tell)
