@@ -202,7 +202,9 @@ def _readable(paths: Sequence[Path], options: ReadOptions) -> tuple[list[Source]
     named = {Path(path) for path in paths}
     for path in export_files(paths):
         try:
-            sources.append(_opened(path, options))
+            found, failed = _opened(path, options)
+            sources += found
+            skipped += failed
         except InputError as error:
             if path in named:
                 raise
@@ -221,16 +223,32 @@ def _some(names: Sequence[str]) -> str:
     return names[0] if len(names) == 1 else f"{names[0]} and {len(names) - 1} more files"
 
 
-def _opened(path: Path, options: ReadOptions) -> Source:
+def _opened(path: Path, options: ReadOptions) -> tuple[list[Source], list[InputError]]:
+    """The tables of a file, one but for workbooks, and why other sheets of a workbook are none."""
     with _told(path):
-        plain = unpacked(path, options.scratch)
-        if is_parquet(plain):
-            table = open_parquet(plain)
-            tag = tag_column(table) if table.rows >= CONVERTED_ROWS else -1
-            return source_of(table if tag < 0 else converted_parquet(table, tag, options.scratch), options)
-        sheet = open_sheet(plain, options)
-        big = sheet.bytes >= CONVERTED_BYTES
-        return source_of(converted(sheet, tag_column(sheet), options.scratch) if big else sheet, options)
+        parts = unpacked(path, options.scratch)
+    found: list[Source] = []
+    failed: list[InputError] = []
+    for part in parts:
+        try:
+            with _told(path):
+                found.append(_table(part, options))
+        except InputError as error:
+            seen = error.seen.replace(str(part), str(path.with_name(part.name)))
+            failed.append(InputError(seen, error.expected, error.remedy))
+    if not found:
+        raise failed[0]
+    return found, failed
+
+
+def _table(plain: Path, options: ReadOptions) -> Source:
+    if is_parquet(plain):
+        table = open_parquet(plain)
+        tag = tag_column(table) if table.rows >= CONVERTED_ROWS else -1
+        return source_of(table if tag < 0 else converted_parquet(table, tag, options.scratch), options)
+    sheet = open_sheet(plain, options)
+    big = sheet.bytes >= CONVERTED_BYTES
+    return source_of(converted(sheet, tag_column(sheet), options.scratch) if big else sheet, options)
 
 
 def _read(source: Source, tags: Sequence[str]) -> dict[str, Raw]:

@@ -5,16 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from analyzer.history import workbook
 from identification.errors import InputError
 
 TEXT_ENDINGS = frozenset({".csv", ".txt", ".tsv"})
 PARQUET_ENDINGS = frozenset({".parquet", ".pq"})
 READ_PACKED = frozenset({".gz", ".bz2", ".xz", ".zip"})
-PACKED_ENDINGS = frozenset({".7z", ".xls", ".xlsx", ".xlsm"})
+PACKED_ENDINGS = frozenset({".7z"})
 NO_EXPORTS = frozenset({"loops.csv", "labels.csv", "changes.csv"})
 MAGIC = b"PAR1"
 PACKED = {
-    b"\xd0\xcf\x11\xe0": ("an old Excel workbook", "save the sheet as CSV and name that file"),
     b"7z\xbc\xaf": ("a 7z archive", "unpack it and name what comes out"),
 }
 """First bytes of files that hold an export in another wrapping: what they are, and what to do."""
@@ -85,15 +85,15 @@ def _listed(folder: Path) -> list[Path]:
         packed = packed_beside([folder])
         raise InputError(
             packed[0] if packed else f"{folder}: a folder without exports",
-            "files ending in .csv, .txt, .tsv, .parquet or .pq",
+            "files ending in .csv, .txt, .tsv, .parquet, .pq or .xlsx",
             "name the folder that holds the exports",
         )
     return files
 
 
 def _is_export(path: Path) -> bool:
-    known = path.suffix.lower() in TEXT_ENDINGS | PARQUET_ENDINGS | READ_PACKED
-    return known and path.name.lower() not in NO_EXPORTS and not path.name.startswith(".")
+    known = path.suffix.lower() in TEXT_ENDINGS | PARQUET_ENDINGS | READ_PACKED | workbook.ENDINGS
+    return known and path.name.lower() not in NO_EXPORTS and not path.name.startswith((".", "~$"))
 
 
 def _closed(path: Path, error: OSError) -> InputError:

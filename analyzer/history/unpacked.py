@@ -1,4 +1,4 @@
-"""Packed exports laid beside as plain ones, bounded: gzip, bzip2, xz, and a zip archive of one file."""
+"""Packed exports laid beside as plain ones, bounded: gzip, bzip2, xz, a zip archive of one file, and workbooks."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import IO, Any
 
+from analyzer.history import workbook
 from identification.errors import InputError
 
 BLOCK_BYTES = 1 << 20
@@ -32,8 +33,6 @@ STREAMS: dict[bytes, Callable[..., Any]] = {
 }
 """How files that begin so are opened."""
 ZIP = b"PK\x03\x04"
-WORKBOOKS = frozenset({".xls", ".xlsx", ".xlsm"})
-SAVE = "save the sheet as CSV and name that file"
 PACKED_ENDINGS = frozenset({".gz", ".bz2", ".xz", ".zip"})
 
 
@@ -45,8 +44,9 @@ def own_scratch() -> Path:
     return made
 
 
-def unpacked(path: Path, scratch: Path | None) -> Path:
-    """The file itself, or, where it is packed, a plain copy of it under `scratch` (None: this process's own).
+def unpacked(path: Path, scratch: Path | None) -> list[Path]:
+    """The file itself, or, where it is packed, a plain copy of it under `scratch` (None: this process's own), or the
+    tables of a workbook.
 
     Raises
     ------
@@ -55,19 +55,22 @@ def unpacked(path: Path, scratch: Path | None) -> Path:
     """
     with path.open("rb") as file:
         start = file.read(5)
-    if path.suffix.lower() in WORKBOOKS:
-        raise InputError(f"{path}: a workbook", "delimited text or Parquet", SAVE)
+    if workbook.is_workbook(path, start):
+        _check_parts(path, scratch or own_scratch())
+        return workbook.as_text(
+            path, Path(tempfile.mkdtemp(prefix="workbook-", dir=scratch or own_scratch()))
+        )
     stream = next((STREAMS[magic] for magic in STREAMS if start.startswith(magic)), None)
     if stream is None and not start.startswith(ZIP):
-        return path
+        return [path]
     folder = Path(tempfile.mkdtemp(prefix="unpacked-", dir=scratch or own_scratch()))
     try:
         if stream is not None:
             out = folder / (path.stem if path.suffix.lower() in PACKED_ENDINGS else path.name)
             with stream(path, "rb") as source:
                 _copied(source, out, path)
-            return out
-        return _member(path, folder)
+            return [out]
+        return [_member(path, folder)]
     except (OSError, EOFError, zipfile.BadZipFile, lzma.LZMAError, RuntimeError, zlib.error) as error:
         why = " ".join(str(error).split())[:80] or type(error).__name__
         raise InputError(
@@ -79,8 +82,6 @@ def _member(path: Path, folder: Path) -> Path:
     """The one file of a zip archive."""
     with zipfile.ZipFile(path) as archive:
         held = [info for info in archive.infolist() if not info.is_dir()]
-        if any(info.filename.startswith("xl/") for info in held):
-            raise InputError(f"{path}: a workbook", "delimited text or Parquet", SAVE)
         if len(held) != 1:
             seen = f"{path}: an archive of {len(held)} files"
             raise InputError(seen, "an archive of one file", "unpack it and name the folder")
@@ -93,6 +94,13 @@ def _member(path: Path, folder: Path) -> Path:
         with archive.open(held[0]) as source:
             _copied(source, out, path)
         return out
+
+
+def _check_parts(path: Path, folder: Path) -> None:
+    """Raise InputError for a workbook (an archive, but for the old kind) whose parts unpack beyond all measure."""
+    if zipfile.is_zipfile(path):
+        with zipfile.ZipFile(path) as archive:
+            _check_size(path, sum(info.file_size for info in archive.infolist()), 0, folder)
 
 
 def _copied(source: IO[Any], out: Path, path: Path) -> None:

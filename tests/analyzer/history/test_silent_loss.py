@@ -50,15 +50,15 @@ def test_a_preamble_above_the_header_is_passed_over(tmp_path: Path, above: str) 
 
 
 def test_packed_files_in_a_folder_are_told(tmp_path: Path) -> None:
-    """A folder's 7z and xlsx beside its CSV are named as not read; a folder of nothing else is refused by name."""
+    """A folder's 7z beside its CSV are named as not read; a folder of nothing else is refused by name."""
     (tmp_path / "more.csv.7z").write_bytes(b"7z\xbc\xaf")
-    (tmp_path / "sheet.xlsx").write_bytes(b"PK\x03\x04")
+    (tmp_path / "rest.7z").write_bytes(b"7z\xbc\xaf")
     refused = CliRunner().invoke(main, ["check", str(tmp_path)])
     assert refused.exit_code == 2
-    assert "more.csv.7z, sheet.xlsx not read: unpack it" in refused.stderr
+    assert "more.csv.7z, rest.7z not read: unpack it" in refused.stderr
     (tmp_path / "a.csv").write_text("timestamp,FIC1.PV\n" + "\n".join(rows(FORMATS[:1])), encoding="utf-8")
     told = [str(note) for note in open_export([tmp_path]).file_notes]
-    assert any("more.csv.7z, sheet.xlsx not read" in note for note in told)
+    assert any("more.csv.7z, rest.7z not read" in note for note in told)
 
 
 def test_check_without_loops_is_no_success(tmp_path: Path) -> None:

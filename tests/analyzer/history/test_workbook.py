@@ -1,0 +1,131 @@
+"""Workbooks are read as the tables in their sheets; what cannot be read is one line."""
+
+from __future__ import annotations
+
+import datetime as dt
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from analyzer.cli import main
+from analyzer.history import workbook
+from analyzer.history.export import open_export
+from analyzer.history.options import ReadOptions
+from identification.errors import InputError
+
+openpyxl = pytest.importorskip("openpyxl")
+BEGIN = dt.datetime(2026, 3, 2)
+N = 400
+PV = np.round(50 + np.sin(np.arange(N) / 9), 3)
+OP = np.round(40 + np.cos(np.arange(N) / 9), 3)
+STAMPS = [BEGIN + dt.timedelta(seconds=5 * k) for k in range(N)]
+
+
+def write(path: Path, sheets: dict[str, list[list[object]]]) -> Path:
+    """A workbook of these sheets."""
+    book = openpyxl.Workbook()
+    book.remove(book.active)
+    for name, rows in sheets.items():
+        sheet = book.create_sheet(name)
+        for row in rows:
+            sheet.append(row)
+    book.save(path)
+    return path
+
+
+def wide(loop: str, pv: np.ndarray = PV) -> list[list[object]]:
+    """A title, a line of tags and samples, a column a tag."""
+    rows = [[t, float(p), float(o)] for t, p, o in zip(STAMPS, pv, OP, strict=True)]
+    return [["Trend report"], ["Time", f"{loop}.PV", f"{loop}.OP"], *rows]
+
+
+def test_a_wide_sheet_reads_as_its_cells(tmp_path):
+    """Stamps kept as dates and values kept as numbers come back as they were put in."""
+    found = open_export([write(tmp_path / "day.xlsx", {"Data": wide("FIC1")})])
+    assert found.tags == ("FIC1.PV", "FIC1.OP")
+    series = found.read(["FIC1.PV"])["FIC1.PV"]
+    np.testing.assert_allclose(series.value, PV)
+    begin = BEGIN.replace(tzinfo=dt.UTC).timestamp()
+    np.testing.assert_allclose(series.stamp_s, begin + 5 * np.arange(N))
+
+
+def test_serial_days_without_a_format_are_stamps(tmp_path):
+    """Cells that hold days since 1899-12-30 as plain numbers are read as those days."""
+    first = (BEGIN - dt.datetime(1899, 12, 30)).days
+    rows = [["Time", "FIC1.PV", "FIC1.OP"]]
+    rows += [[first + 5 * k / 86400, float(PV[k]), float(OP[k])] for k in range(N)]
+    series = open_export([write(tmp_path / "day.xlsx", {"Data": rows})]).read(["FIC1.PV"])["FIC1.PV"]
+    begin = BEGIN.replace(tzinfo=dt.UTC).timestamp()
+    np.testing.assert_allclose(series.stamp_s, begin + 5 * np.arange(N), atol=0.01)
+
+
+def test_a_long_sheet_reads_with_its_quality(tmp_path):
+    """Tag, time, value and quality in rows: bad samples are bad, texts are none."""
+    rows: list[list[object]] = [["TagName", "Timestamp", "Value", "Quality"]]
+    for k, t in enumerate(STAMPS):
+        rows.append(["FIC1.PV", t, float(PV[k]), "Bad" if k == 7 else "Good"])
+        rows.append(["FIC1.OP", t, "No Data" if k == 9 else float(OP[k]), "Good"])
+    found = open_export([write(tmp_path / "day.xlsx", {"Export": rows})]).read(["FIC1.PV", "FIC1.OP"])
+    assert np.flatnonzero(found["FIC1.PV"].bad).tolist() == [7]
+    assert np.flatnonzero(found["FIC1.OP"].bad | ~np.isfinite(found["FIC1.OP"].value)).tolist() == [9]
+
+
+def test_sheets_are_tables_of_their_own_and_a_cover_is_left_out(tmp_path):
+    """Two sheets of two loops both count; a sheet of prose and an empty one cost nothing, and the prose is told."""
+    prose = [["About", "this"], ["made for", "the day shift"], ["by", "hand"]]
+    sheets = {"Cover": prose, "FIC1": wide("FIC1"), "Empty": [], "FIC2": wide("FIC2", PV + 1)}
+    found = open_export([write(tmp_path / "day.xlsx", sheets)])
+    assert set(found.tags) == {"FIC1.PV", "FIC1.OP", "FIC2.PV", "FIC2.OP"}
+    np.testing.assert_allclose(found.read(["FIC2.PV"])["FIC2.PV"].value, PV + 1)
+    assert any("left out" in note and "Cover" in note for note in found.file_notes)
+
+
+def test_a_folder_of_workbooks_is_an_export(tmp_path):
+    """A workbook a loop in a folder, with the lock file of an open one beside, reads as one export."""
+    for loop in ("FIC1", "FIC2"):
+        write(tmp_path / f"{loop}.xlsx", {"Data": wide(loop)})
+    (tmp_path / "~$FIC1.xlsx").write_bytes(b"\x00")
+    assert len(open_export([tmp_path]).tags) == 4
+
+
+def test_a_night_runs_on_a_workbook(tmp_path):
+    """`triage run` assesses the loops of a workbook as those of any export."""
+    path = write(tmp_path / "day.xlsx", {"Data": wide("FIC1")})
+    done = CliRunner().invoke(main, ["run", str(path), "--store", str(tmp_path / "store")])
+    assert done.exit_code == 0, done.output
+    assert "1 of 1 loops assessed" in done.output
+
+
+def test_damage_is_one_line(tmp_path):
+    """A workbook cut short, one that is none, and one with no table each end in a line that says what to do."""
+    whole = write(tmp_path / "whole.xlsx", {"Data": wide("FIC1")}).read_bytes()
+    (tmp_path / "cut.xlsx").write_bytes(whole[: len(whole) // 2])
+    (tmp_path / "none.xlsx").write_bytes(b"hello, world")
+    (tmp_path / "old.xls").write_bytes(b"\xd0\xcf\x11\xe0" + bytes(3000))
+    write(tmp_path / "prose.xlsx", {"A": [["just a word"]]})
+    for name in ("cut.xlsx", "none.xlsx", "old.xls", "prose.xlsx"):
+        done = CliRunner().invoke(main, ["check", str(tmp_path / name)])
+        assert done.exit_code == 2, name
+        assert done.stderr.count("\n") == 1, done.stderr
+        assert name in done.stderr
+        assert "Traceback" not in done.output
+
+
+def test_a_bomb_is_refused_by_its_declared_size(tmp_path):
+    """A workbook whose sheet unpacks to a hundred times what any sheet does is not unpacked."""
+    path = tmp_path / "bomb.xlsx"
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("xl/worksheets/sheet1.xml", bytes(300_000_000))
+    with pytest.raises(InputError, match="unpack to more than"):
+        open_export([path], ReadOptions(scratch=tmp_path))
+
+
+def test_without_the_extra_the_line_says_how_to_get_it(tmp_path, monkeypatch):
+    """Where the package that reads workbooks is missing, the line names the extra, and CSV as the other way."""
+    path = write(tmp_path / "day.xlsx", {"Data": wide("FIC1")})
+    monkeypatch.setattr(workbook, "can_be_read", lambda: False)
+    with pytest.raises(InputError, match=r"loop-triage\[excel\].*save the sheet as CSV"):
+        open_export([path])
