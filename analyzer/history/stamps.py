@@ -11,9 +11,13 @@ from numpy.typing import NDArray
 
 from analyzer.history.zone_names import ZONE_OFFSETS_H
 
+LETTER = r"[^\x00-@\[-`{-\x7f]"
+"""A letter of a month's name: whatever is no other ASCII character. The class of all letters of Unicode would make a
+pattern that takes a hundred times as long to build, and it is built for each column."""
 PATTERN = (
     r"^\s*(?:(?:Mon|Tue|Wed|Thu|Fri|Sat|Sun)[a-z]*\.?,?\s+)?"
-    r"(?P<a>\d{1,4}|\p{L}{3,12})\.?[-/. ]\s*(?P<b>\d{1,2}|\p{L}{3,12})\.?[-/. ,]\s*(?P<c>\d{4}|\d{2}|\d)"
+    rf"(?P<a>\d{{1,4}}|{LETTER}{{3,12}})\.?[-/. ]\s*(?P<b>\d{{1,2}}|{LETTER}{{3,12}})\.?[-/. ,]\s*"
+    r"(?P<c>\d{4}|\d{2}|\d)"
     r"(?:[T ,]+(?:klo )?(?P<h>\d{1,2})[:.](?P<m>\d\d)(?:[:.](?P<s>\d\d)(?:[.,:;](?P<f>\d+))?)?"
     r"\s*(?:(?P<p>[AaPp])(?:\.?[Mm]\.?|\s*$))?)?"
     r"\s*\(?(?:UTC|GMT)?\s*(?P<z>[A-Z]{1,4}|[+-]\d\d(?::?\d\d)?)?\)?\s*$"
