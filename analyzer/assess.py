@@ -14,7 +14,7 @@ from analyzer.cause import NO_CAUSE, Verdict, as_hint, hidden_by_grid, judge, no
 from analyzer.config import Config, QualityLimits
 from analyzer.dead_valve import dead_valve, with_dead_valve
 from analyzer.decisions import Cause, Lack, LacksError, Needs
-from analyzer.measure import measure, time_scale
+from analyzer.measure import Measured, measure, time_scale
 from analyzer.oscillation import Oscillation, Oscillations, barely_seen, counting, detect
 from analyzer.plantwide.wave import Wave, waves_of
 from analyzer.quality import Prepared
@@ -124,10 +124,17 @@ def cause_of(
     except NotAssessedError as error:
         verdict = not_assessed(Needs(Lack.UNBROKEN, str(error))) if oscillation is not None else NO_CAUSE
         return with_dead_valve(verdict, dead) if dead else verdict
+    verdict = judged(measured, prepared, oscillation, config)
+    return with_dead_valve(verdict, dead) if dead and verdict.cause is not Cause.VALVE else verdict
+
+
+def judged(
+    measured: Measured, prepared: Prepared, oscillation: Oscillation | None, config: Config
+) -> Verdict:
+    """The verdict by what was measured, as far as sampling and grid let it be told."""
     if hidden_by_grid(measured, prepared.pv_step, config.cause):
         measured = replace(measured, evidence=0.0)
-    verdict = told_apart(judge(measured, oscillation, config.cause), prepared, oscillation, config)
-    return with_dead_valve(verdict, dead) if dead and verdict.cause is not Cause.VALVE else verdict
+    return told_apart(judge(measured, oscillation, config.cause), prepared, oscillation, config)
 
 
 def told_apart(

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import norm, t
+from scipy.special import ndtri, stdtrit
 
 Floats = NDArray[np.float64]
 
@@ -132,7 +132,7 @@ def student(before: Side, after: Side, spread: tuple[float, float], level: float
         return 1.0
     freedom = sum(parts) ** 2 / sum(p * p / (k - 1) for p, k in zip(parts, n, strict=True))
     bias = np.sqrt(sum(p * k / (k - 1) for p, k in zip(parts, n, strict=True)) / sum(parts))
-    return float(bias * t.ppf(0.5 + level / 2, freedom) / norm.ppf(PERCENTILES[1] / 100))
+    return float(bias * stdtrit(freedom, 0.5 + level / 2) / ndtri(PERCENTILES[1] / 100))
 
 
 def difference(before: Side, after: Side, level: float, seed: int = 0) -> Difference:

@@ -10,13 +10,13 @@ import sys
 import time
 
 import numpy as np
-from scipy.signal import lfilter
 
 from analyzer.chunk import assess_loop
 from analyzer.config import Config
 from analyzer.history.series import Series
 from analyzer.loops.spec import LoopSpec
 from identification.models import Backlash, Fopdt, Loop, Pid, Stiction
+from identification.signals.first_order import first_order
 from identification.simulation.closed_loop import closed_loop
 
 LOOPS = (
@@ -31,7 +31,7 @@ def recorded(loop: Loop, seed: int) -> dict[str, Series]:
     """Three hours of a loop at 1 s, as an export has them."""
     rng, n = np.random.default_rng(seed), 10_800
     swing = 2.0 * np.sin(2 * np.pi * np.arange(n) / 600.0) if loop.valve is None else np.zeros(n)
-    wander = lfilter([0.03], [1.0, -0.999], rng.normal(0.0, 1.0, n))
+    wander = 30.0 * first_order(rng.normal(0.0, 1.0, n), 1000.0)
     made = closed_loop(loop, np.zeros(n), swing + wander + rng.normal(0.0, 0.05, n))
     trends = {"SP": np.full(n, 50.0), "PV": 50.0 + made.pv, "OP": made.op}
     stamp, good = np.arange(n, dtype=np.float64) + 1.7e9, np.zeros(n, dtype=bool)

@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.signal import welch
 
 from analyzer.explain.user_model import Brought
 from identification.estimation.prediction_error import Fitted
@@ -147,6 +146,8 @@ def close_part(found: Explanation, s: Recording, at: Located) -> tuple[int, int]
 
 def spectra(left: Mapping[str, Floats], dt_s: float) -> tuple[Spectrum, ...]:
     """Spectrum of what each simulation leaves."""
+    from scipy.signal import welch  # its import takes longer than most explanations
+
     out = []
     for kind, x in left.items():
         segment = max(min(x.size // SEGMENTS, LONGEST_SEGMENT), SHORTEST_SEGMENT)

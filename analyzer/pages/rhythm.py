@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.signal import welch
 
 from analyzer.block_bootstrap import Floats
 from analyzer.pages.reading import Thinned
@@ -60,6 +59,8 @@ def _correlation(error: Floats, step: float, period_s: float | None) -> Plot:
 
 
 def _spectrum(error: Floats, step: float, period_s: float | None) -> Plot:
+    from scipy.signal import welch  # its import takes longer than a page
+
     n = max(error.size // SEGMENTS, LEAST_SAMPLES // 2)
     frequency, power = welch(error, 1.0 / step, nperseg=min(n, error.size))
     per_hour = 3600.0 * frequency

@@ -12,7 +12,6 @@ from identification.controller.pi_regression import (
     ControlLaw,
     centred,
     recovered_law,
-    smooth,
     span_length,
     trusted,
 )
@@ -37,6 +36,7 @@ from identification.estimation.limits import (
     THINNED_LEAVES,
 )
 from identification.record import Floats, Mask
+from identification.signals.first_order import first_order
 from identification.simulation.pi import due_moves, gapped
 
 
@@ -215,7 +215,7 @@ def judge(
     if said.thinned and said.ti < LEAST_TI:
         return None, None
     found = recovered_law(sp, pv, op, usable, said.ti, said.kp, late=not said.thinned)
-    e = sp - smooth(pv, found.smoothed)
+    e = sp - first_order(pv, found.smoothed)
     wrong = None if obeys(sp, pv, op, said, found) else settings(found, said)
     if said.thinned:
         return wrong, found

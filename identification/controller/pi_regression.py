@@ -10,7 +10,6 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.signal import lfilter
 
 from identification.estimation.limits import (
     FILTER_GAINS,
@@ -20,6 +19,7 @@ from identification.estimation.limits import (
     SHIFTS,
 )
 from identification.record import Floats, Mask
+from identification.signals.first_order import first_order
 
 LATE_STEP = 0.25
 """Lateness is told to this part of a sample."""
@@ -42,15 +42,7 @@ class ControlLaw:
 
     def error(self, sp: Floats, pv: Floats) -> Floats:
         """The error that the controller acts on, shape (n,)."""
-        return sp - smooth(shifted(pv, self.late), self.smoothed)
-
-
-def smooth(x: Floats, samples: float) -> Floats:
-    """The signal behind a filter of first order, shape (n,); its time constant in samples, 0 is none."""
-    if samples <= 0:
-        return x
-    pole = math.exp(-1.0 / samples)
-    return np.asarray(lfilter([1.0 - pole], [1.0, -pole], x - x[0])) + x[0]
+        return sp - first_order(shifted(pv, self.late), self.smoothed)
 
 
 def shifted(x: Floats, late: float) -> Floats:
@@ -101,7 +93,7 @@ def law(
 ) -> ControlLaw:
     """The PI law at a given lateness of PV and a filter's time constant [samples], spans that do not obey it left
     out twice."""
-    e = sp - smooth(shifted(pv, late), smoothed)
+    e = sp - first_order(shifted(pv, late), smoothed)
     n = (e.size // length) * length
     fit = unbroken(usable[:n], length)
     keep = fit

@@ -8,9 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from scipy.signal import lfilter
 
 from identification.record import Floats, LoopRecord, Mask
+from identification.signals.first_order import first_order
 
 
 @dataclass(frozen=True, slots=True)
@@ -159,7 +159,7 @@ def compare_laws(
     for samples in FILTERS:
         if samples * record.dt_s > LONGEST_FILTER * period_s:
             break
-        found = _regression(record, _filtered(error, samples), period_s)
+        found = _regression(record, first_order(error, samples), period_s)
         if found is None:
             return None
         free = _least_squares(found)
@@ -169,11 +169,3 @@ def compare_laws(
         if best.explained - given < alike:
             break
     return None if best is None else LawsCompared(best.kp, best.ti_s, best.explained, given)
-
-
-def _filtered(error: Floats, samples: float) -> Floats:
-    """The error behind a first-order filter of so many samples."""
-    if samples == 0.0:
-        return error
-    keep = math.exp(-1.0 / samples)
-    return np.asarray(lfilter([1.0 - keep], [1.0, -keep], error - error[0]) + error[0], dtype=np.float64)

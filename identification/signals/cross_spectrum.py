@@ -14,7 +14,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 from scipy.fft import ifft, next_fast_len
-from scipy.stats import beta
+from scipy.special import betainccinv
 
 from identification.record import Floats
 from identification.signals.spectrum import Complex
@@ -64,7 +64,7 @@ def chance_coherence(lines: int, width: int, chance: float) -> float:
     free = max(width / HANN_WIDTH, 1.5)
     pieces = max(lines // width / UNEVEN, 1.0)
     spread = pieces * (free + 1) - 1
-    return float(beta.isf(chance, spread / free, spread * (1 - 1 / free)))
+    return float(betainccinv(spread / free, spread * (1 - 1 / free), chance))
 
 
 @njit(cache=True)
