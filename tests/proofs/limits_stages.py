@@ -1,0 +1,152 @@
+"""The stages that limits act on, asked about the samples of limits_samples.py; each gives its answers as a list."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+from analyzer.advice import advise
+from analyzer.assess import assess, cause_of, judged
+from analyzer.assessments import assess_span
+from analyzer.before_after import Span, compare
+from analyzer.config import Config
+from analyzer.loops.changes import behaviour_change
+from analyzer.oscillation import counting, detect
+from analyzer.plantwide.verdict import followers_of, trace
+from analyzer.plantwide.wave import waves_of
+from analyzer.quality import prepare
+from analyzer.settings_check import differing
+from tests.analyzer.plant import prepared, simulate, spec
+from tests.proofs.limits_samples import (
+    ADVISED,
+    DEFAULT,
+    OF_FITS,
+    REFITTED,
+    SETTINGS,
+    START_S,
+    UNFIT,
+    Raw,
+    advised,
+    detected,
+    measured,
+    nothing,
+    plants,
+    raws,
+    ready,
+    tried,
+    weeks,
+)
+
+
+def of_quality(c: Config) -> list[Any]:
+    """Length, masked samples and remarks of each loop."""
+
+    def answer(r: Raw) -> Any:
+        p = prepare(r.spec, r.series, c.quality)
+        return len(p.record), int(p.record.bad.sum()), p.op_known, p.notes, round(p.compressed_share, 6)
+
+    def unfit(r: Raw) -> Any:
+        found = tried(lambda: assess(prepare(r.spec, r.series, c.quality), None, c).verdict.needs)
+        return str(found)
+
+    return [(tried(lambda r=r: answer(r)), unfit(r) if k < UNFIT else "") for k, r in enumerate(raws())]
+
+
+def of_oscillation(c: Config) -> list[Any]:
+    """Periods and shares of each loop, and of records in which nothing oscillates."""
+    held = (*(p.record for _, p in ready()), *nothing())
+    found = (detect(r, c.oscillation).found for r in held)
+    return [tuple((round(o.period_s, 2), round(o.oscillating_pct)) for o in f) for f in found]
+
+
+def _told(v: Any) -> Any:
+    """A verdict as an answer."""
+    return (
+        v if isinstance(v, str) else (v.cause, v.fault, v.needs, *(round(x) for x in v.confidence.values()))
+    )
+
+
+def of_cause(c: Config) -> list[Any]:
+    """Cause, fault, lacks and confidences: of all loops by what was measured of them, or of a few fitted anew."""
+    if all(getattr(c.cause, n) == getattr(DEFAULT.cause, n) for n in OF_FITS) and c is not DEFAULT:
+        return [_told(judged(m, p, counting(f), c)) for p, f, m in measured()]
+    busy = sorted(detected(), key=lambda t: counting(t[2]) is None)[:REFITTED]
+    return [_told(tried(lambda t=t: cause_of(t[1], t[2], t[0].stated, c, t[0].spec.type))) for t in busy]
+
+
+def of_settings(c: Config) -> list[Any]:
+    """Whether stated settings are told to be wrong, right and wrong ones."""
+    out = []
+    for r, p, f in detected()[:SETTINGS]:
+        first = counting(f)
+        scale = first.period_s if first is not None else 20.0 * p.record.dt_s
+        for k in (1.0, 1.3, 1.6):
+            stated = replace(r.stated, kp=k * r.stated.kp, ti_s=r.stated.ti_s * (2.0 if k > 1.5 else 1.0))
+            out.append(differing(p.record, stated, scale, c.settings) is not None)
+    return out
+
+
+def of_advice(c: Config) -> list[Any]:
+    """Action and settings of the simulated loops, in whole records and as hints."""
+    out = []
+    for sketch, found in advised():
+        own = spec("L", sketch.kind, kp=sketch.kp, ti=sketch.ti)
+        a = advise(found, own, sketch.controller, 100.0, c)
+        out.append((a.action, a.kp_new, a.ti_new))
+    sketch = ADVISED[1]
+    for hours in (0.9, 1.1, 1.7, 2.1):
+        made = tried(lambda h=hours: assess(prepared(simulate(sketch, h)), sketch.controller, c))
+        out.append(
+            made if isinstance(made, str) else tuple(round(x) for x in made.verdict.confidence.values())
+        )
+    return out
+
+
+def of_plant(c: Config) -> list[Any]:
+    """Groups, sources and followers of coupled plants."""
+    out: list[Any] = []
+    for loops in plants():
+        waves = [w for name, found, end_s, _ in loops for w in waves_of(name, found, end_s, c.plant)]
+        traced = trace(waves, {name: peer for name, _, _, peer in loops}, c.plant)
+        told = {loop: source.loop for loop, (source, _) in followers_of(traced).items()}
+        out += [(t.group.loops, t.source, round(t.candidates[0].confidence_pct)) for t in traced]
+        out.append(tuple(sorted(told.items())))
+    return out
+
+
+def of_figures(c: Config) -> list[Any]:
+    """Figures of each loop, to three digits."""
+    found = (assess_span(p.record, c.figures).as_row() for _, p in ready())
+    return [tuple(None if v is None else f"{v:.3g}" for v in f.values()) for f in found]
+
+
+def of_weeks(c: Config) -> list[Any]:
+    """Verdicts and reasons of comparisons."""
+    change = START_S + 7 * 86_400.0
+    before, after = Span(START_S, change), Span(change, START_S + 14 * 86_400.0)
+    out = []
+    for hours in weeks():
+        found = compare("L", hours, before, after, limits=c.before_after)
+        out.append((found.reasons, tuple((x.measure.name, x.verdict) for x in found.changes)))
+    return out
+
+
+def of_changes(c: Config) -> list[Any]:
+    """Whether a step of a controller's behaviour is seen."""
+    return [tried(lambda h=h: behaviour_change("L", h, c.changes)) is not None for h in weeks()]
+
+
+STAGES: dict[str, Callable[[Config], list[Any]]] = {
+    "oscillation": of_oscillation,
+    "quality": of_quality,
+    "cause": of_cause,
+    "plant": of_plant,
+    "settings": of_settings,
+    "advice": of_advice,
+    "tuning": of_advice,
+    "figures": of_figures,
+    "before_after": of_weeks,
+    "changes": of_changes,
+}
+"""Sections of the limits, and what asks the stage that each belongs to."""
