@@ -63,6 +63,10 @@ class Column:
     csv_only: bool = False
 
 
+MOST_ROWS = 3000
+"""Rows of a table on a page; ours: of a hundred thousand a browser makes a page of minutes, and nobody reads them."""
+
+
 @dataclass(frozen=True, slots=True)
 class Table:
     """A table; `facet`: key of the column whose values filter it, '' for none; `cards`: on a phone a card a row."""
@@ -75,6 +79,18 @@ class Table:
     searchable: bool = False
     facet: str = ""
     cards: bool = False
+
+    @property
+    def shown(self) -> tuple[tuple[Cell, ...], ...]:
+        """The rows that a page shows."""
+        return self.rows[:MOST_ROWS]
+
+    @property
+    def more(self) -> str:
+        """What is said where there are more; empty where all are shown."""
+        if len(self.rows) <= MOST_ROWS:
+            return ""
+        return f"The first {MOST_ROWS:,} of {len(self.rows):,} rows; its CSV holds all."
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,6 +15,7 @@ from jinja2 import UndefinedError
 from reports import html
 from reports.pages import Band, Cell, Column, Page, Section, Table, Trend
 from reports.svg import nice_ticks
+from reports.tables import as_csv
 
 
 def trend(n: int, rng: np.random.Generator) -> Trend:
@@ -105,3 +106,15 @@ def test_ticks_are_round_and_inside(low: float, high: float) -> None:
     np.testing.assert_allclose(steps, steps[0], rtol=1e-6)
     mantissa = steps[0] / 10 ** np.floor(np.log10(steps[0]) + 1e-9)
     assert min(abs(mantissa - m) for m in (1, 2, 5, 10)) < 1e-6
+
+
+def test_a_long_table_shows_its_first_rows_and_says_so() -> None:
+    """Of ten thousand rows a page holds the first three thousand and says how many there are; its CSV holds all."""
+    rows = tuple((Cell(f"L{k:05d}"),) for k in range(10_000))
+    table = Table("all", "All", (Column("loop", "Loop"),), rows)
+    text = html.render(Page("p", "P", "", (Section("S", (table,)),)), single_file=True)
+    assert text.count("<td") == 3000
+    assert "L02999" in text
+    assert "L03000" not in text
+    assert "The first 3,000 of 10,000 rows; its CSV holds all." in text
+    assert as_csv(table).count("\n") == 10_001
