@@ -31,7 +31,8 @@ from tuning_cases import backlash_case, stick_case  # noqa: E402
 
 OUT = Path(__file__).with_suffix(".md")
 RUNS = 3
-LOOPS = 10_000
+LOOPS = (10_000, 100_000)
+FORMS = ("csv", "table")
 
 
 def command_s(*arguments: str | Path) -> float:
@@ -63,11 +64,19 @@ def rows() -> list[tuple[str, float, str, float]]:
     transform = call_s(lambda: np.fft.rfft(np.ones(86_400)))
     found = [("triage --help", command_s("-m", "analyzer.cli", "--help"), "python with click", bare)]
     with tempfile.TemporaryDirectory() as folder:
-        store = small_store(Path(folder) / "store", loops=LOOPS, nights=1, hours=False, buckets=4)
-        for form in ("csv", "table"):
-            ask = ("-m", "analyzer.cli", "rank", store.path, "--top", "20", "--format", form)
-            name = f"triage rank --format {form}, {LOOPS:,} loops"
-            found.append((name, command_s(*ask), "python with pyarrow and click", arrow))
+        for loops in LOOPS:
+            place = Path(folder) / f"store{loops}"
+            store = small_store(place, loops=loops, nights=1, hours=False, buckets=4)
+            asked = [
+                (f"triage rank --format {f}", ("rank", store.path, "--top", "20", "--format", f))
+                for f in FORMS
+            ]
+            asked.append(
+                ("triage pages --top 20", ("pages", store.path, "--out", place / "out", "--top", "20"))
+            )
+            for name, ask in asked:
+                spent = command_s("-m", "analyzer.cli", *ask)
+                found.append((f"{name}, {loops:,} loops", spent, "python with pyarrow and click", arrow))
         big = small_store(Path(folder) / "big", loops=1500, nights=7, hours=False)
         pages = call_s(lambda: write_html(night.pages(big, None, 50), Path(folder) / "out", single_file=True))
         found.append(
