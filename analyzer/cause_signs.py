@@ -10,12 +10,10 @@ import numpy as np
 
 from analyzer.cause_measures import measures
 from analyzer.cause_weights import pushes
-from analyzer.decisions import CAUSES, Cause
+from analyzer.decisions import AMPLIFICATION, CAUSES, Cause
 from analyzer.measure import Measured
 from analyzer.oscillation import Oscillation
 
-AMPLIFICATION = "amplification"
-"""Name of the sign that tells a loop too tight by what it does, whatever else weighs more."""
 AMPLIFIES = 1.7
 """|S| at the period from which that is told [-]: SIMC settings have 1.6 to 1.7 at their peak (Grimholt, Skogestad
 2012)."""

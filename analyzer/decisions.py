@@ -27,6 +27,8 @@ __all__ = [
 
 CAUSES = (Cause.VALVE, Cause.TUNING, Cause.LOAD)
 """Causes that have a confidence of their own."""
+AMPLIFICATION = "amplification"
+"""Name of the sign that tells a loop too tight by what it does, whatever else weighs more."""
 COUNTS_PCT = 50.0
 """A loop counts as oscillating from this share of the time on [%]; contract of the ranking."""
 

@@ -6,8 +6,7 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
-from analyzer.cause_signs import AMPLIFICATION
-from analyzer.decisions import Action, Cause, Fault, Needs, counts
+from analyzer.decisions import AMPLIFICATION, Action, Cause, Fault, Needs, counts
 from analyzer.units import duration
 
 Row = Mapping[str, Any]

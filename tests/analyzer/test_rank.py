@@ -92,7 +92,8 @@ def test_ranking_imports_nothing_heavy(small, heavy):
     """Neither help nor ranking imports what only the analysis needs."""
     code = (
         "import sys\nfrom analyzer.cli import main\n"
-        f"main(['rank', {str(small)!r}, '--format', 'csv'], standalone_mode=False)\n"
+        "for form in ('csv', 'table'):\n"
+        f"    main(['rank', {str(small)!r}, '--format', form], standalone_mode=False)\n"
         f"sys.exit({heavy!r} in sys.modules)"
     )
     subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)
