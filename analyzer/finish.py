@@ -78,10 +78,9 @@ def finish_night(
     beside = [loop for loop in old if loop not in rows]
     joined = [old[k] if k in kept else rows[k] for k in order if k in rows] + [old[k] for k in beside]
     mine = [loop for loop in rows if loop not in kept]
-    pieces = {name: store.read_parts(night, name, keys) for name in ("hours", "trends", "compared")}
-    for name, piece in pieces.items():
+    for name in ("hours", "trends", "compared"):  # one at a time: trends are most of a night
         before = None if replace else store.read_if_there(name, night)
-        store.write(name, night, _joined(before, piece, mine))
+        store.write(name, night, _joined(before, store.read_parts(night, name, keys), mine))
     groups = [*other, *done.groups]
     store.write("groups", night, rows_table(groups, GROUPS) if groups else None)
     store.write("nights", night, rows_table(joined, NIGHTS))

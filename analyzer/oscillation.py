@@ -130,8 +130,8 @@ def _in_shape(
     usual = 0.5 * math.log2(prominence * max(usual_prominence(s, line), 1e-3))
     total, scatter = usual + limits.shape_trade * levelled, limits.shape_few / math.sqrt(cycles)
     few = s.duration_s / line < limits.samples * s.dt_s
-    enough = total >= max(limits.shape + scatter, limits.shape_least)
-    enough = enough and not (few and levelled < limits.shape_correlation_few)
+    least = limits.shape_correlation_few if few else limits.shape_correlation
+    enough = total >= max(limits.shape + scatter, limits.shape_least) and levelled >= least
     if prominence >= limits.least * limits.prominence and enough:
         return True
     if few or cycles < limits.swing_cycles or total + 2 * limits.swing_trade < limits.swing + scatter:

@@ -136,6 +136,13 @@ class OscillationLimits:
         "Doublings of the prominence that a levelled correlation of 1 is worth",
         UNTIDY,
     )
+    shape_correlation: float = limit(
+        0.08,
+        "-",
+        (0.0, 1.0),
+        "Levelled correlation that no prominence makes up for",
+        UNTIDY,
+    )
     shape_correlation_few: float = limit(
         0.45,
         "-",

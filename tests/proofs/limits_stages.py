@@ -12,11 +12,12 @@ from analyzer.assessments import assess_span
 from analyzer.before_after import Span, compare
 from analyzer.config import Config
 from analyzer.loops.changes import behaviour_change
-from analyzer.oscillation import counting, detect
+from analyzer.oscillation import barely_seen, counting, detect
 from analyzer.plantwide.verdict import followers_of, trace
 from analyzer.plantwide.wave import waves_of
 from analyzer.quality import prepare
 from analyzer.settings_check import differing
+from identification.record import LoopRecord
 from tests.analyzer.plant import prepared, simulate, spec
 from tests.proofs.limits_samples import (
     ADVISED,
@@ -54,10 +55,15 @@ def of_quality(c: Config) -> list[Any]:
 
 
 def of_oscillation(c: Config) -> list[Any]:
-    """Periods and shares of each loop, and of records in which nothing oscillates."""
-    held = (*(p.record for _, p in ready()), *nothing())
-    found = (detect(r, c.oscillation).found for r in held)
-    return [tuple((round(o.period_s, 2), round(o.oscillating_pct)) for o in f) for f in found]
+    """Periods and shares of each loop, and of records in which nothing oscillates, and cycles too fast to be told."""
+
+    def answer(r: LoopRecord) -> Any:
+        found = detect(r, c.oscillation)
+        fast = barely_seen(found, c.oscillation)
+        shares = ((round(o.period_s, 2), round(o.oscillating_pct)) for o in found.found)
+        return *shares, None if fast is None else round(fast, 2)
+
+    return [answer(r) for r in (*(p.record for _, p in ready()), *nothing())]
 
 
 def _told(v: Any) -> Any:
