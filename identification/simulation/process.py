@@ -184,7 +184,8 @@ def vessel_span(
     m : the vessel's memory before the span; returned as it is behind. drive : flow during each sample, load at the
     inlet [% OP] and relative gain, shape (n,) each, known as far as the span goes; base : the flow that counts as
     zero; head : level deviation at which a rooted vessel would be empty, with its sign turned. A sample has two
-    parts, before and after the dead time's fraction; what is the same in each is worked out once.
+    parts, before and after the dead time's fraction; what is the same in each is worked out once, into locals: for
+    all that a compiler knows the loop might write entries of c.
     """
     flow, act, gain = drive
     x, mode, basin, z2, z3 = m
@@ -195,7 +196,6 @@ def vessel_span(
     times, o = (parts[0] / c[T], parts[1] / c[T]), outflow_of(c, head)
     rises = shares_filled(o, times)
     left, mean = kept(c, parts)
-    # what a loop over samples asks for stands in locals: entries of c might be written by it, for all it knows
     k_gain, bias, share, second, third = c[K], c[BIAS], c[SHARE], c[T2] > 0.0, c[T3] > 0.0
     for k in range(*span):
         out[k] = (1.0 - share) * x + share * mode
