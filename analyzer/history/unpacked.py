@@ -98,9 +98,12 @@ def _member(path: Path, folder: Path) -> Path:
 
 def _check_parts(path: Path, folder: Path) -> None:
     """Raise InputError for a workbook (an archive, but for the old kind) whose parts unpack beyond all measure."""
-    if zipfile.is_zipfile(path):
+    try:
         with zipfile.ZipFile(path) as archive:
-            _check_size(path, sum(info.file_size for info in archive.infolist()), 0, folder)
+            declared = sum(info.file_size for info in archive.infolist())
+    except zipfile.BadZipFile:  # of the old kind, or damaged, which its reader tells
+        return
+    _check_size(path, declared, 0, folder)
 
 
 def _copied(source: IO[Any], out: Path, path: Path) -> None:

@@ -26,11 +26,13 @@ PLAIN = re.compile(r"[^\w.-]+")
 
 
 def is_workbook(path: Path, start: bytes) -> bool:
-    """Whether a file that begins so is a workbook."""
-    if path.suffix.lower() in ENDINGS or start.startswith(OLD):
+    """Whether a file that begins so is a workbook; text that is only called one is none."""
+    if start.startswith(OLD):
         return True
     if not start.startswith(b"PK\x03\x04"):
         return False
+    if path.suffix.lower() in ENDINGS:
+        return True
     try:
         with zipfile.ZipFile(path) as archive:
             return any(name.startswith("xl/") for name in archive.namelist())

@@ -99,14 +99,23 @@ def test_a_night_runs_on_a_workbook(tmp_path):
     assert "1 of 1 loops assessed" in done.output
 
 
+def test_text_that_is_only_called_a_workbook_is_read_as_text(tmp_path):
+    """Many tools write tabs and call the file xls: what it holds decides."""
+    lines = [f"{t.isoformat(sep=' ')}\t{p}\t{o}" for t, p, o in zip(STAMPS, PV, OP, strict=True)]
+    path = tmp_path / "report.xls"
+    path.write_text("Time\tFIC1.PV\tFIC1.OP\n" + "\n".join(lines) + "\n")
+    np.testing.assert_allclose(open_export([path]).read(["FIC1.PV"])["FIC1.PV"].value, PV)
+
+
 def test_damage_is_one_line(tmp_path):
     """A workbook cut short, one that is none, and one with no table each end in a line that says what to do."""
     whole = write(tmp_path / "whole.xlsx", {"Data": wide("FIC1")}).read_bytes()
     (tmp_path / "cut.xlsx").write_bytes(whole[: len(whole) // 2])
     (tmp_path / "none.xlsx").write_bytes(b"hello, world")
+    (tmp_path / "list.xlsx").write_bytes(whole.replace(b"PK\x01\x02", b"PK\x09\x02"))
     (tmp_path / "old.xls").write_bytes(b"\xd0\xcf\x11\xe0" + bytes(3000))
     write(tmp_path / "prose.xlsx", {"A": [["just a word"]]})
-    for name in ("cut.xlsx", "none.xlsx", "old.xls", "prose.xlsx"):
+    for name in ("cut.xlsx", "list.xlsx", "none.xlsx", "old.xls", "prose.xlsx"):
         done = CliRunner().invoke(main, ["check", str(tmp_path / name)])
         assert done.exit_code == 2, name
         assert done.stderr.count("\n") == 1, done.stderr
