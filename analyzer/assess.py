@@ -124,11 +124,11 @@ def cause_of(
     except NotAssessedError as error:
         verdict = not_assessed(Needs(Lack.UNBROKEN, str(error))) if oscillation is not None else NO_CAUSE
         return with_dead_valve(verdict, dead) if dead else verdict
-    verdict = verdict_on(measured, prepared, oscillation, config)
+    verdict = verdict_by_measures(measured, prepared, oscillation, config)
     return with_dead_valve(verdict, dead) if dead and verdict.cause is not Cause.VALVE else verdict
 
 
-def verdict_on(
+def verdict_by_measures(
     measured: Measured, prepared: Prepared, oscillation: Oscillation | None, config: Config
 ) -> Verdict:
     """The verdict by what was measured, as far as sampling and grid let it be told."""

@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from analyzer.advice import advise
-from analyzer.assess import assess, cause_of, verdict_on
+from analyzer.assess import assess, cause_of, verdict_by_measures
 from analyzer.assessments import assess_span
 from analyzer.before_after import Span, compare
 from analyzer.config import Config
@@ -76,7 +76,7 @@ def _told(v: Any) -> Any:
 def of_cause(c: Config) -> list[Any]:
     """Cause, fault, lacks and confidences: of all loops by what was measured of them, or of a few fitted anew."""
     if all(getattr(c.cause, n) == getattr(DEFAULT.cause, n) for n in OF_FITS) and c is not DEFAULT:
-        return [_told(verdict_on(m, p, counting(f), c)) for p, f, m in measured()]
+        return [_told(verdict_by_measures(m, p, counting(f), c)) for p, f, m in measured()]
     busy = sorted(detected(), key=lambda t: counting(t[2]) is None)[:REFITTED]
     return [_told(tried(lambda t=t: cause_of(t[1], t[2], t[0].stated, c, t[0].spec.type))) for t in busy]
 
