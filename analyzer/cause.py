@@ -55,9 +55,6 @@ class Verdict:
     dead: bool = False
 
 
-FEW = 2
-"""Times the fewest moves of a stem below which they are few; ours: of 42 valves told without a cycle (untidy, wild,
-recorded) one has so few and less evidence than such moves need, and ramps with a step had 34 to 39 nat with three."""
 NO_CAUSE = Verdict(Cause.NONE, dict.fromkeys(CAUSES, 0.0), Fault.NONE)
 
 
@@ -89,7 +86,7 @@ def quiet_signs(m: Measured, limits: CauseLimits) -> tuple[Sign, ...]:
 
     A few moves of a stem are told from steps of the load, unless the set point called for them, by more evidence.
     """
-    few = m.moves < FEW * limits.moves and not m.excited
+    few = m.moves < limits.few_moves and not m.excited
     least = needed(m, limits, False) * (limits.quiet_factor if few else 1.0)
     if not speaks(m, limits, False) or m.evidence < least or (m.moves < limits.moves and not m.excited):
         return ()

@@ -91,6 +91,15 @@ class CauseLimits:
         "set point called for them",
         "ours",
     )
+    few_moves: int = limit(
+        6,
+        "-",
+        (0, 1000),
+        "Moves of a stem in a loop that does not oscillate below which they need quiet_factor times the evidence, "
+        "unless the set point called for them",
+        "ours: ramps with a step in noise had 34 to 39 nat with three; of 42 valves told without a cycle (untidy, "
+        "wild, recorded) one has so few and so little",
+    )
     jump_share: float = limit(
         0.04,
         "-",
