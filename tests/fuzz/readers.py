@@ -5,7 +5,8 @@
 
 The first byte says what the rest is: an export, a loops.csv, a changes.csv, a model, a configuration. Whatever it
 holds must be read or refused by an InputError; anything else ends the run and leaves the input. CORPUS is filled with
-small files of every dialect of tests/dialects first. Findings are kept as tests (tests/fuzz/test_findings.py).
+small files of every dialect of tests/dialects first. What it finds is to be kept as a test
+(tests/fuzz/test_findings.py); so far it has found nothing.
 """
 
 from __future__ import annotations
