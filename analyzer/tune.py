@@ -11,7 +11,6 @@ import numpy as np
 from analyzer.advice import (
     Advice,
     chosen_fit,
-    lag_factor,
     model_of,
     propose,
     sought_for,
@@ -23,14 +22,12 @@ from analyzer.assess import Assessment
 from analyzer.cause import Verdict
 from analyzer.config import AdviceLimits, Config
 from analyzer.decisions import Cause
+from analyzer.intervals import intervals
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import as_stated
 from analyzer.reconstructed_load import load_of
 from identification.errors import NotAssessedError
-from identification.estimation.covariance import LEAST_BAND, LEAST_JUMP, WIDER, half_width, reaching
-from identification.estimation.gauss_newton import covariance
-from identification.estimation.hammerstein import Fit, ValveTrial
-from identification.estimation.window import Window
+from identification.estimation.hammerstein import Fit
 from identification.models import Estimate, Loop, Pid, Process, Valve
 from identification.record import Floats
 from tuning.describing import describe
@@ -68,60 +65,6 @@ class Tuning:
     proposal: Proposal
     forecast: Forecast | None
     load: Floats
-
-
-def intervals(window: Window, fit: Fit, valve: bool, limits: AdviceLimits) -> dict[str, Estimate]:
-    """Estimates of a fit with 90 % intervals from the curvature of the likelihood and the scatter of its scores.
-
-    Gain and time constant are left out where the record tells their ratio alone (analyzer.advice.lag_factor). Of a
-    valve that jumps PV tells jump times slope; only slips beyond the first of a half cycle part the two, so both
-    are told within wide limits. tests/proofs/coverage.md says how often the intervals hold the truth.
-    """
-    spread = np.sqrt(np.maximum(np.diag(covariance(window, fit, free_width=valve)), 0.0))
-    t = fit.time_constant_s
-    out = {"slope_pct_per_s": _slope(window, fit, valve)}
-    factor = lag_factor(window, fit, valve, limits)
-    if factor is not None:
-        wide = factor**WIDER
-        out["gain"] = _around(fit.gain, half_width(spread[3]), "%/%")
-        out["time_constant_s"] = Estimate(t, t / wide, t * wide, "s")
-    dead_s = fit.dead_time_s + window.half_block_s
-    out["dead_time_s"] = _around(dead_s, half_width(spread[1]), "s", least=0.0)
-    if valve:
-        name = "backlash_pct" if fit.valve.slip_jump == 0 else "stickband_pct"
-        out[name] = _around(fit.valve.stickband, half_width(spread[2]), "% of OP", least=0.0)
-        if fit.valve.slip_jump > 0:
-            out |= _jumping(window, fit.valve, out)
-    return out
-
-
-def _jumping(window: Window, valve: ValveTrial, found: dict[str, Estimate]) -> dict[str, Estimate]:
-    """What is told of a valve that jumps, within what PV leaves open.
-
-    Slip jump from half of the found one to the whole stickband, slope and gain by what their product with the jump
-    leaves; a stem that lets go later is as good as a process that answers later by the time OP takes for that.
-    """
-    jump, band = valve.slip_jump, valve.stickband
-    out = {"slip_jump_pct": Estimate(jump, jump / LEAST_JUMP, band, "% of OP")}
-    for name in ("slope_pct_per_s", "gain"):
-        if name in found:
-            out[name] = reaching(found[name], found[name].value * jump / band, found[name].value * LEAST_JUMP)
-    out["stickband_pct"] = reaching(found["stickband_pct"], band / LEAST_BAND)
-    travel = float(np.abs(np.diff(window.op_blocks)).sum())
-    later_s = 0.5 * band * (1.0 - 1.0 / LEAST_BAND) * window.duration_s / max(travel, 1e-9)
-    out["dead_time_s"] = reaching(found["dead_time_s"], found["dead_time_s"].value + later_s)
-    return out
-
-
-def _slope(window: Window, fit: Fit, valve: bool) -> Estimate:
-    """Gain over time constant with its interval; the errors of the two are strongly correlated."""
-    c = covariance(window, fit, free_width=valve)
-    relative = c[3, 3] / fit.gain**2 + c[0, 0] - 2 * c[0, 3] / fit.gain
-    return _around(fit.slope, half_width(abs(fit.slope) * math.sqrt(max(relative, 0.0))), "%/(% s)")
-
-
-def _around(value: float, half: float, unit: str, least: float = -math.inf) -> Estimate:
-    return Estimate(value, max(value - half, least), value + half, unit)
 
 
 def _model(verdict: Verdict, controller: Pid, limits: AdviceLimits) -> tuple[Loop, Fit, tuple[Loop, ...]]:

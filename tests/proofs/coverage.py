@@ -26,8 +26,8 @@ from concealed.scene import KINDS, Rng, draw_plant, load_path, noise_path, setpo
 from analyzer.advice import chosen_fit
 from analyzer.assess import Assessment, assess
 from analyzer.config import AdviceLimits, QualityLimits
+from analyzer.intervals import intervals
 from analyzer.quality import prepare
-from analyzer.tune import intervals
 from identification.errors import NotAssessedError
 from identification.models import Estimate, Pid
 from identification.record import Floats
