@@ -12,6 +12,11 @@ from analyzer.limits.lanes import LaneLimits
 from analyzer.limits.oscillation import OscillationLimits
 from analyzer.limits.plant import PlantLimits
 from analyzer.limits.quality import QualityLimits
+from identification.limits.controller import ControllerLimits
+from identification.limits.explain import ExplainLimits
+from identification.limits.proof import ProofLimits
+from identification.limits.recorder import RecorderLimits
+from identification.limits.search import SearchLimits
 from tuning.limits import TuningLimits
 
 __all__ = [
@@ -20,12 +25,16 @@ __all__ = [
     "ChangeLimits",
     "ComparisonLimits",
     "Config",
+    "ControllerLimits",
     "FigureLimits",
     "LaneLimits",
     "NightLimits",
     "OscillationLimits",
     "PlantLimits",
+    "ProofLimits",
     "QualityLimits",
+    "RecorderLimits",
+    "SearchLimits",
     "SettingsLimits",
     "TuningLimits",
     "WorkerLimits",
@@ -52,5 +61,16 @@ class Config:
     nights: NightLimits = field(default_factory=NightLimits)
     before_after: ComparisonLimits = field(default_factory=ComparisonLimits)
     changes: ChangeLimits = field(default_factory=ChangeLimits)
+    explain_recorder: RecorderLimits = field(default_factory=RecorderLimits)
+    explain_controller: ControllerLimits = field(default_factory=ControllerLimits)
+    explain_search: SearchLimits = field(default_factory=SearchLimits)
+    explain_proof: ProofLimits = field(default_factory=ProofLimits)
     workers: WorkerLimits = field(default_factory=WorkerLimits)
     opening: WorkerLimits = field(default_factory=lambda: WorkerLimits(65_536.0, 3600.0, 7200.0))
+
+    @property
+    def explain(self) -> ExplainLimits:
+        """What decides about the explanation of one recording."""
+        return ExplainLimits(
+            self.explain_recorder, self.explain_controller, self.explain_search, self.explain_proof
+        )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from tuning.declare import limit
+from identification.limits.declare import limit
 
 OURS = "ours: tests/proofs/retuning.py"
 SAMPLES = "ours: what is worse on any plant that the data allow is not told"

@@ -59,7 +59,7 @@ def stated_law(spec: LoopSpec, prepared: Prepared) -> StatedSettings | None:
 
 
 def neighbours(
-    spec: LoopSpec, specs: tuple[LoopSpec, ...], series: Mapping[str, Series], p: Prepared
+    spec: LoopSpec, specs: tuple[LoopSpec, ...], series: Mapping[str, Series], p: Prepared, config: Config
 ) -> tuple[Floats, ...]:
     """OPs of the export's other loops on this loop's clock."""
     r = p.record
@@ -67,7 +67,7 @@ def neighbours(
     out = []
     for other in specs:
         if other.loop != spec.loop and other.op and other.op in series:
-            op, gap = onto_clock(series[other.op], clock, r.dt_s, Config().quality)
+            op, gap = onto_clock(series[other.op], clock, r.dt_s, config.quality)
             if not gap.all() and float(np.ptp(op)) > 0:
                 out.append(op)
     return tuple(out)
@@ -176,9 +176,10 @@ def case(
         stamps[(stamps >= r.start_s - r.dt_s) & (stamps <= r.start_s + r.duration_s)],
         stated_law(spec, prepared),
         not prepared.scale.recorded,
-        neighbours(spec, specs, series, prepared),
+        neighbours(spec, specs, series, prepared, config),
         spec.type.strip().lower(),
         seen_in_cycles(verdict),
         verdict.measured is not None and verdict.cause is not Cause.VALVE,
+        config.explain,
     )
     return Case(spec, prepared, subject, shortened)

@@ -8,7 +8,6 @@ from typing import Any
 from analyzer.explain.one_loop import Explained
 from analyzer.explain.page_words import ROWS, rms, share
 from analyzer.pages.words import duration
-from identification.estimation.limits import HELD_OUT
 from reports.pages import Block, Cell, Column, Table
 
 
@@ -45,7 +44,8 @@ def fit_tables(e: Explained) -> tuple[Block, ...]:
 def _held(e: Explained) -> str:
     if e.found.others:
         return "the other recordings below, on which nothing but a constant bias was fitted"
-    return f"the last {100 * HELD_OUT:.0f} % of the recording, on which models fitted to the first part are judged"
+    last = f"the last {100 * e.found.p.limits.proof.held_out:.0f} % of the recording"
+    return f"{last}, on which models fitted to the first part are judged"
 
 
 def _others(data: Mapping[str, Any]) -> tuple[Block, ...]:

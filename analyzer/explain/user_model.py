@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from identification.estimation.limits import HELD_OUT
 from identification.mismatch.cross_validation import Misfit, misfit
 from identification.mismatch.diagnosis import restored
 from identification.mismatch.explanation import Explanation
@@ -99,7 +98,7 @@ def judged(data: Mapping[str, Any], found: Explanation, s: Recording, more: str 
         What else there is to say of it.
     """
     out = carried(dict(data), s.op, s.pv, s.dt_s)
-    cut = int((1.0 - HELD_OUT) * s.pv.size)
+    cut = int((1.0 - s.limits.proof.held_out) * s.pv.size)
     window = found.proof.window if found.proof is not None else 0
     whole = misfit(s.pv, out, window)
     plain = misfit(found.p.y, simulate(found.p.inputs, found.plain.model.c), window)

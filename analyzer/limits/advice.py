@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from tuning.declare import limit
+from identification.limits.declare import limit
 
 STUDY = (
     "ours: set on simulated loops whose settings are stated truly (none called), proved on others "

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from tuning.declare import limit
+from identification.limits.declare import limit
 
 CHOSEN = (
     "ours: chosen on tests/untidy (seeds 5 to 7), tests/coupled and ../shared/wild, which prove nothing of it; "

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from tuning.declare import limit
+from identification.limits.declare import limit
 
 STUDY = "ours: set on plants in which nothing was changed (tests/proofs/honesty.py)"
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from tuning.declare import limit
+from identification.limits.declare import limit
 
 STUDY = (
     "ours: tests/proofs/negative_controls.py and tests/proofs/sensitivity.py, false alarms at most 0.5 % "

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from tuning.declare import limit
+from identification.limits.declare import limit
 
 STUDY = "ours: tests/proofs/plant_wide.py"
 FITTED = "ours: conditional logit over the groups of 22 plants of tests/coupled (of seeds 200 to 244)"

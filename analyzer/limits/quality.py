@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from tuning.declare import limit
+from identification.limits.declare import limit
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,13 +80,6 @@ class QualityLimits:
         (0.0, 1.0),
         "Share of samples on straight, sloping segments from which a trend is compressed",
         "Thornhill, Choudhury, Shah 2004 find nonlinearity tests spoilt from a compression factor of 3",
-    )
-    coarse: float = limit(
-        0.5,
-        "-",
-        (0.0, 100.0),
-        "A resolution above this many standard deviations of PV is too coarse for waveforms",
-        "ours",
     )
     limit_pct: float = limit(
         2.0,

@@ -15,26 +15,8 @@ from identification.controller.pi_regression import (
     span_length,
     trusted,
 )
-from identification.estimation.limits import (
-    ASKED,
-    FROZEN,
-    FROZEN_MOVES,
-    GAP_LEAVES,
-    GAPS,
-    LATE,
-    LAW_EXPLAINS,
-    LAWLESS,
-    LAWLESS_SHARE,
-    LEAST_TI,
-    SAME_LAW,
-    SETTING,
-    SETTING_THINNED,
-    STUCK_MOVE,
-    STUCK_RUN,
-    STUCK_SHARE,
-    THINNED,
-    THINNED_LEAVES,
-)
+from identification.limits.controller import ControllerLimits
+from identification.limits.explain import LIMITS
 from identification.record import Floats, Mask
 from identification.signals.first_order import first_order
 from identification.simulation.pi import due_moves, gapped
@@ -48,12 +30,13 @@ class StatedSettings:
     ti: float
     scans: float = 1.0
 
-    @property
-    def thinned(self) -> bool:
+    def thinned(self, limits: ControllerLimits) -> bool:
         """Whether OP answered values of PV that the recording does not hold."""
-        return self.scans >= THINNED
+        return self.scans >= limits.thinned
 
 
+GAPS = (0.05, 0.07, 0.1, 0.14, 0.2, 0.28, 0.4, 0.55, 0.75, 1.0, 1.35, 1.8, 2.5, 3.5, 5.0)
+"""Gaps tried, in medians of the error's size."""
 LATE_SAMPLES = "late_samples"
 """Name of the number by which a finding says how late PV's clock is [samples]."""
 
@@ -82,7 +65,9 @@ def op_step(op: Floats) -> float:
     return float(np.quantile(gaps, 0.1)) if gaps.size else 0.0
 
 
-def frozen_width(e: Floats, op: Floats, said: StatedSettings, usable: Mask) -> float:
+def frozen_width(
+    e: Floats, op: Floats, said: StatedSettings, usable: Mask, limits: ControllerLimits
+) -> float:
     """Largest error [% PV] under which due moves of OP do not happen while those beyond do; 0 without one."""
     due = np.abs(due_moves(e, said.kp, said.ti)) > max(op_step(op), 1e-6)
     still = np.diff(op, prepend=op[0]) == 0
@@ -90,18 +75,20 @@ def frozen_width(e: Floats, op: Floats, said: StatedSettings, usable: Mask) -> f
     use = due & usable
     order = np.argsort(size[use])
     frozen, size = still[use][order], size[use][order]
-    if frozen.size < 4 * FROZEN_MOVES:
+    if frozen.size < 4 * limits.frozen_moves:
         return 0.0
     inside = np.cumsum(frozen) / np.arange(1, frozen.size + 1)
     beyond = (frozen.sum() - np.cumsum(frozen)) / np.maximum(np.arange(frozen.size)[::-1], 1)
-    enough = np.arange(frozen.size) >= FROZEN_MOVES
-    good = np.flatnonzero(enough & (inside >= FROZEN) & (beyond < 0.4 * inside))
+    enough = np.arange(frozen.size) >= limits.frozen_moves
+    good = np.flatnonzero(enough & (inside >= limits.frozen) & (beyond < 0.4 * inside))
     return float(size[good[-1]]) if good.size else 0.0
 
 
-def gap(e: Floats, op: Floats, said: StatedSettings, usable: Mask) -> ControllerFinding | None:
+def gap(
+    e: Floats, op: Floats, said: StatedSettings, usable: Mask, limits: ControllerLimits
+) -> ControllerFinding | None:
     """OP standing still while the error is small: a law with a gap gives OP where the one without does not."""
-    length = span_length(op.size, said.ti)
+    length = span_length(op.size, said.ti, limits)
     n = (op.size // length) * length
     y = centred(op[:n], length)
 
@@ -113,8 +100,8 @@ def gap(e: Floats, op: Floats, said: StatedSettings, usable: Mask) -> Controller
     trials = [(left(size * w, c), size * w) for w in GAPS for c in (True, False)]
     best, width = min(trials)
     still = np.diff(op, prepend=op[0]) == 0
-    if best > GAP_LEAVES * left(0.0, True):
-        width = frozen_width(e, op, said, usable)
+    if best > limits.gap_leaves * left(0.0, True):
+        width = frozen_width(e, op, said, usable, limits)
     inside = still & (np.abs(e) < width)
     if inside.mean() < 0.02:
         return None
@@ -127,42 +114,53 @@ def runs(still: Mask) -> list[tuple[int, int]]:
     return list(zip(np.flatnonzero(edge == 1), np.flatnonzero(edge == -1), strict=True))
 
 
-def asked(sp: Floats, op: Floats) -> Mask:
+def asked(sp: Floats, op: Floats, limits: ControllerLimits) -> Mask:
     """True where a move of SP or a limit of OP stands in for the law, and a sample about it, shape (n,)."""
-    here = (np.abs(np.diff(sp, prepend=sp[0])) > ASKED) | (op <= 0.05) | (op >= 99.95)
+    here = (np.abs(np.diff(sp, prepend=sp[0])) > limits.asked) | (op <= 0.05) | (op >= 99.95)
     return np.convolve(here, np.ones(3), mode="same") > 0
 
 
-def lawless(found: ControlLaw, usable: Mask, step: float) -> Mask:
+def lawless(found: ControlLaw, usable: Mask, step: float, limits: ControllerLimits) -> Mask:
     """True in spans of good samples where OP is far from the law that the others obey, shape (n,)."""
     n, length = found.residual.size, found.length
     size = np.sqrt((found.residual.reshape(-1, length) ** 2).mean(axis=1))
     whole = usable[:n].reshape(-1, length).all(axis=1)
     out = np.zeros(usable.size, dtype=bool)
-    out[:n] = np.repeat(whole & (size > LAWLESS * np.median(size) + step), length)
+    out[:n] = np.repeat(whole & (size > limits.lawless * np.median(size) + step), length)
     return out
 
 
 def ruled(
-    e: Floats, op: Floats, said: StatedSettings, usable: Mask, found: ControlLaw
+    e: Floats,
+    op: Floats,
+    said: StatedSettings,
+    usable: Mask,
+    found: ControlLaw,
+    limits: ControllerLimits,
 ) -> ControllerFinding | None:
     """Spans in which something other than the law moves OP, or keeps it."""
-    off = lawless(found, usable, op_step(op))
-    if float(off.mean()) > LAWLESS_SHARE and found.explained > 0.0:
+    off = lawless(found, usable, op_step(op), limits)
+    if float(off.mean()) > limits.lawless_share and found.explained > 0.0:
         return ControllerFinding(ControllerFault.LOGIC, {"share": float(off.mean())}, off)
-    return logic(e, op, said, usable)
+    return logic(e, op, said, usable, limits)
 
 
-def logic(e: Floats, op: Floats, said: StatedSettings, usable: Mask) -> ControllerFinding | None:
+def logic(
+    e: Floats, op: Floats, said: StatedSettings, usable: Mask, limits: ControllerLimits
+) -> ControllerFinding | None:
     """Stretches in which OP stands although the law asks it to go, whatever the error."""
     path = np.cumsum(due_moves(e, said.kp, said.ti))
-    least = STUCK_MOVE * max(op_step(op), 0.02)
+    least = limits.stuck_move * max(op_step(op), 0.02)
     where = np.zeros(op.size, dtype=bool)
     for first, last in runs((np.diff(op, prepend=op[0] + 1.0) == 0) & usable):
-        if last - first >= STUCK_RUN and float(np.ptp(path[first:last])) > least:
+        if last - first >= limits.stuck_run and float(np.ptp(path[first:last])) > least:
             where[first:last] = True
     share = float(where.mean())
-    return ControllerFinding(ControllerFault.LOGIC, {"share": share}, where) if share > STUCK_SHARE else None
+    return (
+        ControllerFinding(ControllerFault.LOGIC, {"share": share}, where)
+        if share > limits.stuck_share
+        else None
+    )
 
 
 def typical(residual: Floats, length: int) -> float:
@@ -170,7 +168,9 @@ def typical(residual: Floats, length: int) -> float:
     return float(np.median(np.sqrt((residual.reshape(-1, length) ** 2).mean(axis=1))))
 
 
-def obeys(sp: Floats, pv: Floats, op: Floats, said: StatedSettings, found: ControlLaw) -> bool:
+def obeys(
+    sp: Floats, pv: Floats, op: Floats, said: StatedSettings, found: ControlLaw, limits: ControllerLimits
+) -> bool:
     """Whether the stated law gives OP nearly as well as the one found, in most spans and in those that move it; on a
     thinned recording, whether it gives most of OP."""
     n, length = found.residual.size, found.length
@@ -178,27 +178,34 @@ def obeys(sp: Floats, pv: Floats, op: Floats, said: StatedSettings, found: Contr
     left = centred(op[:n], length) - said.kp * (centred(e, length) + centred(np.cumsum(e), length) / said.ti)
     lawful = trusted(found.residual, length)
     moved = float(np.mean(centred(op[:n], length)[lawful] ** 2))
-    if said.thinned and float(np.mean(left[lawful] ** 2)) < THINNED_LEAVES * moved:
+    if said.thinned(limits) and float(np.mean(left[lawful] ** 2)) < limits.thinned_leaves * moved:
         return True
-    whole = float(np.mean(left[lawful] ** 2)) < SAME_LAW**2 * float(np.mean(found.residual[lawful] ** 2))
-    return whole and typical(left, length) < SAME_LAW * typical(found.residual, length)
+    whole = float(np.mean(left[lawful] ** 2)) < limits.same_law**2 * float(
+        np.mean(found.residual[lawful] ** 2)
+    )
+    return whole and typical(left, length) < limits.same_law * typical(found.residual, length)
 
 
-def settings(found: ControlLaw, said: StatedSettings) -> ControllerFinding | None:
+def settings(found: ControlLaw, said: StatedSettings, limits: ControllerLimits) -> ControllerFinding | None:
     """Settings that reproduce OP where the stated ones do not."""
-    if found.explained < LAW_EXPLAINS or found.ki == 0 or found.kp / found.ki <= 0:
+    if found.explained < limits.law_explains or found.ki == 0 or found.kp / found.ki <= 0:
         return None
     ti = found.kp / found.ki
     off_kp = abs(math.log(max(found.kp / said.kp, 1e-6)))
     off_ti = abs(math.log(max(ti / said.ti, 1e-6)))
-    if max(off_kp, off_ti) < (SETTING_THINNED if said.thinned else SETTING):
+    if max(off_kp, off_ti) < (limits.setting_thinned if said.thinned(limits) else limits.setting):
         return None
     values = {"kp": found.kp, "ti_samples": ti} if off_kp >= off_ti else {"ti_samples": ti, "kp": found.kp}
     return ControllerFinding(ControllerFault.SETTINGS, values, np.ones(found.residual.size, dtype=bool))
 
 
 def judge(
-    sp: Floats, pv: Floats, op: Floats, usable: Mask, said: StatedSettings
+    sp: Floats,
+    pv: Floats,
+    op: Floats,
+    usable: Mask,
+    said: StatedSettings,
+    limits: ControllerLimits = LIMITS.controller,
 ) -> tuple[ControllerFinding | None, ControlLaw | None]:
     """The first thing that is wrong with clock or controller, and the law as found.
 
@@ -212,19 +219,21 @@ def judge(
         Of a thinned recording nothing but settings plainly wrong is said: the law is not seen at work; nothing at all
         where its integral acts between the samples.
     """
-    if said.thinned and said.ti < LEAST_TI:
+    thinned = said.thinned(limits)
+    if thinned and said.ti < limits.thinned_ti:
         return None, None
-    found = recovered_law(sp, pv, op, usable, said.ti, said.kp, late=not said.thinned)
+    found = recovered_law(sp, pv, op, usable, said.ti, said.kp, late=not thinned, limits=limits)
     e = sp - first_order(pv, found.smoothed)
-    wrong = None if obeys(sp, pv, op, said, found) else settings(found, said)
-    if said.thinned:
+    wrong = None if obeys(sp, pv, op, said, found, limits) else settings(found, said, limits)
+    if thinned:
         return wrong, found
-    if found.late >= LATE and found.explained > LAW_EXPLAINS:
+    if found.late >= limits.late and found.explained > limits.law_explains:
         return ControllerFinding(
             ControllerFault.CLOCK, {LATE_SAMPLES: found.late}, np.ones(op.size, dtype=bool)
         ), found
     law_now = StatedSettings(found.kp, found.kp / found.ki) if wrong is not None else said
-    frozen, other = gap(e, op, law_now, usable), ruled(e, op, law_now, usable & ~asked(sp, op), found)
+    frozen = gap(e, op, law_now, usable, limits)
+    other = ruled(e, op, law_now, usable & ~asked(sp, op, limits), found, limits)
     if frozen is not None:
         return frozen, found
     return (other if other is not None else wrong), found

@@ -11,16 +11,15 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from identification.estimation.limits import (
-    FILTER_GAINS,
-    FILTERS,
-    LAW_SPAN,
-    LAW_SPANS,
-    SHIFTS,
-)
+from identification.limits.controller import ControllerLimits
+from identification.limits.explain import LIMITS
 from identification.record import Floats, Mask
 from identification.signals.first_order import first_order
 
+SHIFTS = (-2.0, -1.0, 0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0)
+"""Latenesses of PV that are tried [samples]."""
+FILTERS = (0.5, 1.0, 2.0, 4.0, 8.0)
+"""Time constants of a filter between PV and the controller that are tried [samples]."""
 LATE_STEP = 0.25
 """Lateness is told to this part of a sample."""
 
@@ -79,23 +78,30 @@ def trusted(residual: Floats, length: int) -> Mask:
     return np.repeat(size <= 2.0 * np.median(size) + 1e-9, length)
 
 
-def unbroken(usable: Mask, length: int) -> Mask:
+def unbroken(usable: Mask, length: int, limits: ControllerLimits) -> Mask:
     """True in spans that are usable throughout, shape (m * length,); the samples themselves where too few are.
 
     A limit or a hole within a span leaves the integral another constant behind it than before.
     """
     whole = np.repeat(usable.reshape(-1, length).all(axis=1), length)
-    return whole if whole.sum() >= LAW_SPANS * length else usable.copy()
+    return whole if whole.sum() >= limits.spans * length else usable.copy()
 
 
 def law(
-    sp: Floats, pv: Floats, op: Floats, usable: Mask, length: int, late: float, smoothed: float = 0.0
+    sp: Floats,
+    pv: Floats,
+    op: Floats,
+    usable: Mask,
+    length: int,
+    late: float,
+    smoothed: float = 0.0,
+    limits: ControllerLimits = LIMITS.controller,
 ) -> ControlLaw:
     """The PI law at a given lateness of PV and a filter's time constant [samples], spans that do not obey it left
     out twice."""
     e = sp - first_order(shifted(pv, late), smoothed)
     n = (e.size // length) * length
-    fit = unbroken(usable[:n], length)
+    fit = unbroken(usable[:n], length, limits)
     keep = fit
     for _ in range(3):
         kp, ki, residual = regress(e[:n], op[:n], length, keep)
@@ -108,9 +114,9 @@ def law(
     )
 
 
-def span_length(n: int, ti_samples: float) -> int:
-    """Samples in a span of the regression: an integral time, but at least LAW_SPANS spans in the record."""
-    return int(np.clip(ti_samples, LAW_SPAN, max(n // LAW_SPANS, LAW_SPAN)))
+def span_length(n: int, ti_samples: float, limits: ControllerLimits = LIMITS.controller) -> int:
+    """Samples in a span of the regression: an integral time, but at least so many spans in the record."""
+    return int(np.clip(ti_samples, limits.span_samples, max(n // limits.spans, limits.span_samples)))
 
 
 def recovered_law(
@@ -121,6 +127,7 @@ def recovered_law(
     ti_samples: float,
     stated_kp: float = 1.0,
     late: bool = True,
+    limits: ControllerLimits = LIMITS.controller,
 ) -> ControlLaw:
     """The PI law, with PV's lateness searched in whole samples and then between them.
 
@@ -128,10 +135,10 @@ def recovered_law(
     stated one's sign are looked for. late : whether PV's clock may be late at all. A filter before the controller
     makes OP late too, so lateness is searched beside filters as well, up to what it is without one.
     """
-    length = span_length(op.size, ti_samples)
+    length = span_length(op.size, ti_samples, limits)
 
     def at(shift: float, smoothed: float = 0.0) -> ControlLaw:
-        return law(sp, pv, op, usable, length, shift, smoothed)
+        return law(sp, pv, op, usable, length, shift, smoothed, limits)
 
     def scatter(x: ControlLaw) -> float:
         return x.scatter if x.kp * stated_kp > 0 and x.kp * x.ki > 0 else math.inf
@@ -139,7 +146,7 @@ def recovered_law(
     shifts = SHIFTS if late else (0.0,)
     plain = min((at(s) for s in shifts), key=scatter)
     filtered = min((at(s, f) for f in FILTERS for s in shifts if s <= max(plain.late, 0.0)), key=scatter)
-    best = filtered if scatter(filtered) < FILTER_GAINS * scatter(plain) else plain
+    best = filtered if scatter(filtered) < limits.filter_leaves * scatter(plain) else plain
     if math.isinf(scatter(best)):
         return at(0.0)
     for step in (0.5, 0.25, 0.125, 0.06) if best.smoothed else (0.5, 0.25):

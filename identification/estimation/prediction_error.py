@@ -8,8 +8,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from identification.estimation.covariance import inverse, scattered
-from identification.estimation.limits import BIAS_SCATTER, PROMISES, SETTLED, START_SCATTER
 from identification.estimation.noise import Edges, edges_for, fitted, judged, lag_means, whitened
+from identification.limits.explain import LIMITS, ExplainLimits
 from identification.record import Floats, Mask
 from identification.simulation.effect import Param, Variant
 from identification.simulation.open_loop import ModelInputs, simulate
@@ -34,7 +34,7 @@ class Problem:
     """A recording prepared for fitting.
 
     inputs : what drives the model; y : PV less inputs.level, shape (n,); usable : bool, shape (n,); weight : shape
-    (n,), what each innovation counts, 0 where it is not judged.
+    (n,), what each innovation counts, 0 where it is not judged. limits : what decides about candidates.
     """
 
     inputs: ModelInputs
@@ -42,6 +42,7 @@ class Problem:
     usable: Mask
     weight: Floats
     edges: Edges = field(repr=False)
+    limits: ExplainLimits = LIMITS
 
     @property
     def count(self) -> int:
@@ -49,10 +50,10 @@ class Problem:
         return int((self.weight > 0).sum())
 
 
-def problem(inputs: ModelInputs, y: Floats, usable: Mask) -> Problem:
+def problem(inputs: ModelInputs, y: Floats, usable: Mask, limits: ExplainLimits = LIMITS) -> Problem:
     """A problem whose usable samples all count alike."""
     edges = edges_for(usable)
-    return Problem(inputs, y, usable, judged(usable, int(edges[-1])).astype(float), edges)
+    return Problem(inputs, y, usable, judged(usable, int(edges[-1])).astype(float), edges, limits)
 
 
 @dataclass(frozen=True, slots=True)
@@ -226,7 +227,9 @@ def curvature(p: Problem, model: Model, found: Residual) -> tuple[Floats, Floats
     slope = moves @ found.white - beside.T @ cross[:, -1]
     for i, param in enumerate(model.params):
         if param.slot in PRIOR:
-            aim, scatter = (p.y[0], START_SCATTER) if param.slot == Slot.START else (0.0, BIAS_SCATTER)
+            at_start = param.slot == Slot.START
+            aim = p.y[0] if at_start else 0.0
+            scatter = p.limits.search.start_scatter if at_start else p.limits.search.bias_scatter
             held = found.loss / scatter**2
             gram[i, i] += held
             slope[i] += held * (aim - model.c[param.slot])
@@ -238,7 +241,7 @@ def is_out_of_reach(p: Problem, found: Residual, gram: Floats, slope: Floats, ai
     if math.isinf(aim):
         return False
     promised = float(slope @ newton(gram, slope, 1e-6)) / max(float(found.white @ found.white), 1e-300)
-    return math.log(max(found.loss, 1e-300) / aim) > PROMISES * max(promised, 0.0)
+    return math.log(max(found.loss, 1e-300) / aim) > p.limits.search.promises * max(promised, 0.0)
 
 
 def descend(p: Problem, model: Model, steps: int, aim: float = math.inf) -> Fitted:
@@ -270,7 +273,7 @@ def descend(p: Problem, model: Model, steps: int, aim: float = math.inf) -> Fitt
         won = 0.5 * p.count * math.log(best.loss / max(found.loss, 1e-300))
         model, best = trial, found
         damping, failed = max(damping / 10, 1e-7), 0
-        if won < SETTLED:
+        if won < p.limits.search.settled:
             break
     return Fitted(model, best.loss, p.count, best.ar, innovations_of(p, best))
 

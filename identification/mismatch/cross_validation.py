@@ -6,18 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identification.estimation.limits import (
-    HELD_OUT,
-    HELD_OUT_LOSS,
-    HELD_OUT_SHARE,
-    ONE_MOVE,
-    SCREEN_STEPS,
-    SPREAD,
-    WINDOW_SAMPLES,
-    WINDOW_TIMES,
-)
 from identification.estimation.noise import whitened
 from identification.estimation.prediction_error import Fitted, Model, Problem, bounds, descend, gain
+from identification.limits.explain import LIMITS
 from identification.mismatch.effect import Effect
 from identification.mismatch.restarts import simulated_anew
 from identification.mismatch.starts.screening import at_inlet
@@ -26,10 +17,6 @@ from identification.simulation.open_loop import simulate
 from identification.simulation.parameters import Slot
 
 BLOCKS = 20
-LEAST_FIT = 1.0
-"""Fit on held-out data [%] from which a model goes with PV; ours: a stem that never moves has 0."""
-BOUND_SHARE = 0.005
-"""Part of a constant's range within which it stands at the end of it; ours."""
 ENDS_OF_SIGNAL = ("opspan", "pvspan")
 """Scales of constants that are places in a signal's range."""
 
@@ -93,7 +80,7 @@ def gains_by_block(p: Problem, better: Fitted, worse: Fitted) -> Floats:
 def is_one_move(p: Problem) -> bool:
     """Whether OP moves in two parts of the record alone: one experiment, of which no part is left to prove it on."""
     travel = np.sort([float(np.abs(np.diff(part)).sum()) for part in np.array_split(p.inputs.op, BLOCKS)])
-    return float(travel[-2:].sum()) > ONE_MOVE * float(travel.sum())
+    return float(travel[-2:].sum()) > p.limits.proof.one_move * float(travel.sum())
 
 
 def is_spread(p: Problem, better: Fitted, worse: Fitted) -> bool:
@@ -101,7 +88,7 @@ def is_spread(p: Problem, better: Fitted, worse: Fitted) -> bool:
     if is_one_move(p):
         return True
     parts = np.sort(gains_by_block(p, better, worse))
-    return float(parts[:-2].sum()) > SPREAD * float(parts.sum())
+    return float(parts[:-2].sum()) > p.limits.proof.spread * float(parts.sum())
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,7 +97,7 @@ class HeldOut:
 
     overall : misfit over the whole record of the models fitted to all of it, which is what pages draw; window :
     samples after which the simulations begin anew, 0 for one run over all; placed : whether the stem of a valve with
-    friction is then placed anew too (restarts.py).
+    friction is then placed anew too (restarts.py); least_fit : fit on held-out data from which a model goes with PV.
     """
 
     gain: float
@@ -119,6 +106,7 @@ class HeldOut:
     overall: tuple[Misfit, Misfit]
     window: int = 0
     placed: bool = False
+    least_fit: float = LIMITS.proof.least_fit
 
     @property
     def falls(self) -> bool:
@@ -128,7 +116,7 @@ class HeldOut:
     @property
     def follows(self) -> bool:
         """Whether the better model goes with PV at all on held-out data, and not merely less far astray."""
-        return self.held[1].fit_pct >= LEAST_FIT
+        return self.held[1].fit_pct >= self.least_fit
 
     @property
     def carries(self) -> bool:
@@ -151,7 +139,7 @@ def held_out(p: Problem, worse: Fitted, better: Fitted, cycle: int = 0) -> HeldO
     A model's START is of the first sample, so the rest is simulated from the beginning. They are compared over the
     whole rest, and where load drowns the difference there, over windows of some time constants of the plain loop.
     """
-    cut = int((1.0 - HELD_OUT) * p.y.size)
+    cut = int((1.0 - p.limits.proof.held_out) * p.y.size)
     early = replace(p, weight=np.where(np.arange(p.y.size) < cut, p.weight, 0.0))
     fits = [_refit(early, m.model) for m in (worse, better)]
     simulated = [simulate(p.inputs, fit.model.c) for fit in fits]
@@ -160,9 +148,11 @@ def held_out(p: Problem, worse: Fitted, better: Fitted, cycle: int = 0) -> HeldO
     losses = [float((late * e) @ e) for e in whitenings]
     won = 0.5 * (losses[0] - losses[1]) / max(fits[1].loss, 1e-30)
     c = fits[0].model.c
-    window = max(int(WINDOW_TIMES * float(c[Slot.T] + c[Slot.L]) / p.inputs.dt_s), WINDOW_SAMPLES)
+    limits = p.limits.proof
+    memory = limits.window_times * float(c[Slot.T] + c[Slot.L]) / p.inputs.dt_s
+    window = max(int(memory), limits.window_samples)
     final = [simulate(p.inputs, m.model.c) for m in (worse, better)]
-    whole, windowed = (_compared(p.y, simulated, final, cut, won, size) for size in (0, window))
+    whole, windowed = (_compared(p, simulated, final, cut, won, size) for size in (0, window))
     if whole.carries:
         return whole
     if cycle:
@@ -196,20 +186,22 @@ def _by_cycle(
 
     (seen0, unseen0, _), (seen1, unseen1, _) = misfits(early[0]), misfits(early[1])
     drawn = (misfits(final[0])[2], misfits(final[1])[2])
-    return HeldOut(won, (seen0, seen1), (unseen0, unseen1), drawn, window, True)
+    return HeldOut(won, (seen0, seen1), (unseen0, unseen1), drawn, window, True, p.limits.proof.least_fit)
 
 
 def _compared(
-    y: Floats, simulated: list[Floats], final: list[Floats], cut: int, won: float, window: int
+    p: Problem, simulated: list[Floats], final: list[Floats], cut: int, won: float, window: int
 ) -> HeldOut:
+    y, least = p.y, p.limits.proof.least_fit
     seen = [misfit(y[:cut], x[:cut], window) for x in simulated]
     unseen = [misfit(y[cut:], x[cut:], window) for x in simulated]
     drawn = [misfit(y, x, window) for x in final]
-    return HeldOut(won, (seen[0], seen[1]), (unseen[0], unseen[1]), (drawn[0], drawn[1]), window)
+    misfits = (seen[0], seen[1]), (unseen[0], unseen[1]), (drawn[0], drawn[1])
+    return HeldOut(won, *misfits, window, least_fit=least)
 
 
 def _refit(p: Problem, model: Model) -> Fitted:
-    return descend(p, model, SCREEN_STEPS)
+    return descend(p, model, p.limits.search.screen_steps)
 
 
 def runs_out(p: Problem, fit: Fitted) -> bool:
@@ -217,12 +209,13 @@ def runs_out(p: Problem, fit: Fitted) -> bool:
 
     A bound at zero, and one that is an end of a signal's range, is where an effect begins, and no far end.
     """
+    edge = p.limits.proof.bound_share
     for q in fit.model.added[-1].params:
         if q.scale in ENDS_OF_SIGNAL:
             continue
         value, (low, high) = float(fit.model.c[q.slot]), bounds(p.inputs, fit.model.c, q)
-        near = BOUND_SHARE * (high - low)
-        at_high = high != 0.0 and value > (high * (1.0 - BOUND_SHARE) if q.log else high - near)
+        near = edge * (high - low)
+        at_high = high != 0.0 and value > (high * (1.0 - edge) if q.log else high - near)
         at_low = not q.log and low != 0.0 and value < low + near
         if at_high or at_low:
             return True
@@ -243,4 +236,6 @@ def passes(p: Problem, worse: Fitted, better: Fitted, effect: Effect) -> bool:
         return True
     if not effect.local and not is_spread(p, better, worse):
         return False
-    return held_out(p, worse, better).gain > HELD_OUT_LOSS - HELD_OUT_SHARE * gain(better, worse)
+    limits = p.limits.proof
+    least = limits.held_out_loss - limits.held_out_share * gain(better, worse)
+    return held_out(p, worse, better).gain > least

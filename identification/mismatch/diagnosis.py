@@ -8,17 +8,6 @@ import numpy as np
 
 from identification.controller.check import LATE_SAMPLES, judge
 from identification.controller.pi_regression import ControlLaw, shifted
-from identification.estimation.limits import (
-    CEILING_PENALTY,
-    CEILING_SHARE,
-    FULL_STEPS,
-    GRID_MARK,
-    LEAST_CYCLE,
-    PROVEN,
-    ROUNDS,
-    STRAIGHT_LAW,
-    TIE,
-)
 from identification.estimation.prediction_error import Fitted, Model, Problem, descend, gain
 from identification.mismatch import recording_faults
 from identification.mismatch.catalogue import CANDIDATES, CONTROLLER_FAULTS, EFFECTS, RECORDER_FAULTS, fault
@@ -59,9 +48,11 @@ def controller_finding_of(s: Recording, recorder: Finding | None) -> tuple[Findi
     """What clock and controller did, where there is a controller to judge and a recording fit for it."""
     if s.sp is None or s.stated is None or ends(recorder) is Ends.ALL:
         return None, None
-    if any(recording_faults.straightened(x, STRAIGHT_LAW) for x in (s.pv, s.op)):
+    if any(recording_faults.straightened(x, s.limits.recorder.straight_law) for x in (s.pv, s.op)):
         return None, None
-    found, law = judge(s.sp, s.pv, s.op, s.usable & (s.op > 0.05) & (s.op < 99.95), s.stated)
+    found, law = judge(
+        s.sp, s.pv, s.op, s.usable & (s.op > 0.05) & (s.op < 99.95), s.stated, s.limits.controller
+    )
     if found is None:
         return None, law
     return Finding(found.values, found.where, CONTROLLER_FAULTS[found.fault].name), law
@@ -115,7 +106,9 @@ def explain(s: Recording, tell: Progress = silent, brought: Floats | None = None
     -------
     Explanation
     """
-    s = replace(s, usable=s.usable & ~recording_faults.unlogged(s.stamp_s, s.pv.size, s.dt_s))
+    s = replace(
+        s, usable=s.usable & ~recording_faults.unlogged(s.stamp_s, s.pv.size, s.dt_s, s.limits.recorder)
+    )
     recorder = recorder_finding_of(s)
     controller, law = controller_finding_of(s, recorder)
     usable = without_spikes(s.pv, s.usable)
@@ -126,7 +119,7 @@ def explain(s: Recording, tell: Progress = silent, brought: Floats | None = None
         late_s, pv = late * s.dt_s, shifted(pv, late)
     inputs = inputs_of(replace(s, pv=pv))
     tell("plain loop")
-    p, plain = prepared(inputs, pv - inputs.level, usable, brought, transmitter_end(recorder, pv))
+    p, plain = prepared(inputs, pv - inputs.level, usable, brought, transmitter_end(recorder, pv), s.limits)
     found = Explanation(
         p,
         plain,
@@ -145,12 +138,12 @@ def explain(s: Recording, tell: Progress = silent, brought: Floats | None = None
 def beyond_the_grid(found: Explanation) -> Explanation:
     """The explanation without effects that move PV by less than the steps in which a recorder left it."""
     step = 0.0 if found.recorder is None else found.recorder.values.get(STEP, 0.0)
-    count = len(found.accepted)
+    count, least = len(found.accepted), found.p.limits.recorder.grid_mark * step
     told = int(count > 0 and found.cycles is not None and is_friction(found.accepted[0].name))
     while (
         count > told
         and step > 0
-        and mark(found if count == len(found.accepted) else first_effects(found, count)) < (GRID_MARK * step)
+        and mark(found if count == len(found.accepted) else first_effects(found, count)) < least
     ):
         count -= 1
     return found if count == len(found.accepted) else first_effects(found, count)
@@ -183,7 +176,7 @@ def carried_over(found: Explanation) -> Explanation:
 def cycle_of(found: Explanation) -> int:
     """Samples of one cycle of a loop whose cycles show a faulty valve."""
     cycle_s = 0.0 if found.cycles is None else found.cycles.cycle_s
-    return max(round(cycle_s / found.p.inputs.dt_s), LEAST_CYCLE)
+    return max(round(cycle_s / found.p.inputs.dt_s), found.p.limits.proof.least_cycle)
 
 
 def first_effects(found: Explanation, count: int) -> Explanation:
@@ -193,18 +186,19 @@ def first_effects(found: Explanation, count: int) -> Explanation:
         c = cleared(c, candidate.row)
     names = {r.name for r in found.accepted[:count]}
     rows = tuple(r for r in found.best.model.added if r.name in names)
-    best = descend(found.p, Model(rows, c), FULL_STEPS)
+    best = descend(found.p, Model(rows, c), found.p.limits.search.full_steps)
     return replace(found, best=best, accepted=found.accepted[:count])
 
 
 def physics(found: Explanation, tell: Progress, s: Recording) -> Explanation:
     """Add effects of the catalogue one by one, as long as one passes; first a valve that the cycles show."""
+    limits = found.p.limits.search
     p, best = integrating_or_first_order(found.p, found.plain, s.kind)
     found = replace(found, p=p, plain=best)
     accepted: list[Candidate] = []
     first: tuple[Candidate, ...] = ()
     candidates: list[Candidate] = []
-    for _ in range(ROUNDS):
+    for _ in range(limits.rounds):
         x = candidate_inputs(p, best, s.circumstances)
         candidates = compete(x, best, CANDIDATES, tell)
         if s.cycles is not None and not accepted:
@@ -215,7 +209,7 @@ def physics(found: Explanation, tell: Progress, s: Recording) -> Explanation:
         if winner is None:
             break
         accepted.append(winner)
-        p, best = x.p, descend(x.p, winner.fit.model, FULL_STEPS)
+        p, best = x.p, descend(x.p, winner.fit.model, limits.full_steps)
     if len(accepted) > 1:
         told = shown_by_cycles(s, [accepted[0]]) is not None
         if not told:
@@ -224,7 +218,7 @@ def physics(found: Explanation, tell: Progress, s: Recording) -> Explanation:
             best, accepted = replacement_step(x, best, accepted, tell)
         best, accepted = without_the_idle(p, best, accepted, int(told))
     won, weights = ceiling(p, best)
-    least = max(CEILING_PENALTY, CEILING_SHARE * gain(best, found.plain))
+    least = max(limits.ceiling_penalty, limits.ceiling_share * gain(best, found.plain))
     left = won - 0.5 * weights - least
     if not accepted and any(r.row.needs == "steps" and r.penalised > 0 for r in candidates):
         left = max(left, candidates[0].penalised)
@@ -237,7 +231,7 @@ def with_cycles(p: Problem, near: Fitted, seen: SeenInCycles, candidates: list[C
     begun = []
     for fit in from_cycles(p, near, seen, CANDIDATES):
         won = gain(fit, near)
-        begun.append(Candidate(fit, won, won - penalty(fit.model.added[-1])))
+        begun.append(Candidate(fit, won, won - penalty(p, fit.model.added[-1])))
     best: dict[str, Candidate] = {}
     for c in sorted([*candidates, *begun], key=lambda c: -c.penalised):
         best.setdefault(f"{c.name} {c.row.label}", c)
@@ -261,7 +255,7 @@ def shown_by_cycles(s: Recording, candidates: list[Candidate]) -> Candidate | No
 
 def proven(p: Problem, near: Fitted, candidates: list[Candidate]) -> Candidate | None:
     """The best candidate with a gain left after its penalty that passes the proof."""
-    for candidate in candidates[:PROVEN]:
+    for candidate in candidates[: p.limits.proof.proven]:
         if candidate.penalised <= 0:
             return None
         if passes(p, near, candidate.fit, EFFECTS[candidate.name]):
@@ -274,7 +268,9 @@ def alternatives(found: Explanation) -> tuple[str, ...]:
     if not found.accepted:
         return ()
     winner = found.accepted[0]
-    close = [r.name for r in found.first if r.penalised > max(winner.penalised - TIE, 0.0)]
+    close = [
+        r.name for r in found.first if r.penalised > max(winner.penalised - found.p.limits.search.tie, 0.0)
+    ]
     names = dict.fromkeys((*close, *EFFECTS[winner.name].indistinguishable))
     return tuple(n for n in names if n != winner.name)
 

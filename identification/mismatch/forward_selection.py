@@ -8,17 +8,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identification.estimation.limits import (
-    FOLLOWED,
-    FULL_STEPS,
-    PARAMETER_PENALTY,
-    SAME,
-    SCREEN_STEPS,
-    SEARCH_PENALTY,
-    SETTLES,
-    STICKING_HINT,
-    WORTH_FOLLOWING,
-)
 from identification.estimation.outliers import robust_weights
 from identification.estimation.prediction_error import (
     Fitted,
@@ -29,6 +18,7 @@ from identification.estimation.prediction_error import (
     problem,
 )
 from identification.estimation.start_values import plain_processes
+from identification.limits.explain import LIMITS, ExplainLimits
 from identification.mismatch.catalogue import CANDIDATES, EFFECTS
 from identification.mismatch.effect import Friction
 from identification.mismatch.recording import Circumstances
@@ -84,14 +74,14 @@ def censored(p: Problem, clip: Clip) -> Problem:
 
 def plain(p: Problem, brought: Floats | None = None, clip: Clip | None = None) -> Fitted:
     """The plain loop at its optimum; a brought model (its constants) is one more start."""
-    fits = [] if brought is None else [descend(p, Model((), brought.copy()), FULL_STEPS)]
+    fits = [] if brought is None else [descend(p, Model((), brought.copy()), p.limits.search.full_steps)]
     for process in plain_processes(p.y, p.inputs.op, p.usable, p.inputs.dt_s):
         c = as_parameters(process)
         if clip is not None:
             c[Slot.CLIP_HI if clip.upper else Slot.CLIP_LO] = clip.value
         c[Slot.START] = p.y[0]
         c[Slot.BIAS] = float(np.mean(p.y)) - process.gain * float(np.mean(p.inputs.op) - p.inputs.middle)
-        fits.append(descend(p, Model((), c), FULL_STEPS))
+        fits.append(descend(p, Model((), c), p.limits.search.full_steps))
     return min(fits, key=lambda fit: fit.loss)
 
 
@@ -119,35 +109,36 @@ def applies(x: CandidateInputs, near: Fitted, row: Variant) -> bool:
     return True
 
 
-def penalty(row: Variant) -> float:
+def penalty(p: Problem, row: Variant) -> float:
     """Log likelihood [nat] that a variant costs."""
-    return SEARCH_PENALTY + PARAMETER_PENALTY * max(len(row.params), 1) + row.penalty
+    limits = p.limits.search
+    return limits.search_penalty + limits.parameter_penalty * max(len(row.params), 1) + row.penalty
 
 
 def candidate(p: Problem, near: Fitted, models: list[Model], steps: int) -> Candidate:
     """The best of some starts, followed for some steps."""
-    return _of_fits(near, [descend(p, model, steps) for model in models])
+    return _of_fits(p, near, [descend(p, model, steps) for model in models])
 
 
 def screened_candidate(p: Problem, near: Fitted, models: list[Model]) -> Candidate:
     """The same in the first round, where a start that will not come to anything worth following is left."""
-    worth = penalty(models[0].added[-1]) + WORTH_FOLLOWING
+    worth = penalty(p, models[0].added[-1]) + p.limits.search.worth_following
     aim = near.loss * math.exp(-2.0 * worth / near.count)
-    return _of_fits(near, [descend(p, model, SCREEN_STEPS, aim) for model in models])
+    return _of_fits(p, near, [descend(p, model, p.limits.search.screen_steps, aim) for model in models])
 
 
-def _of_fits(near: Fitted, fits: list[Fitted]) -> Candidate:
+def _of_fits(p: Problem, near: Fitted, fits: list[Fitted]) -> Candidate:
     fit = min(fits, key=lambda f: f.loss)
     won = gain(fit, near)
-    return Candidate(fit, won, won - penalty(fit.model.added[-1]))
+    return Candidate(fit, won, won - penalty(p, fit.model.added[-1]))
 
 
 def followed(p: Problem, near: Fitted, first: Candidate, models: list[Model]) -> Candidate:
     """A candidate of the first round followed to the end, from there and from its second and third start."""
-    if first.penalised < WORTH_FOLLOWING:
+    if first.penalised < p.limits.search.worth_following:
         return first
     starts = [first.fit.model, *models[1:3]]
-    best = candidate(p, near, starts, FULL_STEPS)
+    best = candidate(p, near, starts, p.limits.search.full_steps)
     return best if best.penalised > first.penalised else first
 
 
@@ -179,21 +170,27 @@ def compete(
                 first += mode_starts(x.p, near, row)
             tried.append((screened_candidate(x.p, near, first), models))
     tried.sort(key=lambda t: -t[0].penalised)
-    ended = [followed(x.p, near, first, models) for first, models in tried[:FOLLOWED]]
+    most = x.p.limits.search.followed
+    ended = [followed(x.p, near, first, models) for first, models in tried[:most]]
     ended += stiction_candidates(x, near, [first for first, _ in tried], rows, tell)
-    return sorted([*ended, *(first for first, _ in tried[FOLLOWED:])], key=lambda r: -r.penalised)
+    return sorted([*ended, *(first for first, _ in tried[most:])], key=lambda r: -r.penalised)
 
 
 def prepared(
-    inputs: ModelInputs, y: Floats, usable: Mask, brought: Floats | None = None, clip: Clip | None = None
+    inputs: ModelInputs,
+    y: Floats,
+    usable: Mask,
+    brought: Floats | None = None,
+    clip: Clip | None = None,
+    limits: ExplainLimits = LIMITS,
 ) -> tuple[Problem, Fitted]:
     """A problem with its outliers robustly_weighted, and its plain fit."""
-    p = problem(inputs, y, usable)
+    p = problem(inputs, y, usable, limits)
     if clip is not None:
         p = censored(p, clip)
     first = plain(p, brought, clip)
     calm = robustly_weighted(p, first)
-    return calm, descend(calm, first.model, FULL_STEPS)
+    return calm, descend(calm, first.model, p.limits.search.full_steps)
 
 
 def integrating_or_first_order(p: Problem, free: Fitted, kind: str) -> tuple[Problem, Fitted]:
@@ -204,17 +201,17 @@ def integrating_or_first_order(p: Problem, free: Fitted, kind: str) -> tuple[Pro
     """
     rows = [v for v in CANDIDATES if v.replaces]
     x = CandidateInputs(p, (), Circumstances(kind))
-    longest = SETTLES * p.inputs.dt_s * p.y.size
+    longest = p.limits.search.settles * p.inputs.dt_s * p.y.size
     if float(free.model.c[Slot.T]) <= longest or not applies(x, free, rows[0]):
         return p, free
-    ended = candidate(p, free, start_models(x, free, rows[0]), FULL_STEPS)
-    if ended.gain < -SAME:
+    ended = candidate(p, free, start_models(x, free, rows[0]), p.limits.search.full_steps)
+    if ended.gain < -p.limits.search.same:
         return p, free
     held = replace(p, inputs=replace(p.inputs, longest_s=longest))
     c = free.model.c.copy()
     c[Slot.K] *= longest / c[Slot.T]
     c[Slot.T] = longest
-    return held, descend(held, Model((), c), FULL_STEPS)
+    return held, descend(held, Model((), c), p.limits.search.full_steps)
 
 
 def stiction_candidates(
@@ -227,7 +224,7 @@ def stiction_candidates(
     """Sticking valves scanned about the best play, where a play or the like gains anything at all."""
     plays = [r for r in tried if EFFECTS[r.name].friction is Friction.PLAY]
     hints = [r.gain for r in tried if EFFECTS[r.name].friction is not None]
-    if not plays or max(hints) < STICKING_HINT:
+    if not plays or max(hints) < x.p.limits.search.sticking_hint:
         return []
     out = []
     for row in rows:
@@ -235,5 +232,5 @@ def stiction_candidates(
             tell(row.name)
             fit = fit_sticking(x.p, plays[0].fit, row, near.model.added)
             won = gain(fit, near)
-            out.append(Candidate(fit, won, won - penalty(row)))
+            out.append(Candidate(fit, won, won - penalty(x.p, row)))
     return out

@@ -11,13 +11,8 @@ from identification.mismatch.explanation import Explanation
 from identification.mismatch.recording import Recording
 from identification.simulation.parameters import Slot
 
-ANSWERS = 12.5
-"""Log likelihood [nat] that OP must bring for PV to answer it; ours: chance brings three constants under 8.5 in 999
-of 1,000 records, and the model without OP is not fitted to the end."""
 INSENSITIVE = "needs moves of OP that PV answers; without OP the fit is as good"
 """What is said where PV does not answer OP."""
-ENOUGH = 5.0
-"""Time constants that a recording of a process that settles must hold; the catalogue's need."""
 INTEGRATING = ("level",)
 """Loop types that need not settle, of which a short record still tells the slope."""
 
@@ -35,20 +30,21 @@ def unanswered(found: Explanation) -> str:
     loaded = any(
         row.block == "load" for row in found.best.model.added
     )  # a load is counted in terms of the gain
-    if brings(found.p, found.plain if loaded else found.best) >= ANSWERS:
+    if brings(found.p, found.plain if loaded else found.best) >= found.p.limits.proof.answers:
         return ""
     return INSENSITIVE
 
 
 def too_short(found: Explanation, s: Recording) -> str:
     """What is needed where the record is short against the time constant; empty where it is not."""
+    enough = found.p.limits.proof.time_constants
     lag, length = float(found.plain.model.c[Slot.T]), s.pv.size * s.dt_s
     if s.kind in INTEGRATING or any(v.replaces for v in found.best.model.added):
         return ""
-    if length >= ENOUGH * lag:
+    if length >= enough * lag:
         return ""
     return (
-        f"needs {ENOUGH:.0f} time constants, has {length / lag:.2g} "
+        f"needs {enough:.0f} time constants, has {length / lag:.2g} "
         f"(a record of {_time(length)}, a time constant of about {_time(lag)})"
     )
 

@@ -8,7 +8,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from identification.estimation.limits import WINDOW_SAMPLES, WINDOW_TIMES
 from identification.estimation.prediction_error import Fitted, problem
 from identification.mismatch.catalogue import EFFECTS
 from identification.mismatch.cross_validation import HeldOut, Misfit, OnOther, anchored, course, misfit
@@ -59,8 +58,9 @@ def windows_of(found: Explanation, s: Recording) -> tuple[int, ...]:
     if found.proof is not None and found.proof.window:
         return 0, max(round(found.proof.window * found.p.inputs.dt_s / s.dt_s), 1)
     c = found.plain.model.c
-    memory = WINDOW_TIMES * float(c[Slot.T] + c[Slot.L]) / s.dt_s
-    return 0, max(math.ceil(min(memory, 1e9)), WINDOW_SAMPLES)
+    limits = found.p.limits.proof
+    memory = limits.window_times * float(c[Slot.T] + c[Slot.L]) / s.dt_s
+    return 0, max(math.ceil(min(memory, 1e9)), limits.window_samples)
 
 
 def compared(found: Explanation, others: Sequence[Recording]) -> tuple[HeldOut, tuple[OnOther, ...]]:
@@ -81,7 +81,7 @@ def _compared(
     placed = bool(at and found.proof is not None and found.proof.placed)
     courses = [course(p, fit.model.c, window, placed) for fit in (found.plain, found.best)]
     seen = misfit(p.y, courses[0], window), misfit(p.y, courses[1], window)
-    return HeldOut(0.0, seen, held, seen, window, placed), each
+    return HeldOut(0.0, seen, held, seen, window, placed, p.limits.proof.least_fit), each
 
 
 def proven_on(found: Explanation, others: Sequence[Recording]) -> Explanation:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from identification.controller.check import StatedSettings
-from identification.estimation.limits import THINNED
+from identification.limits.explain import LIMITS, ExplainLimits
 from identification.models import Backlash, Fopdt, Stiction
 from identification.record import Floats, Mask
 
@@ -52,7 +52,7 @@ class Recording:
     dt_s [s]; stamp_s : stamps as logged [s]; stated : the controller as the plant states it; ranged : whether PV's
     range is stated; neighbours : OPs of other loops on the same clock, each shape (n,);
     kind : the loop's type as stated, lower case; cycles : the faulty valve that its cycles show, None where they show
-    none; free_valve : whether it cycles and its cycles convict no valve.
+    none; free_valve : whether it cycles and its cycles convict no valve; limits : what decides about it.
     """
 
     sp: Floats | None
@@ -67,11 +67,13 @@ class Recording:
     kind: str = ""
     cycles: SeenInCycles | None = None
     free_valve: bool = False
+    limits: ExplainLimits = LIMITS
 
     @property
     def circumstances(self) -> Circumstances:
         """By which effects are asked about or not; a controller that is not stated has TYPICAL_SCAN_S."""
-        thinned = self.dt_s >= THINNED * TYPICAL_SCAN_S if self.stated is None else self.stated.thinned
+        scans = self.dt_s / TYPICAL_SCAN_S if self.stated is None else self.stated.scans
+        thinned = scans >= self.limits.controller.thinned
         return Circumstances(self.kind, not thinned, self.free_valve)
 
 

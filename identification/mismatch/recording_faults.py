@@ -4,15 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from identification.estimation.limits import (
-    CLIP_RATIO,
-    CLIP_SAMPLES,
-    GRID_STEP,
-    GRID_STEP_OF_RANGE,
-    JITTER,
-    MISSED,
-    STRAIGHT,
-)
+from identification.limits.explain import LIMITS
+from identification.limits.recorder import RecorderLimits
 from identification.mismatch.recording import STEP, Finding
 from identification.record import Floats, Mask
 
@@ -45,18 +38,18 @@ def straightened(x: Floats, share: float) -> bool:
     return float(straight(x).mean()) >= share and not on_grid(level_gaps(x))
 
 
-def compression(pv: Floats) -> Finding | None:
+def compression(pv: Floats, limits: RecorderLimits = LIMITS.recorder) -> Finding | None:
     """Straight segments whose breaks stand on no grid (swinging door and the like)."""
-    if not straightened(pv, STRAIGHT):
+    if not straightened(pv, limits.straight):
         return None
     found = straight(pv)
     return Finding({"straight_share": float(found.mean())}, found)
 
 
-def quantization(pv: Floats, ranged: bool) -> Finding | None:
+def quantization(pv: Floats, ranged: bool, limits: RecorderLimits = LIMITS.recorder) -> Finding | None:
     """Values on a grid coarser than a historian's; `ranged` is False where percent is of the recorded range."""
     gaps = level_gaps(pv)
-    least = GRID_STEP if ranged else GRID_STEP_OF_RANGE
+    least = limits.grid_step if ranged else limits.grid_step_of_range
     if gaps.size == 0 or gaps.size * 20 > pv.size or float(gaps.mean()) < least:
         return None
     if float(gaps.max()) > 4.0 * float(gaps.mean()):
@@ -64,7 +57,7 @@ def quantization(pv: Floats, ranged: bool) -> Finding | None:
     return Finding({STEP: float(gaps.mean())}, np.ones(pv.size, dtype=bool))
 
 
-def clipped(pv: Floats) -> Finding | None:
+def clipped(pv: Floats, limits: RecorderLimits = LIMITS.recorder) -> Finding | None:
     """PV standing at exactly its highest or lowest value far more often than at those next to it."""
     levels, counts = np.unique(pv, return_counts=True)
     if levels.size < 12:
@@ -72,7 +65,7 @@ def clipped(pv: Floats) -> Finding | None:
     best = None
     for end, near in ((-1, counts[-7:-1]), (0, counts[1:7])):
         top = int(counts[end])
-        enough = top >= CLIP_SAMPLES and top > CLIP_RATIO * float(near.mean())
+        enough = top >= limits.clip_samples and top > limits.clip_ratio * float(near.mean())
         if enough and (best is None or top > best.where.sum()):
             best = Finding({"clip_pct": float(levels[end])}, pv == levels[end])
     return best
@@ -85,15 +78,15 @@ def jitter(stamp_s: Floats, dt_s: float) -> float:
     return float(np.std(spacing)) / np.sqrt(2.0) if spacing.size > 10 else 0.0
 
 
-def sampling(stamp_s: Floats, dt_s: float) -> Finding | None:
+def sampling(stamp_s: Floats, dt_s: float, limits: RecorderLimits = LIMITS.recorder) -> Finding | None:
     """Polling that scatters by more than logging does."""
     found = jitter(stamp_s, dt_s)
-    if found < JITTER:
+    if found < limits.jitter:
         return None
     return Finding({"jitter_samples": found}, np.ones(stamp_s.size, dtype=bool))
 
 
-def unlogged(stamp_s: Floats, n: int, dt_s: float) -> Mask:
+def unlogged(stamp_s: Floats, n: int, dt_s: float, limits: RecorderLimits = LIMITS.recorder) -> Mask:
     """True where a record of n samples holds a value over from before because none was logged, shape (n,).
 
     Nothing is marked where the record does not begin with the first stamp and end with the last.
@@ -102,6 +95,6 @@ def unlogged(stamp_s: Floats, n: int, dt_s: float) -> Mask:
     at = (stamp_s - stamp_s[0]) / dt_s if stamp_s.size else stamp_s
     if stamp_s.size < 2 or abs(float(at[-1]) - (n - 1)) > 1.5:
         return out
-    for k in np.flatnonzero(np.diff(at) > MISSED):
+    for k in np.flatnonzero(np.diff(at) > limits.missed):
         out[int(np.ceil(at[k] + 0.5)) : int(np.floor(at[k + 1] + 0.5))] = True
     return out

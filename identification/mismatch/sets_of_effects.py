@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from identification.estimation.limits import FULL_STEPS, TIE
 from identification.estimation.prediction_error import Fitted, Model, Problem, descend, gain
 from identification.mismatch.catalogue import CANDIDATES, EFFECTS
 from identification.mismatch.cross_validation import passes
@@ -20,16 +19,17 @@ def replacement_step(
 
     Effects are added one at a time, so the first may have been taken in the place of two that act together.
     """
+    limits = x.p.limits.search
     for i, old in enumerate(accepted):
         others = tuple(r for r in best.model.added if r.name != old.name)
-        near = descend(x.p, Model(others, cleared(best.model.c, old.row)), FULL_STEPS)
+        near = descend(x.p, Model(others, cleared(best.model.c, old.row)), limits.full_steps)
         candidates = [r for r in compete(x, near, CANDIDATES, tell) if r.name != old.name]
         if not candidates:
             continue
-        least = gain(best, near) - penalty(old.row) + TIE
+        least = gain(best, near) - penalty(x.p, old.row) + limits.tie
         first = candidates[0]
         if first.penalised > max(least, 0.0) and passes(x.p, near, first.fit, EFFECTS[first.name]):
-            best = descend(x.p, first.fit.model, FULL_STEPS)
+            best = descend(x.p, first.fit.model, limits.full_steps)
             accepted = [*accepted[:i], first, *accepted[i + 1 :]]
     return best, accepted
 
@@ -45,8 +45,8 @@ def without_the_idle(
         if len(accepted) == 1:
             break
         others = tuple(r for r in best.model.added if r.name != old.name)
-        near = descend(p, Model(others, cleared(best.model.c, old.row)), FULL_STEPS)
-        if gain(best, near) < penalty(old.row):
+        near = descend(p, Model(others, cleared(best.model.c, old.row)), p.limits.search.full_steps)
+        if gain(best, near) < penalty(p, old.row):
             best, accepted = near, [c for c in accepted if c.name != old.name]
     return best, accepted
 

@@ -28,7 +28,6 @@ from analyzer.commands.options import opened
 from analyzer.config import Config
 from analyzer.explain.case import case
 from analyzer.loops.spec import spec_of
-from identification.estimation.limits import FULL_STEPS
 from identification.estimation.prediction_error import descend
 from identification.mismatch.answer import parameters_of
 from identification.mismatch.catalogue import CANDIDATES
@@ -56,7 +55,7 @@ def fitted(cases: pathlib.Path, tag: str, effect: str):
     x = candidate_inputs(p, plain, s.circumstances)
     rows = tuple(v for v in CANDIDATES if kin(v.name, effect, KIN))
     best = compete(x, plain, rows)[0]
-    return x.p, descend(x.p, best.fit.model, FULL_STEPS)
+    return x.p, descend(x.p, best.fit.model, x.p.limits.search.full_steps)
 
 
 def said(p, fit) -> dict:

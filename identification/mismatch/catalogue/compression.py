@@ -13,7 +13,7 @@ from identification.record import Floats
 
 def find(s: Recording) -> Finding | None:
     """Straight segments whose breaks stand on no grid."""
-    return recording_faults.compression(s.pv)
+    return recording_faults.compression(s.pv, s.limits.recorder)
 
 
 def numbers(found: Finding, _: Recording) -> dict[str, Estimate]:

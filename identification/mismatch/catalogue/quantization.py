@@ -16,7 +16,7 @@ SURE = 0.01
 
 def find(s: Recording) -> Finding | None:
     """Values on a grid coarser than a historian's."""
-    return recording_faults.quantization(s.pv, s.ranged)
+    return recording_faults.quantization(s.pv, s.ranged, s.limits.recorder)
 
 
 def numbers(found: Finding, _: Recording) -> dict[str, Estimate]:

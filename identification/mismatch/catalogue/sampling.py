@@ -16,7 +16,7 @@ SURE = 0.1
 
 def find(s: Recording) -> Finding | None:
     """Stamps that scatter by more than logging does."""
-    return recording_faults.sampling(s.stamp_s, s.dt_s)
+    return recording_faults.sampling(s.stamp_s, s.dt_s, s.limits.recorder)
 
 
 def numbers(found: Finding, _: Recording) -> dict[str, Estimate]:

@@ -15,7 +15,7 @@ from identification.record import Floats
 
 def find(s: Recording) -> Finding | None:
     """PV standing at exactly its highest or lowest value far more often than at those next to it."""
-    return recording_faults.clipped(s.pv)
+    return recording_faults.clipped(s.pv, s.limits.recorder)
 
 
 def numbers(found: Finding, s: Recording) -> dict[str, Estimate]:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from identification.estimation.limits import TIE
 from identification.mismatch.curves.process import gain_over_pv
 from identification.mismatch.effect import Block, Effect
 from identification.simulation.effect import Param, Variant, each
 from identification.simulation.parameters import Slot
+
+TIE = 2.0
+"""Gain [nat] that it may lack beside a bend in the gain and still be told, being the commoner; ours."""
 
 EFFECT = Effect(
     name="sqrt-outflow",

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from identification.estimation.limits import FULL_STEPS
 from identification.estimation.prediction_error import Fitted, Model, Problem, descend
 from identification.mismatch.catalogue import EFFECTS
 from identification.mismatch.effect import Friction
@@ -63,5 +62,5 @@ def from_cycles(p: Problem, near: Fitted, seen: SeenInCycles, rows: tuple[Varian
         valve = valve_for(row, seen.valve) if is_friction(row.name) else None
         if valve is not None:
             model = Model((*near.model.added, row), begun(p, near, seen, valve))
-            out.append(descend(p, model, FULL_STEPS))
+            out.append(descend(p, model, p.limits.search.full_steps))
     return out

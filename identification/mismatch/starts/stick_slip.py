@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from identification.estimation.limits import SCREEN_STEPS
 from identification.estimation.noise import whitened
 from identification.estimation.prediction_error import Fitted, Model, Problem, descend, loss_of, residual_fit
 from identification.record import Floats
@@ -86,7 +85,7 @@ def fit_sticking(p: Problem, play: Fitted, row: Variant, rows: tuple[Variant, ..
     """
     fits = []
     for c in scanned(p, play, row)[:FOLLOWED]:
-        first = descend(p, Model((*rows, row), settled(p, c, row)), SCREEN_STEPS)
+        first = descend(p, Model((*rows, row), settled(p, c, row)), p.limits.search.screen_steps)
         again = settled(p, first.model.c, row)
-        fits.append(descend(p, replace(first.model, c=again), SCREEN_STEPS))
+        fits.append(descend(p, replace(first.model, c=again), p.limits.search.screen_steps))
     return min(fits, key=lambda fit: fit.loss)

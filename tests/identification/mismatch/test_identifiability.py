@@ -7,11 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from identification.limits.explain import LIMITS
 from identification.mismatch.answer import answer
 from identification.mismatch.diagnosis import inputs_of
 from identification.mismatch.explanation import Explanation
 from identification.mismatch.forward_selection import prepared
-from identification.mismatch.identifiability import ANSWERS, brings, too_short, unanswered
+from identification.mismatch.identifiability import brings, too_short, unanswered
 from identification.mismatch.recording import Recording
 from identification.simulation.parameters import Slot
 from tests.identification.scenes import noise, recording
@@ -49,7 +50,7 @@ def test_slow_level_answers_although_its_gain_is_open() -> None:
     """A near integrator, whose gain and time constant are known by their ratio alone, answers OP all the same."""
     s = recording(5)
     found = plainly(s)
-    assert brings(found.p, found.plain) > 10 * ANSWERS
+    assert brings(found.p, found.plain) > 10 * LIMITS.proof.answers
 
 
 @pytest.mark.parametrize(("kind", "told"), [("temperature", True), ("level", False)])

@@ -1,0 +1,1 @@
+"""Numbers that decide what explains a recording, each with unit, range, meaning and source."""
