@@ -4,7 +4,9 @@ Every limit of `triage config` is moved down and up by 20 % (whole numbers by on
 kept), and the stage that it belongs to is asked again: quality, oscillation and figures of 240 untidy loops
 (tests/untidy), oscillation of 900 records without any (nulls.py) too, the causes of those that can be fitted,
 settings of 60 that are stated wrong by half, advice on 30 simulated loops, groups of coupled plants (tests/coupled),
-comparisons of weeks. A limit that no answer notices is listed.
+comparisons of weeks, recorder, controller and effects of sealed cases (tests/concealed). A limit that no answer
+notices is set to both ends of its range, which switches most of them off: what an answer notices then is a guard that
+stands well clear of the sample; what none notices even so is listed apart.
 Sections of resources and of how nights are cut (workers, opening, nights) decide no finding and are left
 out. Writes tests/proofs/limits.md.
 """
@@ -19,9 +21,9 @@ from multiprocessing import Pool
 from pathlib import Path
 from typing import Any
 
+from identification.limits.declare import KEY, Limit
 from tests.proofs.limits_samples import DEFAULT, OF_FITS
 from tests.proofs.limits_stages import STAGES
-from tuning.declare import KEY, Limit
 
 OUT = Path(__file__).with_suffix(".md")
 STEP = 0.2
@@ -38,7 +40,10 @@ def moved(value: float, said: Limit, way: float) -> float:
 
 @dataclass(frozen=True)
 class Effect:
-    """A limit with how many answers change when it is lowered and raised; None where its range ends there."""
+    """A limit with how many answers change when it is lowered and raised; None where its range ends there.
+
+    at_ends : how many do at the end of its range where most do; None where a fifth of it is noticed already.
+    """
 
     section: str
     name: str
@@ -46,6 +51,7 @@ class Effect:
     lower: int | None
     higher: int | None
     answers: int
+    at_ends: int | None = None
 
     @property
     def noticed(self) -> bool:
@@ -65,16 +71,19 @@ def effect(job: tuple[str, str]) -> Effect:
     own = getattr(DEFAULT, section)
     said = next(f.metadata[KEY] for f in fields(own) if f.name == name)
     value, base = getattr(own, name), usual(section, section == "cause" and name not in OF_FITS)
-    counts = []
-    for way in (-1.0, 1.0):
-        new = moved(value, said, way)
+
+    def changed(new: float) -> int | None:
         if new == value:
-            counts.append(None)
-            continue
+            return None
         asked = STAGES[section](replace(DEFAULT, **{section: replace(own, **{name: new})}))
-        differ = sum(a != b for a, b in zip(base, asked, strict=False)) + abs(len(base) - len(asked))
-        counts.append(differ)
-    return Effect(section, name, value, counts[0], counts[1], len(base))
+        return sum(a != b for a, b in zip(base, asked, strict=False)) + abs(len(base) - len(asked))
+
+    lower, higher = (changed(moved(value, said, way)) for way in (-1.0, 1.0))
+    found = Effect(section, name, value, lower, higher, len(base))
+    if found.noticed:
+        return found
+    ends = [changed(type(value)(end)) for end in (said.least, said.most)]
+    return replace(found, at_ends=max(n or 0 for n in ends))
 
 
 def jobs(sections: Sequence[str]) -> list[tuple[str, str]]:
@@ -89,14 +98,16 @@ def jobs(sections: Sequence[str]) -> list[tuple[str, str]]:
 
 def table(found: Sequence[Effect]) -> str:
     """Effects as Markdown, those that nothing notices first by name."""
-    silent = [f"`{e.section}.{e.name}`" for e in found if not e.noticed]
+    clear = [e for e in found if e.at_ends]
+    silent = [f"`{e.section}.{e.name}`" for e in found if e.at_ends == 0]
     head = (
-        f"{len(found)} limits moved by a fifth; {len(found) - len(silent)} change an answer of this sample. What "
-        f"none of its answers notices: {', '.join(silent) or 'nothing'}."
+        f"{len(found)} limits moved by a fifth; {len(found) - len(clear) - len(silent)} change an answer of this "
+        f"sample, {len(clear)} more do at an end of their range. What none of its answers notices even so: "
+        f"{', '.join(silent) or 'nothing'}."
     )
-    lines = ["| limit | value | lowered | raised | of answers |", "|---|--:|--:|--:|--:|"]
+    lines = ["| limit | value | lowered | raised | at an end | of answers |", "|---|--:|--:|--:|--:|--:|"]
     for e in found:
-        cells = ("–" if n is None else str(n) for n in (e.lower, e.higher))
+        cells = ("–" if n is None else str(n) for n in (e.lower, e.higher, e.at_ends))
         lines.append(f"| {e.section}.{e.name} | {e.value:g} | {' | '.join(cells)} | {e.answers} |")
     return "\n".join([head, "", *lines, ""])
 

@@ -38,6 +38,7 @@ from tests.proofs.limits_samples import (
     tried,
     weeks,
 )
+from tests.proofs.limits_sealed import of_controller, of_effects, of_recorder
 
 
 def of_quality(c: Config) -> list[Any]:
@@ -154,5 +155,9 @@ STAGES: dict[str, Callable[[Config], list[Any]]] = {
     "figures": of_figures,
     "before_after": of_weeks,
     "changes": of_changes,
+    "explain_recorder": of_recorder,
+    "explain_controller": of_controller,
+    "explain_search": of_effects,
+    "explain_proof": of_effects,
 }
 """Sections of the limits, and what asks the stage that each belongs to."""
