@@ -20,6 +20,7 @@ from analyzer.plantwide.wave import Wave, waves_of
 from analyzer.quality import Prepared
 from analyzer.sample_clock import constant_for
 from analyzer.settings_check import SettingsDiffer, differing
+from analyzer.slip_by_slip import told_slip_by_slip
 from analyzer.trends import BUCKETS, FINE_BUCKETS, close_view, thinned
 from identification.errors import NotAssessedError
 from identification.models import Pid
@@ -125,6 +126,8 @@ def cause_of(
         verdict = not_assessed(Needs(Lack.UNBROKEN, str(error))) if oscillation is not None else NO_CAUSE
         return with_dead_valve(verdict, dead) if dead else verdict
     verdict = verdict_by_measures(measured, prepared, oscillation, config)
+    if oscillation is not None:
+        verdict = told_slip_by_slip(verdict, oscillation.period_s, config.cause)
     return with_dead_valve(verdict, dead) if dead and verdict.cause is not Cause.VALVE else verdict
 
 

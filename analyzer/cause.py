@@ -104,7 +104,7 @@ def combined(signs: Iterable[Sign]) -> float:
     return 100.0 * (1.0 - doubt)
 
 
-def _fault(m: Measured, limits: CauseLimits) -> Fault:
+def fault_of(m: Measured, limits: CauseLimits) -> Fault:
     """Backlash or stiction, by what a slip jump adds to a play."""
     if m.stick_slip is None:
         return Fault.BACKLASH
@@ -133,7 +133,7 @@ def judge(m: Measured, oscillation: Oscillation | None, limits: CauseLimits) -> 
     if first is Cause.VALVE and (m.size < limits.least_size or not speaks(m, limits, True)):
         confidence[first] = min(confidence[first], 0.9 * limits.named_pct)
     cause = first if confidence[first] >= _least(first, m, limits) else Cause.UNDECIDED
-    fault = _fault(m, limits) if cause is Cause.VALVE else Fault.NONE
+    fault = fault_of(m, limits) if cause is Cause.VALVE else Fault.NONE
     return Verdict(cause, confidence, fault, signs_of(m, oscillation), measured=m)
 
 
@@ -159,7 +159,7 @@ def _quiet(m: Measured, limits: CauseLimits) -> Verdict:
     if not is_valve:
         pct = min(pct, 0.5 * limits.named_pct)
     confidence = {Cause.VALVE: pct, Cause.TUNING: 0.0, Cause.LOAD: 0.0}
-    fault = _fault(m, limits) if is_valve else Fault.NONE
+    fault = fault_of(m, limits) if is_valve else Fault.NONE
     return Verdict(Cause.VALVE if is_valve else Cause.NONE, confidence, fault, signs, measured=m)
 
 
@@ -168,7 +168,8 @@ def hidden_by_grid(m: Measured, pv_step: float, limits: CauseLimits) -> bool:
     holds PV still as the valve would."""
     best = m.stick_slip if m.stick_slip is not None and m.jump > limits.evidence_jump else m.play
     moved = abs(best.gain) * best.valve.stickband
-    return m.window.position is None and moved < limits.grid_steps * pv_step
+    recorded = m.window.position is not None and not m.window.decoded
+    return not recorded and moved < limits.grid_steps * pv_step
 
 
 def as_hint(verdict: Verdict, most_pct: float) -> Verdict:

@@ -9,6 +9,7 @@ import numpy as np
 from analyzer.advice import lag_factor
 from analyzer.limits.advice import AdviceLimits
 from identification.estimation.covariance import (
+    DECODED,
     JUMPING,
     LATER,
     LEAST_BAND,
@@ -46,6 +47,8 @@ def intervals(window: Window, fit: Fit, valve: bool, limits: AdviceLimits) -> di
         out["time_constant_s"] = Estimate(t, t / wide, t * wide, "s")
     dead_s = fit.dead_time_s + window.half_block_s
     out["dead_time_s"] = _around(dead_s, half_width(spread[1], LEAST_BLOCK * window.dt_s), "s", least=0.0)
+    if valve and window.decoded:
+        spread[2] = DECODED * fit.valve.stickband
     if valve:
         name = "backlash_pct" if fit.valve.slip_jump == 0 else "stickband_pct"
         out[name] = _around(fit.valve.stickband, half_width(spread[2]), "% of OP", least=0.0)

@@ -175,12 +175,16 @@ def process_of(window: Window, fit: Fit) -> Fopdt:
     return Fopdt(fit.gain, fit.time_constant_s, fit.dead_time_s + window.half_block_s)
 
 
-def disturbance(window: Window, fit: Fit) -> Floats:
-    """PV less the whole model, slow terms included [% PV], shape (n,)."""
+def slow_terms(window: Window, fit: Fit) -> Floats:
+    """Mean, trend, decay and step of PV by a fit [% PV], shape (n,)."""
     n = window.y.size
     t = 2.0 * np.arange(n) / n - 1.0
     decay = np.exp(-np.arange(n) * window.dt_s / fit.time_constant_s)
     if fit.time_constant_s > 0.5 * window.duration_s:
         decay[:] = 0.0
-    slow = fit.base[0] + fit.base[1] * t + fit.base[2] * decay + fit.base[3] * window.extra
-    return residual(window, fit) - slow
+    return np.asarray(fit.base[0] + fit.base[1] * t + fit.base[2] * decay + fit.base[3] * window.extra)
+
+
+def disturbance(window: Window, fit: Fit) -> Floats:
+    """PV less the whole model, slow terms included [% PV], shape (n,)."""
+    return residual(window, fit) - slow_terms(window, fit)

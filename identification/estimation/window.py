@@ -42,7 +42,7 @@ class Window:
     y : PV [% PV] in blocks, shape (n,); op : OP [% OP] at the record's own interval, shape (n * factor,);
     usable : bool, shape (n,), False at gaps; dt_s : interval of the blocks [s]; most_time_constant_s and
     most_dead_time_s : what is known of such processes [s], inf where nothing is; step_at : block at which the
-    load steps, 0 where it does not; position : stem [% OP], shape of op, where recorded;
+    load steps, 0 where it does not; position : stem [% OP], shape of op, where recorded or, `decoded`, told from PV;
     fine : whether responses are stepped at the record's own interval rather than in blocks. Within a block OP
     answers PV's noise, which a fine response meets where the dead time is shorter than the block; in blocks it counts
     from the next one on.
@@ -58,6 +58,7 @@ class Window:
     step_at: int = 0
     position: Floats | None = None
     fine: bool = False
+    decoded: bool = False
 
     @cached_property
     def extra(self) -> Floats:

@@ -1,0 +1,194 @@
+"""Stick-slip whose slips come at distances that scatter: friction, stem and process found together, path by path."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from identification.estimation.gauss_newton import descend
+from identification.estimation.hammerstein import Fit, ValveTrial, residual, slow_terms, sticking
+from identification.estimation.likelihood_ratio import WindowFit, evidence
+from identification.estimation.noise import every_lag, whitened
+from identification.estimation.slip_paths import Friction, Response, decoded, log_chance
+from identification.estimation.window import Window
+from identification.record import Floats
+from identification.simulation.discretization import unit_lag
+from identification.simulation.valve import play as play_stem
+
+WIDTHS = (0.78, 0.88, 0.98, 1.12)
+"""Stickbands tried, in widths of the play that fits best; ours: on simulated dry friction 0.73 to 1.15."""
+JUMPS = (0.35, 0.6, 0.9)
+"""Slip jumps tried, in stickbands."""
+LATER = (0.0, 0.8, 1.6, 2.8)
+"""Dead times tried, in blocks beyond the play's: a play in place of a jump answers too soon."""
+SCREENED, CARRIED = 8, 16
+"""Paths side by side while these are tried, and later; ours: 24 find nothing that 16 do not."""
+FOLLOWED = 4
+"""Trials that are followed, of each share of the jump two at most."""
+ROUNDS = 5
+"""Turns of decoding and fitting; ours: the fourth and fifth gain a few nat."""
+HOT = (8.0, 4.0, 2.0, 1.0)
+"""Times the innovations' variance in the first rounds, in which the process is not known yet."""
+FEWEST = 6
+"""Slips of a path at least."""
+RESTS = 0.9
+"""Longest rest of a stem, in periods, while the process is not known: one that parks explains nothing."""
+STEPS = (0.15, 0.08, 0.04)
+"""Relative steps of the search for the friction in the end."""
+DEAD_STEPS = 8.0
+"""Blocks of dead time that a step of one takes; ours: a stem that lets go later is like one behind a longer pipe."""
+MOVES = ((1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1), (1, 0, -1), (-1, 0, 1))
+"""Steps that are tried of stickband, jump and dead time."""
+WORTH = 1.0
+"""Gain [nat] of a step from which it is taken."""
+
+
+class SlipPath(NamedTuple):
+    """A stem as decoded [% OP], shape of the window's op, the fit behind it, the log probability of its slips."""
+
+    fit: Fit
+    stem: Floats
+    chance: float
+
+    @property
+    def worth(self) -> float:
+        """Log likelihood of fit and slips [nat]."""
+        return self.fit.log_likelihood + self.chance
+
+
+@dataclass(frozen=True, slots=True)
+class _Trial:
+    """A friction and dead time under which a stem was decoded, with its log probability."""
+
+    score: float
+    band: float
+    share: float
+    later: float
+    stem: Floats
+
+
+def _response(window: Window, fit: Fit, mean: float) -> Response:
+    """How PV follows a stem whose mean is known [% OP], by a fit."""
+    dead_s = fit.dead_time_s + window.half_block_s
+    pole, now, before, delay = unit_lag(fit.time_constant_s, dead_s, window.dt_s / window.factor)
+    return Response(pole, now, before, int(delay), fit.gain, slow_terms(window, fit) - fit.gain * mean)
+
+
+def _friction(band: float, share: float, rest: int) -> Friction:
+    return Friction(0.5 * band * (1.0 + share), 0.5 * band * (1.0 - share), rest)
+
+
+def _slips(stem: Floats) -> int:
+    return int((np.diff(stem) != 0).sum())
+
+
+def _screened(window: Window, play: Fit, noise: Floats, rest: int) -> list[_Trial]:
+    """Frictions and dead times about a play, each with its stem, best first, under a noise model of its own."""
+    left = residual(window, play) - slow_terms(window, play)
+    e = whitened(left, noise, every_lag(noise.size))[noise.size :]
+    sigma2 = float(np.mean(e[window.usable[noise.size :]] ** 2))
+    mean, out = float(play_stem(window.op, play.valve.stickband).mean()), []
+    for later in LATER:
+        r = _response(window, replace(play, dead_time_s=play.dead_time_s + later * window.dt_s), mean)
+        for width in WIDTHS:
+            for share in JUMPS:
+                band = width * play.valve.stickband
+                f = _friction(band, share, rest)
+                stem, score = decoded(window.op, window.centred, window.factor, r, noise, sigma2, f, SCREENED)
+                out.append(_Trial(score, band, share, later, stem))
+    return sorted(out, key=lambda t: -t.score)
+
+
+def _chosen(tried: list[_Trial]) -> list[_Trial]:
+    """The best trials that differ: of each share of the jump two, at different dead times."""
+    out: list[_Trial] = []
+    for t in tried:
+        same = [c.later for c in out if c.share == t.share]
+        if len(same) < 2 and t.later not in same and _slips(t.stem) >= FEWEST:
+            out.append(t)
+    return out[:FOLLOWED]
+
+
+def _path(window: Window, fit: Fit, valve: ValveTrial, stem: Floats) -> SlipPath:
+    """The process behind a stem, as if that had been recorded."""
+    found = descend(replace(window, position=stem), replace(fit, valve=valve))
+    return SlipPath(found, stem, log_chance(window.op, stem, valve.breakaway))
+
+
+def _decoded_by(window: Window, fit: Fit, mean: float, f: Friction, hot: float) -> Floats:
+    r, sigma2 = _response(window, fit, mean), hot * fit.sigma2
+    return decoded(window.op, window.centred, window.factor, r, fit.ar, sigma2, f, CARRIED)[0]
+
+
+def _followed(window: Window, play: Fit, begun: _Trial, rest: int) -> SlipPath:
+    """Process and stem found in turns from a trial; the most probable of them."""
+    valve, stem = sticking(begun.band, begun.share), begun.stem
+    fit = replace(play, dead_time_s=play.dead_time_s + begun.later * window.dt_s)
+    best = path = _path(window, fit, valve, stem)
+    for k in range(1, ROUNDS):
+        f = _friction(begun.band, begun.share, rest if k == 1 else window.op.size)
+        stem = _decoded_by(window, path.fit, float(path.stem.mean()), f, HOT[min(k - 1, len(HOT) - 1)])
+        if _slips(stem) < FEWEST:
+            break
+        path = _path(window, path.fit, valve, stem)
+        best = max(best, path, key=lambda p: p.worth)
+    return best
+
+
+def _moved(window: Window, best: SlipPath, wider: float, jumpier: float, later: float) -> SlipPath | None:
+    """The path under another stickband, jump and dead time; None where these are none, or it has no slips."""
+    v = best.fit.valve
+    band, share = v.stickband * (1.0 + wider), v.slip_jump / v.stickband + 2.0 * jumpier
+    dead_s = best.fit.dead_time_s + later * DEAD_STEPS * window.dt_s
+    if not 0.0 < share <= 1.0 or dead_s < 0.0:
+        return None
+    fit, f = replace(best.fit, dead_time_s=dead_s), _friction(band, share, window.op.size)
+    stem = _decoded_by(window, fit, float(best.stem.mean()), f, 1.0)
+    return _path(window, fit, sticking(band, share), stem) if _slips(stem) >= FEWEST else None
+
+
+def _settled(window: Window, best: SlipPath) -> SlipPath:
+    """Stickband, jump and dead time moved by ever smaller steps to the most probable path."""
+    for step in STEPS:
+        moving = True
+        while moving:
+            moving = False
+            for move in MOVES:
+                path = _moved(window, best, *(step * m for m in move))
+                if path is not None and path.worth > best.worth + WORTH:
+                    best, moving = path, True
+    return best
+
+
+def fit_irregular(window: Window, play: Fit, noise: Floats, period_s: float) -> SlipPath | None:
+    """The most probable path of a sticking stem in a loop that cycles; None where none is as likely as the play.
+
+    Parameters
+    ----------
+    window : Window
+        In blocks, without a recorded stem.
+    play : Fit
+        The best play.
+    noise : ndarray of shape (order,)
+        A noise model that takes no valve's side, under which the search begins.
+    period_s : float
+        Of the cycle [s].
+    """
+    rest = max(int(RESTS * period_s * window.factor / window.dt_s), 1)
+    begun = _chosen(_screened(window, play, noise, rest))
+    best = max((_followed(window, play, t, rest) for t in begun), key=lambda p: p.worth, default=None)
+    if best is None or best.worth < play.log_likelihood:
+        return None
+    return _settled(window, best)
+
+
+def path_evidence(window: Window, path: SlipPath, rival: Fit) -> float:
+    """Log likelihood [nat] of a path, its slips' chance with it, over a fit of the same window without it."""
+    return evidence(WindowFit(told_by(window, path), path.fit), WindowFit(window, rival)) + path.chance
+
+
+def told_by(window: Window, path: SlipPath) -> Window:
+    """The window with the stem as decoded, behind which the path's fit is one."""
+    return replace(window, position=path.stem, decoded=True)

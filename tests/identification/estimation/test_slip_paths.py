@@ -1,0 +1,164 @@
+"""Stems told slip by slip: the beam against every path there is, friction that scatters, and play, which has none."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from scipy.stats import norm
+
+from identification.estimation.backlash_stiction import fit_linear, fit_play, generic_noise
+from identification.estimation.irregular_slips import fit_irregular
+from identification.estimation.slip_paths import (
+    SCATTER,
+    STUCK,
+    Friction,
+    Response,
+    decoded,
+    log_chance,
+    slip_chance,
+)
+from identification.estimation.window import Window
+from identification.record import Floats
+
+POLE, DELAY, GAIN = 0.7, 2, 1.5
+BREAKAWAY, SLIDING, NOISE = 1.0, 0.2, 0.02
+
+
+def chance_of(op: Floats, slips: tuple[int, ...], start: float) -> tuple[float, Floats]:
+    """Log probability of slips at some samples, and the stem, written out by the normal distribution of scipy."""
+    scatter = SCATTER * BREAKAWAY
+    stem, out, farthest, total = start, np.empty(op.size), {True: 0.0, False: 0.0}, 0.0
+    for k, u in enumerate(op):
+        up, far = u > stem, abs(u - stem)
+        if k > 0 and far > BREAKAWAY * (1 - 3.5 * SCATTER) and far > farthest[up]:
+            borne = norm.sf(farthest[up], BREAKAWAY, scatter)
+            stays = norm.sf(far, BREAKAWAY, scatter) / borne
+            if k in slips:
+                total += math.log(max(1.0 - stays, 1e-300))
+                stem, farthest = u - math.copysign(SLIDING, u - stem), {True: 0.0, False: 0.0}
+            else:
+                total += math.log(max(stays, 1e-12))
+                farthest[up] = far
+        elif k in slips:
+            return -math.inf, out
+        out[k] = stem
+    return total, out
+
+
+def responded(stem: Floats) -> Floats:
+    """PV without noise: a lag and a delay, step by step."""
+    x, pv = stem[0], np.empty(stem.size)
+    for k in range(stem.size):
+        pv[k] = GAIN * x
+        x = POLE * x + (1 - POLE) * stem[max(k - DELAY, 0)]
+    return pv
+
+
+def test_the_path_is_the_best_of_all_there_are():
+    """On a short record the path told is the most probable of every choice of slips, its log probability too."""
+    rng = np.random.default_rng(3)
+    op = 1.25 * np.sin(np.arange(26) * 0.5)
+    start = op[0] - BREAKAWAY
+    possible = [k for k in range(1, op.size) if abs(op[k]) > 0.2]
+    truth = max(
+        (chance_of(op, slips, start) for n in (3, 4) for slips in itertools.combinations(possible, n)),
+        key=lambda found: found[0],
+    )[1]
+    pv = responded(truth) + NOISE * rng.standard_normal(op.size)
+
+    def worth(slips: tuple[int, ...]) -> tuple[float, Floats]:
+        chance, stem = chance_of(op, slips, start)
+        e = pv - responded(stem) - (pv[0] - responded(stem)[0]) * POLE ** np.arange(op.size)
+        return chance - 0.5 * float((e[1:] ** 2).sum()) / NOISE**2, stem
+
+    every = [worth(s) for n in range(6) for s in itertools.combinations(possible, n)]
+    best, stem = max(every, key=lambda found: found[0])
+    r = Response(POLE, 1 - POLE, 0.0, DELAY, GAIN, np.zeros(op.size))
+    found, score = decoded(op, pv, 1, r, np.zeros(1), NOISE**2, Friction(BREAKAWAY, SLIDING, 1000), 200)
+    assert score >= best - 1e-6  # it may begin at other places too
+    np.testing.assert_allclose(np.flatnonzero(np.diff(found)), np.flatnonzero(np.diff(stem)))
+    np.testing.assert_allclose(found[5:], stem[5:], atol=1e-12)
+
+
+def test_chance_of_slips_is_that_of_a_normal_threshold():
+    """The chance of letting go between two distances is the normal one, and a path's is the product of its own."""
+    at = np.linspace(0.85, 1.2, 8)
+    for farthest, far in itertools.pairwise(at):
+        wanted = 1.0 - norm.sf(far, 1.0, SCATTER) / norm.sf(farthest, 1.0, SCATTER)
+        assert slip_chance(far, farthest, 1.0) == pytest.approx(wanted, rel=1e-6)
+    op = 1.4 * np.sin(np.arange(60) * 0.3)
+    stem, slips = 0.0, []
+    for k in range(1, op.size):
+        if abs(op[k] - stem) > BREAKAWAY:
+            stem = op[k] - math.copysign(SLIDING, op[k] - stem)
+            slips.append(k)
+    total, path = chance_of(op, tuple(slips), 0.0)
+    assert len(slips) >= 5
+    assert log_chance(op, path, BREAKAWAY) == pytest.approx(total, abs=1e-6)
+
+
+def test_a_stem_does_not_park():
+    """A stem that rests longer than it may costs as much each time, so one that moves is told instead."""
+    op = 1.05 * np.sin(np.arange(200) * 0.1)
+    r = Response(POLE, 1 - POLE, 0.0, DELAY, GAIN, np.zeros(op.size))
+    _, free = decoded(op, np.zeros(op.size), 1, r, np.zeros(1), 1.0, Friction(BREAKAWAY, SLIDING, 1000), 50)
+    _, held = decoded(op, np.zeros(op.size), 1, r, np.zeros(1), 1.0, Friction(BREAKAWAY, SLIDING, 40), 50)
+    assert held <= free
+    assert free - held < 6 * STUCK
+
+
+def cycled(scatter: float, seed: int, n: int = 4000) -> tuple[Floats, Floats]:
+    """PV and OP, each (n,), of a vessel that integrates behind a stem that lets go at 1.5 %, give or take a share.
+
+    Play where the share is 0. Stepped in plain Python; no line of the simulator is in it.
+    """
+    rng = np.random.default_rng(seed)
+    slope, dead, kp, ti = 0.1, 3, 0.8, 40.0
+    stem, x, total, op, limit = 50.0, 3.0, 50.0, 50.0, 1.5
+    pipe, pv_out, op_out = [50.0] * dead, np.empty(n), np.empty(n)
+    for k in range(n):
+        pv = 50.0 + x + 0.04 * rng.standard_normal()
+        total += kp * (50.0 - pv) / ti
+        op = total + kp * (50.0 - pv)
+        pv_out[k], op_out[k] = pv, op
+        if scatter == 0.0:
+            stem = min(max(stem, op - 1.1), op + 1.1)
+        elif abs(op - stem) > limit:
+            stem = op - math.copysign(0.7, op - stem)
+            limit = 1.5 * (1.0 + scatter * rng.standard_normal())
+        pipe.append(stem)
+        x += slope * (pipe.pop(0) - 50.0)
+    return np.round(pv_out, 2), np.round(op_out, 2)
+
+
+def asked(scatter: float, seed: int):
+    """Window, play and path of such a loop, its first quarter left out."""
+    pv, op = (x[1000:] for x in cycled(scatter, seed))
+    window = Window(pv, np.ascontiguousarray(op), np.ones(pv.size, dtype=bool), 1.0)
+    crossings = int((np.diff(np.sign(op - op.mean())) != 0).sum())
+    period = 2.0 * op.size / max(crossings, 1)
+    period = max(period, 40.0)
+    play = fit_play(window, fit_linear(window, period), period)
+    return play, fit_irregular(window, play, generic_noise(), period)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_friction_that_scatters_is_told(seed):
+    """Slips at distances that scatter by 5 % give stickband within a tenth, jump within a third, the process too."""
+    play, path = asked(0.05, seed)
+    assert path is not None
+    assert path.worth > play.log_likelihood + 20.0
+    assert path.fit.valve.stickband == pytest.approx(2.2, rel=0.1)
+    assert path.fit.valve.slip_jump == pytest.approx(0.8, rel=0.35)
+    assert path.fit.dead_time_s == pytest.approx(3.0, abs=1.0)
+    assert path.fit.slope == pytest.approx(0.1, rel=0.3)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_play_has_no_slips(seed):
+    """A play, which never jumps, is not told as friction whose slips scatter."""
+    _, path = asked(0.0, seed)
+    assert path is None
