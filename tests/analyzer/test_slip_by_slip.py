@@ -1,0 +1,29 @@
+"""Valves of simulated dry friction and of play, made by physics that shares no code: how each fails is named."""
+
+from __future__ import annotations
+
+import pytest
+
+from tests.proofs.coverage import FAMILIES, assessed, made
+
+PLAY, STICKS = FAMILIES[:2]
+
+
+@pytest.mark.parametrize("seed", [60_700_009, 60_700_011, 60_700_013])
+def test_dry_friction_sticks(seed):
+    """A stem with mass and dry friction is stiction, its stickband within a tenth, slips scattering or not."""
+    loop = made(STICKS, seed)
+    verdict = assessed(loop).verdict
+    assert (verdict.cause, verdict.fault) == ("valve", "stiction")
+    assert verdict.measured is not None
+    assert verdict.measured.stick_slip is not None
+    assert verdict.measured.stick_slip.valve.stickband == pytest.approx(loop.truth["stickband_pct"], rel=0.1)
+
+
+@pytest.mark.parametrize("seed", [60_800_000, 60_800_001, 60_800_002, 60_800_004])
+def test_play_does_not(seed):
+    """A stem with play is backlash, and no stem is decoded for it."""
+    verdict = assessed(made(PLAY, seed)).verdict
+    assert (verdict.cause, verdict.fault) == ("valve", "backlash")
+    assert verdict.measured is not None
+    assert not verdict.measured.window.decoded
