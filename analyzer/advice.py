@@ -61,13 +61,20 @@ class Proposed:
 
 def chosen_fit(verdict: Verdict) -> Fit:
     """The fit that a verdict rests on."""
-    m = _measured(verdict)
+    m = measured_of(verdict)
     if verdict.cause is not Cause.VALVE:
         return m.linear
     return m.stick_slip if verdict.fault is Fault.STICTION and m.stick_slip is not None else m.play
 
 
-def _measured(verdict: Verdict) -> Measured:
+def measured_of(verdict: Verdict) -> Measured:
+    """What a verdict rests on.
+
+    Raises
+    ------
+    ValueError
+        Where it has no model.
+    """
     if verdict.measured is None:
         raise ValueError("a verdict without a model has no fit")
     return verdict.measured
@@ -81,7 +88,7 @@ def valve_of(verdict: Verdict, fit: Fit) -> Valve:
 def model_of(verdict: Verdict, controller: Pid) -> Loop:
     """The closed loop that a verdict's model and the settings make."""
     fit = chosen_fit(verdict)
-    process = process_of(_measured(verdict).window, fit)
+    process = process_of(measured_of(verdict).window, fit)
     return Loop(process, controller, valve_of(verdict, fit))
 
 
@@ -230,7 +237,8 @@ def sought_for(verdict: Verdict, controller: Pid, limits: AdviceLimits) -> tuple
     Where the loop with its play does not cycle, and with the stick-slip that was tried beside it does, the stem
     sticks: something must move it.
     """
-    m, fit = _measured(verdict), chosen_fit(verdict)
+    verdict = verdict.for_settings
+    m, fit = measured_of(verdict), chosen_fit(verdict)
     loop = replace(model_of(verdict, controller), process=tuned(m.window, fit, True, limits))
     other = _sticks(m, controller, limits) if fit is m.play else None
     if other is None or m.stick_slip is None or not _cycles_alone(other, loop):
@@ -241,10 +249,11 @@ def sought_for(verdict: Verdict, controller: Pid, limits: AdviceLimits) -> tuple
 
 def propose(verdict: Verdict, controller: Pid, period_s: float | None, config: Config) -> Proposed:
     """The tuning package's proposal on the model of a verdict, on its uncertainty, and on the load it leaves."""
-    window, fit = _measured(verdict).window, chosen_fit(verdict)
+    source, verdict = verdict.source, verdict.for_settings
+    window, fit = measured_of(verdict).window, chosen_fit(verdict)
     loop = model_of(verdict, controller)
     if verdict.cause not in (Cause.VALVE, Cause.TUNING):
-        return Proposed(recommend(loop, verdict.cause, limits=config.tuning, source=verdict.source))
+        return Proposed(recommend(loop, verdict.cause, limits=config.tuning, source=source))
     if loop.controller.kp * loop.process.slope <= 0.0:
         return Proposed(recommend(loop, verdict.cause, limits=config.tuning))
     if loop.process.dead_time_s > config.advice.beyond_record * window.duration_s:

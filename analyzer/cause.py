@@ -42,7 +42,7 @@ class Verdict:
 
     cause; confidence [%] of each cause; fault of the valve; signs in words; source : the loop that leads, empty where
     none is known; needs : what the record lacks for a cause, None where it lacks nothing; measured; dead : the valve
-    no longer moves PV at all.
+    no longer moves PV at all; steady : the same by one friction for all slips, where it was told slip by slip since.
     """
 
     cause: Cause
@@ -53,6 +53,12 @@ class Verdict:
     needs: Needs | None = None
     measured: Measured | None = None
     dead: bool = False
+    steady: Verdict | None = None
+
+    @property
+    def for_settings(self) -> Verdict:
+        """The verdict on whose model settings are sought: that of one friction for all slips (slip_by_slip.py)."""
+        return self if self.steady is None or self.cause is not Cause.VALVE else self.steady
 
 
 NO_CAUSE = Verdict(Cause.NONE, dict.fromkeys(CAUSES, 0.0), Fault.NONE)

@@ -11,6 +11,7 @@ import numpy as np
 from analyzer.advice import (
     Advice,
     chosen_fit,
+    measured_of,
     model_of,
     propose,
     sought_for,
@@ -114,19 +115,19 @@ def tune(found: Assessment, controller: Pid, config: Config, kept: Advice | None
         raise NotAssessedError(str(verdict.needs or NO_MODEL))
     first = found.oscillations.first
     period = first.period_s if first else None
-    window = verdict.measured.window
+    tried_on = measured_of(verdict.for_settings)
     model, fit, others = _model(verdict, controller, config.advice)
     if kept is not None and kept.reason and kept.action is not None:
         proposal = Proposal(kept.action, kept.reason)
     else:
         proposal = propose(verdict, controller, period, config).proposal
-    load = load_of(window, fit, controller)
+    load = load_of(tried_on.window, fit, controller)
     new = proposal.controller or proposal.meanwhile
     forecast = (
         predict(model, new, load, others) if new and load.size >= config.advice.forecast_scans else None
     )
     return Tuning(
-        intervals(window, fit, verdict.cause is Cause.VALVE, config.advice),
+        identified(found, config.advice)[2],
         model,
         period,
         first.amplitude_pct if first else None,
