@@ -10,8 +10,8 @@ import numpy as np
 from identification.estimation.gauss_newton import descend
 from identification.estimation.hammerstein import Fit, ValveTrial, residual, slow_terms, sticking
 from identification.estimation.likelihood_ratio import WindowFit, evidence
-from identification.estimation.noise import every_lag, whitened
-from identification.estimation.slip_paths import Friction, Response, decoded, log_chance
+from identification.estimation.noise import every_lag, judged, whitened
+from identification.estimation.slip_paths import Friction, Noise, Response, decoded, log_chance
 from identification.estimation.window import Window
 from identification.record import Floats
 from identification.simulation.discretization import unit_lag
@@ -80,6 +80,11 @@ def _friction(band: float, share: float, rest: int) -> Friction:
     return Friction(0.5 * band * (1.0 + share), 0.5 * band * (1.0 - share), rest)
 
 
+def _decoded(window: Window, r: Response, noise: Noise, f: Friction, most: int) -> tuple[Floats, float]:
+    """The most probable stem of a window, and its log probability."""
+    return decoded(window.op, window.centred, judged(window.usable, noise.ar.size), r, noise, f, most)
+
+
 def _slips(stem: Floats) -> int:
     return int((np.diff(stem) != 0).sum())
 
@@ -96,7 +101,7 @@ def _screened(window: Window, play: Fit, noise: Floats, rest: int) -> list[_Tria
             for share in JUMPS:
                 band = width * play.valve.stickband
                 f = _friction(band, share, rest)
-                stem, score = decoded(window.op, window.centred, window.factor, r, noise, sigma2, f, SCREENED)
+                stem, score = _decoded(window, r, Noise(noise, sigma2), f, SCREENED)
                 out.append(_Trial(score, band, share, later, stem))
     return sorted(out, key=lambda t: -t.score)
 
@@ -118,8 +123,7 @@ def _path(window: Window, fit: Fit, valve: ValveTrial, stem: Floats) -> SlipPath
 
 
 def _decoded_by(window: Window, fit: Fit, mean: float, f: Friction, hot: float) -> Floats:
-    r, sigma2 = _response(window, fit, mean), hot * fit.sigma2
-    return decoded(window.op, window.centred, window.factor, r, fit.ar, sigma2, f, CARRIED)[0]
+    return _decoded(window, _response(window, fit, mean), Noise(fit.ar, hot * fit.sigma2), f, CARRIED)[0]
 
 
 def _followed(window: Window, play: Fit, begun: _Trial, rest: int) -> SlipPath:
@@ -176,6 +180,8 @@ def fit_irregular(window: Window, play: Fit, noise: Floats, period_s: float) -> 
     period_s : float
         Of the cycle [s].
     """
+    if play.gain == 0.0:
+        return None
     rest = max(int(RESTS * period_s * window.factor / window.dt_s), 1)
     begun = _chosen(_screened(window, play, noise, rest))
     best = max((_followed(window, play, t, rest) for t in begun), key=lambda p: p.worth, default=None)

@@ -15,7 +15,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from identification.record import Floats
+from identification.record import Floats, Mask
 
 Indices = NDArray[np.int64]
 SCATTER = 0.05
@@ -47,6 +47,13 @@ class Response(NamedTuple):
     delay: int
     gain: float
     slow: Floats
+
+
+class Noise(NamedTuple):
+    """Noise model of single lags, of blocks, shape (order,), and the variance of its innovations [% PV squared]."""
+
+    ar: Floats
+    sigma2: float
 
 
 class Friction(NamedTuple):
@@ -86,15 +93,11 @@ def slip_chance(distance: float, farthest: float, breakaway: float) -> float:
 
 
 @njit(cache=True)
-def _copy(b: _Beam, to: int, source: int) -> None:
-    b.stem[to], b.x[to], b.total[to], b.score[to] = (
-        b.stem[source],
-        b.x[source],
-        b.total[source],
-        b.score[source],
-    )
-    b.event[to], b.rested[to] = b.event[source], b.rested[source]
-    b.farthest[to], b.ring[to], b.past[to] = b.farthest[source], b.ring[source], b.past[source]
+def _copy(into: _Beam, to: int, b: _Beam, source: int) -> None:
+    """A path of one beam as one of another, or of the same."""
+    into.stem[to], into.x[to], into.total[to] = b.stem[source], b.x[source], b.total[source]
+    into.score[to], into.event[to], into.rested[to] = b.score[source], b.event[source], b.rested[source]
+    into.farthest[to], into.ring[to], into.past[to] = b.farthest[source], b.ring[source], b.past[source]
 
 
 @njit(cache=True)
@@ -107,13 +110,9 @@ def _best(b: _Beam, other: _Beam, count: int, most: int, near: float) -> int:
             if abs(other.stem[k] - b.stem[at]) < near and abs(other.x[k] - b.x[at]) < 2.0 * near:
                 same = True
                 break
-        if same:
-            continue
-        other.stem[kept], other.x[kept] = b.stem[at], b.x[at]
-        other.total[kept], other.score[kept] = b.total[at], b.score[at]
-        other.event[kept], other.rested[kept] = b.event[at], b.rested[at]
-        other.farthest[kept], other.ring[kept], other.past[kept] = b.farthest[at], b.ring[at], b.past[at]
-        kept += 1
+        if not same:
+            _copy(other, kept, b, at)
+            kept += 1
         if kept == most:
             break
     return kept
@@ -150,9 +149,86 @@ def _begun(b: _Beam, op: Floats, first: float, breakaway: float) -> int:
     return count
 
 
+class _Events(NamedTuple):
+    """Slips of all paths, shape (MOST_EVENTS,): the slip before on the same path, sample, and stem after it."""
+
+    parent: Indices
+    moment: Indices
+    place: Floats
+
+
+@njit(cache=True)
+def _divided(
+    b: _Beam, events: _Events, known: tuple[int, int], k: int, op: float, f: Friction
+) -> tuple[int, int]:
+    """Each path as one that slips at a sample and one that does not, with the chance of either.
+
+    `known` and what is returned: how many paths and events there are.
+    """
+    count, slips = known
+    for h in range(count):
+        if k - b.rested[h] > f.rest:
+            b.score[h], b.rested[h] = b.score[h] - STUCK, k
+        gap = op - b.stem[h]
+        far, side = abs(gap), 1 if gap > 0 else 0
+        if k == 0 or far <= b.farthest[h, side] or far <= f.breakaway * (1.0 - FAR * SCATTER):
+            continue
+        chance = slip_chance(far, b.farthest[h, side], f.breakaway)
+        if chance > RARE and count < b.stem.size and slips < MOST_EVENTS:
+            _copy(b, count, b, h)
+            b.stem[count] = op - math.copysign(f.sliding, gap)
+            b.farthest[count, :] = 0.0
+            b.rested[count] = k
+            b.score[count] += math.log(chance)
+            events.parent[slips], events.moment[slips], events.place[slips] = b.event[h], k, b.stem[count]
+            b.event[count] = slips
+            slips, count = slips + 1, count + 1
+        b.score[h] += math.log(max(1.0 - chance, 1e-12))
+        b.farthest[h, side] = far
+    return count, slips
+
+
+@njit(cache=True)
+def _answered(b: _Beam, count: int, k: int, r: Response) -> None:
+    """PV's response of each path stepped on by one sample."""
+    size = r.delay + 2
+    at, now, before = k % size, (k - r.delay) % size, (k - r.delay - 1) % size
+    for h in range(count):
+        b.total[h] += b.x[h]
+        b.ring[h, at] = b.stem[h]
+        b.x[h] = r.pole * b.x[h] + r.now * b.ring[h, now] + r.before * b.ring[h, before]
+
+
+@njit(cache=True)
+def _judge(b: _Beam, count: int, left: float, counts: bool, factor: int, r: Response, n: Noise) -> None:
+    """Score all paths by their innovation of a block, of which `left` is PV less its slow terms."""
+    order = n.ar.size
+    for h in range(count):
+        residual = left - r.gain * b.total[h] / factor
+        b.total[h] = 0.0
+        if counts:
+            e = residual
+            for i in range(order):
+                e -= n.ar[i] * b.past[h, i]
+            b.score[h] -= 0.5 * e * e / n.sigma2
+        for i in range(order - 1, 0, -1):
+            b.past[h, i] = b.past[h, i - 1]
+        b.past[h, 0] = residual
+
+
+@njit(cache=True)
+def _traced(events: _Events, event: int, n: int) -> Floats:
+    """The stem of the path that ends with an event, shape (n,)."""
+    stem, last = np.empty(n), n
+    while event >= 0:
+        stem[events.moment[event] : last] = events.place[event]
+        last, event = events.moment[event], events.parent[event]
+    return stem
+
+
 @njit(cache=True)
 def decoded(
-    op: Floats, y: Floats, factor: int, r: Response, ar: Floats, sigma2: float, f: Friction, most: int
+    op: Floats, y: Floats, counts: Mask, r: Response, n: Noise, f: Friction, most: int
 ) -> tuple[Floats, float]:
     """The stem [% OP], shape of op, of the most probable path, and its log probability.
 
@@ -161,81 +237,31 @@ def decoded(
     op : ndarray of shape (n * factor,)
     y : ndarray of shape (n,)
         PV less its mean, in blocks of `factor` samples.
+    counts : ndarray of bool, shape (n,)
+        Blocks whose innovations are judged.
     r : Response
-    ar : ndarray of shape (order,)
-        Noise model of single lags, of blocks; sigma2 the variance of its innovations.
+    n : Noise
     f : Friction
     most : int
         Paths that are carried side by side.
     """
-    size, order = r.delay + 2, ar.size
-    b, other = _room(3 * most + PLACES, r.delay, order), _room(3 * most + PLACES, r.delay, order)
-    parent, moment, place = (
-        np.empty(MOST_EVENTS, np.int64),
-        np.zeros(MOST_EVENTS, np.int64),
-        np.empty(MOST_EVENTS),
-    )
+    factor, rows, near = op.size // y.size, 3 * most + PLACES, SAME * f.breakaway
+    b, other = _room(rows, r.delay, n.ar.size), _room(rows, r.delay, n.ar.size)
+    events = _Events(np.empty(MOST_EVENTS, np.int64), np.zeros(MOST_EVENTS, np.int64), np.empty(MOST_EVENTS))
     count = _begun(b, op, (y[0] - r.slow[0]) / r.gain, f.breakaway)
-    events, near, at = count, SAME * f.breakaway, 0
-    for k in range(count):
-        parent[k], place[k] = -1, b.stem[k]
-    least = f.breakaway * (1.0 - FAR * SCATTER)
-    for k in range(op.size):
-        for h in range(count):
-            if k - b.rested[h] > f.rest:
-                b.score[h], b.rested[h] = b.score[h] - STUCK, k
-            gap = op[k] - b.stem[h]
-            far, side = abs(gap), 1 if gap > 0 else 0
-            if far <= least or far <= b.farthest[h, side] or k == 0:
-                continue
-            chance = slip_chance(far, b.farthest[h, side], f.breakaway)
-            if chance > RARE and count < b.stem.size and events < MOST_EVENTS:
-                _copy(b, count, h)
-                b.stem[count] = op[k] - math.copysign(f.sliding, gap)
-                b.farthest[count, :] = 0.0
-                b.rested[count] = k
-                b.score[count] += math.log(chance)
-                parent[events], moment[events], place[events] = b.event[h], k, b.stem[count]
-                b.event[count] = events
-                events, count = events + 1, count + 1
-            b.score[h] += math.log(max(1.0 - chance, 1e-12))
-            b.farthest[h, side] = far
-        now, before = (at - r.delay) % size, (at - r.delay - 1) % size
-        for h in range(count):
-            b.total[h] += b.x[h]
-            b.ring[h, at] = b.stem[h]
-            b.x[h] = r.pole * b.x[h] + r.now * b.ring[h, now] + r.before * b.ring[h, before]
-        at = (at + 1) % size
-        if (k + 1) % factor == 0:
-            _judge(b, count, k // factor, y, factor, r, ar, sigma2)
-        if count > 2 * most or (k + 1) % (LOOKED * factor) == 0:
+    events.parent[:count], events.place[:count] = -1, b.stem[:count]
+    slips = count
+    for k in range(factor * y.size):
+        count, slips = _divided(b, events, (count, slips), k, op[k], f)
+        _answered(b, count, k, r)
+        block, ended = k // factor, (k + 1) % factor == 0
+        if ended:
+            _judge(b, count, y[block] - r.slow[block], counts[block], factor, r, n)
+        if count > 2 * most or (ended and (block + 1) % LOOKED == 0):
             count = _best(b, other, count, most, near)
             b, other = other, b
     first = int(np.argmax(b.score[:count]))
-    stem, event, last = np.empty(op.size), b.event[first], op.size
-    while event >= 0:
-        stem[moment[event] : last] = place[event]
-        last, event = moment[event], parent[event]
-    return stem, float(b.score[first])
-
-
-@njit(cache=True)
-def _judge(
-    b: _Beam, count: int, block: int, y: Floats, factor: int, r: Response, ar: Floats, sigma2: float
-) -> None:
-    """Score all paths by their innovation of a block."""
-    order = ar.size
-    for h in range(count):
-        residual = y[block] - r.gain * b.total[h] / factor - r.slow[block]
-        b.total[h] = 0.0
-        if block >= order:
-            e = residual
-            for i in range(order):
-                e -= ar[i] * b.past[h, i]
-            b.score[h] -= 0.5 * e * e / sigma2
-        for i in range(order - 1, 0, -1):
-            b.past[h, i] = b.past[h, i - 1]
-        b.past[h, 0] = residual
+    return _traced(events, b.event[first], op.size), float(b.score[first])
 
 
 @njit(cache=True)

@@ -15,6 +15,7 @@ from identification.estimation.slip_paths import (
     SCATTER,
     STUCK,
     Friction,
+    Noise,
     Response,
     decoded,
     log_chance,
@@ -77,7 +78,9 @@ def test_the_path_is_the_best_of_all_there_are():
     every = [worth(s) for n in range(6) for s in itertools.combinations(possible, n)]
     best, stem = max(every, key=lambda found: found[0])
     r = Response(POLE, 1 - POLE, 0.0, DELAY, GAIN, np.zeros(op.size))
-    found, score = decoded(op, pv, 1, r, np.zeros(1), NOISE**2, Friction(BREAKAWAY, SLIDING, 1000), 200)
+    counts = np.arange(op.size) > 0
+    noise = Noise(np.zeros(1), NOISE**2)
+    found, score = decoded(op, pv, counts, r, noise, Friction(BREAKAWAY, SLIDING, 1000), 200)
     assert score >= best - 1e-6  # it may begin at other places too
     np.testing.assert_allclose(np.flatnonzero(np.diff(found)), np.flatnonzero(np.diff(stem)))
     np.testing.assert_allclose(found[5:], stem[5:], atol=1e-12)
@@ -104,8 +107,9 @@ def test_a_stem_does_not_park():
     """A stem that rests longer than it may costs as much each time, so one that moves is told instead."""
     op = 1.05 * np.sin(np.arange(200) * 0.1)
     r = Response(POLE, 1 - POLE, 0.0, DELAY, GAIN, np.zeros(op.size))
-    _, free = decoded(op, np.zeros(op.size), 1, r, np.zeros(1), 1.0, Friction(BREAKAWAY, SLIDING, 1000), 50)
-    _, held = decoded(op, np.zeros(op.size), 1, r, np.zeros(1), 1.0, Friction(BREAKAWAY, SLIDING, 40), 50)
+    every, noise = np.ones(op.size, dtype=bool), Noise(np.zeros(1), 1.0)
+    _, free = decoded(op, np.zeros(op.size), every, r, noise, Friction(BREAKAWAY, SLIDING, 1000), 50)
+    _, held = decoded(op, np.zeros(op.size), every, r, noise, Friction(BREAKAWAY, SLIDING, 40), 50)
     assert held <= free
     assert free - held < 6 * STUCK
 
