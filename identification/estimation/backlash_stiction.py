@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from identification.estimation.fine_scan import scan
 from identification.estimation.gauss_newton import descend
 from identification.estimation.hammerstein import IDEAL, Fit, ValveTrial, sticking
 from identification.estimation.noise import arx_noise
@@ -15,7 +16,6 @@ from identification.estimation.search import (
     Dynamics,
     Prepared,
     prepare,
-    scan,
     search,
     starts,
     white_pv,

@@ -11,12 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from identification.estimation.hammerstein import ValveTrial, stem_blocks, stem_of
+from identification.estimation.hammerstein import ValveTrial, stem_of
 from identification.estimation.noise import every_lag, judged, whitened
-from identification.estimation.window import Stems, Window
+from identification.estimation.window import Window
 from identification.record import Floats, Mask
 from identification.signals.notch import notch
-from identification.simulation.discretization import respond, unit_lag
+from identification.simulation.discretization import unit_lag
 
 AR_ORDER = 8
 """Order of the noise model; ours: on the simulated plants 12 gives innovations less than 1 % smaller."""
@@ -75,7 +75,7 @@ def _response(
 
 
 @njit(cache=True)
-def _left(
+def variance_left(
     x: Floats, products: Products, rows: Floats, sums: Floats, level: float, pole: float, outlasts: bool
 ) -> tuple[float, int, Floats]:
     """Innovations variance, samples judged and coefficients (gain, 1, t, decay) of one response; see `score`."""
@@ -118,7 +118,7 @@ def score(
     pole, now, before, delay = unit_lag(time_constant_s, dead_time_s, dt_s)
     x = np.empty_like(stem)
     products = _response(stem, pole, now, before, delay, rows, x)
-    return _left(x, products, rows, sums, level, pole, time_constant_s > 0.5 * x.size * dt_s)
+    return variance_left(x, products, rows, sums, level, pole, time_constant_s > 0.5 * x.size * dt_s)
 
 
 Dynamics = tuple[float, float]
@@ -168,7 +168,7 @@ class Prepared:
 
 
 @njit(cache=True)
-def _white(x: Floats, ar: Floats) -> Floats:
+def whitened_stem(x: Floats, ar: Floats) -> Floats:
     """Innovations, zero where they are not whole yet: a lag or a notch would ring from those."""
     white = whitened(x, ar, every_lag(ar.size))
     white[: ar.size] = 0.0
@@ -176,7 +176,7 @@ def _white(x: Floats, ar: Floats) -> Floats:
 
 
 def _filtered(x: Floats, ar: Floats, notch_period: float) -> Floats:
-    white = _white(np.ascontiguousarray(x), ar)
+    white = whitened_stem(np.ascontiguousarray(x), ar)
     return white if notch_period <= 0 else notch(white, notch_period, NOTCH_WIDTH)
 
 
@@ -245,81 +245,6 @@ def search(prepared: Prepared, begins: list[Dynamics], halvings: int = 3) -> Dyn
         halvings,
     )
     return t, dead
-
-
-@njit(cache=True)
-def _scan(
-    stems: Stems,
-    rows: Floats,
-    sums: Floats,
-    ar: Floats,
-    dt_s: float,
-    pairs: Floats,
-    tolerance: float,
-    begins: Floats,
-) -> Floats:
-    level, tries, n = max(1.0 - ar.sum(), 1e-6), begins.shape[0], rows.shape[1]
-    out, x = np.empty(pairs.shape[0]), np.empty(n)
-    for i in range(pairs.shape[0]):
-        width, share = pairs[i, 0], pairs[i, 1]
-        breakaway, sliding = 0.5 * width * (1 + share), 0.5 * width * (1 - share)
-        stem = stem_blocks(stems.op, stems.low, stems.high, breakaway, sliding, tolerance, stems.factor)
-        white = _white(stem - stem.mean(), ar)
-        out[i], whole, known = np.inf, white, 0.0
-        for j in range(tries):
-            pole, now, before, delay = unit_lag(begins[j, 0], begins[j, 1], dt_s)
-            if begins[j, 0] != known:
-                whole, known = respond(white, pole, 1.0, 0.0, 0), begins[j, 0]
-            products = _later(whole, now, before, delay, rows, x)
-            left = _left(x, products, rows, sums, level, pole, begins[j, 0] > 0.5 * n * dt_s)[0]
-            out[i] = min(out[i], left)
-    return out
-
-
-@njit(cache=True, fastmath={"reassoc", "contract", "nsz"})
-def _later(whole: Floats, now: float, before: float, delay: int, rows: Floats, out: Floats) -> Products:
-    """The response at one dead time into `out`, from that without any, and its products, summed in any order.
-
-    The stem is taken to rest at first."""
-    n = out.size
-    out[: min(delay, n)] = 0.0
-    if delay >= n:
-        return 0.0, 0.0, 0.0, 0.0
-    x = now * whole[0]
-    out[delay], xv, x1, xt = x, x * rows[0, delay], x * rows[1, delay], x * rows[2, delay]
-    xx = x * x1
-    v, w, t = rows[0, delay + 1 :], rows[1, delay + 1 :], rows[2, delay + 1 :]
-    late, earlier, later = whole[1 : n - delay], whole[: n - delay - 1], out[delay + 1 :]
-    for k in range(v.size):
-        x = now * late[k] + before * earlier[k]
-        weighted = x * w[k]
-        later[k] = x
-        xv, x1, xt, xx = xv + x * v[k], x1 + weighted, xt + x * t[k], xx + x * weighted
-    return xv, x1, xt, xx
-
-
-def scan(window: Window, pairs: Floats, tolerance: float, ar: Floats, begins: list[Dynamics]) -> Floats:
-    """Innovations variance of many stick-slips at once.
-
-    Parameters
-    ----------
-    window : Window
-    pairs : ndarray of shape (m, 2)
-        Stickband [% OP] and slip jump as a share of it.
-    tolerance : float
-        How the stems behave in motion (valve.py).
-    ar : ndarray of shape (p,)
-        Noise model.
-    begins : list of Dynamics
-        Time constants and dead times tried [s]; the best counts.
-
-    Returns
-    -------
-    ndarray of shape (m,)
-        Least innovations variance of each pair [% PV squared].
-    """
-    pv, table = white_pv(window, ar), np.array(begins)
-    return _scan(window.stems_in_blocks, pv.rows, pv.sums, ar, window.dt_s, pairs, tolerance, table)  # type: ignore[no-any-return]
 
 
 def starts(window: Window, period_s: float) -> list[Dynamics]:

@@ -1,0 +1,87 @@
+"""Many stick-slips at once under a given noise model: each stem's response at many dead times from one lag."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from identification.estimation.hammerstein import stem_blocks
+from identification.estimation.search import Dynamics, Products, variance_left, white_pv, whitened_stem
+from identification.estimation.window import Stems, Window
+from identification.record import Floats
+from identification.simulation.discretization import respond, unit_lag
+
+
+@njit(cache=True)
+def _scan(
+    stems: Stems,
+    rows: Floats,
+    sums: Floats,
+    ar: Floats,
+    dt_s: float,
+    pairs: Floats,
+    tolerance: float,
+    begins: Floats,
+) -> Floats:
+    level, tries, n = max(1.0 - ar.sum(), 1e-6), begins.shape[0], rows.shape[1]
+    out, x = np.empty(pairs.shape[0]), np.empty(n)
+    for i in range(pairs.shape[0]):
+        width, share = pairs[i, 0], pairs[i, 1]
+        breakaway, sliding = 0.5 * width * (1 + share), 0.5 * width * (1 - share)
+        stem = stem_blocks(stems.op, stems.low, stems.high, breakaway, sliding, tolerance, stems.factor)
+        white = whitened_stem(stem - stem.mean(), ar)
+        out[i], whole, known = np.inf, white, 0.0
+        for j in range(tries):
+            pole, now, before, delay = unit_lag(begins[j, 0], begins[j, 1], dt_s)
+            if begins[j, 0] != known:
+                whole, known = respond(white, pole, 1.0, 0.0, 0), begins[j, 0]
+            products = _later(whole, now, before, delay, rows, x)
+            left = variance_left(x, products, rows, sums, level, pole, begins[j, 0] > 0.5 * n * dt_s)[0]
+            out[i] = min(out[i], left)
+    return out
+
+
+@njit(cache=True, fastmath={"reassoc", "contract", "nsz"})
+def _later(whole: Floats, now: float, before: float, delay: int, rows: Floats, out: Floats) -> Products:
+    """The response at one dead time into `out`, from that without any, and its products, summed in any order.
+
+    The stem is taken to rest at first."""
+    n = out.size
+    out[: min(delay, n)] = 0.0
+    if delay >= n:
+        return 0.0, 0.0, 0.0, 0.0
+    x = now * whole[0]
+    out[delay], xv, x1, xt = x, x * rows[0, delay], x * rows[1, delay], x * rows[2, delay]
+    xx = x * x1
+    v, w, t = rows[0, delay + 1 :], rows[1, delay + 1 :], rows[2, delay + 1 :]
+    late, earlier, later = whole[1 : n - delay], whole[: n - delay - 1], out[delay + 1 :]
+    for k in range(v.size):
+        x = now * late[k] + before * earlier[k]
+        weighted = x * w[k]
+        later[k] = x
+        xv, x1, xt, xx = xv + x * v[k], x1 + weighted, xt + x * t[k], xx + x * weighted
+    return xv, x1, xt, xx
+
+
+def scan(window: Window, pairs: Floats, tolerance: float, ar: Floats, begins: list[Dynamics]) -> Floats:
+    """Innovations variance of many stick-slips at once.
+
+    Parameters
+    ----------
+    window : Window
+    pairs : ndarray of shape (m, 2)
+        Stickband [% OP] and slip jump as a share of it.
+    tolerance : float
+        How the stems behave in motion (valve.py).
+    ar : ndarray of shape (p,)
+        Noise model.
+    begins : list of Dynamics
+        Time constants and dead times tried [s]; the best counts.
+
+    Returns
+    -------
+    ndarray of shape (m,)
+        Least innovations variance of each pair [% PV squared].
+    """
+    pv, table = white_pv(window, ar), np.array(begins)
+    return _scan(window.stems_in_blocks, pv.rows, pv.sums, ar, window.dt_s, pairs, tolerance, table)  # type: ignore[no-any-return]
