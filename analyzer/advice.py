@@ -248,12 +248,21 @@ def sought_for(verdict: Verdict, controller: Pid, limits: AdviceLimits) -> tuple
 
 
 def propose(verdict: Verdict, controller: Pid, period_s: float | None, config: Config) -> Proposed:
-    """The tuning package's proposal on the model of a verdict, on its uncertainty, and on the load it leaves."""
-    source, verdict = verdict.source, verdict.for_settings
+    """The tuning package's proposal on the model of a verdict, on its uncertainty, and on the load it leaves; where
+    that is not the model which the verdict tells, its reason says so."""
+    sought_on = verdict.for_settings
+    found = _proposed(sought_on, controller, period_s, config)
+    if sought_on is verdict or not found.proposal.reason:
+        return found
+    reason = f"{words.ONE_FRICTION} {found.proposal.reason}"
+    return replace(found, proposal=replace(found.proposal, reason=reason))
+
+
+def _proposed(verdict: Verdict, controller: Pid, period_s: float | None, config: Config) -> Proposed:
     window, fit = measured_of(verdict).window, chosen_fit(verdict)
     loop = model_of(verdict, controller)
     if verdict.cause not in (Cause.VALVE, Cause.TUNING):
-        return Proposed(recommend(loop, verdict.cause, limits=config.tuning, source=source))
+        return Proposed(recommend(loop, verdict.cause, limits=config.tuning, source=verdict.source))
     if loop.controller.kp * loop.process.slope <= 0.0:
         return Proposed(recommend(loop, verdict.cause, limits=config.tuning))
     if loop.process.dead_time_s > config.advice.beyond_record * window.duration_s:

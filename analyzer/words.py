@@ -18,6 +18,7 @@ NO_INTEGRAL = (
     "Without integral action, as loops.csv states, the identified loop would come to rest, but the record cycles: "
     "check kp and ti before new settings are sought."
 )
+ONE_FRICTION = "Settings are sought with one friction for all slips of the valve, not slip by slip."
 FOLDED = "what is seen may be such a cycle, folded by the sampling"
 CALM = "At the settings in force the valve's fault makes no cycle: nothing to do now."
 

@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
+from analyzer import words
+from analyzer.advice import propose
+from identification.models import Pid
+from tests.analyzer.plant import CONFIG
 from tests.proofs.coverage import FAMILIES, assessed, made
 
 PLAY, STICKS = FAMILIES[:2]
@@ -27,3 +33,14 @@ def test_play_does_not(seed):
     assert (verdict.cause, verdict.fault) == ("valve", "backlash")
     assert verdict.measured is not None
     assert not verdict.measured.window.decoded
+
+
+def test_advice_says_on_which_friction_it_rests():
+    """Settings are sought on the verdict of one friction, and their reason says so; that of a play says nothing."""
+    sticks, plays = made(STICKS, 60_700_009), made(PLAY, 60_800_004)
+    for loop, says in ((sticks, True), (plays, False)):
+        verdict, pid = assessed(loop).verdict, Pid(loop.pi.kp, loop.pi.ti, scan_s=loop.scan_s)
+        found = propose(verdict, pid, 200.0, CONFIG).proposal
+        assert found.reason.startswith(words.ONE_FRICTION) == says
+        before = propose(verdict.for_settings, pid, 200.0, CONFIG).proposal
+        assert replace(found, reason=before.reason) == before
