@@ -27,10 +27,42 @@ from analyzer.store_lock import locked
 from analyzer.workers import Died, Workers
 from identification.errors import InputError
 
-__all__ = ["Outcome", "assess_loop", "run"]
+__all__ = ["Batch", "Outcome", "assess_loop", "run"]
 
 CHUNK = 8
 """Loops per task: enough to carry the cost of a task, few enough for a smooth progress bar."""
+
+
+NO_LOOPS = InputError("no loops in the export", "tags such as LOOP.PV", "state them with --loops loops.csv")
+
+
+@dataclass(frozen=True, slots=True)
+class Batch:
+    """What is assessed, and where it is kept.
+
+    export; specs, its loops with the tags that it has; store, held for the run alone; config; since_s, until_s, the
+    span of time whose samples are assessed [s since 1970-01-01 UTC]; changes, when settings were changed: each night
+    has those in force at its end; zone, the plant's time zone, whose days the nights are.
+    """
+
+    export: Export
+    specs: Sequence[LoopSpec]
+    store: Store
+    config: Config
+    since_s: float = -math.inf
+    until_s: float = math.inf
+    changes: Sequence[TuningChange] = ()
+    zone: str = UTC_NAME
+
+    @property
+    def identity(self) -> run_identity.RunIdentity:
+        """What a run that goes on with its pieces must have in common with it."""
+        own = (*self.specs, *self.changes, self.zone)
+        return run_identity.identity(self.export, own, self.since_s, self.until_s, self.config)
+
+    def nights(self) -> list[Night]:
+        """The nights that the span holds, oldest first."""
+        return nights_of(self.export, self.specs, self.config.nights, self.since_s, self.until_s, self.zone)
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,21 +79,19 @@ class Outcome:
     notes: tuple[str, ...] = ()
 
 
-def _tasks(
-    export: Export,
-    specs: Sequence[LoopSpec],
-    spans: Sequence[Night],
-    store: Store,
-    config: Config,
-    known: set[str],
-    changes: Sequence[TuningChange],
-) -> list[Task]:
+def _tasks(batch: Batch, nights: Sequence[Night], known: set[str]) -> list[Task]:
     """Chunks of the loops that no piece of the last night holds yet."""
-    left = [s for s in specs if s.loop not in known]
+    left = [s for s in batch.specs if s.loop not in known]
     mark = uuid.uuid4().hex[:8]  # a worker of a killed run may write yet; its pieces have another mark
     return [
         Task(
-            export, tuple(left[i : i + CHUNK]), tuple(spans), store, config, f"{mark}-{i:06d}", tuple(changes)
+            batch.export,
+            tuple(left[i : i + CHUNK]),
+            tuple(nights),
+            batch.store,
+            batch.config,
+            f"{mark}-{i:06d}",
+            tuple(batch.changes),
         )
         for i in range(0, len(left), CHUNK)
     ]
@@ -126,103 +156,72 @@ def _loops_in(store: Store, night: str, keys: Sequence[str]) -> set[str]:
 
 
 def run(
-    export: Export,
-    specs: Sequence[LoopSpec],
-    store: Store,
-    config: Config,
+    batch: Batch,
     jobs: int = 0,
     resume: bool = False,
-    since_s: float = -math.inf,
-    until_s: float = math.inf,
-    progress: Callable[[int, int], None] = lambda done, total: None,
     replacing: bool = False,
-    changes: Sequence[TuningChange] = (),
-    zone: str = UTC_NAME,
     scheduler: str | None = None,
+    progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> Outcome:
     """Assess all loops of an export and keep the results.
 
     Parameters
     ----------
-    export : Export
-    specs : sequence of LoopSpec
-        With the tags that the export has.
-    store : Store
-        Held for this run alone.
-    config : Config
+    batch : Batch
     jobs : int
         Worker processes; 0 works in this one, where a loop that takes all memory takes the run with it.
     resume : bool
         Go on with the pieces of a run that was stopped, instead of starting anew.
-    since_s, until_s : float
-        Only samples of this span of time are assessed [s since 1970-01-01 UTC].
-    progress : callable
-        Called with loops done and loops in all.
     replacing : bool
         Forget what the store has of these nights, instead of adding to it.
-    changes : sequence of TuningChange
-        When settings were changed; each night has those in force at its end.
-    zone : str
-        The plant's time zone, whose days the nights are.
     scheduler : str or None
         Address of a Dask scheduler whose workers do the loops, instead of processes of this machine.
+    progress : callable
+        Called with loops done and loops in all.
 
     Raises
     ------
     InputError
         No loops, no nights, another run on the store, or pieces of another run to be gone on with.
     """
-    if not specs:
-        raise InputError(
-            "no loops in the export", "tags such as LOOP.PV", "state them with --loops loops.csv"
-        )
-    with locked(store.path):
-        store_version.upgrade(store.path)
-        spans = nights_of(export, specs, config.nights, since_s, until_s, zone)
-        said = [line for span in spans for line in store.set_aside_damaged(span.name)]
-        keys = _begun(
-            store,
-            spans,
-            run_identity.identity(export, (*specs, *changes, zone), since_s, until_s, config),
-            resume,
-        )
-        known = _loops_in(store, spans[-1].name, keys)
-        progress(len(known), len(specs))
-        done, met = len(known), Counter[str]()
-        tasks = _tasks(export, specs, spans, store, config, known, changes)
-        for result in _results(tasks, jobs, config, scheduler):
+    if not batch.specs:
+        raise NO_LOOPS
+    with locked(batch.store.path):
+        store_version.upgrade(batch.store.path)
+        nights = batch.nights()
+        said = [line for night in nights for line in batch.store.set_aside_damaged(night.name)]
+        keys, met = _begun(batch.store, nights, batch.identity, resume), Counter[str]()
+        known = _loops_in(batch.store, nights[-1].name, keys)
+        done, of = len(known), len(batch.specs)
+        progress(done, of)
+        for result in _results(_tasks(batch, nights, known), jobs, batch.config, scheduler):
             keys.append(result.key)
             done += result.loops
             met.update(result.met)
-            progress(done, len(specs))
-        order = [s.loop for s in specs]
-        written, more = _finished(store, spans, order, config, keys, replacing)
-        return _outcome(store, written, order, (*export.file_notes, *counted(met), *said, *more))
+            progress(done, of)
+        written, more = _finished(batch, nights, keys, replacing)
+        return _outcome(batch, written, (*batch.export.file_notes, *counted(met), *said, *more))
 
 
 def _finished(
-    store: Store,
-    spans: Sequence[Night],
-    order: Sequence[str],
-    config: Config,
-    keys: Sequence[str],
-    replacing: bool,
+    batch: Batch, nights: Sequence[Night], keys: Sequence[str], replacing: bool
 ) -> tuple[list[Night], list[str]]:
     """The nights put together, those without a sample left out unless they are all there is."""
-    full = [span for span in spans if not is_empty(store, span.name, keys)] or list(spans[-1:])
+    store, order = batch.store, [s.loop for s in batch.specs]
+    full = [night for night in nights if not is_empty(store, night.name, keys)] or list(nights[-1:])
     said = []
-    if len(full) < len(spans):
-        said.append(f"{len(spans) - len(full)} nights without a good sample of any loop are left out")
-    for span in full:
-        said += finish_night(store, span.name, order, config, keys, replacing)
+    if len(full) < len(nights):
+        said.append(f"{len(nights) - len(full)} nights without a good sample of any loop are left out")
+    for night in full:
+        said += finish_night(store, night.name, order, batch.config, keys, replacing)
     store.drop_parts()
     return full, said
 
 
-def _outcome(store: Store, nights: Sequence[Night], order: Sequence[str], notes: Sequence[str]) -> Outcome:
+def _outcome(batch: Batch, nights: Sequence[Night], notes: Sequence[str]) -> Outcome:
     """The outcome as the last night's table has it, for the loops of this run."""
-    wanted = set(order)
-    table = store.read("nights", nights[-1].name, ["loop", "status", "reason"]).to_pylist()
+    wanted = {s.loop for s in batch.specs}
+    table = batch.store.read("nights", nights[-1].name, ["loop", "status", "reason"]).to_pylist()
     lost = [
         (r["loop"], r["reason"], r["status"])
         for r in table

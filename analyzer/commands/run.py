@@ -7,7 +7,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING
@@ -18,13 +18,11 @@ from analyzer.commands.options import NOTHING_DONE, SOME_LOST, Asked, export_opt
 from identification.errors import TriageError
 
 if TYPE_CHECKING:
-    from analyzer.batch import Outcome
-    from analyzer.config import Config
+    from analyzer.batch import Batch, Outcome
     from analyzer.history.export import Export
     from analyzer.loops.spec import LoopSpec
     from analyzer.nights import Night
     from analyzer.run_log import RunLog
-    from analyzer.store import Store
 
 STOPPED = 128
 """Exit status of a run that a signal has stopped, less the signal's number: what shells and schedulers expect."""
@@ -102,24 +100,13 @@ def run(
     from importlib.metadata import version
 
     from analyzer.run_log import RunLog
-    from analyzer.store import Store
-    from analyzer.store_lock import scratch
 
     log, begun_s = RunLog(log_file), time.monotonic()
-    log.say(
-        "begin",
-        version=version("loop-triage"),
-        store=store,
-        export=" ".join(map(str, asked.export)),
-        jobs=jobs,
-    )
+    export = " ".join(map(str, asked.export))
+    log.say("begin", version=version("loop-triage"), store=store, export=export, jobs=jobs)
     try:
-        with stoppable(), scratch(store) as copies:
-            source, specs, notes = _opened(replace(asked, reading={**asked.reading, "scratch": copies}))
-            _say(notes, log)
-            outcome = _assessed(source, specs, Store(store), asked, jobs, resume, replacing, log, scheduler)
-            if explaining and len(outcome.unassessed) + len(outcome.failed) < len(specs):
-                _explained(source, specs, Store(store), asked.config, outcome.nights[-1], jobs, resume)
+        with stoppable():
+            outcome, loops = _night(asked, store, log, How(jobs, resume, replacing, scheduler), explaining)
     except StoppedError as stopped:
         kept = f"what is done is kept in {store}: go on with the same command and --resume"
         click.echo(f"triage: stopped by {stopped}; {kept}", err=True)
@@ -128,9 +115,38 @@ def run(
     except (TriageError, OSError) as error:
         log.say("nothing done", error=error, status=NOTHING_DONE)
         raise
-    status = _status(outcome, len(specs))
+    status = _status(outcome, loops)
     log.say("end", status=status, night=outcome.nights[-1].name, seconds=time.monotonic() - begun_s)
     sys.exit(status)
+
+
+@dataclass(frozen=True, slots=True)
+class How:
+    """Worker processes, whether pieces of a stopped run are gone on with, whether what the store has of the nights is
+    forgotten first, and the address of a scheduler, if any."""
+
+    jobs: int
+    resume: bool
+    replacing: bool
+    scheduler: str | None
+
+
+def _night(asked: Asked, place: Path, log: RunLog, how: How, explaining: bool) -> tuple[Outcome, int]:
+    """The export read, assessed and, where it is asked for, explained; the outcome and the number of loops."""
+    from analyzer.batch import Batch
+    from analyzer.store import Store
+    from analyzer.store_lock import scratch
+
+    with scratch(place) as copies:
+        reading = {**asked.reading, "scratch": copies}
+        source, specs, notes = _opened(replace(asked, reading=reading))
+        _say(notes, log)
+        span = asked.since_s, asked.until_s
+        batch = Batch(source, specs, Store(place), asked.config, *span, asked.changes, asked.zone)
+        outcome = _assessed(batch, how, log)
+        if explaining and len(outcome.unassessed) + len(outcome.failed) < len(specs):
+            _explained(batch, how, outcome.nights[-1])
+    return outcome, len(specs)
 
 
 def _opened(asked: Asked) -> tuple[Export, Sequence[LoopSpec], Sequence[str]]:
@@ -177,37 +193,13 @@ def _say(notes: Sequence[str], log: RunLog) -> None:
         log.say("note", text=note)
 
 
-def _assessed(
-    source: Export,
-    specs: Sequence[LoopSpec],
-    store: Store,
-    asked: Asked,
-    jobs: int,
-    resume: bool,
-    replacing: bool,
-    log: RunLog,
-    scheduler: str | None,
-) -> Outcome:
+def _assessed(batch: Batch, how: How, log: RunLog) -> Outcome:
     """Run the batch with progress and say what came of it."""
-    from analyzer import batch
+    from analyzer import batch as nightly
     from analyzer.commands.progress import bar
 
-    span = asked.since_s, asked.until_s
     with bar("loops") as progress:
-        outcome = batch.run(
-            source,
-            specs,
-            store,
-            asked.config,
-            jobs,
-            resume,
-            *span,
-            progress,
-            replacing,
-            asked.changes,
-            asked.zone,
-            scheduler,
-        )
+        outcome = nightly.run(batch, how.jobs, how.resume, how.replacing, how.scheduler, progress)
     more = len(outcome.notes) - FEW
     _say(outcome.notes[:FEW], log)
     if more > 0:
@@ -216,31 +208,26 @@ def _assessed(
         for loop, reason in lost_loops:
             click.echo(f"{loop}: {reason}", err=True)
             log.say("lost", loop=loop, status=status, reason=reason)
-    nights, lost = outcome.nights, len(outcome.unassessed) + len(outcome.failed)
-    several = f" ({len(nights)} nights from {nights[0].name})" if len(nights) > 1 else ""
-    failed = f", {len(outcome.failed)} failed" if outcome.failed else ""
-    done = f"{len(specs) - lost} of {len(specs)} loops assessed{failed}"
-    log.say(
-        "assessed", loops=len(specs) - lost, of=len(specs), failed=len(outcome.failed), nights=len(nights)
-    )
-    click.echo(f"{done}, night {nights[-1].name}{several}, in {store.path}", err=True)
+    _say_assessed(batch, outcome, log)
     return outcome
 
 
-def _explained(
-    source: Export,
-    specs: Sequence[LoopSpec],
-    store: Store,
-    config: Config,
-    night: Night,
-    jobs: int,
-    resume: bool,
-) -> None:
+def _say_assessed(batch: Batch, outcome: Outcome, log: RunLog) -> None:
+    """How many loops were assessed, and of which night."""
+    nights, loops = outcome.nights, len(batch.specs)
+    done, failed = loops - len(outcome.unassessed) - len(outcome.failed), len(outcome.failed)
+    several = f" ({len(nights)} nights from {nights[0].name})" if len(nights) > 1 else ""
+    said = f"{done} of {loops} loops assessed{f', {failed} failed' if failed else ''}"
+    log.say("assessed", loops=done, of=loops, failed=failed, nights=len(nights))
+    click.echo(f"{said}, night {nights[-1].name}{several}, in {batch.store.path}", err=True)
+
+
+def _explained(batch: Batch, how: How, night: Night) -> None:
     """Explain the flagged loops of a night, with progress, and say how many."""
     from analyzer.commands.progress import bar
     from analyzer.explain import night as explain_night
 
     with bar("explained") as progress:
-        rows = explain_night.run(source, specs, store, night, config, jobs, resume, progress)
+        rows = explain_night.run(batch, night, how.jobs, how.resume, progress)
     named = sum(r["verdict"] not in ("none", "unexplained") for r in rows)
     click.echo(f"{len(rows)} flagged loops explained, {named} with a name", err=True)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from analyzer.columns.table import EXPLAINED
 from analyzer.config import Config
@@ -21,9 +21,22 @@ from analyzer.store import Store, rows_table, write_table
 from analyzer.workers import Died, Workers
 from identification.errors import TriageError
 
+if TYPE_CHECKING:
+    from analyzer.batch import Batch
+
 TABLE = "explained"
 QUIET = (Cause.NONE, Action.NONE, "", None)
 """Causes and actions that are none."""
+ASKED = [
+    "loop",
+    "status",
+    "oscillating_pct",
+    "oscillation_significance",
+    "cause",
+    "action",
+    "source_loop",
+]
+"""Columns that say whether a loop is worth an explanation, and whose loop leads it."""
 Row = dict[str, Any]
 
 
@@ -80,14 +93,12 @@ def row_of(data: Mapping[str, Any], night: str, page: str = "") -> Row:
     return {**texts, "night": night, "answer": json.dumps(data), "page": page}
 
 
-def questions(
-    export: Export, specs: Sequence[LoopSpec], rows: Sequence[Mapping[str, Any]], night: Night, config: Config
-) -> list[Question]:
+def questions(batch: Batch, rows: Sequence[Mapping[str, Any]], night: Night) -> list[Question]:
     """The flagged loops of a night, the most significant first."""
-    by_name = {s.loop: s for s in specs}
+    by_name, config = {s.loop: s for s in batch.specs}, batch.config
     chosen = sorted((r for r in rows if flagged(r)), key=lambda r: -(r["oscillation_significance"] or 0.0))
     return [
-        Question(export, by_name[r["loop"]], by_name.get(r["source_loop"] or ""), night, config)
+        Question(batch.export, by_name[r["loop"]], by_name.get(r["source_loop"] or ""), night, config)
         for r in chosen
         if r["loop"] in by_name
     ]
@@ -123,11 +134,8 @@ def keep(store: Store, night: str, rows: Sequence[Row]) -> None:
 
 
 def run(
-    export: Export,
-    specs: Sequence[LoopSpec],
-    store: Store,
+    batch: Batch,
     night: Night,
-    config: Config,
     jobs: int = 0,
     resume: bool = False,
     progress: Callable[[int, int], None] = lambda done, total: None,
@@ -136,12 +144,9 @@ def run(
 
     Parameters
     ----------
-    export : Export
-    specs : sequence of LoopSpec
-    store : Store
-        Which holds the night.
+    batch : Batch
+        Whose store holds the night.
     night : Night
-    config : Config
     jobs : int
         Worker processes; 0 works in this one.
     resume : bool
@@ -154,23 +159,15 @@ def run(
     list of dict
         The rows kept, in the order in which they came.
     """
-    columns = [
-        "loop",
-        "status",
-        "oscillating_pct",
-        "oscillation_significance",
-        "cause",
-        "action",
-        "source_loop",
-    ]
-    asked = questions(export, specs, store.read("nights", night.name, columns).to_pylist(), night, config)
+    store = batch.store
+    asked = questions(batch, store.read("nights", night.name, ASKED).to_pylist(), night)
     names = {q.spec.loop for q in asked}
     rows = [r for r in known(store, night.name) if resume or r["loop"] not in names]
     done = {r["loop"] for r in rows} & names
     left = [q for q in asked if q.spec.loop not in done]
     keep(store, night.name, rows)
     progress(len(done), len(asked))
-    for at, row in enumerate(_rows(left, jobs, config), len(done) + 1):
+    for at, row in enumerate(_rows(left, jobs, batch.config), len(done) + 1):
         rows.append(row)
         keep(store, night.name, rows)
         progress(at, len(asked))

@@ -69,7 +69,7 @@ def whole(night: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The store of an uninterrupted run in one process."""
     store = tmp_path_factory.mktemp("whole") / "store"
     export, specs = opened(night)
-    batch.run(export, specs, Store(store), CONFIG)
+    batch.run(batch.Batch(export, specs, Store(store), CONFIG))
     return store
 
 
@@ -100,7 +100,7 @@ def test_an_error_of_one_loop_is_its_result(night, tmp_path, monkeypatch):
     assess = chunk.assess
     monkeypatch.setattr(chunk, "assess", fails)
     export, specs = opened(night)
-    outcome = batch.run(export, specs[:6], Store(tmp_path / "store"), CONFIG)
+    outcome = batch.run(batch.Batch(export, specs[:6], Store(tmp_path / "store"), CONFIG))
     assert outcome.failed == (("L03", "ZeroDivisionError: of all things"),)
     assert outcome.unassessed == ()
 
@@ -137,7 +137,7 @@ def stopped(night: Path, store: Path, chunks: int) -> None:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(chunk, "work", killed)
         with pytest.raises(KeyboardInterrupt):
-            batch.run(export, specs, Store(store), CONFIG)
+            batch.run(batch.Batch(export, specs, Store(store), CONFIG))
 
 
 def test_a_stopped_run_goes_on_where_it_stood(night, whole, tmp_path, monkeypatch):
@@ -149,7 +149,7 @@ def test_a_stopped_run_goes_on_where_it_stood(night, whole, tmp_path, monkeypatc
     work = chunk.work
     monkeypatch.setattr(chunk, "work", lambda task: worked.extend(s.loop for s in task.specs) or work(task))
     export, specs = opened(night)
-    batch.run(export, specs, Store(store), CONFIG, resume=True)
+    batch.run(batch.Batch(export, specs, Store(store), CONFIG), resume=True)
     assert worked == [f"L{k:02d}" for k in range(2 * batch.CHUNK, LOOPS)]
     assert tables(store) == tables(whole)
     assert Store(store).begun() == []
@@ -171,7 +171,7 @@ def test_a_chunk_stopped_half_written_is_not_kept_twice(night, whole, tmp_path):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(chunk, "write_table", killed)
         with pytest.raises(KeyboardInterrupt):
-            batch.run(export, specs, Store(store), CONFIG)
+            batch.run(batch.Batch(export, specs, Store(store), CONFIG))
     CliRunner().invoke(main, ["run", str(night), "--store", str(store), "--resume", "--jobs", "2"])
     assert tables(store) == tables(whole)
 
@@ -188,7 +188,7 @@ def test_two_processes_give_what_one_gives(night, whole, tmp_path):
     """A pool of two workers writes the same store as one process."""
     export, specs = opened(night)
     store = tmp_path / "store"
-    batch.run(export, specs, Store(store), CONFIG, jobs=2)
+    batch.run(batch.Batch(export, specs, Store(store), CONFIG), jobs=2)
     assert tables(store) == tables(whole)
 
 
@@ -196,7 +196,10 @@ def test_progress_counts_all_loops(night, tmp_path):
     """Progress runs from nothing to all loops."""
     export, specs = opened(night)
     said: list[tuple[int, int]] = []
-    batch.run(export, specs[:20], Store(tmp_path / "s"), CONFIG, progress=lambda d, t: said.append((d, t)))
+    batch.run(
+        batch.Batch(export, specs[:20], Store(tmp_path / "s"), CONFIG),
+        progress=lambda d, t: said.append((d, t)),
+    )
     assert said == [(0, 20), (8, 20), (16, 20), (20, 20)]
 
 
@@ -256,7 +259,7 @@ from analyzer.history.export import open_export
 from analyzer.store import Store
 from analyzer.loops.tags import find_loops
 export = open_export([Path(sys.argv[1])])
-batch.run(export, find_loops(export.tags)[: int(sys.argv[2])], Store(Path(sys.argv[3])), Config())
+batch.run(batch.Batch(export, find_loops(export.tags)[: int(sys.argv[2])], Store(Path(sys.argv[3])), Config()))
 print(json.dumps(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss))
 """
 

@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from analyzer.batch import Batch
 from analyzer.config import Config
 from analyzer.explain import night as explain_night
 from analyzer.explain.answer_data import abstained
@@ -34,6 +35,11 @@ ROW = {"status": "ok", "oscillating_pct": 0.0, "cause": "none", "action": "none"
 def store(tmp_path: Path) -> Store:
     """Two weeks of 30 made-up loops."""
     return small_store(tmp_path / "store", hours=False, buckets=50)
+
+
+def batch_in(store: Store) -> Batch:
+    """The loops of the made-up night, kept in a store."""
+    return Batch(EXPORT, SPECS, store, Config())
 
 
 def told(q: Question) -> tuple[dict[str, Any], str]:
@@ -85,13 +91,13 @@ def test_flagged_loops_oscillate_or_have_cause_or_action(changed: dict[str, Any]
     assert flagged(ROW | changed) is worth
 
 
-def test_worst_loop_comes_first_with_the_loop_that_leads_it() -> None:
+def test_worst_loop_comes_first_with_the_loop_that_leads_it(store: Store) -> None:
     """Questions go by significance, and a follower brings its source's tags."""
     rows = [
         ROW | {"loop": tag, "cause": "load", "oscillation_significance": size, "source_loop": lead}
         for tag, size, lead in (("FIC0000", 1.0, None), ("FIC0001", 9.0, "FIC0000"))
     ]
-    first, second = questions(EXPORT, SPECS, rows, NIGHT, Config())
+    first, second = questions(batch_in(store), rows, NIGHT)
     assert (first.spec.loop, second.spec.loop) == ("FIC0001", "FIC0000")
     assert first.source is not None
     assert first.source.loop == "FIC0000"
@@ -102,7 +108,7 @@ def test_one_failing_loop_never_stops_the_night(store: Store, monkeypatch: pytes
     """A loop that breaks and one that abstains have their reason as answer; all others are explained."""
     monkeypatch.setattr(explain_night, "_explained", told)
     seen: list[tuple[int, int]] = []
-    rows = run(EXPORT, SPECS, store, NIGHT, Config(), progress=lambda *x: seen.append(x))
+    rows = run(batch_in(store), NIGHT, progress=lambda *x: seen.append(x))
     by = {r["loop"]: r for r in known(store, NIGHT.name)}
     assert len(by) == len(rows) == seen[-1][0] == seen[-1][1]
     assert {"unexplained", "backlash"} == {r["verdict"] for r in rows}
@@ -115,7 +121,7 @@ def test_dead_worker_costs_its_loop_alone(store: Store, monkeypatch: pytest.Monk
     """Where every second worker dies, every second loop says so and the others have their answers."""
     monkeypatch.setattr(explain_night, "_explained", told)
     monkeypatch.setattr(explain_night, "Workers", DyingWorkers)
-    rows = run(EXPORT, SPECS, store, NIGHT, Config(), 2)
+    rows = run(batch_in(store), NIGHT, 2)
     dead = [r for r in rows if "SIGKILL" in r["reason"]]
     assert abs(2 * len(dead) - len(rows)) <= 1
 
@@ -123,9 +129,9 @@ def test_dead_worker_costs_its_loop_alone(store: Store, monkeypatch: pytest.Monk
 def test_resumed_night_keeps_what_it_has(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
     """A stopped night goes on with the loops that have no answer yet."""
     monkeypatch.setattr(explain_night, "_explained", told)
-    whole = run(EXPORT, SPECS, store, NIGHT, Config())
+    whole = run(batch_in(store), NIGHT)
     keep(store, NIGHT.name, [whole[0] | {"reason": "kept"}])
-    again = run(EXPORT, SPECS, store, NIGHT, Config(), resume=True)
+    again = run(batch_in(store), NIGHT, resume=True)
     assert again[0]["reason"] == "kept"
     assert {r["loop"] for r in again} == {r["loop"] for r in whole}
 

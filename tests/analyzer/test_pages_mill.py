@@ -33,7 +33,8 @@ def store(tmp_path_factory: pytest.TempPathFactory) -> Store:
     export = open_export([MILL / "mill.parquet"], ReadOptions())
     specs, _ = match(read_loops(MILL / "loops.csv"), export.tags)
     kept = Store(tmp_path_factory.mktemp("mill"))
-    batch.run(export, [s for s in specs if s.loop in (*RETUNED, *OTHERS)], kept, quick, jobs=2)
+    wanted = [s for s in specs if s.loop in (*RETUNED, *OTHERS)]
+    batch.run(batch.Batch(export, wanted, kept, quick), jobs=2)
     return kept
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import pytest
 from plant import START_S, Sketch, simulate, spec, write_export
 
@@ -54,7 +52,7 @@ def test_a_run_advises_on_the_settings_in_force(tmp_path):
     rows = []
     for changes in ((), dated):
         store = Store(tmp_path / f"store{len(changes)}")
-        batch.run(export, stale, store, Config(), 0, False, -math.inf, math.inf, changes=changes)
+        batch.run(batch.Batch(export, stale, store, Config(), changes=changes))
         (row,) = store.read("nights", store.require()).to_pylist()
         rows.append(row)
     assert [r["action"] for r in rows] == ["check settings", "retune"]

@@ -99,7 +99,7 @@ def nights(jobs: int, changes: Sequence[TuningChange]) -> Iterator[Advised]:
         with tempfile.TemporaryDirectory() as folder:
             store = Store(Path(folder) / "store")
             span = first.timestamp(), first.timestamp() + DAY_S
-            batch.run(export, specs, store, Config(), jobs, False, *span, changes=changes)
+            batch.run(batch.Batch(export, specs, store, Config(), *span, changes), jobs)
             rows = {r["loop"]: r for r in ranked(store, "oscillation_significance")[0]}
         for spec in specs:
             row = rows[spec.loop]

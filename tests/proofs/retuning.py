@@ -109,7 +109,7 @@ def triaged(rigs: Sequence[Rig], folder: Path) -> dict[str, dict[str, Any]]:
     export = open_export([trends])
     specs = match(read_loops(folder / "loops.csv"), export.tags)[0]
     store = Store(folder / "store")
-    batch.run(export, specs, store, Config())
+    batch.run(batch.Batch(export, specs, store, Config()))
     return {row["loop"]: row for row in ranked(store, "oscillation_significance")[0]}
 
 
