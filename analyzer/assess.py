@@ -201,6 +201,14 @@ def _dead_time(verdict: Verdict) -> float | None:
     return None if m is None else (m.play if verdict.cause is Cause.VALVE else m.linear).dead_time_s
 
 
+def _hours(
+    prepared: Prepared, found: Oscillations, band_pct: float | None, config: Config
+) -> tuple[Hour, ...]:
+    """The figures of each hour, as far as what they rest on is known."""
+    hours = hourly(prepared.record, found, config.figures, band_pct)
+    return tuple(replace(h, figures=_known(h.figures, prepared.op_known)) for h in hours)
+
+
 def assess(prepared: Prepared, controller: Pid | None, config: Config, kind: str = "") -> Assessment:
     """Assess one loop.
 
@@ -237,10 +245,7 @@ def assess(prepared: Prepared, controller: Pid | None, config: Config, kind: str
         record.start_s,
         record.duration_s,
         night,
-        tuple(
-            replace(h, figures=_known(h.figures, prepared.op_known))
-            for h in hourly(record, found, config.figures, night.noise_band_pct)
-        ),
+        _hours(prepared, found, night.noise_band_pct, config),
         found,
         verdict,
         settings,

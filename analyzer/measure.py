@@ -131,11 +131,9 @@ def measure(
     linear, play, stick, best, gained, jump = fits
     size = best.valve.stickband / max(_op_range(window, scale, oscillation is not None), 1e-9)
     amplification, stable = _amplification(process_of(window, linear), controller, scale)
-    saturated = float(record.mask("saturated").mean())
-    harmonic = locked_harmonic(error, scale) if error is not None and oscillation is not None else 0.0
     told, (fine_linear, fine_play, fine_stick) = _refined(window, (linear, play, stick), best)
-    cycling = error is not None and oscillation is not None
-    shown = trials(WindowFit(window, best), WindowFit(window, linear), scale) if cycling else None
+    wave = error if oscillation is not None else None
+    shown = trials(WindowFit(window, best), WindowFit(window, linear), scale) if wave is not None else None
     return Measured(
         fine_linear,
         fine_play,
@@ -148,14 +146,14 @@ def measure(
         amplification,
         stable,
         _consistency(window, linear, scale) if oscillation is not None else 1.0,
-        harmonic,
-        saturated,
+        locked_harmonic(wave, scale) if wave is not None else 0.0,
+        float(record.mask("saturated").mean()),
         controller,
         told,
         stem_moves(window, best.valve),
         bool(due.any()),
         shown,
-        size_kurtosis(error, error.duration_s / scale) if cycling and error is not None else 3.0,
+        size_kurtosis(wave, wave.duration_s / scale) if wave is not None else 3.0,
     )
 
 

@@ -94,6 +94,14 @@ def _enough(pv: Series | None, spec: LoopSpec, limits: QualityLimits) -> Series:
     return pv
 
 
+def _interval(pv: Series) -> float:
+    """The interval of the samples [s]."""
+    dt = interval(pv.stamp_s)
+    if not dt > 0:
+        raise LacksError(Needs(Lack.SAMPLES, "needs samples at different times, has one stamp"))
+    return dt
+
+
 def prepare(spec: LoopSpec, series: Mapping[str, Series], limits: QualityLimits) -> Prepared:
     """One loop's raw samples on one clock, with masks.
 
@@ -110,11 +118,8 @@ def prepare(spec: LoopSpec, series: Mapping[str, Series], limits: QualityLimits)
         Where there is no PV, or too little of it; the text says what is needed and what there is.
     """
     series = _numeric(spec, series, limits)
-    pv_raw = _enough(series.get(spec.pv or ""), spec, limits)
-    trimmed = without_stray_ends(pv_raw)
-    dt = interval(trimmed.stamp_s)
-    if not dt > 0:
-        raise LacksError(Needs(Lack.SAMPLES, "needs samples at different times, has one stamp"))
+    trimmed = without_stray_ends(_enough(series.get(spec.pv or ""), spec, limits))
+    dt = _interval(trimmed)
     clock = clock_of(trimmed, dt, limits)
     pv, gap = onto_clock(trimmed, clock, dt, limits)
     scale = scale_of(spec, pv[~gap])

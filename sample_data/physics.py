@@ -78,6 +78,14 @@ def shares(lag: float, delay: float, dt: float) -> tuple[int, float, float]:
 
 
 @njit(cache=True)
+def moved(rest: float, way: float, force: float, valve: Three, share: float) -> tuple[float, float]:
+    """One step of a stem that sticks, or of one behind play: its position and direction."""
+    if valve[1] > 0.0:
+        return slip(rest, way, force, valve[1], valve[2], share)
+    return drag(rest, force, valve[0]), way
+
+
+@njit(cache=True)
 def run(
     sp: Floats, load: Floats, noise: Floats, kp: Floats, ti: Floats, push: Floats, manual: Mask, op0: float,
     valve: Three, process: Three,
@@ -116,10 +124,7 @@ def run(
         before, u = e, min(max(u, 0.0), 100.0)
         for _ in range(SUBSTEPS):
             force += follow * (u - force)
-            if valve[1] > 0.0:
-                rest, way = slip(rest, way, force, valve[1], valve[2], share)
-            else:
-                rest = drag(rest, force, valve[0])
+            rest, way = moved(rest, way, force, valve, share)
             late[at] = rest
             at = (at + 1) % late.size
             inflow = older_share * late[at] + newer_share * late[(at + 1) % late.size]

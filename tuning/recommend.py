@@ -72,6 +72,16 @@ class Proposal:
     candidates: tuple[Candidate, ...] = ()
 
 
+def _check(cause: str, load: Floats | None) -> None:
+    """Raise ValueError for what `recommend` cannot take."""
+    if cause not in tuple(Cause):
+        raise ValueError(f"cause is one of {', '.join(Cause)}, got {cause!r}")
+    if load is not None and not np.all(np.isfinite(load)):
+        raise ValueError(
+            f"load must be finite, {np.sum(~np.isfinite(load))} of its {load.size} values are not"
+        )
+
+
 def recommend(
     loop: Loop,
     cause: str,
@@ -106,22 +116,15 @@ def recommend(
     ValueError
         For a cause that is none of the five, and for a load that is not finite everywhere.
     """
-    if cause not in tuple(Cause):
-        raise ValueError(f"cause is one of {', '.join(Cause)}, got {cause!r}")
-    if load is not None and not np.all(np.isfinite(load)):
-        raise ValueError(
-            f"load must be finite, {np.sum(~np.isfinite(load))} of its {load.size} values are not"
-        )
+    _check(cause, load)
     if cause == Cause.LOAD:
         return Proposal(Action.SEE_SOURCE_LOOP if source else Action.NONE, reasons.load(source))
     if cause in (Cause.NONE, Cause.UNDECIDED):
-        action = Action.NONE if cause == Cause.NONE else Action.UNDECIDED
-        return Proposal(action, reasons.no_cause(cause))
+        return Proposal(Action.NONE if cause == Cause.NONE else Action.UNDECIDED, reasons.no_cause(cause))
     if loop.controller.kp * loop.process.slope <= 0.0:
         return Proposal(Action.CHECK_SETTINGS, reasons.wrong_sign(loop))
     others = tuple(uncertainty) or assumed_uncertainty(loop, limits)
-    if load is not None and load.size < limits.least_steps:
-        load = None
+    load = None if load is None or load.size < limits.least_steps else load
     return (_tight if cause == Cause.TUNING else _valve)(loop, others, load, limits)
 
 

@@ -113,6 +113,17 @@ def _bucket(tag: str, count: int) -> int:
     return zlib.crc32(loop.encode("utf-8")) % count
 
 
+def _folder(sheet: Sheet, place: Path) -> Path:
+    """A new folder with room for a copy of a sheet."""
+    if shutil.disk_usage(place).free < sheet.bytes:
+        raise InputError(
+            f"{sheet.path}: no room for a copy of {sheet.bytes / 1e9:.1f} GB in {place}",
+            "free disk",
+            "make room",
+        )
+    return Path(tempfile.mkdtemp(prefix="converted-", dir=place))
+
+
 def converted(sheet: Sheet, tag: int, scratch: Path | None) -> Converted:
     """Stream a sheet into Parquet.
 
@@ -129,14 +140,7 @@ def converted(sheet: Sheet, tag: int, scratch: Path | None) -> Converted:
     InputError
         The disk has no room, or the text cannot be read.
     """
-    place = scratch or own_scratch()
-    if shutil.disk_usage(place).free < sheet.bytes:
-        raise InputError(
-            f"{sheet.path}: no room for a copy of {sheet.bytes / 1e9:.1f} GB in {place}",
-            "free disk",
-            "make room",
-        )
-    folder = Path(tempfile.mkdtemp(prefix="converted-", dir=place))
+    folder = _folder(sheet, scratch or own_scratch())
     try:
         done = as_far_as_numbers_go(sheet.encoding, partial(_pass, sheet, tag, folder))
         rows = pq_rows(folder) + done.left_out

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from analyzer.columns.table import BY_NAME
-from analyzer.decisions import CAUSES, Fault, Status
+from analyzer.decisions import CAUSES, Fault
 from analyzer.explain.agreement import agreement
 from analyzer.explain.page_words import title
 from analyzer.pages.engineering import Scale, beside, scale_of
-from analyzer.pages.headings import heading, headings, titled
+from analyzer.pages.headings import heading, titled
+from analyzer.pages.loop_history import history
 from analyzer.pages.reading import Thinned
 from analyzer.pages.rhythm import rhythm_plots
 from analyzer.pages.trends import LEAST_PCT, close_span, trend_block
@@ -107,6 +108,11 @@ def _facts(row: Row) -> Facts:
     return Facts(tuple(facts))
 
 
+def _notes(notes: Sequence[str]) -> tuple[Section, ...]:
+    """What people wrote, the newest first."""
+    return (Section("Notes", (Listing(tuple(("", n) for n in reversed(notes))),)),) if notes else ()
+
+
 def _first(row: Row, thin: Thinned | None) -> Section:
     """What is wrong, what to do in three lines, and ten periods of it."""
     reason = row["reason"] or "nothing was found"
@@ -168,41 +174,6 @@ def _pv_op(thin: Thinned, row: Row) -> Plot:
     title = "PV over OP, " + ("the last ten periods" if close else "the last night")
     reach = (middle - half, middle + half)
     return Plot("pv-op", title, "OP [%]", f"PV [{scale.label}]", (line,), (), caption, reach=reach)
-
-
-HISTORY = (
-    *headings("night", "cause", "oscillation_significance", "oscillating_pct", "period_s"),
-    *headings("average_absolute_error_pct", "valve_travel_pct_per_h", "variability_pct"),
-    heading("action", wide=True),
-)
-
-
-def _history_row(row: Row) -> tuple[Cell, ...]:
-    cells = []
-    for column in HISTORY:
-        value = row[column.key]
-        text = (
-            duration(value) if column.key == "period_s" else number(value) if column.numeric else value or ""
-        )
-        cells.append(Cell(text or "", value if column.numeric else None))
-    if row["status"] != Status.OK:
-        cells[-1] = Cell(f"{row['status']}: {row['reason']}")
-    return tuple(cells)
-
-
-def _history(rows: Sequence[Row]) -> Section:
-    table = Table("history", "", HISTORY, tuple(_history_row(r) for r in reversed(rows)))
-    known = [(i - len(rows) + 1.0, r["oscillation_significance"]) for i, r in enumerate(rows)]
-    points = np.array([(x, y) for x, y in known if y is not None], float)
-    blocks: list[Block] = [table]
-    if len(points) > 2:
-        line = Line("significance", points[:, 0], points[:, 1])
-        shown = BY_NAME["oscillation_significance"]
-        title = f"{shown.title} over the nights"
-        blocks.insert(
-            0, Plot("nights", title, "nights before this one", shown.unit, (line,), reach=(0.0, 1.0))
-        )
-    return Section("Over the nights", tuple(blocks))
 
 
 def _figure(name: str, row: Row, scale: Scale) -> tuple[str, str]:
@@ -277,10 +248,10 @@ def page(
     """
     row = rows[-1]
     scale = scale_of(row)
-    figures = [_figure(k, row, scale) for k in FIGURES if row[k] is not None]
+    figures = tuple(_figure(k, row, scale) for k in FIGURES if row[k] is not None)
     sections = [
         _first(row, thin),
-        *((Section("Notes", (Listing(tuple(("", n) for n in reversed(notes))),)),) if notes else ()),
+        *_notes(notes),
         _verdict(row),
         *(() if shared is None else (shared,)),
         *_explained(explained, row),
@@ -288,13 +259,20 @@ def page(
         *_trends(thin, row),
         *_limit_cycle(row),
         *(() if settings is None else settings.sections[:1]),
-        _history(rows),
+        history(rows),
     ]
-    sections.insert(-1, Section("Figures of the night, for experts", (Facts(tuple(figures)),), closed=True))
+    sections.insert(-1, Section("Figures of the night, for experts", (Facts(figures),), closed=True))
     known = [row["description"], row["type"], row["area"], f"night {row['night']}"]
-    links = (("All loops", index),) + (() if more is None else (("The explanation", f"{more.name}.html"),))
-    if settings is not None:
-        links = (*links, ("Try settings", f"{settings.name}.html"))
-    if shared is not None and row["group"]:
-        links = (*links, ("Its group", f"group-{row['group']}.html"))
+    group = row["group"] if shared is not None else None
+    links = (("All loops", index), *_links(more, settings, group))
     return Page(slug(row["loop"]), row["loop"], ", ".join(k for k in known if k), tuple(sections), links)
+
+
+def _links(more: Page | None, settings: Page | None, group: str | None) -> Iterator[tuple[str, str]]:
+    """To the loop's other pages and to its group's."""
+    if more is not None:
+        yield "The explanation", f"{more.name}.html"
+    if settings is not None:
+        yield "Try settings", f"{settings.name}.html"
+    if group:
+        yield "Its group", f"group-{group}.html"

@@ -14,6 +14,14 @@ COARSEST = 0.2
 """Interval of samples beyond which, in the loop's own time, one sample's noise passes for memory [-]; ours."""
 
 
+def _averaged(error: Floats, good: Mask, blocks: int, width: int) -> tuple[Floats, Mask]:
+    """Means of the good samples of each block, 0 in blocks that are half bad, and which are not, shape (blocks,)."""
+    weight = good[: blocks * width].reshape(blocks, width).mean(axis=1)
+    total = np.where(good, error, 0.0)[: blocks * width].reshape(blocks, width).mean(axis=1)
+    use = weight > 0.5
+    return np.where(use, total / np.where(use, weight, 1.0), 0.0), use
+
+
 def correlation_time(error: Floats, good: Mask, dt_s: float, scale_s: float) -> float | None:
     """The time [s] after which the autocorrelation of the averaged error is under 1/e.
 
@@ -45,12 +53,9 @@ def correlation_time(error: Floats, good: Mask, dt_s: float, scale_s: float) -> 
     blocks = error.size // width
     if blocks * width * dt_s < 10.0 * scale_s:
         return None
-    weight = good[: blocks * width].reshape(blocks, width).mean(axis=1)
-    total = np.where(good, error, 0.0)[: blocks * width].reshape(blocks, width).mean(axis=1)
-    use = weight > 0.5
+    x, use = _averaged(error, good, blocks, width)
     if use.sum() < 2:
         return None
-    x = np.where(use, total / np.where(use, weight, 1.0), 0.0)
     x[use] -= x[use].mean()
     power = np.abs(np.fft.rfft(x, 2 * blocks)) ** 2
     pairs = np.abs(np.fft.rfft(use.astype(np.float64), 2 * blocks)) ** 2

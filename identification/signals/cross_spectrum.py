@@ -68,6 +68,19 @@ def chance_coherence(lines: int, width: int, chance: float) -> float:
 
 
 @njit(cache=True)
+def _cross(mine: Complex, yours: Complex) -> tuple[float, float]:
+    """Squared cross power of two pieces of lines, and the product of their powers."""
+    re, im, own, other = 0.0, 0.0, 0.0, 0.0
+    for k in range(mine.size):
+        x, y = mine[k], yours[k]
+        re += x.real * y.real + x.imag * y.imag
+        im += x.imag * y.real - x.real * y.imag
+        own += x.real * x.real + x.imag * x.imag
+        other += y.real * y.real + y.imag * y.imag
+    return re * re + im * im, own * other
+
+
+@njit(cache=True)
 def coherences(
     flat: Complex, offset: Whole, first: Whole, count: Whole, one: int, others: Whole, span: Whole, shift: int
 ) -> Floats:
@@ -105,16 +118,11 @@ def coherences(
         shared, whole = 0.0, 0.0
         for p in range(pieces):
             begin, end = low + (high - low) * p // pieces, low + (high - low) * (p + 1) // pieces
-            cross_re, cross_im, mine, yours = 0.0, 0.0, 0.0, 0.0
-            for k in range(begin, end):
-                x = flat[offset[one] + k - first[one]]
-                y = flat[offset[j] + k + shift - first[j]]
-                cross_re += x.real * y.real + x.imag * y.imag
-                cross_im += x.imag * y.real - x.real * y.imag
-                mine += x.real * x.real + x.imag * x.imag
-                yours += y.real * y.real + y.imag * y.imag
-            shared += cross_re * cross_re + cross_im * cross_im
-            whole += mine * yours
+            mine = flat[offset[one] + begin - first[one] : offset[one] + end - first[one]]
+            yours = flat[offset[j] + begin + shift - first[j] : offset[j] + end + shift - first[j]]
+            cross, powers = _cross(mine, yours)
+            shared += cross
+            whole += powers
         if whole > 0:
             out[q] = shared / whole
     return out

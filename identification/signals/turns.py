@@ -82,11 +82,8 @@ def halves(
         if last - first < 3 or not good[first : last + 1].all():
             continue
         at = np.arange(first, min(last, first + LONGEST * 0.5 * period_s / dt_s) + 1e-9, step / dt_s)
-        o, p, later = (
-            np.interp(at, clock, op),
-            np.interp(at, clock, pv),
-            np.interp(at + marks.dead_s / dt_s, clock, pv),
-        )
+        o, p = np.interp(at, clock, op), np.interp(at, clock, pv)
+        later = np.interp(at + marks.dead_s / dt_s, clock, pv)
         found.append(Half(float(first) * dt_s, step, o, p, later, _stuck(o, step, marks)))
     return tuple(reversed(found))
 

@@ -150,6 +150,17 @@ def shares_filled(o: Outflow, times: tuple[float, float]) -> Floats:
 
 
 @njit(cache=True, error_model="numpy")
+def risen(x: float, feed: float, basin: float, o: Outflow, rises: Floats, half: int) -> tuple[float, float]:
+    """What `filled` gives of a linear outflow, by its shares (`shares_filled`)."""
+    net = feed + o.spill * basin - o.leak * x
+    if x > o.cap:
+        spill = WEIR * (x - o.cap)
+        net -= spill
+        return x + net * rises[half, 0 if net > 0.0 else 1, 1], spill
+    return x + net * rises[half, 0 if net > 0.0 else 1, 0], 0.0
+
+
+@njit(cache=True, error_model="numpy")
 def held(lag_s: float, h: float) -> tuple[float, float]:
     """What is left of a first-order lag's distance from its aim after h seconds, and the mean of it meanwhile."""
     if lag_s <= 0.0 or h <= 0.0:
@@ -170,15 +181,9 @@ def kept(c: Floats, parts: tuple[float, float]) -> tuple[Floats, Floats]:
 
 @njit(cache=True, error_model="numpy")
 def vessel_span(
-    span: tuple[int, int],
-    m: Memory,
-    drive: tuple[Floats, Floats, Floats],
-    c: Floats,
-    dt_s: float,
-    base: float,
-    head: float,
-    out: Floats,
-) -> Memory:
+    span: tuple[int, int], m: Memory, drive: tuple[Floats, Floats, Floats], c: Floats, dt_s: float, base: float,
+    head: float, out: Floats,
+) -> Memory:  # fmt: skip
     """PV's deviation [% PV] over samples span[0] (included) to span[1] (excluded), put into `out`, shape (n,).
 
     m : the vessel's memory before the span; returned as it is behind. drive : flow during each sample, load at the
@@ -211,15 +216,8 @@ def vessel_span(
                 z2, feed = feed + (z2 - feed) * left[half, 0], feed + (z2 - feed) * mean[half, 0]
             if third:
                 z3, feed = feed + (z3 - feed) * left[half, 1], feed + (z3 - feed) * mean[half, 1]
-            spill = 0.0
             if linear:
-                net = feed + o.spill * basin - o.leak * x
-                if x > o.cap:
-                    spill = WEIR * (x - o.cap)
-                    net -= spill
-                    x += net * rises[half, 0 if net > 0.0 else 1, 1]
-                else:
-                    x += net * rises[half, 0 if net > 0.0 else 1, 0]
+                x, spill = risen(x, feed, basin, o, rises, half)
             else:
                 x, spill = filled(x, feed, basin, times[half], o)
             if o.spill > 0.0:
