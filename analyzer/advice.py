@@ -152,7 +152,7 @@ def advise(
     if proposed.loop is not None and proposed.load is not None:
         new = proposal.controller or proposal.meanwhile
         period_s = oscillation.period_s
-        beside = compared(proposed.loop, proposed.load, new, period_s, spec, pv_span, config.advice)
+        beside = compared(proposed.loop, proposed.load, new, period_s, spec, pv_span, config.tuning)
     return replace(_stated(proposal, spec, pv_span), compared=beside)
 
 

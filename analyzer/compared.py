@@ -8,12 +8,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analyzer.config import AdviceLimits
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import as_stated
 from identification.models import Loop, Pid
 from identification.record import Floats
 from tuning.compared import Tried, rivals, tried
+from tuning.limits import TuningLimits
 from tuning.linear import integral_s
 from tuning.maps import TravelMap, travel_map
 from tuning.predict import run, settled
@@ -85,7 +85,7 @@ def compared(
     period_s: float,
     spec: LoopSpec,
     pv_span: float,
-    limits: AdviceLimits,
+    limits: TuningLimits,
 ) -> Comparison | None:
     """The settings side by side.
 
@@ -102,14 +102,14 @@ def compared(
     spec : LoopSpec
     pv_span : float
         Span of PV in its own unit.
-    limits : AdviceLimits
+    limits : TuningLimits
 
     Returns
     -------
     Comparison or None
         None where the load is too short to compare on.
     """
-    if load.size < limits.forecast_scans or loop.process.slope * loop.controller.kp <= 0.0:
+    if load.size < limits.least_steps or loop.process.slope * loop.controller.kp <= 0.0:
         return None
     settings = rivals(loop, new)
     return Comparison(

@@ -139,8 +139,7 @@ def _in_shape(
     found = shape(s, line)
     total += limits.swing_trade * max(3.0 - found.kurtosis, 0.0)
     even = found.spread <= limits.swing_spread and found.share >= limits.swing_share
-    turns = limits.swing_turns_least <= found.turns <= limits.swing_turns_most
-    return even and turns and total >= max(limits.swing + scatter, limits.swing_least)
+    return even and total >= max(limits.swing + scatter, limits.swing_least)
 
 
 def _candidate(s: Spectrum, b: Bands, k: int, limits: OscillationLimits) -> Oscillation | None:

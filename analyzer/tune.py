@@ -123,9 +123,8 @@ def tune(found: Assessment, controller: Pid, config: Config, kept: Advice | None
         proposal = propose(verdict, controller, period, config).proposal
     load = load_of(tried_on.window, fit, controller)
     new = proposal.controller or proposal.meanwhile
-    forecast = (
-        predict(model, new, load, others) if new and load.size >= config.advice.forecast_scans else None
-    )
+    is_long = load.size >= config.tuning.least_steps
+    forecast = predict(model, new, load, others) if new and is_long else None
     return Tuning(
         identified(found, config.advice)[2],
         model,

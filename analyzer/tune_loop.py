@@ -80,7 +80,7 @@ def _drawn(t: Tuning, spec: LoopSpec, pv_span: float, config: Config, night: str
 
     new = t.proposal.controller or t.proposal.meanwhile
     period_s = t.period_s or 10.0 * slowest_s(t.model)
-    found = compared(t.model, t.load, new, period_s, spec, pv_span, config.advice)
+    found = compared(t.model, t.load, new, period_s, spec, pv_span, config.tuning)
     tried = (
         {} if found is None else {"settings.html": render(page(spec.loop, night, found, spec), True).encode()}
     )

@@ -146,13 +146,6 @@ class TuningLimits:
         "Least cut in travel for which a change is proposed",
         OURS,
     )
-    worth_error: float = limit(
-        0.15,
-        "-",
-        (0.0, 1.0),
-        "Least cut in error for which a change is proposed",
-        "ours: at 0.1 one pair of 99 in tests/proofs/nights.py, for a stem that sticks, made error and travel larger",
-    )
     cycle_growth: float = limit(
         1.05,
         "-",

@@ -219,7 +219,7 @@ def _is_short_and_sticks(loop: Loop, limits: TuningLimits) -> bool:
 
 
 def _worth(candidate: Candidate, limits: TuningLimits) -> bool:
-    return candidate.travel <= 1.0 - limits.worth_travel or candidate.error <= 1.0 - limits.worth_error
+    return candidate.travel <= 1.0 - limits.worth_travel
 
 
 def _smaller(after: Confirmed, before: Confirmed, most_growth: float) -> bool:

@@ -107,10 +107,3 @@ class AdviceLimits:
         "Dead time over the length of the window from which the record does not support the model",
         "ours: four dead times hold no answer and its aftermath twice",
     )
-    forecast_scans: int = limit(
-        240,
-        "scans",
-        (12, 1000000),
-        "Scans of load that a forecast needs",
-        "ours: twenty for each block of its bootstrap",
-    )

@@ -195,20 +195,6 @@ class OscillationLimits:
         "twice have 0.4, what flips at random 1.28",
         UNTIDY,
     )
-    swing_turns_least: float = limit(
-        0.5,
-        "-",
-        (0.0, 10.0),
-        "Half-cycles of the wide band over those of the period, at least",
-        UNTIDY,
-    )
-    swing_turns_most: float = limit(
-        1.6,
-        "-",
-        (0.0, 10.0),
-        "The same at most",
-        UNTIDY,
-    )
     swing_share: float = limit(
         0.3,
         "-",

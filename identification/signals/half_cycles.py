@@ -115,13 +115,11 @@ class Shape:
 
     kurtosis : fourth moment over the squared second [-]: Gaussian noise 3 however coloured, a triangle 1.8, a sine
     1.5, a square 1, for a cycle swings between limits and noise does not; spread : standard deviation of the
-    logarithm of the half-cycles' lengths [-]; turns : half-cycles over those of the period [-]; share : of the
-    record's variance [-].
+    logarithm of the half-cycles' lengths [-]; share : of the record's variance [-].
     """
 
     kurtosis: float
     spread: float
-    turns: float
     share: float
 
 
@@ -135,7 +133,7 @@ def shape(s: Spectrum, line: float) -> Shape:
     x = irfft(cut, m) * (m / s.n)
     power = float(x @ x) / m
     if power <= 0.0:
-        return Shape(3.0, 0.0, 0.0, 0.0)
+        return Shape(3.0, 0.0, 0.0)
     halves = half_cycles(x, s.duration_s / m, FIRM_TURN).duration_s
     spread = float(np.log(halves).std()) if halves.size > 2 else math.inf
-    return Shape(float(np.mean(x**4)) / power**2, spread, halves.size / (2 * line), power / s.variance)
+    return Shape(float(np.mean(x**4)) / power**2, spread, power / s.variance)
