@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
@@ -34,7 +34,7 @@ REFITTED, UNFIT, SETTINGS = 12, 8, 60
 whether settings are wrong."""
 OF_FITS = frozenset({"window", "blocks_per_period", "judged", "evidence_jump"})
 """Limits of causes that act on what is fitted; the others act on what was."""
-VARIANTS, PLANTS, WEEKS, NULLS = 3, 10, 60, 150
+VARIANTS, PLANTS, WEEKS, NULLS = 3, 20, 60, 150
 """Loops of each sketch that are advised on, their gains a tenth apart, coupled plants, pairs of
 weeks, and records of each family in which nothing oscillates."""
 START_S = 1_772_409_600.0
@@ -50,6 +50,19 @@ ADVISED = (
     Sketch("tuning", (1.5, 90.0, 10.0), 5.5, 40.0, noise=0.05, load_std=0.6, load_s=300.0),
     Sketch("load", (1.4, 90.0, 10.0), 0.8, 120.0, load_std=0.3, sine=3.0, sine_s=840.0),
 )
+SMALL = tuple(
+    Sketch(
+        "valve", (rate * 8000.0, 8000.0, 6.0), kp, ti, backlash=play, load_std=0.1, sine=sine, sine_s=period
+    )
+    for rate, kp, ti, period in (
+        (0.01, 0.8, 25.0, 170.0),
+        (0.005, 1.0, 40.0, 230.0),
+        (0.02, 0.3, 40.0, 210.0),
+    )
+    for play in (1.0, 2.0, 4.0)
+    for sine in (0.0, 1.5, 4.0)
+)
+"""Tanks under PI of little damping, whose play is small beside OP's range, some of them driven from outside."""
 DEFAULT = Config()
 
 
@@ -62,9 +75,52 @@ class Raw:
     stated: Pid | None
 
 
+def spoilt(kind: int, rng: np.random.Generator, series: dict[str, Series]) -> dict[str, Series]:
+    """A loop's samples with what historians do to some: values frozen, lost or not understood, OP out of its range,
+    stamps left out, a month between two parts."""
+    out = dict(series)
+    pv, op = series["L.PV"], series["L.OP"]
+    n = pv.value.size
+    part = slice(int(0.3 * n), int((0.3 + rng.uniform(0.02, 0.5)) * n))
+    match kind:
+        case 0 | 1:
+            tag = ("L.PV", "L.OP")[kind]
+            value = out[tag].value.copy()
+            value[part] = value[part.start]
+            out[tag] = replace(out[tag], value=value)
+        case 2:
+            bad = rng.random(n) < rng.uniform(0.02, 0.6)
+            out = {tag: replace(s, bad=bad) for tag, s in out.items()}
+        case 3:
+            kept = np.ones(n, dtype=bool)
+            for at in rng.integers(0, n, n // 40):
+                kept[at : at + int(rng.integers(1, 12))] = False
+            out["L.OP"] = Series(op.stamp_s[kept], op.value[kept], op.bad[kept])
+        case 4:
+            out["L.OP"] = replace(op, value=op.value - op.value.max() + rng.uniform(100.0, 110.0))
+        case 5:
+            lost = rng.random(n) < rng.uniform(0.005, 0.04)
+            out["L.PV"] = replace(pv, bad=lost, unread=int(lost.sum()), example="1.2.3")
+        case 6:
+            apart = np.where(np.arange(n) < n // 2, 0.0, rng.uniform(5.0, 40.0) * np.ptp(pv.stamp_s))
+            out = {tag: replace(s, stamp_s=s.stamp_s + apart) for tag, s in out.items()}
+    return out
+
+
+@dataclass(frozen=True)
+class Coupled:
+    """A loop of a coupled plant: what oscillates in it, when its record ends, and what its own verdict says."""
+
+    name: str
+    found: Oscillations
+    end_s: float
+    peer: Peer
+    confidence: Mapping[Cause, float]
+
+
 @cache
 def raws() -> tuple[Raw, ...]:
-    """Untidy loops, half of them with gaps, a frozen PV or an OP that stands still."""
+    """Untidy loops, half of them spoilt."""
     out = []
     for seed in range(700_000, 700_000 + 40 * LOOPS):
         drawn = draw(seed)
@@ -72,17 +128,11 @@ def raws() -> tuple[Raw, ...]:
             continue
         rng = np.random.default_rng(seed)
         stamp = START_S + drawn.step_s * np.arange(drawn.pv.size)
-        bad = np.zeros(stamp.size, dtype=bool)
-        pv, op = drawn.pv.copy(), drawn.op.copy()
-        part = slice(int(0.3 * pv.size), int((0.3 + rng.uniform(0.02, 0.5)) * pv.size))
-        match len(out) % 6:
-            case 0:
-                pv[part] = pv[part.start]
-            case 1:
-                op[part] = op[part.start]
-            case 2:
-                bad[rng.random(pv.size) < rng.uniform(0.02, 0.6)] = True
-        series = {f"L.{n}": Series(stamp, x, bad) for n, x in (("PV", pv), ("OP", op), ("SP", drawn.sp))}
+        fine, trends = (
+            np.zeros(stamp.size, dtype=bool),
+            (("PV", drawn.pv), ("OP", drawn.op), ("SP", drawn.sp)),
+        )
+        series = spoilt(len(out) % 14, rng, {f"L.{n}": Series(stamp, x, fine) for n, x in trends})
         own = LoopSpec("L", type=drawn.kind, pv="L.PV", op="L.OP", sp="L.SP", pv_lo=0.0, pv_hi=100.0)
         out.append(Raw(own, series, Pid(drawn.plant.kp, drawn.plant.ti, scan_s=1.0)))
         if len(out) == LOOPS:
@@ -130,6 +180,21 @@ def measured() -> tuple[tuple[Prepared, Oscillations, Measured], ...]:
         m = tried(lambda args=args: measure(*args))
         if isinstance(m, Measured):
             out.append((p, f, m))
+    for sketch in SMALL:
+        p = prepared(simulate(sketch, 3.0))
+        f = detect(p.record, DEFAULT.oscillation)
+        out.append((p, f, measure(p.record, counting(f), sketch.controller, DEFAULT.cause, f.spectrum)))
+    return tuple(out)
+
+
+@cache
+def wound() -> tuple[LoopRecord, ...]:
+    """Records of a PV that stands off its set point while OP winds over some of its range."""
+    n, out = 3600, []
+    for k, width in enumerate(range(4, 64, 4)):
+        pv = 45.0 + 0.02 * np.random.default_rng(k).standard_normal(n)
+        op = 30.0 + width * np.linspace(0.0, 1.0, n)
+        out.append(LoopRecord("L", START_S, 1.0, np.full(n, 50.0), pv, op, np.zeros(n, dtype=bool)))
     return tuple(out)
 
 
@@ -146,7 +211,7 @@ def advised() -> tuple[tuple[Sketch, Assessment], ...]:
 
 
 @cache
-def plants() -> tuple[tuple[tuple[str, Oscillations, float, Peer], ...], ...]:
+def plants() -> tuple[tuple[Coupled, ...], ...]:
     """Loops of coupled plants with what oscillates in them and what their own verdicts say."""
     out = []
     for seed in range(46, 46 + PLANTS):
@@ -162,7 +227,8 @@ def plants() -> tuple[tuple[tuple[str, Oscillations, float, Peer], ...], ...]:
             if isinstance(a, Assessment):
                 m = a.verdict.measured
                 peer = Peer(a.verdict.cause, m.evidence if m else 0.0, a.verdict.confidence[Cause.TUNING])
-                loops.append((x.name, a.oscillations, a.start_s + a.duration_s, peer))
+                end_s, own_pct = a.start_s + a.duration_s, a.verdict.confidence
+                loops.append(Coupled(x.name, a.oscillations, end_s, peer, own_pct))
         out.append(tuple(loops))
     return tuple(out)
 
@@ -190,7 +256,11 @@ def weeks() -> tuple[dict[str, np.ndarray], ...]:
             "pv_mean_pct": 50.0 + 3 * moved,
             "op_mean_pct": 40.0 + 8 * moved,
         }
-        hours |= {"sp_travel_pct": 0.2 * moved, "service_pct": 90.0 + 8 * moved, "at_limits_pct": 4 * moved}
+        hours |= {
+            "sp_travel_pct": (0.2, 4.0)[seed % 2] * moved**3,
+            "service_pct": 90.0 + 8 * moved,
+            "at_limits_pct": 4 * moved,
+        }
         hours |= {"oscillating_pct": 50.0 * moved, "op_variability_pct": noise}
         out.append(hours)
     return tuple(out)

@@ -30,12 +30,14 @@ from concealed.plan import Case, plan
 CASES, EXPLAINED, SEED = 84, 21, 4077
 """Cases asked about recorder and controller, how many of them are explained whole, and the seed of all."""
 HARD = tuple(
-    (name, level) for name in ("controller-gap", "controller-logic") for level in ("concealed", "buried")
+    (name, level)
+    for name in ("controller-gap", "controller-logic")
+    for level in ("masked", "concealed", "buried")
 )
-EACH = 6
+EACH = 12
 """Faults of a controller that are hard to see, and how many of each are asked about beside the others."""
 THINNED = 10
-"""Every tenth sample of every third recording is asked about too, as a historian keeps it."""
+"""Every tenth sample of each recording is asked about too, as a historian keeps it."""
 
 
 def _cases() -> list[Case]:
@@ -100,7 +102,7 @@ def of_recorder(c: Config) -> list[Any]:
 
 def of_controller(c: Config) -> list[Any]:
     """What clock and controller did."""
-    kept = [thinned(s) for s in subjects()[::3]]
+    kept = [thinned(s) for s in subjects()]
     made = (replace(s, limits=c.explain) for s in [*subjects(), *kept])
     return [(_told(controller_finding_of(s, None)[0]), s.circumstances.every_scan) for s in made]
 

@@ -6,19 +6,25 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from analyzer.advice import advise
 from analyzer.assess import assess, cause_of, verdict_by_measures
 from analyzer.assessments import assess_span
-from analyzer.before_after import Span, compare
+from analyzer.before_after import Span, compare, grade
+from analyzer.before_after import follows as source_of
 from analyzer.config import Config
+from analyzer.dead_valve import dead_valve
 from analyzer.loops.changes import behaviour_change
 from analyzer.oscillation import barely_seen, counting, detect
-from analyzer.plantwide.verdict import followers_of, trace
+from analyzer.plantwide.rows import likely, wave_columns
+from analyzer.plantwide.verdict import followers_of, follows, trace
 from analyzer.plantwide.wave import waves_of
 from analyzer.quality import prepare
 from analyzer.settings_check import differing
+from identification.models import Backlash, Fopdt, Loop, Pid, Stiction
 from identification.record import LoopRecord
-from tests.analyzer.plant import prepared, simulate, spec
+from tests.analyzer.plant import prepared, series, simulate, spec
 from tests.proofs.limits_samples import (
     ADVISED,
     DEFAULT,
@@ -37,8 +43,10 @@ from tests.proofs.limits_samples import (
     ready,
     tried,
     weeks,
+    wound,
 )
 from tests.proofs.limits_sealed import of_controller, of_effects, of_recorder
+from tuning.recommend import recommend
 
 
 def of_quality(c: Config) -> list[Any]:
@@ -46,7 +54,8 @@ def of_quality(c: Config) -> list[Any]:
 
     def answer(r: Raw) -> Any:
         p = prepare(r.spec, r.series, c.quality)
-        return len(p.record), int(p.record.bad.sum()), p.op_known, p.notes, round(p.compressed_share, 6)
+        masked = (int(p.record.bad.sum()), int(p.record.mask("saturated").sum()))
+        return len(p.record), masked, p.op_known, p.notes, round(p.compressed_share, 6)
 
     def unfit(r: Raw) -> Any:
         found = tried(lambda: assess(prepare(r.spec, r.series, c.quality), None, c).verdict.needs)
@@ -77,7 +86,8 @@ def _told(v: Any) -> Any:
 def of_cause(c: Config) -> list[Any]:
     """Cause, fault, lacks and confidences: of all loops by what was measured of them, or of a few fitted anew."""
     if all(getattr(c.cause, n) == getattr(DEFAULT.cause, n) for n in OF_FITS) and c is not DEFAULT:
-        return [_told(verdict_by_measures(m, p, counting(f), c)) for p, f, m in measured()]
+        dead = [dead_valve(r, c.cause) is not None for r in wound()]
+        return [*dead, *(_told(verdict_by_measures(m, p, counting(f), c)) for p, f, m in measured())]
     busy = sorted(detected(), key=lambda t: counting(t[2]) is None)[:REFITTED]
     return [_told(tried(lambda t=t: cause_of(t[1], t[2], t[0].stated, c, t[0].spec.type))) for t in busy]
 
@@ -107,18 +117,40 @@ def of_advice(c: Config) -> list[Any]:
         out.append(
             made if isinstance(made, str) else tuple(round(x) for x in made.verdict.confidence.values())
         )
+    for s in ADVISED:
+        valve = Stiction(s.stickband, s.slip_jump) if s.stickband else Backlash(s.backlash)
+        loop = Loop(Fopdt(s.process[0], s.process[1], s.process[2]), s.controller, valve)
+        found = recommend(loop, s.cause, limits=c.tuning)
+        out.append((found.action, found.controller))
+    out += [_is_hidden(dt_s, c) for dt_s in range(8, 40, 2)]
     return out
 
 
+def _is_hidden(dt_s: int, c: Config) -> bool:
+    """Whether a loop with an integral time of 20 s is said to be recorded too coarsely at an interval [s]."""
+    calm = simulate(replace(ADVISED[4], stickband=0.0, slip_jump=0.0, ti=20.0), 6.0)
+    stamp = START_S + np.arange(0.0, calm.pv.size, dt_s)
+    trends = {f"L.{name.upper()}": series(stamp, getattr(calm, name)[::dt_s]) for name in ("sp", "pv", "op")}
+    made = prepare(spec("L"), trends, c.quality)
+    return assess(made, Pid(0.1, 20.0), c).needs is not None
+
+
 def of_plant(c: Config) -> list[Any]:
-    """Groups, sources and followers of coupled plants."""
+    """Groups, sources and followers of coupled plants, and what is said of each follower."""
     out: list[Any] = []
     for loops in plants():
-        waves = [w for name, found, end_s, _ in loops for w in waves_of(name, found, end_s, c.plant)]
-        traced = trace(waves, {name: peer for name, _, _, peer in loops}, c.plant)
-        told = {loop: source.loop for loop, (source, _) in followers_of(traced).items()}
-        out += [(t.group.loops, t.source, round(t.candidates[0].confidence_pct)) for t in traced]
-        out.append(tuple(sorted(told.items())))
+        by_name = {x.name: x for x in loops}
+        waves = [w for x in loops for w in waves_of(x.name, x.found, x.end_s, c.plant)]
+        traced = trace(waves, {x.name: x.peer for x in loops}, c.plant)
+        out += [(t.group.loops, t.source, tuple(likely(t, c.plant))) for t in traced]
+        for loop, (source, wave) in sorted(followers_of(traced).items()):
+            first = counting(by_name[loop].found)
+            row = {"oscillating_pct": first.oscillating_pct if first else 0.0, "usable_h": 8.0}
+            said = follows(by_name[loop].confidence, source, c.plant, wave)
+            shown = tuple(wave_columns(row, said, c.plant))
+            out.append(
+                (loop, source.loop, {k: round(v) for k, v in said.confidence.items()}, said.strength, shown)
+            )
     return out
 
 
@@ -135,13 +167,22 @@ def of_weeks(c: Config) -> list[Any]:
     out = []
     for hours in weeks():
         found = compare("L", hours, before, after, limits=c.before_after)
-        out.append((found.reasons, tuple((x.measure.name, x.verdict) for x in found.changes)))
+        out.append((found.reasons, grade(found), tuple((x.measure.name, x.verdict) for x in found.changes)))
+    for named in range(1, 10):
+        out.append(source_of(["A"] * named + [None] * (10 - named), [True] * 10, c.before_after))
     return out
 
 
 def of_changes(c: Config) -> list[Any]:
     """Whether a step of a controller's behaviour is seen."""
-    return [tried(lambda h=h: behaviour_change("L", h, c.changes)) is not None for h in weeks()]
+    out = []
+    for seed, hours in enumerate(weeks()):
+        rng = np.random.default_rng(seed)
+        travel = hours["valve_travel_pct_per_h"]
+        later = np.arange(travel.size) >= 24 * rng.uniform(1.0, 13.0)
+        hours = {**hours, "valve_travel_pct_per_h": travel * np.exp(later * rng.uniform(-1.0, 1.0))}
+        out.append(tried(lambda h=hours: behaviour_change("L", h, c.changes)) is not None)
+    return out
 
 
 STAGES: dict[str, Callable[[Config], list[Any]]] = {
