@@ -34,6 +34,8 @@ SAME = 0.01
 """Distance of two stems, in the mean distance at which they let go, under which their paths are one; ours."""
 LOOKED = 8
 """Blocks after which paths are compared, if they do not become too many before; ours: bounds the time."""
+WAITING = 12
+"""Slips of a path that PV does not answer yet, at most; ours: a dead time of six cycles is no dead time."""
 MOST_EVENTS = 60_000
 """Slips of all paths that are remembered; beyond it no path divides any more; ours: 8,400 were seen."""
 
@@ -65,19 +67,32 @@ class Friction(NamedTuple):
     rest: int
 
 
-class _Beam(NamedTuple):
-    """Paths side by side, a row each: stem, farthest distance below and above since its last slip, response, its sum
-    over the block, score, last stems, last residuals, last event, sample of the last slip."""
+STEM, X, TOTAL, SCORE, LATE, FAR_LOW, FAR_HIGH, PLACED = 0, 1, 2, 3, 4, 5, 6, 7
+"""Columns of a path's numbers: stem, response, its sum over the block, score, stem that PV answers now, farthest
+distance below and above since the last slip; then places of the stem that PV does not answer yet, and residuals."""
+EVENT, RESTED, COMING, PENDING, DUE = 0, 1, 2, 3, 4
+"""Columns of its marks: last event, sample of the last slip, next sample, how many slips PV does not answer yet; then
+the samples from which it does."""
 
-    stem: Floats
-    farthest: Floats
-    x: Floats
-    total: Floats
-    score: Floats
-    ring: Floats
-    past: Floats
-    event: Indices
-    rested: Indices
+
+class _Beam(NamedTuple):
+    """Paths side by side, a row each, in two arrays: a function is handed each array at a cost."""
+
+    numbers: Floats
+    marks: Indices
+
+
+class _Block(NamedTuple):
+    """A block's first sample, the one behind its last, and the extremes of OP in it; and where PV answers a stem at
+    rest, at u, what is left of a response x then, and the weights of x and of u in its sum over the block."""
+
+    first: int
+    last: int
+    low: float
+    high: float
+    left: float
+    of_x: float
+    of_u: float
 
 
 @njit(cache=True)
@@ -96,19 +111,21 @@ def slip_chance(distance: float, farthest: float, breakaway: float) -> float:
 @njit(cache=True)
 def _copy(into: _Beam, to: int, b: _Beam, source: int) -> None:
     """A path of one beam as one of another, or of the same."""
-    into.stem[to], into.x[to], into.total[to] = b.stem[source], b.x[source], b.total[source]
-    into.score[to], into.event[to], into.rested[to] = b.score[source], b.event[source], b.rested[source]
-    into.farthest[to], into.ring[to], into.past[to] = b.farthest[source], b.ring[source], b.past[source]
+    for i in range(b.numbers.shape[1]):
+        into.numbers[to, i] = b.numbers[source, i]
+    for i in range(b.marks.shape[1]):
+        into.marks[to, i] = b.marks[source, i]
 
 
 @njit(cache=True)
 def _best(b: _Beam, other: _Beam, count: int, most: int, near: float) -> int:
     """The best paths of `b` in `other`, of two at the same place the better; how many they are."""
     kept = 0
-    for at in np.argsort(-b.score[:count]):
+    for at in np.argsort(-b.numbers[:count, SCORE]):
         same = False
         for k in range(kept):
-            if abs(other.stem[k] - b.stem[at]) < near and abs(other.x[k] - b.x[at]) < 2.0 * near:
+            stem, x = other.numbers[k, STEM] - b.numbers[at, STEM], other.numbers[k, X] - b.numbers[at, X]
+            if abs(stem) < near and abs(x) < 2.0 * near:
                 same = True
                 break
         if not same:
@@ -120,18 +137,8 @@ def _best(b: _Beam, other: _Beam, count: int, most: int, near: float) -> int:
 
 
 @njit(cache=True)
-def _room(rows: int, delay: int, order: int) -> _Beam:
-    return _Beam(
-        np.zeros(rows),
-        np.zeros((rows, 2)),
-        np.zeros(rows),
-        np.zeros(rows),
-        np.zeros(rows),
-        np.zeros((rows, delay + 2)),
-        np.zeros((rows, order)),
-        np.zeros(rows, np.int64),
-        np.zeros(rows, np.int64),
-    )
+def _room(rows: int, order: int) -> _Beam:
+    return _Beam(np.zeros((rows, PLACED + WAITING + order)), np.zeros((rows, DUE + WAITING), np.int64))
 
 
 @njit(cache=True)
@@ -143,9 +150,9 @@ def _begun(b: _Beam, op: Floats, first: float, breakaway: float) -> int:
         stem = op[0] + breakaway * (2.0 * k / (PLACES - 1) - 1.0)
         if max(high - stem, stem - low) < breakaway and k % (PLACES - 1) > 0:
             continue
-        b.stem[count], b.x[count] = stem, first
-        b.ring[count, :] = stem
-        b.event[count] = count
+        b.numbers[count, STEM] = b.numbers[count, LATE] = stem
+        b.numbers[count, X] = first
+        b.marks[count, EVENT] = count
         count += 1
     return count
 
@@ -159,62 +166,122 @@ class _Events(NamedTuple):
 
 
 @njit(cache=True)
-def _divided(
-    b: _Beam, events: _Events, known: tuple[int, int], k: int, op: float, f: Friction
+def _answered(b: _Beam, h: int, k: int, r: Response) -> None:
+    """PV's response of a path stepped on by one sample."""
+    own, marks = b.numbers[h], b.marks[h]
+    own[TOTAL] += own[X]
+    before = own[LATE]
+    if marks[PENDING] > 0 and marks[DUE] <= k:
+        own[LATE] = own[PLACED]
+        marks[PENDING] -= 1
+        for i in range(marks[PENDING]):
+            marks[DUE + i], own[PLACED + i] = marks[DUE + i + 1], own[PLACED + i + 1]
+    own[X] = r.pole * own[X] + r.now * own[LATE] + r.before * before
+
+
+@njit(cache=True)
+def _slipped(b: _Beam, events: _Events, at: tuple[int, int, int, int], place: float, r: Response) -> None:
+    """Path `at[1]` as `at[0]` with the stem at another place from sample `at[2]` on, remembered as event `at[3]`."""
+    h, to, k, event = at
+    _copy(b, to, b, h)
+    own, marks = b.numbers[to], b.marks[to]
+    own[STEM], marks[RESTED] = place, k
+    own[FAR_LOW] = own[FAR_HIGH] = 0.0
+    own[PLACED + marks[PENDING]], marks[DUE + marks[PENDING]] = place, k + r.delay
+    marks[PENDING] += 1
+    events.parent[event], events.moment[event], events.place[event] = marks[EVENT], k, place
+    marks[EVENT] = event
+    _answered(b, to, k, r)
+    marks[COMING] = k + 1
+
+
+@njit(cache=True)
+def _shares(r: Response, factor: int) -> tuple[float, float, float]:
+    """left, of_x and of_u of a block (`_Block`)."""
+    left, of_x = 1.0, 0.0
+    for _ in range(factor):
+        of_x += left
+        left *= r.pole
+    return left, of_x, factor - of_x
+
+
+@njit(cache=True, inline="always")
+def _rests(numbers: Floats, marks: Indices, h: int, block: _Block, f: Friction) -> bool:
+    """Whether nothing becomes of a path over a block: its stem bears OP, and PV answers no slip anew."""
+    if marks[h, COMING] != block.first or block.first == 0 or block.last - 1 - marks[h, RESTED] > f.rest:
+        return False
+    if marks[h, PENDING] > 0 and marks[h, DUE] < block.last:
+        return False
+    stem, least = numbers[h, STEM], f.breakaway * (1.0 - FAR * SCATTER)
+    above = block.high - stem <= max(numbers[h, FAR_HIGH], least)
+    return above and stem - block.low <= max(numbers[h, FAR_LOW], least)
+
+
+@njit(cache=True)
+def _through(
+    b: _Beam, events: _Events, known: tuple[int, int], h: int, last: int, op: Floats, f: Friction, r: Response
 ) -> tuple[int, int]:
-    """Each path as one that slips at a sample and one that does not, with the chance of either.
+    """A path through the samples before `last`, with a new path for each slip that is likely enough.
 
     `known` and what is returned: how many paths and events there are.
     """
-    count, slips = known
-    for h in range(count):
-        if k - b.rested[h] > f.rest:
-            b.score[h], b.rested[h] = b.score[h] - STUCK, k
-        gap = op - b.stem[h]
-        far, side = abs(gap), 1 if gap > 0 else 0
-        if k == 0 or far <= b.farthest[h, side] or far <= f.breakaway * (1.0 - FAR * SCATTER):
-            continue
-        chance = slip_chance(far, b.farthest[h, side], f.breakaway)
-        if chance > RARE and count < b.stem.size and slips < MOST_EVENTS:
-            _copy(b, count, b, h)
-            b.stem[count] = op - math.copysign(f.sliding, gap)
-            b.farthest[count, :] = 0.0
-            b.rested[count] = k
-            b.score[count] += math.log(chance)
-            events.parent[slips], events.moment[slips], events.place[slips] = b.event[h], k, b.stem[count]
-            b.event[count] = slips
-            slips, count = slips + 1, count + 1
-        b.score[h] += math.log(max(1.0 - chance, 1e-12))
-        b.farthest[h, side] = far
+    (count, slips), own, marks = known, b.numbers[h], b.marks[h]
+    least = f.breakaway * (1.0 - FAR * SCATTER)
+    for k in range(marks[COMING], last):
+        if k - marks[RESTED] > f.rest:
+            own[SCORE], marks[RESTED] = own[SCORE] - STUCK, k
+        gap = op[k] - own[STEM]
+        far, side = abs(gap), FAR_HIGH if gap > 0 else FAR_LOW
+        if k > 0 and far > own[side] and far > least:
+            chance = slip_chance(far, own[side], f.breakaway)
+            room = count < b.marks.shape[0] and slips < MOST_EVENTS and marks[PENDING] < WAITING
+            if chance > RARE and room:
+                _slipped(b, events, (h, count, k, slips), op[k] - math.copysign(f.sliding, gap), r)
+                b.numbers[count, SCORE] += math.log(chance)
+                count, slips = count + 1, slips + 1
+            own[SCORE] += math.log(max(1.0 - chance, 1e-12))
+            own[side] = far
+        _answered(b, h, k, r)
+    marks[COMING] = last
     return count, slips
 
 
 @njit(cache=True)
-def _answered(b: _Beam, count: int, k: int, r: Response) -> None:
-    """PV's response of each path stepped on by one sample."""
-    size = r.delay + 2
-    at, now, before = k % size, (k - r.delay) % size, (k - r.delay - 1) % size
-    for h in range(count):
-        b.total[h] += b.x[h]
-        b.ring[h, at] = b.stem[h]
-        b.x[h] = r.pole * b.x[h] + r.now * b.ring[h, now] + r.before * b.ring[h, before]
+def _divided(
+    b: _Beam, events: _Events, known: tuple[int, int], block: _Block, op: Floats, f: Friction, r: Response
+) -> tuple[int, int]:
+    """All paths through a block, those that begin in it too; how many paths and events there are."""
+    (count, slips), numbers, marks = known, b.numbers, b.marks
+    h = 0
+    while h < count:
+        if _rests(numbers, marks, h, block, f):
+            x, u = numbers[h, X], numbers[h, LATE]
+            numbers[h, TOTAL] = block.of_x * x + block.of_u * u
+            numbers[h, X] = block.left * x + (1.0 - block.left) * u
+            marks[h, COMING] = block.last
+        else:
+            count, slips = _through(b, events, (count, slips), h, block.last, op, f, r)
+        h += 1
+    return count, slips
 
 
 @njit(cache=True)
-def _judge(b: _Beam, count: int, left: float, counts: bool, factor: int, r: Response, n: Noise) -> None:
+def _judge(
+    b: _Beam, count: int, left: float, block: int, factor: int, r: Response, n: Noise, counts: bool
+) -> None:
     """Score all paths by their innovation of a block, of which `left` is PV less its slow terms."""
-    order = n.ar.size
+    order, past = n.ar.size, PLACED + WAITING
     for h in range(count):
-        residual = left - r.gain * b.total[h] / factor
-        b.total[h] = 0.0
+        own = b.numbers[h]
+        residual = left - r.gain * own[TOTAL] / factor
+        own[TOTAL] = 0.0
         if counts:
-            e = residual
+            e, at = residual, block % order
             for i in range(order):
-                e -= n.ar[i] * b.past[h, i]
-            b.score[h] -= 0.5 * e * e / n.sigma2
-        for i in range(order - 1, 0, -1):
-            b.past[h, i] = b.past[h, i - 1]
-        b.past[h, 0] = residual
+                at = at - 1 if at > 0 else order - 1
+                e -= n.ar[i] * own[past + at]
+            own[SCORE] -= 0.5 * e * e / n.sigma2
+        own[past + block % order] = residual
 
 
 @njit(cache=True)
@@ -246,23 +313,26 @@ def decoded(
     most : int
         Paths that are carried side by side.
     """
-    factor, rows, near = op.size // y.size, 3 * most + PLACES, SAME * f.breakaway
-    b, other = _room(rows, r.delay, n.ar.size), _room(rows, r.delay, n.ar.size)
+    factor, near = op.size // y.size, SAME * f.breakaway
+    rows = 6 * most + PLACES
+    b, other = _room(rows, n.ar.size), _room(rows, n.ar.size)
     events = _Events(np.empty(MOST_EVENTS, np.int64), np.zeros(MOST_EVENTS, np.int64), np.empty(MOST_EVENTS))
     count = _begun(b, op, (y[0] - r.slow[0]) / r.gain, f.breakaway)
-    events.parent[:count], events.place[:count] = -1, b.stem[:count]
-    slips = count
-    for k in range(factor * y.size):
-        count, slips = _divided(b, events, (count, slips), k, op[k], f)
-        _answered(b, count, k, r)
-        block, ended = k // factor, (k + 1) % factor == 0
-        if ended:
-            _judge(b, count, y[block] - r.slow[block], counts[block], factor, r, n)
-        if count > 2 * most or (ended and (block + 1) % LOOKED == 0):
+    events.parent[:count], events.place[:count] = -1, b.numbers[:count, STEM]
+    slips, shares = count, _shares(r, factor)
+    for block in range(y.size):
+        first, last = block * factor, (block + 1) * factor
+        low, high = op[first], op[first]
+        for u in op[first:last]:
+            low, high = min(low, u), max(high, u)
+        at = _Block(first, last, low, high, *shares)
+        count, slips = _divided(b, events, (count, slips), at, op, f, r)
+        _judge(b, count, y[block] - r.slow[block], block, factor, r, n, counts[block])
+        if count > 2 * most or (block + 1) % LOOKED == 0:
             count = _best(b, other, count, most, near)
             b, other = other, b
-    first = int(np.argmax(b.score[:count]))
-    return _traced(events, b.event[first], op.size), float(b.score[first])
+    best = int(np.argmax(b.numbers[:count, SCORE]))
+    return _traced(events, b.marks[best, EVENT], op.size), float(b.numbers[best, SCORE])
 
 
 @njit(cache=True)
