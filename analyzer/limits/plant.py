@@ -105,32 +105,11 @@ class PlantLimits:
         "Coherence at the period from which one loop follows another",
         STUDY,
     )
-    follows: float = limit(
-        0.8,
-        "-",
-        (0.0, 1.0),
-        "Coherence from which even a loop whose own valve seems at fault follows another",
-        "ours",
-    )
     outweighs: float = limit(
         4.0,
         "-",
         (1.0, 1000.0),
         "Evidence of the other valve over its own from which it does",
-        "ours",
-    )
-    one_wave: float = limit(
-        0.98,
-        "-",
-        (0.0, 1.0),
-        "Coherence from which two loops share one wave, so that the valve with more evidence leads",
-        "ours",
-    )
-    outweighs_wave: float = limit(
-        1.5,
-        "-",
-        (1.0, 1000.0),
-        "Evidence of the other valve over its own from which it leads then",
         "ours",
     )
     follow_cycles: float = limit(

@@ -104,9 +104,7 @@ def may_follow(own: Peer, other: Peer, level: float, limits: PlantLimits) -> boo
         return False
     if own.cause is not Cause.VALVE:
         return True
-    factor = limits.outweighs_wave if level >= limits.one_wave else limits.outweighs
-    outweighed = other.evidence >= factor * own.evidence
-    return other.cause is Cause.VALVE and level >= limits.follows and outweighed
+    return other.cause is Cause.VALVE and other.evidence >= limits.outweighs * own.evidence
 
 
 def traced(group: Group, peers: Mapping[str, Peer], limits: PlantLimits) -> Traced | None:

@@ -21,7 +21,7 @@ from analyzer.quality import Prepared, prepare
 from identification.errors import TriageError
 from identification.models import Pid
 from identification.record import LoopRecord
-from tests.analyzer.plant import Sketch, prepared, simulate
+from tests.analyzer.plant import Sketch, prepared, record, simulate
 from tests.coupled.draw import draw as draw_plant
 from tests.proofs.nulls import FAMILIES
 from tests.proofs.nulls import record as null
@@ -230,7 +230,28 @@ def plants() -> tuple[tuple[Coupled, ...], ...]:
                 end_s, own_pct = a.start_s + a.duration_s, a.verdict.confidence
                 loops.append(Coupled(x.name, a.oscillations, end_s, peer, own_pct))
         out.append(tuple(loops))
-    return tuple(out)
+    return (*out, *pairs())
+
+
+def pairs() -> list[tuple[Coupled, ...]]:
+    """Two loops with one wave: of the second its third harmonic alone, or both with a valve that is blamed."""
+    rng, n, out = np.random.default_rng(5), 28_800, []
+    phase = 2 * np.pi * np.arange(n) / 300.0 + np.cumsum(0.005 * rng.standard_normal(n))
+    for size in (0.03, 0.04, 0.055, 0.08, 0.11, 0.2):
+        errors = (np.sin(phase) + size * np.sin(3 * phase), np.sin(3 * phase))
+        out.append(tuple(_sharing(k, e, Peer(Cause.LOAD)) for k, e in enumerate(errors)))
+    for ratio in (1.0, 2.0, 3.5, 4.5, 8.0):
+        errors = (np.sin(phase), np.sin(phase - 0.5))
+        blamed = (Peer(Cause.VALVE, 4000.0), Peer(Cause.VALVE, 4000.0 / ratio))
+        out.append(tuple(_sharing(k, e, p) for k, (e, p) in enumerate(zip(errors, blamed, strict=True))))
+    return out
+
+
+def _sharing(k: int, error: np.ndarray, peer: Peer) -> Coupled:
+    """A loop with an error [%] of one sample a second under a little noise."""
+    own = record(50.0 - error + 0.1 * np.random.default_rng(k).standard_normal(error.size))
+    pct = {cause: 100.0 * (cause is peer.cause) for cause in (Cause.VALVE, Cause.TUNING, Cause.LOAD)}
+    return Coupled(f"L{k}", detect(own, DEFAULT.oscillation), own.start_s + own.duration_s, peer, pct)
 
 
 @cache
