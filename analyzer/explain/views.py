@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from analyzer.explain.user_model import Brought
-from identification.estimation.prediction_error import Fitted
+from identification.estimation.candidate import Fitted
 from identification.mismatch.answer import Answer
 from identification.mismatch.catalogue import EFFECTS, fault
 from identification.mismatch.cross_validation import course

@@ -3,128 +3,26 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from identification.estimation.candidate import Fitted, Model, Problem, bounds
 from identification.estimation.covariance import inverse, scattered
-from identification.estimation.noise import Edges, edges_for, fitted, judged, lag_means, whitened
-from identification.limits.explain import LIMITS, ExplainLimits
-from identification.record import Floats, Mask
-from identification.simulation.effect import Param, Variant
+from identification.estimation.noise import fitted, lag_means, whitened
+from identification.record import Floats
+from identification.simulation.effect import Param
 from identification.simulation.open_loop import ModelInputs, simulate
 from identification.simulation.parameters import Slot
 
-BASE = (
-    Param(Slot.T, "time_constant_s", "s", 0.3, 1e9, "dt", True),
-    Param(Slot.L, "dead_time_s", "s", 0.0, 0.2, "span"),
-    Param(Slot.K, "gain", "% PV/% OP", -1e4, 1e4),
-    Param(Slot.BIAS, "bias_pct", "% PV", -2e3, 2e3),
-    Param(Slot.START, "start_pct", "% PV", -300.0, 300.0),
-)
-"""Constants of the plain loop, free in every candidate."""
 PRIOR = (Slot.START, Slot.BIAS)
 """Constants that short time constants, or a load like a random walk, leave open; they are held near the recording."""
+PLACES = (-1.0, -0.5, 0.0, 0.5, 1.0)
+"""Where a stem may stand first, from OP on, in distances at which it lets go; ours."""
+WORTH = 3.0
+"""Gain [nat] of another place from which it is taken: what a parameter costs; ours."""
 FAR = 3e3
 """A model whose residual reaches this [% PV] has run away and is the worst there is."""
-
-
-@dataclass(frozen=True, slots=True)
-class Problem:
-    """A recording prepared for fitting.
-
-    inputs : what drives the model; y : PV less inputs.level, shape (n,); usable : bool, shape (n,); weight : shape
-    (n,), what each innovation counts, 0 where it is not judged. limits : what decides about candidates.
-    """
-
-    inputs: ModelInputs
-    y: Floats
-    usable: Mask
-    weight: Floats
-    edges: Edges = field(repr=False)
-    limits: ExplainLimits = LIMITS
-
-    @property
-    def count(self) -> int:
-        """Samples judged."""
-        return int((self.weight > 0).sum())
-
-
-def problem(inputs: ModelInputs, y: Floats, usable: Mask, limits: ExplainLimits = LIMITS) -> Problem:
-    """A problem whose usable samples all count alike."""
-    edges = edges_for(usable)
-    return Problem(inputs, y, usable, judged(usable, int(edges[-1])).astype(float), edges, limits)
-
-
-@dataclass(frozen=True, slots=True)
-class Model:
-    """What is added to the plain loop, and all constants, shape (SIZE,)."""
-
-    added: tuple[Variant, ...]
-    c: Floats
-
-    @property
-    def params(self) -> tuple[Param, ...]:
-        """What is free: the plain loop's constants that nothing replaces, and those of what is added."""
-        own = tuple(p for v in self.added for p in v.params)
-        replaced = {slot for v in self.added for slot in v.replaces}
-        return (*(p for p in BASE if p.slot not in replaced), *own)
-
-
-@dataclass(frozen=True, slots=True)
-class Fitted:
-    """A model at its optimum: `loss` the weighted mean square innovation, `ar` the noise model."""
-
-    model: Model
-    loss: float
-    count: int
-    ar: Floats
-    e: Floats = field(repr=False)
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of what is added."""
-        return tuple(v.name for v in self.model.added)
-
-
-def gain(better: Fitted, worse: Fitted) -> float:
-    """Gain in log likelihood [nat]."""
-    return 0.5 * worse.count * math.log(max(worse.loss, 1e-30) / max(better.loss, 1e-30))
-
-
-def scales(inputs: ModelInputs, c: Floats, param: Param) -> tuple[float, float]:
-    """Offset and factor that turn a row's numbers into the constant's own unit."""
-    op = inputs.op
-    reach = max(float(np.ptp(op)), 1e-6)
-    match param.scale:
-        case "op":
-            return 0.0, reach
-        case "op/dt":
-            return 0.0, reach / inputs.dt_s
-        case "opspan":
-            return float(op.min()), reach
-        case "1/op":
-            return 0.0, 100.0 / reach
-        case "1/pv":
-            return 0.0, 50.0 / max(inputs.pv_range[1] - inputs.pv_range[0], 1e-6)
-        case "pvspan":
-            return inputs.pv_range[0], inputs.pv_range[1] - inputs.pv_range[0]
-        case "T":
-            return 0.0, float(c[Slot.T])
-        case "dt":
-            return 0.0, inputs.dt_s
-        case "span":
-            return 0.0, inputs.dt_s * op.size
-    return 0.0, 1.0
-
-
-def bounds(inputs: ModelInputs, c: Floats, param: Param) -> tuple[float, float]:
-    """Lowest and highest value of a constant, in its own unit."""
-    if param.slot == Slot.T:
-        longest = 2.0 * inputs.dt_s * inputs.op.size
-        return 0.3 * inputs.dt_s, longest if c[Slot.LEAK] == 0 else min(longest, inputs.longest_s)
-    offset, factor = scales(inputs, c, param)
-    return offset + factor * param.low, offset + factor * param.high
 
 
 @dataclass(frozen=True, slots=True)
@@ -244,8 +142,25 @@ def is_out_of_reach(p: Problem, found: Residual, gram: Floats, slope: Floats, ai
     return math.log(max(found.loss, 1e-300) / aim) > p.limits.search.promises * max(promised, 0.0)
 
 
+def placed(p: Problem, model: Model) -> Model:
+    """The model with its stem's first place where PV says that it stood; none has slipped before a record begins."""
+    if not model.c[Slot.STICKBAND] > 0.0:
+        return model
+    losses: dict[float, float] = {}
+    for place in (float(model.c[Slot.PLACE]), *PLACES):
+        c = model.c.copy()
+        c[Slot.PLACE] = place
+        losses.setdefault(place, residual_fit(p, c).loss)
+    first, best = float(model.c[Slot.PLACE]), min(losses, key=lambda place: losses[place])
+    if not 0.5 * p.count * math.log(losses[first] / max(losses[best], 1e-300)) > WORTH:
+        return model
+    c = model.c.copy()
+    c[Slot.PLACE] = best
+    return replace(model, c=c)
+
+
 def descend(p: Problem, model: Model, steps: int, aim: float = math.inf) -> Fitted:
-    """Follow a model to the least innovations by damped Gauss-Newton steps.
+    """Follow a model to the least innovations, its stem placed anew before and behind it where there is friction.
 
     Parameters
     ----------
@@ -253,10 +168,17 @@ def descend(p: Problem, model: Model, steps: int, aim: float = math.inf) -> Fitt
     model : Model
         Where to start.
     steps : int
-        Steps at most.
+        Steps at most, each time.
     aim : float
         Loss that is worth anything; from the second step on a descent that will not come to it ends.
     """
+    fit = _descend(p, placed(p, model), steps, aim)
+    again = placed(p, fit.model)
+    return fit if again is fit.model else _descend(p, again, steps, aim)
+
+
+def _descend(p: Problem, model: Model, steps: int, aim: float) -> Fitted:
+    """Follow a model to the least innovations by damped Gauss-Newton steps."""
     best, damping, failed = residual_fit(p, model.c), 1e-3, 0
     for step in range(steps):
         gram, slope = curvature(p, model, best)

@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from identification.estimation.candidate import Fitted, Problem
 from identification.estimation.covariance import half_width
-from identification.estimation.prediction_error import Fitted, Problem, deviations
+from identification.estimation.prediction_error import deviations
 from identification.mismatch.catalogue import EFFECTS, fault
 from identification.mismatch.cross_validation import HeldOut, Misfit, held_out, misfit
 from identification.mismatch.diagnosis import alternatives, restored

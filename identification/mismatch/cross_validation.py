@@ -6,8 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from identification.estimation.candidate import Fitted, Model, Problem, bounds, gain
 from identification.estimation.noise import whitened
-from identification.estimation.prediction_error import Fitted, Model, Problem, bounds, descend, gain
+from identification.estimation.prediction_error import descend
 from identification.limits.explain import LIMITS
 from identification.mismatch.effect import Effect
 from identification.mismatch.restarts import simulated_anew

@@ -8,7 +8,8 @@ import numpy as np
 
 from identification.controller.check import LATE_SAMPLES, judge
 from identification.controller.pi_regression import ControlLaw, shifted
-from identification.estimation.prediction_error import Fitted, Model, Problem, descend, gain
+from identification.estimation.candidate import Fitted, Model, Problem, gain
+from identification.estimation.prediction_error import descend
 from identification.mismatch import recording_faults
 from identification.mismatch.catalogue import CANDIDATES, CONTROLLER_FAULTS, EFFECTS, RECORDER_FAULTS, fault
 from identification.mismatch.cross_validation import held_out, is_one_move, passes

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from identification.controller.pi_regression import ControlLaw
-from identification.estimation.prediction_error import Fitted, Problem
+from identification.estimation.candidate import Fitted, Problem
 from identification.mismatch.catalogue import EFFECTS, fault
 from identification.mismatch.cross_validation import HeldOut, OnOther
 from identification.mismatch.effect import Ends

@@ -8,15 +8,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from identification.estimation.candidate import Fitted, Model, Problem, gain, problem
 from identification.estimation.outliers import robust_weights
-from identification.estimation.prediction_error import (
-    Fitted,
-    Model,
-    Problem,
-    descend,
-    gain,
-    problem,
-)
+from identification.estimation.prediction_error import descend
 from identification.estimation.start_values import plain_processes
 from identification.limits.explain import LIMITS, ExplainLimits
 from identification.mismatch.catalogue import CANDIDATES, EFFECTS

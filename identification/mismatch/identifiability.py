@@ -6,7 +6,8 @@ import math
 
 import numpy as np
 
-from identification.estimation.prediction_error import Fitted, Problem, residual_fit
+from identification.estimation.candidate import Fitted, Problem
+from identification.estimation.prediction_error import residual_fit
 from identification.mismatch.explanation import Explanation
 from identification.mismatch.recording import Recording
 from identification.simulation.parameters import Slot

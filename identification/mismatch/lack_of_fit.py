@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from identification.estimation.candidate import Fitted, Problem
 from identification.estimation.noise import lag_means, whitened
-from identification.estimation.prediction_error import Fitted, Problem, sensitivities
+from identification.estimation.prediction_error import sensitivities
 from identification.record import Floats
 from identification.simulation.open_loop import simulate, through_valve
 from identification.simulation.parameters import Slot

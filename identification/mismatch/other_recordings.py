@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from identification.estimation.prediction_error import Fitted, problem
+from identification.estimation.candidate import Fitted, problem
 from identification.mismatch.catalogue import EFFECTS
 from identification.mismatch.cross_validation import HeldOut, Misfit, OnOther, anchored, course, misfit
 from identification.mismatch.explanation import Explanation

@@ -13,7 +13,7 @@ import math
 import numpy as np
 from numba import njit
 
-from identification.estimation.prediction_error import Problem
+from identification.estimation.candidate import Problem
 from identification.record import Floats
 from identification.simulation.acts import Signal, acted
 from identification.simulation.open_loop import from_flow, simulate

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from identification.estimation.prediction_error import Fitted, Model, Problem, descend, gain
+from identification.estimation.candidate import Fitted, Model, Problem, gain
+from identification.estimation.prediction_error import descend
 from identification.mismatch.catalogue import CANDIDATES, EFFECTS
 from identification.mismatch.cross_validation import passes
 from identification.mismatch.forward_selection import Candidate, Progress, compete, penalty

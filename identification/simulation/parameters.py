@@ -61,7 +61,8 @@ class Slot(IntEnum):
     STEP = 40
     GAIN_SLOPE = 43
     SPEED = 44
-    HEAD = 45
+    PLACE = 45
+    HEAD = 46
 
 
 SIZE = int(Slot.HEAD) + KNOTS

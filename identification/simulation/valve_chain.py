@@ -177,13 +177,13 @@ def flow(op: Floats, c: Floats, dt_s: float, middle: float) -> Floats:
     Returns
     -------
     ndarray of shape (n,)
-        Flow during each sample. A stem with friction starts where OP does, if OP ever leaves there; else where it
-        stands once it has slipped.
+        Flow during each sample. A stem with friction starts where OP does, if OP ever leaves there, else where it
+        stands once it has slipped; and from there by PLACE, in distances at which it lets go.
     """
     x = before_stem(np.ascontiguousarray(op, dtype=np.float64), c, dt_s)
     breakaway, sliding, tolerance = friction_of(c)
     if breakaway > 0:
         moves = float(np.abs(x - x[0]).max()) > breakaway
         start = float(x[0]) if moves else first_slip(x, breakaway, sliding)
-        x = walk(x, breakaway, sliding, tolerance, start)
+        x = walk(x, breakaway, sliding, tolerance, start + float(c[Slot.PLACE]) * breakaway)
     return np.asarray(behind_stem(x, c, dt_s, middle))

@@ -15,7 +15,8 @@ from analyzer.explain.views import views
 from analyzer.history.series import Series
 from analyzer.loops.spec import LoopSpec
 from identification.controller.check import judge
-from identification.estimation.prediction_error import Model, descend, gain
+from identification.estimation.candidate import Model, gain
+from identification.estimation.prediction_error import descend
 from identification.mismatch.answer import answer
 from identification.mismatch.catalogue import CANDIDATES
 from identification.mismatch.diagnosis import controller_finding_of, inputs_of, recorder_finding_of

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from identification.estimation.candidate import Fitted, Problem
 from identification.estimation.noise import whitened
-from identification.estimation.prediction_error import Fitted, Problem
 from identification.mismatch.explanation import Explanation
 from identification.mismatch.location.locate import Feature, Located, located
 from identification.mismatch.recording import Recording

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from identification.estimation.prediction_error import Fitted, Model, Problem, descend
+from identification.estimation.candidate import Fitted, Model, Problem
+from identification.estimation.prediction_error import descend
 from identification.mismatch.catalogue import EFFECTS
 from identification.mismatch.effect import Friction
 from identification.mismatch.recording import SeenInCycles

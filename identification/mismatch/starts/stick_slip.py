@@ -6,8 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from identification.estimation.candidate import Fitted, Model, Problem
 from identification.estimation.noise import whitened
-from identification.estimation.prediction_error import Fitted, Model, Problem, descend, loss_of, residual_fit
+from identification.estimation.prediction_error import descend, loss_of, residual_fit
 from identification.record import Floats
 from identification.simulation.effect import Variant
 from identification.simulation.open_loop import simulate

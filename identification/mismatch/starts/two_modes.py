@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from identification.estimation.candidate import Fitted, Model, Problem
 from identification.estimation.noise import whitened
-from identification.estimation.prediction_error import Fitted, Model, Problem
 from identification.record import Floats
 from identification.simulation.effect import Variant
 from identification.simulation.open_loop import through_valve

@@ -8,7 +8,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from identification.estimation.prediction_error import Fitted, Model, Problem, descend, problem
+from identification.estimation.candidate import Fitted, Model, Problem, problem
+from identification.estimation.prediction_error import descend
 from identification.mismatch.answer import Answer, answer
 from identification.mismatch.catalogue import EFFECTS
 from identification.mismatch.cross_validation import HeldOut, Misfit, runs_out

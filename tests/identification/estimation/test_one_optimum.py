@@ -1,0 +1,83 @@
+"""The kernel that fits a night's loops and the fit of any candidate find the same constants from one start."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from identification.estimation.backlash_stiction import generic_noise
+from identification.estimation.candidate import Model, problem
+from identification.estimation.gauss_newton import covariance
+from identification.estimation.gauss_newton import descend as descend_lag
+from identification.estimation.hammerstein import Fit, ValveTrial
+from identification.estimation.prediction_error import descend as descend_any
+from identification.estimation.prediction_error import deviations
+from identification.estimation.window import Window
+from identification.mismatch.catalogue import EFFECTS
+from identification.record import Floats
+from identification.simulation.open_loop import ModelInputs
+from identification.simulation.parameters import Slot, neutral
+
+GAIN, LAG, DEAD, BAND, N = 1.3, 20.0, 4.0, 2.0, 4000
+FIRST = 420
+"""Samples left out: from then on OP has turned, and where the stem stood first does not matter."""
+
+
+def cycled(seed: int) -> tuple[Floats, Floats]:
+    """PV and OP, each (n,), of a lag behind play under PI control and set point steps, in plain Python.
+
+    Noise is of the first order, which both noise models hold: single lags, and means of ever more of them.
+    """
+    rng = np.random.default_rng(seed)
+    stem, x, total, noise = 50.0, 0.0, 50.0, 0.0
+    pipe, pv_out, op_out = [50.0] * int(DEAD), np.empty(N + FIRST), np.empty(N + FIRST)
+    for k in range(N + FIRST):
+        noise = 0.6 * noise + 0.05 * rng.standard_normal()
+        pv = 50.0 + x + noise
+        e = 50.0 + 4.0 * ((k // 400) % 2) - pv
+        total += 0.6 * e / 25.0
+        op = total + 0.6 * e
+        pv_out[k], op_out[k] = pv, op
+        stem = min(max(stem, op - BAND / 2), op + BAND / 2)
+        pipe.append(stem)
+        x += (1.0 - math.exp(-1.0 / LAG)) * (GAIN * (pipe.pop(0) - 50.0) - x)
+    return pv_out[FIRST:], op_out[FIRST:]
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3, 4, 5])
+def test_both_fits_find_the_same_constants(seed: int) -> None:
+    """From one start, a tenth off, constants agree within their own deviations, and these agree within 30 %."""
+    pv, op = cycled(seed)
+    good = np.ones(N, dtype=bool)
+    window = Window(pv, op, good, 1.0)
+    begun = Fit(
+        1.1 * GAIN, 0.9 * LAG, DEAD, ValveTrial(BAND / 2, BAND / 2, 0.0), 1.0, N, generic_noise(), np.zeros(4)
+    )
+    one = descend_lag(window, begun, free_width=True)
+    spread = np.sqrt(np.diag(covariance(window, one, free_width=True)))
+
+    level, middle = float(pv.mean()), float(op.mean())
+    inputs = ModelInputs(op, 1.0, middle, level, (float(pv.min()), float(pv.max())))
+    c = neutral()
+    c[Slot.K], c[Slot.T], c[Slot.L], c[Slot.STICKBAND] = 1.1 * GAIN, 0.9 * LAG, DEAD, BAND
+    p = problem(inputs, pv - level, good)
+    any_fit = descend_any(p, Model((EFFECTS["backlash"].variants[0],), c), 40)
+    found = any_fit.model.c
+    told = {param.slot: d for param, d in zip(any_fit.model.params, deviations(p, any_fit), strict=True)}
+
+    pairs = (
+        (math.log(one.time_constant_s), math.log(found[Slot.T]), spread[0], told[Slot.T]),
+        (one.dead_time_s, found[Slot.L], spread[1], told[Slot.L]),
+        (
+            math.log(one.valve.stickband),
+            math.log(found[Slot.STICKBAND]),
+            spread[2] / one.valve.stickband,
+            told[Slot.STICKBAND],
+        ),
+        (one.gain, found[Slot.K], spread[3], told[Slot.K]),
+    )
+    for mine, yours, my_spread, your_spread in pairs:
+        assert abs(mine - yours) < min(my_spread, your_spread)
+        assert my_spread == pytest.approx(your_spread, rel=0.3)
