@@ -14,7 +14,7 @@ from analyzer.commands import notes as notes_cli
 from analyzer.commands import report as report_cli
 from analyzer.commands import run as run_cli
 from analyzer.commands import store as store_cli
-from analyzer.commands.options import SOME_LOST, Asked, export_options, told
+from analyzer.commands.options import PLACE, SOME_LOST, Asked, export_options, told
 from analyzer.decisions import Lane
 from identification.errors import InputError
 
@@ -61,7 +61,7 @@ def check(asked: Asked) -> None:
 
 
 @main.command()
-@click.argument("store", type=click.Path(path_type=Path))
+@click.argument("store", type=PLACE)
 @click.option(
     "--by",
     "column",

@@ -15,6 +15,7 @@ from dataclasses import asdict, dataclass
 from io import FileIO
 from pathlib import Path
 
+from analyzer.places import is_remote
 from analyzer.plant_clock import stamp
 from identification.errors import InputError
 from reports.visible import visible
@@ -58,6 +59,11 @@ def add(store: Path, note: Note) -> None:
         It could not be written whole, on a full disk for example.
     """
     line = (json.dumps(asdict(note), ensure_ascii=False) + "\n").encode("utf-8")
+    if is_remote(store):  # an object cannot be added to
+        path = store / FILE
+        before = path.read_bytes() if path.exists() else b""
+        path.write_bytes(before + (b"" if not before or before.endswith(b"\n") else b"\n") + line)
+        return
     with (store / FILE).open("ab+", buffering=0) as kept:
         if kept.tell() and not _ends_a_line(kept):
             line = b"\n" + line

@@ -12,7 +12,6 @@ STORE/notes.jsonl            what people wrote; STORE/store.json the version of 
 from __future__ import annotations
 
 import secrets
-import shutil
 from collections.abc import Mapping, Sequence
 from datetime import date
 from pathlib import Path
@@ -23,6 +22,7 @@ import pyarrow as pa
 from analyzer import store_version
 from analyzer.columns.column import Column
 from analyzer.columns.table import require_declared
+from analyzer.places import remove_tree
 from analyzer.stored_table import read_stored, stored_names, write_table
 from identification.errors import InputError
 
@@ -181,4 +181,4 @@ class Store:
 
     def drop_parts(self) -> None:
         """Forget all pieces, and the run that they are of."""
-        shutil.rmtree(self.path / "parts", ignore_errors=True)
+        remove_tree(self.path / "parts")

@@ -10,28 +10,37 @@ import contextlib
 import getpass
 import json
 import os
+import secrets
 import shutil
 import socket
 import tempfile
+import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
+from analyzer.places import answering, is_remote
 from identification.errors import InputError
 
 LOCK, OWNER = "run.lock", "run.owner.json"
 """Names within the store."""
 SCRATCH = ".copies-"
 """Beginning of the names of directories of copies."""
+TRIED = ".written"
+"""Name of an object that shows whether shared storage can be written."""
+ALIVE_S, DEAD_S = 60.0, 600.0
+"""How often a holder of shared storage signs anew, and the age from which its signature is a dead run's [s]; ours."""
 LEFT_OVER_S = 86_400.0
 """Age from which something half done is left over from a process that died [s]; ours."""
 
 
 @contextmanager
 def scratch(store: Path) -> Iterator[Path]:
-    """A directory in the store for the copies that a run makes of packed exports, gone with the run.
+    """A directory in the store for the copies that a run makes of packed exports, gone with the run; beside
+    a store of shared storage one of this machine.
 
     That it can be made shows, before any work is done, that the store can be written; those of runs that were killed
     go after a day.
@@ -41,6 +50,13 @@ def scratch(store: Path) -> Iterator[Path]:
     OSError
         The store cannot be made or written.
     """
+    if is_remote(store):
+        with answering(store):
+            (store / TRIED).write_text("")
+            (store / TRIED).unlink()
+        with tempfile.TemporaryDirectory(prefix="triage-copies-", ignore_cleanup_errors=True) as made:
+            yield Path(made)
+        return
     store.mkdir(parents=True, exist_ok=True)
     for left in store.glob(f"{SCRATCH}*"):
         if time.time() - left.stat().st_mtime > LEFT_OVER_S:
@@ -58,6 +74,10 @@ def locked(store: Path) -> Iterator[None]:
     InputError
         Another run holds it; says who, where and since when.
     """
+    if is_remote(store):
+        with _signed(store):
+            yield
+        return
     from filelock import FileLock, Timeout
 
     store.mkdir(parents=True, exist_ok=True)
@@ -65,11 +85,7 @@ def locked(store: Path) -> Iterator[None]:
     try:
         lock.acquire(timeout=0)
     except Timeout as error:
-        raise InputError(
-            f"{store}: in use by {_owner(store)}",
-            "one run on a store at a time",
-            "wait until that run ends, or give another --store",
-        ) from error
+        raise _in_use(store) from error
     try:
         _sign(store)
         yield
@@ -79,10 +95,45 @@ def locked(store: Path) -> Iterator[None]:
         lock.release()
 
 
-def _sign(store: Path) -> None:
+@contextmanager
+def _signed(store: Path) -> Iterator[None]:
+    """Hold a store of shared storage, which has no locks, by a signature that is written anew while the run lives."""
+    held = _signature(store)
+    if held is not None and time.time() - float(held.get("alive_s", 0.0)) < DEAD_S:
+        raise _in_use(store)
+    mine, ended = secrets.token_hex(8), threading.Event()
+    _sign(store, mine)
+
+    def live() -> None:
+        while not ended.wait(ALIVE_S):
+            with contextlib.suppress(Exception):  # the next one may succeed
+                _sign(store, mine)
+
+    alive = threading.Thread(target=live, daemon=True)
+    alive.start()
+    try:
+        yield
+    finally:
+        ended.set()
+        alive.join()
+        if (_signature(store) or {}).get("mark") == mine:
+            (store / OWNER).unlink(missing_ok=True)
+
+
+def _in_use(store: Path) -> InputError:
+    return InputError(
+        f"{store}: in use by {_owner(store)}",
+        "one run on a store at a time",
+        "wait until that run ends, or give another --store",
+    )
+
+
+def _sign(store: Path, mark: str = "") -> None:
     """Write down who holds the store."""
     now = datetime.now(UTC).strftime("%Y-%m-%d %H:%M:%S UTC")
     owner = {"user": _user(), "host": socket.gethostname(), "process": os.getpid(), "since": now}
+    if mark:
+        owner |= {"mark": mark, "alive_s": time.time()}
     (store / OWNER).write_text(json.dumps(owner), encoding="utf-8")
 
 
@@ -95,8 +146,17 @@ def _user() -> str:
 
 def _owner(store: Path) -> str:
     """Who holds the store, as far as it is written down."""
+    owner = _signature(store)
     try:
-        owner = json.loads((store / OWNER).read_text(encoding="utf-8"))
-        return f"process {owner['process']} of {owner['user']} on {owner['host']} since {owner['since']}"
-    except (OSError, ValueError, KeyError, TypeError):
+        return f"process {owner['process']} of {owner['user']} on {owner['host']} since {owner['since']}"  # type: ignore[index]
+    except (KeyError, TypeError):
         return "another run"
+
+
+def _signature(store: Path) -> dict[str, Any] | None:
+    """What the holder of a store has written down; None where nothing can be read."""
+    try:
+        found = json.loads((store / OWNER).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    return found if isinstance(found, dict) else None

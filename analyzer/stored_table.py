@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from analyzer.columns.table import BY_NAME, EXPLAINED, GROUPS, HOURS, SETTINGS
+from analyzer.places import is_remote
 from identification.errors import InputError
 from reports.whole_file import whole_file
 
@@ -40,13 +42,12 @@ def read_stored(
     """
     wanted = list(columns) if columns else None
     try:
-        if filters is not None:
-            table = pq.read_table(path, columns=wanted, filters=filters, page_checksum_verification=True)
-        else:
-            with pq.ParquetFile(
-                path, page_checksum_verification=True
-            ) as file:  # read_table would import pandas, which takes longer than the rest
-                table = file.read(columns=wanted)
+        with _opened(path) as held:
+            if filters is not None:
+                table = pq.read_table(held, columns=wanted, filters=filters, page_checksum_verification=True)
+            else:  # read_table would import pandas, which takes longer than the rest
+                with pq.ParquetFile(held, page_checksum_verification=True) as file:
+                    table = file.read(columns=wanted)
     except FileNotFoundError:
         raise
     except (pa.ArrowException, OSError, ValueError) as error:
@@ -55,10 +56,20 @@ def read_stored(
     return table
 
 
+@contextmanager
+def _opened(path: Path) -> Iterator[Any]:
+    """A path as Parquet's reader takes it: itself, or an open object of shared storage."""
+    if not is_remote(path):
+        yield path
+        return
+    with path.open("rb") as held:
+        yield held
+
+
 def stored_names(path: Path) -> list[str]:
     """Names of the columns of a table of the store; errors as of `read_stored`."""
     try:
-        with pq.ParquetFile(path, page_checksum_verification=True) as file:
+        with _opened(path) as held, pq.ParquetFile(held, page_checksum_verification=True) as file:
             schema = file.schema_arrow
     except FileNotFoundError:
         raise

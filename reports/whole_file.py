@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import secrets
+import shutil
+import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -19,10 +21,15 @@ def whole_file(path: Path, kept: bool = False) -> Iterator[Path]:
     Parameters
     ----------
     path : Path
-        Its folder is made where there is none.
+        Its folder is made where there is none. Where it is one of shared storage, an object takes its place when
+        it is closed, whole.
     kept : bool
         Wait until the disk has it, so that it is whole after a loss of power too.
     """
+    if not isinstance(path, Path):
+        with _uploaded(path) as begun:
+            yield begun
+        return
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_name(f".{path.name[:80]}.{secrets.token_hex(8)}{SUFFIX}")
     flags = os.O_CREAT | os.O_EXCL | os.O_WRONLY  # a link laid in the way is not followed
@@ -35,6 +42,17 @@ def whole_file(path: Path, kept: bool = False) -> Iterator[Path]:
     except BaseException:
         temporary.unlink(missing_ok=True)
         raise
+
+
+@contextmanager
+def _uploaded(path: Path) -> Iterator[Path]:
+    """A path of this machine whose file is put in the place of an object of shared storage."""
+    with tempfile.TemporaryDirectory(prefix="triage-") as folder:
+        temporary = Path(folder) / path.name
+        temporary.touch()
+        yield temporary
+        with temporary.open("rb") as source, path.open("wb") as target:
+            shutil.copyfileobj(source, target, 1 << 22)
 
 
 def _to_disk(path: Path) -> None:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from analyzer.commands.options import NOTHING_DONE, Asked, export_options
+from analyzer.commands.options import NOTHING_DONE, PLACE, Asked, export_options
 from identification.errors import InputError, NotAssessedError
 
 if TYPE_CHECKING:
@@ -95,7 +95,7 @@ def _cases(asked: Asked, tag: str, held_out: tuple[Path, ...]) -> tuple[Case, di
 @click.option(
     "--held-out",
     multiple=True,
-    type=click.Path(path_type=Path),
+    type=PLACE,
     help="Another recording of the loop, on which the explanation is proven; may be given again.",
 )
 @click.option("--save-model", type=click.Path(path_type=Path), help="Write the model found, for `simulate`.")

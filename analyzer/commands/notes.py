@@ -7,9 +7,11 @@ from pathlib import Path
 
 import click
 
+from analyzer.commands.options import PLACE
+
 
 @click.command()
-@click.argument("store", type=click.Path(path_type=Path))
+@click.argument("store", type=PLACE)
 @click.argument("loop")
 @click.argument("text", required=False)
 @click.option("--owner", help="Who looks after it. Default: the user of this computer.")
@@ -50,7 +52,7 @@ def note(store: Path, loop: str, text: str | None, owner: str | None, hide_until
 
 
 @click.command()
-@click.argument("store", type=click.Path(path_type=Path))
+@click.argument("store", type=PLACE)
 @click.option("--night", help="Night to show, e.g. 2026-03-08. Default: the latest.")
 @click.option(
     "--format",

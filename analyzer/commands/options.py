@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from analyzer.places import place, refused
 from analyzer.plant_clock import seconds, zone_of
 from identification.errors import InputError, TriageError
 from reports.visible import visible
@@ -25,6 +26,20 @@ if TYPE_CHECKING:
     from analyzer.loops.changes import TuningChange
     from analyzer.loops.spec import LoopSpec
 
+
+class Place(click.ParamType):
+    """A path, or the URL of shared storage."""
+
+    name = "path"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
+        try:
+            return place(value) if isinstance(value, str) else value
+        except InputError as error:
+            self.fail(str(error), param, ctx)
+
+
+PLACE = Place()
 NOTHING_DONE = 2
 SOME_LOST = 1
 
@@ -48,6 +63,11 @@ def told(command: Callable[..., Any]) -> Callable[..., Any]:
         except OSError as error:
             seen = f"{error.filename}: {error.strerror}" if error.filename else str(error)
             click.echo(f"triage: {one_line(seen)}; check path and permissions", err=True)
+        except Exception as error:
+            if not refused(error):
+                raise
+            said = one_line(f"{type(error).__name__}: {error}")
+            click.echo(f"triage: {said}; check URL, endpoint and credentials of the storage", err=True)
         sys.exit(NOTHING_DONE)
 
     return wrapped
@@ -129,7 +149,7 @@ def config_option(command: Callable[..., Any]) -> Callable[..., Any]:
 TIMES = ("%Y-%m-%d", *(f"%Y-%m-%d{between}%H:%M{end}" for between in "T " for end in (":%S", "")))
 """How --since and --until may be written."""
 OPTIONS = (
-    click.argument("export", nargs=-1, required=True, type=click.Path(path_type=Path)),
+    click.argument("export", nargs=-1, required=True, type=PLACE),
     click.option(
         "--loops", type=click.Path(path_type=Path), help="loops.csv; without it loops are found by tags."
     ),

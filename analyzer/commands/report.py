@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from analyzer.commands.options import config_option
+from analyzer.commands.options import PLACE, config_option
 from identification.errors import InputError
 
 if TYPE_CHECKING:
@@ -70,7 +70,7 @@ def made(store: Store) -> str:
 
     from analyzer.plant_clock import stamp
 
-    zone, name = store.zone(), store.path.resolve().name
+    zone, name = store.zone(), store.path.name or store.path.resolve().name
     return f"triage {version('loop-triage')}, store {name}, made {stamp(time.time(), zone)}; times in {zone}"
 
 
@@ -94,7 +94,7 @@ def _subtitle(spans: Spans, store: Path) -> str:
 
 
 @click.command()
-@click.argument("store", type=click.Path(path_type=Path))
+@click.argument("store", type=PLACE)
 @click.option("--changes", type=click.Path(path_type=Path), help="CSV: loop, time, kp_old ... ti_new, who.")
 @click.option("--loop", help="One loop's tag.")
 @click.option("--changed", help="When that loop was changed, e.g. 2026-03-09T08:00Z.")
@@ -149,7 +149,7 @@ def report(
 
 
 @click.command()
-@click.argument("store", type=click.Path(path_type=Path))
+@click.argument("store", type=PLACE)
 @click.option("--night", help="Night to show, e.g. 2026-03-08. Default: the latest.")
 @click.option(
     "--top", default=50, show_default=True, type=click.IntRange(0), help="Loops with a page of their own."

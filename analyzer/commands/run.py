@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from analyzer.commands.options import NOTHING_DONE, SOME_LOST, Asked, export_options
+from analyzer.commands.options import NOTHING_DONE, PLACE, SOME_LOST, Asked, export_options
 from identification.errors import TriageError
 
 if TYPE_CHECKING:
@@ -63,7 +63,7 @@ def stoppable() -> Iterator[None]:
 @click.command()
 @export_options
 @click.option(
-    "--store", required=True, type=click.Path(path_type=Path), help="Directory that keeps the results."
+    "--store", required=True, type=PLACE, help="Directory, or URL of shared storage, that keeps the results."
 )
 @click.option("--jobs", default=1, show_default=True, type=click.IntRange(1), help="Worker processes.")
 @click.option(

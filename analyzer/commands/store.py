@@ -8,7 +8,7 @@ from pathlib import Path
 
 import click
 
-from analyzer.commands.options import told
+from analyzer.commands.options import PLACE, told
 from identification.errors import InputError
 
 SOME_WRONG = 1
@@ -42,7 +42,7 @@ def store() -> None:
 
 
 @store.command()
-@click.argument("path", metavar="STORE", type=click.Path(path_type=Path))
+@click.argument("path", metavar="STORE", type=PLACE)
 @told
 def check(path: Path) -> None:
     """Read every table of a store and say what is damaged, left over or not finished.
@@ -66,7 +66,7 @@ def check(path: Path) -> None:
 
 
 @store.command()
-@click.argument("path", metavar="STORE", type=click.Path(path_type=Path))
+@click.argument("path", metavar="STORE", type=PLACE)
 @click.option("--keep", required=True, help="How long nights are kept, before the latest: 400d, 60w, 2y.")
 @click.option("--keep-trends", help="How long trends and hours are kept. Default: as long as nights.")
 @click.option("--dry-run", is_flag=True, help="Only say what would be deleted.")

@@ -10,7 +10,7 @@ import codecs
 import csv
 import re
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from datetime import datetime
@@ -32,7 +32,8 @@ from analyzer.history.sheet import WHOLE_FILE_BYTES
 from analyzer.history.sniff import open_sheet
 from analyzer.history.stray import MainSpan, NoStampError
 from analyzer.history.table import Source
-from analyzer.history.unpacked import unpacked
+from analyzer.history.unpacked import own_scratch, unpacked
+from analyzer.places import at_hand, bring, is_remote
 from analyzer.plant_clock import zone_of
 from identification.errors import InputError
 
@@ -55,12 +56,15 @@ class Export:
         All tags, in the order in which they are met.
     skipped : tuple of str
         Files of a folder that could not be read, each with the reason.
+    origins : mapping of Path to str
+        URLs of the files that were copied from shared storage.
     """
 
     sources: tuple[Source, ...]
     tags: tuple[str, ...]
     _homes: dict[str, tuple[int, ...]] = field(repr=False, compare=False)
     skipped: tuple[str, ...] = ()
+    origins: Mapping[Path, str] = field(default_factory=dict, repr=False, compare=False)
     _met: dict[str, Counter[str]] = field(default_factory=dict, repr=False, compare=False)
     _spans: dict[int, MainSpan] = field(default_factory=dict, repr=False, compare=False)
 
@@ -74,6 +78,8 @@ class Export:
         """
         self._check_known(tags)
         homes = sorted({home for tag in tags for home in self._homes[tag]})
+        for home in homes:
+            bring(self.sources[home].path, self.origins)
         pieces = [_read(self.sources[home], tags) for home in homes]
         series = {}
         for tag in tags:
@@ -144,7 +150,7 @@ def open_export(paths: Sequence[Path], options: ReadOptions | None = None) -> Ex
     Parameters
     ----------
     paths : sequence of Path
-        Files, or folders of them.
+        Files, or folders of them; those of shared storage (places.py) are copied first.
     options : ReadOptions
         What the user states; the rest is detected.
 
@@ -155,12 +161,15 @@ def open_export(paths: Sequence[Path], options: ReadOptions | None = None) -> Ex
     """
     options = options or ReadOptions()
     _check_stated(options)
+    paths, origins = (
+        at_hand(paths, options.scratch or own_scratch()) if any(map(is_remote, paths)) else (paths, {})
+    )
     opened, skipped = _readable(paths, options)
     sources = agreed(opened)
     homes: dict[str, tuple[int, ...]] = {}
     for i, source in enumerate(sources):
         homes.update({tag: (*homes.get(tag, ()), i) for tag in source.tags})
-    return Export(sources, tuple(homes), homes, skipped=(*skipped, *packed_beside(paths)))
+    return Export(sources, tuple(homes), homes, (*skipped, *packed_beside(paths)), origins)
 
 
 def _check_stated(options: ReadOptions) -> None:
