@@ -52,7 +52,7 @@ class SearchLimits:
     worth_following: float = limit(
         -6.0,
         "nat",
-        (-1e6, 1e3),
+        (-1e3, 1e3),
         "Gain less its price from which a candidate of the first round is followed",
         "ours: of 242 below it on the same cases one came to anything, 0.6",
     )
