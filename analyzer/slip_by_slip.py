@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from analyzer.cause import Verdict, fault_of
-from analyzer.decisions import Cause
+from analyzer.decisions import Cause, Fault
 from analyzer.limits.cause import CauseLimits
 from analyzer.measure import Measured
 from identification.estimation.backlash_stiction import SHORT, generic_noise
@@ -40,7 +40,7 @@ def told_slip_by_slip(verdict: Verdict, period_s: float, limits: CauseLimits) ->
         return verdict
     window = replace(m.window, fine=False)
     play = descend(window, m.play, free_width=True) if m.window.fine else m.play
-    path = fit_irregular(window, play, generic_noise(), period_s)
+    path = fit_irregular(window, play, generic_noise(), period_s, verdict.fault is not Fault.STICTION)
     if path is None:
         return verdict
     jump = path_evidence(window, path, play)

@@ -22,6 +22,9 @@ WIDTHS = (0.78, 0.88, 0.98, 1.12)
 """Stickbands tried, in widths of the play that fits best; ours: on 32 simulated stems of dry friction 0.7 to 1.3."""
 JUMPS = (0.35, 0.6, 0.9)
 """Slip jumps tried, in stickbands."""
+ABSURD = 2.0
+"""Times that the play's gain exceeds what a friction's slips need from which theirs is taken: a play may answer a
+square PV by a stem that barely moves and a gain that no process has; ours."""
 LATER = (0.0, 0.8, 1.6, 2.8)
 """Dead times tried, in blocks beyond the play's: a play in place of a jump answers too soon."""
 SCREENED, CARRIED = 8, 16
@@ -51,6 +54,10 @@ MOST_MOVES = 40
 """Steps that are taken at most, for time; ours: on 9 simulated stems some five were."""
 
 
+Gains = dict[tuple[float, float], float]
+"""Gains under which frictions are tried, by width and share of the jump; 0 where one is not."""
+
+
 class SlipPath(NamedTuple):
     """A stem as decoded [% OP], shape of the window's op, the fit behind it, the log probability of its slips."""
 
@@ -66,12 +73,13 @@ class SlipPath(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class _Trial:
-    """A friction and dead time under which a stem was decoded, with its log probability."""
+    """A friction, dead time and gain under which a stem was decoded, with its log probability."""
 
     score: float
     band: float
     share: float
     later: float
+    gain: float
     stem: Floats
 
 
@@ -95,20 +103,34 @@ def _slips(stem: Floats) -> int:
     return int((np.diff(stem) != 0).sum())
 
 
-def _screened(window: Window, play: Fit, noise: Floats, rest: int) -> list[_Trial]:
+def _gain(window: Window, play: Fit, band: float, share: float, half: int) -> float:
+    """The gain with which a friction's slips move PV as far in half a period (`half` blocks) as it moves.
+
+    0 where it is not far smaller than the play's.
+    """
+    stem = residual(window, replace(play, valve=sticking(band, share), gain=-1.0)) - window.centred
+    moved = (
+        float(np.std(x[half:] - x[:-half])) if 0 < half < x.size else 0.0 for x in (window.centred, stem)
+    )
+    pv, swing = moved
+    found = math.copysign(pv / swing, play.gain) if swing > 0.0 else 0.0
+    return found if abs(found) < abs(play.gain) / ABSURD else 0.0
+
+
+def _screened(window: Window, play: Fit, noise: Floats, rest: int, gains: Gains) -> list[_Trial]:
     """Frictions and dead times about a play, each with its stem, best first, under a noise model of its own."""
     left = residual(window, play) - slow_terms(window, play)
     e = whitened(left, noise, every_lag(noise.size))[noise.size :]
     sigma2 = float(np.mean(e[window.usable[noise.size :]] ** 2))
     mean, out = float(play_stem(window.op, play.valve.stickband).mean()), []
     for later in LATER:
-        r = _response(window, replace(play, dead_time_s=play.dead_time_s + later * window.dt_s), mean)
-        for width in WIDTHS:
-            for share in JUMPS:
+        for (width, share), gain in gains.items():
+            if gain:
                 band = width * play.valve.stickband
-                f = _friction(band, share, rest)
-                stem, score = _decoded(window, r, Noise(noise, sigma2), f, SCREENED)
-                out.append(_Trial(score, band, share, later, stem))
+                fit = replace(play, dead_time_s=play.dead_time_s + later * window.dt_s, gain=gain)
+                r, f = _response(window, fit, mean), _friction(band, share, rest)
+                path, score = _decoded(window, r, Noise(noise, sigma2), f, SCREENED)
+                out.append(_Trial(score, band, share, later, gain, path))
     return sorted(out, key=lambda t: -t.score)
 
 
@@ -135,7 +157,8 @@ def _decoded_by(window: Window, fit: Fit, mean: float, f: Friction, hot: float) 
 def _followed(window: Window, play: Fit, begun: _Trial, rest: int) -> SlipPath:
     """Process and stem found in turns from a trial; the most probable of them."""
     valve, stem = sticking(begun.band, begun.share), begun.stem
-    fit = replace(play, dead_time_s=play.dead_time_s + begun.later * window.dt_s)
+    later_s = begun.later * window.dt_s
+    fit = replace(play, dead_time_s=play.dead_time_s + later_s, gain=begun.gain)
     best = path = _path(window, fit, valve, stem)
     for k in range(1, ROUNDS):
         f = _friction(begun.band, begun.share, rest if k == 1 else window.op.size)
@@ -173,7 +196,9 @@ def _settled(window: Window, best: SlipPath) -> SlipPath:
     return best
 
 
-def fit_irregular(window: Window, play: Fit, noise: Floats, period_s: float) -> SlipPath | None:
+def fit_irregular(
+    window: Window, play: Fit, noise: Floats, period_s: float, any_gain: bool = True
+) -> SlipPath | None:
     """The most probable path of a sticking stem in a loop that cycles; None where none is as likely as the play.
 
     Parameters
@@ -186,18 +211,29 @@ def fit_irregular(window: Window, play: Fit, noise: Floats, period_s: float) -> 
         A noise model that takes no valve's side, under which the search begins.
     period_s : float
         Of the cycle [s].
+    any_gain : bool
+        Whether gains far under the play's are tried too, where its own comes to nothing.
     """
     if play.gain == 0.0:
         return None
     rest = max(int(RESTS * period_s * window.factor / window.dt_s), 1)
-    begun = _chosen(_screened(window, play, noise, rest))
+    bands, half = play.valve.stickband, rest // window.factor // 2
+    usual: Gains = {(w, s): play.gain for w in WIDTHS for s in JUMPS}
+    best = _likeliest(window, play, noise, rest, usual)
+    if best is None and any_gain:
+        smaller = {(w, s): _gain(window, play, w * bands, s, half) for w, s in usual}
+        best = _likeliest(window, play, noise, rest, smaller)
+    return None if best is None else _settled(window, best)
+
+
+def _likeliest(window: Window, play: Fit, noise: Floats, rest: int, gains: Gains) -> SlipPath | None:
+    """The most probable path that the best trials come to; None where none is as likely as the play."""
+    begun = _chosen(_screened(window, play, noise, rest, gains))
     paths = [_followed(window, play, t, rest) for t in begun[:2]]
     if max((p.worth for p in paths), default=-math.inf) > play.log_likelihood + HOPELESS:
         paths += [_followed(window, play, t, rest) for t in begun[2:]]
     best = max(paths, key=lambda p: p.worth, default=None)
-    if best is None or best.worth < play.log_likelihood:
-        return None
-    return _settled(window, best)
+    return None if best is None or best.worth < play.log_likelihood else best
 
 
 def path_evidence(window: Window, path: SlipPath, rival: Fit) -> float:

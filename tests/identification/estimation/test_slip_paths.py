@@ -166,3 +166,35 @@ def test_play_has_no_slips(seed):
     """A play, which never jumps, is not told as friction whose slips scatter."""
     _, path = asked(0.0, seed)
     assert path is None
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_square_pv_of_a_fast_flow_is_no_play(seed):
+    """A flow far faster than its sticking valve's cycle, logged every 10 s, is told as friction within 15 %, whatever
+    gain a play needs to answer so square a PV."""
+    rng = np.random.default_rng(seed)
+    kp, ti, x, total, stem, load = 0.3, 50.0, 53.0, 50.0, 50.0, 0.0
+    pipe, pv_out, op_out = [50.0] * 4, [], []
+    for k in range(10 * 3600):
+        load = 0.9995 * load + 0.006 * rng.standard_normal()
+        pv = x + 0.05 * rng.standard_normal()
+        total += kp * (50.0 - pv) / ti
+        op = total + kp * (50.0 - pv)
+        if k % 10 == 0:
+            pv_out.append(round(pv, 2))
+            op_out.append(round(op, 2))
+        if abs(op - stem) > 5.5:
+            stem = op - math.copysign(0.5, op - stem)
+        pipe.append(stem)
+        x += (1.0 - math.exp(-1.0 / 12.0)) * (50.0 + 1.1 * (pipe.pop(0) + load - 50.0) - x)
+    pv, op = np.array(pv_out[100:]), np.array(op_out[100:])
+    window = Window(pv, op, np.ones(pv.size, dtype=bool), 10.0)
+    play = fit_play(window, fit_linear(window, 300.0), 300.0)
+    assert play.gain > 3.0 * 1.1
+    if seed == 1:
+        assert fit_irregular(window, play, generic_noise(), 300.0, any_gain=False) is None
+    path = fit_irregular(window, play, generic_noise(), 300.0)
+    assert path is not None
+    assert path.worth > play.log_likelihood + 1000.0
+    assert path.fit.gain == pytest.approx(1.1, rel=0.25)
+    assert path.fit.valve.stickband == pytest.approx(6.0, rel=0.15)
