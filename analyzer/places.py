@@ -67,6 +67,23 @@ def remove_tree(path: Path) -> None:
         remote.fs.rm(remote.path, recursive=True)
 
 
+def content(path: Path) -> bytes:
+    """What a small file holds now.
+
+    One of shared storage is asked for in one request: it may be written anew while it is read.
+
+    Raises
+    ------
+    FileNotFoundError
+        There is none.
+    """
+    if not is_remote(path):
+        return path.read_bytes()
+    remote: Any = path
+    remote.fs.invalidate_cache(remote.path)
+    return bytes(remote.fs.cat_file(remote.path))
+
+
 def at_hand(paths: Sequence[Path], into: Path) -> tuple[list[Path], dict[Path, str]]:
     """Paths of this machine, and from which URL each file among them was copied.
 

@@ -22,7 +22,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from analyzer.places import answering, is_remote
+from analyzer.places import answering, content, is_remote
 from identification.errors import InputError
 
 LOCK, OWNER = "run.lock", "run.owner.json"
@@ -98,7 +98,8 @@ def locked(store: Path) -> Iterator[None]:
 @contextmanager
 def _signed(store: Path) -> Iterator[None]:
     """Hold a store of shared storage, which has no locks, by a signature that is written anew while the run lives."""
-    held = _signature(store)
+    with answering(store):
+        held = _signature(store)
     if held is not None and time.time() - float(held.get("alive_s", 0.0)) < DEAD_S:
         raise _in_use(store)
     mine, ended = secrets.token_hex(8), threading.Event()
@@ -116,8 +117,9 @@ def _signed(store: Path) -> Iterator[None]:
     finally:
         ended.set()
         alive.join()
-        if (_signature(store) or {}).get("mark") == mine:
-            (store / OWNER).unlink(missing_ok=True)
+        with contextlib.suppress(OSError):  # what stays is a dead run's in ten minutes
+            if (_signature(store) or {}).get("mark") == mine:
+                (store / OWNER).unlink(missing_ok=True)
 
 
 def _in_use(store: Path) -> InputError:
@@ -146,17 +148,17 @@ def _user() -> str:
 
 def _owner(store: Path) -> str:
     """Who holds the store, as far as it is written down."""
-    owner = _signature(store)
     try:
+        owner = _signature(store)
         return f"process {owner['process']} of {owner['user']} on {owner['host']} since {owner['since']}"  # type: ignore[index]
-    except (KeyError, TypeError):
+    except (OSError, KeyError, TypeError):
         return "another run"
 
 
 def _signature(store: Path) -> dict[str, Any] | None:
-    """What the holder of a store has written down; None where nothing can be read."""
+    """What the holder of a store has written down; None where that is nothing, or no signature."""
     try:
-        found = json.loads((store / OWNER).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        found = json.loads(content(store / OWNER).decode("utf-8"))
+    except (FileNotFoundError, ValueError):
         return None
     return found if isinstance(found, dict) else None

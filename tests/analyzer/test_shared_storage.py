@@ -161,9 +161,9 @@ def test_two_runs_on_one_store_at_once(bucket: str, monkeypatch: pytest.MonkeyPa
     with locked(store):
         with pytest.raises(InputError, match=f"in use by process {os.getpid()}"), locked(store):
             pass
-        first = json.loads((store / OWNER).read_text())["alive_s"]
+        first = json.loads(places.content(store / OWNER))["alive_s"]
         for _ in range(1000):
-            if json.loads((store / OWNER).read_text())["alive_s"] > first:
+            if json.loads(places.content(store / OWNER))["alive_s"] > first:
                 break
             time.sleep(0.01)
         else:
@@ -171,7 +171,7 @@ def test_two_runs_on_one_store_at_once(bucket: str, monkeypatch: pytest.MonkeyPa
     assert not (store / OWNER).exists()
     (store / OWNER).write_text(json.dumps({"alive_s": time.time() - 3600.0, "mark": "dead"}))
     with locked(store):
-        assert json.loads((store / OWNER).read_text())["process"] == os.getpid()
+        assert json.loads(places.content(store / OWNER))["process"] == os.getpid()
 
 
 @pytest.mark.parametrize(
