@@ -97,7 +97,8 @@ def spoilt(kind: int, rng: np.random.Generator, series: dict[str, Series]) -> di
                 kept[at : at + int(rng.integers(1, 12))] = False
             out["L.OP"] = Series(op.stamp_s[kept], op.value[kept], op.bad[kept])
         case 4:
-            out["L.OP"] = replace(op, value=op.value - op.value.max() + rng.uniform(100.0, 110.0))
+            high = op.value - op.value.max() + rng.uniform(100.0, 110.0)
+            out["L.OP"] = replace(op, value=np.minimum(high, 100.0) if rng.random() < 0.7 else high)
         case 5:
             lost = rng.random(n) < rng.uniform(0.005, 0.04)
             out["L.PV"] = replace(pv, bad=lost, unread=int(lost.sum()), example="1.2.3")

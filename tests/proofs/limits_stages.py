@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from analyzer.advice import advise
-from analyzer.assess import assess, cause_of, verdict_by_measures
+from analyzer.assess import assess, at_limits, cause_of, verdict_by_measures
 from analyzer.assessments import assess_span
 from analyzer.before_after import Span, compare, grade
 from analyzer.before_after import follows as source_of
@@ -55,7 +55,8 @@ def of_quality(c: Config) -> list[Any]:
     def answer(r: Raw) -> Any:
         p = prepare(r.spec, r.series, c.quality)
         masked = (int(p.record.bad.sum()), int(p.record.mask("saturated").sum()))
-        return len(p.record), masked, p.op_known, p.notes, round(p.compressed_share, 6)
+        told = (p.op_known, p.notes, at_limits(p.record, c.quality) is not None)
+        return len(p.record), masked, *told, round(p.compressed_share, 6)
 
     def unfit(r: Raw) -> Any:
         found = tried(lambda: assess(prepare(r.spec, r.series, c.quality), None, c).verdict.needs)
