@@ -62,7 +62,7 @@ def add(store: Path, note: Note) -> None:
     if is_remote(store):  # an object cannot be added to
         path = store / FILE
         before = path.read_bytes() if path.exists() else b""
-        path.write_bytes(before + (b"" if not before or before.endswith(b"\n") else b"\n") + line)
+        path.write_bytes(before + (b"" if before[-1:] in (b"", b"\n") else b"\n") + line)
         return
     with (store / FILE).open("ab+", buffering=0) as kept:
         if kept.tell() and not _ends_a_line(kept):

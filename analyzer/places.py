@@ -35,7 +35,7 @@ def place(text: str) -> Path:
     """
     if not URL.match(text):
         return Path(text)
-    if text.lower().startswith("file://"):
+    if urlsplit(text).scheme == "file":
         return Path(unquote(urlsplit(text).path))
     try:
         from upath import UPath
