@@ -34,7 +34,7 @@ err by 2.1 % in nine of ten where deviations of .4 % are told, dead times by .01
 LEAST_JUMP = 2.0
 """Times that a slip jump may be smaller than found; ours: on simulated dry friction found ones are too small."""
 DECODED = 0.05
-"""Standard deviation of a stickband that was told slip by slip, in itself: as its slips scatter (slip_paths.py)."""
+"""Standard deviation of a stickband that was told slip by slip, in itself: as its slips scatter (slips.py)."""
 LEAST_BAND = 1.5
 """Times that a stickband may be smaller, or larger, than found; ours: on simulated dry friction up to 1.45."""
 

@@ -12,7 +12,8 @@ from identification.estimation.gauss_newton import descend
 from identification.estimation.hammerstein import Fit, ValveTrial, residual, slow_terms, sticking
 from identification.estimation.likelihood_ratio import WindowFit, evidence
 from identification.estimation.noise import every_lag, judged, whitened
-from identification.estimation.slip_paths import Friction, Noise, Response, decoded, log_chance
+from identification.estimation.slip_paths import decoded
+from identification.estimation.slips import Friction, Noise, Response, log_chance
 from identification.estimation.window import Window
 from identification.record import Floats
 from identification.simulation.discretization import unit_lag

@@ -8,141 +8,38 @@ dropped (a beam search over a hidden state, as in multiple-hypothesis tracking: 
 
 from __future__ import annotations
 
-import math
-from typing import NamedTuple
-
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from identification.estimation.slip_beam import (
+    EVENT,
+    LATE,
+    MOST_EVENTS,
+    SCORE,
+    STEM,
+    Beam,
+    Block,
+    Events,
+    X,
+    best_paths,
+    divided,
+    judge_block,
+    room,
+    shares_of,
+)
+from identification.estimation.slips import Friction, Noise, Response
 from identification.record import Floats, Mask
 
-Indices = NDArray[np.int64]
-SCATTER = 0.05
-"""Standard deviation of the distance at which a stem lets go, in that distance; ours, the one
-value tried: on six simulated stems of dry friction OP, which comes in samples, goes 2 to 5 % beyond it (median)."""
 PLACES = 13
 """Places of the stem that a path may begin at, across what it may be behind OP; ours."""
-FAR = 3.5
-"""Standard deviations below the mean distance from which a slip is thought of at all; ours: about RARE."""
-RARE = 1e-4
-"""Chance of a slip under which no path is begun for it; ours: 9 nat, what an outlier costs."""
-STUCK = 100.0
-"""Log probability that a stem costs which rests for longer than is asked; ours: on simulated stems parking for good
-cost less than the wrong dead time did at first, and cost three of six their slips."""
 SAME = 0.01
 """Distance of two stems, in the mean distance at which they let go, under which their paths are one; ours."""
 LOOKED = 8
 """Blocks after which paths are compared, if they do not become too many before; ours: bounds the time."""
-WAITING = 12
-"""Slips of a path that PV does not answer yet, at most; ours: a dead time of six cycles is no dead time."""
-MOST_EVENTS = 60_000
-"""Slips of all paths that are remembered; beyond it no path divides any more; ours: 8,400 were seen."""
-
-
-class Response(NamedTuple):
-    """How PV follows the stem: the lag's pole and weights, the delay [samples], gain, and PV's slow terms, shape
-    (blocks,)."""
-
-    pole: float
-    now: float
-    before: float
-    delay: int
-    gain: float
-    slow: Floats
-
-
-class Noise(NamedTuple):
-    """Noise model of single lags, of blocks, shape (order,), and the variance of its innovations [% PV squared]."""
-
-    ar: Floats
-    sigma2: float
-
-
-class Friction(NamedTuple):
-    """Mean distances |OP - stem| at which a stem lets go and comes to rest [% OP], and its longest rest [samples]."""
-
-    breakaway: float
-    sliding: float
-    rest: int
-
-
-STEM, X, TOTAL, SCORE, LATE, FAR_LOW, FAR_HIGH, PLACED = 0, 1, 2, 3, 4, 5, 6, 7
-"""Columns of a path's numbers: stem, response, its sum over the block, score, stem that PV answers now, farthest
-distance below and above since the last slip; then places of the stem that PV does not answer yet, and residuals."""
-EVENT, RESTED, COMING, PENDING, DUE = 0, 1, 2, 3, 4
-"""Columns of its marks: last event, sample of the last slip, next sample, how many slips PV does not answer yet; then
-the samples from which it does."""
-
-
-class _Beam(NamedTuple):
-    """Paths side by side, a row each, in two arrays: a function is handed each array at a cost."""
-
-    numbers: Floats
-    marks: Indices
-
-
-class _Block(NamedTuple):
-    """A block's first sample, the one behind its last, and the extremes of OP in it; and where PV answers a stem at
-    rest, at u, what is left of a response x then, and the weights of x and of u in its sum over the block."""
-
-    first: int
-    last: int
-    low: float
-    high: float
-    left: float
-    of_x: float
-    of_u: float
 
 
 @njit(cache=True)
-def _normal(x: float) -> float:
-    return 0.5 * math.erfc(-x / math.sqrt(2.0))
-
-
-@njit(cache=True)
-def slip_chance(distance: float, farthest: float, breakaway: float) -> float:
-    """Chance that a stem lets go between the farthest distance that it has borne and a farther one."""
-    scatter = SCATTER * breakaway
-    borne = _normal((farthest - breakaway) / scatter)
-    return min((_normal((distance - breakaway) / scatter) - borne) / max(1.0 - borne, 1e-12), 1.0)
-
-
-@njit(cache=True)
-def _copy(into: _Beam, to: int, b: _Beam, source: int) -> None:
-    """A path of one beam as one of another, or of the same."""
-    for i in range(b.numbers.shape[1]):
-        into.numbers[to, i] = b.numbers[source, i]
-    for i in range(b.marks.shape[1]):
-        into.marks[to, i] = b.marks[source, i]
-
-
-@njit(cache=True)
-def _best(b: _Beam, other: _Beam, count: int, most: int, near: float) -> int:
-    """The best paths of `b` in `other`, of two at the same place the better; how many they are."""
-    kept = 0
-    for at in np.argsort(-b.numbers[:count, SCORE]):
-        same = False
-        for k in range(kept):
-            stem, x = other.numbers[k, STEM] - b.numbers[at, STEM], other.numbers[k, X] - b.numbers[at, X]
-            if abs(stem) < near and abs(x) < 2.0 * near:
-                same = True
-                break
-        if not same:
-            _copy(other, kept, b, at)
-            kept += 1
-        if kept == most:
-            break
-    return kept
-
-
-@njit(cache=True)
-def _room(rows: int, order: int) -> _Beam:
-    return _Beam(np.zeros((rows, PLACED + WAITING + order)), np.zeros((rows, DUE + WAITING), np.int64))
-
-
-@njit(cache=True)
-def _begun(b: _Beam, op: Floats, first: float, breakaway: float) -> int:
+def _begun(b: Beam, op: Floats, first: float, breakaway: float) -> int:
     """Paths from places of the stem from which it will have to slip; how many they are."""
     early = op[: max(op.size // 3, 1)]
     high, low, count = early.max(), early.min(), 0
@@ -157,135 +54,8 @@ def _begun(b: _Beam, op: Floats, first: float, breakaway: float) -> int:
     return count
 
 
-class _Events(NamedTuple):
-    """Slips of all paths, shape (MOST_EVENTS,): the slip before on the same path, sample, and stem after it."""
-
-    parent: Indices
-    moment: Indices
-    place: Floats
-
-
 @njit(cache=True)
-def _answered(b: _Beam, h: int, k: int, r: Response) -> None:
-    """PV's response of a path stepped on by one sample."""
-    own, marks = b.numbers[h], b.marks[h]
-    own[TOTAL] += own[X]
-    before = own[LATE]
-    if marks[PENDING] > 0 and marks[DUE] <= k:
-        own[LATE] = own[PLACED]
-        marks[PENDING] -= 1
-        for i in range(marks[PENDING]):
-            marks[DUE + i], own[PLACED + i] = marks[DUE + i + 1], own[PLACED + i + 1]
-    own[X] = r.pole * own[X] + r.now * own[LATE] + r.before * before
-
-
-@njit(cache=True)
-def _slipped(b: _Beam, events: _Events, at: tuple[int, int, int, int], place: float, r: Response) -> None:
-    """Path `at[1]` as `at[0]` with the stem at another place from sample `at[2]` on, remembered as event `at[3]`."""
-    h, to, k, event = at
-    _copy(b, to, b, h)
-    own, marks = b.numbers[to], b.marks[to]
-    own[STEM], marks[RESTED] = place, k
-    own[FAR_LOW] = own[FAR_HIGH] = 0.0
-    own[PLACED + marks[PENDING]], marks[DUE + marks[PENDING]] = place, k + r.delay
-    marks[PENDING] += 1
-    events.parent[event], events.moment[event], events.place[event] = marks[EVENT], k, place
-    marks[EVENT] = event
-    _answered(b, to, k, r)
-    marks[COMING] = k + 1
-
-
-@njit(cache=True)
-def _shares(r: Response, factor: int) -> tuple[float, float, float]:
-    """left, of_x and of_u of a block (`_Block`)."""
-    left, of_x = 1.0, 0.0
-    for _ in range(factor):
-        of_x += left
-        left *= r.pole
-    return left, of_x, factor - of_x
-
-
-@njit(cache=True, inline="always")
-def _rests(numbers: Floats, marks: Indices, h: int, block: _Block, f: Friction) -> bool:
-    """Whether nothing becomes of a path over a block: its stem bears OP, and PV answers no slip anew."""
-    if marks[h, COMING] != block.first or block.first == 0 or block.last - 1 - marks[h, RESTED] > f.rest:
-        return False
-    if marks[h, PENDING] > 0 and marks[h, DUE] < block.last:
-        return False
-    stem, least = numbers[h, STEM], f.breakaway * (1.0 - FAR * SCATTER)
-    above = block.high - stem <= max(numbers[h, FAR_HIGH], least)
-    return above and stem - block.low <= max(numbers[h, FAR_LOW], least)
-
-
-@njit(cache=True)
-def _through(
-    b: _Beam, events: _Events, known: tuple[int, int], h: int, last: int, op: Floats, f: Friction, r: Response
-) -> tuple[int, int]:
-    """A path through the samples before `last`, with a new path for each slip that is likely enough.
-
-    `known` and what is returned: how many paths and events there are.
-    """
-    (count, slips), own, marks = known, b.numbers[h], b.marks[h]
-    least = f.breakaway * (1.0 - FAR * SCATTER)
-    for k in range(marks[COMING], last):
-        if k - marks[RESTED] > f.rest:
-            own[SCORE], marks[RESTED] = own[SCORE] - STUCK, k
-        gap = op[k] - own[STEM]
-        far, side = abs(gap), FAR_HIGH if gap > 0 else FAR_LOW
-        if k > 0 and far > own[side] and far > least:
-            chance = slip_chance(far, own[side], f.breakaway)
-            room = count < b.marks.shape[0] and slips < MOST_EVENTS and marks[PENDING] < WAITING
-            if chance > RARE and room:
-                _slipped(b, events, (h, count, k, slips), op[k] - math.copysign(f.sliding, gap), r)
-                b.numbers[count, SCORE] += math.log(chance)
-                count, slips = count + 1, slips + 1
-            own[SCORE] += math.log(max(1.0 - chance, 1e-12))
-            own[side] = far
-        _answered(b, h, k, r)
-    marks[COMING] = last
-    return count, slips
-
-
-@njit(cache=True)
-def _divided(
-    b: _Beam, events: _Events, known: tuple[int, int], block: _Block, op: Floats, f: Friction, r: Response
-) -> tuple[int, int]:
-    """All paths through a block, those that begin in it too; how many paths and events there are."""
-    (count, slips), numbers, marks = known, b.numbers, b.marks
-    h = 0
-    while h < count:
-        if _rests(numbers, marks, h, block, f):
-            x, u = numbers[h, X], numbers[h, LATE]
-            numbers[h, TOTAL] = block.of_x * x + block.of_u * u
-            numbers[h, X] = block.left * x + (1.0 - block.left) * u
-            marks[h, COMING] = block.last
-        else:
-            count, slips = _through(b, events, (count, slips), h, block.last, op, f, r)
-        h += 1
-    return count, slips
-
-
-@njit(cache=True)
-def _judge(
-    b: _Beam, count: int, left: float, block: int, factor: int, r: Response, n: Noise, counts: bool
-) -> None:
-    """Score all paths by their innovation of a block, of which `left` is PV less its slow terms."""
-    order, past = n.ar.size, PLACED + WAITING
-    for h in range(count):
-        own = b.numbers[h]
-        residual = left - r.gain * own[TOTAL] / factor
-        own[TOTAL] = 0.0
-        if counts:
-            e, at = residual, block % order
-            for i in range(order):
-                at = at - 1 if at > 0 else order - 1
-                e -= n.ar[i] * own[past + at]
-            own[SCORE] -= 0.5 * e * e / n.sigma2
-        own[past + block % order] = residual
-
-
-@njit(cache=True)
-def _traced(events: _Events, event: int, n: int) -> Floats:
+def _traced(events: Events, event: int, n: int) -> Floats:
     """The stem of the path that ends with an event, shape (n,)."""
     stem, last = np.empty(n), n
     while event >= 0:
@@ -315,37 +85,21 @@ def decoded(
     """
     factor, near = op.size // y.size, SAME * f.breakaway
     rows = 6 * most + PLACES
-    b, other = _room(rows, n.ar.size), _room(rows, n.ar.size)
-    events = _Events(np.empty(MOST_EVENTS, np.int64), np.zeros(MOST_EVENTS, np.int64), np.empty(MOST_EVENTS))
+    b, other = room(rows, n.ar.size), room(rows, n.ar.size)
+    events = Events(np.empty(MOST_EVENTS, np.int64), np.zeros(MOST_EVENTS, np.int64), np.empty(MOST_EVENTS))
     count = _begun(b, op, (y[0] - r.slow[0]) / r.gain, f.breakaway)
     events.parent[:count], events.place[:count] = -1, b.numbers[:count, STEM]
-    slips, shares = count, _shares(r, factor)
+    slips, shares = count, shares_of(r, factor)
     for block in range(y.size):
         first, last = block * factor, (block + 1) * factor
         low, high = op[first], op[first]
         for u in op[first:last]:
             low, high = min(low, u), max(high, u)
-        at = _Block(first, last, low, high, *shares)
-        count, slips = _divided(b, events, (count, slips), at, op, f, r)
-        _judge(b, count, y[block] - r.slow[block], block, factor, r, n, counts[block])
+        at = Block(first, last, low, high, *shares)
+        count, slips = divided(b, events, (count, slips), at, op, f, r)
+        judge_block(b, count, y[block] - r.slow[block], block, factor, r, n, counts[block])
         if count > 2 * most or (block + 1) % LOOKED == 0:
-            count = _best(b, other, count, most, near)
+            count = best_paths(b, other, count, most, near)
             b, other = other, b
     best = int(np.argmax(b.numbers[:count, SCORE]))
     return _traced(events, b.marks[best, EVENT], op.size), float(b.numbers[best, SCORE])
-
-
-@njit(cache=True)
-def log_chance(op: Floats, stem: Floats, breakaway: float) -> float:
-    """Log probability of when a stem, shape of op, has slipped, given OP [nat]."""
-    below, above, out = 0.0, 0.0, 0.0
-    for k in range(1, op.size):
-        gap = op[k] - stem[k - 1]
-        far, farthest = abs(gap), above if gap > 0 else below
-        if stem[k] != stem[k - 1]:
-            out += math.log(max(slip_chance(far, farthest, breakaway), 1e-12))
-            below, above = 0.0, 0.0
-        elif far > farthest and far > breakaway * (1.0 - FAR * SCATTER):
-            out += math.log(max(1.0 - slip_chance(far, farthest, breakaway), 1e-12))
-            below, above = (below, far) if gap > 0 else (far, above)
-    return out

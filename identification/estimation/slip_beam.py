@@ -1,0 +1,210 @@
+"""Paths of a stem side by side: each carried through a block of samples, divided where it may slip, and scored."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from identification.estimation.slips import FAR, SCATTER, Friction, Noise, Response, slip_chance
+from identification.record import Floats
+
+Indices = NDArray[np.int64]
+RARE = 1e-4
+"""Chance of a slip under which no path is begun for it; ours: 9 nat, what an outlier costs."""
+STUCK = 100.0
+"""Log probability that a stem costs which rests for longer than is asked; ours: on simulated stems parking for good
+cost less than the wrong dead time did at first, and cost three of six their slips."""
+WAITING = 12
+"""Slips of a path that PV does not answer yet, at most; ours: a dead time of six cycles is no dead time."""
+MOST_EVENTS = 60_000
+"""Slips of all paths that are remembered; beyond it no path divides any more; ours: 8,400 were seen."""
+STEM, X, TOTAL, SCORE, LATE, FAR_LOW, FAR_HIGH, PLACED = 0, 1, 2, 3, 4, 5, 6, 7
+"""Columns of a path's numbers: stem, response, its sum over the block, score, stem that PV answers now, farthest
+distance below and above since the last slip; then places of the stem that PV does not answer yet, and residuals."""
+EVENT, RESTED, COMING, PENDING, DUE = 0, 1, 2, 3, 4
+"""Columns of its marks: last event, sample of the last slip, next sample, how many slips PV does not answer yet; then
+the samples from which it does."""
+
+
+class Beam(NamedTuple):
+    """Paths side by side, a row each, in two arrays: a function is handed each array at a cost."""
+
+    numbers: Floats
+    marks: Indices
+
+
+class Block(NamedTuple):
+    """A block's first sample, the one behind its last, and the extremes of OP in it; and where PV answers a stem at
+    rest, at u, what is left of a response x then, and the weights of x and of u in its sum over the block."""
+
+    first: int
+    last: int
+    low: float
+    high: float
+    left: float
+    of_x: float
+    of_u: float
+
+
+@njit(cache=True)
+def copy_path(into: Beam, to: int, b: Beam, source: int) -> None:
+    """A path of one beam as one of another, or of the same."""
+    for i in range(b.numbers.shape[1]):
+        into.numbers[to, i] = b.numbers[source, i]
+    for i in range(b.marks.shape[1]):
+        into.marks[to, i] = b.marks[source, i]
+
+
+@njit(cache=True)
+def best_paths(b: Beam, other: Beam, count: int, most: int, near: float) -> int:
+    """The best paths of `b` in `other`, of two at the same place the better; how many they are."""
+    kept = 0
+    for at in np.argsort(-b.numbers[:count, SCORE]):
+        same = False
+        for k in range(kept):
+            stem, x = other.numbers[k, STEM] - b.numbers[at, STEM], other.numbers[k, X] - b.numbers[at, X]
+            if abs(stem) < near and abs(x) < 2.0 * near:
+                same = True
+                break
+        if not same:
+            copy_path(other, kept, b, at)
+            kept += 1
+        if kept == most:
+            break
+    return kept
+
+
+@njit(cache=True)
+def room(rows: int, order: int) -> Beam:
+    return Beam(np.zeros((rows, PLACED + WAITING + order)), np.zeros((rows, DUE + WAITING), np.int64))
+
+
+class Events(NamedTuple):
+    """Slips of all paths, shape (MOST_EVENTS,): the slip before on the same path, sample, and stem after it."""
+
+    parent: Indices
+    moment: Indices
+    place: Floats
+
+
+@njit(cache=True)
+def _answered(b: Beam, h: int, k: int, r: Response) -> None:
+    """PV's response of a path stepped on by one sample."""
+    own, marks = b.numbers[h], b.marks[h]
+    own[TOTAL] += own[X]
+    before = own[LATE]
+    if marks[PENDING] > 0 and marks[DUE] <= k:
+        own[LATE] = own[PLACED]
+        marks[PENDING] -= 1
+        for i in range(marks[PENDING]):
+            marks[DUE + i], own[PLACED + i] = marks[DUE + i + 1], own[PLACED + i + 1]
+    own[X] = r.pole * own[X] + r.now * own[LATE] + r.before * before
+
+
+@njit(cache=True)
+def _slipped(b: Beam, events: Events, at: tuple[int, int, int, int], place: float, r: Response) -> None:
+    """Path `at[1]` as `at[0]` with the stem at another place from sample `at[2]` on, remembered as event `at[3]`."""
+    h, to, k, event = at
+    copy_path(b, to, b, h)
+    own, marks = b.numbers[to], b.marks[to]
+    own[STEM], marks[RESTED] = place, k
+    own[FAR_LOW] = own[FAR_HIGH] = 0.0
+    own[PLACED + marks[PENDING]], marks[DUE + marks[PENDING]] = place, k + r.delay
+    marks[PENDING] += 1
+    events.parent[event], events.moment[event], events.place[event] = marks[EVENT], k, place
+    marks[EVENT] = event
+    _answered(b, to, k, r)
+    marks[COMING] = k + 1
+
+
+@njit(cache=True)
+def shares_of(r: Response, factor: int) -> tuple[float, float, float]:
+    """left, of_x and of_u of a block (`Block`)."""
+    left, of_x = 1.0, 0.0
+    for _ in range(factor):
+        of_x += left
+        left *= r.pole
+    return left, of_x, factor - of_x
+
+
+@njit(cache=True, inline="always")
+def _rests(numbers: Floats, marks: Indices, h: int, block: Block, f: Friction) -> bool:
+    """Whether nothing becomes of a path over a block: its stem bears OP, and PV answers no slip anew."""
+    if marks[h, COMING] != block.first or block.first == 0 or block.last - 1 - marks[h, RESTED] > f.rest:
+        return False
+    if marks[h, PENDING] > 0 and marks[h, DUE] < block.last:
+        return False
+    stem, least = numbers[h, STEM], f.breakaway * (1.0 - FAR * SCATTER)
+    above = block.high - stem <= max(numbers[h, FAR_HIGH], least)
+    return above and stem - block.low <= max(numbers[h, FAR_LOW], least)
+
+
+@njit(cache=True)
+def _through(
+    b: Beam, events: Events, known: tuple[int, int], h: int, last: int, op: Floats, f: Friction, r: Response
+) -> tuple[int, int]:
+    """A path through the samples before `last`, with a new path for each slip that is likely enough.
+
+    `known` and what is returned: how many paths and events there are.
+    """
+    (count, slips), own, marks = known, b.numbers[h], b.marks[h]
+    least = f.breakaway * (1.0 - FAR * SCATTER)
+    for k in range(marks[COMING], last):
+        if k - marks[RESTED] > f.rest:
+            own[SCORE], marks[RESTED] = own[SCORE] - STUCK, k
+        gap = op[k] - own[STEM]
+        far, side = abs(gap), FAR_HIGH if gap > 0 else FAR_LOW
+        if k > 0 and far > own[side] and far > least:
+            chance = slip_chance(far, own[side], f.breakaway)
+            room = count < b.marks.shape[0] and slips < MOST_EVENTS and marks[PENDING] < WAITING
+            if chance > RARE and room:
+                _slipped(b, events, (h, count, k, slips), op[k] - math.copysign(f.sliding, gap), r)
+                b.numbers[count, SCORE] += math.log(chance)
+                count, slips = count + 1, slips + 1
+            own[SCORE] += math.log(max(1.0 - chance, 1e-12))
+            own[side] = far
+        _answered(b, h, k, r)
+    marks[COMING] = last
+    return count, slips
+
+
+@njit(cache=True)
+def divided(
+    b: Beam, events: Events, known: tuple[int, int], block: Block, op: Floats, f: Friction, r: Response
+) -> tuple[int, int]:
+    """All paths through a block, those that begin in it too; how many paths and events there are."""
+    (count, slips), numbers, marks = known, b.numbers, b.marks
+    h = 0
+    while h < count:
+        if _rests(numbers, marks, h, block, f):
+            x, u = numbers[h, X], numbers[h, LATE]
+            numbers[h, TOTAL] = block.of_x * x + block.of_u * u
+            numbers[h, X] = block.left * x + (1.0 - block.left) * u
+            marks[h, COMING] = block.last
+        else:
+            count, slips = _through(b, events, (count, slips), h, block.last, op, f, r)
+        h += 1
+    return count, slips
+
+
+@njit(cache=True)
+def judge_block(
+    b: Beam, count: int, left: float, block: int, factor: int, r: Response, n: Noise, counts: bool
+) -> None:
+    """Score all paths by their innovation of a block, of which `left` is PV less its slow terms."""
+    order, past = n.ar.size, PLACED + WAITING
+    for h in range(count):
+        own = b.numbers[h]
+        residual = left - r.gain * own[TOTAL] / factor
+        own[TOTAL] = 0.0
+        if counts:
+            e, at = residual, block % order
+            for i in range(order):
+                at = at - 1 if at > 0 else order - 1
+                e -= n.ar[i] * own[past + at]
+            own[SCORE] -= 0.5 * e * e / n.sigma2
+        own[past + block % order] = residual
