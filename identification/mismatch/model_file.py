@@ -22,6 +22,7 @@ TIMED = (
     Slot.COSINE,
     Slot.NEIGHBOUR,
     Slot.START,
+    Slot.PLACE,
     Slot.HEAD_BIAS,
     *(Slot.STEP + i for i in range(STEPS)),
     *(Slot.HEAD + i for i in range(KNOTS)),

@@ -16,6 +16,7 @@ from identification.estimation.prediction_error import descend as descend_any
 from identification.estimation.prediction_error import deviations
 from identification.estimation.window import Window
 from identification.mismatch.catalogue import EFFECTS
+from identification.mismatch.model_file import constants, to_data
 from identification.record import Floats
 from identification.simulation.open_loop import ModelInputs
 from identification.simulation.parameters import Slot, neutral
@@ -81,3 +82,14 @@ def test_both_fits_find_the_same_constants(seed: int) -> None:
     for mine, yours, my_spread, your_spread in pairs:
         assert abs(mine - yours) < min(my_spread, your_spread)
         assert my_spread == pytest.approx(your_spread, rel=0.3)
+
+
+def test_where_a_stem_stood_first_is_not_carried_to_another_recording() -> None:
+    """A saved model leaves out where the stem and PV stood first: both belong to the recording that was fitted."""
+    op = np.linspace(40.0, 60.0, 50)
+    c = neutral()
+    c[Slot.K], c[Slot.STICKBAND], c[Slot.PLACE], c[Slot.START] = 1.2, 2.0, -1.0, 3.0
+    data = to_data("L", ModelInputs(op, 1.0, 50.0, 50.0, (40.0, 60.0)), c, ("backlash",), 0.0, None)
+    back = constants(data)
+    assert (back[Slot.PLACE], back[Slot.START]) == (0.0, 0.0)
+    assert (back[Slot.K], back[Slot.STICKBAND]) == (1.2, 2.0)
