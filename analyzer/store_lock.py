@@ -100,7 +100,8 @@ def _signed(store: Path) -> Iterator[None]:
     """Hold a store of shared storage, which has no locks, by a signature that is written anew while the run lives."""
     with answering(store):
         held = _signature(store)
-    if held is not None and time.time() - float(held.get("alive_s", 0.0)) < DEAD_S:
+    alive_s = (held or {}).get("alive_s")
+    if isinstance(alive_s, int | float) and time.time() - alive_s < DEAD_S:
         raise _in_use(store)
     mine, ended = secrets.token_hex(8), threading.Event()
     _sign(store, mine)
