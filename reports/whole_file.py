@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import os
 import secrets
-import shutil
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 SUFFIX = ".tmp"
 """Ending of what is being written; such files of a process that died may be deleted."""
@@ -45,14 +45,13 @@ def whole_file(path: Path, kept: bool = False) -> Iterator[Path]:
 
 
 @contextmanager
-def _uploaded(path: Path) -> Iterator[Path]:
+def _uploaded(path: Any) -> Iterator[Path]:
     """A path of this machine whose file is put in the place of an object of shared storage."""
     with tempfile.TemporaryDirectory(prefix="triage-") as folder:
         temporary = Path(folder) / path.name
         temporary.touch()
         yield temporary
-        with temporary.open("rb") as source, path.open("wb") as target:
-            shutil.copyfileobj(source, target, 1 << 22)
+        path.fs.put_file(str(temporary), path.path)
 
 
 def _to_disk(path: Path) -> None:
