@@ -125,8 +125,6 @@ def answering(url: Path) -> Iterator[None]:
     """
     try:
         yield
-    except InputError:
-        raise
     except Exception as error:
         if not (isinstance(error, OSError) or refused(error)):
             raise
@@ -143,6 +141,11 @@ def _files(path: Path, copied: Path) -> list[tuple[Path, Path]]:
     found = [(p, copied / PurePosixPath(str(p).removeprefix(root))) for p in path.rglob("*") if p.is_file()]
     if not found:
         raise InputError(f"{path}: nothing there", "a file or a folder of exports", "correct the URL")
+    for url, local in found:  # objects may be named as no file can be, or as one outside the copies
+        if not local.resolve().is_relative_to(copied.resolve()):
+            raise InputError(
+                f"{url}: a name that leads out of its folder", "names without ..", "rename the object"
+            )
     return found
 
 

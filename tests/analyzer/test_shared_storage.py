@@ -215,3 +215,13 @@ def test_a_cluster_reads_and_writes_shared_storage(
     result = ran(url, store, "--scheduler", cluster[0])
     assert result.exit_code == 0, result.output
     assert kept(store, tmp_path) == whole
+
+
+def test_a_name_that_leads_out_is_refused(bucket: str, export: Path, tmp_path: Path):
+    """An object whose name climbs out of its folder is refused before anything is written."""
+    import s3fs
+
+    s3fs.S3FileSystem().pipe_file("mill/climbing/../../../evil.parquet", export.read_bytes())
+    with pytest.raises(InputError, match="leads out of its folder"):
+        places.at_hand([places.place(f"{bucket}/climbing")], tmp_path / "copies")
+    assert not list(tmp_path.rglob("*.parquet"))
