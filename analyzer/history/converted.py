@@ -142,11 +142,11 @@ def converted(sheet: Sheet, tag: int, scratch: Path | None) -> Converted:
     """
     folder = _folder(sheet, scratch or own_scratch())
     try:
-        done = as_far_as_numbers_go(sheet.encoding, partial(_pass, sheet, tag, folder))
+        done = as_far_as_numbers_go(sheet.encoding, len(sheet.names), partial(_pass, sheet, tag, folder))
         rows = pq_rows(folder) + done.left_out
         if rows < WHOLE_SHARE * (lines_of(sheet) - sheet.skip_rows) - 1 and not sheet.unquoted:
             sheet = replace(sheet, unquoted=True)
-            done = as_far_as_numbers_go(sheet.encoding, partial(_pass, sheet, tag, folder))
+            done = as_far_as_numbers_go(sheet.encoding, len(sheet.names), partial(_pass, sheet, tag, folder))
             done.notes.append("a quote is not closed: quotes are taken as they stand")
     except (UnicodeError, pa.ArrowInvalid) as error:
         raise unreadable(sheet.path, error) from error

@@ -22,7 +22,9 @@ BLOCK_BYTES = 1 << 24
 WHOLE_SHARE = 0.95
 """Share of a file's lines that must come back as rows [-]; where fewer do, an open quote has swallowed the rest."""
 Read = TypeVar("Read")
-LATE_TEXT = re.compile(r"In CSV column #(?P<column>\d+): CSV conversion error")
+LATE_TEXT = re.compile(r"In CSV column #(?P<column>\d+): (?:Row #\d+: )?CSV conversion error")
+MOST_LATE = 3
+"""Columns whose texts come late that a pass is begun anew for, one by one; then all columns are read as texts."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,22 +98,22 @@ class Loaded:
 def _loaded(sheet: Sheet, columns: tuple[int, ...]) -> Loaded:
     """Some columns of the whole file."""
     try:
-        loaded = as_far_as_numbers_go(sheet.encoding, partial(_parsed, sheet, columns))
+        loaded = as_far_as_numbers_go(sheet.encoding, len(sheet.names), partial(_parsed, sheet, columns))
         lines = _lines(sheet.path, sheet.changed_ns) - sheet.skip_rows
         rows = len(loaded.columns[columns[0]]) + loaded.left_out
         if rows >= WHOLE_SHARE * lines - 1 or sheet.unquoted:
             return loaded
         plain = replace(sheet, unquoted=True)
-        again = as_far_as_numbers_go(sheet.encoding, partial(_parsed, plain, columns))
+        again = as_far_as_numbers_go(sheet.encoding, len(sheet.names), partial(_parsed, plain, columns))
         more = len(again.columns[columns[0]]) > rows
         return replace(again, unquoted=True) if more else loaded
     except (UnicodeError, OSError, pa.ArrowInvalid) as error:
         raise unreadable(sheet.path, error) from error
 
 
-def as_far_as_numbers_go(encoding: str, read: Callable[[str, Collection[int]], Read]) -> Read:
-    """What `read` gives, begun anew with a column as text where only its first block is all numbers, or in another
-    encoding where a letter late in the file shows it."""
+def as_far_as_numbers_go(encoding: str, width: int, read: Callable[[str, Collection[int]], Read]) -> Read:
+    """What `read` gives of a file of `width` columns, begun anew with a column as text where only its first block is
+    all numbers, or in another encoding where a letter late in the file shows it."""
     texts = set[int]()
     while True:
         try:
@@ -121,7 +123,7 @@ def as_far_as_numbers_go(encoding: str, read: Callable[[str, Collection[int]], R
             if "UTF8" in str(error) and encoding != "cp1252":
                 encoding = "cp1252"
             elif late is not None and int(late["column"]) not in texts:
-                texts.add(int(late["column"]))
+                texts.update([int(late["column"])] if len(texts) < MOST_LATE else range(width))
             else:
                 raise
 

@@ -81,6 +81,25 @@ def test_streamed_is_read_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
     assert [n for n in whole.notes if "left out" in n] == [n for n in streamed.notes if "left out" in n]
 
 
+def test_texts_that_come_late_cost_no_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Words behind megabytes of numbers, in one column after the other, are bad samples of those columns alone."""
+    path, rows, rng = tmp_path / "x.csv", 12_000, np.random.default_rng(4)
+    words = {9000 + 300 * k: k for k in range(8)}
+    lines = ["Time," + ",".join(TAGS[:8])]
+    for k in range(rows):
+        cells = [f"{x:.9f}" for x in rng.normal(50, 5, 8)]
+        if k in words:
+            cells[words[k]] = "I/O Timeout"
+        lines.append(f"2026-03-02 {k // 3600:02d}:{k // 60 % 60:02d}:{k % 60:02d},{','.join(cells)}")
+    path.write_text("\n".join(lines) + "\n")
+    assert path.stat().st_size > 1 << 20  # the parser settles its types on the first megabyte
+    whole, streamed = both(path, monkeypatch, tmp_path)
+    a, b = whole.read(TAGS[:8]), streamed.read(TAGS[:8])
+    for k, tag in enumerate(TAGS[:8]):
+        np.testing.assert_array_equal(a[tag].value, b[tag].value)
+        assert np.flatnonzero(b[tag].bad).tolist() == [9000 + 300 * k]
+
+
 def test_a_long_parquet_is_parted_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A long Parquet file, its tags a dictionary, reads alike whether it is searched or parted by loop."""
     n, stamps = ROWS * len(TAGS), np.arange(ROWS) * 1_000_000 + 1_772_409_600_000_000
