@@ -14,12 +14,9 @@ from pathlib import Path
 
 from analyzer.config import Config
 from analyzer.history.export import Export
+from analyzer.history.files import ends_of
 from analyzer.loops.spec import LoopSpec
 from identification.errors import InputError
-
-ENDS_BYTES = 65_536
-"""Bytes at both ends of a file that stand for it beside its size; ours: headers, footers and the newest samples are
-there, and a folder of thousands of files is known in a second."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +35,7 @@ def identity(
     """The identity of a run over an export, with what is stated of its loops, within a span of time [s, UTC]."""
     mark = hashlib.blake2b(digest_size=16)
     for source in export.sources:
-        mark.update(_ends(source.path))
+        mark.update(ends_of(source.path))
         mark.update(repr(source.clock).encode())
     mark.update(repr((tuple(stated), since_s, until_s, config)).encode())
     names = [source.path.name for source in export.sources]
@@ -46,16 +43,6 @@ def identity(
     more = f" and {len(names) - 1} more files" if len(names) > 1 else ""
     now = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
     return RunIdentity(mark.hexdigest(), names[0] + more, loops, now)
-
-
-def _ends(path: Path) -> bytes:
-    """Size and both ends of a file."""
-    with path.open("rb") as file:
-        size = file.seek(0, 2)
-        file.seek(0)
-        head = file.read(ENDS_BYTES)
-        file.seek(max(size - ENDS_BYTES, 0))
-        return str(size).encode() + head + file.read()
 
 
 def write(path: Path, run: RunIdentity) -> None:

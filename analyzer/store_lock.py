@@ -20,15 +20,19 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from analyzer.history.laid_copy import forget_halves, holds_copies
 from analyzer.places import answering, content, is_remote
 from identification.errors import InputError
 
+if TYPE_CHECKING:
+    from filelock import BaseFileLock
+
 LOCK, OWNER = "run.lock", "run.owner.json"
 """Names within the store."""
-SCRATCH = ".copies-"
-"""Beginning of the names of directories of copies."""
+SCRATCH, MAKING = ".copies-", ".making"
+"""Beginning of the names of directories of copies, and what stands before it until they are locked."""
 TRIED = ".written"
 """Name of an object that shows whether shared storage can be written."""
 ALIVE_S, DEAD_S = 60.0, 600.0
@@ -38,12 +42,13 @@ LEFT_OVER_S = 86_400.0
 
 
 @contextmanager
-def scratch(store: Path) -> Iterator[Path]:
-    """A directory in the store for the copies that a run makes of packed exports, gone with the run; beside
-    a store of shared storage one of this machine.
+def scratch(store: Path, resume: bool = False) -> Iterator[Path]:
+    """A directory in the store for the copies that a run makes of packed and of big exports; beside a store of shared
+    storage one of this machine.
 
-    That it can be made shows, before any work is done, that the store can be written; those of runs that were killed
-    go after a day.
+    That it can be made shows, before any work is done, that the store can be written. It goes with the run; where an
+    exception ends the run and a whole copy was made, it stays, as that of a run that was killed does: a run that
+    goes on (`resume`) takes it up, any other forgets it.
 
     Raises
     ------
@@ -58,11 +63,55 @@ def scratch(store: Path) -> Iterator[Path]:
             yield Path(made)
         return
     store.mkdir(parents=True, exist_ok=True)
-    for left in store.glob(f"{SCRATCH}*"):
-        if time.time() - left.stat().st_mtime > LEFT_OVER_S:
+    place, mine = _held_scratch(store, resume)
+    kept = False
+    try:
+        yield place
+    except BaseException:
+        kept = holds_copies(place)
+        raise
+    finally:
+        mine.release()
+        if not kept:
+            shutil.rmtree(place, ignore_errors=True)
+
+
+def _held_scratch(store: Path, resume: bool) -> tuple[Path, BaseFileLock]:
+    """A directory of copies and the lock that says that it is in use: the newest that nobody uses where a run goes
+    on, else a new one. Others that nobody uses are removed."""
+    from filelock import FileLock, Timeout
+
+    for left in store.glob(f"{MAKING}{SCRATCH}*"):
+        if time.time() - _changed_s(left) > LEFT_OVER_S:
             shutil.rmtree(left, ignore_errors=True)
-    with tempfile.TemporaryDirectory(prefix=SCRATCH, dir=store, ignore_cleanup_errors=True) as made:
-        yield Path(made)
+    taken: tuple[Path, BaseFileLock] | None = None
+    for left in sorted(store.glob(f"{SCRATCH}*"), key=_changed_s, reverse=True):
+        lock = FileLock(left / LOCK)
+        try:
+            lock.acquire(timeout=0)
+        except (Timeout, OSError):
+            continue
+        if resume and taken is None and holds_copies(left):
+            taken = left, lock
+            continue
+        lock.release()
+        shutil.rmtree(left, ignore_errors=True)
+    if taken is not None:
+        forget_halves(taken[0])
+        return taken
+    made = Path(tempfile.mkdtemp(prefix=f"{MAKING}{SCRATCH}", dir=store))
+    lock = FileLock(made / LOCK)
+    lock.acquire(timeout=0)
+    place = made.with_name(made.name.removeprefix(MAKING))  # others see it once it is locked
+    made.rename(place)
+    return place, lock
+
+
+def _changed_s(path: Path) -> float:
+    try:
+        return path.stat().st_mtime
+    except OSError:
+        return 0.0
 
 
 @contextmanager

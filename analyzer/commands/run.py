@@ -137,7 +137,7 @@ def _night(asked: Asked, place: Path, log: RunLog, how: How, explaining: bool) -
     from analyzer.store import Store
     from analyzer.store_lock import scratch
 
-    with scratch(place) as copies:
+    with scratch(place, how.resume) as copies:
         reading = {**asked.reading, "scratch": copies}
         source, specs, notes = _opened(replace(asked, reading=reading))
         _say(notes, log)

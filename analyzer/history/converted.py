@@ -6,12 +6,10 @@ by line, the rows go into some dozens of files by tag, so that a loop's tags are
 
 from __future__ import annotations
 
-import shutil
-import tempfile
 import zlib
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import lru_cache, partial
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +18,7 @@ import pyarrow.compute as pc
 import pyarrow.parquet as pq
 from pyarrow import csv
 
+from analyzer.history.laid_copy import Laid, laid
 from analyzer.history.parquet import ParquetTable
 from analyzer.history.sheet import (
     HEAD_ROWS,
@@ -107,25 +106,15 @@ class Converted:
         return max(self.folder.glob("*.parquet"), key=lambda p: (p.stat().st_size, p.name))
 
 
+@lru_cache(maxsize=100_000)
 def _bucket(tag: str, count: int) -> int:
     """The file of a tag: that of its loop, which is what stands before its last point, stroke or colon."""
     loop = tag[: max(tag.rfind(mark) for mark in "./:|")] or tag
     return zlib.crc32(loop.encode("utf-8")) % count
 
 
-def _folder(sheet: Sheet, place: Path) -> Path:
-    """A new folder with room for a copy of a sheet."""
-    if shutil.disk_usage(place).free < sheet.bytes:
-        raise InputError(
-            f"{sheet.path}: no room for a copy of {sheet.bytes / 1e9:.1f} GB in {place}",
-            "free disk",
-            "make room",
-        )
-    return Path(tempfile.mkdtemp(prefix="converted-", dir=place))
-
-
 def converted(sheet: Sheet, tag: int, scratch: Path | None) -> Converted:
-    """Stream a sheet into Parquet.
+    """Stream a sheet into Parquet, or take up what an earlier process has streamed of the same.
 
     Parameters
     ----------
@@ -140,34 +129,40 @@ def converted(sheet: Sheet, tag: int, scratch: Path | None) -> Converted:
     InputError
         The disk has no room, or the text cannot be read.
     """
-    folder = _folder(sheet, scratch or own_scratch())
+    written = sheet.encoding, sheet.delimiter, sheet.decimal, sheet.skip_rows, sheet.names
+    how = (*written, sheet.as_written, sheet.unquoted, tag)
+    place = scratch or own_scratch()
+    folder, done = laid(place, sheet.path, sheet.bytes, how, partial(_streamed, sheet, tag))
+    types = tuple(pq.read_schema(_any_file(sheet, folder)).types)
+    notes = (*sheet.found, *done.notes)
+    start = sheet.path, folder, 1 if tag < 0 else BUCKETS, sheet.names, types, notes
+    return Converted(*start, sheet.decimal, sheet.first_row, tag, done.tags, done.unquoted)
+
+
+def _any_file(sheet: Sheet, folder: Path) -> Path:
+    """One of the files of a copy."""
+    found = next(folder.glob("*.parquet"), None)
+    if found is None:
+        raise InputError(f"{sheet.path}: no row", "rows of as many columns as the header", "export it again")
+    return found
+
+
+def _streamed(sheet: Sheet, tag: int, folder: Path) -> Laid:
+    """A sheet's rows laid into a folder."""
+    width = len(sheet.names)
     try:
-        done = as_far_as_numbers_go(sheet.encoding, len(sheet.names), partial(_pass, sheet, tag, folder))
+        done = as_far_as_numbers_go(sheet.encoding, width, partial(_pass, sheet, tag, folder))
         rows = pq_rows(folder) + done.left_out
         if rows < WHOLE_SHARE * (lines_of(sheet) - sheet.skip_rows) - 1 and not sheet.unquoted:
             sheet = replace(sheet, unquoted=True)
-            done = as_far_as_numbers_go(sheet.encoding, len(sheet.names), partial(_pass, sheet, tag, folder))
+            done = as_far_as_numbers_go(sheet.encoding, width, partial(_pass, sheet, tag, folder))
             done.notes.append("a quote is not closed: quotes are taken as they stand")
     except (UnicodeError, pa.ArrowInvalid) as error:
         raise unreadable(sheet.path, error) from error
     if done.left_out:
         lost = f"{done.left_out} lines do not have as many columns as the header and are left out"
         done.notes.append(lost)
-    count = 1 if tag < 0 else BUCKETS
-    notes = (*sheet.found, *done.notes)
-    return Converted(
-        sheet.path,
-        folder,
-        count,
-        sheet.names,
-        tuple(done.types),
-        notes,
-        sheet.decimal,
-        sheet.first_row,
-        tag,
-        tuple(done.tags),
-        sheet.unquoted,
-    )
+    return Laid(tuple(done.notes), tuple(done.tags), sheet.unquoted)
 
 
 def converted_parquet(table: ParquetTable, tag: int, scratch: Path | None) -> Converted:
@@ -178,10 +173,14 @@ def converted_parquet(table: ParquetTable, tag: int, scratch: Path | None) -> Co
     InputError
         The disk has no room.
     """
-    place = scratch or own_scratch()
-    if shutil.disk_usage(place).free < 4 * table.path.stat().st_size:
-        raise InputError(f"{table.path}: no room for a copy in {place}", "free disk", "make room")
-    folder = Path(tempfile.mkdtemp(prefix="converted-", dir=place))
+    place, room = scratch or own_scratch(), 4 * table.path.stat().st_size
+    folder, done = laid(place, table.path, room, (table.names, tag), partial(_parted, table, tag))
+    start = table.path, folder, BUCKETS, table.names, table.types, table.notes
+    return Converted(*start, ".", None, tag, done.tags)
+
+
+def _parted(table: ParquetTable, tag: int, folder: Path) -> Laid:
+    """A table's rows laid into a folder."""
     stream = _Stream(folder, tag)
     names = [str(i) for i in range(len(table.names))]
     with pq.ParquetFile(table.path) as file:
@@ -189,9 +188,7 @@ def converted_parquet(table: ParquetTable, tag: int, scratch: Path | None) -> Co
             if batch.num_rows:
                 stream.take(pa.RecordBatch.from_arrays([_plain(a) for a in batch.columns], names=names))
     stream.close()
-    return Converted(
-        table.path, folder, BUCKETS, table.names, table.types, table.notes, ".", None, tag, tuple(stream.tags)
-    )
+    return Laid((), tuple(stream.tags))
 
 
 def _plain(array: pa.Array) -> pa.Array:
@@ -209,7 +206,7 @@ class _Stream:
 
     def __init__(self, folder: Path, tag: int) -> None:
         self.folder, self.tag = folder, tag
-        self.left_out, self.notes, self.types = 0, list[str](), list[pa.DataType]()
+        self.left_out, self.notes = 0, list[str]()
         self.tags: dict[str, int] = {}
         self._held: dict[int, list[pa.RecordBatch]] = {}
         self._rows: dict[int, int] = {}
@@ -267,7 +264,6 @@ def _pass(sheet: Sheet, tag: int, folder: Path, encoding: str, texts: Collection
     columns = tuple(range(len(sheet.names)))
     as_text = {*texts, tag} - {-1}
     with csv.open_csv(sheet.path, **reading(sheet, columns, encoding, left_out, as_text)) as reader:
-        stream.types = list(reader.schema.types)
         for batch in reader:
             if batch.num_rows:
                 stream.take(batch)

@@ -13,6 +13,9 @@ PARQUET_ENDINGS = frozenset({".parquet", ".pq"})
 READ_PACKED = frozenset({".gz", ".bz2", ".xz", ".zip"})
 PACKED_ENDINGS = frozenset({".7z"})
 NO_EXPORTS = frozenset({"loops.csv", "labels.csv", "changes.csv"})
+ENDS_BYTES = 65_536
+"""Bytes at both ends of a file that stand for it beside its size; ours: headers, footers and the newest samples are
+there, and a folder of thousands of files is known in a second."""
 MAGIC = b"PAR1"
 PACKED = {
     b"7z\xbc\xaf": ("a 7z archive", "unpack it and name what comes out"),
@@ -34,6 +37,16 @@ def export_files(paths: Sequence[Path]) -> list[Path]:
     if not found:
         raise InputError("no path to an export", "a file or a folder", "name the export to read")
     return list(found)
+
+
+def ends_of(path: Path) -> bytes:
+    """Size and both ends of a file, by which it is known."""
+    with path.open("rb") as file:
+        size = file.seek(0, 2)
+        file.seek(0)
+        head = file.read(ENDS_BYTES)
+        file.seek(max(size - ENDS_BYTES, 0))
+        return str(size).encode() + head + file.read()
 
 
 def is_parquet(path: Path) -> bool:

@@ -41,12 +41,12 @@ else:
 print(json.dumps([time.process_time() - begun, PEAK()]))
 """
 OURS = """
-import json, sys, time
+import json, sys, tempfile, time
 from pathlib import Path
 from analyzer.history.export import open_export
 from analyzer.history.options import ReadOptions
 begun = time.process_time()
-export = open_export([Path(sys.argv[1])], ReadOptions(scratch=Path(sys.argv[2])))
+export = open_export([Path(sys.argv[1])], ReadOptions(scratch=Path(tempfile.mkdtemp(dir=sys.argv[2]))))
 export.span()
 for k in range(0, len(export.tags), 3):
     export.read(list(export.tags[k : k + 3]))

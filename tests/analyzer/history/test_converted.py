@@ -12,9 +12,12 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
+import analyzer.history.converted as converted_module
 from analyzer.history.converted import Converted
 from analyzer.history.export import Export, open_export
 from analyzer.history.options import ReadOptions
+from analyzer.history.series import Series
+from analyzer.store_lock import scratch
 
 TAGS = [f"FIC{k:03d}.{role}" for k in range(40) for role in ("PV", "OP")]
 ROWS = 300
@@ -134,6 +137,52 @@ def test_an_open_quote_costs_no_rows(tmp_path: Path, monkeypatch: pytest.MonkeyP
     a, b = (e.read([TAGS[0]])[TAGS[0]] for e in (whole, streamed))
     np.testing.assert_array_equal(a.value, b.value)
     assert any("a quote is not closed" in note for note in streamed.notes)
+
+
+def test_a_stopped_run_s_copy_is_taken_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A run that goes on streams a big export no second time, reads the same, and streams anew what changed."""
+    path, store = long(tmp_path / "x.csv", umlaut=True), tmp_path / "store"
+    monkeypatch.setattr("analyzer.history.export.CONVERTED_BYTES", 100)
+    first: dict[str, Series] = {}
+
+    def stop() -> None:
+        with scratch(store) as copies:
+            first.update(open_export([path], ReadOptions(scratch=copies)).read(TAGS[:4]))
+            (copies / "converted-half").mkdir()
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        stop()
+    passes: list[Path] = []
+    plain = converted_module._pass
+    monkeypatch.setattr(converted_module, "_pass", lambda *a: passes.append(a[2]) or plain(*a))  # type: ignore[func-returns-value]
+    with scratch(store, resume=True) as copies:
+        opened = open_export([path], ReadOptions(scratch=copies))
+        again = opened.read(TAGS[:4])
+        assert passes == []
+        assert not (copies / "converted-half").exists()
+        next(copies.glob("converted-*/*.parquet")).write_bytes(b"PAR1")  # its end is lost
+        open_export([path], ReadOptions(scratch=copies))
+        assert len(passes) == 1
+        path.write_bytes(path.read_bytes().replace(b"192", b"000", 1))
+        open_export([path], ReadOptions(scratch=copies))
+        assert len(passes) == 2
+    for tag in TAGS[:4]:
+        np.testing.assert_array_equal(first[tag].value, again[tag].value)
+        np.testing.assert_array_equal(first[tag].bad, again[tag].bad)
+    assert not list(store.glob(".copies-*"))
+
+
+def test_copies_of_a_living_run_are_nobody_else_s(tmp_path: Path) -> None:
+    """A run takes up or removes copies of runs that have ended, never those of one that lives."""
+    with scratch(tmp_path) as living:
+        (living / "converted-1").mkdir()
+        (living / "converted-1" / "done.json").write_text("{}")
+        with scratch(tmp_path, resume=True) as other:
+            assert other != living
+        with scratch(tmp_path):
+            assert (living / "converted-1").exists()
+    assert not list(tmp_path.glob(".*copies-*"))
 
 
 MEASURE = """
