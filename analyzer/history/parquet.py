@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -16,10 +17,14 @@ from identification.errors import InputError
 
 MAGIC = b"PAR1"
 HEAD_ROWS = 1000
-CACHED_FOOTERS = 4
+OPEN_FILES = 4
 MANY_ROWS, ROWS_A_BYTE = 5e6, 20.0
 """Files of more rows than both are not read; ours: where any value moves there are 3 rows a byte at most, in whatever
 encoding; a file of nothing but constants may have 90."""
+LONGEST_TEXT, MUCH_TEXT = 1000.0, 10_000_000
+"""Mean length of the texts of a column in a row group, and their bytes, beyond which together a file is not read;
+ours: names, stamps and states are short, and a few texts of megabytes unpack from nothing to gigabytes. A list of ten
+thousand tags, which stands whole before a group of few rows, has a twentieth of the second."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,7 +32,6 @@ class ParquetTable:
     """A Parquet file, known by its footer; see `table.Table`."""
 
     path: Path
-    changed_ns: int
     names: tuple[str, ...]
     types: tuple[pa.DataType, ...]
     notes: tuple[str, ...] = ()
@@ -38,9 +42,8 @@ class ParquetTable:
     def head(self, columns: Sequence[int]) -> list[pa.Array]:
         """First rows of some columns."""
         names = [self.names[i] for i in columns]
-        with _file(self) as file:
-            batches = file.iter_batches(batch_size=HEAD_ROWS, columns=names)
-            batch = next((b for b in batches if b.num_rows), None)
+        batches = _file(self).iter_batches(batch_size=HEAD_ROWS, columns=names)
+        batch = next((b for b in batches if b.num_rows), None)
         if batch is None:
             raise InputError(
                 f"{self.path}: rows that its pages do not hold", "a whole Parquet file", "export it again"
@@ -51,8 +54,7 @@ class ParquetTable:
         """Whole columns, or the rows where a column holds one of some texts."""
         names = [self.names[i] for i in columns]
         if where is None:
-            with _file(self) as file:
-                table = file.read(columns=names)
+            table = _file(self).read(columns=names)
         else:
             table = _filtered(self, names, self.names[where[0]], where[1])
         return [_one_chunk(table.column(name)) for name in names]
@@ -68,7 +70,7 @@ def open_parquet(path: Path) -> ParquetTable:
     """
     try:
         with pq.ParquetFile(path) as file:
-            schema, rows = file.schema_arrow, file.metadata.num_rows
+            schema, rows, long_text = file.schema_arrow, file.metadata.num_rows, _longest_text(file.metadata)
     except (pa.ArrowException, OSError) as error:
         raise InputError(
             f"{path}: named as Parquet, but cannot be read as such ({_first_line(error)})",
@@ -82,22 +84,38 @@ def open_parquet(path: Path) -> ParquetTable:
             f"at most {ROWS_A_BYTE:g} rows a byte",
             "export it again; a file that unpacks to so much more is not read",
         )
+    if long_text > LONGEST_TEXT:
+        raise InputError(
+            f"{path}: texts of {long_text:.0f} bytes on average",
+            f"at most {LONGEST_TEXT:g} bytes for a tag, a stamp or a state",
+            "export numbers, tags and stamps alone",
+        )
     if rows == 0:
         raise InputError(f"{path}: Parquet without rows", "at least one sample", "export a period with data")
-    return ParquetTable(path, path.stat().st_mtime_ns, tuple(schema.names), tuple(schema.types), rows=rows)
+    return ParquetTable(path, tuple(schema.names), tuple(schema.types), rows=rows)
+
+
+def _longest_text(footer: pq.FileMetaData) -> float:
+    """Mean length of the longest texts that a column has in a row group, as the footer declares them [bytes]; 0 where
+    none has much text."""
+    texts = [j for j in range(footer.num_columns) if footer.schema.column(j).physical_type == "BYTE_ARRAY"]
+    groups = [footer.row_group(k) for k in range(footer.num_row_groups)]
+    sizes = [(g.column(j).total_uncompressed_size, g.num_rows) for g in groups for j in texts]
+    return max((size / max(rows, 1) for size, rows in sizes if size > MUCH_TEXT), default=0.0)
 
 
 def _first_line(error: Exception) -> str:
     return str(error).splitlines()[0][:100] if str(error) else type(error).__name__
 
 
-@lru_cache(maxsize=CACHED_FOOTERS)
-def _footer(path: Path, changed_ns: int) -> pq.FileMetaData:
-    return pq.read_metadata(path)
+@lru_cache(maxsize=OPEN_FILES)
+def _opened(path: Path, changed_ns: int, process: int) -> pq.ParquetFile:
+    return pq.ParquetFile(path)  # not mapped: pages of a file that stays open would stay in memory
 
 
 def _file(table: ParquetTable) -> pq.ParquetFile:
-    return pq.ParquetFile(table.path, metadata=_footer(table.path, table.changed_ns), memory_map=True)
+    """The file, opened once by each process: of a footer with thousands of columns that takes as long as a loop."""
+    return _opened(table.path, table.path.stat().st_mtime_ns, os.getpid())
 
 
 def _filtered(table: ParquetTable, names: list[str], key: str, wanted: Sequence[str]) -> pa.Table:

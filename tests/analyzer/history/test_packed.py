@@ -10,6 +10,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
 from analyzer.history.export import open_export
@@ -57,6 +59,40 @@ def test_a_bomb_is_refused_before_it_bursts(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="unpack to more than"):
         open_export([path], ReadOptions(scratch=scratch))
     assert sum(p.stat().st_size for p in scratch.rglob("*") if p.is_file()) < 110_000_000
+
+
+@pytest.mark.parametrize("shared", [True, False])
+def test_texts_of_megabytes_are_refused_by_the_footer(tmp_path: Path, shared: bool) -> None:
+    """A Parquet file of a few kilobytes whose texts unpack to megabytes is one line; short texts are read."""
+    rows, start = 5, 1_772_409_600_000_000
+    stamps = (start + 1_000_000 * np.arange(rows)).astype("datetime64[us]")
+    for name, text in (("long", "x" * 12_000_000), ("short", "Good")):
+        table = pa.table({"time": stamps, "FIC1.PV": np.arange(rows) * 1.0, "note": [text] * rows})
+        path = tmp_path / f"{name}.parquet"
+        pq.write_table(table, path, compression="zstd", use_dictionary=shared)
+        assert path.stat().st_size < 50_000
+        if name == "long":
+            with pytest.raises(InputError, match="bytes on average"):
+                open_export([path])
+        else:
+            assert "FIC1.PV" in open_export([path]).tags
+
+
+def test_a_long_list_of_tags_before_few_rows_is_read(tmp_path: Path) -> None:
+    """A column of tags that brings a dictionary of ten thousand into groups of a few rows is no bomb."""
+    tags = [f"unit-{k:05d}/controller/FIC{k:05d}.PV" for k in range(10_000)]
+    rows, start = 60, 1_772_409_600_000_000
+    table = pa.table(
+        {
+            "TagName": pa.DictionaryArray.from_arrays(np.zeros(rows, dtype=np.int32), tags),
+            "DateTime": (start + 1_000_000 * np.arange(rows)).astype("datetime64[us]"),
+            "Value": np.arange(rows) * 1.0,
+        }
+    )
+    pq.write_table(table, tmp_path / "x.parquet", row_group_size=20)
+    group = pq.read_metadata(tmp_path / "x.parquet").row_group(0)
+    assert group.column(0).total_uncompressed_size > 300_000  # all tags stand before twenty rows
+    assert open_export([tmp_path / "x.parquet"]).tags == (tags[0],)
 
 
 def test_an_archive_of_several_files_is_refused(tmp_path: Path) -> None:
