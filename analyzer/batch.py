@@ -29,8 +29,9 @@ from identification.errors import InputError
 
 __all__ = ["Batch", "Outcome", "assess_loop", "run"]
 
-CHUNK = 8
-"""Loops per task: enough to carry the cost of a task, few enough for a smooth progress bar."""
+CHUNKS, FEWEST, MOST = 16, 4, 16
+"""Tasks of a run that is small, and loops per task: enough to carry its four small tables, few enough for a smooth
+progress bar and for workers that end together."""
 
 
 NO_LOOPS = InputError("no loops in the export", "tags such as LOOP.PV", "state them with --loops loops.csv")
@@ -79,21 +80,27 @@ class Outcome:
     notes: tuple[str, ...] = ()
 
 
+def chunk_size(loops: int) -> int:
+    """Loops per task of a run over so many."""
+    return min(max(-(-loops // CHUNKS), FEWEST), MOST)
+
+
 def _tasks(batch: Batch, nights: Sequence[Night], known: set[str]) -> list[Task]:
     """Chunks of the loops that no piece of the last night holds yet."""
     left = [s for s in batch.specs if s.loop not in known]
+    size = chunk_size(len(left))
     mark = uuid.uuid4().hex[:8]  # a worker of a killed run may write yet; its pieces have another mark
     return [
         Task(
             batch.export,
-            tuple(left[i : i + CHUNK]),
+            tuple(left[i : i + size]),
             tuple(nights),
             batch.store,
             batch.config,
             f"{mark}-{i:06d}",
             tuple(batch.changes),
         )
-        for i in range(0, len(left), CHUNK)
+        for i in range(0, len(left), size)
     ]
 
 
