@@ -75,10 +75,8 @@ def _ramp(x: float, low: float, high: float) -> float:
 
 
 def needed(m: Measured, limits: CauseLimits, oscillating: bool) -> float:
-    """Evidence needed [nat]: a floor, and a share of the samples, for no model is exact."""
-    per_sample = limits.evidence_per_sample * (1.0 if oscillating else limits.quiet_factor)
-    least = limits.evidence if m.excited or oscillating else limits.evidence_unexcited
-    return max(least, per_sample * m.play.count)
+    """Evidence needed of these measures [nat]."""
+    return limits.needed(m.play.count, m.excited, oscillating)
 
 
 def speaks(m: Measured, limits: CauseLimits, oscillating: bool) -> bool:

@@ -129,9 +129,10 @@ def measure(
     due = answering(record, window, scale)
     window, fits = _fits(window, scale, due, limits, oscillation)
     linear, play, stick, best, gained, jump = fits
+    hopeless = oscillation is None and gained < _hopeful(window, due, limits)
     size = best.valve.stickband / max(_op_range(window, scale, oscillation is not None), 1e-9)
     amplification, stable = _amplification(process_of(window, linear), controller, scale)
-    told, (fine_linear, fine_play, fine_stick) = _refined(window, (linear, play, stick), best)
+    told, (fine_linear, fine_play, fine_stick) = _refined(window, (linear, play, stick), best, hopeless)
     wave = error if oscillation is not None else None
     shown = trials(WindowFit(window, best), WindowFit(window, linear), scale) if wave is not None else None
     return Measured(
@@ -141,8 +142,8 @@ def measure(
         gained,
         size,
         jump,
-        _prominence(residual(window, linear), window.dt_s, scale),
-        _prominence(residual(window, best), window.dt_s, scale),
+        _prominence(residual(window, linear), window.dt_s, scale) if oscillation is not None else 0.0,
+        _prominence(residual(window, best), window.dt_s, scale) if oscillation is not None else 0.0,
         amplification,
         stable,
         _consistency(window, linear, scale) if oscillation is not None else 1.0,
@@ -177,12 +178,15 @@ def _check_judged(window: Window, limits: CauseLimits) -> None:
         )
 
 
-def _refined(window: Window, fits: Candidates, best: Fit) -> tuple[Window, Candidates]:
-    """Window and fits at the record's own interval, where the dead time is no shorter than a block."""
+def _refined(window: Window, fits: Candidates, best: Fit, hopeless: bool) -> tuple[Window, Candidates]:
+    """Window and fits at the record's own interval, where the dead time is no shorter than a block; the valve's are
+    left as they are where it is `hopeless` to look for its fault."""
     if window.factor == 1 or best.dead_time_s + window.half_block_s < window.dt_s:
         return window, fits
     fine = replace(window, fine=True)
     linear, play, stick = fits
+    if hopeless:
+        return fine, (descend(fine, linear), play, stick)
     return fine, (
         descend(fine, linear),
         descend(fine, play, free_width=window.position is None),
@@ -190,15 +194,22 @@ def _refined(window: Window, fits: Candidates, best: Fit) -> tuple[Window, Candi
     )
 
 
+def _hopeful(window: Window, due: Mask, limits: CauseLimits) -> float:
+    """Evidence [nat] from which it is worth looking for the fault of a valve whose loop does not oscillate."""
+    count = int(judged(window.usable, AR_ORDER).sum())
+    return limits.hopeless * limits.needed(count, bool(due.any()), False)
+
+
 def _candidates(
     window: Window, scale_s: float, due: Mask, limits: CauseLimits, oscillation: Oscillation | None
 ) -> Fits:
     """Plain fit, play, stick-slip if it was tried, the better valve, its evidence and that of the jump [nat]."""
     linear = fit_linear(window, scale_s)
-    play = fit_play(window, linear, scale_s)
-    gained = play.log_likelihood - linear.log_likelihood
     short = oscillation is None and window.y.size < SHORT
-    if gained < SCREENED and not short:
+    hopeful = SCREENED if oscillation is not None or short else _hopeful(window, due, limits)
+    play = fit_play(window, linear, scale_s, hopeful)
+    gained = play.log_likelihood - linear.log_likelihood
+    if gained < hopeful and not short:
         return linear, play, None, play, gained, 0.0
     linear = better_linear(window, linear, play)
     best, stick, jump = play, None, 0.0

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from identification.estimation.fine_scan import scan
-from identification.estimation.gauss_newton import descend
+from identification.estimation.gauss_newton import descend, descend_best
 from identification.estimation.hammerstein import IDEAL, Fit, ValveTrial, sticking
 from identification.estimation.noise import arx_noise
 from identification.estimation.search import (
@@ -105,15 +105,20 @@ def _ranked(window: Window, ar: Floats, valves: list[ValveTrial], begins: list[D
 
 
 def _scan(window: Window, near: Fit, valves: list[ValveTrial], period_s: float, followed: int) -> Fit:
-    """Valves tried under two noise models; the best few of each followed to the end, the best returned."""
+    """Valves tried under two noise models; the best few of each followed to the end, the best returned.
+
+    On a short record none is given up on the way: with few events a descent may begin slowly and end best.
+    """
     begins = [(near.time_constant_s, near.dead_time_s), *starts(window, period_s)]
     chosen = [
         fit for ar in (generic_noise(), near.ar) for fit in _ranked(window, ar, valves, begins)[:followed]
     ]
+    if window.y.size >= SHORT:
+        return descend_best(window, chosen, free_width=True)
     return max((descend(window, fit, free_width=True) for fit in chosen), key=lambda fit: fit.log_likelihood)
 
 
-def fit_play(window: Window, linear: Fit, period_s: float) -> Fit:
+def fit_play(window: Window, linear: Fit, period_s: float, hopeful: float = SCREENED) -> Fit:
     """The best play followed by a lag: a quick screening, and the whole search where it finds anything.
 
     Parameters
@@ -123,11 +128,13 @@ def fit_play(window: Window, linear: Fit, period_s: float) -> Fit:
         The best fit behind an ideal valve.
     period_s : float
         Scale of the search [s].
+    hopeful : float
+        Gain in log likelihood [nat] of the screening from which the whole search follows.
     """
     reach = max(window.op_range, 1e-9)
     more = FOLLOWED_SHORT if window.y.size < SHORT else 1
     best = _scan(window, linear, [sticking(share * reach, 0.0) for share in SCREEN_SHARES], period_s, more)
-    if best.log_likelihood - linear.log_likelihood < SCREENED:
+    if best.log_likelihood - linear.log_likelihood < hopeful:
         return best
     shares = (*STICKBAND_SHARES, best.valve.stickband / reach)
     found = _scan(
