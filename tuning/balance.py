@@ -15,7 +15,7 @@ import numpy as np
 from identification.models import Loop
 from identification.record import Floats
 from tuning.describing import Branch, branches
-from tuning.linear import controller_response, frequencies, loop_response
+from tuning.linear import controller_response, frequencies, loop_response, spaced
 
 POLISH_STEPS = 6
 """Eightfold bracketings that polish a root found on the grid."""
@@ -69,7 +69,7 @@ def _ends(loop: Loop, branch: Branch, omega: Floats) -> tuple[float, float]:
     """The frequencies [rad/s] between which a branch closes the phase, within omega of shape (m,), m >= 2."""
     low, high = omega[:2], omega[-2:]
     for _ in range(END_STEPS):
-        up, down = np.geomspace(low[0], low[1], FINER), np.geomspace(high[0], high[1], FINER)
+        up, down = spaced(low[0], low[1], FINER), spaced(high[0], high[1], FINER)
         begins = np.flatnonzero(np.isfinite(_excess(loop, branch, up)))
         ends = np.flatnonzero(np.isfinite(_excess(loop, branch, down)))
         first = max(begins[0] - 1, 0) if begins.size else FINER - 2

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from scipy.fft import irfft, next_fast_len, rfft
 
 from identification.record import Floats, Mask
 
@@ -20,6 +21,13 @@ def _averaged(error: Floats, good: Mask, blocks: int, width: int) -> tuple[Float
     total = np.where(good, error, 0.0)[: blocks * width].reshape(blocks, width).mean(axis=1)
     use = weight > 0.5
     return np.where(use, total / np.where(use, weight, 1.0), 0.0), use
+
+
+def _products(x: Floats) -> Floats:
+    """Sums over x[k] x[k + lag] at all lags, shape (n,)."""
+    size = next_fast_len(2 * x.size, real=True)
+    f = rfft(x, size)
+    return irfft(f.real**2 + f.imag**2, size)[: x.size]  # type: ignore[no-any-return]
 
 
 def correlation_time(error: Floats, good: Mask, dt_s: float, scale_s: float) -> float | None:
@@ -57,9 +65,8 @@ def correlation_time(error: Floats, good: Mask, dt_s: float, scale_s: float) -> 
     if use.sum() < 2:
         return None
     x[use] -= x[use].mean()
-    power = np.abs(np.fft.rfft(x, 2 * blocks)) ** 2
-    pairs = np.abs(np.fft.rfft(use.astype(np.float64), 2 * blocks)) ** 2
-    r, n = (np.fft.irfft(p)[:blocks] for p in (power, pairs))
+    r = _products(x)
+    n = np.arange(blocks, 0, -1.0) if use.all() else _products(use.astype(np.float64))
     if not r[0] > 0.0:
         return None
     known = n > 0.05 * n[0]
