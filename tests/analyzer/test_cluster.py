@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner, Result
+from dask_cluster import Process, dask_cluster
 from plant import write_export
 from test_batch import quiet, tables
 
@@ -41,35 +42,11 @@ def ran(export: Path, store: Path, *more: str) -> Result:
     return CliRunner().invoke(main, ["run", str(export), "--store", str(store), *more])
 
 
-def process(*arguments: str) -> subprocess.Popen[bytes]:
-    """A part of the cluster as a process."""
-    quiet_output = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-    return subprocess.Popen(
-        [sys.executable, "-m", "distributed.cli." + arguments[0], *arguments[1:]], **quiet_output
-    )
-
-
 @pytest.fixture
-def cluster(tmp_path: Path) -> Iterator[tuple[str, list[subprocess.Popen[bytes]]]]:
+def cluster(tmp_path: Path) -> Iterator[tuple[str, list[Process]]]:
     """A scheduler and two workers of one thread on loopback; their address and the workers."""
-    written = tmp_path / "scheduler.json"
-    local = ("--host", "127.0.0.1")
-    parts = [
-        process("dask_scheduler", *local, "--port", "0", "--no-dashboard", "--scheduler-file", str(written))
-    ]
-    for _ in range(400):
-        if written.exists() and written.stat().st_size:
-            break
-        time.sleep(0.05)
-    import json
-
-    address = json.loads(written.read_text())["address"]
-    one = ("--nthreads", "1", "--no-nanny", "--no-dashboard", "--local-directory", str(tmp_path))
-    parts += [process("dask_worker", address, *local, *one) for _ in range(2)]
-    yield address, parts[1:]
-    for part in parts:
-        part.kill()
-        part.wait()
+    with dask_cluster(tmp_path) as parts:
+        yield parts
 
 
 def test_a_cluster_makes_the_same_store(export, whole, cluster, tmp_path):
