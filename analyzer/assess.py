@@ -13,7 +13,7 @@ from analyzer.assessments import Assessments, Hour, assess_span, hourly, settlin
 from analyzer.cause import NO_CAUSE, Verdict, as_hint, hidden_by_grid, judge, not_assessed
 from analyzer.config import Config, QualityLimits
 from analyzer.dead_valve import dead_valve, with_dead_valve
-from analyzer.decisions import Cause, Lack, LacksError, Needs
+from analyzer.decisions import CAUSES, Cause, Fault, Lack, LacksError, Needs
 from analyzer.measure import Measured, measure, time_scale
 from analyzer.oscillation import Oscillation, Oscillations, barely_seen, counting, detect
 from analyzer.plantwide.wave import Wave, waves_of
@@ -41,7 +41,8 @@ class Assessment:
     hour; oscillations; verdict; settings, where the controller's are not the stated ones; harris index (1: minimum
     variance) and settling time [s] where known; waves, its part in the plant-wide pass; trend, thinned;
     notes, plain sentences about the data; needs, what the record lacks to tell whether the loop oscillates, None
-    where that is told; close_s, first and last time [s] of the last ten periods.
+    where that is told; close_s, first and last time [s] of the last ten periods; for_settings, what
+    the record lacks for new settings whatever its cause, None where it lacks nothing.
     """
 
     loop: str
@@ -59,6 +60,7 @@ class Assessment:
     notes: tuple[str, ...] = ()
     needs: Needs | None = None
     close_s: tuple[float, float] | None = None
+    for_settings: Needs | None = None
 
 
 def unassessable(record: LoopRecord, config: Config) -> Needs | None:
@@ -77,18 +79,31 @@ def unassessable(record: LoopRecord, config: Config) -> Needs | None:
     )
 
 
-def unfit_for_cause(prepared: Prepared, config: Config) -> Needs | None:
-    """What these trends lack for a cause; None where one can be told."""
+def unfit_for_cause(prepared: Prepared, oscillation: Oscillation | None, config: Config) -> Needs | None:
+    """What these trends lack for a cause; None where one can be told.
+
+    oscillation : None where the loop does not oscillate, or it is not known whether it does.
+    """
     record, q = prepared.record, config.quality
     if not prepared.op_known:
         return Needs(Lack.OP, "needs OP, which is not recorded")
     if float(np.ptp(record.op)) == 0.0:
         return Needs(Lack.MOVING_OP, "needs OP that moves, it stands still")
-    straight = prepared.compressed_share
-    if straight > q.straight_share:
-        text = f"needs trends without compression, {100 * straight:.0f} % lie on straight segments"
-        return Needs(Lack.UNCOMPRESSED, text)
-    return _scattered(record, q) or at_limits(record, q)
+    return compressed(prepared, oscillation, q) or _scattered(record, q) or at_limits(record, q)
+
+
+def compressed(prepared: Prepared, oscillation: Oscillation | None, q: QualityLimits) -> Needs | None:
+    """What trends lack that a historian compressed; None where it did not, or kept enough of each cycle."""
+    if prepared.compressed_share <= q.straight_share:
+        return None
+    lie = f"{100 * prepared.compressed_share:.0f} % lie on straight segments"
+    if oscillation is None:
+        return Needs(Lack.UNCOMPRESSED, f"needs trends without compression, {lie}")
+    points = prepared.archived_share * oscillation.period_s / prepared.record.dt_s
+    if points >= q.archived_points:
+        return None
+    wanted = f"needs trends without compression, or {q.archived_points:g} archived samples a cycle"
+    return Needs(Lack.UNCOMPRESSED, f"{wanted}: there are {points:.2g}, {lie}")
 
 
 def at_limits(record: LoopRecord, q: QualityLimits) -> Needs | None:
@@ -116,7 +131,7 @@ def cause_of(
     """The verdict on one loop by itself; abstains where the trends cannot tell."""
     record, oscillation = prepared.record, counting(found)
     dead = dead_valve(record, config.cause) if prepared.op_known else None
-    needs = unfit_for_cause(prepared, config)
+    needs = unfit_for_cause(prepared, oscillation, config)
     if needs or float(np.ptp(record.pv)) == 0.0:
         verdict = not_assessed(needs) if oscillation is not None else NO_CAUSE
         return with_dead_valve(verdict, dead) if dead else verdict
@@ -143,20 +158,31 @@ def verdict_by_measures(
 def told_apart(
     verdict: Verdict, prepared: Prepared, oscillation: Oscillation | None, config: Config
 ) -> Verdict:
-    """The verdict, or none where so few samples a cycle, or so coarse a grid, make other causes look like it."""
-    if oscillation is None or verdict.cause not in (Cause.LOAD, Cause.TUNING):
+    """The verdict, or none where so few samples a cycle, or so coarse a grid, make other causes look like it; and
+    none where trends on straight segments make a likely valve of a load."""
+    if oscillation is None or verdict.cause not in CAUSES:
         return verdict
-    samples = oscillation.period_s / prepared.record.dt_s
-    steps = oscillation.amplitude_pct / max(prepared.pv_step, 1e-12)
-    lacking = None
-    if steps < config.cause.steps_told:
-        lacking = Needs(Lack.FINER, words.too_rough(prepared.pv_step, oscillation.amplitude_pct))
-    elif verdict.cause is Cause.LOAD and samples < config.cause.samples_told:
-        lacking = Needs(Lack.FASTER, words.too_few(samples, config.cause.samples_told))
+    lacking = _hides(verdict, prepared, oscillation, config)
     if lacking is None:
         return verdict
-    most = 0.9 * config.cause.named_pct
-    return replace(as_hint(verdict, most), cause=Cause.UNDECIDED, needs=lacking)
+    fault = Fault.UNDECIDED if verdict.cause is Cause.VALVE else verdict.fault
+    hint = as_hint(verdict, 0.9 * config.cause.named_pct)
+    return replace(hint, cause=Cause.UNDECIDED, fault=fault, needs=lacking)
+
+
+def _hides(verdict: Verdict, prepared: Prepared, oscillation: Oscillation, config: Config) -> Needs | None:
+    """What the recording lacks to tell the cause that is named from others; None where it lacks nothing."""
+    limits = config.cause
+    if verdict.cause is Cause.VALVE:
+        sure = verdict.confidence[Cause.VALVE] >= limits.compressed_pct
+        return None if sure else compressed(prepared, None, config.quality)
+    samples = oscillation.period_s / prepared.record.dt_s
+    steps = oscillation.amplitude_pct / max(prepared.pv_step, 1e-12)
+    if steps < limits.steps_told:
+        return Needs(Lack.FINER, words.too_rough(prepared.pv_step, oscillation.amplitude_pct))
+    if verdict.cause is Cause.LOAD and samples < limits.samples_told:
+        return Needs(Lack.FASTER, words.too_few(samples, limits.samples_told))
+    return None
 
 
 def _known(figures: Assessments, op: bool) -> Assessments:
@@ -258,4 +284,5 @@ def assess(prepared: Prepared, controller: Pid | None, config: Config, kind: str
         None
         if close is None
         else (record.start_s + close[0] * record.dt_s, record.start_s + close[1] * record.dt_s),
+        compressed(prepared, None, config.quality),
     )

@@ -30,7 +30,7 @@ def _fit(lacking: Needs | None, prepared: Prepared, config: Config) -> str:
     """Which questions the record is fit for, in words."""
     if lacking is not None:
         return f"fit for nothing: {lacking}"
-    unfit = unfit_for_cause(prepared, config)
+    unfit = unfit_for_cause(prepared, None, config)
     if unfit is None:
         return "fit for all questions"
     return f"fit for oscillation and assessments; not for the cause: {unfit}"

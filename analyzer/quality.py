@@ -19,6 +19,7 @@ from analyzer.decisions import Lack, LacksError, Needs
 from analyzer.history.series import Series
 from analyzer.loops.spec import LoopSpec
 from analyzer.sample_clock import (
+    archived_share,
     clock_of,
     constant_stretches,
     interval,
@@ -61,7 +62,8 @@ class Prepared:
     """A record with its scale, the resolution of its trends and plain sentences about its quality.
 
     pv_step, op_step : resolution of PV and OP [% of span], 0 where none was seen; compressed_share : share of
-    samples on straight segments [-]; op_known : False where no OP was recorded.
+    samples on straight segments [-]; op_known : False where no OP was recorded; archived_share : share of samples, of
+    PV or OP the fewer, that were kept where trends are compressed [-].
     """
 
     record: LoopRecord
@@ -71,6 +73,7 @@ class Prepared:
     compressed_share: float
     notes: tuple[str, ...]
     op_known: bool = True
+    archived_share: float = 1.0
 
 
 def scale_of(spec: LoopSpec, pv: Floats) -> Scale:
@@ -250,4 +253,5 @@ def _described(
     op_step = resolution(record.op) if known_op else 0.0
     if pv_step > 0:
         notes.append(f"PV on a grid of {pv_step:.3g} % of span")
-    return Prepared(record, scale, pv_step, op_step, compressed, tuple(notes), known_op)
+    archived = min(archived_share(x) for x in ((record.pv, record.op) if known_op else (record.pv,)))
+    return Prepared(record, scale, pv_step, op_step, compressed, tuple(notes), known_op, archived)

@@ -95,6 +95,13 @@ def straight(value: Floats) -> Mask:
     return out
 
 
+def archived_share(value: Floats) -> float:
+    """Share of samples that a line through their neighbours does not give [-]: those that compression kept."""
+    level = np.zeros(value.size, dtype=np.bool_)
+    level[1:-1] = (value[1:-1] == value[:-2]) & (value[1:-1] == value[2:])
+    return float((~(straight(value) | level)).mean())
+
+
 def resolution(value: Floats) -> float:
     """The step of the grid that values stand on, in their unit; 0 where there is none.
 

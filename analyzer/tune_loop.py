@@ -28,7 +28,7 @@ NO_MODEL = "needs PV that moves with OP, so that a model can be identified"
 def _unfit(prepared: Prepared, config: Config) -> Needs | None:
     """What the trends lack for a model, the nearest first; None where nothing is known."""
     limited = at_limits(prepared.record, config.quality) if prepared.op_known else None
-    return limited or unfit_for_cause(prepared, config)
+    return limited or unfit_for_cause(prepared, None, config)
 
 
 def proposal(

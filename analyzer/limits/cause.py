@@ -200,6 +200,14 @@ class CauseLimits:
         "The same for the valve, for one that is blamed is taken out",
         CHOSEN + "; at 60 one of four sticking valves of ../shared/recordings/isdb is undecided",
     )
+    compressed_pct: float = limit(
+        80.0,
+        "%",
+        (0.0, 100.0),
+        "The same for the valve where trends are compressed",
+        "ours: straight segments of PV and OP make a likely valve of a load (of 30 cycles of another cause on seeds "
+        "60100 to 64599 of tests/untidy 2 above 55 %, none above 77 %; 8 of 11 valves are above 80 %)",
+    )
     named_pct: float = limit(
         50.0,
         "%",

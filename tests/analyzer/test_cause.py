@@ -17,6 +17,7 @@ from analyzer.plantwide.source import Peer
 from analyzer.plantwide.verdict import followers_of, trace
 from analyzer.quality import prepare
 from identification.errors import NotAssessedError
+from tests.untidy.recorder import swinging_door
 
 SKETCHES = {
     "healthy flow": Sketch(
@@ -163,9 +164,42 @@ def test_trends_that_cannot_tell_say_what_they_need():
     blind = unseen.verdict
     assert (blind.cause, blind.fault) == ("undecided", "undecided")
     assert str(blind.needs) == "needs OP, which is not recorded"
-    straight = assess(replace(made, compressed_share=0.9), None, CONFIG).verdict
+    straight = assess(replace(made, compressed_share=0.9, archived_share=0.02), None, CONFIG).verdict
     assert straight.cause == "undecided"
-    assert str(straight.needs) == "needs trends without compression, 90 % lie on straight segments"
+    wanted = "needs trends without compression, or 7 archived samples a cycle"
+    assert str(straight.needs) == f"{wanted}: there are 2.6, 90 % lie on straight segments"
+
+
+def compressed(name: str, share: float) -> Trends:
+    """A sketch's trends behind a swinging door, its deviation in terms of the usual step from sample to sample."""
+    made = trends(name)
+    pv, op = (swinging_door(x, share * float(np.std(np.diff(x))), 600) for x in (made.pv, made.op))
+    return replace(made, pv=pv, op=op)
+
+
+@pytest.mark.parametrize("name", [n for n, s in SKETCHES.items() if s.cause in ("valve", "load")])
+def test_compressed_trends_tell_the_cause_of_a_cycle_that_they_kept(name):
+    """Behind a swinging door a cause is the true one or none, with no new settings; where little was kept of each
+    cycle the verdict says so."""
+    causes = {}
+    for share in (0.9, 3.0, 10.0):
+        prep = prepared(compressed(name, share))
+        found = assess(prep, None, CONFIG)
+        causes[share] = found.verdict.cause
+        if prep.compressed_share > CONFIG.quality.straight_share:
+            assert found.for_settings is not None
+            assert found.verdict.cause in (SKETCHES[name].cause, "undecided", "none")
+    if name in ("play, tank", "swinging load, flow", "swinging load, pressure"):
+        assert causes[0.9] == SKETCHES[name].cause
+    assert causes[10.0] in ("undecided", "none")
+
+
+@pytest.mark.parametrize("name", named("none"))
+def test_a_healthy_loop_is_blamed_for_nothing_behind_a_swinging_door(name):
+    """A compressed trend makes no fault of a healthy loop's valve."""
+    for share in (0.9, 3.0, 10.0):
+        found = assess(prepared(compressed(name, share)), SKETCHES[name].controller, CONFIG)
+        assert found.verdict.cause in ("none", "undecided")
 
 
 @pytest.mark.parametrize("every", [2, 3, 1200])

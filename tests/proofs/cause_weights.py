@@ -90,7 +90,7 @@ def told(prepared: Prepared, stated: Pid | None, kind: str, cause: str, plain: b
     config = Config()
     found = detect(prepared.record, config.oscillation)
     first = counting(found)
-    if first is None or unfit_for_cause(prepared, config) is not None:
+    if first is None or unfit_for_cause(prepared, first, config) is not None:
         return None
     try:
         m = measure(prepared.record, first, stated, config.cause, found.spectrum, kind)

@@ -175,7 +175,7 @@ def measured() -> tuple[tuple[Prepared, Oscillations, Measured], ...]:
     """Those of which models can be fitted, with what was measured of them."""
     out = []
     for r, p, f in detected():
-        if unfit_for_cause(p, DEFAULT) or float(np.ptp(p.record.pv)) == 0.0:
+        if unfit_for_cause(p, None, DEFAULT) or float(np.ptp(p.record.pv)) == 0.0:
             continue
         args = (p.record, counting(f), r.stated, DEFAULT.cause, f.spectrum, r.spec.type)
         m = tried(lambda args=args: measure(*args))
