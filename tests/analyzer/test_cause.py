@@ -170,6 +170,19 @@ def test_trends_that_cannot_tell_say_what_they_need():
     assert str(straight.needs) == f"{wanted}: there are 2.6, 90 % lie on straight segments"
 
 
+@pytest.mark.parametrize("seed", [0, 1, 4, 5])
+@pytest.mark.parametrize("grid", [0.01, 0.1])
+def test_a_plain_play_is_found_whatever_noise_and_load(seed, grid):
+    """A play of half OP's range is not lost to a small one with a long dead time, alike at the period."""
+    sketch = SKETCHES["play, tank"]
+    made = simulate(sketch, 6, seed)
+    pv, op = (np.round(x / (grid * np.std(x))) * grid * np.std(x) for x in (made.pv, made.op))
+    found = assess(prepared(replace(made, pv=pv, op=op)), sketch.controller, CONFIG).verdict
+    assert found.cause == "valve"
+    assert found.measured is not None
+    assert found.measured.play.valve.stickband == pytest.approx(sketch.backlash, rel=0.1)
+
+
 def compressed(name: str, share: float) -> Trends:
     """A sketch's trends behind a swinging door, its deviation in terms of the usual step from sample to sample."""
     made = trends(name)
