@@ -178,7 +178,8 @@ def _moved(window: Window, best: SlipPath, wider: float, jumpier: float, later: 
     dead_s = best.fit.dead_time_s + later * DEAD_STEPS * window.dt_s
     if not 0.0 < share <= 1.0 or dead_s < 0.0:
         return None
-    fit, f = replace(best.fit, dead_time_s=dead_s), _friction(band, share, window.op.size)
+    gain = best.fit.gain * v.slip_jump / (band * share)  # a slip moves PV by gain times jump
+    fit, f = replace(best.fit, dead_time_s=dead_s, gain=gain), _friction(band, share, window.op.size)
     stem = _decoded_by(window, fit, float(best.stem.mean()), f, 1.0)
     return _path(window, fit, sticking(band, share), stem) if _slips(stem) >= FEWEST else None
 
