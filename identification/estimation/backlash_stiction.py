@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from identification.estimation.fine_scan import scan
-from identification.estimation.gauss_newton import descend, descend_best
+from identification.estimation.gauss_newton import descend
 from identification.estimation.hammerstein import IDEAL, Fit, ValveTrial, sticking
 from identification.estimation.noise import arx_noise
 from identification.estimation.search import (
@@ -136,10 +136,8 @@ def fit_play(window: Window, linear: Fit, period_s: float, hopeful: float | None
     """
     reach = max(window.op_range, 1e-9)
     screened = [sticking(share * reach, 0.0) for share in SCREEN_SHARES]
-    if hopeful is None:
-        best = _likeliest(window, _chosen(window, linear, screened, period_s, len(screened)))
-    else:
-        best = descend_best(window, _chosen(window, linear, screened, period_s, 1), free_width=True)
+    followed = len(screened) if hopeful is None else 1
+    best = _likeliest(window, _chosen(window, linear, screened, period_s, followed))
     if best.log_likelihood - linear.log_likelihood < (SCREENED if hopeful is None else hopeful):
         return best
     followed = FOLLOWED_SHORT if window.y.size < SHORT else 1
@@ -173,8 +171,7 @@ def fit_stick_slip(window: Window, play: Fit, period_s: float) -> Fit:
     """
     short = window.y.size < SHORT
     begun = _chosen(window, play, _coarse(window, play), period_s, FOLLOWED_SHORT if short else FOLLOWED)
-    whole = _likeliest(window, begun) if short else descend_best(window, begun, free_width=True)
-    return max([whole, *_finely(window, play)], key=lambda fit: fit.log_likelihood)
+    return max([_likeliest(window, begun), *_finely(window, play)], key=lambda fit: fit.log_likelihood)
 
 
 def _coarse(window: Window, play: Fit) -> list[ValveTrial]:

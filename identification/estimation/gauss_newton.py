@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -20,12 +19,6 @@ ITERATIONS = 25
 """Gauss-Newton steps at most; ours: nine in ten fits stop before the fifteenth."""
 SETTLED = 0.01
 """Gain in log likelihood [nat] below which the steps stop."""
-RACED = 4
-"""Steps after which descents from several starts are compared; ours: of 226 scans of 120 loops, healthy and ill, the
-60 about a play lost 0.1 nat at most, and 4 % of the first ones and of those with jumps more than 1, at two thirds of
-the cost."""
-BEHIND = 10.0
-"""Log likelihood [nat] behind the leader's from which a descent is given up; ours, of the same study."""
 NARROWEST = 0.2
 """Stickband after a step, in terms of that before, that is tried no more."""
 
@@ -121,16 +114,12 @@ def _moved(b: _Bench, p: _Point, step: Floats) -> tuple[bool, Floats, Valve]:
 
 
 @njit(cache=True)
-def _descend(b: _Bench, theta: Floats, valve: Valve, steps: int) -> tuple[_Point, bool]:
-    """Damped Gauss-Newton steps to the least mean square of the innovations judged, from `steps` points at most, and
-    whether they have ended there."""
+def _descend(b: _Bench, theta: Floats, valve: Valve) -> _Point:
+    """Damped Gauss-Newton steps to the least mean square of the innovations judged."""
     best, damping, fresh = _point(b, theta, valve), 1e-3, True
     gram, slope = np.empty((theta.size, theta.size)), np.empty(theta.size)
     for _ in range(ITERATIONS):
         if fresh:
-            if steps == 0:
-                return best, False
-            steps -= 1
             rows = _slopes(b, best)
             gram, slope, fresh = np.dot(rows, rows.T), -np.dot(rows, best.e), False
         inside, moved, other = _moved(b, best, damped_step(gram, slope, damping, b.held))
@@ -144,7 +133,7 @@ def _descend(b: _Bench, theta: Floats, valve: Valve, steps: int) -> tuple[_Point
         best, damping, fresh = trial, max(damping / 5, 1e-7), True
         if gained < SETTLED:
             break
-    return best, True
+    return best
 
 
 def _theta(fit: Fit) -> Floats:
@@ -178,32 +167,9 @@ def descend(window: Window, fit: Fit, free_width: bool = False) -> Fit:
     Time constant, dead time, gain, slow terms and the noise model, and with `free_width` the stickband, move at
     once, because they trade against each other along narrow valleys.
     """
-    return _descended(window, fit, free_width, ITERATIONS)[0]
-
-
-def descend_best(window: Window, fits: Sequence[Fit], free_width: bool = False) -> Fit:
-    """The likeliest of what `descend` makes of several starts, those that fall behind given up on the way.
-
-    Parameters
-    ----------
-    window : Window
-    fits : sequence of Fit
-        The starts, at least one.
-    free_width : bool
-    """
-    begun = [_descended(window, fit, free_width, RACED) for fit in fits]
-    lead = max(fit.log_likelihood for fit, _ in begun)
-    near = [(fit, ended) for fit, ended in begun if fit.log_likelihood >= lead - BEHIND]
-    ends = [fit if ended else descend(window, fit, free_width) for fit, ended in near]
-    return max(ends, key=lambda fit: fit.log_likelihood)
-
-
-def _descended(window: Window, fit: Fit, free_width: bool, steps: int) -> tuple[Fit, bool]:
-    """What `_descend` makes of a fit, and whether it has ended."""
-    bench = _bench(window, fit.ar.size, free_width)
-    best, ended = _descend(bench, _theta(fit), _constants(fit.valve), steps)
+    best = _descend(_bench(window, fit.ar.size, free_width), _theta(fit), _constants(fit.valve))
     theta = best.theta
-    found = Fit(
+    return Fit(
         float(theta[3]),
         float(math.exp(theta[0])),
         float(theta[1]),
@@ -213,4 +179,3 @@ def _descended(window: Window, fit: Fit, free_width: bool, steps: int) -> tuple[
         theta[BASE:].copy(),
         theta[4:BASE].copy(),
     )
-    return found, ended
