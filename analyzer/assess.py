@@ -11,14 +11,14 @@ import numpy as np
 from analyzer import words
 from analyzer.assessments import Assessments, Hour, assess_span, hourly, settling_time, usable
 from analyzer.cause import NO_CAUSE, Verdict, as_hint, hidden_by_grid, judge, not_assessed
-from analyzer.config import Config, QualityLimits
+from analyzer.config import Config
 from analyzer.dead_valve import dead_valve, with_dead_valve
 from analyzer.decisions import CAUSES, Cause, Fault, Lack, LacksError, Needs
+from analyzer.fit_for_cause import compressed, unfit_for_cause
 from analyzer.measure import Measured, measure, time_scale
 from analyzer.oscillation import Oscillation, Oscillations, barely_seen, counting, detect
 from analyzer.plantwide.wave import Wave, waves_of
 from analyzer.quality import Prepared
-from analyzer.sample_clock import constant_for
 from analyzer.settings_check import SettingsDiffer, differing
 from analyzer.slip_by_slip import told_slip_by_slip
 from analyzer.trends import BUCKETS, FINE_BUCKETS, close_view, thinned
@@ -79,52 +79,6 @@ def unassessable(record: LoopRecord, config: Config) -> Needs | None:
     )
 
 
-def unfit_for_cause(prepared: Prepared, oscillation: Oscillation | None, config: Config) -> Needs | None:
-    """What these trends lack for a cause; None where one can be told.
-
-    oscillation : None where the loop does not oscillate, or it is not known whether it does.
-    """
-    record, q = prepared.record, config.quality
-    if not prepared.op_known:
-        return Needs(Lack.OP, "needs OP, which is not recorded")
-    if float(np.ptp(record.op)) == 0.0:
-        return Needs(Lack.MOVING_OP, "needs OP that moves, it stands still")
-    return compressed(prepared, oscillation, q) or _scattered(record, q) or at_limits(record, q)
-
-
-def compressed(prepared: Prepared, oscillation: Oscillation | None, q: QualityLimits) -> Needs | None:
-    """What trends lack that a historian compressed; None where it did not, or kept enough of each cycle."""
-    if prepared.compressed_share <= q.straight_share:
-        return None
-    lie = f"{100 * prepared.compressed_share:.0f} % lie on straight segments"
-    if oscillation is None:
-        return Needs(Lack.UNCOMPRESSED, f"needs trends without compression, {lie}")
-    points = prepared.archived_share * oscillation.period_s / prepared.record.dt_s
-    if points >= q.archived_points:
-        return None
-    wanted = f"needs trends without compression, or {q.archived_points:g} archived samples a cycle"
-    return Needs(Lack.UNCOMPRESSED, f"{wanted}: there are {points:.2g}, {lie}")
-
-
-def at_limits(record: LoopRecord, q: QualityLimits) -> Needs | None:
-    """What a record lacks whose OP is at a limit for most of the time; None where it is not."""
-    saturated = float(record.mask("saturated").mean())
-    if saturated <= q.saturated_share:
-        return None
-    text = f"needs OP within its limits, it is at one for {100 * saturated:.0f} % of the time"
-    return Needs(Lack.OP_OFF_LIMITS, text)
-
-
-def _scattered(record: LoopRecord, q: QualityLimits) -> Needs | None:
-    """What good samples lack that are too scattered for a model; None where enough of them follow each other."""
-    good = ~record.bad
-    share = float((good & constant_for(good.astype(np.float64), q.run_samples)).sum()) / max(len(record), 1)
-    if share >= q.run_share:
-        return None
-    wanted = f"{100 * q.run_share:.0f} % of the time in runs of {q.run_samples} good samples"
-    return Needs(Lack.UNBROKEN, f"needs {wanted}, has {100 * share:.0f} %")
-
-
 def cause_of(
     prepared: Prepared, found: Oscillations, controller: Pid | None, config: Config, kind: str
 ) -> Verdict:
@@ -144,6 +98,31 @@ def cause_of(
     if oscillation is not None:
         verdict = told_slip_by_slip(verdict, oscillation.period_s, config.cause)
     return with_dead_valve(verdict, dead) if dead and verdict.cause is not Cause.VALVE else verdict
+
+
+def convicted(
+    prepared: Prepared, found: Oscillations, controller: Pid | None, config: Config, kind: str
+) -> tuple[Oscillations, Verdict]:
+    """What oscillates, and why: a cycle that alone is not regular enough to count does so where PV convicts the valve
+    of making it, for noise of no spectrum fits a valve's model.
+
+    Parameters
+    ----------
+    prepared : Prepared
+    found : Oscillations
+        What counts by itself.
+    controller : Pid or None
+    config : Config
+    kind : str
+    """
+    verdict = cause_of(prepared, found, controller, config, kind)
+    if counting(found) is not None or not prepared.op_known:
+        return found, verdict
+    near = detect(prepared.record, config.oscillation.nearly())
+    if counting(near) is None:
+        return found, verdict
+    told = cause_of(prepared, near, controller, config, kind)
+    return (near, told) if told.cause is Cause.VALVE and not told.dead else (found, verdict)
 
 
 def verdict_by_measures(
@@ -259,7 +238,8 @@ def assess(prepared: Prepared, controller: Pid | None, config: Config, kind: str
         raise LacksError(lacking)
     found = detect(record, config.oscillation)
     settings = _settings(prepared, found, controller, config)
-    verdict = cause_of(prepared, found, settings.recorded if settings else controller, config, kind)
+    stated = settings.recorded if settings else controller
+    found, verdict = convicted(prepared, found, stated, config, kind)
     dead_time = _dead_time(verdict)
     night = _known(assess_span(record, config.figures), prepared.op_known)
     if night.usable_h < config.advice.least_h or _is_coarse(record, controller, config):

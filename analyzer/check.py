@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
-from analyzer.assess import unassessable, unfit_for_cause
+from analyzer.assess import unassessable
 from analyzer.config import Config
 from analyzer.decisions import Needs
+from analyzer.fit_for_cause import unfit_for_cause
 from analyzer.history.export import Export
 from analyzer.history.series import Series
 from analyzer.loops.changes import TuningChange

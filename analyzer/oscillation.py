@@ -4,7 +4,8 @@ A peak counts where three signs agree: it stands out of the spectrum about it, t
 comes back after one period, and it carries a fair share of the error. A cycle that is regular only in shape counts
 where it stands out most of the time and its half-cycles, none larger than the usual one, come back: see _in_shape.
 What the set point explains is taken out first, so set point steps and a cascade's moving set point are not
-oscillation of the loop.
+oscillation of the loop. A cycle a little short of that counts where PV convicts the valve of making it: see
+`assess.convicted`.
 """
 
 from __future__ import annotations

@@ -7,9 +7,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from analyzer.advice import withheld
-from analyzer.assess import assess, at_limits, unfit_for_cause
+from analyzer.assess import assess
 from analyzer.config import Config
 from analyzer.decisions import Action, Cause, Needs
+from analyzer.fit_for_cause import at_limits, unfit_for_cause
 from analyzer.history.export import Export
 from analyzer.loops.changes import TuningChange
 from analyzer.loops.settings_in_force import in_force

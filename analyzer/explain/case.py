@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analyzer.assess import cause_of
+from analyzer.assess import convicted
 from analyzer.cause import NO_CAUSE, Verdict
 from analyzer.config import Config
 from analyzer.decisions import Cause, Fault
@@ -115,8 +115,8 @@ def seen_in_cycles(verdict: Verdict) -> SeenInCycles | None:
 
 def verdict_on(spec: LoopSpec, prepared: Prepared, config: Config) -> Verdict:
     """What a night would say of this very recording: why it oscillates, or of which valve it rests."""
-    found = detect(prepared.record, config.oscillation)
-    said = cause_of(prepared, found, pid_of(spec, prepared), config, spec.type)
+    seen = detect(prepared.record, config.oscillation)
+    found, said = convicted(prepared, seen, pid_of(spec, prepared), config, spec.type)
     return said if counting(found) is not None or said.cause is Cause.VALVE else NO_CAUSE
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -10,9 +11,10 @@ import pytest
 from plant import CONFIG, START_S, series, spec
 from scipy.signal import lfilter
 
-from analyzer.assess import cause_of
-from analyzer.oscillation import detect
+from analyzer.assess import cause_of, convicted
+from analyzer.oscillation import counting, detect
 from analyzer.quality import prepare
+from tests.proofs.untidy import NAMED, recorded
 from tests.untidy.draw import draw
 from tests.untidy.loop import Plant, Stem, run
 from tests.untidy.recorder import rounded
@@ -80,3 +82,29 @@ def test_a_play_of_many_steps_of_the_grid_is_still_found():
     load = 1.5 * lfilter([0.1], [1, -0.99], rng.standard_normal(n))
     pv, op, _ = run(plant, Stem(lag=1.0, play=12.0), sp, load, 0.02 * rng.standard_normal(n), rng)
     assert verdict_of(sp, rounded(pv, 0.3), op, 1.0, "") == "valve"
+
+
+@pytest.mark.parametrize("seed", [60112, 60663, 68857])
+def test_a_cycle_short_of_regular_counts_where_its_valve_is_convicted(seed):
+    """A sticking valve's irregular cycle, which noise of its spectrum would show too, is found by what OP tells."""
+    drawn, config = draw(seed), CONFIG
+    ready, stated = recorded(drawn, config)
+    seen = detect(ready.record, config.oscillation)
+    assert counting(seen) is None
+    found, said = convicted(ready, seen, stated, config, drawn.kind)
+    assert counting(found) is not None
+    assert said.cause == NAMED[drawn.truth["cause"]] == "valve"
+
+
+def test_a_healthy_loop_s_near_cycle_counts_for_nothing():
+    """Of healthy loops, their limits of shape lowered by two doublings, none oscillates for its valve."""
+    eager = replace(CONFIG, oscillation=replace(CONFIG.oscillation, near=2.0))
+    looked = 0
+    for seed in range(80_000, 80_040):
+        drawn = draw(seed, "healthy")
+        ready, stated = recorded(drawn, eager)
+        seen = detect(ready.record, eager.oscillation)
+        looked += counting(detect(ready.record, eager.oscillation.nearly())) is not None
+        found, _ = convicted(ready, seen, stated, eager, drawn.kind)
+        assert counting(found) is None
+    assert looked > 0

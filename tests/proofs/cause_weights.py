@@ -21,11 +21,11 @@ import numpy as np
 from scipy.optimize import minimize
 
 from analyzer import api
-from analyzer.assess import unfit_for_cause
 from analyzer.cause_measures import NAMES, measures
 from analyzer.cause_weights import FILE, parted
 from analyzer.config import Config
 from analyzer.decisions import CAUSES
+from analyzer.fit_for_cause import unfit_for_cause
 from analyzer.loops.tags import controller
 from analyzer.measure import measure
 from analyzer.oscillation import counting, detect

@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from analyzer.assess import Assessment, assess, unfit_for_cause
+from analyzer.assess import Assessment, assess
 from analyzer.config import Config
 from analyzer.decisions import Cause
+from analyzer.fit_for_cause import unfit_for_cause
 from analyzer.history.series import Series
 from analyzer.loops.spec import LoopSpec
 from analyzer.measure import Measured, measure

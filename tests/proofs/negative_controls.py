@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from analyzer.assess import cause_of
+from analyzer.assess import convicted
 from analyzer.config import Config
 from analyzer.history.series import Series
 from analyzer.loops.spec import LoopSpec
@@ -33,8 +33,8 @@ def judged(case: tuple[str, int]) -> tuple[str, bool, bool]:
     spec = LoopSpec("L", sp="L.SP", pv="L.PV", op="L.OP", pv_lo=0.0, pv_hi=100.0)
     config = Config()
     prepared = prepare(spec, series, config.quality)
-    found = detect(prepared.record, config.oscillation)
-    verdict = cause_of(prepared, found, None, config, "")
+    seen = detect(prepared.record, config.oscillation)
+    found, verdict = convicted(prepared, seen, None, config, "")
     claimed = counting(found) is not None
     return family, claimed, verdict.cause == "valve"
 

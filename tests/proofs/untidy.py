@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from analyzer.assess import cause_of
+from analyzer.assess import convicted
 from analyzer.config import Config
 from analyzer.history.series import Series
 from analyzer.loops.spec import LoopSpec
@@ -46,9 +46,9 @@ def judged(seed: int) -> tuple[str, bool, bool, bool, str]:
     """Cause, whether it shows, whether it is clear, whether oscillation is found, cause named."""
     drawn, config = draw(seed), Config()
     prepared, stated = recorded(drawn, config)
-    found = detect(prepared.record, config.oscillation)
-    said = cause_of(prepared, found, stated, config, drawn.kind).cause
-    return drawn.truth["cause"], shows(drawn), clear(drawn), counting(found) is not None, said
+    seen = detect(prepared.record, config.oscillation)
+    found, said = convicted(prepared, seen, stated, config, drawn.kind)
+    return drawn.truth["cause"], shows(drawn), clear(drawn), counting(found) is not None, said.cause
 
 
 def recorded(drawn: Drawn, config: Config) -> tuple[Prepared, Pid | None]:

@@ -1,0 +1,58 @@
+"""What trends lack for a cause to be told from them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from analyzer.config import Config, QualityLimits
+from analyzer.decisions import Lack, Needs
+from analyzer.oscillation import Oscillation
+from analyzer.quality import Prepared
+from analyzer.sample_clock import constant_for
+from identification.record import LoopRecord
+
+
+def unfit_for_cause(prepared: Prepared, oscillation: Oscillation | None, config: Config) -> Needs | None:
+    """What these trends lack for a cause; None where one can be told.
+
+    oscillation : None where the loop does not oscillate, or it is not known whether it does.
+    """
+    record, q = prepared.record, config.quality
+    if not prepared.op_known:
+        return Needs(Lack.OP, "needs OP, which is not recorded")
+    if float(np.ptp(record.op)) == 0.0:
+        return Needs(Lack.MOVING_OP, "needs OP that moves, it stands still")
+    return compressed(prepared, oscillation, q) or _scattered(record, q) or at_limits(record, q)
+
+
+def compressed(prepared: Prepared, oscillation: Oscillation | None, q: QualityLimits) -> Needs | None:
+    """What trends lack that a historian compressed; None where it did not, or kept enough of each cycle."""
+    if prepared.compressed_share <= q.straight_share:
+        return None
+    lie = f"{100 * prepared.compressed_share:.0f} % lie on straight segments"
+    if oscillation is None:
+        return Needs(Lack.UNCOMPRESSED, f"needs trends without compression, {lie}")
+    points = prepared.archived_share * oscillation.period_s / prepared.record.dt_s
+    if points >= q.archived_points:
+        return None
+    wanted = f"needs trends without compression, or {q.archived_points:g} archived samples a cycle"
+    return Needs(Lack.UNCOMPRESSED, f"{wanted}: there are {points:.2g}, {lie}")
+
+
+def at_limits(record: LoopRecord, q: QualityLimits) -> Needs | None:
+    """What a record lacks whose OP is at a limit for most of the time; None where it is not."""
+    saturated = float(record.mask("saturated").mean())
+    if saturated <= q.saturated_share:
+        return None
+    text = f"needs OP within its limits, it is at one for {100 * saturated:.0f} % of the time"
+    return Needs(Lack.OP_OFF_LIMITS, text)
+
+
+def _scattered(record: LoopRecord, q: QualityLimits) -> Needs | None:
+    """What good samples lack that are too scattered for a model; None where enough of them follow each other."""
+    good = ~record.bad
+    share = float((good & constant_for(good.astype(np.float64), q.run_samples)).sum()) / max(len(record), 1)
+    if share >= q.run_share:
+        return None
+    wanted = f"{100 * q.run_share:.0f} % of the time in runs of {q.run_samples} good samples"
+    return Needs(Lack.UNBROKEN, f"needs {wanted}, has {100 * share:.0f} %")
