@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 
 from identification.models import Backlash, Integrator, Loop, Pid
+from tuning.bench import Bench, Candidate
 from tuning.decisions import Cause
 from tuning.describing import band, is_play
 from tuning.limit_cycle import Confirmed, Cycle
 from tuning.limits import TuningLimits
 from tuning.linear import integral_s
-from tuning.search import Bench, Candidate, rejection
+from tuning.search import rejection
 
 
 def load(source: str) -> str:

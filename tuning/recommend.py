@@ -11,23 +11,14 @@ from identification.models import Fopdt, Loop, Pid
 from identification.record import Floats
 from identification.simulation.closed_loop import scan_step
 from tuning import reasons
+from tuning.bench import Bench, Candidate, assumed_uncertainty, bench, mean_error, standard_load
 from tuning.decisions import Action, Cause
 from tuning.describing import band, is_play
 from tuning.limit_cycle import Confirmed, confirm
 from tuning.limits import LIMITS, TuningLimits
 from tuning.linear import margins
 from tuning.rules import TAU_C_PER_DELAY, effective_delay, simc
-from tuning.search import (
-    Bench,
-    Candidate,
-    assumed_uncertainty,
-    bench,
-    mean_error,
-    robust,
-    rounded,
-    search,
-    standard_load,
-)
+from tuning.search import robust, rounded, search
 
 CONFIRMED = 15
 """Candidates whose limit cycle is simulated, from the best down, before the search gives up."""

@@ -27,7 +27,6 @@ from analyzer.quality import prepare
 from analyzer.reconstructed_load import load_of, scan_noise
 from analyzer.rows import night_row
 from identification.models import Backlash, Fopdt, Integrator, Pid
-from tuning.compared import NOW, RECOMMENDED
 from tuning.limits import LIMITS
 from tuning.linear import margins
 
@@ -124,28 +123,15 @@ def test_load_keeps_the_noise_of_a_scan(tank):
     assert jumps == pytest.approx(TANK.noise, rel=0.3)
 
 
-def figures(advice, name):
-    """What settings of that name do on the reconstructed load."""
-    return next(tried for tried in advice.compared.tried if tried.name == name)
-
-
 def test_mirror_image_gets_mirrored_settings(pipe):
-    """With OP turned about and a direct-acting controller, the model is the same with the gain's sign turned, and the
-    advice as good: rounding moves a simulated cycle, so that settings whose travel and error differ by a fiftieth
-    may change places."""
+    """With OP turned about and a direct-acting controller, the advice is the same with the gain's sign turned."""
     trends = simulate(PIPE, 6.0)
     turned = replace(PIPE, kp=-PIPE.kp)
     other = assess(prepared(replace(trends, op=100 - trends.op)), turned.controller, CONFIG)
-    fit, back = (chosen_fit(found.verdict) for found in (pipe, other))
-    assert back.gain == pytest.approx(-fit.gain, rel=1e-6)
-    assert back.valve.stickband == pytest.approx(fit.valve.stickband, rel=1e-6)
     one, mirrored = settings(pipe, PIPE), settings(other, turned)
     assert mirrored.action == one.action == "retune"
-    assert one.kp_new * mirrored.kp_new < 0
-    new, turned_new = (figures(a, RECOMMENDED) for a in (one, mirrored))
-    assert turned_new.stem_travel == pytest.approx(new.stem_travel, abs=0.02 * figures(one, NOW).stem_travel)
-    assert turned_new.error == pytest.approx(new.error, rel=0.02)
-    assert turned_new.integral_s == pytest.approx(new.integral_s, rel=0.1)
+    assert mirrored.kp_new == pytest.approx(-one.kp_new, rel=0.05)
+    assert mirrored.ti_new == pytest.approx(one.ti_new, rel=0.1)
 
 
 def test_units_and_form_of_the_plant(pipe):

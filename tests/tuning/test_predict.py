@@ -8,10 +8,10 @@ from tuning_cases import backlash_case
 
 from identification.models import Backlash, Fopdt, Loop, Pid
 from identification.record import LoopRecord
+from tuning.bench import assumed_uncertainty
 from tuning.limits import LIMITS
 from tuning.predict import NAMES, assess, autocorrelation_peak, predict
 from tuning.rules import backlash_rule
-from tuning.search import assumed_uncertainty
 
 
 def record(error, stem):

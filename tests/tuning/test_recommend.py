@@ -8,13 +8,14 @@ import pytest
 from tuning_cases import backlash_case, level_case, load, stick_case
 
 from identification.models import Backlash, Fopdt, Integrator, Loop, Pid, Stiction
+from tuning.bench import assumed_uncertainty
 from tuning.limit_cycle import confirm
 from tuning.limits import LIMITS
 from tuning.linear import integral_s, margins
 from tuning.predict import assess, run, settled
 from tuning.recommend import recommend
 from tuning.rules import backlash_rule, simc
-from tuning.search import allowed, assumed_uncertainty, rejection
+from tuning.search import allowed, rejection
 
 STUDY = Loop(Fopdt(80, 200, 1), Pid(1, 10), Backlash(1.0))
 
