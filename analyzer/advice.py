@@ -200,12 +200,12 @@ def _unsupported(found: Assessment, controller: Pid | None, config: Config) -> A
     verdict, m = found.verdict, found.verdict.measured
     if m is None or (verdict.fault is Fault.UNDECIDED and m.play.gain == 0):
         return Advice(Action.REPAIR_VALVE) if verdict.cause is Cause.VALVE else Advice(Action.UNDECIDED)
-    if controller is None:
-        return _without_settings(verdict)
     if found.for_settings is not None:
         lacking = _lacking(found.for_settings)
         unset = f"no new settings: {found.for_settings}"
         return Advice(Action.REPAIR_VALVE, unset) if verdict.cause is Cause.VALVE else lacking
+    if controller is None:
+        return _without_settings(verdict)
     if found.night.usable_h < config.advice.least_h:
         return _lacking(Needs(Lack.LONGER, words.too_short(found.night.usable_h, config.advice.least_h)))
     return _too_thin(found, controller, config)

@@ -238,6 +238,13 @@ def test_unstated_settings_are_asked_for(pipe):
     assert "no kp and ti" in advice.reason
 
 
+def test_settings_are_not_asked_for_where_they_would_help_nothing(pipe):
+    """On a record that bears no settings the reason is the record, stated kp and ti or not."""
+    packed = replace(pipe, for_settings=Needs(Lack.UNCOMPRESSED, "compressed"))
+    reasons = {advise(packed, spec(), pid, 100.0, CONFIG).reason for pid in (None, PIPE.controller)}
+    assert reasons == {"no new settings: compressed"}
+
+
 def test_wrong_sign_is_told(pipe):
     """A gain of the wrong sign gets no settings and says that the controller would act the wrong way."""
     turned = replace(PIPE.controller, kp=-PIPE.kp)
