@@ -54,7 +54,7 @@ def quantization(pv: Floats, ranged: bool, limits: RecorderLimits = LIMITS.recor
         return None
     if float(gaps.max()) > 4.0 * float(gaps.mean()):
         return None
-    return Finding({STEP: float(gaps.mean())}, np.ones(pv.size, dtype=bool))
+    return Finding({STEP: float(np.median(gaps))}, np.ones(pv.size, dtype=bool))
 
 
 def clipped(pv: Floats, limits: RecorderLimits = LIMITS.recorder) -> Finding | None:

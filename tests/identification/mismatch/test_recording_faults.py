@@ -54,3 +54,14 @@ def test_samples_over_a_hole_are_unlogged() -> None:
     assert not recording_faults.unlogged(
         np.arange(100.0) * 2.0 + np.random.default_rng(0).normal(0, 0.3, 100), 100, 2.0
     ).any()
+
+
+def test_the_grid_is_its_unit_where_values_are_left_out() -> None:
+    """Of a PV that stands at two set points and passes between, the step is that of its grid, not the mean gap."""
+    rng = np.random.default_rng(2)
+    stand = np.where(np.arange(12_000) % 4000 < 2000, 40.0, 60.0) + 0.3 * rng.standard_normal(12_000)
+    ramp = np.linspace(40.0, 60.0, 30)
+    pv = np.round(np.concatenate((stand, ramp)) / 0.4) * 0.4
+    found = recording_faults.quantization(pv, True)
+    assert found is not None
+    assert found.values["step_pct"] == pytest.approx(0.4, rel=0.01)
