@@ -9,6 +9,7 @@ import numpy as np
 
 from analyzer.explain.case import Case
 from analyzer.explain.user_model import Brought
+from identification.controller.pi_regression import ControlLaw
 from identification.mismatch.answer import Answer
 from identification.mismatch.words import sentence, unexplained_reason
 
@@ -41,6 +42,15 @@ def as_data(c: Case, said: Answer, brought: Brought | None = None) -> dict[str, 
         "reason": f"{reason_of(said)} {c.shortened}".strip(),
     }
     return json_ready(data)
+
+
+def law_data(law: ControlLaw | None, dt_s: float) -> dict[str, Any]:
+    """The PI law that gives OP, as a further key: Kp [% OP/% PV], Ti [s], and the share of OP that it explains."""
+    if law is None or law.kp * law.ki <= 0.0:
+        return {}
+    return json_ready(
+        {"controller": {"kp": law.kp, "ti_s": law.kp / law.ki * dt_s, "explained": law.explained}}
+    )
 
 
 def reason_of(said: Answer) -> str:

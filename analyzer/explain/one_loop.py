@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from analyzer.explain.answer_data import as_data
+from analyzer.explain.answer_data import as_data, law_data
 from analyzer.explain.case import Case
 from analyzer.explain.saved_model import saved_model
 from analyzer.explain.user_model import Brought, judged
@@ -68,7 +68,9 @@ def explained(
         said = answer(found, c.subject)
         own = None if brought is None else judged(brought, found, c.subject, span_note(c, brought))
         drawn = views(found, c.subject, said, own)
-    data = as_data(c, said, own) | ({"held_out_on": on_others(found, tuple(others))} if others else {})
+    data = as_data(c, said, own) | law_data(found.law, c.subject.dt_s)
+    if others:
+        data["held_out_on"] = on_others(found, tuple(others))
     return Explained(c, found, said, data, drawn, own)
 
 

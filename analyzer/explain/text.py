@@ -61,6 +61,14 @@ def _parameters(data: Mapping[str, Any]) -> Rows:
     ]
 
 
+def _controller(data: Mapping[str, Any]) -> Rows:
+    law = data.get("controller")
+    if law is None:
+        return []
+    rows = (("Kp", number(law["kp"]), "% OP/% PV"), ("Ti", number(law["ti_s"]), "s"))
+    return [*rows, ("explains", share(law["explained"]), "of OP's variance")]
+
+
 def _fit(data: Mapping[str, Any]) -> Rows:
     shown = [k for k in ROWS if k in data["fit"] and (k != "explained" or data["moved"])]
     rows = [
@@ -113,6 +121,7 @@ def lines(data: Mapping[str, Any]) -> list[str]:
     block = f" ({data['block']})" if data["block"] != "none" else ""
     out = [head + block, *wrap(data["reason"], WIDTH), *wrap(check(data["verdict"]), WIDTH)]
     out += _part("Parameters (90 % intervals)", _parameters(data), (2,))
+    out += _part("Controller, as SP, PV and OP show it", _controller(data), (1,))
     out += _part("Misfit, rms in % of span", _fit(data), (1, 2, 3, 4))
     out += _part("On the recordings held out", _others(data), (1, 3, 4))
     if "brought" in data["fit"]:

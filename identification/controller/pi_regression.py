@@ -20,6 +20,8 @@ SHIFTS = (-2.0, -1.0, 0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11
 """Latenesses of PV that are tried [samples]."""
 FILTERS = (0.5, 1.0, 2.0, 4.0, 8.0)
 """Time constants of a filter between PV and the controller that are tried [samples]."""
+GUESSES = (10.0, 40.0, 160.0, 640.0)
+"""Integral times begun with where none is stated [samples]; ours: each finds any within four of itself."""
 LATE_STEP = 0.25
 """Lateness is told to this part of a sample."""
 
@@ -154,3 +156,24 @@ def recovered_law(
         slower = [at(best.late, best.smoothed * (1 + way * step)) for way in (-1, 1) if best.smoothed]
         best = min([best, *later, *slower], key=scatter)
     return best
+
+
+def unstated_law(
+    sp: Floats, pv: Floats, op: Floats, usable: Mask, limits: ControllerLimits = LIMITS.controller
+) -> ControlLaw | None:
+    """The PI law of a controller of which nothing is stated; None where none gives OP.
+
+    The spans of the regression are as long as the integral time, so that is found in two steps.
+    """
+    best = None
+    for guess in GUESSES:
+        first = law(sp, pv, op, usable, span_length(op.size, guess, limits), 0.0, limits=limits)
+        if first.kp * first.ki > 0.0 and (best is None or first.explained > best.explained):
+            best = first
+    if best is None:
+        return None
+    found = recovered_law(sp, pv, op, usable, best.kp / best.ki, best.kp, limits=limits)
+    moved = centred(op, found.length)
+    over_all = 1.0 - float(found.residual @ found.residual) / max(float(moved @ moved), 1e-12)
+    believed = found.explained >= limits.law_explains and over_all >= limits.law_gives
+    return found if found.kp * found.ki > 0.0 and believed else None

@@ -39,6 +39,13 @@ class ControllerLimits:
     law_explains: float = limit(
         0.9, "-", (0.0, 1.0), "Share of OP that a law has to give before its settings are believed", "ours"
     )
+    law_gives: float = limit(
+        0.5,
+        "-",
+        (0.0, 1.0),
+        "Share of OP's motion within all spans that it has to give where no settings are stated",
+        "ours: where a script holds OP still any law gives most spans",
+    )
     same_law: float = limit(
         1.15,
         "-",

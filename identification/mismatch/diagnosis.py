@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from identification.controller.check import LATE_SAMPLES, judge
-from identification.controller.pi_regression import ControlLaw, shifted
+from identification.controller.pi_regression import ControlLaw, shifted, unstated_law
 from identification.estimation.candidate import Fitted, Model, Problem, gain
 from identification.estimation.prediction_error import descend
 from identification.mismatch import recording_faults
@@ -46,14 +46,16 @@ def recorder_finding_of(s: Recording) -> Finding | None:
 
 
 def controller_finding_of(s: Recording, recorder: Finding | None) -> tuple[Finding | None, ControlLaw | None]:
-    """What clock and controller did, where there is a controller to judge and a recording fit for it."""
-    if s.sp is None or s.stated is None or ends(recorder) is Ends.ALL:
+    """What clock and controller did, where there is a controller to judge and a recording fit for it, and the law
+    that gives OP, stated or not."""
+    if s.sp is None or ends(recorder) is Ends.ALL:
         return None, None
     if any(recording_faults.straightened(x, s.limits.recorder.straight_law) for x in (s.pv, s.op)):
         return None, None
-    found, law = judge(
-        s.sp, s.pv, s.op, s.usable & (s.op > 0.05) & (s.op < 99.95), s.stated, s.limits.controller
-    )
+    free = s.usable & (s.op > 0.05) & (s.op < 99.95)
+    if s.stated is None:
+        return None, unstated_law(s.sp, s.pv, s.op, free, s.limits.controller)
+    found, law = judge(s.sp, s.pv, s.op, free, s.stated, s.limits.controller)
     if found is None:
         return None, law
     return Finding(found.values, found.where, CONTROLLER_FAULTS[found.fault].name), law
