@@ -77,6 +77,27 @@ class LoopRecord:
         found = self.masks.get(name)
         return np.zeros(self.pv.size, dtype=bool) if found is None else found
 
+    def thinned(self, factor: int) -> LoopRecord:
+        """Every so-manieth sample, with OP's mean until the next, which drives the process meanwhile.
+
+        A sample is bad, or a named thing happens at it, where that is so of any until the next.
+        """
+        n = self.pv.size // factor * factor
+
+        def within(x: Mask) -> Mask:
+            return np.asarray(x[:n].reshape(-1, factor).any(axis=1))
+
+        return replace(
+            self,
+            dt_s=self.dt_s * factor,
+            sp=self.sp[:n:factor],
+            pv=self.pv[:n:factor],
+            op=self.op[:n].reshape(-1, factor).mean(axis=1),
+            bad=within(self.bad),
+            position=None if self.position is None else self.position[:n:factor],
+            masks=MappingProxyType({k: within(v) for k, v in self.masks.items()}),
+        )
+
     def span(self, first: int, last: int) -> LoopRecord:
         """The record of samples first (included) to last (excluded)."""
         cut = slice(max(first, 0), last)

@@ -23,6 +23,7 @@ from identification.errors import NotAssessedError
 from identification.estimation.hammerstein import process_of
 from identification.estimation.likelihood_ratio import WindowFit
 from identification.estimation.trials import trials_between_moves
+from identification.mismatch.experiment import coarser_by, is_experiment
 from identification.mismatch.recording import Recording, SeenInCycles
 from identification.models import Pid
 from identification.record import Floats
@@ -166,20 +167,42 @@ def case(
     if float(np.ptp(r.op)) == 0 or float(np.ptp(r.pv)) == 0:
         raise NotAssessedError(f"{spec.loop}: needs OP and PV that move, one of them stands still")
     stamps = raw.stamp_s[~raw.bad]
+    stamps = stamps[(stamps >= r.start_s - r.dt_s) & (stamps <= r.start_s + r.duration_s)]
     verdict = verdict_on(spec, prepared, config)
-    subject = Recording(
+    others = neighbours(spec, specs, series, prepared, config)
+    subject = subject_of(spec, prepared, stamps, verdict, others, config)
+    factor = coarser_by(subject) if is_experiment(subject) else 1
+    if factor == 1:
+        return Case(spec, prepared, subject, shortened)
+    thin = replace(prepared, record=r.thinned(factor))
+    said = f"Judged at every {factor}th sample, one in {thin.record.dt_s:.3g} s: its time constant needs no more."
+    others = tuple(x[: len(thin.record) * factor : factor] for x in others)
+    subject = subject_of(spec, thin, stamps[::factor], verdict, others, config)
+    return Case(spec, thin, subject, f"{shortened} {said}".strip())
+
+
+def subject_of(
+    spec: LoopSpec,
+    prepared: Prepared,
+    stamps: Floats,
+    verdict: Verdict,
+    others: tuple[Floats, ...],
+    config: Config,
+) -> Recording:
+    """What is explained of a prepared record, beside what a night says of it and the OPs of its neighbours."""
+    r = prepared.record
+    return Recording(
         None if r.sp_estimated else r.sp,
         r.pv,
         r.op,
         ~(r.bad | r.mask("gap")),
         r.dt_s,
-        stamps[(stamps >= r.start_s - r.dt_s) & (stamps <= r.start_s + r.duration_s)],
+        stamps,
         stated_law(spec, prepared),
         not prepared.scale.recorded,
-        neighbours(spec, specs, series, prepared, config),
+        others,
         spec.type.strip().lower(),
         seen_in_cycles(verdict),
         verdict.measured is not None and verdict.cause is not Cause.VALVE,
         config.explain,
     )
-    return Case(spec, prepared, subject, shortened)

@@ -14,6 +14,8 @@ from identification.simulation.effect import Param, Variant
 from identification.simulation.open_loop import ModelInputs
 from identification.simulation.parameters import Slot
 
+CONSTANT = 1e-12
+"""Share of its mean square under which an error's variance is a rounding."""
 BASE = (
     Param(Slot.T, "time_constant_s", "s", 0.3, 1e9, "dt", True),
     Param(Slot.L, "dead_time_s", "s", 0.0, 0.2, "span"),
@@ -29,7 +31,8 @@ class Problem:
     """A recording prepared for fitting.
 
     inputs : what drives the model; y : PV less inputs.level, shape (n,); usable : bool, shape (n,); weight : shape
-    (n,), what each innovation counts, 0 where it is not judged. limits : what decides about candidates.
+    (n,), what each innovation counts, 0 where it is not judged. limits : what decides about candidates; memory :
+    in an experiment, samples that tell as much as an independent one, at most.
     """
 
     inputs: ModelInputs
@@ -38,16 +41,46 @@ class Problem:
     weight: Floats
     edges: Edges = field(repr=False)
     limits: ExplainLimits = LIMITS
+    memory: float = math.inf
 
     @property
     def count(self) -> int:
         """Samples judged."""
         return int((self.weight > 0).sum())
 
+    @property
+    def by_simulation(self) -> bool:
+        """Whether errors of the simulation are judged, with no noise model between."""
+        return self.edges.size == 1
 
-def problem(inputs: ModelInputs, y: Floats, usable: Mask, limits: ExplainLimits = LIMITS) -> Problem:
-    """A problem whose usable samples all count alike."""
-    edges = edges_for(usable)
+    def independent(self, e: Floats) -> int:
+        """Samples judged of which each tells something by itself, of a model that leaves errors of shape (n,)."""
+        memory = min(self.memory, correlated(e[self.weight > 0])) if self.by_simulation else 1.0
+        return max(int(self.count / memory), 1)
+
+
+def correlated(e: Floats) -> float:
+    """Samples that tell as much as one independent one: one and twice the autocorrelation's sum, taken until it first
+    falls below zero (Geyer 1992's initial positive sequence); 1 for white noise, all of them for a constant."""
+    x = e - e.mean()
+    power = np.abs(np.fft.rfft(x, 2 * x.size)) ** 2
+    auto = np.fft.irfft(power)[: x.size]
+    if not auto[0] > CONSTANT * float(e @ e):
+        return float(e.size)
+    rho = auto / auto[0]
+    end = int(np.argmax(rho < 0.0)) if (rho < 0.0).any() else rho.size
+    return float(1.0 + 2.0 * rho[1:end].sum())
+
+
+def problem(
+    inputs: ModelInputs,
+    y: Floats,
+    usable: Mask,
+    limits: ExplainLimits = LIMITS,
+    edges: Edges | None = None,
+) -> Problem:
+    """A problem whose usable samples all count alike, with lag groups of its own where none are given."""
+    edges = edges_for(usable) if edges is None else edges
     return Problem(inputs, y, usable, judged(usable, int(edges[-1])).astype(float), edges, limits)
 
 
@@ -68,7 +101,8 @@ class Model:
 
 @dataclass(frozen=True, slots=True)
 class Fitted:
-    """A model at its optimum: `loss` the weighted mean square innovation, `ar` the noise model."""
+    """A model at its optimum: `loss` the weighted mean square innovation, `ar` the noise model; count : innovations
+    that tell something each by itself."""
 
     model: Model
     loss: float
@@ -84,7 +118,7 @@ class Fitted:
 
 def gain(better: Fitted, worse: Fitted) -> float:
     """Gain in log likelihood [nat]."""
-    return 0.5 * worse.count * math.log(max(worse.loss, 1e-30) / max(better.loss, 1e-30))
+    return 0.5 * better.count * math.log(max(worse.loss, 1e-30) / max(better.loss, 1e-30))
 
 
 def scales(inputs: ModelInputs, c: Floats, param: Param) -> tuple[float, float]:

@@ -18,6 +18,8 @@ Edges = NDArray[np.int64]
 EDGES = np.array([0, 1, 2, 3, 4, 5, 6, 8, 10, 13, 17, 22, 29, 38, 50, 66, 88, 117], dtype=np.int64)
 """Lags between consecutive edges act together, by their mean; ours: single lags where noise is, a third of an
 octave where load is, reaching as far as a loop of 100 samples' time constant needs."""
+NO_NOISE = np.zeros(1, dtype=np.int64)
+"""Edges of no lags at all: innovations are the errors of the simulation themselves."""
 FEWEST = 4
 """Fewest edges."""
 JUDGED = 0.5
@@ -105,6 +107,8 @@ def fitted(columns: Floats, r: Floats) -> tuple[Floats, Floats]:
     `columns` from lag_means, shape (groups, n), and `r`, shape (n,), both times the root of what each sample counts.
     """
     gram = columns @ columns.T
+    if gram.size == 0:
+        return np.empty(0), gram
     ridge = 1e-10 * np.trace(gram) / gram.shape[0] + 1e-300
     return np.linalg.lstsq(gram + ridge * np.eye(gram.shape[0]), columns @ r, rcond=1e-13)[0], gram
 

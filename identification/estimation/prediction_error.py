@@ -118,11 +118,13 @@ def curvature(p: Problem, model: Model, found: Residual) -> tuple[Floats, Floats
     """Gauss-Newton matrix of the constants with the noise model eliminated, and the slope."""
     moves = sensitivities(p, model, found.ar, found.simulated) * np.sqrt(p.weight)
     own, groups = found.columns, found.ar.size
-    inner = found.gram + 1e-10 * np.trace(found.gram) / groups * np.eye(groups)
+    inner = found.gram + 1e-10 * np.trace(found.gram) / max(groups, 1) * np.eye(groups)
     beside = own @ moves.T
-    cross = np.linalg.lstsq(inner, np.column_stack((beside, own @ found.white)), rcond=1e-13)[0]
-    gram = moves @ moves.T - beside.T @ cross[:, :-1]
-    slope = moves @ found.white - beside.T @ cross[:, -1]
+    gram, slope = moves @ moves.T, moves @ found.white
+    if groups:
+        cross = np.linalg.lstsq(inner, np.column_stack((beside, own @ found.white)), rcond=1e-13)[0]
+        gram -= beside.T @ cross[:, :-1]
+        slope -= beside.T @ cross[:, -1]
     for i, param in enumerate(model.params):
         if param.slot in PRIOR:
             at_start = param.slot == Slot.START
@@ -197,7 +199,8 @@ def _descend(p: Problem, model: Model, steps: int, aim: float) -> Fitted:
         damping, failed = max(damping / 10, 1e-7), 0
         if won < p.limits.search.settled:
             break
-    return Fitted(model, best.loss, p.count, best.ar, innovations_of(p, best))
+    e = innovations_of(p, best)
+    return Fitted(model, best.loss, p.independent(e), best.ar, e)
 
 
 def innovations_of(p: Problem, found: Residual) -> Floats:

@@ -122,3 +122,17 @@ class ControllerLimits:
         "Integral time from which the law is judged on a thinned recording",
         "ours: under it found settings of sound loops are off by up to half",
     )
+    feedback: float = limit(
+        0.15,
+        "-",
+        (0.0, 1.0),
+        "Share of OP's moves that PV tells from which it answers PV",
+        "ours: of six laboratory experiments the largest is .10, by a multisine that PV remembers",
+    )
+    by_hand: float = limit(
+        0.05,
+        "-",
+        (0.0, 1.0),
+        "Share of samples at which OP moves up to which a hand or a script moves it, in a loop that cycles",
+        "ours: staircases move at one sample in 200",
+    )

@@ -94,3 +94,17 @@ class ProofLimits:
         "Fewest samples of a window in which the stem is placed anew",
         "ours: a line and the place are three numbers",
     )
+    course_leaves: float = limit(
+        0.3,
+        "-",
+        (0.0, 1.0),
+        "Part of an experiment's misfit (mean square) that a supply may leave to be told without a gain of its own",
+        "ours: a heater that failed leaves .18",
+    )
+    course_from: float = limit(
+        0.4,
+        "-",
+        (0.0, 1.0),
+        "The misfit that the plain loop then leaves at least, in PV's spread",
+        "ours: loads that are no effect move PV less than OP does",
+    )

@@ -18,6 +18,13 @@ class SearchLimits:
         "Gain that one more constant has to bring",
         "ours: half of log(n) would be 4.5, chance brings a half",
     )
+    hidden_penalty: float = limit(
+        1.0,
+        "nat",
+        (0.0, 1e3),
+        "The same in an experiment, of a constant not told by itself: a knot of a course, where a record began",
+        "Akaike 1974: what chance brings on average",
+    )
     search_penalty: float = limit(
         6.0,
         "nat",
@@ -108,4 +115,18 @@ class SearchLimits:
         (0.0, 10.0),
         "The same in terms of what the named effects gain: a name stands if little is left beside it",
         "ours",
+    )
+    experiment_samples: int = limit(
+        4000,
+        "-",
+        (100, 10000000),
+        "Samples of an experiment beyond which it is judged at a coarser step, where its time constant bears it",
+        "ours: bounds the time",
+    )
+    samples_a_lag: float = limit(
+        5.0,
+        "-",
+        (1.0, 1e4),
+        "Samples that a time constant and dead time keep at the coarser step",
+        "ours: OP's mean drives a step exactly, and a move is placed to a tenth of the lag",
     )

@@ -147,7 +147,7 @@ def held_out(p: Problem, worse: Fitted, better: Fitted, cycle: int = 0) -> HeldO
     late = p.weight[cut:]
     whitenings = [whitened(p.y - x, fit.ar, p.edges)[cut:] for x, fit in zip(simulated, fits, strict=True)]
     losses = [float((late * e) @ e) for e in whitenings]
-    won = 0.5 * (losses[0] - losses[1]) / max(fits[1].loss, 1e-30)
+    won = 0.5 * (losses[0] - losses[1]) / max(fits[1].loss, 1e-30) * fits[1].count / max(early.count, 1)
     c = fits[0].model.c
     limits = p.limits.proof
     memory = limits.window_times * float(c[Slot.T] + c[Slot.L]) / p.inputs.dt_s

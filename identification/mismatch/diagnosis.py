@@ -12,8 +12,9 @@ from identification.estimation.candidate import Fitted, Model, Problem, gain
 from identification.estimation.prediction_error import descend
 from identification.mismatch import recording_faults
 from identification.mismatch.catalogue import CANDIDATES, CONTROLLER_FAULTS, EFFECTS, RECORDER_FAULTS, fault
-from identification.mismatch.cross_validation import held_out, is_one_move, passes
+from identification.mismatch.cross_validation import passes
 from identification.mismatch.effect import Ends, Friction
+from identification.mismatch.experiment import is_experiment, is_seconded, judged_by_simulation, nearer
 from identification.mismatch.explanation import Explanation
 from identification.mismatch.forward_selection import (
     Candidate,
@@ -25,14 +26,15 @@ from identification.mismatch.forward_selection import (
     prepared,
     silent,
 )
+from identification.mismatch.kept_effects import beyond_the_grid, carried_over
 from identification.mismatch.lack_of_fit import ceiling
-from identification.mismatch.recording import STEP, Finding, Recording, SeenInCycles
-from identification.mismatch.sets_of_effects import cleared, replacement_step, without_the_idle
+from identification.mismatch.recording import Finding, Recording, SeenInCycles
+from identification.mismatch.sets_of_effects import replacement_step, without_the_idle
 from identification.mismatch.starts.from_cycles import from_cycles, is_friction
 from identification.mismatch.starts.screening import candidate_inputs
 from identification.models import Stiction
 from identification.record import Floats, Mask
-from identification.simulation.open_loop import ModelInputs, simulate
+from identification.simulation.open_loop import ModelInputs
 from identification.simulation.parameters import Slot
 
 
@@ -122,7 +124,8 @@ def explain(s: Recording, tell: Progress = silent, brought: Floats | None = None
         late_s, pv = late * s.dt_s, shifted(pv, late)
     inputs = inputs_of(replace(s, pv=pv))
     tell("plain loop")
-    p, plain = prepared(inputs, pv - inputs.level, usable, brought, transmitter_end(recorder, pv), s.limits)
+    clip = transmitter_end(recorder, pv)
+    p, plain = prepared(inputs, pv - inputs.level, usable, brought, clip, s.limits)
     found = Explanation(
         p,
         plain,
@@ -135,62 +138,17 @@ def explain(s: Recording, tell: Progress = silent, brought: Floats | None = None
     )
     if any(ends(x) is Ends.ALL for x in (recorder, controller)):
         return found
-    return carried_over(beyond_the_grid(physics(found, tell, s)))
-
-
-def beyond_the_grid(found: Explanation) -> Explanation:
-    """The explanation without effects that move PV by less than the steps in which a recorder left it."""
-    step = 0.0 if found.recorder is None else found.recorder.values.get(STEP, 0.0)
-    count, least = len(found.accepted), found.p.limits.recorder.grid_mark * step
-    told = int(count > 0 and found.cycles is not None and is_friction(found.accepted[0].name))
-    while (
-        count > told
-        and step > 0
-        and mark(found if count == len(found.accepted) else first_effects(found, count)) < least
-    ):
-        count -= 1
-    return found if count == len(found.accepted) else first_effects(found, count)
-
-
-def mark(found: Explanation) -> float:
-    """Standard deviation of what the effects together change in the simulated PV [% PV]."""
-    plain, best = (simulate(found.p.inputs, fit.model.c) for fit in (found.plain, found.best))
-    return float(np.std(best - plain))
-
-
-def carried_over(found: Explanation) -> Explanation:
-    """The explanation with its proof: as many effects, in the order taken, as carry over to held-out data.
-
-    A valve that the loop's cycles show is proven by them.
-    """
-    names = tuple(r.name for r in found.accepted)
-    for count in range(len(names), 0, -1):
-        kept = found if count == len(names) else first_effects(found, count)
-        by_cycles = count == 1 and found.cycles is not None and is_friction(names[0])
-        proof = held_out(kept.p, kept.plain, kept.best, cycle_of(found) if by_cycles else 0)
-        unproven = not proof.carries and proof.falls and is_one_move(found.p)
-        timed = proof.falls and all(EFFECTS[name].timed for name in names[:count])
-        if proof.carries or unproven or by_cycles or timed:
-            return replace(kept, proof=proof, refuted=names[count:], unproven=unproven)
-    proof = held_out(found.p, found.plain, found.plain)
-    return replace(found, best=found.plain, accepted=(), proof=proof, refuted=names)
-
-
-def cycle_of(found: Explanation) -> int:
-    """Samples of one cycle of a loop whose cycles show a faulty valve."""
-    cycle_s = 0.0 if found.cycles is None else found.cycles.cycle_s
-    return max(round(cycle_s / found.p.inputs.dt_s), found.p.limits.proof.least_cycle)
-
-
-def first_effects(found: Explanation, count: int) -> Explanation:
-    """The explanation with its first effects alone, the others given up and the rest fitted anew."""
-    c = found.best.model.c
-    for candidate in found.accepted[count:]:
-        c = cleared(c, candidate.row)
-    names = {r.name for r in found.accepted[:count]}
-    rows = tuple(r for r in found.best.model.added if r.name in names)
-    best = descend(found.p, Model(rows, c), found.p.limits.search.full_steps)
-    return replace(found, best=best, accepted=found.accepted[:count])
+    told = carried_over(beyond_the_grid(physics(found, tell, s)))
+    if not is_experiment(s):
+        return told
+    p, plain = prepared(inputs, pv - inputs.level, usable, brought, clip, s.limits, experiment=True)
+    by_misfit = carried_over(beyond_the_grid(physics(replace(found, p=p, plain=plain, best=plain), tell, s)))
+    left = min(
+        told.left, by_misfit.left
+    )  # what both miss; a load that wanders is no lack, and innovations see none
+    by_misfit = replace(by_misfit, left=left, by_innovations=told)
+    other = judged_by_simulation(told, by_misfit)
+    return nearer(other, by_misfit) if is_seconded(by_misfit, told) else other
 
 
 def physics(found: Explanation, tell: Progress, s: Recording) -> Explanation:
@@ -257,10 +215,17 @@ def shown_by_cycles(s: Recording, candidates: list[Candidate]) -> Candidate | No
 
 
 def proven(p: Problem, near: Fitted, candidates: list[Candidate]) -> Candidate | None:
-    """The best candidate with a gain left after its penalty that passes the proof."""
-    for candidate in candidates[: p.limits.proof.proven]:
-        if candidate.penalised <= 0:
-            return None
+    """The best candidate with a gain left after its penalty that passes the proof.
+
+    In an experiment one that is bound to a time is taken where none that lasts does anything: a course of the load
+    can be drawn through whatever the model lacks, and no data can be held out from it.
+    """
+    gains = [c for c in candidates if c.penalised > 0]
+    if p.by_simulation:
+        lasts = any(not EFFECTS[name].timed for name in near.names)
+        gains = [c for c in gains if not (lasts and EFFECTS[c.name].timed)]
+        gains.sort(key=lambda c: EFFECTS[c.name].timed)
+    for candidate in gains[: p.limits.proof.proven]:
         if passes(p, near, candidate.fit, EFFECTS[candidate.name]):
             return candidate
     return None

@@ -87,8 +87,8 @@ class Effect:
     @property
     def candidates(self) -> tuple[Variant, ...]:
         """Its variants, each with the effect's name, block and needs."""
-        own = {"name": self.name, "block": str(self.block), "needs": self.needs, "types": self.types}
-        return tuple(replace(v, **own) for v in self.variants)  # type: ignore[arg-type]
+        own = {"name": self.name, "block": str(self.block), "types": self.types}
+        return tuple(replace(v, needs=v.needs or self.needs, **own) for v in self.variants)  # type: ignore[arg-type]
 
     @property
     def called(self) -> dict[str, str]:

@@ -8,13 +8,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identification.estimation.candidate import Fitted, Model, Problem, gain, problem
+from identification.estimation.candidate import Fitted, Model, Problem, correlated, gain, problem
+from identification.estimation.noise import NO_NOISE
 from identification.estimation.outliers import robust_weights
 from identification.estimation.prediction_error import descend
 from identification.estimation.start_values import plain_processes
 from identification.limits.explain import LIMITS, ExplainLimits
 from identification.mismatch.catalogue import CANDIDATES, EFFECTS
+from identification.mismatch.cross_validation import is_one_move
 from identification.mismatch.effect import Friction
+from identification.mismatch.lack_of_fit import explained_freely
 from identification.mismatch.recording import Circumstances
 from identification.mismatch.starts.screening import CandidateInputs, screened, span_of, start_models
 from identification.mismatch.starts.stick_slip import fit_sticking
@@ -93,11 +96,17 @@ def applies(x: CandidateInputs, near: Fitted, row: Variant) -> bool:
         return False
     if row.needs == "every scan" and not x.known.every_scan:
         return False
+    if row.needs == "experiment" and not x.p.by_simulation:
+        return False
     rubs = EFFECTS[row.name].friction is not None
     if rubs and (x.known.free_valve or any(EFFECTS[r.name].friction is not None for r in near.model.added)):
         return (
             False  # behind one friction a second of the same stem cannot be told without the stem's position
         )
+    if row.needs == "moves" and is_one_move(x.p):
+        return False
+    if x.p.by_simulation and EFFECTS[row.name].timed and row.opponent is None:
+        return False  # a load that is added is told by innovations
     if row.needs == "neighbour":
         return x.p.inputs.neighbour is not None
     return True
@@ -106,7 +115,11 @@ def applies(x: CandidateInputs, near: Fitted, row: Variant) -> bool:
 def penalty(p: Problem, row: Variant) -> float:
     """Log likelihood [nat] that a variant costs."""
     limits = p.limits.search
-    return limits.search_penalty + limits.parameter_penalty * max(len(row.params), 1) + row.penalty
+    free = [
+        limits.hidden_penalty if q.hidden and p.by_simulation else limits.parameter_penalty
+        for q in row.params
+    ]
+    return limits.search_penalty + (sum(free) or limits.parameter_penalty) + row.penalty
 
 
 def candidate(p: Problem, near: Fitted, models: list[Model], steps: int) -> Candidate:
@@ -117,19 +130,55 @@ def candidate(p: Problem, near: Fitted, models: list[Model], steps: int) -> Cand
 def screened_candidate(p: Problem, near: Fitted, models: list[Model]) -> Candidate:
     """The same in the first round, where a start that will not come to anything worth following is left."""
     worth = penalty(p, models[0].added[-1]) + p.limits.search.worth_following
-    aim = near.loss * math.exp(-2.0 * worth / near.count)
+    aim = near.loss * math.exp(-2.0 * worth / p.count)
     return _of_fits(p, near, [descend(p, model, p.limits.search.screen_steps, aim) for model in models])
 
 
 def _of_fits(p: Problem, near: Fitted, fits: list[Fitted]) -> Candidate:
-    fit = min(fits, key=lambda f: f.loss)
+    return priced(p, near, min(fits, key=lambda f: f.loss))
+
+
+def priced(p: Problem, near: Fitted, fit: Fitted) -> Candidate:
+    """A fit as a candidate beside the fit before."""
     won = gain(fit, near)
     return Candidate(fit, won, won - penalty(p, fit.model.added[-1]))
 
 
+def counted_alike(p: Problem, near: Fitted, found: list[Candidate]) -> list[Candidate]:
+    """An experiment's candidates with errors that count as many as those of the one that leaves the whitest: what
+    another leaves is correlated by what it lacks, and not by the noise. A course takes the noise itself up, and is
+    counted by itself."""
+    lasting = [c.fit.count for c in found if c.row.opponent is None]
+    if not p.by_simulation or not lasting:
+        return found
+    return [
+        c if c.row.opponent is not None else priced(p, near, replace(c.fit, count=max(lasting)))
+        for c in found
+    ]
+
+
+def outdoing(p: Problem, near: Fitted, first: Candidate) -> Candidate:
+    """A candidate of an experiment that has an opponent, by what it gains over that: the same course of a load that
+    is added, which is no effect but the plain loop's own. One that moves PV as much as OP does needs no such proof:
+    whether it changes the gain too, the record may not tell."""
+    row = first.row.opponent
+    if row is None or not p.by_simulation:
+        return first
+    c = near.model.c.copy()
+    for slot, value in (row.fixed or {}).items():
+        c[slot] = value
+    added = descend(p, Model((*near.model.added, row), c), p.limits.search.full_steps)
+    own = descend(p, first.fit.model, p.limits.search.full_steps)
+    limits, moves = p.limits.proof, float(p.weight @ p.y**2 / p.weight.sum())
+    if own.loss < limits.course_leaves * near.loss and near.loss > limits.course_from**2 * moves:
+        return priced(p, near, own)
+    won = gain(own, added)
+    return Candidate(own, won, won - penalty(p, first.row) + first.row.penalty)
+
+
 def followed(p: Problem, near: Fitted, first: Candidate, models: list[Model]) -> Candidate:
     """A candidate of the first round followed to the end, from there and from its second and third start."""
-    if first.penalised < p.limits.search.worth_following:
+    if first.penalised < p.limits.search.worth_following and not p.by_simulation:
         return first
     starts = [first.fit.model, *models[1:3]]
     best = candidate(p, near, starts, p.limits.search.full_steps)
@@ -163,11 +212,14 @@ def compete(
             if row.modes:
                 first += mode_starts(x.p, near, row)
             tried.append((screened_candidate(x.p, near, first), models))
-    tried.sort(key=lambda t: -t[0].penalised)
+    alike = counted_alike(x.p, near, [first for first, _ in tried])
+    tried = sorted(zip(alike, (models for _, models in tried), strict=True), key=lambda t: -t[0].penalised)
     most = x.p.limits.search.followed
-    ended = [followed(x.p, near, first, models) for first, models in tried[:most]]
+    ended = [outdoing(x.p, near, followed(x.p, near, first, models)) for first, models in tried[:most]]
     ended += stiction_candidates(x, near, [first for first, _ in tried], rows, tell)
-    return sorted([*ended, *(first for first, _ in tried[most:])], key=lambda r: -r.penalised)
+    ended += [outdoing(x.p, near, first) for first, _ in tried[most:]]
+    found = counted_alike(x.p, near, ended)
+    return sorted(found, key=lambda r: -r.penalised)
 
 
 def prepared(
@@ -177,14 +229,23 @@ def prepared(
     brought: Floats | None = None,
     clip: Clip | None = None,
     limits: ExplainLimits = LIMITS,
+    experiment: bool = False,
 ) -> tuple[Problem, Fitted]:
-    """A problem with its outliers robustly_weighted, and its plain fit."""
-    p = problem(inputs, y, usable, limits)
+    """A problem with its outliers robustly_weighted, and its plain fit; an experiment's is judged by simulation."""
+    p = problem(inputs, y, usable, limits, NO_NOISE if experiment else None)
     if clip is not None:
         p = censored(p, clip)
     first = plain(p, brought, clip)
     calm = robustly_weighted(p, first)
-    return calm, descend(calm, first.model, p.limits.search.full_steps)
+    fit = descend(calm, first.model, p.limits.search.full_steps)
+    return with_memory(calm, fit) if experiment else (calm, fit)
+
+
+def with_memory(p: Problem, fit: Fitted) -> tuple[Problem, Fitted]:
+    """An experiment and its fit, with the memory of what the most flexible model leaves: the nearest to its noise."""
+    _, left, _ = explained_freely(p, fit)
+    known = replace(p, memory=correlated(left[p.weight > 0]))
+    return known, replace(fit, count=known.independent(fit.e))
 
 
 def integrating_or_first_order(p: Problem, free: Fitted, kind: str) -> tuple[Problem, Fitted]:
@@ -225,6 +286,5 @@ def stiction_candidates(
         if EFFECTS[row.name].friction is Friction.STICKS:
             tell(row.name)
             fit = fit_sticking(x.p, plays[0].fit, row, near.model.added)
-            won = gain(fit, near)
-            out.append(Candidate(fit, won, won - penalty(x.p, row)))
+            out.append(priced(x.p, near, fit))
     return out

@@ -54,6 +54,14 @@ def ceiling(p: Problem, fit: Fitted) -> tuple[float, int]:
 
     The fit's own constants and its noise model follow linearly, so the gain is of what they cannot give.
     """
+    e, left, count = explained_freely(p, fit)
+    won = 0.5 * float(e @ e - left @ left) / max(fit.loss, 1e-30)
+    return won * fit.count / max(p.count, 1), count
+
+
+def explained_freely(p: Problem, fit: Fitted) -> tuple[Floats, Floats, int]:
+    """Weighted innovations that a fit's own constants cannot lessen and what the flexible model leaves of them, shape
+    (n,) each, and the number of its weights."""
     c = fit.model.c
     through = through_valve(p.inputs, c)
     length = REACH * float(c[Slot.T] + c[Slot.L])
@@ -70,5 +78,4 @@ def ceiling(p: Problem, fit: Fitted) -> tuple[float, int]:
     more = more.T - span @ (span.T @ more.T)
     q, scale = np.linalg.qr(more)
     kept = np.abs(np.diag(scale)) > 1e-8 * np.abs(np.diag(scale)).max()
-    won = 0.5 * float(((q[:, kept].T @ e) ** 2).sum()) / max(fit.loss, 1e-30)
-    return won, int(kept.sum())
+    return e, e - q[:, kept] @ (q[:, kept].T @ e), int(kept.sum())

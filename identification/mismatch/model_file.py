@@ -11,7 +11,7 @@ from identification.controller.check import StatedSettings
 from identification.errors import InputError
 from identification.record import Floats
 from identification.simulation.closed_model import closed_model
-from identification.simulation.open_loop import ModelInputs, simulate
+from identification.simulation.open_loop import ModelInputs, begun_at_rest, simulate
 from identification.simulation.parameters import KNOTS, STEPS, Slot, neutral, places
 
 VERSION = 1
@@ -85,6 +85,7 @@ def carried(data: dict[str, Any], op: Floats, pv: Floats, dt_s: float) -> Floats
         free[Slot.START] = float(pv[0]) - level - bias
         for clip in (Slot.CLIP_HI, Slot.CLIP_LO):
             free[clip] = math.copysign(math.inf, neutral()[clip])
+        free = begun_at_rest(inputs, free) if c[Slot.BEGUN] != 0.0 else free
         out = level + simulate(inputs, free)
         bias = _bias(pv, out, c)
     out = np.clip(out + bias, c[Slot.CLIP_LO], c[Slot.CLIP_HI])

@@ -24,7 +24,7 @@ def replacement_step(
     for i, old in enumerate(accepted):
         others = tuple(r for r in best.model.added if r.name != old.name)
         near = descend(x.p, Model(others, cleared(best.model.c, old.row)), limits.full_steps)
-        candidates = [r for r in compete(x, near, CANDIDATES, tell) if r.name != old.name]
+        candidates = [r for r in compete(x, near, CANDIDATES, tell) if may_replace(x.p, r, old)]
         if not candidates:
             continue
         least = gain(best, near) - penalty(x.p, old.row) + limits.tie
@@ -33,6 +33,13 @@ def replacement_step(
             best = descend(x.p, first.fit.model, limits.full_steps)
             accepted = [*accepted[:i], first, *accepted[i + 1 :]]
     return best, accepted
+
+
+def may_replace(p: Problem, new: Candidate, old: Candidate) -> bool:
+    """Whether a candidate may stand in an effect's place: another, or another way of the same; in an experiment none
+    bound to a time for one that lasts, for through whatever a model lacks a course can be drawn."""
+    bound = EFFECTS[new.name].timed and not EFFECTS[old.name].timed
+    return (new.name, new.row.label) != (old.name, old.row.label) and not (bound and p.by_simulation)
 
 
 def without_the_idle(

@@ -36,11 +36,13 @@ class Variant:
 
     delays : parameters whose start is taken off the dead time, which stood for them in the plain loop; replaces :
     parameters of the plain loop that the effect makes meaningless; fixed : parameters set, not searched; needs : what
-    has to be in the recording before it can be tried (steps, line, neighbour, every scan of the controller); types :
+    has to be in the recording, or in the model, before it can be tried (steps, line, neighbour, every scan of the
+    controller, experiment, moves); types :
     loop types that can have it, any where empty or the type is not known; modes : time constants tried for a second
     mode, in that of the plain loop, and the share that its gain may have; label : told apart by; penalty : added to
     that of the parameters;
-    enter : turns the plain loop's parameters, in place, where they change their meaning.
+    enter : turns the plain loop's parameters, in place, where they change their meaning; opponent : what it has to
+    do better than in an experiment, of no name and a part of the plain loop's load.
     """
 
     params: tuple[Param, ...]
@@ -53,6 +55,7 @@ class Variant:
     mode_share: tuple[float, float] = (0.0, 0.0)
     penalty: float = 0.0
     enter: Callable[[Floats], None] | None = None
+    opponent: Variant | None = None
     name: str = ""
     block: str = ""
     needs: str = ""

@@ -11,7 +11,7 @@ from identification.models import Backlash, Integrator, Process, Valve
 from identification.record import Floats
 from identification.simulation.acts import Signal, acted
 from identification.simulation.parameters import KNOTS, SIZE, STEPS, Slot, neutral
-from identification.simulation.process import plain_vessel, transported, vessel
+from identification.simulation.process import outflow, outflow_of, plain_vessel, transported, vessel
 from identification.simulation.valve_chain import COASTS, flow, lagged
 
 OUTSIDE = (
@@ -138,6 +138,18 @@ def outflow_head(inputs: ModelInputs, c: Floats) -> float:
     return max(inputs.level, 1.0) / float(c[Slot.ROOT]) if c[Slot.ROOT] > 0 else 1.0
 
 
+def begun_at_rest(inputs: ModelInputs, c: Floats) -> Floats:
+    """Constants, shape (SIZE,), whose vessel before the last feeds it at the first sample what its own level lets go.
+
+    A record may begin in the middle of a move; where the vessel before the last stood then is of that record alone.
+    """
+    out = c.copy()
+    flow_out, _ = outflow(float(c[Slot.START]), outflow_of(c, outflow_head(inputs, c)))
+    fed = c[Slot.K] * (through_valve(inputs, c)[0] - inputs.middle) + c[Slot.BIAS]
+    out[Slot.BEGUN] = flow_out - fed
+    return out
+
+
 def _plain(inputs: ModelInputs, c: Floats, through: Floats) -> Floats:
     return plain_vessel(through, load(inputs, c), c, inputs.dt_s, inputs.middle)
 
@@ -147,5 +159,6 @@ def _rich(inputs: ModelInputs, c: Floats, through: Floats) -> Floats:
         through = transported(through, c[Slot.L], c[Slot.PIPE], max(inputs.middle, 1e-3), inputs.dt_s)
     full = c.copy()
     full[Slot.CAP] -= inputs.level
+    full[Slot.UPPER_CAP] -= inputs.level
     act, gain = load_over_record(inputs, c), gain_over_record(inputs, c)
     return vessel(through, act, gain, full, inputs.dt_s, inputs.middle, outflow_head(inputs, c))

@@ -62,7 +62,10 @@ class Slot(IntEnum):
     GAIN_SLOPE = 43
     SPEED = 44
     PLACE = 45
-    HEAD = 46
+    UPPER_CAP = 46
+    PASSED = 47
+    BEGUN = 48
+    HEAD = 49
 
 
 SIZE = int(Slot.HEAD) + KNOTS
@@ -98,7 +101,7 @@ def neutral() -> Floats:
     c[Slot.COAST] = -1.0
     c[Slot.MODE_T], c[Slot.NEIGHBOUR_T], c[Slot.OMEGA], c[Slot.SPILL_T] = 1.0, 1.0, 1.0, 1.0
     c[Slot.DAMPING] = 0.5
-    for slot in (Slot.RATE, Slot.STOP_HI, Slot.SPLIT, Slot.CAP, Slot.CLIP_HI):
+    for slot in (Slot.RATE, Slot.STOP_HI, Slot.SPLIT, Slot.CAP, Slot.UPPER_CAP, Slot.CLIP_HI):
         c[slot] = math.inf
     for slot in (Slot.STOP_LO, Slot.CLIP_LO):
         c[slot] = -math.inf

@@ -17,6 +17,7 @@ SLOPE, ROOT, CAP, SPILL, SPILL_T = (
     int(s) for s in (Slot.SLOPE, Slot.ROOT, Slot.CAP, Slot.SPILL, Slot.SPILL_T)
 )
 LEAK, PIPE, GAIN_SLOPE, SPEED = (int(s) for s in (Slot.LEAK, Slot.PIPE, Slot.GAIN_SLOPE, Slot.SPEED))
+UPPER_CAP, PASSED, BEGUN = (int(s) for s in (Slot.UPPER_CAP, Slot.PASSED, Slot.BEGUN))
 Memory = tuple[float, float, float, float, float]
 """What a vessel remembers: level, second mode, spilled liquid, second and third lag."""
 SHORT = 0.03
@@ -180,6 +181,22 @@ def kept(c: Floats, parts: tuple[float, float]) -> tuple[Floats, Floats]:
 
 
 @njit(cache=True, error_model="numpy")
+def poured(
+    level: float, feed: float, left: float, mean: float, cap: tuple[float, float], held_over: float
+) -> tuple[float, float]:
+    """Level of the vessel before the last one, after a while of constant feed, and the mean that leaves it meanwhile.
+
+    All in % PV of feed at rest. left, mean : of `held`; cap : level over which it spills, and the share [-] of what
+    it spills that falls into the next vessel; held_over : its time constant over that while [-].
+    """
+    after = feed + (level - feed) * left
+    out = feed + (level - feed) * mean
+    if after > cap[0]:
+        return cap[0], min(out, cap[0]) + cap[1] * (after - cap[0]) * held_over
+    return after, out
+
+
+@njit(cache=True, error_model="numpy")
 def vessel_span(
     span: tuple[int, int], m: Memory, drive: tuple[Floats, Floats, Floats], c: Floats, dt_s: float, base: float,
     head: float, out: Floats,
@@ -202,6 +219,8 @@ def vessel_span(
     rises = shares_filled(o, times)
     left, mean = kept(c, parts)
     k_gain, bias, share, second, third = c[K], c[BIAS], c[SHARE], c[T2] > 0.0, c[T3] > 0.0
+    upper = (c[UPPER_CAP], c[PASSED])
+    pours = math.isfinite(upper[0])
     for k in range(*span):
         out[k] = (1.0 - share) * x + share * mode
         factor, added = gain[k], k_gain * act[k]
@@ -212,7 +231,9 @@ def vessel_span(
             if o.gain_slope != 0.0:
                 feed *= scheduled(x, o.gain_slope)
             feed += added
-            if second:
+            if second and pours:
+                z2, feed = poured(z2, feed, left[half, 0], mean[half, 0], upper, c[T2] / parts[half])
+            elif second:
                 z2, feed = feed + (z2 - feed) * left[half, 0], feed + (z2 - feed) * mean[half, 0]
             if third:
                 z3, feed = feed + (z3 - feed) * left[half, 1], feed + (z3 - feed) * mean[half, 1]
@@ -229,9 +250,9 @@ def vessel_span(
 
 @njit(cache=True, error_model="numpy")
 def at_start(first: float, c: Floats, base: float) -> Memory:
-    """The vessel's memory before the first sample, at the first flow [% OP]."""
+    """The vessel's memory before the first sample: at the first flow [% OP], but for what is begun elsewhere."""
     feed = c[K] * (first - base) + c[BIAS]
-    return c[START], c[START], 0.0, feed, feed
+    return c[START], c[START], 0.0, min(feed + c[BEGUN], c[UPPER_CAP]), feed
 
 
 @njit(cache=True, error_model="numpy")

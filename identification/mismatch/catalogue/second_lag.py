@@ -42,5 +42,12 @@ EFFECT = Effect(
             label="and a third",
             delays=(Slot.T2, Slot.T3),
         ),
+        Variant(
+            (SECOND, Param(Slot.BEGUN, "begun_pct", "% PV", -300.0, 300.0, hidden=True)),
+            each(Slot.T2, 0.7, 1.5, 3.0, 6.0, 12.0, 25.0, 50.0, 100.0),
+            label="begun elsewhere",
+            delays=(Slot.T2,),
+            needs="experiment",
+        ),
     ),
 )

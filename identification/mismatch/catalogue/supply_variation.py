@@ -23,6 +23,10 @@ def supply_over_time(d: Drawing) -> Shape:
     return course(d, at, read, Axis("supply", "% of its mean"))
 
 
+KNOT = tuple(Param(int(Slot.HEAD) + i, f"head_{i + 1}", "", -2.0, 2.0, hidden=True) for i in range(KNOTS))
+ADDED = 1e4
+"""Flow at rest [% OP] beside which a course that is added has no part in the gain; ours."""
+
 EFFECT = Effect(
     name="supply-variation",
     block=Block.LOAD,
@@ -34,18 +38,17 @@ EFFECT = Effect(
         "coupling": "The supply's own trend beside the other loop's OP.",
     },
     timed=True,
+    needs="moves",
     curve=supply_over_time,
     variants=(
         Variant(
             (
                 Param(Slot.HEAD_BIAS, "flow_at_rest_pct", "% OP", -60.0, 60.0, title="Flow at rest"),
-                *(
-                    Param(int(Slot.HEAD) + i, f"head_{i + 1}", "", -2.0, 2.0, hidden=True)
-                    for i in range(KNOTS)
-                ),
+                *KNOT,
             ),
             ({Slot.HEAD_BIAS: 8.0},),
             penalty=-5.0,
+            opponent=Variant(KNOT, ({},), fixed={Slot.HEAD_BIAS: ADDED}),
         ),
     ),
 )

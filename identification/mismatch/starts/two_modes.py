@@ -84,9 +84,9 @@ def fits_row(point: Point, row: Variant) -> bool:
 def mode_starts(p: Problem, near: Fitted, row: Variant) -> list[Model]:
     """Starts of a two-mode row from the grid."""
     blind = np.zeros_like(near.ar)
-    blind[0] = LEADING
+    blind[:1] = LEADING
     out = []
-    for ar in (near.ar, blind):
+    for ar in (near.ar, blind) if near.ar.size else (near.ar,):
         for point in [q for q in grid(p, near, row, ar) if fits_row(q, row)][:KEPT]:
             c = near.model.c.copy()
             c[Slot.T], c[Slot.L], c[Slot.MODE_T] = (

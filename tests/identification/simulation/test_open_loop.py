@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from identification.models import Backlash, Fopdt, Integrator, Motion, Process, Stiction, Valve
-from identification.simulation.open_loop import ModelInputs, as_parameters, simulate
+from identification.simulation.open_loop import ModelInputs, as_parameters, begun_at_rest, simulate
 from identification.simulation.parameters import Slot, neutral
 from identification.simulation.valve import play
 from tests.identification.responses import pv_of
@@ -111,3 +111,36 @@ def test_overflow_is_flat_and_then_late() -> None:
     assert capped.max() < 0.5 * top + 0.3
     assert clipped.max() <= 0.5 * top + 1e-9
     assert not np.allclose(capped, clipped, atol=0.05)
+
+
+def by_euler(op: np.ndarray, c: np.ndarray, level: float, parts: int = 400) -> np.ndarray:
+    """PV's deviation of two vessels in series, the upper of which spills, in small steps, shape (n,)."""
+    middle, dt = float(op[0]), 2.0 / parts
+    x, above, out = c[Slot.START], c[Slot.BIAS] + c[Slot.BEGUN], np.empty(op.size)
+    fed = np.concatenate((np.full(round(c[Slot.L] / dt), op[0]), np.repeat(op, parts)))
+    for k in range(op.size):
+        out[k] = x
+        for u in fed[k * parts : (k + 1) * parts]:
+            above += dt / c[Slot.T2] * (c[Slot.K] * (u - middle) + c[Slot.BIAS] - above)
+            spilt = max(above - (c[Slot.UPPER_CAP] - level), 0.0)
+            above -= spilt
+            x += dt / c[Slot.T] * (above - x) + c[Slot.PASSED] * spilt * c[Slot.T2] / c[Slot.T]
+    return out
+
+
+def test_a_vessel_that_spills_into_the_next() -> None:
+    """What the upper of two vessels spills falls on in the share stated: as small steps of the balance have it."""
+    s = inputs(n=150)
+    c = constants(T2=25.0, UPPER_CAP=52.0, PASSED=0.6, BEGUN=-3.0, L=8.0)
+    expected = by_euler(s.op, c, s.level)
+    assert np.abs(simulate(s, c) - expected).max() < 0.02 * np.ptp(expected)
+    without = simulate(s, constants(T2=25.0, BEGUN=-3.0, L=8.0))
+    assert np.abs(without - expected).max() > 0.2 * np.ptp(expected)
+
+
+@pytest.mark.parametrize("root", [0.0, 0.8])
+def test_begun_at_rest_pv_does_not_move(root: float) -> None:
+    """A vessel fed at first what its level lets go begins level, wherever it stands and OP is; else it does not."""
+    s, c = inputs(), constants(T2=60.0, BEGUN=5.0, START=-6.0, BIAS=2.0, ROOT=root)
+    assert np.diff(simulate(s, begun_at_rest(s, c)))[0] == pytest.approx(0.0, abs=0.01)
+    assert np.diff(simulate(s, c))[0] > 0.3

@@ -1,0 +1,92 @@
+"""Experiments in open loop: OP moved by hand or by a script, so that what a simulation misses is the model's lack.
+
+Where a controller answers PV, a load moves OP too, and only innovations tell effect and load apart (noise.py). Where
+none does, no load hides in OP; the innovations then see little of what is slow, for a noise model takes it up.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from identification.controller.feedback import fed_back
+from identification.estimation.candidate import Model, gain
+from identification.estimation.prediction_error import descend
+from identification.estimation.start_values import plain_processes
+from identification.mismatch.catalogue import EFFECTS
+from identification.mismatch.cross_validation import is_one_move
+from identification.mismatch.explanation import Explanation
+from identification.mismatch.forward_selection import Candidate
+from identification.mismatch.kept_effects import carried_over
+from identification.mismatch.recording import Recording
+from identification.mismatch.sets_of_effects import cleared
+
+
+def is_experiment(s: Recording) -> bool:
+    """Whether OP was moved by hand or by a script: nothing is known of a controller, and OP does not answer PV.
+
+    In a loop that cycles, so that PV tells OP's moves and is told by them, OP must stand still nearly always.
+    """
+    if s.sp is not None or s.stated is not None or fed_back(s.op, s.pv) >= s.limits.controller.feedback:
+        return False
+    cycles = s.cycles is not None or s.free_valve
+    return not cycles or float(np.mean(np.diff(s.op) != 0.0)) < s.limits.controller.by_hand
+
+
+def coarser_by(s: Recording) -> int:
+    """Of how many samples of an experiment one tells all there is to tell of its process; 1 where each is needed."""
+    limits = s.limits.search
+    most = s.pv.size // limits.experiment_samples
+    if most < 2:
+        return 1
+    fast = min(x.time_constant_s + x.dead_time_s for x in plain_processes(s.pv, s.op, s.usable, s.dt_s))
+    return max(min(most, int(fast / (limits.samples_a_lag * s.dt_s))), 1)
+
+
+def most_telling_first(found: Explanation) -> Explanation:
+    """The explanation with its effects in the order of what the simulation would miss without each."""
+    full = found.p.limits.search.full_steps
+    rows = found.best.model.added
+    missed = {}
+    for row in rows if len(rows) > 1 else ():
+        others = tuple(r for r in rows if r.name != row.name)
+        missed[row.name] = descend(found.p, Model(others, cleared(found.best.model.c, row)), full).loss
+    if not missed:
+        return found
+
+    def worth(one: Candidate) -> float:
+        return -missed[one.name]
+
+    ordered = tuple(sorted(rows, key=lambda row: -missed[row.name]))
+    best = replace(found.best, model=replace(found.best.model, added=ordered))
+    return replace(found, best=best, accepted=tuple(sorted(found.accepted, key=worth)))
+
+
+def nearer(one: Explanation, other: Explanation) -> Explanation:
+    """Of two explanations the one whose simulation is nearer to PV: on held-out data, or over all where none could be
+    held out, for OP moved once or an effect is bound to a time."""
+    timed = any(EFFECTS[c.name].timed for c in (*one.accepted, *other.accepted))
+    over_all = timed or is_one_move(one.p)
+
+    def missed(found: Explanation) -> float:
+        if found.proof is None:
+            return math.inf
+        return (found.proof.overall if over_all else found.proof.held)[1].rmse
+
+    return min(one, other, key=missed)
+
+
+def is_seconded(found: Explanation, told: Explanation) -> bool:
+    """Whether innovations gain what one constant costs by the effects that a simulation's misfit tells: two signs."""
+    limits = told.p.limits.search
+    seen = descend(told.p, found.best.model, limits.full_steps)
+    return gain(seen, told.plain) > limits.search_penalty + limits.parameter_penalty
+
+
+def judged_by_simulation(found: Explanation, other: Explanation) -> Explanation:
+    """An experiment's explanation by innovations, fitted anew to what its simulation misses, as the other one is."""
+    best = descend(other.p, found.best.model, other.p.limits.search.full_steps)
+    anew = replace(found, p=other.p, plain=other.plain, best=best, left=other.left, by_innovations=found)
+    return carried_over(most_telling_first(anew))

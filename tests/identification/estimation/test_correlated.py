@@ -1,0 +1,25 @@
+"""How many samples tell as much as an independent one."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from identification.estimation.candidate import correlated
+
+
+@pytest.mark.parametrize("pole", [0.0, 0.5, 0.9])
+def test_of_a_first_order_noise_it_is_known(pole: float) -> None:
+    """Noise of first order with pole a has (1 + a) / (1 - a) samples to an independent one."""
+    e = np.random.default_rng(5).standard_normal(40_000)
+    x = np.empty(e.size)
+    x[0] = e[0]
+    for k in range(1, e.size):
+        x[k] = pole * x[k - 1] + e[k]
+    assert correlated(x) == pytest.approx((1.0 + pole) / (1.0 - pole), rel=0.15)
+
+
+def test_a_constant_is_one_sample() -> None:
+    """An error that never changes tells once, however long it is recorded."""
+    assert correlated(np.full(700, 3.0)) == 700.0
+    assert correlated(np.zeros(700)) == 700.0

@@ -1,0 +1,74 @@
+"""Experiments in open loop: what a simulation misses is named, what a load does is not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identification.controller.check import StatedSettings
+from identification.mismatch.answer import answer
+from identification.mismatch.diagnosis import explain
+from identification.mismatch.experiment import coarser_by, is_experiment
+from tests.proofs.experiments import Plant, asked, carried_misfit, drawn, slow_mode
+
+
+def test_only_an_output_that_nobody_closed_is_an_experiment() -> None:
+    """A set point, or settings of a controller, make a loop of a record whose OP a script moved."""
+    s, _ = drawn("plain", 3)
+    assert is_experiment(s)
+    assert not is_experiment(replace(s, sp=np.full(s.pv.size, 50.0)))
+    assert not is_experiment(replace(s, stated=StatedSettings(1.0, 20.0)))
+    assert not is_experiment(replace(s, op=100.0 - s.pv))
+
+
+@pytest.mark.parametrize("seed", [41, 42])
+def test_a_plain_process_under_a_slow_load_is_none(seed: int) -> None:
+    """A load that wanders more slowly than the process answers makes no physics of a plain process."""
+    said, _ = asked("plain", seed)
+    assert said.verdict == "none"
+
+
+def test_a_slow_wall_is_told_by_one_step_and_carries_over() -> None:
+    """The creep behind a single step is a slow mode, and its model misses less of other moves by half."""
+    rng, wall = np.random.default_rng(1), Plant(1.0, 15.0, 3.0, 0.2 / 0.375)
+    one, other = drawn("plain", 51)
+    step = np.where(np.arange(one.op.size) < 200, 50.0, 60.0)
+    made = [slow_mode(op, rng, wall) + 0.05 * rng.standard_normal(op.size) for op in (step, other.op)]
+    s, later = replace(one, op=step, pv=np.round(made[0], 2)), replace(other, pv=np.round(made[1], 2))
+    found = explain(s)
+    said = answer(found, s)
+    assert said.verdict == "slow-mode"
+    assert said.effects[0].parameters["slow_share"].value == pytest.approx(0.2, abs=0.03)
+    assert said.effects[0].parameters["slow_time_constant_s"].value == pytest.approx(120.0, rel=0.2)
+    before, after = carried_misfit(found, later)
+    assert after < 0.5 * before
+
+
+def test_two_vessels_with_holes_carry_over() -> None:
+    """Behind two vessels, the upper of which spills, what is named halves the misfit of another recording."""
+    s, later = drawn("two vessels", 6)
+    found = explain(s)
+    names = {e.name for e in answer(found, s).effects}
+    assert names & {"overflow", "sqrt-outflow", "second-lag"}
+    before, after = carried_misfit(found, later)
+    assert after < 0.5 * before
+
+
+def test_a_long_experiment_is_judged_at_a_coarser_step() -> None:
+    """Twelve thousand samples of a lag of a hundred are taken by thirds, and a lag of six samples is not."""
+    rng = np.random.default_rng(3)
+    s, _ = drawn("plain", 5)
+    op = np.repeat(50.0 + 8.0 * rng.choice([-1.0, 1.0], 60), 200)
+
+    def after(lag: float) -> int:
+        x, pv = 0.0, np.empty(op.size)
+        for k in range(op.size):
+            pv[k] = x
+            x += (op[k] - 50.0 - x) / lag
+        pv += 0.05 * rng.standard_normal(op.size)
+        return coarser_by(replace(s, op=op, pv=pv, usable=np.ones(op.size, bool)))
+
+    assert after(100.0) == 3
+    assert after(6.0) == 1
