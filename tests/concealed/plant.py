@@ -53,6 +53,12 @@ class Plant(NamedTuple):
     echo: float = 0.0
     echo_s: float = 0.0
     helper: float = 0.0  # strength of a hidden second controller
+    recall: float = 0.0  # relative gain change per 10 % of where PV has been
+    recall_s: float = 1.0
+    grip: float = 0.0  # the sensor follows only once PV is so far [%] from what it shows
+    switch: float = 0.0  # load [% OP] that is on while PV is high
+    switch_at: float = 0.0  # above y0 [%], half a band to either side
+    switch_band: float = 1.0
     mount: float = 0.0  # share of a swinging mount
     mount_w: float = 1.0
     mount_z: float = 0.1
@@ -145,6 +151,20 @@ def aid(now: float, y: float, on: float, dt: float, p: Any) -> float:
 
 
 @njit(cache=True)
+def gripped(shown: float, seen: float, grip: float) -> float:
+    """What a sensor shows that follows only once it is `grip` [%] off, and then at once."""
+    return seen if abs(seen - shown) >= grip else shown
+
+
+@njit(cache=True)
+def switched(on: float, x: float, at: float, band: float) -> float:
+    """Whether (1, 0) a load is on that PV itself switches, at a deviation [%] with a band about it."""
+    if x > at + 0.5 * band:
+        return 1.0
+    return 0.0 if x < at - 0.5 * band else on
+
+
+@njit(cache=True)
 def settle(p: Any, c: Any, sp: float) -> tuple[np.ndarray, np.ndarray]:
     """Valve stages and controller memory of a loop at rest."""
     valve = np.zeros(8)
@@ -162,8 +182,11 @@ def run(p: Any, c: Any, rows: np.ndarray, given: np.ndarray, closed: bool, h: fl
     x, work, out = np.zeros(STATES), np.zeros((5, STATES)), np.zeros((2, n))
     valve, memory = settle(p, c, rows[0, 0])
     now, back, aided = 0, 0, 0.0
+    felt, on, shown = 0.0, 0.0, p.y0
     for k in range(n):
-        out[0, k] = reading(x, rows[3, k], rows[4, k], p)
+        seen = reading(x, rows[3, k], rows[4, k], p)
+        shown = gripped(shown, seen, p.grip)
+        out[0, k] = shown
         u = given[k]
         if closed:
             u = decide(rows[0, k], out[0, k], memory, rows[6, k], rows[7, k], h, c)
@@ -179,7 +202,10 @@ def run(p: Any, c: Any, rows: np.ndarray, given: np.ndarray, closed: bool, h: fl
             old = now - int(p.echo_s / dt)
             again = p.echo * past[old] / p.K if old > 0 else 0.0
             aided = aid(aided, p.y0 + x[0], rows[8, k], dt, p)
-            feed = p.K * gain * ((q - p.v0) * rows[2, k] + rows[1, k] + rows[9, k] + again + aided)
+            felt += (x[0] - felt) * dt / p.recall_s
+            on = switched(on, x[0], p.switch_at, p.switch_band)
+            act = rows[1, k] + rows[9, k] + again + aided + p.switch * on
+            feed = p.K * gain * max(1.0 + p.recall * felt / 10.0, 0.1) * ((q - p.v0) * rows[2, k] + act)
             advance(x, work, feed, rows[3, k], dt, p)
             past[now] = level_of(x, p) - p.y0
     return out

@@ -51,12 +51,32 @@ def bursts(scene: Scene, s: float, rng: Rng) -> Made:
     return both(scene, burst), {"burst": s}
 
 
+def long_memory(scene: Scene, s: float, rng: Rng) -> Made:
+    """A gain that goes with where PV has been for many time constants."""
+    slow = rng.uniform(15.0, 40.0) * (scene.plant.T + scene.plant.L)
+    return scene.with_plant(recall=s, recall_s=slow), {"recall": s, "recall_s": slow}
+
+
+def sticking_sensor(scene: Scene, s: float, rng: Rng) -> Made:
+    """A sensor that stands until PV is a way off, and then jumps."""
+    return scene.with_plant(grip=s), {"grip": s}
+
+
+def switched_load(scene: Scene, s: float, rng: Rng) -> Made:
+    """A load that PV switches on when it is high, and off when it is low."""
+    at = float(rng.uniform(-1.5, 1.5))
+    return scene.with_plant(switch=s, switch_at=at, switch_band=1.0), {"switch": s, "switch_at": at}
+
+
 OUTSIDE = (
     Effect("rate-gain", "valve", rate_gain, 0.002, 5.0),
     Effect("swinging-mount", "sensor", swinging_mount, 0.01, 0.9),
     Effect("hidden-controller", "load", hidden_controller, 0.01, 30.0),
     Effect("recycle", "process", recycle, 0.005, 0.6),
     Effect("bursts", "sensor", bursts, sizes=(3.0, 1.5, 0.7, 0.35)),
+    Effect("long-memory", "process", long_memory, 0.002, 3.0),
+    Effect("sticking-sensor", "sensor", sticking_sensor, sizes=(3.0, 2.0, 1.2, 0.8)),
+    Effect("switched-load", "load", switched_load, 0.01, 20.0),
 )
 
 
