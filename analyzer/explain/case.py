@@ -25,6 +25,7 @@ from identification.estimation.likelihood_ratio import WindowFit
 from identification.estimation.trials import trials_between_moves
 from identification.mismatch.experiment import coarser_by, is_experiment
 from identification.mismatch.recording import Recording, SeenInCycles
+from identification.mismatch.recording_faults import least_jump
 from identification.models import Pid
 from identification.record import Floats
 
@@ -166,6 +167,13 @@ def case(
         raise NotAssessedError(f"{spec.loop}: needs OP, has none")
     if float(np.ptp(r.op)) == 0 or float(np.ptp(r.pv)) == 0:
         raise NotAssessedError(f"{spec.loop}: needs OP and PV that move, one of them stands still")
+    jump = least_jump(r.pv, config.explain.recorder)
+    if jump > 0.0:
+        stands = 100.0 * float(np.mean(np.diff(r.pv) == 0.0))
+        raise NotAssessedError(
+            f"{spec.loop}: needs PV as measured; it stands for {stands:.0f} % of the samples and else moves by "
+            f"{jump:.2g} % or more: a sensor that sticks, or a historian that keeps large changes alone"
+        )
     stamps = raw.stamp_s[~raw.bad]
     stamps = stamps[(stamps >= r.start_s - r.dt_s) & (stamps <= r.start_s + r.duration_s)]
     verdict = verdict_on(spec, prepared, config)

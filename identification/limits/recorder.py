@@ -62,3 +62,25 @@ class RecorderLimits:
         "Spacing of stamps from which a sample is missing",
         "ours: polling scatters by less",
     )
+    stands: float = limit(
+        0.4,
+        "-",
+        (0.0, 1.0),
+        "Share of samples at which PV stands from which it may be one that stands and jumps",
+        "ours: sensors that stick by 1 to 3 % stand for 96 to 99 % of sealed cases",
+    )
+    jumps: int = limit(20, "-", (1, 1000000), "Moves that such a PV makes at least", "ours: fewer are steps")
+    jump_steps: float = limit(
+        4.0,
+        "-",
+        (1.0, 1e6),
+        "Its least move over the steps in which it is recorded",
+        "ours: sealed sensors that stick 24 to 150; none of 471 recordings of ../shared passes the three",
+    )
+    jump_share: float = limit(
+        0.03,
+        "-",
+        (0.0, 1.0),
+        "Its least move over PV's range",
+        "ours: sealed sensors that stick .11 and more",
+    )

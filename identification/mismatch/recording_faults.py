@@ -57,6 +57,23 @@ def quantization(pv: Floats, ranged: bool, limits: RecorderLimits = LIMITS.recor
     return Finding({STEP: float(np.median(gaps))}, np.ones(pv.size, dtype=bool))
 
 
+def least_jump(pv: Floats, limits: RecorderLimits = LIMITS.recorder) -> float:
+    """The least move [% PV] of a trend that stands and then jumps, far over its own resolution; 0 of any other.
+
+    A sensor that sticks makes such a trend, or a historian that keeps changes of some size alone.
+    """
+    moves, gaps = np.abs(np.diff(pv)), np.diff(np.unique(pv))
+    moves = moves[moves > 0.0]
+    if moves.size < limits.jumps or moves.size > (1.0 - limits.stands) * pv.size:
+        return 0.0
+    jump = float(np.quantile(moves, 0.02))
+    low, high = np.quantile(pv, [0.05, 0.95])
+    coarse = jump > limits.jump_steps * float(np.quantile(gaps, 0.1)) and jump > limits.jump_share * (
+        high - low
+    )
+    return jump if coarse else 0.0
+
+
 def clipped(pv: Floats, limits: RecorderLimits = LIMITS.recorder) -> Finding | None:
     """PV standing at exactly its highest or lowest value far more often than at those next to it."""
     levels, counts = np.unique(pv, return_counts=True)

@@ -65,3 +65,22 @@ def test_the_grid_is_its_unit_where_values_are_left_out() -> None:
     found = recording_faults.quantization(pv, True)
     assert found is not None
     assert found.values["step_pct"] == pytest.approx(0.4, rel=0.01)
+
+
+def standing(wave: np.ndarray, grip: float, grid: float) -> np.ndarray:
+    """A sensor that follows only once it is `grip` off, recorded in steps of `grid`."""
+    out, shown = np.empty(wave.size), wave[0]
+    for k, value in enumerate(wave):
+        shown = value if abs(value - shown) >= grip else shown
+        out[k] = np.round(shown / grid) * grid
+    return out
+
+
+def test_a_sensor_that_stands_and_jumps_is_seen() -> None:
+    """PV that moves only once it is 1 % off is told with that; noise, a coarse grid and few steps of SP are not."""
+    rng = np.random.default_rng(3)
+    wave = 50.0 + 6.0 * np.sin(np.arange(6000) / 90.0) + 0.1 * rng.standard_normal(6000)
+    assert recording_faults.least_jump(standing(wave, 1.0, 0.01)) == pytest.approx(1.0, abs=0.1)
+    stairs = np.repeat(50.0 + 5.0 * rng.standard_normal(12), 500)
+    for sound in (wave, np.round(wave, 1), np.round(wave / 2.0) * 2.0, np.round(stairs, 2)):
+        assert recording_faults.least_jump(sound) == 0.0
