@@ -44,6 +44,13 @@ ONE_MOVE_ONLY = "rests on one move of OP, of which nothing is left to prove it o
 """What a recording of one experiment lacks."""
 
 
+STACKED = (
+    "The loop does something that no known cause explains: only {names}, stacked on each other, come near it, and "
+    "one cause is likelier than three."
+)
+"""Why a stack of effects is no name."""
+
+
 @dataclass(frozen=True, slots=True)
 class EffectFound:
     """One effect: name, block, parameters, the part of the held-out misfit it removes, and its alternatives."""
@@ -179,11 +186,18 @@ def verdict_of(
     """The verdict and its block; what is left over, and what a record cannot tell, has no name."""
     if found.refuted and not found.accepted and not any(found_first(found)):
         return "unexplained", "none"
-    if found.left > 0 and not any(found_first(found)) and not by_cycles(found):
+    none = (found.left > 0 or is_stack(found)) and not any(found_first(found)) and not by_cycles(found)
+    if none:
         return "unexplained", LIVES.get(at.carrying[0].name, "process") if at.carrying else "process"
     if effects and not (insensitive and effects[0].block in (Block.VALVE, Block.PROCESS)):
         return effects[0].name, effects[0].block
     return ("unexplained", "none") if lacking else ("none", "none")
+
+
+def is_stack(found: Explanation) -> bool:
+    """Whether a loop is given as many effects as are looked for: one that the catalogue lacks comes out as a stack of
+    those it has. Rigs in open loop do have several."""
+    return len(found.accepted) >= found.p.limits.search.rounds and not found.p.by_simulation
 
 
 def by_cycles(found: Explanation) -> bool:
@@ -220,7 +234,8 @@ def _note(found: Explanation) -> str:
             "recording of this loop is needed."
         )
     if found.left <= 0:
-        return ""
+        stacked = " and ".join(c.name for c in found.accepted)
+        return STACKED.format(names=stacked) if is_stack(found) else ""
     return (
         "The loop does something that no known cause explains: a flexible model without a name does better "
         f"(log likelihood +{found.left:.0f})."

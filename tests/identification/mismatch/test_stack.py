@@ -1,0 +1,27 @@
+"""Three effects stacked on each other are no name."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from identification.estimation.candidate import Model
+from identification.estimation.noise import NO_NOISE
+from identification.mismatch.answer import is_stack
+from identification.mismatch.catalogue import CANDIDATES
+from identification.mismatch.diagnosis import inputs_of
+from identification.mismatch.explanation import Explanation
+from identification.mismatch.forward_selection import Candidate, prepared
+from tests.identification.hand_made import Plant, recording
+
+
+@pytest.mark.parametrize(("count", "stacked"), [(1, False), (2, False), (3, True)])
+def test_three_effects_of_a_loop_are_a_stack_and_two_are_a_pair(count: int, stacked: bool) -> None:
+    """Of a loop in closed loop three effects are a stack, two are not; of an experiment three are not either."""
+    s = recording(Plant(), 1)
+    p, fit = prepared(inputs_of(s), s.pv - s.pv.mean(), s.usable)
+    rows = [next(r for r in CANDIDATES if r.name == n) for n in ("slow-mode", "backlash", "gain-drift")]
+    taken = tuple(Candidate(replace(fit, model=Model((r,), fit.model.c)), 20.0, 10.0) for r in rows[:count])
+    assert is_stack(Explanation(p, fit, fit, accepted=taken)) is stacked
+    assert not is_stack(Explanation(replace(p, edges=NO_NOISE), fit, fit, accepted=taken))
