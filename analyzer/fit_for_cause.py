@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
+from analyzer import words
 from analyzer.config import Config, QualityLimits
 from analyzer.decisions import Lack, Needs
 from analyzer.oscillation import Oscillation
 from analyzer.quality import Prepared
 from analyzer.sample_clock import constant_for
+from identification.limits.recorder import RecorderLimits
+from identification.mismatch.recording_faults import least_jump
 from identification.record import LoopRecord
 
 
@@ -22,7 +25,16 @@ def unfit_for_cause(prepared: Prepared, oscillation: Oscillation | None, config:
         return Needs(Lack.OP, "needs OP, which is not recorded")
     if float(np.ptp(record.op)) == 0.0:
         return Needs(Lack.MOVING_OP, "needs OP that moves, it stands still")
-    return compressed(prepared, oscillation, q) or _scattered(record, q) or at_limits(record, q)
+    jumps = _jumps(record, config.explain.recorder)
+    return jumps or compressed(prepared, oscillation, q) or _scattered(record, q) or at_limits(record, q)
+
+
+def _jumps(record: LoopRecord, limits: RecorderLimits) -> Needs | None:
+    """What a PV lacks that stands and then jumps, as behind a valve that sticks, though it is the sensor that does;
+    None of any other."""
+    jump = least_jump(record.pv[~record.bad], limits)
+    stands = float(np.mean(np.diff(record.pv) == 0.0))
+    return Needs(Lack.FINER, words.stands_and_jumps(stands, jump)) if jump > 0.0 else None
 
 
 def compressed(prepared: Prepared, oscillation: Oscillation | None, q: QualityLimits) -> Needs | None:

@@ -75,6 +75,14 @@ def too_few(samples: float, needed: float) -> str:
     )
 
 
+def stands_and_jumps(stands: float, jump_pct: float) -> str:
+    """What a PV lacks that stands for a share of the samples [-] and else moves by so much [% of span] or more."""
+    return (
+        f"needs PV as measured; it stands for {100.0 * stands:.0f} % of the samples and else moves by "
+        f"{jump_pct:.2g} % or more: a sensor that sticks, or a historian that keeps large changes alone"
+    )
+
+
 def too_rough(step_pct: float, amplitude_pct: float) -> str:
     """Why a coarse grid tells no cause."""
     return (

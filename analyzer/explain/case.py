@@ -18,6 +18,7 @@ from analyzer.loops.tags import controller
 from analyzer.oscillation import counting, detect
 from analyzer.quality import Prepared, prepare
 from analyzer.sample_clock import onto_clock
+from analyzer.words import stands_and_jumps
 from identification.controller.check import StatedSettings
 from identification.errors import NotAssessedError
 from identification.estimation.hammerstein import process_of
@@ -169,11 +170,8 @@ def case(
         raise NotAssessedError(f"{spec.loop}: needs OP and PV that move, one of them stands still")
     jump = least_jump(r.pv, config.explain.recorder)
     if jump > 0.0:
-        stands = 100.0 * float(np.mean(np.diff(r.pv) == 0.0))
-        raise NotAssessedError(
-            f"{spec.loop}: needs PV as measured; it stands for {stands:.0f} % of the samples and else moves by "
-            f"{jump:.2g} % or more: a sensor that sticks, or a historian that keeps large changes alone"
-        )
+        stands = float(np.mean(np.diff(r.pv) == 0.0))
+        raise NotAssessedError(f"{spec.loop}: {stands_and_jumps(stands, jump)}")
     stamps = raw.stamp_s[~raw.bad]
     stamps = stamps[(stamps >= r.start_s - r.dt_s) & (stamps <= r.start_s + r.duration_s)]
     verdict = verdict_on(spec, prepared, config)

@@ -1,0 +1,47 @@
+"""A sensor that sticks makes a cycle that looks like a sticking valve's: nothing is told of such a PV."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from plant import CONFIG, Sketch, Trends, prepared
+
+from analyzer.assess import assess
+from analyzer.decisions import Lack
+
+HEALTHY = Sketch("none", (1.2, 60.0, 10.0), 1.2, 60.0, noise=0.1, load_std=1.0)
+
+
+def behind_a_sticking_sensor(grip: float, seed: int, n: int = 14_400) -> Trends:
+    """SP, PV and OP, shape (n,) each at 1 s, of a sound loop whose sensor follows only once it is `grip` [%] off."""
+    rng, (gain, lag, dead) = np.random.default_rng(seed), HEALTHY.process
+    late, held, x, load, shown = [50.0] * int(dead), 50.0, 50.0, 0.0, 50.0 - 0.4 * grip
+    pv, op = np.empty(n), np.empty(n)
+    for k in range(n):
+        load += 0.02 * rng.standard_normal() - load / 600.0
+        seen = x + 0.1 * rng.standard_normal()
+        shown = round(seen, 2) if abs(seen - shown) >= grip else shown
+        pv[k], e = shown, 50.0 - shown
+        held += HEALTHY.kp / HEALTHY.ti * e
+        op[k] = np.round(HEALTHY.kp * e + held, 2)
+        late.append(op[k])
+        x += (50.0 + gain * (late.pop(0) - 50.0 + load) - x) / lag
+    return Trends(np.full(n, 50.0), pv, op, op)
+
+
+@pytest.mark.parametrize("grip", [0.8, 1.5, 3.0])
+def test_its_valve_is_not_blamed(grip: float) -> None:
+    """No cause is told of a loop that cycles by its sensor; the reason asks for PV as measured."""
+    trends = behind_a_sticking_sensor(grip, 3)
+    found = assess(prepared(trends), HEALTHY.controller, CONFIG)
+    assert found.verdict.cause in ("undecided", "none")
+    assert found.verdict.needs is not None
+    assert found.verdict.needs.lack is Lack.FINER
+    assert "stands" in found.verdict.needs.text
+
+
+def test_a_sound_sensor_is_not_doubted() -> None:
+    """The same loop with a sensor that follows lacks nothing."""
+    found = assess(prepared(behind_a_sticking_sensor(0.0, 3)), HEALTHY.controller, CONFIG)
+    assert found.verdict.cause == "none"
+    assert found.verdict.needs is None or "stands" not in found.verdict.needs.text
