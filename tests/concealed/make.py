@@ -20,7 +20,7 @@ from concealed.acting import scaled
 from concealed.company import add_neighbour, borrow, read_residuals, with_neighbour
 from concealed.effects import CATALOGUE, Effect, apply
 from concealed.grade import LEVELS, Grade, energy_of, fopdt, noise_like, quiet, strength_for
-from concealed.plan import Case, plan
+from concealed.plan import Case, outside_alone, plan
 from concealed.plant import close_loop, open_loop
 from concealed.recorder import leave_out, record
 from concealed.scene import Rng, Scene, draw_scene
@@ -170,10 +170,10 @@ def write(out: pathlib.Path, sealed: list[tuple[list[dict], str, dict]]) -> None
     (out / "truth.json").write_text(json.dumps({tag: truth for _, tag, truth in sealed}, indent=1))
 
 
-def make(out: pathlib.Path, cases: int, seed: int, residuals: pathlib.Path | None, jobs: int) -> None:
+def make(out: pathlib.Path, todo: list[Case], residuals: pathlib.Path | None, jobs: int) -> None:
     """Seal a whole set with `jobs` processes."""
     out.mkdir(parents=True, exist_ok=True)
-    todo, begun, sealed = plan(cases, seed), time.time(), []
+    cases, begun, sealed = len(todo), time.time(), []
     work = partial(seal, out, read_residuals(residuals))
     with multiprocessing.Pool(jobs) as pool:
         for i, s in enumerate(pool.imap(work, todo, chunksize=1), 1):
@@ -190,8 +190,10 @@ def main() -> None:
     ap.add_argument("--seed", type=int, default=1)
     ap.add_argument("--residuals", type=pathlib.Path, help="folder of residual series to take loads from")
     ap.add_argument("--jobs", type=int, default=2)
+    ap.add_argument("--outside", action="store_true", help="physics outside the catalogue alone")
     a = ap.parse_args()
-    make(a.out, a.cases, a.seed, a.residuals, a.jobs)
+    todo = (outside_alone if a.outside else plan)(a.cases, a.seed)
+    make(a.out, todo, a.residuals, a.jobs)
 
 
 if __name__ == "__main__":

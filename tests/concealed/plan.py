@@ -71,3 +71,11 @@ def plan(cases: int, seed: int) -> list[Case]:
     order = rng.permutation(len(every))
     seeds = rng.integers(2**31, size=len(every))
     return [Case(f"L{i:04d}", every[j][0], every[j][1], int(seeds[i])) for i, j in enumerate(order)]
+
+
+def outside_alone(cases: int, seed: int) -> list[Case]:
+    """Cases of physics outside the catalogue alone, every kind as often at each of three levels."""
+    rng = np.random.default_rng(seed)
+    cards = [((e.name, level),) for e in OUTSIDE for level in ("plain", "masked", "concealed")]
+    hand, seeds = dealt(rng, cards, cases), rng.integers(2**31, size=cases)
+    return [Case(f"L{i:04d}", h, "", int(s)) for i, (h, s) in enumerate(zip(hand, seeds, strict=True))]
