@@ -14,7 +14,7 @@ from identification.mismatch import recording_faults
 from identification.mismatch.catalogue import CANDIDATES, CONTROLLER_FAULTS, EFFECTS, RECORDER_FAULTS, fault
 from identification.mismatch.cross_validation import passes
 from identification.mismatch.effect import Ends, Friction
-from identification.mismatch.experiment import is_experiment, is_seconded, judged_by_simulation, nearer
+from identification.mismatch.experiment import agreed, is_experiment
 from identification.mismatch.explanation import Explanation
 from identification.mismatch.forward_selection import (
     Candidate,
@@ -143,12 +143,7 @@ def explain(s: Recording, tell: Progress = silent, brought: Floats | None = None
         return told
     p, plain = prepared(inputs, pv - inputs.level, usable, brought, clip, s.limits, experiment=True)
     by_misfit = carried_over(beyond_the_grid(physics(replace(found, p=p, plain=plain, best=plain), tell, s)))
-    left = min(
-        told.left, by_misfit.left
-    )  # what both miss; a load that wanders is no lack, and innovations see none
-    by_misfit = replace(by_misfit, left=left, by_innovations=told)
-    other = judged_by_simulation(told, by_misfit)
-    return nearer(other, by_misfit) if is_seconded(by_misfit, told) else other
+    return agreed(told, by_misfit)
 
 
 def physics(found: Explanation, tell: Progress, s: Recording) -> Explanation:

@@ -45,6 +45,17 @@ def coarser_by(s: Recording) -> int:
     return max(min(most, int(fast / (limits.samples_a_lag * s.dt_s))), 1)
 
 
+def agreed(told: Explanation, by_misfit: Explanation) -> Explanation:
+    """Of an experiment's explanations by innovations and by the simulation's misfit the nearer one.
+
+    What the misfit tells, innovations have to second. What is left is what both miss: a load that wanders is no lack
+    of the model, and innovations see none in it.
+    """
+    by_misfit = replace(by_misfit, left=min(told.left, by_misfit.left), by_innovations=told)
+    other = judged_by_simulation(told, by_misfit)
+    return nearer(other, by_misfit) if is_seconded(by_misfit, told) else other
+
+
 def most_telling_first(found: Explanation) -> Explanation:
     """The explanation with its effects in the order of what the simulation would miss without each."""
     full = found.p.limits.search.full_steps
