@@ -181,7 +181,9 @@ def case(
     if factor == 1:
         return Case(spec, prepared, subject, shortened)
     thin = replace(prepared, record=r.thinned(factor))
-    said = f"Judged at every {factor}th sample, one in {thin.record.dt_s:.3g} s: its time constant needs no more."
+    said = (
+        f"Judged at one sample in {factor}, each {thin.record.dt_s:.3g} s: its time constant needs no more."
+    )
     others = tuple(x[: len(thin.record) * factor : factor] for x in others)
     subject = subject_of(spec, thin, stamps[::factor], verdict, others, config)
     return Case(spec, thin, subject, f"{shortened} {said}".strip())

@@ -44,6 +44,10 @@ ONE_MOVE_ONLY = "rests on one move of OP, of which nothing is left to prove it o
 """What a recording of one experiment lacks."""
 
 
+AT_REST = "flow_at_rest_pct"
+"""Parameter of a supply: the flow that goes with it while OP is at its middle."""
+WANDERS = "does not tell whether the gain wanders too, or a load alone is added"
+"""Caution of a supply whose part in the gain an experiment does not show."""
 STACKED = (
     "The loop does something that no known cause explains: only {names}, stacked on each other, come near it, and "
     "one cause is likelier than three."
@@ -175,7 +179,7 @@ def answer(found: Explanation, s: Recording) -> Answer:
         moved(found),
         remaining(found),
         f"Not told: {lacking}." if lacking and (verdict, block) == ("unexplained", "none") else _note(found),
-        (lacking or (ONE_MOVE_ONLY if found.unproven else "")) if effects else "",
+        (lacking or (ONE_MOVE_ONLY if found.unproven else untold_gain(found, effects))) if effects else "",
         shown_by(found),
     )
 
@@ -192,6 +196,13 @@ def verdict_of(
     if effects and not (insensitive and effects[0].block in (Block.VALVE, Block.PROCESS)):
         return effects[0].name, effects[0].block
     return ("unexplained", "none") if lacking else ("none", "none")
+
+
+def untold_gain(found: Explanation, effects: tuple[EffectFound, ...]) -> str:
+    """What an experiment does not tell of a supply whose flow at rest may be anything; empty of any other."""
+    at_rest = next((e.parameters[AT_REST] for e in effects if AT_REST in e.parameters), None)
+    open_ended = at_rest is not None and at_rest.low < 0.0 < at_rest.high
+    return WANDERS if open_ended and found.p.by_simulation else ""
 
 
 def is_stack(found: Explanation) -> bool:

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from identification.controller.check import StatedSettings
-from identification.mismatch.answer import answer
+from identification.mismatch.answer import AT_REST, WANDERS, answer, untold_gain
 from identification.mismatch.diagnosis import explain
 from identification.mismatch.experiment import coarser_by, is_experiment
+from identification.models import Estimate
 from tests.proofs.experiments import Plant, asked, carried_misfit, drawn, slow_mode
 
 
@@ -72,3 +73,14 @@ def test_a_long_experiment_is_judged_at_a_coarser_step() -> None:
 
     assert after(100.0) == 3
     assert after(6.0) == 1
+
+
+def test_a_supply_whose_part_in_the_gain_is_not_seen_is_told_with_that() -> None:
+    """A supply that is seen to wander with the gain is told so; with a flow at rest of any sign it is doubted."""
+    s, _ = drawn("wandering supply", 2001)
+    found = explain(s)
+    said = answer(found, s)
+    assert said.verdict == "supply-variation"
+    assert not said.caution
+    any_sign = replace(said.effects[0], parameters={AT_REST: Estimate(10.0, -35.0, 55.0, "% OP")})
+    assert untold_gain(found, (any_sign,)) == WANDERS
