@@ -33,6 +33,14 @@ def on_grid(gaps: Floats) -> bool:
     return float(np.mean(np.abs(gaps / unit - np.round(gaps / unit)) < 0.05)) > 0.6
 
 
+def grid_unit(gaps: Floats) -> float:
+    """The step of values [% PV]: what their differences are multiples of, or where a finer rounding lies over it, the
+    mean of those that leave no value out."""
+    if gaps.size >= 5 and on_grid(gaps):
+        return float(np.quantile(gaps, 0.1))
+    return float(np.mean(gaps[gaps < 1.5 * np.median(gaps)]))
+
+
 def straightened(x: Floats, share: float) -> bool:
     """Whether at least that share of a trend lies on straight lines that no grid makes."""
     return float(straight(x).mean()) >= share and not on_grid(level_gaps(x))
@@ -54,7 +62,7 @@ def quantization(pv: Floats, ranged: bool, limits: RecorderLimits = LIMITS.recor
         return None
     if float(gaps.max()) > 4.0 * float(gaps.mean()):
         return None
-    return Finding({STEP: float(np.median(gaps))}, np.ones(pv.size, dtype=bool))
+    return Finding({STEP: grid_unit(gaps)}, np.ones(pv.size, dtype=bool))
 
 
 def least_jump(pv: Floats, limits: RecorderLimits = LIMITS.recorder) -> float:
