@@ -68,7 +68,9 @@ def explained(
         said = answer(found, c.subject)
         own = None if brought is None else judged(brought, found, c.subject, span_note(c, brought))
         drawn = views(found, c.subject, said, own)
-    data = as_data(c, said, own) | law_data(found.law, c.subject.dt_s)
+    data = as_data(c, said, own)
+    if c.subject.stated is None:  # where they are stated, the controller's check says what is to be said
+        data |= law_data(found.law, c.subject.dt_s)
     if others:
         data["held_out_on"] = on_others(found, tuple(others))
     return Explained(c, found, said, data, drawn, own)

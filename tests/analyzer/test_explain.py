@@ -134,3 +134,17 @@ def test_heat_exchanger_valve_is_curved() -> None:
     said = of_rig("PHX-2022_06_11_17_30_NORMAL")
     names = {e["name"] for e in said["effects"]}
     assert names & {"valve-characteristic", "nonlinear-gain", "split-range"}
+
+
+def test_settings_that_give_op_are_told_where_none_are_stated(played: Path) -> None:
+    """Without kp and ti in loops.csv the answer has those that give OP, within a twentieth; with them no such key."""
+    bare = played / "bare.csv"
+    bare.write_text("loop,scan_s,pv_lo,pv_hi\nA,1,0,100\n")
+    status, text = asked(
+        "explain", played / "week.parquet", "--loops", bare, "--loop", "A", "--format", "json"
+    )
+    assert status == 0
+    law = json.loads(text)["controller"]
+    assert law["kp"] == pytest.approx(1.8, rel=0.05)
+    assert law["ti_s"] == pytest.approx(20.0, rel=0.05)
+    assert "controller" not in json.loads((played / "said.json").read_text())
