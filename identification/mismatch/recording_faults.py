@@ -9,6 +9,9 @@ from identification.limits.recorder import RecorderLimits
 from identification.mismatch.recording import STEP, Finding
 from identification.record import Floats, Mask
 
+OFTEN, FEWEST = 0.2, 4
+"""Share of the mean count from which a value is one at which PV dwells, and samples there at least; ours."""
+
 
 def level_gaps(pv: Floats) -> Floats:
     """Differences of neighbouring values that occur, in the middle nine tenths of the range; shape (levels - 1,)."""
@@ -33,12 +36,16 @@ def on_grid(gaps: Floats) -> bool:
     return float(np.mean(np.abs(gaps / unit - np.round(gaps / unit)) < 0.05)) > 0.6
 
 
-def grid_unit(gaps: Floats) -> float:
-    """The step of values [% PV]: what their differences are multiples of, or where a finer rounding lies over it, the
-    mean of those that leave no value out."""
-    if gaps.size >= 5 and on_grid(gaps):
-        return float(np.quantile(gaps, 0.1))
-    return float(np.mean(gaps[gaps < 1.5 * np.median(gaps)]))
+def grid_unit(pv: Floats) -> float:
+    """The step of values [% PV]: their mean distance where PV dwells, so that none between is left out.
+
+    A finer rounding over a converter's steps makes some longer and some shorter, and the mean is theirs.
+    """
+    levels, counts = np.unique(pv, return_counts=True)
+    often = counts >= max(OFTEN * pv.size / levels.size, FEWEST)
+    gaps = np.diff(levels)
+    dwelt = gaps[often[1:] & often[:-1]]
+    return float(dwelt.mean() if dwelt.size >= FEWEST - 1 else np.median(gaps))
 
 
 def straightened(x: Floats, share: float) -> bool:
@@ -62,7 +69,7 @@ def quantization(pv: Floats, ranged: bool, limits: RecorderLimits = LIMITS.recor
         return None
     if float(gaps.max()) > 4.0 * float(gaps.mean()):
         return None
-    return Finding({STEP: grid_unit(gaps)}, np.ones(pv.size, dtype=bool))
+    return Finding({STEP: grid_unit(pv)}, np.ones(pv.size, dtype=bool))
 
 
 def least_jump(pv: Floats, limits: RecorderLimits = LIMITS.recorder) -> float:
