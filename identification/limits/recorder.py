@@ -75,7 +75,7 @@ class RecorderLimits:
         "-",
         (1.0, 1e6),
         "Its least move over the steps in which it is recorded",
-        "ours: sealed sensors that stick 24 to 150; none of 471 recordings of ../shared passes the three",
+        "ours: sealed sensors that stick 24 to 150; none of 371 recordings of ../shared passes the three",
     )
     jump_share: float = limit(
         0.03,
