@@ -10,7 +10,13 @@ from numba import njit
 from identification.errors import NotAssessedError
 from identification.record import Floats
 from identification.simulation.acts import acting
-from identification.simulation.open_loop import ModelInputs, gain_over_record, load_over_record, outflow_head
+from identification.simulation.open_loop import (
+    ModelInputs,
+    counted_from_level,
+    gain_over_record,
+    load_over_record,
+    outflow_head,
+)
 from identification.simulation.parameters import Slot
 from identification.simulation.pi import Law, next_op
 from identification.simulation.process import at_start, vessel_span
@@ -81,8 +87,7 @@ def closed_model(
     e0 = float(sp[0]) - (inputs.level + float(c[Slot.START]))
     ti = ti_samples if math.isfinite(ti_samples) else math.inf
     law = (kp, kp / ti, 0.0, 0.0, 100.0)
-    own = c.copy()
-    own[Slot.CAP] -= inputs.level
+    own = counted_from_level(inputs, c)
     frame = (inputs.dt_s, inputs.middle, inputs.level, outflow_head(inputs, c))
     gain, load = gain_over_record(inputs, c), load_over_record(inputs, c)
     return _closed(sp, load, gain, own, law, friction_of(c), memory(op0), frame, (op0, e0))

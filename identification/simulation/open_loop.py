@@ -150,6 +150,14 @@ def begun_at_rest(inputs: ModelInputs, c: Floats) -> Floats:
     return out
 
 
+def counted_from_level(inputs: ModelInputs, c: Floats) -> Floats:
+    """Constants, shape (SIZE,), whose caps [% PV] count from inputs.level, as the vessel's own deviations do."""
+    out = c.copy()
+    out[Slot.CAP] -= inputs.level
+    out[Slot.UPPER_CAP] -= inputs.level
+    return out
+
+
 def _plain(inputs: ModelInputs, c: Floats, through: Floats) -> Floats:
     return plain_vessel(through, load(inputs, c), c, inputs.dt_s, inputs.middle)
 
@@ -157,8 +165,6 @@ def _plain(inputs: ModelInputs, c: Floats, through: Floats) -> Floats:
 def _rich(inputs: ModelInputs, c: Floats, through: Floats) -> Floats:
     if c[Slot.PIPE] != 0:
         through = transported(through, c[Slot.L], c[Slot.PIPE], max(inputs.middle, 1e-3), inputs.dt_s)
-    full = c.copy()
-    full[Slot.CAP] -= inputs.level
-    full[Slot.UPPER_CAP] -= inputs.level
+    full = counted_from_level(inputs, c)
     act, gain = load_over_record(inputs, c), gain_over_record(inputs, c)
     return vessel(through, act, gain, full, inputs.dt_s, inputs.middle, outflow_head(inputs, c))

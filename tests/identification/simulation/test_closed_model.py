@@ -37,6 +37,7 @@ def setpoint() -> np.ndarray:
         {"GAIN_SLOPE": -0.5, "SPEED": -1.0},
         {"ROOT": 0.8},
         {"CAP": 53.0},
+        {"T2": 12.0, "UPPER_CAP": 52.0, "PASSED": 0.5, "BEGUN": -2.0},
         {"ASYMMETRY": 0.8},
         {"RATE": 0.3},
         {"SERVO": 3.0, "DEADBAND": 0.4},
