@@ -10,23 +10,14 @@ import numpy as np
 from analyzer.explain.case import Case
 from analyzer.explain.user_model import Brought
 from identification.controller.pi_regression import ControlLaw
-from identification.mismatch.answer import Answer
+from identification.mismatch.answer import Answer, EffectFound
 from identification.mismatch.words import sentence, unexplained_reason
 
 
 def as_data(c: Case, said: Answer, brought: Brought | None = None) -> dict[str, Any]:
     """The answer as data that JSON can hold."""
     effects = [
-        {
-            "name": e.name,
-            "block": e.block,
-            "parameters": {
-                k: {"value": v.value, "low": v.low, "high": v.high, "unit": v.unit}
-                for k, v in e.parameters.items()
-            },
-            "held_out_share": e.held_out_share,
-            "alternatives": list(e.alternatives),
-        }
+        _found(e) | {"held_out_share": e.held_out_share, "alternatives": list(e.alternatives)}
         for e in said.effects
     ]
     fit = said.fit if brought is None else said.fit | {"brought": brought.as_data()}
@@ -41,7 +32,16 @@ def as_data(c: Case, said: Answer, brought: Brought | None = None) -> dict[str, 
         "remaining": said.remaining,
         "reason": f"{reason_of(said)} {c.shortened}".strip(),
     }
+    if said.outside is not None:
+        data["outside"] = _found(said.outside)
     return json_ready(data)
+
+
+def _found(e: EffectFound) -> dict[str, Any]:
+    numbers = {
+        k: {"value": v.value, "low": v.low, "high": v.high, "unit": v.unit} for k, v in e.parameters.items()
+    }
+    return {"name": e.name, "block": e.block, "parameters": numbers}
 
 
 def law_data(law: ControlLaw | None, dt_s: float) -> dict[str, Any]:

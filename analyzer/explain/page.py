@@ -64,7 +64,7 @@ def page(e: Explained, zone: str = UTC_NAME) -> Page:
 
 def abstention(data: Mapping[str, Any]) -> Page:
     """The page of a loop whose recording cannot be explained at all."""
-    text = Text((data["reason"][:1].upper() + data["reason"][1:] + ".", check("unexplained")), "lead")
+    text = Text((data["reason"][:1].upper() + data["reason"][1:] + ".", check({"verdict": "unexplained"})), "lead")
     name = f"{slug(data['loop'])}-explained"
     return Page(name, f"{data['loop']}: not told", "", (Section("What is missing", (text,)),))
 
@@ -88,7 +88,7 @@ def _footer(e: Explained) -> str:
 def _verdict(e: Explained) -> tuple[Block, ...]:
     d = e.data
     brought = [Text((d["fit"]["brought"]["note"],))] if "brought" in d["fit"] else []
-    return (Text((d["reason"],), "lead"), Text((check(d["verdict"]),)), *brought, Tiles(_tiles(e)))
+    return (Text((d["reason"],), "lead"), Text((check(d),)), *brought, Tiles(_tiles(e)))
 
 
 def _tiles(e: Explained) -> tuple[tuple[str, str, str], ...]:

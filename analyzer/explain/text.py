@@ -119,7 +119,7 @@ def lines(data: Mapping[str, Any]) -> list[str]:
     """
     head = f"{data['loop']}: {title(data['verdict']) if data['fit'] else 'not told'}"
     block = f" ({data['block']})" if data["block"] != "none" else ""
-    out = [head + block, *wrap(data["reason"], WIDTH), *wrap(check(data["verdict"]), WIDTH)]
+    out = [head + block, *wrap(data["reason"], WIDTH), *wrap(check(data), WIDTH)]
     out += _part("Parameters (90 % intervals)", _parameters(data), (2,))
     out += _part("Controller, as SP, PV and OP show it", _controller(data), (1,))
     out += _part("Misfit, rms in % of span", _fit(data), (1, 2, 3, 4))

@@ -210,7 +210,7 @@ def _explained(found: Row | None, row: Row) -> list[Section]:
     if found is None:
         return []
     together = agreement(row, found["verdict"], found["block"])
-    said = (f"{title(found['verdict']).capitalize()}: {found['reason']}", check(found["verdict"]))
+    said = (f"{title(found['verdict']).capitalize()}: {found['reason']}", check(found))
     text = Text((*said, together) if together else said)
     return [Section("What the plain loop lacks", (text,))]
 

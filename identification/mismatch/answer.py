@@ -11,7 +11,7 @@ import numpy as np
 from identification.estimation.candidate import Fitted, Problem
 from identification.estimation.covariance import half_width
 from identification.estimation.prediction_error import deviations
-from identification.mismatch.catalogue import EFFECTS, fault
+from identification.mismatch.catalogue import fault
 from identification.mismatch.cross_validation import HeldOut, Misfit, held_out, misfit
 from identification.mismatch.diagnosis import alternatives, restored
 from identification.mismatch.effect import Block, exact
@@ -19,6 +19,7 @@ from identification.mismatch.explanation import Explanation
 from identification.mismatch.identifiability import too_short, unanswered
 from identification.mismatch.location.locate import Located
 from identification.mismatch.location.where import located_in, where_of
+from identification.mismatch.outside import about
 from identification.mismatch.recording import Finding, Recording
 from identification.mismatch.starts.from_cycles import is_friction
 from identification.models import Estimate
@@ -71,7 +72,7 @@ class Answer:
     """What `triage explain` says of one loop, in numbers.
 
     note : why there is no name; caution : what the recording lacks although there is one; shown : what shows the
-    first effect beside the fit.
+    first effect beside the fit; outside : what explains it best and has no name that could be the verdict.
     """
 
     verdict: str
@@ -84,6 +85,7 @@ class Answer:
     note: str = field(default="")
     caution: str = field(default="")
     shown: str = field(default="")
+    outside: EffectFound | None = None
 
 
 def finding_effect(finding: Finding | None, s: Recording) -> EffectFound | None:
@@ -106,7 +108,7 @@ def parameters_of(p: Problem, fit: Fitted, row: Variant) -> dict[str, Estimate]:
             out[q.name] = Estimate(value, value / spread, value * spread, q.unit)
         else:
             out[q.name] = exact(value, q.unit, half)
-    derived = EFFECTS[row.name].derived
+    derived = about(row.name).derived
     return out | (derived(out) if derived is not None else {})
 
 
@@ -125,6 +127,14 @@ def effects_of(found: Explanation, s: Recording, proof: HeldOut | None) -> tuple
         for i, row in enumerate(rows)
     ]
     return (*physics, *gates) if found.finding is None else (*gates, *physics)
+
+
+def outside_of(found: Explanation) -> EffectFound | None:
+    """What explains a loop better than anything that has a name."""
+    if found.outside is None:
+        return None
+    row, fit = found.outside.row, found.outside.fit
+    return EffectFound(row.name, row.block, parameters_of(found.p, fit, row), None)
 
 
 def fit_of(proof: HeldOut, dt_s: float) -> dict[str, Any]:
@@ -181,6 +191,7 @@ def answer(found: Explanation, s: Recording) -> Answer:
         f"Not told: {lacking}." if lacking and (verdict, block) == ("unexplained", "none") else _note(found),
         (lacking or (ONE_MOVE_ONLY if found.unproven else untold_gain(found, effects))) if effects else "",
         shown_by(found),
+        outside_of(found) if verdict == "unexplained" else None,
     )
 
 
@@ -191,6 +202,8 @@ def verdict_of(
     if found.refuted and not found.accepted and not any(found_first(found)):
         return "unexplained", "none"
     none = (found.left > 0 or is_stack(found)) and not any(found_first(found)) and not by_cycles(found)
+    if none and found.outside is not None:
+        return "unexplained", found.outside.row.block
     if none:
         return "unexplained", LIVES.get(at.carrying[0].name, "process") if at.carrying else "process"
     if effects and not (insensitive and effects[0].block in (Block.VALVE, Block.PROCESS)):
@@ -247,6 +260,8 @@ def _note(found: Explanation) -> str:
     if found.left <= 0:
         stacked = " and ".join(c.name for c in found.accepted)
         return STACKED.format(names=stacked) if is_stack(found) else ""
+    if found.outside is not None:
+        return ""
     return (
         "The loop does something that no known cause explains: a flexible model without a name does better "
         f"(log likelihood +{found.left:.0f})."

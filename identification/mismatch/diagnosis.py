@@ -28,6 +28,7 @@ from identification.mismatch.forward_selection import (
 )
 from identification.mismatch.kept_effects import beyond_the_grid, carried_over
 from identification.mismatch.lack_of_fit import ceiling
+from identification.mismatch.outside import OUTSIDE, RIVALS, about
 from identification.mismatch.recording import Finding, Recording, SeenInCycles
 from identification.mismatch.sets_of_effects import replacement_step, without_the_idle
 from identification.mismatch.starts.from_cycles import from_cycles, is_friction
@@ -73,9 +74,8 @@ def inputs_of(s: Recording) -> ModelInputs:
     """What drives the model of a recording."""
     level = float(np.mean(s.pv))
     neighbour = s.neighbours[0] - s.neighbours[0].mean() if s.neighbours else None
-    return ModelInputs(
-        s.op, s.dt_s, float(s.op.mean()), level, (float(s.pv.min()), float(s.pv.max())), (), neighbour
-    )
+    span = (float(s.pv.min()), float(s.pv.max()))
+    return ModelInputs(s.op, s.dt_s, float(s.op.mean()), level, span, (), neighbour, pv=s.pv - level)
 
 
 def without_spikes(pv: Floats, usable: Mask) -> Mask:
@@ -154,15 +154,18 @@ def physics(found: Explanation, tell: Progress, s: Recording) -> Explanation:
     accepted: list[Candidate] = []
     first: tuple[Candidate, ...] = ()
     candidates: list[Candidate] = []
+    outside: Candidate | None = None
+    rows = CANDIDATES if is_experiment(s) else (*CANDIDATES, *RIVALS)
     for _ in range(limits.rounds):
         x = candidate_inputs(p, best, s.circumstances)
-        candidates = compete(x, best, CANDIDATES, tell)
+        candidates = compete(x, best, rows, tell)
         if s.cycles is not None and not accepted:
             candidates = with_cycles(x.p, best, s.cycles, candidates)
-        first = first or tuple(candidates)
+        first = first or tuple(c for c in candidates if c.name in EFFECTS)
         winner = shown_by_cycles(s, candidates) if not accepted else None
         winner = winner or proven(x.p, best, candidates)
-        if winner is None:
+        if winner is None or winner.name in OUTSIDE:
+            outside = winner
             break
         accepted.append(winner)
         p, best = x.p, descend(x.p, winner.fit.model, limits.full_steps)
@@ -178,7 +181,9 @@ def physics(found: Explanation, tell: Progress, s: Recording) -> Explanation:
     left = won - 0.5 * weights - least
     if not accepted and any(r.row.needs == "steps" and r.penalised > 0 for r in candidates):
         left = max(left, candidates[0].penalised)
-    found = replace(found, p=p, best=best, accepted=tuple(accepted), first=first)
+    if outside is not None:
+        left = max(left, outside.penalised)
+    found = replace(found, p=p, best=best, accepted=tuple(accepted), first=first, outside=outside)
     return replace(found, left=left if left > 0 else 0.0)
 
 
@@ -217,11 +222,11 @@ def proven(p: Problem, near: Fitted, candidates: list[Candidate]) -> Candidate |
     """
     gains = [c for c in candidates if c.penalised > 0]
     if p.by_simulation:
-        lasts = any(not EFFECTS[name].timed for name in near.names)
-        gains = [c for c in gains if not (lasts and EFFECTS[c.name].timed)]
-        gains.sort(key=lambda c: EFFECTS[c.name].timed)
+        lasts = any(not about(name).timed for name in near.names)
+        gains = [c for c in gains if not (lasts and about(c.name).timed)]
+        gains.sort(key=lambda c: about(c.name).timed)
     for candidate in gains[: p.limits.proof.proven]:
-        if passes(p, near, candidate.fit, EFFECTS[candidate.name]):
+        if passes(p, near, candidate.fit, about(candidate.name)):
             return candidate
     return None
 

@@ -23,7 +23,8 @@ class Explanation:
     its least, 0 where nothing is left; proof : plain and best on held-out data; refuted : names of effects that
     explain the fitted part and not the rest; unproven : whether OP moved once, so that nothing is left to prove the
     effects on; cycles : the faulty valve that the loop's cycles show; others : misfits on other recordings, where
-    some were held out whole; by_innovations : in an experiment, what innovations alone explain.
+    some were held out whole; by_innovations : in an experiment, what innovations alone explain; outside : physics of
+    no name that explains it better than any that has one.
     """
 
     p: Problem = field(repr=False)
@@ -41,6 +42,7 @@ class Explanation:
     unproven: bool = False
     cycles: SeenInCycles | None = None
     others: tuple[OnOther, ...] = ()
+    outside: Candidate | None = None
     by_innovations: Explanation | None = field(default=None, repr=False)
 
     @property

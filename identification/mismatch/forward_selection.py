@@ -18,6 +18,7 @@ from identification.mismatch.catalogue import CANDIDATES, EFFECTS
 from identification.mismatch.cross_validation import is_one_move
 from identification.mismatch.effect import Friction
 from identification.mismatch.lack_of_fit import explained_freely
+from identification.mismatch.outside import about
 from identification.mismatch.recording import Circumstances
 from identification.mismatch.starts.screening import CandidateInputs, screened, span_of, start_models
 from identification.mismatch.starts.stick_slip import fit_sticking
@@ -98,14 +99,14 @@ def applies(x: CandidateInputs, near: Fitted, row: Variant) -> bool:
         return False
     if row.needs == "experiment" and not x.p.by_simulation:
         return False
-    rubs = EFFECTS[row.name].friction is not None
+    rubs = about(row.name).friction is not None
     if rubs and (x.known.free_valve or any(EFFECTS[r.name].friction is not None for r in near.model.added)):
         return (
             False  # behind one friction a second of the same stem cannot be told without the stem's position
         )
     if row.needs == "moves" and is_one_move(x.p):
         return False
-    if x.p.by_simulation and EFFECTS[row.name].timed and row.opponent is None:
+    if x.p.by_simulation and about(row.name).timed and row.opponent is None:
         return False  # a load that is added is told by innovations
     if row.needs == "neighbour":
         return x.p.inputs.neighbour is not None
@@ -277,13 +278,13 @@ def stiction_candidates(
     tell: Progress = silent,
 ) -> list[Candidate]:
     """Sticking valves scanned about the best play, where a play or the like gains anything at all."""
-    plays = [r for r in tried if EFFECTS[r.name].friction is Friction.PLAY]
-    hints = [r.gain for r in tried if EFFECTS[r.name].friction is not None]
+    plays = [r for r in tried if about(r.name).friction is Friction.PLAY]
+    hints = [r.gain for r in tried if about(r.name).friction is not None]
     if not plays or max(hints) < x.p.limits.search.sticking_hint:
         return []
     out = []
     for row in rows:
-        if EFFECTS[row.name].friction is Friction.STICKS:
+        if about(row.name).friction is Friction.STICKS:
             tell(row.name)
             fit = fit_sticking(x.p, plays[0].fit, row, near.model.added)
             out.append(priced(x.p, near, fit))

@@ -5,11 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from identification.mismatch.answer import Answer
+from identification.mismatch.answer import Answer, EffectFound
 from identification.mismatch.catalogue import EFFECTS
+from identification.mismatch.outside import OUTSIDE
 
 NOTHING_LEFT = "The plain loop explains the recording; nothing is left that the data could name."
 NO_NAME = "Something is left that no effect of the catalogue explains."
+BETTER = "No cause that the catalogue names explains the loop as well as one that it does not name"
+"""How physics of no name is told."""
 CHECKS = {
     "none": "Nothing has to be done about the model.",
     "unexplained": "Give it a recording with moves of the set point, or say what else acts on this loop.",
@@ -19,8 +22,11 @@ LONGER = "A step of OP each way in manual, held for five time constants, at two 
 """What tells apart what has no line of its own."""
 
 
-def check(verdict: str) -> str:
-    """What to look at, by verdict."""
+def check(data: Mapping[str, Any]) -> str:
+    """What to look at, by an answer as data: its verdict, and what of no name explains the loop."""
+    verdict = data["verdict"]
+    if "outside" in data:
+        return OUTSIDE[data["outside"]["name"]].check
     return EFFECTS[verdict].check if verdict in EFFECTS else CHECKS.get(verdict, CHECKS["unexplained"])
 
 
@@ -30,6 +36,10 @@ def discriminating_test(one: str, other: str) -> str:
         if a in EFFECTS and b in EFFECTS[a].tests:
             return EFFECTS[a].tests[b]
     return LONGER
+
+
+SPOKEN_S = (600.0, 7200.0)
+"""Times from which minutes and hours are spoken of [s]; ours."""
 
 
 class _Spoken(dict[str, str]):
@@ -52,8 +62,15 @@ def sentence(said: Answer) -> str:
 
 def unexplained_reason(said: Answer) -> str:
     """What is left, where it lives, and why it has no name."""
-    why = said.note or NO_NAME
+    why = said.note or (NO_NAME if said.outside is None else outside_sentence(said.outside))
     return f"{why} {located_sentence(said.where)}".strip()
+
+
+def outside_sentence(found: EffectFound) -> str:
+    """What explains a loop better than the catalogue does, with its numbers."""
+    effect = OUTSIDE[found.name]
+    shown = {k: _number(v.value, v.unit) for k, v in found.parameters.items()}
+    return f"{BETTER}: {effect.sentence.format_map(_Spoken(shown))}."
 
 
 PLACES = {
@@ -95,4 +112,6 @@ def located_sentence(where: Mapping[str, Any]) -> str:
 
 
 def _number(value: float, unit: str) -> str:
+    if unit == "s" and abs(value) >= SPOKEN_S[0]:
+        return f"{value / 60:.3g} min" if abs(value) < SPOKEN_S[1] else f"{value / 3600:.3g} h"
     return f"{value:.3g} {unit}".strip()

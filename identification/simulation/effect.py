@@ -42,7 +42,8 @@ class Variant:
     mode, in that of the plain loop, and the share that its gain may have; label : told apart by; penalty : added to
     that of the parameters;
     enter : turns the plain loop's parameters, in place, where they change their meaning; opponent : what it has to
-    do better than in an experiment, of no name and a part of the plain loop's load.
+    do better than in an experiment, of no name and a part of the plain loop's load; linear : the parameter that PV
+    goes with in a straight line, None of most: its start follows from those of the others.
     """
 
     params: tuple[Param, ...]
@@ -56,6 +57,7 @@ class Variant:
     penalty: float = 0.0
     enter: Callable[[Floats], None] | None = None
     opponent: Variant | None = None
+    linear: int | None = None
     name: str = ""
     block: str = ""
     needs: str = ""

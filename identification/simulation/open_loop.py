@@ -11,6 +11,7 @@ from identification.models import Backlash, Integrator, Process, Valve
 from identification.record import Floats
 from identification.simulation.acts import Signal, acted
 from identification.simulation.parameters import KNOTS, SIZE, STEPS, Slot, neutral
+from identification.simulation.past_pv import recalled, switched
 from identification.simulation.process import outflow, outflow_of, plain_vessel, transported, vessel
 from identification.simulation.valve_chain import COASTS, flow, lagged
 
@@ -21,6 +22,7 @@ OUTSIDE = (
     *(Slot.SINE, Slot.COSINE, Slot.OMEGA, Slot.NEIGHBOUR, Slot.NEIGHBOUR_T),
     *(int(Slot.STEP) + i for i in range(STEPS)),
     *(Slot.MODE_T, Slot.SPILL, Slot.SPILL_T, Slot.SPEED, Slot.HEAD_BIAS),
+    *(Slot.RECALL_T, Slot.SWITCH, Slot.SWITCH_AT, Slot.SWITCH_BAND),
 )
 """Parameters that a vessel of first order with constant gain, and what stands before and behind it, take care of, and
 those that do nothing by themselves. Any other at work asks for the whole vessel, a new one too."""
@@ -35,7 +37,8 @@ class ModelInputs:
 
     op : shape (n,) [% OP]; dt_s [s]; middle : OP that counts as zero [% OP]; level : PV that counts as zero
     [% PV]; pv_range : lowest and highest PV; step_at : samples at which the load may step; neighbour : another
-    loop's OP less its mean, shape (n,); longest_s : longest time constant that counts as one [s].
+    loop's OP less its mean, shape (n,); longest_s : longest time constant that counts as one [s]; pv : PV as recorded
+    less level, shape (n,), by which gain or load may go; None where it is what is asked for.
     """
 
     op: Floats
@@ -46,6 +49,7 @@ class ModelInputs:
     step_at: tuple[int, ...] = ()
     neighbour: Floats | None = field(default=None, repr=False)
     longest_s: float = math.inf
+    pv: Floats | None = field(default=None, repr=False)
 
     @property
     def clock(self) -> Floats:
@@ -89,7 +93,16 @@ def load(inputs: ModelInputs, c: Floats) -> Floats:
         act += c[Slot.SINE] * np.sin(angle) + c[Slot.COSINE] * np.cos(angle)
     if inputs.neighbour is not None and c[Slot.NEIGHBOUR] != 0:
         act += c[Slot.NEIGHBOUR] * lagged(inputs.neighbour, c[Slot.NEIGHBOUR_T], inputs.dt_s)
+    if inputs.pv is not None and c[Slot.SWITCH] != 0:
+        act += c[Slot.SWITCH] * switched(inputs.pv, c[Slot.SWITCH_AT] - inputs.level, c[Slot.SWITCH_BAND])
     return act
+
+
+def history(inputs: ModelInputs, c: Floats) -> Floats:
+    """Relative change of gain with where the recorded PV has been, shape (n,)."""
+    if inputs.pv is None or c[Slot.RECALL] == 0:
+        return np.zeros(inputs.op.size)
+    return recalled(inputs.pv, float(c[Slot.RECALL]), float(c[Slot.RECALL_T]), inputs.dt_s)
 
 
 def through_valve(inputs: ModelInputs, c: Floats) -> Floats:
@@ -123,14 +136,14 @@ def from_flow(inputs: ModelInputs, c: Floats, through: Floats) -> Floats:
 
 
 def gain_over_record(inputs: ModelInputs, c: Floats) -> Floats:
-    """Relative gain of the process over the recording, shape (n,): the supply, and drift."""
-    supply = head(inputs, c)
+    """Relative gain of the process over the recording, shape (n,): the supply, drift, and PV's past."""
+    supply = head(inputs, c) + history(inputs, c)
     return 1.0 + supply if c[Slot.DRIFT] == 0 else 1.0 + c[Slot.DRIFT] * inputs.clock + supply
 
 
 def load_over_record(inputs: ModelInputs, c: Floats) -> Floats:
-    """Load at the inlet with what the supply adds to it, shape (n,) [% OP]."""
-    return load(inputs, c) + c[Slot.HEAD_BIAS] * head(inputs, c)
+    """Load at the inlet with what goes with the gain, a supply's or that of PV's past, shape (n,) [% OP]."""
+    return load(inputs, c) + c[Slot.HEAD_BIAS] * (head(inputs, c) + history(inputs, c))
 
 
 def outflow_head(inputs: ModelInputs, c: Floats) -> float:

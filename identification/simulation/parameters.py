@@ -65,7 +65,12 @@ class Slot(IntEnum):
     UPPER_CAP = 46
     PASSED = 47
     BEGUN = 48
-    HEAD = 49
+    RECALL = 49
+    RECALL_T = 50
+    SWITCH = 51
+    SWITCH_AT = 52
+    SWITCH_BAND = 53
+    HEAD = 54
 
 
 SIZE = int(Slot.HEAD) + KNOTS
@@ -100,6 +105,7 @@ def neutral() -> Floats:
     c[Slot.T], c[Slot.K], c[Slot.LEAK], c[Slot.RATIO] = 1.0, 1.0, 1.0, 1.0
     c[Slot.COAST] = -1.0
     c[Slot.MODE_T], c[Slot.NEIGHBOUR_T], c[Slot.OMEGA], c[Slot.SPILL_T] = 1.0, 1.0, 1.0, 1.0
+    c[Slot.RECALL_T] = 1.0
     c[Slot.DAMPING] = 0.5
     for slot in (Slot.RATE, Slot.STOP_HI, Slot.SPLIT, Slot.CAP, Slot.UPPER_CAP, Slot.CLIP_HI):
         c[slot] = math.inf

@@ -180,9 +180,31 @@ def screened(p: Problem, near: Fitted, span: Floats, models: list[Model]) -> lis
     """Starts ordered by the innovations that they leave once the fit's own constants have followed, linearly."""
     if len(models) == 1:
         return models
-    root = np.sqrt(p.weight)
-    left = []
-    for i, model in enumerate(models):
-        e = whitened(p.y - simulate(p.inputs, model.c), near.ar, p.edges) * root
-        left.append((float(e @ e) - float(((e @ span) ** 2).sum()), i))
-    return [models[i] for _, i in sorted(left)]
+    sized = [on_line(p, near, span, model) for model in models]
+    left = [(_left(p, near, span, model), i) for i, model in enumerate(sized)]
+    return [sized[i] for _, i in sorted(left)]
+
+
+def _free(p: Problem, near: Fitted, span: Floats, x: Floats) -> Floats:
+    """Weighted innovations of what is left, shape (n,), that a fit's own constants cannot lessen."""
+    e = whitened(x, near.ar, p.edges) * np.sqrt(p.weight)
+    return e - span @ (span.T @ e)  # type: ignore[no-any-return]
+
+
+def _left(p: Problem, near: Fitted, span: Floats, model: Model) -> float:
+    e = _free(p, near, span, p.y - simulate(p.inputs, model.c))
+    return float(e @ e)
+
+
+def on_line(p: Problem, near: Fitted, span: Floats, model: Model) -> Model:
+    """A start with the parameter that PV goes with in a straight line where it leaves least."""
+    slot = model.added[-1].linear
+    if slot is None:
+        return model
+    none, one = model.c.copy(), model.c.copy()
+    none[slot], one[slot] = 0.0, 1.0
+    still = simulate(p.inputs, none)
+    along = _free(p, near, span, simulate(p.inputs, one) - still)
+    c = model.c.copy()
+    c[slot] = float(along @ _free(p, near, span, p.y - still)) / max(float(along @ along), 1e-300)
+    return Model(model.added, c)

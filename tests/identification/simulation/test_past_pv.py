@@ -1,0 +1,42 @@
+"""What goes with PV as recorded: a switch with its band, and the mean of the past."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from identification.simulation.past_pv import RAMP, recalled, switched
+
+
+def test_load_is_switched_as_a_schmitt_trigger_does() -> None:
+    """Beyond the ramp on either side of its band a switched load is what two comparisons and a memory make of PV."""
+    rng = np.random.default_rng(3)
+    pv = np.cumsum(rng.normal(0.0, 0.6, 4000))
+    pv -= pv.mean()
+    on, slow = 0.0, []
+    for x in pv:
+        if x > 0.4 + 0.5 * 2.0:
+            on = 1.0
+        elif x < 0.4 - 0.5 * 2.0:
+            on = 0.0
+        slow.append(on)
+    out = switched(pv, 0.4, 2.0)
+    apart = np.abs(out - np.array(slow))
+    near = np.minimum(np.abs(pv - 1.4), np.abs(pv + 0.6)) <= RAMP
+    assert out.min() == 0.0 and out.max() == 1.0
+    assert float(np.mean(apart > 0.0)) < 0.25
+    settled = np.flatnonzero(~near)
+    assert float(np.mean(apart[settled] > 0.0)) < 0.02
+
+
+def test_past_of_pv_is_a_first_order_mean_of_it() -> None:
+    """A step of PV is remembered as 1 - exp(-t / memory), and never by the sample at which it is recorded."""
+    pv = np.where(np.arange(3000) >= 500, 5.0, 0.0)
+    gain = recalled(pv, 0.4, 300.0, 2.0)
+    assert not gain[:501].any()
+    middle_s = 2.0 * np.arange(2499) + 1.0
+    assert np.allclose(gain[501:], 0.2 * (1.0 - np.exp(-middle_s / 300.0)), atol=1e-5)
+
+
+def test_gain_never_changes_its_sign() -> None:
+    """However far PV has been, a twentieth of the gain is left."""
+    assert recalled(np.full(500, -90.0), 3.0, 10.0, 1.0).min() == -0.95
