@@ -64,7 +64,9 @@ def page(e: Explained, zone: str = UTC_NAME) -> Page:
 
 def abstention(data: Mapping[str, Any]) -> Page:
     """The page of a loop whose recording cannot be explained at all."""
-    text = Text((data["reason"][:1].upper() + data["reason"][1:] + ".", check({"verdict": "unexplained"})), "lead")
+    text = Text(
+        (data["reason"][:1].upper() + data["reason"][1:] + ".", check({"verdict": "unexplained"})), "lead"
+    )
     name = f"{slug(data['loop'])}-explained"
     return Page(name, f"{data['loop']}: not told", "", (Section("What is missing", (text,)),))
 

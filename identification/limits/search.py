@@ -63,6 +63,13 @@ class SearchLimits:
         "Gain less its price from which a candidate of the first round is followed",
         "ours: of 242 below it on the same cases one came to anything, 0.6",
     )
+    may_come_to: float = limit(
+        0.5,
+        "-",
+        (0.0, 1.0),
+        "Share of what a candidate has to come to from which it is followed, where that is known",
+        "ours",
+    )
     tie: float = limit(
         2.0,
         "nat",

@@ -210,7 +210,7 @@ def shown_by_cycles(s: Recording, candidates: list[Candidate]) -> Candidate | No
     rubs = [c for c in candidates if is_friction(c.name)]
     if isinstance(s.cycles.valve, Stiction) or not s.cycles.cycling:
         wanted = Friction.STICKS if isinstance(s.cycles.valve, Stiction) else Friction.PLAY
-        rubs = [*(c for c in rubs if EFFECTS[c.name].friction is wanted), *rubs]
+        rubs = [*(c for c in rubs if about(c.name).friction is wanted), *rubs]
     return rubs[0] if rubs else None
 
 

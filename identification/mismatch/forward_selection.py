@@ -128,9 +128,16 @@ def candidate(p: Problem, near: Fitted, models: list[Model], steps: int) -> Cand
     return _of_fits(p, near, [descend(p, model, steps) for model in models])
 
 
-def screened_candidate(p: Problem, near: Fitted, models: list[Model]) -> Candidate:
+def worth_following(p: Problem, least: float) -> float:
+    """What a candidate of the first round has to come to, to be followed [nat], its penalty taken off."""
+    limits = p.limits.search
+    return limits.may_come_to * least if least > 0.0 else limits.worth_following
+
+
+def screened_candidate(p: Problem, near: Fitted, models: list[Model], least: float = 0.0) -> Candidate:
     """The same in the first round, where a start that will not come to anything worth following is left."""
-    worth = penalty(p, models[0].added[-1]) + p.limits.search.worth_following
+    worth = penalty(p, models[0].added[-1])
+    worth += worth_following(p, least)
     aim = near.loss * math.exp(-2.0 * worth / p.count)
     return _of_fits(p, near, [descend(p, model, p.limits.search.screen_steps, aim) for model in models])
 
@@ -177,9 +184,12 @@ def outdoing(p: Problem, near: Fitted, first: Candidate) -> Candidate:
     return Candidate(own, won, won - penalty(p, first.row) + first.row.penalty)
 
 
-def followed(p: Problem, near: Fitted, first: Candidate, models: list[Model]) -> Candidate:
+def followed(
+    p: Problem, near: Fitted, first: Candidate, models: list[Model], least: float = 0.0
+) -> Candidate:
     """A candidate of the first round followed to the end, from there and from its second and third start."""
-    if first.penalised < p.limits.search.worth_following and not p.by_simulation:
+    enough = first.penalised >= worth_following(p, least)
+    if not enough and (least > 0.0 or not p.by_simulation):
         return first
     starts = [first.fit.model, *models[1:3]]
     best = candidate(p, near, starts, p.limits.search.full_steps)
@@ -187,7 +197,11 @@ def followed(p: Problem, near: Fitted, first: Candidate, models: list[Model]) ->
 
 
 def compete(
-    x: CandidateInputs, near: Fitted, rows: tuple[Variant, ...] = CANDIDATES, tell: Progress = silent
+    x: CandidateInputs,
+    near: Fitted,
+    rows: tuple[Variant, ...] = CANDIDATES,
+    tell: Progress = silent,
+    least: float = 0.0,
 ) -> list[Candidate]:
     """All rows as candidates of a fit, best first; the better half followed to the end.
 
@@ -199,6 +213,8 @@ def compete(
     rows : tuple of Variant
     tell : callable
         Is told each row's name before it is tried.
+    least : float
+        What a candidate has to come to, penalty taken off, to be of any use [nat].
     """
     tried: list[tuple[Candidate, list[Model]]] = []
     span = span_of(x.p, near)
@@ -212,11 +228,11 @@ def compete(
                 first = models[:1]
             if row.modes:
                 first += mode_starts(x.p, near, row)
-            tried.append((screened_candidate(x.p, near, first), models))
+            tried.append((screened_candidate(x.p, near, first, least), models))
     alike = counted_alike(x.p, near, [first for first, _ in tried])
     tried = sorted(zip(alike, (models for _, models in tried), strict=True), key=lambda t: -t[0].penalised)
     most = x.p.limits.search.followed
-    ended = [outdoing(x.p, near, followed(x.p, near, first, models)) for first, models in tried[:most]]
+    ended = [outdoing(x.p, near, followed(x.p, near, first, models, least)) for first, models in tried[:most]]
     ended += stiction_candidates(x, near, [first for first, _ in tried], rows, tell)
     ended += [outdoing(x.p, near, first) for first, _ in tried[most:]]
     found = counted_alike(x.p, near, ended)

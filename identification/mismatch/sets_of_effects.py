@@ -24,12 +24,12 @@ def replacement_step(
     for i, old in enumerate(accepted):
         others = tuple(r for r in best.model.added if r.name != old.name)
         near = descend(x.p, Model(others, cleared(best.model.c, old.row)), limits.full_steps)
-        candidates = [r for r in compete(x, near, CANDIDATES, tell) if may_replace(x.p, r, old)]
+        least = max(gain(best, near) - penalty(x.p, old.row) + limits.tie, 0.0)
+        candidates = [r for r in compete(x, near, CANDIDATES, tell, least) if may_replace(x.p, r, old)]
         if not candidates:
             continue
-        least = gain(best, near) - penalty(x.p, old.row) + limits.tie
         first = candidates[0]
-        if first.penalised > max(least, 0.0) and passes(x.p, near, first.fit, EFFECTS[first.name]):
+        if first.penalised > least and passes(x.p, near, first.fit, EFFECTS[first.name]):
             best = descend(x.p, first.fit.model, limits.full_steps)
             accepted = [*accepted[:i], first, *accepted[i + 1 :]]
     return best, accepted

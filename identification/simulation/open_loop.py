@@ -11,7 +11,7 @@ from identification.models import Backlash, Integrator, Process, Valve
 from identification.record import Floats
 from identification.simulation.acts import Signal, acted
 from identification.simulation.parameters import KNOTS, SIZE, STEPS, Slot, neutral
-from identification.simulation.past_pv import recalled, switched
+from identification.simulation.past_pv import recalled, returned, switched
 from identification.simulation.process import outflow, outflow_of, plain_vessel, transported, vessel
 from identification.simulation.valve_chain import COASTS, flow, lagged
 
@@ -22,7 +22,7 @@ OUTSIDE = (
     *(Slot.SINE, Slot.COSINE, Slot.OMEGA, Slot.NEIGHBOUR, Slot.NEIGHBOUR_T),
     *(int(Slot.STEP) + i for i in range(STEPS)),
     *(Slot.MODE_T, Slot.SPILL, Slot.SPILL_T, Slot.SPEED, Slot.HEAD_BIAS),
-    *(Slot.RECALL_T, Slot.SWITCH, Slot.SWITCH_AT, Slot.SWITCH_BAND),
+    *(Slot.RECALL_T, Slot.SWITCH, Slot.SWITCH_AT, Slot.SWITCH_BAND, Slot.RETURNED, Slot.RETURNS_S),
 )
 """Parameters that a vessel of first order with constant gain, and what stands before and behind it, take care of, and
 those that do nothing by themselves. Any other at work asks for the whole vessel, a new one too."""
@@ -95,6 +95,8 @@ def load(inputs: ModelInputs, c: Floats) -> Floats:
         act += c[Slot.NEIGHBOUR] * lagged(inputs.neighbour, c[Slot.NEIGHBOUR_T], inputs.dt_s)
     if inputs.pv is not None and c[Slot.SWITCH] != 0:
         act += c[Slot.SWITCH] * switched(inputs.pv, c[Slot.SWITCH_AT] - inputs.level, c[Slot.SWITCH_BAND])
+    if inputs.pv is not None and c[Slot.RETURNED] != 0:
+        act += c[Slot.RETURNED] / c[Slot.K] * returned(inputs.pv, float(c[Slot.RETURNS_S]), inputs.dt_s)
     return act
 
 

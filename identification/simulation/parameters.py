@@ -70,7 +70,9 @@ class Slot(IntEnum):
     SWITCH = 51
     SWITCH_AT = 52
     SWITCH_BAND = 53
-    HEAD = 54
+    RETURNED = 54
+    RETURNS_S = 55
+    HEAD = 56
 
 
 SIZE = int(Slot.HEAD) + KNOTS

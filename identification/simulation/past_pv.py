@@ -39,3 +39,12 @@ def recalled(pv: Floats, change: float, memory_s: float, dt_s: float) -> Floats:
     """
     past = lagged(np.concatenate((np.zeros(1), pv[:-1])), memory_s, dt_s)
     return np.maximum(change * past / 10.0, LEAST_GAIN - 1.0)  # type: ignore[no-any-return]
+
+
+def returned(pv: Floats, way_s: float, dt_s: float) -> Floats:
+    """PV as it was a while before the middle of each sample, shape (n,); before the first sample as at the first.
+
+    pv : shape (n,) [% PV]; way_s : how long before [s].
+    """
+    k = np.arange(pv.size)
+    return np.interp(k + 0.5 - way_s / dt_s, k, pv)

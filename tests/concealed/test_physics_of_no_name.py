@@ -1,4 +1,4 @@
-"""Physics outside the catalogue, made by plants that share no code with the estimator, is told in words, not by name."""
+"""Physics outside the catalogue, of plants that share no code with the estimator, is told in words, not by name."""
 
 import numpy as np
 import pytest
@@ -48,7 +48,7 @@ def test_gain_that_remembers_is_told_in_words() -> None:
 
 
 def test_load_that_pv_switches_is_told_in_words() -> None:
-    """A load of 3 % that PV switches on at 53 % gets no name; size and place are found within a tenth and a half %."""
+    """A load of 3 % that PV switches on at 53 % gets no name; its size and place are found."""
     said = asked(PLANT._replace(switch=3.0, switch_at=1.0, switch_band=1.0), 2)
     assert said.verdict == "unexplained"
     assert said.block == "load"
@@ -57,6 +57,26 @@ def test_load_that_pv_switches_is_told_in_words() -> None:
     assert said.outside.parameters["switched_load_pct"].value == pytest.approx(3.0, rel=0.1)
     assert said.outside.parameters["switches_at_pct"].value == pytest.approx(53.0, abs=0.5)
     assert "a switch on PV" in check({"verdict": "unexplained", "outside": {"name": said.outside.name}})
+
+
+def test_moves_that_count_for_more_when_fast_are_told_in_words() -> None:
+    """A flow that goes beyond fast moves gets no name; by how much and for how long are found within a fifth."""
+    said = asked(PLANT._replace(hurry=2.0), 6)
+    assert (said.verdict, said.block) == ("unexplained", "valve")
+    assert said.outside is not None
+    assert said.outside.name == "gain-with-rate"
+    assert said.outside.parameters["hurry"].value == pytest.approx(2.0, rel=0.2)
+    assert said.outside.parameters["hurry_s"].value == pytest.approx(0.5 * PLANT.T, rel=0.2)
+
+
+def test_recycle_is_told_in_words() -> None:
+    """A fifth that comes back after two minutes gets no name; share and way are found within a tenth."""
+    said = asked(PLANT._replace(echo=0.2, echo_s=120.0), 7)
+    assert (said.verdict, said.block) == ("unexplained", "process")
+    assert said.outside is not None
+    assert said.outside.name == "recycle"
+    assert said.outside.parameters["returned"].value == pytest.approx(0.2, rel=0.1)
+    assert said.outside.parameters["returns_s"].value == pytest.approx(120.0, rel=0.1)
 
 
 def test_plain_loop_is_not_given_physics_of_no_name() -> None:

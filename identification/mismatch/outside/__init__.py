@@ -7,11 +7,14 @@ from collections.abc import Mapping
 
 from identification.mismatch.catalogue import EFFECTS
 from identification.mismatch.effect import Effect
-from identification.mismatch.outside import gain_with_history, switched_load
+from identification.mismatch.outside import gain_with_history, gain_with_rate, recycle, switched_load
+from identification.simulation.acts import bring
 from identification.simulation.effect import Variant
 
-OUTSIDE: Mapping[str, Effect] = {e.name: e for e in (gain_with_history.EFFECT, switched_load.EFFECT)}
+_ALL = (gain_with_history.EFFECT, gain_with_rate.EFFECT, recycle.EFFECT, switched_load.EFFECT)
+OUTSIDE: Mapping[str, Effect] = {e.name: e for e in _ALL}
 """All of it by what it is called here."""
+bring(tuple(act for e in _ALL for act in e.acts))
 RIVALS: tuple[Variant, ...] = tuple(v for e in OUTSIDE.values() for v in e.candidates)
 """What competes with the catalogue and gives no name."""
 

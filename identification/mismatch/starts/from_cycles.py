@@ -13,6 +13,7 @@ from identification.estimation.candidate import Fitted, Model, Problem
 from identification.estimation.prediction_error import descend
 from identification.mismatch.catalogue import EFFECTS
 from identification.mismatch.effect import Friction
+from identification.mismatch.outside import about
 from identification.mismatch.recording import SeenInCycles
 from identification.models import Backlash, Stiction, Valve
 from identification.record import Floats
@@ -26,7 +27,7 @@ OF_CYCLES = (Slot.T, Slot.L, Slot.K, Slot.STICKBAND, Slot.JUMP, Slot.COAST)
 
 def is_friction(name: str) -> bool:
     """Whether an effect is play or stick-slip, which cycles can show."""
-    return EFFECTS[name].friction in (Friction.PLAY, Friction.STICKS)
+    return about(name).friction in (Friction.PLAY, Friction.STICKS)
 
 
 def begun(p: Problem, near: Fitted, seen: SeenInCycles, valve: Valve) -> Floats:

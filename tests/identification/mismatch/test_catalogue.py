@@ -8,6 +8,7 @@ import pytest
 from identification.estimation.candidate import scales
 from identification.mismatch.catalogue import CANDIDATES, CONTROLLER_FAULTS, EFFECTS, RECORDER_FAULTS
 from identification.mismatch.effect import Fault
+from identification.mismatch.outside import OUTSIDE, RIVALS
 from identification.record import Floats
 from identification.simulation.effect import Param, Variant
 from identification.simulation.open_loop import ModelInputs, simulate
@@ -22,7 +23,8 @@ def inputs() -> ModelInputs:
     """OP up and down over most of its range, with a neighbour and places for steps."""
     k = np.arange(N)
     op = 50 + 30 * np.sin(k / 40.0) + 8 * np.sign(np.sin(k / 7.0))
-    return ModelInputs(op, 1.0, 50.0, 50.0, (5.0, 95.0), (300, 700, 1100), np.cos(k / 25.0))
+    pv = 45.0 * np.sin(k / 40.0 - 0.6)
+    return ModelInputs(op, 1.0, 50.0, 50.0, (5.0, 95.0), (300, 700, 1100), np.cos(k / 25.0), pv=pv)
 
 
 def started(variant: Variant) -> Floats:
@@ -44,7 +46,7 @@ def other(c: Floats, p: Param) -> Floats:
     return out
 
 
-@pytest.mark.parametrize("variant", CANDIDATES, ids=lambda v: f"{v.name} {v.label}".strip())
+@pytest.mark.parametrize("variant", [*CANDIDATES, *RIVALS], ids=lambda v: f"{v.name} {v.label}".strip())
 def test_every_parameter_acts(variant: Variant) -> None:
     """What an effect frees changes the simulated PV: one that no kernel knows is not skipped in silence."""
     plain = neutral()
@@ -70,6 +72,11 @@ def test_every_effect_is_said_and_drawn() -> None:
         assert effect.check
         drawn = effect.drawn if isinstance(effect, Fault) else effect.curve
         assert drawn is not None, effect.name
+
+
+def test_physics_of_no_name_takes_no_name() -> None:
+    """What is told in words beside `unexplained` is called nothing that could be a verdict."""
+    assert not set(OUTSIDE) & set(EFFECTS)
 
 
 def test_names_are_those_of_the_contract() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from identification.simulation.past_pv import RAMP, recalled, switched
+from identification.simulation.past_pv import RAMP, recalled, returned, switched
 
 
 def test_load_is_switched_as_a_schmitt_trigger_does() -> None:
@@ -22,7 +22,8 @@ def test_load_is_switched_as_a_schmitt_trigger_does() -> None:
     out = switched(pv, 0.4, 2.0)
     apart = np.abs(out - np.array(slow))
     near = np.minimum(np.abs(pv - 1.4), np.abs(pv + 0.6)) <= RAMP
-    assert out.min() == 0.0 and out.max() == 1.0
+    assert out.min() == 0.0
+    assert out.max() == 1.0
     assert float(np.mean(apart > 0.0)) < 0.25
     settled = np.flatnonzero(~near)
     assert float(np.mean(apart[settled] > 0.0)) < 0.02
@@ -40,3 +41,11 @@ def test_past_of_pv_is_a_first_order_mean_of_it() -> None:
 def test_gain_never_changes_its_sign() -> None:
     """However far PV has been, a twentieth of the gain is left."""
     assert recalled(np.full(500, -90.0), 3.0, 10.0, 1.0).min() == -0.95
+
+
+def test_what_returns_is_pv_of_a_while_ago() -> None:
+    """A straight line comes back later by the way, counted to each sample's middle."""
+    pv = 3.0 + 0.2 * np.arange(400)
+    back = returned(pv, 101.0, 2.0)
+    k = np.arange(400)
+    assert np.allclose(back, 3.0 + 0.2 * np.maximum(k + 0.5 - 50.5, 0.0))

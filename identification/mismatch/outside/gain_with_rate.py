@@ -1,0 +1,41 @@
+"""Moves that count for more the faster they are: a relief port, a booster that opens, feed that overshoots."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from identification.mismatch.effect import Block, Effect
+from identification.record import Floats
+from identification.simulation.acts import Act, Signal
+from identification.simulation.effect import Param, Variant
+from identification.simulation.parameters import own_slot
+from identification.simulation.valve_chain import lagged
+
+HURRY, HURRY_T = own_slot("HURRY"), own_slot("HURRY_T", 1.0)
+LAGS = (0.2, 0.6)
+"""How long a move counts as fast, where the search begins, in time constants; ours."""
+
+
+def hurried(flow: Floats, c: Floats, dt_s: float) -> Floats:
+    """Flow, shape (n,) [% OP], with the square of what it is ahead of its own lag, of the move's sign."""
+    ahead = flow - lagged(flow, float(c[HURRY_T]), dt_s)
+    return flow + c[HURRY] * np.abs(ahead) * ahead / 10.0  # type: ignore[no-any-return]
+
+
+EFFECT = Effect(
+    name="gain-with-rate",
+    block=Block.VALVE,
+    sentence="moves count for more the faster they are, a sudden one of 10 % by {hurry} of itself, for {hurry_s}",
+    check="Look for a booster, a relief port or a feed that overshoots, and at fast moves of OP beside slow ones.",
+    acts=(Act(HURRY, 0.0, Signal.FLOW, hurried),),
+    variants=(
+        Variant(
+            (
+                Param(HURRY, "hurry", "", -20.0, 20.0, title="Extra of a move of 10 %"),
+                Param(HURRY_T, "hurry_s", "s", 0.02, 3.0, "T", True, title="Lasts"),
+            ),
+            tuple({HURRY_T: lag} for lag in LAGS),
+            linear=HURRY,
+        ),
+    ),
+)
