@@ -176,7 +176,7 @@ def _parameters(data: Mapping[str, Any]) -> tuple[Block, ...]:
             Cell(interval(v)),
             Cell(v["unit"]),
         )
-        for x in data["effects"]
+        for x in (*data["effects"], *([data["outside"]] if "outside" in data else []))
         for k, v in x["parameters"].items()
         if k not in HIDDEN
     ]

@@ -8,11 +8,14 @@ from typing import Any
 
 from analyzer.pages.words import duration, number
 from identification.mismatch.catalogue import EFFECTS
+from identification.mismatch.outside import OUTSIDE
 from identification.mismatch.words import ALONG, place
 
-PARAMETERS = {name: text for e in EFFECTS.values() for name, text in e.called.items()}
+KNOWN = {**EFFECTS, **OUTSIDE}
+"""Every effect, named or not."""
+PARAMETERS = {name: text for e in KNOWN.values() for name, text in e.called.items()}
 """Parameters as they are called on a page; others by their own name."""
-HIDDEN = frozenset(name for e in EFFECTS.values() for name in e.hidden)
+HIDDEN = frozenset(name for e in KNOWN.values() for name in e.hidden)
 """Parameters whose meaning another one carries."""
 MOVED = {
     "gain": ("Gain", "% PV/% OP"),
@@ -70,7 +73,7 @@ OBEYED = "OP rebuilt from SP and PV by the stated settings lies on OP as recorde
 
 def caption(effect: str, kind: str) -> str:
     """What a picture shows: by its effect where that says more than its kind."""
-    return (EFFECTS[effect].caption if effect in EFFECTS else OBEYED) or SHAPES.get(kind, "")
+    return (KNOWN[effect].caption if effect in KNOWN else OBEYED) or SHAPES.get(kind, "")
 
 
 def title(verdict: str) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 from analyzer.explain.user_model import Brought
 from identification.estimation.candidate import Fitted
 from identification.mismatch.answer import Answer
-from identification.mismatch.catalogue import EFFECTS, fault
+from identification.mismatch.catalogue import fault
 from identification.mismatch.cross_validation import course
 from identification.mismatch.curves.controller import by_stated_law
 from identification.mismatch.curves.drawn import Drawing, Shape
@@ -19,6 +19,7 @@ from identification.mismatch.explanation import Explanation
 from identification.mismatch.location.features import Group, groups
 from identification.mismatch.location.locate import Located, profile
 from identification.mismatch.location.where import located_in, won_over
+from identification.mismatch.outside import about
 from identification.mismatch.recording import Recording
 from identification.record import Floats
 from identification.simulation.open_loop import simulate
@@ -191,18 +192,21 @@ def feature_views(found: Explanation, s: Recording, at: Located) -> tuple[Featur
 
 
 def found_shape(found: Explanation, s: Recording, said: Answer) -> Shape | None:
-    """The picture of the first effect found."""
+    """The picture of what has no name and explains the loop best, else of the first effect found."""
     inputs, finding = found.p.inputs, found.finding
     if finding is not None:
         free = found.plain.model.c.copy()
         free[Slot.CLIP_HI], free[Slot.CLIP_LO] = np.inf, -np.inf
         drawn = fault(finding.name).drawn
         return None if drawn is None else drawn(finding, s, inputs.level + simulate(inputs, free))
-    if not found.accepted:
+    if said.outside is not None and found.outside is not None:
+        fit, added, known = found.outside.fit, found.outside.row, said.outside.parameters
+    elif found.accepted:
+        fit, added, known = found.best, found.best.model.added[0], said.effects[0].parameters
+    else:
         return None
-    added, known = found.best.model.added[0], said.effects[0].parameters
-    curve = EFFECTS[added.name].curve
-    drawing = Drawing(inputs, added, known, found.best.model.c, found.plain.model.c)
+    curve = about(added.name).curve
+    drawing = Drawing(inputs, added, known, fit.model.c, found.plain.model.c)
     return None if curve is None else curve(drawing)
 
 

@@ -155,7 +155,7 @@ def physics(found: Explanation, tell: Progress, s: Recording) -> Explanation:
     first: tuple[Candidate, ...] = ()
     candidates: list[Candidate] = []
     outside: Candidate | None = None
-    rows = CANDIDATES if is_experiment(s) else (*CANDIDATES, *RIVALS)
+    rows = (*CANDIDATES, *RIVALS) if has_rivals(s) else CANDIDATES
     for _ in range(limits.rounds):
         x = candidate_inputs(p, best, s.circumstances)
         candidates = compete(x, best, rows, tell)
@@ -185,6 +185,15 @@ def physics(found: Explanation, tell: Progress, s: Recording) -> Explanation:
         left = max(left, outside.penalised)
     found = replace(found, p=p, best=best, accepted=tuple(accepted), first=first, outside=outside)
     return replace(found, left=left if left > 0 else 0.0)
+
+
+def has_rivals(s: Recording) -> bool:
+    """Whether physics of no name, which goes with PV as recorded, may be what acts.
+
+    In a loop that cycles, PV of any while ago tells PV, whatever makes it cycle; in an experiment, which is judged by
+    its simulation, what is fed with recorded PV is no simulation.
+    """
+    return s.cycles is None and not s.free_valve and not is_experiment(s)
 
 
 def with_cycles(p: Problem, near: Fitted, seen: SeenInCycles, candidates: list[Candidate]) -> list[Candidate]:

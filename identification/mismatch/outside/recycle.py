@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from identification.mismatch.curves.course import course, load_over_time, over_record
+from identification.mismatch.curves.drawn import Axis, Drawing, Shape
 from identification.mismatch.effect import Block, Effect
 from identification.simulation.effect import Param, Variant
 from identification.simulation.parameters import Slot
@@ -9,11 +11,19 @@ from identification.simulation.parameters import Slot
 WAYS = tuple(0.8 * 1.12**i for i in range(25))
 """How long the way back is, where the search begins, in time constants; ours: what comes back is as wide as one."""
 
+
+def load_returned(d: Drawing) -> Shape:
+    """What comes back, over the recording."""
+    at = over_record(d.inputs)
+    return course(d, at, load_over_time(d, at), Axis("what comes back", "% OP"))
+
+
 EFFECT = Effect(
     name="recycle",
     block=Block.PROCESS,
     sentence="{returned} of what leaves comes back to the inlet after {returns_s}",
     check="Look for a circuit that brings material or heat back: white water, solvent, condensate, a recirculation.",
+    curve=load_returned,
     variants=(
         Variant(
             (
