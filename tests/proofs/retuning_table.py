@@ -25,9 +25,9 @@ def _ratios(found: Sequence[Outcome], name: str) -> list[float]:
 def groups(found: Sequence[Outcome]) -> str:
     """A Markdown table with a row for each kind of loop."""
     lines = [
-        "| loops | number | new settings | stem travel cut % | error better | worst error % | rule, true T % |"
-        " rule, identified T % | everything known % |",
-        "|---|---|---|---|---|---|---|---|---|",
+        "| loops | number | new settings | stem travel cut % | of those with settings | error better |"
+        " worst error % | rule, true T % | rule, identified T % | everything known % |",
+        "|---|---|---|---|---|---|---|---|---|---|",
     ]
     for kind in KINDS:
         mine = [o for o in found if o.rig.kind == kind]
@@ -35,9 +35,10 @@ def groups(found: Sequence[Outcome]) -> str:
         worst = 100 * (max((o.error for o in told), default=1.0) - 1)
         better = sum(o.error < 1 for o in told)
         cells = (
-            [_cut([o.travel for o in mine]), f"{better} of {len(told)}", f"{worst:+.0f}"]
+            [_cut([o.travel for o in some]) for some in (mine, told)]
+            + [f"{better} of {len(told)}", f"{worst:+.0f}"]
             if told
-            else [""] * 3
+            else [""] * 4
         )
         others = [_cut(_ratios(mine, n)) if told else "" for n in ("rule", "rule_found", "known")]
         lines.append(f"| {kind} | {len(mine)} | {len(told)} | {' | '.join(cells + others)} |")
