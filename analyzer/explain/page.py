@@ -17,6 +17,7 @@ from analyzer.explain.page_words import (
     chance,
     change,
     figure,
+    found_in,
     interval,
     rms,
     share,
@@ -64,9 +65,7 @@ def page(e: Explained, zone: str = UTC_NAME) -> Page:
 
 def abstention(data: Mapping[str, Any]) -> Page:
     """The page of a loop whose recording cannot be explained at all."""
-    text = Text(
-        (data["reason"][:1].upper() + data["reason"][1:] + ".", check({"verdict": "unexplained"})), "lead"
-    )
+    text = Text((data["reason"][:1].upper() + data["reason"][1:] + ".",), "lead")
     name = f"{slug(data['loop'])}-explained"
     return Page(name, f"{data['loop']}: not told", "", (Section("What is missing", (text,)),))
 
@@ -176,7 +175,7 @@ def _parameters(data: Mapping[str, Any]) -> tuple[Block, ...]:
             Cell(interval(v)),
             Cell(v["unit"]),
         )
-        for x in (*data["effects"], *([data["outside"]] if "outside" in data else []))
+        for x in found_in(data)
         for k, v in x["parameters"].items()
         if k not in HIDDEN
     ]

@@ -86,6 +86,11 @@ def called(name: str) -> str:
     return PARAMETERS.get(name, name.replace("_", " "))
 
 
+def found_in(data: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    """What an answer as data tells of with parameters: its effects, and physics that has no name."""
+    return [*data["effects"], *([data["outside"]] if "outside" in data else [])]
+
+
 def figure(value: float | None, unit: str = "") -> str:
     """A number of three digits with its unit, a dash where it is not known."""
     if value is None or not math.isfinite(value):

@@ -15,6 +15,7 @@ from analyzer.explain.page_words import (
     carried_by,
     chance,
     figure,
+    found_in,
     interval,
     rms,
     share,
@@ -55,7 +56,7 @@ def _part(name: str, rows: Rows, numeric: Sequence[int] = ()) -> list[str]:
 def _parameters(data: Mapping[str, Any]) -> Rows:
     return [
         (x["name"], called(k), number(v["value"]), interval(v), v["unit"])
-        for x in data["effects"]
+        for x in found_in(data)
         for k, v in x["parameters"].items()
         if k not in HIDDEN
     ]
@@ -119,7 +120,7 @@ def lines(data: Mapping[str, Any]) -> list[str]:
     """
     head = f"{data['loop']}: {title(data['verdict']) if data['fit'] else 'not told'}"
     block = f" ({data['block']})" if data["block"] != "none" else ""
-    out = [head + block, *wrap(data["reason"], WIDTH), *wrap(check(data), WIDTH)]
+    out = [head + block, *wrap(data["reason"], WIDTH), *(wrap(check(data), WIDTH) if check(data) else [])]
     out += _part("Parameters (90 % intervals)", _parameters(data), (2,))
     out += _part("Controller, as SP, PV and OP show it", _controller(data), (1,))
     out += _part("Misfit, rms in % of span", _fit(data), (1, 2, 3, 4))

@@ -23,8 +23,11 @@ LONGER = "A step of OP each way in manual, held for five time constants, at two 
 
 
 def check(data: Mapping[str, Any]) -> str:
-    """What to look at, by an answer as data: its verdict, and what of no name explains the loop."""
+    """What to look at, by an answer as data: its verdict, and what of no name explains the loop; nothing where the
+    recording cannot be explained at all, for the reason says then what it needs."""
     verdict = data["verdict"]
+    if not data.get("fit", True):
+        return ""
     if "outside" in data:
         return OUTSIDE[data["outside"]["name"]].check
     return EFFECTS[verdict].check if verdict in EFFECTS else CHECKS.get(verdict, CHECKS["unexplained"])
