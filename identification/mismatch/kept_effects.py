@@ -52,7 +52,8 @@ def carried_over(found: Explanation) -> Explanation:
         if proof.carries or unproven or by_cycles or timed:
             return replace(kept, proof=proof, refuted=names[count:], unproven=unproven)
     proof = held_out(found.p, found.plain, found.plain)
-    return replace(found, best=found.plain, accepted=(), proof=proof, refuted=names)
+    outside = None if names else found.outside
+    return replace(found, best=found.plain, accepted=(), proof=proof, refuted=names, outside=outside)
 
 
 def cycle_of(found: Explanation) -> int:
@@ -62,11 +63,11 @@ def cycle_of(found: Explanation) -> int:
 
 
 def first_effects(found: Explanation, count: int) -> Explanation:
-    """The explanation with its first effects alone, the others given up and the rest fitted anew."""
+    """The explanation with its first effects alone; the others, and what was found beside all, are given up."""
     c = found.best.model.c
     for candidate in found.accepted[count:]:
         c = cleared(c, candidate.row)
     names = {r.name for r in found.accepted[:count]}
     rows = tuple(r for r in found.best.model.added if r.name in names)
     best = descend(found.p, Model(rows, c), found.p.limits.search.full_steps)
-    return replace(found, best=best, accepted=found.accepted[:count])
+    return replace(found, best=best, accepted=found.accepted[:count], outside=None)
