@@ -55,11 +55,13 @@ def too_uncertain(limits: TuningLimits) -> str:
     )
 
 
-def more_error(grown: float, now: float) -> str:
-    """Why a tight loop gets no settings: calmer ones would cost error."""
+def little_less_error(left: float, now: float) -> str:
+    """Why a tight loop gets no settings: on its own load calmer ones might win nothing."""
+    way, size = ("raise", left - 1.0) if left > 1.0 else ("lower", 1.0 - left)
     return (
-        f"Too tight (Ms {now:.2f}), but on a process that the data allow robust settings would raise the average "
-        f"absolute error by {100 * (grown - 1):.0f} %: a record with set point moves would tell more."
+        f"Too tight (Ms {now:.2f}), but on a process that the data allow robust settings would {way} the average "
+        f"absolute error by {100 * size:.0f} %{' alone' * (way == 'lower')}: a record with set point moves would "
+        "tell more."
     )
 
 

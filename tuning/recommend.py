@@ -130,9 +130,9 @@ def _tight(loop: Loop, others: Sequence[Loop], load: Floats | None, limits: Tuni
     new, ms = found[0]
     if load is not None:
         new, ms = min(found, key=lambda pair: mean_error((loop, *others), pair[0], load))
-        grown = max(mean_error((one,), new, load) / _error_now(one, load) for one in (loop, *others))
-        if grown > limits.error_growth_sample:
-            return Proposal(Action.UNDECIDED, reasons.more_error(grown, now), ms_before=now)
+        left = max(mean_error((one,), new, load) / _error_now(one, load) for one in (loop, *others))
+        if left > 1.0 - limits.worth_error:
+            return Proposal(Action.UNDECIDED, reasons.little_less_error(left, now), ms_before=now)
     return Proposal(Action.RETUNE, reasons.tight(loop, new, now, ms), new, ms_before=now, ms=ms)
 
 

@@ -178,6 +178,16 @@ def test_robustness_is_not_bought_with_error():
     assert "would raise the average absolute error by" in p.reason
 
 
+def test_little_less_error_is_not_worth_a_change():
+    """Where calm settings might lower a tight loop's error by a hundredth alone, none are told."""
+    process = Fopdt(1.5, 100, 8)
+    nominal = simc(process, scan_s=1.0)
+    loop = Loop(process, replace(nominal, kp=3.2 * nominal.kp))
+    p = recommend(loop, "tuning", load=load(np.random.default_rng(3), 6000, 1.0, 20.0, 0.02))
+    assert (p.action, p.controller) == ("undecided", None)
+    assert "would lower the average absolute error by 1 % alone" in p.reason
+
+
 def test_gain_with_play_stays_near_the_present(proposals):
     """With play the gain is kept within the stated factors, unless it was above the nominal one."""
     for case, p in proposals[:6]:
