@@ -166,7 +166,12 @@ def _score(travel: Floats, error: Floats, aim: float, limits: TuningLimits) -> f
     return math.log(mean_travel) + limits.error_weight * math.log(mean_error) + limits.error_beyond * above
 
 
-def is_harmless(c: Candidate, limits: TuningLimits) -> bool:
+def is_harmless(c: Candidate, table: Bench) -> bool:
     """Whether a candidate is worse on none of the loops that the data allow."""
-    worst = c.worst_error <= limits.error_growth_sample and c.worst_travel <= limits.travel_growth_sample
-    return worst and c.error <= limits.error_growth
+    limits = table.limits
+    most = limits.error_growth_play if is_play(table.loops[0].valve) else limits.error_growth_sample
+    return (
+        c.worst_error <= most
+        and c.worst_travel <= limits.travel_growth_sample
+        and c.error <= limits.error_growth
+    )

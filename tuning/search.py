@@ -130,7 +130,7 @@ def _kept(table: Bench, most: Rejection, pairs: list[Pid]) -> list[Candidate]:
             continue
         if try_out(table, pid, ms, 1).error <= table.limits.error_growth:
             found.append(try_out(table, pid, ms))
-    return [c for c in found if is_harmless(c, table.limits)]
+    return [c for c in found if is_harmless(c, table)]
 
 
 def _grid(loop: Loop, most: Rejection, limits: TuningLimits) -> tuple[Floats, Floats]:
