@@ -102,8 +102,8 @@ class TuningLimits:
         "-",
         (0.1, 10.0),
         "The same with play",
-        "ours: of 72 loops with play of seeds 31, 41 and 61 two errors grew by 7 and 12 % at 1.05, one by 2 % here; of "
-        "72 of 42, 62 and 96 one by 19 %, here one by 5 %; travel falls by one to two points less",
+        "ours: of 72 loops with play of seeds 31, 41 and 61 two errors grew by 7 and 12 % at 1.05, one by 2 % here; "
+        "of 72 of 42, 62 and 96 one by 19 %, here one by 5 %; travel falls by one to two points less",
     )
     travel_growth_sample: float = limit(
         1.05,
