@@ -42,9 +42,10 @@ def recalled(pv: Floats, change: float, memory_s: float, dt_s: float) -> Floats:
 
 
 def returned(pv: Floats, way_s: float, dt_s: float) -> Floats:
-    """PV as it was a while before the middle of each sample, shape (n,); before the first sample as at the first.
+    """PV as it was a while before the middle of each sample, shape (n,), never later than at the sample itself, for what
+    comes after is not known yet; before the first sample as at the first.
 
     pv : shape (n,) [% PV]; way_s : how long before [s].
     """
     k = np.arange(pv.size)
-    return np.interp(k + 0.5 - way_s / dt_s, k, pv)
+    return np.interp(np.minimum(k + 0.5 - way_s / dt_s, k), k, pv)

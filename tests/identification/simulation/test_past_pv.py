@@ -46,6 +46,7 @@ def test_gain_never_changes_its_sign() -> None:
 def test_what_returns_is_pv_of_a_while_ago() -> None:
     """A straight line comes back later by the way, counted to each sample's middle."""
     pv = 3.0 + 0.2 * np.arange(400)
+    assert np.array_equal(returned(pv, 0.1, 2.0), pv)
     back = returned(pv, 101.0, 2.0)
     k = np.arange(400)
     assert np.allclose(back, 3.0 + 0.2 * np.maximum(k + 0.5 - 50.5, 0.0))
