@@ -164,8 +164,12 @@ def physics(found: Explanation, tell: Progress, s: Recording) -> Explanation:
         first = first or tuple(c for c in candidates if c.name in EFFECTS)
         winner = shown_by_cycles(s, candidates) if not accepted else None
         winner = winner or proven(x.p, best, candidates)
-        if winner is None or winner.name in OUTSIDE:
-            outside = winner if is_large(p, winner, gain(best, found.plain)) else None
+        if winner is not None and winner.name in OUTSIDE:
+            if winner.penalised > limits.ceiling_share * gain(best, found.plain):
+                outside = winner
+                break
+            winner = proven(x.p, best, [c for c in candidates if c.name in EFFECTS])
+        if winner is None:
             break
         accepted.append(winner)
         p, best = x.p, descend(x.p, winner.fit.model, limits.full_steps)
@@ -185,11 +189,6 @@ def physics(found: Explanation, tell: Progress, s: Recording) -> Explanation:
         left = max(left, outside.penalised)
     found = replace(found, p=p, best=best, accepted=tuple(accepted), first=first, outside=outside)
     return replace(found, left=left if left > 0 else 0.0)
-
-
-def is_large(p: Problem, beside: Candidate | None, told: float) -> bool:
-    """Whether what has no name gains so much beside named effects that their names fall, as of the ceiling."""
-    return beside is not None and beside.penalised > p.limits.search.ceiling_share * told
 
 
 def has_rivals(s: Recording) -> bool:
