@@ -129,9 +129,10 @@ def candidate(p: Problem, near: Fitted, models: list[Model], steps: int) -> Cand
 
 
 def worth_following(p: Problem, least: float) -> float:
-    """What a candidate of the first round has to come to, to be followed [nat], its penalty taken off."""
+    """What a candidate of the first round has to come to, to be followed [nat], its penalty taken off: so far below
+    what it is of use from as any may lie, or at a share of that where that is less."""
     limits = p.limits.search
-    return limits.may_come_to * least if least > 0.0 else limits.worth_following
+    return min(limits.may_come_to * least, least + limits.worth_following)
 
 
 def screened_candidate(p: Problem, near: Fitted, models: list[Model], least: float = 0.0) -> Candidate:
