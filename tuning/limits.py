@@ -94,7 +94,7 @@ class TuningLimits:
         1.05,
         "-",
         (0.1, 10.0),
-        "Error on the worst uncertainty sample over the present one",
+        "Error on the worst uncertainty sample over the present one, with stick-slip",
         SAMPLES,
     )
     error_growth_play: float = limit(
