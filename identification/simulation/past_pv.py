@@ -42,8 +42,8 @@ def recalled(pv: Floats, change: float, memory_s: float, dt_s: float) -> Floats:
 
 
 def returned(pv: Floats, way_s: float, dt_s: float) -> Floats:
-    """PV as it was a while before the middle of each sample, shape (n,), never later than at the sample itself, for what
-    comes after is not known yet; before the first sample as at the first.
+    """PV as it was a while before the middle of each sample, shape (n,); before the first sample as at the first, and
+    never later than at the sample itself, for what comes after is not known yet.
 
     pv : shape (n,) [% PV]; way_s : how long before [s].
     """
