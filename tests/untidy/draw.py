@@ -126,7 +126,8 @@ def _period(cause: str, with_it: np.ndarray, sp: np.ndarray, guess: float) -> fl
     if cause == "tuning":
         r = _correlations(with_it[0] - sp, int(12 * guess))
         quarter = int(np.argmax(r < 0)) or 1
-        return float(2 * quarter + np.argmax(r[2 * quarter : 6 * quarter + 2]))
+        back = r[2 * quarter : 6 * quarter + 2]
+        return float(2 * quarter + np.argmax(back)) if back.size else guess
     turns = _turns(with_it[2], int(6 * guess)) if cause in ("stiction", "backlash") else 0
     return 2 * sp.size / turns if turns > 5 else guess
 
