@@ -11,7 +11,8 @@
    was identified with it. Under a strong load feedback alone is identified, and the gain falls or turns.
 5. Rhythm: a load from a machine keeps its period as by a clock; noise through a resonance does not.
 6. Wave: third harmonic locked to the phase of the fundamental (a triangle has 1/9, a square 1/3), after the
-   idea of harmonics and bicoherence (Choudhury, Shah, Thornhill 2004); a sine points away from the valve.
+   idea of harmonics and bicoherence (Choudhury, Shah, Thornhill 2004); a sine points away from the valve, and so do
+   harmonics that the valve's model does not explain.
 7. Size: noise through a resonance forgets its size as it forgets its phase (Rice 1945), so a cycle whose phase
    wanders and whose size is kept is no tuning's.
 

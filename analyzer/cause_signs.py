@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analyzer.cause_measures import measures
+from analyzer.cause_measures import PLAIN, measures
 from analyzer.cause_weights import pushes
 from analyzer.decisions import AMPLIFICATION, CAUSES, Cause
 from analyzer.measure import Measured
@@ -87,6 +87,13 @@ def _wave(m: Measured, o: Oscillation) -> str:
     return f"the wave has a phase-locked third harmonic of {100 * m.harmonic:.0f} %"
 
 
+def _wave_left(m: Measured, o: Oscillation) -> str:
+    share = 100 * m.wave_left
+    if m.wave_left < PLAIN:
+        return "a faulty valve leaves few harmonics of the cycle unexplained"
+    return f"a faulty valve leaves harmonics of {share:.0f} % of the cycle unexplained"
+
+
 def _size(m: Measured, o: Oscillation) -> str:
     size, rhythm = m.kurtosis < 2.0, o.rhythm.third >= 0.5
     figures = f"(kurtosis {m.kurtosis:.1f}, noise has 3; rhythm {o.rhythm.third:.1f})"
@@ -115,6 +122,7 @@ GROUPS: tuple[tuple[tuple[str, ...], Callable[[Measured, Oscillation], str]], ..
     (("loop_gain",), _loop_gain),
     (("consistency",), _process),
     (("harmonic",), _wave),
+    (("wave_left",), _wave_left),
     (("kurtosis", "rhythm"), _size),
     (("saturated",), _limits),
     (("dead_time_share",), _dead_time),

@@ -40,6 +40,11 @@ from identification.signals.spectrum import (
 )
 from tuning.linear import is_stable, loop_response
 
+HARMONICS = (2, 3)
+"""Harmonics of a cycle that a valve's model must explain: beyond the third few samples a cycle are left."""
+FEWEST_CYCLES = 2.5
+"""Cycles from which harmonics are told apart from drift; ours."""
+
 
 @dataclass(frozen=True, slots=True)
 class Measured:
@@ -52,7 +57,7 @@ class Measured:
     locked third over the fundamental; saturated, share of time at limits [-]; moves, how often the stem of the
     better valve sets out; excited, whether set point moves drove the loop; trials, how the stretches between OP's
     turns agree on the better valve, None with too few; kurtosis [-] of the band at the period, 3 for noise, 1.5 where
-    the size is kept.
+    the size is kept; wave_left [-], harmonics of PV's cycle that the better valve leaves, over its fundamental.
     """
 
     linear: Fit
@@ -74,6 +79,7 @@ class Measured:
     excited: bool
     trials: Trials | None = None
     kurtosis: float = 3.0
+    wave_left: float = 0.0
 
 
 def _op_range(window: Window, scale_s: float, oscillating: bool) -> float:
@@ -92,6 +98,14 @@ def _op_range(window: Window, scale_s: float, oscillating: bool) -> float:
 def _prominence(x: Floats, dt_s: float, period_s: float) -> float:
     s = spectrum(x, dt_s)
     return peak_prominence(tapered_power(s), s.duration_s / period_s)
+
+
+def _wave_left(window: Window, fit: Fit, period_s: float) -> float:
+    """Second and third harmonic locked to PV's cycle in what a fit leaves of PV, over PV's fundamental."""
+    if window.duration_s < FEWEST_CYCLES * period_s:
+        return 0.0
+    left, cycle = spectrum(residual(window, fit), window.dt_s), spectrum(window.centred, window.dt_s)
+    return math.hypot(*(locked_harmonic(left, period_s, order, cycle) for order in HARMONICS))
 
 
 def _consistency(window: Window, fit: Fit, period_s: float) -> float:
@@ -155,6 +169,7 @@ def measure(
         bool(due.any()),
         shown,
         size_kurtosis(wave, wave.duration_s / scale) if wave is not None else 3.0,
+        _wave_left(window, best, scale) if wave is not None else 0.0,
     )
 
 

@@ -12,6 +12,7 @@ from plant import CONFIG, START_S, series, spec
 from scipy.signal import lfilter
 
 from analyzer.assess import cause_of, convicted
+from analyzer.measure import measure
 from analyzer.oscillation import counting, detect
 from analyzer.quality import prepare
 from tests.proofs.untidy import NAMED, recorded
@@ -94,6 +95,28 @@ def test_a_cycle_short_of_regular_counts_where_its_valve_is_convicted(seed):
     found, said = convicted(ready, seen, stated, config, drawn.kind)
     assert counting(found) is not None
     assert said.cause == NAMED[drawn.truth["cause"]] == "valve"
+
+
+def share_left(cause: str, loops: int = 8) -> float:
+    """Of the harmonics of cycles that are no sines, the share that a faulty valve leaves: the median of loops."""
+    shares: list[float] = []
+    seed = 7000
+    while len(shares) < loops:
+        seed += 1
+        drawn = draw(seed, cause)
+        ready, stated = recorded(drawn, CONFIG)
+        found = detect(ready.record, CONFIG.oscillation)
+        if drawn.truth["packed"] or counting(found) is None:
+            continue
+        m = measure(ready.record, counting(found), stated, CONFIG.cause, found.spectrum, drawn.kind)
+        shares += [m.wave_left / m.harmonic] if m.harmonic > 0.05 else []
+    return float(np.median(shares))
+
+
+def test_a_faulty_valve_explains_the_wave_that_it_makes_and_not_that_of_a_load():
+    """A play's model leaves less than half of the harmonics of the cycles it makes, and most of those of loads."""
+    assert share_left("backlash") < 0.5
+    assert share_left("load") > 0.7
 
 
 def test_a_healthy_loop_s_near_cycle_counts_for_nothing():

@@ -48,12 +48,12 @@ RIDGE = 10.0
 """Penalty on squared weights of measures in units of their deviation [nat]; of 2 to 20 the loops kept apart are told
 alike."""
 WAYS = {
-    "evidence": "+00",
-    "evidence_per_cycle": "+00",
-    "agreeing": "+00",
+    "evidence": "+-0",
+    "evidence_per_cycle": "+-0",
+    "agreeing": "+-0",
     "steadiness": "+00",
-    "jump": "+00",
-    "size": "+00",
+    "jump": "+-0",
+    "size": "+-0",
     "line_linear": "0-+",
     "line_valve": "-0+",
     "amplification": "0+-",
@@ -64,13 +64,16 @@ WAYS = {
     "kurtosis": "0f-",
     "rhythm": "-f+",
     "saturated": "0+-",
+    "wave_left": "-0+",
 }
 """Whether a measure speaks for (+) or against (-) valve, tuning and load, says nothing of it (0), or may do both (f).
 
-What fits a faulty valve speaks for it alone; a peak left in the load for a load; amplification, a loop gain, a period
-of few dead times and limits at both ends for the tuning; a kept size and rhythm for a load and, of the size, against
-noise through a resonance. Without these ways the fit learns how the simulated plants were drawn: it tells a little
-more of the loops kept apart, and calls three of four sticking valves of real recordings loads.
+What fits a faulty valve speaks for it, and against a tuning, whose swing is a sine that no play explains, but not
+against a load, whose wave may be any; a peak left in the load, and harmonics of the cycle that the faulty valve does
+not explain, for a load; amplification, a loop gain, a period of few dead times and limits at both ends for tuning; a
+kept size and rhythm for a load and, of the size, against noise through a resonance. Without these ways the fit learns
+how the simulated plants were drawn, whose loads are squares in loops of little gain and whose valves seldom make
+squares: it tells more of the loops kept apart, and calls sticking valves of real flows loads.
 """
 BOUNDS = {"+": (0.0, None), "-": (None, 0.0), "0": (0.0, 0.0), "f": (None, None)}
 PER_SEED = 300
