@@ -11,7 +11,7 @@ import numpy as np
 from analyzer import words
 from analyzer.assessments import Assessments, Hour, assess_span, hourly, settling_time, usable
 from analyzer.cause import NO_CAUSE, Verdict, as_hint, hidden_by_grid, judge, not_assessed
-from analyzer.config import Config
+from analyzer.config import CauseLimits, Config
 from analyzer.dead_valve import dead_valve, with_dead_valve
 from analyzer.decisions import CAUSES, Cause, Fault, Lack, LacksError, Needs
 from analyzer.fit_for_cause import compressed, unfit_for_cause
@@ -116,13 +116,24 @@ def convicted(
     kind : str
     """
     verdict = cause_of(prepared, found, controller, config, kind)
-    if counting(found) is not None or not prepared.op_known:
+    quiet = verdict.measured
+    if counting(found) is not None or not prepared.op_known or quiet is None:
+        return found, verdict
+    if quiet.evidence < config.cause.near_evidence:
         return found, verdict
     near = detect(prepared.record, config.oscillation.nearly())
     if counting(near) is None:
         return found, verdict
     told = cause_of(prepared, near, controller, config, kind)
-    return (near, told) if told.cause is Cause.VALVE and not told.dead else (found, verdict)
+    return (near, told) if _made_by_valve(told, config.cause) else (found, verdict)
+
+
+def _made_by_valve(verdict: Verdict, limits: CauseLimits) -> bool:
+    """Whether the valve is convicted of a cycle: surely at fault, not dead, of a stickband that OP crosses."""
+    m = verdict.measured
+    if verdict.cause is not Cause.VALVE or verdict.dead or m is None:
+        return False
+    return verdict.confidence[Cause.VALVE] >= limits.near_pct and m.size <= limits.near_size
 
 
 def verdict_by_measures(
