@@ -168,7 +168,7 @@ def _hides(verdict: Verdict, prepared: Prepared, oscillation: Oscillation, confi
         return None if sure else compressed(prepared, None, config.quality)
     samples = oscillation.period_s / prepared.record.dt_s
     steps = oscillation.amplitude_pct / max(prepared.pv_step, 1e-12)
-    if steps < limits.steps_told:
+    if steps < (limits.steps_told if verdict.cause is Cause.LOAD else limits.steps_tuning):
         return Needs(Lack.FINER, words.too_rough(prepared.pv_step, oscillation.amplitude_pct))
     if verdict.cause is Cause.LOAD and samples < limits.samples_told:
         return Needs(Lack.FASTER, words.too_few(samples, limits.samples_told))

@@ -85,6 +85,16 @@ def test_a_play_of_many_steps_of_the_grid_is_still_found():
     assert verdict_of(sp, rounded(pv, 0.3), op, 1.0, "") == "valve"
 
 
+@pytest.mark.parametrize("seed", [1503739, 1503856, 1503904])
+def test_a_tuning_is_told_on_a_grid_of_two_steps_an_amplitude(seed):
+    """Of loops that their tuning swings by 1.5 steps of PV's grid and more the tuning is told."""
+    drawn = draw(seed)
+    ready, stated = recorded(drawn, CONFIG)
+    found = detect(ready.record, CONFIG.oscillation)
+    assert counting(found).amplitude_pct < CONFIG.cause.steps_told * ready.pv_step
+    assert drawn.truth["cause"] == cause_of(ready, found, stated, CONFIG, drawn.kind).cause == "tuning"
+
+
 @pytest.mark.parametrize("seed", [60112, 60663, 68857, 1503325, 1503665, 1504195])
 def test_a_cycle_short_of_regular_counts_where_its_valve_is_convicted(seed):
     """A sticking valve's irregular cycle, which noise of its spectrum would show too, is found by what OP tells."""
