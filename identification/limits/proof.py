@@ -75,6 +75,14 @@ class ProofLimits:
         "Share of OP's travel in two parts of twenty of the record from which it is one experiment without spread",
         "ours",
     )
+    sound_valve: float = limit(
+        0.1,
+        "% OP",
+        (0.0, 10.0),
+        "Play or stickband below which a valve is in good order",
+        "the narrowest dead band that a positioner can be set to (Siemens, SIPART PS2 operating instructions, "
+        "A5E00074631, parameter DEBA: 0.1 to 10 %)",
+    )
     bound_share: float = limit(
         0.005, "-", (0.0, 0.5), "Part of a constant's range within which it stands at the end of it", "ours"
     )

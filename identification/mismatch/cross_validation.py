@@ -10,7 +10,7 @@ from identification.estimation.candidate import Fitted, Model, Problem, bounds, 
 from identification.estimation.noise import whitened
 from identification.estimation.prediction_error import descend
 from identification.limits.explain import LIMITS
-from identification.mismatch.effect import Effect
+from identification.mismatch.effect import Effect, Friction
 from identification.mismatch.restarts import simulated_anew
 from identification.mismatch.starts.screening import at_inlet
 from identification.record import Floats
@@ -223,13 +223,19 @@ def runs_out(p: Problem, fit: Fitted) -> bool:
     return False
 
 
+def in_sound_valves(p: Problem, fit: Fitted, effect: Effect) -> bool:
+    """Whether an effect is play or stick-slip no wider than a valve in good order has."""
+    wears = effect.friction in (Friction.PLAY, Friction.STICKS)
+    return wears and float(fit.model.c[Slot.STICKBAND]) < p.limits.proof.sound_valve
+
+
 def passes(p: Problem, worse: Fitted, better: Fitted, effect: Effect) -> bool:
-    """Whether the effect stands: its constants within their range, spread over the record and, where it is bound to
-    no time, on held-out spans.
+    """Whether the effect stands: its constants within their range, no valve in good order, spread over the record
+    and, where it is bound to no time, on held-out spans.
 
     What an effect that is bound to a time will do later does not follow from what it did, so no span is held out.
     """
-    if runs_out(p, better):
+    if runs_out(p, better) or in_sound_valves(p, better, effect):
         return False
     if effect.needs == "steps":
         return at_inlet(p, worse)

@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from identification.controller.check import StatedSettings
 from identification.estimation.candidate import Fitted, Model, Problem, problem
 from identification.estimation.prediction_error import descend
 from identification.mismatch.answer import Answer, answer
@@ -166,6 +167,14 @@ def test_constant_at_its_far_end_is_no_finding(name: str, slot: Slot, value: flo
         c[q.slot] = 5.0 if q.log else -0.5
     c[slot] = value if name != "saturation" else float(p.inputs.op.max())
     assert runs_out(p, Fitted(Model((row,), c), 1.0, N, np.zeros(3), np.zeros(N))) is out
+
+
+def test_play_that_a_valve_in_good_order_has_is_no_finding() -> None:
+    """A play of 2 % is named; of the same recording, with an OP and a play a fortieth as large, no valve's fault."""
+    s = recording(11, PLAY)
+    assert told(s).verdict == "backlash"
+    fine = replace(s, op=50.0 + (s.op - 50.0) / 40.0, stated=StatedSettings(1.8 / 40.0, 20.0))
+    assert not {e.name for e in told(fine).effects} & {"backlash", "stiction", "positioner"}
 
 
 @pytest.mark.parametrize(("fit_pct", "carries"), [(-20.0, False), (0.0, False), (30.0, True)])
