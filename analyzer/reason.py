@@ -22,8 +22,7 @@ STEPS = 4.0
 
 def reason_of(row: Row, needs: Needs | None = None) -> str:
     """One sentence on what was found and why."""
-    oscillates = counts(row["oscillating_pct"]) and row["period_s"]
-    cycle = f"cycles every {duration(row['period_s'])}" if oscillates else "does not oscillate"
+    cycle = _cycle(row)
     cause = Cause(row["cause"])
     if cause is Cause.VALVE:
         return f"{cycle}: {_valve(row)}"
@@ -34,6 +33,15 @@ def reason_of(row: Row, needs: Needs | None = None) -> str:
     if cause is Cause.UNDECIDED:
         return f"{cycle}; cause undecided: {needs or 'the signs do not agree'}"
     return cycle
+
+
+def _cycle(row: Row) -> str:
+    """Whether the loop cycles, and for how much of the time where it is too little to count."""
+    share = row["oscillating_pct"]
+    if not share or not row["period_s"]:
+        return "does not oscillate"
+    cycle = f"cycles every {duration(row['period_s'])}"
+    return cycle if counts(share) else f"{cycle}, for {share:.0f} % of the time"
 
 
 def to_stroke(row: Row) -> str:

@@ -1,0 +1,23 @@
+"""The sentence that says what a loop does."""
+
+from __future__ import annotations
+
+import pytest
+
+from analyzer.reason import reason_of
+
+
+@pytest.mark.parametrize(
+    ("share", "said"),
+    [
+        (0.0, "does not oscillate"),
+        (26.3, "cycles every 18.1 min, for 26 % of the time"),
+        (49.9, "cycles every 18.1 min, for 50 % of the time"),
+        (80.0, "cycles every 18.1 min: driven from outside; the cycle keeps its size"),
+    ],
+)
+def test_a_loop_that_cycles_for_a_part_of_the_night_is_not_said_to_be_calm(share: float, said: str) -> None:
+    """A cycle of too little time to count is told with its share; only a loop without one does not oscillate."""
+    signs = '[{"points_to": "load", "strength": 1.0, "text": "the cycle keeps its size"}]'
+    row = {"oscillating_pct": share, "period_s": 1086.0 if share else None, "signs": signs}
+    assert reason_of(row | {"cause": "load" if share >= 50 else "none"}) == said
