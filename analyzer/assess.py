@@ -13,7 +13,7 @@ from analyzer.assessments import Assessments, Hour, assess_span, hourly, settlin
 from analyzer.cause import NO_CAUSE, Verdict, as_hint, hidden_by_grid, judge, not_assessed
 from analyzer.config import CauseLimits, Config
 from analyzer.dead_valve import dead_valve, with_dead_valve
-from analyzer.decisions import CAUSES, Cause, Fault, Lack, LacksError, Needs
+from analyzer.decisions import Cause, Lack, LacksError, Needs
 from analyzer.fit_for_cause import compressed, unfit_for_cause
 from analyzer.measure import Measured, measure, time_scale
 from analyzer.oscillation import Oscillation, Oscillations, barely_seen, counting, detect
@@ -21,6 +21,7 @@ from analyzer.plantwide.wave import Wave, waves_of
 from analyzer.quality import Prepared
 from analyzer.settings_check import SettingsDiffer, differing
 from analyzer.slip_by_slip import told_slip_by_slip
+from analyzer.told_apart import told_apart
 from analyzer.trends import BUCKETS, FINE_BUCKETS, close_view, thinned
 from identification.errors import NotAssessedError
 from identification.models import Pid
@@ -143,36 +144,6 @@ def verdict_by_measures(
     if hidden_by_grid(measured, prepared.pv_step, config.cause):
         measured = replace(measured, evidence=0.0)
     return told_apart(judge(measured, oscillation, config.cause), prepared, oscillation, config)
-
-
-def told_apart(
-    verdict: Verdict, prepared: Prepared, oscillation: Oscillation | None, config: Config
-) -> Verdict:
-    """The verdict, or none where so few samples a cycle, or so coarse a grid, make other causes look like it; and
-    none where trends on straight segments make a likely valve of a load."""
-    if oscillation is None or verdict.cause not in CAUSES:
-        return verdict
-    lacking = _hides(verdict, prepared, oscillation, config)
-    if lacking is None:
-        return verdict
-    fault = Fault.UNDECIDED if verdict.cause is Cause.VALVE else verdict.fault
-    hint = as_hint(verdict, 0.9 * config.cause.named_pct)
-    return replace(hint, cause=Cause.UNDECIDED, fault=fault, needs=lacking)
-
-
-def _hides(verdict: Verdict, prepared: Prepared, oscillation: Oscillation, config: Config) -> Needs | None:
-    """What the recording lacks to tell the cause that is named from others; None where it lacks nothing."""
-    limits = config.cause
-    if verdict.cause is Cause.VALVE:
-        sure = verdict.confidence[Cause.VALVE] >= limits.compressed_pct
-        return None if sure else compressed(prepared, None, config.quality)
-    samples = oscillation.period_s / prepared.record.dt_s
-    steps = oscillation.amplitude_pct / max(prepared.pv_step, 1e-12)
-    if steps < (limits.steps_told if verdict.cause is Cause.LOAD else limits.steps_tuning):
-        return Needs(Lack.FINER, words.too_rough(prepared.pv_step, oscillation.amplitude_pct))
-    if verdict.cause is Cause.LOAD and samples < limits.samples_told:
-        return Needs(Lack.FASTER, words.too_few(samples, limits.samples_told))
-    return None
 
 
 def _known(figures: Assessments, op: bool) -> Assessments:

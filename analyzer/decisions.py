@@ -86,6 +86,7 @@ class Lack(StrEnum):
     FASTER = "faster samples"
     FINER = "finer values"
     LONGER = "longer record"
+    STROKE = "a stroke of the valve"
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,6 +20,7 @@ from identification.estimation.backlash_stiction import (
     fit_play,
     fit_stick_slip,
 )
+from identification.estimation.expected_evidence import expected_evidence
 from identification.estimation.gauss_newton import descend
 from identification.estimation.hammerstein import IDEAL, Fit, process_of, residual
 from identification.estimation.likelihood_ratio import WindowFit, evidence, stem_moves, with_load_step
@@ -42,6 +43,8 @@ from tuning.linear import is_stable, loop_response
 
 HARMONICS = (2, 3)
 """Harmonics of a cycle that a valve's model must explain: beyond the third few samples a cycle are left."""
+PLAYS = (0.25, 0.6)
+"""Least and greatest play, over OP's range, whose evidence is foretold; ours: plays of loops that cycle."""
 FEWEST_CYCLES = 2.5
 """Cycles from which harmonics are told apart from drift; ours."""
 
@@ -57,7 +60,8 @@ class Measured:
     locked third over the fundamental; saturated, share of time at limits [-]; moves, how often the stem of the
     better valve sets out; excited, whether set point moves drove the loop; trials, how the stretches between OP's
     turns agree on the better valve, None with too few; kurtosis [-] of the band at the period, 3 for noise, 1.5 where
-    the size is kept; wave_left [-], harmonics of PV's cycle that the better valve leaves, over its fundamental.
+    the size is kept; wave_left [-], harmonics of PV's cycle that the better valve leaves, over its fundamental;
+    expected [nat], the evidence that a play would bring in such a recording.
     """
 
     linear: Fit
@@ -80,6 +84,7 @@ class Measured:
     trials: Trials | None = None
     kurtosis: float = 3.0
     wave_left: float = 0.0
+    expected: float = 0.0
 
 
 def _op_range(window: Window, scale_s: float, oscillating: bool) -> float:
@@ -106,6 +111,11 @@ def _wave_left(window: Window, fit: Fit, period_s: float) -> float:
         return 0.0
     left, cycle = spectrum(residual(window, fit), window.dt_s), spectrum(window.centred, window.dt_s)
     return math.hypot(*(locked_harmonic(left, period_s, order, cycle) for order in HARMONICS))
+
+
+def _play(size: float) -> float:
+    """Width of the play that is looked for, over OP's range: that which fits best, where it could make a cycle."""
+    return min(max(size, PLAYS[0]), PLAYS[1])
 
 
 def _consistency(window: Window, fit: Fit, period_s: float) -> float:
@@ -144,7 +154,8 @@ def measure(
     window, fits = _fits(window, scale, due, limits, oscillation)
     linear, play, stick, best, gained, jump = fits
     hopeless = oscillation is None and gained < _hopeful(window, due, limits)
-    size = best.valve.stickband / max(_op_range(window, scale, oscillation is not None), 1e-9)
+    op_range = _op_range(window, scale, oscillation is not None)
+    size = best.valve.stickband / max(op_range, 1e-9)
     amplification, stable = _amplification(process_of(window, linear), controller, scale)
     told, (fine_linear, fine_play, fine_stick) = _refined(window, (linear, play, stick), best, hopeless)
     wave = error if oscillation is not None else None
@@ -170,6 +181,7 @@ def measure(
         shown,
         size_kurtosis(wave, wave.duration_s / scale) if wave is not None else 3.0,
         _wave_left(window, best, scale) if wave is not None else 0.0,
+        expected_evidence(window, linear, _play(size) * op_range, scale) if wave is not None else 0.0,
     )
 
 

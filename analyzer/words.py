@@ -83,6 +83,14 @@ def stands_and_jumps(stands: float, jump_pct: float) -> str:
     )
 
 
+def valve_beside(size: float, agreeing: float) -> str:
+    """Why a likely load is not told alone."""
+    return (
+        f"a load is likelier, but PV fits a play of {100 * size:.0f} % of OP's range as well, in "
+        f"{100 * agreeing:.0f} % of the stretches between OP's turns; needs the valve stroked in small steps"
+    )
+
+
 def too_rough(step_pct: float, amplitude_pct: float) -> str:
     """Why a coarse grid tells no cause."""
     return (

@@ -9,12 +9,14 @@ from functools import cache
 import numpy as np
 import pytest
 from plant import CONFIG, START_S, series, spec
+from plant import prepared as sketched
 from scipy.signal import lfilter
 
-from analyzer.assess import cause_of, convicted
+from analyzer.assess import assess, cause_of, convicted
 from analyzer.measure import measure
 from analyzer.oscillation import counting, detect
 from analyzer.quality import prepare
+from tests.proofs.sensitivity import SKETCHES, Cell, made
 from tests.proofs.untidy import NAMED, recorded
 from tests.untidy.draw import draw
 from tests.untidy.loop import Plant, Stem, run
@@ -141,3 +143,11 @@ def test_a_healthy_loop_s_near_cycle_counts_for_nothing():
         found, _ = convicted(ready, seen, stated, eager, drawn.kind)
         assert counting(found) is None
     assert looked > 0
+
+
+def test_no_load_is_told_alone_where_noise_half_hides_a_play():
+    """Behind noise of a third of its cycle, on PV alone, a level that a play swings is not said to be driven."""
+    cell = Cell("play, noise on PV alone", 3.0, 20.0)
+    for seed in range(3):
+        said = assess(sketched(made(cell, seed)), SKETCHES[cell.name].controller, CONFIG).verdict
+        assert said.cause == "valve" or "stroked in small steps" in str(said.needs)

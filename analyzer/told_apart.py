@@ -1,0 +1,59 @@
+"""Whether a recording can tell the cause that is likeliest from the others that would look like it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from analyzer import words
+from analyzer.cause import Verdict, as_hint
+from analyzer.cause_measures import PLAIN
+from analyzer.config import CauseLimits, Config
+from analyzer.decisions import CAUSES, Cause, Fault, Lack, Needs
+from analyzer.fit_for_cause import compressed
+from analyzer.measure import PLAYS
+from analyzer.oscillation import Oscillation
+from analyzer.quality import Prepared
+
+
+def told_apart(
+    verdict: Verdict, prepared: Prepared, oscillation: Oscillation | None, config: Config
+) -> Verdict:
+    """The verdict, or none where so few samples a cycle, or so coarse a grid, make other causes look like it; and
+    none where trends on straight segments make a likely valve of a load."""
+    if oscillation is None or verdict.cause not in CAUSES:
+        return verdict
+    lacking = _hides(verdict, prepared, oscillation, config)
+    if lacking is None:
+        return verdict
+    fault = Fault.UNDECIDED if verdict.cause is Cause.VALVE else verdict.fault
+    hint = as_hint(verdict, 0.9 * config.cause.named_pct)
+    return replace(hint, cause=Cause.UNDECIDED, fault=fault, needs=lacking)
+
+
+def _hides(verdict: Verdict, prepared: Prepared, oscillation: Oscillation, config: Config) -> Needs | None:
+    """What the recording lacks to tell the cause that is named from others; None where it lacks nothing."""
+    limits = config.cause
+    if verdict.cause is Cause.VALVE:
+        sure = verdict.confidence[Cause.VALVE] >= limits.compressed_pct
+        return None if sure else compressed(prepared, None, config.quality)
+    samples = oscillation.period_s / prepared.record.dt_s
+    steps = oscillation.amplitude_pct / max(prepared.pv_step, 1e-12)
+    if steps < (limits.steps_told if verdict.cause is Cause.LOAD else limits.steps_tuning):
+        return Needs(Lack.FINER, words.too_rough(prepared.pv_step, oscillation.amplitude_pct))
+    if verdict.cause is not Cause.LOAD:
+        return None
+    if samples < limits.samples_told:
+        return Needs(Lack.FASTER, words.too_few(samples, limits.samples_told))
+    return _beside(verdict, limits)
+
+
+def _beside(verdict: Verdict, limits: CauseLimits) -> Needs | None:
+    """A stroke of the valve, where a load is likely and a play shows all the same; None where it does not."""
+    m = verdict.measured
+    if m is None or m.trials is None or verdict.confidence[Cause.LOAD] >= limits.beside_pct:
+        return None
+    plain = m.evidence > limits.beside_share * (m.expected + limits.evidence)
+    crossed = PLAYS[0] <= m.size <= limits.near_size
+    if not plain or not crossed or m.trials.agreeing < limits.beside_agreeing or m.wave_left > PLAIN:
+        return None
+    return Needs(Lack.STROKE, words.valve_beside(m.size, m.trials.agreeing))
