@@ -141,7 +141,7 @@ def verdict_by_measures(
     measured: Measured, prepared: Prepared, oscillation: Oscillation | None, config: Config
 ) -> Verdict:
     """The verdict by what was measured, as far as sampling and grid let it be told."""
-    if hidden_by_grid(measured, prepared.pv_step, config.cause):
+    if hidden_by_grid(measured, prepared.pv_step, oscillation is not None, config.cause):
         measured = replace(measured, evidence=0.0)
     return told_apart(judge(measured, oscillation, config.cause), prepared, oscillation, config)
 

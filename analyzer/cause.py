@@ -168,13 +168,15 @@ def _quiet(m: Measured, limits: CauseLimits) -> Verdict:
     return Verdict(Cause.VALVE if is_valve else Cause.NONE, confidence, fault, signs, measured=m)
 
 
-def hidden_by_grid(m: Measured, pv_step: float, limits: CauseLimits) -> bool:
-    """Whether the valve's stickband moves PV by so few steps of its grid, pv_step [% of span], that the grid itself
-    holds PV still as the valve would."""
+def hidden_by_grid(m: Measured, pv_step: float, oscillates: bool, limits: CauseLimits) -> bool:
+    """Whether the valve's stickband moves PV by so few steps of its grid, pv_step [% of span], or PV of a calm loop
+    covers so few, that the grid itself holds PV still as the valve would."""
+    if m.window.position is not None and not m.window.decoded:
+        return False
     best = m.stick_slip if m.stick_slip is not None and m.jump > limits.evidence_jump else m.play
-    moved = abs(best.gain) * best.valve.stickband
-    recorded = m.window.position is not None and not m.window.decoded
-    return not recorded and moved < limits.grid_steps * pv_step
+    covered = float(np.ptp(m.window.y[m.window.usable]))
+    rough = not oscillates and covered < limits.grid_covered * pv_step
+    return rough or abs(best.gain) * best.valve.stickband < limits.grid_steps * pv_step
 
 
 def as_hint(verdict: Verdict, most_pct: float) -> Verdict:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from analyzer.limits.calm_loop import CalmLoopLimits
 from identification.limits.declare import limit
 
 CHOSEN = (
@@ -19,7 +20,7 @@ STUDY = "ours: tests/proofs/negative_controls.py and the healthy loops of a simu
 
 
 @dataclass(frozen=True, slots=True)
-class CauseLimits:
+class CauseLimits(CalmLoopLimits):
     """When a cause is named."""
 
     judged: int = limit(
@@ -127,29 +128,6 @@ class CauseLimits:
         "Slip jump over stickband below which the fault is a play",
         STUDY,
     )
-    near_evidence: float = limit(
-        5.0,
-        "nat",
-        (0.0, 1000.0),
-        "Gain in log likelihood of a valve's fault in a loop that does not oscillate from which the valve is asked "
-        "whether it makes a cycle that is not regular",
-        "ours: of 747 such loops (untidy, seeds 1502500 to 1504499) 38 have it, and 21 of the 23 that are convicted",
-    )
-    near_size: float = limit(
-        1.0,
-        "-",
-        (0.0, 10.0),
-        "Stickband over the range of OP beyond which it makes no such cycle: OP does not swing far enough to move it",
-        "by definition; of 1,920 healthy untidy loops (seeds 1500000 to 1504999) one is convicted without it",
-    )
-    near_pct: float = limit(
-        75.0,
-        "%",
-        (0.0, 100.0),
-        "Confidence from which the valve is convicted of such a cycle",
-        "ours: two of 24 valves convicted on untidy loops (seeds 1502000 to 1504999) are below, and so is a level "
-        "whose noise swings (59 %, ../shared/recordings/refinery, 2411LIC30102-N39)",
-    )
     beside_pct: float = limit(
         80.0,
         "%",
@@ -241,13 +219,6 @@ class CauseLimits:
         (0.0, 10.0),
         "Locked third harmonic above which a small stickband is never named: a square has 1/3, a triangle 1/9",
         CHOSEN,
-    )
-    size: float = limit(
-        0.45,
-        "-",
-        (0.0, 1.0),
-        "Stickband over the range of OP from which a valve is at fault in a loop that does not cycle",
-        "below it the describing function of play is within 15 degrees of a gain",
     )
     valve_pct: float = limit(
         55.0,

@@ -151,3 +151,14 @@ def test_no_load_is_told_alone_where_noise_half_hides_a_play():
     for seed in range(3):
         said = assess(sketched(made(cell, seed)), SKETCHES[cell.name].controller, CONFIG).verdict
         assert said.cause == "valve" or "stroked in small steps" in str(said.needs)
+
+
+@pytest.mark.parametrize("seed", [1508212, 1509512, 1600279, 1800233])
+def test_no_valve_is_blamed_for_a_coarse_grid_in_a_calm_loop(seed):
+    """In calm healthy loops whose PV covers one to five steps of its grid, no valve is told."""
+    drawn = draw(seed)
+    ready, stated = recorded(drawn, CONFIG)
+    found, said = convicted(ready, detect(ready.record, CONFIG.oscillation), stated, CONFIG, drawn.kind)
+    assert drawn.truth["cause"] == "healthy"
+    assert counting(found) is None
+    assert said.cause == "none"
