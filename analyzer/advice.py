@@ -164,8 +164,9 @@ def _without_settings(verdict: Verdict) -> Advice:
 
 
 def _lacking(needs: Needs) -> Advice:
-    """The advice to get more data, with what is lacking."""
-    return Advice(Action.NEEDS_DATA, needs.text, lack=needs.lack)
+    """The advice to get more data, or a test where no data tell, with what is lacking."""
+    action = Action.UNDECIDED if needs.lack is Lack.STROKE else Action.NEEDS_DATA
+    return Advice(action, needs.text, lack=needs.lack)
 
 
 def withheld(

@@ -87,7 +87,8 @@ def valve_beside(size: float, agreeing: float) -> str:
     """Why a likely load is not told alone."""
     return (
         f"a load is likelier, but PV fits a play of {100 * size:.0f} % of OP's range as well, in "
-        f"{100 * agreeing:.0f} % of the stretches between OP's turns; needs the valve stroked in small steps"
+        f"{100 * agreeing:.0f} % of the stretches between OP's turns; needs some periods in manual, or the valve "
+        "stroked in small steps"
     )
 
 
