@@ -18,8 +18,8 @@ from analyzer.quality import Prepared
 def told_apart(
     verdict: Verdict, prepared: Prepared, oscillation: Oscillation | None, config: Config
 ) -> Verdict:
-    """The verdict, or none where so few samples a cycle, or so coarse a grid, make other causes look like it; and
-    none where trends on straight segments make a likely valve of a load."""
+    """The verdict, or none where so few samples a cycle, or so coarse a grid, make other causes look like it; where
+    trends on straight segments make a likely valve of a load; and where a valve's play shows beside a likely load."""
     if oscillation is None or verdict.cause not in CAUSES:
         return verdict
     lacking = _hides(verdict, prepared, oscillation, config)

@@ -13,8 +13,9 @@ CHOSEN = (
 )
 UNTIDY = "ours: tests/proofs/untidy.py and tests/proofs/negative_controls.py"
 BESIDE = (
-    "ours: of the loads that tests/proofs/cause_weights.py and its folders hold 18 of 708 are told no more, and 15 "
-    "of 61 valves that were called loads; with noise of a tenth to two thirds of the cycle 4 of 142, and 5 of 35"
+    "ours: of the loads of tests/proofs/cause_weights.py, its folders and untidy draws 1502500 to 1504499 18 of 708 "
+    "are told no more, and 15 of 61 valves called loads; with noise of a tenth to two thirds of the cycle 4 of 142, "
+    "and 5 of 35"
 )
 STUDY = "ours: tests/proofs/negative_controls.py and the healthy loops of a simulated plant"
 
@@ -139,7 +140,8 @@ class CauseLimits(CalmLoopLimits):
         0.2,
         "-",
         (0.0, 10.0),
-        "Part of the evidence that such a play would bring in such a recording from which it shows",
+        "Part of the evidence that such a play would bring in such a recording, `evidence` added to it, from which "
+        "it shows",
         BESIDE,
     )
     beside_agreeing: float = limit(
