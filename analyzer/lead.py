@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from analyzer.cost import cost, cost_column
-from analyzer.decisions import Action, Cause, Fault, Lane
+from analyzer.decisions import Action, Cause, Fault, GroupRole, Lane
 from analyzer.lane_figures import lanes_in
 from analyzer.plantwide.view import GroupView
 from analyzer.units import duration
@@ -34,11 +34,11 @@ def first_things(rows: Sequence[Row], groups: Sequence[GroupView] = ()) -> tuple
     for group in groups:
         if group.source is None:
             continue
-        members = [r["loop"] for r in group.rows if r["loop"] in by_loop]
         source = by_loop.get(group.source["loop"])
-        others = [m for m in members if source is not None and m != source["loop"]]
+        others = [r["loop"] for r in group.rows if r["role"] == GroupRole.FOLLOWER and r["loop"] in by_loop]
         if source is None or not others:
             continue
+        members = [source["loop"], *others]
         told |= set(members)
         found.append((sum(cost(by_loop[m], by) for m in members), _of_group(source, others)))
     left = sorted((r for r in rows if r["loop"] not in told), key=lambda r: (-cost(r, by), r["loop"]))

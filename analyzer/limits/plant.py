@@ -105,13 +105,6 @@ class PlantLimits:
         "Coherence at the period from which one loop follows another",
         STUDY,
     )
-    outweighs: float = limit(
-        4.0,
-        "-",
-        (1.0, 1000.0),
-        "Evidence of the other valve over its own from which it does",
-        "ours",
-    )
     follow_cycles: float = limit(
         12.0,
         "-",

@@ -97,14 +97,15 @@ def follows(
 def may_follow(own: Peer, other: Peer, level: float, limits: PlantLimits) -> bool:
     """Whether a loop can follow another at this coherence.
 
-    A loop whose own valve seems at fault follows only one whose valve is so by far more evidence: what comes from
-    a neighbour's stem looks like stem motion in the follower too, but explains it worse.
+    Two loops that each cycle by themselves do not keep step over a night, so one of the two moves the other; what
+    comes from a neighbour's stem looks like stem motion in the follower too, but explains it worse. A loop whose own
+    valve seems at fault follows one whose valve is so by more evidence, and no other.
     """
     if level < limits.coherent:
         return False
     if own.cause is not Cause.VALVE:
         return True
-    return other.cause is Cause.VALVE and other.evidence >= limits.outweighs * own.evidence
+    return other.cause is Cause.VALVE and other.evidence >= own.evidence
 
 
 def traced(group: Group, peers: Mapping[str, Peer], limits: PlantLimits) -> Traced | None:

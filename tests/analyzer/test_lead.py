@@ -38,6 +38,18 @@ def test_a_source_is_named_with_whom_it_moves() -> None:
     )
 
 
+def test_only_followers_are_said_to_be_moved() -> None:
+    """A loop that shares a group's wave and keeps a verdict of its own is not said to be moved by the source."""
+    rows = [row("FIC1", 60.0, **VALVE), row("TIC2", 20.0, **FOLLOWS), row("LIC3", 30.0, **VALVE)]
+    roles = ("source", "follower", "shares")
+    members = tuple({"loop": r["loop"], "role": role} for r, role in zip(rows, roles, strict=True))
+    group = GroupView("1", members, {r["loop"]: r for r in rows})
+    assert first_things(rows, [group]) == (
+        "Fix FIC1's valve: it also moves TIC2.",
+        "Stroke the valve of LIC3: it sticks.",
+    )
+
+
 def test_three_at_most_by_what_they_gain() -> None:
     """Of five kinds of work the three that gain most are told; importance counts where it is stated."""
     rows = [

@@ -14,7 +14,7 @@ from analyzer.oscillation import detect
 from analyzer.plantwide.groups import Group, groups_of
 from analyzer.plantwide.source import Peer
 from analyzer.plantwide.table import waves_in, waves_table
-from analyzer.plantwide.verdict import Traced, followers_of, trace
+from analyzer.plantwide.verdict import Traced, followers_of, may_follow, trace
 from analyzer.plantwide.wave import Wave, waves_of
 from tests.analyzer.plant import CONFIG, START_S, record
 
@@ -159,6 +159,16 @@ def test_records_of_other_hours_share_nothing():
     """Two loops with the same trend at other hours of the day are no group."""
     x = wave(8)
     assert grouped(loop("A", x), loop("B", x, seed=2, start_s=START_S + HOURS_8)) == []
+
+
+@pytest.mark.parametrize(("own", "follows"), [(100.0, True), (270.0, True), (1500.0, False)])
+def test_the_valve_with_more_evidence_moves_the_other(own, follows):
+    """Of two valves in step the one with more evidence is the source, and the other loop follows it, whatever the
+    ratio."""
+    limits = CONFIG.plant
+    valve = Peer(Cause.VALVE, own)
+    assert may_follow(valve, Peer(Cause.VALVE, 1000.0), 0.95, limits) is follows
+    assert not may_follow(valve, Peer(Cause.LOAD, 0.0), 0.95, limits)
 
 
 def test_a_loop_may_follow_in_two_groups():
