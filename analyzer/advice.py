@@ -176,6 +176,8 @@ def withheld(
     verdict = found.verdict
     if verdict.dead:
         return Advice(Action.REPAIR_VALVE)
+    if found.outdated:
+        return Advice(Action.NONE, words.JUST_CHANGED)
     if found.settings is not None:
         return Advice(Action.CHECK_SETTINGS, words.settings_differ(found.settings, spec, pv_span))
     if found.needs is not None:
@@ -207,8 +209,8 @@ def _unsupported(found: Assessment, controller: Pid | None, config: Config) -> A
         return Advice(Action.REPAIR_VALVE, unset) if verdict.cause is Cause.VALVE else lacking
     if controller is None:
         return _without_settings(verdict)
-    if found.night.usable_h < config.advice.least_h:
-        return _lacking(Needs(Lack.LONGER, words.too_short(found.night.usable_h, config.advice.least_h)))
+    if found.judged_h < config.advice.least_h:
+        return _lacking(Needs(Lack.LONGER, words.too_short(found.judged_h, config.advice.least_h)))
     return _too_thin(found, controller, config)
 
 

@@ -57,7 +57,7 @@ def assess(loop: PlantLoop) -> Assessment:
     """
     from analyzer.assess import assess as assessed
 
-    return assessed(loop.prepared, loop.controller, loop.plant.config, loop.spec.type)
+    return assessed(loop.prepared, loop.controller, loop.plant.config, loop.spec.type, loop.earlier)
 
 
 @dataclass(frozen=True)

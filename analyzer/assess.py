@@ -3,18 +3,27 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from analyzer import words
-from analyzer.assessments import Assessments, Hour, assess_span, hourly, settling_time, usable
+from analyzer.assessments import (
+    HOUR_S,
+    Assessments,
+    Hour,
+    assess_span,
+    hourly,
+    settling_time,
+    usable,
+)
 from analyzer.cause import NO_CAUSE, Verdict, as_hint, hidden_by_grid, judge, not_assessed
 from analyzer.config import CauseLimits, Config
 from analyzer.dead_valve import dead_valve, with_dead_valve
 from analyzer.decisions import Cause, Lack, LacksError, Needs
 from analyzer.fit_for_cause import compressed, unfit_for_cause
+from analyzer.judged_stretch import Earlier, judged_stretch
 from analyzer.measure import Measured, measure, time_scale
 from analyzer.oscillation import Oscillation, Oscillations, barely_seen, counting, detect
 from analyzer.plantwide.wave import Wave, waves_of
@@ -43,7 +52,9 @@ class Assessment:
     variance) and settling time [s] where known; waves, its part in the plant-wide pass; trend, thinned;
     notes, plain sentences about the data; needs, what the record lacks to tell whether the loop oscillates, None
     where that is told; close_s, first and last time [s] of the last ten periods; for_settings, what
-    the record lacks for new settings whatever its cause, None where it lacks nothing.
+    the record lacks for new settings whatever its cause, None where it lacks nothing; judged_h, good hours in
+    automatic that oscillations and verdict rest on: of the stretch that is judged (judged_stretch.py), whose settings
+    are `outdated` where they were changed since.
     """
 
     loop: str
@@ -62,6 +73,8 @@ class Assessment:
     needs: Needs | None = None
     close_s: tuple[float, float] | None = None
     for_settings: Needs | None = None
+    judged_h: float = 0.0
+    outdated: bool = False
 
 
 def unassessable(record: LoopRecord, config: Config) -> Needs | None:
@@ -196,18 +209,28 @@ def _hours(
     return tuple(replace(h, figures=_known(h.figures, prepared.op_known)) for h in hours)
 
 
-def assess(prepared: Prepared, controller: Pid | None, config: Config, kind: str = "") -> Assessment:
+def assess(
+    prepared: Prepared,
+    controller: Pid | None,
+    config: Config,
+    kind: str = "",
+    earlier: Sequence[Earlier] = (),
+) -> Assessment:
     """Assess one loop.
+
+    Figures, hours, waves and trend are of the whole record; oscillations and verdict of the stretch that is judged.
 
     Parameters
     ----------
     prepared : Prepared
         The record on one clock, with masks.
     controller : Pid or None
-        The stated settings in percent and seconds.
+        The stated settings in percent and seconds, those in force at the record's end.
     config : Config
     kind : str
         The loop's type (flow, level, ...), empty where not stated.
+    earlier : sequence of Earlier
+        Settings that were in force in the record before, oldest first.
 
     Raises
     ------
@@ -218,33 +241,47 @@ def assess(prepared: Prepared, controller: Pid | None, config: Config, kind: str
     lacking = unassessable(record, config)
     if lacking is not None:
         raise LacksError(lacking)
-    found = detect(record, config.oscillation)
-    settings = _settings(prepared, found, controller, config)
-    stated = settings.recorded if settings else controller
-    found, verdict = convicted(prepared, found, stated, config, kind)
+    of_all = detect(record, config.oscillation)
+    stretch = judged_stretch(record, controller, earlier, config)
+    part = replace(prepared, record=record.span(stretch.first, stretch.last))
+    whole = len(part.record) == len(record)
+    found = of_all if whole else detect(part.record, config.oscillation)
+    settings = None if stretch.outdated else _settings(part, found, stretch.controller, config)
+    stated = settings.recorded if settings else stretch.controller
+    found, verdict = convicted(part, found, stated, config, kind)
+    of_all = found if whole else of_all
     dead_time = _dead_time(verdict)
     night = _known(assess_span(record, config.figures), prepared.op_known)
-    if night.usable_h < config.advice.least_h or _is_coarse(record, controller, config):
+    judged_h = float(usable(part.record).sum()) * record.dt_s / HOUR_S
+    if judged_h < config.advice.least_h or _is_coarse(record, stretch.controller, config):
         verdict = as_hint(verdict, config.advice.hint_pct)
     harris = harris_index(record.error, usable(record), record.dt_s, dead_time) if dead_time else None
-    first, close = counting(found), close_view(record, found)
+    first, close = counting(found), _close(part.record, found, stretch.first)
     return Assessment(
         record.tag,
         record.start_s,
         record.duration_s,
         night,
-        _hours(prepared, found, night.noise_band_pct, config),
+        _hours(prepared, of_all, night.noise_band_pct, config),
         found,
         verdict,
         settings,
         harris,
         settling_time(record, night.noise_band_pct or 0.0),
-        waves_of(record.tag, found, record.start_s + record.duration_s, config.plant),
+        waves_of(record.tag, of_all, record.start_s + record.duration_s, config.plant),
         thinned(record, FINE_BUCKETS if first else BUCKETS, close),
         prepared.notes,
-        _hidden(record, found, controller, config),
+        _hidden(part.record, found, stretch.controller, config),
         None
         if close is None
         else (record.start_s + close[0] * record.dt_s, record.start_s + close[1] * record.dt_s),
         compressed(prepared, None, config.quality),
+        judged_h,
+        stretch.outdated,
     )
+
+
+def _close(part: LoopRecord, found: Oscillations, first: int) -> tuple[int, int] | None:
+    """First and last sample (excluded) of the last ten periods, in a record of which `part` begins at `first`."""
+    close = close_view(part, found)
+    return None if close is None else (close[0] + first, close[1] + first)

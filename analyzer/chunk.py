@@ -7,11 +7,12 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import pyarrow as pa
 
+from analyzer import words
 from analyzer.advice import Advice, advise
 from analyzer.assess import Assessment, assess
 from analyzer.columns.table import HOURS, NIGHTS, SETTINGS
@@ -19,13 +20,14 @@ from analyzer.config import Config
 from analyzer.decisions import Action, Cause, Lack, LacksError, Status
 from analyzer.history.export import Export
 from analyzer.history.series import Series
+from analyzer.judged_stretch import Earlier, controller_of, earlier_settings
 from analyzer.lanes import standing
 from analyzer.loops.changes import TuningChange
 from analyzer.loops.settings_in_force import in_force, settings_from
 from analyzer.loops.spec import LoopSpec
-from analyzer.loops.tags import controller
 from analyzer.nights import Night, cut
 from analyzer.pages import compared as settings_page
+from analyzer.plant_clock import stamp
 from analyzer.plantwide.table import waves_table
 from analyzer.present import advised
 from analyzer.quality import Prepared, prepare
@@ -34,7 +36,6 @@ from analyzer.sample_clock import interval
 from analyzer.store import Store, rows_table, write_table
 from analyzer.turn_events import turn_events
 from identification.errors import NotAssessedError, TriageError
-from identification.models import Pid
 from reports.page_file import dumps
 
 HISTORY = {Cause.NONE: Action.NONE, Cause.LOAD: Action.NONE, Cause.UNDECIDED: Action.UNDECIDED}
@@ -70,22 +71,14 @@ def assess_loop(
     spec: LoopSpec, series: dict[str, Series], config: Config, advising: bool = True
 ) -> tuple[Assessment, Advice]:
     """Prepare and assess one loop from its raw samples, and advise on it if wanted."""
-    prepared = prepare(spec, series, config.quality)
-    return _assessed(spec, prepared, _stated(spec, prepared), config, advising)
-
-
-def _stated(spec: LoopSpec, prepared: Prepared) -> Pid | None:
-    """The controller that loops.csv states, its scan that of the record where it states none."""
-    stated = controller(spec, prepared.scale.span)
-    if stated is None or spec.scan_s is not None:
-        return stated
-    return replace(stated, scan_s=prepared.record.dt_s)
+    return _assessed(spec, prepare(spec, series, config.quality), config, advising)
 
 
 def _assessed(
-    spec: LoopSpec, prepared: Prepared, stated: Pid | None, config: Config, advising: bool
+    spec: LoopSpec, prepared: Prepared, config: Config, advising: bool, earlier: Sequence[Earlier] = ()
 ) -> tuple[Assessment, Advice]:
-    found = assess(prepared, stated, config, spec.type)
+    stated = controller_of(spec, prepared)
+    found = assess(prepared, stated, config, spec.type, earlier)
     if not advising:
         return found, Advice(HISTORY.get(found.verdict.cause))
     return found, advise(found, spec, stated, prepared.scale.span, config)
@@ -100,20 +93,25 @@ class Rows:
     found: list[Assessment] = field(default_factory=list)
 
 
-def _loop_row(
-    spec: LoopSpec, series: dict[str, Series], night: Night, config: Config, advising: bool, kept: Rows
-) -> None:
+def _loop_row(stated: LoopSpec, series: dict[str, Series], night: Night, task: Task, kept: Rows) -> None:
     """Keep the row of one loop and night, whatever happens, and its assessment where there is one."""
+    config, advising = task.config, night is task.nights[-1]
+    spec = in_force(stated, task.changes, night.last_s)
     part = {tag: cut(s, night) for tag, s in series.items()}
-    known: dict[str, Any] = {"good_h": _good_h(part.get(spec.pv or "")), "timezone": night.zone}
+    known: dict[str, Any] = {
+        "good_h": _good_h(part.get(spec.pv or "")),
+        "timezone": night.zone,
+        "settings_from": settings_from(stated, task.changes, night.last_s, night.zone),
+    }
     try:
         prepared = prepare(spec, part, config.quality)
-        stated = _stated(spec, prepared)
         known |= {"pv_lo": prepared.scale.low, "pv_hi": prepared.scale.low + prepared.scale.span}
-        known |= standing(prepared, stated, spec.type, config).as_row()
-        found, advice = _assessed(spec, prepared, stated, config, advising)
+        known |= standing(prepared, controller_of(spec, prepared), spec.type, config).as_row()
+        earlier = earlier_settings(stated, task.changes, prepared)
+        found, advice = _assessed(spec, prepared, config, advising, earlier)
         turns = turn_events(prepared, found) if advising else None
-        row = {**night_row(found, spec, night.name, config.advice), **known, "turns": turns}
+        known |= {"settings_changed": _typed_in(earlier, spec, found, night.zone), "turns": turns}
+        row = {**night_row(found, spec, night.name, config.advice), **known}
         row, drawn = advised(row, found.verdict.needs, advice), _settings_row(spec, night.name, advice)
     except Exception as error:  # an error of one loop is that loop's result, never the night's end
         kept.nights.append({**lost_row(spec, night.name, _lost(error, config)), **known})
@@ -121,6 +119,15 @@ def _loop_row(
     kept.nights.append(row)
     kept.compared += drawn
     kept.found.append(found)
+
+
+def _typed_in(earlier: Sequence[Earlier], spec: LoopSpec, found: Assessment, zone: str) -> str | None:
+    """What was typed in last within the night, in words; None where nothing was."""
+    if not earlier:
+        return None
+    last = earlier[-1]
+    clock = stamp(last.until_s, zone).split()[-1]
+    return words.settings_changed(last.spec, spec, clock, not found.outdated)
 
 
 def _settings_row(spec: LoopSpec, night: str, advice: Advice) -> list[dict[str, Any]]:
@@ -175,11 +182,7 @@ def work(task: Task, began: Callable[[int], None] = lambda at: None) -> Done:
                 row = {**lost_row(spec, night.name, series), "timezone": night.zone}
                 kept[night.name].nights.append(row)
                 continue
-            advising = night is task.nights[-1]
-            stated = in_force(spec, task.changes, night.last_s)
-            since = settings_from(spec, task.changes, night.last_s, night.zone)
-            _loop_row(stated, series, night, task.config, advising, kept[night.name])
-            kept[night.name].nights[-1]["settings_from"] = since
+            _loop_row(spec, series, night, task, kept[night.name])
     for night in task.nights:
         _write_pieces(task, night.name, kept[night.name])
     return Done(task.key, len(task.specs), task.export.met(tag for spec in task.specs for tag in spec.tags))

@@ -66,4 +66,5 @@ def in_lanes(row: Row, limits: LaneLimits) -> dict[str, Any]:
     known = {Lane.MANUAL} if row["lack"] == Lack.AUTOMATIC else set()  # the reason has said so already
     said = [SAID[lane](named) for lane in lanes if lane in SAID and lane not in known]
     reason = "; ".join((row["reason"], *said)) if row["reason"] else "; ".join(said)
+    reason = f"{row['settings_changed']}: {reason}" if row["settings_changed"] else reason
     return {**named, "reason": reason, "action": action_of(row, lanes)}

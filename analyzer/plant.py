@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,6 +14,7 @@ from identification.record import LoopRecord
 if TYPE_CHECKING:
     from analyzer.config import Config
     from analyzer.history.export import Export
+    from analyzer.judged_stretch import Earlier
     from analyzer.loops.changes import TuningChange
     from analyzer.loops.spec import LoopSpec
     from analyzer.nights import Night
@@ -43,10 +44,18 @@ class PlantLoop:
     @property
     def controller(self) -> Pid | None:
         """The stated settings in percent and seconds; None where loops.csv does not state them."""
-        from analyzer.loops.tags import controller
+        from analyzer.judged_stretch import controller_of
 
-        stated = controller(self.spec, self.prepared.scale.span)
-        return stated if stated is None or self.spec.scan_s else replace(stated, scan_s=self.record.dt_s)
+        return controller_of(self.spec, self.prepared)
+
+    @property
+    def earlier(self) -> tuple[Earlier, ...]:
+        """Settings that were in force in the record before its last ones, oldest first."""
+        from analyzer.judged_stretch import earlier_settings
+        from analyzer.loops.spec import spec_of
+
+        stated = spec_of(self.plant.specs, self.spec.loop)
+        return earlier_settings(stated, self.plant.changes, self.prepared)
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 
 from analyzer.advice import withheld
 from analyzer.assess import assess
@@ -12,10 +11,10 @@ from analyzer.config import Config
 from analyzer.decisions import Action, Cause, Needs
 from analyzer.fit_for_cause import at_limits, unfit_for_cause
 from analyzer.history.export import Export
+from analyzer.judged_stretch import controller_of, earlier_settings
 from analyzer.loops.changes import TuningChange
 from analyzer.loops.settings_in_force import in_force
 from analyzer.loops.spec import LoopSpec, spec_of
-from analyzer.loops.tags import controller
 from analyzer.nights import cut, nights_of
 from analyzer.plant_clock import UTC_NAME
 from analyzer.quality import Prepared, prepare
@@ -49,18 +48,16 @@ def proposal(
     InputError, NotAssessedError
         Where the loop or its settings are not known, or its trends give no model.
     """
-    spec = spec_of(specs, loop)
-    night = nights_of(export, [spec], config.nights, *span, zone)[-1]
-    spec = in_force(spec, changes, night.last_s)
+    row = spec_of(specs, loop)
+    night = nights_of(export, [row], config.nights, *span, zone)[-1]
+    spec = in_force(row, changes, night.last_s)
     prepared = prepare(spec, {t: cut(s, night) for t, s in export.read(spec.tags).items()}, config.quality)
-    stated = controller(spec, prepared.scale.span)
+    stated = controller_of(spec, prepared)
     if stated is None:
         raise InputError(
             f"{loop}: no kp and ti in loops.csv", "both", "state them, so that new ones can be compared"
         )
-    if spec.scan_s is None:
-        stated = replace(stated, scan_s=prepared.record.dt_s)
-    found = assess(prepared, stated, config, spec.type)
+    found = assess(prepared, stated, config, spec.type, earlier_settings(row, changes, prepared))
     head = [f"{loop}, night {night.name}: cause {found.verdict.cause}"]
     text = head + [f"sign of {s.points_to}: {s.text}" for s in found.verdict.signs]
     needs = _unfit(prepared, config)

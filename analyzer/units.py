@@ -51,16 +51,17 @@ def changed_settings(row: Mapping[str, Any]) -> str:
     """Old and new settings of a row with their units; a band in gain and other times in seconds too."""
     gain, time = gain_unit(row["gain_unit"], row["pv_unit"]), row["ti_unit"] or "s"
     old, new = (row["kp"], row["ti"]), (row["kp_new"], row["ti_new"])
-    kp = f"Kp {_arrow(old[0], new[0])} {gain}"
+    kp = f"Kp {arrow(old[0], new[0])} {gain}"
     if row["gain_unit"] == "band" and old[0] and new[0]:
         more = "more" if new[0] < old[0] else "less"
-        kp += f" ({more} gain: {_arrow(100 / old[0], 100 / new[0])} %/%)"
-    ti = f"Ti {_arrow(old[1], new[1])} {time}"
+        kp += f" ({more} gain: {arrow(100 / old[0], 100 / new[0])} %/%)"
+    ti = f"Ti {arrow(old[1], new[1])} {time}"
     if time != "s" and new[1] is not None:
-        ti += f" ({_arrow(*(None if t is None else seconds_of(t, time) for t in (old[1], new[1])))} s)"
+        ti += f" ({arrow(*(None if t is None else seconds_of(t, time) for t in (old[1], new[1])))} s)"
     return f"{kp}, {ti}"
 
 
-def _arrow(old: float | None, new: float | None) -> str:
+def arrow(old: float | None, new: float | None) -> str:
+    """An old and a new number in three digits."""
     texts = ["none" if x is None else f"{x:.3g}" if abs(x) < 1000 else f"{x:.0f}" for x in (old, new)]
     return f"{texts[0]} \u2192 {texts[1]}"

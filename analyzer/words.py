@@ -5,7 +5,7 @@ from __future__ import annotations
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import as_stated
 from analyzer.settings_check import SettingsDiffer
-from analyzer.units import gain_unit, settings
+from analyzer.units import arrow, gain_unit, settings
 from identification.models import Pid
 
 NOT_STATED = "no new settings: loops.csv states no kp and ti of this loop; add them"
@@ -20,6 +20,7 @@ NO_INTEGRAL = (
 )
 ONE_FRICTION = "Settings are sought with one friction for all slips of the valve, not slip by slip."
 FOLDED = "what is seen may be such a cycle, folded by the sampling"
+JUST_CHANGED = "The settings were changed too late in the night to judge them: the next night tells."
 CALM = "At the settings in force the valve's fault makes no cycle: nothing to do now."
 
 
@@ -27,6 +28,20 @@ def of_controller(pid: Pid, spec: LoopSpec, pv_span: float) -> str:
     """A controller's settings as they are typed into it."""
     kp, ti = as_stated(pid, spec, pv_span)
     return settings(kp, ti, gain_unit(spec.gain_unit, spec.pv_unit), spec.ti_unit)
+
+
+def settings_changed(old: LoopSpec, new: LoopSpec, clock: str, judged: bool) -> str:
+    """What was typed in within the night, at which time of day, and whether what follows is told of it."""
+    gain = gain_unit(new.gain_unit, new.pv_unit)
+    parts = [
+        f"{name} {arrow(a, b)} {unit}"
+        for name, a, b, unit in (("Kp", old.kp, new.kp, gain), ("Ti", old.ti, new.ti, new.ti_unit))
+        if a != b
+    ]
+    what = ", ".join(parts) or "settings changed"
+    return (
+        f"since {what} at {clock}" if judged else f"before {what} at {clock}, too late in the night to judge"
+    )
 
 
 def settings_differ(found: SettingsDiffer, spec: LoopSpec, pv_span: float) -> str:

@@ -259,6 +259,14 @@ LISTED = (
         Source.LOOPS,
         "Where the settings in force at the night's end stand, loops.csv or changes.csv, and since which day.",
     ),
+    Column(
+        "settings_changed",
+        Kind.TEXT,
+        "Changed within the night",
+        "",
+        Source.LOOPS,
+        "What was typed in last within the night, at which time, and whether the verdict is told of what came since.",
+    ),
     Column("form", Kind.TEXT, "Form", "", Source.LOOPS, "Form of the controller: ideal, series or parallel."),
     Column(
         "gain_unit",

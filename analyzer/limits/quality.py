@@ -124,3 +124,10 @@ class QualityLimits:
         "See manual_s",
         "ours",
     )
+    automatic_share: float = limit(
+        0.5,
+        "-",
+        (0.0, 1.0),
+        "Share of the time in automatic that a stretch between long spans in manual must hold to be judged by itself",
+        "ours: of shorter ones none stands for the record",
+    )

@@ -57,6 +57,30 @@ def in_force(spec: LoopSpec, changes: Sequence[TuningChange], at_s: float) -> Lo
     return spec if (kp, ti) == (spec.kp, spec.ti) else replace(spec, kp=kp, ti=ti)
 
 
+def settings_before(
+    spec: LoopSpec, changes: Sequence[TuningChange], first_s: float, last_s: float
+) -> tuple[tuple[float, LoopSpec], ...]:
+    """What was in force within a span before its last settings: until when [s], and the loop with them, oldest first.
+
+    Parameters
+    ----------
+    spec : LoopSpec
+        The loop as loops.csv states it.
+    changes : sequence of TuningChange
+    first_s, last_s : float
+        Ends of the span [s since 1970-01-01 UTC].
+    """
+    dated = [s.valid_from_s for s in (*spec.earlier, spec) if s.valid_from_s is not None]
+    times = {*dated, *(c.time_s for c in changes if c.loop == spec.loop)}
+    inside = sorted(t for t in times if first_s < t < last_s)
+    before = [in_force(spec, changes, t) for t in (first_s, *inside)]
+    return tuple(
+        (t, old)
+        for t, old, new in zip(inside, before[:-1], before[1:], strict=True)
+        if any(getattr(old, name) != getattr(new, name) for name in SETTINGS)
+    )
+
+
 def settings_from(spec: LoopSpec, changes: Sequence[TuningChange], at_s: float, zone: str) -> str:
     """Where the settings in force at a time stand, with the date from which they hold; '' where none are stated.
 
