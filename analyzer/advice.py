@@ -10,7 +10,7 @@ from analyzer.assess import Assessment
 from analyzer.cause import Verdict
 from analyzer.compared import Comparison, compared
 from analyzer.config import AdviceLimits, Config
-from analyzer.decisions import Action, Cause, Fault, Lack, Needs
+from analyzer.decisions import Action, Cause, Due, Fault, Lack, Needs
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import as_stated
 from analyzer.measure import Measured
@@ -36,8 +36,8 @@ class Advice:
     action as in the ranking, None where none was sought; reason in words, empty where the finding says it all;
     kp_new and ti_new in the units and form that loops.csv states, None unless action is retune; before and after, the
     limit cycles that simulation finds at the present and at the new settings, None where there is none; lack, what
-    the record lacks where the action is to get more data; compared, present, new and textbook settings on the load,
-    None where no settings were sought.
+    the record lacks where the action is to get more data; due, when a valve's repair is; compared, present, new and
+    textbook settings on the load, None where no settings were sought.
     """
 
     action: Action | None
@@ -47,6 +47,7 @@ class Advice:
     before: Cycle | None = None
     after: Cycle | None = None
     lack: Lack | None = None
+    due: Due = Due.NOW
     compared: Comparison | None = field(default=None, compare=False)
 
 
@@ -184,8 +185,10 @@ def withheld(
         return _lacking(found.needs)
     if verdict.cause in (Cause.NONE, Cause.LOAD):
         return Advice(Action.NONE)
+    if counting(found.oscillations) is None and verdict.cause is Cause.VALVE:
+        return Advice(Action.REPAIR_VALVE, words.CALM, due=Due.SHUTDOWN)
     if counting(found.oscillations) is None:
-        return Advice(Action.NONE, words.CALM)
+        return Advice(Action.NONE)
     if verdict.cause is Cause.UNDECIDED:
         return _for_a_cause(found, controller, config)
     return _unsupported(found, controller, config)
@@ -222,7 +225,10 @@ def _too_thin(found: Assessment, controller: Pid | None, config: Config) -> Advi
     dt_s = m.window.dt_s / m.window.factor
     if dt_s <= controller.ti_s / samples:
         return None
-    return _lacking(Needs(Lack.FASTER, words.too_thin(dt_s, controller.ti_s, samples)))
+    thin = words.too_thin(dt_s, controller.ti_s, samples)
+    if found.verdict.cause is Cause.VALVE:  # a stroke test needs no settings
+        return Advice(Action.REPAIR_VALVE, thin)
+    return _lacking(Needs(Lack.FASTER, thin))
 
 
 def _sticks(m: Measured, controller: Pid, limits: AdviceLimits) -> Loop | None:
@@ -285,7 +291,7 @@ def _proposed(verdict: Verdict, controller: Pid, period_s: float | None, config:
     sought, fit, others = sought_for(verdict, controller, config.advice)
     rests = confirm(sought).cycle is None
     if rests and period_s is None:
-        return Proposed(Proposal(Action.NONE, words.CALM))
+        return Proposed(Proposal(Action.REPAIR_VALVE, words.CALM))
     if rests and math.isinf(integral_s(controller)):
         return Proposed(Proposal(Action.CHECK_SETTINGS, words.NO_INTEGRAL))
     load = load_of(window, fit, controller)

@@ -93,24 +93,31 @@ class Rows:
     found: list[Assessment] = field(default_factory=list)
 
 
-def _loop_row(stated: LoopSpec, series: dict[str, Series], night: Night, task: Task, kept: Rows) -> None:
+def _loop_row(
+    stated: LoopSpec,
+    series: dict[str, Series],
+    night: Night,
+    config: Config,
+    advising: bool,
+    kept: Rows,
+    changes: Sequence[TuningChange] = (),
+) -> None:
     """Keep the row of one loop and night, whatever happens, and its assessment where there is one."""
-    config, advising = task.config, night is task.nights[-1]
-    spec = in_force(stated, task.changes, night.last_s)
+    spec = in_force(stated, changes, night.last_s)
     part = {tag: cut(s, night) for tag, s in series.items()}
     known: dict[str, Any] = {
         "good_h": _good_h(part.get(spec.pv or "")),
         "timezone": night.zone,
-        "settings_from": settings_from(stated, task.changes, night.last_s, night.zone),
+        "settings_from": settings_from(stated, changes, night.last_s, night.zone),
     }
     try:
         prepared = prepare(spec, part, config.quality)
         known |= {"pv_lo": prepared.scale.low, "pv_hi": prepared.scale.low + prepared.scale.span}
         known |= standing(prepared, controller_of(spec, prepared), spec.type, config).as_row()
-        earlier = earlier_settings(stated, task.changes, prepared)
+        earlier = earlier_settings(stated, changes, prepared)
         found, advice = _assessed(spec, prepared, config, advising, earlier)
         turns = turn_events(prepared, found) if advising else None
-        known |= {"settings_changed": _typed_in(earlier, spec, found, night.zone), "turns": turns}
+        known |= _typed_in(earlier, spec, found, night.zone) | {"turns": turns}
         row = {**night_row(found, spec, night.name, config.advice), **known}
         row, drawn = advised(row, found.verdict.needs, advice), _settings_row(spec, night.name, advice)
     except Exception as error:  # an error of one loop is that loop's result, never the night's end
@@ -121,13 +128,16 @@ def _loop_row(stated: LoopSpec, series: dict[str, Series], night: Night, task: T
     kept.found.append(found)
 
 
-def _typed_in(earlier: Sequence[Earlier], spec: LoopSpec, found: Assessment, zone: str) -> str | None:
-    """What was typed in last within the night, in words; None where nothing was."""
+def _typed_in(
+    earlier: Sequence[Earlier], spec: LoopSpec, found: Assessment, zone: str
+) -> dict[str, str | float | None]:
+    """What was typed in last within the night, in words, and since when the verdict is told of it; nothing where
+    nothing was."""
     if not earlier:
-        return None
+        return {}
     last = earlier[-1]
-    clock = stamp(last.until_s, zone).split()[-1]
-    return words.settings_changed(last.spec, spec, clock, not found.outdated)
+    text = words.settings_changed(last.spec, spec, stamp(last.until_s, zone).split()[-1])
+    return {"settings_changed": text, "judged_since_s": None if found.outdated else last.until_s}
 
 
 def _settings_row(spec: LoopSpec, night: str, advice: Advice) -> list[dict[str, Any]]:
@@ -182,7 +192,8 @@ def work(task: Task, began: Callable[[int], None] = lambda at: None) -> Done:
                 row = {**lost_row(spec, night.name, series), "timezone": night.zone}
                 kept[night.name].nights.append(row)
                 continue
-            _loop_row(spec, series, night, task, kept[night.name])
+            advising = night is task.nights[-1]
+            _loop_row(spec, series, night, task.config, advising, kept[night.name], task.changes)
     for night in task.nights:
         _write_pieces(task, night.name, kept[night.name])
     return Done(task.key, len(task.specs), task.export.met(tag for spec in task.specs for tag in spec.tags))

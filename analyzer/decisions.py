@@ -15,6 +15,7 @@ __all__ = [
     "CAUSES",
     "Action",
     "Cause",
+    "Due",
     "Fault",
     "GroupRole",
     "Lack",
@@ -69,6 +70,13 @@ class Lane(StrEnum):
     FROZEN = "frozen"
     SLUGGISH = "sluggish"
     TRAVEL = "valve travel"
+
+
+class Due(StrEnum):
+    """When a valve's repair is due: at once, or at the next shutdown, for what it does costs little meanwhile."""
+
+    NOW = "now"
+    SHUTDOWN = "next shutdown"
 
 
 class Lack(StrEnum):

@@ -12,14 +12,18 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.compute as pc
 
+from analyzer.calmed import REMEMBERED, calmed
 from analyzer.columns.table import BY_NAME, GROUPS, NIGHTS, names
 from analyzer.config import Config, NightLimits
 from analyzer.decisions import Status
 from analyzer.lane_words import in_lanes
+from analyzer.pages.reading import read_nights
 from analyzer.plantwide.night import traced_night
 from analyzer.plantwide.table import waves_in
 from analyzer.store import Store, rows_table
 
+MEMORY = 30
+"""Nights before that are looked at for the last one under other settings; ours: a month."""
 WORTH = {Status.OK: 2, Status.NOT_ASSESSED: 1}
 """What a status is worth when two records of one loop meet; a failure is worth nothing."""
 Row = Mapping[str, Any]
@@ -72,7 +76,10 @@ def finish_night(
     other = [] if replace else _other_groups(store, night, fresh)
     first = 1 + max((int(r["group"]) for r in other), default=0)
     done = traced_night(fresh, waves_in(store.read_parts(night, "waves", keys)), config.plant, first)
-    rows = {loop: in_lanes(row, config.lanes) for loop, row in done.rows.items()}
+    earlier = _earlier(store, night)
+    rows = {
+        loop: in_lanes(calmed(row, earlier.get(loop, ())), config.lanes) for loop, row in done.rows.items()
+    }
     old = {} if replace else _known(store, night)
     kept = {loop for loop, row in rows.items() if loop in old and fuller(old[loop], row, config.nights)}
     beside = [loop for loop in old if loop not in rows]
@@ -87,6 +94,15 @@ def finish_night(
     store.forget_explained(night, None if replace else mine)
     store.forget_compared()
     return _told(night, rows, old, kept, beside)
+
+
+def _earlier(store: Store, night: str) -> dict[str, list[Row]]:
+    """The rows of the nights before by loop, oldest first, with what tells whether a change calmed it."""
+    out: dict[str, list[Row]] = {}
+    names = [n for n in store.nights() if n < night][-MEMORY:]
+    for row in read_nights(store, names, REMEMBERED):
+        out.setdefault(row["loop"], []).append(row)
+    return out
 
 
 def _other_groups(store: Store, night: str, mine: Mapping[str, Row]) -> list[Row]:

@@ -59,6 +59,15 @@ def action_of(row: Row, lanes: tuple[Lane, ...]) -> Action | None:
     return action
 
 
+def since(row: Row) -> str:
+    """What was typed in within the night, and whether what is said is told of it; '' where nothing was."""
+    if not row["settings_changed"]:
+        return ""
+    if row["judged_since_s"] is None:
+        return f"before {row['settings_changed']}, too late in the night to judge"
+    return f"since {row['settings_changed']}"
+
+
 def in_lanes(row: Row, limits: LaneLimits) -> dict[str, Any]:
     """The row with its lanes, the clauses they add to the reason, and the action they ask for."""
     lanes = lanes_of(row, limits)
@@ -66,5 +75,5 @@ def in_lanes(row: Row, limits: LaneLimits) -> dict[str, Any]:
     known = {Lane.MANUAL} if row["lack"] == Lack.AUTOMATIC else set()  # the reason has said so already
     said = [SAID[lane](named) for lane in lanes if lane in SAID and lane not in known]
     reason = "; ".join((row["reason"], *said)) if row["reason"] else "; ".join(said)
-    reason = f"{row['settings_changed']}: {reason}" if row["settings_changed"] else reason
+    reason = f"{since(row)}: {reason}" if row["settings_changed"] else reason
     return {**named, "reason": reason, "action": action_of(row, lanes)}

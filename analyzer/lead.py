@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from analyzer.cost import cost, cost_column
-from analyzer.decisions import Action, Cause, Fault, GroupRole, Lane
+from analyzer.decisions import Action, Cause, Due, Fault, GroupRole, Lane
 from analyzer.lane_figures import lanes_in
 from analyzer.plantwide.view import GroupView
 from analyzer.units import duration
@@ -43,6 +43,7 @@ def first_things(rows: Sequence[Row], groups: Sequence[GroupView] = ()) -> tuple
         found.append((sum(cost(by_loop[m], by) for m in members), _of_group(source, others)))
     left = sorted((r for r in rows if r["loop"] not in told), key=lambda r: (-cost(r, by), r["loop"]))
     found += _by_work(left, by)
+    found += _at_shutdown(left)
     ordered = sorted(found, key=lambda pair: -pair[0])
     return tuple(text for _, text in ordered[:MOST]) or (CALM,)
 
@@ -64,7 +65,7 @@ def _by_work(rows: Sequence[Row], by: str) -> list[tuple[float, str]]:
     kinds = (
         (lambda r: r["action"] == Action.RETUNE and r["cause"] == Cause.VALVE, _retune_valve),
         (lambda r: r["action"] == Action.RETUNE and r["cause"] != Cause.VALVE, _retune_tight),
-        (lambda r: r["action"] == Action.REPAIR_VALVE, _stroke),
+        (lambda r: r["action"] == Action.REPAIR_VALVE and r["due"] != Due.SHUTDOWN, _stroke),
         (lambda r: r["action"] == Action.CHECK_MEASUREMENT, _measurement),
         (lambda r: r["action"] == Action.CHECK_SETTINGS and _stated(r), _settings),
         (lambda r: r["action"] == Action.CHECK_SETTINGS and not _stated(r), _unstated),
@@ -76,6 +77,16 @@ def _by_work(rows: Sequence[Row], by: str) -> list[tuple[float, str]]:
         if mine:
             out.append((sum(cost(r, by) for r in mine), say(mine)))
     return out
+
+
+def _at_shutdown(rows: Sequence[Row]) -> list[tuple[float, str]]:
+    """One sentence, worth nothing tonight, on worn valves whose loops are calm."""
+    worn = [r for r in rows if r["action"] == Action.REPAIR_VALVE and r["due"] == Due.SHUTDOWN]
+    if not worn:
+        return []
+    its = "valve" if len(worn) == 1 else "valves"
+    they = "worn, though its loop is calm" if len(worn) == 1 else "worn, though their loops are calm"
+    return [(0.0, f"At the next shutdown look at the {its} of {_names(worn)}: {they}.")]
 
 
 def _stated(row: Row) -> bool:

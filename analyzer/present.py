@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 from analyzer.columns.table import BY_NAME
 from analyzer.cost import LOSS, cost_column
-from analyzer.decisions import Action, Cause, Needs
-from analyzer.reason import reason_of, to_stroke
+from analyzer.decisions import Action, Cause, Due, Needs
+from analyzer.reason import reason_of, to_stroke, valve_text
 from analyzer.units import duration, gain_unit
 from reports.visible import visible
 
@@ -93,6 +93,10 @@ def _settings(now: float | None, new: float | None, unit: str) -> str:
     return f"{figure(now)} {unit}" if new is None else f"{figure(now)} -> {figure(new)} {unit}"
 
 
+CALMED = (
+    "The last change of settings took most of the cycle away; what is left is small beside what nights differ by, so "
+    "no further settings are advised. The valve is still worn: at the next shutdown."
+)
 MOST_NAMES = 5
 """Followers that are named in a row."""
 SAID_AT_ONCE = (Action.CHECK_SETTINGS, Action.NEEDS_DATA)
@@ -110,6 +114,7 @@ def advised(row: dict[str, Any], needs: Needs | None, advice: Advice) -> dict[st
         **row,
         "action": advice.action,
         "lack": advice.lack or row["lack"],
+        "due": advice.due if advice.action is Action.REPAIR_VALVE else None,
         "kp_new": advice.kp_new,
         "ti_new": advice.ti_new,
         "advice": advice.reason,
@@ -147,6 +152,18 @@ def follower_row(row: Mapping[str, Any], found: Follower) -> dict[str, Any]:
         "signs": json.dumps([sign, *json.loads(row["signs"] or "[]")]),
         "reason": f"cycles every {duration(row['period_s'])}: follows {source.loop}{later}; {sure}",
     }
+
+
+def calmed_row(row: Mapping[str, Any], before: Mapping[str, Any]) -> dict[str, Any]:
+    """The row of a loop whose worn valve makes far less of a cycle since its settings were changed; `before`, its row
+    of the last night under other settings."""
+    share = 100 * row["oscillation_significance"] / before["oscillation_significance"]
+    slower = "slower and " if (row["period_s"] or 0.0) > (before["period_s"] or 0.0) else ""
+    then = f"every {duration(before['period_s'])} until {before['night']}"
+    cycle = f"{duration(row['period_s'])}, {slower}{share:.0f} % as much as before its settings were changed ({then})"
+    done = {**row, "action": Action.REPAIR_VALVE, "due": Due.SHUTDOWN, "kp_new": None, "ti_new": None}
+    done |= {"lack": None, "advice": CALMED}
+    return {**done, "reason": f"cycles every {cycle}: {valve_text(row)}{to_stroke(done)}"}
 
 
 def root_row(row: Mapping[str, Any], followers: Sequence[str]) -> dict[str, Any]:

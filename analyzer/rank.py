@@ -14,7 +14,7 @@ from analyzer.columns.other_tables import NOTED
 from analyzer.columns.ranking import LISTED, RANKING
 from analyzer.columns.table import BY_NAME, names
 from analyzer.cost import LOSS, SIGNIFICANCE, cost_column
-from analyzer.decisions import Cause, Lane
+from analyzer.decisions import Cause, Due, Lane
 from analyzer.lane_figures import FIGURE, lanes_in
 from analyzer.notes import Note
 from analyzer.store import Store
@@ -108,6 +108,8 @@ def worst_first(rows: Sequence[dict[str, Any]], column: str | None = None) -> li
 def _worth(row: Row, lossy: bool) -> int:
     """0 for loops to be looked at first, 2 for those with nothing to look at; losses are compared across lanes."""
     lanes = lanes_in(row)
+    if row["due"] == Due.SHUTDOWN:
+        return 1
     if Lane.OSCILLATION in lanes or row["cause"] == Cause.VALVE:
         return 0
     return 2 if not lanes else 0 if lossy else 1

@@ -6,7 +6,7 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
-from analyzer.decisions import AMPLIFICATION, Action, Cause, Fault, Needs, counts
+from analyzer.decisions import AMPLIFICATION, Action, Cause, Due, Fault, Needs, counts
 from analyzer.units import duration
 
 Row = Mapping[str, Any]
@@ -14,8 +14,11 @@ PLAIN = {
     Fault.BACKLASH: "the valve has {width:.2g} % play ({share:.0f} % of OP's range)",
     Fault.STICTION: "the valve sticks by {width:.2g} % ({share:.0f} % of OP's range)",
 }
-BY_HAND = "; stroke it in steps of {step:.2g} %"
-"""How a valve's fault is confirmed."""
+BY_HAND = {
+    Due.NOW: "; stroke it in steps of {step:.2g} %",
+    Due.SHUTDOWN: "; at the next shutdown stroke it in steps of {step:.2g} %",
+}
+"""How a valve's fault is confirmed, and when."""
 STEPS = 4.0
 """Steps of a stroke test to the width of what is looked for; ours: the first three must then move nothing."""
 
@@ -25,7 +28,7 @@ def reason_of(row: Row, needs: Needs | None = None) -> str:
     cycle = _cycle(row)
     cause = Cause(row["cause"])
     if cause is Cause.VALVE:
-        return f"{cycle}: {_valve(row)}"
+        return f"{cycle}: {valve_text(row)}"
     if cause is Cause.TUNING:
         return f"{cycle}: too tight for its process; {_strongest(row, cause, 1, AMPLIFICATION)}"
     if cause is Cause.LOAD:
@@ -49,10 +52,10 @@ def to_stroke(row: Row) -> str:
     width = row["stickband_pct"] or row["backlash_pct"]
     if row["action"] != Action.REPAIR_VALVE or not width:
         return ""
-    return BY_HAND.format(step=width / STEPS)
+    return BY_HAND[Due(row["due"] or Due.NOW)].format(step=width / STEPS)
 
 
-def _valve(row: Row) -> str:
+def valve_text(row: Row) -> str:
     """What is wrong with the valve, in figures where there are any."""
     plain, width = PLAIN.get(row["valve_fault"]), row["stickband_pct"] or row["backlash_pct"]
     if plain is None or not width or row["valve_size"] is None:

@@ -21,7 +21,7 @@ NO_INTEGRAL = (
 ONE_FRICTION = "Settings are sought with one friction for all slips of the valve, not slip by slip."
 FOLDED = "what is seen may be such a cycle, folded by the sampling"
 JUST_CHANGED = "The settings were changed too late in the night to judge them: the next night tells."
-CALM = "At the settings in force the valve's fault makes no cycle: nothing to do now."
+CALM = "At the settings in force the valve's fault makes no cycle: its repair can wait for the next shutdown."
 
 
 def of_controller(pid: Pid, spec: LoopSpec, pv_span: float) -> str:
@@ -30,8 +30,8 @@ def of_controller(pid: Pid, spec: LoopSpec, pv_span: float) -> str:
     return settings(kp, ti, gain_unit(spec.gain_unit, spec.pv_unit), spec.ti_unit)
 
 
-def settings_changed(old: LoopSpec, new: LoopSpec, clock: str, judged: bool) -> str:
-    """What was typed in within the night, at which time of day, and whether what follows is told of it."""
+def settings_changed(old: LoopSpec, new: LoopSpec, clock: str) -> str:
+    """What was typed in within the night, and at which time of day."""
     gain = gain_unit(new.gain_unit, new.pv_unit)
     parts = [
         f"{name} {arrow(a, b)} {unit}"
@@ -39,9 +39,7 @@ def settings_changed(old: LoopSpec, new: LoopSpec, clock: str, judged: bool) -> 
         if a != b
     ]
     what = ", ".join(parts) or "settings changed"
-    return (
-        f"since {what} at {clock}" if judged else f"before {what} at {clock}, too late in the night to judge"
-    )
+    return f"{what} at {clock}"
 
 
 def settings_differ(found: SettingsDiffer, spec: LoopSpec, pv_span: float) -> str:

@@ -32,13 +32,20 @@ COLUMNS = (
     *("source_loop", "average_absolute_error_pct", "valve_travel_pct_per_h", "variability_pct", "kp", "ti"),
     *("kp_new", "ti_new", "action", "reason", "form", "gain_unit", "ti_unit", "pv_unit"),
     *("lanes", "loss", "close_first_s", "close_last_s", "group", "timezone", "backlash_pct", "stickband_pct"),
-    *("advice", *FIGURE.values()),
+    *("advice", "due", "settings_changed", "judged_since_s", *FIGURE.values()),
 )
+REMEMBERED = ("loop", "status", "oscillation_significance", "oscillating_pct", "cause")
+"""What is read of nights before the last one."""
+MEMORY = 14
+"""Nights before the last one that tell what is usual for a loop; ours: two weeks."""
 
 
 @dataclass(frozen=True, slots=True)
 class Night:
-    """The rows of a night, the worst first, those of the night before by loop, and trends of the worst."""
+    """The rows of a night, the worst first, those of the night before by loop, and trends of the worst.
+
+    earlier : rows of the nights before that one by loop, oldest first, with what is remembered of them.
+    """
 
     name: str
     rows: tuple[Row, ...]
@@ -47,6 +54,7 @@ class Night:
     worst: tuple[Row, ...]
     trends: Mapping[str, Thinned] = field(default_factory=dict)
     notes: Mapping[str, tuple[Note, ...]] = field(default_factory=dict)
+    earlier: Mapping[str, Sequence[Row]] = field(default_factory=dict)
 
     @property
     def zone(self) -> str:
@@ -105,11 +113,14 @@ def read_night(store: Store, name: str | None, top: int, drawn: bool = True) -> 
     earlier = [n for n in nights if n < night]
     rows = worst_first(read_nights(store, [night], COLUMNS))
     before = {r["loop"]: r for r in read_nights(store, earlier[-1:], COLUMNS)}
+    remembered: dict[str, list[Row]] = {}
+    for row in read_nights(store, earlier[-1 - MEMORY : -1], REMEMBERED):
+        remembered.setdefault(row["loop"], []).append(row)
     known = notes.read(store.path)
     looked = [r for r in rows if needs_a_look(r) and not is_hidden(last(known, r["loop"]), night)]
     worst = tuple(followers_under(looked)[:top])
     trends = read_trends(store, {r["loop"] for r in worst}, [night]) if drawn else {}
-    return Night(night, tuple(rows), before, earlier[-1] if earlier else "", worst, trends, known)
+    return Night(night, tuple(rows), before, earlier[-1] if earlier else "", worst, trends, known, remembered)
 
 
 def linked(night: Night, loop: str) -> Cell:

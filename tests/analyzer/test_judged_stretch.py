@@ -105,6 +105,7 @@ def test_no_false_alarm_of_settings_on_the_day_of_a_change(retuned):
     assert not [loop for loop, r in rows.items() if r["action"] == "check settings"]
     named = {loop for loop, r in rows.items() if r["settings_changed"]}
     assert named == changed
+    assert rows["TIC2106"]["judged_since_s"] == START_S + 7 * DAY_S + 9 * HOUR + 600.0
     assert rows["TIC2106"]["reason"].startswith("since Ti 70 \u2192 520 s at 09:10: ")
 
 

@@ -116,6 +116,7 @@ def test_without_op_nothing_is_said_of_op() -> None:
 def made(loop: str, lanes: str, loss: float | None, significance: float = 0.0) -> dict[str, object]:
     """A row as the list sorts it."""
     figures = {"oscillation_significance": significance, "loss": loss, "importance": loss, "cause": "none"}
+    figures |= {"due": None}
     return {"loop": loop, "lanes": lanes or None, **figures}
 
 
@@ -143,5 +144,6 @@ def test_without_importance_oscillation_comes_first() -> None:
 def test_a_failed_loop_asks_for_nothing() -> None:
     """What failed has no action; its reason stands."""
     row = dict.fromkeys((*FIGURE.values(), "oscillating_pct", "lack", "action", "sp_mean_pct", "pv_mean_pct"))
+    row |= {"settings_changed": None}
     done = in_lanes({**row, "status": Status.FAILED, "reason": "ValueError: x"}, CONFIG.lanes)
     assert (done["action"], done["reason"], done["lanes"]) == (None, "ValueError: x", None)

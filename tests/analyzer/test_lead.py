@@ -11,7 +11,7 @@ from analyzer.plantwide.view import GroupView
 
 ROW: dict[str, Any] = {
     **{"loss": None, "oscillation_significance": 0.0, "action": "none", "cause": "none", "lanes": None},
-    **{"valve_fault": "none", "period_s": 600.0, "importance": None, "kp": 1.0, "ti": 60.0},
+    **{"valve_fault": "none", "period_s": 600.0, "importance": None, "kp": 1.0, "ti": 60.0, "due": None},
 }
 
 
@@ -65,6 +65,15 @@ def test_three_at_most_by_what_they_gain() -> None:
         "Type new settings into A",
         "Check the measurement of C",
     ]
+
+
+def test_a_valve_that_can_wait_is_told_last():
+    """A worn valve whose loop is calm has a sentence of its own, behind all that costs something tonight."""
+    rows = [row("A", 0.0, **VALVE | {"due": "next shutdown"}), row("B", 0.1, **VALVE | {"due": "now"})]
+    assert first_things(rows) == (
+        "Stroke the valve of B: it sticks.",
+        "At the next shutdown look at the valve of A: worn, though its loop is calm.",
+    )
 
 
 def test_what_is_not_stated_is_not_compared() -> None:
