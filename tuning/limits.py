@@ -155,6 +155,27 @@ class TuningLimits:
         "Least cut in travel for which a change is proposed",
         OURS,
     )
+    near_gain: float = limit(
+        1.3,
+        "-",
+        (1.0, 10.0),
+        "Factor of Kp up to which new settings are nearly the present ones",
+        "ours: on seven nights of six unchanged loops of the sample mill the median loop is told gains within it",
+    )
+    near_time: float = limit(
+        2.5,
+        "-",
+        (1.0, 100.0),
+        "Factor of Ti up to which they are",
+        "ours: as near_gain; integral times of three of the six lie within 1.7, of the others within 2.3 to 6.5",
+    )
+    worth_near: float = limit(
+        0.5,
+        "-",
+        (0.0, 1.0),
+        "Least cut in travel for which nearly the present settings are proposed",
+        "ours: what one night promises of them, another night takes back (tests/proofs/retuning.py)",
+    )
     worth_error: float = limit(
         0.1,
         "-",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -16,7 +17,7 @@ from tuning.decisions import Action, Cause
 from tuning.describing import band, is_play
 from tuning.limit_cycle import Confirmed, confirm
 from tuning.limits import LIMITS, TuningLimits
-from tuning.linear import margins
+from tuning.linear import integral_s, margins
 from tuning.rules import TAU_C_PER_DELAY, effective_delay, simc
 from tuning.search import robust, rounded, search
 
@@ -209,8 +210,16 @@ def _is_short_and_sticks(loop: Loop, limits: TuningLimits) -> bool:
     return loop.process.time_constant_s < limits.stick_ratio * effective_delay(loop.process, scan_step(loop))
 
 
-def _worth(candidate: Candidate, limits: TuningLimits) -> bool:
-    return candidate.travel <= 1.0 - limits.worth_travel
+def _worth(candidate: Candidate, now: Pid, limits: TuningLimits) -> bool:
+    """Whether a candidate cuts travel by enough for a change; by more where it is nearly the present settings."""
+    cut = limits.worth_near if _is_near(candidate.controller, now, limits) else limits.worth_travel
+    return candidate.travel <= 1.0 - cut
+
+
+def _is_near(new: Pid, now: Pid, limits: TuningLimits) -> bool:
+    """Whether new settings differ from the present ones by no more than one night's advice from another's."""
+    gain, time = abs(math.log(new.kp / now.kp)), abs(math.log(integral_s(new) / integral_s(now)))
+    return gain <= math.log(limits.near_gain) and time <= math.log(limits.near_time)
 
 
 def _smaller(after: Confirmed, before: Confirmed, most_growth: float) -> bool:
@@ -238,7 +247,7 @@ def _confirmed(
     table: Bench, candidates: tuple[Candidate, ...], before: Confirmed
 ) -> tuple[Candidate, Confirmed] | None:
     """The best candidate worth a change whose simulated limit cycle is none or smaller, on samples too."""
-    worthy = _apart([c for c in candidates if _worth(c, table.limits)])[:CONFIRMED]
+    worthy = _apart([c for c in candidates if _worth(c, table.loops[0].controller, table.limits)])[:CONFIRMED]
     samples = [(one, confirm(one)) for one in table.loops[1 : 1 + SAMPLES_CONFIRMED]] if worthy else []
     limits = table.limits
     growth = limits.cycle_growth if is_play(table.loops[0].valve) else limits.cycle_growth_stick

@@ -101,6 +101,22 @@ def test_stick_slip_travels_less(proposals):
         assert "Tuning cannot end stick-slip" in p.reason
 
 
+def test_nearly_the_present_settings_have_to_win_half():
+    """What counts as nearly the present settings is told where it halves travel alone: of sticking stems, where a
+    fifth less is enough for others, some are then told nothing, and none is told less than half."""
+    near = replace(LIMITS, near_gain=10.0, near_time=100.0)
+    told = []
+    for case in (stick_case(seed) for seed in range(6)):
+        usual, strict = (recommend(case.loop, "valve", load=case.load, limits=x) for x in (LIMITS, near))
+        travels = [
+            next(c.travel for c in p.candidates if c.controller == p.controller) if p.controller else None
+            for p in (usual, strict)
+        ]
+        told.append(travels)
+    assert all(strict is None or strict <= 0.5 for _, strict in told)
+    assert any(usual is not None and strict is None for usual, strict in told)
+
+
 def test_integrating_level_is_told_what_would_end_the_cycle(proposals):
     """On an integrator the cycle stays, slower and no larger, and the reason names P-only and gap."""
     found = [p for _, p in proposals[12:] if p.action == "retune"]
