@@ -11,6 +11,7 @@ from analyzer.cause import Verdict
 from analyzer.compared import Comparison, compared
 from analyzer.config import AdviceLimits, Config
 from analyzer.decisions import Action, Cause, Due, Fault, Lack, Needs
+from analyzer.fit_for_settings import too_thin
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import as_stated
 from analyzer.measure import Measured
@@ -140,10 +141,26 @@ def advise(
     config : Config
     """
     kept = withheld(found, spec, controller, pv_span, config)
+    if not found.op_scaled and found.for_settings is not None:
+        return _unscaled(kept, found.for_settings)
     oscillation = counting(found.oscillations)
     if kept is not None or controller is None or oscillation is None:
         return kept or _without_settings(found.verdict)
-    proposed = propose(found.verdict, controller, oscillation.period_s, config)
+    return _sought(found, spec, controller, oscillation.period_s, pv_span, config)
+
+
+def _unscaled(kept: Advice | None, needs: Needs) -> Advice:
+    """What is left to do where OP is not in percent: a valve is stroked all the same, else the range is stated."""
+    if kept is not None and kept.action is Action.REPAIR_VALVE:
+        return replace(kept, reason=needs.text, lack=needs.lack)
+    return _lacking(needs)
+
+
+def _sought(
+    found: Assessment, spec: LoopSpec, controller: Pid, period_s: float, pv_span: float, config: Config
+) -> Advice:
+    """The settings that the tuning package proposes for a loop that oscillates, or what to do instead."""
+    proposed = propose(found.verdict, controller, period_s, config)
     proposal = proposed.proposal
     if proposal.action is Action.UNDECIDED and found.verdict.cause is Cause.VALVE:
         proposal = replace(proposal, action=Action.REPAIR_VALVE)
@@ -152,7 +169,6 @@ def advise(
     beside = None
     if proposed.loop is not None and proposed.load is not None:
         new = proposal.controller or proposal.meanwhile
-        period_s = oscillation.period_s
         beside = compared(proposed.loop, proposed.load, new, period_s, spec, pv_span, config.tuning)
     return replace(_stated(proposal, spec, pv_span), compared=beside)
 
@@ -219,16 +235,11 @@ def _unsupported(found: Assessment, controller: Pid | None, config: Config) -> A
 
 def _too_thin(found: Assessment, controller: Pid | None, config: Config) -> Advice | None:
     """What sampling it takes, where the controller acts several times between two samples, unseen."""
-    m, samples = found.verdict.measured, config.settings.ti_samples
-    if m is None or controller is None:
-        return None
-    dt_s = m.window.dt_s / m.window.factor
-    if dt_s <= controller.ti_s / samples:
-        return None
-    thin = words.too_thin(dt_s, controller.ti_s, samples)
-    if found.verdict.cause is Cause.VALVE:  # a stroke test needs no settings
-        return Advice(Action.REPAIR_VALVE, thin)
-    return _lacking(Needs(Lack.FASTER, thin))
+    m = found.verdict.measured
+    thin = None if m is None else too_thin(m.window.dt_s / m.window.factor, controller, config)
+    if thin is not None and found.verdict.cause is Cause.VALVE:  # a stroke test needs no settings
+        return Advice(Action.REPAIR_VALVE, thin.text)
+    return None if thin is None else _lacking(thin)
 
 
 def _sticks(m: Measured, controller: Pid, limits: AdviceLimits) -> Loop | None:

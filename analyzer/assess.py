@@ -22,7 +22,8 @@ from analyzer.cause import NO_CAUSE, Verdict, as_hint, hidden_by_grid, judge, no
 from analyzer.config import CauseLimits, Config
 from analyzer.dead_valve import dead_valve, with_dead_valve
 from analyzer.decisions import Cause, Lack, LacksError, Needs
-from analyzer.fit_for_cause import compressed, unfit_for_cause
+from analyzer.fit_for_cause import unfit_for_cause
+from analyzer.fit_for_settings import too_thin, unfit_for_settings
 from analyzer.judged_stretch import Earlier, judged_stretch
 from analyzer.measure import Measured, measure, time_scale
 from analyzer.oscillation import Oscillation, Oscillations, barely_seen, counting, detect
@@ -54,7 +55,7 @@ class Assessment:
     where that is told; close_s, first and last time [s] of the last ten periods; for_settings, what
     the record lacks for new settings whatever its cause, None where it lacks nothing; judged_h, good hours in
     automatic that oscillations and verdict rest on: of the stretch that is judged (judged_stretch.py), whose settings
-    are `outdated` where they were changed since.
+    are `outdated` where they were changed since; op_scaled as in Prepared.
     """
 
     loop: str
@@ -75,6 +76,7 @@ class Assessment:
     for_settings: Needs | None = None
     judged_h: float = 0.0
     outdated: bool = False
+    op_scaled: bool = True
 
 
 def unassessable(record: LoopRecord, config: Config) -> Needs | None:
@@ -159,19 +161,19 @@ def verdict_by_measures(
     return told_apart(judge(measured, oscillation, config.cause), prepared, oscillation, config)
 
 
+def _in_percent(prepared: Prepared) -> bool:
+    """Whether OP is known in percent of its range."""
+    return prepared.op_known and prepared.op_scaled
+
+
 def _known(figures: Assessments, op: bool) -> Assessments:
-    """The figures without those that rest on OP where there is none: unknown is empty, never zero."""
+    """The figures without those that rest on OP where none is in percent: unknown is empty, never zero."""
     if op:
         return figures
     return Assessments(**{k: None if k in OF_OP else v for k, v in figures.as_row().items()})  # type: ignore[arg-type]
 
 
-def _is_coarse(record: LoopRecord, controller: Pid | None, config: Config) -> bool:
-    """Whether the controller acts several times between two samples, unseen."""
-    return controller is not None and record.dt_s > controller.ti_s / config.settings.ti_samples
-
-
-def _hidden(record: LoopRecord, found: Oscillations, controller: Pid | None, config: Config) -> Needs | None:
+def hidden(record: LoopRecord, found: Oscillations, controller: Pid | None, config: Config) -> Needs | None:
     """Why what is seen, or not, says nothing: the loop's cycles are too fast for the sampling; None where not."""
     samples = config.oscillation.samples
     if found.first is not None:
@@ -206,7 +208,7 @@ def _hours(
 ) -> tuple[Hour, ...]:
     """The figures of each hour, as far as what they rest on is known."""
     hours = hourly(prepared.record, found, config.figures, band_pct)
-    return tuple(replace(h, figures=_known(h.figures, prepared.op_known)) for h in hours)
+    return tuple(replace(h, figures=_known(h.figures, _in_percent(prepared))) for h in hours)
 
 
 def assess(
@@ -241,6 +243,8 @@ def assess(
     lacking = unassessable(record, config)
     if lacking is not None:
         raise LacksError(lacking)
+    if not prepared.op_scaled:  # settings in percent mean nothing beside such an OP
+        controller, earlier = None, [replace(e, controller=None) for e in earlier]
     of_all = detect(record, config.oscillation)
     stretch = judged_stretch(record, controller, earlier, config)
     part = replace(prepared, record=record.span(stretch.first, stretch.last))
@@ -251,9 +255,9 @@ def assess(
     found, verdict = convicted(part, found, stated, config, kind)
     of_all = found if whole else of_all
     dead_time = _dead_time(verdict)
-    night = _known(assess_span(record, config.figures), prepared.op_known)
+    night = _known(assess_span(record, config.figures), _in_percent(prepared))
     judged_h = float(usable(part.record).sum()) * record.dt_s / HOUR_S
-    if judged_h < config.advice.least_h or _is_coarse(record, stretch.controller, config):
+    if judged_h < config.advice.least_h or too_thin(record.dt_s, stretch.controller, config) is not None:
         verdict = as_hint(verdict, config.advice.hint_pct)
     harris = harris_index(record.error, usable(record), record.dt_s, dead_time) if dead_time else None
     first, close = counting(found), _close(part.record, found, stretch.first)
@@ -271,13 +275,14 @@ def assess(
         waves_of(record.tag, of_all, record.start_s + record.duration_s, config.plant),
         thinned(record, FINE_BUCKETS if first else BUCKETS, close),
         prepared.notes,
-        _hidden(part.record, found, stretch.controller, config),
+        hidden(part.record, found, stretch.controller, config),
         None
         if close is None
         else (record.start_s + close[0] * record.dt_s, record.start_s + close[1] * record.dt_s),
-        compressed(prepared, None, config.quality),
+        unfit_for_settings(prepared, config),
         judged_h,
         stretch.outdated,
+        prepared.op_scaled,
     )
 
 

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
-from analyzer.assess import unassessable
+from analyzer.assess import hidden, unassessable
 from analyzer.config import Config
 from analyzer.decisions import Needs
 from analyzer.fit_for_cause import unfit_for_cause
+from analyzer.fit_for_settings import too_thin, unfit_for_settings
 from analyzer.history.export import Export
 from analyzer.history.series import Series
+from analyzer.judged_stretch import controller_of
 from analyzer.loops.changes import TuningChange
+from analyzer.loops.settings_in_force import in_force
 from analyzer.loops.spec import LoopSpec
+from analyzer.oscillation import detect
 from analyzer.plant_clock import UTC_NAME, stamp
 from analyzer.quality import Prepared, prepare
 from identification.errors import TriageError
@@ -27,14 +31,19 @@ def _tags(spec: LoopSpec) -> str:
     return ", ".join(f"{role.upper()} {tag}" for role, tag in found if tag)
 
 
-def _fit(lacking: Needs | None, prepared: Prepared, config: Config) -> str:
-    """Which questions the record is fit for, in words."""
+def _fit(lacking: Needs | None, spec: LoopSpec, prepared: Prepared, config: Config) -> str:
+    """Which questions the record is fit for, in words, as a run judges it."""
     if lacking is not None:
         return f"fit for nothing: {lacking}"
+    stated = controller_of(spec, prepared) if prepared.op_scaled else None
+    unseen = hidden(prepared.record, detect(prepared.record, config.oscillation), stated, config)
+    if unseen is not None:
+        return f"fit for its figures alone: {unseen}"
     unfit = unfit_for_cause(prepared, None, config)
-    if unfit is None:
-        return "fit for all questions"
-    return f"fit for oscillation and assessments; not for the cause: {unfit}"
+    if unfit is not None:
+        return f"fit for oscillation and assessments; not for the cause: {unfit}"
+    unset = unfit_for_settings(prepared, config) or too_thin(prepared.record.dt_s, stated, config)
+    return "fit for all questions" if unset is None else f"fit for all but new settings: {unset}"
 
 
 def loop_line(export: Export, spec: LoopSpec, config: Config, within: Within) -> tuple[str, bool]:
@@ -47,7 +56,7 @@ def loop_line(export: Export, spec: LoopSpec, config: Config, within: Within) ->
         return f"{spec.loop}: {_tags(spec)}; fit for nothing: {error}", True
     record = prepared.record
     lacking = unassessable(record, config)
-    fit = _fit(lacking, prepared, config)
+    fit = _fit(lacking, spec, prepared, config)
     parts = [_tags(spec), f"{len(record)} samples every {record.dt_s:g} s", *prepared.notes, fit]
     return f"{spec.loop}: " + "; ".join(parts), lacking is not None
 
@@ -80,6 +89,6 @@ def lines(
     if changes:
         yield _dated(changes, specs), False
     for spec in specs:
-        yield loop_line(export, spec, config, within)
+        yield loop_line(export, in_force(spec, changes, last), config, within)
     for note in export.notes:
         yield note, False

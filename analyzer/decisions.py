@@ -88,6 +88,7 @@ class Lack(StrEnum):
     AUTOMATIC = "time in automatic"
     OP = "OP"
     MOVING_OP = "moving OP"
+    OP_RANGE = "OP's range"
     OP_OFF_LIMITS = "OP off its limits"
     UNCOMPRESSED = "uncompressed trends"
     UNBROKEN = "unbroken samples"

@@ -87,10 +87,11 @@ def standing(prepared: Prepared, controller: Pid | None, kind: str, config: Conf
     config : Config
     """
     record, op = prepared.record, prepared.op_known
+    scaled = op and prepared.op_scaled
     good, use = ~record.bad, usable(record)
     return Standing(
         _percent(record.mask("manual"), good) if op else None,
-        _percent(record.mask("saturated"), use if use.any() else good) if op else None,
+        _percent(record.mask("saturated"), use if use.any() else good) if scaled else None,
         100.0 * float(record.mask("stale").mean()) if op else None,
         _lasting_error(record, config.lanes),
         _memory(prepared, controller, kind, config),

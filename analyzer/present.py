@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from analyzer.columns.table import BY_NAME
 from analyzer.cost import LOSS, cost_column
-from analyzer.decisions import Action, Cause, Due, Needs
+from analyzer.decisions import Action, Cause, Due, Lack, Needs
 from analyzer.reason import reason_of, to_stroke, valve_text
 from analyzer.units import duration, gain_unit
 from reports.visible import visible
@@ -108,7 +108,10 @@ def advised(row: dict[str, Any], needs: Needs | None, advice: Advice) -> dict[st
     reason = reason_of(row, needs)
     if row["oscillating_pct"] is None:
         reason = f"not assessed: {advice.reason}"
-    elif advice.action in SAID_AT_ONCE and advice.reason not in (str(needs), ""):
+    elif (advice.action in SAID_AT_ONCE or advice.lack is Lack.OP_RANGE) and advice.reason not in (
+        str(needs),
+        "",
+    ):
         reason = f"{reason}; {advice.reason}"
     done = {
         **row,

@@ -62,7 +62,8 @@ class Prepared:
     """A record with its scale, the resolution of its trends and plain sentences about its quality.
 
     pv_step, op_step : resolution of PV and OP [% of span], 0 where none was seen; compressed_share : share of
-    samples on straight segments [-]; op_known : False where no OP was recorded; archived_share : share of samples, of
+    samples on straight segments [-]; op_known : False where no OP was recorded; op_scaled : False where what was
+    recorded cannot be percent of the range that is stated, or assumed, of OP; archived_share : share of samples, of
     PV or OP the fewer, that were kept where trends are compressed [-].
     """
 
@@ -73,6 +74,7 @@ class Prepared:
     compressed_share: float
     notes: tuple[str, ...]
     op_known: bool = True
+    op_scaled: bool = True
     archived_share: float = 1.0
 
 
@@ -187,15 +189,15 @@ def _signal(
 def op_in_range(op: Floats, q: QualityLimits) -> bool:
     """Whether OP can be in percent of its stated range.
 
-    It cannot where it leaves the range, nor where it moves freely within a band beside a limit and never rests
-    on the limit itself, as outputs do that were recorded from 0 to 1 or as deviations.
+    It cannot where it leaves the range, nor where it moves freely within a band beside a limit and does not rest on
+    the limit itself, as outputs do that were recorded from 0 to 1 or as deviations.
     """
     low, high = float(op.min()), float(op.max())
     if low < -q.outside_pct or high > 100 + q.outside_pct:
         return False
+    resting = float(((op <= q.on_limit_pct) | (op >= 100 - q.on_limit_pct)).mean())
     beside = high <= q.limit_pct or low >= 100 - q.limit_pct
-    resting = max(float((op == low).mean()), float((op == high).mean()))
-    return not (beside and resting < 0.2)
+    return not beside or low == high or resting >= q.resting_share
 
 
 def _masks(
@@ -230,6 +232,16 @@ def _masks(
     }
 
 
+def op_range(scale: Scale, op: Floats) -> str:
+    """What to state where OP [% of the range assumed] cannot be percent of that range."""
+    low, high = (scale.op_low + 0.01 * scale.op_span * float(x) for x in (op.min(), op.max()))
+    assumed = f"{scale.op_low:g} to {scale.op_low + scale.op_span:g}"
+    return (
+        f"OP runs from {low:.3g} to {high:.3g}, which is no plausible part of {assumed}: state op_lo and op_hi in "
+        "loops.csv; without them nothing is told in % of OP"
+    )
+
+
 def _described(
     record: LoopRecord, scale: Scale, op: Floats, pv_step: float, limits: QualityLimits
 ) -> Prepared:
@@ -242,8 +254,9 @@ def _described(
         notes.append("no SP recorded: estimated as the median of PV")
     if not known_op:
         notes.append("no OP recorded: no cause can be told")
-    elif not op_in_range(op, limits):
-        notes.append("OP does not fit its stated range: its limits are not known")
+    op_scaled = not known_op or op_in_range(op, limits)
+    if not op_scaled:
+        notes.append(op_range(scale, op))
     for name in ("gap", "stale", "saturated", "manual"):
         share = float(record.mask(name).mean())
         if share > 0.005:
@@ -254,4 +267,4 @@ def _described(
     if pv_step > 0:
         notes.append(f"PV on a grid of {pv_step:.3g} % of span")
     archived = min(archived_share(x) for x in ((record.pv, record.op) if known_op else (record.pv,)))
-    return Prepared(record, scale, pv_step, op_step, compressed, tuple(notes), known_op, archived)
+    return Prepared(record, scale, pv_step, op_step, compressed, tuple(notes), known_op, op_scaled, archived)

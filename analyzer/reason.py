@@ -14,6 +14,11 @@ PLAIN = {
     Fault.BACKLASH: "the valve has {width:.2g} % play ({share:.0f} % of OP's range)",
     Fault.STICTION: "the valve sticks by {width:.2g} % ({share:.0f} % of OP's range)",
 }
+WITHOUT_WIDTH = {
+    Fault.BACKLASH: "the valve has play over {share:.0f} % of OP's range",
+    Fault.STICTION: "the valve sticks over {share:.0f} % of OP's range",
+}
+"""The same where OP is not in percent."""
 BY_HAND = {
     Due.NOW: "; stroke it in steps of {step:.2g} %",
     Due.SHUTDOWN: "; at the next shutdown stroke it in steps of {step:.2g} %",
@@ -58,6 +63,8 @@ def to_stroke(row: Row) -> str:
 def valve_text(row: Row) -> str:
     """What is wrong with the valve, in figures where there are any."""
     plain, width = PLAIN.get(row["valve_fault"]), row["stickband_pct"] or row["backlash_pct"]
+    if plain is not None and not width and row["valve_size"] is not None:
+        return WITHOUT_WIDTH[row["valve_fault"]].format(share=100 * row["valve_size"])
     if plain is None or not width or row["valve_size"] is None:
         return f"the valve is at fault; {_strongest(row, Cause.VALVE, 2)}"
     return plain.format(width=width, share=100 * row["valve_size"])

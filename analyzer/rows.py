@@ -88,6 +88,15 @@ def _model_columns(verdict: Verdict, limits: AdviceLimits) -> dict[str, float | 
     return {**_process_columns(m.play, m.window, limits), "backlash_pct": m.play.valve.stickband}
 
 
+PER_OP = ("gain", "slope_pct_per_s", "backlash_pct", "stickband_pct", "slip_jump_pct")
+"""Constants in percent of OP, or per percent of it."""
+
+
+def _in_known_units(columns: dict[str, float | None], op_scaled: bool) -> dict[str, float | None]:
+    """A model's constants without those that want OP in percent, where it is not."""
+    return columns if op_scaled else {k: None if k in PER_OP else v for k, v in columns.items()}
+
+
 def _oscillation_columns(a: Assessment) -> dict[str, Any]:
     first = a.oscillations.first
     if first is None:
@@ -125,7 +134,7 @@ def night_row(a: Assessment, spec: LoopSpec, night: str, limits: AdviceLimits) -
         **a.night.as_row(),
         "loss": loss(a.night.average_absolute_error_pct, spec.importance),
         **_oscillation_columns(a),
-        **_model_columns(v, limits),
+        **_in_known_units(_model_columns(v, limits), a.op_scaled),
         "status": Status.OK,
         **{f"osc_{c}_pct": v.confidence[c] for c in CAUSES},
         "cause": v.cause,

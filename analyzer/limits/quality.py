@@ -96,6 +96,20 @@ class QualityLimits:
         "OP within this distance of a limit is at the limit",
         "the study's assessment of time at limits",
     )
+    on_limit_pct: float = limit(
+        0.05,
+        "% of span",
+        (0.0, 5.0),
+        "OP within this distance of a limit stands on it",
+        "ours: half a step of what controllers export",
+    )
+    resting_share: float = limit(
+        0.2,
+        "-",
+        (0.0, 1.0),
+        "Share of the time on the limit itself from which an OP that never leaves its neighbourhood is believed",
+        "ours: a closed valve rests there; what was recorded from 0 to 1 runs freely",
+    )
     outside_pct: float = limit(
         5.0,
         "% of span",

@@ -146,7 +146,7 @@ def test_op_outside_its_range_is_not_saturated(op):
     """OP recorded from 0 to 1, as a deviation or beyond 100 has limits that are not known, and that is said."""
     found = ready(op=series(STAMP, op))
     assert not where(found, "saturated").size
-    assert any("does not fit its stated range" in note for note in found.notes)
+    assert any("state op_lo and op_hi" in note for note in found.notes)
 
 
 @pytest.mark.parametrize(
