@@ -71,6 +71,12 @@ def usable(record: LoopRecord) -> Mask:
     return ~(record.bad | record.mask("manual"))
 
 
+def at_limits_share(record: LoopRecord) -> float:
+    """Share of the usable time with OP at a limit [-]; in manual a limit limits nothing."""
+    use = usable(record)
+    return float(record.mask("saturated")[use].mean()) if use.any() else 0.0
+
+
 def noise_band(pv: Floats) -> float:
     """Standard deviation of the fast noise: of the differences (robust.py) over root 2."""
     if pv.size < 3:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from analyzer import words
+from analyzer.assessments import at_limits_share
 from analyzer.config import Config, QualityLimits
 from analyzer.decisions import Lack, Needs
 from analyzer.oscillation import Oscillation
@@ -53,7 +54,7 @@ def compressed(prepared: Prepared, oscillation: Oscillation | None, q: QualityLi
 
 def at_limits(record: LoopRecord, q: QualityLimits) -> Needs | None:
     """What a record lacks whose OP is at a limit for most of the time; None where it is not."""
-    saturated = float(record.mask("saturated").mean())
+    saturated = at_limits_share(record)
     if saturated <= q.saturated_share:
         return None
     text = f"needs OP within its limits, it is at one for {100 * saturated:.0f} % of the time"

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from analyzer.assessments import at_limits_share
 from analyzer.config import CauseLimits
 from analyzer.fit_window import answering, time_scale, window_of
 from analyzer.oscillation import Oscillation
@@ -173,7 +174,7 @@ def measure(
         stable,
         _consistency(window, linear, scale) if oscillation is not None else 1.0,
         locked_harmonic(wave, scale) if wave is not None else 0.0,
-        float(record.mask("saturated").mean()),
+        at_limits_share(record),
         controller,
         told,
         stem_moves(window, best.valve),

@@ -4,8 +4,8 @@ A peak counts where three signs agree: it stands out of the spectrum about it, t
 comes back after one period, and it carries a fair share of the error. A cycle that is regular only in shape counts
 where it stands out most of the time and its half-cycles, none larger than the usual one, come back: see _in_shape.
 What the set point explains is taken out first, so set point steps and a cascade's moving set point are not
-oscillation of the loop. A cycle a little short of that counts where PV convicts the valve of making it: see
-`assess.convicted`.
+oscillation of the loop, nor is what dies away where the set point rests, as a programme's corners do. A cycle a
+little short of that counts where PV convicts the valve of making it: see `assess.convicted`.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from analyzer.config import OscillationLimits
 from analyzer.decisions import counts
 from identification.record import Floats, LoopRecord, Mask
 from identification.signals.half_cycles import half_cycles, levelled_correlation, shape, usual_prominence
-from identification.signals.setpoint_response import without_setpoint
+from identification.signals.setpoint_response import amplitude_at_rest, moves, without_setpoint
 from identification.signals.spectrum import (
     WIDE_BAND,
     Bands,
@@ -214,6 +214,20 @@ def _sized(
     return sized, active, smooth, dt
 
 
+def _lasts(record: LoopRecord, o: Oscillation, limits: OscillationLimits) -> bool:
+    """Whether a period is seen where the set point has rested too; one in each cycle of which the set point moves is
+    the set point's. Of a set point that never moves, or never rests, it is not asked."""
+    moving = moves(record.sp)
+    if record.sp_estimated or not moving.any() or moving.mean() > limits.programme_moves:
+        return True
+    use = ~(record.bad | record.mask("manual"))
+    left, count = amplitude_at_rest(record.error, record.sp, use, o.period_s / record.dt_s)
+    if count >= limits.rest_stretches:
+        return left >= limits.rest_share * o.amplitude_pct
+    begun = int(np.sum(moving[1:] & ~moving[:-1]))
+    return begun * o.period_s < record.duration_s
+
+
 def _is_harmonic(o: Oscillation, other: Oscillation) -> bool:
     """Whether one oscillation is a whole multiple (2 to 7) of a stronger one's frequency."""
     ratio = other.period_s / o.period_s
@@ -256,7 +270,10 @@ def detect(record: LoopRecord, limits: OscillationLimits) -> Oscillations:
             kept.append(o)
     if not kept:
         return Oscillations(spectrum=s, bands=b)
-    sized = sorted((_sized(s, o, usable, limits) for o in kept[:MOST]), key=lambda r: -r[0].significance)
+    each = (_sized(s, o, usable, limits) for o in kept[:MOST])
+    sized = sorted((r for r in each if _lasts(record, r[0], limits)), key=lambda r: -r[0].significance)
+    if not sized:
+        return Oscillations(spectrum=s, bands=b)
     first = sized[0]
     return Oscillations(tuple(r[0] for r in sized), first[1], first[2], first[3], s, b)
 

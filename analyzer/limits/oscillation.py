@@ -241,3 +241,26 @@ class OscillationLimits:
             swing_spread=math.inf,
             swing_share=0.0,
         )
+
+    programme_moves: float = limit(
+        0.5,
+        "-",
+        (0.0, 1.0),
+        "Share of the samples in which the set point moves up to which a cycle must be seen where it rests",
+        "ours: a master's output moves in nearly all, a programme's in less than half",
+    )
+    rest_stretches: int = limit(
+        6,
+        "-",
+        (1, 1000),
+        "Stretches of a period in which the set point has rested from which they tell whether a cycle lasts",
+        "ours: three periods, as an oscillation needs",
+    )
+    rest_share: float = limit(
+        0.5,
+        "-",
+        (0.0, 1.0),
+        "Amplitude at rest over that of the cycle below which it is the set point's response",
+        "ours: of 13 batch loops of an hour's programme (healthy and tight) it is 0.01 to 0.3, of loops with a limit "
+        "cycle 0.9 and more",
+    )

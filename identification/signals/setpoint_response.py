@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
+from identification.record import Floats, Mask
 from identification.signals.spectrum import Complex
 
 SMOOTHING = 0.1
 """Half width of the band over which a frequency response is taken as constant, as a share of its frequency."""
 FEWEST = 4
 """Fewest lines on each side over which it is averaged."""
+DIES_S = 2.0
+"""Periods after a move of the set point in which its response dies away; ours."""
 SMALLEST = 1e-200
 """Power of a set point that stands still but for rounding."""
 
@@ -37,3 +40,40 @@ def without_setpoint(error: Complex, sp: Complex) -> Complex:
     cross = _running(error * sp.conj(), first, last)
     floor = 1e-9 * max(float(auto.max(initial=0.0)), SMALLEST)
     return error - np.divide(cross, auto, out=np.zeros_like(cross), where=auto > floor) * sp
+
+
+def moves(sp: Floats) -> Mask:
+    """True at each sample at which the set point is another than before, shape (n,)."""
+    return np.abs(np.diff(sp, prepend=sp[0])) > 1e-9 * max(float(np.ptp(sp)), SMALLEST)
+
+
+def amplitude_at_rest(error: Floats, sp: Floats, usable: Mask, period: float) -> tuple[float, int]:
+    """Amplitude of a period where the set point has stood still for long, and the stretches that tell it.
+
+    A sine with a straight line is fitted to each stretch of one period, half of one apart, in which every sample is
+    usable and whose set point has not moved for two periods before its end; see DIES_S.
+
+    Parameters
+    ----------
+    error, sp : ndarray of shape (n,)
+    usable : ndarray of bool, shape (n,)
+    period : float
+        [samples]
+
+    Returns
+    -------
+    amplitude : float
+        Root mean square of the stretches' amplitudes, in the unit of the error; 0 without a stretch.
+    count : int
+    """
+    n = max(round(period), 4)
+    moved = np.convolve(moves(sp), np.ones(round(DIES_S * n)))[: sp.size] > 0
+    out = np.concatenate(([0], np.cumsum(moved | ~usable)))
+    first = np.arange(0, sp.size - n + 1, max(n // 2, 1))
+    first = first[out[first + n] == out[first]]
+    if not first.size:
+        return 0.0, 0
+    t = np.arange(n)
+    basis = np.column_stack((np.ones(n), t, np.cos(2 * np.pi * t / period), np.sin(2 * np.pi * t / period)))
+    found = np.linalg.lstsq(basis, error[first + t[:, None]], rcond=None)[0][2:]
+    return float(np.sqrt(np.mean(np.sum(found**2, axis=0)))), int(first.size)
