@@ -18,11 +18,12 @@ from analyzer.measure import Measured
 from analyzer.model_samples import uncertain
 from analyzer.oscillation import counting
 from analyzer.reconstructed_load import load_of
+from analyzer.tight import cautious
 from identification.estimation.covariance import NINETY
 from identification.estimation.gauss_newton import covariance
 from identification.estimation.hammerstein import Fit, process_of
 from identification.estimation.window import Window
-from identification.models import Fopdt, Integrator, Loop, Pid, Process, Valve
+from identification.models import Integrator, Loop, Pid, Process, Valve
 from identification.record import Floats
 from tuning.limit_cycle import Cycle, confirm
 from tuning.linear import integral_s, is_stable
@@ -115,16 +116,6 @@ def tuned(window: Window, fit: Fit, valve: bool, limits: AdviceLimits) -> Proces
     return process
 
 
-def cautious(process: Fopdt, period_s: float | None) -> Fopdt:
-    """A process with its time constant raised to two periods at the same slope.
-
-    A cycle tells gain over time constant; a time constant much beyond the period cannot be told from it, and an
-    integral time after one that is too short makes a loop swing that should be calmed.
-    """
-    t = max(process.time_constant_s, 2.0 * (period_s or 0.0))
-    return Fopdt(process.slope * t, t, process.dead_time_s)
-
-
 def advise(
     found: Assessment, spec: LoopSpec, controller: Pid | None, pv_span: float, config: Config
 ) -> Advice:
@@ -182,7 +173,8 @@ def _without_settings(verdict: Verdict) -> Advice:
 
 def _lacking(needs: Needs) -> Advice:
     """The advice to get more data, or a test where no data tell, with what is lacking."""
-    action = Action.UNDECIDED if needs.lack is Lack.STROKE else Action.NEEDS_DATA
+    tests = (Lack.STROKE, Lack.MANUAL_TEST)
+    action = Action.UNDECIDED if needs.lack in tests else Action.NEEDS_DATA
     return Advice(action, needs.text, lack=needs.lack)
 
 

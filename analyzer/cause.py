@@ -29,7 +29,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analyzer.cause_measures import measures
-from analyzer.cause_signs import Sign, likelihood_text, signs_of, width_text
+from analyzer.cause_signs import Sign, likelihood_told, signs_of, width_text
 from analyzer.cause_weights import chances
 from analyzer.config import CauseLimits
 from analyzer.decisions import CAUSES, Cause, Fault, Needs
@@ -95,7 +95,8 @@ def quiet_signs(m: Measured, limits: CauseLimits) -> tuple[Sign, ...]:
     least = needed(m, limits, False) * (limits.quiet_factor if few else 1.0)
     if not speaks(m, limits, False) or m.evidence < least or (m.moves < limits.moves and not m.excited):
         return ()
-    signs = [Sign("valve", 0.5 + 0.5 * _ramp(m.evidence, least, 4 * least), likelihood_text(m.evidence))]
+    text, figures = likelihood_told(m.evidence)
+    signs = [Sign("valve", 0.5 + 0.5 * _ramp(m.evidence, least, 4 * least), text, figures=figures)]
     if m.size >= limits.size:
         signs.append(Sign("valve", 0.6 + 0.4 * _ramp(m.size, limits.size, 0.7), width_text(m.size)))
     return tuple(signs)

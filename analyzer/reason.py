@@ -6,7 +6,7 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
-from analyzer.decisions import AMPLIFICATION, Action, Cause, Due, Fault, Needs, counts
+from analyzer.decisions import AMPLIFICATION, OF_LOAD, Action, Cause, Due, Fault, Needs, counts
 from analyzer.units import duration
 
 Row = Mapping[str, Any]
@@ -37,7 +37,7 @@ def reason_of(row: Row, needs: Needs | None = None) -> str:
     if cause is Cause.TUNING:
         return f"{cycle}: too tight for its process; {_strongest(row, cause, 1, AMPLIFICATION)}"
     if cause is Cause.LOAD:
-        return f"{cycle}: driven from outside; {_strongest(row, cause, 1)}"
+        return f"{cycle}: driven from outside; {_strongest(row, cause, 1, *OF_LOAD)}"
     if cause is Cause.UNDECIDED:
         return f"{cycle}; cause undecided: {needs or 'the signs do not agree'}"
     return cycle
@@ -70,8 +70,8 @@ def valve_text(row: Row) -> str:
     return plain.format(width=width, share=100 * row["valve_size"])
 
 
-def _strongest(row: Row, cause: Cause, most: int, first: str = "") -> str:
-    """The strongest signs of a cause, one of a name before all others."""
+def _strongest(row: Row, cause: Cause, most: int, *first: str) -> str:
+    """The strongest signs of a cause, those of some names before all others."""
     signs = [s for s in json.loads(row.get("signs") or "[]") if s["points_to"] == cause]
-    order = sorted(signs, key=lambda s: (s.get("name", "") != first, -s["strength"]))
+    order = sorted(signs, key=lambda s: (s.get("name", "") not in first, -s["strength"]))
     return "; ".join(s["text"] for s in order[:most])

@@ -8,18 +8,20 @@ from analyzer import words
 from analyzer.cause import Verdict, as_hint
 from analyzer.cause_measures import PLAIN
 from analyzer.config import CauseLimits, Config
-from analyzer.decisions import CAUSES, Cause, Fault, Lack, Needs
+from analyzer.decisions import CAUSES, OF_LOAD, Cause, Fault, Lack, Needs
 from analyzer.fit_for_cause import compressed
 from analyzer.measure import PLAYS
 from analyzer.oscillation import Oscillation
 from analyzer.quality import Prepared
+from analyzer.tight import sensitivity
 
 
 def told_apart(
     verdict: Verdict, prepared: Prepared, oscillation: Oscillation | None, config: Config
 ) -> Verdict:
     """The verdict, or none where so few samples a cycle, or so coarse a grid, make other causes look like it; where
-    trends on straight segments make a likely valve of a load; and where a valve's play shows beside a likely load."""
+    trends on straight segments make a likely valve of a load; where nothing but the want of other causes shows a
+    load, or a valve's play shows beside it; and where the loop that is called too tight is robust."""
     if oscillation is None or verdict.cause not in CAUSES:
         return verdict
     lacking = _hides(verdict, prepared, oscillation, config)
@@ -36,15 +38,33 @@ def _hides(verdict: Verdict, prepared: Prepared, oscillation: Oscillation, confi
     if verdict.cause is Cause.VALVE:
         sure = verdict.confidence[Cause.VALVE] >= limits.compressed_pct
         return None if sure else compressed(prepared, None, config.quality)
+    if verdict.cause is Cause.TUNING:
+        return _robust(verdict, oscillation, config) or _rough(verdict, prepared, oscillation, limits)
     samples = oscillation.period_s / prepared.record.dt_s
-    steps = oscillation.amplitude_pct / max(prepared.pv_step, 1e-12)
-    if steps < (limits.steps_told if verdict.cause is Cause.LOAD else limits.steps_tuning):
-        return Needs(Lack.FINER, words.too_rough(prepared.pv_step, oscillation.amplitude_pct))
-    if verdict.cause is not Cause.LOAD:
-        return None
+    rough = _rough(verdict, prepared, oscillation, limits)
+    if rough is not None:
+        return rough
     if samples < limits.samples_told:
         return Needs(Lack.FASTER, words.too_few(samples, limits.samples_told))
+    if not any(s.points_to == Cause.LOAD and s.name in OF_LOAD for s in verdict.signs):
+        return Needs(Lack.MANUAL_TEST, words.NO_SIGN_OF_A_LOAD)
     return _beside(verdict, limits)
+
+
+def _rough(
+    verdict: Verdict, prepared: Prepared, oscillation: Oscillation, limits: CauseLimits
+) -> Needs | None:
+    """Finer values, where PV's grid has too few steps in the swing; None where it has enough."""
+    steps = oscillation.amplitude_pct / max(prepared.pv_step, 1e-12)
+    if steps >= (limits.steps_told if verdict.cause is Cause.LOAD else limits.steps_tuning):
+        return None
+    return Needs(Lack.FINER, words.too_rough(prepared.pv_step, oscillation.amplitude_pct))
+
+
+def _robust(verdict: Verdict, oscillation: Oscillation, config: Config) -> Needs | None:
+    """A test in manual, where signs speak for the tuning and the identified loop is robust; None where it is not."""
+    ms = None if verdict.measured is None else sensitivity(verdict.measured, oscillation.period_s)
+    return None if ms is None or ms > config.tuning.ms_most else Needs(Lack.MANUAL_TEST, words.robust(ms))
 
 
 def _beside(verdict: Verdict, limits: CauseLimits) -> Needs | None:

@@ -59,7 +59,7 @@ def proposal(
         )
     found = assess(prepared, stated, config, spec.type, earlier_settings(row, changes, prepared))
     head = [f"{loop}, night {night.name}: cause {found.verdict.cause}"]
-    text = head + [f"sign of {s.points_to}: {s.text}" for s in found.verdict.signs]
+    text = head + [f"sign of {s.points_to}: {s.whole}" for s in found.verdict.signs]
     needs = _unfit(prepared, config)
     if found.verdict.measured is None and found.verdict.cause is Cause.VALVE:
         return [*text, f"action: {Action.REPAIR_VALVE}", f"no settings: {needs or NO_MODEL}"], {}

@@ -19,6 +19,10 @@ NO_INTEGRAL = (
     "check kp and ti before new settings are sought."
 )
 ONE_FRICTION = "Settings are sought with one friction for all slips of the valve, not slip by slip."
+NO_SIGN_OF_A_LOAD = (
+    "a load is likeliest, but only because no valve and no tuning is seen at work; needs some periods in manual: a "
+    "swing that goes on comes from outside"
+)
 FOLDED = "what is seen may be such a cycle, folded by the sampling"
 JUST_CHANGED = "The settings were changed too late in the night to judge them: the next night tells."
 CALM = "At the settings in force the valve's fault makes no cycle: its repair can wait for the next shutdown."
@@ -102,6 +106,14 @@ def valve_beside(size: float, agreeing: float) -> str:
         f"a load is likelier, but PV fits a play of {100 * size:.0f} % of OP's range as well, in "
         f"{100 * agreeing:.0f} % of the stretches between OP's turns; needs some periods in manual, or the valve "
         "stroked in small steps"
+    )
+
+
+def robust(ms: float) -> str:
+    """Why a loop that seems too tight is not told so."""
+    return (
+        f"it swings as a loop too tight for its process does, but the one identified is robust (Ms {ms:.2f}); needs "
+        "some periods in manual: a swing that stops is the loop's own"
     )
 
 

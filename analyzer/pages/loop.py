@@ -149,7 +149,7 @@ def _evidence(row: Row) -> Section:
         (
             Cell(s["points_to"], kind=s["points_to"] if s["points_to"] in CAUSES else ""),
             Cell(f"{s['strength']:.2f}", s["strength"]),
-            Cell(s["text"]),
+            Cell(f"{s['text']} ({s['figures']})" if s.get("figures") else s["text"]),
         )
         for s in signs
     )
