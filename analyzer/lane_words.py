@@ -30,14 +30,20 @@ def _at_limit(row: Row) -> str:
     return f"OP rests at its{side} limit for {share:.0f} % of the time: look at the valve's size and at what feeds it"
 
 
+def _sluggish(row: Row) -> str:
+    text = f"sluggish: errors last {row['error_memory_ti']:.2g} integral times, the gain is small"
+    room = row["gain_room"]
+    return (
+        text if room is None or room < 2.0 else f"{text} (the process bears about {room:.1g} times as much)"
+    )
+
+
 SAID: Mapping[Lane, Callable[[Row], str]] = {
     Lane.MANUAL: lambda r: f"in manual for {r['manual_pct']:.0f} % of the time",
     Lane.AT_LIMIT: _at_limit,
     Lane.LASTING_ERROR: _lasting,
     Lane.FROZEN: lambda r: f"PV stands still for {r['frozen_pct']:.0f} % of the time while OP moves: frozen",
-    Lane.SLUGGISH: lambda r: (
-        f"sluggish: errors last {r['error_memory_ti']:.2g} integral times, the gain is small"
-    ),
+    Lane.SLUGGISH: _sluggish,
     Lane.TRAVEL: lambda r: f"OP travels {r['valve_travel_pct_per_h']:.0f} %/h",
 }
 """One clause a lane; oscillation has the reason itself."""

@@ -64,11 +64,14 @@ def _lasting_error(record: LoopRecord, limits: LaneLimits) -> float | None:
 
 
 def _memory(prepared: Prepared, controller: Pid | None, kind: str, config: Config) -> float | None:
-    """The error's correlation time in Ti; None where it says nothing or compression would make it longer."""
+    """The error's correlation time in Ti; None where it says nothing, for the loop is at its set point as far as a
+    transmitter tells, or compression would make it longer."""
     record, use = prepared.record, usable(prepared.record)
     if controller is None or kind == AVERAGING or prepared.compressed_share > config.lanes.straight_share:
         return None
     if float(use.mean()) < config.quality.usable_share:
+        return None
+    if float(np.median(np.abs(record.error[use]))) <= max(config.lanes.at_set_point, prepared.pv_step):
         return None
     found = correlation_time(record.error, use, record.dt_s, controller.ti_s)
     return None if found is None else found / controller.ti_s
@@ -109,6 +112,9 @@ def lanes_of(row: Mapping[str, Any], limits: LaneLimits) -> tuple[Lane, ...]:
         Lane.TRAVEL: limits.travel_pct_per_h,
     }
     found = {lane for lane, limit in beyond.items() if (row[FIGURE[lane]] or 0.0) > limit}
+    slow = (row["error_memory_ti"] or 0.0) > limits.small_gain_memory_ti
+    if slow and (row["gain_room"] or 0.0) > limits.small_gain_room:
+        found.add(Lane.SLUGGISH)
     if counts(row["oscillating_pct"]):
         found = (found | {Lane.OSCILLATION}) - {Lane.SLUGGISH}
     if found & {Lane.AT_LIMIT, Lane.FROZEN}:

@@ -215,8 +215,8 @@ def _sized(
 
 
 def _lasts(record: LoopRecord, o: Oscillation, limits: OscillationLimits) -> bool:
-    """Whether a period is seen where the set point has rested too; one in each cycle of which the set point moves is
-    the set point's. Of a set point that never moves, or never rests, it is not asked."""
+    """Whether a period is seen where the set point has rested too; one in every second cycle of which the set point
+    moves is the set point's. Of a set point that never moves, or never rests, it is not asked."""
     moving = moves(record.sp)
     if record.sp_estimated or not moving.any() or moving.mean() > limits.programme_moves:
         return True
@@ -225,7 +225,7 @@ def _lasts(record: LoopRecord, o: Oscillation, limits: OscillationLimits) -> boo
     if count >= limits.rest_stretches:
         return left >= limits.rest_share * o.amplitude_pct
     begun = int(np.sum(moving[1:] & ~moving[:-1]))
-    return begun * o.period_s < record.duration_s
+    return begun * o.period_s < limits.moved_cycles * record.duration_s
 
 
 def _is_harmonic(o: Oscillation, other: Oscillation) -> bool:

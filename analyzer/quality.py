@@ -195,7 +195,7 @@ def op_in_range(op: Floats, q: QualityLimits) -> bool:
     low, high = float(op.min()), float(op.max())
     if low < -q.outside_pct or high > 100 + q.outside_pct:
         return False
-    resting = float(((op <= q.on_limit_pct) | (op >= 100 - q.on_limit_pct)).mean())
+    resting = float((np.minimum(np.abs(op), np.abs(op - 100)) <= q.on_limit_pct).mean())
     beside = high <= q.limit_pct or low >= 100 - q.limit_pct
     return not beside or low == high or resting >= q.resting_share
 

@@ -18,6 +18,7 @@ from analyzer.cost import loss
 from analyzer.decisions import CAUSES, Cause, Fault, Lack, Status
 from analyzer.loops.spec import LoopSpec
 from analyzer.oscillation import Oscillations
+from analyzer.tight import gain_room
 from identification.estimation.hammerstein import Fit
 from identification.estimation.window import Window
 
@@ -144,6 +145,7 @@ def night_row(a: Assessment, spec: LoopSpec, night: str, limits: AdviceLimits) -
         "evidence": m.evidence if m else None,
         "valve_size": m.size if m else None,
         "amplification": m.amplification if m else None,
+        "gain_room": gain_room(m) if m else None,
         "harris_index": a.harris,
         "settling_time_s": a.settling_s,
         "signs": json.dumps(signs),

@@ -1,4 +1,4 @@
-"""Whether an identified loop is too tight for its process at all, by its maximum sensitivity."""
+"""How tight an identified loop is: its maximum sensitivity, and how much more gain its process bears."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from analyzer.measure import Measured
 from identification.estimation.hammerstein import process_of
 from identification.models import Fopdt, Loop
 from tuning.linear import margins
+from tuning.rules import simc
 
 
 def cautious(process: Fopdt, period_s: float | None) -> Fopdt:
@@ -32,3 +33,12 @@ def sensitivity(m: Measured, period_s: float) -> float | None:
     if controller is None or process.gain * controller.kp <= 0.0:
         return None
     return min(float(margins(Loop(x, controller)).ms) for x in (process, cautious(process, period_s)))
+
+
+def gain_room(m: Measured) -> float | None:
+    """SIMC's gain for the identified process over the present one [-]; None where no settings are known, or they act
+    the wrong way, or the set point did not move: a load alone does not tell how late PV answers OP."""
+    process, controller = process_of(m.window, m.linear), m.controller
+    if not m.excited or controller is None or process.gain * controller.kp <= 0.0:
+        return None
+    return abs(simc(process, scan_s=controller.scan_s).kp / controller.kp)

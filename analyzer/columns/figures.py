@@ -202,6 +202,14 @@ FIGURES = (
         short="Memory [Ti]",
     ),
     Column(
+        "gain_room",
+        Kind.NUMBER,
+        "Gain borne",
+        "-",
+        Source.MODEL,
+        "SIMC's gain for the identified process over the present one; sluggish control leaves several times.",
+    ),
+    Column(
         "service_pct",
         Kind.NUMBER,
         "Effective service factor",

@@ -53,6 +53,28 @@ class LaneLimits:
         "Correlation time of the error, in integral times, above which a loop is sluggish",
         "ours: Kp times gain of 1.2 and more gives 0.5 to 2.4, of 0.45 and less 2 to 12 (test_correlation_time.py)",
     )
+    small_gain_memory_ti: float = limit(
+        0.6,
+        "Ti",
+        (0.0, 1000.0),
+        "Correlation time from which it is where the process bears far more gain too",
+        "ours: of 10 loops at a tenth of SIMC's gain whose set point steps 0.8 to 2.8, of 10 at SIMC's own 0.2 to "
+        "0.4 (test_lanes.py)",
+    )
+    small_gain_room: float = limit(
+        4.0,
+        "-",
+        (1.0, 1000.0),
+        "SIMC's gain over the present one from which the process bears far more",
+        "ours: of the same loops 3.4 to 9, and 0.8 to 0.9",
+    )
+    at_set_point: float = limit(
+        0.05,
+        "% of span",
+        (0.0, 100.0),
+        "Median error up to which a loop is at its set point and not sluggish; a step of PV's grid where it is more",
+        "ours: half of the accuracy of industrial transmitters, 0.1 %",
+    )
     straight_share: float = limit(
         0.1,
         "-",

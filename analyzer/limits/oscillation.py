@@ -256,6 +256,13 @@ class OscillationLimits:
         "Stretches of a period in which the set point has rested from which they tell whether a cycle lasts",
         "ours: three periods, as an oscillation needs",
     )
+    moved_cycles: float = limit(
+        0.5,
+        "-",
+        (0.0, 100.0),
+        "Moves of the set point a cycle from which, without such stretches, the cycle is the set point's",
+        "ours: steps up and down each hour and a half leave a slow loop that answers them a cycle of 47 min",
+    )
     rest_share: float = limit(
         0.5,
         "-",

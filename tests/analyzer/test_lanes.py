@@ -11,9 +11,10 @@ from analyzer import chunk
 from analyzer.decisions import Action, Lane, Status
 from analyzer.lane_figures import FIGURE
 from analyzer.lane_words import in_lanes
+from analyzer.loops.spec import LoopSpec
 from analyzer.nights import Night
 from analyzer.rank import worst_first
-from tests.analyzer.plant import CONFIG, START_S, series, spec
+from tests.analyzer.plant import CONFIG, START_S, Sketch, series, simulate, spec
 from tests.identification.signals import hand_loop
 
 NIGHT = Night("2026-03-02", START_S, START_S + 86400.0)
@@ -30,11 +31,20 @@ def trends(kp: float = 2.0, seed: int = 0) -> dict[str, np.ndarray]:
     return {"sp": np.full(n, 50.0), "pv": 50.0 - error, "op": op}
 
 
-def row_of(values: dict[str, np.ndarray], kp: float = 2.0, **extra: np.ndarray) -> dict[str, object]:
+FLOW = spec(kp=2.0, ti=60.0, type="flow")
+
+
+def row_of(
+    values: dict[str, np.ndarray],
+    kp: float = 2.0,
+    stated: LoopSpec = FLOW,
+    every_s: float = 1.0,
+    **extra: np.ndarray,
+) -> dict[str, object]:
     """The night's row of a loop of these trends."""
-    stamp = START_S + np.arange(values["pv"].size, dtype=float)
+    stamp = START_S + every_s * np.arange(values["pv"].size, dtype=float)
     found = {f"L.{role.upper()}": series(stamp, x) for role, x in {**values, **extra}.items()}
-    stated = replace(spec(kp=kp, ti=60.0, type="flow"), mode="L.MODE" if "mode" in extra else None)
+    stated = replace(stated, kp=kp, mode="L.MODE" if "mode" in extra else None)
     kept = chunk.Rows()
     chunk._loop_row(stated, found, NIGHT, CONFIG, True, kept)
     (row,) = kept.nights
@@ -57,6 +67,31 @@ def test_a_small_gain_is_sluggish() -> None:
     assert lanes(row) == {Lane.SLUGGISH}
     assert "sluggish" in str(row["reason"])
     assert row["kp_new"] is None
+
+
+def test_a_loop_at_its_set_point_is_not_sluggish() -> None:
+    """Slow errors of a hundredth of the same size, which no transmitter tells from none, put a loop in no lane."""
+    values = trends(0.2)
+    small = {"sp": values["sp"], "pv": 50.0 + 0.01 * (values["pv"] - 50.0), "op": values["op"]}
+    assert Lane.SLUGGISH not in lanes(row_of(small, 0.2))
+
+
+@pytest.mark.parametrize(("share", "sluggish"), [(0.1, 7), (1.0, 0)])
+def test_a_process_that_bears_far_more_gain_is_told(share: float, sluggish: int) -> None:
+    """Of ten temperatures whose set point steps, at a tenth of SIMC's gain seven or more are sluggish, at SIMC's own
+    none: errors that last, and a process that bears more gain, are two signs."""
+    found = []
+    for seed in range(10):
+        rng = np.random.default_rng(100 + seed)
+        gain, late = rng.uniform(0.8, 2.0), rng.uniform(5.0, 25.0)
+        lag = late * rng.uniform(8.0, 40.0)
+        kp = share * lag / (gain * 2.5 * (late + 1.0))
+        ti = lag if share < 1.0 else min(lag, 10.0 * late)
+        load = {"load_std": 10 ** rng.uniform(-0.5, 0.5), "load_s": 10 ** rng.uniform(2.0, 3.8)}
+        made = simulate(Sketch("none", (gain, lag, late), kp, ti, noise=0.05, moves=3.0, **load), 12.0, seed)
+        values = {role: getattr(made, role)[::5] for role in ("sp", "pv", "op")}
+        found.append(Lane.SLUGGISH in lanes(row_of(values, kp, spec(type="temperature", ti=ti), 5.0)))
+    assert sum(found) >= sluggish if sluggish else not any(found)
 
 
 def test_compression_is_not_sluggish() -> None:

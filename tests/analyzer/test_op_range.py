@@ -72,6 +72,7 @@ def test_a_sound_loop_is_asked_for_its_range_too():
         (99.0, 100.0, 0.4, True),
         (20.0, 60.0, 0.0, True),
         (4.0, 200.0, 0.0, False),
+        (-1.5, 1.0, 0.0, False),
         (1.0, 1.0, 1.0, True),
     ],
 )
