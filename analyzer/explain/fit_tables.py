@@ -8,6 +8,7 @@ from typing import Any
 from analyzer.explain.one_loop import Explained
 from analyzer.explain.page_words import ROWS, rms, share
 from analyzer.pages.words import duration
+from identification.mismatch.words import seen_ahead, two_plain_loops
 from reports.pages import Block, Cell, Column, Table
 
 
@@ -38,6 +39,8 @@ def fit_tables(e: Explained) -> tuple[Block, ...]:
             else ""
         )
     )
+    fit = e.data["fit"]
+    note = " ".join(x for x in (note, seen_ahead(fit), two_plain_loops(fit)) if x)
     return (Table("fit", "", columns, tuple(rows), note), *_others(e.data))
 
 

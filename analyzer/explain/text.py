@@ -23,7 +23,7 @@ from analyzer.explain.page_words import (
     title,
 )
 from analyzer.pages.words import number
-from identification.mismatch.words import check, discriminating_test
+from identification.mismatch.words import check, discriminating_test, seen_ahead, two_plain_loops
 
 WIDTH = 110
 """Columns of text."""
@@ -125,6 +125,8 @@ def lines(data: Mapping[str, Any]) -> list[str]:
     out += _part("Controller, as SP, PV and OP show it", _controller(data), (1,))
     out += _part("Misfit, rms in % of span", _fit(data), (1, 2, 3, 4))
     out += _part("On the recordings held out", _others(data), (1, 3, 4))
+    for told in (seen_ahead(data["fit"]), two_plain_loops(data["fit"])):
+        out += ["", *wrap(told, WIDTH)] if told else []
     if "brought" in data["fit"]:
         out += ["", *wrap(data["fit"]["brought"]["note"], WIDTH)]
     first = data["effects"][0] if data["effects"] else None

@@ -6,14 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from identification.mismatch.cross_validation import Misfit, misfit
 from identification.mismatch.diagnosis import restored
 from identification.mismatch.explanation import Explanation
 from identification.mismatch.identifiability import unanswered
 from identification.mismatch.model_file import carried, constants
+from identification.mismatch.proof import Misfit, misfit
 from identification.mismatch.recording import Recording
 from identification.record import Floats
-from identification.simulation.open_loop import simulate
 from identification.simulation.parameters import Slot
 
 HUNDRED = (60.0, 160.0)
@@ -22,8 +21,6 @@ SIXTY = (40.0, 90.0)
 """Ratios of two time constants that look like minutes against seconds."""
 AN_HOUR = (2400.0, 5400.0)
 """Ratios of two time constants that look like hours against seconds."""
-AS_GOOD = 1.1
-"""A model whose misfit stays under this many times that of the refitted plain loop does as well; ours."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,13 +71,13 @@ def wrong_units(own: Floats, found: Mapping[str, float]) -> str:
     return "; ".join(said)
 
 
-def compared(own: float, plain: float) -> str:
+def compared(own: float, plain: float, as_good: float) -> str:
     """How a model does against the plain loop fitted anew, from both misfits."""
-    if own > AS_GOOD * plain:
+    if own > as_good * plain:
         return "it does worse than the plain loop can"
     return (
         "it does better than the plain loop can"
-        if own * AS_GOOD < plain
+        if own * as_good < plain
         else "it does as well as the plain loop"
     )
 
@@ -99,15 +96,13 @@ def judged(data: Mapping[str, Any], found: Explanation, s: Recording, more: str 
     """
     out = carried(dict(data), s.op, s.pv, s.dt_s)
     cut = int((1.0 - s.limits.proof.held_out) * s.pv.size)
-    window = found.proof.window if found.proof is not None else 0
+    window, overall = found.proven.window, found.proven.overall
     whole = misfit(s.pv, out, window)
-    plain = misfit(found.p.y, simulate(found.p.inputs, found.plain.model.c), window)
-    said = f"Your model leaves {whole.rmse:.3g} % of span rms, the plain loop fitted anew {plain.rmse:.3g} %"
+    said = f"Your model leaves {whole.rmse:.3g} % of span rms, the plain loop fitted anew {overall[0].rmse:.3g} %"
     if found.accepted:
-        best = misfit(found.p.y, simulate(found.p.inputs, found.best.model.c), window)
-        said += f", the improved loop {best.rmse:.3g} %"
+        said += f", the improved loop {overall[1].rmse:.3g} %"
     units = "" if unanswered(found) else wrong_units(constants(dict(data)), restored(found.plain.model))
-    verdict = "" if units else compared(whole.rmse, plain.rmse)
+    verdict = "" if units else compared(whole.rmse, overall[0].rmse, s.limits.proof.as_good)
     note = "; ".join(x for x in (said, verdict, units, more) if x) + "."
     fitted, held = misfit(s.pv[:cut], out[:cut], window), misfit(s.pv[cut:], out[cut:], window)
     return Brought(out, fitted, held, note)

@@ -11,7 +11,6 @@ from analyzer.explain.user_model import Brought
 from identification.estimation.candidate import Fitted
 from identification.mismatch.answer import Answer
 from identification.mismatch.catalogue import fault
-from identification.mismatch.cross_validation import course
 from identification.mismatch.curves.controller import by_stated_law
 from identification.mismatch.curves.drawn import Drawing, Shape
 from identification.mismatch.curves.stretches import busiest
@@ -20,6 +19,7 @@ from identification.mismatch.location.features import Group, groups
 from identification.mismatch.location.locate import Located, profile
 from identification.mismatch.location.where import located_in, won_over
 from identification.mismatch.outside import about
+from identification.mismatch.proof import course
 from identification.mismatch.recording import Recording
 from identification.record import Floats
 from identification.simulation.open_loop import simulate
@@ -118,9 +118,9 @@ class Views:
 def simulations(found: Explanation, brought: Brought | None) -> dict[str, Floats]:
     """PV as simulated [% of span], anchored as for the proof, shape (n,) each."""
     p = found.p
-    fits = {"baseline": found.plain} | ({"model": found.best} if found.accepted else {})
-    window, placed = (0, False) if found.proof is None else (found.proof.window, found.proof.placed)
-    out = {kind: p.inputs.level + course(p, fit.model.c, window, placed) for kind, fit in fits.items()}
+    proof = found.proven
+    drawn = dict(zip(("baseline", "model") if found.accepted else ("baseline",), proof.drawn, strict=False))
+    out = {k: p.inputs.level + course(p, c, proof.window, proof.placed) for k, c in drawn.items()}
     return out if brought is None else out | {"brought": brought.simulated}
 
 

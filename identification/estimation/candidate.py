@@ -32,7 +32,8 @@ class Problem:
 
     inputs : what drives the model; y : PV less inputs.level, shape (n,); usable : bool, shape (n,); weight : shape
     (n,), what each innovation counts, 0 where it is not judged. limits : what decides about candidates; memory :
-    in an experiment, samples that tell as much as an independent one, at most.
+    in an experiment, samples that tell as much as an independent one, at most; window : samples after which a
+    simulation that is judged by its own errors begins anew (without_lines), 0 for one run over all.
     """
 
     inputs: ModelInputs
@@ -42,6 +43,7 @@ class Problem:
     edges: Edges = field(repr=False)
     limits: ExplainLimits = LIMITS
     memory: float = math.inf
+    window: int = 0
 
     @property
     def count(self) -> int:

@@ -11,6 +11,7 @@ from identification.estimation.candidate import Fitted, Model, Problem, bounds
 from identification.estimation.covariance import inverse, scattered
 from identification.estimation.noise import fitted, lag_means, whitened
 from identification.record import Floats
+from identification.signals.lines import without_lines
 from identification.simulation.effect import Param
 from identification.simulation.open_loop import ModelInputs, simulate
 from identification.simulation.parameters import Slot
@@ -45,7 +46,7 @@ class Residual:
 def residual_fit(p: Problem, c: Floats) -> Residual:
     """Residual, noise model and innovations at given constants."""
     simulated = simulate(p.inputs, c)
-    r = p.y - simulated
+    r = without_lines(p.y - simulated, p.window)
     groups, root, total = p.edges.size - 1, np.sqrt(p.weight), float(p.weight.sum())
     if not float(np.abs(r).max()) < FAR:
         none = np.zeros((groups, r.size)), np.zeros((groups, groups)), np.zeros(groups)
@@ -88,7 +89,7 @@ def sensitivities(p: Problem, model: Model, ar: Floats, here: Floats | None = No
             h = -h
         c[param.slot] += h
         slope = (simulate(p.inputs, c) - here) / (h / model.c[param.slot] if param.log else h)
-        out[i] = whitened(np.clip(slope, -1e9, 1e9), ar, p.edges)
+        out[i] = whitened(without_lines(np.clip(slope, -1e9, 1e9), p.window), ar, p.edges)
     return out
 
 
@@ -207,7 +208,8 @@ def innovations_of(p: Problem, found: Residual) -> Floats:
     """Innovations [% PV], shape (n,), also where they count nothing."""
     if not found.loss < FAR**2:
         return np.full(p.y.size, FAR)
-    return whitened(p.y - found.simulated, found.ar, p.edges)  # type: ignore[no-any-return]
+    left = without_lines(p.y - found.simulated, p.window)
+    return whitened(left, found.ar, p.edges)  # type: ignore[no-any-return]
 
 
 def deviations(p: Problem, fit: Fitted) -> Floats:

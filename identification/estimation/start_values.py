@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from identification.estimation.backlash_stiction import begin, generic_noise
@@ -12,22 +14,39 @@ from identification.estimation.window import Window
 from identification.models import Fopdt
 from identification.record import Floats, Mask
 
-TIMES = (1.5, 4.0, 10.0, 25.0, 60.0, 150.0, 400.0)
-"""Time constants tried [samples]; ours: from the scan to the longest that a shift of logging shows."""
+SHORTEST = 1.5
+"""Shortest time constant tried [samples]."""
+APART = 2.5
+"""Ratio of neighbouring time constants; ours: the descent covers a factor of three either way."""
 DELAYS = (0.0, 0.1, 0.3, 0.8)
 """Dead times tried, as shares of the time constant."""
-LONGEST_DELAY = 80
-"""Longest dead time tried at first [samples]; the descent may go on from there."""
+LONGEST_DELAY = 0.1
+"""Longest dead time tried at first, as a share of the record; the descent may go on from there."""
+NO_WHITENING = np.zeros(1)
+"""The noise model of a simulation judged by its own errors: none."""
 
 
-def starts(dt_s: float) -> list[Dynamics]:
-    """Time constants and dead times [s] from which the search begins."""
-    pairs = {(t, min(round(t * d, 1), LONGEST_DELAY)) for t in TIMES for d in DELAYS}
+def starts(samples: int, dt_s: float) -> list[Dynamics]:
+    """Time constants and dead times [s] from which the search begins, over all time scales of the record."""
+    count = 1 + math.ceil(math.log(max(samples / SHORTEST, APART)) / math.log(APART))
+    times = SHORTEST * APART ** np.arange(count)
+    pairs = {(t, min(round(t * d, 1), LONGEST_DELAY * samples)) for t in times for d in DELAYS}
     return [(t * dt_s, d * dt_s) for t, d in sorted(pairs)]
 
 
+def simulated_best(y: Floats, op: Floats, usable: Mask, dt_s: float) -> Fopdt:
+    """The plain loop whose simulation leaves least of PV, a straight line of load taken out; see plain_processes."""
+    return _searched(Window(y, op, usable, dt_s), NO_WHITENING)
+
+
+def _searched(window: Window, ar: Floats) -> Fopdt:
+    prepared = prepare(window, IDEAL, np.ascontiguousarray(ar))
+    fit = begin(prepared, search(prepared, starts(window.y.size, window.dt_s), 2))
+    return Fopdt(fit.gain, fit.time_constant_s, fit.dead_time_s)
+
+
 def plain_processes(y: Floats, op: Floats, usable: Mask, dt_s: float) -> list[Fopdt]:
-    """Plain loops that explain PV from OP best under each of two first noise models.
+    """Plain loops that explain PV from OP best: one step ahead under each of two first noise models, and simulated.
 
     Parameters
     ----------
@@ -41,14 +60,9 @@ def plain_processes(y: Floats, op: Floats, usable: Mask, dt_s: float) -> list[Fo
     Returns
     -------
     list of Fopdt
-        Starts for a descent; where the record is too short for one, the other alone.
+        Starts for a descent, one for each; the last is the simulated one.
     """
     window = Window(y, op, usable, dt_s)
     stem = window.stems_in_blocks.ideal
     learnt = arx_noise(window.centred, stem, usable, AR_ORDER, INPUT_LAGS)
-    found = []
-    for ar in (learnt, generic_noise()):
-        prepared = prepare(window, IDEAL, np.ascontiguousarray(ar))
-        fit = begin(prepared, search(prepared, starts(dt_s), 2))
-        found.append(Fopdt(fit.gain, fit.time_constant_s, fit.dead_time_s))
-    return found
+    return [_searched(window, ar) for ar in (learnt, generic_noise(), NO_WHITENING)]

@@ -6,13 +6,10 @@ import math
 from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
-
-from identification.estimation.candidate import Fitted, Problem
+from identification.estimation.candidate import Fitted, Model, Problem
 from identification.estimation.covariance import half_width
 from identification.estimation.prediction_error import deviations
 from identification.mismatch.catalogue import fault
-from identification.mismatch.cross_validation import HeldOut, Misfit, held_out, misfit
 from identification.mismatch.diagnosis import alternatives, restored
 from identification.mismatch.effect import Block, exact
 from identification.mismatch.explanation import Explanation
@@ -20,11 +17,12 @@ from identification.mismatch.identifiability import too_short, unanswered
 from identification.mismatch.location.locate import Located
 from identification.mismatch.location.where import located_in, where_of
 from identification.mismatch.outside import about
+from identification.mismatch.proof import HeldOut, Misfit
 from identification.mismatch.recording import Finding, Recording
 from identification.mismatch.starts.from_cycles import is_friction
 from identification.models import Estimate
 from identification.simulation.effect import Variant
-from identification.simulation.open_loop import simulate
+from identification.simulation.parameters import Slot
 
 LIVES = {
     "op_level": "valve",
@@ -137,6 +135,25 @@ def outside_of(found: Explanation) -> EffectFound | None:
     return EffectFound(row.name, row.block, parameters_of(found.p, fit, row), None)
 
 
+def plain_loops(found: Explanation) -> dict[str, dict[str, float]]:
+    """The plain loop that simulates best and the one that foretells best one step ahead, where they differ widely."""
+    loops = {"simulated": found.proven.drawn[0], "one_step_ahead": found.plain.model.c}
+    own = {name: restored(Model((), c)) for name, c in loops.items()}
+    here, ahead = (Slot.K, Slot.T), own["one_step_ahead"]
+    ratios = [abs(loops["simulated"][s]) / max(abs(loops["one_step_ahead"][s]), 1e-12) for s in here]
+    alike = all(
+        1.0 / found.p.limits.proof.optima_apart <= r <= found.p.limits.proof.optima_apart for r in ratios
+    )
+    same_sign = own["simulated"]["gain"] * ahead["gain"] > 0.0
+    return {} if alike and same_sign else own
+
+
+def ahead(found: Explanation) -> float | None:
+    """Gain on held-out data [nat] of effects that innovations show and no smaller misfit; None of any other."""
+    proof = found.proven
+    return proof.gain if found.accepted and proof.share <= 0.0 and proof.seen_ahead else None
+
+
 def fit_of(proof: HeldOut, dt_s: float) -> dict[str, Any]:
     """Misfit before and after, fitted and held out, and the horizon that simulations run over [s]; None: all."""
     both: dict[str, Any] = {
@@ -158,12 +175,6 @@ def moved(found: Explanation) -> dict[str, tuple[float, float]]:
     return {k: (before[k], after[k]) for k in before}
 
 
-def remaining(found: Explanation) -> float:
-    """Share of PV's mean square about its mean that the last model leaves."""
-    left = misfit(found.p.y, simulate(found.p.inputs, found.best.model.c))
-    return (left.rmse / max(float(np.std(found.p.y)), 1e-12)) ** 2
-
-
 def answer(found: Explanation, s: Recording) -> Answer:
     """The answer of an explanation.
 
@@ -173,7 +184,7 @@ def answer(found: Explanation, s: Recording) -> Answer:
     s : Recording
         What was explained.
     """
-    proof = found.proof or held_out(found.p, found.plain, found.best)
+    proof = found.proven
     effects = effects_of(found, s, proof if found.accepted else None)
     asked = not any(found_first(found)) and not by_cycles(found)
     silent = unanswered(found) if asked else ""
@@ -185,9 +196,9 @@ def answer(found: Explanation, s: Recording) -> Answer:
         block,
         effects,
         where_of(found, s, block, at),
-        fit_of(proof, s.dt_s),
+        fit_of(proof, s.dt_s) | {"plain_loops": plain_loops(found), "ahead_nat": ahead(found)},
         moved(found),
-        remaining(found),
+        (1.0 - proof.overall[1].fit_pct / 100.0) ** 2,
         f"Not told: {lacking}." if lacking and (verdict, block) == ("unexplained", "none") else _note(found),
         (lacking or (ONE_MOVE_ONLY if found.unproven else untold_gain(found, effects))) if effects else "",
         shown_by(found),

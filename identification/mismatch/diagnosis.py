@@ -137,10 +137,10 @@ def explain(s: Recording, tell: Progress = silent, brought: Floats | None = None
         late_s=late_s,
     )
     if any(ends(x) is Ends.ALL for x in (recorder, controller)):
-        return found
-    told = carried_over(beyond_the_grid(physics(found, tell, s)))
+        return carried_over(found)
+    told = beyond_the_grid(physics(found, tell, s))
     if not is_experiment(s):
-        return told
+        return carried_over(told)
     p, plain = prepared(inputs, pv - inputs.level, usable, brought, clip, s.limits, experiment=True)
     by_misfit = carried_over(beyond_the_grid(physics(replace(found, p=p, plain=plain, best=plain), tell, s)))
     return agreed(told, by_misfit)

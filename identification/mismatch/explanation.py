@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 from identification.controller.pi_regression import ControlLaw
 from identification.estimation.candidate import Fitted, Problem
 from identification.mismatch.catalogue import EFFECTS, fault
-from identification.mismatch.cross_validation import HeldOut, OnOther
 from identification.mismatch.effect import Ends
 from identification.mismatch.forward_selection import Candidate
+from identification.mismatch.proof import HeldOut, OnOther
 from identification.mismatch.recording import Finding, SeenInCycles
 
 
@@ -44,6 +44,13 @@ class Explanation:
     others: tuple[OnOther, ...] = ()
     outside: Candidate | None = None
     by_innovations: Explanation | None = field(default=None, repr=False)
+
+    @property
+    def proven(self) -> HeldOut:
+        """The proof, which every explanation that is told of has."""
+        if self.proof is None:
+            raise ValueError("an explanation that was not put to the proof")
+        return self.proof
 
     @property
     def finding(self) -> Finding | None:

@@ -9,8 +9,9 @@ import numpy as np
 from identification.estimation.candidate import Model
 from identification.estimation.prediction_error import descend
 from identification.mismatch.catalogue import EFFECTS
-from identification.mismatch.cross_validation import held_out, is_one_move
+from identification.mismatch.cross_validation import is_one_move
 from identification.mismatch.explanation import Explanation
+from identification.mismatch.proof import held_out
 from identification.mismatch.recording import STEP
 from identification.mismatch.sets_of_effects import cleared
 from identification.mismatch.starts.from_cycles import is_friction

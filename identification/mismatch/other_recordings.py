@@ -8,11 +8,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from identification.estimation.candidate import Fitted, problem
+from identification.estimation.candidate import problem
 from identification.mismatch.catalogue import EFFECTS
-from identification.mismatch.cross_validation import HeldOut, Misfit, OnOther, anchored, course, misfit
 from identification.mismatch.explanation import Explanation
 from identification.mismatch.model_file import carried, constants, to_data
+from identification.mismatch.proof import HeldOut, Misfit, OnOther, anchored, course, misfit
 from identification.mismatch.recording import Recording
 from identification.mismatch.sets_of_effects import cleared
 from identification.mismatch.starts.from_cycles import is_friction
@@ -21,10 +21,10 @@ from identification.simulation.open_loop import ModelInputs
 from identification.simulation.parameters import Slot
 
 
-def simulated_there(found: Explanation, fit: Fitted, s: Recording, window: int) -> Floats:
-    """PV [% PV], shape (n,), that a fit gives for another recording's OP, anchored in windows."""
-    data = to_data("", found.p.inputs, fit.model.c, fit.names, found.late_s, None)
-    if window and found.proof is not None and found.proof.placed:
+def simulated_there(found: Explanation, c: Floats, s: Recording, window: int) -> Floats:
+    """PV [% PV], shape (n,), that constants give for another recording's OP, anchored in windows."""
+    data = to_data("", found.p.inputs, c, found.best.names, found.late_s, None)
+    if window and found.proven.placed:
         inputs = found.p.inputs
         here = ModelInputs(s.op, s.dt_s, inputs.middle, inputs.level, (float(s.pv.min()), float(s.pv.max())))
         c = constants(data)
@@ -34,14 +34,14 @@ def simulated_there(found: Explanation, fit: Fitted, s: Recording, window: int) 
 
 
 def on_other(found: Explanation, s: Recording, window: int) -> OnOther:
-    """Both models on one other recording, and the better one without its effects."""
-    c = found.best.model.c
+    """Both models on another recording, the plain one by either criterion, and the better without its effects."""
+    best = found.best.model.c
+    bare = best
     for row in found.best.model.added:
-        c = cleared(c, row)
-    bare = replace(found.best, model=replace(found.best.model, c=c))
-    courses = [simulated_there(found, fit, s, window) for fit in (found.plain, found.best, bare)]
-    plain, better, without = (misfit(s.pv, x, window) for x in courses)
-    return OnOther(plain, better, without, s.pv.size)
+        bare = cleared(bare, row)
+    models = (found.plain.model.c, found.proven.drawn[0], best, bare)
+    own, drawn, better, without = (misfit(s.pv, simulated_there(found, c, s, window), window) for c in models)
+    return OnOther(min(own, drawn, key=lambda x: x.rmse), better, without, s.pv.size)
 
 
 def together(parts: Sequence[Misfit], samples: Sequence[int]) -> Misfit:
@@ -55,8 +55,8 @@ def together(parts: Sequence[Misfit], samples: Sequence[int]) -> Misfit:
 
 def windows_of(found: Explanation, s: Recording) -> tuple[int, ...]:
     """Windows in which models are compared there [samples]: the whole, and what own proof or loop ask for."""
-    if found.proof is not None and found.proof.window:
-        return 0, max(round(found.proof.window * found.p.inputs.dt_s / s.dt_s), 1)
+    if found.proven.window:
+        return 0, max(round(found.proven.window * found.p.inputs.dt_s / s.dt_s), 1)
     c = found.plain.model.c
     limits = found.p.limits.proof
     memory = limits.window_times * float(c[Slot.T] + c[Slot.L]) / s.dt_s
@@ -78,10 +78,11 @@ def _compared(
     samples = [x.samples for x in each]
     held = together([x.baseline for x in each], samples), together([x.explained for x in each], samples)
     window = round(windows_of(found, others[0])[at] * others[0].dt_s / p.inputs.dt_s)
-    placed = bool(at and found.proof is not None and found.proof.placed)
-    courses = [course(p, fit.model.c, window, placed) for fit in (found.plain, found.best)]
+    placed = bool(at and found.proven.placed)
+    drawn = found.proven.drawn
+    courses = [course(p, c, window, placed) for c in drawn]
     seen = misfit(p.y, courses[0], window), misfit(p.y, courses[1], window)
-    return HeldOut(0.0, seen, held, seen, window, placed, p.limits.proof.least_fit), each
+    return HeldOut(0.0, seen, held, seen, drawn, window, placed, limits=p.limits.proof), each
 
 
 def proven_on(found: Explanation, others: Sequence[Recording]) -> Explanation:

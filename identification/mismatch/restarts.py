@@ -15,6 +15,7 @@ from numba import njit
 
 from identification.estimation.candidate import Problem
 from identification.record import Floats
+from identification.signals.lines import stretch_ends
 from identification.simulation.acts import Signal, acted
 from identification.simulation.open_loop import from_flow, simulate
 from identification.simulation.parameters import Slot
@@ -25,12 +26,6 @@ PLACES = 9
 """Places of the stem that are tried within its friction band; ours: an eighth of the band apart."""
 CARRIED_ON = 0.9
 """Squares left by another place, in those left by the stem carried on, from which it is placed anew; ours."""
-
-
-def window_ends(n: int, window: int) -> np.ndarray:
-    """First sample of each window and the end of the last, as the windows of a straight line of load are laid."""
-    parts = np.array_split(np.arange(n), max(n // max(window, 1), 1))
-    return np.array([*(int(part[0]) for part in parts), n], dtype=np.int64)
 
 
 @njit(cache=True)
@@ -109,6 +104,6 @@ def simulated_anew(p: Problem, c: Floats, window: int) -> Floats:
     op = before_stem(np.ascontiguousarray(acted(Signal.OP, inputs.op, c, inputs.dt_s)), c, inputs.dt_s)
     dead = round(float(c[Slot.L]) / inputs.dt_s)
     pole = math.exp(-inputs.dt_s / max(float(c[Slot.T]), 1e-9))
-    stem = placed(op, p.y, window_ends(op.size, window), dead, pole, float(c[Slot.K]), friction)
+    stem = placed(op, p.y, stretch_ends(op.size, window), dead, pole, float(c[Slot.K]), friction)
     flow = behind_stem(stem, c, inputs.dt_s, inputs.middle)
     return from_flow(inputs, c, acted(Signal.FLOW, flow, c, inputs.dt_s))

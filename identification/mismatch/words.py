@@ -41,6 +41,32 @@ def discriminating_test(one: str, other: str) -> str:
     return LONGER
 
 
+def two_plain_loops(fit: Mapping[str, Any]) -> str:
+    """That the plain loop which simulates best is another than the one that foretells best; empty where it is not."""
+    loops = fit.get("plain_loops")
+    if not loops:
+        return ""
+    drawn, ahead = (
+        f"gain {x['gain']:.3g}, time constant {_number(x['time_constant_s'], 's')}"
+        for x in (loops["simulated"], loops["one_step_ahead"])
+    )
+    return (
+        f"Two plain loops: one simulates best ({drawn}) and is drawn, another foretells the next sample best "
+        f"({ahead}). A load that a controller answers biases the first, a slow load the second: figures of the "
+        "process are rough until OP is stepped in manual."
+    )
+
+
+def seen_ahead(fit: Mapping[str, Any]) -> str:
+    """That what was found shows one step ahead and not in a simulation; empty where it shows in both."""
+    if fit.get("ahead_nat") is None:
+        return ""
+    return (
+        "What was found shows from one sample to the next on data it was not fitted to; simulated, a plain loop of "
+        "other constants leaves as little, for the load hides in OP."
+    )
+
+
 SPOKEN_S = (600.0, 7200.0)
 """Times from which minutes and hours are spoken of [s]; ours."""
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -22,6 +23,7 @@ from identification.mismatch.catalogue import CANDIDATES
 from identification.mismatch.diagnosis import controller_finding_of, inputs_of, recorder_finding_of
 from identification.mismatch.explanation import Explanation
 from identification.mismatch.forward_selection import Candidate, prepared
+from identification.mismatch.proof import held_out
 from identification.models import Backlash, Fopdt, Loop, Pid
 from identification.simulation.closed_loop import closed_loop
 from identification.simulation.parameters import Slot
@@ -90,6 +92,7 @@ def explanation(kind: str) -> Explained:
         found = with_play(found, 1.5)
     if kind == "unexplained":
         found = Explanation(p, plain, plain, left=99.0)
+    found = replace(found, proof=held_out(found.p, found.plain, found.best))
     said = answer(found, s)
     model = {
         "loop": "A",

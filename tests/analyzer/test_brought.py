@@ -13,9 +13,11 @@ from analyzer.explain.saved_model import read_model, scale_of
 from analyzer.explain.user_model import compared, judged, within, wrong_units
 from analyzer.quality import Scale
 from identification.errors import InputError
+from identification.limits.explain import LIMITS
 from identification.mismatch.diagnosis import inputs_of
 from identification.mismatch.explanation import Explanation
 from identification.mismatch.forward_selection import prepared
+from identification.mismatch.kept_effects import carried_over
 from identification.mismatch.recording import Recording
 from identification.models import Fopdt, Loop, Pid
 from identification.simulation.closed_loop import closed_loop
@@ -43,7 +45,7 @@ def asked() -> tuple[Explanation, Recording]:
     r = closed_loop(Loop(Fopdt(1.2, 20.0, 3.0), Pid(1.8, 20.0)), sp, rng.normal(0, 0.1, N))
     s = Recording(r.sp, r.pv, r.op, np.ones(N, dtype=bool), 1.0, r.time_s)
     p, plain = prepared(inputs_of(s), r.pv - r.pv.mean(), s.usable)
-    return Explanation(p, plain, plain), s
+    return carried_over(Explanation(p, plain, plain)), s
 
 
 def test_right_model_does_as_well(asked: tuple[Explanation, Recording]) -> None:
@@ -85,8 +87,8 @@ def test_ratios_count_both_ways() -> None:
 
 
 def test_comparison_has_three_outcomes() -> None:
-    """Worse, as well and better are told apart at a tenth."""
-    said = [compared(x, 1.0).split()[2] for x in (1.2, 1.0, 0.8)]
+    """Worse, as well and better are told apart at a twentieth."""
+    said = [compared(x, 1.0, LIMITS.proof.as_good).split()[2] for x in (1.06, 1.04, 0.94)]
     assert said == ["worse", "as", "better"]
 
 

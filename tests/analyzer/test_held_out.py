@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from identification.mismatch.cross_validation import Misfit
 from identification.mismatch.other_recordings import together
+from identification.mismatch.proof import Misfit
 from tests.analyzer.test_explain import asked, export
 
 

@@ -19,10 +19,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from identification.mismatch.answer import Answer, answer
-from identification.mismatch.cross_validation import misfit
 from identification.mismatch.diagnosis import explain
 from identification.mismatch.explanation import Explanation
 from identification.mismatch.model_file import carried, to_data
+from identification.mismatch.proof import misfit
 from identification.mismatch.recording import Recording
 from identification.record import Floats
 

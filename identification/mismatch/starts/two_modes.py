@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,9 +15,10 @@ from identification.simulation.open_loop import through_valve
 from identification.simulation.parameters import Slot
 from identification.simulation.process import plain_vessel
 
-SHORTER = (0.15, 0.35, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
-"""Dead times tried, in that of the plain loop: a missing lag or zero has lengthened it."""
-LONGER = (0.7, 1.0, 1.4)
+DELAYS = 40
+"""Dead times tried at most, from none to that of the plain loop, which a missing lag or zero has lengthened; a mode
+that answers at once is found to the sample alone."""
+LONGER = (0.7, 1.0, 1.4, 2.0)
 """Time constants tried, in that of the plain loop."""
 LEADING = 0.95
 """First coefficient of the noise model that knows nothing: nearly a difference."""
@@ -35,17 +37,22 @@ class Point:
     left: float
 
 
-def responses(p: Problem, near: Fitted, dead_s: float, times: set[float], ar: Floats) -> dict[float, Floats]:
-    """Whitened unit responses, each shape (n,), of lags with these time constants [s]."""
+def responses(p: Problem, near: Fitted, times: set[float], ar: Floats) -> dict[float, Floats]:
+    """Whitened unit responses without dead time, each shape (n,), of lags with these time constants [s]."""
     inputs, c = p.inputs, near.model.c.copy()
     through = through_valve(inputs, c)
     still = np.zeros(inputs.op.size)
-    c[Slot.K], c[Slot.BIAS], c[Slot.START], c[Slot.L] = 1.0, 0.0, 0.0, dead_s
+    c[Slot.K], c[Slot.BIAS], c[Slot.START], c[Slot.L] = 1.0, 0.0, 0.0, 0.0
     out = {}
     for t in times:
         c[Slot.T] = max(t, 0.1 * inputs.dt_s)
         out[t] = whitened(plain_vessel(through, still, c, inputs.dt_s, inputs.middle), ar, p.edges)
     return out
+
+
+def later(x: Floats, samples: int) -> Floats:
+    """x, shape (n,), so many samples later, still before."""
+    return np.concatenate((np.full(samples, x[0]), x[: x.size - samples]))
 
 
 def solved(
@@ -63,13 +70,15 @@ def grid(p: Problem, near: Fitted, row: Variant, ar: Floats) -> list[Point]:
     t0, dead0 = float(near.model.c[Slot.T]), float(near.model.c[Slot.L])
     y, level = whitened(p.y, ar, p.edges), whitened(np.ones(p.y.size), ar, p.edges)
     firsts, others = [t0 * f for f in LONGER], [t0 * f for f in row.modes]
+    found = responses(p, near, {*firsts, *others}, ar)
+    longest = min(math.ceil(dead0 / p.inputs.dt_s), p.y.size - 1)
     out = []
-    for dead in {dead0 * f for f in SHORTER}:
-        found = responses(p, near, dead, {*firsts, *others}, ar)
+    for samples in range(0, longest + 1, longest // DELAYS + 1):
+        moved = {t: later(x, samples) for t, x in found.items()}
         for first in firsts:
             for other in others:
-                gains, left = solved(y, found[first], found[other], level, p.weight)
-                out.append(Point(dead, first, other, gains, left))
+                gains, left = solved(y, moved[first], moved[other], level, p.weight)
+                out.append(Point(samples * p.inputs.dt_s, first, other, gains, left))
     return sorted(out, key=lambda point: point.left)
 
 

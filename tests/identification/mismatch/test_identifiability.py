@@ -13,6 +13,7 @@ from identification.mismatch.diagnosis import inputs_of
 from identification.mismatch.explanation import Explanation
 from identification.mismatch.forward_selection import prepared
 from identification.mismatch.identifiability import brings, too_short, unanswered
+from identification.mismatch.kept_effects import carried_over
 from identification.mismatch.recording import Recording
 from identification.simulation.parameters import Slot
 from tests.identification.scenes import noise, recording
@@ -22,7 +23,7 @@ def plainly(s: Recording) -> Explanation:
     """The plain fit alone."""
     inputs = inputs_of(s)
     p, plain = prepared(inputs, s.pv - inputs.level, s.usable)
-    return Explanation(p, plain, plain)
+    return carried_over(Explanation(p, plain, plain))
 
 
 def test_loop_with_moves_is_informed() -> None:

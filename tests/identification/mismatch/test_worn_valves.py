@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -13,12 +12,13 @@ from identification.estimation.candidate import Fitted, Model, Problem, problem
 from identification.estimation.prediction_error import descend
 from identification.mismatch.answer import Answer, answer
 from identification.mismatch.catalogue import EFFECTS
-from identification.mismatch.cross_validation import HeldOut, Misfit, runs_out
+from identification.mismatch.cross_validation import runs_out
 from identification.mismatch.diagnosis import explain, inputs_of
 from identification.mismatch.explanation import Explanation
 from identification.mismatch.forward_selection import Candidate, applies
+from identification.mismatch.proof import HeldOut, Misfit
 from identification.mismatch.recording import Circumstances, Finding, Recording, SeenInCycles
-from identification.mismatch.restarts import simulated_anew, window_ends
+from identification.mismatch.restarts import simulated_anew
 from identification.mismatch.sets_of_effects import without_the_idle
 from identification.mismatch.starts.screening import CandidateInputs
 from identification.models import Fopdt, Stiction
@@ -124,11 +124,10 @@ def as_problem(seed: int, scatter: float) -> Problem:
 
 def parts_left(p: Problem, simulated: Floats, window: int) -> float:
     """Standard deviation of what a simulation leaves about a line in each window."""
-    ends, left = window_ends(p.y.size, window), p.y - simulated
-    for a, b in pairwise(ends):
-        k = np.arange(b - a)
-        left[a:b] -= np.polyval(np.polyfit(k, left[a:b], 1), k)
-    return float(left.std())
+    left = p.y - simulated
+    parts = np.array_split(left, left.size // window)
+    own = [x - np.polyval(np.polyfit(np.arange(x.size), x, 1), np.arange(x.size)) for x in parts]
+    return float(np.concatenate(own).std())
 
 
 @pytest.mark.parametrize("seed", [5, 6])
@@ -181,7 +180,20 @@ def test_play_that_a_valve_in_good_order_has_is_no_finding() -> None:
 def test_less_far_astray_is_no_proof(fit_pct: float, carries: bool) -> None:
     """A model that leaves more than PV's own motion proves nothing by leaving less than a worse one."""
     plain, better = Misfit(2.0, -100.0), Misfit(1.0, fit_pct)
-    assert HeldOut(5.0, (plain, better), (plain, better), (plain, better)).carries is carries
+    constants = np.zeros(3), np.zeros(3)
+    assert HeldOut(5.0, (plain, better), (plain, better), (plain, better), constants).carries is carries
+
+
+@pytest.mark.parametrize(
+    ("gain", "held", "carries"), [(5.0, 1.03, False), (50.0, 1.03, True), (50.0, 1.4, False)]
+)
+def test_what_is_seen_ahead_has_to_simulate_as_well_as_a_plain_loop(
+    gain: float, held: float, carries: bool
+) -> None:
+    """An effect that removes no held-out misfit stands where innovations show it plainly and it loses nothing."""
+    plain, drawn, better = Misfit(1.0, 20.0), Misfit(0.9, 25.0), Misfit(held, 20.0)
+    constants = np.zeros(3), np.zeros(3)
+    assert HeldOut(gain, (plain, drawn), (plain, better), (plain, drawn), constants).carries is carries
 
 
 def test_idle_effect_goes_again() -> None:
