@@ -3,8 +3,8 @@
 Simulated loops (a closed PI loop with big set-point steps, an OP at its limit, a slow drift, or steps in manual; 200
 of each) and every recording of the folders. A lag with dead time, a constant and where PV began is fitted to PV by
 least squares in free run, by code that shares nothing with the fit, from twelve starts over all time scales. Told is
-the misfit of the plain loop shown over that of the best of these; it should nowhere be more than 1.05. A time constant
-of over a quarter of a record is no settling process. Writes tests/proofs/plain_loop.md.
+the misfit of the plain loop shown over that of the best of these; it should nowhere be more than 1.05. A time
+constant of over a quarter of a record is no settling process. Writes tests/proofs/plain_loop.md.
 """
 
 from __future__ import annotations
