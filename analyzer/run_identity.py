@@ -7,10 +7,12 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping, Sequence
+from collections.abc import Set as AbstractSet
+from dataclasses import asdict, dataclass, fields, is_dataclass
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
 from analyzer.config import Config
 from analyzer.history.export import Export
@@ -36,13 +38,34 @@ def identity(
     mark = hashlib.blake2b(digest_size=16)
     for source in export.sources:
         mark.update(ends_of(source.path))
-        mark.update(repr(source.clock).encode())
-    mark.update(repr((tuple(stated), since_s, until_s, config)).encode())
+        mark.update(in_one_order(source.clock))
+    mark.update(in_one_order((tuple(stated), since_s, until_s, config)))
     names = [source.path.name for source in export.sources]
     loops = sum(isinstance(row, LoopSpec) for row in stated)
     more = f" and {len(names) - 1} more files" if len(names) > 1 else ""
     now = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
     return RunIdentity(mark.hexdigest(), names[0] + more, loops, now)
+
+
+def in_one_order(value: object) -> bytes:
+    """A value as bytes that are the same in every process: sets and mappings sorted, dataclasses by their fields.
+
+    Raises
+    ------
+    TypeError
+        The value holds something whose text may differ between processes.
+    """
+    return json.dumps(value, sort_keys=True, default=_plain).encode()
+
+
+def _plain(value: Any) -> object:
+    if is_dataclass(value):
+        return [type(value).__name__, {f.name: getattr(value, f.name) for f in fields(value)}]
+    if isinstance(value, AbstractSet):
+        return sorted(value)
+    if isinstance(value, Mapping):
+        return dict(value)
+    raise TypeError(f"{type(value).__name__} has no stated order")
 
 
 def write(path: Path, run: RunIdentity) -> None:

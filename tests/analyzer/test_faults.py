@@ -19,7 +19,7 @@ import pyarrow.parquet as pq
 import pytest
 from click.testing import CliRunner, Result
 from plant import START_S, write_export
-from test_batch import quiet, stopped, tables
+from test_batch import quiet, tables
 
 from analyzer.cli import main
 from analyzer.commands import run as run_cli
@@ -46,12 +46,31 @@ def whole(export: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, l
     return tables(store)
 
 
+def stated(export: Path) -> list[str]:
+    """Options of a plant: loops.csv and changes.csv of an export's loops, written beside it; one has several rows."""
+    loops = [name[:-3] for name in pq.read_schema(export).names if name.endswith(".PV")]
+    path, changes = export.with_suffix(".loops.csv"), export.with_suffix(".changes.csv")
+    head = "loop,area,sp,pv,op,pv_lo,pv_hi,kp,ti,form,gain_unit,ti_unit,op_unit,valid_from\n"
+    row = "{0},Washing,{0}.SP,{0}.PV,{0}.OP,0,100,{1},60,ideal,percent,s,%,{2}\n"
+    rows = [row.format(n, 1 + int(n[1:]) / 10, "") for n in loops]
+    rows += [row.format(n, 2, "2026-03-02 00:20") for n in loops if n == "L05"]
+    path.write_text("".join([head, *rows]))
+    changed = [f"{n},2026-03-0{2 if n == 'L00' else 1} 00:30,0.5,1,AB\n" for n in loops]
+    changes.write_text("".join(["loop,time,kp_old,kp_new,who\n", *changed]))
+    return ["--loops", str(path), "--changes", str(changes)]
+
+
 def command(export: Path, store: Path, *more: str) -> list[str]:
-    """The batch as a process of its own."""
+    """The batch as a process of its own, as a plant runs it."""
     return [
-        *(sys.executable, "-m", "analyzer.cli", "run", str(export)),
+        *(sys.executable, "-m", "analyzer.cli", "run", str(export), *stated(export)),
         *("--store", str(store), "--jobs", "2", *more),
     ]
+
+
+def seeded(seed: int) -> dict[str, str]:
+    """The environment of a process whose sets have an order of their own."""
+    return {**os.environ, "PYTHONHASHSEED": str(seed)}
 
 
 def children(pid: int) -> list[int]:
@@ -69,7 +88,8 @@ def children(pid: int) -> list[int]:
 @contextlib.contextmanager
 def running(export: Path, store: Path, *more: str) -> Iterator[subprocess.Popen[str]]:
     """A run in a process of its own, given once it has written its first piece."""
-    with subprocess.Popen(command(export, store, *more), stderr=subprocess.PIPE, text=True) as run:
+    asked = command(export, store, *more)
+    with subprocess.Popen(asked, stderr=subprocess.PIPE, text=True, env=seeded(1)) as run:
         while run.poll() is None and not list(store.glob("parts/*/nights-*.parquet")):
             time.sleep(0.005)
         yield run
@@ -92,13 +112,15 @@ def test_a_killed_worker_costs_no_loop(export, whole, tmp_path):
 
 @linux
 def test_a_run_killed_with_signal_9_goes_on_with_resume(export, whole, tmp_path):
-    """After kill -9 of the parent its workers are gone, and --resume makes the store of an undisturbed run."""
+    """After kill -9 of the parent its workers are gone, and --resume, in a process whose sets have another order,
+    makes the store of an undisturbed run."""
     store = tmp_path / "store"
     with running(export, store) as run:
         workers = children(run.pid)
         run.kill()
         run.wait()
-    done = subprocess.run(command(export, store, "--resume"), capture_output=True, text=True, check=False)
+    again = command(export, store, "--resume")
+    done = subprocess.run(again, capture_output=True, text=True, check=False, env=seeded(2))
     assert done.returncode == 0, done.stderr
     assert not set(workers) & {int(p.name) for p in Path("/proc").glob("[0-9]*")}
     assert tables(store) == whole
@@ -144,7 +166,14 @@ def test_a_dead_owner_holds_nothing(export, tmp_path):
 
 def ran(export: Path, store: Path, *more: str) -> Result:
     """The batch in this process, with one worker."""
-    return CliRunner().invoke(main, ["run", str(export), "--store", str(store), *more])
+    return CliRunner().invoke(main, ["run", str(export), *stated(export), "--store", str(store), *more])
+
+
+def begun(export: Path, store: Path) -> None:
+    """A run that is stopped after its first piece."""
+    with running(export, store) as run:
+        run.kill()
+        run.wait()
 
 
 def part(export: Path, out: Path, loops: range, rows: int | None = None) -> Path:
@@ -199,7 +228,7 @@ def test_a_good_night_is_not_lost_to_an_empty_one(export, whole, tmp_path):
 def test_pieces_of_two_exports_are_never_mixed(export, tmp_path):
     """--resume with another export than the stopped run's is refused and says what that run read."""
     store = tmp_path / "store"
-    stopped(export, store, 1)
+    begun(export, store)
     other = part(export, tmp_path / "other.parquet", range(16, LOOPS))
     told = ran(other, store, "--resume")
     assert told.exit_code == 2
@@ -211,7 +240,7 @@ def test_a_run_goes_on_with_its_own_limits_alone(export, tmp_path):
     """--resume with other limits than the stopped run's is refused and names --config among what must be the same."""
     store, limits = tmp_path / "store", tmp_path / "limits.toml"
     limits.write_text("[oscillation]\nperiods = 3.5\n")
-    stopped(export, store, 1)
+    begun(export, store)
     told = ran(export, store, "--resume", "--config", str(limits))
     assert told.exit_code == 2
     assert "--config" in told.stderr

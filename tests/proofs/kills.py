@@ -1,13 +1,15 @@
 """A night killed at random points and gone on with: python -m tests.proofs.kills [--kills 50]
 
-A run of 24 loops over two nights is killed with signal 9, parent and workers, after a random share of the time that
-an undisturbed one takes, and begun again with --resume until it ends; its store must be that of the undisturbed run,
-table by table and cell by cell. Writes kills.md here.
+A run of 24 loops over two nights, as a plant runs it (loops.csv, changes.csv, two worker processes), is killed with
+signal 9, parent and workers, after a random share of the time that an undisturbed one takes, and begun again with
+--resume until it ends; its store must be that of the undisturbed run, table by table and cell by cell. Every process
+has a hash seed of its own, as on a plant. Writes kills.md here.
 """
 
 from __future__ import annotations
 
 import argparse
+import os
 import random
 import signal
 import subprocess
@@ -15,14 +17,18 @@ import sys
 import tempfile
 import time
 from collections import Counter
+from collections.abc import Sequence
+from datetime import UTC, datetime
 from pathlib import Path
 
 import pyarrow.parquet as pq
 
-from tests.analyzer.plant import Sketch, simulate, write_export
+from tests.analyzer.plant import START_S, Sketch, simulate, write_export
 
 OUT = Path(__file__).with_suffix(".md")
 LOOPS, HOURS = 24, 40.0
+CHANGED_H = 30.0
+"""When settings of some loops are changed, within the second night [h after the start]."""
 
 
 def tables(store: Path) -> dict[str, list[dict[str, object]]]:
@@ -38,10 +44,27 @@ def tables(store: Path) -> dict[str, list[dict[str, object]]]:
     }
 
 
+def state(folder: Path, loops: Sequence[str]) -> None:
+    """loops.csv and changes.csv of a plant: settings and ranges of each loop, every fourth one changed."""
+    head = "loop,area,sp,pv,op,pv_lo,pv_hi,op_lo,op_hi,kp,ti,form,gain_unit,ti_unit,scan_s,importance,op_unit"
+    rows = [f"{n},Mill,{n}.SP,{n}.PV,{n}.OP,0,100,0,100,1,60,ideal,percent,s,1,2,%" for n in loops]
+    (folder / "loops.csv").write_text("\n".join([head, *rows]) + "\n", encoding="utf-8")
+    at = datetime.fromtimestamp(START_S + CHANGED_H * 3600.0, UTC).isoformat()
+    changes = [f"{n},{at},2,60,1,60,AB" for n in loops[::4]]
+    text = "\n".join(["loop,time,kp_old,ti_old,kp_new,ti_new,who", *changes]) + "\n"
+    (folder / "changes.csv").write_text(text, encoding="utf-8")
+
+
 def command(export: Path, store: Path, *more: str) -> list[str]:
-    """The batch as a process of its own."""
+    """The batch as a process of its own, as a plant runs it."""
     said = [sys.executable, "-m", "analyzer.cli", "run", str(export), "--store", str(store), "--jobs", "2"]
-    return [*said, *more]
+    stated = ("--loops", str(export.parent / "loops.csv"), "--changes", str(export.parent / "changes.csv"))
+    return [*said, *stated, *more]
+
+
+def seeded(seed: int) -> dict[str, str]:
+    """The environment of a process whose sets have an order of their own."""
+    return {**os.environ, "PYTHONHASHSEED": str(seed)}
 
 
 def stage(store: Path) -> str:
@@ -56,7 +79,8 @@ def stage(store: Path) -> str:
 
 def killed(export: Path, store: Path, after_s: float) -> str:
     """Run, kill after a time, and go on until it ends; the stage at which it was killed, or 'not killed'."""
-    run = subprocess.Popen(command(export, store), stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
+    silent = subprocess.DEVNULL
+    run = subprocess.Popen(command(export, store), stderr=silent, stdout=silent, env=seeded(1))
     try:
         run.wait(after_s)
         return "not killed"
@@ -64,7 +88,8 @@ def killed(export: Path, store: Path, after_s: float) -> str:
         run.send_signal(signal.SIGKILL)
         run.wait()
     where = stage(store)
-    again = subprocess.run(command(export, store, "--resume"), capture_output=True, text=True, check=False)
+    asked = command(export, store, "--resume")
+    again = subprocess.run(asked, capture_output=True, text=True, check=False, env=seeded(2))
     if again.returncode != 0 or "Traceback" in again.stderr:
         raise SystemExit(f"killed {where}: {again.stderr}")
     return where
@@ -83,6 +108,7 @@ def main() -> None:
         sketch = Sketch("none", (1.0, 60.0, 10.0), 1.0, 60.0)
         loops = {f"L{k:02d}": simulate(sketch, HOURS, k) for k in range(LOOPS)}
         export = write_export(folder / "x.parquet", loops)
+        state(folder, list(loops))
         begun = time.monotonic()
         subprocess.run(command(export, folder / "whole"), check=True, capture_output=True)
         takes_s = time.monotonic() - begun
@@ -97,7 +123,10 @@ def main() -> None:
     lines = ["| killed | times |", "|---|--:|", *(f"| {where} | {n} |" for where, n in sorted(at.items()))]
     text = "\n".join([*lines, "", f"{same} of {wanted} stores are those of the undisturbed run."])
     print(text)
-    about = f"{LOOPS} loops of {HOURS:g} h at 1 s, two workers; signal 9 to the parent, whose workers end with it."
+    about = (
+        f"{LOOPS} loops of {HOURS:g} h at 1 s with loops.csv and changes.csv, two workers; signal 9 to the parent,\n"
+        "whose workers end with it; each process with a hash seed of its own."
+    )
     head = f"# A night killed at random points\n\n`python -m tests.proofs.kills --kills {wanted}`"
     OUT.write_text(f"{head}\n\n{about}\n\n{text}\n", encoding="utf-8")
 
