@@ -30,7 +30,7 @@ def read_config(path: Path | None) -> Config:
     if path is None:
         return Config()
     try:
-        stated = tomllib.loads(path.read_text(encoding="utf-8"))
+        stated = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except (ValueError, RecursionError) as error:  # of the decoder, of the encoding, of numbers without end
         raise InputError(
             f"{path}: {error}", "TOML in UTF-8", "begin with what 'triage config' prints"

@@ -90,6 +90,15 @@ def test_a_file_changes_what_it_states_and_nothing_else(tmp_path: Path):
     assert document(found).count("periods = 4.0") == 1
 
 
+def test_a_byte_order_mark_changes_nothing(tmp_path: Path):
+    """A file as Notepad saves it, with a byte order mark, states what it states without."""
+    text = "[oscillation]\nperiods = 3.5\n"
+    plain, marked = tmp_path / "plain.toml", tmp_path / "marked.toml"
+    plain.write_text(text, encoding="utf-8")
+    marked.write_bytes(b"\xef\xbb\xbf" + text.encode())
+    assert read_config(marked) == read_config(plain) != Config()
+
+
 @pytest.mark.parametrize(("text", "fragments"), CASES)
 def test_what_is_wrong_in_a_file_is_one_line(text, fragments, tmp_path: Path, export: Path):
     """Unknown names, wrong types and values out of range are one line: seen, expected, remedy; exit status 2."""
