@@ -22,7 +22,7 @@ import pyarrow as pa
 from analyzer import store_version
 from analyzer.columns.column import Column
 from analyzer.columns.table import require_declared
-from analyzer.places import remove_tree
+from analyzer.places import is_remote, remove_tree
 from analyzer.stored_table import read_stored, stored_names, write_table
 from identification.errors import InputError
 
@@ -83,7 +83,8 @@ class Store:
         store_version.require_known(self.path)
         nights = self.nights()
         if not nights:
-            seen = "no such directory" if not self.path.exists() else "no complete night in it"
+            empty = "nothing there" if is_remote(self.path) else "no such directory"
+            seen = "no complete night in it" if self.path.exists() else empty
             raise InputError(f"{self.path}: {seen}", "a store", "run 'triage run EXPORT --store DIR' first")
         return nights[-1]
 

@@ -5,11 +5,13 @@ from __future__ import annotations
 import contextlib
 import json
 from collections.abc import Callable
+from contextlib import nullcontext
 from pathlib import Path
 
 import pyarrow as pa
 
 from analyzer.columns.table import NIGHTS
+from analyzer.places import answering, content, is_remote
 from analyzer.stored_table import read_stored, stored_names, write_table
 from identification.errors import InputError
 from reports.whole_file import whole_file
@@ -30,13 +32,29 @@ def version_of(store: Path) -> int:
     """
     path = store / FILE
     try:
-        return int(json.loads(path.read_text(encoding="utf-8"))["schema"])
+        with answering(store) if is_remote(store) else nullcontext():
+            return _stated(path)
+    except (OSError, ValueError, TypeError, KeyError, RecursionError) as error:
+        right = f'{{"schema": {SCHEMA}}}'
+        raise InputError(
+            f"{path}: damaged, and nothing else: {_held(store)}", right, f"write {right} into it and go on"
+        ) from error
+
+
+def _stated(path: Path) -> int:
+    try:
+        return int(json.loads(content(path).decode("utf-8"))["schema"])
     except (FileNotFoundError, NotADirectoryError):
         return 1
-    except (OSError, ValueError, TypeError, KeyError, RecursionError) as error:
-        raise InputError(
-            f"{path}: damaged", f'{{"schema": {SCHEMA}}}', "delete it: the next run writes it anew"
-        ) from error
+
+
+def _held(store: Path) -> str:
+    """What stands in the tables of nights, in words."""
+    nights = sorted(p.stem for p in (store / "nights").glob("*.parquet"))
+    if not nights:
+        return "no night is in the store"
+    several = f" to {nights[-1]}" if len(nights) > 1 else ""
+    return f"the tables of {len(nights)} nights, {nights[0]}{several}, stand as they were"
 
 
 def require_known(store: Path) -> None:

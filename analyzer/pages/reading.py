@@ -9,12 +9,11 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.compute as pc
 
 from analyzer.block_bootstrap import Floats
 from analyzer.spans import Span
 from analyzer.store import Store
-from analyzer.stored_table import read_stored, stored_names
+from analyzer.stored_table import TREND, read_stored, stored_names
 
 SIGNALS = ("sp", "pv", "op")
 AROUND_D = 2
@@ -106,8 +105,9 @@ def read_hours(store: Store, loops: Collection[str], nights: Sequence[str]) -> d
 
 def read_trends(store: Store, loops: Collection[str], nights: Sequence[str]) -> dict[str, Thinned]:
     """Thinned trends by loop, in order of time; a bucket of a gap stands where nothing was recorded."""
-    tables = _tables(store, "trends", loops, nights, None)
-    tables = [t.set_column(0, "loop", pc.cast(t.column("loop"), pa.string())) for t in tables]
+    tables = _tables(store, "trends", loops, nights, ("loop", *TREND))
+    kinds = pa.schema([("loop", pa.string()), *((name, pa.float64()) for name in TREND)])
+    tables = [t.select(kinds.names).cast(kinds) for t in tables]
     if not tables:
         return {}
     joined = pa.concat_tables(tables)

@@ -110,6 +110,42 @@ def test_a_table_of_other_columns_is_named(store: Store, columns: dict[str, list
     assert result.stderr.count("\n") == 1
 
 
+@pytest.mark.parametrize(
+    ("table", "column"),
+    [
+        *(("nights", name) for name in ("signs", "turns", "action", "ti_unit")),
+        *(("trends", name) for name in ("sp_min", "sp_max", "time_s")),
+    ],
+)
+def test_a_column_of_other_text_is_named(store: Store, tmp_path: Path, table: str, column: str) -> None:
+    """A stored column that holds a text where figures, JSON or one of a few words should be is one line of `pages`
+    with file and column, and a problem of `store check`."""
+    path = store.path / table / f"{store.nights()[-1]}.parquet"
+    kept = pq.read_table(path)
+    text = pa.array(["much"] * kept.num_rows)
+    pq.write_table(kept.set_column(kept.column_names.index(column), column, text), path)
+    result = answer(store, "pages", "", tmp_path / "out")
+    assert result.exit_code == 2
+    assert isinstance(result.exception, SystemExit)
+    assert f"{path}: damaged (column {column} holds " in result.stderr
+    assert result.stderr.count("\n") == 1
+    assert [p for p in problems(store) if f"{path}: damaged" in p.seen]
+
+
+@pytest.mark.parametrize("text", ["", "{", "[]", '{"schema": "new"}'])
+def test_a_damaged_version_tells_of_the_nights(store: Store, text: str) -> None:
+    """A store whose version is unreadable says that its nights stand, and what to write; so written it is ranked."""
+    (store.path / store_version.FILE).write_text(text)
+    result = asked("rank", store.path)
+    assert result.exit_code == 2
+    assert "5 nights, 2026-03-02 to 2026-03-06, stand as they were" in result.stderr
+    assert "delete" not in result.stderr
+    right = '{"schema": 2}'
+    assert f"write {right} into it" in result.stderr
+    (store.path / store_version.FILE).write_text(right)
+    assert asked("rank", store.path).exit_code == 0
+
+
 def test_a_whole_store_has_nothing_wrong(store: Store) -> None:
     """A sound store is told to be whole, with its size."""
     result = asked("store", "check", store.path)
