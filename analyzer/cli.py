@@ -14,7 +14,7 @@ from analyzer.commands import notes as notes_cli
 from analyzer.commands import report as report_cli
 from analyzer.commands import run as run_cli
 from analyzer.commands import store as store_cli
-from analyzer.commands.options import PLACE, SOME_LOST, Asked, export_options, told
+from analyzer.commands.options import PLACE, SOME_LOST, Asked, export_options, say, told
 from analyzer.decisions import Lane
 from identification.errors import InputError
 
@@ -50,13 +50,13 @@ def check(asked: Asked) -> None:
     source, specs, notes = asked.opened()
     lost = 0
     if not specs:
-        click.echo("\n".join(line for line, _ in lines(source, specs, notes, asked.config, asked.within)))
+        say("\n".join(line for line, _ in lines(source, specs, notes, asked.config, asked.within)))
         raise InputError(
             "no loops in the export", "tags such as LOOP.PV", "state them with --loops loops.csv"
         )
     for line, bad in lines(source, specs, notes, asked.config, asked.within, asked.changes, asked.zone):
         lost += bad
-        click.echo(line)
+        say(line)
     sys.exit(SOME_LOST if lost else 0)
 
 
@@ -117,7 +117,7 @@ def rank(
     shown = [r for r in rows if r["loop"] not in hidden][:top]
     click.echo(rendered(shown, form, name, wide, asked))
     if hidden:
-        click.echo(f"hidden by their notes (--all shows them): {', '.join(hidden)}", err=True)
+        say(f"hidden by their notes (--all shows them): {', '.join(hidden)}", err=True)
 
 
 @main.command()
@@ -139,7 +139,7 @@ def tune(asked: Asked, tag: str, out: Path | None) -> None:
         source, specs, tag, asked.config, span, out is not None, asked.changes, asked.zone
     )
     for line in lines:
-        click.echo(line)
+        say(line)
     if out is not None:
         out.mkdir(parents=True, exist_ok=True)
         for name, picture in pictures.items():

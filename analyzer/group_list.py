@@ -15,6 +15,7 @@ from analyzer.present import figure
 from analyzer.store import Store
 from analyzer.units import duration, row_settings
 from reports.tables import harmless
+from reports.visible import visible
 
 Row = dict[str, Any]
 
@@ -88,10 +89,11 @@ def _cells(row: Row) -> tuple[str, ...]:
     candidates = json.loads(row["candidates"])
     start = ", ".join(f"{loop} {pct:.0f} %" for loop, pct in candidates.items())
     members = [m for m in json.loads(row["members"]) if m != row["fix_first"]]
-    return (
+    cells = (
         *(row["group"], f"{row['loops']:.0f}", duration(row["group_period_s"]), start or "unseen"),
         *(row["source_action"] or "undecided", figure(row["others_gain_pct"]), ", ".join(members)),
     )
+    return tuple(map(visible, cells))
 
 
 def _table(rows: Sequence[Row], night: str) -> str:
@@ -121,7 +123,7 @@ def _csv(rows: Sequence[Row], night: str) -> str:
     writer.writerow(names(GROUP_LIST))
     for row in rows:
         cells = ("" if v is None else v for v in row.values())
-        writer.writerow(harmless(v) if isinstance(v, str) else v for v in cells)
+        writer.writerow(harmless(visible(v)) if isinstance(v, str) else v for v in cells)
     return out.getvalue().rstrip("\n")
 
 

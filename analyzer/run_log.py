@@ -10,6 +10,8 @@ import sys
 from datetime import UTC, datetime
 from pathlib import Path
 
+from reports.visible import visible
+
 PLAIN = frozenset("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789._:/+-%")
 """Characters of values that need no quotes."""
 
@@ -17,7 +19,7 @@ PLAIN = frozenset("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ012345678
 def logfmt(value: object) -> str:
     """A value as one word or one quoted text, in printable characters alone."""
     text = f"{value:.6g}" if isinstance(value, float) else str(value)
-    shown = "".join(c if c.isprintable() else " " for c in text)
+    shown = visible(text)
     if shown and set(shown) <= PLAIN:
         return shown
     return '"' + shown.replace("\\", "\\\\").replace('"', '\\"') + '"'

@@ -10,6 +10,7 @@ import numpy as np
 from reports import map_charts
 from reports.map_blocks import Field, Graph, HeatMap, TreeMap
 from reports.pages import IntervalChart, Panels, Picture, Plot, Trend
+from reports.visible import visible_parts
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -76,6 +77,7 @@ def _day(time_s: float) -> float:
 
 def draw(block: Picture) -> bytes:
     """A picture as PNG."""
+    block = visible_parts(block)
     if isinstance(block, HeatMap):
         return map_charts.heat_map(block)
     if isinstance(block, Field):

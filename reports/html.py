@@ -18,6 +18,7 @@ from markupsafe import Markup
 
 from reports import fields, maps, svg, treemap
 from reports.pages import Band, Bars, Cell, Floats, Page, Sparkline, Trend, WhatIf
+from reports.visible import visible_parts
 
 ASSETS = ("page.css", "uPlot.min.css", "uPlot.iife.min.js", "page.js", "what_if.js")
 LICENCE = "uPlot.LICENSE.txt"
@@ -145,7 +146,7 @@ def render(page: Page, single_file: bool = False, assets: str = "assets/") -> st
         _environment()
         .get_template("page.html.j2")
         .render(
-            page=page,
+            page=visible_parts(page),
             policy=Markup(policy(single_file)),
             single_file=single_file,
             assets=assets,

@@ -7,6 +7,7 @@ from functools import cache
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from reports.pages import Page
+from reports.visible import visible_parts
 
 
 @cache
@@ -24,4 +25,4 @@ def _environment() -> Environment:
 
 def render(page: Page) -> str:
     """A page's texts, lists and tables as a mail's HTML."""
-    return _environment().get_template("mail.html.j2").render(page=page)
+    return _environment().get_template("mail.html.j2").render(page=visible_parts(page))

@@ -24,18 +24,20 @@ from reports.pages import (
     Trend,
     WhatIf,
 )
+from reports.visible import visible
 
 MARKS = re.compile(r"([\\`*_\[\]#!|~$])")
 STARTS = re.compile(r"^(\d+(?=[.)](?:\s|$))|(?=[-+:](?:\s|$)|=+$|-+$))")
-ADDRESSES = re.compile(r"(?i)\b(https?|ftp|mailto|www)(?=[:.])")
+ADDRESSES = re.compile(r"(?i)\b(?:(https?|ftp|mailto|www)(?=[:.])|(javascript|vbscript|data|file)(?=:\S))")
+"""What turns into a link, or runs where a renderer is careless; a word before a colon and a blank stays."""
 
 
 def escaped(text: str) -> str:
     """Text as text: no markup, no HTML, no line breaks, nothing that turns into a link or calls a person."""
-    text = " ".join(text.split())
+    text = visible(" ".join(text.split()))
     text = text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
     text = STARTS.sub(r"\1\\", MARKS.sub(r"\\\1", text))
-    return ADDRESSES.sub(r"\1&#8203;", text).replace("@", "&#64;")
+    return ADDRESSES.sub(r"\g<0>&#8203;", text).replace("@", "&#64;")
 
 
 def _link(href: str) -> str:

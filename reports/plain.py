@@ -5,6 +5,7 @@ from __future__ import annotations
 import textwrap
 
 from reports.pages import Block, Facts, Listing, Page, Table, Text, Tiles
+from reports.visible import visible_parts
 
 WIDTH = 100
 """Characters of a line."""
@@ -43,6 +44,7 @@ def _block(block: Block) -> list[str]:
 
 def render(page: Page) -> str:
     """A page as plain text."""
+    page = visible_parts(page)
     lines = [page.title, "=" * min(len(page.title), WIDTH), *_wrapped(page.subtitle)]
     for section in page.sections:
         lines += ["", section.title, "-" * min(len(section.title), WIDTH)]

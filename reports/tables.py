@@ -7,6 +7,7 @@ import io
 import math
 
 from reports.pages import Cell, Table
+from reports.visible import visible
 
 FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n")
 """First characters by which spreadsheets take a text for a formula (OWASP, CSV injection)."""
@@ -19,7 +20,7 @@ def harmless(text: str) -> str:
 
 def _cell(cell: Cell, numeric: bool) -> str:
     if not numeric:
-        return harmless(cell.text)
+        return harmless(visible(cell.text))
     if cell.number is None or not math.isfinite(cell.number):
         return ""
     return repr(float(cell.number))

@@ -2,7 +2,39 @@
 
 from __future__ import annotations
 
+from dataclasses import fields, is_dataclass, replace
+from typing import Any, TypeVar
+
+T = TypeVar("T")
+
 
 def visible(text: str) -> str:
-    """The text without characters that steer a terminal or turn the direction of writing."""
-    return "".join(c if c.isprintable() else " " for c in text)
+    """The text with characters that steer a terminal or turn the direction of writing as escapes such as \\u202e,
+    blanks of any kind as blanks."""
+    return text if text.isprintable() else "".join(map(_visible, text))
+
+
+def _visible(character: str) -> str:
+    if character.isprintable():
+        return character
+    return " " if character.isspace() else character.encode("unicode_escape").decode("ascii")
+
+
+def visible_lines(text: str) -> str:
+    """The same of a text of several lines."""
+    return "\n".join(map(visible, text.split("\n")))
+
+
+def visible_parts(part: T) -> T:
+    """A page, or a part of one, with all its texts visible; the same object where they are."""
+    found: Any = part
+    if type(part) is str:
+        return visible_lines(part)  # type: ignore[return-value]
+    if isinstance(part, tuple):
+        shown = tuple(map(visible_parts, part))
+        return part if all(a is b for a, b in zip(part, shown, strict=True)) else shown  # type: ignore[return-value]
+    if not is_dataclass(part) or isinstance(part, type):
+        return part
+    held = {f.name: getattr(part, f.name) for f in fields(part)}
+    changed = {name: new for name, old in held.items() if (new := visible_parts(old)) is not old}
+    return replace(found, **changed) if changed else part

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import secrets
 import tempfile
@@ -9,6 +10,15 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
+
+FULL = frozenset(getattr(errno, name) for name in ("ENOSPC", "EDQUOT", "EFBIG") if hasattr(errno, name))
+"""What the system says where a disk, a quota or the largest size of a file ends."""
+
+
+def is_full(error: OSError) -> bool:
+    """Whether there was no room to write."""
+    return error.errno in FULL
+
 
 SUFFIX = ".tmp"
 """Ending of what is being written; such files of a process that died may be deleted."""
@@ -39,6 +49,12 @@ def whole_file(path: Path, kept: bool = False) -> Iterator[Path]:
         if kept:
             _to_disk(temporary)
         os.replace(temporary, path)
+    except OSError as error:
+        temporary.unlink(missing_ok=True)
+        named = error.filename is not None and str(error.filename) != str(temporary)
+        if named or error.errno is None:
+            raise
+        raise OSError(error.errno, os.strerror(error.errno), str(path)) from error
     except BaseException:
         temporary.unlink(missing_ok=True)
         raise

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from analyzer.commands.options import NOTHING_DONE, PLACE, Asked, export_options
+from analyzer.commands.options import NOTHING_DONE, PLACE, Asked, export_options, say
 from identification.errors import InputError, NotAssessedError
 
 if TYPE_CHECKING:
@@ -148,7 +148,7 @@ def _show(data: dict[str, Any], found: Explained | None, form: str, out: Path | 
     elif form == "text":
         from analyzer.explain.text import lines
 
-        click.echo("\n".join(lines(data)))
+        say("\n".join(lines(data)))
     else:
         _show_page(data, found, form, out, zone)
 

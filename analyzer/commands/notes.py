@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from analyzer.commands.options import PLACE
+from analyzer.commands.options import PLACE, say
 
 
 @click.command()
@@ -43,12 +43,12 @@ def note(store: Path, loop: str, text: str | None, owner: str | None, hide_until
     if text is None:
         own = notes.read(store).get(loop, ())
         zone = kept.zone()
-        click.echo("\n".join(n.said(zone) for n in own) or f"{loop}: no notes")
+        say("\n".join(n.said(zone) for n in own) or f"{loop}: no notes")
         return
     until = "" if hide_until is None else hide_until.strftime("%Y-%m-%d")
     written = notes.new(loop, text, owner, until)
     notes.add(store, written)
-    click.echo(f"{loop}: {written.said(kept.zone())}")
+    say(f"{loop}: {written.said(kept.zone())}")
 
 
 @click.command()

@@ -17,7 +17,8 @@ import click
 from analyzer.places import place, refused
 from analyzer.plant_clock import seconds, zone_of
 from identification.errors import InputError, TriageError
-from reports.visible import visible
+from reports.visible import visible, visible_lines
+from reports.whole_file import is_full
 
 if TYPE_CHECKING:
     from analyzer.config import Config
@@ -61,8 +62,8 @@ def told(command: Callable[..., Any]) -> Callable[..., Any]:
         except BrokenPipeError:
             sys.stderr.close()
         except OSError as error:
-            seen = f"{error.filename}: {error.strerror}" if error.filename else str(error)
-            click.echo(f"triage: {one_line(seen)}; check path and permissions", err=True)
+            remedy = "make room and say it again" if is_full(error) else "check path and permissions"
+            click.echo(f"triage: {one_line(what_failed(error))}; {remedy}", err=True)
         except Exception as error:
             if not refused(error):
                 raise
@@ -71,6 +72,16 @@ def told(command: Callable[..., Any]) -> Callable[..., Any]:
         sys.exit(NOTHING_DONE)
 
     return wrapped
+
+
+def what_failed(error: OSError) -> str:
+    """What the system says of a file."""
+    return f"{error.filename}: {error.strerror}" if error.filename else str(error)
+
+
+def say(text: str, err: bool = False) -> None:
+    """Print a text in which a plant's names may stand, none of which steers the terminal."""
+    click.echo(visible_lines(text), err=err)
 
 
 MOST_SAID = 600

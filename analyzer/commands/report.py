@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from analyzer.commands.options import PLACE, config_option
+from analyzer.commands.options import PLACE, config_option, say
 from identification.errors import InputError
 
 if TYPE_CHECKING:
@@ -144,7 +144,7 @@ def report(
         raise InputError(why, "loops and times that the store holds", "check the tags and times")
     _written(kept, [page(found, missing, _subtitle(spans, store), find, zone)], form, out, single_file)
     for tag, reason in missing:
-        click.echo(f"{tag}: {reason}", err=True)
+        say(f"{tag}: {reason}", err=True)
     sys.exit(SOME_LOST if missing else 0)
 
 

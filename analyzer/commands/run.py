@@ -14,8 +14,17 @@ from typing import TYPE_CHECKING
 
 import click
 
-from analyzer.commands.options import NOTHING_DONE, PLACE, SOME_LOST, Asked, export_options
-from identification.errors import TriageError
+from analyzer.commands.options import (
+    NOTHING_DONE,
+    PLACE,
+    SOME_LOST,
+    Asked,
+    export_options,
+    say,
+    what_failed,
+)
+from identification.errors import InputError, TriageError
+from reports.whole_file import is_full
 
 if TYPE_CHECKING:
     from analyzer.batch import Batch, Outcome
@@ -108,16 +117,21 @@ def run(
         with stoppable():
             outcome, loops = _night(asked, store, log, How(jobs, resume, replacing, scheduler), explaining)
     except StoppedError as stopped:
-        kept = f"what is done is kept in {store}: go on with the same command and --resume"
-        click.echo(f"triage: stopped by {stopped}; {kept}", err=True)
+        say(f"triage: stopped by {stopped}; {_go_on(store)}", err=True)
         log.say("stopped", signal=stopped, status=STOPPED + stopped.number)
         sys.exit(STOPPED + stopped.number)
     except (TriageError, OSError) as error:
         log.say("nothing done", error=error, status=NOTHING_DONE)
+        if isinstance(error, OSError) and is_full(error):
+            raise InputError(what_failed(error), "room to write", f"make room; {_go_on(store)}") from error
         raise
     status = _status(outcome, loops)
     log.say("end", status=status, night=outcome.nights[-1].name, seconds=time.monotonic() - begun_s)
     sys.exit(status)
+
+
+def _go_on(store: Path) -> str:
+    return f"what is done is kept in {store}: go on with the same command and --resume"
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,7 +172,6 @@ def _opened(asked: Asked) -> tuple[Export, Sequence[LoopSpec], Sequence[str]]:
         The export cannot be used, or the process that read it died.
     """
     from analyzer.workers import Died, Workers
-    from identification.errors import InputError
 
     with Workers(1, find_out, asked.config.opening) as workers:
         workers.submit(asked)
@@ -189,7 +202,7 @@ def _status(outcome: Outcome, loops: int) -> int:
 
 def _say(notes: Sequence[str], log: RunLog) -> None:
     for note in notes:
-        click.echo(f"triage: {note}", err=True)
+        say(f"triage: {note}", err=True)
         log.say("note", text=note)
 
 
@@ -206,7 +219,7 @@ def _assessed(batch: Batch, how: How, log: RunLog) -> Outcome:
         _say([f"{more} further notes on what was read; 'triage check' prints them all"], log)
     for status, lost_loops in (("not assessed", outcome.unassessed), ("failed", outcome.failed)):
         for loop, reason in lost_loops:
-            click.echo(f"{loop}: {reason}", err=True)
+            say(f"{loop}: {reason}", err=True)
             log.say("lost", loop=loop, status=status, reason=reason)
     _say_assessed(batch, outcome, log)
     return outcome

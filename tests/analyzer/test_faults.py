@@ -316,3 +316,29 @@ def test_an_error_of_ours_travels_between_processes():
         "expected",
         "remedy",
     )
+
+
+def small_files(most: int) -> None:
+    """Let this process write no file larger than so many bytes, as where a disk ends."""
+    import resource
+
+    resource.setrlimit(resource.RLIMIT_FSIZE, (most, most))
+
+
+@linux
+@pytest.mark.parametrize("most", [512, 20_000])
+def test_a_full_disk_names_the_file_and_resume(export, whole, tmp_path, most):
+    """Where there is no room to write, one line names the file and --resume, and with room the run goes on."""
+    store = tmp_path / "store"
+    asked = command(export, store)
+    done = subprocess.run(
+        asked, capture_output=True, text=True, check=False, preexec_fn=lambda: small_files(most)
+    )
+    assert done.returncode == 2, done.stderr
+    last = done.stderr.strip().splitlines()[-1]
+    assert str(store) in last.partition(": ")[2].partition(": ")[0]
+    assert "make room" in last
+    assert "--resume" in last
+    assert "Traceback" not in done.stderr
+    assert ran(export, store, "--resume").exit_code == 0
+    assert tables(store) == whole

@@ -163,7 +163,7 @@ def test_a_damaged_piece_is_worked_on_again(tmp_path: Path) -> None:
 
 
 def test_names_steer_no_terminal(tmp_path: Path) -> None:
-    """Escape sequences and marks that turn the writing, in a loop's name or reason, are blanks in every list."""
+    """Escape sequences and marks that turn the writing, in a name or reason, are shown as escapes in every list."""
     store = small_store(tmp_path / "store", loops=3, nights=1)
     path = store.path / "nights" / f"{store.nights()[0]}.parquet"
     table = pq.read_table(path)
@@ -174,6 +174,8 @@ def test_names_steer_no_terminal(tmp_path: Path) -> None:
     for form in ("table", "csv", "markdown"):
         text = asked("rank", store.path, "--format", form).stdout
         assert all(c.isprintable() or c == "\n" for c in text), form
+        assert r"A\x1b" in text.replace("\\\\", "\\"), form
+        assert r"B\u202eC" in text.replace("\\\\", "\\"), form
 
 
 def test_a_number_that_is_none_is_not_known(tmp_path: Path) -> None:

@@ -143,11 +143,11 @@ def test_what_is_no_note_is_passed_over(tmp_path: Path, line: str) -> None:
 
 
 def test_a_note_steers_no_terminal(tmp_path: Path) -> None:
-    """Escape sequences and marks that turn the writing are blanks, whether typed or found in the file."""
-    assert notes.new("L", "a\x1b[2Jb\u202ec", "me", "").text == "a [2Jb c"
+    """Escape sequences and marks that turn the writing are escapes, whether typed or found in the file."""
+    assert notes.new("L", "a\x1b[2Jb\u202ec", "me", "").text == r"a\x1b[2Jb\u202ec"
     notes.add(tmp_path, notes.Note("L", 1.0, "a\x1b]0;b\u2066", "m\x07e"))
     (found,) = notes.read(tmp_path)["L"]
-    assert (found.text, found.owner) == ("a ]0;b ", "m e")
+    assert (found.text, found.owner) == (r"a\x1b]0;b\u2066", r"m\x07e")
 
 
 @pytest.mark.parametrize("form", ["text", "html", "markdown"])

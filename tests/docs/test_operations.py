@@ -69,7 +69,12 @@ def test_a_log_line_is_one_line_of_words(tmp_path: Path) -> None:
     (line,) = (tmp_path / "logs" / "x.log").read_text(encoding="utf-8").splitlines()
     assert line.isprintable()
     words = shlex.split(line)
-    assert words[2:] == ["lost", "loop=FIC 1", 'reason=a "quoted" line [2J   back\\slash', "share=0.5"]
+    assert words[2:] == [
+        "lost",
+        "loop=FIC 1",
+        'reason=a "quoted" line\\x1b[2J \\u202e back\\slash',
+        "share=0.5",
+    ]
 
 
 def test_a_log_that_cannot_be_written_costs_no_night(

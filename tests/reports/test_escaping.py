@@ -14,6 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from reports.html import render
+from reports.mail import render as render_mail
 from reports.map_blocks import Mark
 from reports.markdown import escaped
 from reports.markdown import render as render_markdown
@@ -36,6 +37,7 @@ from reports.pages import (
     Tiles,
     Trend,
 )
+from reports.plain import render as render_text
 from reports.tables import as_csv, harmless
 
 NASTY = (
@@ -97,6 +99,22 @@ def test_html_holds_no_markup_of_the_plant(text: str, single_file: bool) -> None
     plain, nasty = (Shape(render(page_of(t), single_file)) for t in ("plain", text))
     assert nasty.elements == plain.elements
     assert "".join(nasty.words).count(text) >= "".join(plain.words).count("plain") - 6
+
+
+def test_no_page_turns_the_writing() -> None:
+    """Marks that turn the direction of writing and control characters of a tag stand as escapes in every format."""
+    page = page_of("FIC\u202e101\x1b[2J\u2066")
+    tables = [as_csv(t) for t in page.tables()]
+    for text in (render(page), render_mail(page), render_text(page), render_markdown(page), *tables):
+        assert all(c.isprintable() or c == "\n" for c in text)
+        assert r"FIC\u202e101\x1b" in text.replace("\\\\", "\\")
+
+
+def test_markdown_runs_nothing() -> None:
+    """No scheme that a careless renderer would run stands before its colon; words before a colon stay as they are."""
+    found = escaped("[x](javascript:alert(1)) JavaScript:x data:text/html,x vbscript:x file:///etc")
+    assert not re.search(r"(?i)(javascript|vbscript|data|file):", found)
+    assert escaped("about the data: none") == "about the data: none"
 
 
 @pytest.mark.parametrize("text", NASTY)
