@@ -120,7 +120,8 @@ class Asked:
 
     def opened(self) -> tuple[Export, tuple[LoopSpec, ...], tuple[str, ...]]:
         """The export, its loops with their tags, and what there is to say about them."""
-        return opened(self.export, self.loops, **self.reading)
+        source, specs, notes = opened(self.export, self.loops, **self.reading)
+        return source, specs, (*notes, *_of_no_loop(self.changes, specs))
 
     def within(self, series: Mapping[str, Series]) -> dict[str, Series]:
         """The samples within the span of time that is asked for."""
@@ -128,6 +129,21 @@ class Asked:
 
         span = Night("", self.since_s, self.until_s)
         return {tag: cut(found, span) for tag, found in series.items()}
+
+
+MOST_NAMES = 10
+"""Loops that are named in a note; the rest is counted."""
+
+
+def _of_no_loop(changes: Sequence[TuningChange], specs: Sequence[LoopSpec]) -> tuple[str, ...]:
+    """A note on changes of loops that are not among those that are read."""
+    known = {spec.loop for spec in specs}
+    strange = sorted({change.loop for change in changes} - known)
+    if not strange:
+        return ()
+    more = f" and {len(strange) - MOST_NAMES} more" if len(strange) > MOST_NAMES else ""
+    named = ", ".join(strange[:MOST_NAMES]) + more
+    return (f"--changes: {named}: no such loop is read; these changes are left aside: correct the name",)
 
 
 def _asked(
