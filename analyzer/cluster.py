@@ -6,7 +6,9 @@ that ends several workers is parted into its loops, and a loop that does so alon
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterator, Sequence
+from concurrent.futures import CancelledError
 from dataclasses import replace
 from typing import Any
 
@@ -31,10 +33,11 @@ def results(address: str, tasks: Sequence[Task]) -> Iterator[Done]:
     Raises
     ------
     InputError
-        Dask is not installed, or no scheduler answers there.
+        Dask is not installed, no scheduler answers there, or it died before all was done.
     """
     try:
-        from distributed import Client, KilledWorker, as_completed
+        from distributed import Client
+        from distributed.comm import CommClosedError
     except ImportError as error:
         raise InputError(
             f"--scheduler {address}: no Dask here",
@@ -48,21 +51,39 @@ def results(address: str, tasks: Sequence[Task]) -> Iterator[Done]:
         raise InputError(
             seen, "the address that 'dask scheduler' prints", "start it, or correct it"
         ) from error
+    logging.getLogger("distributed.client").setLevel(
+        logging.CRITICAL
+    )  # what ends the run is told in one line below
     with client:
-        waiting = {_submitted(client, task): task for task in tasks}
-        coming = as_completed(list(waiting), loop=client.loop)
-        for future in coming:
-            task = waiting.pop(future)
-            try:
-                yield future.result()
-            except KilledWorker:
-                if len(task.specs) == 1:
-                    yield chunk.lose(replace(task, key=f"{task.key}-lost"), WHY)
-                    continue
-                for again in _parted(task):
-                    future = _submitted(client, again)
-                    waiting[future] = again
-                    coming.add(future)
+        try:
+            yield from _gathered(client, tasks)
+        except (CancelledError, CommClosedError) as error:
+            seen, kept = f"--scheduler {address}: lost in mid-run", "what is done is kept in the store"
+            raise InputError(
+                seen,
+                "a scheduler that lives until the run ends",
+                f"{kept}: start the scheduler again, then the same command with --resume",
+            ) from error
+
+
+def _gathered(client: Any, tasks: Sequence[Task]) -> Iterator[Done]:
+    """What the chunks give, as they come; those that ended several workers in parts."""
+    from distributed import KilledWorker, as_completed
+
+    waiting = {_submitted(client, task): task for task in tasks}
+    coming = as_completed(list(waiting), loop=client.loop)
+    for future in coming:
+        task = waiting.pop(future)
+        try:
+            yield future.result()
+        except KilledWorker:
+            if len(task.specs) == 1:
+                yield chunk.lose(replace(task, key=f"{task.key}-lost"), WHY)
+                continue
+            for again in _parted(task):
+                future = _submitted(client, again)
+                waiting[future] = again
+                coming.add(future)
 
 
 def _submitted(client: Any, task: Task) -> Any:

@@ -24,6 +24,13 @@ def _process(*arguments: str) -> Process:
 @contextmanager
 def dask_cluster(folder: Path, workers: int = 2) -> Iterator[tuple[str, list[Process]]]:
     """The address of a scheduler and its workers, which end with the block; `folder` holds what they write."""
+    with whole_cluster(folder, workers) as (address, parts):
+        yield address, parts[1:]
+
+
+@contextmanager
+def whole_cluster(folder: Path, workers: int = 2) -> Iterator[tuple[str, list[Process]]]:
+    """The same with the scheduler before its workers."""
     written, local = folder / "scheduler.json", ("--host", "127.0.0.1")
     quiet = ("--no-dashboard", "--scheduler-file", str(written))
     parts = [_process("dask_scheduler", *local, "--port", "0", *quiet)]
@@ -35,7 +42,7 @@ def dask_cluster(folder: Path, workers: int = 2) -> Iterator[tuple[str, list[Pro
         address = json.loads(written.read_text())["address"]
         one = ("--nthreads", "1", "--no-nanny", "--no-dashboard", "--local-directory", str(folder))
         parts += [_process("dask_worker", address, *local, *one) for _ in range(workers)]
-        yield address, parts[1:]
+        yield address, parts
     finally:
         for part in parts:
             part.kill()

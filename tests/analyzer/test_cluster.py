@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner, Result
-from dask_cluster import Process, dask_cluster
+from dask_cluster import Process, dask_cluster, whole_cluster
 from plant import write_export
 from test_batch import quiet, tables
 
@@ -68,6 +68,25 @@ def test_a_worker_killed_in_mid_run_costs_no_loop(export, whole, cluster, tmp_pa
         os.kill(workers[0].pid, signal.SIGKILL)
         _, said = run.communicate(timeout=120)
     assert run.returncode == 0, said
+    assert tables(store) == whole
+
+
+def test_a_scheduler_that_dies_is_one_line(export, whole, tmp_path):
+    """With kill -9 of the scheduler in mid-run the run ends with exit 2 and a last line that names it and --resume,
+    and so gone on with on this machine it makes the store of an undisturbed run."""
+    store = tmp_path / "store"
+    command = [sys.executable, "-m", "analyzer.cli", "run", str(export), "--store", str(store)]
+    with whole_cluster(tmp_path) as (address, parts):
+        with subprocess.Popen([*command, "--scheduler", address], stderr=subprocess.PIPE, text=True) as run:
+            while run.poll() is None and not list(store.glob("parts/*/nights-*.parquet")):
+                time.sleep(0.005)
+            os.kill(parts[0].pid, signal.SIGKILL)
+            _, said = run.communicate(timeout=120)
+    assert run.returncode == 2, said
+    assert "Traceback" not in said
+    assert address in said.splitlines()[-1]
+    assert "--resume" in said.splitlines()[-1]
+    assert ran(export, store, "--resume").exit_code == 0
     assert tables(store) == whole
 
 
