@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import getpass
 import json
+import math
 import os
 import secrets
 import shutil
@@ -151,7 +152,8 @@ def _signed(store: Path) -> Iterator[None]:
         held = _signature(store)
     alive_s = (held or {}).get("alive_s")
     if isinstance(alive_s, int | float) and time.time() - alive_s < DEAD_S:
-        raise _in_use(store)
+        left = max(math.ceil((DEAD_S + alive_s - time.time()) / 60.0), 1)
+        raise _in_use(store, f"; if it died, its hold ends in {left} min, then --resume goes on with it")
     mine, ended = secrets.token_hex(8), threading.Event()
     _sign(store, mine)
 
@@ -172,11 +174,11 @@ def _signed(store: Path) -> Iterator[None]:
                 (store / OWNER).unlink(missing_ok=True)
 
 
-def _in_use(store: Path) -> InputError:
+def _in_use(store: Path, more: str = "") -> InputError:
     return InputError(
         f"{store}: in use by {_owner(store)}",
         "one run on a store at a time",
-        "wait until that run ends, or give another --store",
+        f"wait until that run ends, or give another --store{more}",
     )
 
 

@@ -6,7 +6,7 @@ import signal
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import FrameType
@@ -49,8 +49,12 @@ class StoppedError(Exception):
 
 @contextmanager
 def stoppable() -> Iterator[None]:
-    """Turn SIGINT and SIGTERM into `StoppedError`, once; further ones are ignored while the run ends."""
-    numbers = (signal.SIGINT, signal.SIGTERM)
+    """Turn SIGINT, SIGTERM and SIGHUP into `StoppedError`, once; further ones are ignored while the run ends.
+
+    A signal that is ignored, as SIGHUP is under nohup, stays so.
+    """
+    known = (getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
+    numbers = [number for number in known if signal.getsignal(number) != signal.SIG_IGN]
 
     def stop(number: int, frame: FrameType | None) -> None:
         for each in numbers:
@@ -117,8 +121,9 @@ def run(
         with stoppable():
             outcome, loops = _night(asked, store, log, How(jobs, resume, replacing, scheduler), explaining)
     except StoppedError as stopped:
-        say(f"triage: stopped by {stopped}; {_go_on(store)}", err=True)
         log.say("stopped", signal=stopped, status=STOPPED + stopped.number)
+        with suppress(OSError):  # the terminal may be gone
+            say(f"triage: stopped by {stopped}; {_go_on(store)}", err=True)
         sys.exit(STOPPED + stopped.number)
     except (TriageError, OSError) as error:
         log.say("nothing done", error=error, status=NOTHING_DONE)

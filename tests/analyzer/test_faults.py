@@ -127,9 +127,9 @@ def test_a_run_killed_with_signal_9_goes_on_with_resume(export, whole, tmp_path)
 
 
 @linux
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
 def test_a_stopped_run_ends_at_once_and_says_how_to_go_on(export, tmp_path, number):
-    """SIGTERM and SIGINT end run and workers, with one line that names --resume and no traceback."""
+    """SIGTERM, SIGINT and SIGHUP end run and workers, with one line that names --resume and no traceback."""
     store = tmp_path / "store"
     with running(export, store) as run:
         workers = children(run.pid)
@@ -141,6 +141,33 @@ def test_a_stopped_run_ends_at_once_and_says_how_to_go_on(export, tmp_path, numb
     assert number.name in last
     assert "Traceback" not in said
     assert not set(workers) & {int(p.name) for p in Path("/proc").glob("[0-9]*")}
+
+
+@linux
+def test_a_run_under_nohup_outlives_its_terminal(export, whole, tmp_path):
+    """Where SIGHUP is ignored, as under nohup, it ends nothing."""
+    store = tmp_path / "store"
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        with running(export, store) as run:
+            run.send_signal(signal.SIGHUP)
+            _, said = run.communicate(timeout=120)
+    finally:
+        signal.signal(signal.SIGHUP, before)
+    assert run.returncode == 0, said
+    assert tables(store) == whole
+
+
+def test_a_change_of_no_loop_is_told(export, tmp_path):
+    """A loop that changes.csv names and loops.csv does not is named by check and by run."""
+    changes = tmp_path / "changes.csv"
+    changes.write_text("loop,time,kp_old,kp_new,who\nL00,2026-03-01,1,1.5,AB\nFIC9,2026-03-01,1,1.5,AB\n")
+    more = (str(export), *stated(export), "--changes", str(changes))
+    for words in (("check", *more), ("run", *more, "--store", str(tmp_path / "store"))):
+        told = CliRunner().invoke(main, words)
+        assert told.exit_code == 0, told.output
+        assert "--changes: FIC9: no such loop is read" in told.output
+        assert "L00: no such" not in told.output
 
 
 def test_two_runs_on_one_store_are_one(export, whole, tmp_path):

@@ -17,7 +17,7 @@ from plant import write_export
 from test_batch import cycling, quiet, tables
 from test_cluster import cluster  # noqa: F401
 
-from analyzer import places, store_lock
+from analyzer import places, store_lock, store_version
 from analyzer.cli import main
 from analyzer.store_lock import OWNER, locked
 from identification.errors import InputError
@@ -159,7 +159,13 @@ def test_two_runs_on_one_store_at_once(bucket: str, monkeypatch: pytest.MonkeyPa
     store = places.place(f"{bucket}/held")
     monkeypatch.setattr(store_lock, "ALIVE_S", 0.05)
     with locked(store):
-        with pytest.raises(InputError, match=f"in use by process {os.getpid()}"), locked(store):
+        with (
+            pytest.raises(
+                InputError,
+                match=f"in use by process {os.getpid()} .*if it died, its hold ends in 10 min, then --resume",
+            ),
+            locked(store),
+        ):
             pass
         first = json.loads(places.content(store / OWNER))["alive_s"]
         for _ in range(1000):
@@ -172,6 +178,20 @@ def test_two_runs_on_one_store_at_once(bucket: str, monkeypatch: pytest.MonkeyPa
     (store / OWNER).write_text(json.dumps({"alive_s": time.time() - 3600.0, "mark": "dead"}))
     with locked(store):
         assert json.loads(places.content(store / OWNER))["process"] == os.getpid()
+
+
+def test_an_empty_place_is_no_damage(bucket: str, monkeypatch: pytest.MonkeyPatch):
+    """An empty URL is no store and nothing damaged; storage that refuses is told in its own words."""
+    told = CliRunner().invoke(main, ["rank", f"{bucket}/empty"])
+    assert (told.exit_code, "s3://mill/empty: nothing there" in told.stderr) == (2, True)
+
+    def denied(path: Path) -> bytes:
+        raise PermissionError("Access Denied")
+
+    monkeypatch.setattr(store_version, "content", denied)
+    told = CliRunner().invoke(main, ["rank", f"{bucket}/empty"])
+    assert "s3://mill/empty: Access Denied" in told.stderr
+    assert "damaged" not in told.stderr
 
 
 @pytest.mark.parametrize(
