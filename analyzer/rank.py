@@ -6,7 +6,9 @@ import csv
 import io
 import json
 import math
+import os
 from collections.abc import Mapping, Sequence
+from shutil import get_terminal_size
 from typing import Any
 
 from analyzer import notes
@@ -30,8 +32,8 @@ LIST_COLUMNS = (*KEPT, *names(NOTED))
 """Columns of CSV and JSON: the contract's, then what says in which units settings stand, and the advice in full."""
 MOST_NAMES = 10
 """Areas that are named in an error."""
-WIDEST = 240
-"""Characters of a wide table."""
+WIDEST, PIPED = 240, 180
+"""Characters of a line of a wide table, and of one that no terminal shows."""
 Row = Mapping[str, Any]
 
 
@@ -166,30 +168,36 @@ def as_table(
     rows: Sequence[Row], night: str, width: int | None = None, columns: Sequence[str] | None = None
 ) -> str:
     """The columns for people as a table; those worth least go where `width` (the terminal's by default) is short."""
-    from rich.box import SIMPLE_HEAD
-    from rich.console import Console
-    from rich.table import Table
-    from rich.text import Text
+    from analyzer.present import SHOWN, WITH_UNITS, brief, fitting
+    from reports.terminal import Heading, table
 
-    from analyzer.present import CAUSE_STYLES, SHOWN, WITH_UNITS, brief, fitting
-
-    table = Table(
-        box=SIMPLE_HEAD, title=f"Night {night}", title_justify="left", pad_edge=False, padding=(0, 1, 0, 0)
-    )
-    console = Console(width=width or (None if interactive() else 180))
+    width = width or (get_terminal_size().columns if interactive() else PIPED)
     shown = [brief(row, columns or SHOWN) for row in rows]
-    kept = fitting(shown, console.width)
-    for column in (BY_NAME[name] for name in kept):
-        right = column.is_number and column.name not in WITH_UNITS
-        table.add_column(
-            column.heading, justify="right" if right else "left", no_wrap=column.name != "reason"
-        )
-    for row, cells in zip(rows, shown, strict=True):
-        style = CAUSE_STYLES.get(row["cause"], "")
-        table.add_row(*(Text(cells[name], style=style if name == "loop" else "") for name in kept))
-    with console.capture() as capture:
-        console.print(table)
-    return "\n".join(line.rstrip() for line in capture.get().rstrip().splitlines())
+    kept = fitting(shown, width)
+    headings = [
+        Heading(c.heading, c.is_number and c.name not in WITH_UNITS, c.name == "reason")
+        for c in map(BY_NAME.__getitem__, kept)
+    ]
+    head, body = table(headings, [[cells[name] for name in kept] for cells in shown], width)
+    rule = " " + "\u2500" * (max(map(len, (head, *(line for lines in body for line in lines)))) - 1)
+    coloured = _coloured if interactive() and not os.environ.get("NO_COLOR") else None
+    lines = [
+        coloured(line, row["loop"], row["cause"]) if coloured and not k else line
+        for row, lines in zip(rows, body, strict=True)
+        for k, line in enumerate(lines)
+    ]
+    return "\n".join([f"Night {night}", "", head, rule, *lines])
+
+
+def _coloured(line: str, loop: str, cause: str | None) -> str:
+    """A row's first line with its loop in the colour of its cause."""
+    import click
+
+    from analyzer.present import CAUSE_STYLES
+
+    colour = CAUSE_STYLES.get(cause)
+    shown = visible(loop)
+    return line if colour is None else line.replace(shown, click.style(shown, fg=colour), 1)
 
 
 def interactive() -> bool:

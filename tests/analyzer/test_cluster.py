@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import signal
 import subprocess
@@ -76,12 +77,14 @@ def test_a_scheduler_that_dies_is_one_line(export, whole, tmp_path):
     and so gone on with on this machine it makes the store of an undisturbed run."""
     store = tmp_path / "store"
     command = [sys.executable, "-m", "analyzer.cli", "run", str(export), "--store", str(store)]
-    with whole_cluster(tmp_path) as (address, parts):
-        with subprocess.Popen([*command, "--scheduler", address], stderr=subprocess.PIPE, text=True) as run:
-            while run.poll() is None and not list(store.glob("parts/*/nights-*.parquet")):
-                time.sleep(0.005)
-            os.kill(parts[0].pid, signal.SIGKILL)
-            _, said = run.communicate(timeout=120)
+    with contextlib.ExitStack() as held:
+        address, parts = held.enter_context(whole_cluster(tmp_path))
+        asked = [*command, "--scheduler", address]
+        run = held.enter_context(subprocess.Popen(asked, stderr=subprocess.PIPE, text=True))
+        while run.poll() is None and not list(store.glob("parts/*/nights-*.parquet")):
+            time.sleep(0.005)
+        os.kill(parts[0].pid, signal.SIGKILL)
+        _, said = run.communicate(timeout=120)
     assert run.returncode == 2, said
     assert "Traceback" not in said
     assert address in said.splitlines()[-1]

@@ -99,6 +99,23 @@ def test_ranking_imports_nothing_heavy(small, heavy):
     subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)
 
 
+WHOLE_LIST_S = 2.0
+"""Processor time that a list of 10,000 loops may take, start of the program included [s]."""
+
+
+@pytest.mark.parametrize("form", ["table", "csv", "json", "markdown"])
+def test_the_whole_list_of_a_large_store_is_quick(large, form):
+    """10,000 loops in full take less than two seconds of processor time in every format."""
+    code = (
+        "import sys, time\nfrom analyzer.cli import main\n"
+        f"main(['rank', {str(large)!r}, '--format', {form!r}], standalone_mode=False)\n"
+        "print(time.process_time(), file=sys.stderr)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
+    assert done.stdout.count("FIC") >= LOOPS
+    assert float(done.stderr) < WHOLE_LIST_S
+
+
 # In order
 
 
