@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from analyzer.clauses import joined
 from analyzer.decisions import Action, Lack, Lane, Status
 from analyzer.lane_figures import lanes_in
 from analyzer.lanes import lanes_of
@@ -80,6 +81,6 @@ def in_lanes(row: Row, limits: LaneLimits) -> dict[str, Any]:
     named = {**row, "lanes": ", ".join(lanes) or None}
     known = {Lane.MANUAL} if row["lack"] == Lack.AUTOMATIC else set()  # the reason has said so already
     said = [SAID[lane](named) for lane in lanes if lane in SAID and lane not in known]
-    reason = "; ".join((row["reason"], *said)) if row["reason"] else "; ".join(said)
+    reason = joined(row["reason"], *said)
     reason = f"{since(row)}: {reason}" if row["settings_changed"] else reason
     return {**named, "reason": reason, "action": action_of(row, lanes)}

@@ -36,11 +36,14 @@ def wrong_sign(loop: Loop) -> str:
     )
 
 
+def robustness(ms: float) -> str:
+    """A maximum sensitivity in words; a loop that has none is unstable."""
+    return f"Ms {ms:.2f}" if math.isfinite(ms) else "unstable"
+
+
 def not_tight(ms: float) -> str:
     """Why a loop said to be tight gets no settings."""
-    return (
-        f"The identified loop is robust as it is (Ms {ms:.2f}); its tuning does not explain the oscillation."
-    )
+    return f"The identified loop is robust as it is ({robustness(ms)}); its tuning does not explain the oscillation."
 
 
 def _seconds(x: float) -> str:
@@ -59,9 +62,9 @@ def little_less_error(left: float, now: float) -> str:
     """Why a tight loop gets no settings: on its own load calmer ones might win nothing."""
     way, size = ("raise", left - 1.0) if left > 1.0 else ("lower", 1.0 - left)
     return (
-        f"Too tight (Ms {now:.2f}), but on a process that the data allow robust settings would {way} the average "
-        f"absolute error by {100 * size:.0f} %{' alone' * (way == 'lower')}: a record with set point moves would "
-        "tell more."
+        f"Too tight ({robustness(now)}), but on a process that the data allow robust settings would {way} the "
+        f"average absolute error by {100 * size:.0f} %{' alone' * (way == 'lower')}: a record with set point moves "
+        "would tell more."
     )
 
 
@@ -85,10 +88,10 @@ def settings(controller: Pid) -> str:
 
 def tight(loop: Loop, new: Pid, before: float, ms: float) -> str:
     """Why SIMC settings are proposed."""
-    was = f"Ms {before:.2f}" if math.isfinite(before) else "unstable on the identified process"
+    was = robustness(before) + " on the identified process" * math.isinf(before)
     return (
         f"Too tight: {was} at {settings(loop.controller)}. SIMC for the identified process gives "
-        f"{settings(new)} with Ms {ms:.2f}."
+        f"{settings(new)} with {robustness(ms)}."
     )
 
 
@@ -113,14 +116,13 @@ def valve(
     loop: Loop, best: Candidate, before: Confirmed, after: Confirmed, ms_before: float, table: Bench
 ) -> str:
     """Why settings for a loop with a faulty valve are proposed."""
-    was = f"Ms {ms_before:.2f}" if math.isfinite(ms_before) else "unstable"
     old, new = rejection(loop.process, loop.controller), rejection(loop.process, best.controller)
     return (
         f"The valve has {_fault(loop)}: simulated, {_cycle(before.cycle)} at {settings(loop.controller)} "
-        f"({was}) and {_cycle(after.cycle)} at {settings(best.controller)} (Ms {best.ms:.2f}). "
-        f"On the load, mean over {len(table.loops)} models: stem travel {_percent(best.travel)}, "
-        f"average absolute error {_percent(best.error)}. A load step at the valve peaks "
-        f"{new.peak / old.peak:.2g} times as high as now.{_outlook(loop, after)}"
+        f"({robustness(ms_before)}) and {_cycle(after.cycle)} at {settings(best.controller)} "
+        f"({robustness(best.ms)}). On the load, mean over {len(table.loops)} models: "
+        f"stem travel {_percent(best.travel)}, average absolute error {_percent(best.error)}. "
+        f"A load step at the valve peaks {new.peak / old.peak:.2g} times as high as now.{_outlook(loop, after)}"
     )
 
 
