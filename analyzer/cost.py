@@ -8,11 +8,31 @@ from typing import Any
 Row = Mapping[str, Any]
 LOSS = "loss"
 SIGNIFICANCE = "oscillation_significance"
+STATED, RECORDED = "stated", "recorded"
+"""What percent of a loop's PV means: of the range in loops.csv, or of that which was recorded."""
+OF_RANGE = frozenset(
+    (SIGNIFICANCE, "average_absolute_error_pct", "variability_pct", "lasting_error_pct", "pv_amplitude_pct")
+)
+"""Columns in percent of that range, or that count it, which compare between loops only where it is stated."""
+MARK = "*"
+OF_RECORDED = "percent of the recorded range, for loops.csv states none: compares with no other loop"
+"""What the mark means."""
 
 
-def loss(error_pct: float | None, importance: float | None) -> float | None:
-    """Average absolute error [% of span] times importance, 1 where none is stated; None without an error."""
-    if error_pct is None:
+def compares(row: Row, column: str) -> bool:
+    """Whether a figure is known and compares with those of loops whose range is stated."""
+    return row[column] not in (None, "") and not (column in OF_RANGE and row.get("percent_of") == RECORDED)
+
+
+def mark(row: Row, column: str) -> str:
+    """What stands behind a figure that compares with no other loop's; '' behind others."""
+    return "" if not row[column] or compares(row, column) else MARK
+
+
+def loss(error_pct: float | None, importance: float | None, stated: bool = True) -> float | None:
+    """Average absolute error [% of span] times importance, 1 where none is stated; None without an error, or where
+    no span is `stated`: percent of what was recorded compares with no other loop."""
+    if error_pct is None or not stated:
         return None
     return error_pct * (1.0 if importance is None else importance)
 

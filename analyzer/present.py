@@ -6,8 +6,9 @@ import json
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from analyzer.clauses import joined
 from analyzer.columns.table import BY_NAME
-from analyzer.cost import LOSS, cost_column
+from analyzer.cost import LOSS, cost_column, mark
 from analyzer.decisions import Action, Cause, Due, Lack, Needs
 from analyzer.reason import reason_of, to_stroke, valve_text
 from analyzer.units import duration, gain_unit
@@ -63,7 +64,9 @@ def brief(row: Mapping[str, Any], columns: Sequence[str] = SHOWN) -> dict[str, s
     }
     if row.get("note"):
         special["reason"] = f"{row['reason'] or ''} [note: {row['note']}]"
-    return {name: visible(special.get(name, "") or figure(row[name], name)) for name in columns}
+    return {
+        name: visible(special.get(name, "") or figure(row[name], name) + mark(row, name)) for name in columns
+    }
 
 
 WORTH_LEAST = (
@@ -112,7 +115,7 @@ def advised(row: dict[str, Any], needs: Needs | None, advice: Advice) -> dict[st
         str(needs),
         "",
     ):
-        reason = f"{reason}; {advice.reason}"
+        reason = joined(reason, advice.reason)
     done = {
         **row,
         "action": advice.action,
@@ -172,7 +175,7 @@ def calmed_row(row: Mapping[str, Any], before: Mapping[str, Any]) -> dict[str, A
 def root_row(row: Mapping[str, Any], followers: Sequence[str]) -> dict[str, Any]:
     """The row of a loop that moves others: what is known of it, and whom it moves."""
     names = ", ".join(followers[:MOST_NAMES]) + (" ..." if len(followers) > MOST_NAMES else "")
-    return {**row, "reason": f"{row['reason']}; it also moves {names}: fix this one first"}
+    return {**row, "reason": joined(row["reason"], f"it also moves {names}: fix this one first")}
 
 
 def figure(value: Any, column: str = "") -> str:

@@ -15,7 +15,7 @@ from analyzer import notes
 from analyzer.columns.other_tables import NOTED
 from analyzer.columns.ranking import LISTED, RANKING
 from analyzer.columns.table import BY_NAME, names
-from analyzer.cost import LOSS, SIGNIFICANCE, cost_column
+from analyzer.cost import LOSS, MARK, OF_RECORDED, SIGNIFICANCE, compares, cost_column, mark
 from analyzer.decisions import Cause, Due, Lane
 from analyzer.lane_figures import FIGURE, lanes_in
 from analyzer.notes import Note
@@ -104,7 +104,15 @@ def _sorted(rows: Sequence[dict[str, Any]], column: str, ascending: bool) -> lis
 def worst_first(rows: Sequence[dict[str, Any]], column: str | None = None) -> list[dict[str, Any]]:
     """Rows as the morning reads them: what oscillates, then what stands in another lane, then the rest."""
     by = cost_column(rows)
-    return sorted(_sorted(rows, column or by, False), key=lambda row: _worth(row, by == LOSS))
+    return sorted(_comparable_first(rows, column or by), key=lambda row: _worth(row, by == LOSS))
+
+
+def _comparable_first(rows: Sequence[dict[str, Any]], column: str) -> list[dict[str, Any]]:
+    """Rows by a column; behind them, by the significance within their own recorded range, those whose figure is not
+    known or compares with no other's."""
+    alike = [r for r in rows if compares(r, column)]
+    others = [r for r in rows if not compares(r, column)]
+    return _sorted(alike, column, False) + _sorted(others, SIGNIFICANCE, False)
 
 
 def _worth(row: Row, lossy: bool) -> int:
@@ -133,13 +141,18 @@ def rendered(rows: Sequence[Row], form: str, night: str, wide: bool = False, lan
     """Rows as text in one of the formats; a `wide` table keeps all its columns, one of a lane shows its figure."""
     if form in ("table", "markdown"):
         from analyzer.present import markdown_table, shown_of
+        from reports.markdown import escaped
 
         shown = shown_of(rows, None if lane is None else FIGURE[lane])
-        return (
+        if not rows:
+            return f"Night {night}: no loop is in the lane {lane}" if lane else f"Night {night}: no loops"
+        text = (
             as_table(rows, night, WIDEST if wide else None, shown)
             if form == "table"
             else markdown_table(rows, shown)
         )
+        marked = any(mark(row, column) for row in rows for column in shown)
+        return f"{text}\n\n{escaped(MARK) if form == 'markdown' else MARK} {OF_RECORDED}" if marked else text
     return {"csv": as_csv, "json": as_json}[form](rows, night)
 
 

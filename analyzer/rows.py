@@ -14,7 +14,7 @@ from analyzer.assess import Assessment
 from analyzer.cause import Verdict
 from analyzer.columns.table import HOURS, row_of
 from analyzer.config import AdviceLimits
-from analyzer.cost import loss
+from analyzer.cost import RECORDED, STATED, loss
 from analyzer.decisions import CAUSES, Cause, Fault, Lack, Status
 from analyzer.loops.spec import LoopSpec
 from analyzer.oscillation import Oscillations
@@ -40,6 +40,7 @@ def empty_row(spec: LoopSpec, night: str) -> dict[str, Any]:
         "description": spec.description,
         "pv_unit": spec.pv_unit,
         "importance": spec.importance,
+        "percent_of": STATED if spec.has_pv_range else RECORDED,
         "kp": spec.kp,
         "ti": spec.ti,
         "form": str(spec.form),
@@ -133,7 +134,7 @@ def night_row(a: Assessment, spec: LoopSpec, night: str, limits: AdviceLimits) -
     row = {
         **empty_row(spec, night),
         **a.night.as_row(),
-        "loss": loss(a.night.average_absolute_error_pct, spec.importance),
+        "loss": loss(a.night.average_absolute_error_pct, spec.importance, spec.has_pv_range),
         **_oscillation_columns(a),
         **_in_known_units(_model_columns(v, limits), a.op_scaled),
         "status": Status.OK,

@@ -309,8 +309,18 @@ LISTED = (
         "Loss",
         "% of span times importance",
         Source.FIGURES,
-        "Average absolute error times importance; orders the list where loops.csv states importances.",
+        "Average absolute error times importance; orders the list where loops.csv states importances; empty where "
+        "loops.csv states no range of PV.",
     ),
     Column("advice", Kind.TEXT, "Advice", "", Source.ADVICE, "What to do and why in full, with figures."),
+    Column(
+        "percent_of",
+        Kind.TEXT,
+        "Percent of",
+        "",
+        Source.LOOPS,
+        "What percent of the PV means: stated (the range in loops.csv) or recorded (that of the night, for want "
+        "of one: such figures compare with no other loop's, and there is no loss).",
+    ),
 )
 """Columns that follow in CSV and JSON: facts of the plant, the units that settings stand in, the advice in full."""

@@ -120,6 +120,11 @@ class LoopSpec:
         return tuple(tag for tag in (getattr(self, role) for role in ROLES) if tag is not None)
 
     @property
+    def has_pv_range(self) -> bool:
+        """Whether the row states what percent of the PV means; else it is percent of what was recorded."""
+        return self.pv_lo is not None and self.pv_hi is not None
+
+    @property
     def defaults(self) -> tuple[str, ...]:
         """What is assumed because the row is silent, for the output to say."""
         return tuple(text for column, text in DEFAULTS.items() if column not in self.stated)

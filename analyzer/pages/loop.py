@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from analyzer.columns.table import BY_NAME
+from analyzer.cost import mark
 from analyzer.decisions import CAUSES, Fault
 from analyzer.explain.agreement import agreement
 from analyzer.explain.page_words import title
@@ -81,6 +82,7 @@ COLUMNS = (
         "notes",
         "advice",
         "start_s",
+        "percent_of",
         *FIGURES,
         *MODEL,
     ),
@@ -178,7 +180,7 @@ def _pv_op(thin: Thinned, row: Row) -> Plot:
 
 def _figure(name: str, row: Row, scale: Scale) -> tuple[str, str]:
     """A figure with its unit, and in the loop's own unit too where it is a percentage of span."""
-    term, text = titled(name, number(row[name]))
+    term, text = titled(name, number(row[name]) + mark(row, name))
     own = "" if name in LEVELS else beside(BY_NAME[name].unit, row[name], scale)
     return term, text + own
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from analyzer.columns.table import BY_NAME
-from analyzer.cost import cost_column
+from analyzer.cost import MARK, OF_RECORDED, SIGNIFICANCE, cost_column, mark
 from analyzer.decisions import CAUSES, Cause, Status
 from analyzer.lead import first_things
 from analyzer.pages import maintenance
@@ -27,7 +27,7 @@ from reports.pages import Cell, Column, Listing, Page, Section, Sparkline, Table
 def _value(row: Row, name: str, digits: str = "") -> Cell:
     value = row[name]
     text = number(value) if not digits or value is None else f"{value:{digits}}"
-    return Cell(text, value)
+    return Cell(text + mark(row, name), value)
 
 
 def _cause(row: Row) -> Cell:
@@ -69,7 +69,7 @@ def _worst_row(night: Night, row: Row, follows: bool, by: str) -> tuple[Cell, ..
         replace(name, text=FOLLOWER + name.text) if follows else name,
         Cell(row["description"] or ""),
         Cell("", figure=_spark(night, row)),
-        Cell(number(row[by]), row[by]),
+        Cell(number(row[by]) + mark(row, by), row[by]),
         Cell(duration(row["period_s"]), row["period_s"]),
         _cause(row),
         Cell(row["reason"] or ""),
@@ -85,17 +85,32 @@ def worst_table(night: Night) -> Table:
     rows = tuple(_worst_row(night, r, r["source_loop"] in here, by) for r in night.worst)
     hidden = sorted(night.hidden & {r["loop"] for r in night.rows if needs_a_look(r)})
     said = f"Hidden by their notes: {', '.join(hidden)}." if hidden else ""
+    said += f" {MARK} {OF_RECORDED}." if any(mark(r, by) for r in night.worst) else ""
     noted = any(row[-1].text for row in rows)
     columns = (*BEFORE_COST, heading(by), *(AFTER_COST if noted else AFTER_COST[:-1]))
     rows = tuple(row[: len(columns)] for row in rows)
-    return Table("worst", "", columns, rows, said, searchable=len(rows) > 10, facet="cause", cards=True)
+    return Table(
+        "worst", "", columns, rows, said.strip(), searchable=len(rows) > 10, facet="cause", cards=True
+    )
 
 
 ALL_SHARES = ("oscillating_pct", "osc_valve_pct", "osc_tuning_pct", "osc_load_pct")
 ALL_COSTS = ("average_absolute_error_pct", "valve_travel_pct_per_h", "variability_pct")
-ALL = headings(
-    *("loop", "description", "type", "area", "oscillation_significance", *ALL_SHARES, "cause", *ALL_COSTS),
-    "action",
+ALL = (
+    *headings(
+        *(
+            "loop",
+            "description",
+            "type",
+            "area",
+            "oscillation_significance",
+            *ALL_SHARES,
+            "cause",
+            *ALL_COSTS,
+        ),
+        "action",
+    ),
+    replace(heading("percent_of"), csv_only=True),
 )
 
 
@@ -104,12 +119,14 @@ def _all_row(night: Night, row: Row) -> tuple[Cell, ...]:
     shares = tuple(_value(row, c, ".0f") for c in ALL_SHARES)
     costs = tuple(_value(row, c) for c in ALL_COSTS)
     first = (linked(night, row["loop"]), *texts, _value(row, "oscillation_significance"))
-    return (*first, *shares, _cause(row), *costs, Cell(row["action"] or ""))
+    return (*first, *shares, _cause(row), *costs, Cell(row["action"] or ""), Cell(row["percent_of"] or ""))
 
 
 def ranking(night: Night) -> Table:
     """All loops of the night."""
-    return Table("ranking", "", ALL, tuple(_all_row(night, r) for r in night.rows), "", True, "cause")
+    marked = any(mark(row, name) for row in night.rows for name in (SIGNIFICANCE, *ALL_COSTS))
+    note = f"{MARK} {OF_RECORDED}." if marked else ""
+    return Table("ranking", "", ALL, tuple(_all_row(night, r) for r in night.rows), note, True, "cause")
 
 
 def _tiles(night: Night) -> Tiles:

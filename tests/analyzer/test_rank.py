@@ -228,6 +228,36 @@ def test_an_area_alone(tmp_path):
     assert "Dry end, Wet End" in refused.stderr
 
 
+@pytest.mark.parametrize("importance", [None, 2.0])
+def test_percent_of_the_recorded_range_leads_no_list(tmp_path, importance):
+    """A loop without a range stands behind those with one in its class however large its figures are, without a loss,
+    marked in table and Markdown with what the mark means; without such a loop there is no mark."""
+    held = [r for r in rows(20) if r["status"] == "ok" and r["oscillation_significance"]]
+    held = [{**r, "importance": importance, "loss": importance and 1.0, "percent_of": "stated"} for r in held]
+    own = {"loop": "WIDE", "percent_of": "recorded", "loss": None, "average_absolute_error_pct": 15.0}
+    odd = {**held[0], **own, "oscillation_significance": 900.0}
+    for name, kept in (("without", held), ("with", [odd, *held])):
+        write_table(rows_table(kept, NIGHTS), tmp_path / name / "nights" / f"{NIGHT}.parquet")
+    for form in ("table", "markdown"):
+        shown = asked(tmp_path / "with", "--format", form, "--wide").stdout
+        order = re.findall(r"WIDE|FIC\d{5}", shown)
+        assert order[-1] == "WIDE"
+        assert len(order) == len(held) + 1
+        assert re.search(r"WIDE.* 15\\?\*", shown)
+        assert "percent of the recorded range" in shown
+        assert "recorded range" not in asked(tmp_path / "without", "--format", form).stdout
+    listed = list(csv.DictReader(io.StringIO(asked(tmp_path / "with", "--format", "csv").stdout)))
+    assert [r["percent_of"] for r in listed] == ["stated"] * len(held) + ["recorded"]
+
+
+@pytest.mark.parametrize("lane", ["frozen", "sluggish", "valve-travel"])
+@pytest.mark.parametrize("form", ["table", "markdown"])
+def test_an_empty_lane_is_a_sentence(small, lane, form):
+    """A lane in which no loop stands is said to be empty."""
+    found = asked(small, "--lane", lane, "--format", form)
+    assert found.stdout == f"Night {NIGHT}: no loop is in the lane {lane.replace('-', ' ')}\n"
+
+
 # Refused
 
 
