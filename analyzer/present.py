@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from analyzer.advice import Advice
     from analyzer.plantwide.verdict import Follower
 
-CAUSE_STYLES = {
+CAUSE_STYLES: Mapping[str, str] = {
     Cause.VALVE: "red",
     Cause.TUNING: "yellow",
     Cause.LOAD: "cyan",

@@ -208,7 +208,7 @@ def _coloured(line: str, loop: str, cause: str | None) -> str:
 
     from analyzer.present import CAUSE_STYLES
 
-    colour = CAUSE_STYLES.get(cause)
+    colour = CAUSE_STYLES.get(cause or "")
     shown = visible(loop)
     return line if colour is None else line.replace(shown, click.style(shown, fg=colour), 1)
 

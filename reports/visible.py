@@ -22,19 +22,25 @@ def _visible(character: str) -> str:
 
 def visible_lines(text: str) -> str:
     """The same of a text of several lines."""
+    if text.isprintable():
+        return text
     return "\n".join(map(visible, text.split("\n")))
 
 
 def visible_parts(part: T) -> T:
     """A page, or a part of one, with all its texts visible; the same object where they are."""
-    found: Any = part
+    shown: T = _shown(part)
+    return shown
+
+
+def _shown(part: Any) -> Any:
     if type(part) is str:
-        return visible_lines(part)  # type: ignore[return-value]
+        return visible_lines(part)
     if isinstance(part, tuple):
-        shown = tuple(map(visible_parts, part))
-        return part if all(a is b for a, b in zip(part, shown, strict=True)) else shown  # type: ignore[return-value]
+        shown = tuple(map(_shown, part))
+        return part if all(a is b for a, b in zip(part, shown, strict=True)) else shown
     if not is_dataclass(part) or isinstance(part, type):
         return part
     held = {f.name: getattr(part, f.name) for f in fields(part)}
-    changed = {name: new for name, old in held.items() if (new := visible_parts(old)) is not old}
-    return replace(found, **changed) if changed else part
+    changed = {name: new for name, old in held.items() if (new := _shown(old)) is not old}
+    return replace(part, **changed) if changed else part

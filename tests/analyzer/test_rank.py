@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 
+from analyzer import rank
 from analyzer.cli import main
 from analyzer.columns.table import NIGHTS, row_of
 from analyzer.rank import as_table
@@ -207,6 +208,19 @@ def test_a_narrow_table_keeps_tags_action_and_reason(tmp_path, width):
     assert "Action" in text
     assert "Reason" in text
     assert ("Load %" in text) < ("Load %" in as_table([row_of(row) for row in odd], NIGHT, 240))
+
+
+def test_a_terminal_has_colours_and_the_same_words(small, monkeypatch):
+    """On a terminal a loop has the colour of its cause, the words are those of a pipe, and NO_COLOR is heeded."""
+    held = [row_of(row) for row in rows(10)]
+    plain = as_table(held, NIGHT, 180)
+    monkeypatch.setattr(rank, "interactive", lambda: True)
+    monkeypatch.delenv("NO_COLOR", raising=False)
+    coloured = as_table(held, NIGHT, 180)
+    assert "\x1b[31mFIC00000\x1b[0m" in coloured
+    assert re.sub(r"\x1b\[\d+m", "", coloured) == plain
+    monkeypatch.setenv("NO_COLOR", "1")
+    assert as_table(held, NIGHT, 180) == plain
 
 
 def test_wide_has_every_column(small):
