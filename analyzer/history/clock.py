@@ -87,6 +87,8 @@ class Clock:
         What the column's name states of its zone [s east of Greenwich].
     year_first : bool
         True where a year of two digits stands first.
+    winter_s : float or None
+        Offset of the stated zone's winter time [s east of Greenwich] where the clock keeps it all the year.
     """
 
     columns: tuple[int, ...]
@@ -100,6 +102,7 @@ class Clock:
     below_s: float = 0.0
     offset_s: float | None = None
     year_first: bool = False
+    winter_s: float | None = None
 
     def seconds(self, arrays: Sequence[pa.Array]) -> tuple[NDArray[np.float64], bool]:
         """Seconds since 1970-01-01 on the file's clock, NaN where unreadable; True where that is local."""
@@ -125,8 +128,9 @@ class Clock:
 
     def utc(self, second: NDArray[np.float64], local: bool) -> tuple[NDArray[np.float64], Counter[str]]:
         """Seconds of UTC from seconds of the file's clock, in the order of the file."""
-        if local and self.offset_s is not None:
-            return second - self.offset_s, Counter()
+        fixed_s = self.winter_s if self.offset_s is None else self.offset_s
+        if local and fixed_s is not None:
+            return second - fixed_s, Counter()
         if not local or self.timezone is None:
             return second, Counter()
         return zone.to_utc(second, self.timezone)
@@ -140,6 +144,12 @@ class Clock:
             notes.append(f"dates are read {first} first: {self.why}")
         if self.local and self.offset_s is not None:
             notes.append(f"stamps are {self.offset_s / 3600.0:+g} h from UTC, as their column's name states")
+        elif self.local and self.winter_s is not None:
+            hours = self.winter_s / 3600.0
+            notes.append(
+                f"stamps do not show the changes of {self.timezone} to or from summer time, taken as {hours:+g} h from UTC"
+                f" throughout; state --timezone Etc/GMT{-hours:+g} for all exports of this clock, or UTC if it keeps that"
+            )
         elif self.local:
             notes.append(f"stamps state no time zone, taken as {self.timezone or 'UTC'}")
         return tuple(notes)

@@ -86,7 +86,12 @@ def _decided(clock: Clock, parts: stamps.Fields | None, head: pa.Array) -> Clock
 
 
 def agreed(sources: Sequence[Source]) -> tuple[Source, ...]:
-    """Files whose dates read either way follow a file of the same export whose dates do not."""
+    """Files whose dates read either way follow a file of the same export whose dates do not; and all keep winter time
+    where one file shows that its clock does."""
+    winter = next((s.clock for s in sources if s.clock.winter_s is not None), None)
+    if winter is not None:
+        kept = winter.winter_s
+        sources = [s.with_clock(replace(s.clock, winter_s=kept)) if s.clock.local else s for s in sources]
     sure = next((s for s in sources if s.clock.why and not s.clock.ambiguous), None)
     if sure is None:
         return tuple(sources)

@@ -74,9 +74,9 @@ class PairSource:
         return (*self.table.notes, layout, *self.clock.notes)
 
     def with_clock(self, clock: Clock) -> Self:
-        """The same file, all its stamps read in the order of day and month of another clock."""
+        """The same file, all its stamps read in the order of day and month, and the winter time, of another clock."""
         order = {"day_first": clock.day_first, "ambiguous": clock.ambiguous, "why": clock.why}
-        order |= {"year_first": clock.year_first}
+        order |= {"year_first": clock.year_first, "winter_s": clock.winter_s}
         pairs = tuple(replace(p, clock=replace(p.clock, **order)) for p in self.pairs)  # type: ignore[arg-type]
         return replace(self, pairs=pairs)
 

@@ -39,6 +39,8 @@ MONTHS = pa.array(  # three letters each: English, German, French, Spanish, Ital
     ]
 )
 CENTURY_TURN = 70
+MOST_OFFSET_S = 14 * 3600.0
+"""No zone is further from UTC [s]."""
 
 
 YMD, DMY, MDY, OPEN = 0, 1, 2, 3
@@ -89,7 +91,7 @@ def fields(texts: pa.Array) -> Fields | None:
         _number(part["c"]),
         _clock(part),
         _offset(part["z"]),
-        _readable(parts, part["z"]),
+        _readable(parts, part["z"]) & _on_a_clock(part),
         bool(pc.any(pc.not_equal(part["z"], "")).as_py()),
         _written_order(part),
         pc.less_equal(pc.utf8_length(part["c"]), 2).to_numpy(zero_copy_only=False),
@@ -103,6 +105,15 @@ def _readable(parts: pa.Array, zone: pa.Array) -> NDArray[np.bool_]:
     return np.asarray(
         pc.and_(pc.is_valid(parts), pc.or_(pc.invert(letters), known)).to_numpy(zero_copy_only=False)
     )
+
+
+def _on_a_clock(part: dict[str, pa.Array]) -> NDArray[np.bool_]:
+    """Times of day that a clock shows, midnight at the end of a day and leap seconds among them, and zones' offsets."""
+    hour, minute, second = (_number(part[name]) for name in "hms")
+    whole = (hour < 24) | ((hour == 24) & (minute == 0) & (second == 0))
+    half = (hour <= 12) | pc.invert(pc.equal(pc.utf8_lower(part["p"]), "a")).to_numpy(zero_copy_only=False)
+    zone = np.abs(_offset(part["z"])) <= MOST_OFFSET_S
+    return np.asarray(whole & half & (minute < 60) & (second <= 60) & zone)
 
 
 def seconds(parts: Fields, day_first: bool, year_first: bool = False) -> NDArray[np.float64]:
@@ -119,7 +130,22 @@ def seconds(parts: Fields, day_first: bool, year_first: bool = False) -> NDArray
     first = ((year - 1970) * 12 + np.clip(month, 1, 12) - 1).astype("datetime64[M]")
     days = first.astype("datetime64[D]").astype(np.int64) + day - 1
     next_first = (first + 1).astype("datetime64[D]").astype(np.int64)
-    return np.where(valid & (days < next_first), days * 86400.0 + parts.clock_s - parts.offset_s, np.nan)
+    second = np.where(valid & (days < next_first), days * 86400.0 + parts.clock_s - parts.offset_s, np.nan)
+    return _midnights_told(second, parts.clock_s == 86400.0)
+
+
+def _midnights_told(second: NDArray[np.float64], midnight: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """Stamps whose 24:00 ends its day, or begins it where only so the stamps run on."""
+    if not midnight.any():
+        return second
+    begins = second - 86400.0 * midnight
+    return begins if _turns(begins) < _turns(second) else second
+
+
+def _turns(second: NDArray[np.float64]) -> int:
+    """Steps against the run of the stamps."""
+    step = np.diff(second)
+    return int(min((step < 0).sum(), (step > 0).sum()))
 
 
 def may_be_year_first(parts: Fields) -> bool:

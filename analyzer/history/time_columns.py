@@ -10,7 +10,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from analyzer.history import stamps
+from analyzer.history import stamps, zone
 from analyzer.history.clock import SINCE_START, Clock, as_text, is_count, is_text, scale_of
 from analyzer.history.day_order import with_day_order
 from analyzer.history.names import (
@@ -56,7 +56,21 @@ def find_clock(table: Table, options: ReadOptions) -> Clock:
     second, local = clock.seconds(table.head(clock.columns))
     if np.isnan(second).all():
         raise _unreadable(table, clock.columns[0])
-    return replace(clock, local=local, offset_s=header_offset_s(table.names[clock.columns[0]]))
+    clock = replace(clock, local=local, offset_s=header_offset_s(table.names[clock.columns[0]]))
+    return with_winter_time(table, clock)
+
+
+def with_winter_time(table: Table, clock: Clock) -> Clock:
+    """The clock, marked where its stamps show that it keeps the stated zone's winter time all the year."""
+    if (
+        not clock.local
+        or clock.offset_s is not None
+        or clock.timezone is None
+        or zone.is_fixed(clock.timezone)
+    ):
+        return clock
+    second = clock.seconds(table.read(clock.columns))[0]
+    return replace(clock, winter_s=zone.winter_offset_s(second, clock.timezone))
 
 
 def _with_fraction(table: Table, clock: Clock) -> Clock:
@@ -78,7 +92,7 @@ def clock_of(table: Table, column: int, options: ReadOptions) -> Clock:
     scale = scale_of(head, time_unit(table.names[column])) if is_number else None
     clock = Clock((column,), timezone=options.timezone, scale=scale)
     clock = with_day_order(table, clock, options)
-    return replace(clock, local=clock.seconds([head])[1])
+    return with_winter_time(table, replace(clock, local=clock.seconds([head])[1]))
 
 
 def holds_stamps(name: str, head: pa.Array, since_start: bool = True) -> bool:
