@@ -146,9 +146,10 @@ class Clock:
             notes.append(f"stamps are {self.offset_s / 3600.0:+g} h from UTC, as their column's name states")
         elif self.local and self.winter_s is not None:
             hours = self.winter_s / 3600.0
+            fixed = f"Etc/GMT{-hours:+.0f}" if hours.is_integer() else "a zone without summer time"
+            seen = f"stamps do not show the changes of {self.timezone} to or from summer time"
             notes.append(
-                f"stamps do not show the changes of {self.timezone} to or from summer time, taken as {hours:+g} h from UTC"
-                f" throughout; state --timezone Etc/GMT{-hours:+g} for all exports of this clock, or UTC if it keeps that"
+                f"{seen}, taken as {hours:+g} h from UTC throughout; state --timezone {fixed} for all of them"
             )
         elif self.local:
             notes.append(f"stamps state no time zone, taken as {self.timezone or 'UTC'}")

@@ -108,7 +108,7 @@ def _readable(parts: pa.Array, zone: pa.Array) -> NDArray[np.bool_]:
 
 
 def _on_a_clock(part: dict[str, pa.Array]) -> NDArray[np.bool_]:
-    """Times of day that a clock shows, midnight at the end of a day and leap seconds among them, and zones' offsets."""
+    """Times that a clock shows, midnight at the end of a day and leap seconds among them, in zones that there are."""
     hour, minute, second = (_number(part[name]) for name in "hms")
     whole = (hour < 24) | ((hour == 24) & (minute == 0) & (second == 0))
     half = (hour <= 12) | pc.invert(pc.equal(pc.utf8_lower(part["p"]), "a")).to_numpy(zero_copy_only=False)

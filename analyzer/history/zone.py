@@ -18,8 +18,8 @@ ENOUGH = 12
 """Samples in the hours about an autumn change from which their number tells whether an hour came twice; ours: one in
 five minutes."""
 IN_SPRING, IN_AUTUMN = 0.25, 1.5
-"""Samples in the hour that spring leaves out, and in that which autumn repeats, over those of their neighbours: beyond
-the first, or below the second, a clock keeps winter time [-]; where it is changed they are 0 and 2."""
+"""Samples in the hour that spring leaves out, and in that which autumn repeats, over those of their neighbours:
+beyond the first, or below the second, a clock keeps winter time [-]; where it is changed they are 0 and 2."""
 TYPICAL_STEPS = 3.0
 """Typical steps that a step over the change may take where the clock does not run backwards [-]; ours."""
 
@@ -68,7 +68,7 @@ def winter_offset_s(local_s: NDArray[np.float64], zone: str) -> float | None:
         IANA name.
     """
     hour, count = np.unique(np.floor(local_s[np.isfinite(local_s)] / HOUR_S), return_counts=True)
-    inner = np.flatnonzero((np.diff(hour) <= 2.0))
+    inner = np.flatnonzero(np.diff(hour) <= 2.0)
     around = np.unique(np.concatenate([hour, hour[inner] + 1.0]))
     summer, winter = _offset_readings(around * HOUR_S + HOUR_S / 2, zone)
     held = dict(zip(hour.tolist(), count.tolist(), strict=True))
@@ -143,6 +143,6 @@ def _set_back(local_s: NDArray[np.float64], rows: NDArray[np.intp], typical_s: f
     at_end = local_s[rows[-1] + 1] - local_s[rows[-1]] if rows[-1] + 1 < len(local_s) else -np.inf
     inner = int(np.argmin(before[1:])) + 1 if rows.size > 1 else 0
     step = before[inner] if inner else np.inf
-    if step < 0 or step + HOUR_S <= TYPICAL_STEPS * typical_s and step < min(at_start, at_end):
+    if step < 0 or (step + HOUR_S <= TYPICAL_STEPS * typical_s and step < min(at_start, at_end)):
         return inner
     return 0 if at_start < at_end else len(rows)
