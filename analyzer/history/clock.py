@@ -149,7 +149,7 @@ class Clock:
             fixed = f"Etc/GMT{-hours:+.0f}" if hours.is_integer() else "a zone without summer time"
             seen = f"stamps do not show the changes of {self.timezone} to or from summer time"
             notes.append(
-                f"{seen}, taken as {hours:+g} h from UTC throughout; state --timezone {fixed} for all of them"
+                f"{seen}, taken as {hours:+g} h from UTC throughout; state --timezone {fixed}"
             )
         elif self.local:
             notes.append(f"stamps state no time zone, taken as {self.timezone or 'UTC'}")
