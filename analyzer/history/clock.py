@@ -38,19 +38,22 @@ SINCE_START_MOST = 1e8
 """Largest number of a clock that counts from the start of the export; above it are the seconds since 1970."""
 EXCEL_MOST_SPAN = 4000.0
 """Days that stamps in Excel days may span [d]; ours: numbers that rise further count seconds."""
+LEAST_MS_STEP = 100.0
+"""Steps of a clock without a unit from which it counts milliseconds where they are no whole minutes; ours."""
 SINCE_START = {
-    "ms": Scale("milliseconds since the start", 0, SINCE_START_MOST, 1e-3),
+    "ms": Scale("milliseconds since the start", 0, 1e11, 1e-3),
     "s": Scale("seconds since the start", 0, SINCE_START_MOST, 1.0),
     "min": Scale("minutes since the start", 0, SINCE_START_MOST, 60.0),
     "h": Scale("hours since the start", 0, SINCE_START_MOST, 3600.0),
     "d": Scale("days since the start", 0, 2e4, 86400.0),
 }
 """Clocks that count from the start, by the unit that the column's name states; seconds where it states none."""
+SECONDS = Scale("seconds since 1970", 1e8, 3e9, 1.0)
 SCALES = (
     Scale("Excel days", 2e4, 8e4, 86400.0, EXCEL_ORIGIN_S, local=True),
     Scale("days since year 0", 7.1e5, 7.7e5, 86400.0, -719529 * 86400.0, local=True),
     Scale("Julian days", 2.43e6, 2.49e6, 86400.0, -2440587.5 * 86400.0),
-    Scale("seconds since 1970", 1e8, 3e9, 1.0),
+    SECONDS,
     Scale("seconds since 1904", 3e9, 4.1e9, 1.0, -2082844800.0),
     Scale("millions of Excel days", 2e10, 8e10, 0.0864, EXCEL_ORIGIN_S, local=True),
     Scale("milliseconds since 1970", 1e11, 4e12, 1e-3),
@@ -139,6 +142,10 @@ class Clock:
     def notes(self) -> tuple[str, ...]:
         """How the stamps are read, where that is not plain from their writing."""
         notes = [] if self.scale is None else [f"stamps are numbers, read as {self.scale.name}"]
+        if self.scale in SINCE_START.values():
+            notes[0] += (
+                ", from 1970 on; state the unit in the column's name, as in 'Time (ms)', where it is another"
+            )
         if self.why:
             first = "year" if self.year_first else "day" if self.day_first else "month"
             notes.append(f"dates are read {first} first: {self.why}")
@@ -148,9 +155,7 @@ class Clock:
             hours = self.winter_s / 3600.0
             fixed = f"Etc/GMT{-hours:+.0f}" if hours.is_integer() else "a zone without summer time"
             seen = f"stamps do not show the changes of {self.timezone} to or from summer time"
-            notes.append(
-                f"{seen}, taken as {hours:+g} h from UTC throughout; state --timezone {fixed}"
-            )
+            notes.append(f"{seen}, taken as {hours:+g} h from UTC throughout; state --timezone {fixed}")
         elif self.local:
             notes.append(f"stamps state no time zone, taken as {self.timezone or 'UTC'}")
         return tuple(notes)
@@ -180,10 +185,20 @@ def scale_of(column: pa.Array, unit: str = "") -> Scale | None:
     middle, reach = float(np.median(number)), float(np.ptp(number))
     found = next((scale for scale in SCALES if scale.low <= middle < scale.high), None)
     in_days = found is not None and found.name in IN_DAYS
-    if found is not None and not (in_days and (unit in ("ms", "s", "min", "h") or reach > EXCEL_MOST_SPAN)):
+    other = unit in ("ms", "s", "min", "h") if in_days else unit not in ("", "s") and found is SECONDS
+    if found is not None and not (other or (in_days and reach > EXCEL_MOST_SPAN)):
         return found
-    since = SINCE_START[unit or "s"]
+    since = SINCE_START[unit or _unit_by_step(number)]
     return since if since.low <= middle < since.high else None
+
+
+def _unit_by_step(number: NDArray[np.float64]) -> str:
+    """'ms' for counts that step by what only milliseconds do, 's' for others: trends of loops are sampled every few
+    seconds, or every few minutes."""
+    steps = np.abs(np.diff(number))
+    step = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
+    whole = bool((number % 1 == 0).all())
+    return "ms" if whole and step >= LEAST_MS_STEP and (step % 60 != 0 or step % 1000 == 0) else "s"
 
 
 def is_count(column: pa.Array) -> bool:

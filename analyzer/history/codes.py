@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
+from collections.abc import Iterable
 from enum import StrEnum
 
 import numpy as np
@@ -41,6 +42,8 @@ GOOD_TEXTS = frozenset(
 )
 DA_GOOD, UA_UNCERTAIN, CONFIDENCE_GOOD, CONFIDENCE_FULL = 192, 0x40000000, 50, 100
 PCS7_GOOD = 0x80
+MOST_FLAG = 10
+"""Codes below this number are a plant's own, of which 0 or 1 is good."""
 NOT_BAD = frozenset(
     {"", "0", "0.0", "false", "f", "n", "no", "none", "nan", "ok", "good", "nein", "non", "ei"}
 )
@@ -66,13 +69,28 @@ class Scheme(StrEnum):
     UA = "codes with 0 good"
     CONFIDENCE = "confidence in percent, good from 50"
     FLAG = "flags, 1 good and all else bad"
+    ONE_GOOD = "codes with 1 good, for most are; state --good-quality 0 if it is that"
     BAD_FLAG = "flags of what is bad: 0, false and blank good"
     PCS7 = "PCS 7 codes, 128 and above good"
     IGNITION = "Ignition codes, 192 to 255 good"
 
 
-def scheme_of(name: str, codes: pa.Array) -> Scheme:
-    """Decide by the column's name and all the codes that occur in it."""
+def mostly_one(columns: Iterable[pa.Array]) -> bool:
+    """Whether of the codes 0 and 1 in some columns' rows most are 1."""
+    number = np.concatenate([np.empty(0), *(_numbers(codes) for codes in columns)])
+    return bool((number == 1).sum() > (number == 0).sum())
+
+
+def scheme_of(name: str, codes: pa.Array, ones: bool | None = None) -> Scheme:
+    """Decide by the column's name and all the codes that occur in it.
+
+    Parameters
+    ----------
+    name : str
+    codes : pyarrow.Array, shape (n,)
+    ones : bool or None
+        Whether of the codes 0 and 1 most are 1, as `mostly_one` has it of more rows; None: of these.
+    """
     number = _numbers(codes)
     known = number[np.isfinite(number)].astype(np.int64)
     if plain(name).endswith(BAD_NAMES) and _flags(codes):
@@ -92,6 +110,8 @@ def scheme_of(name: str, codes: pa.Array) -> Scheme:
         return Scheme.DA
     if (small == PCS7_GOOD).any() and known.max() < 0x100:
         return Scheme.PCS7
+    if len(known) and known.max() < MOST_FLAG and (mostly_one([codes]) if ones is None else ones):
+        return Scheme.ONE_GOOD
     return Scheme.CONFIDENCE if len(known) and known.max() == CONFIDENCE_FULL else Scheme.UA
 
 
@@ -145,7 +165,7 @@ def _good(kinds: pa.Array, scheme: Scheme) -> NDArray[np.bool_]:
     code = np.nan_to_num(number, nan=-1).astype(np.int64)
     if scheme is Scheme.CONFIDENCE:
         return code >= CONFIDENCE_GOOD
-    if scheme is Scheme.FLAG:
+    if scheme in (Scheme.FLAG, Scheme.ONE_GOOD):
         return code == 1
     if scheme is Scheme.DA:
         return (code >= 0) & ((code & 0xC0) == DA_GOOD)
@@ -172,12 +192,15 @@ def is_understood(codes: pa.Array, scheme: Scheme) -> bool:
         known = {k for k in kinds if _good_text(k) or k in BAD_TEXTS or k.startswith("bad")}
         return bool(kinds) and 2 * len(known) >= len(kinds)
     if scheme is Scheme.UA:
-        return "0" in kinds or "0.0" in kinds or any(k.startswith("0x") for k in kinds)
+        return not kinds.isdisjoint({"0", "0.0"}) or any(k.startswith("0x") for k in kinds)
     return True
 
 
 def _good_text(text: str) -> bool:
-    return text.strip().lower() in GOOD_TEXTS or text.strip().lower().startswith("good")
+    """Whether a text is good, or one of the words that commas part is, and none of them is bad."""
+    words = [word.strip() for word in re.split(r"[,;|]", text.lower())]
+    good = [word in GOOD_TEXTS or word.startswith("good") for word in words]
+    return any(good) and BAD_TEXTS.isdisjoint(words)
 
 
 def _listed(kinds: pa.Array, good: tuple[str, ...]) -> NDArray[np.bool_]:

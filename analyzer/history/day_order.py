@@ -14,6 +14,8 @@ from analyzer.history.clock import Clock, as_text, is_text, joined
 from analyzer.history.options import ReadOptions
 from analyzer.history.table import Source, Table
 
+DAY_FIRST_ZONES = ("Europe/", "Africa/", "Australia/", "Asia/")
+"""Zones in which dates have the day first where figures alone would read either way."""
 AHEAD_S = 2 * 86400.0
 """Stamps later than now by more than this are taken as read in a wrong order [s]."""
 
@@ -36,10 +38,11 @@ def _texts(arrays: Sequence[pa.Array]) -> pa.Array | None:
     return as_text(column) if is_text(column.type) else None
 
 
-def _year_first(parts: stamps.Fields, dashed: bool) -> Clock | None:
+def _year_first(parts: stamps.Fields, mark: str) -> Clock | None:
     """What is decided of dates with years of two digits that may stand in front; None where they do not.
 
-    Dates with points or strokes have the year in front only where no other reading fits as well.
+    Dates with points have the year in front only where no other reading fits as well; of others that read several
+    ways the latest counts, for exports are of late.
     """
     if not stamps.may_be_year_first(parts):
         return None
@@ -58,17 +61,32 @@ def _year_first(parts: stamps.Fields, dashed: bool) -> Clock | None:
     if leaps["year"] < min(leap for name, leap in leaps.items() if name != "year"):
         return Clock((0,), day_first=False, year_first=True, why="so read, the stamps run without a leap")
     alike = {name: found.max() for name, found in possible.items() if leaps[name] == min(leaps.values())}
-    if "year" not in alike or not dashed:
+    if "year" not in alike:
         return None
-    latest = max(alike, key=lambda name: alike[name])
-    why = "the later of two readings, with the year in front or behind; state --date-format if it is not so"
-    return Clock((0,), day_first=latest == "day", year_first=latest == "year", ambiguous=True, why=why)
+    others = [name for name in alike if name != "year"]
+    if mark == "." or max(alike[name] for name in others) > alike["year"]:
+        first = others[0] if len(others) == 1 else ""
+    else:
+        first = "year"
+    if not first:
+        return None
+    why = "the year may stand in front or behind; state --date-format if it is not so"
+    return Clock((0,), day_first=first == "day", year_first=first == "year", ambiguous=True, why=why)
+
+
+def _usual(parts: stamps.Fields, timezone: str | None) -> bool:
+    """Whether dates that read either way have the day first: where the month first would lie ahead of us, or as
+    is usual in the stated zone."""
+    ahead = [bool((stamps.seconds(parts, first) > time.time() + AHEAD_S).any()) for first in (True, False)]
+    if ahead[0] != ahead[1]:
+        return ahead[1]
+    return timezone is not None and timezone.startswith(DAY_FIRST_ZONES)
 
 
 def _decided(clock: Clock, parts: stamps.Fields | None, head: pa.Array) -> Clock:
     if parts is None:
         return clock
-    year = _year_first(parts, "-" in str(head[0].as_py()).split(" ")[0])
+    year = _year_first(parts, next((m for m in "-/." if m in str(head[0].as_py()).split(" ")[0]), ""))
     if year is not None:
         order = {"day_first": year.day_first, "year_first": year.year_first, "ambiguous": year.ambiguous}
         return replace(clock, why=year.why, **order)  # type: ignore[arg-type]
@@ -81,8 +99,11 @@ def _decided(clock: Clock, parts: stamps.Fields | None, head: pa.Array) -> Clock
         return replace(clock, day_first=running, why="so read, the stamps run without a leap")
     if "." in str(head[0].as_py()).split(" ")[0]:
         return replace(clock, day_first=True, why="dates with points; no day above 12 occurs")
-    either = "every date fits both orders; state the order if it is not so"
-    return replace(clock, day_first=False, ambiguous=True, why=either)
+    first = _usual(parts, clock.timezone)
+    other = "--month-first" if first else "--day-first"
+    return replace(
+        clock, day_first=first, ambiguous=True, why=f"every date fits both orders; state {other} if so"
+    )
 
 
 def agreed(sources: Sequence[Source]) -> tuple[Source, ...]:

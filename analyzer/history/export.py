@@ -41,6 +41,8 @@ CONVERTED_BYTES = WHOLE_FILE_BYTES
 """Size from which delimited text is streamed into Parquet once, instead of read for each loop anew [bytes]."""
 CONVERTED_ROWS = 2_000_000
 """Rows from which a long Parquet file is parted by loop once, instead of being searched for each loop anew."""
+DOUBT = "; state "
+"""What stands in notes on readings of which another is possible, before how the other is stated."""
 __all__ = ["Export", "ReadOptions", "open_export"]
 
 
@@ -111,8 +113,9 @@ class Export:
 
     @property
     def file_notes(self) -> tuple[str, ...]:
-        """What was detected of every file, and stamps that were set aside."""
-        return (*self.skipped, *self._file_notes(), *self._stray_notes())
+        """What was detected of every file, and stamps that were set aside; first what could be read otherwise."""
+        notes = (*self.skipped, *self._file_notes(), *self._stray_notes())
+        return tuple(sorted(notes, key=lambda note: DOUBT not in note))
 
     def met(self, tags: Iterable[str]) -> Counter[str]:
         """How often something worth telling was met in the samples of some tags that were read."""

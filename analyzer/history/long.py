@@ -13,7 +13,7 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from analyzer.history.clock import Clock, as_text
-from analyzer.history.codes import Scheme, not_good, scheme_of
+from analyzer.history.codes import Scheme, mostly_one, not_good, scheme_of
 from analyzer.history.converted import Converted
 from analyzer.history.names import QUALITY_NAMES, STAMP_NAMES, TAG_NAMES, VALUE_NAMES, first_named, plain
 from analyzer.history.options import ReadOptions
@@ -123,7 +123,7 @@ def open_long(table: Table, options: ReadOptions) -> LongSource | None:
     quality = _quality_column(table, options)
     if quality is None:
         return LongSource(table, clock, tags, tag, value)
-    scheme = scheme_of(table.names[quality], _kinds(table, quality))
+    scheme = scheme_of(table.names[quality], _kinds(table, quality), mostly_one(table.head([quality])))
     return LongSource(table, clock, tags, tag, value, quality, scheme, options.good_quality)
 
 

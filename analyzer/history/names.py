@@ -62,7 +62,7 @@ QUALITY_BEGINNING = re.compile(
 LONGEST = 200
 """Characters of a name that are looked at: no tag has more, and patterns take the square of a name's length."""
 UNIT_IN_NAME = re.compile(
-    r"[\s_(\[.,-]+(?P<unit>ms|msec|s|sec|secs|seconds?|sek|sekunden|min|mins|minutes?|minuten|h|hr|hrs|hours?|std"
+    r"(?:^|[\s_(\[.,-]+)(?P<unit>ms|msec|s|sec|secs|seconds?|sek|sekunden|min|mins|minutes?|minuten|h|hr|hrs|hours?|std"
     r"|stunden|d|days?|tage)[)\].]*$",
     re.IGNORECASE,
 )
@@ -78,6 +78,8 @@ UNITS = {
     "ho": "h",
     "hr": "h",
 }
+ELAPSED_NAMES = ("t", "elapsed", "elapsedtime", "")
+"""Names of clocks that count from the start; a unit alone is one."""
 REMARKS = frozenset({
     "annotated", "annotation", "annotations", "substituted", "comment", "comments", "remark", "marker",
 })  # fmt: skip
@@ -106,12 +108,9 @@ def without_unit(name: str) -> str:
 
 def is_stamp(name: str) -> bool:
     """Whether a column is named as stamps are, with or without a unit behind the name."""
-    return plain(name) in STAMP_NAMES or plain(without_unit(name)) in (
-        *STAMP_NAMES,
-        "t",
-        "elapsed",
-        "elapsedtime",
-    )
+    if not plain(name):
+        return False
+    return plain(name) in STAMP_NAMES or plain(without_unit(name)) in (*STAMP_NAMES, *ELAPSED_NAMES)
 
 
 def first_named(names: Sequence[str], wanted: Iterable[str]) -> int | None:

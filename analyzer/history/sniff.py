@@ -28,6 +28,8 @@ NO_DATA_LINE = re.compile(r"^(?:#.*|\[\w+\]|sep=.?|)$", re.IGNORECASE)
 COMMA_NUMBER = re.compile(r"^[+-]?\d+,\d+(?:[eE][+-]?\d+)?$")
 POINT_NUMBER = re.compile(r"^[+-]?\d*\.\d+(?:[eE][+-]?\d+)?$")
 NUMBER = re.compile(r"^[+-]?\d*[.,]?\d+(?:[eE][+-]?\d+)?$")
+GROUP = re.compile(r"^[+-]?[1-9]\d{0,2}[.,]\d{3}$")
+"""A number whose mark may be decimal or may group thousands."""
 DATA_MARK = re.compile(r"^\s*\[data\]\s*$", re.IGNORECASE)
 JSON = re.compile(r"^(?:\{\s*[\"}]|\[\s*[\[{\"])")
 PREAMBLE = 30
@@ -59,20 +61,39 @@ def open_sheet(path: Path, options: ReadOptions) -> Sheet:
     if not rows:
         raise InputError(f"{path}: a header and no rows", "at least one sample", "export a period with data")
     names = _padded(tuple(name.strip() for name in header), rows)
-    decimal = options.decimal or detect_decimal(rows, delimiter)
+    decimal, doubt = (options.decimal, "") if options.decimal else detect_decimal(rows, delimiter)
     stat = path.stat()
     skipped = place + 1 + above
     sheet = Sheet(path, stat.st_mtime_ns, stat.st_size, encoding, delimiter, decimal, skipped, names)
-    said = () if guessed is None else (f"no header: columns are taken as {', '.join(guessed)}",)
-    return _described(replace(sheet, as_written=options.date_format is not None), said)
+    said = [] if guessed is None else [f"no header: columns are taken as {', '.join(guessed)}"]
+    said += [doubt] if doubt else []
+    return _described(replace(sheet, as_written=options.date_format is not None), tuple(said))
 
 
-def detect_decimal(rows: Sequence[Sequence[str]], delimiter: str) -> str:
-    """Decimal mark of most numbers with a fraction; a point where there are none."""
+def detect_decimal(rows: Sequence[Sequence[str]], delimiter: str) -> tuple[str, str]:
+    """Decimal mark of most numbers with a fraction, a point where there are none; and a word where it may be another.
+
+    A mark before three digits in all numbers may group thousands: it does where another mark parts fractions, and
+    where it is the comma of a file whose columns commas part.
+    """
     cells = [cell.strip() for row in rows for cell in row]
-    commas = sum(COMMA_NUMBER.match(cell) is not None for cell in cells)
-    points = sum(POINT_NUMBER.match(cell) is not None for cell in cells)
-    return "," if commas > points else "."
+    marked = {",": _all(COMMA_NUMBER, cells), ".": _all(POINT_NUMBER, cells)}
+    mark = "," if len(marked[","]) > len(marked["."]) else "."
+    other = "." if mark == "," else ","
+    if not marked[mark] or not all(GROUP.match(cell) for cell in marked[mark]):
+        return mark, ""
+    if any(not GROUP.match(cell) for cell in marked[other]):
+        return other, ""
+    name, seen = {",": "comma", ".": "point"}[mark], f"numbers such as {marked[mark][0]} are taken"
+    if mark == delimiter:
+        return other, f"{seen} as whole; state --decimal '{mark}' if their {name} is decimal"
+    if delimiter == ",":
+        return mark, ""
+    return mark, f"{seen} with a decimal {name}; state --decimal '{other}' if it groups thousands"
+
+
+def _all(pattern: re.Pattern[str], cells: Sequence[str]) -> list[str]:
+    return [cell for cell in cells if pattern.match(cell)]
 
 
 def _head(path: Path) -> bytes:

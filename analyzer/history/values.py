@@ -34,6 +34,8 @@ ERROR_SHAPES = re.compile(
 
 MINUS = str.maketrans({"\u2212": "-", "\u2013": "-", "\u2012": "-", "\ufe63": "-", "\uff0d": "-"})
 """Signs that stand for a minus."""
+MINUS_BEHIND = re.compile(r"^([\d.,' \u00a0\u2007\u2009\u202f]*\d[.,]?)\s?-$")
+"""A number with its minus behind it."""
 SPACES = re.compile("[\u00a0\u2007\u2009\u202f' ]")
 """Marks that group thousands, besides comma and point."""
 NUMBER = re.compile(r"^[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?$")
@@ -126,7 +128,7 @@ def parsed(texts: list[str], decimal: str) -> tuple[NDArray[np.float64], list[st
     A minus may be any dash, thousands may be grouped, a unit may stand behind if it is the same everywhere, and a
     comma that can only be decimal decides for the column.
     """
-    plain = [text.translate(MINUS) for text in texts]
+    plain = [MINUS_BEHIND.sub(r"-\1", text.translate(MINUS)) for text in texts]
     plain, unit = _without_unit(plain)
     notes = [f"values have the unit '{unit}' behind the number"] if unit else []
     if decimal == "." and any(COMMA_FRACTION.match(text) for text in plain):

@@ -13,7 +13,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from analyzer.history.clock import Clock, is_text
-from analyzer.history.codes import not_good, scheme_of
+from analyzer.history.codes import Scheme, mostly_one, not_good, scheme_of
 from analyzer.history.names import REMARKS, check_once, plain, with_loop
 from analyzer.history.options import ReadOptions
 from analyzer.history.quality_columns import quality_columns
@@ -28,7 +28,7 @@ from identification.errors import InputError
 @dataclass(frozen=True, slots=True)
 class WideSource:
     """A wide table; see `table.Source`. `columns` and `quality` are columns of each tag, -1 for none;
-    `said` what of the layout is worth a warning."""
+    `said` what of the layout is worth a warning, `ones` whether most codes of quality are 1 and not 0."""
 
     table: Table
     clock: Clock
@@ -37,6 +37,7 @@ class WideSource:
     quality: tuple[int, ...]
     good_quality: tuple[str, ...] | None = None
     said: tuple[str, ...] = ()
+    ones: bool = False
 
     @property
     def path(self) -> Path:
@@ -80,7 +81,7 @@ class WideSource:
         if self.quality[i] >= 0:
             codes = arrays[self.quality[i]]
             rejected, counts = not_good(
-                codes, scheme_of(self.table.names[self.quality[i]], codes), self.good_quality
+                codes, scheme_of(self.table.names[self.quality[i]], codes, self.ones), self.good_quality
             )
             bad, found = bad | rejected, found + counts
         return Raw(stamp_s, read.value, bad, read.text, found, read.unread, read.example)
@@ -108,7 +109,16 @@ def open_wide(table: Table, options: ReadOptions) -> WideSource:
     check_once(table.path, names)
     quality = tuple(partner.get(i, -1) for i in columns)
     tags = with_loop(names, table.path.stem)
-    return WideSource(table, clock, tags, tuple(columns), quality, options.good_quality, tuple(said))
+    ones = mostly_one(table.head(sorted({*partner.values()})))
+    said += _read_as(table, quality, ones)
+    return WideSource(table, clock, tags, tuple(columns), quality, options.good_quality, tuple(said), ones)
+
+
+def _read_as(table: Table, quality: Sequence[int], ones: bool) -> list[str]:
+    """A sentence on codes of quality of which another reading is possible."""
+    columns = sorted({i for i in quality if i >= 0}) if ones else []
+    schemes = {scheme_of(table.names[i], table.head([i])[0], ones) for i in columns}
+    return [f"quality is read as {Scheme.ONE_GOOD.value}"] if Scheme.ONE_GOOD in schemes else []
 
 
 def _any_number(table: Table, columns: Sequence[int]) -> bool:
