@@ -90,6 +90,8 @@ class Clock:
         What the column's name states of its zone [s east of Greenwich].
     year_first : bool
         True where a year of two digits stands first.
+    doubt : str
+        What of the zone is not known, for the notes.
     winter_s : float or None
         Offset of the stated zone's winter time [s east of Greenwich] where the clock keeps it all the year.
     """
@@ -106,6 +108,7 @@ class Clock:
     offset_s: float | None = None
     year_first: bool = False
     winter_s: float | None = None
+    doubt: str = ""
 
     def seconds(self, arrays: Sequence[pa.Array]) -> tuple[NDArray[np.float64], bool]:
         """Seconds since 1970-01-01 on the file's clock, NaN where unreadable; True where that is local."""
@@ -157,13 +160,13 @@ class Clock:
             seen = f"stamps do not show the changes of {self.timezone} to or from summer time"
             notes.append(f"{seen}, taken as {hours:+g} h from UTC throughout; state --timezone {fixed}")
         elif self.local:
-            notes.append(f"stamps state no time zone, taken as {self.timezone or 'UTC'}")
+            notes.append(f"stamps state no time zone, taken as {self.timezone or 'UTC'}{self.doubt}")
         return tuple(notes)
 
     def _from_texts(self, texts: pa.Array) -> tuple[NDArray[np.float64], bool]:
         if self.date_format is not None:
             return _formatted(texts, self.date_format)
-        parts = stamps.fields(texts)
+        parts = stamps.fields(texts, self.timezone)
         if parts is None:
             return np.full(len(texts), np.nan), True
         return stamps.seconds(parts, self._order(parts), self.year_first), not parts.zoned

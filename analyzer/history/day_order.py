@@ -27,10 +27,10 @@ def with_day_order(table: Table, clock: Clock, options: ReadOptions) -> Clock:
     if clock.date_format is not None or clock.scale is not None:
         return clock
     head = _texts(table.head(clock.columns))
-    parts = None if head is None else stamps.fields(head)
+    parts = None if head is None else stamps.fields(head, clock.timezone)
     if parts is None or not parts.is_open:
         return clock
-    return _decided(clock, stamps.fields(_texts(table.read(clock.columns))), head)
+    return _decided(clock, stamps.fields(_texts(table.read(clock.columns)), clock.timezone), head)
 
 
 def _texts(arrays: Sequence[pa.Array]) -> pa.Array | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,7 +10,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
-from analyzer.history.zone_names import ZONE_OFFSETS_H
+from analyzer.history.zone_names import offsets_h
 
 LETTER = r"[^\x00-@\[-`{-\x7f]"
 """A letter of a month's name: whatever is no other ASCII character. The class of all letters of Unicode would make a
@@ -20,9 +21,25 @@ PATTERN = (
     r"(?P<c>\d{4}|\d{2}|\d)"
     r"(?:[T ,]+(?:klo )?(?P<h>\d{1,2})[:.](?P<m>\d\d)(?:[:.](?P<s>\d\d)(?:[.,:;](?P<f>\d+))?)?"
     r"\s*(?:(?P<p>[AaPp])(?:\.?[Mm]\.?|\s*$))?)?"
-    r"\s*\(?(?:UTC|GMT)?\s*(?P<z>[A-Z]{1,4}|[+-]\d\d(?::?\d\d)?)?\)?\s*$"
+    r"\s*[(\[]?(?:UTC|GMT)?\s*(?P<z>[A-Z]{1,5}|[+-]\d\d(?::?\d\d)?)?[)\]]?"
+    r"(?:\s*[(\[]?(?P<n>[A-Z][A-Za-z]+/[A-Za-z_/]+|[A-Z][A-Za-z]+(?: [A-Za-z]+)+)[)\]]?)?\s*$"
 )
-COMPACT = r"^(\d{4})(\d\d)(\d\d)[T ]?(\d\d):?(\d\d):?(\d\d)"
+REARRANGED = (
+    (r"^(\d{4})(\d\d)(\d\d)[T ]?(\d\d):?(\d\d):?(\d\d)", r"\1-\2-\3 \4:\5:\6"),  # ISO without marks
+    (rf"^{LETTER}{{2,12}}\.?,? +({LETTER}|\d+[-/.]|\d+ {LETTER})", r"\1"),  # a day of the week
+    (  # ctime
+        rf"^({LETTER}{{3,12}}\.?) +(\d{{1,2}}) +(\d{{1,2}}:\d\d:\d\d(?:[.,]\d+)?) +([A-Z]+ |[+-]\d{{4}} )?(\d{{4}})$",
+        r"\1 \2 \5 \3 \4",
+    ),
+    (r"^(\d{1,2}:\d\d(?::\d\d)?(?:[.,]\d+)?),? +(\S.*\d{4})$", r"\2 \1"),  # the time of day first
+    (r"[年月년월] ?(\d)", r"-\1"),
+    (r"[일日]", ""),
+    (r" (\d{1,2})[时時시] ?(\d\d)[分분] ?(?:(\d\d)[秒초])?$", r" \1:\2:\3"),
+    (r"(\d)(?:st|nd|rd|th)\b", r"\1"),
+    (r" (?:de|del) ", " "),
+    (r",? (?:at|um|à|kl\.?) (\d{1,2}[:.])", r" \1"),
+)
+"""Writings that are brought into the form of the pattern, and what they become."""
 MONTHS = pa.array(  # three letters each: English, German, French, Spanish, Italian, Portuguese, Dutch, Swedish, ...
     [
         *("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec"),
@@ -35,6 +52,14 @@ MONTHS = pa.array(  # three letters each: English, German, French, Spanish, Ital
         *("jan", "feb", "mar", "apr", "maj", "jun", "jul", "aou", "sep", "okt", "nov", "des"),
         *("tam", "hel", "maa", "huh", "tou", "kes", "hei", "elo", "syy", "lok", "marras", "jou"),  # Finnish
         *("sty", "lut", "mar", "kwi", "maj", "cze", "lip", "sie", "wrz", "paź", "lis", "gru"),  # Polish
+        *("янв", "фев", "мар", "апр", "май", "июн", "июл", "авг", "сен", "окт", "ноя", "дек"),
+        *("січ", "лют", "бер", "кві", "тра", "чер", "лип", "сер", "вер", "жов", "лис", "гру"),
+        *("oca", "şub", "mar", "nis", "may", "haz", "tem", "ağu", "eyl", "eki", "kas", "ara"),
+        *("ian", "feb", "mar", "apr", "mai", "iun", "iul", "aug", "sep", "oct", "noi", "dec"),
+        *("jan", "feb", "már", "ápr", "máj", "jún", "júl", "ágú", "sze", "okt", "nóv", "dec"),
+        *("ιαν", "φεβ", "μαρ", "απρ", "μαΐ", "ιουν", "ιουλ", "αυγ", "σεπ", "οκτ", "νοε", "δεκ"),
+        *("sau", "vas", "kov", "bal", "geg", "bir", "lie", "rugp", "rugs", "spa", "lap", "gru"),
+        *("jan", "feb", "mrz", "apr", "мая", "cze", "lip", "avg", "sep", "okt", "nov", "dec"),
         *("led", "úno", "bře", "dub", "kvě", "čer", "čvc", "srp", "zář", "říj", "lis", "pro"),  # Czech
     ]
 )
@@ -76,44 +101,49 @@ class Fields:
         return bool((self.readable & (self.order == OPEN)).any())
 
 
-def fields(texts: pa.Array) -> Fields | None:
-    """Take written stamps apart; None where not one of them can be read."""
+def fields(texts: pa.Array, timezone: str | None = None) -> Fields | None:
+    """Take written stamps apart; None where not one of them can be read.
+
+    Parameters
+    ----------
+    texts : pyarrow.Array of str, shape (n,)
+    timezone : str or None
+        IANA name of the stated zone, whose letters behind stamps mean what they mean there.
+    """
     parts = pc.extract_regex(texts, PATTERN)
     if parts.null_count > texts.null_count:
-        spaced = pc.replace_substring_regex(texts, COMPACT, r"\1-\2-\3 \4:\5:\6")
-        parts = pc.extract_regex(spaced, PATTERN)
+        other = texts
+        for written, meant in REARRANGED:
+            other = pc.replace_substring_regex(other, written, meant)
+        parts = pc.extract_regex(pc.if_else(pc.is_valid(parts), texts, other), PATTERN)
     if parts.null_count == len(parts):
         return None
-    part = {name: pc.fill_null(pc.struct_field(parts, name), "") for name in "abchmsfpz"}
+    part = {name: pc.fill_null(pc.struct_field(parts, name), "") for name in "abchmsfpzn"}
+    known = offsets_h(timezone)
+    offset_s = _offset(part["z"], known)
+    clock_s, shown = _clock(part)
     return Fields(
         _number_or_month(part["a"]),
         _number_or_month(part["b"]),
         _number(part["c"]),
-        _clock(part),
-        _offset(part["z"]),
-        _readable(parts, part["z"]) & _on_a_clock(part),
+        clock_s,
+        offset_s,
+        _readable(parts, part, known) & shown & (np.abs(offset_s) <= MOST_OFFSET_S),
         bool(pc.any(pc.not_equal(part["z"], "")).as_py()),
         _written_order(part),
         pc.less_equal(pc.utf8_length(part["c"]), 2).to_numpy(zero_copy_only=False),
     )
 
 
-def _readable(parts: pa.Array, zone: pa.Array) -> NDArray[np.bool_]:
-    """Stamps that the pattern knows, and whose zone is none of letters that mean nothing."""
-    letters = pc.match_substring_regex(zone, "^[A-Z]+$")
-    known = pc.is_in(pc.utf8_lower(zone), value_set=pa.array(ZONE_OFFSETS_H))
-    return np.asarray(
-        pc.and_(pc.is_valid(parts), pc.or_(pc.invert(letters), known)).to_numpy(zero_copy_only=False)
-    )
-
-
-def _on_a_clock(part: dict[str, pa.Array]) -> NDArray[np.bool_]:
-    """Times that a clock shows, midnight at the end of a day and leap seconds among them, in zones that there are."""
-    hour, minute, second = (_number(part[name]) for name in "hms")
-    whole = (hour < 24) | ((hour == 24) & (minute == 0) & (second == 0))
-    half = (hour <= 12) | pc.invert(pc.equal(pc.utf8_lower(part["p"]), "a")).to_numpy(zero_copy_only=False)
-    zone = np.abs(_offset(part["z"])) <= MOST_OFFSET_S
-    return np.asarray(whole & half & (minute < 60) & (second <= 60) & zone)
+def _readable(parts: pa.Array, part: dict[str, pa.Array], known: Mapping[str, float]) -> NDArray[np.bool_]:
+    """Stamps that the pattern knows, and whose zone is none of letters or words that mean nothing."""
+    letters = pc.match_substring_regex(part["z"], "^[A-Z]+$")
+    meant = pc.or_(pc.invert(letters), pc.is_in(pc.utf8_lower(part["z"]), value_set=pa.array(known)))
+    told = pc.and_(pc.is_valid(parts), meant)
+    if pc.any(pc.not_equal(part["n"], "")).as_py():
+        words = pc.and_(pc.match_substring(part["n"], " "), pc.equal(part["z"], ""))
+        told = pc.and_(told, pc.invert(words))
+    return np.asarray(told.to_numpy(zero_copy_only=False))
 
 
 def seconds(parts: Fields, day_first: bool, year_first: bool = False) -> NDArray[np.float64]:
@@ -201,30 +231,32 @@ def _number_or_month(texts: pa.Array) -> NDArray[np.int64]:
     short = pc.replace_substring_regex(
         short, "^marras.*", "nov"
     )  # Finnish; three letters of it are March elsewhere
+    long = pc.match_substring_regex(short, "^(?:ιου|rug)")
     place = pc.index_in(pc.utf8_slice_codeunits(short, 0, 3), MONTHS)
+    place = pc.if_else(long, pc.index_in(pc.utf8_slice_codeunits(short, 0, 4), MONTHS), place)
     months = pc.fill_null(place, -1).to_numpy(zero_copy_only=False).astype(np.int64)
     return np.where(months < 0, numbers, months % 12 + 1)
 
 
-def _clock(part: dict[str, pa.Array]) -> NDArray[np.float64]:
-    """Time of day [s]; 12 h clocks by their first letter."""
-    hour = _number(part["h"])
+def _clock(part: dict[str, pa.Array]) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Time of day [s], 12 h clocks by their first letter; and where a clock shows it, midnight of a
+    day's end and leap seconds among them."""
+    hour, minute, second = (_number(part[name]) for name in "hms")
     letter = pc.utf8_lower(part["p"])
     noon = pc.equal(letter, "p").to_numpy(zero_copy_only=False)
     twelve_hours = pc.not_equal(letter, "").to_numpy(zero_copy_only=False)
+    shown = (hour < np.where(twelve_hours & ~noon, 13, 24)) & (minute < 60) & (second <= 60)
+    shown |= (hour == 24) & (minute == 0) & (second == 0) & ~twelve_hours
     hour = np.where(twelve_hours, hour % 12 + 12 * noon, hour)
     fraction = pc.cast(pc.binary_join_element_wise("0.", part["f"], "0", ""), pa.float64())
-    whole = 3600 * hour + 60 * _number(part["m"]) + _number(part["s"])
-    return whole + fraction.to_numpy(zero_copy_only=False)
+    return 3600 * hour + 60 * minute + second + fraction.to_numpy(zero_copy_only=False), shown
 
 
-def _offset(zone: pa.Array) -> NDArray[np.float64]:
+def _offset(zone: pa.Array, known: Mapping[str, float]) -> NDArray[np.float64]:
     """Offset from UTC [s]; 0 where none is written."""
-    place = pc.index_in(pc.utf8_lower(zone), value_set=pa.array(ZONE_OFFSETS_H)).to_numpy(
-        zero_copy_only=False
-    )
-    hours = np.array([*ZONE_OFFSETS_H.values(), 0.0])
-    named = hours[np.where(np.isnan(place), len(ZONE_OFFSETS_H), np.nan_to_num(place)).astype(int)]
+    place = pc.index_in(pc.utf8_lower(zone), value_set=pa.array(known)).to_numpy(zero_copy_only=False)
+    hours = np.array([*known.values(), 0.0])
+    named = hours[np.where(np.isnan(place), len(known), np.nan_to_num(place)).astype(int)]
     digits = pc.replace_substring_regex(zone, r"^[A-Z]+$|[+:-]", "")
     hour, minute = (
         _number(pc.utf8_slice_codeunits(digits, 0, 2)),

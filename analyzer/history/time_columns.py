@@ -24,7 +24,7 @@ from analyzer.history.names import (
 )
 from analyzer.history.options import ReadOptions
 from analyzer.history.table import Table
-from analyzer.history.zone_names import header_offset_s
+from analyzer.history.zone_names import SEVERAL, header_offset_s, named_zone, of_several
 from identification.errors import InputError
 
 TIME_OF_DAY = r"^\s*\d{1,2}(:\d\d(:\d\d([.,;]\d+)?)?|\.\d\d\.\d\d([.,]\d+)?)\s*([AaPp]\.?[Mm]\.?)?\s*$"
@@ -32,8 +32,11 @@ UNREADABLE_SHARE = 0.5
 GLANCE = 50
 """Texts of a column that are glanced at before they are taken apart."""
 LIKE_STAMP = re.compile(
-    r"\d[-/. ]\.?\s*\w{1,12}[-/. ,]|\d:\d\d|[^\W\d]{3}\.? \d{1,2}\b|^\s*\d{8}|\d\.\d\d\.\d\d"
+    r"\d[-/. ]\.?\s*\w{1,12}[-/. ,]|\d:\d\d|[^\W\d]{3}\.? \d{1,2}\b|^\s*\d{8}|\d\.\d\d\.\d\d|\d[年년]"
 )
+LETTERS_BEHIND = re.compile(r"\b([A-Z]{3,5})\W*$")
+SHOWN = 60
+"""Characters of a cell that an error shows."""
 FINER = "timems"
 """Column of WinCC that holds its text's stamp to the microsecond, in millions of Excel days."""
 
@@ -48,7 +51,7 @@ def find_clock(table: Table, options: ReadOptions) -> Clock:
     """
     columns = _candidates(table, options)
     heads = dict(zip(columns, table.head(columns), strict=True))
-    kinds = {i: _kind(table.names[i], head) for i, head in heads.items()}
+    kinds = {i: _kind(table.names[i], head, options.timezone) for i, head in heads.items()}
     clock = _chosen(table, kinds, options)
     if clock is None or _is_doubtful(table, clock, kinds, heads):
         raise _no_time(table, columns)
@@ -56,8 +59,17 @@ def find_clock(table: Table, options: ReadOptions) -> Clock:
     second, local = clock.seconds(table.head(clock.columns))
     if np.isnan(second).all():
         raise _unreadable(table, clock.columns[0])
-    clock = replace(clock, local=local, offset_s=header_offset_s(table.names[clock.columns[0]]))
-    return with_winter_time(table, clock)
+    return with_winter_time(table, _with_zone(table, replace(clock, local=local)))
+
+
+def _with_zone(table: Table, clock: Clock) -> Clock:
+    """The clock with the zone that the column's name or its stamps state, where these are local."""
+    name, head = table.names[clock.columns[0]], table.head(clock.columns[:1])[0].drop_null()
+    text = str(head[0].as_py()) if clock.local and is_text(head.type) and len(head) else ""
+    zone_name = named_zone(name) or named_zone(text) or clock.timezone
+    several = of_several(name, zone_name)
+    doubt = f", for '{several}' means several zones; state --timezone" if several else ""
+    return replace(clock, offset_s=header_offset_s(name, zone_name), timezone=zone_name, doubt=doubt)
 
 
 def with_winter_time(table: Table, clock: Clock) -> Clock:
@@ -147,7 +159,7 @@ def _is_index(name: str) -> bool:
     return name.startswith("__index_level_") or name in ("", "index")
 
 
-def _kind(name: str, head: pa.Array) -> str:
+def _kind(name: str, head: pa.Array, timezone: str | None = None) -> str:
     """'full', 'date', 'time of day', 'number' or '' for what the first rows hold."""
     if pa.types.is_timestamp(head.type):
         return "full"
@@ -156,14 +168,14 @@ def _kind(name: str, head: pa.Array) -> str:
     if pa.types.is_time(head.type):
         return "time of day"
     if is_text(head.type):
-        return _text_kind(as_text(head).drop_null())
+        return _text_kind(as_text(head).drop_null(), timezone)
     numeric = pa.types.is_integer(head.type) or pa.types.is_floating(head.type)
     if not numeric:
         return ""
     return "number" if scale_of(head, time_unit(name)) is not None else _text_kind(as_text(head.drop_null()))
 
 
-def _text_kind(texts: pa.Array) -> str:
+def _text_kind(texts: pa.Array, timezone: str | None = None) -> str:
     if not any(LIKE_STAMP.search(text) for text in texts.slice(0, GLANCE).to_pylist()):
         return ""  # most columns of text are modes: the patterns below cost more than the rest of opening
     if (
@@ -171,7 +183,7 @@ def _text_kind(texts: pa.Array) -> str:
         > UNREADABLE_SHARE
     ):
         return "time of day"
-    parts = stamps.fields(texts)
+    parts = stamps.fields(texts, timezone)
     if parts is None or parts.readable.mean() <= UNREADABLE_SHARE:
         return ""
     return "full" if (parts.clock_s != 0).any() or len(texts) == 1 else "date"
@@ -218,8 +230,14 @@ def _no_time(table: Table, columns: Sequence[int]) -> InputError:
 def _unreadable(table: Table, column: int) -> InputError:
     text = next(iter(as_text(table.head([column])[0].drop_null()).to_pylist()), "")
     row = "" if table.first_row is None else f", row {table.first_row}"
+    seen = (
+        f"{table.path}: column '{table.names[column]}'{row}: '{text[:SHOWN]}' is no time stamp that is known"
+    )
+    letters = LETTERS_BEHIND.search(text)
+    if letters is not None and letters[1].lower() in SEVERAL:
+        return InputError(seen, f"one zone, but '{letters[1]}' means several", "state --timezone")
     return InputError(
-        f"{table.path}: column '{table.names[column]}'{row}: '{text}' is no time stamp that is known",
+        seen,
         "stamps such as 2024-11-21 08:00:00 or 21.11.2024 08:00:00",
-        "state the date format",
+        "state the date format, such as --date-format '%y%m%d %H%M%S'",
     )

@@ -1,0 +1,141 @@
+"""Stamps in words and zones of many lands: each is the moment that it says, or is refused in one line."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from analyzer.history.export import open_export
+from analyzer.history.options import ReadOptions
+from identification.errors import InputError
+
+FIRST = datetime(2024, 11, 21, 8, 0, 0, tzinfo=UTC)
+MOMENTS = [FIRST + timedelta(seconds=5 * k) for k in range(60)]
+
+
+def written(path: Path, show: Callable[[datetime], str], time: str = "Time") -> Path:
+    """An export whose stamps are shown so."""
+    rows = [f"{show(at)};{k}" for k, at in enumerate(MOMENTS)]
+    path.write_text("\n".join([f"{time};a.PV", *rows]) + "\n", encoding="utf-8")
+    return path
+
+
+def check(path: Path, timezone: str | None = None) -> list[str]:
+    """All stamps are the moments; the notes."""
+    export = open_export([path], ReadOptions(timezone=timezone))
+    stamp_s = export.read(["a.PV"])["a.PV"].stamp_s
+    np.testing.assert_allclose(stamp_s, [at.timestamp() for at in MOMENTS], rtol=0, atol=1e-3)
+    return list(export.notes)
+
+
+NOVEMBER = (
+    *(
+        "November",
+        "nov.",
+        "noviembre",
+        "novembre",
+        "novembro",
+        "marraskuuta",
+        "listopada",
+        "listopadu",
+        "ноября",
+    ),
+    *("листопада", "Kasım", "noiembrie", "nóvember", "Νοεμβρίου", "lapkričio", "novembris", "Novembra"),
+)
+
+
+@pytest.mark.parametrize("month", NOVEMBER)
+def test_a_month_in_another_language(tmp_path: Path, month: str) -> None:
+    """The eleventh month by its name."""
+    check(written(tmp_path / "x.csv", lambda at: f"{at:%d}. {month} {at:%Y %H:%M:%S}"))
+
+
+@pytest.mark.parametrize("june", ["Ιουνίου", "июня", "Haziran", "czerwca", "juin", "birželio", "kesäkuuta"])
+def test_june_is_not_july(tmp_path: Path, june: str) -> None:
+    """Months whose names begin alike are told apart."""
+    path = written(tmp_path / "x.csv", lambda at: f"{at:%d} {june} {at:%Y %H:%M:%S}")
+    stamp_s = open_export([path]).read(["a.PV"])["a.PV"].stamp_s
+    assert stamp_s[0] == datetime(2024, 6, 21, 8, tzinfo=UTC).timestamp()
+
+
+SHOWN = (
+    *(
+        "%a %b %d %H:%M:%S %Y",
+        "%A, %B %d, %Y %I:%M:%S %p",
+        "%B %d, %Y at %I:%M:%S %p",
+        "%dst %B %Y, %H:%M:%S",
+    ),
+    *(
+        "%H:%M:%S %d/%m/%Y",
+        "%d de noviembre de %Y %H:%M:%S",
+        "%Y年%m月%d日 %H:%M:%S",
+        "%Y年%m月%d日 %H时%M分%S秒",
+    ),
+    *(
+        "Do. %d.%m.%Y %H:%M:%S",
+        "jeu. %d nov. %Y %H:%M:%S",
+        "%a, %d %b %Y %H:%M:%S +0000",
+        "%a %b %d %H:%M:%S UTC %Y",
+    ),
+)
+
+
+@pytest.mark.parametrize("form", SHOWN)
+def test_a_stamp_in_words(tmp_path: Path, form: str) -> None:
+    """ctime, long English, days of the week, the time of day first, Spanish and Chinese dates."""
+    check(written(tmp_path / "x.csv", lambda at: at.strftime(form)))
+
+
+ZONES = (
+    *((" EST", -5.0), (" (CET)", 1.0), (" [CET]", 1.0), (" AEST", 10.0), (" Europe/Berlin", 1.0)),
+    *(
+        (" [Europe/Berlin]", 1.0),
+        ("+01:00[Europe/Berlin]", 1.0),
+        (" GMT+0100 (Central European Standard Time)", 1.0),
+    ),
+)
+
+
+@pytest.mark.parametrize(("behind", "hours"), ZONES)
+def test_a_zone_behind_the_stamp(tmp_path: Path, behind: str, hours: float) -> None:
+    """Letters, names and offsets of zones, in brackets or not."""
+    east = timedelta(hours=hours)
+    check(written(tmp_path / "x.csv", lambda at: f"{at + east:%Y-%m-%d %H:%M:%S}{behind}"))
+
+
+@pytest.mark.parametrize(
+    ("zone", "hours"),
+    [("EST", -5.0), ("MESZ", 2.0), ("AEST", 10.0), ("Europe/Berlin", 1.0), ("UTC-03:00", -3.0)],
+)
+@pytest.mark.parametrize("name", ["Time ({})", "Timestamp [{}]", "Timestamp {}"])
+def test_a_zone_in_the_column_s_name(tmp_path: Path, name: str, zone: str, hours: float) -> None:
+    """The zone in the name of the column is that of its stamps."""
+    east = timedelta(hours=hours)
+    check(written(tmp_path / "x.csv", lambda at: f"{at + east:%Y-%m-%d %H:%M:%S}", name.format(zone)))
+
+
+@pytest.mark.parametrize(
+    ("letters", "zone", "hours"), [("CST", "America/Chicago", -6.0), ("CST", "Asia/Shanghai", 8.0)]
+)
+def test_letters_of_several_zones(tmp_path: Path, letters: str, zone: str, hours: float) -> None:
+    """Letters that mean several zones are refused behind a stamp and told in a name, until the zone is stated."""
+    east = timedelta(hours=hours)
+    behind = written(tmp_path / "x.csv", lambda at: f"{at + east:%Y-%m-%d %H:%M:%S} {letters}")
+    named = written(tmp_path / "y.csv", lambda at: f"{at + east:%Y-%m-%d %H:%M:%S}", f"Time ({letters})")
+    with pytest.raises(InputError, match=f"'{letters}' means several; state --timezone"):
+        open_export([behind])
+    assert "; state --timezone" in open_export([named]).notes[0]
+    check(behind, zone)
+    check(named, zone)
+
+
+def test_eastern_time_has_summer(tmp_path: Path) -> None:
+    """Where the stated zone calls itself EST, a column so named follows that zone in summer too."""
+    rows = "\n".join(f"2024-07-01 08:00:{k:02d};{k}" for k in range(60))
+    (tmp_path / "x.csv").write_text(f"Time (EST);a.PV\n{rows}\n")
+    export = open_export([tmp_path / "x.csv"], ReadOptions(timezone="America/New_York"))
+    assert export.read(["a.PV"])["a.PV"].stamp_s[0] == datetime(2024, 7, 1, 12, tzinfo=UTC).timestamp()
