@@ -48,6 +48,9 @@ SINCE_START = {
     "d": Scale("days since the start", 0, 2e4, 86400.0),
 }
 """Clocks that count from the start, by the unit that the column's name states; seconds where it states none."""
+ELAPSED = Scale("hours, minutes and seconds since the start", 0, 0, 1.0)
+"""A clock in text that counts from the start, such as 25:10:03."""
+COUNTED = r"^\s*(?P<h>\d{1,5}):(?P<m>[0-5]\d):(?P<s>[0-5]\d(?:[.,]\d+)?)\s*$"
 SECONDS = Scale("seconds since 1970", 1e8, 3e9, 1.0)
 SCALES = (
     Scale("Excel days", 2e4, 8e4, 86400.0, EXCEL_ORIGIN_S, local=True),
@@ -124,6 +127,8 @@ class Clock:
             )
             return second + rest * self.below_s, local
         column = arrays[0] if len(arrays) == 1 else joined(arrays)
+        if self.scale is ELAPSED:
+            return counted_s(as_text(column)), False
         if pa.types.is_date(column.type):
             column = pc.cast(column, pa.timestamp("s"))
         if pa.types.is_timestamp(column.type):
@@ -144,7 +149,8 @@ class Clock:
     @property
     def notes(self) -> tuple[str, ...]:
         """How the stamps are read, where that is not plain from their writing."""
-        notes = [] if self.scale is None else [f"stamps are numbers, read as {self.scale.name}"]
+        kind = "texts" if self.scale is ELAPSED else "numbers"
+        notes = [] if self.scale is None else [f"stamps are {kind}, read as {self.scale.name}"]
         if self.scale in SINCE_START.values():
             notes[0] += (
                 ", from 1970 on; state the unit in the column's name, as in 'Time (ms)', where it is another"
@@ -202,6 +208,18 @@ def _unit_by_step(number: NDArray[np.float64]) -> str:
     step = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
     whole = bool((number % 1 == 0).all())
     return "ms" if whole and step >= LEAST_MS_STEP and (step % 60 != 0 or step % 1000 == 0) else "s"
+
+
+def counted_s(texts: pa.Array) -> NDArray[np.float64]:
+    """Texts such as 25:10:03 as seconds, shape (n,), NaN where they are none."""
+    parts = pc.extract_regex(texts, COUNTED)
+    hour, minute, second = (
+        pc.cast(pc.replace_substring(pc.struct_field(parts, name), ",", "."), pa.float64()).to_numpy(
+            zero_copy_only=False
+        )
+        for name in "hms"
+    )
+    return np.asarray(3600.0 * hour + 60.0 * minute + second)
 
 
 def is_count(column: pa.Array) -> bool:

@@ -20,7 +20,7 @@ from analyzer.history.options import ReadOptions
 from analyzer.history.raw import Raw
 from analyzer.history.stray import MainSpan, NoStampError, main_span
 from analyzer.history.table import Table
-from analyzer.history.time_columns import find_clock
+from analyzer.history.time_columns import check_seconds, find_clock
 from analyzer.history.values import values
 from identification.errors import InputError
 
@@ -118,6 +118,7 @@ def open_long(table: Table, options: ReadOptions) -> LongSource | None:
     if tag is None or value is None:
         return None
     clock = find_clock(table, options)
+    check_seconds(table, clock, tag)
     met = table.tags if isinstance(table, Converted) else _kinds(table, tag).to_pylist()
     tags = tuple(str(name) for name in met if name not in (None, ""))
     quality = _quality_column(table, options)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import tempfile
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
@@ -17,6 +18,8 @@ TITLE = re.compile(
 )
 BARE_TITLE = re.compile(r"^\"?(?P<tag>[^\s\",;|]*[A-Za-z][^\s\",;|]*[._:/-][^\s\",;|]*)\"?$")
 STAMPED = re.compile(r"^\s*\"?\d{1,4}[-/. ]\w{1,10}[-/. ]\d{1,4}\b")
+NUMBERED = re.compile(r"^[+-]?\d[\d.:/T+-]*Z?$")
+"""What a row of data begins with: a stamp or a number."""
 GAP = re.compile(r"\s{2,}")
 RULE = re.compile(r"^\s*-{3,}(?:\s+-{3,})+\s*$")
 FIRST = 12
@@ -37,7 +40,7 @@ def rewritten(path: Path, encoding: str, lines: Sequence[str], scratch: Path | N
     scratch : Path or None
         Where the copy is laid; None: this process's own directory.
     """
-    rewrite = _blocks(lines) or _columns(lines)
+    rewrite = _blocks(lines) or _columns(lines) or _words(lines)
     if rewrite is None:
         return None
     out = Path(tempfile.mkdtemp(prefix="rewritten-", dir=scratch or own_scratch())) / path.name
@@ -112,5 +115,26 @@ def _columns(lines: Sequence[str]) -> Rewrite | None:
             found = cells(line) if line.strip() and not RULE.match(line) else []
             if len(found) == widths[0]:
                 yield found
+
+    return rows
+
+
+def _words(lines: Sequence[str]) -> Rewrite | None:
+    """How a table is read whose columns are parted by one blank, below a header as wide or, where a stamp is a date
+    and a time of day under one name, a word narrower."""
+    head, *rest = [line.split() for line in lines if line.strip()][: 4 * FIRST] or [[]]
+    more = (Counter(map(len, rest)).most_common(1) or [(0, 0)])[0][0] - len(head)
+    fitting = sum(len(row) == len(head) + more and NUMBERED.match(row[0]) is not None for row in rest)
+    if len(head) < 2 or more not in (0, 1) or fitting < max(3, 0.9 * len(rest)) or NUMBERED.match(head[0]):
+        return None
+    if any(d in line for d in DELIMITERS for line in lines[:4]):
+        return None
+
+    def rows(source: Iterator[str]) -> Iterator[Sequence[str]]:
+        yield head
+        for line in source:
+            found = line.split()
+            if len(found) == len(head) + more and found != head:
+                yield [" ".join(found[: more + 1]), *found[more + 1 :]]
 
     return rows

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from analyzer.history.encoding import detect_encoding
 from analyzer.history.headerless import taken_as
-from analyzer.history.names import is_stamp
+from analyzer.history.names import is_stamp, without_unit
 from analyzer.history.options import ReadOptions
 from analyzer.history.rewritten import rewritten
 from analyzer.history.sheet import Sheet
@@ -158,18 +158,36 @@ def _score(body: Sequence[str], mark: str) -> tuple[int, int]:
 
 
 def _header(path: Path, lines: Sequence[str], delimiter: str) -> tuple[int, list[str]]:
-    """Line number (from 0) and cells of the header: the first line as wide as the table, and no data."""
+    """Line number (from 0) and cells of the header: of the lines as wide as the table above its data the first with a
+    name of a time column, else the first."""
     body = [line for line in lines if not NO_DATA_LINE.match(line.strip())]
     width = _widths(body, delimiter).most_common(1)[0][0]
+    above: list[tuple[int, list[str]]] = []
     for place, line in enumerate(lines):
         cells = next(iter(_split([line], delimiter)), [])
         if NO_DATA_LINE.match(line.strip()) or len(cells) < max(2, width - 1):
             continue
         if not _is_data(cells):
-            return place, cells
-        below = _header_below(lines, place, delimiter, width)
-        return below if below is not None else _commented(path, lines, place, delimiter)
+            above.append((place, cells))
+            continue
+        named = next(((k, names) for k, names in above if _names_all(names)), None)
+        below = None if named is not None else _header_below(lines, place, delimiter, width)
+        found = named or below or next(iter(above), None)
+        return found if found is not None else _commented(path, lines, place, delimiter)
+    if above:
+        return above[0]
     raise InputError(f"{path}: no header", f"a line of {width} names above the samples", "add a header line")
+
+
+def _names_all(cells: Sequence[str]) -> bool:
+    """Whether cells are the names of a table's columns: each another, all but one of them filled, one of a time."""
+    filled = [cell.strip() for cell in cells if cell.strip()]
+    return len(filled) >= len(cells) - 1 and len({*filled}) == len(filled) and _names_time(cells)
+
+
+def _names_time(cells: Sequence[str]) -> bool:
+    """Whether one of some cells is the name of a time column; a unit alone is none."""
+    return any(is_stamp(cell.strip()) and without_unit(cell.strip()) for cell in cells)
 
 
 def _header_below(
@@ -183,8 +201,7 @@ def _header_below(
         :PREAMBLE
     ]
     for (place, cells), (_, after) in pairwise(rows):
-        named = any(is_stamp(cell.strip()) for cell in cells)
-        if len(cells) >= width - 1 and named and not _is_data(cells) and _is_data(after):
+        if len(cells) >= width - 1 and _names_time(cells) and not _is_data(cells) and _is_data(after):
             return place, cells
     return None
 

@@ -11,7 +11,16 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from analyzer.history import stamps, zone
-from analyzer.history.clock import SINCE_START, Clock, as_text, is_count, is_text, scale_of
+from analyzer.history.clock import (
+    ELAPSED,
+    SINCE_START,
+    Clock,
+    as_text,
+    counted_s,
+    is_count,
+    is_text,
+    scale_of,
+)
 from analyzer.history.day_order import with_day_order
 from analyzer.history.names import (
     CLOCK_NAMES,
@@ -35,6 +44,9 @@ LIKE_STAMP = re.compile(
     r"\d[-/. ]\.?\s*\w{1,12}[-/. ,]|\d:\d\d|[^\W\d]{3}\.? \d{1,2}\b|^\s*\d{8}|\d\.\d\d\.\d\d|\d[年년]"
 )
 LETTERS_BEHIND = re.compile(r"\b([A-Z]{3,5})\W*$")
+FEW_ROWS, SHARED_MINUTES = 10, 0.7
+"""Rows from which stamps of whole minutes are looked at, and the share of them that must differ [-]; ours: samples 42
+s apart and more are read, a few of them on one stamp."""
 SHOWN = 60
 """Characters of a cell that an error shows."""
 FINER = "timems"
@@ -60,6 +72,30 @@ def find_clock(table: Table, options: ReadOptions) -> Clock:
     if np.isnan(second).all():
         raise _unreadable(table, clock.columns[0])
     return with_winter_time(table, _with_zone(table, replace(clock, local=local)))
+
+
+def check_seconds(table: Table, clock: Clock, tag: int = -1) -> None:
+    """Raise InputError where stamps have lost their seconds, so that the samples of a minute share one.
+
+    Parameters
+    ----------
+    table : Table
+    clock : Clock
+    tag : int
+        Column of the tags of a long table, -1 for a wide one.
+    """
+    second = clock.seconds(table.head(clock.columns))[0]
+    known = np.isfinite(second)
+    if known.sum() < FEW_ROWS or (second[known] % 60.0 != 0).any():
+        return
+    tags = as_text(table.head([tag])[0]).to_pylist() if tag >= 0 else [""] * len(second)
+    kept = {(tags[k], second[k]) for k in np.flatnonzero(known)}
+    if len(kept) <= SHARED_MINUTES * known.sum():
+        raise InputError(
+            f"{table.path}: stamps without their seconds, {known.sum()} samples on {len(kept)} whole minutes",
+            "a stamp of its own for each sample",
+            "export the time with its seconds (in a spreadsheet, format the column as yyyy-mm-dd hh:mm:ss)",
+        )
 
 
 def _with_zone(table: Table, clock: Clock) -> Clock:
@@ -207,7 +243,19 @@ def _chosen(table: Table, kinds: dict[int, str], options: ReadOptions) -> Clock 
         return replace(
             clock, columns=(column,), scale=scale_of(table.head([column])[0], time_unit(table.names[column]))
         )
-    return replace(clock, columns=(by_kind["date"][0],)) if "date" in by_kind else None
+    if "date" in by_kind:
+        return replace(clock, columns=(by_kind["date"][0],))
+    return _elapsed(table, clock, by_kind.get("time of day", ()))
+
+
+def _elapsed(table: Table, clock: Clock, columns: Sequence[int]) -> Clock | None:
+    """The clock of times without a date, where they begin with zero or pass a day: they count from the start."""
+    for i in columns:
+        second = counted_s(as_text(table.head([i])[0]))
+        known = second[np.isfinite(second)]
+        if known.size and (known[0] < 60.0 or known.max() > 86400.0):
+            return replace(clock, columns=(i,), scale=ELAPSED)
+    return None
 
 
 def _by_name(table: Table, columns: Sequence[int]) -> list[int]:

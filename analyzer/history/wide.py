@@ -20,7 +20,7 @@ from analyzer.history.quality_columns import quality_columns
 from analyzer.history.raw import Raw
 from analyzer.history.stray import MainSpan, main_span
 from analyzer.history.table import Table
-from analyzer.history.time_columns import find_clock
+from analyzer.history.time_columns import check_seconds, find_clock
 from analyzer.history.values import values
 from identification.errors import InputError
 
@@ -96,6 +96,7 @@ def open_wide(table: Table, options: ReadOptions) -> WideSource:
         There is no time column, or no column of values beside it.
     """
     clock = find_clock(table, options)
+    check_seconds(table, clock)
     free = [i for i in range(len(table.names)) if i not in clock.columns and _holds_values(table, i)]
     partner, said = quality_columns(table, free)
     columns = [i for i in free if i not in partner.values()]

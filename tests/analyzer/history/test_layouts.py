@@ -1,0 +1,94 @@
+"""Tables under preambles, parted by blanks, on clocks counting from the start; stamps that lost their seconds."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from analyzer.history.export import open_export
+from identification.errors import InputError
+
+MOMENTS = pd.date_range("2024-11-21 08:00", periods=60, freq="5s", tz="UTC")
+NUMBER = np.arange(60) / 4
+
+
+def lines(sep: str, form: str = "%Y-%m-%d %H:%M:%S", time: str = "Time") -> list[str]:
+    """A table of two tags."""
+    rows = [f"{at:{form}}{sep}{v}{sep}{50 - v}" for at, v in zip(MOMENTS, NUMBER, strict=True)]
+    return [sep.join([time, "FIC1.PV", "FIC1.OP"]), *rows]
+
+
+def check(path: Path, text: list[str]) -> None:
+    """Both tags are read, every sample at its moment, and nothing is left out."""
+    path.write_text("\n".join(text) + "\n", encoding="utf-8")
+    export = open_export([path])
+    assert export.tags == ("FIC1.PV", "FIC1.OP")
+    series = export.read(export.tags)
+    np.testing.assert_array_equal(series["FIC1.PV"].value, NUMBER)
+    np.testing.assert_array_equal(series["FIC1.OP"].value, 50 - NUMBER)
+    np.testing.assert_array_equal(series["FIC1.OP"].stamp_s, MOMENTS.as_unit("s").asi8)
+    assert not any("left out" in note for note in export.notes)
+
+
+PREAMBLES = (
+    ["Trend report;Mill A;north"],
+    ["Trend report;Mill A;north", "User;joe;", "From;2024-11-21 08:00:00;", "To;2024-11-21 09:00:00;"],
+    ["Trend report;Mill A;", "Operator;A;B", "Shift;2;B"],
+)
+
+
+@pytest.mark.parametrize("preamble", PREAMBLES)
+def test_a_preamble_as_wide_as_the_table(tmp_path: Path, preamble: list[str]) -> None:
+    """Lines of a preamble are no header where a row of names with a time's among them stands below."""
+    check(tmp_path / "x.csv", preamble + lines(";"))
+
+
+@pytest.mark.parametrize(
+    ("form", "time"),
+    [("%Y-%m-%d %H:%M:%S", "Time"), ("%Y-%m-%d %H:%M:%S", "Date Time"), ("%Y-%m-%dT%H:%M:%S", "Time")],
+)
+def test_columns_parted_by_one_blank(tmp_path: Path, form: str, time: str) -> None:
+    """Words parted by blanks are a table, also where date and time of day stand under one name."""
+    check(tmp_path / "x.txt", lines(" ", form, time))
+
+
+@pytest.mark.parametrize("step_s", [1, 60, 3600])
+def test_hours_minutes_and_seconds_since_the_start(tmp_path: Path, step_s: int) -> None:
+    """Times without a date that begin with zero count from the start, beyond a day too."""
+    at = np.arange(60) * step_s
+    rows = [f"{s // 3600}:{s // 60 % 60:02d}:{s % 60:02d},{k}" for k, s in enumerate(at)]
+    (tmp_path / "x.csv").write_text("\n".join(["Elapsed,a.PV", *rows]) + "\n")
+    export = open_export([tmp_path / "x.csv"])
+    np.testing.assert_array_equal(export.read(["a.PV"])["a.PV"].stamp_s, at)
+    assert any("since the start" in note for note in export.notes)
+
+
+def test_a_time_of_day_without_a_date_is_refused(tmp_path: Path) -> None:
+    """Of what day eight o'clock was nobody knows."""
+    rows = [f"08:00:{k:02d},{k}" for k in range(60)]
+    (tmp_path / "x.csv").write_text("\n".join(["Time,a.PV", *rows]) + "\n")
+    with pytest.raises(InputError, match="no time stamp that is known"):
+        open_export([tmp_path / "x.csv"])
+
+
+@pytest.mark.parametrize("long", [False, True])
+@pytest.mark.parametrize("form", ["%m/%d/%Y %H:%M", "%m/%d/%Y %I:%M %p", "%Y-%m-%d %H:%M:00"])
+@pytest.mark.parametrize("step_s", [5, 30, 60])
+def test_stamps_that_lost_their_seconds(tmp_path: Path, long: bool, form: str, step_s: int) -> None:
+    """Samples of a minute on one stamp are refused in one line; samples a minute apart are read."""
+    at = pd.date_range("2024-11-21 08:00", periods=120, freq=f"{step_s}s")
+    rows = [
+        f"{f'{tag},' if long else ''}{t.strftime(form)},{k}"
+        for k, t in enumerate(at)
+        for tag in "ab"[: 1 + long]
+    ]
+    (tmp_path / "x.csv").write_text("\n".join(["tag,time,value" if long else "time,a.PV", *rows]) + "\n")
+    if step_s < 60:
+        with pytest.raises(InputError, match=r"x\.csv: stamps without their seconds, .* on .* whole minutes"):
+            open_export([tmp_path / "x.csv"])
+    else:
+        export = open_export([tmp_path / "x.csv"])
+        assert export.read([export.tags[0]])[export.tags[0]].stamp_s.size == 120
