@@ -137,7 +137,10 @@ def not_good(
     if good is None and bad[~blank].all() and 2 * count[blank].sum() > count.sum():
         bad = bad & ~blank  # codes stand only where something is wrong
     found = Counter(
-        {f"samples have quality '{names[i]}', taken as bad": int(count[i]) for i in np.flatnonzero(bad)}
+        {
+            f"samples have quality '{str(names[i])[:60]}', taken as bad": int(count[i])
+            for i in np.flatnonzero(bad)
+        }
     )
     found[FLAGGED_INTERPOLATED] = int(count[_interpolated(kinds, scheme)].sum())
     return bad[place], +found

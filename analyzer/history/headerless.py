@@ -16,7 +16,7 @@ ROWS = 200
 """Rows that are looked at."""
 MOSTLY = 0.8
 """Share of a column's cells that are numbers where it holds numbers; the rest is a historian's words; ours."""
-NUMBER = re.compile(r"^[+-]?\d*[.,]?\d+(?:[eE][+-]?\d+)?$")
+NUMBER = re.compile(r"^[+-]?(?:\d+(?:[.,]\d+)?|[.,]\d+)(?:[eE][+-]?\d+)?$")
 GOOD_OR_BAD = frozenset({"good", "bad", "uncertain", "g", "b", "u", "0", "100", "192"})
 
 

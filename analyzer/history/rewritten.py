@@ -8,15 +8,17 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
+from analyzer.history.names import LONGEST
 from analyzer.history.unpacked import own_scratch
 
 DELIMITERS = (";", "\t", "|", ",")
 TITLE = re.compile(
     r"^\W*(?:tag ?name|tag|point ?name|point|item|variable|channel|signal|messstelle|name)\s*[:=]\s*"
-    r"(?P<tag>\S.*?)\W*$",
+    r"(?P<tag>\S.*)$",
     re.IGNORECASE,
 )
-BARE_TITLE = re.compile(r"^\"?(?P<tag>[^\s\",;|]*[A-Za-z][^\s\",;|]*[._:/-][^\s\",;|]*)\"?$")
+BARE_TITLE = re.compile(r"^\"?(?P<tag>[^\s\",;|A-Za-z]*[A-Za-z][^\s\",;|._:/-]*[._:/-][^\s\",;|]*)\"?$")
+BEHIND = re.compile(r"\W+$")
 STAMPED = re.compile(r"^\s*\"?\d{1,4}[-/. ]\w{1,10}[-/. ]\d{1,4}\b")
 NUMBERED = re.compile(r"^[+-]?\d[\d.:/T+-]*Z?$")
 """What a row of data begins with: a stamp or a number."""
@@ -55,10 +57,13 @@ def rewritten(path: Path, encoding: str, lines: Sequence[str], scratch: Path | N
 
 def _title(line: str) -> str:
     """The tag that a line stands for as a title over its samples; '' for any other line."""
+    if len(line) > LONGEST:
+        return ""
     found = TITLE.match(line) or BARE_TITLE.match(line.strip())
     if found is None or STAMPED.match(line):
         return ""
-    return found["tag"].strip().strip('"')
+    tag: str = found["tag"].strip()
+    return (BEHIND.sub("", tag) or tag[:1]) if found.re is TITLE else tag.strip('"')
 
 
 def _blocks(lines: Sequence[str]) -> Rewrite | None:

@@ -27,7 +27,7 @@ DELIMITER_NAMES = {",": "comma", ";": "semicolon", "\t": "tab", "|": "bar"}
 NO_DATA_LINE = re.compile(r"^(?:#.*|\[\w+\]|sep=.?|)$", re.IGNORECASE)
 COMMA_NUMBER = re.compile(r"^[+-]?\d+,\d+(?:[eE][+-]?\d+)?$")
 POINT_NUMBER = re.compile(r"^[+-]?\d*\.\d+(?:[eE][+-]?\d+)?$")
-NUMBER = re.compile(r"^[+-]?\d*[.,]?\d+(?:[eE][+-]?\d+)?$")
+NUMBER = re.compile(r"^[+-]?(?:\d+(?:[.,]\d+)?|[.,]\d+)(?:[eE][+-]?\d+)?$")
 GROUP = re.compile(r"^[+-]?[1-9]\d{0,2}[.,]\d{3}$")
 """A number whose mark may be decimal or may group thousands."""
 DATA_MARK = re.compile(r"^\s*\[data\]\s*$", re.IGNORECASE)

@@ -38,7 +38,7 @@ MINUS_BEHIND = re.compile(r"^([\d.,' \u00a0\u2007\u2009\u202f]*\d[.,]?)\s?-$")
 """A number with its minus behind it."""
 SPACES = re.compile("[\u00a0\u2007\u2009\u202f' ]")
 """Marks that group thousands, besides comma and point."""
-NUMBER = re.compile(r"^[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?$")
+NUMBER = re.compile(r"^[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?$")
 GROUPED = {
     ".": re.compile(r"^[+-]?\d{1,3}(?:,\d{3})+(?:\.\d+)?$"),
     ",": re.compile(r"^[+-]?\d{1,3}(?:\.\d{3})+(?:,\d+)?$"),
@@ -48,6 +48,8 @@ SPACED = re.compile(r"^[+-]?\d{1,3}(?: \d{3})+(?:[.,]\d+)?$")
 COMMA_FRACTION = re.compile(r"^[+-]?\d+,(?:\d{1,2}|\d{4,})(?:[eE][+-]?\d+)?$|^[+-]?0,\d+$")
 """A decimal comma that can be nothing else."""
 WITH_UNIT = re.compile(r"^(?P<number>[+-]?[\d.,]*\d(?:[eE][+-]?\d+)?)\s*(?P<unit>[^\d\s.,+-][^\d]{0,11})$")
+LONGEST, SHOWN = 100, 60
+"""Characters of a number at most, and of a text that notes show."""
 LIKE_NUMBER = re.compile(r"^[^\w]*\d")
 """A text that begins as a number does, and so was meant as one."""
 
@@ -144,6 +146,8 @@ def parsed(texts: list[str], decimal: str) -> tuple[NDArray[np.float64], list[st
 
 def _number(text: str, decimal: str) -> tuple[float, bool]:
     """A text as a number, NaN where it is none, and whether its thousands are grouped."""
+    if len(text) > LONGEST:
+        return math.nan, False
     spaced = SPACES.sub(" ", text)
     grouped = bool(SPACED.match(spaced)) or bool(GROUPED[decimal].match(text))
     if grouped:
@@ -168,6 +172,6 @@ def _found(
 ) -> Counter[str]:
     found: Counter[str] = Counter()
     for i in np.flatnonzero(error & (count > 0)):
-        found[f"values are the text '{kinds[i]}', taken as bad"] += int(count[i])
+        found[f"values are the text '{kinds[i][:SHOWN]}', taken as bad"] += int(count[i])
     found[BLANK] += int(count[blank].sum())
     return +found

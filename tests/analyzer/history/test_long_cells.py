@@ -1,0 +1,49 @@
+"""Long lines and cells cost time by their length, not by its square."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import pytest
+
+from analyzer.history.export import open_export
+from analyzer.history.options import ReadOptions
+from identification.errors import InputError
+
+ROWS = "".join(f"2024-11-21 08:00:{k:02d},{k / 4},{k}\n" for k in range(60))
+HEAD = "time,a.PV,a.OP\n"
+LONG = 100_000
+"""Characters, of which the square takes minutes and the length milliseconds."""
+FIRST = "2024-11-21 07:00:00,"
+LINES = {
+    "points": HEAD + "a.b." * (LONG // 4) + "\n" + ROWS,
+    "points before a blank": "a.b." * (LONG // 4) + " ;\n" + HEAD + ROWS,
+    "a title and blanks": "tag: a" + " " * LONG + ".b\n" + HEAD + ROWS,
+    "a title and points": "tag: " + ". " * (LONG // 2) + "\n" + HEAD + ROWS,
+    "digits": HEAD + FIRST + "1" * LONG + ",3\n" + ROWS,
+    "digits and a letter": HEAD + FIRST + "1" * LONG + "x,3\n" + ROWS,
+    "grouped digits": HEAD + FIRST + "1'" * (LONG // 2) + "x,3\n" + ROWS,
+    "digits and a minus": HEAD + FIRST + "1" * LONG + "--,3\n" + ROWS,
+    "a stamp of zeros": HEAD + "0" * LONG + ":00:00,1,3\n" + ROWS,
+    "a stamp of blanks": HEAD + "2024-11-21" + " " * LONG + "x,1,3\n" + ROWS,
+    "a name of blanks": HEAD.replace("time", "time" + " " * LONG + "x") + ROWS,
+    "marks of error": HEAD + FIRST + "?" * LONG + "x,3\n" + ROWS,
+    "words": "a " * (LONG // 2) + "\n" + HEAD + ROWS,
+}
+
+
+@pytest.mark.parametrize("what", LINES)
+def test_a_long_line_is_read_in_time(tmp_path: Path, what: str) -> None:
+    """An export with one long line or cell is read or refused within five seconds, and its notes stay short."""
+    (tmp_path / "x.csv").write_text(LINES[what], encoding="utf-8")
+    begun = time.process_time()
+    try:
+        export = open_export([tmp_path / "x.csv"], ReadOptions(scratch=tmp_path))
+        export.span()
+        export.read(export.tags)
+        said = max(map(len, export.notes))
+    except InputError as error:
+        said = len(str(error))
+    assert time.process_time() - begun < 5.0
+    assert said < 1000
