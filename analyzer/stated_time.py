@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from datetime import datetime, timedelta
 
 import numpy as np
 import pyarrow as pa
+from numpy.typing import NDArray
 
 from analyzer.history import stamps
 from analyzer.plant_clock import UTC_NAME, seconds
@@ -37,34 +39,46 @@ def parse_time(text: str, where: str, zone: str = UTC_NAME, day_first: bool | No
     InputError
         It is no time, could be read two ways, or lies outside 1970 to 2099.
     """
-    shown = text.strip()[:SHOWN]
-    parts = stamps.fields(pa.array([text.strip()]))
-    if parts is None or not parts.readable[0]:
-        raise InputError(f"{where}: time {shown!r}", EXAMPLE, "correct the time")
-    order = _day_first(parts, text, day_first)
-    if order is None:
-        raise InputError(
-            f"{where}: time {shown!r} reads two ways", EXAMPLE, "write the year first, with four digits"
-        )
-    local_s = float(stamps.seconds(parts, order)[0])
-    if not np.isfinite(local_s) or not FIRST_S <= local_s < LAST_S:
-        raise InputError(f"{where}: time {shown!r} is no such day", EXAMPLE, "correct the time")
-    if parts.zoned:
-        return local_s
-    return seconds(datetime(1970, 1, 1) + timedelta(seconds=local_s), zone)
+    return float(parse_times([text], [where], zone, day_first)[0])
 
 
-def _day_first(parts: stamps.Fields, text: str, stated: bool | None) -> bool | None:
-    """Whether the day stands first; None where a date reads two ways."""
-    if not parts.is_open:
-        return False
-    if parts.short_year and stamps.may_be_year_first(parts):
-        return stated
+def parse_times(
+    texts: Sequence[str], where: Sequence[str], zone: str = UTC_NAME, day_first: bool | None = None
+) -> NDArray[np.float64]:
+    """The same of many times at once, shape (n,); the first that is none, or reads two ways, is refused."""
+    trimmed = [text.strip() for text in texts]
+    parts = stamps.fields(pa.array(trimmed, pa.string()))
+    readable = np.zeros(len(texts), dtype=bool) if parts is None else parts.readable
+    for at in np.flatnonzero(~readable)[:1]:
+        raise InputError(f"{where[at]}: time {trimmed[at][:SHOWN]!r}", EXAMPLE, "correct the time")
+    if parts is None:
+        return np.empty(0)
+    first, sure = _day_first(parts, trimmed, day_first)
+    local_s = np.where(first, stamps.seconds(parts, True), stamps.seconds(parts, False))
+    with np.errstate(invalid="ignore"):
+        of_our_time = (local_s >= FIRST_S) & (local_s < LAST_S)
+    for at in np.flatnonzero(~sure | ~of_our_time)[:1]:
+        seen = f"{where[at]}: time {trimmed[at][:SHOWN]!r}"
+        if not sure[at]:
+            raise InputError(f"{seen} reads two ways", EXAMPLE, "write the year first, with four digits")
+        raise InputError(f"{seen} is no such day", EXAMPLE, "correct the time")
+    epoch = datetime(1970, 1, 1)
+    return np.array(
+        [
+            s if zoned else seconds(epoch + timedelta(seconds=s), zone)
+            for s, zoned in zip(local_s.tolist(), parts.stated.tolist(), strict=True)
+        ]
+    )
+
+
+def _day_first(
+    parts: stamps.Fields, texts: Sequence[str], stated: bool | None
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Whether the day stands first in each date, shape (n,), and whether that is sure."""
+    is_open = parts.order == stamps.OPEN
+    year = is_open & parts.short & (parts.b >= 1) & (parts.b <= 12) & (parts.c >= 1) & (parts.c <= 31)
+    above = (parts.a > 12) != (parts.b > 12)
+    pointed = np.array(["." in text.split(" ")[0] for text in texts]) | (parts.a == parts.b)
     if stated is not None:
-        return stated
-    seen = stamps.days_seen(parts)
-    if seen is not None:
-        return seen
-    if "." in text.strip().split(" ")[0] or parts.a[0] == parts.b[0]:
-        return True
-    return None
+        return is_open & stated, np.ones(len(texts), dtype=bool)
+    return is_open & np.where(above, parts.a > 12, pointed), ~is_open | (~year & (above | pointed))

@@ -175,7 +175,8 @@ class Clock:
         parts = stamps.fields(texts, self.timezone)
         if parts is None:
             return np.full(len(texts), np.nan), True
-        return stamps.seconds(parts, self._order(parts), self.year_first), not parts.zoned
+        second = stamps.seconds(parts, self._order(parts), self.year_first)
+        return stamps.midnights_told(second, parts), not parts.zoned
 
     def _order(self, parts: stamps.Fields) -> bool:
         """Whether these stamps are read day first; where the head left nothing open and these do, they decide."""

@@ -86,9 +86,14 @@ class Fields:
     clock_s: NDArray[np.float64]
     offset_s: NDArray[np.float64]
     readable: NDArray[np.bool_]
-    zoned: bool
+    stated: NDArray[np.bool_]
     order: NDArray[np.int8]
     short: NDArray[np.bool_]
+
+    @property
+    def zoned(self) -> bool:
+        """Whether any stamp states its zone."""
+        return bool(self.stated.any())
 
     @property
     def short_year(self) -> bool:
@@ -129,7 +134,7 @@ def fields(texts: pa.Array, timezone: str | None = None) -> Fields | None:
         clock_s,
         offset_s,
         _readable(parts, part, known) & shown & (np.abs(offset_s) <= MOST_OFFSET_S),
-        bool(pc.any(pc.not_equal(part["z"], "")).as_py()),
+        pc.not_equal(part["z"], "").to_numpy(zero_copy_only=False),
         _written_order(part),
         pc.less_equal(pc.utf8_length(part["c"]), 2).to_numpy(zero_copy_only=False),
     )
@@ -160,12 +165,12 @@ def seconds(parts: Fields, day_first: bool, year_first: bool = False) -> NDArray
     first = ((year - 1970) * 12 + np.clip(month, 1, 12) - 1).astype("datetime64[M]")
     days = first.astype("datetime64[D]").astype(np.int64) + day - 1
     next_first = (first + 1).astype("datetime64[D]").astype(np.int64)
-    second = np.where(valid & (days < next_first), days * 86400.0 + parts.clock_s - parts.offset_s, np.nan)
-    return _midnights_told(second, parts.clock_s == 86400.0)
+    return np.where(valid & (days < next_first), days * 86400.0 + parts.clock_s - parts.offset_s, np.nan)
 
 
-def _midnights_told(second: NDArray[np.float64], midnight: NDArray[np.bool_]) -> NDArray[np.float64]:
-    """Stamps whose 24:00 ends its day, or begins it where only so the stamps run on."""
+def midnights_told(second: NDArray[np.float64], parts: Fields) -> NDArray[np.float64]:
+    """Stamps of one file [s], whose 24:00 ends its day, or begins it where only so the stamps run on."""
+    midnight = parts.clock_s == 86400.0
     if not midnight.any():
         return second
     begins = second - 86400.0 * midnight

@@ -17,7 +17,7 @@ from analyzer.block_bootstrap import Floats
 from analyzer.config import ChangeLimits
 from analyzer.history.encoding import detect_encoding
 from analyzer.plant_clock import UTC_NAME
-from analyzer.stated_time import parse_time
+from analyzer.stated_time import parse_times
 from identification.errors import InputError
 
 COLUMNS = ("loop", "time", "kp_old", "ti_old", "kp_new", "ti_new", "who")
@@ -79,19 +79,17 @@ def read_changes(path: Path, zone: str = UTC_NAME, day_first: bool | None = None
         if required not in names:
             raise InputError(f"{path}: no column {required!r}", "columns " + ", ".join(COLUMNS), "add it")
     rows = [{k: (row[n] or "") for k, n in names.items() if k in COLUMNS} for row in reader]
-    found = tuple(
-        _change(row, f"{path}, row {i}", zone, day_first)
-        for i, row in enumerate(rows, 2)
-        if row["loop"].strip()
-    )
-    if not found:
+    places = [f"{path}, row {i}" for i, row in enumerate(rows, 2) if row["loop"].strip()]
+    rows = [row for row in rows if row["loop"].strip()]
+    if not rows:
         raise InputError(f"{path}: no changes", "one row a change below the header", "add the changes")
-    return found
+    times = parse_times([row["time"] for row in rows], places, zone, day_first).tolist()
+    return tuple(_change(*stated) for stated in zip(rows, places, times, strict=True))
 
 
-def _change(row: Mapping[str, str], where: str, zone: str, day_first: bool | None) -> TuningChange:
+def _change(row: Mapping[str, str], where: str, time_s: float) -> TuningChange:
     kp_old, ti_old, kp_new, ti_new = (_number(row.get(c, ""), where, c) for c in COLUMNS[2:6])
-    time_s, who = parse_time(row["time"], where, zone, day_first), row.get("who", "").strip()
+    who = row.get("who", "").strip()
     return TuningChange(row["loop"].strip(), time_s, kp_old, ti_old, kp_new, ti_new, who)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -83,3 +84,31 @@ def test_changes_are_read_in_one_order(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="row 2"):
         read_changes(path)
     assert [c.time_s for c in read_changes(path, day_first=True)] == [at("2026-05-12")]
+
+
+@pytest.mark.parametrize("time", ["25:00", "24:01", "12:61", "12:00:61", "12:00+99:00", "13:00 AM"])
+def test_what_no_clock_shows_is_refused(tmp_path: Path, time: str) -> None:
+    """A time that no clock shows is one line with file and row, and not carried over into another hour or day."""
+    path = tmp_path / "changes.csv"
+    path.write_text(f"loop,time\nA,2026-03-04 08:00\n,\nB,2026-03-04 {time}\n")
+    with pytest.raises(InputError, match=r"changes\.csv, row 4: time "):
+        read_changes(path)
+
+
+def test_many_changes_are_one_table(tmp_path: Path) -> None:
+    """Each of 20,000 rows is what it is alone, in one second of processor time for them all."""
+    shown = (
+        "2026-03-{d:02d} 0{h}:00",
+        "{d:02d}.03.2026 0{h}:00",
+        "2026-03-{d:02d}T0{h}:00+02:00",
+        "Mar {d} 2026 0{h}:00",
+    )
+    texts = [shown[k % 4].format(d=1 + k % 28, h=k % 10) for k in range(20_000)]
+    path = tmp_path / "changes.csv"
+    path.write_text("loop,time\n" + "".join(f"A,{text}\n" for text in texts))
+    begun = time.process_time()
+    found = [change.time_s for change in read_changes(path, "Europe/Helsinki")]
+    assert time.process_time() - begun < 1.0
+    some = range(0, 20_000, 997)
+    assert [found[k] for k in some] == [parse_time(texts[k], "here", "Europe/Helsinki") for k in some]
+    assert found[0] == at("2026-02-28T22:00:00")
