@@ -20,6 +20,7 @@ from analyzer.finish import finish_night, is_empty
 from analyzer.history.export import Export, counted
 from analyzer.loops.changes import TuningChange
 from analyzer.loops.spec import LoopSpec
+from analyzer.loops.tags import no_loops
 from analyzer.nights import Night, nights_of
 from analyzer.plant_clock import UTC_NAME
 from analyzer.store import Store
@@ -32,9 +33,6 @@ __all__ = ["Batch", "Outcome", "assess_loop", "run"]
 CHUNKS, FEWEST, MOST = 16, 4, 16
 """Tasks of a run that is small, and loops per task: enough to carry its four small tables, few enough for a smooth
 progress bar and for workers that end together."""
-
-
-NO_LOOPS = InputError("no loops in the export", "tags such as LOOP.PV", "state them with --loops loops.csv")
 
 
 @dataclass(frozen=True, slots=True)
@@ -192,7 +190,7 @@ def run(
         No loops, no nights, another run on the store, or pieces of another run to be gone on with.
     """
     if not batch.specs:
-        raise NO_LOOPS
+        raise no_loops(batch.export.tags)
     with locked(batch.store.path):
         store_version.upgrade(batch.store.path)
         nights = batch.nights()

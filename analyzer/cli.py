@@ -16,7 +16,6 @@ from analyzer.commands import run as run_cli
 from analyzer.commands import store as store_cli
 from analyzer.commands.options import PLACE, SOME_LOST, Asked, export_options, say, told
 from analyzer.decisions import Lane
-from identification.errors import InputError
 
 for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
@@ -46,14 +45,13 @@ def check(asked: Asked) -> None:
     Example: triage check export.csv --loops loops.csv
     """
     from analyzer.check import lines
+    from analyzer.loops.tags import no_loops
 
     source, specs, notes = asked.opened()
     lost = 0
     if not specs:
         say("\n".join(line for line, _ in lines(source, specs, notes, asked.config, asked.within)))
-        raise InputError(
-            "no loops in the export", "tags such as LOOP.PV", "state them with --loops loops.csv"
-        )
+        raise no_loops(source.tags)
     for line, bad in lines(source, specs, notes, asked.config, asked.within, asked.changes, asked.zone):
         lost += bad
         say(line)

@@ -84,7 +84,10 @@ REMARKS = frozenset({
     "annotated", "annotation", "annotations", "substituted", "comment", "comments", "remark", "marker",
 })  # fmt: skip
 """Columns beside the values that are neither."""
-BARE_ENDINGS = frozenset({"pv", "sp", "op", "mv", "out", "mode", "pos", "position", "sv", "meas", "spt"})
+BARE_ENDINGS = frozenset({
+    "pv", "sp", "op", "mv", "out", "mode", "pos", "position", "sv", "meas", "spt", "setp", "setpoint", "cv", "co",
+    "output", "sollwert", "soll", "istwert", "ist", "stellgröße", "stellgrösse", "stellgroesse", "stellwert",
+})  # fmt: skip
 
 
 def plain(name: str) -> str:

@@ -8,10 +8,11 @@ from collections.abc import Iterable, Mapping
 ROLES = ("sp", "pv", "op", "mode", "position")
 
 # The same ending means different things: CV is a current value in DeltaV and an output in Rockwell, MV an
-# output in Yokogawa. So a loop follows one row as a whole: the one that explains most of its tags.
+# output in Yokogawa. So a loop follows one row as a whole: the one that explains most of its tags. What that row
+# leaves without a tag is taken from the others, of tags that are free: where PV is PV, a CV is the output.
 ENDINGS: Mapping[str, Mapping[str, tuple[str, ...]]] = {
     "plain": {
-        "sp": ("SP", "SETPOINT"),
+        "sp": ("SP", "SETPOINT", "SETP"),
         "pv": ("PV",),
         "op": ("OP", "OUT", "CO", "OUTPUT"),
         "mode": ("MODE", "MD"),
@@ -22,11 +23,18 @@ ENDINGS: Mapping[str, Mapping[str, tuple[str, ...]]] = {
     "Rockwell": {"sp": ("SP",), "pv": ("PV",), "op": ("CV",), "mode": ("MODE",)},
     "Foxboro": {"sp": ("SPT",), "pv": ("MEAS",), "op": ("OUT",), "mode": ("MA",)},
     "DeltaV": {"sp": ("SP.CV",), "pv": ("PV.CV",), "op": ("OUT.CV",), "mode": ("MODE.ACTUAL", "MODE.CV")},
+    "German": {
+        "sp": ("SOLLWERT", "SOLL"),
+        "pv": ("ISTWERT", "IST"),
+        "op": ("STELLGRÖSSE", "STELLGRÖßE", "STELLGROESSE", "STELLWERT", "STELLSIGNAL"),
+    },
     "Valmet": {"sp": ("SPA", "SP"), "pv": ("ME",), "op": ("CON",)},
 }
 _KNOWN = {ending for roles in ENDINGS.values() for endings in roles.values() for ending in endings}
 _SPLIT = re.compile(
-    r"^(?P<loop>.+?)[._:/](?P<ending>" + "|".join(re.escape(ending) for ending in sorted(_KNOWN)) + r")$",
+    r"^(?P<loop>.+?)(?:[._:/]| (?=\w{4,}$))(?P<ending>"
+    + "|".join(re.escape(ending) for ending in sorted(_KNOWN))
+    + r")$",
     re.IGNORECASE,
 )
 _BLOCK = re.compile(r"^(?P<module>.+)/[^/]+$")
@@ -49,7 +57,13 @@ def loops_of(tags: Iterable[str]) -> dict[str, dict[str, str]]:
 def _roles(endings: Mapping[str, str]) -> dict[str, str]:
     """Tags by role, as the control system has it that explains most endings."""
     readings = [_reading(endings, system) for system in ENDINGS]
-    return max(readings, key=lambda roles: ("pv" in roles, len(roles)))
+    roles = max(readings, key=lambda roles: ("pv" in roles, len(roles)))
+    for role in ("sp", "op"):
+        others = (ending for system in ENDINGS.values() for ending in system.get(role, ()))
+        free = (endings[e] for e in others if e in endings and endings[e] not in roles.values())
+        if role not in roles and (tag := next(free, None)) is not None:
+            roles[role] = tag
+    return roles
 
 
 def _reading(endings: Mapping[str, str], system: str) -> dict[str, str]:

@@ -12,12 +12,18 @@ from analyzer.loops.spec import LoopSpec, read_loops
 from identification.errors import InputError
 from identification.models import Form, Pid
 
-__all__ = ["LoopSpec", "as_stated", "controller", "find_loops", "match", "read_loops"]
+__all__ = ["LoopSpec", "as_stated", "controller", "find_loops", "match", "no_loops", "read_loops"]
 
 
 def find_loops(tags: Iterable[str]) -> tuple[LoopSpec, ...]:
     """Loops with at least a PV, found by the endings of the tags."""
     return tuple(LoopSpec(loop, **tags_of) for loop, tags_of in loops_of(tags).items())  # type: ignore[arg-type]
+
+
+def no_loops(tags: Sequence[str]) -> InputError:
+    """What is said of an export whose tags name no loop."""
+    seen = f"no loops in the export, whose tags are {', '.join(tags[:8])}{', ...' if len(tags) > 8 else ''}"
+    return InputError(seen, "tags such as LOOP.PV", "state them with --loops loops.csv")
 
 
 def match(specs: Sequence[LoopSpec], tags: Iterable[str]) -> tuple[tuple[LoopSpec, ...], tuple[str, ...]]:

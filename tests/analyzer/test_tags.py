@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from analyzer.history.export import open_export
 from analyzer.loops.tags import LoopSpec, as_stated, controller, find_loops, match, read_loops
 from identification.errors import InputError
 from identification.models import Form
@@ -240,3 +241,39 @@ def test_a_zero_that_says_nothing_ends_no_night(tmp_path):
     (loop,) = read_loops(written(tmp_path, "loop,kp,ti,scan_s\nFIC1,0,10,0\n"))
     assert (loop.kp, loop.ti, loop.scan_s) == (None, 10.0, None)
     assert not loop.stated & {"kp", "scan_s"}
+
+
+@pytest.mark.parametrize(
+    ("sp", "pv", "op"),
+    [
+        *(("SPT", "PV", "OP"), ("SETP", "PV", "CV"), ("SPT", "PV", "MV"), ("SPT", "MEAS", "CO")),
+        *(("Sollwert", "Istwert", "Stellgröße"), ("SP", "IST", "OP"), ("SP", "PV", "Stellwert")),
+    ],
+)
+@pytest.mark.parametrize("mark", "._")
+def test_endings_of_several_makes(sp, pv, op, mark):
+    """A set point and an output are found by what any make calls them, where the process value has another's name."""
+    tags = {role: f"FIC1{mark}{ending}" for role, ending in (("sp", sp), ("pv", pv), ("op", op))}
+    (loop,) = find_loops(tags.values())
+    assert (loop.loop, loop.sp, loop.pv, loop.op) == ("FIC1", tags["sp"], tags["pv"], tags["op"])
+
+
+def test_words_behind_a_blank():
+    """A whole word may stand behind a blank; two letters there may be part of a name."""
+    (loop,) = find_loops(["FIC1 Istwert", "FIC1 Sollwert", "column PV", "column SP"])
+    assert (loop.loop, loop.sp, loop.pv) == ("FIC1", "FIC1 Sollwert", "FIC1 Istwert")
+
+
+def test_no_tag_has_two_roles():
+    """An MV beside PV and OP is no second output, and no tag is taken for a set point and an output."""
+    (loop,) = find_loops(["A.PV", "A.OP", "A.MV"])
+    assert (loop.pv, loop.op, loop.sp) == ("A.PV", "A.OP", None)
+
+
+@pytest.mark.parametrize("names", [("Sollwert", "Istwert", "Stellgröße"), ("SETP", "PV", "CV")])
+def test_bare_columns_belong_to_the_file_s_loop(tmp_path, names):
+    """Columns that are named for roles alone are of the loop that the file is named for."""
+    rows = "".join(f"2026-03-02 00:00:{k:02d};50;{k};{k}\n" for k in range(60))
+    (tmp_path / "FIC1.csv").write_text(f"Zeit;{';'.join(names)}\n{rows}", encoding="utf-8")
+    (loop,) = find_loops(open_export([tmp_path / "FIC1.csv"]).tags)
+    assert (loop.loop, loop.op is not None, loop.sp is not None) == ("FIC1", True, True)

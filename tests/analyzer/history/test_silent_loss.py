@@ -68,5 +68,6 @@ def test_check_without_loops_is_no_success(tmp_path: Path) -> None:
     result = CliRunner().invoke(main, ["check", str(path)])
     assert result.exit_code == 2
     assert result.stderr.splitlines() == [
-        "triage: no loops in the export; expected tags such as LOOP.PV; state them with --loops loops.csv"
+        "triage: no loops in the export, whose tags are a, b; expected tags such as LOOP.PV; "
+        "state them with --loops loops.csv"
     ]
