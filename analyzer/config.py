@@ -66,7 +66,7 @@ class Config:
     explain_search: SearchLimits = field(default_factory=SearchLimits)
     explain_proof: ProofLimits = field(default_factory=ProofLimits)
     workers: WorkerLimits = field(default_factory=WorkerLimits)
-    opening: WorkerLimits = field(default_factory=lambda: WorkerLimits(65_536.0, 3600.0, 7200.0))
+    opening: WorkerLimits = field(default_factory=lambda: WorkerLimits(65_536.0, 60.0, 360.0))
 
     @property
     def explain(self) -> ExplainLimits:

@@ -28,6 +28,7 @@ from reports.whole_file import is_full
 
 if TYPE_CHECKING:
     from analyzer.batch import Batch, Outcome
+    from analyzer.config import WorkerLimits
     from analyzer.history.export import Export
     from analyzer.loops.spec import LoopSpec
     from analyzer.nights import Night
@@ -35,6 +36,9 @@ if TYPE_CHECKING:
 
 STOPPED = 128
 """Exit status of a run that a signal has stopped, less the signal's number: what shells and schedulers expect."""
+OPENED_BYTES_S, FETCHED_S = 1e6, 3600.0
+"""Speed that an export's opening has at least beyond its limit [bytes/s], and the time more that one of shared
+storage may take [s]; ours: text is laid beside as Parquet at fifty times the first."""
 FEW = 10
 """Notes on what was read that are printed; the rest is counted."""
 
@@ -178,7 +182,7 @@ def _opened(asked: Asked) -> tuple[Export, Sequence[LoopSpec], Sequence[str]]:
     """
     from analyzer.workers import Died, Workers
 
-    with Workers(1, find_out, asked.config.opening) as workers:
+    with Workers(1, find_out, _allowed(asked)) as workers:
         workers.submit(asked)
         (found,) = workers.results()
     if isinstance(found, Died):
@@ -188,6 +192,18 @@ def _opened(asked: Asked) -> tuple[Export, Sequence[LoopSpec], Sequence[str]]:
             "export them again or in parts; 'triage check FILE' on each finds the one",
         )
     return found
+
+
+def _allowed(asked: Asked) -> WorkerLimits:
+    """What opening the export may cost, by its size; of shared storage the copying is not known beforehand."""
+    from analyzer.places import is_remote
+
+    near = [path for path in asked.export if not is_remote(path)]
+    files = [file for path in near for file in (path.rglob("*") if path.is_dir() else [path])]
+    more_s = sum(file.stat().st_size for file in files if file.is_file()) / OPENED_BYTES_S
+    more_s += FETCHED_S * (len(near) < len(asked.export))
+    limits = asked.config.opening
+    return replace(limits, processor_s=limits.processor_s + more_s, wall_s=limits.wall_s + 6.0 * more_s)
 
 
 def find_out(asked: Asked, began: Callable[[int], None]) -> tuple[Export, Sequence[LoopSpec], Sequence[str]]:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
+import threading
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -21,6 +23,9 @@ OPEN_FILES = 4
 MANY_ROWS, ROWS_A_BYTE = 5e6, 20.0
 """Files of more rows than both are not read; ours: where any value moves there are 3 rows a byte at most, in whatever
 encoding; a file of nothing but constants may have 90."""
+PROBED_BYTES, PROBE_S = 4_000_000, 10.0
+"""Size below which a file is read through when it is opened, and the time that this may take by the clock; ours: it
+takes 50 ms, and of larger files the limits of a run's workers hold."""
 LONGEST_TEXT, MUCH_TEXT = 1000.0, 10_000_000
 """Mean length of the texts of a column in a row group, and their bytes, beyond which together a file is not read;
 ours: names, stamps and states are short, and a few texts of megabytes unpack from nothing to gigabytes. A list of ten
@@ -90,9 +95,33 @@ def open_parquet(path: Path) -> ParquetTable:
             f"at most {LONGEST_TEXT:g} bytes for a tag, a stamp or a state",
             "export numbers, tags and stamps alone",
         )
+    if path.stat().st_size < PROBED_BYTES:
+        _check_pages(path)
     if rows == 0:
         raise InputError(f"{path}: Parquet without rows", "at least one sample", "export a period with data")
     return ParquetTable(path, tuple(schema.names), tuple(schema.types), rows=rows)
+
+
+def _check_pages(path: Path) -> None:
+    """Raise InputError for a file whose pages, damaged, are read without end; other damage shows where it is read.
+
+    The read is left to a thread, which ends with the process: nothing else stops it.
+    """
+    reading = threading.Thread(target=_read_through, args=(path,), daemon=True)
+    reading.start()
+    reading.join(PROBE_S)
+    if reading.is_alive():
+        raise InputError(
+            f"{path}: its pages take longer than {PROBE_S:g} s to read",
+            "a whole Parquet file",
+            "export it again",
+        )
+
+
+def _read_through(path: Path) -> None:
+    with contextlib.suppress(pa.ArrowException, OSError, MemoryError), pq.ParquetFile(path) as file:
+        for _ in file.iter_batches(use_threads=False):
+            pass
 
 
 def _longest_text(footer: pq.FileMetaData) -> float:

@@ -31,12 +31,8 @@ ENDINGS: Mapping[str, Mapping[str, tuple[str, ...]]] = {
     "Valmet": {"sp": ("SPA", "SP"), "pv": ("ME",), "op": ("CON",)},
 }
 _KNOWN = {ending for roles in ENDINGS.values() for endings in roles.values() for ending in endings}
-_SPLIT = re.compile(
-    r"^(?P<loop>.+?)(?:[._:/]| (?=\w{4,}$))(?P<ending>"
-    + "|".join(re.escape(ending) for ending in sorted(_KNOWN))
-    + r")$",
-    re.IGNORECASE,
-)
+_ENDINGS = "|".join(re.escape(ending) for ending in sorted(_KNOWN))
+_SPLIT = re.compile(rf"^(?P<loop>.+?)(?:[._:/]| (?=\w{{4,}}$))(?P<ending>{_ENDINGS})$", re.IGNORECASE)
 _BLOCK = re.compile(r"^(?P<module>.+)/[^/]+$")
 
 

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import decimal
+import threading
+import time
 from datetime import UTC, date, datetime, timedelta
 from pathlib import Path
 
@@ -11,7 +14,9 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
+from analyzer.history import parquet
 from analyzer.history.export import Export, open_export
+from identification.errors import InputError
 
 STAMPS = [datetime(2024, 11, 21, 8, 0, i) for i in range(4)]
 FIRST_S = datetime(2024, 11, 21, 8, tzinfo=UTC).timestamp()
@@ -97,3 +102,39 @@ def test_modes_beside_numbers_in_a_long_file(tmp_path: Path) -> None:
     assert (read["F.PV"].value.tolist(), read["F.PV"].text) == ([1.5, 2.5], None)
     assert read["F.MODE"].text is not None
     assert read["F.MODE"].text.tolist() == ["AUTO", "MAN"]
+
+
+def test_pages_without_end_are_refused(tmp_path, monkeypatch):
+    """A small file that a damaged page keeps from being read ends in one line, within the time that it is given."""
+    path = tmp_path / "x.parquet"
+    pq.write_table(pa.table({"time": pa.array([0, 1], pa.timestamp("s")), "a.PV": [1.0, 2.0]}), path)
+    stop = threading.Event()
+    monkeypatch.setattr(parquet, "_read_through", lambda _: stop.wait(60.0))
+    monkeypatch.setattr(parquet, "PROBE_S", 0.2)
+    begun = time.monotonic()
+    with pytest.raises(InputError, match=r"x\.parquet: its pages take longer than 0\.2 s to read"):
+        open_export([path])
+    stop.set()
+    assert time.monotonic() - begun < 5.0
+
+
+def test_changed_bytes_end_in_time(tmp_path):
+    """Whatever bytes of a page are changed, in any codec, the file is read or refused within the given time."""
+    rng, n = np.random.default_rng(5), 400
+    stamps = pa.array(np.arange(n), pa.timestamp("s"))
+    table = pa.table({"time": stamps, "a.PV": rng.normal(size=n).round(2), "a.MODE": ["AUTO"] * n})
+    for codec in ("snappy", "gzip", "brotli", "zstd", "lz4", "none"):
+        pq.write_table(table, tmp_path / "whole.parquet", compression=codec)
+        whole = (tmp_path / "whole.parquet").read_bytes()
+        pages = len(whole) - 8 - int.from_bytes(whole[-8:-4], "little")
+        for k in range(25):
+            changed = bytearray(whole)
+            for at in rng.integers(4, pages, size=3):
+                changed[at] = rng.integers(256)
+            path = tmp_path / f"{codec}{k}.parquet"
+            path.write_bytes(changed)
+            begun = time.monotonic()
+            with contextlib.suppress(InputError):
+                export = open_export([path])
+                export.read(export.tags)
+            assert time.monotonic() - begun < 2 * parquet.PROBE_S
