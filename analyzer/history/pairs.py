@@ -75,9 +75,7 @@ class PairSource:
 
     def with_clock(self, clock: Clock) -> Self:
         """The same file, all its stamps read in the order of day and month, and the winter time, of another clock."""
-        order = {"day_first": clock.day_first, "ambiguous": clock.ambiguous, "why": clock.why}
-        order |= {"year_first": clock.year_first, "winter_s": clock.winter_s}
-        pairs = tuple(replace(p, clock=replace(p.clock, **order)) for p in self.pairs)  # type: ignore[arg-type]
+        pairs = tuple(replace(p, clock=_ordered_as(p.clock, clock)) for p in self.pairs)
         return replace(self, pairs=pairs)
 
     def read(self, tags: Sequence[str]) -> dict[str, Raw]:
@@ -112,6 +110,17 @@ class PairSource:
             rejected, counts = not_good(codes, scheme, self.good_quality)
             bad, met = bad | rejected, met + counts
         return Raw(stamp_s, read.value, bad, read.text, Counter(met), read.unread, read.example)
+
+
+def _ordered_as(clock: Clock, other: Clock) -> Clock:
+    return replace(
+        clock,
+        day_first=other.day_first,
+        year_first=other.year_first,
+        ambiguous=other.ambiguous,
+        why=other.why,
+        winter_s=other.winter_s,
+    )
 
 
 def open_pairs(table: Table, options: ReadOptions) -> PairSource | None:

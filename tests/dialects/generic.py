@@ -131,6 +131,35 @@ thousands("thousands_swiss", "'", ".", "1'234.5")
 thousands("thousands_english_quoted", ",", ".", '"1,234.5" in a comma file', ",", True)
 
 
+@case("numbers", why='whole numbers with quoted thousands, "12,312"')
+def thousands_whole():
+    lp = loop("th1", 120, 5)
+    lp.pv, lp.sp, lp.op = lp.pv * 250, lp.sp * 250, lp.op * 250
+    body = table(lp, stamp, val=lambda x: f'"{x:,.0f}"')
+    return {"e.csv": body}, three(lp, NAMES, digits=0)
+
+
+@case("numbers", why="a minus behind the number, 12.3-")
+def minus_behind():
+    lp = loop("th2", 120, 5)
+    lp.pv, lp.sp, lp.op = lp.pv - 50, lp.sp - 50, lp.op - 50
+    body = table(lp, stamp, val=lambda x: num(abs(x)) + ("-" if x < 0 else ""))
+    return {"e.csv": body}, three(lp, NAMES)
+
+
+@case("layout", why="a preamble as wide as the table")
+def preamble_as_wide():
+    lp = loop("m7", 120, 5)
+    above = b"Trend report;Mill A;Line 3;Shift B\r\nOperator;a;b;c\r\n"
+    return {"e.csv": above + wide(lp, NAMES, sep=";")}, three(lp, NAMES)
+
+
+@case("layout", why="columns parted by one blank, date and time of day under one name")
+def parted_by_blanks():
+    lp = loop("m8", 120, 5)
+    return {"e.txt": wide(lp, NAMES, sep=" ")}, three(lp, NAMES)
+
+
 @case("layout", why="newest row first")
 def newest_first():
     lp = loop("m1", 150, 4)

@@ -155,3 +155,9 @@ def q_sentinel_with_status():
         lambda n, i, v, b: [n, stamp(lp.t[i]), "-9999" if b else num(v), "BAD" if b else "OK"],
     )
     return {"e.csv": sheet(["Tagname", "Timestamp", "Value", "Status"], rows)}, three(lp, NAMES)
+
+
+columns("q_one_zero", lambda n: f"{n} Quality", 1, 0, "1 good and 0 bad, under a plain name")
+columns(
+    "q_annotated", lambda n: f"{n}.Status", "Annotated; Good", "Bad; Annotated", "words that semicolons part"
+)

@@ -170,3 +170,53 @@ def local_spring_missing_hour():
 def local_fall_back_no_zone():
     lp = loop("y7", 240, 10, "2024-10-27 00:40:00")
     return {"e.csv": table(lp, lambda t: stamp(t, tz="Europe/Berlin"))}, three(lp, NAMES)
+
+
+@case("time-dst", options=BERLIN, why="a clock that keeps winter time, over the spring change")
+def winter_clock_spring():
+    lp = loop("y8", 400, 60, "2024-03-30 22:00:00")
+    return {"e.csv": table(lp, lambda t: stamp(t + 3600))}, three(lp, NAMES)
+
+
+@case("time-dst", options=BERLIN, why="a clock that keeps winter time, over the autumn change")
+def winter_clock_autumn():
+    lp = loop("y9", 400, 60, "2024-10-26 22:00:00")
+    return {"e.csv": table(lp, lambda t: stamp(t + 3600))}, three(lp, NAMES)
+
+
+@case("time-dst", options=BERLIN, why="hourly samples: two at 02:00 in autumn")
+def hourly_autumn():
+    lp = loop("y10", 100, 3600, "2024-10-25 22:00:00")
+    return {"e.csv": table(lp, lambda t: stamp(t, tz="Europe/Berlin"))}, three(lp, NAMES)
+
+
+@case("time-zone", why="EST in the header")
+def zone_letters_header():
+    lp = loop("z7", 120, 5)
+    return {"e.csv": table(lp, lambda t: stamp(t - 5 * 3600), "Time (EST)")}, three(lp, NAMES)
+
+
+@case("time-zone", why="ISO with the zone's name in brackets, as Java writes it")
+def zone_name_bracket():
+    lp = loop("z8", 120, 5)
+
+    def show(t):
+        return stamp(t, "%Y-%m-%dT%H:%M:%S+01:00[Europe/Berlin]", "Europe/Berlin")
+
+    return {"e.csv": table(lp, show)}, three(lp, NAMES)
+
+
+@case("time-words", why="ctime")
+def ctime_stamps():
+    lp = loop("w1", 120, 5)
+    return {"e.csv": table(lp, lambda t: stamp(t, "%a %b %d %H:%M:%S %Y"))}, three(lp, NAMES)
+
+
+@case("time-words", why="24:00:00 at the end of a day")
+def midnight_24():
+    lp = loop("w2", 120, 60, "2024-11-21 23:00:00")
+
+    def show(t):
+        return stamp(t - 86400, "%Y-%m-%d 24:00:00") if t == at("2024-11-22 00:00:00") else stamp(t)
+
+    return {"e.csv": table(lp, show)}, three(lp, NAMES)
