@@ -56,11 +56,11 @@ def shown_of(rows: Sequence[Mapping[str, Any]], figure: str | None = None) -> tu
 
 def brief(row: Mapping[str, Any], columns: Sequence[str] = SHOWN) -> dict[str, str]:
     """A row for people, by column: figures in few characters, settings as old and new in one cell."""
-    gain = gain_unit(row.get("gain_unit"), row.get("pv_unit"))
+    gain = gain_unit(row.get("gain_unit"), row.get("pv_unit"), row.get("op_unit"))
     special = {
         "period_s": duration(row["period_s"]),
         "kp": _settings(row["kp"], row["kp_new"], gain),
-        "ti": _settings(row["ti"], row["ti_new"], row.get("ti_unit") or ""),
+        "ti": _settings(row["ti"], row["ti_new"], row.get("ti_unit") or "s", "none"),
     }
     if row.get("note"):
         special["reason"] = f"{row['reason'] or ''} [note: {row['note']}]"
@@ -89,11 +89,14 @@ def fitting(shown: Sequence[Mapping[str, str]], width: int) -> tuple[str, ...]:
     return tuple(kept)
 
 
-def _settings(now: float | None, new: float | None, unit: str) -> str:
-    """A setting and what to make of it, with its unit; empty where it is not known."""
+def _settings(now: float | None, new: float | None, unit: str, off: str = "0") -> str:
+    """A setting and what to make of it, with its unit; empty where it is not known, `off` where it is 0."""
     if now is None:
         return ""
-    return f"{figure(now)} {unit}" if new is None else f"{figure(now)} -> {figure(new)} {unit}"
+    present = figure(now) if now else off
+    if new is not None:
+        return f"{present} -> {figure(new)} {unit}"
+    return f"{present} {unit}" if now else off
 
 
 CALMED = (

@@ -39,6 +39,7 @@ def empty_row(spec: LoopSpec, night: str) -> dict[str, Any]:
         "master": spec.master,
         "description": spec.description,
         "pv_unit": spec.pv_unit,
+        "op_unit": spec.op_unit,
         "importance": spec.importance,
         "percent_of": STATED if spec.has_pv_range else RECORDED,
         "kp": spec.kp,

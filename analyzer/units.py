@@ -15,11 +15,11 @@ def duration(seconds: float | None) -> str:
     return f"{seconds / 60:.3g} min" if seconds < 7200 else f"{seconds / 3600:.3g} h"
 
 
-def gain_unit(kind: str | None, pv_unit: str | None) -> str:
-    """The unit of a controller gain as loops.csv states it."""
+def gain_unit(kind: str | None, pv_unit: str | None, op_unit: str | None = "%") -> str:
+    """The unit of a controller gain as loops.csv states it; op_unit: % or, where OP has a range of its own, OP."""
     if kind == "band":
         return "% band"
-    return f"%/{pv_unit or 'PV unit'}" if kind == "engineering" else "%/%"
+    return f"{op_unit or '%'}/{pv_unit or 'PV unit'}" if kind == "engineering" else "%/%"
 
 
 def settings(kp: float | None, ti: float | None, gain: str, time: str) -> str:
@@ -32,7 +32,7 @@ def settings(kp: float | None, ti: float | None, gain: str, time: str) -> str:
 
 def row_settings(row: Mapping[str, Any], kp: str = "kp", ti: str = "ti") -> str:
     """The settings in two columns of a row of the night, with the units that the row states."""
-    gain = gain_unit(row["gain_unit"], row["pv_unit"])
+    gain = gain_unit(row["gain_unit"], row["pv_unit"], row.get("op_unit"))
     return settings(row[kp], row[ti], gain, row["ti_unit"] or "s")
 
 
@@ -49,13 +49,13 @@ def seconds_of(ti: float, unit: str) -> float | None:
 
 def changed_settings(row: Mapping[str, Any]) -> str:
     """Old and new settings of a row with their units; a band in gain and other times in seconds too."""
-    gain, time = gain_unit(row["gain_unit"], row["pv_unit"]), row["ti_unit"] or "s"
+    gain, time = gain_unit(row["gain_unit"], row["pv_unit"], row.get("op_unit")), row["ti_unit"] or "s"
     old, new = (row["kp"], row["ti"]), (row["kp_new"], row["ti_new"])
     kp = f"Kp {arrow(old[0], new[0])} {gain}"
     if row["gain_unit"] == "band" and old[0] and new[0]:
         more = "more" if new[0] < old[0] else "less"
         kp += f" ({more} gain: {arrow(100 / old[0], 100 / new[0])} %/%)"
-    ti = f"Ti {arrow(old[1], new[1])} {time}"
+    ti = f"Ti {arrow(old[1] or None, new[1])} {time}"
     if time != "s" and new[1] is not None:
         ti += f" ({arrow(*(None if t is None else seconds_of(t, time) for t in (old[1], new[1])))} s)"
     return f"{kp}, {ti}"

@@ -31,12 +31,12 @@ CALM = "At the settings in force the valve's fault makes no cycle: its repair ca
 def of_controller(pid: Pid, spec: LoopSpec, pv_span: float) -> str:
     """A controller's settings as they are typed into it."""
     kp, ti = as_stated(pid, spec, pv_span)
-    return settings(kp, ti, gain_unit(spec.gain_unit, spec.pv_unit), spec.ti_unit)
+    return settings(kp, ti, gain_unit(spec.gain_unit, spec.pv_unit, spec.op_unit), spec.ti_unit)
 
 
 def settings_changed(old: LoopSpec, new: LoopSpec, clock: str) -> str:
     """What was typed in within the night, and at which time of day."""
-    gain = gain_unit(new.gain_unit, new.pv_unit)
+    gain = gain_unit(new.gain_unit, new.pv_unit, new.op_unit)
     parts = [
         f"{name} {arrow(a, b)} {unit}"
         for name, a, b, unit in (("Kp", old.kp, new.kp, gain), ("Ti", old.ti, new.ti, new.ti_unit))

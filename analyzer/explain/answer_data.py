@@ -10,6 +10,7 @@ import numpy as np
 from analyzer.explain.case import Case
 from analyzer.explain.user_model import Brought
 from identification.controller.pi_regression import ControlLaw
+from identification.controller.settings import integral_time
 from identification.mismatch.answer import Answer, EffectFound
 from identification.mismatch.words import sentence, unexplained_reason
 
@@ -45,12 +46,12 @@ def _found(e: EffectFound) -> dict[str, Any]:
 
 
 def law_data(law: ControlLaw | None, dt_s: float) -> dict[str, Any]:
-    """The PI law that gives OP, as a further key: Kp [% OP/% PV], Ti [s], and the share of OP that it explains."""
+    """The law that gives OP, as a further key: Kp [% OP/% PV], Ti [s], none without integral action, and the share of
+    OP that it explains."""
     if law is None or law.kp * law.ki <= 0.0:
         return {}
-    return json_ready(
-        {"controller": {"kp": law.kp, "ti_s": law.kp / law.ki * dt_s, "explained": law.explained}}
-    )
+    ti_s = integral_time(law.kp, law.ki, law.residual.size) * dt_s
+    return json_ready({"controller": {"kp": law.kp, "ti_s": ti_s, "explained": law.explained}})
 
 
 def reason_of(said: Answer) -> str:

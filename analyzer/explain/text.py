@@ -66,7 +66,8 @@ def _controller(data: Mapping[str, Any]) -> Rows:
     law = data.get("controller")
     if law is None:
         return []
-    rows = (("Kp", number(law["kp"]), "% OP/% PV"), ("Ti", number(law["ti_s"]), "s"))
+    ti = "none" if law["ti_s"] is None else number(law["ti_s"])
+    rows = (("Kp", number(law["kp"]), "% OP/% PV"), ("Ti", ti, "s"))
     return [*rows, ("explains", share(law["explained"]), "of OP's variance")]
 
 

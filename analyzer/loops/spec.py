@@ -120,6 +120,11 @@ class LoopSpec:
         return tuple(tag for tag in (getattr(self, role) for role in ROLES) if tag is not None)
 
     @property
+    def op_unit(self) -> str:
+        """What one unit of OP is called: percent where its range is 0 to 100, else OP, in a unit of its own."""
+        return "%" if (self.op_lo, self.op_hi) == (0.0, 100.0) else "OP"
+
+    @property
     def has_pv_range(self) -> bool:
         """Whether the row states what percent of the PV means; else it is percent of what was recorded."""
         return self.pv_lo is not None and self.pv_hi is not None

@@ -85,7 +85,7 @@ def _ti(seconds_or_none: float, unit: str) -> str:
 def table(c: Comparison, spec: LoopSpec, unit: str) -> Table:
     """The settings with what they do on the load."""
     scale, now = c.pv_span / 100.0, c.tried[0]
-    gain = gain_unit(spec.gain_unit, spec.pv_unit)
+    gain = gain_unit(spec.gain_unit, spec.pv_unit, spec.op_unit)
     meaning = MEANING | (INTEGRATOR if isinstance(c.loop.process, Integrator) else {})
     rows = []
     for t in c.tried:
@@ -212,7 +212,7 @@ def model(c: Comparison, spec: LoopSpec, unit: str) -> str:
                 "form": str(spec.form),
                 "band": spec.gain_unit == "band",
                 "ratio": unit_ratio(spec, c.pv_span),
-                "kp_unit": gain_unit(spec.gain_unit, spec.pv_unit),
+                "kp_unit": gain_unit(spec.gain_unit, spec.pv_unit, spec.op_unit),
                 "ti_unit": spec.ti_unit,
             },
         }

@@ -49,7 +49,19 @@ CYCLES = (
     ("expected with the new settings", "expected_period_s", "expected_pv_amplitude_pct"),
 )
 COLUMNS = (
-    *("loop", "type", "area", "description", "pv_unit", "status", "reason", "action", "cause", "valve_fault"),
+    *(
+        "loop",
+        "type",
+        "area",
+        "description",
+        "pv_unit",
+        "op_unit",
+        "status",
+        "reason",
+        "action",
+        "cause",
+        "valve_fault",
+    ),
     *(
         "pv_lo",
         "pv_hi",

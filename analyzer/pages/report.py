@@ -27,6 +27,7 @@ COLUMNS = (
         "gain_unit",
         "ti_unit",
         "pv_unit",
+        "op_unit",
         "form",
         "kp",
         "ti",
@@ -81,7 +82,7 @@ def _source(rows: Sequence[dict[str, Any]], limits: ComparisonLimits) -> str:
 
 
 def _units(row: dict[str, Any]) -> str:
-    gain = gain_unit(row["gain_unit"], row["pv_unit"])
+    gain = gain_unit(row["gain_unit"], row["pv_unit"], row["op_unit"])
     return f"{row['form'] or 'ideal'} form, Kp in {gain}, Ti in {row['ti_unit'] or 's'}"
 
 

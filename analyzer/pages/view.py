@@ -30,7 +30,7 @@ COLUMNS = (
         "period_s",
     ),
     *("source_loop", "average_absolute_error_pct", "valve_travel_pct_per_h", "variability_pct", "kp", "ti"),
-    *("kp_new", "ti_new", "action", "reason", "form", "gain_unit", "ti_unit", "pv_unit"),
+    *("kp_new", "ti_new", "action", "reason", "form", "gain_unit", "ti_unit", "pv_unit", "op_unit"),
     *("lanes", "loss", "close_first_s", "close_last_s", "group", "timezone", "backlash_pct", "stickband_pct"),
     *("advice", "due", "settings_changed", "judged_since_s", "percent_of", *FIGURE.values()),
 )

@@ -25,7 +25,16 @@ OF_LOOPS = (
         "gain_unit",
         "ti_unit",
     ),
-    *("pv_unit", "description", "area", "master", "spectrum", "average_absolute_error_pct", "start_s"),
+    *(
+        "pv_unit",
+        "op_unit",
+        "description",
+        "area",
+        "master",
+        "spectrum",
+        "average_absolute_error_pct",
+        "start_s",
+    ),
 )
 """What is read of the rows of the night."""
 

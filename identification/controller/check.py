@@ -15,6 +15,7 @@ from identification.controller.pi_regression import (
     span_length,
     trusted,
 )
+from identification.controller.settings import integral_time
 from identification.limits.controller import ControllerLimits
 from identification.limits.explain import LIMITS
 from identification.record import Floats, Mask
@@ -190,7 +191,7 @@ def settings(found: ControlLaw, said: StatedSettings, limits: ControllerLimits) 
     """Settings that reproduce OP where the stated ones do not."""
     if found.explained < limits.law_explains or found.ki == 0 or found.kp / found.ki <= 0:
         return None
-    ti = found.kp / found.ki
+    ti = integral_time(found.kp, found.ki, found.residual.size)
     off_kp = abs(math.log(max(found.kp / said.kp, 1e-6)))
     off_ti = abs(math.log(max(ti / said.ti, 1e-6)))
     if max(off_kp, off_ti) < (limits.setting_thinned if said.thinned(limits) else limits.setting):

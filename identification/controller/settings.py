@@ -99,14 +99,25 @@ def fit_pi(record: LoopRecord, period_s: float) -> ControllerFit | None:
         None where OP or the error never moves, or too little of the record is in automatic.
     """
     found = _regression(record, record.error, period_s)
-    return None if found is None else _least_squares(found)
+    return None if found is None else _least_squares(found, record.duration_s)
 
 
-def _least_squares(x: _Products) -> ControllerFit:
+LONGEST_INTEGRAL = 10.0
+"""Integral time, in lengths of the record, from which there is no integral action; ours: over the record it gives a
+tenth of what the gain gives."""
+
+
+def integral_time(kp: float, ki: float, record_s: float) -> float:
+    """Integral time [s] of a law, inf where its integral does next to nothing in a record of so many seconds."""
+    ti = kp / ki if ki != 0 and kp / ki > 0 else math.inf
+    return ti if ti < LONGEST_INTEGRAL * record_s else math.inf
+
+
+def _least_squares(x: _Products, record_s: float) -> ControllerFit:
     scale = np.sqrt(np.array([x.ee, x.ss]) / x.used) + 1e-300
     gram = np.array([[x.ee, x.es], [x.es, x.ss]]) / np.outer(scale, scale)
     kp, ki = (float(c) for c in np.linalg.lstsq(gram, np.array([x.em, x.sm]) / scale, rcond=None)[0] / scale)
-    ti = kp / ki if ki != 0 and kp / ki > 0 else math.inf
+    ti = integral_time(kp, ki, record_s)
     return ControllerFit(kp, ti, x.explained(kp, ki), x.used)
 
 
@@ -162,7 +173,7 @@ def compare_laws(
         found = _regression(record, first_order(error, samples), period_s)
         if found is None:
             return None
-        free = _least_squares(found)
+        free = _least_squares(found, record.duration_s)
         needed = -math.inf if best is None else best.explained + FILTER_WORTH
         best = free if best is None or free.explained > needed else best
         given = max(given, found.explained(kp, kp / ti_s))

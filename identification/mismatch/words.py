@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -141,6 +142,8 @@ def located_sentence(where: Mapping[str, Any]) -> str:
 
 
 def _number(value: float, unit: str) -> str:
+    if math.isinf(value):
+        return "none"
     if unit == "s" and abs(value) >= SPOKEN_S[0]:
         return f"{value / 60:.3g} min" if abs(value) < SPOKEN_S[1] else f"{value / 3600:.3g} h"
     return f"{value:.3g} {unit}".strip()

@@ -1,0 +1,38 @@
+"""Settings in words: in the controller's own units, and without an integral time where there is none."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from analyzer.loops.spec import LoopSpec
+from analyzer.present import brief
+from analyzer.rows import empty_row
+from analyzer.units import gain_unit
+from identification.controller.settings import fit_pi
+from identification.models import Fopdt, Loop, Pid
+from identification.simulation.closed_loop import closed_loop
+
+
+def test_a_gain_is_in_percent_of_op_only_where_op_is() -> None:
+    """Where OP runs from 0 to 255 counts a gain is in its units for one of PV; from 0 to 100 it is in percent."""
+    counts = LoopSpec("A", op_lo=0.0, op_hi=255.0, gain_unit="engineering", pv_unit="counts")
+    percent = LoopSpec("A", gain_unit="engineering", pv_unit="degC")
+    assert [gain_unit(s.gain_unit, s.pv_unit, s.op_unit) for s in (counts, percent)] == [
+        "OP/counts",
+        "%/degC",
+    ]
+
+
+def test_a_controller_without_integral_action_has_no_integral_time() -> None:
+    """Of P alone on a noisy loop no integral time of years is found but none, and the list says so."""
+    rng = np.random.default_rng(8)
+    sp = 50 + np.repeat(rng.uniform(-5, 5, 20), 200)
+    r = closed_loop(Loop(Fopdt(1.0, 30.0, 3.0), Pid(2.0, math.inf)), sp, rng.normal(0, 0.1, sp.size))
+    found = fit_pi(r, 200.0)
+    assert found is not None
+    assert abs(found.kp / 2.0 - 1.0) < 0.05
+    assert math.isinf(found.ti_s)
+    row = empty_row(LoopSpec("A", kp=2.0, ti=0.0), "2026-03-02")
+    assert brief(row, ("ti",)) == {"ti": "none"}
