@@ -11,4 +11,4 @@ def joined(*clauses: str | None) -> str:
 def _open(clause: str | None) -> str:
     """A clause to which another one may be added."""
     text = (clause or "").strip()
-    return text if text.endswith("..") else text.removesuffix(".").strip()
+    return text if text[-2:] == ".." else text.removesuffix(".").strip()

@@ -22,7 +22,8 @@ it no longer does [-]; ours: of five loops of the sample mill that a retune calm
 SELDOM_PCT = 25.0
 """Share of the time below which a loop stopped oscillating [%]: half of that from which it counts."""
 CONFIRMED = 2
-"""Nights in a row without a cause after which a fault is told to be gone; ours: one night can miss it."""
+"""Nights in a row without a cause after which a fault is told to be gone, and in or out of a lane that is inferred;
+ours: one night can miss it."""
 NOTHING = ("", "")
 """No news, in no colour."""
 
@@ -34,7 +35,7 @@ def _news(night: Night, row: Row) -> tuple[str, str]:
         return NOTHING
     known = [r for r in (*night.earlier.get(row["loop"], ()), old, row) if _is_known(r)]
     told = _swing_news(known) if _is_known(row) and _is_known(old) else NOTHING
-    return _lane_news(row, old) if told == NOTHING else told
+    return told if told != NOTHING else _lane_news([*night.earlier.get(row["loop"], ()), old, row])
 
 
 def _is_known(row: Row) -> bool:
@@ -81,15 +82,28 @@ def _swing_news(known: Sequence[Row]) -> tuple[str, str]:
     return _cause_news([r["cause"] or Cause.UNDECIDED for r in known])
 
 
-def _lane_news(row: Row, old: Row) -> tuple[str, str]:
+def _lane_news(nights: Sequence[Row]) -> tuple[str, str]:
     """Lanes beside oscillation that a loop came into or left, of those whose figures both nights know."""
+    old, row = nights[-2:]
     known = [x for x in Lane if x is not Lane.OSCILLATION and None not in (old[FIGURE[x]], row[FIGURE[x]])]
-    now, then = lanes_in(row), lanes_in(old)
-    came = [x for x in known if x in now and x not in then]
-    left = [x for x in known if x in then and x not in now]
+    states = {x: _inside(nights, x) for x in known}
+    came = [x for x in known if states[x][-1] and not states[x][-2]]
+    left = [x for x in known if states[x][-2] and not states[x][-1]]
     if came:
         return f"new: {', '.join(came)}", "worse"
     return (f"no more: {', '.join(left)}", "better") if left else NOTHING
+
+
+def _inside(nights: Sequence[Row], lane: Lane) -> list[bool]:
+    """Whether a loop was in a lane in each night; one that is inferred has to be told CONFIRMED nights in a row."""
+    told = [lane in lanes_in(row) for row in nights]
+    if lane is not Lane.SLUGGISH:
+        return told
+    states = told[:1]
+    for k in range(1, len(told)):
+        last = told[max(k + 1 - CONFIRMED, 0) : k + 1]
+        states.append(told[k] if len(set(last)) == 1 else states[-1])
+    return states
 
 
 def _cause_news(causes: Sequence[str]) -> tuple[str, str]:

@@ -34,7 +34,7 @@ COLUMNS = (
     *("lanes", "loss", "close_first_s", "close_last_s", "group", "timezone", "backlash_pct", "stickband_pct"),
     *("advice", "due", "settings_changed", "judged_since_s", "percent_of", *FIGURE.values()),
 )
-REMEMBERED = ("loop", "status", "oscillation_significance", "oscillating_pct", "cause")
+REMEMBERED = ("loop", "status", "oscillation_significance", "oscillating_pct", "cause", "lanes")
 """What is read of nights before the last one."""
 MEMORY = 14
 """Nights before the last one that tell what is usual for a loop; ours: two weeks."""

@@ -85,6 +85,16 @@ def children(pid: int) -> list[int]:
     return found
 
 
+@pytest.fixture(autouse=True)
+def as_from_a_terminal() -> Iterator[None]:
+    """Signals as a terminal leaves them: a suite under nohup, or in the background, hands on that it ignores some."""
+    asked = {signal.SIGINT: signal.default_int_handler, signal.SIGHUP: signal.SIG_DFL}
+    before = {number: signal.signal(number, handler) for number, handler in asked.items()}
+    yield
+    for number, handler in before.items():
+        signal.signal(number, handler)
+
+
 @contextlib.contextmanager
 def running(export: Path, store: Path, *more: str) -> Iterator[subprocess.Popen[str]]:
     """A run in a process of its own, given once it has written its first piece."""

@@ -98,3 +98,17 @@ def test_a_cause_that_was_told_before_is_no_news():
 def test_lanes_are_news_too(before, now, new, better):
     """A loop at its limit or in manual is new, one that left a lane better; what a night cannot tell is neither."""
     assert told(before, now) == (new, better)
+
+
+def test_a_lane_that_is_inferred_is_told_by_the_second_night():
+    """Sluggish for one night is no news, nor is one night without; manual is told at once."""
+    slow, still, by_hand = {"lanes": "sluggish"}, {"lanes": None}, {"lanes": "manual"}
+    assert night_by_night([still, slow, still, slow, slow, still, slow]) == [
+        "",
+        "",
+        "",
+        "new: sluggish",
+        "",
+        "",
+    ]
+    assert night_by_night([still, by_hand, still]) == ["new: manual", "no more: manual"]

@@ -1,9 +1,9 @@
 """Two weeks night by night, advice beside truth: python -m tests.proofs.nights [--jobs 2]
 
-Each night of the sample mill is a run of its own: with loops.csv alone, as a plant does it that keeps no list of
-changes (from 2026-03-09 on it is stale for the seven loops retuned that day), and with changes.csv. Every pair of
-settings that is advised is typed into the true loop, and the night's load and noise run once more under both. Writes
-nights.md here.
+Each night of the sample mill is a run of its own, one after another into one store: with loops.csv alone, as a plant
+does it that keeps no list of changes (from 2026-03-09 on it is stale for the seven loops retuned that day), and with
+changes.csv. Every pair of settings that is advised is typed into the true loop, and the night's load and noise run
+once more under both; each morning's news stand beside the truth. Writes nights.md here.
 """
 
 from __future__ import annotations
@@ -22,10 +22,13 @@ import numpy as np
 
 from analyzer import batch
 from analyzer.config import Config
+from analyzer.decisions import Action, Fault
 from analyzer.history.export import open_export
 from analyzer.loops.changes import TuningChange, read_changes
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import controller, match, read_loops
+from analyzer.pages.news import news_lines
+from analyzer.pages.view import read_night
 from analyzer.rank import ranked
 from analyzer.store import Store
 
@@ -89,25 +92,53 @@ def typed_in(loop: Loop, spec: LoopSpec, row: dict[str, Any], night: int) -> tup
     return after[0] / before[0], after[1] / max(before[1], 1e-9)
 
 
-def nights(jobs: int, changes: Sequence[TuningChange]) -> Iterator[Advised]:
-    """All loops of all nights, with the changes that the plant states."""
+def nights(jobs: int, changes: Sequence[TuningChange], news: list[str]) -> Iterator[Advised]:
+    """All loops of all nights, run one after another into one store, with the changes that the plant states; each
+    morning's news go to `news`."""
+    with tempfile.TemporaryDirectory() as folder:
+        yield from _nights(jobs, changes, Store(Path(folder) / "store"), news)
+
+
+def _nights(jobs: int, changes: Sequence[TuningChange], store: Store, news: list[str]) -> Iterator[Advised]:
     export = open_export([SAMPLE / "mill.parquet"])
     specs = match(read_loops(SAMPLE / "loops.csv"), export.tags)[0]
     truth = {loop.tag: loop for loop in MILL}
     for night in range(14):
         first = START + timedelta(days=night)
-        with tempfile.TemporaryDirectory() as folder:
-            store = Store(Path(folder) / "store")
-            span = first.timestamp(), first.timestamp() + DAY_S
-            batch.run(batch.Batch(export, specs, store, Config(), *span, changes), jobs)
-            rows = {r["loop"]: r for r in ranked(store, "oscillation_significance")[0]}
+        span = first.timestamp(), first.timestamp() + DAY_S
+        batch.run(batch.Batch(export, specs, store, Config(), *span, changes), jobs)
+        rows = {r["loop"]: r for r in ranked(store, "oscillation_significance")[0]}
+        told_news = news_lines(read_night(store, None, 1, drawn=False)) if night else []
+        news += [f"| {first:%m-%d} | {line} | {truth[line.split()[0]].cause} |" for line in told_news]
         for spec in specs:
             row = rows[spec.loop]
             told = (None, None) if row["kp_new"] is None else typed_in(truth[spec.loop], spec, row, night)
             yield Advised(f"{first:%m-%d}", spec.loop, row, *told)
 
 
-def section(title: str, found: list[Advised]) -> list[str]:
+def wrong(found: list[Advised], listed: bool) -> list[str]:
+    """Valves told of loops whose valve is sound, and settings called wrong where those stated are in force."""
+    truth = {loop.tag: loop for loop in MILL}
+    worn = [
+        a
+        for a in found
+        if truth[a.loop].cause not in (Fault.BACKLASH, Fault.STICTION)
+        and (
+            a.row["valve_fault"] in (Fault.BACKLASH, Fault.STICTION) or a.row["action"] == Action.REPAIR_VALVE
+        )
+    ]
+    stale = [
+        a
+        for a in found
+        if a.row["action"] == Action.CHECK_SETTINGS
+        and (listed or a.night < "03-09" or truth[a.loop].retuned is None)
+    ]
+    said = [f"{a.loop} on {a.night}" for a in (*worn, *stale)]
+    names = f": {', '.join(said)}" if said else ""
+    return [f"{len(worn)} sound valves told to be worn, {len(stale)} true settings called wrong{names}.", ""]
+
+
+def section(title: str, found: list[Advised], listed: bool, news: list[str]) -> list[str]:
     """What was said of each loop, and every night in which settings were advised."""
     advised = [a for a in found if a.error is not None]
     harmful = [a for a in advised if a.is_harmful]
@@ -120,6 +151,7 @@ def section(title: str, found: list[Advised]) -> list[str]:
         f"(error or stem travel of the true loop more than 5 % larger). Largest error {100 * (worst - 1):+.0f} %, "
         f"largest travel {100 * (most - 1):+.0f} %.",
         "",
+        *wrong(found, listed),
         "| loop | truth | nights before the 9th | the 9th and after |",
         "|---|---|---|---|",
     ]
@@ -138,7 +170,7 @@ def section(title: str, found: list[Advised]) -> list[str]:
             f"{100 * (a.error - 1):+.0f} | {100 * (a.travel - 1):+.0f}" if a.error and a.travel else " | "
         )
         lines.append(f"| {a.night} | {a.loop} | {a.row['cause']} | {change} |")
-    return [*lines, ""]
+    return [*lines, "", "| night | news | truth |", "|---|---|---|", *news, ""]
 
 
 def _said(found: list[Advised]) -> str:
@@ -163,8 +195,10 @@ def main() -> None:
         about,
         "",
     ]
-    lines += section("With loops.csv alone", list(nights(jobs, ())))
-    lines += section("With changes.csv", list(nights(jobs, read_changes(SAMPLE / "changes.csv"))))
+    for title, changes in (("loops.csv alone", ()), ("changes.csv", read_changes(SAMPLE / "changes.csv"))):
+        news: list[str] = []
+        found = list(nights(jobs, changes, news))
+        lines += section(f"With {title}", found, bool(changes), news)
     text = "\n".join(lines).rstrip() + "\n"
     OUT.write_text(text)
     print(text)
