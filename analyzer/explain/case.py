@@ -13,6 +13,8 @@ from analyzer.cause import NO_CAUSE, Verdict
 from analyzer.config import Config
 from analyzer.decisions import Cause, Fault
 from analyzer.history.series import Series
+from analyzer.intervals import intervals
+from analyzer.limits.advice import AdviceLimits
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import controller
 from analyzer.oscillation import counting, detect
@@ -97,7 +99,11 @@ def snapped(series: dict[str, Series], pv: str) -> dict[str, Series]:
     return out
 
 
-def seen_in_cycles(verdict: Verdict) -> SeenInCycles | None:
+VALVE_FIGURES = ("backlash_pct", "stickband_pct", "slip_jump_pct")
+"""Figures of a valve at fault, by the names of the columns."""
+
+
+def seen_in_cycles(verdict: Verdict, limits: AdviceLimits) -> SeenInCycles | None:
     """The faulty valve that a night's verdict on this very recording rests on; None where it blames none.
 
     The verdict asks each stretch between two turns of OP by itself, so it stands where friction changes from slip to
@@ -113,11 +119,13 @@ def seen_in_cycles(verdict: Verdict) -> SeenInCycles | None:
         return None
     cycle_s = 2.0 * m.window.duration_s / shown.count
     process = process_of(m.window, fit)
-    return SeenInCycles(process, valve, shown.count, shown.agreeing, cycle_s, m.trials is not None)
+    known = intervals(m.window, fit, True, limits)
+    told = {name: known[name] for name in VALVE_FIGURES if name in known}
+    return SeenInCycles(process, valve, shown.count, shown.agreeing, cycle_s, m.trials is not None, told)
 
 
 def verdict_on(spec: LoopSpec, prepared: Prepared, config: Config) -> Verdict:
-    """What a night would say of this very recording: why it oscillates, or of which valve it rests."""
+    """What a night would say of the whole recording: why it oscillates, or of which valve it rests."""
     seen = detect(prepared.record, config.oscillation)
     found, said = convicted(prepared, seen, pid_of(spec, prepared), config, spec.type)
     return said if counting(found) is not None or said.cause is Cause.VALVE else NO_CAUSE
@@ -162,7 +170,8 @@ def case(
     """
     raw = series[spec.pv or ""]
     series = snapped(series, spec.pv or "")
-    prepared, shortened = telling_stretch(prepare(spec, series, config.quality), most)
+    whole = prepare(spec, series, config.quality)
+    prepared, shortened = telling_stretch(whole, most)
     r = prepared.record
     if not prepared.op_known:
         raise NotAssessedError(f"{spec.loop}: needs OP, has none")
@@ -174,7 +183,7 @@ def case(
         raise NotAssessedError(f"{spec.loop}: {stands_and_jumps(stands, jump)}")
     stamps = raw.stamp_s[~raw.bad]
     stamps = stamps[(stamps >= r.start_s - r.dt_s) & (stamps <= r.start_s + r.duration_s)]
-    verdict = verdict_on(spec, prepared, config)
+    verdict = verdict_on(spec, whole, config)
     others = neighbours(spec, specs, series, prepared, config)
     subject = subject_of(spec, prepared, stamps, verdict, others, config)
     factor = coarser_by(subject) if is_experiment(subject) else 1
@@ -210,7 +219,7 @@ def subject_of(
         not prepared.scale.recorded,
         others,
         spec.type.strip().lower(),
-        seen_in_cycles(verdict),
+        seen_in_cycles(verdict, config.advice),
         verdict.measured is not None and verdict.cause is not Cause.VALVE,
         config.explain,
     )

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from identification.controller.check import StatedSettings
 from identification.limits.explain import LIMITS, ExplainLimits
-from identification.models import Backlash, Fopdt, Stiction
+from identification.models import Backlash, Estimate, Fopdt, Stiction
 from identification.record import Floats, Mask
 
 TYPICAL_SCAN_S = 1.0
@@ -20,7 +20,8 @@ class SeenInCycles:
 
     stretches : between two turns of OP, or in a loop that does not cycle between moves of the stem, each a trial by
     itself; agreeing : share of them in which PV goes as behind this valve and not as behind a free one [-]; cycle_s :
-    mean length of two of them [s]; cycling : whether they lie between turns of OP.
+    mean length of two of them [s]; cycling : whether they lie between turns of OP; told : the valve's figures by
+    name, with 90 % intervals, as the night tells them.
     """
 
     process: Fopdt
@@ -29,6 +30,7 @@ class SeenInCycles:
     agreeing: float
     cycle_s: float
     cycling: bool = True
+    told: Mapping[str, Estimate] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)

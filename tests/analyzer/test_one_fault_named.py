@@ -10,7 +10,7 @@ import pandas as pd
 from analyzer import api
 from analyzer.oscillation import counting
 from analyzer.plant import PlantLoop
-from identification.models import Fopdt, Loop, Motion, Pid, Stiction
+from identification.models import Backlash, Fopdt, Loop, Motion, Pid, Stiction
 from identification.simulation.closed_loop import closed_loop
 
 N, STEP_S = 700, 10.0
@@ -45,3 +45,30 @@ def test_the_same_loop_with_a_free_valve_names_no_friction(tmp_path: Path) -> No
     loop = recorded(tmp_path, None)
     assert api.assess(loop).verdict.cause == "none"
     assert api.explain(loop).said.verdict not in ("stiction", "backlash")
+
+
+def worn(folder: Path) -> PlantLoop:
+    """Eleven hours, of which a stretch alone is simulated, of a level that a play of 2 % makes cycle."""
+    n = 41_000
+    rng = np.random.default_rng(4)
+    r = closed_loop(
+        Loop(Fopdt(20.0, 800.0, 4.0), Pid(1.5, 60.0), Backlash(2.0)),
+        np.full(n, 50.0),
+        0.02 * np.cumsum(rng.standard_normal(n)) * 0.1 + 0.05 * rng.standard_normal(n),
+    )
+    stamp = pd.Timestamp("2026-03-02") + pd.to_timedelta(np.arange(n), unit="s")
+    trends = {"LIC1.SP": r.sp, "LIC1.PV": r.pv.round(3), "LIC1.OP": r.op.round(3)}
+    pd.DataFrame({"timestamp": stamp, **trends}).to_parquet(folder / "export.parquet")
+    (folder / "loops.csv").write_text("loop,type,kp,ti,pv_lo,pv_hi\nLIC1,level,1.5,60,0,100\n")
+    return api.read(folder / "export.parquet", loops=folder / "loops.csv").loop("LIC1")
+
+
+def test_a_play_has_one_size_and_one_interval(tmp_path: Path) -> None:
+    """What `explain` tells of a play is what `fit` tells, though it simulates a stretch alone; it holds the truth."""
+    loop = worn(tmp_path)
+    told = api.fit(loop).estimates["backlash_pct"]
+    found = api.explain(loop)
+    said = found.said.effects[0].parameters["backlash_pct"]
+    assert found.case.shortened
+    assert (said.value, said.low, said.high) == (told.value, told.low, told.high)
+    assert told.low <= 2.0 <= told.high
