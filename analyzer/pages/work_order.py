@@ -31,7 +31,7 @@ def _order(do: str, look: str, after: str) -> Lines:
 
 
 def _expected(row: Row) -> str:
-    if row["expected_period_s"] is not None:
+    if None not in (row["expected_period_s"], row["expected_pv_amplitude_pct"]):
         swing = f"{row['expected_pv_amplitude_pct']:.2g} % of span"
         return f"a cycle of {duration(row['expected_period_s'])} and {swing}: the valve stays as it is"
     if row["cause"] == Cause.VALVE:

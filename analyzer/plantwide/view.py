@@ -9,6 +9,8 @@ from typing import Any
 from analyzer.columns.table import GROUPS, names
 from analyzer.decisions import Action, Cause, GroupRole
 from analyzer.store import Store
+from analyzer.stored_table import REMEDY
+from identification.errors import InputError
 
 Row = Mapping[str, Any]
 OF_LOOPS = (
@@ -37,6 +39,8 @@ OF_LOOPS = (
     ),
 )
 """What is read of the rows of the night."""
+ALWAYS = ("loop", "group", "role", "source_pct", "coherence", "group_period_s")
+"""Columns that every table of groups has."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,6 +95,10 @@ def read_groups(store: Store, night: str) -> list[GroupView]:
     table = store.read_if_there("groups", night)
     if table is None:
         return []
+    lacking = [name for name in ALWAYS if name not in table.column_names]
+    if lacking:
+        path = store.path / "groups" / f"{night}.parquet"
+        raise InputError(f"{path}: no column {lacking[0]}", "a table that 'triage run' wrote", REMEDY)
     empty = dict.fromkeys(names(GROUPS))
     rows = [empty | r for r in table.select([c for c in empty if c in table.column_names]).to_pylist()]
     wanted = {r["loop"] for r in rows}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import time
 from pathlib import Path
 
@@ -19,6 +20,8 @@ from analyzer.store import Store
 from analyzer.store_care import problems
 from tests.analyzer.plant import Sketch, simulate, write_export
 from tests.reports.small_store import small_store
+
+MILL = Path(__file__).resolve().parents[2] / "sample_data"
 
 
 @pytest.fixture
@@ -240,3 +243,28 @@ def test_a_damaged_night_is_written_anew(tmp_path: Path) -> None:
     assert "set aside as" in result.stderr
     assert pq.read_table(table).equals(good)
     assert len(list((path / "nights").glob("*.damaged"))) == 1
+
+
+@pytest.fixture(scope="module")
+def night_of_the_mill(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A store of one night of the sample mill."""
+    path = tmp_path_factory.mktemp("mill") / "store"
+    more = ("--loops", MILL / "loops.csv", "--store", path, "--until", "2026-03-03", "--jobs", 1)
+    assert asked("run", MILL / "mill.parquet", *more).exit_code == 0
+    return path
+
+
+@pytest.mark.parametrize(
+    ("table", "column"),
+    [("nights", "expected_pv_amplitude_pct"), ("groups", "coherence"), ("groups", "group_period_s")],
+)
+def test_a_table_that_lacks_a_column_is_no_traceback(
+    night_of_the_mill: Path, tmp_path: Path, table: str, column: str
+) -> None:
+    """A night of the sample mill without one of its columns has its pages, or file and column are named."""
+    store = Store(shutil.copytree(night_of_the_mill, tmp_path / "store"))
+    path = store.path / table / f"{store.nights()[-1]}.parquet"
+    pq.write_table(pq.read_table(path).drop_columns([column]), path)
+    result = answer(store, "pages", "", tmp_path / "out")
+    assert result.exception is None or isinstance(result.exception, SystemExit)
+    assert result.exit_code == 0 or f"{path}: no column {column}" in result.stderr
