@@ -55,7 +55,8 @@ NOTHING_SURER = (None, Action.NONE, Action.NEEDS_DATA, Action.CHECK_SETTINGS)
 
 
 def action_of(row: Row, lanes: tuple[Lane, ...]) -> Action | None:
-    """The row's action, or the one that a lane asks for where nothing else is to be done."""
+    """The row's action, or the one that a lane asks for where nothing else is to be done; what holds OP at its limit
+    has to be found out first."""
     action = None if row["action"] is None else Action(row["action"])
     if row["status"] == Status.NOT_ASSESSED and action is None:
         action = Action.NEEDS_DATA
@@ -63,7 +64,7 @@ def action_of(row: Row, lanes: tuple[Lane, ...]) -> Action | None:
         asks = [lane for lane in lanes if lane in OF_MEASUREMENT]
         if asks and not (asks == [Lane.LASTING_ERROR] and Lane.AT_LIMIT in lanes):
             return Action.CHECK_MEASUREMENT
-    return action
+    return Action.UNDECIDED if action is Action.NONE and Lane.AT_LIMIT in lanes else action
 
 
 def since(row: Row) -> str:

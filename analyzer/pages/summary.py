@@ -7,6 +7,7 @@ from analyzer.lead import first_things
 from analyzer.pages.news import news_lines
 from analyzer.pages.view import Night, Row, needs_a_look, oscillates, read_night
 from analyzer.pages.words import counted
+from analyzer.pages.work_order import work_order
 from analyzer.plantwide.view import read_groups
 from analyzer.store import Store
 from analyzer.units import changed_settings
@@ -27,6 +28,8 @@ COLUMNS = (
 def _do(row: Row) -> str:
     if row["kp_new"] is not None or row["ti_new"] is not None:
         return f"{row['action']}: {changed_settings(row)}"
+    if row["action"] == Action.UNDECIDED:
+        return dict(work_order(row))["Do"]
     return "" if row["action"] in (None, Action.NONE) else row["action"]
 
 

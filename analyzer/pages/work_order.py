@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from analyzer.decisions import Action, Cause, Fault
+from analyzer.decisions import Action, Cause, Fault, Lane
+from analyzer.lane_figures import lanes_in
 from analyzer.reason import STEPS
 from analyzer.units import changed_settings, duration
 
@@ -96,6 +97,10 @@ def _none(row: Row) -> Lines:
 
 
 def _undecided(row: Row) -> Lines:
+    if row["cause"] == Cause.NONE and Lane.AT_LIMIT in lanes_in(row):
+        do = "see why OP rests at its limit: no settings bring PV to SP while it does"
+        look = "the valve's size, a closed hand valve or bypass, pressure and temperature of what feeds it"
+        return _order(do, look, NEXT_NIGHT)
     do = "put the controller in manual for some periods while the process is calm"
     look = "a swing that stops is the loop's own (valve or tuning); one that goes on comes from outside"
     return _order(do, look, f'Note what was seen: triage note STORE {row["loop"]} "..."')

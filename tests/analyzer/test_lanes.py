@@ -10,9 +10,10 @@ import pytest
 from analyzer import chunk
 from analyzer.decisions import Action, Lane, Status
 from analyzer.lane_figures import FIGURE
-from analyzer.lane_words import in_lanes
+from analyzer.lane_words import action_of, in_lanes
 from analyzer.loops.spec import LoopSpec
 from analyzer.nights import Night
+from analyzer.pages.work_order import work_order
 from analyzer.rank import worst_first
 from tests.analyzer.plant import CONFIG, START_S, Sketch, series, simulate, spec
 from tests.identification.signals import hand_loop
@@ -182,3 +183,13 @@ def test_a_failed_loop_asks_for_nothing() -> None:
     row |= {"settings_changed": None}
     done = in_lanes({**row, "status": Status.FAILED, "reason": "ValueError: x"}, CONFIG.lanes)
     assert (done["action"], done["reason"], done["lanes"]) == (None, "ValueError: x", None)
+
+
+def test_an_op_that_rests_at_its_limit_is_not_nothing_to_do():
+    """A loop that the first lines say to look at has no action 'none', and its page says what to look for."""
+    row = {"status": "ok", "action": "none", "cause": "none", "loop": "TIC1", "lanes": "at limit"}
+    assert action_of(row, (Lane.AT_LIMIT, Lane.LASTING_ERROR)) is Action.UNDECIDED
+    assert action_of(row, ()) is Action.NONE
+    (_, do), (_, look), _ = work_order({**row, "action": "undecided"})
+    assert "limit" in do
+    assert "valve's size" in look
