@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -111,10 +110,10 @@ def parameters_of(p: Problem, fit: Fitted, row: Variant) -> dict[str, Estimate]:
     return out | (derived(out) if derived is not None else {})
 
 
-def told_by_cycles(found: Explanation, row: Variant) -> Mapping[str, Estimate]:
+def told_by_cycles(found: Explanation, row: Variant) -> dict[str, Estimate]:
     """Figures of a valve that the loop's cycles show, as the night tells them: one estimate and one interval. A
     simulation with one friction over hours knows them less well than the cycles, and takes them for surer."""
-    told = {} if found.cycles is None else found.cycles.told
+    told = {} if found.cycles is None else dict(found.cycles.told)
     return told if told.keys() == {q.name for q in row.params} else {}
 
 
