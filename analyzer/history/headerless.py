@@ -1,4 +1,4 @@
-"""Long tables without a header: which column is what, by what stands in it."""
+"""Tables without a header: which column is what, by what stands in it."""
 
 from __future__ import annotations
 
@@ -12,6 +12,8 @@ import pyarrow as pa
 from analyzer.history import stamps
 from analyzer.history.clock import SINCE_START, scale_of
 
+UNNAMED = "column {}"
+"""Name of a column that has none, by its place, from 1."""
 ROWS = 200
 """Rows that are looked at."""
 MOSTLY = 0.8
@@ -21,20 +23,24 @@ GOOD_OR_BAD = frozenset({"good", "bad", "uncertain", "g", "b", "u", "0", "100", 
 
 
 def taken_as(lines: Sequence[str], delimiter: str) -> tuple[str, ...] | None:
-    """Names for the columns of a table of tag, stamp, value and quality without a header; None for any other.
+    """Names for the columns of a table without a header, of tag, stamp, value and quality or of a stamp and numbers;
+    None for any other.
 
-    Only where each of the first rows has the same shape: a stamp, a text that is none of the rest, and a number.
+    Only where each of the first rows has the same shape: a stamp, a text that is none of the rest, and a number; or a
+    stamp first and behind it numbers alone, which are named by their places (loops.csv may tell what they are).
     """
     rows = [row for row in csv.reader(io.StringIO("\n".join(lines[:ROWS])), delimiter=delimiter) if row]
-    if len(rows) < 3 or len({len(row) for row in rows}) != 1 or not 3 <= len(rows[0]) <= 8:
+    if len(rows) < 3 or len({len(row) for row in rows}) != 1 or len(rows[0]) < 3:
         return None
     columns = [[cell.strip() for cell in column] for column in zip(*rows, strict=True)]
     kinds = [_kind(column) for column in columns]
-    if kinds.count("stamp") != 1 or "text" not in kinds or "number" not in kinds:
+    if kinds[0] == "stamp" and set(kinds[1:]) == {"number"}:
+        return ("timestamp", *(UNNAMED.format(i + 1) for i in range(1, len(columns))))
+    if len(columns) > 8 or kinds.count("stamp") != 1 or "text" not in kinds or "number" not in kinds:
         return None
     tag = max(_places(kinds, "text"), key=lambda i: (len(set(columns[i])), -i))
     value = max(_places(kinds, "number"), key=lambda i: (len(set(columns[i])), -i))
-    names = [f"column {i + 1}" for i in range(len(columns))]
+    names = [UNNAMED.format(i + 1) for i in range(len(columns))]
     names[tag], names[kinds.index("stamp")], names[value] = "tag", "timestamp", "value"
     free = [i for i in range(len(columns)) if names[i].startswith("column")]
     coded = [i for i in free if {cell.lower() for cell in columns[i]} <= GOOD_OR_BAD]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -12,6 +13,8 @@ from analyzer.loops.spec import LoopSpec, read_loops
 from identification.errors import InputError
 from identification.models import Form, Pid
 
+UNNAMED = re.compile(r"column \d+")
+"""Name of a column of a table without a header."""
 __all__ = ["LoopSpec", "as_stated", "controller", "find_loops", "match", "no_loops", "read_loops"]
 
 
@@ -39,14 +42,35 @@ def match(specs: Sequence[LoopSpec], tags: Iterable[str]) -> tuple[tuple[LoopSpe
         A sentence for every loop and tag that is missing, and one for loops that only the export has.
     """
     known = dict.fromkeys(tags)
+    specs, by_place = in_order(specs, tuple(known))
     by_ending = loops_of(known)
     matched = tuple(_matched(spec, known, by_ending.get(spec.loop, {})) for spec in specs)
-    notes = [note for before, after in zip(specs, matched, strict=True) for note in _missing(before, after)]
+    notes = list(by_place)
+    notes += [note for before, after in zip(specs, matched, strict=True) for note in _missing(before, after)]
     taken = {tag for spec in matched for tag in spec.tags}
     others = [loop for loop, roles in by_ending.items() if roles["pv"] not in taken]
     if others:
         notes.append(f"{len(others)} loops of the export are not in loops.csv, not assessed: {_few(others)}")
     return matched, tuple(notes)
+
+
+def in_order(specs: Sequence[LoopSpec], tags: Sequence[str]) -> tuple[Sequence[LoopSpec], tuple[str, ...]]:
+    """Loops with the columns of a table without a header for their tags, in the order in which loops.csv states them,
+    and a sentence on it; the loops as they are where the columns have names or are not as many."""
+    stated = [(k, role) for k, spec in enumerate(specs) for role in (_stated_roles(spec) or ROLES[:3])]
+    if not tags or not all(UNNAMED.fullmatch(tag) for tag in tags) or len(stated) != len(tags):
+        return specs, ()
+    taken: list[dict[str, str]] = [{} for _ in specs]
+    for (k, role), tag in zip(stated, tags, strict=True):
+        taken[k][role] = tag
+    first = [f"{tag} is {specs[0].loop}'s {role.upper()}" for role, tag in taken[0].items()]
+    more = " ..." if len(specs) > 1 else ""
+    said = f"no header: columns are taken in the order of loops.csv: {', '.join(first)}{more}"
+    return tuple(replace(s, **own) for s, own in zip(specs, taken, strict=True)), (said,)  # type: ignore[arg-type]
+
+
+def _stated_roles(spec: LoopSpec) -> tuple[str, ...]:
+    return tuple(role for role in ROLES if getattr(spec, role))
 
 
 def _matched(spec: LoopSpec, known: Mapping[str, None], found: Mapping[str, str]) -> LoopSpec:

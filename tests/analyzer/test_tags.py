@@ -277,3 +277,15 @@ def test_bare_columns_belong_to_the_file_s_loop(tmp_path, names):
     (tmp_path / "FIC1.csv").write_text(f"Zeit;{';'.join(names)}\n{rows}", encoding="utf-8")
     (loop,) = find_loops(open_export([tmp_path / "FIC1.csv"]).tags)
     assert (loop.loop, loop.op is not None, loop.sp is not None) == ("FIC1", True, True)
+
+
+def test_a_table_without_a_header_is_taken_in_the_order_of_loops_csv() -> None:
+    """Columns without names are the tags that loops.csv states, in its order, where they are as many; else nobody's."""
+    stated = (LoopSpec("A", sp="A.S", pv="A.P", op="A.O"), LoopSpec("B"))
+    columns = [f"column {i}" for i in range(2, 8)]
+    (a, b), notes = match(stated, columns)
+    assert (a.sp, a.pv, a.op) == ("column 2", "column 3", "column 4")
+    assert (b.sp, b.pv, b.op) == ("column 5", "column 6", "column 7")
+    assert "in the order of loops.csv" in notes[0]
+    assert match(stated, columns[:-1])[0][0].pv is None
+    assert match(stated, ["A.S", "A.P", "A.O"])[0][0].pv == "A.P"
