@@ -280,7 +280,7 @@ def test_bare_columns_belong_to_the_file_s_loop(tmp_path, names):
 
 
 def test_a_table_without_a_header_is_taken_in_the_order_of_loops_csv() -> None:
-    """Columns without names are the tags that loops.csv states, in its order, where they are as many; else nobody's."""
+    """Columns without names are the tags that loops.csv states, in its order, where they are as many; else none."""
     stated = (LoopSpec("A", sp="A.S", pv="A.P", op="A.O"), LoopSpec("B"))
     columns = [f"column {i}" for i in range(2, 8)]
     (a, b), notes = match(stated, columns)
