@@ -95,10 +95,6 @@ def read_groups(store: Store, night: str) -> list[GroupView]:
     table = store.read_if_there("groups", night)
     if table is None:
         return []
-    lacking = [name for name in ALWAYS if name not in table.column_names]
-    if lacking:
-        path = store.path / "groups" / f"{night}.parquet"
-        raise InputError(f"{path}: no column {lacking[0]}", "a table that 'triage run' wrote", REMEDY)
     empty = dict.fromkeys(names(GROUPS))
     rows = [empty | r for r in table.select([c for c in empty if c in table.column_names]).to_pylist()]
     wanted = {r["loop"] for r in rows}
@@ -109,6 +105,10 @@ def read_groups(store: Store, night: str) -> list[GroupView]:
     for row in rows:
         if row["loop"] in loops:  # a store that was put together by hand may lack some
             by_number.setdefault(row["group"], []).append(row)
+    lacking = [name for name in ALWAYS if name not in table.column_names]
+    if by_number and lacking:
+        path = store.path / "groups" / f"{night}.parquet"
+        raise InputError(f"{path}: no column {lacking[0]}", "a table that 'triage run' wrote", REMEDY)
     found = [GroupView(number, tuple(_sorted(own)), loops) for number, own in by_number.items()]
     return sorted(found, key=lambda g: (-g.gain_pct, int(g.number)))
 
