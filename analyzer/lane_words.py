@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from analyzer.clauses import joined
-from analyzer.decisions import Action, Lack, Lane, Status
+from analyzer.decisions import Action, Cause, Lack, Lane, Status
 from analyzer.lane_figures import lanes_in
 from analyzer.lanes import lanes_of
 from analyzer.limits.lanes import LaneLimits
@@ -28,7 +28,11 @@ def _lasting(row: Row) -> str:
 def _at_limit(row: Row) -> str:
     side = "" if row["op_mean_pct"] is None else " lower" if row["op_mean_pct"] < 50 else " upper"
     share = row["at_limits_pct"]
-    return f"OP rests at its{side} limit for {share:.0f} % of the time: look at the valve's size and at what feeds it"
+    text = f"OP rests at its{side} limit for {share:.0f} % of the time"
+    swings = (
+        row["cause"] == Cause.TUNING
+    )  # from end to end of its range: nothing is wrong with the valve's size
+    return text if swings else f"{text}: look at the valve's size and at what feeds it"
 
 
 def _sluggish(row: Row) -> str:

@@ -69,7 +69,8 @@ def _by_work(rows: Sequence[Row], by: str) -> list[tuple[float, str]]:
         (lambda r: r["action"] == Action.CHECK_MEASUREMENT, _measurement),
         (lambda r: r["action"] == Action.CHECK_SETTINGS and _stated(r), _settings),
         (lambda r: r["action"] == Action.CHECK_SETTINGS and not _stated(r), _unstated),
-        (lambda r: Lane.AT_LIMIT in lanes_in(r), _limit),
+        (lambda r: r["cause"] == Cause.TUNING and r["action"] == Action.NEEDS_DATA, _halve),
+        (lambda r: Lane.AT_LIMIT in lanes_in(r) and r["cause"] != Cause.TUNING, _limit),
     )
     out = []
     for asks, say in kinds:
@@ -125,6 +126,15 @@ def _settings(rows: Sequence[Row]) -> str:
 def _unstated(rows: Sequence[Row]) -> str:
     it = "its controller has" if len(rows) == 1 else "their controllers have"
     return f"State Kp and Ti of {_names(rows)} in loops.csv, as {it} them: new settings wait for that."
+
+
+def _halve(rows: Sequence[Row]) -> str:
+    it = (
+        "it swings, too tight for its process"
+        if len(rows) == 1
+        else "they swing, too tight for their processes"
+    )
+    return f"Halve the gain of {_names(rows)} or go to manual: {it}; settings wait for other data."
 
 
 def _limit(rows: Sequence[Row]) -> str:
