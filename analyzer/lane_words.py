@@ -29,10 +29,8 @@ def _at_limit(row: Row) -> str:
     side = "" if row["op_mean_pct"] is None else " lower" if row["op_mean_pct"] < 50 else " upper"
     share = row["at_limits_pct"]
     text = f"OP rests at its{side} limit for {share:.0f} % of the time"
-    swings = (
-        row["cause"] == Cause.TUNING
-    )  # from end to end of its range: nothing is wrong with the valve's size
-    return text if swings else f"{text}: look at the valve's size and at what feeds it"
+    from_end_to_end = row["cause"] == Cause.TUNING  # then nothing is wrong with the valve's size
+    return text if from_end_to_end else f"{text}: look at the valve's size and at what feeds it"
 
 
 def _sluggish(row: Row) -> str:
