@@ -22,16 +22,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from analyzer.plant import Plant, PlantLoop, read
+from analyzer.night.plant import Plant, PlantLoop, read
 from identification.models import Estimate, Loop, Pid, Process, Valve
 from identification.record import Floats, LoopRecord
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from analyzer.assess import Assessment
     from analyzer.explain.one_loop import Explained
-    from analyzer.tune import Tuning
+    from analyzer.loop.assess import Assessment
+    from analyzer.loop.tune import Tuning
 
 __all__ = [
     "Identified",
@@ -55,7 +55,7 @@ def assess(loop: PlantLoop) -> Assessment:
     NotAssessedError
         The record cannot support it; the text says what it needs.
     """
-    from analyzer.assess import assess as assessed
+    from analyzer.loop.assess import assess as assessed
 
     return assessed(loop.prepared, loop.controller, loop.plant.config, loop.spec.type, loop.earlier)
 
@@ -86,7 +86,7 @@ def fit(loop: PlantLoop) -> Identified:
     NotAssessedError
         The trends give no model; the text says what they lack.
     """
-    from analyzer.tune import identified
+    from analyzer.loop.tune import identified
 
     return Identified(*identified(assess(loop), loop.plant.config.advice))
 
@@ -133,8 +133,8 @@ def tune(loop: PlantLoop) -> Tuning:
     NotAssessedError
         The trends give no model.
     """
-    from analyzer.advice import withheld
-    from analyzer.tune import tune as tuned
+    from analyzer.loop.advice import withheld
+    from analyzer.loop.tune import tune as tuned
     from identification.errors import InputError, NotAssessedError
 
     controller, found = loop.controller, assess(loop)
@@ -156,7 +156,7 @@ def explain(loop: PlantLoop) -> Explained:
     """
     from analyzer.explain.case import case, tags_of
     from analyzer.explain.one_loop import explained
-    from analyzer.nights import cut
+    from analyzer.night.nights import cut
 
     plant, spec = loop.plant, loop.spec
     series = plant.export.read(tags_of(spec, plant.specs))
@@ -182,7 +182,7 @@ def nights(store: str | Path, table: str = "nights") -> pd.DataFrame:
     """
     import pandas as pd
 
-    from analyzer.store import Store
+    from analyzer.store.store import Store
 
     kept = Store(Path(store))
     kept.require()

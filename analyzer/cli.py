@@ -15,7 +15,7 @@ from analyzer.commands import report as report_cli
 from analyzer.commands import run as run_cli
 from analyzer.commands import store as store_cli
 from analyzer.commands.options import PLACE, SOME_LOST, Asked, export_options, say, told
-from analyzer.decisions import Lane
+from analyzer.loop.decisions import Lane
 
 for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
@@ -44,8 +44,8 @@ def check(asked: Asked) -> None:
 
     Example: triage check export.csv --loops loops.csv
     """
-    from analyzer.check import lines
     from analyzer.loops.tags import no_loops
+    from analyzer.night.check import lines
 
     source, specs, notes = asked.opened()
     lost = 0
@@ -100,11 +100,11 @@ def rank(
 
     Example: triage rank store --top 20 --format markdown
     """
-    from analyzer.rank import hidden_loops, ranked, rendered
-    from analyzer.store import Store
+    from analyzer.pages.rank import hidden_loops, ranked, rendered
+    from analyzer.store.store import Store
 
     if groups:
-        from analyzer import group_list
+        from analyzer.pages import group_list
 
         found, name = group_list.grouped(Store(store), night, top)
         click.echo(group_list.rendered(found, form, name))
@@ -129,7 +129,7 @@ def tune(asked: Asked, tag: str, out: Path | None) -> None:
 
     Example: triage tune export.parquet --loops loops.csv --loop LIC2107 --out pictures
     """
-    from analyzer.tune_loop import proposal
+    from analyzer.loop.tune_loop import proposal
 
     source, specs, _ = asked.opened()
     span = asked.since_s, asked.until_s

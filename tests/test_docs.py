@@ -11,7 +11,7 @@ import pytest
 from click.testing import CliRunner
 
 from analyzer.cli import main
-from analyzer.decisions import Action, Lane
+from analyzer.loop.decisions import Action, Lane
 from analyzer.loops import changes, spec
 
 ROOT = Path(__file__).resolve().parents[1]

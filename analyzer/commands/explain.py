@@ -37,7 +37,7 @@ def _read(asked: Asked, tag: str) -> Trends:
     """A loop of an export with its trends."""
     from analyzer.explain.case import tags_of
     from analyzer.loops.spec import spec_of
-    from analyzer.nights import Night, cut
+    from analyzer.night.nights import Night, cut
 
     source, specs, _ = asked.opened()
     spec = spec_of(specs, tag)

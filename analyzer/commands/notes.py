@@ -28,8 +28,8 @@ def note(store: Path, loop: str, text: str | None, owner: str | None, hide_until
 
     Example: triage note store FIC2110 "stroked, packing tight, ordered" --hide-until 2026-04-01
     """
-    from analyzer import notes
-    from analyzer.store import Store
+    from analyzer.store import notes
+    from analyzer.store.store import Store
     from identification.errors import InputError
 
     kept = Store(store)
@@ -71,7 +71,7 @@ def summary(store: Path, night: str | None, form: str) -> None:
 
     from analyzer.commands.report import made
     from analyzer.pages.summary import page
-    from analyzer.store import Store
+    from analyzer.store.store import Store
     from reports import mail, markdown, plain
 
     kept = Store(store)

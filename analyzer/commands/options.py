@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from analyzer.history.plant_clock import seconds, zone_of
 from analyzer.places import place, refused
-from analyzer.plant_clock import seconds, zone_of
 from identification.errors import InputError, TriageError
 from reports.visible import visible, visible_lines
 from reports.whole_file import is_full
@@ -125,7 +125,7 @@ class Asked:
 
     def within(self, series: Mapping[str, Series]) -> dict[str, Series]:
         """The samples within the span of time that is asked for."""
-        from analyzer.nights import Night, cut
+        from analyzer.night.nights import Night, cut
 
         span = Night("", self.since_s, self.until_s)
         return {tag: cut(found, span) for tag, found in series.items()}

@@ -13,11 +13,11 @@ from analyzer.commands.options import PLACE, config_option, say
 from identification.errors import InputError
 
 if TYPE_CHECKING:
+    from analyzer.comparison.spans import Span
     from analyzer.config import ChangeLimits
     from analyzer.loops.changes import TuningChange
     from analyzer.pages.report import Spans
-    from analyzer.spans import Span
-    from analyzer.store import Store
+    from analyzer.store.store import Store
     from reports.pages import Page
 
 SOME_LOST = 1
@@ -26,8 +26,8 @@ MOST_DAYS = 3660
 
 
 def _span(texts: Sequence[str] | None, option: str, zone: str) -> Span | None:
-    from analyzer.spans import Span
-    from analyzer.stated_time import parse_time
+    from analyzer.comparison.spans import Span
+    from analyzer.history.stated_time import parse_time
 
     if not texts:
         return None
@@ -50,9 +50,9 @@ def _asked(
     limits: ChangeLimits,
 ) -> list[TuningChange]:
     """The changes that the command line names."""
+    from analyzer.history.stated_time import parse_time
     from analyzer.loops.changes import TuningChange, read_changes
     from analyzer.pages.report import detected
-    from analyzer.stated_time import parse_time
 
     if find:
         return detected(store, [loop] if loop else None, limits)
@@ -68,7 +68,7 @@ def made(store: Store) -> str:
     import time
     from importlib.metadata import version
 
-    from analyzer.plant_clock import stamp
+    from analyzer.history.plant_clock import stamp
 
     zone, name = store.zone(), store.path.name or store.path.resolve().name
     return f"triage {version('loop-triage')}, store {name}, made {stamp(time.time(), zone)}; times in {zone}"
@@ -129,7 +129,7 @@ def report(
     from analyzer.config_file import read_config
     from analyzer.pages.before_after import page
     from analyzer.pages.report import Spans, cases
-    from analyzer.store import Store
+    from analyzer.store.store import Store
 
     kept, limits = Store(store), read_config(config)
     kept.require()
@@ -163,7 +163,7 @@ def pages(store: Path, night: str | None, top: int, form: str, single_file: bool
     Example: triage pages store --out pages --top 50
     """
     from analyzer.pages import night as night_pages
-    from analyzer.store import Store
+    from analyzer.store.store import Store
 
     kept = Store(store)
     kept.require()

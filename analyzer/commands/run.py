@@ -27,12 +27,12 @@ from identification.errors import InputError, TriageError
 from reports.whole_file import is_full
 
 if TYPE_CHECKING:
-    from analyzer.batch import Batch, Outcome
     from analyzer.config import WorkerLimits
     from analyzer.history.export import Export
     from analyzer.loops.spec import LoopSpec
-    from analyzer.nights import Night
-    from analyzer.run_log import RunLog
+    from analyzer.night.batch import Batch, Outcome
+    from analyzer.night.nights import Night
+    from analyzer.night.run_log import RunLog
 
 STOPPED = 128
 """Exit status of a run that a signal has stopped, less the signal's number: what shells and schedulers expect."""
@@ -116,7 +116,7 @@ def run(
     """
     from importlib.metadata import version
 
-    from analyzer.run_log import RunLog
+    from analyzer.night.run_log import RunLog
 
     log, begun_s = RunLog(log_file), time.monotonic()
     export = " ".join(map(str, asked.export))
@@ -156,9 +156,9 @@ class How:
 
 def _night(asked: Asked, place: Path, log: RunLog, how: How, explaining: bool) -> tuple[Outcome, int]:
     """The export read, assessed and, where it is asked for, explained; the outcome and the number of loops."""
-    from analyzer.batch import Batch
-    from analyzer.store import Store
-    from analyzer.store_lock import scratch
+    from analyzer.night.batch import Batch
+    from analyzer.store.lock import scratch
+    from analyzer.store.store import Store
 
     with scratch(place, how.resume) as copies:
         reading = {**asked.reading, "scratch": copies}
@@ -180,7 +180,7 @@ def _opened(asked: Asked) -> tuple[Export, Sequence[LoopSpec], Sequence[str]]:
     InputError
         The export cannot be used, or the process that read it died.
     """
-    from analyzer.workers import Died, Workers
+    from analyzer.night.workers import Died, Workers
 
     with Workers(1, find_out, _allowed(asked)) as workers:
         workers.submit(asked)
@@ -229,8 +229,8 @@ def _say(notes: Sequence[str], log: RunLog) -> None:
 
 def _assessed(batch: Batch, how: How, log: RunLog) -> Outcome:
     """Run the batch with progress and say what came of it."""
-    from analyzer import batch as nightly
     from analyzer.commands.progress import bar
+    from analyzer.night import batch as nightly
 
     with bar("loops") as progress:
         outcome = nightly.run(batch, how.jobs, how.resume, how.replacing, how.scheduler, progress)

@@ -51,8 +51,8 @@ def check(path: Path) -> None:
 
     Example: triage store check store
     """
-    from analyzer import store_care
-    from analyzer.store import Store
+    from analyzer.store import care as store_care
+    from analyzer.store.store import Store
 
     kept = Store(path)
     found = 0
@@ -76,9 +76,9 @@ def prune(path: Path, keep: str, keep_trends: str | None, dry_run: bool) -> None
 
     Example: triage store prune store --keep 400d --keep-trends 90d
     """
-    from analyzer import store_care
-    from analyzer.store import Store
-    from analyzer.store_lock import locked
+    from analyzer.store import care as store_care
+    from analyzer.store.lock import locked
+    from analyzer.store.store import Store
 
     kept = Store(path)
     kept.require()

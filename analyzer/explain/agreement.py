@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from analyzer.decisions import Fault
+from analyzer.loop.decisions import Fault
 from identification.mismatch import effect
 from identification.mismatch.catalogue import EFFECTS, fault
 from identification.mismatch.effect import Block, Ends

@@ -8,19 +8,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analyzer.assess import convicted
-from analyzer.cause import NO_CAUSE, Verdict
 from analyzer.config import Config
-from analyzer.decisions import Cause, Fault
 from analyzer.history.series import Series
-from analyzer.intervals import intervals
 from analyzer.limits.advice import AdviceLimits
+from analyzer.loop.assess import convicted
+from analyzer.loop.cause import NO_CAUSE, Verdict
+from analyzer.loop.decisions import Cause, Fault
+from analyzer.loop.intervals import intervals
+from analyzer.loop.oscillation import counting, detect
+from analyzer.loop.quality import Prepared, prepare
+from analyzer.loop.sample_clock import onto_clock
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import controller
-from analyzer.oscillation import counting, detect
-from analyzer.quality import Prepared, prepare
-from analyzer.sample_clock import onto_clock
-from analyzer.words import stands_and_jumps
+from analyzer.words.settings import stands_and_jumps
 from identification.controller.check import StatedSettings
 from identification.errors import NotAssessedError
 from identification.estimation.hammerstein import process_of

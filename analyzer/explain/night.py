@@ -13,16 +13,16 @@ from typing import TYPE_CHECKING, Any
 
 from analyzer.columns.table import EXPLAINED
 from analyzer.config import Config
-from analyzer.decisions import Action, Cause, Status, counts
 from analyzer.history.export import Export
+from analyzer.loop.decisions import Action, Cause, Status, counts
 from analyzer.loops.spec import LoopSpec
-from analyzer.nights import Night, cut
-from analyzer.store import Store, rows_table, write_table
-from analyzer.workers import Died, Workers
+from analyzer.night.nights import Night, cut
+from analyzer.night.workers import Died, Workers
+from analyzer.store.store import Store, rows_table, write_table
 from identification.errors import TriageError
 
 if TYPE_CHECKING:
-    from analyzer.batch import Batch
+    from analyzer.night.batch import Batch
 
 TABLE = "explained"
 QUIET = (Cause.NONE, Action.NONE, "", None)

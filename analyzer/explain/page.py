@@ -25,8 +25,8 @@ from analyzer.explain.page_words import (
     title,
 )
 from analyzer.explain.views import Tried
+from analyzer.history.plant_clock import UTC_NAME
 from analyzer.pages.words import duration, number, stamp
-from analyzer.plant_clock import UTC_NAME
 from identification.mismatch.words import check, discriminating_test, located_sentence
 from reports.names import slug
 from reports.pages import Block, Cell, Column, Facts, Page, Section, Table, Text, Tiles

@@ -10,12 +10,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
+from analyzer.history.plant_clock import stamp
 from analyzer.history.series import Series
 from analyzer.loops.changes import TuningChange
 from analyzer.loops.settings_in_force import in_force
 from analyzer.loops.spec import LoopSpec
-from analyzer.nights import Night, cut
-from analyzer.plant_clock import stamp
+from analyzer.night.nights import Night, cut
 
 FEWEST = 300
 """Samples of PV from which a part is judged; ours: a noise model that looks 25 back needs twelve times that."""

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from analyzer.explain.case import Case
-from analyzer.quality import Scale
+from analyzer.loop.quality import Scale
 from identification.errors import InputError
 from identification.mismatch.answer import Answer
 from identification.mismatch.diagnosis import transmitter_end

@@ -26,6 +26,7 @@ from analyzer.history.files import export_files, is_parquet, packed_beside
 from analyzer.history.long import tag_column
 from analyzer.history.options import ReadOptions
 from analyzer.history.parquet import open_parquet
+from analyzer.history.plant_clock import zone_of
 from analyzer.history.raw import Raw, settle
 from analyzer.history.series import Series
 from analyzer.history.sheet import WHOLE_FILE_BYTES
@@ -34,7 +35,6 @@ from analyzer.history.stray import MainSpan, NoStampError
 from analyzer.history.table import Source
 from analyzer.history.unpacked import own_scratch, unpacked
 from analyzer.places import at_hand, bring, is_remote
-from analyzer.plant_clock import zone_of
 from identification.errors import InputError
 
 CONVERTED_BYTES = WHOLE_FILE_BYTES

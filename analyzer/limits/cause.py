@@ -1,4 +1,4 @@
-"""Limits of the cause; what its signs weigh is a table of its own (analyzer/cause_weights.py)."""
+"""Limits of the cause; what its signs weigh is a table of its own (analyzer/loop/cause_weights.py)."""
 
 from __future__ import annotations
 

@@ -13,11 +13,11 @@ from typing import Any
 
 import numpy as np
 
-from analyzer.block_bootstrap import Floats
+from analyzer.comparison.block_bootstrap import Floats
 from analyzer.config import ChangeLimits
 from analyzer.history.encoding import detect_encoding
-from analyzer.plant_clock import UTC_NAME
-from analyzer.stated_time import parse_times
+from analyzer.history.plant_clock import UTC_NAME
+from analyzer.history.stated_time import parse_times
 from identification.errors import InputError
 
 COLUMNS = ("loop", "time", "kp_old", "ti_old", "kp_new", "ti_new", "who")

@@ -13,9 +13,9 @@ from pathlib import Path
 from typing import Any
 
 from analyzer.history.encoding import detect_encoding
+from analyzer.history.plant_clock import UTC_NAME
+from analyzer.history.stated_time import parse_time
 from analyzer.loops.endings import ROLES
-from analyzer.plant_clock import UTC_NAME
-from analyzer.stated_time import parse_time
 from identification.errors import InputError
 from identification.models import Form
 

@@ -9,7 +9,7 @@ from analyzer.pages import morning
 from analyzer.pages.plant_history import NightSum
 from analyzer.pages.view import read_night
 from analyzer.plantwide.view import read_groups
-from analyzer.store import Store
+from analyzer.store.store import Store
 from reports.map_blocks import TreeMap
 from reports.pages import Block, Page, Section, Table
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from analyzer.decisions import CAUSES, Cause, Status
+from analyzer.loop.decisions import CAUSES, Cause, Status
 from analyzer.pages.headings import heading
 from analyzer.pages.words import number
 from reports.pages import Cell, Column, Table

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from analyzer.before_after import LIMITS, Change, Grade, LoopComparison, Verdict, grade
+from analyzer.comparison.before_after import LIMITS, Change, Grade, LoopComparison, Verdict, grade
 from analyzer.config import ComparisonLimits
+from analyzer.history.plant_clock import UTC_NAME
 from analyzer.loops.changes import TuningChange
 from analyzer.pages.change_case import TONES, Case, outcome
 from analyzer.pages.change_charts import PRIMARY, average_chart, per_loop_chart
 from analyzer.pages.headings import heading
 from analyzer.pages.trends import trend_block
 from analyzer.pages.words import KINDS, interval, number, setting, signed, stamp
-from analyzer.plant_clock import UTC_NAME
 from reports.map_blocks import Mark
 from reports.pages import (
     Block,

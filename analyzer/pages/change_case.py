@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from analyzer.before_after import Change, Grade, LoopComparison, Verdict, grade
+from analyzer.comparison.before_after import Change, Grade, LoopComparison, Verdict, grade
 from analyzer.loops.changes import TuningChange
 from analyzer.pages.engineering import PLAIN, Scale
 from analyzer.pages.reading import Thinned

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from analyzer.before_after import MEASURES, Change, Measure, Verdict
+from analyzer.comparison.before_after import MEASURES, Change, Measure, Verdict
 from analyzer.pages.change_case import Case
 from analyzer.pages.words import KINDS, counted, signed
 from reports.pages import IntervalBar, IntervalChart

@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from analyzer.compared import SPREAD, Comparison, Shown
+from analyzer.loop.compared import SPREAD, Comparison, Shown
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import unit_ratio
 from analyzer.pages.words import number
-from analyzer.units import duration, gain_unit
+from analyzer.words.units import duration, gain_unit
 from identification.models import Integrator, Pid
 from identification.simulation.closed_loop import scan_step
 from identification.simulation.discretization import discretize

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from analyzer.decisions import GroupRole
+from analyzer.loop.decisions import GroupRole
 from analyzer.pages.reading import Thinned
 from analyzer.pages.words import duration, number
 from analyzer.plantwide.view import GroupView

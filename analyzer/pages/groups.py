@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from analyzer.columns.table import GROUPS
-from analyzer.decisions import GroupRole
-from analyzer.group_list import sentence, with_settings
+from analyzer.loop.decisions import GroupRole
+from analyzer.pages.group_list import sentence, with_settings
 from analyzer.pages.group_pictures import aligned, graph, heat_map
 from analyzer.pages.reading import Thinned
 from analyzer.pages.view import Night

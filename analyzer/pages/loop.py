@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from analyzer.columns.table import BY_NAME
-from analyzer.cost import mark
-from analyzer.decisions import CAUSES, Fault
 from analyzer.explain.agreement import agreement
 from analyzer.explain.page_words import title
+from analyzer.loop.decisions import CAUSES, Fault
+from analyzer.pages.cost import mark
 from analyzer.pages.engineering import Scale, beside, scale_of
 from analyzer.pages.headings import heading, titled
 from analyzer.pages.loop_history import history
@@ -22,7 +22,7 @@ from analyzer.pages.trends import LEAST_PCT, close_span, trend_block
 from analyzer.pages.turns import turn_panels
 from analyzer.pages.words import duration, number
 from analyzer.pages.work_order import work_order
-from analyzer.units import row_settings
+from analyzer.words.units import row_settings
 from identification.mismatch.words import check
 from reports.names import slug
 from reports.pages import Block, Cell, Column, Facts, Line, Listing, Page, Plot, Section, Table, Text

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from analyzer.decisions import Action, Cause, Fault, Status
+from analyzer.loop.decisions import Action, Cause, Fault, Status
 from analyzer.pages.headings import heading, headings
 from analyzer.pages.view import Night, linked
 from analyzer.pages.words import counted, number

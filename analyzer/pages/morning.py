@@ -6,13 +6,13 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from analyzer.columns.table import BY_NAME
-from analyzer.cost import MARK, OF_RECORDED, SIGNIFICANCE, cost_column, mark
-from analyzer.decisions import CAUSES, Cause, Status
-from analyzer.lead import first_things
+from analyzer.loop.decisions import CAUSES, Cause, Status
 from analyzer.pages import maintenance
 from analyzer.pages.areas import area_table
+from analyzer.pages.cost import MARK, OF_RECORDED, SIGNIFICANCE, cost_column, mark
 from analyzer.pages.groups import morning_table
 from analyzer.pages.headings import heading, headings
+from analyzer.pages.lead import first_things
 from analyzer.pages.news import since
 from analyzer.pages.plant_history import NightSum, history
 from analyzer.pages.plant_map import plant_map
@@ -20,7 +20,7 @@ from analyzer.pages.trends import close_span, sparkline
 from analyzer.pages.view import Night, Row, linked, needs_a_look, oscillates
 from analyzer.pages.words import counted, duration, number
 from analyzer.plantwide.view import GroupView
-from analyzer.units import changed_settings, row_settings
+from analyzer.words.units import changed_settings, row_settings
 from reports.pages import Cell, Column, Listing, Page, Section, Sparkline, Table, Tiles
 
 

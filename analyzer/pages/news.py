@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from analyzer.decisions import Cause, Lane, Status
-from analyzer.lane_figures import FIGURE, lanes_in
+from analyzer.lanes.figures import FIGURE, lanes_in
+from analyzer.loop.decisions import Cause, Lane, Status
 from analyzer.pages.headings import heading
 from analyzer.pages.view import Night, Row, linked, oscillates, proposal
 from analyzer.pages.words import number

@@ -12,7 +12,7 @@ from analyzer.pages.plant_history import read_sums
 from analyzer.pages.reading import read_nights, read_trends
 from analyzer.pages.view import read_night
 from analyzer.plantwide.view import read_groups
-from analyzer.store import Store
+from analyzer.store.store import Store
 from reports.page_file import PageFileError, loads
 from reports.pages import Page
 

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 
 from analyzer.columns.table import BY_NAME
-from analyzer.cost import LOSS, SIGNIFICANCE, cost, cost_column
-from analyzer.decisions import CAUSES, Cause, counts
+from analyzer.loop.decisions import CAUSES, Cause, counts
+from analyzer.pages.cost import LOSS, SIGNIFICANCE, cost, cost_column
 from analyzer.pages.reading import read_nights
 from analyzer.pages.words import number
-from analyzer.store import Store
+from analyzer.store.store import Store
 from reports.pages import Block, Floats, Line, Panels, Plot
 
 COLUMNS = (*("loop", "status", "oscillating_pct", "cause", "importance", LOSS, SIGNIFICANCE),)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from analyzer.cost import LOSS, cost, cost_column
-from analyzer.decisions import CAUSES, Status
+from analyzer.loop.decisions import CAUSES, Status
+from analyzer.pages.cost import LOSS, cost, cost_column
 from analyzer.pages.view import Night, linked, needs_a_look
 from analyzer.pages.words import number
 from reports.map_blocks import Tile, TileGroup, TreeMap

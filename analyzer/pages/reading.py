@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
-from analyzer.block_bootstrap import Floats
-from analyzer.spans import Span
-from analyzer.store import Store
-from analyzer.stored_table import TREND, read_stored, stored_names
+from analyzer.comparison.block_bootstrap import Floats
+from analyzer.comparison.spans import Span
+from analyzer.store.store import Store
+from analyzer.store.table import TREND, read_stored, stored_names
 
 SIGNALS = ("sp", "pv", "op")
 AROUND_D = 2

@@ -6,17 +6,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from analyzer.before_after import LIMITS, LoopComparison, Span, compare, follows
+from analyzer.comparison.before_after import LIMITS, LoopComparison, Span, compare, follows
+from analyzer.comparison.spans import spans_around
 from analyzer.config import ChangeLimits, ComparisonLimits
-from analyzer.decisions import counts
+from analyzer.loop.decisions import counts
 from analyzer.loops.changes import TuningChange, behaviour_change, stated_changes
 from analyzer.pages.change_case import Case
 from analyzer.pages.engineering import scale_of
 from analyzer.pages.reading import nights_within, read_hours, read_nights, read_trends
 from analyzer.pages.wear import wear_texts
-from analyzer.spans import spans_around
-from analyzer.store import Store
-from analyzer.units import gain_unit
+from analyzer.store.store import Store
+from analyzer.words.units import gain_unit
 
 COLUMNS = (
     *(

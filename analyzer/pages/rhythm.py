@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from analyzer.pages.reading import Thinned
+from analyzer.pages.trend_rhythm import LEAST_SAMPLES, autocorrelation, even_error, power_shares
 from analyzer.pages.words import duration
-from analyzer.trend_rhythm import LEAST_SAMPLES, autocorrelation, even_error, power_shares
 from identification.record import Floats
 from reports.map_blocks import Mark
 from reports.pages import Line, Plot, Text

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from analyzer.decisions import CAUSES, Action, Status
-from analyzer.lead import first_things
+from analyzer.loop.decisions import CAUSES, Action, Status
+from analyzer.pages.lead import first_things
 from analyzer.pages.news import news_lines
 from analyzer.pages.view import Night, Row, needs_a_look, oscillates, read_night
 from analyzer.pages.words import counted
 from analyzer.pages.work_order import work_order
 from analyzer.plantwide.view import read_groups
-from analyzer.store import Store
-from analyzer.units import changed_settings
+from analyzer.store.store import Store
+from analyzer.words.units import changed_settings
 from reports.pages import Cell, Column, Listing, Page, Section, Table, Text
 
 WORST = 10

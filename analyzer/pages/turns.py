@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from analyzer.decisions import Cause
+from analyzer.loop.decisions import Cause
 from analyzer.pages.engineering import Scale
 from analyzer.pages.trends import LEAST_PCT
 from reports.pages import Floats, Line, Panels, Plot

@@ -6,14 +6,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from analyzer import notes
-from analyzer.decisions import Cause, Status, counts
-from analyzer.lane_figures import FIGURE
-from analyzer.notes import Note, is_hidden, last
+from analyzer.lanes.figures import FIGURE
+from analyzer.loop.decisions import Cause, Status, counts
+from analyzer.pages.rank import worst_first
 from analyzer.pages.reading import Thinned, read_nights, read_trends
-from analyzer.rank import worst_first
-from analyzer.store import Store
-from analyzer.units import row_settings
+from analyzer.store import notes
+from analyzer.store.notes import Note, is_hidden, last
+from analyzer.store.store import Store
+from analyzer.words.units import row_settings
 from reports.names import slug
 from reports.pages import Cell
 

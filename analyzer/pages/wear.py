@@ -7,7 +7,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from analyzer.before_after import Change, LoopComparison, Verdict
+from analyzer.comparison.before_after import Change, LoopComparison, Verdict
 from analyzer.pages.words import number
 
 HOURS_A_YEAR = 8760.0

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from analyzer.before_after import Change, Verdict
-from analyzer.plant_clock import stamp
-from analyzer.units import duration
+from analyzer.comparison.before_after import Change, Verdict
+from analyzer.history.plant_clock import stamp
+from analyzer.words.units import duration
 
 __all__ = ["KINDS", "counted", "duration", "interval", "number", "setting", "signed", "stamp"]
 

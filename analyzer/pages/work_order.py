@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from analyzer.decisions import Action, Cause, Fault, Lane
-from analyzer.lane_figures import lanes_in
-from analyzer.reason import STEPS
-from analyzer.units import changed_settings, duration
+from analyzer.lanes.figures import lanes_in
+from analyzer.loop.decisions import Action, Cause, Fault, Lane
+from analyzer.words.reason import STEPS
+from analyzer.words.units import changed_settings, duration
 
 Row = Mapping[str, Any]
 Lines = tuple[tuple[str, str], ...]

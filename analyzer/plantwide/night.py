@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from typing import Any
 
 from analyzer.config import PlantLimits
-from analyzer.decisions import CAUSES, Cause, Status, counts
+from analyzer.loop.decisions import CAUSES, Cause, Status, counts
 from analyzer.plantwide.rows import group_rows, is_told, own_groups, wave_columns
 from analyzer.plantwide.source import Peer
 from analyzer.plantwide.verdict import followers_of, follows, trace
 from analyzer.plantwide.wave import Wave
-from analyzer.present import follower_row, root_row
+from analyzer.words.present import follower_row, root_row
 
 Row = Mapping[str, Any]
 

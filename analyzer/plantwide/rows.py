@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from analyzer.config import PlantLimits
-from analyzer.decisions import GroupRole, counts
+from analyzer.loop.decisions import GroupRole, counts
 from analyzer.plantwide.verdict import Follower, Source, Traced, amplitude_pct, oscillating_pct
 from analyzer.plantwide.wave import Wave
 

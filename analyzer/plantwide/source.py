@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from analyzer.config import PlantLimits
-from analyzer.decisions import Cause
+from analyzer.loop.decisions import Cause
 from analyzer.plantwide.foresight import foresees
 from analyzer.plantwide.groups import Group
 from analyzer.plantwide.wave import Wave

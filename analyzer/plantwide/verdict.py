@@ -10,7 +10,7 @@ import numpy as np
 from scipy.fft import ifft, next_fast_len
 
 from analyzer.config import PlantLimits
-from analyzer.decisions import Action, Cause, Fault
+from analyzer.loop.decisions import Action, Cause, Fault
 from analyzer.plantwide.groups import Group, groups_of
 from analyzer.plantwide.source import Candidate, Peer, lag_between, ranked, signs_of
 from analyzer.plantwide.wave import Wave

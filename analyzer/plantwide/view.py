@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from analyzer.columns.table import GROUPS, names
-from analyzer.decisions import Action, Cause, GroupRole
-from analyzer.store import Store
-from analyzer.stored_table import REMEDY
+from analyzer.loop.decisions import Action, Cause, GroupRole
+from analyzer.store.store import Store
+from analyzer.store.table import REMEDY
 from identification.errors import InputError
 
 Row = Mapping[str, Any]

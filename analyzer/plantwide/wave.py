@@ -9,7 +9,7 @@ import numpy as np
 from scipy.fft import irfft
 
 from analyzer.config import PlantLimits
-from analyzer.oscillation import Oscillations, peaks
+from analyzer.loop.oscillation import Oscillations, peaks
 from identification.record import Floats
 from identification.signals.spectrum import Complex, Spectrum, locked_harmonic, peak_prominence
 

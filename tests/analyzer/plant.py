@@ -12,8 +12,8 @@ import pyarrow.parquet as pq
 
 from analyzer.config import Config, QualityLimits
 from analyzer.history.series import Series
+from analyzer.loop.quality import Prepared, prepare
 from analyzer.loops.spec import LoopSpec
-from analyzer.quality import Prepared, prepare
 from identification.models import Pid
 from identification.record import Floats, LoopRecord
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from plant import CONFIG, START_S, Sketch, prepared, series, simulate, spec
 
-from analyzer.advice import (
+from analyzer.loop.advice import (
     advise,
     chosen_fit,
     lag_factor,
@@ -19,13 +19,13 @@ from analyzer.advice import (
     tuned,
     uncertain,
 )
-from analyzer.assess import Assessment, assess
-from analyzer.cause import NO_CAUSE, not_assessed
-from analyzer.decisions import Lack, Needs
-from analyzer.oscillation import Oscillations
-from analyzer.quality import prepare
-from analyzer.reconstructed_load import load_of, scan_noise
-from analyzer.rows import night_row
+from analyzer.loop.assess import Assessment, assess
+from analyzer.loop.cause import NO_CAUSE, not_assessed
+from analyzer.loop.decisions import Lack, Needs
+from analyzer.loop.oscillation import Oscillations
+from analyzer.loop.quality import prepare
+from analyzer.loop.reconstructed_load import load_of, scan_noise
+from analyzer.store.rows import night_row
 from identification.models import Backlash, Fopdt, Integrator, Pid
 from tuning.limits import LIMITS
 from tuning.linear import margins

@@ -11,8 +11,8 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from plant import CONFIG, START_S, record
 
-from analyzer.assess import assess, unassessable
-from analyzer.assessments import (
+from analyzer.loop.assess import assess, unassessable
+from analyzer.loop.assessments import (
     HOUR_S,
     assess_span,
     crossings,
@@ -23,9 +23,9 @@ from analyzer.assessments import (
     travel,
     usable,
 )
-from analyzer.decisions import Lack
-from analyzer.oscillation import detect
-from analyzer.quality import Prepared, Scale
+from analyzer.loop.decisions import Lack
+from analyzer.loop.oscillation import detect
+from analyzer.loop.quality import Prepared, Scale
 from identification.record import LoopRecord
 
 FIGURES = CONFIG.figures

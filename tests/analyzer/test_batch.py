@@ -14,13 +14,13 @@ import pytest
 from click.testing import CliRunner
 from plant import CONFIG, START_S, Sketch, Trends, simulate, write_export
 
-from analyzer import batch, chunk
 from analyzer.cli import main
 from analyzer.columns.table import NIGHTS, names
 from analyzer.history.export import Export, open_export
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import find_loops
-from analyzer.store import Store
+from analyzer.night import batch, chunk
+from analyzer.store.store import Store
 
 LOOPS = 40
 BROKEN = "L17"
@@ -253,10 +253,10 @@ def test_the_last_night_is_read_while_another_is_worked_on(night, whole, tmp_pat
 MEASURE = """
 import json, resource, sys
 from pathlib import Path
-from analyzer import batch
+from analyzer.night import batch
 from analyzer.config import Config
 from analyzer.history.export import open_export
-from analyzer.store import Store
+from analyzer.store.store import Store
 from analyzer.loops.tags import find_loops
 export = open_export([Path(sys.argv[1])])
 batch.run(batch.Batch(export, find_loops(export.tags)[: int(sys.argv[2])], Store(Path(sys.argv[3])), Config()))

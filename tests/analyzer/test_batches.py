@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from plant import CONFIG, START_S, run, series, spec, wander
 
-from analyzer.assess import assess
-from analyzer.quality import Prepared, prepare
+from analyzer.loop.assess import assess
+from analyzer.loop.quality import Prepared, prepare
 from identification.models import Pid
 
 PERIOD_S, EVERY_S, HOURS = 3600, 15, 20

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from analyzer.before_after import (
+from analyzer.comparison.before_after import (
     LIMITS,
     MEASURES,
     Verdict,
@@ -14,8 +14,8 @@ from analyzer.before_after import (
     grade,
     reasons_against,
 )
-from analyzer.block_bootstrap import Side, difference, drift_factor, replicates
-from analyzer.spans import HOUR_S, Span, gridded, spans_around
+from analyzer.comparison.block_bootstrap import Side, difference, drift_factor, replicates
+from analyzer.comparison.spans import HOUR_S, Span, gridded, spans_around
 from tests.proofs.honesty import examined
 
 CHANGED_S = 1000 * 86400.0

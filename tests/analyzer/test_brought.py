@@ -11,7 +11,7 @@ import pytest
 from analyzer.explain.one_loop import plain_start
 from analyzer.explain.saved_model import read_model, scale_of
 from analyzer.explain.user_model import compared, judged, within, wrong_units
-from analyzer.quality import Scale
+from analyzer.loop.quality import Scale
 from identification.errors import InputError
 from identification.limits.explain import LIMITS
 from identification.mismatch.diagnosis import inputs_of

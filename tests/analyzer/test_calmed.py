@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from analyzer.calmed import calmed
+from analyzer.night.calmed import calmed
 
 NOW: dict[str, Any] = {
     **{"loop": "L", "night": "2026-03-15", "status": "ok", "kp": 6.0, "ti": 1100.0, "cause": "valve"},

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from plant import CONFIG, START_S, Sketch, Trends, prepared, record, series, simulate, spec
 
-from analyzer.assess import Assessment, assess
-from analyzer.cause import judge
-from analyzer.dead_valve import dead_valve
-from analyzer.decisions import Lack
+from analyzer.loop.assess import Assessment, assess
+from analyzer.loop.cause import judge
+from analyzer.loop.dead_valve import dead_valve
+from analyzer.loop.decisions import Lack
+from analyzer.loop.quality import prepare
 from analyzer.plantwide.source import Peer
 from analyzer.plantwide.verdict import followers_of, trace
-from analyzer.quality import prepare
 from identification.errors import NotAssessedError
 from tests.untidy.recorder import swinging_door
 

@@ -8,9 +8,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from analyzer.cause_measures import NAMES
-from analyzer.cause_weights import chances, parted, pushes, weights
-from analyzer.decisions import CAUSES, Cause
+from analyzer.loop.cause_measures import NAMES
+from analyzer.loop.cause_weights import chances, parted, pushes, weights
+from analyzer.loop.decisions import CAUSES, Cause
 from tests.proofs.cause_weights import WAYS, fitted
 
 LOW, HIGH = -3.0, 8.0

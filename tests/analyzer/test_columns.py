@@ -14,8 +14,8 @@ import pytest
 from analyzer.columns.column import Column
 from analyzer.columns.table import EXPLAINED, HOURS, NIGHTS, names, row_of
 from analyzer.config import Config
-from analyzer.finish import finish_night
-from analyzer.store import Store, rows_table, write_table
+from analyzer.night.finish import finish_night
+from analyzer.store.store import Store, rows_table, write_table
 
 ROOT = Path(__file__).resolve().parents[2]
 TABLES = (NIGHTS, HOURS, EXPLAINED)

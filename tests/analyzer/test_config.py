@@ -16,7 +16,7 @@ from analyzer.commands.options import Asked
 from analyzer.config import Config
 from analyzer.config_file import configured, document, limit_of, read_config
 from analyzer.loops.changes import TuningChange
-from analyzer.store import Store
+from analyzer.store.store import Store
 from tests.analyzer.plant import START_S, Sketch, simulate, write_export
 from tests.reports.small_store import small_store
 

@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from analyzer import chunk
 from analyzer.config import PlantLimits
-from analyzer.decisions import CAUSES, Action, Cause, Fault, Lack, LacksError, Needs, Status, counts
-from analyzer.nights import Night
+from analyzer.loop.decisions import CAUSES, Action, Cause, Fault, Lack, LacksError, Needs, Status, counts
+from analyzer.night import chunk
+from analyzer.night.nights import Night
 from analyzer.plantwide.verdict import Source, follows
 from tests.analyzer.plant import CONFIG, START_S, series, spec
 

@@ -9,16 +9,16 @@ from typing import Any
 
 import pytest
 
-from analyzer.batch import Batch
 from analyzer.config import Config
 from analyzer.explain import night as explain_night
 from analyzer.explain.answer_data import abstained
 from analyzer.explain.night import Question, answered, flagged, keep, known, questions, row_of, run
 from analyzer.loops.spec import LoopSpec
-from analyzer.nights import Night
+from analyzer.night.batch import Batch
+from analyzer.night.nights import Night
+from analyzer.night.workers import Died
 from analyzer.pages import night as night_pages
-from analyzer.store import Store
-from analyzer.workers import Died
+from analyzer.store.store import Store
 from identification.errors import NotAssessedError
 from reports.html import render
 from reports.page_file import dumps

@@ -23,8 +23,8 @@ from test_batch import quiet, tables
 
 from analyzer.cli import main
 from analyzer.commands import run as run_cli
-from analyzer.store import Store
-from analyzer.store_lock import locked
+from analyzer.store.lock import locked
+from analyzer.store.store import Store
 from identification.errors import InputError
 
 LOOPS = 24

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from analyzer import chunk
-from analyzer.decisions import Lack
-from analyzer.nights import Night
+from analyzer.loop.decisions import Lack
+from analyzer.night import chunk
+from analyzer.night.nights import Night
 from tests.analyzer.plant import CONFIG, START_S, series, spec
 
 

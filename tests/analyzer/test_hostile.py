@@ -14,7 +14,7 @@ from click.testing import CliRunner, Result
 from analyzer.cli import main
 from analyzer.commands.options import MOST_SAID, one_line
 from analyzer.explain.saved_model import checked
-from analyzer.store import Store
+from analyzer.store.store import Store
 from identification.errors import InputError
 from tests.analyzer.plant import Sketch, simulate, write_export
 from tests.analyzer.test_batch import stopped

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from plant import CONFIG, SAMPLE_DATA, START_S, Trends, prepared, run, spec, wander
 
-from analyzer import batch
-from analyzer.assess import assess
 from analyzer.history.export import open_export
-from analyzer.judged_stretch import Earlier, judged_stretch
+from analyzer.loop.assess import assess
+from analyzer.loop.judged_stretch import Earlier, judged_stretch
 from analyzer.loops.changes import read_changes
 from analyzer.loops.tags import match, read_loops
-from analyzer.store import Store
+from analyzer.night import batch
+from analyzer.store.store import Store
 from identification.models import Pid
 from identification.record import LoopRecord
 

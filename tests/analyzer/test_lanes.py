@@ -7,14 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analyzer import chunk
-from analyzer.decisions import Action, Lane, Status
-from analyzer.lane_figures import FIGURE
-from analyzer.lane_words import action_of, in_lanes
+from analyzer.lanes.figures import FIGURE
+from analyzer.lanes.words import action_of, in_lanes
+from analyzer.loop.decisions import Action, Lane, Status
 from analyzer.loops.spec import LoopSpec
-from analyzer.nights import Night
+from analyzer.night import chunk
+from analyzer.night.nights import Night
+from analyzer.pages.rank import worst_first
 from analyzer.pages.work_order import work_order
-from analyzer.rank import worst_first
 from tests.analyzer.plant import CONFIG, START_S, Sketch, series, simulate, spec
 from tests.identification.signals import hand_loop
 

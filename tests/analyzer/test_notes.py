@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner, Result
 
-from analyzer import notes
 from analyzer.cli import main
-from analyzer.store import Store
+from analyzer.store import notes
+from analyzer.store.store import Store
 from tests.reports.small_store import NASTY, small_store
 
 

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from plant import CONFIG, START_S, Sketch, Trends, series, simulate, spec
 
-from analyzer import chunk
 from analyzer.config import QualityLimits
-from analyzer.lane_words import in_lanes
-from analyzer.nights import Night
-from analyzer.quality import op_in_range
+from analyzer.lanes.words import in_lanes
+from analyzer.loop.quality import op_in_range
+from analyzer.night import chunk
+from analyzer.night.nights import Night
 
 PIPE = Sketch("valve", (12.0, 150.0, 6.0), 0.65, 30.0, backlash=2.5, load_std=0.1)
 NIGHT = Night("2026-03-02", START_S, START_S + 86400.0)

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from plant import CONFIG, START_S, record
 from scipy.signal import lfilter, square
 
-from analyzer.assessments import hourly
-from analyzer.oscillation import Oscillation, Oscillations, counting, detect
+from analyzer.loop.assessments import hourly
+from analyzer.loop.oscillation import Oscillation, Oscillations, counting, detect
 from identification.record import LoopRecord
 from tests.untidy.draw import draw
 

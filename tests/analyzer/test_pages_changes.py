@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from analyzer.history.stated_time import parse_time
 from analyzer.loops.changes import TuningChange, read_changes, stated_changes
-from analyzer.stated_time import parse_time
 from identification.errors import InputError
 
 T = 1773043200.0

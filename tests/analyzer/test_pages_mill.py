@@ -7,14 +7,14 @@ from pathlib import Path
 
 import pytest
 
-from analyzer.before_after import Verdict, grade
+from analyzer.comparison.before_after import Verdict, grade
 from analyzer.config import Config
 from analyzer.history.export import ReadOptions, open_export
 from analyzer.loops.changes import read_changes
 from analyzer.loops.tags import match, read_loops
 from analyzer.pages import before_after
 from analyzer.pages.report import Case, Spans, cases, detected
-from analyzer.store import Store
+from analyzer.store.store import Store
 from reports.markdown import render
 
 MILL = Path(__file__).parents[2] / "sample_data"
@@ -25,7 +25,7 @@ OTHERS = ("FIC2110", "FIC2113", "PIC2116")
 @pytest.fixture(scope="module")
 def store(tmp_path_factory: pytest.TempPathFactory) -> Store:
     """The mill's fourteen nights, of the retuned loops and some others, without causes: none is compared."""
-    from analyzer import batch
+    from analyzer.night import batch
 
     config = Config()
     quick = replace(config, quality=replace(config.quality, straight_share=0.0))

@@ -16,11 +16,11 @@ from analyzer.pages.engineering import Scale
 from analyzer.pages.reading import read_hours, read_trends
 from analyzer.pages.report import Spans, cases, detected
 from analyzer.pages.rhythm import rhythm_plots
+from analyzer.pages.trend_rhythm import autocorrelation
 from analyzer.pages.turns import turn_panels
 from analyzer.pages.view import read_night
 from analyzer.pages.wear import wear_texts
-from analyzer.store import Store
-from analyzer.trend_rhythm import autocorrelation
+from analyzer.store.store import Store
 from identification.errors import InputError
 from reports import html
 from reports.folder import write_csv, write_html, write_markdown

@@ -11,12 +11,12 @@ import pyarrow.parquet as pq
 import pytest
 from click.testing import CliRunner
 
-from analyzer import plant_clock
 from analyzer.cli import main
 from analyzer.config import Config
-from analyzer.nights import nights
-from analyzer.stated_time import parse_time
-from analyzer.store import Store
+from analyzer.history import plant_clock
+from analyzer.history.stated_time import parse_time
+from analyzer.night.nights import nights
+from analyzer.store.store import Store
 from identification.errors import InputError
 
 HELSINKI = "Europe/Helsinki"

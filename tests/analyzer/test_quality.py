@@ -10,7 +10,7 @@ from plant import START_S, series, spec
 
 from analyzer.config import QualityLimits
 from analyzer.history.series import Series
-from analyzer.quality import Prepared, prepare
+from analyzer.loop.quality import Prepared, prepare
 from identification.errors import NotAssessedError
 
 N = 8000

@@ -14,11 +14,11 @@ import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 
-from analyzer import rank
 from analyzer.cli import main
 from analyzer.columns.table import NIGHTS, row_of
-from analyzer.rank import as_table
-from analyzer.store import Store, rows_table, write_table
+from analyzer.pages import rank
+from analyzer.pages.rank import as_table
+from analyzer.store.store import Store, rows_table, write_table
 
 LOOPS = 10_000
 NIGHT = "2026-03-08"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from analyzer.reason import reason_of
+from analyzer.words.reason import reason_of
 
 
 @pytest.mark.parametrize(

@@ -5,14 +5,14 @@ from __future__ import annotations
 import pytest
 from plant import START_S, Sketch, simulate, spec, write_export
 
-from analyzer import batch
 from analyzer.config import Config
 from analyzer.history.export import open_export
+from analyzer.history.stated_time import parse_time
 from analyzer.loops.changes import TuningChange
 from analyzer.loops.settings_in_force import in_force, settings_from
 from analyzer.loops.tags import match, read_loops
-from analyzer.stated_time import parse_time
-from analyzer.store import Store
+from analyzer.night import batch
+from analyzer.store.store import Store
 from identification.errors import InputError
 
 LOOP = spec("L", kp=1.0, ti=10.0)

@@ -17,9 +17,11 @@ from plant import write_export
 from test_batch import cycling, quiet, tables
 from test_cluster import cluster  # noqa: F401
 
-from analyzer import places, store_lock, store_version
+from analyzer import places
 from analyzer.cli import main
-from analyzer.store_lock import OWNER, locked
+from analyzer.store import lock as store_lock
+from analyzer.store import version as store_version
+from analyzer.store.lock import OWNER, locked
 from identification.errors import InputError
 
 pytest.importorskip("upath", reason="the extra 'remote' is not installed")
@@ -138,7 +140,7 @@ def test_a_stopped_run_is_gone_on_with(
     bucket: str, export: Path, whole: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
     """Pieces on shared storage are gone on with by --resume, as those of a directory."""
-    from analyzer import finish
+    from analyzer.night import finish
 
     store = f"{bucket}/stopped"
 
@@ -146,7 +148,7 @@ def test_a_stopped_run_is_gone_on_with(
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
-        patch.setattr("analyzer.batch.finish_night", killed)
+        patch.setattr("analyzer.night.batch.finish_night", killed)
         ran(str(export), store)
     assert any(p.name.startswith("nights-") for p in places.place(store).rglob("*"))
     assert finish.finish_night is not killed

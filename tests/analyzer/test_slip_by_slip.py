@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import pytest
 
-from analyzer import words
-from analyzer.advice import propose
+from analyzer.loop.advice import propose
+from analyzer.words import settings as words
 from identification.models import Pid
 from tests.analyzer.plant import CONFIG
 from tests.proofs.coverage import FAMILIES, assessed, made

@@ -8,8 +8,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from analyzer.assess import Assessment
-from analyzer.chunk import assess_loop
+from analyzer.loop.assess import Assessment
+from analyzer.night.chunk import assess_loop
 from tests.analyzer.plant import CONFIG, START_S, series, spec
 
 HOURS = 5

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from analyzer.history.stated_time import parse_time
 from analyzer.loops.changes import read_changes
-from analyzer.stated_time import parse_time
 from identification.errors import InputError
 
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from plant import CONFIG, Sketch, Trends, prepared
 
-from analyzer.assess import assess
-from analyzer.decisions import Lack
+from analyzer.loop.assess import assess
+from analyzer.loop.decisions import Lack
 
 HEALTHY = Sketch("none", (1.2, 60.0, 10.0), 1.2, 60.0, noise=0.1, load_std=1.0)
 

@@ -13,11 +13,11 @@ import pyarrow.parquet as pq
 import pytest
 from click.testing import CliRunner, Result
 
-from analyzer import store_version
 from analyzer.cli import main
 from analyzer.columns.table import NIGHTS
-from analyzer.store import Store
-from analyzer.store_care import problems
+from analyzer.store import version as store_version
+from analyzer.store.care import problems
+from analyzer.store.store import Store
 from tests.analyzer.plant import Sketch, simulate, write_export
 from tests.reports.small_store import small_store
 

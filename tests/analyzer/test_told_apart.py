@@ -7,11 +7,11 @@ from dataclasses import replace
 import pytest
 from plant import CONFIG, Sketch, prepared, simulate
 
-from analyzer.assess import assess
-from analyzer.cause_signs import Sign
-from analyzer.decisions import Cause, Lack
-from analyzer.oscillation import counting
-from analyzer.told_apart import told_apart
+from analyzer.loop.assess import assess
+from analyzer.loop.cause_signs import Sign
+from analyzer.loop.decisions import Cause, Lack
+from analyzer.loop.oscillation import counting
+from analyzer.loop.told_apart import told_apart
 from identification.models import Fopdt, Loop
 from tuning.linear import margins
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from analyzer.assessments import assess_span
 from analyzer.config import FigureLimits
-from analyzer.sample_clock import interval
+from analyzer.loop.assessments import assess_span
+from analyzer.loop.sample_clock import interval
 from identification.record import LoopRecord
 
 

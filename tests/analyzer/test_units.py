@@ -7,9 +7,9 @@ import math
 import numpy as np
 
 from analyzer.loops.spec import LoopSpec
-from analyzer.present import brief
-from analyzer.rows import empty_row
-from analyzer.units import gain_unit
+from analyzer.store.rows import empty_row
+from analyzer.words.present import brief
+from analyzer.words.units import gain_unit
 from identification.controller.settings import fit_pi
 from identification.models import Fopdt, Loop, Pid
 from identification.simulation.closed_loop import closed_loop

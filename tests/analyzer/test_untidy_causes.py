@@ -12,13 +12,13 @@ from plant import CONFIG, START_S, series, spec
 from plant import prepared as sketched
 from scipy.signal import lfilter
 
-from analyzer.advice import withheld
-from analyzer.assess import assess, cause_of, convicted
-from analyzer.decisions import Action, Lack
+from analyzer.loop.advice import withheld
+from analyzer.loop.assess import assess, cause_of, convicted
+from analyzer.loop.decisions import Action, Lack
+from analyzer.loop.measure import measure
+from analyzer.loop.oscillation import counting, detect
+from analyzer.loop.quality import prepare
 from analyzer.loops.spec import LoopSpec
-from analyzer.measure import measure
-from analyzer.oscillation import counting, detect
-from analyzer.quality import prepare
 from tests.proofs.sensitivity import SKETCHES, Cell, made
 from tests.proofs.untidy import NAMED, recorded
 from tests.untidy.draw import draw

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from analyzer.config import WorkerLimits
-from analyzer.workers import Began, Died, Workers
+from analyzer.night.workers import Began, Died, Workers
 
 LIMITS = WorkerLimits(memory_mb=512.0, processor_s=600.0, wall_s=6000.0)
 """Limits of memory that tell, and of time that no busy machine reaches; tests of time have one of their own."""
@@ -113,7 +113,7 @@ PARENT = """
 import sys
 sys.path.insert(0, sys.argv[1])
 from test_workers import LIMITS, act
-from analyzer.workers import Workers
+from analyzer.night.workers import Workers
 if __name__ == "__main__":
     with Workers(2, act, LIMITS) as workers:
         workers.submit(("hanging",)); workers.submit(("hanging",))

@@ -19,7 +19,7 @@ import numpy as np
 import pyarrow.parquet as pq
 
 from analyzer.config import PlantLimits
-from analyzer.decisions import Cause
+from analyzer.loop.decisions import Cause
 from analyzer.plantwide.source import Peer
 from analyzer.plantwide.table import waves_in, waves_table
 from analyzer.plantwide.verdict import trace

@@ -23,13 +23,13 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from analyzer.assess import Assessment, assess
 from analyzer.config import Config
-from analyzer.decisions import counts
 from analyzer.history.export import Export, open_export
+from analyzer.loop.assess import Assessment, assess
+from analyzer.loop.decisions import counts
+from analyzer.loop.quality import prepare
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import controller, find_loops, match, read_loops
-from analyzer.quality import prepare
 from identification.errors import TriageError
 from tests.analyzer.plant import Sketch, simulate, write_export
 

@@ -29,10 +29,10 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 
-from analyzer.assess import assess
 from analyzer.config import Config
-from analyzer.decisions import Cause
-from analyzer.quality import prepare
+from analyzer.loop.assess import assess
+from analyzer.loop.decisions import Cause
+from analyzer.loop.quality import prepare
 from tests.analyzer.plant import START_S, Sketch, Trends, series, simulate, spec
 from tests.benchmarks.night import HEALTHY
 

@@ -28,8 +28,8 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from analyzer.decisions import COUNTS_PCT
-from analyzer.store import Store
+from analyzer.loop.decisions import COUNTS_PCT
+from analyzer.store.store import Store
 from tests.analyzer.plant import Sketch, Trends, simulate, write_export
 from tests.benchmarks.night import FAULTY, HEALTHY
 

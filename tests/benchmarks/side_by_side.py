@@ -24,7 +24,7 @@ from pathlib import Path
 import numpy as np
 
 from analyzer.config import Config
-from analyzer.measure import measure, time_scale, window_of
+from analyzer.loop.measure import measure, time_scale, window_of
 from identification.estimation.backlash_stiction import fit_linear
 from identification.estimation.hammerstein import process_of
 from identification.models import Backlash, Fopdt, Loop, Pid
@@ -297,7 +297,7 @@ def speed_table() -> str:
     """Simulation and identification of a day, over floors that any program pays."""
     from scipy.signal import lfilter
 
-    from analyzer.oscillation import detect
+    from analyzer.loop.oscillation import detect
 
     loop, zero = Loop(Fopdt(80, 200, 1), Pid(1, 10), Backlash(1.0)), np.zeros(86_400)
     noise = np.random.default_rng(0).standard_normal(86_400)

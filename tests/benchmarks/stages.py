@@ -17,16 +17,16 @@ from pathlib import Path
 import numpy as np
 import pyarrow as pa
 
-from analyzer.advice import advise
-from analyzer.assess import assess, cause_of
 from analyzer.config import Config
 from analyzer.explain.case import case, pid_of
 from analyzer.explain.one_loop import explained
 from analyzer.history.export import Export, open_export
+from analyzer.loop.advice import advise
+from analyzer.loop.assess import assess, cause_of
+from analyzer.loop.oscillation import counting, detect
+from analyzer.loop.quality import prepare
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import find_loops
-from analyzer.oscillation import counting, detect
-from analyzer.quality import prepare
 from tests.benchmarks.night import fastest, floor, plant, stated
 
 OUT = Path(__file__).with_suffix(".md")

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from analyzer.compared import compared
 from analyzer.config import Config
+from analyzer.loop.compared import compared
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import controller
 from analyzer.pages.compared import page

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from analyzer.run_log import RunLog
-from analyzer.store import Store
+from analyzer.night.run_log import RunLog
+from analyzer.store.store import Store
 from tests.analyzer.plant import Sketch, simulate, write_export
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -15,8 +15,8 @@ from multiprocessing import Pool
 from pathlib import Path
 
 from analyzer import api
-from analyzer.decisions import Cause
-from analyzer.plant import PlantLoop
+from analyzer.loop.decisions import Cause
+from analyzer.night.plant import PlantLoop
 from identification.errors import NotAssessedError
 
 OUT = Path(__file__).with_suffix(".md")

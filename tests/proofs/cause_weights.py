@@ -5,7 +5,7 @@ fitted to them by ridge regression, each sign pointing the way that physics give
 tests/untidy (seeds 21 to 32, and 51 and 52 with up to 900 cycles), loads that swing worn valves (seed 41), plants of
 tests/coupled (seeds 500 to 513; a follower has a load), and the folders given, as ../shared/wild has them. Others are
 kept apart and only asked: untidy loops of seeds 5, 6 and 7, worn valves of seed 42, coupled plants 520 to 533. Writes
-analyzer/cause_weights.json and tests/proofs/cause_weights.md.
+analyzer/loop/cause_weights.json and tests/proofs/cause_weights.md.
 """
 
 from __future__ import annotations
@@ -21,15 +21,15 @@ import numpy as np
 from scipy.optimize import minimize
 
 from analyzer import api
-from analyzer.cause_measures import NAMES, measures
-from analyzer.cause_weights import FILE, parted
 from analyzer.config import Config
-from analyzer.decisions import CAUSES
-from analyzer.fit_for_cause import unfit_for_cause
+from analyzer.loop.cause_measures import NAMES, measures
+from analyzer.loop.cause_weights import FILE, parted
+from analyzer.loop.decisions import CAUSES
+from analyzer.loop.fit_for_cause import unfit_for_cause
+from analyzer.loop.measure import measure
+from analyzer.loop.oscillation import counting, detect
+from analyzer.loop.quality import Prepared, prepare
 from analyzer.loops.tags import controller
-from analyzer.measure import measure
-from analyzer.oscillation import counting, detect
-from analyzer.quality import Prepared, prepare
 from identification.errors import TriageError
 from identification.models import Pid
 from identification.record import Floats
@@ -40,7 +40,7 @@ from tests.proofs.untidy import NAMED, clear, recorded, shows
 from tests.untidy.draw import CYCLES, draw
 
 OUT = Path(__file__).with_suffix(".md")
-WEIGHTS = Path(api.__file__).parent / FILE
+WEIGHTS = Path(api.__file__).parent / "loop" / FILE
 LONG = (150.0, 900.0)
 KNOTS = (0.33, 0.67)
 """Quantiles of each measure at which its line breaks."""
@@ -239,7 +239,7 @@ def main() -> None:
             "coupled plants 520 to 533": plants(520, 533),
         }
     written(fit)
-    from analyzer.cause_weights import chances
+    from analyzer.loop.cause_weights import chances
 
     head = (
         "| loops kept apart | clear | likeliest is right | right below .6 | .6 to .8 | above .8 "

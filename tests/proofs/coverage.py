@@ -23,11 +23,11 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from concealed.plant import Drive, Pi, Plant, close_loop
 from concealed.scene import KINDS, Rng, draw_plant, load_path, noise_path, setpoints
 
-from analyzer.advice import chosen_fit
-from analyzer.assess import Assessment, assess
 from analyzer.config import AdviceLimits, QualityLimits
-from analyzer.intervals import intervals
-from analyzer.quality import prepare
+from analyzer.loop.advice import chosen_fit
+from analyzer.loop.assess import Assessment, assess
+from analyzer.loop.intervals import intervals
+from analyzer.loop.quality import prepare
 from identification.errors import NotAssessedError
 from identification.models import Estimate, Pid
 from identification.record import Floats

@@ -18,11 +18,11 @@ import numpy as np
 from scipy.signal import lfilter
 from scipy.stats import ttest_ind
 
-from analyzer.assessments import hourly
-from analyzer.before_after import MEASURES, LoopComparison, Verdict, compare
+from analyzer.comparison.before_after import MEASURES, LoopComparison, Verdict, compare
+from analyzer.comparison.spans import gridded, spans_around
 from analyzer.config import Config
-from analyzer.oscillation import detect
-from analyzer.spans import gridded, spans_around
+from analyzer.loop.assessments import hourly
+from analyzer.loop.oscillation import detect
 from identification.models import Backlash, Fopdt, Loop, Pid, Stiction
 from identification.record import LoopRecord
 from identification.simulation.closed_loop import closed_loop

@@ -9,16 +9,16 @@ from typing import Any
 
 import numpy as np
 
-from analyzer.assess import Assessment, assess
 from analyzer.config import Config
-from analyzer.decisions import Cause
-from analyzer.fit_for_cause import unfit_for_cause
 from analyzer.history.series import Series
+from analyzer.loop.assess import Assessment, assess
+from analyzer.loop.decisions import Cause
+from analyzer.loop.fit_for_cause import unfit_for_cause
+from analyzer.loop.measure import Measured, measure
+from analyzer.loop.oscillation import Oscillations, counting, detect
+from analyzer.loop.quality import Prepared, prepare
 from analyzer.loops.spec import LoopSpec
-from analyzer.measure import Measured, measure
-from analyzer.oscillation import Oscillations, counting, detect
 from analyzer.plantwide.source import Peer
-from analyzer.quality import Prepared, prepare
 from identification.errors import TriageError
 from identification.models import Pid
 from identification.record import LoopRecord

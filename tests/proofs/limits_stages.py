@@ -8,20 +8,20 @@ from typing import Any
 
 import numpy as np
 
-from analyzer.advice import advise
-from analyzer.assess import assess, at_limits, cause_of, verdict_by_measures
-from analyzer.assessments import assess_span
-from analyzer.before_after import Span, compare, grade
-from analyzer.before_after import follows as source_of
+from analyzer.comparison.before_after import Span, compare, grade
+from analyzer.comparison.before_after import follows as source_of
 from analyzer.config import Config
-from analyzer.dead_valve import dead_valve
+from analyzer.loop.advice import advise
+from analyzer.loop.assess import assess, at_limits, cause_of, verdict_by_measures
+from analyzer.loop.assessments import assess_span
+from analyzer.loop.dead_valve import dead_valve
+from analyzer.loop.oscillation import barely_seen, counting, detect
+from analyzer.loop.quality import prepare
+from analyzer.loop.settings_check import differing
 from analyzer.loops.changes import behaviour_change
-from analyzer.oscillation import barely_seen, counting, detect
 from analyzer.plantwide.rows import likely, wave_columns
 from analyzer.plantwide.verdict import followers_of, follows, trace
 from analyzer.plantwide.wave import waves_of
-from analyzer.quality import prepare
-from analyzer.settings_check import differing
 from identification.models import Backlash, Fopdt, Loop, Pid, Stiction
 from identification.record import LoopRecord
 from tests.analyzer.plant import prepared, series, simulate, spec

@@ -11,12 +11,12 @@ from pathlib import Path
 
 import numpy as np
 
-from analyzer.assess import convicted
 from analyzer.config import Config
 from analyzer.history.series import Series
+from analyzer.loop.assess import convicted
+from analyzer.loop.oscillation import counting, detect
+from analyzer.loop.quality import prepare
 from analyzer.loops.spec import LoopSpec
-from analyzer.oscillation import counting, detect
-from analyzer.quality import prepare
 from tests.proofs.nulls import FAMILIES, record
 
 OUT = Path(__file__).with_suffix(".md")

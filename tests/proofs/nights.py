@@ -20,17 +20,17 @@ from typing import Any
 
 import numpy as np
 
-from analyzer import batch
 from analyzer.config import Config
-from analyzer.decisions import Action, Fault
 from analyzer.history.export import open_export
+from analyzer.loop.decisions import Action, Fault
 from analyzer.loops.changes import TuningChange, read_changes
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import controller, match, read_loops
+from analyzer.night import batch
 from analyzer.pages.news import news_lines
+from analyzer.pages.rank import ranked
 from analyzer.pages.view import read_night
-from analyzer.rank import ranked
-from analyzer.store import Store
+from analyzer.store.store import Store
 
 SAMPLE = Path(__file__).resolve().parents[2] / "sample_data"
 if str(SAMPLE) not in sys.path:

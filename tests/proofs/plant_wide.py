@@ -17,15 +17,15 @@ from typing import Any
 
 import numpy as np
 
-from analyzer.advice import Advice
-from analyzer.chunk import assess_loop
 from analyzer.config import Config
-from analyzer.decisions import Action, Cause, counts
 from analyzer.history.series import Series
+from analyzer.loop.advice import Advice
+from analyzer.loop.decisions import Action, Cause, counts
 from analyzer.loops.spec import LoopSpec
+from analyzer.night.chunk import assess_loop
 from analyzer.plantwide.night import TracedNight, traced_night
-from analyzer.present import advised
-from analyzer.rows import night_row
+from analyzer.store.rows import night_row
+from analyzer.words.present import advised
 from identification.errors import TriageError
 from tests.coupled.draw import Drawn, Recorded, draw
 

@@ -16,10 +16,10 @@ from pathlib import Path
 
 import numpy as np
 
-from analyzer.assess import assess
-from analyzer.decisions import Cause, counts
-from analyzer.oscillation import detect
-from analyzer.quality import prepare
+from analyzer.loop.assess import assess
+from analyzer.loop.decisions import Cause, counts
+from analyzer.loop.oscillation import detect
+from analyzer.loop.quality import prepare
 from identification.errors import NotAssessedError
 from tests.analyzer.plant import CONFIG, START_S, Sketch, Trends, prepared, series, simulate, spec
 from tests.untidy.recorder import swinging_door

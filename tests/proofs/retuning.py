@@ -18,12 +18,12 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from analyzer import batch
 from analyzer.config import Config
 from analyzer.history.export import open_export
 from analyzer.loops.tags import match, read_loops
-from analyzer.rank import ranked
-from analyzer.store import Store
+from analyzer.night import batch
+from analyzer.pages.rank import ranked
+from analyzer.store.store import Store
 from tests.proofs.retuning_outcome import (
     STATED_INTEGRAL,
     STATED_INTEGRAL_RAMP,

@@ -13,7 +13,7 @@ from collections.abc import Callable
 import numpy as np
 import statsmodels.api as sm
 
-from analyzer.block_bootstrap import Floats, Side, difference
+from analyzer.comparison.block_bootstrap import Floats, Side, difference
 
 DAYS, HOURS = 7, 24
 DRIFTS = (0.0, 0.4, 0.8)

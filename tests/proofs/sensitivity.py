@@ -16,9 +16,9 @@ from pathlib import Path
 
 import numpy as np
 
-from analyzer.assess import assess
-from analyzer.decisions import counts
-from analyzer.oscillation import detect
+from analyzer.loop.assess import assess
+from analyzer.loop.decisions import counts
+from analyzer.loop.oscillation import detect
 from identification.errors import NotAssessedError
 from tests.analyzer.plant import CONFIG, Sketch, Trends, prepared, simulate
 

@@ -13,11 +13,11 @@ from pathlib import Path
 
 from analyzer.config import Config
 from analyzer.history.export import open_export
+from analyzer.loop.measure import time_scale
+from analyzer.loop.oscillation import counting, detect
+from analyzer.loop.quality import prepare
+from analyzer.loop.settings_check import differing
 from analyzer.loops.tags import controller, match, read_loops
-from analyzer.measure import time_scale
-from analyzer.oscillation import counting, detect
-from analyzer.quality import prepare
-from analyzer.settings_check import differing
 from tests.proofs.retuning import COUNTS, write_export, write_loops
 from tests.proofs.retuning_plant import drawn
 

@@ -17,7 +17,7 @@ from analyzer.history.converted import Converted
 from analyzer.history.export import Export, open_export
 from analyzer.history.options import ReadOptions
 from analyzer.history.series import Series
-from analyzer.store_lock import scratch
+from analyzer.store.lock import scratch
 
 TAGS = [f"FIC{k:03d}.{role}" for k in range(40) for role in ("PV", "OP")]
 ROWS = 300

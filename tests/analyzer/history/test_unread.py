@@ -10,8 +10,8 @@ import pytest
 from analyzer.config import QualityLimits
 from analyzer.history.export import ReadOptions, open_export
 from analyzer.history.values import parsed
+from analyzer.loop.quality import prepare
 from analyzer.loops.spec import LoopSpec
-from analyzer.quality import prepare
 from identification.errors import InputError, NotAssessedError
 
 N = 400

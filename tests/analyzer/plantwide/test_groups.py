@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from analyzer.decisions import Cause
-from analyzer.oscillation import detect
+from analyzer.loop.decisions import Cause
+from analyzer.loop.oscillation import detect
 from analyzer.plantwide.groups import Group, groups_of
 from analyzer.plantwide.source import Peer
 from analyzer.plantwide.table import waves_in, waves_table

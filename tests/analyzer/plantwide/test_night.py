@@ -14,10 +14,10 @@ from click.testing import CliRunner
 from analyzer.cli import main
 from analyzer.columns.other_tables import GROUP_LIST
 from analyzer.columns.table import names
-from analyzer.decisions import counts
-from analyzer.lane_figures import lanes_in
+from analyzer.lanes.figures import lanes_in
+from analyzer.loop.decisions import counts
 from analyzer.pages.night import pages
-from analyzer.store import Store
+from analyzer.store.store import Store
 from reports.charts import draw as drawn
 from reports.html import render
 from reports.map_blocks import Graph, HeatMap
@@ -145,7 +145,7 @@ def test_a_second_run_of_some_loops_keeps_the_others_group(run_plant: RunPlant, 
 def test_a_night_without_groups_says_so(tmp_path, form):
     """A store whose night has no groups lists none and fails nowhere."""
     from analyzer.columns.table import NIGHTS
-    from analyzer.store import rows_table, write_table
+    from analyzer.store.store import rows_table, write_table
 
     path = tmp_path / "nights" / "2026-03-02.parquet"
     write_table(rows_table([{"loop": "FIC1", "status": "ok"}], NIGHTS), path)

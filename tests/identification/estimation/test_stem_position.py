@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from analyzer.assess import assess
-from analyzer.quality import prepare
+from analyzer.loop.assess import assess
+from analyzer.loop.quality import prepare
 from identification.estimation.stem_position import seen
 from tests.analyzer.plant import CONFIG, START_S, Sketch, Trends, series, simulate, spec
 

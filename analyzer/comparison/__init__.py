@@ -1,0 +1,1 @@
+"""Spans of hours before and after a change, compared."""

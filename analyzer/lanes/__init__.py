@@ -1,0 +1,1 @@
+"""Why a loop is worth a look beside its oscillation."""

@@ -1,0 +1,122 @@
+"""Beside oscillation: loops in manual, at a limit, off their set point, frozen, sluggish, or wearing their valve.
+
+Each lane has one figure and one limit; a loop may stand in several. Figures rest on samples as logged, so that a loop
+that cannot be assessed, all in manual for example, has its lane all the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from analyzer.config import Config
+from analyzer.lanes.figures import FIGURE
+from analyzer.limits.lanes import LaneLimits
+from analyzer.loop.assessments import HOUR_S, hour_edges, usable
+from analyzer.loop.decisions import Lane, counts
+from analyzer.loop.quality import Prepared
+from identification.models import Pid
+from identification.record import LoopRecord
+from identification.signals.correlation_time import correlation_time
+
+AVERAGING = "level"
+"""Type of loops that are slow on purpose: a level buffers flow."""
+
+
+@dataclass(frozen=True, slots=True)
+class Standing:
+    """Figures of the lanes; None where they cannot be told.
+
+    manual_pct, at_limits_pct : shares of the good time [%], the latter of that in automatic where there is any;
+    frozen_pct : share of the time in which PV stands while OP moves [%]; lasting_error_pct : median over the hours of
+    the size of the hour's mean error [% of span]; error_memory_ti : correlation time of the error in Ti [-]
+    """
+
+    manual_pct: float | None = None
+    at_limits_pct: float | None = None
+    frozen_pct: float | None = None
+    lasting_error_pct: float | None = None
+    error_memory_ti: float | None = None
+
+    def as_row(self) -> Mapping[str, float | None]:
+        """The figures by column."""
+        return asdict(self)
+
+
+def _percent(part: np.ndarray, whole: np.ndarray) -> float | None:
+    return 100.0 * float(part[whole].mean()) if whole.any() else None
+
+
+def _lasting_error(record: LoopRecord, limits: LaneLimits) -> float | None:
+    """The typical hour's mean error; None without a recorded set point or without an hour that is half usable."""
+    if record.sp_estimated:
+        return None
+    use, error = usable(record), record.error
+    hours = [
+        abs(float(error[a:b][use[a:b]].mean()))
+        for a, b, _ in hour_edges(record)
+        if use[a:b].sum() * record.dt_s >= limits.hour_share * HOUR_S
+    ]
+    return float(np.median(hours)) if hours else None
+
+
+def _memory(prepared: Prepared, controller: Pid | None, kind: str, config: Config) -> float | None:
+    """The error's correlation time in Ti; None where it says nothing, for the loop is at its set point as far as a
+    transmitter tells, or compression would make it longer."""
+    record, use = prepared.record, usable(prepared.record)
+    if controller is None or kind == AVERAGING or prepared.compressed_share > config.lanes.straight_share:
+        return None
+    if float(use.mean()) < config.quality.usable_share:
+        return None
+    if float(np.median(np.abs(record.error[use]))) <= max(config.lanes.at_set_point, prepared.pv_step):
+        return None
+    found = correlation_time(record.error, use, record.dt_s, controller.ti_s)
+    return None if found is None else found / controller.ti_s
+
+
+def standing(prepared: Prepared, controller: Pid | None, kind: str, config: Config) -> Standing:
+    """The figures of one prepared record.
+
+    Parameters
+    ----------
+    prepared : Prepared
+    controller : Pid or None
+        The settings in force; without them nothing is sluggish.
+    kind : str
+        The loop's type.
+    config : Config
+    """
+    record, op = prepared.record, prepared.op_known
+    scaled = op and prepared.op_scaled
+    good, use = ~record.bad, usable(record)
+    return Standing(
+        _percent(record.mask("manual"), good) if op else None,
+        _percent(record.mask("saturated"), use if use.any() else good) if scaled else None,
+        100.0 * float(record.mask("stale").mean()) if op else None,
+        _lasting_error(record, config.lanes),
+        _memory(prepared, controller, kind, config),
+    )
+
+
+def lanes_of(row: Mapping[str, Any], limits: LaneLimits) -> tuple[Lane, ...]:
+    """The lanes that a loop's figures put it into."""
+    beyond = {
+        Lane.MANUAL: limits.manual_pct,
+        Lane.AT_LIMIT: limits.at_limits_pct,
+        Lane.LASTING_ERROR: limits.lasting_error_pct,
+        Lane.FROZEN: limits.frozen_pct,
+        Lane.SLUGGISH: limits.error_memory_ti,
+        Lane.TRAVEL: limits.travel_pct_per_h,
+    }
+    found = {lane for lane, limit in beyond.items() if (row[FIGURE[lane]] or 0.0) > limit}
+    slow = (row["error_memory_ti"] or 0.0) > limits.small_gain_memory_ti
+    if slow and (row["gain_room"] or 0.0) > limits.small_gain_room:
+        found.add(Lane.SLUGGISH)
+    if counts(row["oscillating_pct"]):
+        found = (found | {Lane.OSCILLATION}) - {Lane.SLUGGISH}
+    if found & {Lane.AT_LIMIT, Lane.FROZEN}:
+        found -= {Lane.SLUGGISH}
+    return tuple(lane for lane in Lane if lane in found)

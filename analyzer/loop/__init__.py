@@ -1,0 +1,1 @@
+"""One loop over one span: what is fit for use, what oscillates, why, and what to do."""

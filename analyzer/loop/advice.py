@@ -1,0 +1,310 @@
+"""What to do about a flagged loop: its identified model and settings, handed to the tuning package."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+
+from analyzer.config import AdviceLimits, Config
+from analyzer.loop.assess import Assessment
+from analyzer.loop.cause import Verdict
+from analyzer.loop.compared import Comparison, compared
+from analyzer.loop.decisions import Action, Cause, Due, Fault, Lack, Needs
+from analyzer.loop.fit_for_settings import too_thin
+from analyzer.loop.measure import Measured
+from analyzer.loop.model_samples import uncertain
+from analyzer.loop.oscillation import counting
+from analyzer.loop.reconstructed_load import load_of
+from analyzer.loop.tight import cautious
+from analyzer.loops.spec import LoopSpec
+from analyzer.loops.tags import as_stated
+from analyzer.words import settings as words
+from identification.estimation.covariance import NINETY
+from identification.estimation.gauss_newton import covariance
+from identification.estimation.hammerstein import Fit, process_of
+from identification.estimation.window import Window
+from identification.models import Integrator, Loop, Pid, Process, Valve
+from identification.record import Floats
+from tuning.limit_cycle import Cycle, confirm
+from tuning.linear import integral_s, is_stable
+from tuning.recommend import Proposal, recommend
+from tuning.search import rounded
+
+
+@dataclass(frozen=True, slots=True)
+class Advice:
+    """A proposal in the loop's own units.
+
+    action as in the ranking, None where none was sought; reason in words, empty where the finding says it all;
+    kp_new and ti_new in the units and form that loops.csv states, None unless action is retune; before and after, the
+    limit cycles that simulation finds at the present and at the new settings, None where there is none; lack, what
+    the record lacks where the action is to get more data; due, when a valve's repair is; compared, present, new and
+    textbook settings on the load, None where no settings were sought.
+    """
+
+    action: Action | None
+    reason: str = ""
+    kp_new: float | None = None
+    ti_new: float | None = None
+    before: Cycle | None = None
+    after: Cycle | None = None
+    lack: Lack | None = None
+    due: Due = Due.NOW
+    compared: Comparison | None = field(default=None, compare=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Proposed:
+    """A proposal, and the loop and load [% PV] that it was sought on, None where none was sought."""
+
+    proposal: Proposal
+    loop: Loop | None = None
+    load: Floats | None = None
+
+
+def chosen_fit(verdict: Verdict) -> Fit:
+    """The fit that a verdict rests on."""
+    m = measured_of(verdict)
+    if verdict.cause is not Cause.VALVE:
+        return m.linear
+    return m.stick_slip if verdict.fault is Fault.STICTION and m.stick_slip is not None else m.play
+
+
+def measured_of(verdict: Verdict) -> Measured:
+    """What a verdict rests on.
+
+    Raises
+    ------
+    ValueError
+        Where it has no model.
+    """
+    if verdict.measured is None:
+        raise ValueError("a verdict without a model has no fit")
+    return verdict.measured
+
+
+def valve_of(verdict: Verdict, fit: Fit) -> Valve:
+    """The valve of a verdict's model, None where it is not at fault."""
+    return fit.valve.valve if verdict.cause is Cause.VALVE else None
+
+
+def model_of(verdict: Verdict, controller: Pid) -> Loop:
+    """The closed loop that a verdict's model and the settings make."""
+    fit = chosen_fit(verdict)
+    process = process_of(measured_of(verdict).window, fit)
+    return Loop(process, controller, valve_of(verdict, fit))
+
+
+def lag_factor(window: Window, fit: Fit, valve: bool, limits: AdviceLimits) -> float | None:
+    """Factor from the time constant to its 90 % limits [-]; None where the record tells gain over it alone."""
+    spread = math.sqrt(max(float(covariance(window, fit, free_width=valve)[0, 0]), 0.0))
+    factor = math.exp(min(NINETY * spread, 20.0))
+    known = is_known(fit, window, limits) and factor < limits.most_factor
+    return factor if known else None
+
+
+def is_known(fit: Fit, window: Window, limits: AdviceLimits) -> bool:
+    """Whether the time constant is well inside the window, so that it can be told from an integrator's."""
+    return fit.time_constant_s < limits.longest_share * window.duration_s
+
+
+def tuned(window: Window, fit: Fit, valve: bool, limits: AdviceLimits) -> Process:
+    """The process that settings are sought for: an integrator where the time constant is not known."""
+    process = process_of(window, fit)
+    if lag_factor(window, fit, valve, limits) is None:
+        return Integrator(process.slope, process.dead_time_s)
+    return process
+
+
+def advise(
+    found: Assessment, spec: LoopSpec, controller: Pid | None, pv_span: float, config: Config
+) -> Advice:
+    """The advice on one assessed loop.
+
+    Parameters
+    ----------
+    found : Assessment
+    spec : LoopSpec
+    controller : Pid or None
+        The stated settings in percent and seconds.
+    pv_span : float
+        Span of PV in its own unit, for settings in engineering units.
+    config : Config
+    """
+    kept = withheld(found, spec, controller, pv_span, config)
+    if not found.op_scaled and found.for_settings is not None:
+        return _unscaled(kept, found.for_settings)
+    oscillation = counting(found.oscillations)
+    if kept is not None or controller is None or oscillation is None:
+        return kept or _without_settings(found.verdict)
+    return _sought(found, spec, controller, oscillation.period_s, pv_span, config)
+
+
+def _unscaled(kept: Advice | None, needs: Needs) -> Advice:
+    """What is left to do where OP is not in percent: a valve is stroked all the same, else the range is stated."""
+    if kept is not None and kept.action is Action.REPAIR_VALVE:
+        return replace(kept, reason=needs.text, lack=needs.lack)
+    return _lacking(needs)
+
+
+def _sought(
+    found: Assessment, spec: LoopSpec, controller: Pid, period_s: float, pv_span: float, config: Config
+) -> Advice:
+    """The settings that the tuning package proposes for a loop that oscillates, or what to do instead."""
+    proposed = propose(found.verdict, controller, period_s, config)
+    proposal = proposed.proposal
+    if proposal.action is Action.UNDECIDED and found.verdict.cause is Cause.VALVE:
+        proposal = replace(proposal, action=Action.REPAIR_VALVE)
+    elif proposal.action is Action.UNDECIDED:
+        return _lacking(Needs(Lack.LONGER, f"{words.MORE} {proposal.reason}"))
+    beside = None
+    if proposed.loop is not None and proposed.load is not None:
+        new = proposal.controller or proposal.meanwhile
+        beside = compared(proposed.loop, proposed.load, new, period_s, spec, pv_span, config.tuning)
+    return replace(_stated(proposal, spec, pv_span), compared=beside)
+
+
+def _without_settings(verdict: Verdict) -> Advice:
+    """What is left to do where none are stated: a valve at fault is one all the same."""
+    if verdict.cause is Cause.VALVE:
+        return Advice(Action.REPAIR_VALVE, words.NOT_STATED)
+    return Advice(Action.CHECK_SETTINGS, words.NOT_STATED)
+
+
+def _lacking(needs: Needs) -> Advice:
+    """The advice to get more data, or a test where no data tell, with what is lacking."""
+    tests = (Lack.STROKE, Lack.MANUAL_TEST)
+    action = Action.UNDECIDED if needs.lack in tests else Action.NEEDS_DATA
+    return Advice(action, needs.text, lack=needs.lack)
+
+
+def withheld(
+    found: Assessment, spec: LoopSpec, controller: Pid | None, pv_span: float, config: Config
+) -> Advice | None:
+    """Why no settings are sought for a loop, and what to do instead; None where they are sought."""
+    verdict = found.verdict
+    if verdict.dead:
+        return Advice(Action.REPAIR_VALVE)
+    if found.outdated:
+        return Advice(Action.NONE, words.JUST_CHANGED)
+    if found.settings is not None:
+        return Advice(Action.CHECK_SETTINGS, words.settings_differ(found.settings, spec, pv_span))
+    if found.needs is not None:
+        return _lacking(found.needs)
+    if verdict.cause in (Cause.NONE, Cause.LOAD):
+        return Advice(Action.NONE)
+    if counting(found.oscillations) is None and verdict.cause is Cause.VALVE:
+        return Advice(Action.REPAIR_VALVE, words.CALM, due=Due.SHUTDOWN)
+    if counting(found.oscillations) is None:
+        return Advice(Action.NONE)
+    if verdict.cause is Cause.UNDECIDED:
+        return _for_a_cause(found, controller, config)
+    return _unsupported(found, controller, config)
+
+
+def _for_a_cause(found: Assessment, controller: Pid | None, config: Config) -> Advice:
+    """What a loop whose cause is not told lacks, if anything that is known."""
+    if found.verdict.needs is not None:
+        return _lacking(found.verdict.needs)
+    return _too_thin(found, controller, config) or Advice(Action.UNDECIDED)
+
+
+def _unsupported(found: Assessment, controller: Pid | None, config: Config) -> Advice | None:
+    """What a loop that oscillates for its valve or its tuning lacks for new settings; None where nothing."""
+    verdict, m = found.verdict, found.verdict.measured
+    if m is None or (verdict.fault is Fault.UNDECIDED and m.play.gain == 0):
+        return Advice(Action.REPAIR_VALVE) if verdict.cause is Cause.VALVE else Advice(Action.UNDECIDED)
+    if found.for_settings is not None:
+        lacking = _lacking(found.for_settings)
+        unset = f"no new settings: {found.for_settings}"
+        return Advice(Action.REPAIR_VALVE, unset) if verdict.cause is Cause.VALVE else lacking
+    if controller is None:
+        return _without_settings(verdict)
+    if found.judged_h < config.advice.least_h:
+        return _lacking(Needs(Lack.LONGER, words.too_short(found.judged_h, config.advice.least_h)))
+    return _too_thin(found, controller, config)
+
+
+def _too_thin(found: Assessment, controller: Pid | None, config: Config) -> Advice | None:
+    """What sampling it takes, where the controller acts several times between two samples, unseen."""
+    m = found.verdict.measured
+    thin = None if m is None else too_thin(m.window.dt_s / m.window.factor, controller, config)
+    if thin is not None and found.verdict.cause is Cause.VALVE:  # a stroke test needs no settings
+        return Advice(Action.REPAIR_VALVE, thin.text)
+    return None if thin is None else _lacking(thin)
+
+
+def _sticks(m: Measured, controller: Pid, limits: AdviceLimits) -> Loop | None:
+    """The loop with the stick-slip that was tried beside a play, None where none was."""
+    fit = m.stick_slip
+    if fit is None or fit.valve.slip_jump <= 0:
+        return None
+    return Loop(tuned(m.window, fit, True, limits), controller, fit.valve.valve)
+
+
+def _cycles_alone(one: Loop, other: Loop) -> bool:
+    """Whether the first loop, simulated without load, cycles and the second does not."""
+    return confirm(other).cycle is None and confirm(one).cycle is not None
+
+
+def sought_for(verdict: Verdict, controller: Pid, limits: AdviceLimits) -> tuple[Loop, Fit, tuple[Loop, ...]]:
+    """The loop that settings are sought for, its fit, and what else it may be, for a valve at fault.
+
+    Where the loop with its play does not cycle, and with the stick-slip that was tried beside it does, the stem
+    sticks: something must move it.
+    """
+    verdict = verdict.for_settings
+    m, fit = measured_of(verdict), chosen_fit(verdict)
+    loop = replace(model_of(verdict, controller), process=tuned(m.window, fit, True, limits))
+    other = _sticks(m, controller, limits) if fit is m.play else None
+    if other is None or m.stick_slip is None or not _cycles_alone(other, loop):
+        return loop, fit, uncertain(m.window, fit, loop)
+    samples = uncertain(m.window, m.stick_slip, other, 3), uncertain(m.window, fit, loop, 2)
+    return other, m.stick_slip, (loop, *samples[0], *samples[1])
+
+
+def propose(verdict: Verdict, controller: Pid, period_s: float | None, config: Config) -> Proposed:
+    """The tuning package's proposal on the model of a verdict, on its uncertainty, and on the load it leaves; where
+    that is not the model which the verdict tells, its reason says so."""
+    sought_on = verdict.for_settings
+    found = _proposed(sought_on, controller, period_s, config)
+    if sought_on is verdict or not found.proposal.reason:
+        return found
+    reason = f"{words.ONE_FRICTION} {found.proposal.reason}"
+    return replace(found, proposal=replace(found.proposal, reason=reason))
+
+
+def _proposed(verdict: Verdict, controller: Pid, period_s: float | None, config: Config) -> Proposed:
+    window, fit = measured_of(verdict).window, chosen_fit(verdict)
+    loop = model_of(verdict, controller)
+    if verdict.cause not in (Cause.VALVE, Cause.TUNING):
+        return Proposed(recommend(loop, verdict.cause, limits=config.tuning, source=verdict.source))
+    if loop.controller.kp * loop.process.slope <= 0.0:
+        return Proposed(recommend(loop, verdict.cause, limits=config.tuning))
+    if loop.process.dead_time_s > config.advice.beyond_record * window.duration_s:
+        why = words.beyond_record(loop.process.dead_time_s, window.duration_s)
+        return Proposed(Proposal(Action.UNDECIDED, why))
+    if verdict.cause is Cause.TUNING:
+        slow = replace(loop, process=cautious(process_of(window, fit), period_s))
+        others = (loop, *uncertain(window, fit, loop)[:2])
+        load = load_of(window, fit, controller)
+        return Proposed(recommend(slow, verdict.cause, others, load, config.tuning), loop, load)
+    if not is_stable(loop):
+        return Proposed(Proposal(Action.UNDECIDED, words.UNSTABLE))
+    sought, fit, others = sought_for(verdict, controller, config.advice)
+    rests = confirm(sought).cycle is None
+    if rests and period_s is None:
+        return Proposed(Proposal(Action.REPAIR_VALVE, words.CALM))
+    if rests and math.isinf(integral_s(controller)):
+        return Proposed(Proposal(Action.CHECK_SETTINGS, words.NO_INTEGRAL))
+    load = load_of(window, fit, controller)
+    return Proposed(recommend(sought, verdict.cause, others, load, config.tuning), sought, load)
+
+
+def _stated(proposal: Proposal, spec: LoopSpec, pv_span: float) -> Advice:
+    """A proposal in the units and form of the plant's controller."""
+    before, after = (c.cycle if c is not None else None for c in (proposal.before, proposal.after))
+    if proposal.controller is None:
+        return Advice(proposal.action, proposal.reason, before=before)
+    kp, ti = as_stated(proposal.controller, spec, pv_span)
+    return Advice(proposal.action, proposal.reason, rounded(kp), rounded(ti), before, after)

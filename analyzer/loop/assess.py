@@ -1,0 +1,292 @@
+"""One loop, one night: from a prepared record to everything that is known about it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from analyzer.config import CauseLimits, Config
+from analyzer.loop.assessments import (
+    HOUR_S,
+    Assessments,
+    Hour,
+    assess_span,
+    hourly,
+    settling_time,
+    usable,
+)
+from analyzer.loop.cause import NO_CAUSE, Verdict, as_hint, hidden_by_grid, judge, not_assessed
+from analyzer.loop.dead_valve import dead_valve, with_dead_valve
+from analyzer.loop.decisions import Cause, Lack, LacksError, Needs
+from analyzer.loop.fit_for_cause import unfit_for_cause
+from analyzer.loop.fit_for_settings import too_thin, unfit_for_settings
+from analyzer.loop.judged_stretch import Earlier, judged_stretch
+from analyzer.loop.measure import Measured, measure, time_scale
+from analyzer.loop.oscillation import Oscillation, Oscillations, barely_seen, counting, detect
+from analyzer.loop.quality import Prepared
+from analyzer.loop.settings_check import SettingsDiffer, differing
+from analyzer.loop.slip_by_slip import told_slip_by_slip
+from analyzer.loop.told_apart import told_apart
+from analyzer.loop.trends import BUCKETS, FINE_BUCKETS, close_view, thinned
+from analyzer.plantwide.wave import Wave, waves_of
+from analyzer.words import settings as words
+from identification.errors import NotAssessedError
+from identification.models import Pid
+from identification.record import LoopRecord
+from identification.signals.harris import harris_index
+
+NYQUIST = 2.0
+"""Samples a period below which a cycle is seen as a slower one."""
+OF_OP = ("valve_travel_pct_per_h", "reversals_per_h", "at_limits_pct", "service_pct", "op_mean_pct")
+"""Figures that rest on OP."""
+
+
+@dataclass(frozen=True, slots=True)
+class Assessment:
+    """What is known about one loop after one night.
+
+    loop; start_s, duration_s of the record [s]; night, the figures of the whole span; hours, of each clock
+    hour; oscillations; verdict; settings, where the controller's are not the stated ones; harris index (1: minimum
+    variance) and settling time [s] where known; waves, its part in the plant-wide pass; trend, thinned;
+    notes, plain sentences about the data; needs, what the record lacks to tell whether the loop oscillates, None
+    where that is told; close_s, first and last time [s] of the last ten periods; for_settings, what
+    the record lacks for new settings whatever its cause, None where it lacks nothing; judged_h, good hours in
+    automatic that oscillations and verdict rest on: of the stretch that is judged (judged_stretch.py), whose settings
+    are `outdated` where they were changed since; op_scaled as in Prepared.
+    """
+
+    loop: str
+    start_s: float
+    duration_s: float
+    night: Assessments
+    hours: tuple[Hour, ...]
+    oscillations: Oscillations
+    verdict: Verdict
+    settings: SettingsDiffer | None = None
+    harris: float | None = None
+    settling_s: float | None = None
+    waves: tuple[Wave, ...] = ()
+    trend: Mapping[str, np.ndarray] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+    needs: Needs | None = None
+    close_s: tuple[float, float] | None = None
+    for_settings: Needs | None = None
+    judged_h: float = 0.0
+    outdated: bool = False
+    op_scaled: bool = True
+
+
+def unassessable(record: LoopRecord, config: Config) -> Needs | None:
+    """What the record lacks for an assessment; None where it can support one."""
+    q = config.quality
+    share = float(usable(record).mean())
+    if len(record) < q.samples:
+        return Needs(Lack.SAMPLES, f"needs {q.samples} samples, has {len(record)}")
+    if share >= q.usable_share:
+        return None
+    manual, bad = float(record.mask("manual").mean()), float(record.bad.mean())
+    return Needs(
+        Lack.AUTOMATIC if manual >= bad else Lack.SAMPLES,
+        f"needs {100 * q.usable_share:.0f} % good samples in automatic, has {100 * share:.0f} % "
+        f"(manual {100 * manual:.0f} %, gaps and stale {100 * bad:.0f} %)",
+    )
+
+
+def cause_of(
+    prepared: Prepared, found: Oscillations, controller: Pid | None, config: Config, kind: str
+) -> Verdict:
+    """The verdict on one loop by itself; abstains where the trends cannot tell."""
+    record, oscillation = prepared.record, counting(found)
+    dead = dead_valve(record, config.cause) if prepared.op_known else None
+    needs = unfit_for_cause(prepared, oscillation, config)
+    if needs or float(np.ptp(record.pv)) == 0.0:
+        verdict = not_assessed(needs) if oscillation is not None else NO_CAUSE
+        return with_dead_valve(verdict, dead) if dead else verdict
+    try:
+        measured = measure(record, oscillation, controller, config.cause, found.spectrum, kind)
+    except NotAssessedError as error:
+        verdict = not_assessed(Needs(Lack.UNBROKEN, str(error))) if oscillation is not None else NO_CAUSE
+        return with_dead_valve(verdict, dead) if dead else verdict
+    verdict = verdict_by_measures(measured, prepared, oscillation, config)
+    if oscillation is not None:
+        verdict = told_slip_by_slip(verdict, oscillation.period_s, config.cause)
+    return with_dead_valve(verdict, dead) if dead and verdict.cause is not Cause.VALVE else verdict
+
+
+def convicted(
+    prepared: Prepared, found: Oscillations, controller: Pid | None, config: Config, kind: str
+) -> tuple[Oscillations, Verdict]:
+    """What oscillates, and why: a cycle that alone is not regular enough to count does so where PV convicts the valve
+    of making it, for noise of no spectrum fits a valve's model.
+
+    Parameters
+    ----------
+    prepared : Prepared
+    found : Oscillations
+        What counts by itself.
+    controller : Pid or None
+    config : Config
+    kind : str
+    """
+    verdict = cause_of(prepared, found, controller, config, kind)
+    quiet = verdict.measured
+    if counting(found) is not None or not prepared.op_known or quiet is None:
+        return found, verdict
+    if quiet.evidence < config.cause.near_evidence:
+        return found, verdict
+    near = detect(prepared.record, config.oscillation.nearly())
+    if counting(near) is None:
+        return found, verdict
+    told = cause_of(prepared, near, controller, config, kind)
+    return (near, told) if _made_by_valve(told, config.cause) else (found, verdict)
+
+
+def _made_by_valve(verdict: Verdict, limits: CauseLimits) -> bool:
+    """Whether the valve is convicted of a cycle: surely at fault, not dead, of a stickband that OP crosses."""
+    m = verdict.measured
+    if verdict.cause is not Cause.VALVE or verdict.dead or m is None:
+        return False
+    return verdict.confidence[Cause.VALVE] >= limits.near_pct and m.size <= limits.near_size
+
+
+def verdict_by_measures(
+    measured: Measured, prepared: Prepared, oscillation: Oscillation | None, config: Config
+) -> Verdict:
+    """The verdict by what was measured, as far as sampling and grid let it be told."""
+    if hidden_by_grid(measured, prepared.pv_step, oscillation is not None, config.cause):
+        measured = replace(measured, evidence=0.0)
+    return told_apart(judge(measured, oscillation, config.cause), prepared, oscillation, config)
+
+
+def _in_percent(prepared: Prepared) -> bool:
+    """Whether OP is known in percent of its range."""
+    return prepared.op_known and prepared.op_scaled
+
+
+def _known(figures: Assessments, op: bool) -> Assessments:
+    """The figures without those that rest on OP where none is in percent: unknown is empty, never zero."""
+    if op:
+        return figures
+    return Assessments(**{k: None if k in OF_OP else v for k, v in figures.as_row().items()})  # type: ignore[arg-type]
+
+
+def hidden(record: LoopRecord, found: Oscillations, controller: Pid | None, config: Config) -> Needs | None:
+    """Why what is seen, or not, says nothing: the loop's cycles are too fast for the sampling; None where not."""
+    samples = config.oscillation.samples
+    if found.first is not None:
+        folded = None if controller is None else config.advice.cycle_per_ti * controller.ti_s
+        if folded is None or folded >= NYQUIST * record.dt_s:
+            return None
+        return Needs(Lack.FASTER, f"{words.too_coarse(record.dt_s, folded, samples)}; {words.FOLDED}")
+    period = barely_seen(found, config.oscillation)
+    if period is None and controller is not None and math.isfinite(controller.ti_s):
+        expected = config.advice.cycle_per_ti * controller.ti_s
+        period = expected if expected < samples * record.dt_s else None
+    return None if period is None else Needs(Lack.FASTER, words.too_coarse(record.dt_s, period, samples))
+
+
+def _settings(
+    prepared: Prepared, found: Oscillations, stated: Pid | None, config: Config
+) -> SettingsDiffer | None:
+    """Where the controller works with other settings than the stated ones."""
+    if stated is None or not prepared.op_known:
+        return None
+    scale = time_scale(prepared.record, counting(found), stated)
+    return differing(prepared.record, stated, scale, config.settings)
+
+
+def _dead_time(verdict: Verdict) -> float | None:
+    m = verdict.measured
+    return None if m is None else (m.play if verdict.cause is Cause.VALVE else m.linear).dead_time_s
+
+
+def _hours(
+    prepared: Prepared, found: Oscillations, band_pct: float | None, config: Config
+) -> tuple[Hour, ...]:
+    """The figures of each hour, as far as what they rest on is known."""
+    hours = hourly(prepared.record, found, config.figures, band_pct)
+    return tuple(replace(h, figures=_known(h.figures, _in_percent(prepared))) for h in hours)
+
+
+def assess(
+    prepared: Prepared,
+    controller: Pid | None,
+    config: Config,
+    kind: str = "",
+    earlier: Sequence[Earlier] = (),
+) -> Assessment:
+    """Assess one loop.
+
+    Figures, hours, waves and trend are of the whole record; oscillations and verdict of the stretch that is judged.
+
+    Parameters
+    ----------
+    prepared : Prepared
+        The record on one clock, with masks.
+    controller : Pid or None
+        The stated settings in percent and seconds, those in force at the record's end.
+    config : Config
+    kind : str
+        The loop's type (flow, level, ...), empty where not stated.
+    earlier : sequence of Earlier
+        Settings that were in force in the record before, oldest first.
+
+    Raises
+    ------
+    NotAssessedError
+        Where the record cannot support it.
+    """
+    record = prepared.record
+    lacking = unassessable(record, config)
+    if lacking is not None:
+        raise LacksError(lacking)
+    if not prepared.op_scaled:  # settings in percent mean nothing beside such an OP
+        controller, earlier = None, [replace(e, controller=None) for e in earlier]
+    of_all = detect(record, config.oscillation)
+    stretch = judged_stretch(record, controller, earlier, config)
+    part = replace(prepared, record=record.span(stretch.first, stretch.last))
+    whole = len(part.record) == len(record)
+    found = of_all if whole else detect(part.record, config.oscillation)
+    settings = None if stretch.outdated else _settings(part, found, stretch.controller, config)
+    stated = settings.recorded if settings else stretch.controller
+    found, verdict = convicted(part, found, stated, config, kind)
+    of_all = found if whole else of_all
+    dead_time = _dead_time(verdict)
+    night = _known(assess_span(record, config.figures), _in_percent(prepared))
+    judged_h = float(usable(part.record).sum()) * record.dt_s / HOUR_S
+    if judged_h < config.advice.least_h or too_thin(record.dt_s, stretch.controller, config) is not None:
+        verdict = as_hint(verdict, config.advice.hint_pct)
+    harris = harris_index(record.error, usable(record), record.dt_s, dead_time) if dead_time else None
+    first, close = counting(found), _close(part.record, found, stretch.first)
+    return Assessment(
+        record.tag,
+        record.start_s,
+        record.duration_s,
+        night,
+        _hours(prepared, of_all, night.noise_band_pct, config),
+        found,
+        verdict,
+        settings,
+        harris,
+        settling_time(record, night.noise_band_pct or 0.0),
+        waves_of(record.tag, of_all, record.start_s + record.duration_s, config.plant),
+        thinned(record, FINE_BUCKETS if first else BUCKETS, close),
+        prepared.notes,
+        hidden(part.record, found, stretch.controller, config),
+        None
+        if close is None
+        else (record.start_s + close[0] * record.dt_s, record.start_s + close[1] * record.dt_s),
+        unfit_for_settings(prepared, config),
+        judged_h,
+        stretch.outdated,
+        prepared.op_scaled,
+    )
+
+
+def _close(part: LoopRecord, found: Oscillations, first: int) -> tuple[int, int] | None:
+    """First and last sample (excluded) of the last ten periods, in a record of which `part` begins at `first`."""
+    close = close_view(part, found)
+    return None if close is None else (close[0] + first, close[1] + first)

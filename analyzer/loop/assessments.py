@@ -1,0 +1,197 @@
+"""What a loop costs: error, travel, variability and the rest, hour by hour and for the night.
+
+All figures are over good samples in automatic only, all survive gaps and constants, and what cannot be told is
+None, never a good score.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from analyzer.config import FigureLimits
+from analyzer.loop.oscillation import Oscillations
+from analyzer.loop.span_sums import Trends, crossings_of, sums_of, travel_of
+from identification.record import Floats, LoopRecord, Mask
+from identification.signals.robust import robust_deviation
+
+HOUR_S = 3600.0
+
+
+@dataclass(frozen=True, slots=True)
+class Assessments:
+    """Figures of one span; None where they cannot be told.
+
+    usable_h : hours they rest on [h]; average_absolute_error_pct, variability_pct (2 sigma of e) and
+    pv_variability_pct (2 sigma of PV over its mean) [%]; valve_travel_pct_per_h [%/h] of OP or, where recorded,
+    of the position; reversals_per_h, crossings_per_h (of e beyond the noise band) [1/h]; noise_band_pct [% of
+    span]; normal_pct, at_limits_pct, service_pct, shares of good time [%]; sp_mean_pct, pv_mean_pct,
+    op_mean_pct, sp_travel_pct [% of span], which say whether two spans are comparable.
+    """
+
+    usable_h: float
+    average_absolute_error_pct: float | None = None
+    valve_travel_pct_per_h: float | None = None
+    reversals_per_h: float | None = None
+    variability_pct: float | None = None
+    pv_variability_pct: float | None = None
+    crossings_per_h: float | None = None
+    noise_band_pct: float | None = None
+    normal_pct: float | None = None
+    at_limits_pct: float | None = None
+    service_pct: float | None = None
+    sp_mean_pct: float | None = None
+    pv_mean_pct: float | None = None
+    op_mean_pct: float | None = None
+    sp_travel_pct: float | None = None
+
+    def as_row(self) -> Mapping[str, float | None]:
+        """The figures by name."""
+        return {f.name: getattr(self, f.name) for f in fields(self)}
+
+
+@dataclass(frozen=True, slots=True)
+class Hour:
+    """One hour of a loop: its start [s since 1970-01-01 UTC], figures, and oscillation.
+
+    oscillation_significance [% h] of that hour and oscillating_pct [%] add up to the night's.
+    """
+
+    start_s: float
+    figures: Assessments
+    oscillation_significance: float
+    oscillating_pct: float
+
+
+def usable(record: LoopRecord) -> Mask:
+    """True where a sample is good and the loop in automatic, shape (n,)."""
+    return ~(record.bad | record.mask("manual"))
+
+
+def at_limits_share(record: LoopRecord) -> float:
+    """Share of the usable time with OP at a limit [-]; in manual a limit limits nothing."""
+    use = usable(record)
+    return float(record.mask("saturated")[use].mean()) if use.any() else 0.0
+
+
+def noise_band(pv: Floats) -> float:
+    """Standard deviation of the fast noise: of the differences (robust.py) over root 2."""
+    if pv.size < 3:
+        return 0.0
+    return robust_deviation(np.diff(pv)) / math.sqrt(2)
+
+
+def travel(signal: Floats, deadband: float) -> tuple[float, int]:
+    """Travel and reversals of a signal beyond a deadband, both over its whole length."""
+    return travel_of(signal, np.ones(signal.size, dtype=bool), 1, deadband)  # type: ignore[no-any-return]
+
+
+def crossings(error: Floats, band: float) -> int:
+    """How often the error goes from beyond one side of a band to beyond the other."""
+    return crossings_of(error, np.ones(error.size, dtype=bool), band)  # type: ignore[no-any-return]
+
+
+def assess_span(record: LoopRecord, limits: FigureLimits, noise: float | None = None) -> Assessments:
+    """The figures of one span of a record.
+
+    Parameters
+    ----------
+    record : LoopRecord
+    limits : FigureLimits
+    noise : float or None
+        Noise band of PV [% of span], measured here where None.
+    """
+    use = usable(record)
+    count = int(use.sum())
+    hours = count * record.dt_s / HOUR_S
+    total = len(record) * record.dt_s / HOUR_S
+    if count < 2 or hours < limits.least_share * min(total, 1.0):
+        return Assessments(hours)
+    stem = record.op if record.position is None else record.position
+    step = max(round(limits.travel_grid_s / record.dt_s), 1)
+    path, turns = travel_of(stem, use, step, limits.travel_deadband_pct)
+    band = noise_band(record.pv[use]) if noise is None else noise
+    trends = Trends(record.sp, record.pv, record.op, record.mask("saturated"))
+    sums = sums_of(trends, use, limits.small_error_pct, 2 * band)
+    spread = 2 * sums.pv_deviation
+    automatic = 100 * count / max(float((~record.bad).sum()), 1.0)
+    return Assessments(
+        usable_h=hours,
+        average_absolute_error_pct=sums.absolute_error,
+        valve_travel_pct_per_h=path / hours,
+        reversals_per_h=turns / hours,
+        variability_pct=2 * sums.error_deviation,
+        pv_variability_pct=100 * spread / abs(sums.pv) if abs(sums.pv) > spread else None,
+        crossings_per_h=sums.crossings / hours,
+        noise_band_pct=band,
+        normal_pct=automatic,
+        at_limits_pct=100 * sums.at_limits,
+        service_pct=automatic * sums.service,
+        sp_mean_pct=sums.sp,
+        pv_mean_pct=sums.pv,
+        op_mean_pct=sums.op,
+        sp_travel_pct=sums.sp_travel,
+    )
+
+
+def hour_edges(record: LoopRecord) -> list[tuple[int, int, float]]:
+    """First and last sample (excluded) and start [s] of each clock hour that the record touches."""
+    first = math.floor(record.start_s / HOUR_S)
+    last = math.ceil((record.start_s + record.duration_s) / HOUR_S - 1e-9)
+    starts = [h * HOUR_S for h in range(first, last)]
+    at = [min(max(math.ceil((s - record.start_s) / record.dt_s - 1e-6), 0), len(record)) for s in starts]
+    ends = [*at[1:], len(record)]
+    return [(a, b, s) for a, b, s in zip(at, ends, starts, strict=True) if b > a]
+
+
+def _hourly_oscillation(
+    found: Oscillations, record: LoopRecord, start_s: float, a: int, b: int
+) -> tuple[float, float]:
+    """Significance and oscillating share of the samples a to b; they sum to the night's."""
+    if found.first is None or found.active is None or found.level is None:
+        return 0.0, 0.0
+    dt = found.active_dt_s
+    skipped = len(record) * record.dt_s - found.active.size * dt
+    first = max(round((a * record.dt_s - skipped) / dt), 0)
+    last = max(round((b * record.dt_s - skipped) / dt), first)
+    on = found.active[first:last]
+    if on.size == 0:
+        return 0.0, 0.0
+    amplitude = found.first.amplitude_pct
+    hours = float(on.sum()) * dt / HOUR_S
+    return amplitude * max(found.first.rhythm.first, 0.0) * hours, 100 * float(on.mean())
+
+
+def hourly(
+    record: LoopRecord, found: Oscillations, limits: FigureLimits, noise: float | None = None
+) -> list[Hour]:
+    """The figures of each clock hour of a record; `noise`, the noise band of PV, measured here where None."""
+    band = noise_band(record.pv[usable(record)]) if noise is None else noise
+    rows = []
+    for a, b, start in hour_edges(record):
+        significance, share = _hourly_oscillation(found, record, start, a, b)
+        rows.append(Hour(start, assess_span(record.span(a, b), limits, band), significance, share))
+    return rows
+
+
+def settling_time(record: LoopRecord, noise: float) -> float | None:
+    """Median time [s] from a set point step until e stays within the larger of 2 noise bands and 5 % of the step.
+
+    None where no step larger than 10 noise bands stood for long enough.
+    """
+    if record.sp_estimated:
+        return None
+    steps = np.flatnonzero(np.abs(np.diff(record.sp)) > max(10 * noise, 1e-6)) + 1
+    if steps.size == 0:
+        return None
+    ends = np.append(steps[1:], len(record))
+    times = []
+    for at, end in zip(steps, ends, strict=True):
+        size = abs(record.sp[at] - record.sp[at - 1])
+        outside = np.flatnonzero(np.abs(record.error[at:end]) > max(3 * noise, 0.05 * size))
+        if outside.size and outside[-1] < 0.8 * (end - at):
+            times.append((outside[-1] + 1) * record.dt_s)
+    return float(np.median(times)) if times else None

@@ -1,0 +1,185 @@
+"""Why a loop oscillates: valve, tuning or load, from signs that do not depend on each other.
+
+1. Likelihood and size of a valve fault: a play (or stick-slip) on the recorded OP followed by a lag explains PV
+   better than the lag alone, by innovations, in most stretches between two turns of OP, and its width is a large
+   share of OP's travel. Two questions.
+2. What is left as load: PV less the model's response. Where the valve model removes the peak from the load,
+   the valve made it; where the peak stays, it came from outside.
+3. Amplification: the identified process and the controller's settings give |S| at the period. A tuning makes
+   its own period only where the loop amplifies there.
+4. The same process on both sides: the gain that the data outside the period's band give to the process that
+   was identified with it. Under a strong load feedback alone is identified, and the gain falls or turns.
+5. Rhythm: a load from a machine keeps its period as by a clock; noise through a resonance does not.
+6. Wave: third harmonic locked to the phase of the fundamental (a triangle has 1/9, a square 1/3), after the
+   idea of harmonics and bicoherence (Choudhury, Shah, Thornhill 2004); a sine points away from the valve, and so do
+   harmonics that the valve's model does not explain.
+7. Size: noise through a resonance forgets its size as it forgets its phase (Rice 1945), so a cycle whose phase
+   wanders and whose size is kept is no tuning's.
+
+Of a loop that oscillates the signs are weighed together (cause_weights.py); a loop that does not can only have a
+valve at fault, by the first two questions.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from analyzer.config import CauseLimits
+from analyzer.loop.cause_measures import measures
+from analyzer.loop.cause_signs import Sign, likelihood_told, signs_of, width_text
+from analyzer.loop.cause_weights import chances
+from analyzer.loop.decisions import CAUSES, Cause, Fault, Needs
+from analyzer.loop.measure import Measured
+from analyzer.loop.oscillation import Oscillation
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """The cause of one loop's oscillation.
+
+    cause; confidence [%] of each cause; fault of the valve; signs in words; source : the loop that leads, empty where
+    none is known; needs : what the record lacks for a cause, None where it lacks nothing; measured; dead : the valve
+    no longer moves PV at all; steady : the same by one friction for all slips, where it was told slip by slip since.
+    """
+
+    cause: Cause
+    confidence: dict[Cause, float]
+    fault: Fault
+    signs: tuple[Sign, ...] = ()
+    source: str = ""
+    needs: Needs | None = None
+    measured: Measured | None = None
+    dead: bool = False
+    steady: Verdict | None = None
+
+    @property
+    def for_settings(self) -> Verdict:
+        """The verdict on whose model settings are sought: that of one friction for all slips (slip_by_slip.py)."""
+        return self if self.steady is None or self.cause is not Cause.VALVE else self.steady
+
+
+NO_CAUSE = Verdict(Cause.NONE, dict.fromkeys(CAUSES, 0.0), Fault.NONE)
+
+
+def not_assessed(needs: Needs | None) -> Verdict:
+    """The verdict that abstains and says what it needs."""
+    return Verdict(Cause.UNDECIDED, dict.fromkeys(CAUSES, 0.0), Fault.UNDECIDED, needs=needs)
+
+
+def _ramp(x: float, low: float, high: float) -> float:
+    """0 below low, 1 above high, straight between."""
+    return min(max((x - low) / (high - low), 0.0), 1.0)
+
+
+def needed(m: Measured, limits: CauseLimits, oscillating: bool) -> float:
+    """Evidence needed of these measures [nat]."""
+    return limits.needed(m.play.count, m.excited, oscillating)
+
+
+def speaks(m: Measured, limits: CauseLimits, oscillating: bool) -> bool:
+    """Whether PV speaks for a fault of the valve: enough evidence, and a process that goes the controller's way."""
+    wrong_way = m.controller is not None and m.controller.kp * m.play.gain < 0
+    return m.evidence >= needed(m, limits, oscillating) and not wrong_way
+
+
+def quiet_signs(m: Measured, limits: CauseLimits) -> tuple[Sign, ...]:
+    """Signs of a valve at fault in a loop that does not oscillate.
+
+    A few moves of a stem are told from steps of the load, unless the set point called for them, by more evidence.
+    """
+    few = m.moves < limits.few_moves and not m.excited
+    least = needed(m, limits, False) * (limits.quiet_factor if few else 1.0)
+    if not speaks(m, limits, False) or m.evidence < least or (m.moves < limits.moves and not m.excited):
+        return ()
+    text, figures = likelihood_told(m.evidence)
+    signs = [Sign("valve", 0.5 + 0.5 * _ramp(m.evidence, least, 4 * least), text, figures=figures)]
+    if m.size >= limits.size:
+        signs.append(Sign("valve", 0.6 + 0.4 * _ramp(m.size, limits.size, 0.7), width_text(m.size)))
+    return tuple(signs)
+
+
+def combined(signs: Iterable[Sign]) -> float:
+    """Confidence [%]: the signs taken as independent, none of them certain by itself (0.9 at most)."""
+    doubt = 1.0
+    for sign in signs:
+        doubt *= 1.0 - 0.9 * sign.strength
+    return 100.0 * (1.0 - doubt)
+
+
+def fault_of(m: Measured, limits: CauseLimits) -> Fault:
+    """Backlash or stiction, by what a slip jump adds to a play."""
+    if m.stick_slip is None:
+        return Fault.BACKLASH
+    share = m.stick_slip.valve.slip_jump / max(m.stick_slip.valve.stickband, 1e-9)
+    clear = max(limits.evidence_jump, limits.jump_share * m.evidence)
+    if m.jump > clear and share >= limits.least_jump:
+        return Fault.STICTION
+    return Fault.BACKLASH if m.jump < 0.5 * clear or share < limits.least_jump else Fault.UNDECIDED
+
+
+def judge(m: Measured, oscillation: Oscillation | None, limits: CauseLimits) -> Verdict:
+    """The verdict on one loop.
+
+    Of a loop that oscillates the likeliest cause is named where its probability is high enough; the valve's more so,
+    and only where PV speaks for its fault, for a valve that is blamed is taken out. Where a
+    sign is not known none is.
+    """
+    if oscillation is None:
+        return _quiet(m, limits)
+    seen = measures(m, oscillation)
+    if not np.isfinite(seen).all():
+        return replace(not_assessed(None), measured=m)
+    found = chances(seen)
+    first = max(found, key=lambda c: found[c])
+    confidence = {c: 100.0 * p for c, p in found.items()}
+    if first is Cause.VALVE and (m.size < limits.least_size or not speaks(m, limits, True)):
+        confidence[first] = min(confidence[first], 0.9 * limits.named_pct)
+    cause = first if confidence[first] >= _least(first, m, limits) else Cause.UNDECIDED
+    fault = fault_of(m, limits) if cause is Cause.VALVE else Fault.NONE
+    return Verdict(cause, confidence, fault, signs_of(m, oscillation), measured=m)
+
+
+def _least(cause: Cause, m: Measured, limits: CauseLimits) -> float:
+    """Confidence [%] from which a cause is named.
+
+    A stickband that is small beside OP's range makes no square of PV, and a cycle that keeps its size may be brought.
+    """
+    if cause is not Cause.VALVE:
+        return limits.named_pct
+    if m.size >= limits.small_size:
+        return limits.valve_pct
+    if m.harmonic > limits.square:
+        return math.inf
+    return limits.small_pct if m.kurtosis < limits.changing else limits.changing_pct
+
+
+def _quiet(m: Measured, limits: CauseLimits) -> Verdict:
+    """The verdict on a loop that does not oscillate: a valve at fault, where likelihood and size agree, or none."""
+    signs = quiet_signs(m, limits)
+    pct = combined(signs)
+    is_valve = len(signs) >= limits.signs and pct >= limits.named_pct
+    if not is_valve:
+        pct = min(pct, 0.5 * limits.named_pct)
+    confidence = {Cause.VALVE: pct, Cause.TUNING: 0.0, Cause.LOAD: 0.0}
+    fault = fault_of(m, limits) if is_valve else Fault.NONE
+    return Verdict(Cause.VALVE if is_valve else Cause.NONE, confidence, fault, signs, measured=m)
+
+
+def hidden_by_grid(m: Measured, pv_step: float, oscillates: bool, limits: CauseLimits) -> bool:
+    """Whether the valve's stickband moves PV by so few steps of its grid, pv_step [% of span], or PV of a calm loop
+    covers so few, that the grid itself holds PV still as the valve would."""
+    if m.window.position is not None and not m.window.decoded:
+        return False
+    best = m.stick_slip if m.stick_slip is not None and m.jump > limits.evidence_jump else m.play
+    covered = float(np.ptp(m.window.y[m.window.usable]))
+    rough = not oscillates and covered < limits.grid_covered * pv_step
+    return rough or abs(best.gain) * best.valve.stickband < limits.grid_steps * pv_step
+
+
+def as_hint(verdict: Verdict, most_pct: float) -> Verdict:
+    """A verdict that rests on little: no confidence above `most_pct` [%]."""
+    return replace(verdict, confidence={k: min(v, most_pct) for k, v in verdict.confidence.items()})

@@ -1,0 +1,71 @@
+"""What trends lack for a cause to be told from them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from analyzer.config import Config, QualityLimits
+from analyzer.loop.assessments import at_limits_share
+from analyzer.loop.decisions import Lack, Needs
+from analyzer.loop.oscillation import Oscillation
+from analyzer.loop.quality import Prepared
+from analyzer.loop.sample_clock import constant_for
+from analyzer.words import settings as words
+from identification.limits.recorder import RecorderLimits
+from identification.mismatch.recording_faults import least_jump
+from identification.record import LoopRecord
+
+
+def unfit_for_cause(prepared: Prepared, oscillation: Oscillation | None, config: Config) -> Needs | None:
+    """What these trends lack for a cause; None where one can be told.
+
+    oscillation : None where the loop does not oscillate, or it is not known whether it does.
+    """
+    record, q = prepared.record, config.quality
+    if not prepared.op_known:
+        return Needs(Lack.OP, "needs OP, which is not recorded")
+    if float(np.ptp(record.op)) == 0.0:
+        return Needs(Lack.MOVING_OP, "needs OP that moves, it stands still")
+    jumps = _jumps(record, config.explain.recorder)
+    return jumps or compressed(prepared, oscillation, q) or _scattered(record, q) or at_limits(record, q)
+
+
+def _jumps(record: LoopRecord, limits: RecorderLimits) -> Needs | None:
+    """What a PV lacks that stands and then jumps, as behind a valve that sticks, though it is the sensor that does;
+    None of any other."""
+    jump = least_jump(record.pv[~record.bad], limits)
+    stands = float(np.mean(np.diff(record.pv) == 0.0))
+    return Needs(Lack.FINER, words.stands_and_jumps(stands, jump)) if jump > 0.0 else None
+
+
+def compressed(prepared: Prepared, oscillation: Oscillation | None, q: QualityLimits) -> Needs | None:
+    """What trends lack that a historian compressed; None where it did not, or kept enough of each cycle."""
+    if prepared.compressed_share <= q.straight_share:
+        return None
+    lie = f"{100 * prepared.compressed_share:.0f} % lie on straight segments"
+    if oscillation is None:
+        return Needs(Lack.UNCOMPRESSED, f"needs trends without compression, {lie}")
+    points = prepared.archived_share * oscillation.period_s / prepared.record.dt_s
+    if points >= q.archived_points:
+        return None
+    wanted = f"needs trends without compression, or {q.archived_points:g} archived samples a cycle"
+    return Needs(Lack.UNCOMPRESSED, f"{wanted}: there are {points:.2g}, {lie}")
+
+
+def at_limits(record: LoopRecord, q: QualityLimits) -> Needs | None:
+    """What a record lacks whose OP is at a limit for most of the time; None where it is not."""
+    saturated = at_limits_share(record)
+    if saturated <= q.saturated_share:
+        return None
+    text = f"needs OP within its limits, it is at one for {100 * saturated:.0f} % of the time"
+    return Needs(Lack.OP_OFF_LIMITS, text)
+
+
+def _scattered(record: LoopRecord, q: QualityLimits) -> Needs | None:
+    """What good samples lack that are too scattered for a model; None where enough of them follow each other."""
+    good = ~record.bad
+    share = float((good & constant_for(good.astype(np.float64), q.run_samples)).sum()) / max(len(record), 1)
+    if share >= q.run_share:
+        return None
+    wanted = f"{100 * q.run_share:.0f} % of the time in runs of {q.run_samples} good samples"
+    return Needs(Lack.UNBROKEN, f"needs {wanted}, has {100 * share:.0f} %")

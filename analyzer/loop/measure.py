@@ -1,0 +1,280 @@
+"""What the signs of a cause are read from: rivals fitted to one loop's trends, and what they leave."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from analyzer.config import CauseLimits
+from analyzer.loop.assessments import at_limits_share
+from analyzer.loop.fit_window import answering, time_scale, window_of
+from analyzer.loop.oscillation import Oscillation
+from identification.controller.settings import fit_pi
+from identification.errors import NotAssessedError
+from identification.estimation.backlash_stiction import (
+    SCREENED,
+    SHORT,
+    better_linear,
+    fit_linear,
+    fit_play,
+    fit_stick_slip,
+)
+from identification.estimation.expected_evidence import expected_evidence
+from identification.estimation.gauss_newton import descend
+from identification.estimation.hammerstein import IDEAL, Fit, process_of, residual
+from identification.estimation.likelihood_ratio import WindowFit, evidence, stem_moves, with_load_step
+from identification.estimation.noise import judged
+from identification.estimation.search import AR_ORDER, prepare
+from identification.estimation.stem_position import Seen, seen
+from identification.estimation.trials import Trials, trials
+from identification.estimation.window import Window
+from identification.models import Fopdt, Loop, Pid
+from identification.record import Floats, LoopRecord, Mask
+from identification.signals.half_cycles import size_kurtosis
+from identification.signals.spectrum import (
+    Spectrum,
+    locked_harmonic,
+    peak_prominence,
+    spectrum,
+    tapered_power,
+)
+from tuning.linear import is_stable, loop_response
+
+HARMONICS = (2, 3)
+"""Harmonics of a cycle that a valve's model must explain: beyond the third few samples a cycle are left."""
+PLAYS = (0.25, 0.6)
+"""Least and greatest play, over OP's range, whose evidence is foretold; ours: plays of loops that cycle."""
+FEWEST_CYCLES = 2.5
+"""Cycles from which harmonics are told apart from drift; ours."""
+
+
+@dataclass(frozen=True, slots=True)
+class Measured:
+    """What the signs are read from.
+
+    linear, play, stick_slip : the fits; evidence [nat] of the better valve over none; size, its stickband over
+    OP's range [-]; jump [nat], stick-slip over play; line_linear and line_valve, prominence at the period of the
+    load that the plain model and the valve model leave [-]; amplification |S| there [-], None without settings;
+    stable, the identified loop; consistency [-], gain outside the period's band over gain with it; harmonic [-],
+    locked third over the fundamental; saturated, share of time at limits [-]; moves, how often the stem of the
+    better valve sets out; excited, whether set point moves drove the loop; trials, how the stretches between OP's
+    turns agree on the better valve, None with too few; kurtosis [-] of the band at the period, 3 for noise, 1.5 where
+    the size is kept; wave_left [-], harmonics of PV's cycle that the better valve leaves, over its fundamental;
+    expected [nat], the evidence that a play would bring in such a recording.
+    """
+
+    linear: Fit
+    play: Fit
+    stick_slip: Fit | None
+    evidence: float
+    size: float
+    jump: float
+    line_linear: float
+    line_valve: float
+    amplification: float | None
+    stable: bool
+    consistency: float
+    harmonic: float
+    saturated: float
+    controller: Pid | None
+    window: Window
+    moves: int
+    excited: bool
+    trials: Trials | None = None
+    kurtosis: float = 3.0
+    wave_left: float = 0.0
+    expected: float = 0.0
+
+
+def _op_range(window: Window, scale_s: float, oscillating: bool) -> float:
+    """Range of OP that a fault is compared with [% OP]: within two periods where it oscillates, else of all."""
+    whole = window.op_range
+    if not oscillating:
+        return whole
+    length = max(round(2 * scale_s / window.dt_s * window.factor), 2)
+    rows = window.op.size // length
+    if rows < 2:
+        return whole
+    local = np.ptp(window.op[: rows * length].reshape(rows, length), axis=1)
+    return min(whole, float(np.quantile(local, 0.75)))
+
+
+def _prominence(x: Floats, dt_s: float, period_s: float) -> float:
+    s = spectrum(x, dt_s)
+    return peak_prominence(tapered_power(s), s.duration_s / period_s)
+
+
+def _wave_left(window: Window, fit: Fit, period_s: float) -> float:
+    """Second and third harmonic locked to PV's cycle in what a fit leaves of PV, over PV's fundamental."""
+    if window.duration_s < FEWEST_CYCLES * period_s:
+        return 0.0
+    left, cycle = spectrum(residual(window, fit), window.dt_s), spectrum(window.centred, window.dt_s)
+    return math.hypot(*(locked_harmonic(left, period_s, order, cycle) for order in HARMONICS))
+
+
+def _play(size: float) -> float:
+    """Width of the play that is looked for, over OP's range: that which fits best, where it could make a cycle."""
+    return min(max(size, PLAYS[0]), PLAYS[1])
+
+
+def _consistency(window: Window, fit: Fit, period_s: float) -> float:
+    """Gain of the identified process outside the period's band over its gain with it."""
+    prepared = prepare(window, IDEAL, fit.ar, period_s / window.dt_s)
+    gain = float(prepared.score(fit.time_constant_s, fit.dead_time_s)[2][0])
+    return gain / fit.gain if fit.gain else 0.0
+
+
+Candidates = tuple[Fit, Fit, Fit | None]
+"""Plain fit, play and stick-slip."""
+Fits = tuple[Fit, Fit, Fit | None, Fit, float, float]
+"""Plain fit, play, stick-slip if it was tried, the better valve, its evidence and that of the jump [nat]."""
+
+
+def measure(
+    record: LoopRecord,
+    oscillation: Oscillation | None,
+    controller: Pid | None,
+    limits: CauseLimits,
+    error: Spectrum | None = None,
+    kind: str = "",
+) -> Measured:
+    """Fit the candidates and read what the signs need; see Measured.
+
+    Raises
+    ------
+    NotAssessedError
+        Good samples are too scattered for a model of how one follows from those before it.
+    """
+    scale = time_scale(record, oscillation, controller)
+    window = window_of(record, scale, limits, kind)
+    _check_judged(window, limits)
+    controller = controller or recovered(record, scale)
+    due = answering(record, window, scale)
+    window, fits = _fits(window, scale, due, limits, oscillation)
+    linear, play, stick, best, gained, jump = fits
+    hopeless = oscillation is None and gained < _hopeful(window, due, limits)
+    op_range = _op_range(window, scale, oscillation is not None)
+    size = best.valve.stickband / max(op_range, 1e-9)
+    amplification, stable = _amplification(process_of(window, linear), controller, scale)
+    told, (fine_linear, fine_play, fine_stick) = _refined(window, (linear, play, stick), best, hopeless)
+    wave = error if oscillation is not None else None
+    shown = trials(WindowFit(window, best), WindowFit(window, linear), scale) if wave is not None else None
+    return Measured(
+        fine_linear,
+        fine_play,
+        fine_stick,
+        gained,
+        size,
+        jump,
+        _prominence(residual(window, linear), window.dt_s, scale) if oscillation is not None else 0.0,
+        _prominence(residual(window, best), window.dt_s, scale) if oscillation is not None else 0.0,
+        amplification,
+        stable,
+        _consistency(window, linear, scale) if oscillation is not None else 1.0,
+        locked_harmonic(wave, scale) if wave is not None else 0.0,
+        at_limits_share(record),
+        controller,
+        told,
+        stem_moves(window, best.valve),
+        bool(due.any()),
+        shown,
+        size_kurtosis(wave, wave.duration_s / scale) if wave is not None else 3.0,
+        _wave_left(window, best, scale) if wave is not None else 0.0,
+        expected_evidence(window, linear, _play(size) * op_range, scale) if wave is not None else 0.0,
+    )
+
+
+def _fits(
+    window: Window, scale: float, due: Mask, limits: CauseLimits, oscillation: Oscillation | None
+) -> tuple[Window, Fits]:
+    """The candidates' fits, by a recorded stem where one shows a fault, and the window that they are of."""
+    shown = None if window.position is None else seen(window.op, window.position)
+    if shown is not None:
+        return window, _shown(window, shown, due, scale)
+    window = replace(window, position=None)
+    return window, _candidates(window, scale, due, limits, oscillation)
+
+
+def _check_judged(window: Window, limits: CauseLimits) -> None:
+    """Raise NotAssessedError where too few blocks follow on as many good ones as the noise model looks back."""
+    count = int(judged(window.usable, AR_ORDER).sum())
+    if count < limits.judged:
+        raise NotAssessedError(
+            f"needs {limits.judged} stretches of {AR_ORDER + 1} good samples in a row, has {count}"
+        )
+
+
+def _refined(window: Window, fits: Candidates, best: Fit, hopeless: bool) -> tuple[Window, Candidates]:
+    """Window and fits at the record's own interval, where the dead time is no shorter than a block; the valve's are
+    left as they are where it is `hopeless` to look for its fault."""
+    if window.factor == 1 or best.dead_time_s + window.half_block_s < window.dt_s:
+        return window, fits
+    fine = replace(window, fine=True)
+    linear, play, stick = fits
+    if hopeless:
+        return fine, (descend(fine, linear), play, stick)
+    return fine, (
+        descend(fine, linear),
+        descend(fine, play, free_width=window.position is None),
+        None if stick is None else descend(fine, stick),
+    )
+
+
+def _hopeful(window: Window, due: Mask, limits: CauseLimits) -> float:
+    """Evidence [nat] from which it is worth looking for the fault of a valve whose loop does not oscillate."""
+    count = int(judged(window.usable, AR_ORDER).sum())
+    return limits.hopeless * limits.needed(count, bool(due.any()), False)
+
+
+def _candidates(
+    window: Window, scale_s: float, due: Mask, limits: CauseLimits, oscillation: Oscillation | None
+) -> Fits:
+    """Plain fit, play, stick-slip if it was tried, the better valve, its evidence and that of the jump [nat]."""
+    linear = fit_linear(window, scale_s)
+    short = oscillation is None and window.y.size < SHORT
+    hopeful = None if oscillation is not None or short else _hopeful(window, due, limits)
+    play = fit_play(window, linear, scale_s, hopeful)
+    gained = play.log_likelihood - linear.log_likelihood
+    if gained < (SCREENED if hopeful is None else hopeful) and not short:
+        return linear, play, None, play, gained, 0.0
+    linear = better_linear(window, linear, play)
+    best, stick, jump = play, None, 0.0
+    wide = play.valve.stickband > 0.25 * window.op_range
+    if short or (wide and (oscillation is not None or gained >= limits.evidence)):
+        stick = fit_stick_slip(window, play, scale_s)
+        jump = evidence(WindowFit(window, stick), WindowFit(window, play))
+        jump -= max(play.log_likelihood - stick.log_likelihood, 0.0)
+        best = stick if jump > limits.evidence_jump else play
+    plain = with_load_step(window, linear, due, best.ar)
+    gained = evidence(WindowFit(window, best), plain) - (limits.evidence_jump if best is stick else 0.0)
+    return linear, play, stick, best, gained, jump
+
+
+def _shown(window: Window, shown: Seen, due: Mask, scale_s: float) -> Fits:
+    """The same where the stem is recorded: its fault is seen, and PV answers the stem itself."""
+    linear = fit_linear(window, scale_s)
+    behind = window if window.position is None else replace(window, op=window.position)
+    play = descend(window, replace(fit_linear(behind, scale_s), valve=shown.play))
+    stick = None if shown.jumping is None else replace(play, valve=shown.jumping)
+    best = play if stick is None else stick
+    gained = evidence(WindowFit(window, best), with_load_step(window, linear, due, best.ar))
+    return linear, play, stick, best, gained, 0.0 if stick is None else math.inf
+
+
+def recovered(record: LoopRecord, scale_s: float) -> Pid | None:
+    """PI settings recovered from the record where they explain OP, None where they do not."""
+    found = fit_pi(record, scale_s)
+    if found is None or found.explained < 0.5 or not math.isfinite(found.ti_s):
+        return None
+    return Pid(found.kp, found.ti_s, scan_s=record.dt_s)
+
+
+def _amplification(process: Fopdt, controller: Pid | None, period_s: float) -> tuple[float | None, bool]:
+    """|S| of the identified loop at the period, and whether the loop is stable."""
+    if controller is None or process.gain * controller.kp <= 0:
+        return None, True
+    loop = Loop(process, controller)
+    omega = np.array([2 * math.pi / period_s])
+    return float(1 / abs(1 + loop_response(loop, omega)[0])), is_stable(loop)

@@ -1,0 +1,281 @@
+"""Whether a loop oscillates: periods, amplitude, regularity, share of time, significance.
+
+A peak counts where three signs agree: it stands out of the spectrum about it, the autocorrelation of its band
+comes back after one period, and it carries a fair share of the error. A cycle that is regular only in shape counts
+where it stands out most of the time and its half-cycles, none larger than the usual one, come back: see _in_shape.
+What the set point explains is taken out first, so set point steps and a cascade's moving set point are not
+oscillation of the loop, nor is what dies away where the set point rests, as a programme's corners do. A cycle a
+little short of that counts where PV convicts the valve of making it: see `assess.convicted`.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from analyzer.config import OscillationLimits
+from analyzer.loop.decisions import counts
+from identification.record import Floats, LoopRecord, Mask
+from identification.signals.half_cycles import half_cycles, levelled_correlation, shape, usual_prominence
+from identification.signals.setpoint_response import amplitude_at_rest, moves, without_setpoint
+from identification.signals.spectrum import (
+    WIDE_BAND,
+    Bands,
+    Rhythm,
+    Spectrum,
+    band_signal,
+    bands,
+    envelope,
+    rhythm,
+    spectrum,
+    tapered_power,
+)
+
+MOST = 3
+"""Periods reported per loop."""
+
+
+@dataclass(frozen=True, slots=True)
+class Oscillation:
+    """One period of a loop.
+
+    period_s [s]; amplitude_pct, half of peak to peak of the fundamental [% of PV span] while it oscillates;
+    oscillating_pct, share of time [%]; significance [% h], amplitude times correlation summed over the hours
+    of oscillation; rhythm, what the autocorrelation says; prominence and share as in OscillationLimits;
+    cycles, periods that the record holds; line, its frequency in lines of the spectrum; scatter, spread of the
+    cycles' lengths about the period [-].
+    """
+
+    period_s: float
+    amplitude_pct: float
+    oscillating_pct: float
+    significance: float
+    rhythm: Rhythm
+    prominence: float
+    share: float
+    cycles: float
+    line: float
+    scatter: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Oscillations:
+    """What was found in one record.
+
+    found : the oscillations, the most significant first; active : True where the first one is on, shape (m,), at
+    interval active_dt_s [s]; level : its amplitude over time [% of PV span], shape (m,); spectrum and bands of
+    the error without the set point's part; needs : why it could not be assessed, empty where it could.
+    """
+
+    found: tuple[Oscillation, ...] = ()
+    active: Mask | None = None
+    level: Floats | None = None
+    active_dt_s: float = 1.0
+    spectrum: Spectrum | None = None
+    bands: Bands | None = None
+    needs: str = ""
+
+    @property
+    def first(self) -> Oscillation | None:
+        """The most significant oscillation, None where there is none."""
+        return self.found[0] if self.found else None
+
+
+def fill(x: Floats, bad: Mask) -> Floats:
+    """The signal with straight lines over what must not be used, shape (n,)."""
+    if not bad.any():
+        return x
+    good = np.flatnonzero(~bad)
+    return np.interp(np.arange(x.size), good, x[good])
+
+
+def error_spectrum(record: LoopRecord) -> Spectrum:
+    """Spectrum of the error without what the set point explains."""
+    found = spectrum(fill(record.error, record.bad), record.dt_s)
+    if record.sp_estimated or float(np.ptp(record.sp)) == 0.0:
+        return found
+    sp = spectrum(record.sp, record.dt_s)
+    lines = without_setpoint(found.lines, sp.lines)
+    power = float(np.sum(np.abs(lines[1:]) ** 2)) * 2 / found.n**2
+    return replace(found, lines=lines, variance=power)
+
+
+def _agree(limits: OscillationLimits, cycles: float, prominence: float, correlation: float) -> bool:
+    """Whether spectrum and autocorrelation together are more than noise shows in so many periods."""
+    asked = limits.prominence + limits.prominence_few * max(6.0 - cycles, 0.0) / 3.0
+    scatter = min(limits.correlation + limits.correlation_few / math.sqrt(cycles), limits.correlation_most)
+    if prominence < max(limits.least * asked, limits.prominence) or correlation < limits.correlation:
+        return False
+    return correlation - scatter + limits.trade * math.log2(prominence / asked) >= 0
+
+
+def _in_shape(
+    s: Spectrum,
+    line: float,
+    x: Floats,
+    dt_s: float,
+    seen: tuple[float, float, float],
+    limits: OscillationLimits,
+) -> bool:
+    """Whether half-cycles that differ in length and size are yet more than noise of the same surroundings shows.
+
+    seen : cycles, prominence, correlation. Prominence in doublings (its mean over time and its median averaged)
+    and correlation (of the band and of its levelled half-cycles averaged) add up; noise of any colour, the closed
+    loop's included, reaches shape + shape_few / sqrt(cycles) in fewer than one of a thousand records. What swings
+    between limits, as Gaussian noise of no spectrum does, adds to that and stands alone where halves differ most.
+    """
+    cycles, prominence, correlation = seen
+    levelled = 0.5 * (correlation + levelled_correlation(x, dt_s, s.duration_s / line))
+    usual = 0.5 * math.log2(prominence * max(usual_prominence(s, line), 1e-3))
+    total, scatter = usual + limits.shape_trade * levelled, limits.shape_few / math.sqrt(cycles)
+    few = s.duration_s / line < limits.samples * s.dt_s
+    least = limits.shape_correlation_few if few else limits.shape_correlation
+    enough = total >= max(limits.shape + scatter, limits.shape_least) and levelled >= least
+    if prominence >= limits.least * limits.prominence and enough:
+        return True
+    if few or cycles < limits.swing_cycles or total + 2 * limits.swing_trade < limits.swing + scatter:
+        return False
+    found = shape(s, line)
+    total += limits.swing_trade * max(3.0 - found.kurtosis, 0.0)
+    even = found.spread <= limits.swing_spread and found.share >= limits.swing_share
+    return even and total >= max(limits.swing + scatter, limits.swing_least)
+
+
+def _candidate(s: Spectrum, b: Bands, k: int, limits: OscillationLimits) -> Oscillation | None:
+    """The oscillation about one trial frequency, None where the signs do not agree."""
+    line = float(b.line[k])
+    expected = s.duration_s / line
+    if expected < limits.samples_few * s.dt_s:
+        return None
+    x, dt = band_signal(s, line)
+    above = float(np.sum(np.abs(s.lines[math.ceil(line / WIDE_BAND) :]) ** 2)) * 2 / s.n**2
+    share = float(x @ x) / x.size / above if above > 0 else 0.0
+    found = rhythm(x, dt, expected)
+    cycles = s.duration_s / found.period_s
+    if cycles < limits.periods or share < limits.share:
+        return None
+    prominence, correlation = float(b.prominence[k]), min(found.first, 1.5 * found.trough)
+    tonal = expected >= limits.samples * s.dt_s and _agree(limits, cycles, prominence, correlation)
+    if not tonal and not _in_shape(s, line, x, dt, (cycles, prominence, correlation), limits):
+        return None
+    amplitude = math.sqrt(2 * float(x @ x) / x.size)
+    scatter = half_cycles(x, dt).scatter
+    return Oscillation(found.period_s, amplitude, 0, 0, found, prominence, share, cycles, cycles, scatter)
+
+
+def peaks(b: Bands, least: float) -> list[int]:
+    """Trial frequencies whose prominence is the highest within half an octave, the most power first."""
+    p = b.prominence
+    ks = [k for k in range(p.size) if p[k] >= least and p[k] >= p[max(k - 3, 0) : k + 4].max()]
+    return sorted(ks, key=lambda k: -float(b.power[k] * b.line[k]))[: 2 * MOST]
+
+
+FEWEST = 2.2
+"""Samples per period from which a peak of the spectrum is a cycle at all [-]: below it every tone folds back."""
+
+
+def barely_seen(found: Oscillations, limits: OscillationLimits) -> float | None:
+    """Period [s] of a cycle that stands out of the spectrum with too few samples to be judged, or None."""
+    s, b = found.spectrum, found.bands
+    if s is None or b is None:
+        return None
+    few = replace(limits, samples=FEWEST, samples_few=FEWEST)
+    fast = [
+        k for k in peaks(b, limits.prominence) if s.duration_s / float(b.line[k]) < limits.samples * s.dt_s
+    ]
+    seen = [o.period_s for k in fast if (o := _candidate(s, b, k, few)) is not None]
+    return seen[0] if seen else None
+
+
+def _sized(
+    s: Spectrum, o: Oscillation, usable: Mask, limits: OscillationLimits
+) -> tuple[Oscillation, Mask, Floats, float]:
+    """Amplitude, share of time and significance from the envelope of the band."""
+    level, dt = envelope(s, o.line)
+    width = max(round(2 * o.period_s / dt), 1)
+    kernel = np.ones(width) / width
+    smooth = np.sqrt(np.convolve(np.pad(level**2, width, mode="reflect"), kernel, mode="same")[width:-width])
+    at = np.minimum((np.arange(level.size) * dt / s.dt_s).astype(np.int64), usable.size - 1)
+    good = usable[at]
+    if not good.any():
+        return o, good, smooth, dt
+    top = float(np.quantile(smooth[good], 0.9))
+    active = (smooth >= limits.envelope * top) & good
+    amplitude = math.sqrt(float(np.mean(level[active] ** 2))) if active.any() else 0.0
+    hours = active.sum() * dt / 3600.0
+    sized = replace(
+        o,
+        amplitude_pct=amplitude,
+        oscillating_pct=100.0 * float(active.sum()) / float(good.sum()),
+        significance=amplitude * max(o.rhythm.first, 0.0) * hours,
+    )
+    return sized, active, smooth, dt
+
+
+def _lasts(record: LoopRecord, o: Oscillation, limits: OscillationLimits) -> bool:
+    """Whether a period is seen where the set point has rested too; one in every second cycle of which the set point
+    moves is the set point's. Of a set point that never moves, or never rests, it is not asked."""
+    moving = moves(record.sp)
+    if record.sp_estimated or not moving.any() or moving.mean() > limits.programme_moves:
+        return True
+    use = ~(record.bad | record.mask("manual"))
+    left, count = amplitude_at_rest(record.error, record.sp, use, o.period_s / record.dt_s)
+    if count >= limits.rest_stretches:
+        return left >= limits.rest_share * o.amplitude_pct
+    begun = int(np.sum(moving[1:] & ~moving[:-1]))
+    return begun * o.period_s < limits.moved_cycles * record.duration_s
+
+
+def _is_harmonic(o: Oscillation, other: Oscillation) -> bool:
+    """Whether one oscillation is a whole multiple (2 to 7) of a stronger one's frequency."""
+    ratio = other.period_s / o.period_s
+    whole = round(ratio)
+    return 2 <= whole <= 7 and abs(ratio / whole - 1) < 0.02 and o.amplitude_pct < 0.6 * other.amplitude_pct
+
+
+def counting(found: Oscillations) -> Oscillation | None:
+    """The first oscillation where it fills enough of the time for the loop to count as oscillating, else None."""
+    first = found.first
+    return first if first is not None and counts(first.oscillating_pct) else None
+
+
+def detect(record: LoopRecord, limits: OscillationLimits) -> Oscillations:
+    """Find the oscillations of a loop.
+
+    Parameters
+    ----------
+    record : LoopRecord
+    limits : OscillationLimits
+
+    Returns
+    -------
+    Oscillations
+        Empty for noise, drift, ramps, steps and constants.
+    """
+    s = error_spectrum(record)
+    resolution = float(np.max(np.abs(record.error))) * 1e-9
+    if s.n < 16 or s.variance <= resolution**2:
+        return Oscillations(spectrum=s)
+    b = bands(tapered_power(s), limits.periods)
+    usable = ~record.bad[record.bad.size - s.n :]
+    kept: list[Oscillation] = []
+    strong = peaks(b, limits.prominence)
+    for k in strong + [k for k in peaks(b, limits.shape_prominence) if k not in strong]:
+        o = _candidate(s, b, k, limits)
+        if o is None or any(abs(math.log(o.period_s / p.period_s)) < math.log(1.3) for p in kept):
+            continue
+        if not any(_is_harmonic(o, p) for p in kept):
+            kept.append(o)
+    if not kept:
+        return Oscillations(spectrum=s, bands=b)
+    each = (_sized(s, o, usable, limits) for o in kept[:MOST])
+    sized = sorted((r for r in each if _lasts(record, r[0], limits)), key=lambda r: -r[0].significance)
+    if not sized:
+        return Oscillations(spectrum=s, bands=b)
+    first = sized[0]
+    return Oscillations(tuple(r[0] for r in sized), first[1], first[2], first[3], s, b)
+
+
+__all__ = ["WIDE_BAND", "Oscillation", "Oscillations", "detect", "error_spectrum", "fill"]

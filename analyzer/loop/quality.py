@@ -1,0 +1,270 @@
+"""From raw stamps to one clock: what is fit for use, said sample by sample, before any analysis.
+
+Masks are taken on the raw stamps, where a gap, a frozen value or a compressed stretch is still visible, and
+carried onto the clock of the loop's record.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+
+import numpy as np
+
+from analyzer.config import QualityLimits
+from analyzer.history.series import Series
+from analyzer.loop.controller_mode import manual_mask
+from analyzer.loop.decisions import Lack, LacksError, Needs
+from analyzer.loop.sample_clock import (
+    archived_share,
+    clock_of,
+    constant_stretches,
+    interval,
+    onto_clock,
+    resolution,
+    straight,
+    without_stray_ends,
+)
+from analyzer.loops.spec import LoopSpec
+from identification.record import Floats, LoopRecord, Mask
+
+RECORDED_RANGE = (0.005, 0.995)
+"""Quantiles of PV that stand for its span where none is stated; contract of loops.csv."""
+
+
+@dataclass(frozen=True, slots=True)
+class Scale:
+    """What percent means for a loop.
+
+    low, span : PV range in the tag's own unit; op_low, op_span : range of OP; recorded : True where the PV
+    range was taken from the record because none is stated.
+    """
+
+    low: float
+    span: float
+    op_low: float
+    op_span: float
+    recorded: bool
+
+    def pv_pct(self, value: Floats) -> Floats:
+        """PV or SP in % of span."""
+        return (value - self.low) * (100.0 / self.span)
+
+    def op_pct(self, value: Floats) -> Floats:
+        """OP or position in % of span."""
+        return (value - self.op_low) * (100.0 / self.op_span)
+
+
+@dataclass(frozen=True, slots=True)
+class Prepared:
+    """A record with its scale, the resolution of its trends and plain sentences about its quality.
+
+    pv_step, op_step : resolution of PV and OP [% of span], 0 where none was seen; compressed_share : share of
+    samples on straight segments [-]; op_known : False where no OP was recorded; op_scaled : False where what was
+    recorded cannot be percent of the range that is stated, or assumed, of OP; archived_share : share of samples, of
+    PV or OP the fewer, that were kept where trends are compressed [-].
+    """
+
+    record: LoopRecord
+    scale: Scale
+    pv_step: float
+    op_step: float
+    compressed_share: float
+    notes: tuple[str, ...]
+    op_known: bool = True
+    op_scaled: bool = True
+    archived_share: float = 1.0
+
+
+def scale_of(spec: LoopSpec, pv: Floats) -> Scale:
+    """What percent means: the stated ranges, else the recorded range of PV and 0 to 100 for OP."""
+    op_low = spec.op_lo if spec.op_lo is not None else 0.0
+    op_high = spec.op_hi if spec.op_hi is not None else 100.0
+    if spec.pv_lo is not None and spec.pv_hi is not None:
+        return Scale(spec.pv_lo, spec.pv_hi - spec.pv_lo, op_low, op_high - op_low, False)
+    low, high = (float(q) for q in np.quantile(pv, RECORDED_RANGE))
+    return Scale(low, high - low if high > low else 1.0, op_low, op_high - op_low, True)
+
+
+def _enough(pv: Series | None, spec: LoopSpec, limits: QualityLimits) -> Series:
+    if pv is None:
+        raise LacksError(Needs(Lack.PV, f"no PV tag {spec.pv or spec.loop + '.PV'} in the export"))
+    good = int((~pv.bad).sum())
+    if pv.stamp_s.size == 0 or good == 0:
+        raise LacksError(Needs(Lack.SAMPLES, "needs PV samples, has none that is good"))
+    if good < limits.samples:
+        raise LacksError(Needs(Lack.SAMPLES, f"needs {limits.samples} good PV samples, has {good}"))
+    return pv
+
+
+def _interval(pv: Series) -> float:
+    """The interval of the samples [s]."""
+    dt = interval(pv.stamp_s)
+    if not dt > 0:
+        raise LacksError(Needs(Lack.SAMPLES, "needs samples at different times, has one stamp"))
+    return dt
+
+
+def prepare(spec: LoopSpec, series: Mapping[str, Series], limits: QualityLimits) -> Prepared:
+    """One loop's raw samples on one clock, with masks.
+
+    Parameters
+    ----------
+    spec : LoopSpec
+        With the tags that the export has.
+    series : mapping of tag to Series
+    limits : QualityLimits
+
+    Raises
+    ------
+    LacksError
+        Where there is no PV, or too little of it; the text says what is needed and what there is.
+    """
+    series = _numeric(spec, series, limits)
+    trimmed = without_stray_ends(_enough(series.get(spec.pv or ""), spec, limits))
+    dt = _interval(trimmed)
+    clock = clock_of(trimmed, dt, limits)
+    pv, gap = onto_clock(trimmed, clock, dt, limits)
+    scale = scale_of(spec, pv[~gap])
+    pv = scale.pv_pct(pv)
+    op, op_gap = _signal(series, spec.op, clock, dt, limits)
+    sp, sp_gap = _signal(series, spec.sp, clock, dt, limits)
+    sp_known = spec.sp is not None and not sp_gap.all()
+    sp = scale.pv_pct(sp) if sp_known else np.full(clock.size, float(np.median(pv[~gap])))
+    op = scale.op_pct(op) if spec.op and not op_gap.all() else np.full(clock.size, math.nan)
+    position, _ = _signal(series, spec.position, clock, dt, limits)
+    has_position = bool(spec.position and spec.position in series)
+    step = resolution(pv)
+    masks = _masks(spec, series, limits, clock, dt, pv, sp, op, gap | (op_gap if spec.op else False), step)
+    record = LoopRecord(
+        spec.loop,
+        float(clock[0]),
+        dt,
+        sp,
+        pv,
+        op if np.isfinite(op).all() else np.zeros(clock.size),
+        masks["gap"] | masks["stale"],
+        scale.op_pct(position) if has_position else None,
+        not sp_known,
+        MappingProxyType(masks),
+    )
+    return _described(record, scale, op, step, limits)
+
+
+def _numeric(spec: LoopSpec, series: Mapping[str, Series], limits: QualityLimits) -> dict[str, Series]:
+    """The samples of a loop, what is no number in SP, PV, OP or position bad.
+
+    Raises
+    ------
+    LacksError
+        Where many values of one of them were not understood: what is left would be another trend.
+    """
+    out = dict(series)
+    for role in ("pv", "sp", "op", "position"):
+        tag = getattr(spec, role)
+        found = series.get(tag) if tag else None
+        if found is None:
+            continue
+        if found.unread > limits.unread_share * max(found.value.size, 1):
+            text = (
+                f"{found.unread} values of {tag}, such as '{found.example}', are not understood as numbers; needs "
+                "plain numbers: export them so, or state --decimal and --delimiter"
+            )
+            raise LacksError(Needs(Lack.READABLE, text))
+        out[tag] = replace(found, bad=found.bad | ~np.isfinite(found.value), text=None)
+    return out
+
+
+def _signal(
+    series: Mapping[str, Series], tag: str | None, clock: Floats, dt: float, limits: QualityLimits
+) -> tuple[Floats, Mask]:
+    found = series.get(tag) if tag else None
+    if found is None:
+        return np.zeros(clock.size), np.ones(clock.size, dtype=bool)
+    return onto_clock(found, clock, dt, limits)
+
+
+def op_in_range(op: Floats, q: QualityLimits) -> bool:
+    """Whether OP can be in percent of its stated range.
+
+    It cannot where it leaves the range, nor where it moves freely within a band beside a limit and does not rest on
+    the limit itself, as outputs do that were recorded from 0 to 1 or as deviations.
+    """
+    low, high = float(op.min()), float(op.max())
+    if low < -q.outside_pct or high > 100 + q.outside_pct:
+        return False
+    resting = float((np.minimum(np.abs(op), np.abs(op - 100)) <= q.on_limit_pct).mean())
+    beside = high <= q.limit_pct or low >= 100 - q.limit_pct
+    return not beside or low == high or resting >= q.resting_share
+
+
+def _masks(
+    spec: LoopSpec,
+    series: Mapping[str, Series],
+    q: QualityLimits,
+    clock: Floats,
+    dt: float,
+    pv: Floats,
+    sp: Floats,
+    op: Floats,
+    gap: Mask,
+    pv_step: float,
+) -> dict[str, Mask]:
+    none = np.zeros(clock.size, dtype=bool)
+    known_op = bool(np.isfinite(op).all())
+    stale = constant_stretches(pv, dt, q.stale_s, q.stale_samples) & ~gap
+    if stale.any() and (not known_op or float(np.ptp(op[stale])) == 0.0):
+        stale = none
+    ranged = known_op and op_in_range(op, q)
+    saturated = (op <= q.limit_pct) | (op >= 100 - q.limit_pct) if ranged else none
+    mode = series.get(spec.mode or "")
+    manual = manual_mask(mode, clock, dt, op, sp - pv, q) if known_op else none
+    coarse = none if pv_step == 0 else np.ones(clock.size, dtype=bool)
+    return {
+        "gap": gap,
+        "stale": stale,
+        "compressed": straight(pv),
+        "quantized": coarse,
+        "saturated": saturated,
+        "manual": manual & ~saturated if mode is None else manual,
+    }
+
+
+def op_range(scale: Scale, op: Floats) -> str:
+    """What to state where OP [% of the range assumed] cannot be percent of that range."""
+    low, high = (scale.op_low + 0.01 * scale.op_span * float(x) for x in (op.min(), op.max()))
+    assumed = f"{scale.op_low:g} to {scale.op_low + scale.op_span:g}"
+    return (
+        f"OP runs from {low:.3g} to {high:.3g}, which is no plausible part of {assumed}: state op_lo and op_hi in "
+        "loops.csv; without them nothing is told in % of OP"
+    )
+
+
+def _described(
+    record: LoopRecord, scale: Scale, op: Floats, pv_step: float, limits: QualityLimits
+) -> Prepared:
+    known_op = bool(np.isfinite(op).all())
+    compressed = float(record.mask("compressed").mean())
+    notes = []
+    if scale.recorded:
+        notes.append("no PV range stated: percent of the recorded range")
+    if record.sp_estimated:
+        notes.append("no SP recorded: estimated as the median of PV")
+    if not known_op:
+        notes.append("no OP recorded: no cause can be told")
+    op_scaled = not known_op or op_in_range(op, limits)
+    if not op_scaled:
+        notes.append(op_range(scale, op))
+    for name in ("gap", "stale", "saturated", "manual"):
+        share = float(record.mask(name).mean())
+        if share > 0.005:
+            notes.append(f"{name} {100 * share:.0f} % of the time")
+    if compressed > 0.3:
+        notes.append(f"compressed: {100 * compressed:.0f} % of the samples lie on straight segments")
+    op_step = resolution(record.op) if known_op else 0.0
+    if pv_step > 0:
+        notes.append(f"PV on a grid of {pv_step:.3g} % of span")
+    archived = min(archived_share(x) for x in ((record.pv, record.op) if known_op else (record.pv,)))
+    return Prepared(record, scale, pv_step, op_step, compressed, tuple(notes), known_op, op_scaled, archived)

@@ -1,0 +1,152 @@
+"""Raw stamps and one clock: intervals, holding values, runs of equal values, straight lines, steps of a grid."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from analyzer.config import QualityLimits
+from analyzer.history.series import Series
+from analyzer.history.stray import main_span
+from analyzer.loop.decisions import Lack, LacksError, Needs
+from identification.record import Floats, Mask
+
+LOOKED_AT = 20_000
+"""Samples that are searched for a grid; ours."""
+PER_LEVEL = 10
+"""Samples a level that tell a grid from values that happen to repeat; ours."""
+
+
+def interval(stamp_s: Floats) -> float:
+    """The sample interval of raw stamps [s]: the median spacing, or the mean where it is the same but for jitter."""
+    if stamp_s.size < 2:
+        return math.nan
+    median = float(np.median(np.diff(stamp_s)))
+    even = float(f"{(stamp_s[-1] - stamp_s[0]) / (stamp_s.size - 1):.4g}")
+    return even if abs(even - median) < 0.005 * median else median
+
+
+def onto_clock(series: Series, clock: Floats, dt_s: float, limits: QualityLimits) -> tuple[Floats, Mask]:
+    """Values held on a clock, and where there is nothing to hold.
+
+    Returns
+    -------
+    ndarray of shape (n,), ndarray of bool, shape (n,)
+        The last good value at or before each tick (the next one where there is none), and True where it is a
+        gap: older than gap_factor intervals of the tag, or not good.
+    """
+    good = ~series.bad
+    if not good.any():
+        return np.zeros(clock.size), np.ones(clock.size, dtype=bool)
+    if clock.size == series.stamp_s.size and np.array_equal(clock, series.stamp_s):
+        return _held(series.value, good)
+    stamp, value = series.stamp_s[good], series.value[good]
+    at = np.searchsorted(stamp, clock + 0.01 * dt_s, side="right") - 1
+    own = max(interval(stamp), dt_s) if stamp.size > 1 else dt_s
+    age = clock - stamp[np.maximum(at, 0)]
+    lost = np.zeros(clock.size, dtype=bool)
+    raw = np.clip(np.searchsorted(series.stamp_s, clock + 0.01 * dt_s, side="right") - 1, 0, None)
+    lost |= ~good[raw] & (np.abs(clock - series.stamp_s[raw]) < 0.5 * dt_s)
+    return value[np.maximum(at, 0)], (at < 0) | (age > limits.gap_factor * own) | lost
+
+
+def _held(value: Floats, good: Mask) -> tuple[Floats, Mask]:
+    if good.all():
+        return value, ~good
+    at = np.maximum.accumulate(np.where(good, np.arange(value.size), -1))
+    return value[np.where(at < 0, int(np.argmax(good)), at)], ~good
+
+
+@njit(cache=True)
+def constant_for(value: Floats, samples: float) -> Mask:
+    """True where a value stands unchanged for at least so many samples, shape (n,)."""
+    out = np.zeros(value.size, dtype=np.bool_)
+    first = 0
+    for k in range(1, value.size + 1):
+        if k < value.size and value[k] == value[k - 1]:
+            continue
+        if k - first >= samples:
+            out[first:k] = True
+        first = k
+    return out
+
+
+def constant_stretches(value: Floats, dt_s: float, seconds: float, samples: int) -> Mask:
+    """True where a value stands unchanged for so long [s] and so many samples, shape (n,)."""
+    return constant_for(value, max(samples, seconds / dt_s))  # type: ignore[no-any-return]
+
+
+@njit(cache=True)
+def straight(value: Floats) -> Mask:
+    """True where a sample lies on the line between its neighbours while the trend moves, shape (n,).
+
+    Swinging-door compression leaves straight, sloping segments; steps of a coarse resolution and constants
+    are straight too, but level.
+    """
+    out = np.zeros(value.size, dtype=np.bool_)
+    largest = 0.0
+    for k in range(1, value.size):
+        largest = max(largest, abs(value[k] - value[k - 1]))
+    for k in range(1, value.size - 1):
+        before, after = value[k] - value[k - 1], value[k + 1] - value[k]
+        out[k] = before != 0 and abs(after - before) <= max(1e-4 * largest, 1e-3 * abs(before))
+    return out
+
+
+def archived_share(value: Floats) -> float:
+    """Share of samples that a line through their neighbours does not give [-]: those that compression kept."""
+    level = np.zeros(value.size, dtype=np.bool_)
+    level[1:-1] = (value[1:-1] == value[:-2]) & (value[1:-1] == value[2:])
+    return float((~(straight(value) | level)).mean())
+
+
+def resolution(value: Floats) -> float:
+    """The step of the grid that values stand on, in their unit; 0 where there is none.
+
+    The usual difference between values that occur; a grid is told by so many samples a level.
+    """
+    most = min(value.size, LOOKED_AT) / PER_LEVEL
+    if np.unique(value[: int(most) + 2 * PER_LEVEL]).size > most:
+        return 0.0
+    levels = np.unique(value[:LOOKED_AT])
+    if levels.size < 2 or levels.size > most:
+        return 0.0
+    return float(np.median(np.diff(levels)))
+
+
+def clock_of(pv: Series, dt_s: float, limits: QualityLimits) -> Floats:
+    """PV's own stamps where they are uniform, else a uniform clock over them.
+
+    Raises
+    ------
+    LacksError
+        The samples are spread so thinly that most of that clock would be gaps.
+    """
+    spacing = np.diff(pv.stamp_s)
+    if spacing.size and float(np.max(np.abs(spacing - dt_s))) <= 0.01 * dt_s:
+        return pv.stamp_s
+    count = int((pv.stamp_s[-1] - pv.stamp_s[0]) / dt_s + 1e-6) + 1
+    if count > limits.ticks_per_sample * pv.stamp_s.size:
+        share = 100 * pv.stamp_s.size / count
+        text = (
+            f"needs samples that follow each other, has {pv.stamp_s.size}, mostly {dt_s:g} s apart, spread over "
+            f"{(pv.stamp_s[-1] - pv.stamp_s[0]) / 86400:.1f} days ({share:.1f} % of that time)"
+        )
+        raise LacksError(Needs(Lack.SAMPLES, text))
+    return pv.stamp_s[0] + dt_s * np.arange(count)
+
+
+def without_stray_ends(pv: Series) -> Series:
+    """PV from its first to its last good sample, those far from the rest left out."""
+    stamp = pv.stamp_s[~pv.bad]
+    span = main_span(stamp)
+    if span.stray:
+        inside = slice(*np.searchsorted(pv.stamp_s, [span.first_s, np.nextafter(span.last_s, np.inf)]))
+        pv = Series(pv.stamp_s[inside], pv.value[inside], pv.bad[inside])
+    good = np.flatnonzero(~pv.bad)
+    if good[0] == 0 and good[-1] == pv.bad.size - 1:
+        return pv
+    cut = slice(int(good[0]), int(good[-1]) + 1)
+    return Series(pv.stamp_s[cut], pv.value[cut], pv.bad[cut])

@@ -1,0 +1,237 @@
+"""What `triage tune` says of one loop: the model with intervals, the limit cycle, the proposal, the forecast."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from analyzer.config import AdviceLimits, Config
+from analyzer.loop.advice import (
+    Advice,
+    chosen_fit,
+    measured_of,
+    model_of,
+    propose,
+    sought_for,
+    tuned,
+    uncertain,
+    valve_of,
+)
+from analyzer.loop.assess import Assessment
+from analyzer.loop.cause import Verdict
+from analyzer.loop.decisions import Cause
+from analyzer.loop.intervals import intervals
+from analyzer.loop.reconstructed_load import load_of
+from analyzer.loops.spec import LoopSpec
+from analyzer.loops.tags import as_stated
+from identification.errors import NotAssessedError
+from identification.estimation.hammerstein import Fit
+from identification.models import Estimate, Loop, Pid, Process, Valve
+from identification.record import Floats
+from tuning.describing import describe
+from tuning.limit_cycle import Confirmed, confirm
+from tuning.linear import integral_s
+from tuning.maps import curves, travel_map
+from tuning.predict import Forecast, predict, run
+from tuning.recommend import Proposal
+from tuning.rules import simc
+
+if TYPE_CHECKING:
+    from reports.tuning_charts import ForecastPicture, MapPicture
+
+MAP_POINTS = 36
+"""Points of the map along each axis."""
+NO_MODEL = "needs trends from which a model can be identified"
+SPREAD = 20.0
+"""The map reaches this factor below and above the present settings."""
+
+
+@dataclass(frozen=True, slots=True)
+class Tuning:
+    """All that is known about retuning one loop.
+
+    estimates by name with 90 % intervals; model, the identified loop with its present controller; period_s and
+    amplitude_pct of the recorded cycle [s], [% of span], None where there is none; cycle, the one simulation
+    finds; proposal; forecast, None where nothing is proposed; load [% PV] on the scan's clock.
+    """
+
+    estimates: dict[str, Estimate]
+    model: Loop
+    period_s: float | None
+    amplitude_pct: float | None
+    cycle: Confirmed
+    proposal: Proposal
+    forecast: Forecast | None
+    load: Floats
+
+
+def _model(verdict: Verdict, controller: Pid, limits: AdviceLimits) -> tuple[Loop, Fit, tuple[Loop, ...]]:
+    """The loop that the forecast runs on, its fit, and what else it may be."""
+    if verdict.cause is Cause.VALVE:
+        return sought_for(verdict, controller, limits)
+    fit, model = chosen_fit(verdict), model_of(verdict, controller)
+    window = verdict.measured.window if verdict.measured else None
+    return model, fit, uncertain(window, fit, model) if window else ()
+
+
+def identified(found: Assessment, limits: AdviceLimits) -> tuple[Process, Valve, dict[str, Estimate]]:
+    """Process, valve and their parameters with 90 % intervals, as one assessed loop's verdict has them.
+
+    Raises
+    ------
+    NotAssessedError
+        Where the loop's trends give no model.
+    """
+    verdict = found.verdict
+    if verdict.measured is None:
+        raise NotAssessedError(str(verdict.needs or NO_MODEL))
+    window, fit, at_fault = verdict.measured.window, chosen_fit(verdict), verdict.cause is Cause.VALVE
+    process = tuned(window, fit, at_fault, limits)
+    return process, valve_of(verdict, fit), intervals(window, fit, at_fault, limits)
+
+
+def tune(found: Assessment, controller: Pid, config: Config, kept: Advice | None = None) -> Tuning:
+    """Propose settings for one assessed loop.
+
+    Parameters
+    ----------
+    found : Assessment
+    controller : Pid
+        The stated settings in percent and seconds.
+    config : Config
+    kept : Advice or None
+        Why none are to be proposed (analyzer.loop.advice.withheld).
+
+    Raises
+    ------
+    NotAssessedError
+        Where the loop's trends give no model.
+    """
+    verdict = found.verdict
+    if verdict.measured is None:
+        raise NotAssessedError(str(verdict.needs or NO_MODEL))
+    first = found.oscillations.first
+    period = first.period_s if first else None
+    tried_on = measured_of(verdict.for_settings)
+    model, fit, others = _model(verdict, controller, config.advice)
+    if kept is not None and kept.reason and kept.action is not None:
+        proposal = Proposal(kept.action, kept.reason)
+    else:
+        proposal = propose(verdict, controller, period, config).proposal
+    load = load_of(tried_on.window, fit, controller)
+    new = proposal.controller or proposal.meanwhile
+    is_long = load.size >= config.tuning.least_steps
+    forecast = predict(model, new, load, others) if new and is_long else None
+    return Tuning(
+        identified(found, config.advice)[2],
+        model,
+        period,
+        first.amplitude_pct if first else None,
+        confirm(model),
+        proposal,
+        forecast,
+        load,
+    )
+
+
+def _between(e: Estimate) -> str:
+    return f"{e.value:.3g} ({e.low:.3g} to {e.high:.3g}) {e.unit}"
+
+
+def _cycle(t: Tuning) -> list[str]:
+    recorded = "none"
+    if t.period_s is not None and t.amplitude_pct is not None:
+        recorded = f"{t.period_s:.3g} s, ±{t.amplitude_pct:.3g} % of PV span"
+    c = t.cycle.cycle
+    simulated = f"{c.period_s:.3g} s, ±{c.pv_amplitude:.3g} %" if c else "none"
+    p = t.cycle.predicted
+    predicted = f"{p.period_s:.3g} s, ±{p.pv_amplitude:.3g} %" if p else "none"
+    return [
+        f"limit cycle recorded: {recorded}",
+        f"  simulated: {simulated}",
+        f"  describing function: {predicted}",
+    ]
+
+
+def _forecast(t: Tuning) -> list[str]:
+    if t.forecast is None:
+        return []
+    names = {
+        "average_absolute_error": "average absolute error",
+        "stem_travel": "stem travel",
+        "oscillation": "oscillation",
+        "variability": "variability",
+    }
+    lines = ["forecast on the reconstructed load (90 % intervals):"]
+    for key, name in names.items():
+        b, a, c = t.forecast.before[key], t.forecast.after[key], t.forecast.change[key]
+        change = f"{100 * c.value:+.0f} % ({100 * c.low:+.0f} to {100 * c.high:+.0f})"
+        lines.append(f"  {name}: {b.value:.3g} to {a.value:.3g} {b.unit}, {change}")
+    return lines
+
+
+def lines(t: Tuning, spec: LoopSpec, pv_span: float) -> list[str]:
+    """The proposal in words and figures."""
+    out = [f"{name}: {_between(e)}" for name, e in t.estimates.items()]
+    if "gain" not in t.estimates:
+        out.append("gain and time constant: only their ratio is known from this record")
+    out += [*_cycle(t), f"action: {t.proposal.action}"]
+    for title, pid in (("new settings", t.proposal.controller), ("until the repair", t.proposal.meanwhile)):
+        if pid is not None:
+            kp, ti = as_stated(pid, spec, pv_span)
+            out.append(f"{title}: kp {kp:.3g}, ti {ti:.3g} {spec.ti_unit} ({spec.gain_unit}, {spec.form})")
+    return [*out, t.proposal.reason, *_forecast(t)]
+
+
+def pictures(t: Tuning, title: str) -> dict[str, bytes]:
+    """PNGs by file name: describing functions, travel map, forecast."""
+    from reports import tuning_charts as charts
+
+    out = {}
+    if t.model.valve is not None:
+        c = curves(t.model)
+        at = np.array([describe(t.model.valve, b.op_amplitude) for b in c.crossings], dtype=np.complex128)
+        labels = [f"{b.period_s:.3g} s{'' if b.stable else ', unstable'}" for b in c.crossings]
+        drawn = charts.CurvesPicture(c.valve, c.linear, at, labels)
+        out["limit-cycle.png"] = charts.curves(drawn, f"{title}: N(A) and −1/(G C)")
+        out["travel-map.png"] = charts.travel_map(_map(t), f"{title}: predicted travel")
+    new = t.proposal.controller or t.proposal.meanwhile
+    if new is not None:
+        out["forecast.png"] = charts.forecast(_trends(t, new), f"{title}: both tunings on the same load")
+    return out
+
+
+def _map(t: Tuning) -> MapPicture:
+    from reports.tuning_charts import MapPicture
+
+    c, new = t.model.controller, t.proposal.controller
+    kp = c.kp * np.geomspace(1 / SPREAD, SPREAD, MAP_POINTS)
+    now_s = _finite_ti(c, t.model.process)
+    top = max(SPREAD * now_s, 3 * new.ti_s if new else 0.0)
+    found = travel_map(t.model, kp, np.geomspace(now_s / 4, top, MAP_POINTS))
+    chosen = (new.kp, new.ti_s) if new else None
+    travel = 3600.0 * found.travel
+    return MapPicture(found.kp, found.ti_s, travel, found.rests, found.unstable, (c.kp, now_s), chosen)
+
+
+def _finite_ti(controller: Pid, process: Process) -> float:
+    """Integral time [s] for a map's axis; SIMC's where the integral is off."""
+    ti = integral_s(controller)
+    return ti if math.isfinite(ti) else simc(process, scan_s=max(controller.scan_s, 1.0)).ti_s
+
+
+def _trends(t: Tuning, new: Pid) -> ForecastPicture:
+    from reports.tuning_charts import ForecastPicture
+
+    both = [run(replace(t.model, controller=c), t.load) for c in (t.model.controller, new)]
+    n = min(len(both[0]), int(15 * (t.period_s or 600) / both[0].dt_s))
+    stems = [r.op if r.position is None else r.position for r in both]
+    return ForecastPicture(
+        both[0].time_s[-n:] / 3600.0,
+        (both[0].pv[-n:], both[1].pv[-n:]),
+        (both[0].op[-n:], both[1].op[-n:]),
+        (stems[0][-n:], stems[1][-n:]),
+    )

@@ -1,0 +1,238 @@
+"""A night over many loops: in chunks on worker processes, pieces kept as they come, then put together.
+
+A killed run goes on where it stood; a worker that dies costs the loop in hand at most. The plant-wide pass and the
+joining happen once all pieces are there.
+"""
+
+from __future__ import annotations
+
+import math
+import uuid
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+from analyzer.config import Config
+from analyzer.history.export import Export, counted
+from analyzer.history.plant_clock import UTC_NAME
+from analyzer.loop.decisions import Status
+from analyzer.loops.changes import TuningChange
+from analyzer.loops.spec import LoopSpec
+from analyzer.loops.tags import no_loops
+from analyzer.night import chunk, cluster, run_identity
+from analyzer.night.chunk import Done, Task, assess_loop
+from analyzer.night.finish import finish_night, is_empty
+from analyzer.night.nights import Night, nights_of
+from analyzer.night.workers import Died, Workers
+from analyzer.store import version as store_version
+from analyzer.store.lock import locked
+from analyzer.store.store import Store
+from identification.errors import InputError
+
+__all__ = ["Batch", "Outcome", "assess_loop", "run"]
+
+CHUNKS, FEWEST, MOST = 16, 4, 16
+"""Tasks of a run that is small, and loops per task: enough to carry its four small tables, few enough for a smooth
+progress bar and for workers that end together."""
+
+
+@dataclass(frozen=True, slots=True)
+class Batch:
+    """What is assessed, and where it is kept.
+
+    export; specs, its loops with the tags that it has; store, held for the run alone; config; since_s, until_s, the
+    span of time whose samples are assessed [s since 1970-01-01 UTC]; changes, when settings were changed: each night
+    has those in force at its end; zone, the plant's time zone, whose days the nights are.
+    """
+
+    export: Export
+    specs: Sequence[LoopSpec]
+    store: Store
+    config: Config
+    since_s: float = -math.inf
+    until_s: float = math.inf
+    changes: Sequence[TuningChange] = ()
+    zone: str = UTC_NAME
+
+    @property
+    def identity(self) -> run_identity.RunIdentity:
+        """What a run that goes on with its pieces must have in common with it."""
+        own = (*self.specs, *self.changes, self.zone)
+        return run_identity.identity(self.export, own, self.since_s, self.until_s, self.config)
+
+    def nights(self) -> list[Night]:
+        """The nights that the span holds, oldest first."""
+        return nights_of(self.export, self.specs, self.config.nights, self.since_s, self.until_s, self.zone)
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What a run did.
+
+    nights, those written, oldest first; unassessed and failed, loop and reason in the last of them; notes, sentences
+    on what was read and on what the store had already.
+    """
+
+    nights: tuple[Night, ...]
+    unassessed: tuple[tuple[str, str], ...]
+    failed: tuple[tuple[str, str], ...]
+    notes: tuple[str, ...] = ()
+
+
+def chunk_size(loops: int) -> int:
+    """Loops per task of a run over so many."""
+    return min(max(-(-loops // CHUNKS), FEWEST), MOST)
+
+
+def _tasks(batch: Batch, nights: Sequence[Night], known: set[str]) -> list[Task]:
+    """Chunks of the loops that no piece of the last night holds yet."""
+    left = [s for s in batch.specs if s.loop not in known]
+    size = chunk_size(len(left))
+    mark = uuid.uuid4().hex[:8]  # a worker of a killed run may write yet; its pieces have another mark
+    return [
+        Task(
+            batch.export,
+            tuple(left[i : i + size]),
+            tuple(nights),
+            batch.store,
+            batch.config,
+            f"{mark}-{i:06d}",
+            tuple(batch.changes),
+        )
+        for i in range(0, len(left), size)
+    ]
+
+
+def _results(tasks: Sequence[Task], jobs: int, config: Config, scheduler: str | None) -> Iterator[Done]:
+    """What the chunks give, on a cluster, on worker processes or, with no jobs, in this process, unprotected."""
+    if scheduler is not None:
+        yield from cluster.results(scheduler, tasks)
+        return
+    if jobs == 0:
+        yield from map(chunk.work, tasks)
+        return
+    with Workers[Task, Done](min(jobs, max(len(tasks), 1)), chunk.work, config.workers) as workers:
+        for task in tasks:
+            workers.submit(task)
+        for result in workers.results():
+            if isinstance(result, Died):
+                yield from _mourned(workers, result)
+            else:
+                yield result
+
+
+def _mourned(workers: Workers[Task, Done], died: Died[Task]) -> Iterator[Done]:
+    """The loop that was in hand is tried once alone, then given up with the reason; others go to other workers."""
+    task, at = died.task, died.at
+    others, hand = task.specs[:at] + task.specs[at + 1 :], task.specs[at : at + 1]
+    if others:
+        workers.submit(replace(task, specs=others, key=f"{task.key}-{len(others)}"))
+    if died.again and not task.alone:
+        workers.submit(replace(task, specs=hand, key=f"{task.key}-alone", alone=True), alone=True)
+    else:
+        yield chunk.lose(replace(task, specs=hand, key=f"{task.key}-lost"), died.why)
+
+
+def _begun(store: Store, nights: Sequence[Night], mine: run_identity.RunIdentity, resume: bool) -> list[str]:
+    """Keys of the chunks that a stopped run left whole; all else of it is forgotten."""
+    if resume:
+        run_identity.check_same(store.run_file, mine)
+        keys = [key for key in store.whole_chunks(nights[-1].name) if _is_readable(store, nights, key)]
+    else:
+        store.drop_parts()
+        keys = []
+    run_identity.write(store.run_file, mine)
+    return keys
+
+
+def _is_readable(store: Store, nights: Sequence[Night], key: str) -> bool:
+    """Whether a chunk's pieces can be read; a damaged one is not done, and is worked on again."""
+    try:
+        for night in nights:
+            for table in ("nights", "hours", "trends", "waves"):
+                store.read_parts(night.name, table, [key])
+    except InputError:
+        return False
+    return True
+
+
+def _loops_in(store: Store, night: str, keys: Sequence[str]) -> set[str]:
+    table = store.read_parts(night, "nights", keys)
+    return set() if table is None else set(table.column("loop").to_pylist())
+
+
+def run(
+    batch: Batch,
+    jobs: int = 0,
+    resume: bool = False,
+    replacing: bool = False,
+    scheduler: str | None = None,
+    progress: Callable[[int, int], None] = lambda done, total: None,
+) -> Outcome:
+    """Assess all loops of an export and keep the results.
+
+    Parameters
+    ----------
+    batch : Batch
+    jobs : int
+        Worker processes; 0 works in this one, where a loop that takes all memory takes the run with it.
+    resume : bool
+        Go on with the pieces of a run that was stopped, instead of starting anew.
+    replacing : bool
+        Forget what the store has of these nights, instead of adding to it.
+    scheduler : str or None
+        Address of a Dask scheduler whose workers do the loops, instead of processes of this machine.
+    progress : callable
+        Called with loops done and loops in all.
+
+    Raises
+    ------
+    InputError
+        No loops, no nights, another run on the store, or pieces of another run to be gone on with.
+    """
+    if not batch.specs:
+        raise no_loops(batch.export.tags)
+    with locked(batch.store.path):
+        store_version.upgrade(batch.store.path)
+        nights = batch.nights()
+        said = [line for night in nights for line in batch.store.set_aside_damaged(night.name)]
+        keys, met = _begun(batch.store, nights, batch.identity, resume), Counter[str]()
+        known = _loops_in(batch.store, nights[-1].name, keys)
+        done, of = len(known), len(batch.specs)
+        progress(done, of)
+        for result in _results(_tasks(batch, nights, known), jobs, batch.config, scheduler):
+            keys.append(result.key)
+            done += result.loops
+            met.update(result.met)
+            progress(done, of)
+        written, more = _finished(batch, nights, keys, replacing)
+        return _outcome(batch, written, (*batch.export.file_notes, *counted(met), *said, *more))
+
+
+def _finished(
+    batch: Batch, nights: Sequence[Night], keys: Sequence[str], replacing: bool
+) -> tuple[list[Night], list[str]]:
+    """The nights put together, those without a sample left out unless they are all there is."""
+    store, order = batch.store, [s.loop for s in batch.specs]
+    full = [night for night in nights if not is_empty(store, night.name, keys)] or list(nights[-1:])
+    said = []
+    if len(full) < len(nights):
+        said.append(f"{len(nights) - len(full)} nights without a good sample of any loop are left out")
+    for night in full:
+        said += finish_night(store, night.name, order, batch.config, keys, replacing)
+    store.drop_parts()
+    return full, said
+
+
+def _outcome(batch: Batch, nights: Sequence[Night], notes: Sequence[str]) -> Outcome:
+    """The outcome as the last night's table has it, for the loops of this run."""
+    wanted = {s.loop for s in batch.specs}
+    table = batch.store.read("nights", nights[-1].name, ["loop", "status", "reason"]).to_pylist()
+    lost = [
+        (r["loop"], r["reason"], r["status"])
+        for r in table
+        if r["loop"] in wanted and r["status"] != Status.OK
+    ]
+    unassessed = tuple((loop, why) for loop, why, status in lost if status == Status.NOT_ASSESSED)
+    failed = tuple((loop, why) for loop, why, status in lost if status != Status.NOT_ASSESSED)
+    return Outcome(tuple(nights), unassessed, failed, tuple(notes))

@@ -1,0 +1,94 @@
+"""What `triage check` says: what was read, and which questions each loop's trends are fit for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+
+from analyzer.config import Config
+from analyzer.history.export import Export
+from analyzer.history.plant_clock import UTC_NAME, stamp
+from analyzer.history.series import Series
+from analyzer.loop.assess import hidden, unassessable
+from analyzer.loop.decisions import Needs
+from analyzer.loop.fit_for_cause import unfit_for_cause
+from analyzer.loop.fit_for_settings import too_thin, unfit_for_settings
+from analyzer.loop.judged_stretch import controller_of
+from analyzer.loop.oscillation import detect
+from analyzer.loop.quality import Prepared, prepare
+from analyzer.loops.changes import TuningChange
+from analyzer.loops.settings_in_force import in_force
+from analyzer.loops.spec import LoopSpec
+from identification.errors import TriageError
+
+Within = Callable[[Mapping[str, Series]], dict[str, Series]]
+"""Cuts samples to a span of time."""
+MOST_NAMES = 5
+"""Loops that are named in a line."""
+
+
+def _tags(spec: LoopSpec) -> str:
+    found = [(role, getattr(spec, role)) for role in ("sp", "pv", "op", "mode", "position")]
+    return ", ".join(f"{role.upper()} {tag}" for role, tag in found if tag)
+
+
+def _fit(lacking: Needs | None, spec: LoopSpec, prepared: Prepared, config: Config) -> str:
+    """Which questions the record is fit for, in words, as a run judges it."""
+    if lacking is not None:
+        return f"fit for nothing: {lacking}"
+    stated = controller_of(spec, prepared) if prepared.op_scaled else None
+    unseen = hidden(prepared.record, detect(prepared.record, config.oscillation), stated, config)
+    if unseen is not None:
+        return f"fit for its figures alone: {unseen}"
+    unfit = unfit_for_cause(prepared, None, config)
+    if unfit is not None:
+        return f"fit for oscillation and assessments; not for the cause: {unfit}"
+    unset = unfit_for_settings(prepared, config) or too_thin(prepared.record.dt_s, stated, config)
+    return "fit for all questions" if unset is None else f"fit for all but new settings: {unset}"
+
+
+def loop_line(export: Export, spec: LoopSpec, config: Config, within: Within) -> tuple[str, bool]:
+    """One loop's line, and whether it cannot be assessed."""
+    if spec.pv is None:
+        return f"{spec.loop}: no PV tag {spec.wanted_pv or spec.loop + '.PV'} in the export", True
+    try:
+        prepared = prepare(spec, within(export.read(spec.tags)), config.quality)
+    except TriageError as error:
+        return f"{spec.loop}: {_tags(spec)}; fit for nothing: {error}", True
+    record = prepared.record
+    lacking = unassessable(record, config)
+    fit = _fit(lacking, spec, prepared, config)
+    parts = [_tags(spec), f"{len(record)} samples every {record.dt_s:g} s", *prepared.notes, fit]
+    return f"{spec.loop}: " + "; ".join(parts), lacking is not None
+
+
+def _dated(changes: Sequence[TuningChange], specs: Sequence[LoopSpec]) -> str:
+    """What the changes of settings are of."""
+    here = {s.loop for s in specs}
+    others = sorted({c.loop for c in changes} - here)
+    text = f"{len(changes)} changes of settings, {sum(c.loop in here for c in changes)} of these loops"
+    return text + (f"; not of {', '.join(others[:MOST_NAMES])}" if others else "")
+
+
+def lines(
+    export: Export,
+    specs: Sequence[LoopSpec],
+    notes: Sequence[str],
+    config: Config,
+    within: Within,
+    changes: Sequence[TuningChange] = (),
+    zone: str = UTC_NAME,
+) -> Iterator[tuple[str, bool]]:
+    """All lines, each with whether a loop of it cannot be assessed."""
+    first, last = export.span()
+    span = f"{stamp(first, zone)} to {stamp(last, zone)} {zone}"
+    yield f"{len(export.tags)} tags, {len(specs)} loops, {span}", False
+    for note in notes:
+        yield note, False
+    if specs and specs[0].defaults:
+        yield "assumed where loops.csv is silent: " + ", ".join(specs[0].defaults), False
+    if changes:
+        yield _dated(changes, specs), False
+    for spec in specs:
+        yield loop_line(export, in_force(spec, changes, last), config, within)
+    for note in export.notes:
+        yield note, False

@@ -1,0 +1,232 @@
+"""What a worker does: a few loops over some nights, each on its own, the results written as pieces of the nights.
+
+An error of one loop is a result of that loop.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import pyarrow as pa
+
+from analyzer.columns.table import HOURS, NIGHTS, SETTINGS
+from analyzer.config import Config
+from analyzer.history.export import Export
+from analyzer.history.plant_clock import stamp
+from analyzer.history.series import Series
+from analyzer.lanes.rules import standing
+from analyzer.loop.advice import Advice, advise
+from analyzer.loop.assess import Assessment, assess
+from analyzer.loop.decisions import Action, Cause, Lack, LacksError, Status
+from analyzer.loop.judged_stretch import Earlier, controller_of, earlier_settings
+from analyzer.loop.quality import Prepared, prepare
+from analyzer.loop.sample_clock import interval
+from analyzer.loop.turn_events import turn_events
+from analyzer.loops.changes import TuningChange
+from analyzer.loops.settings_in_force import in_force, settings_from
+from analyzer.loops.spec import LoopSpec
+from analyzer.night.nights import Night, cut
+from analyzer.pages import compared as settings_page
+from analyzer.plantwide.table import waves_table
+from analyzer.store.rows import Lost, hour_rows, lost_row, night_row
+from analyzer.store.store import Store, rows_table, write_table
+from analyzer.words import settings as words
+from analyzer.words.present import advised
+from identification.errors import NotAssessedError, TriageError
+from reports.page_file import dumps
+
+HISTORY = {Cause.NONE: Action.NONE, Cause.LOAD: Action.NONE, Cause.UNDECIDED: Action.UNDECIDED}
+"""Actions of nights that are not the last, empty for the others: settings are advised on for tomorrow, not for the
+week before."""
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """One chunk of loops over some nights, small enough to send to a worker; `key` names its pieces, and `alone` says
+    that it is one loop's second try."""
+
+    export: Export
+    specs: tuple[LoopSpec, ...]
+    nights: tuple[Night, ...]
+    store: Store
+    config: Config
+    key: str
+    changes: tuple[TuningChange, ...] = ()
+    alone: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Done:
+    """What a worker says of its chunk: the key of its pieces, the loops they hold, what was met in their samples."""
+
+    key: str
+    loops: int
+    met: Counter[str] = field(default_factory=Counter)
+
+
+def assess_loop(
+    spec: LoopSpec, series: dict[str, Series], config: Config, advising: bool = True
+) -> tuple[Assessment, Advice]:
+    """Prepare and assess one loop from its raw samples, and advise on it if wanted."""
+    return _assessed(spec, prepare(spec, series, config.quality), config, advising)
+
+
+def _assessed(
+    spec: LoopSpec, prepared: Prepared, config: Config, advising: bool, earlier: Sequence[Earlier] = ()
+) -> tuple[Assessment, Advice]:
+    stated = controller_of(spec, prepared)
+    found = assess(prepared, stated, config, spec.type, earlier)
+    if not advising:
+        return found, Advice(HISTORY.get(found.verdict.cause))
+    return found, advise(found, spec, stated, prepared.scale.span, config)
+
+
+@dataclass(slots=True)
+class Rows:
+    """What is kept of the loops of one night: rows of three tables, and assessments."""
+
+    nights: list[dict[str, Any]] = field(default_factory=list)
+    compared: list[dict[str, Any]] = field(default_factory=list)
+    found: list[Assessment] = field(default_factory=list)
+
+
+def _loop_row(
+    stated: LoopSpec,
+    series: dict[str, Series],
+    night: Night,
+    config: Config,
+    advising: bool,
+    kept: Rows,
+    changes: Sequence[TuningChange] = (),
+) -> None:
+    """Keep the row of one loop and night, whatever happens, and its assessment where there is one."""
+    spec = in_force(stated, changes, night.last_s)
+    part = {tag: cut(s, night) for tag, s in series.items()}
+    known: dict[str, Any] = {
+        "good_h": _good_h(part.get(spec.pv or "")),
+        "timezone": night.zone,
+        "settings_from": settings_from(stated, changes, night.last_s, night.zone),
+    }
+    try:
+        prepared = prepare(spec, part, config.quality)
+        known |= {"pv_lo": prepared.scale.low, "pv_hi": prepared.scale.low + prepared.scale.span}
+        known |= standing(prepared, controller_of(spec, prepared), spec.type, config).as_row()
+        earlier = earlier_settings(stated, changes, prepared)
+        found, advice = _assessed(spec, prepared, config, advising, earlier)
+        turns = turn_events(prepared, found) if advising else None
+        known |= _typed_in(earlier, spec, found, night.zone) | {"turns": turns}
+        row = {**night_row(found, spec, night.name, config.advice), **known}
+        row, drawn = advised(row, found.verdict.needs, advice), _settings_row(spec, night.name, advice)
+    except Exception as error:  # an error of one loop is that loop's result, never the night's end
+        kept.nights.append({**lost_row(spec, night.name, _lost(error, config)), **known})
+        return
+    kept.nights.append(row)
+    kept.compared += drawn
+    kept.found.append(found)
+
+
+def _typed_in(
+    earlier: Sequence[Earlier], spec: LoopSpec, found: Assessment, zone: str
+) -> dict[str, str | float | None]:
+    """What was typed in last within the night, in words, and since when the verdict is told of it; nothing where
+    nothing was."""
+    if not earlier:
+        return {}
+    last = earlier[-1]
+    text = words.settings_changed(last.spec, spec, stamp(last.until_s, zone).split()[-1])
+    return {"settings_changed": text, "judged_since_s": None if found.outdated else last.until_s}
+
+
+def _settings_row(spec: LoopSpec, night: str, advice: Advice) -> list[dict[str, Any]]:
+    """The page on which settings are compared, as a row, none where none were sought."""
+    if advice.compared is None:
+        return []
+    page = settings_page.page(spec.loop, night, advice.compared, spec)
+    return [{"loop": spec.loop, "night": night, "settings_page": dumps(page)}]
+
+
+def _lost(error: Exception, config: Config) -> Lost:
+    """What is left of a loop that an error has ended."""
+    if isinstance(error, LacksError):
+        return Lost(Status.NOT_ASSESSED, str(error), error.needs.lack)
+    if isinstance(error, NotAssessedError):
+        return Lost(Status.NOT_ASSESSED, str(error))
+    if isinstance(error, TriageError):
+        return Lost(Status.FAILED, str(error))
+    if isinstance(error, MemoryError):
+        most = config.workers.memory_mb
+        return Lost(Status.FAILED, f"needs more memory than the {most:.0f} MB that one loop may take")
+    return Lost(Status.FAILED, f"{type(error).__name__}: {error}")
+
+
+def _good_h(pv: Series | None) -> float:
+    """Hours of good samples of a PV as logged [h]."""
+    good = 0 if pv is None else int((~pv.bad).sum())
+    if pv is None or good < 2:
+        return 0.0
+    return good * interval(pv.stamp_s) / 3600.0
+
+
+def _read(task: Task, spec: LoopSpec) -> dict[str, Series] | Lost:
+    """The loop's raw samples, or why there are none."""
+    if spec.pv is None:
+        wanted = spec.wanted_pv or f"{spec.loop}.PV"
+        return Lost(Status.NOT_ASSESSED, f"no PV tag {wanted} in the export", Lack.PV)
+    try:
+        return task.export.read(spec.tags)
+    except Exception as error:  # a broken column is that loop's result
+        return _lost(error, task.config)
+
+
+def work(task: Task, began: Callable[[int], None] = lambda at: None) -> Done:
+    """Assess a chunk and write its pieces; `began` is told the number of each loop that is begun with."""
+    kept = {n.name: Rows() for n in task.nights}
+    for at, spec in enumerate(task.specs):
+        began(at)
+        series = _read(task, spec)
+        for night in task.nights:
+            if isinstance(series, Lost):
+                row = {**lost_row(spec, night.name, series), "timezone": night.zone}
+                kept[night.name].nights.append(row)
+                continue
+            advising = night is task.nights[-1]
+            _loop_row(spec, series, night, task.config, advising, kept[night.name], task.changes)
+    for night in task.nights:
+        _write_pieces(task, night.name, kept[night.name])
+    return Done(task.key, len(task.specs), task.export.met(tag for spec in task.specs for tag in spec.tags))
+
+
+def lose(task: Task, reason: str) -> Done:
+    """Write the rows of a chunk that no worker could finish."""
+    lost = Lost(Status.FAILED, reason)
+    for night in task.nights:
+        rows = [{**lost_row(spec, night.name, lost), "timezone": night.zone} for spec in task.specs]
+        _write_pieces(task, night.name, Rows(nights=rows))
+    return Done(task.key, len(task.specs))
+
+
+def _write_pieces(task: Task, night: str, kept: Rows) -> None:
+    """The piece of the table of nights comes last: where it is, the chunk is whole."""
+    hours = [row for a in kept.found for row in hour_rows(a, night)]
+    if hours:
+        write_table(rows_table(hours, HOURS), task.store.part(night, "hours", task.key))
+    if kept.found:
+        write_table(_trend_table(kept.found), task.store.part(night, "trends", task.key))
+    waves = [wave for a in kept.found for wave in a.waves]
+    if waves:
+        write_table(waves_table(waves), task.store.part(night, "waves", task.key))
+    if kept.compared:
+        write_table(rows_table(kept.compared, SETTINGS), task.store.part(night, "compared", task.key))
+    write_table(rows_table(kept.nights, NIGHTS), task.store.part(night, "nights", task.key))
+
+
+def _trend_table(found: Sequence[Assessment]) -> pa.Table:
+    tables = []
+    for a in found:
+        columns = {k: pa.array(v) for k, v in a.trend.items()}
+        n = len(a.trend["time_s"])
+        tables.append(pa.table({"loop": pa.array([a.loop] * n).dictionary_encode(), **columns}))
+    return pa.concat_tables(tables).unify_dictionaries()

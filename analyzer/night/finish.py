@@ -1,0 +1,154 @@
+"""A night put together: the plant-wide pass over its pieces, lanes, then one table, joined with what the store has.
+
+A second export of the same night adds its loops. Of a loop that stands in both the fuller record is kept, and the
+newer of two that are alike, so that the same night twice replaces and a good night is never lost to an empty one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.compute as pc
+
+from analyzer.columns.table import BY_NAME, GROUPS, NIGHTS, names
+from analyzer.config import Config, NightLimits
+from analyzer.lanes.words import in_lanes
+from analyzer.loop.decisions import Status
+from analyzer.night.calmed import REMEMBERED, calmed
+from analyzer.pages.reading import read_nights
+from analyzer.plantwide.night import traced_night
+from analyzer.plantwide.table import waves_in
+from analyzer.store.store import Store, rows_table
+
+MEMORY = 30
+"""Nights before that are looked at for the last one under other settings; ours: a month."""
+WORTH = {Status.OK: 2, Status.NOT_ASSESSED: 1}
+"""What a status is worth when two records of one loop meet; a failure is worth nothing."""
+Row = Mapping[str, Any]
+
+
+def fuller(old: Row, new: Row, limits: NightLimits) -> bool:
+    """Whether the record that the store has of a loop is worth more than the new one."""
+    worth = [WORTH.get(r["status"], 0) for r in (old, new)]
+    if worth[0] != worth[1]:
+        return worth[0] > worth[1]
+    had, has = (r.get("good_h") or 0.0 for r in (old, new))
+    return had > limits.fuller_share * has + limits.fuller_h
+
+
+def is_empty(store: Store, night: str, keys: Sequence[str]) -> bool:
+    """Whether no loop of a night has a good sample, and none failed, so that there is nothing to keep."""
+    table = store.read_parts(night, "nights", keys)
+    if table is None:
+        return False
+    rows = table.select(["status", "good_h"]).to_pylist()
+    return all(r["status"] == Status.NOT_ASSESSED and not r["good_h"] for r in rows)
+
+
+def finish_night(
+    store: Store, night: str, order: Sequence[str], config: Config, keys: Sequence[str], replace: bool = False
+) -> tuple[str, ...]:
+    """Put one night together from its pieces and keep it; nothing where it has none.
+
+    Parameters
+    ----------
+    store : Store
+    night : str
+    order : sequence of str
+        The loops of the run, in the order in which they are kept.
+    config : Config
+    keys : sequence of str
+        The chunks whose pieces count.
+    replace : bool
+        Forget what the store has of the night.
+
+    Returns
+    -------
+    tuple of str
+        Sentences on what was joined, and on loops whose earlier record was kept.
+    """
+    table = store.read_parts(night, "nights", keys)
+    if table is None:
+        return ()
+    fresh = {r["loop"]: r for r in table.to_pylist()}
+    other = [] if replace else _other_groups(store, night, fresh)
+    first = 1 + max((int(r["group"]) for r in other), default=0)
+    done = traced_night(fresh, waves_in(store.read_parts(night, "waves", keys)), config.plant, first)
+    earlier = _earlier(store, night)
+    rows = {
+        loop: in_lanes(calmed(row, earlier.get(loop, ())), config.lanes) for loop, row in done.rows.items()
+    }
+    old = {} if replace else _known(store, night)
+    kept = {loop for loop, row in rows.items() if loop in old and fuller(old[loop], row, config.nights)}
+    beside = [loop for loop in old if loop not in rows]
+    joined = [old[k] if k in kept else rows[k] for k in order if k in rows] + [old[k] for k in beside]
+    mine = [loop for loop in rows if loop not in kept]
+    for name in ("hours", "trends", "compared"):  # one at a time: trends are most of a night
+        before = None if replace else store.read_if_there(name, night)
+        store.write(name, night, _joined(before, store.read_parts(night, name, keys), mine))
+    groups = [*other, *done.groups]
+    store.write("groups", night, rows_table(groups, GROUPS) if groups else None)
+    store.write("nights", night, rows_table(joined, NIGHTS))
+    store.forget_explained(night, None if replace else mine)
+    store.forget_compared()
+    return _told(night, rows, old, kept, beside)
+
+
+def _earlier(store: Store, night: str) -> dict[str, list[Row]]:
+    """The rows of the nights before by loop, oldest first, with what tells whether a change calmed it."""
+    out: dict[str, list[Row]] = {}
+    names = [n for n in store.nights() if n < night][-MEMORY:]
+    for row in read_nights(store, names, REMEMBERED):
+        out.setdefault(row["loop"], []).append(row)
+    return out
+
+
+def _other_groups(store: Store, night: str, mine: Mapping[str, Row]) -> list[Row]:
+    """The groups that the store has of a night and that hold none of these loops."""
+    table = store.read_if_there("groups", night)
+    rows = [] if table is None else table.select(names(GROUPS)).to_pylist()
+    gone = {r["group"] for r in rows if r["loop"] in mine}
+    return [r for r in rows if r["group"] not in gone]
+
+
+def _known(store: Store, night: str) -> dict[str, Row]:
+    """The rows that the store has of a night, without columns that another version wrote."""
+    table = store.read_if_there("nights", night)
+    if table is None:
+        return {}
+    declared = table.select([c for c in table.column_names if c in BY_NAME])
+    return {r["loop"]: r for r in declared.to_pylist()}
+
+
+def _joined(before: pa.Table | None, piece: pa.Table | None, mine: Sequence[str]) -> pa.Table | None:
+    """Rows of a table of the store, those of some loops taken from a piece."""
+    wanted = pa.array(mine, pa.string())
+    tables = []
+    if before is not None:
+        tables.append(before.filter(pc.invert(pc.is_in(_loops(before), value_set=wanted))))
+    if piece is not None:
+        tables.append(piece.filter(pc.is_in(_loops(piece), value_set=wanted)))
+    tables = [t for t in tables if t.num_rows] or tables[:1]
+    return pa.concat_tables(tables, promote_options="default").unify_dictionaries() if tables else None
+
+
+def _loops(table: pa.Table) -> pa.ChunkedArray:
+    return pc.cast(table.column("loop"), pa.string())
+
+
+def _told(
+    night: str, rows: Mapping[str, Row], old: Mapping[str, Row], kept: set[str], beside: Sequence[str]
+) -> tuple[str, ...]:
+    """What is worth saying of a night that was there already."""
+    said = []
+    if beside:
+        said.append(f"night {night}: {len(beside)} loops of an earlier run are kept beside these")
+    for loop in sorted(kept):
+        had, has = (r.get("good_h") or 0.0 for r in (old[loop], rows[loop]))
+        said.append(
+            f"{loop}: the store has {had:.1f} good hours of night {night}, this export {has:.1f}; the fuller record "
+            "is kept (--replace takes this one)"
+        )
+    return tuple(said)

@@ -1,0 +1,123 @@
+"""How an export is cut into nights, each a span of time that is assessed as one."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from analyzer.config import NightLimits
+from analyzer.history import plant_clock
+from analyzer.history.export import Export
+from analyzer.history.series import Series
+from analyzer.history.stray import stamp_text
+from analyzer.loops.spec import LoopSpec
+from identification.errors import InputError
+
+DAY_S = 86400.0
+
+
+@dataclass(frozen=True, slots=True)
+class Night:
+    """A span of time that is assessed as one: its name (the plant's date of its middle), its ends [s], the plant's
+    time zone."""
+
+    name: str
+    first_s: float
+    last_s: float
+    zone: str = plant_clock.UTC_NAME
+
+
+def _named(first_s: float, last_s: float, zone: str) -> Night:
+    return Night(plant_clock.date_of((first_s + last_s) / 2, zone), first_s, last_s, zone)
+
+
+def daily(
+    first_s: float, last_s: float, limits: NightLimits, zone: str = plant_clock.UTC_NAME
+) -> list[Night]:
+    """Cut a span of time at the plant's midnights; a short first or last piece joins its neighbour.
+
+    Raises
+    ------
+    InputError
+        There would be more of them than one run may have.
+    """
+    if last_s - first_s > limits.most * DAY_S:
+        days, ends = (last_s - first_s) / DAY_S, f"{stamp_text(first_s)} to {stamp_text(last_s)} UTC"
+        raise InputError(
+            f"the export spans {days:.0f} days, {ends}",
+            f"at most {limits.most} nights in one run",
+            "state the part that is meant with --since and --until",
+        )
+    least_s = 3600.0 * limits.least_piece_h
+    cuts = plant_clock.midnights(first_s, last_s, zone)
+    inner = [c for c in cuts if c - first_s >= least_s and last_s - c >= least_s]
+    edges = [first_s, *inner, last_s + 1.0]
+    return [_named(a, b, zone) for a, b in pairwise(edges)]
+
+
+def nights(
+    spans: Sequence[tuple[float, float]], limits: NightLimits, zone: str = plant_clock.UTC_NAME
+) -> list[Night]:
+    """The nights of an export from the spans of its loops [s].
+
+    Where the median loop has over whole_h (36 h), the export is cut into days; else each loop is assessed whole, in
+    one night, named by the date of the middle of the loop that ends last. Recordings of different days can so be
+    ranked together.
+    """
+    lengths = sorted(last - first for first, last in spans)
+    first, last = min(s[0] for s in spans), max(s[1] for s in spans)
+    if lengths[len(lengths) // 2] > limits.whole_h * 3600.0:
+        return daily(first, last, limits, zone)
+    latest = max(spans, key=lambda s: s[1])
+    return [replace(_named(*latest, zone), first_s=first, last_s=last + 1.0)]
+
+
+def clipped(
+    spans: Sequence[tuple[float, float]], since_s: float, until_s: float
+) -> list[tuple[float, float]]:
+    """Spans within a span of time; those outside are left out.
+
+    Raises
+    ------
+    InputError
+        Where nothing is left.
+    """
+    inside = [(max(a, since_s), min(b, until_s - 1.0)) for a, b in spans if a < until_s and b >= since_s]
+    if not inside:
+        raise InputError("no samples between --since and --until", "a span of the export", "widen it")
+    return inside
+
+
+def cut(series: Series, night: Night) -> Series:
+    """The samples of one night."""
+    a, b = np.searchsorted(series.stamp_s, [night.first_s, night.last_s])
+    text = None if series.text is None else series.text[a:b]
+    return replace(
+        series, stamp_s=series.stamp_s[a:b], value=series.value[a:b], bad=series.bad[a:b], text=text
+    )
+
+
+def nights_of(
+    export: Export,
+    specs: Sequence[LoopSpec],
+    limits: NightLimits,
+    since_s: float = -math.inf,
+    until_s: float = math.inf,
+    zone: str = plant_clock.UTC_NAME,
+) -> list[Night]:
+    """The nights of an export within a span of time, cut at the plant's midnights.
+
+    Raises
+    ------
+    InputError
+        Where the export has no PV of any loop, or nothing within the span.
+    """
+    present = [s.pv for s in specs if s.pv is not None]
+    if not present:
+        wanted = specs[0].wanted_pv or f"{specs[0].loop}.PV"
+        raise InputError("no PV tag of any loop is in the export", f"tags such as {wanted}", "check --loops")
+    return nights(clipped([export.span(tag) for tag in present], since_s, until_s), limits, zone)

@@ -1,0 +1,220 @@
+"""The morning list from a store, as table, CSV, JSON or Markdown; reads what it shows and no more."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+import os
+from collections.abc import Mapping, Sequence
+from shutil import get_terminal_size
+from typing import Any
+
+from analyzer.columns.other_tables import NOTED
+from analyzer.columns.ranking import LISTED, RANKING
+from analyzer.columns.table import BY_NAME, names
+from analyzer.lanes.figures import FIGURE, lanes_in
+from analyzer.loop.decisions import Cause, Due, Lane
+from analyzer.pages.cost import LOSS, MARK, OF_RECORDED, SIGNIFICANCE, compares, cost_column, mark
+from analyzer.store import notes
+from analyzer.store.notes import Note
+from analyzer.store.store import Store
+from identification.errors import InputError
+from reports.tables import harmless
+from reports.visible import visible
+
+LANE_FIGURES = tuple(name for name in FIGURE.values() if name not in names(RANKING))
+"""Figures of lanes that the contract's columns do not hold."""
+SORTABLE = (*names(RANKING), "importance", LOSS, *LANE_FIGURES)
+KEPT = names((*RANKING, *LISTED))
+LIST_COLUMNS = (*KEPT, *names(NOTED))
+"""Columns of CSV and JSON: the contract's, then what says in which units settings stand, and the advice in full."""
+MOST_NAMES = 10
+"""Areas that are named in an error."""
+WIDEST, PIPED = 240, 180
+"""Characters of a line of a wide table, and of one that no terminal shows."""
+Row = Mapping[str, Any]
+
+
+def ranked(
+    store: Store,
+    column: str | None = None,
+    top: int | None = None,
+    night: str | None = None,
+    ascending: bool = False,
+    area: str | None = None,
+    lane: Lane | None = None,
+) -> tuple[list[dict[str, Any]], str]:
+    """Rows of a night, or of one of its areas or lanes, sorted; loops without a figure come last by name.
+
+    Without a column, loops that are worth a look come first: those of a lane by its figure; all by their loss where
+    loops.csv states importances, else by the significance of their oscillation.
+
+    Raises
+    ------
+    InputError
+        Where there is no such store, night, column or area.
+    """
+    if column is not None and column not in SORTABLE:
+        raise InputError(f"column {column!r}", "one of " + ", ".join(SORTABLE), "correct --by")
+    name = night or store.require()
+    rows = _within(_read(store, name), area)
+    if lane is not None:
+        rows = [r for r in rows if lane in lanes_in(r)]
+    if column is None and not ascending:
+        return worst_first(rows, None if lane is None else FIGURE[lane])[:top], name
+    return _sorted(rows, column or SIGNIFICANCE, ascending)[:top], name
+
+
+def _read(store: Store, night: str) -> list[dict[str, Any]]:
+    """The night's rows; columns that an older version did not write are None."""
+    wanted = (*KEPT, *LANE_FIGURES, "timezone")
+    held = set(store.columns("nights", night))
+    rows = store.read("nights", night, [c for c in wanted if c in held]).to_pylist()
+    known = notes.read(store.path)
+    return [_noted({**dict.fromkeys(wanted), **row}, known) for row in rows]
+
+
+def _noted(row: dict[str, Any], known: Mapping[str, tuple[Note, ...]]) -> dict[str, Any]:
+    """A row with the newest note of its loop; numbers that are none are not known."""
+    row = {k: None if isinstance(v, float) and not math.isfinite(v) else v for k, v in row.items()}
+    found = notes.last(known, row["loop"])
+    if found is None:
+        return {**row, "note": None, "hidden_until": None}
+    return {**row, "note": found.said(row["timezone"]), "hidden_until": found.hidden_until or None}
+
+
+def hidden_loops(rows: Sequence[Row], night: str) -> tuple[str, ...]:
+    """Loops that their notes keep out of a night's list."""
+    return tuple(r["loop"] for r in rows if notes.hides(r["hidden_until"], night))
+
+
+def _sorted(rows: Sequence[dict[str, Any]], column: str, ascending: bool) -> list[dict[str, Any]]:
+    """Rows by a column, ties and loops without a figure by name."""
+    known = [r for r in rows if r[column] not in (None, "")]
+    others = sorted((r for r in rows if r[column] in (None, "")), key=lambda r: r["loop"])
+    if BY_NAME[column].is_number:
+        known.sort(key=lambda r: (r[column] if ascending else -r[column], r["loop"]))
+    else:
+        known.sort(key=lambda r: (r[column], r["loop"]))
+    return known + others
+
+
+def worst_first(rows: Sequence[dict[str, Any]], column: str | None = None) -> list[dict[str, Any]]:
+    """Rows as the morning reads them: what oscillates, then what stands in another lane, then the rest."""
+    by = cost_column(rows)
+    return sorted(_comparable_first(rows, column or by), key=lambda row: _worth(row, by == LOSS))
+
+
+def _comparable_first(rows: Sequence[dict[str, Any]], column: str) -> list[dict[str, Any]]:
+    """Rows by a column; behind them, by the significance within their own recorded range, those whose figure is not
+    known or compares with no other's."""
+    alike = [r for r in rows if compares(r, column)]
+    others = [r for r in rows if not compares(r, column)]
+    return _sorted(alike, column, False) + _sorted(others, SIGNIFICANCE, False)
+
+
+def _worth(row: Row, lossy: bool) -> int:
+    """0 for loops to be looked at first, 2 for those with nothing to look at; losses are compared across lanes."""
+    lanes = lanes_in(row)
+    if row["due"] == Due.SHUTDOWN:
+        return 1
+    if Lane.OSCILLATION in lanes or row["cause"] == Cause.VALVE:
+        return 0
+    return 2 if not lanes else 0 if lossy else 1
+
+
+def _within(rows: list[dict[str, Any]], area: str | None) -> list[dict[str, Any]]:
+    """The rows of an area, all where none is named; capitals do not matter."""
+    if area is None:
+        return rows
+    found = [r for r in rows if (r["area"] or "").casefold() == area.casefold()]
+    if not found:
+        known = sorted({r["area"] for r in rows if r["area"]})
+        named = ", ".join(known[:MOST_NAMES]) or "none: loops.csv states no areas"
+        raise InputError(f"area {area!r}", f"one of {named}", "correct --area")
+    return found
+
+
+def rendered(rows: Sequence[Row], form: str, night: str, wide: bool = False, lane: Lane | None = None) -> str:
+    """Rows as text in one of the formats; a `wide` table keeps all its columns, one of a lane shows its figure."""
+    if form in ("table", "markdown"):
+        from analyzer.words.present import markdown_table, shown_of
+        from reports.markdown import escaped
+
+        shown = shown_of(rows, None if lane is None else FIGURE[lane])
+        if not rows:
+            return f"Night {night}: no loop is in the lane {lane}" if lane else f"Night {night}: no loops"
+        text = (
+            as_table(rows, night, WIDEST if wide else None, shown)
+            if form == "table"
+            else markdown_table(rows, shown)
+        )
+        marked = any(mark(row, column) for row in rows for column in shown)
+        return f"{text}\n\n{escaped(MARK) if form == 'markdown' else MARK} {OF_RECORDED}" if marked else text
+    return {"csv": as_csv, "json": as_json}[form](rows, night)
+
+
+def as_csv(rows: Sequence[Row], night: str) -> str:
+    """All columns as CSV, empty where not assessed, texts of the plant harmless to spreadsheets."""
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(LIST_COLUMNS)
+    writer.writerows([_cell(r[c]) for c in LIST_COLUMNS] for r in rows)
+    return out.getvalue().rstrip("\n")
+
+
+def _cell(value: Any) -> Any:
+    """A cell that no spreadsheet takes for a formula; empty where nothing is known."""
+    if value is None:
+        return ""
+    return harmless(visible(value)) if isinstance(value, str) else value
+
+
+def as_json(rows: Sequence[Row], night: str) -> str:
+    """All columns as a JSON list of objects, null where not assessed."""
+    return json.dumps([{c: r[c] for c in LIST_COLUMNS} for r in rows], indent=1)
+
+
+def as_table(
+    rows: Sequence[Row], night: str, width: int | None = None, columns: Sequence[str] | None = None
+) -> str:
+    """The columns for people as a table; those worth least go where `width` (the terminal's by default) is short."""
+    from analyzer.words.present import SHOWN, WITH_UNITS, brief, fitting
+    from reports.terminal import Heading, table
+
+    width = width or (get_terminal_size().columns if interactive() else PIPED)
+    shown = [brief(row, columns or SHOWN) for row in rows]
+    kept = fitting(shown, width)
+    headings = [
+        Heading(c.heading, c.is_number and c.name not in WITH_UNITS, c.name == "reason")
+        for c in map(BY_NAME.__getitem__, kept)
+    ]
+    head, body = table(headings, [[cells[name] for name in kept] for cells in shown], width)
+    rule = " " + "\u2500" * (max(map(len, (head, *(line for lines in body for line in lines)))) - 1)
+    coloured = _coloured if interactive() and not os.environ.get("NO_COLOR") else None
+    lines = [
+        coloured(line, row["loop"], row["cause"]) if coloured and not k else line
+        for row, lines in zip(rows, body, strict=True)
+        for k, line in enumerate(lines)
+    ]
+    return "\n".join([f"Night {night}", "", head, rule, *lines])
+
+
+def _coloured(line: str, loop: str, cause: str | None) -> str:
+    """A row's first line with its loop in the colour of its cause."""
+    import click
+
+    from analyzer.words.present import CAUSE_STYLES
+
+    colour = CAUSE_STYLES.get(cause or "")
+    shown = visible(loop)
+    return line if colour is None else line.replace(shown, click.style(shown, fg=colour), 1)
+
+
+def interactive() -> bool:
+    """Whether the output is read on a terminal."""
+    import sys
+
+    return sys.stdout.isatty()

@@ -1,0 +1,149 @@
+"""A store looked after: what in it is damaged or left over, and nights that are old enough to go."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from datetime import date, timedelta
+from pathlib import Path
+
+from analyzer.store import notes
+from analyzer.store import version as store_version
+from analyzer.store.store import TABLES, Store, is_night
+from analyzer.store.lock import LEFT_OVER_S
+from analyzer.store.table import read_stored
+from identification.errors import InputError
+from reports.whole_file import SUFFIX
+
+NEVER = "1900-01-01"
+"""A day before all nights."""
+BULKY = ("hours", "trends")
+"""Tables that pages of recent nights draw from; the longest part of a store."""
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """Something in a store that is not as it should be: what was seen, and what to do."""
+
+    seen: str
+    remedy: str
+
+
+@dataclass(frozen=True, slots=True)
+class Sizes:
+    """What a store holds: nights, tables, and bytes in all."""
+
+    nights: int
+    tables: int
+    bytes: int
+
+
+def sizes(store: Store) -> Sizes:
+    """What a store holds."""
+    tables = sum(len(list((store.path / t).glob("*.parquet"))) for t in TABLES)
+    total = sum(p.stat().st_size for p in store.path.rglob("*") if p.is_file())
+    return Sizes(len(store.nights()), tables, total)
+
+
+def problems(store: Store) -> Iterator[Problem]:
+    """All that is wrong with a store, every table read whole.
+
+    Raises
+    ------
+    InputError
+        There is no such directory.
+    """
+    if not store.path.is_dir():
+        raise InputError(
+            f"{store.path}: no such directory", "a store", "run 'triage run EXPORT --store DIR' first"
+        )
+    yield from _version(store.path)
+    whole = set(store.nights())
+    for table in TABLES:
+        for path in sorted((store.path / table).glob("*")):
+            yield from _table(path, table, whole)
+    yield from _notes(store.path)
+    for night in store.begun():
+        yield Problem(
+            f"{store.path / 'parts' / night}: a run that was begun and not finished",
+            "run it again with --resume; without, the next run starts anew",
+        )
+
+
+def _version(store: Path) -> Iterator[Problem]:
+    try:
+        found = store_version.version_of(store)
+        store_version.require_known(store)
+    except InputError as error:
+        yield Problem(error.seen, error.remedy)
+        return
+    if found < store_version.SCHEMA and (store / "nights").is_dir():
+        yield Problem(f"{store}: tables of version {found}", "the next run brings them up to date")
+
+
+def _table(path: Path, table: str, whole: set[str]) -> Iterator[Problem]:
+    if path.suffix == SUFFIX:
+        yield Problem(
+            f"{path}: left over from a process that died", "'triage store prune' deletes it after a day"
+        )
+    elif path.suffix == ".damaged":
+        yield Problem(f"{path}: a damaged table that a run has set aside", "delete it when nobody needs it")
+    elif path.suffix != ".parquet" or not is_night(path.stem):
+        yield Problem(f"{path}: not the name of a table of a night", "move it away")
+    else:
+        try:
+            read_stored(path)
+        except InputError as error:
+            yield Problem(error.seen, "restore it from a backup, or delete it and run its night anew")
+            return
+        if table != "nights" and path.stem not in whole:
+            yield Problem(f"{path}: no night of that name in nights", "run the night again, or delete it")
+
+
+def _notes(store: Path) -> Iterator[Problem]:
+    lines = notes.broken(store)
+    if lines:
+        yield Problem(f"{store / notes.FILE}: {lines} lines are no notes", "nothing: they are passed over")
+
+
+def pruned(store: Store, keep_d: int, detail_d: int | None, dry: bool = False) -> list[Path]:
+    """Delete nights that lie more than `keep_d` days before the latest, and files left over; what was deleted.
+
+    A night ahead of this machine's clock, of a historian whose clock was wrong, is no measure of what is old: without
+    an earlier one nothing goes. The table of nights goes first, so that no reader meets half of one. Notes stay. The
+    caller holds the store.
+
+    Parameters
+    ----------
+    store : Store
+    keep_d : int
+        Days of nights that are kept.
+    detail_d : int or None
+        Days of which hours and trends are kept, None as long as the nights.
+    dry : bool
+        Only say what would go.
+    """
+    tomorrow = (date.today() + timedelta(days=1)).isoformat()
+    latest = date.fromisoformat(max((n for n in store.nights() if n <= tomorrow), default=NEVER))
+    first = _days_before(latest, keep_d)
+    detailed = first if detail_d is None else _days_before(latest, detail_d)
+    gone = []
+    for table in TABLES:
+        oldest = max(first, detailed) if table in BULKY else first
+        for path in sorted((store.path / table).glob("*.parquet")):
+            if is_night(path.stem) and path.stem < oldest:
+                gone.append(path)
+    now = time.time()
+    for path in sorted(store.path.rglob(f".*{SUFFIX}")):
+        if now - path.stat().st_mtime > LEFT_OVER_S:
+            gone.append(path)
+    if not dry:
+        for path in gone:
+            path.unlink(missing_ok=True)
+    return gone
+
+
+def _days_before(day: date, days: int) -> str:
+    """A day so many days earlier, the first of all where there is none."""
+    return (day - timedelta(days=min(days, day.toordinal() - 1))).isoformat()

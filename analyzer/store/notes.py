@@ -1,0 +1,144 @@
+"""What people write about loops: kept in the store line by line, the newest standing for the loop.
+
+A line is one JSON object; lines are only ever added, so that two writers lose nothing and a night can run meanwhile.
+"""
+
+from __future__ import annotations
+
+import errno
+import getpass
+import json
+import os
+import time
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from io import FileIO
+from pathlib import Path
+
+from analyzer.places import is_remote
+from analyzer.history.plant_clock import stamp
+from identification.errors import InputError
+from reports.visible import visible
+
+FILE = "notes.jsonl"
+"""Name within the store."""
+LATEST_S = 32503680000.0
+"""Times of notes beyond the year 3000 are none [s since 1970-01-01 UTC]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Note:
+    """A note: the loop, when [s since 1970-01-01 UTC], what, by whom, and the date until which the loop is hidden."""
+
+    loop: str
+    time_s: float
+    text: str
+    owner: str = ""
+    hidden_until: str = ""
+
+    def said(self, zone: str | None) -> str:
+        """The note in one line, its time on the plant's clock."""
+        until = f", hidden until {self.hidden_until}" if self.hidden_until else ""
+        return f"{self.text} ({self.owner or 'unknown'}, {stamp(self.time_s, zone)}{until})"
+
+
+def user() -> str:
+    """Who writes, as the system names them; '' where it does not."""
+    try:
+        return getpass.getuser()
+    except (OSError, KeyError, ImportError):
+        return ""
+
+
+def add(store: Path, note: Note) -> None:
+    """Add a note to a store, on a line of its own whatever stands before it.
+
+    Raises
+    ------
+    OSError
+        It could not be written whole, on a full disk for example.
+    """
+    line = (json.dumps(asdict(note), ensure_ascii=False) + "\n").encode("utf-8")
+    if is_remote(store):  # an object cannot be added to
+        path = store / FILE
+        before = path.read_bytes() if path.exists() else b""
+        path.write_bytes(before + (b"" if before[-1:] in (b"", b"\n") else b"\n") + line)
+        return
+    with (store / FILE).open("ab+", buffering=0) as kept:
+        if kept.tell() and not _ends_a_line(kept):
+            line = b"\n" + line
+        if kept.write(line) != len(line):
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(store / FILE))
+
+
+def _ends_a_line(kept: FileIO) -> bool:
+    kept.seek(-1, os.SEEK_END)
+    return kept.read(1) == b"\n"
+
+
+def new(loop: str, text: str, owner: str | None, hidden_until: str) -> Note:
+    """A note of now.
+
+    Raises
+    ------
+    InputError
+        The text says nothing.
+    """
+    told = " ".join(visible(text).split())
+    if not told:
+        raise InputError(
+            f"an empty note on {loop}", "what was seen or done", 'say it: triage note STORE LOOP "..."'
+        )
+    return Note(loop, time.time(), told, visible(user() if owner is None else owner), hidden_until)
+
+
+def read(store: Path) -> dict[str, tuple[Note, ...]]:
+    """The notes of a store by loop, oldest first; lines that are none are passed over."""
+    try:
+        lines = (store / FILE).read_text(encoding="utf-8", errors="replace").split("\n")
+    except OSError:
+        return {}
+    out: dict[str, list[Note]] = {}
+    for line in lines:
+        found = _parsed(line)
+        if found is not None:
+            out.setdefault(found.loop, []).append(found)
+    return {loop: tuple(sorted(own, key=lambda n: n.time_s)) for loop, own in out.items()}
+
+
+def _parsed(line: str) -> Note | None:
+    """The note of a line; None where it is none, whatever else it is."""
+    try:
+        kept = json.loads(line)
+        loop, text, owner, until = (kept.get(k, "") for k in ("loop", "text", "owner", "hidden_until"))
+        at_s = float(kept["time_s"])
+    except (ValueError, TypeError, KeyError, AttributeError, OverflowError, RecursionError):
+        return None
+    if not all(isinstance(x, str) for x in (loop, text, owner, until)) or not 0.0 <= at_s <= LATEST_S:
+        return None
+    return Note(loop, at_s, visible(text), visible(owner), visible(until))
+
+
+def broken(store: Path) -> int:
+    """Lines of a store's notes that are none."""
+    try:
+        lines = (store / FILE).read_text(encoding="utf-8", errors="replace").split("\n")
+    except OSError:
+        return 0
+    return sum(bool(line.strip()) and _parsed(line) is None for line in lines)
+
+
+def last(notes: Mapping[str, tuple[Note, ...]], loop: str) -> Note | None:
+    """The newest note of a loop."""
+    own = notes.get(loop, ())
+    return own[-1] if own else None
+
+
+def is_hidden(note: Note | None, night: str) -> bool:
+    """Whether a note keeps its loop out of the list of a night."""
+    return note is not None and hides(note.hidden_until, night)
+
+
+def hides(until: str | None, night: str) -> bool:
+    """Whether a night lies before the date until which a loop is hidden, if any."""
+    return bool(until) and night < str(until)

@@ -1,0 +1,1 @@
+"""What is told in sentences: results in, text out."""
