@@ -12,7 +12,7 @@ from typing import Any
 
 from analyzer.config import Config
 from identification.errors import InputError
-from identification.limits.declare import KEY, Limit
+from identification.limits import KEY, Limit
 
 REMEDY = "correct it; 'triage config' prints all limits with their ranges"
 WIDTH = 100

@@ -15,7 +15,7 @@ import numpy as np
 from analyzer.columns.table import BY_NAME
 from analyzer.comparison.block_bootstrap import Difference, difference
 from analyzer.comparison.spans import HOUR_S, Hours, Span, gridded, mean
-from analyzer.limits.comparison import ComparisonLimits
+from analyzer.config import ComparisonLimits
 
 
 @dataclass(frozen=True, slots=True)

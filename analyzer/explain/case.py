@@ -8,9 +8,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analyzer.config import Config
+from analyzer.config import AdviceLimits, Config
 from analyzer.history.series import Series
-from analyzer.limits.advice import AdviceLimits
 from analyzer.loop.assess import convicted
 from analyzer.loop.cause import NO_CAUSE, Verdict
 from analyzer.loop.decisions import Cause, Fault

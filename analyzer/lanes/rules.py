@@ -12,9 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from analyzer.config import Config
+from analyzer.config import Config, LaneLimits
 from analyzer.lanes.figures import FIGURE
-from analyzer.limits.lanes import LaneLimits
 from analyzer.loop.assessments import HOUR_S, hour_edges, usable
 from analyzer.loop.decisions import Lane, counts
 from analyzer.loop.quality import Prepared

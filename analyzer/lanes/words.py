@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from analyzer.config import LaneLimits
 from analyzer.lanes.figures import lanes_in
 from analyzer.lanes.rules import lanes_of
-from analyzer.limits.lanes import LaneLimits
 from analyzer.loop.decisions import Action, Cause, Lack, Lane, Status
 from analyzer.words.clauses import joined
 

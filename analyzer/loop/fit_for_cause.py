@@ -11,7 +11,7 @@ from analyzer.loop.oscillation import Oscillation
 from analyzer.loop.quality import Prepared
 from analyzer.loop.sample_clock import constant_for
 from analyzer.words import settings as words
-from identification.limits.recorder import RecorderLimits
+from identification.limits import RecorderLimits
 from identification.mismatch.recording_faults import least_jump
 from identification.record import LoopRecord
 

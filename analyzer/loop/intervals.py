@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from analyzer.limits.advice import AdviceLimits
+from analyzer.config import AdviceLimits
 from analyzer.loop.advice import lag_factor
 from identification.estimation.covariance import (
     DECODED,

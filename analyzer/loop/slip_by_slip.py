@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from analyzer.limits.cause import CauseLimits
+from analyzer.config import CauseLimits
 from analyzer.loop.cause import Verdict, fault_of
 from analyzer.loop.decisions import Cause, Fault
 from analyzer.loop.measure import Measured

@@ -16,8 +16,7 @@ from identification.controller.pi_regression import (
     trusted,
 )
 from identification.controller.settings import integral_time
-from identification.limits.controller import ControllerLimits
-from identification.limits.explain import LIMITS
+from identification.limits import LIMITS, ControllerLimits
 from identification.record import Floats, Mask
 from identification.signals.first_order import first_order
 from identification.simulation.pi import due_moves, gapped

@@ -11,8 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from identification.limits.controller import ControllerLimits
-from identification.limits.explain import LIMITS
+from identification.limits import LIMITS, ControllerLimits
 from identification.record import Floats, Mask
 from identification.signals.first_order import first_order
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from identification.estimation.noise import Edges, edges_for, judged
-from identification.limits.explain import LIMITS, ExplainLimits
+from identification.limits import LIMITS, ExplainLimits
 from identification.record import Floats, Mask
 from identification.simulation.effect import Param, Variant
 from identification.simulation.open_loop import ModelInputs

@@ -13,7 +13,7 @@ from identification.estimation.noise import NO_NOISE
 from identification.estimation.outliers import robust_weights
 from identification.estimation.prediction_error import descend
 from identification.estimation.start_values import plain_processes
-from identification.limits.explain import LIMITS, ExplainLimits
+from identification.limits import LIMITS, ExplainLimits
 from identification.mismatch.catalogue import CANDIDATES, EFFECTS
 from identification.mismatch.cross_validation import is_one_move
 from identification.mismatch.effect import Friction

@@ -16,8 +16,7 @@ from identification.estimation.candidate import Fitted, Model, Problem
 from identification.estimation.noise import NO_NOISE
 from identification.estimation.prediction_error import descend
 from identification.estimation.start_values import simulated_best
-from identification.limits.explain import LIMITS
-from identification.limits.proof import ProofLimits
+from identification.limits import LIMITS, ProofLimits
 from identification.mismatch.cross_validation import early_part, fitted_early, held_out_gain
 from identification.mismatch.restarts import simulated_anew
 from identification.record import Floats, Mask

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from identification.controller.check import StatedSettings
-from identification.limits.explain import LIMITS, ExplainLimits
+from identification.limits import LIMITS, ExplainLimits
 from identification.models import Backlash, Estimate, Fopdt, Stiction
 from identification.record import Floats, Mask
 

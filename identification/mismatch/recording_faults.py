@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from identification.limits.explain import LIMITS
-from identification.limits.recorder import RecorderLimits
+from identification.limits import LIMITS, RecorderLimits
 from identification.mismatch.recording import STEP, Finding
 from identification.record import Floats, Mask
 

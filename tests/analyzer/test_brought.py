@@ -13,7 +13,7 @@ from analyzer.explain.saved_model import read_model, scale_of
 from analyzer.explain.user_model import compared, judged, within, wrong_units
 from analyzer.loop.quality import Scale
 from identification.errors import InputError
-from identification.limits.explain import LIMITS
+from identification.limits import LIMITS
 from identification.mismatch.diagnosis import inputs_of
 from identification.mismatch.explanation import Explanation
 from identification.mismatch.forward_selection import prepared

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from analyzer.config import Config
-from identification.limits.explain import LIMITS, ExplainLimits
+from identification.limits import LIMITS, ExplainLimits
 from identification.mismatch.answer import answer
 from identification.mismatch.diagnosis import explain
 from identification.mismatch.recording import Recording

@@ -21,7 +21,7 @@ from multiprocessing import Pool
 from pathlib import Path
 from typing import Any
 
-from identification.limits.declare import KEY, Limit
+from identification.limits import KEY, Limit
 from tests.proofs.limits_samples import DEFAULT, OF_FITS
 from tests.proofs.limits_stages import STAGES
 

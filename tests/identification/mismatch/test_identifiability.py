@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.limits.explain import LIMITS
+from identification.limits import LIMITS
 from identification.mismatch.answer import answer
 from identification.mismatch.diagnosis import inputs_of
 from identification.mismatch.explanation import Explanation
