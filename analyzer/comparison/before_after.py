@@ -12,7 +12,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from analyzer.columns.table import BY_NAME
+from analyzer.columns import BY_NAME
 from analyzer.comparison.block_bootstrap import Difference, difference
 from analyzer.comparison.spans import HOUR_S, Hours, Span, gridded, mean
 from analyzer.config import ComparisonLimits

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from analyzer.columns.table import EXPLAINED
+from analyzer.columns import EXPLAINED
 from analyzer.config import Config
 from analyzer.history.export import Export
 from analyzer.loop.decisions import Action, Cause, Status, counts

@@ -12,7 +12,7 @@ from typing import Any
 
 import pyarrow as pa
 
-from analyzer.columns.table import HOURS, NIGHTS, SETTINGS
+from analyzer.columns import HOURS, NIGHTS, SETTINGS
 from analyzer.config import Config
 from analyzer.history.export import Export
 from analyzer.history.plant_clock import stamp

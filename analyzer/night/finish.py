@@ -12,7 +12,7 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from analyzer.columns.table import BY_NAME, GROUPS, NIGHTS, names
+from analyzer.columns import BY_NAME, GROUPS, NIGHTS, names
 from analyzer.config import Config, NightLimits
 from analyzer.lanes.words import in_lanes
 from analyzer.loop.decisions import Status

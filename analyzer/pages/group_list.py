@@ -8,8 +8,7 @@ import json
 from collections.abc import Sequence
 from typing import Any
 
-from analyzer.columns.other_tables import GROUP_LIST
-from analyzer.columns.table import names, row_of
+from analyzer.columns import GROUP_LIST, names, row_of
 from analyzer.plantwide.view import GroupView, read_groups
 from analyzer.store.store import Store
 from analyzer.words.present import figure

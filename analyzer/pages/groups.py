@@ -6,7 +6,7 @@ import json
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from analyzer.columns.table import GROUPS
+from analyzer.columns import GROUPS
 from analyzer.loop.decisions import GroupRole
 from analyzer.pages.group_list import sentence, with_settings
 from analyzer.pages.group_pictures import aligned, graph, heat_map

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from analyzer.columns.table import BY_NAME
+from analyzer.columns import BY_NAME
 from reports.pages import Column
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from analyzer.columns.table import BY_NAME
+from analyzer.columns import BY_NAME
 from analyzer.explain.agreement import agreement
 from analyzer.explain.page_words import title
 from analyzer.loop.decisions import CAUSES, Fault
@@ -248,7 +248,7 @@ def page(
     thin : Thinned or None
         Its trends of the last week.
     explained : mapping or None
-        The night's explanation of the loop (analyzer.columns.table.EXPLAINED).
+        The night's explanation of the loop (analyzer.columns.EXPLAINED).
     more : Page or None
         The page of that explanation, which is linked.
     shared : Section or None

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from analyzer.columns.table import BY_NAME
+from analyzer.columns import BY_NAME
 from analyzer.loop.decisions import Status
 from analyzer.pages.headings import heading, headings
 from analyzer.pages.words import duration, number

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from analyzer.columns.table import BY_NAME
+from analyzer.columns import BY_NAME
 from analyzer.loop.decisions import CAUSES, Cause, Status
 from analyzer.pages import maintenance
 from analyzer.pages.areas import area_table

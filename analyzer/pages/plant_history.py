@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from analyzer.columns.table import BY_NAME
+from analyzer.columns import BY_NAME
 from analyzer.loop.decisions import CAUSES, Cause, counts
 from analyzer.pages.cost import LOSS, SIGNIFICANCE, cost, cost_column
 from analyzer.pages.reading import read_nights

@@ -11,9 +11,7 @@ from collections.abc import Mapping, Sequence
 from shutil import get_terminal_size
 from typing import Any
 
-from analyzer.columns.other_tables import NOTED
-from analyzer.columns.ranking import LISTED, RANKING
-from analyzer.columns.table import BY_NAME, names
+from analyzer.columns import BY_NAME, LISTED, NOTED, RANKING, names
 from analyzer.lanes.figures import FIGURE, lanes_in
 from analyzer.loop.decisions import Cause, Due, Lane
 from analyzer.pages.cost import LOSS, MARK, OF_RECORDED, SIGNIFICANCE, compares, cost_column, mark

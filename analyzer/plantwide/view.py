@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from analyzer.columns.table import GROUPS, names
+from analyzer.columns import GROUPS, names
 from analyzer.loop.decisions import Action, Cause, GroupRole
 from analyzer.store.store import Store
 from analyzer.store.table import REMEDY

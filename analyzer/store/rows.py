@@ -12,7 +12,7 @@ import numpy as np
 from analyzer.loop.advice import is_known
 from analyzer.loop.assess import Assessment
 from analyzer.loop.cause import Verdict
-from analyzer.columns.table import HOURS, row_of
+from analyzer.columns import HOURS, row_of
 from analyzer.config import AdviceLimits
 from analyzer.pages.cost import RECORDED, STATED, loss
 from analyzer.loop.decisions import CAUSES, Cause, Fault, Lack, Status

@@ -20,8 +20,8 @@ from typing import Any
 import pyarrow as pa
 
 from analyzer.store import version as store_version
-from analyzer.columns.column import Column
-from analyzer.columns.table import require_declared
+from analyzer.columns import Column
+from analyzer.columns import require_declared
 from analyzer.places import is_remote, remove_tree
 from analyzer.store.table import read_stored, stored_names, write_table
 from identification.errors import InputError

@@ -11,8 +11,8 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from analyzer.columns.column import Kind
-from analyzer.columns.table import BY_NAME, EXPLAINED, GROUPS, HOURS, SETTINGS
+from analyzer.columns import Kind
+from analyzer.columns import BY_NAME, EXPLAINED, GROUPS, HOURS, SETTINGS
 from analyzer.loop.decisions import Action
 from analyzer.places import is_remote
 from analyzer.words.units import SECONDS

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pyarrow as pa
 
-from analyzer.columns.table import NIGHTS
+from analyzer.columns import NIGHTS
 from analyzer.places import answering, content, is_remote
 from analyzer.store.table import read_stored, stored_names, write_table
 from identification.errors import InputError

@@ -6,7 +6,7 @@ import json
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from analyzer.columns.table import BY_NAME
+from analyzer.columns import BY_NAME
 from analyzer.loop.decisions import Action, Cause, Due, Lack, Needs
 from analyzer.pages.cost import LOSS, cost_column, mark
 from analyzer.words.clauses import joined

@@ -15,7 +15,7 @@ from click.testing import CliRunner
 from plant import CONFIG, START_S, Sketch, Trends, simulate, write_export
 
 from analyzer.cli import main
-from analyzer.columns.table import NIGHTS, names
+from analyzer.columns import NIGHTS, names
 from analyzer.history.export import Export, open_export
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import find_loops

@@ -11,8 +11,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from analyzer.columns.column import Column
-from analyzer.columns.table import EXPLAINED, HOURS, NIGHTS, names, row_of
+from analyzer.columns import EXPLAINED, HOURS, NIGHTS, Column, names, row_of
 from analyzer.config import Config
 from analyzer.night.finish import finish_night
 from analyzer.store.store import Store, rows_table, write_table

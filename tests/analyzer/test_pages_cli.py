@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner, Result
 
-from analyzer.columns.table import NIGHTS, row_of
+from analyzer.columns import NIGHTS, row_of
 from analyzer.commands.report import pages, report
 from analyzer.store.store import Store, rows_table, write_table
 from identification.errors import InputError

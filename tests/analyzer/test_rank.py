@@ -15,7 +15,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from analyzer.cli import main
-from analyzer.columns.table import NIGHTS, row_of
+from analyzer.columns import NIGHTS, row_of
 from analyzer.pages import rank
 from analyzer.pages.rank import as_table
 from analyzer.store.store import Store, rows_table, write_table

@@ -14,7 +14,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from analyzer.cli import main
-from analyzer.columns.table import NIGHTS
+from analyzer.columns import NIGHTS
 from analyzer.store import version as store_version
 from analyzer.store.care import problems
 from analyzer.store.store import Store

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
-from analyzer.columns.table import HOURS, NIGHTS, row_of
+from analyzer.columns import HOURS, NIGHTS, row_of
 from analyzer.store.store import Store, rows_table, write_table
 
 NASTY = (

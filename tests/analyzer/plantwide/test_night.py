@@ -12,8 +12,7 @@ import pytest
 from click.testing import CliRunner
 
 from analyzer.cli import main
-from analyzer.columns.other_tables import GROUP_LIST
-from analyzer.columns.table import names
+from analyzer.columns import GROUP_LIST, names
 from analyzer.lanes.figures import lanes_in
 from analyzer.loop.decisions import counts
 from analyzer.pages.night import pages
@@ -144,7 +143,7 @@ def test_a_second_run_of_some_loops_keeps_the_others_group(run_plant: RunPlant, 
 @pytest.mark.parametrize("form", ["table", "json", "csv", "markdown"])
 def test_a_night_without_groups_says_so(tmp_path, form):
     """A store whose night has no groups lists none and fails nowhere."""
-    from analyzer.columns.table import NIGHTS
+    from analyzer.columns import NIGHTS
     from analyzer.store.store import rows_table, write_table
 
     path = tmp_path / "nights" / "2026-03-02.parquet"

@@ -1,0 +1,158 @@
+"""The columns of the results: declared once in columns.toml; rows, the store's types, lists and pages come from here.
+
+`python -m analyzer.columns > docs/columns.md` prints them as a page of the documentation.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from importlib.resources import files
+from typing import Any
+
+
+class Kind(StrEnum):
+    """What a column's cells hold; an empty cell is what is not known."""
+
+    TEXT = "text"
+    NUMBER = "number"
+    JSON = "JSON"
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """One column of results.
+
+    name : as in store, CSV and JSON; kind : what its cells hold; title, unit : for people, unit '' for none; source :
+    what it comes from; meaning : one sentence; short : heading where there is little room, '' for the title itself;
+    hourly : whether the table of hours has it too.
+    """
+
+    name: str
+    kind: Kind
+    title: str
+    unit: str
+    source: str
+    meaning: str
+    short: str = ""
+    hourly: bool = False
+
+    @property
+    def heading(self) -> str:
+        """The heading of a narrow table."""
+        return self.short or self.title
+
+    @property
+    def is_number(self) -> bool:
+        """Whether its cells hold numbers."""
+        return self.kind is Kind.NUMBER
+
+    @property
+    def hint(self) -> str:
+        """What the column is, for who points at its heading."""
+        unit = f" [{self.unit}]" if self.unit else ""
+        return f"{self.title}{unit}: {self.meaning}"
+
+
+Table = tuple[Column, ...]
+
+
+def _declared() -> dict[str, Table]:
+    stated = tomllib.loads((files("analyzer") / "columns.toml").read_text("utf-8"))
+    return {
+        table: tuple(Column(**{"unit": "", **c, "kind": Kind(c["kind"])}) for c in columns)
+        for table, columns in stated.items()
+    }
+
+
+_TABLES = _declared()
+RANKING = _TABLES["ranking"]
+"""The contract's columns in its order."""
+LISTED = _TABLES["listed"]
+"""Columns that follow in CSV and JSON: facts of the plant, the units that settings stand in, the advice in full."""
+NOTED = _TABLES["noted"]
+"""What `triage note` keeps, joined when a night is listed."""
+GROUP_LIST = _TABLES["group_list"]
+"""Of a group, as `triage rank --groups` lists it."""
+NIGHTS = (*RANKING, *LISTED, *_TABLES["stored"])
+"""Of the table of nights: a row a loop."""
+BY_NAME: Mapping[str, Column] = {c.name: c for c in NIGHTS}
+_KEYS = (BY_NAME["loop"], BY_NAME["night"])
+HOURS = (*_KEYS, *_TABLES["hour"], *(c for c in NIGHTS if c.hourly))
+"""Of the table of hours: a row a loop and hour."""
+EXPLAINED = (*_KEYS, *_TABLES["explanation"])
+"""Of the table of explanations: a row a loop that was explained."""
+SETTINGS = (*_KEYS, *_TABLES["compared"])
+"""Of the table of settings compared: a row a loop."""
+GROUPS = (*_KEYS, *_TABLES["group"])
+"""Of the table of groups: a row a loop and group."""
+
+
+def names(columns: Sequence[Column]) -> tuple[str, ...]:
+    """The names of columns in their order."""
+    return tuple(c.name for c in columns)
+
+
+def require_declared(row: Mapping[str, Any], columns: Sequence[Column]) -> None:
+    """Raise ValueError for a cell of a row whose column is declared nowhere."""
+    unknown = sorted(row.keys() - {c.name for c in columns})
+    if unknown:
+        raise ValueError(f"no such column: {', '.join(unknown)}; declare it in analyzer/columns.toml")
+
+
+def row_of(values: Mapping[str, Any], columns: Sequence[Column] = NIGHTS) -> dict[str, Any]:
+    """A row with every column of a table, None where nothing is known.
+
+    Raises
+    ------
+    ValueError
+        For a value whose column is declared nowhere.
+    """
+    require_declared(values, columns)
+    return {c.name: values.get(c.name) for c in columns}
+
+
+HEAD = """# Columns of the results
+
+Every column is declared once, in `analyzer/columns.toml`; rows, the store's types, lists and pages come from
+there, and so does this page (`python -m analyzer.columns > docs/columns.md`).
+
+Numbers are 64-bit floats; an empty cell is what is not known. Percent of span is of PV's range, percent of OP of
+OP's. Columns marked h stand in the table of hours too.
+"""
+PARTS = {
+    "ranking": "The ranking: `triage rank`, names and order a contract",
+    "listed": "Further columns of `triage rank --format csv` and `json`",
+    "noted": "Notes, last in `triage rank --format csv` and `json`",
+    "stored": "Further columns of the store: `nights/*.parquet`, a row a loop",
+    "hour": "Of the hours alone: `hours/*.parquet`, a row a loop and hour",
+    "group": "Groups that share an oscillation: `groups/*.parquet`, a row a loop and group",
+    "group_list": "Groups as listed: `triage rank --groups --format csv` and `json`, a row a group",
+    "compared": "Settings compared: `compared/*.parquet`, a row a loop for which they were sought, newest night",
+    "explanation": "Explanations: `explained/*.parquet`, a row a loop that was explained",
+}
+TITLES = ("column", "holds", "title", "unit", "from", "h", "meaning")
+
+
+def _line(cells: Sequence[str]) -> str:
+    return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
+
+
+def _part(title: str, columns: Sequence[Column]) -> str:
+    holds = {kind: "JSON as text" if kind is Kind.JSON else kind for kind in Kind}
+    lines = [
+        _line((f"`{c.name}`", holds[c.kind], c.title, c.unit, c.source, "h" if c.hourly else "", c.meaning))
+        for c in columns
+    ]
+    return "\n".join([f"## {title}", "", _line(TITLES), _line(["---"] * len(TITLES)), *lines])
+
+
+def document() -> str:
+    """All columns as a page in Markdown."""
+    return "\n".join([HEAD, *(_part(title, _TABLES[table]) + "\n" for table, title in PARTS.items())])
+
+
+if __name__ == "__main__":
+    print(document(), end="")
