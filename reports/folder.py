@@ -6,9 +6,9 @@ import json
 from collections.abc import Collection, Iterable, Sequence
 from pathlib import Path
 
-from reports import charts, html, markdown
+from reports import html, markdown, pictures
 from reports.pages import Page
-from reports.tables import as_csv
+from reports.plain import as_csv
 from reports.whole_file import whole_file
 
 
@@ -74,7 +74,6 @@ def write_markdown(pages: Iterable[Page], out: Path) -> list[Path]:
     for page in pages:
         folder = f"{page.name}-pictures"
         for block in markdown.pictures(page):
-            with whole_file(out / folder / f"{block.name}.png") as temporary:
-                temporary.write_bytes(charts.draw(block))
+            write_text(out / folder / f"{block.name}.svg", pictures.as_file(block, page.zone))
         written.append(write_text(out / f"{page.name}.md", markdown.render(page, folder)))
     return written

@@ -1,7 +1,7 @@
 """Pages as HTML: self-contained or with shared assets, no request to any network.
 
 Templates place what is prepared here and compute nothing. Every text is escaped by jinja2; what is marked as
-safe is drawn in reports.svg, which escapes its texts itself.
+safe is drawn in reports.pictures, which escapes its texts itself.
 """
 
 from __future__ import annotations
@@ -10,15 +10,15 @@ import base64
 import hashlib
 import json
 from functools import cache
-from importlib.resources import files
 
 import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from reports import fields, maps, svg, treemap
+from reports import svg
 from reports.pages import Band, Bars, Cell, Floats, Page, Sparkline, Trend, WhatIf
-from reports.visible import visible_parts
+from reports.pictures import asset, drawings, keys
+from reports.texts import visible_parts
 
 ASSETS = ("page.css", "uPlot.min.css", "uPlot.iife.min.js", "page.js", "what_if.js")
 LICENCE = "uPlot.LICENSE.txt"
@@ -26,12 +26,6 @@ FINE_S = 1e-3
 """Step of times that are no whole seconds [s]."""
 MISSING = 65535
 """Code of a bucket that is not shown; levels run from 0 to 65534."""
-
-
-@cache
-def asset(name: str) -> str:
-    """Text of a style sheet, script or licence."""
-    return (files("reports") / "templates" / "assets" / name).read_text("utf-8")
 
 
 def _coded(values: Floats, gap: np.ndarray) -> dict[str, object]:
@@ -80,7 +74,7 @@ def _for_script(data: dict[str, object]) -> Markup:
     return Markup(json.dumps(data).replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e"))
 
 
-def cell_figure(cell: Cell) -> Markup:
+def cell_figure(cell: Cell) -> svg.Drawing | Markup:
     """The picture in a cell, if there is one."""
     if isinstance(cell.figure, Sparkline):
         return svg.sparkline(cell.figure)
@@ -98,20 +92,9 @@ def _environment() -> Environment:
     env = Environment(
         loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
-    env.filters.update(
-        picture=cell_figure,
-        sort_key=sort_key,
-        intervals=svg.intervals,
-        plot=svg.plot,
-        heat_map=maps.heat_map,
-        tree_map=treemap.tree_map,
-        graph=maps.graph,
-        keys=svg.keys,
-        field=fields.field,
-        trend_data=trend_data,
-        what_if_data=what_if_data,
-    )
-    env.filters["block"] = lambda block: type(block).__name__
+    env.filters.update(picture=cell_figure, sort_key=sort_key, keys=keys, trend_data=trend_data)
+    env.filters.update(what_if_data=what_if_data, block=lambda block: type(block).__name__)
+    env.filters["drawn"] = lambda block: Markup("").join(drawn for _, drawn in drawings(block))
     return env
 
 
@@ -153,3 +136,8 @@ def render(page: Page, single_file: bool = False, assets: str = "assets/") -> st
             inlined=inlined,
         )
     )
+
+
+def mail(page: Page) -> str:
+    """A page's texts, lists and tables as one small mail: no scripts, no pictures, nothing asked of any network."""
+    return _environment().get_template("mail.html.j2").render(page=visible_parts(page))

@@ -1,55 +1,105 @@
-"""Colour maps and graphs as inline SVG; as in svg.py, colours come from style sheets and texts are escaped."""
+"""Colour maps, fields over two axes, graphs and treemaps, as SVG."""
 
 from __future__ import annotations
 
-import math
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
-from markupsafe import Markup
+from markupsafe import escape
 
-from reports.map_blocks import Graph, HeatMap, Node
-from reports.svg import digits, picture, written
+from reports.pages import Field, Floats, Graph, HeatMap, Node, Tile, TreeMap
+from reports.svg import (
+    LETTER,
+    Axis,
+    Drawing,
+    box,
+    digits,
+    log_ticks,
+    named_place,
+    tick_x,
+    tick_y,
+    upright,
+    written,
+)
 
 NAMES, WIDTH, ROW, FOOT = 120.0, 640.0, 20.0, 44.0
 """Of a colour map: room for names, width of the map, height of a row, room below for the axis."""
+FIELD = (62.0, 420.0, 270.0, 40.0)
+"""Of a field: room for the vertical axis, width, height, room below for the other axis."""
+TITLED = 16.0
+"""How far down from the top a field's vertical axis has its name, where no figure stands."""
+FAINT = 0.12
+"""Opacity of a field's least value."""
 BOX = (150.0, 38.0)
 GAP = (110.0, 16.0)
 """Width and height of a graph's box, and the room to the next."""
+TREE = (1000.0, 360.0)
+HEAD = 17.0
+"""Of a treemap: width and height, and room for a group's name."""
 
 
-def log_ticks(low: float, high: float) -> list[float]:
-    """Ones, twos and fives of every power of ten between two values; where there are many, powers alone."""
-    powers = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
-    found = [m * 10.0**k for k in powers for m in (1, 2, 5) if low <= m * 10.0**k <= high]
-    return found if len(found) <= 9 else [t for t in found if round(math.log10(t), 9).is_integer()]
-
-
-def heat_map(m: HeatMap) -> Markup:
+def heat_map(m: HeatMap) -> Drawing:
     """Rows of cells whose colour is the deeper, the larger their share."""
-    columns = m.x.size
-    step = WIDTH / max(columns, 1)
+    step, foot = WIDTH / max(m.x.size, 1), ROW * len(m.rows)
+    axis = Axis.of_cells(m.x, NAMES, NAMES + WIDTH)
     body = []
     for i, name in enumerate(m.rows):
         body.append(written(NAMES - 8, ROW * i + 14, name, "end"))
         for j in np.flatnonzero(np.isfinite(m.shares[i]) & (m.shares[i] > 0.02)):
-            place = f'x="{digits(NAMES + j * step)}" y="{digits(ROW * i + 1)}"'
-            size = f'width="{digits(step + 0.3)}" height="{digits(ROW - 2)}"'
-            body.append(f'<rect class="heat" {place} {size} fill-opacity="{min(m.shares[i, j], 1.0):.2f}"/>')
-    foot = ROW * len(m.rows)
-    ends = np.log(m.x[[0, -1]]) if columns > 1 else np.array([0.0, 1.0])
-
-    def across(value: float) -> float:
-        share = (math.log(value) - ends[0]) / (ends[1] - ends[0])
-        return NAMES + (0.5 + share * (columns - 1)) * step
-
-    for tick in log_ticks(*sorted((float(m.x[0]), float(m.x[-1])))) if columns > 1 else []:
-        body.append(f'<path class="grid" d="M{digits(across(tick))},0V{digits(foot)}"/>')
-        body.append(written(across(tick), foot + 15, f"{tick:g}", "middle", "tick"))
+            cell = box(NAMES + j * step, ROW * i + 1, step + 0.3, ROW - 2)
+            body.append(f'<rect class="heat" {cell} fill-opacity="{min(m.shares[i, j], 1.0):.2f}"/>')
+    for tick in log_ticks(float(m.x.min()), float(m.x.max())) if m.x.size > 1 else []:
+        body += tick_x(axis.at(tick), (0, foot), f"{tick:g}")
     for mark in m.marks:
-        body.append(f'<path class="mark" d="M{digits(across(mark.x))},0V{digits(foot)}"/>')
-        body.append(written(across(mark.x), foot + 28, mark.label, "middle", "marked"))
+        at = axis.at(mark.x)
+        body += [upright(at, (0, foot), "mark"), written(at, foot + 28, mark.label, "middle", "marked")]
     body.append(written(NAMES + WIDTH / 2, foot + 41, m.x_label, "middle", "axis"))
-    return picture(NAMES + WIDTH + 10, foot + FOOT, body, m.title, "chart")
+    return Drawing(NAMES + WIDTH + 10, foot + FOOT, "".join(body), m.title, "chart")
+
+
+def opacities(value: Floats) -> Floats:
+    """Opacity of each cell by the logarithm of its value, 0 where there is none; shape as given."""
+    known = value[value > 0]
+    if not known.size:
+        return np.zeros(value.shape)
+    low, high = (float(v) for v in np.log(np.quantile(known, [0.02, 0.98])))
+    share = (np.log(np.where(value > 0, value, 1.0)) - low) / max(high - low, 0.1)
+    return np.where(value > 0, FAINT + (1.0 - FAINT) * np.clip(share, 0.0, 1.0), 0.0)
+
+
+def _cells(f: Field) -> list[str]:
+    """Rectangles of a field, from the foot."""
+    left, width, height, _ = FIELD
+    wide, high = width / f.x.size, height / f.y.size
+    opacity = opacities(f.value)
+    out = []
+    for i, j in np.ndindex(opacity.shape):
+        kind = "unstable" if f.unstable[i, j] else "calm" if f.calm[i, j] else "swings"
+        if kind == "swings" and opacity[i, j] <= 0:
+            continue
+        shade = f' fill-opacity="{opacity[i, j]:.2f}"' if kind == "swings" else ""
+        cell = box(left + j * wide, height - (i + 1) * high, wide + 0.3, high + 0.3)
+        out.append(f'<rect class="cell {kind}" {cell}{shade}/>')
+    return out
+
+
+def field(f: Field) -> Drawing:
+    """Cells coloured by their value, two axes, and named points."""
+    left, width, height, foot = FIELD
+    across, along = (left, left + width), (0.0, height)
+    x, y = Axis.of_cells(f.x, *across), Axis.of_cells(f.y, height, 0.0)
+    body = _cells(f)
+    for tick in log_ticks(float(f.x[0]), float(f.x[-1])):
+        body += tick_x(x.at(tick), along, f"{tick:g}")
+    for tick in log_ticks(float(f.y[0]), float(f.y[-1])):
+        body += tick_y(y.at(tick), across, f"{tick:g}" if y.at(tick) > TITLED else "")
+    body.append(written(left + width / 2, height + 32, f.x_label, "middle", "axis"))
+    body.append(written(4, 12, f.y_label, "start", "axis"))
+    for place in f.places:
+        at = min(max(x.at(place.x), left), left + width), min(max(y.at(place.y), 0.0), height)
+        body += named_place(place, *at, across)
+    return Drawing(left + width + 10, height + foot, "".join(body), f.title, "graph", natural=True)
 
 
 def places(g: Graph) -> dict[str, tuple[float, float]]:
@@ -77,7 +127,7 @@ def _arrow(first: tuple[float, float], last: tuple[float, float], text: str) -> 
     return [drawn, written(c - 10, d - 6, text, "end", "tick")]
 
 
-def graph(g: Graph) -> Markup:
+def graph(g: Graph) -> Drawing:
     """Boxes and arrows."""
     at = places(g)
     body = []
@@ -87,10 +137,98 @@ def graph(g: Graph) -> Markup:
             body += _arrow((x1 + BOX[0], y1 + BOX[1] / 2), (x2 - 2, y2 + BOX[1] / 2), arrow.text)
     for node in g.nodes:
         x, y = at[node.name]
-        place = f'x="{digits(x)}" y="{digits(y)}" width="{digits(BOX[0])}" height="{digits(BOX[1])}"'
-        body.append(f'<rect class="box {node.kind}" rx="5" {place}/>')
+        body.append(f'<rect class="box {node.kind}" rx="5" {box(x, y, *BOX)}/>')
         body.append(written(x + 8, y + 16, node.name, "start", "strong"))
         body.append(written(x + 8, y + 31, node.text, "start", "tick"))
     width = max((x for x, _ in at.values()), default=0.0) + BOX[0] + 4
     height = max((y for _, y in at.values()), default=0.0) + BOX[1] + 4
-    return picture(width, height, body, g.title, "graph", natural=True)
+    return Drawing(width, height, "".join(body), g.title, "graph", natural=True)
+
+
+@dataclass(frozen=True, slots=True)
+class Room:
+    """A rectangle: left, top, width, height."""
+
+    x: float
+    y: float
+    w: float
+    h: float
+
+
+def squarified(sizes: Sequence[float], room: Room) -> list[Room]:
+    """Rectangles of areas in proportion to sizes (above zero, the largest first), as square as can be, in a room."""
+    total = sum(sizes)
+    areas = [s * room.w * room.h / total for s in sizes] if total > 0 else []
+    out: list[Room] = []
+    while areas:
+        row = _row(areas, min(room.w, room.h))
+        out += (placed := _laid(areas[:row], room))[0]
+        room, areas = placed[1], areas[row:]
+    return out
+
+
+def _worst(areas: Sequence[float], side: float) -> float:
+    """The worst ratio of sides of a row of rectangles along a side."""
+    total = sum(areas)
+    return max(side**2 * max(areas) / total**2, total**2 / (side**2 * min(areas)))
+
+
+def _row(areas: Sequence[float], side: float) -> int:
+    """How many of the next rectangles make a row whose worst ratio does not grow."""
+    count = 1
+    while count < len(areas) and _worst(areas[: count + 1], side) <= _worst(areas[:count], side):
+        count += 1
+    return count
+
+
+def _laid(areas: Sequence[float], room: Room) -> tuple[list[Room], Room]:
+    """A row along the shorter side of a room, and the room that is left."""
+    if room.w < room.h:
+        row, left = _laid(areas, _mirrored(room))
+        return [_mirrored(r) for r in row], _mirrored(left)
+    out, at = [], room.y
+    width = sum(areas) / room.h
+    for area in areas:
+        out.append(Room(room.x, at, width, area / width))
+        at += area / width
+    return out, Room(room.x + width, room.y, max(room.w - width, 1e-9), room.h)
+
+
+def _mirrored(room: Room) -> Room:
+    return Room(room.y, room.x, room.h, room.w)
+
+
+def laid_out(m: TreeMap, width: float, height: float) -> list[tuple[str, Room, list[tuple[Tile, Room]]]]:
+    """Each group's name and room, and its tiles with theirs, the largest first; tiles without size are left out."""
+    groups = [(g.name, [t for t in g.tiles if t.size > 0]) for g in m.groups]
+    groups = sorted(((n, t) for n, t in groups if t), key=lambda g: -sum(t.size for t in g[1]))
+    rooms = squarified([sum(t.size for t in tiles) for _, tiles in groups], Room(0.0, 0.0, width, height))
+    out = []
+    for (name, tiles), room in zip(groups, rooms, strict=True):
+        tiles = sorted(tiles, key=lambda t: -t.size)
+        inner = Room(room.x + 1, room.y + HEAD, max(room.w - 2, 1.0), max(room.h - HEAD - 1, 1.0))
+        out.append((name, room, list(zip(tiles, squarified([t.size for t in tiles], inner), strict=True))))
+    return out
+
+
+def fitting(text: str, width: float) -> str:
+    """A text cut to a width, '' where not even four letters fit."""
+    most = int((width - 6) / LETTER)
+    return text if len(text) <= most else text[: most - 1] + "…" if most >= 4 else ""
+
+
+def tree_map(m: TreeMap) -> Drawing:
+    """The map, each tile with its text for who points at it."""
+    body = []
+    for name, room, tiles in laid_out(m, *TREE):
+        body.append(written(room.x + 3, room.y + 13, fitting(name, room.w), kind="strong"))
+        body += [_tile(t, p) for t, p in tiles]
+    return Drawing(*TREE, "".join(body), m.title, "chart treemap", role="group")
+
+
+def _tile(t: Tile, p: Room) -> str:
+    title = f"<title>{escape(t.text)}</title>"
+    drawn = f'<rect class="tile {escape(t.kind)}" {box(p.x, p.y, p.w, p.h)}>{title}</rect>'
+    if p.h >= 16:
+        drawn += written(p.x + 4, p.y + 13, fitting(t.name, p.w), kind="on")
+    return f'<a href="{escape(t.href)}">{drawn}</a>' if t.href else drawn

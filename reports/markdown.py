@@ -5,26 +5,21 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-from reports.map_blocks import Field, Graph, HeatMap, TreeMap
 from reports.pages import (
     Bars,
     Block,
     Cell,
     Facts,
-    IntervalChart,
     Listing,
     Page,
-    Panels,
     Picture,
-    Plot,
     Section,
     Table,
     Text,
     Tiles,
-    Trend,
     WhatIf,
 )
-from reports.visible import visible
+from reports.texts import visible
 
 MARKS = re.compile(r"([\\`*_\[\]#!|~$])")
 STARTS = re.compile(r"^(\d+(?=[.)](?:\s|$))|(?=[-+:](?:\s|$)|=+$|-+$))")
@@ -77,11 +72,11 @@ def _block(block: Block, folder: str) -> list[str]:
             return [f"- **{escaped(figure)}** {escaped(what)}" for figure, what, _ in block.items]
         case WhatIf():
             return []
-        case IntervalChart() | Plot() | Panels() | Trend() | HeatMap() | Field() | Graph() | TreeMap():
+        case _:
             if not folder:
                 return []
             caption = ["", escaped(block.caption)] if block.caption else []
-            return [f"![{escaped(block.title)}]({folder}/{block.name}.png)", *caption]
+            return [f"![{escaped(block.title)}]({folder}/{block.name}.svg)", *caption]
 
 
 def _section(section: Section, folder: str) -> list[str]:

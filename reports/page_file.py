@@ -14,36 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from reports import map_blocks, pages
+from reports import pages
 
-KINDS = {
-    kind.__name__: kind
-    for kind in (
-        *(pages.Page, pages.Section, pages.Table, pages.Column, pages.Cell, pages.Sparkline, pages.Bars),
-        *(pages.IntervalChart, pages.IntervalBar, pages.Plot, pages.Line, pages.Area, map_blocks.Mark),
-        *(
-            map_blocks.HeatMap,
-            map_blocks.Field,
-            map_blocks.Place,
-            map_blocks.TreeMap,
-            map_blocks.TileGroup,
-            map_blocks.Tile,
-            map_blocks.Graph,
-            map_blocks.Node,
-            map_blocks.Arrow,
-        ),
-        *(
-            pages.Panels,
-            pages.Trend,
-            pages.Band,
-            pages.Text,
-            pages.Listing,
-            pages.Facts,
-            pages.Tiles,
-            pages.WhatIf,
-        ),
-    )
-}
+KINDS = {k.__name__: k for k in vars(pages).values() if isinstance(k, type) and dataclasses.is_dataclass(k)}
 """The parts of which pages are made."""
 FULL = 1e5
 """Arrays that reach this are kept in double precision: they are times."""
@@ -79,10 +52,8 @@ def _array(x: np.ndarray) -> dict[str, Any]:
     large = x.dtype != np.bool_ and x.size > 0 and float(np.nanmax(np.abs(x), initial=0.0)) >= FULL
     code = "b1" if x.dtype == np.bool_ else "f8" if large else "f4"
     shape = {"shape": list(x.shape)} if x.ndim > 1 else {}
-    return shape | {
-        "type": code,
-        "values": base64.b64encode(np.ascontiguousarray(x, TYPES[code]).tobytes()).decode(),
-    }
+    values = base64.b64encode(np.ascontiguousarray(x, TYPES[code]).tobytes()).decode()
+    return shape | {"type": code, "values": values}
 
 
 def loads(text: str) -> pages.Page:

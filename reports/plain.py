@@ -1,21 +1,33 @@
-"""Pages as plain text, for a terminal or a mail: texts, lists and tables; pictures are left out."""
+"""Pages and tables without markup: text for a terminal or a mail, and CSV; pictures are left out."""
 
 from __future__ import annotations
 
+import csv
+import io
+import math
 import textwrap
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
 
-from reports.pages import Block, Facts, Listing, Page, Table, Text, Tiles
-from reports.visible import visible_parts
+from rich.cells import cell_len, chop_cells, set_cell_size
+
+from reports.pages import Block, Cell, Facts, Listing, Page, Table, Text, Tiles
+from reports.texts import harmless, visible, visible_parts
 
 WIDTH = 100
 """Characters of a line."""
+GAP = "  "
+"""Between two columns."""
+LEAST = 20
+"""Characters of a line of a wrapped cell at least, however narrow the terminal."""
 
 
 def _wrapped(text: str, first: str = "", then: str = "") -> list[str]:
     return textwrap.wrap(" ".join(text.split()), WIDTH, initial_indent=first, subsequent_indent=then) or []
 
 
-def _table(table: Table) -> list[str]:
+def _told(table: Table) -> list[str]:
     """A row as its first cell and, indented below, the others that say something."""
     out = []
     for row in table.rows:
@@ -30,7 +42,7 @@ def _table(table: Table) -> list[str]:
 def _block(block: Block) -> list[str]:
     match block:
         case Table():
-            return _table(block)
+            return _told(block)
         case Text():
             return [line for p in block.paragraphs for line in _wrapped(p)]
         case Listing():
@@ -50,3 +62,91 @@ def render(page: Page) -> str:
         lines += ["", section.title, "-" * min(len(section.title), WIDTH)]
         lines += [line for block in section.blocks for line in _block(block)]
     return "\n".join([*lines, "", *_wrapped(page.made)]).rstrip() + "\n"
+
+
+def csv_text(names: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
+    """Rows as CSV, empty where nothing is known, texts harmless to spreadsheets."""
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(map(harmless, names))
+    writer.writerows([harmless(visible(v)) if isinstance(v, str) else v for v in row] for row in rows)
+    return out.getvalue()
+
+
+def as_csv(table: Table) -> str:
+    """A table as CSV: full numbers, empty where not known, texts harmless."""
+    rows = [
+        [_held(c, column.numeric) for c, column in zip(row, table.columns, strict=True)] for row in table.rows
+    ]
+    return csv_text([c.key for c in table.columns], rows)
+
+
+def _held(cell: Cell, numeric: bool) -> str | float | None:
+    if not numeric:
+        return cell.text
+    return None if cell.number is None or not math.isfinite(cell.number) else float(cell.number)
+
+
+@dataclass(frozen=True, slots=True)
+class Heading:
+    """A column: its title, whether its cells stand at the right, and whether they are wrapped (one at most)."""
+
+    title: str
+    right: bool = False
+    wrapped: bool = False
+
+
+def table(
+    headings: Sequence[Heading], rows: Sequence[Sequence[str]], width: int
+) -> tuple[str, list[list[str]]]:
+    """The line of headings, and of each row its lines.
+
+    Parameters
+    ----------
+    headings : sequence of Heading
+    rows : sequence of rows
+        A cell for each heading.
+    width : int
+        Characters of a line; columns that are not wrapped are never cut, and may make it longer.
+    """
+    sizes = [
+        max(map(cell_len, (h.title, *(row[k] for row in rows))), default=0) for k, h in enumerate(headings)
+    ]
+    others = sum(size for size, h in zip(sizes, headings, strict=True) if not h.wrapped)
+    room = max(width - others - len(GAP) * (len(headings) - 1) - 2, LEAST)
+    sizes = [min(size, room) if h.wrapped else size for size, h in zip(sizes, headings, strict=True)]
+    head = _line([h.title for h in headings], headings, sizes)
+    return head, [_lines(row, headings, sizes, room) for row in rows]
+
+
+def _lines(row: Sequence[str], headings: Sequence[Heading], sizes: Sequence[int], room: int) -> list[str]:
+    folded = [_folded(cell, room) if h.wrapped else [cell] for cell, h in zip(row, headings, strict=True)]
+    return [
+        _line([cell[k] if k < len(cell) else "" for cell in folded], headings, sizes)
+        for k in range(max(map(len, folded)))
+    ]
+
+
+def _folded(text: str, width: int) -> list[str]:
+    """The lines of a wrapped cell, by what they take on the screen; a word longer than a line is parted."""
+    if cell_len(text) <= width:
+        return [text]
+    lines = [""]
+    for word in (part for whole in text.split() for part in chop_cells(whole, width)):
+        longer = f"{lines[-1]} {word}" if lines[-1] else word
+        if cell_len(longer) <= width:
+            lines[-1] = longer
+        else:
+            lines.append(word)
+    return lines
+
+
+def _line(cells: Sequence[str], headings: Sequence[Heading], sizes: Sequence[int]) -> str:
+    padded = (_padded(cell, h.right, size) for cell, h, size in zip(cells, headings, sizes, strict=True))
+    return f" {GAP.join(padded)}".rstrip()
+
+
+def _padded(text: str, right: bool, size: int) -> str:
+    if text.isascii():
+        return text.rjust(size) if right else text.ljust(size)
+    return " " * (size - cell_len(text)) + text if right else set_cell_size(text, size)

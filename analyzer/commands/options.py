@@ -17,7 +17,7 @@ import click
 from analyzer.history.plant_clock import seconds, zone_of
 from analyzer.places import place, refused
 from identification.errors import InputError, TriageError
-from reports.visible import visible, visible_lines
+from reports.texts import visible, visible_lines
 from reports.whole_file import is_full
 
 if TYPE_CHECKING:

@@ -28,8 +28,8 @@ from analyzer.explain.views import Tried
 from analyzer.history.plant_clock import UTC_NAME
 from analyzer.pages.words import duration, number, stamp
 from identification.mismatch.words import check, discriminating_test, located_sentence
-from reports.names import slug
 from reports.pages import Block, Cell, Column, Facts, Page, Section, Table, Text, Tiles
+from reports.texts import slug
 
 HARDLY = 0.05
 """Relative change of the plain loop's constants under which they count as kept."""

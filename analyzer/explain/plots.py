@@ -10,8 +10,7 @@ from analyzer.explain.views import CLOSE, FeatureView, Spectrum
 from analyzer.pages.words import number
 from identification.mismatch.curves.drawn import Shape
 from identification.record import Floats
-from reports.map_blocks import Mark
-from reports.pages import Area, Band, Line, Panels, Plot, Trend
+from reports.pages import Area, Band, Line, Mark, Panels, Plot, Trend
 
 WHOLE = 1500
 """Buckets of the trend over the whole recording: a screen's width."""

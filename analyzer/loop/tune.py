@@ -40,7 +40,7 @@ from tuning.recommend import Proposal
 from tuning.rules import simc
 
 if TYPE_CHECKING:
-    from reports.tuning_charts import ForecastPicture, MapPicture
+    from reports.pages import Field, Panels, Picture, Plot
 
 MAP_POINTS = 36
 """Points of the map along each axis."""
@@ -186,35 +186,64 @@ def lines(t: Tuning, spec: LoopSpec, pv_span: float) -> list[str]:
     return [*out, t.proposal.reason, *_forecast(t)]
 
 
-def pictures(t: Tuning, title: str) -> dict[str, bytes]:
-    """PNGs by file name: describing functions, travel map, forecast."""
-    from reports import tuning_charts as charts
-
-    out = {}
+def pictures(t: Tuning, title: str) -> tuple[Picture, ...]:
+    """Describing functions, travel map and forecast, as far as there are any."""
+    out: tuple[Picture, ...] = ()
     if t.model.valve is not None:
-        c = curves(t.model)
-        at = np.array([describe(t.model.valve, b.op_amplitude) for b in c.crossings], dtype=np.complex128)
-        labels = [f"{b.period_s:.3g} s{'' if b.stable else ', unstable'}" for b in c.crossings]
-        drawn = charts.CurvesPicture(c.valve, c.linear, at, labels)
-        out["limit-cycle.png"] = charts.curves(drawn, f"{title}: N(A) and −1/(G C)")
-        out["travel-map.png"] = charts.travel_map(_map(t), f"{title}: predicted travel")
+        out = (_curves(t, title), _map(t, title))
     new = t.proposal.controller or t.proposal.meanwhile
-    if new is not None:
-        out["forecast.png"] = charts.forecast(_trends(t, new), f"{title}: both tunings on the same load")
-    return out
+    return out if new is None else (*out, _trends(t, new, title))
 
 
-def _map(t: Tuning) -> MapPicture:
-    from reports.tuning_charts import MapPicture
+def _curves(t: Tuning, title: str) -> Plot:
+    """Where the describing function meets the loop: a limit cycle."""
+    from reports.pages import Line, Place, Plot
+
+    c = curves(t.model)
+    reach = 1.4 * float(np.abs(c.valve).max(initial=1.0))
+    re, im = c.linear.real, c.linear.imag
+    inside = (re > -0.3 * reach) & (re < reach) & (im > -0.8 * reach) & (im < 0.25 * reach)
+    lines = (
+        Line("valve N(A)", c.valve.real, c.valve.imag, kind="op"),
+        Line("−1/(G C)", re[inside], im[inside], kind="pv"),
+    )
+    at = [(describe(t.model.valve, b.op_amplitude), b) for b in c.crossings]
+    places = tuple(
+        Place(n.real, n.imag, f"{b.period_s:.3g} s{'' if b.stable else ', unstable'}", "cycle") for n, b in at
+    )
+    whole = f"{title}: N(A) and −1/(G C)"
+    return Plot("limit-cycle", whole, "real", "imaginary", lines, reach=(0.0,), places=places)
+
+
+def _map(t: Tuning, title: str) -> Field:
+    """Valve travel of each pair of settings, where the loop comes to rest, and where it is unstable."""
+    from reports.pages import Field, Place
 
     c, new = t.model.controller, t.proposal.controller
+    sign = math.copysign(1.0, c.kp)
     kp = c.kp * np.geomspace(1 / SPREAD, SPREAD, MAP_POINTS)
     now_s = _finite_ti(c, t.model.process)
     top = max(SPREAD * now_s, 3 * new.ti_s if new else 0.0)
     found = travel_map(t.model, kp, np.geomspace(now_s / 4, top, MAP_POINTS))
-    chosen = (new.kp, new.ti_s) if new else None
-    travel = 3600.0 * found.travel
-    return MapPicture(found.kp, found.ti_s, travel, found.rests, found.unstable, (c.kp, now_s), chosen)
+    places = [Place(abs(c.kp), now_s, "now", "now")]
+    places += [Place(abs(new.kp), new.ti_s, "proposed", "recommended")] if new else []
+    return Field(
+        "travel-map",
+        f"{title}: predicted travel",
+        "Kp [%/%]",
+        "Ti [s]",
+        sign * found.kp,
+        found.ti_s,
+        3600.0 * found.travel,
+        found.rests,
+        found.unstable,
+        tuple(places),
+        (
+            ("swings", "limit cycle, the darker the more OP travels"),
+            ("calm", "comes to rest"),
+            ("unstable", "unstable"),
+        ),
+    )
 
 
 def _finite_ti(controller: Pid, process: Process) -> float:
@@ -223,15 +252,21 @@ def _finite_ti(controller: Pid, process: Process) -> float:
     return ti if math.isfinite(ti) else simc(process, scan_s=max(controller.scan_s, 1.0)).ti_s
 
 
-def _trends(t: Tuning, new: Pid) -> ForecastPicture:
-    from reports.tuning_charts import ForecastPicture
+def _trends(t: Tuning, new: Pid, title: str) -> Panels:
+    """Both tunings on the same reconstructed load."""
+    from reports.pages import Line, Panels, Plot
 
-    both = [run(replace(t.model, controller=c), t.load) for c in (t.model.controller, new)]
-    n = min(len(both[0]), int(15 * (t.period_s or 600) / both[0].dt_s))
-    stems = [r.op if r.position is None else r.position for r in both]
-    return ForecastPicture(
-        both[0].time_s[-n:] / 3600.0,
-        (both[0].pv[-n:], both[1].pv[-n:]),
-        (both[0].op[-n:], both[1].op[-n:]),
-        (stems[0][-n:], stems[1][-n:]),
+    pv: list[Line] = []
+    op: list[Line] = []
+    for name, kind, c in (("now", "pv", t.model.controller), ("proposed", "brought", new)):
+        r = run(replace(t.model, controller=c), t.load)
+        last = slice(-min(len(r), int(15 * (t.period_s or 600) / r.dt_s)), None)
+        hours, stem = r.time_s[last] / 3600.0, r.op if r.position is None else r.position
+        pv.append(Line(name, hours, r.pv[last], kind=kind))
+        op.append(Line(name, hours, r.op[last], kind=kind))
+        op.append(Line(f"stem, {name}", hours, stem[last], kind=f"{kind} stem"))
+    plots = (
+        Plot("forecast-pv", "Error", "hours", "PV − SP [%]", tuple(pv)),
+        Plot("forecast-op", "Valve", "hours", "OP, stem [%]", tuple(op)),
     )
+    return Panels("forecast", f"{title}: both tunings on the same load", plots)

@@ -75,6 +75,7 @@ def _drawn(t: Tuning, spec: LoopSpec, pv_span: float, config: Config, night: str
     from analyzer.loop.compared import compared
     from analyzer.pages.compared import page
     from reports.html import render
+    from reports.pictures import as_file
 
     new = t.proposal.controller or t.proposal.meanwhile
     period_s = t.period_s or 10.0 * slowest_s(t.model)
@@ -82,4 +83,4 @@ def _drawn(t: Tuning, spec: LoopSpec, pv_span: float, config: Config, night: str
     tried = (
         {} if found is None else {"settings.html": render(page(spec.loop, night, found, spec), True).encode()}
     )
-    return pictures(t, spec.loop) | tried
+    return {f"{p.name}.svg": as_file(p).encode() for p in pictures(t, spec.loop)} | tried

@@ -10,8 +10,7 @@ from analyzer.pages.plant_history import NightSum
 from analyzer.pages.view import read_night
 from analyzer.plantwide.view import read_groups
 from analyzer.store.store import Store
-from reports.map_blocks import TreeMap
-from reports.pages import Block, Page, Section, Table
+from reports.pages import Block, Page, Section, Table, TreeMap
 
 MOST = 31
 """Nights that have a page; the store has the others."""

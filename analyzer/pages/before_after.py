@@ -13,13 +13,13 @@ from analyzer.pages.change_charts import PRIMARY, average_chart, per_loop_chart
 from analyzer.pages.headings import heading
 from analyzer.pages.trends import trend_block
 from analyzer.pages.words import KINDS, interval, number, setting, signed, stamp
-from reports.map_blocks import Mark
 from reports.pages import (
     Block,
     Cell,
     Column,
     Facts,
     Listing,
+    Mark,
     Page,
     Section,
     Table,

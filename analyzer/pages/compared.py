@@ -18,9 +18,22 @@ from identification.models import Integrator, Pid
 from identification.simulation.closed_loop import scan_step
 from identification.simulation.discretization import discretize
 from identification.simulation.valve import constants_of
-from reports.map_blocks import Field, Place
-from reports.names import slug
-from reports.pages import Block, Cell, Column, Line, Page, Panels, Plot, Section, Table, Text, WhatIf
+from reports.pages import (
+    Block,
+    Cell,
+    Column,
+    Field,
+    Line,
+    Page,
+    Panels,
+    Place,
+    Plot,
+    Section,
+    Table,
+    Text,
+    WhatIf,
+)
+from reports.texts import slug
 from tuning.compared import LAMBDA, LONGER, NOW, RECOMMENDED, SIMC, Tried
 from tuning.describing import band, is_play
 from tuning.limit_cycle import KICK

@@ -13,8 +13,7 @@ from analyzer.plantwide.view import GroupView, read_groups
 from analyzer.store.store import Store
 from analyzer.words.present import figure
 from analyzer.words.units import duration, row_settings
-from reports.tables import harmless
-from reports.visible import visible
+from reports.texts import harmless, visible
 
 Row = dict[str, Any]
 

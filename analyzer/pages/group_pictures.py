@@ -13,8 +13,7 @@ from analyzer.pages.reading import Thinned
 from analyzer.pages.words import duration, number
 from analyzer.plantwide.view import GroupView
 from identification.signals.spectrum import PER_OCTAVE
-from reports.map_blocks import Arrow, Graph, HeatMap, Mark, Node
-from reports.pages import Band, Trend
+from reports.pages import Arrow, Band, Graph, HeatMap, Mark, Node, Trend
 
 Row = Mapping[str, Any]
 MOST = 12

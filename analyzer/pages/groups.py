@@ -14,8 +14,8 @@ from analyzer.pages.reading import Thinned
 from analyzer.pages.view import Night
 from analyzer.pages.words import counted, duration, number
 from analyzer.plantwide.view import GroupView
-from reports.names import slug
 from reports.pages import Cell, Column, Facts, Page, Section, Table, Text
+from reports.texts import slug
 
 Row = Mapping[str, Any]
 DECLARED = {c.name: c for c in GROUPS}

@@ -24,8 +24,8 @@ from analyzer.pages.words import duration, number
 from analyzer.pages.work_order import work_order
 from analyzer.words.units import row_settings
 from identification.mismatch.words import check
-from reports.names import slug
 from reports.pages import Block, Cell, Column, Facts, Line, Listing, Page, Plot, Section, Table, Text
+from reports.texts import slug
 
 Row = Mapping[str, Any]
 WEEK = 7

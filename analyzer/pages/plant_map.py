@@ -9,7 +9,7 @@ from analyzer.loop.decisions import CAUSES, Status
 from analyzer.pages.cost import LOSS, cost, cost_column
 from analyzer.pages.view import Night, linked, needs_a_look
 from analyzer.pages.words import number
-from reports.map_blocks import Tile, TileGroup, TreeMap
+from reports.pages import Tile, TileGroup, TreeMap
 
 Row = Mapping[str, Any]
 MOST = 15

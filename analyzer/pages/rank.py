@@ -19,8 +19,7 @@ from analyzer.store import notes
 from analyzer.store.notes import Note
 from analyzer.store.store import Store
 from identification.errors import InputError
-from reports.tables import harmless
-from reports.visible import visible
+from reports.texts import harmless, visible
 
 LANE_FIGURES = tuple(name for name in FIGURE.values() if name not in names(RANKING))
 """Figures of lanes that the contract's columns do not hold."""
@@ -180,7 +179,7 @@ def as_table(
 ) -> str:
     """The columns for people as a table; those worth least go where `width` (the terminal's by default) is short."""
     from analyzer.words.present import SHOWN, WITH_UNITS, brief, fitting
-    from reports.terminal import Heading, table
+    from reports.plain import Heading, table
 
     width = width or (get_terminal_size().columns if interactive() else PIPED)
     shown = [brief(row, columns or SHOWN) for row in rows]

@@ -8,8 +8,7 @@ from analyzer.pages.reading import Thinned
 from analyzer.pages.trend_rhythm import LEAST_SAMPLES, autocorrelation, even_error, power_shares
 from analyzer.pages.words import duration
 from identification.record import Floats
-from reports.map_blocks import Mark
-from reports.pages import Line, Plot, Text
+from reports.pages import Line, Mark, Plot, Text
 
 LEAST_BUCKETS = 2.5
 """Buckets a period needs to be seen in a thinned trend [-]; below 2 it is folded (Nyquist)."""

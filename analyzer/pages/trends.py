@@ -7,8 +7,7 @@ from typing import Any
 
 from analyzer.pages.engineering import PLAIN, Scale
 from analyzer.pages.reading import Thinned
-from reports.map_blocks import Mark
-from reports.pages import Band, Sparkline, Trend
+from reports.pages import Band, Mark, Sparkline, Trend
 
 SPARK_BUCKETS = 100
 """Buckets of a sparkline: a pixel and a fifth each."""

@@ -14,8 +14,8 @@ from analyzer.store import notes
 from analyzer.store.notes import Note, is_hidden, last
 from analyzer.store.store import Store
 from analyzer.words.units import row_settings
-from reports.names import slug
 from reports.pages import Cell
+from reports.texts import slug
 
 Row = Mapping[str, Any]
 COLUMNS = (

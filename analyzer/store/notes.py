@@ -18,7 +18,7 @@ from pathlib import Path
 from analyzer.places import is_remote
 from analyzer.history.plant_clock import stamp
 from identification.errors import InputError
-from reports.visible import visible
+from reports.texts import visible
 
 FILE = "notes.jsonl"
 """Name within the store."""

@@ -12,7 +12,7 @@ from analyzer.pages.cost import LOSS, cost_column, mark
 from analyzer.words.clauses import joined
 from analyzer.words.reason import reason_of, to_stroke, valve_text
 from analyzer.words.units import duration, gain_unit
-from reports.visible import visible
+from reports.texts import visible
 
 if TYPE_CHECKING:
     from analyzer.loop.advice import Advice

@@ -180,7 +180,7 @@ def test_everything_is_written(store: Store, tmp_path: Path) -> None:
     tables = [p for page in pages for p in write_csv(page, tmp_path / "c")]
     assert len(html) == len(text) == 5
     assert len(tables) == sum(len(p.tables()) for p in pages)
-    named = list((tmp_path / "m").rglob("*.png"))
+    named = list((tmp_path / "m").rglob("*.svg"))
     assert len(named) == sum(t.read_text("utf-8").count("![") for t in text)
     assert all(p.resolve().is_relative_to(tmp_path) for p in (*html, *text, *tables))
     assert not list(tmp_path.rglob("*.tmp"))

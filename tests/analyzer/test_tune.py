@@ -16,7 +16,6 @@ from analyzer.cli import main
 
 TANK = Sketch("valve", (60.0, 1800.0, 9.0), 0.9, 40.0, backlash=2.5)
 STATED = "0.9,40,0,100"
-PNG = b"\x89PNG\r\n\x1a\n"
 
 
 @pytest.fixture(scope="module")
@@ -52,7 +51,7 @@ def refused(result: Result) -> str:
 
 
 def test_play_gets_settings_and_three_pictures(tmp_path, tank):
-    """A tank with play gets a longer Ti at about its gain, its play within 10 %, a forecast and three PNGs."""
+    """A tank with play gets a longer Ti at about its gain, its play within 10 %, a forecast and three pictures."""
     out = clean(asked(tmp_path, tank, STATED, "--out", str(tmp_path / "pictures")), 0)
     assert "action: retune" in out
     kp, ti = map(float, re.search(r"new settings: kp ([\d.e+]+), ti ([\d.e+]+) s", out).groups())
@@ -63,8 +62,14 @@ def test_play_gets_settings_and_three_pictures(tmp_path, tank):
     assert re.search(r"stem travel: .* -\d\d %", out)
     made = {p.name: p.read_bytes() for p in (tmp_path / "pictures").iterdir()}
     page = made.pop("settings.html").decode()
-    assert set(made) == {"limit-cycle.png", "travel-map.png", "forecast.png"}
-    assert all(picture.startswith(PNG) for picture in made.values())
+    assert set(made) == {"limit-cycle.svg", "travel-map.svg", "forecast.svg"}
+    assert all(picture.startswith(b"<svg ") for picture in made.values())
+    for name, said in (
+        ("limit-cycle", "valve N(A)"),
+        ("travel-map", "proposed"),
+        ("forecast", "stem, proposed"),
+    ):
+        assert f">{said}<" in made[f"{name}.svg"].decode()
     assert "Try settings" in page
     assert "SIMC" in page
 

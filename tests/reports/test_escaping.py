@@ -13,12 +13,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from reports.html import mail as render_mail
 from reports.html import render
-from reports.mail import render as render_mail
-from reports.map_blocks import Mark
 from reports.markdown import escaped
 from reports.markdown import render as render_markdown
-from reports.names import slug
 from reports.pages import (
     Band,
     Bars,
@@ -29,6 +27,7 @@ from reports.pages import (
     IntervalChart,
     Line,
     Listing,
+    Mark,
     Page,
     Plot,
     Section,
@@ -37,8 +36,9 @@ from reports.pages import (
     Tiles,
     Trend,
 )
+from reports.plain import as_csv
 from reports.plain import render as render_text
-from reports.tables import as_csv, harmless
+from reports.texts import harmless, slug
 
 NASTY = (
     "<script>alert(1)</script>",

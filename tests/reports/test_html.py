@@ -14,8 +14,8 @@ from jinja2 import UndefinedError
 
 from reports import html
 from reports.pages import Band, Cell, Column, Page, Section, Table, Trend
+from reports.plain import as_csv
 from reports.svg import nice_ticks
-from reports.tables import as_csv
 
 
 def trend(n: int, rng: np.random.Generator) -> Trend:

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from reports.html import render
-from reports.map_blocks import Mark
 from reports.page_file import PageFileError, dumps, loads
 from reports.pages import (
     Area,
@@ -16,6 +15,7 @@ from reports.pages import (
     Cell,
     Column,
     Line,
+    Mark,
     Page,
     Panels,
     Plot,

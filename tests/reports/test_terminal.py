@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from reports.terminal import Heading, table
+from reports.plain import Heading, table
 
 HEADINGS = (Heading("Loop"), Heading("Error %", right=True), Heading("Kp"), Heading("Reason", wrapped=True))
 WORDS = ("cycles", "every", "10.2", "min:", "the", "valve", "sticks", "by", "5", "%", "\u03a4\u0399\u039a-1")

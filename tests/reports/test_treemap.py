@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from reports.map_blocks import Tile, TileGroup, TreeMap
-from reports.treemap import HEAD, Place, fitting, laid_out, squarified, tree_map
+from reports.maps import HEAD, Room, fitting, laid_out, squarified, tree_map
+from reports.pages import Tile, TileGroup, TreeMap
 
 SIZES = st.lists(st.floats(0.01, 1e4), min_size=1, max_size=40).map(lambda x: sorted(x, reverse=True))
 
@@ -17,7 +17,7 @@ SIZES = st.lists(st.floats(0.01, 1e4), min_size=1, max_size=40).map(lambda x: so
 @given(SIZES)
 def test_areas_are_in_proportion_and_fill_the_room(sizes: list[float]) -> None:
     """Every rectangle's area is its share of the room, all lie inside, and no two overlap."""
-    room = Place(3.0, 5.0, 400.0, 250.0)
+    room = Room(3.0, 5.0, 400.0, 250.0)
     found = squarified(sizes, room)
     areas = np.array([p.w * p.h for p in found])
     assert areas == pytest.approx(np.array(sizes) / sum(sizes) * 100000.0, rel=1e-6)
@@ -31,7 +31,7 @@ def test_areas_are_in_proportion_and_fill_the_room(sizes: list[float]) -> None:
 
 def test_the_papers_example() -> None:
     """Sizes 6 6 4 3 2 2 1 in a room of 6 by 4: the first two stand above each other (Bruls et al. 2000)."""
-    found = squarified([6, 6, 4, 3, 2, 2, 1], Place(0, 0, 6, 4))
+    found = squarified([6, 6, 4, 3, 2, 2, 1], Room(0, 0, 6, 4))
     assert [(round(p.w, 6), round(p.h, 6)) for p in found[:2]] == [(3, 2), (3, 2)]
     assert found[2].w == pytest.approx(12 / 7, abs=1e-6)
 
@@ -40,7 +40,7 @@ def test_nothing_is_drawn_of_nothing() -> None:
     """Loops that lose nothing and areas without loss have no rectangle."""
     empty = TreeMap("m", "M", (TileGroup("a", (Tile("x", 0.0, "calm", "x"),)),))
     assert laid_out(empty, 100, 100) == []
-    assert "<rect" not in tree_map(empty)
+    assert "<rect" not in str(tree_map(empty))
 
 
 def test_groups_lie_apart_and_names_are_escaped() -> None:
@@ -49,7 +49,7 @@ def test_groups_lie_apart_and_names_are_escaped() -> None:
     m = TreeMap("m", "M", (TileGroup("<A>", tiles), TileGroup("B", (Tile("y", 3.0, "calm", "y"),))))
     for _, room, placed in laid_out(m, 500, 300):
         assert all(p.y >= room.y + HEAD - 1e-9 and p.x + p.w <= room.x + room.w + 1e-9 for _, p in placed)
-    drawn = tree_map(m)
+    drawn = str(tree_map(m))
     assert "<b>" not in drawn
     assert "a &amp; b" in drawn
     assert drawn.count("<a href") == 3

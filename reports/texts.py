@@ -1,11 +1,18 @@
-"""Texts of a plant as people may be shown them."""
+"""What a plant writes, made fit for where it goes: a screen, a spreadsheet, a file's name."""
 
 from __future__ import annotations
 
+import hashlib
+import re
+import unicodedata
 from dataclasses import fields, is_dataclass, replace
 from typing import Any, TypeVar
 
 T = TypeVar("T")
+FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n")
+"""First characters by which spreadsheets take a text for a formula (OWASP, CSV injection)."""
+LONGEST = 40
+"""Characters of a tag that are kept in a file name; ours: readable, and far below any file system's limit."""
 
 
 def visible(text: str) -> str:
@@ -44,3 +51,20 @@ def _shown(part: Any) -> Any:
     held = {f.name: getattr(part, f.name) for f in fields(part)}
     changed = {name: new for name, old in held.items() if (new := _shown(old)) is not old}
     return replace(part, **changed) if changed else part
+
+
+def harmless(text: str) -> str:
+    """A text that no spreadsheet takes for a formula: an apostrophe goes before those that it would."""
+    return f"'{text}" if text.lstrip(" ").startswith(FORMULA) or text.startswith(FORMULA) else text
+
+
+def slug(tag: str) -> str:
+    """A file name without ending: letters, digits and '-' of the tag, and a hash that keeps different tags
+    apart.
+
+    It holds no dot, slash or space and begins with a letter, digit or '-', so it stays inside its folder.
+    """
+    plain = unicodedata.normalize("NFKD", tag).encode("ascii", "ignore").decode()
+    kept = re.sub(r"[^A-Za-z0-9]+", "-", plain).strip("-")[:LONGEST].strip("-")
+    digest = hashlib.sha256(tag.encode("utf-8", "surrogatepass")).hexdigest()[:6]
+    return f"{kept or 'loop'}-{digest}"
