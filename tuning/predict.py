@@ -10,6 +10,7 @@ import numpy as np
 
 from identification.models import Estimate, Loop, Pid
 from identification.record import Floats, LoopRecord
+from identification.signals.correlation import lag_sums
 from identification.simulation.closed_loop import closed_loop, scan_step
 from tuning.describing import band, is_play
 from tuning.limit_cycle import KICK
@@ -91,8 +92,7 @@ def autocorrelation_peak(error: Floats) -> float:
     power = float(x @ x)
     if x.size < 8 or power <= 1e-18:
         return 0.0
-    size = 2 ** int(np.ceil(np.log2(2 * x.size)))
-    r = np.fft.irfft(np.abs(np.fft.rfft(x, size)) ** 2)[: x.size] / power
+    r = lag_sums(x, x.size - 1) / power
     below = np.flatnonzero(r < 0)
     if below.size == 0:
         return 0.0

@@ -19,7 +19,7 @@ from analyzer.loop.decisions import Lane, counts
 from analyzer.loop.quality import Prepared
 from identification.models import Pid
 from identification.record import LoopRecord
-from identification.signals.correlation_time import correlation_time
+from identification.signals.correlation import correlation_time
 
 AVERAGING = "level"
 """Type of loops that are slow on purpose: a level buffers flow."""

@@ -36,7 +36,7 @@ from analyzer.words import settings as words
 from identification.errors import NotAssessedError
 from identification.models import Pid
 from identification.record import LoopRecord
-from identification.signals.harris import harris_index
+from identification.signals.correlation import harris_index
 
 NYQUIST = 2.0
 """Samples a period below which a cycle is seen as a slower one."""

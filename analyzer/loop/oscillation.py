@@ -18,17 +18,16 @@ import numpy as np
 from analyzer.config import OscillationLimits
 from analyzer.loop.decisions import counts
 from identification.record import Floats, LoopRecord, Mask
+from identification.signals.correlation import Rhythm, rhythm
 from identification.signals.half_cycles import half_cycles, levelled_correlation, shape, usual_prominence
 from identification.signals.setpoint_response import amplitude_at_rest, moves, without_setpoint
 from identification.signals.spectrum import (
     WIDE_BAND,
     Bands,
-    Rhythm,
     Spectrum,
     band_signal,
     bands,
     envelope,
-    rhythm,
     spectrum,
     tapered_power,
 )

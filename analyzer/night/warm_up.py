@@ -16,7 +16,7 @@ from analyzer.history.series import Series
 from analyzer.loops.spec import LoopSpec
 from analyzer.night.chunk import assess_loop
 from identification.models import Backlash, Fopdt, Loop, Pid, Stiction
-from identification.signals.first_order import first_order
+from identification.signals.filters import first_order
 from identification.simulation.closed_loop import closed_loop
 
 LOOPS = (

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from identification.record import Floats, Mask
+from identification.signals.correlation import lag_sums
 
 SEGMENTS = 4
 """Parts that the spectrum is averaged over."""
@@ -31,8 +32,7 @@ def even_error(time_s: Floats, error: Floats, known: Mask) -> tuple[Floats, floa
 def autocorrelation(x: Floats) -> Floats:
     """Autocorrelation of a signal without mean at lags 0 to n/2, shape (n // 2,); 1 at lag 0."""
     n = x.size
-    power = np.abs(np.fft.rfft(x, 2 * n)) ** 2
-    found = np.fft.irfft(power)[: n // 2]
+    found = lag_sums(x, n // 2)[: n // 2]
     return found / found[0] if found[0] > 0 else np.zeros(n // 2)
 
 

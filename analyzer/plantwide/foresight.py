@@ -9,7 +9,7 @@ import numpy as np
 
 from analyzer.plantwide.wave import Wave
 from identification.record import Floats
-from identification.signals.granger import granger_f
+from identification.signals.cross_spectrum import granger_f
 
 FORESEEN = 12
 """Steps of the past by which others are foreseen: half of a period to a whole one."""

@@ -18,7 +18,7 @@ from identification.controller.pi_regression import (
 from identification.controller.settings import integral_time
 from identification.limits import LIMITS, ControllerLimits
 from identification.record import Floats, Mask
-from identification.signals.first_order import first_order
+from identification.signals.filters import first_order
 from identification.simulation.pi import due_moves, gapped
 
 
@@ -209,15 +209,9 @@ def judge(
 ) -> tuple[ControllerFinding | None, ControlLaw | None]:
     """The first thing that is wrong with clock or controller, and the law as found.
 
-    Parameters
-    ----------
-    sp, pv, op : ndarray of shape (n,)
-        Trends [% of span].
-    usable : ndarray of bool, shape (n,)
-        False in gaps, in manual and at OP's limits.
-    said : StatedSettings
-        Of a thinned recording nothing but settings plainly wrong is said: the law is not seen at work; nothing at all
-        where its integral acts between the samples.
+    sp, pv, op : shape (n,), trends [% of span]; usable : bool, shape (n,), False in gaps, in manual and at OP's
+    limits; said : of a thinned recording nothing but settings plainly wrong is said: the law is not seen at work;
+    nothing at all where its integral acts between the samples.
     """
     thinned = said.thinned(limits)
     if thinned and said.ti < limits.thinned_ti:

@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit
 
 from identification.record import Floats, LoopRecord, Mask
-from identification.signals.first_order import first_order
+from identification.signals.filters import first_order
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,16 +87,8 @@ def fit_pi(record: LoopRecord, period_s: float) -> ControllerFit | None:
     An increment of OP over m samples is kp times that of e plus kp/ti times the integral of e between; over
     an eighth of a period both are large against the resolution of the trends, and drifts of a bias cancel.
 
-    Parameters
-    ----------
-    record : LoopRecord
-    period_s : float
-        Period, or other time scale on which the loop moves [s].
-
-    Returns
-    -------
-    ControllerFit or None
-        None where OP or the error never moves, or too little of the record is in automatic.
+    period_s : period, or other time scale on which the loop moves [s]. None where OP or the error never
+    moves, or too little of the record is in automatic.
     """
     found = _regression(record, record.error, period_s)
     return None if found is None else _least_squares(found, record.duration_s)
@@ -151,20 +143,9 @@ def compare_laws(
     Many controllers act on a filtered PV while the raw one is recorded. Left out, a filter of a tenth of the period
     passes for half the gain and a third of the integral time.
 
-    Parameters
-    ----------
-    record : LoopRecord
-    period_s : float
-        Period, or other time scale on which the loop moves [s].
-    kp, ti_s : float
-        The given settings [% OP / % PV], [s]; ti_s may be inf.
-    alike : float
-        Difference of the shares explained below which no filter is tried: the given settings do [-].
-
-    Returns
-    -------
-    LawsCompared or None
-        None where the record tells no settings.
+    period_s : period, or other time scale on which the loop moves [s]; kp, ti_s : the given settings [% OP / % PV],
+    [s]; ti_s may be inf; alike : difference of the shares explained below which no filter is tried: the given
+    settings do [-]. None where the record tells no settings.
     """
     best, given, error = None, -math.inf, record.error
     for samples in FILTERS:

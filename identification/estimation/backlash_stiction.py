@@ -76,11 +76,7 @@ def begin(prepared: Prepared, dynamics: Dynamics) -> Fit:
 def fit_linear(window: Window, period_s: float) -> Fit:
     """The process behind an ideal valve.
 
-    Parameters
-    ----------
-    window : Window
-    period_s : float
-        Period of the oscillation, or other scale of the loop [s], about which the search begins.
+    period_s : period of the oscillation, or other scale of the loop [s], about which the search begins.
     """
     stem = window.stems_in_blocks.ideal
     learnt = arx_noise(window.centred, stem, window.usable, AR_ORDER, INPUT_LAGS)
@@ -123,16 +119,9 @@ def _likeliest(window: Window, fits: list[Fit]) -> Fit:
 def fit_play(window: Window, linear: Fit, period_s: float, hopeful: float | None = None) -> Fit:
     """The best play followed by a lag: a screening, and the whole search where it finds anything.
 
-    Parameters
-    ----------
-    window : Window
-    linear : Fit
-        The best fit behind an ideal valve.
-    period_s : float
-        Scale of the search [s].
-    hopeful : float or None
-        Gain in log likelihood [nat] of a quick screening from which the whole search follows; None: the screening is
-        thorough, and SCREENED is enough.
+    linear : the best fit behind an ideal valve; period_s : scale of the search [s]; hopeful : gain in log likelihood
+    [nat] of a quick screening from which the whole search follows; None: the screening is thorough, and SCREENED is
+    enough.
     """
     reach = max(window.op_range, 1e-9)
     screened = [sticking(share * reach, 0.0) for share in SCREEN_SHARES]
@@ -161,13 +150,8 @@ def better_linear(window: Window, linear: Fit, play: Fit) -> Fit:
 def fit_stick_slip(window: Window, play: Fit, period_s: float) -> Fit:
     """The best stick-slip (J > 0) followed by a lag, scanned whole and finely about the play.
 
-    Parameters
-    ----------
-    window : Window
-    play : Fit
-        The best play: its width is near the stickband, for OP tells both by its travel between slips.
-    period_s : float
-        Scale of the search [s].
+    play : the best play: its width is near the stickband, for OP tells both by its travel between slips; period_s :
+    scale of the search [s].
     """
     short = window.y.size < SHORT
     begun = _chosen(window, play, _coarse(window, play), period_s, FOLLOWED_SHORT if short else FOLLOWED)

@@ -10,12 +10,11 @@ import numpy as np
 from identification.estimation.noise import Edges, edges_for, judged
 from identification.limits import LIMITS, ExplainLimits
 from identification.record import Floats, Mask
+from identification.signals.correlation import correlated
 from identification.simulation.effect import Param, Variant
 from identification.simulation.open_loop import ModelInputs
 from identification.simulation.parameters import Slot
 
-CONSTANT = 1e-12
-"""Share of its mean square under which an error's variance is a rounding."""
 BASE = (
     Param(Slot.T, "time_constant_s", "s", 0.3, 1e9, "dt", True),
     Param(Slot.L, "dead_time_s", "s", 0.0, 0.2, "span"),
@@ -59,19 +58,6 @@ class Problem:
         """Samples judged of which each tells something by itself, of a model that leaves errors of shape (n,)."""
         memory = min(self.memory, correlated(e[self.weight > 0])) if self.by_simulation else 1.0
         return max(int(self.count / memory), 1)
-
-
-def correlated(e: Floats) -> float:
-    """Samples that tell as much as one independent one: one and twice the autocorrelation's sum, taken until it first
-    falls below zero (Geyer 1992's initial positive sequence); 1 for white noise, all of them for a constant."""
-    x = e - e.mean()
-    power = np.abs(np.fft.rfft(x, 2 * x.size)) ** 2
-    auto = np.fft.irfft(power)[: x.size]
-    if not auto[0] > CONSTANT * float(e @ e):
-        return float(e.size)
-    rho = auto / auto[0]
-    end = int(np.argmax(rho < 0.0)) if (rho < 0.0).any() else rho.size
-    return float(1.0 + 2.0 * rho[1:end].sum())
 
 
 def problem(

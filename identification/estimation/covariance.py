@@ -46,14 +46,9 @@ def scattered(inside: Floats, scores: Floats, sigma2: float) -> Floats:
     stretches scatter by more than that (Huber 1967: the model is not the truth, and what it lacks lasts longer than a
     sample), the standard deviations are those of the scatter.
 
-    Parameters
-    ----------
-    inside : ndarray of shape (m, m)
-        Inverse of the Gauss-Newton matrix, what was fitted beside the parameters eliminated.
-    scores : ndarray of shape (n, m)
-        Derivative of half the squared innovation by each parameter, sample by sample.
-    sigma2 : float
-        Variance of the innovations.
+    inside : shape (m, m), inverse of the Gauss-Newton matrix, what was fitted beside the parameters eliminated;
+    scores : shape (n, m), derivative of half the squared innovation by each parameter, sample by sample; sigma2 :
+    variance of the innovations.
     """
     moves = np.array([part.sum(axis=0) for part in np.array_split(scores, STRETCHES)]) @ inside
     usual = sigma2 * np.diag(inside)

@@ -22,15 +22,8 @@ def expected_evidence(window: Window, linear: Fit, width: float, period_s: float
     the two models (Kullback 1951). Noise, few samples and a short record make it small. A play that is there brings
     as much to three times as much: noise keeps the plain process from fitting as well as it does here.
 
-    Parameters
-    ----------
-    window : Window
-    linear : Fit
-        The process behind an ideal valve, fitted to the window in blocks.
-    width : float
-        Of the play [% OP].
-    period_s : float
-        Period of the oscillation [s].
+    linear : the process behind an ideal valve, fitted to the window in blocks; width : of the play [% OP]; period_s :
+    period of the oscillation [s].
     """
     blocks = replace(window, fine=False, position=None)
     free, behind = (_pv(blocks, linear, valve) for valve in (IDEAL, sticking(width, 0.0)))

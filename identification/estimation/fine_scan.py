@@ -66,22 +66,9 @@ def _later(whole: Floats, now: float, before: float, delay: int, rows: Floats, o
 def scan(window: Window, pairs: Floats, tolerance: float, ar: Floats, begins: list[Dynamics]) -> Floats:
     """Innovations variance of many stick-slips at once.
 
-    Parameters
-    ----------
-    window : Window
-    pairs : ndarray of shape (m, 2)
-        Stickband [% OP] and slip jump as a share of it.
-    tolerance : float
-        How the stems behave in motion (valve.py).
-    ar : ndarray of shape (p,)
-        Noise model.
-    begins : list of Dynamics
-        Time constants and dead times tried [s]; the best counts.
-
-    Returns
-    -------
-    ndarray of shape (m,)
-        Least innovations variance of each pair [% PV squared].
+    pairs : shape (m, 2), stickband [% OP] and slip jump as a share of it; tolerance : how the stems behave in motion
+    (valve.py); ar : shape (p,), noise model; begins : time constants and dead times tried [s]; the best counts.
+    Returns shape (m,), least innovations variance of each pair [% PV squared].
     """
     pv, table = white_pv(window, ar), np.array(begins)
     return _scan(window.stems_in_blocks, pv.rows, pv.sums, ar, window.dt_s, pairs, tolerance, table)  # type: ignore[no-any-return]

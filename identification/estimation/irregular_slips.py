@@ -203,18 +203,9 @@ def fit_irregular(
 ) -> SlipPath | None:
     """The most probable path of a sticking stem in a loop that cycles; None where none is as likely as the play.
 
-    Parameters
-    ----------
-    window : Window
-        In blocks, without a recorded stem.
-    play : Fit
-        The best play.
-    noise : ndarray of shape (order,)
-        A noise model that takes no valve's side, under which the search begins.
-    period_s : float
-        Of the cycle [s].
-    any_gain : bool
-        Whether gains far under the play's are tried too, where its own comes to nothing.
+    window : in blocks, without a recorded stem; play : the best play; noise : shape (order,), a noise model that
+    takes no valve's side, under which the search begins; period_s : of the cycle [s]; any_gain : whether gains far
+    under the play's are tried too, where its own comes to nothing.
     """
     if play.gain == 0.0:
         return None

@@ -9,9 +9,9 @@ import numpy as np
 from identification.estimation.gauss_newton import descend
 from identification.estimation.hammerstein import Fit, ValveTrial, disturbance, stem_of
 from identification.estimation.noise import every_lag, judged, whitened
-from identification.estimation.outliers import clipped_gain
 from identification.estimation.window import Window
 from identification.record import Floats, Mask
+from identification.signals.robust import clipped_gain
 
 
 def innovations(window: Window, fit: Fit) -> Floats:

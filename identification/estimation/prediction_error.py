@@ -11,7 +11,7 @@ from identification.estimation.candidate import Fitted, Model, Problem, bounds
 from identification.estimation.covariance import inverse, scattered
 from identification.estimation.noise import fitted, lag_means, whitened
 from identification.record import Floats
-from identification.signals.lines import without_lines
+from identification.signals.filters import without_lines
 from identification.simulation.effect import Param
 from identification.simulation.open_loop import ModelInputs, simulate
 from identification.simulation.parameters import Slot
@@ -165,15 +165,8 @@ def placed(p: Problem, model: Model) -> Model:
 def descend(p: Problem, model: Model, steps: int, aim: float = math.inf) -> Fitted:
     """Follow a model to the least innovations, its stem placed anew before and behind it where there is friction.
 
-    Parameters
-    ----------
-    p : Problem
-    model : Model
-        Where to start.
-    steps : int
-        Steps at most, each time.
-    aim : float
-        Loss that is worth anything; from the second step on a descent that will not come to it ends.
+    model : where to start; steps : steps at most, each time; aim : loss that is worth anything; from the second step
+    on a descent that will not come to it ends.
     """
     fit = _descend(p, placed(p, model), steps, aim)
     again = placed(p, fit.model)

@@ -15,7 +15,7 @@ from identification.estimation.hammerstein import ValveTrial, stem_of
 from identification.estimation.noise import every_lag, judged, whitened
 from identification.estimation.window import Window
 from identification.record import Floats, Mask
-from identification.signals.notch import notch
+from identification.signals.filters import notch
 from identification.simulation.discretization import unit_lag
 
 AR_ORDER = 8

@@ -70,18 +70,8 @@ def decoded(
 ) -> tuple[Floats, float]:
     """The stem [% OP], shape of op, of the most probable path, and its log probability.
 
-    Parameters
-    ----------
-    op : ndarray of shape (n * factor,)
-    y : ndarray of shape (n,)
-        PV less its mean, in blocks of `factor` samples.
-    counts : ndarray of bool, shape (n,)
-        Blocks whose innovations are judged.
-    r : Response
-    n : Noise
-    f : Friction
-    most : int
-        Paths that are carried side by side.
+    op : shape (n * factor,); y : shape (n,), PV less its mean, in blocks of `factor` samples; counts : bool, shape
+    (n,), blocks whose innovations are judged; most : paths that are carried side by side.
     """
     factor, near = op.size // y.size, SAME * f.breakaway
     rows = 6 * most + PLACES

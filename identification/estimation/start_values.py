@@ -48,19 +48,8 @@ def _searched(window: Window, ar: Floats) -> Fopdt:
 def plain_processes(y: Floats, op: Floats, usable: Mask, dt_s: float) -> list[Fopdt]:
     """Plain loops that explain PV from OP best: one step ahead under each of two first noise models, and simulated.
 
-    Parameters
-    ----------
-    y, op : ndarray of shape (n,)
-        PV and OP [% of span].
-    usable : ndarray of bool, shape (n,)
-        False where a sample must not be used.
-    dt_s : float
-        Sample interval [s].
-
-    Returns
-    -------
-    list of Fopdt
-        Starts for a descent, one for each; the last is the simulated one.
+    y, op : shape (n,), PV and OP [% of span]; usable : bool, shape (n,), False where a sample must not be used; dt_s
+    : sample interval [s]. Returns starts for a descent, one for each; the last is the simulated one.
     """
     window = Window(y, op, usable, dt_s)
     stem = window.stems_in_blocks.ideal

@@ -87,15 +87,8 @@ def slips(op: Floats, position: Floats) -> Floats:
 def seen(op: Floats, position: Floats) -> Seen | None:
     """Play or stick-slip between a recorded OP and a recorded stem.
 
-    Parameters
-    ----------
-    op, position : ndarray of shape (n,)
-        OP and stem [% of span].
-
-    Returns
-    -------
-    Seen or None
-        None where the stem follows OP, or nothing of this kind explains why it does not.
+    op, position : shape (n,), OP and stem [% of span]. None where the stem follows OP, or nothing of this
+    kind explains why it does not.
     """
     low, high = np.quantile(op, [0.02, 0.98])
     reach, offset = float(high - low), float(np.median(position - op))

@@ -15,8 +15,8 @@ from numba import njit
 
 from identification.estimation.likelihood_ratio import WindowFit, innovations, moves_begun
 from identification.estimation.noise import judged
-from identification.estimation.outliers import clipped_gain
 from identification.record import Floats
+from identification.signals.robust import clipped_gain
 
 TURN = 0.4
 """A turn of OP is one by this share of its usual range within a period [-]; ours: noise on OP turns by less."""

@@ -10,7 +10,6 @@ import numpy as np
 
 from identification.estimation.candidate import Fitted, Model, Problem, correlated, gain, problem
 from identification.estimation.noise import NO_NOISE
-from identification.estimation.outliers import robust_weights
 from identification.estimation.prediction_error import descend
 from identification.estimation.start_values import plain_processes
 from identification.limits import LIMITS, ExplainLimits
@@ -24,6 +23,7 @@ from identification.mismatch.starts.screening import CandidateInputs, screened, 
 from identification.mismatch.starts.stick_slip import fit_sticking
 from identification.mismatch.starts.two_modes import mode_starts
 from identification.record import Floats, Mask
+from identification.signals.robust import robust_weights
 from identification.simulation.effect import Variant
 from identification.simulation.open_loop import ModelInputs, as_parameters
 from identification.simulation.parameters import Slot

@@ -20,7 +20,7 @@ from identification.limits import LIMITS, ProofLimits
 from identification.mismatch.cross_validation import early_part, fitted_early, held_out_gain
 from identification.mismatch.restarts import simulated_anew
 from identification.record import Floats, Mask
-from identification.signals.lines import without_lines
+from identification.signals.filters import without_lines
 from identification.simulation.open_loop import simulate
 from identification.simulation.parameters import Slot
 

@@ -2,6 +2,7 @@
 
 Lines are compared in pieces of the band within which the phase may be taken as constant, so that a delay or a slow
 wandering of the phase does not hide what is shared, and after a Hann taper, so that a steady wave stays in its lines.
+Granger's test asks whether the past of one helps to foresee the other.
 """
 
 from __future__ import annotations
@@ -55,11 +56,7 @@ def chance_coherence(lines: int, width: int, chance: float) -> float:
     Of one piece it is distributed as Beta(1, d - 1), d the independent lines of the piece (Carter, Knapp, Nuttall
     1973); of a mean over pieces as the beta of the same mean and a variance as many times smaller.
 
-    Parameters
-    ----------
-    lines, width : int
-        Lines of the band, and of one of its pieces.
-    chance : float
+    lines, width : lines of the band, and of one of its pieces.
     """
     free = max(width / HANN_WIDTH, 1.5)
     pieces = max(lines // width / UNEVEN, 1.0)
@@ -86,25 +83,11 @@ def coherences(
 ) -> Floats:
     """Coherence of one stretch of lines with others over a band [-].
 
-    Parameters
-    ----------
-    flat : complex ndarray
-        The lines of all stretches, one after the other.
-    offset, first, count : ndarray of shape (s,)
-        Where in `flat` each stretch begins, the number of its first line, and how many it has.
-    one : int
-        The stretch that is compared.
-    others : ndarray of shape (k,)
-        Those with which it is compared.
-    span : ndarray of shape (3,)
-        First line, line after the last and width of the pieces (`band`).
-    shift : int
-        Lines by which the others are shifted: shifted ones share nothing but the shape of their band.
-
-    Returns
-    -------
-    ndarray of shape (k,)
-        0 where a stretch does not hold the band.
+    flat : the lines of all stretches, one after the other; offset, first, count : shape (s,), where in `flat` each
+    stretch begins, the number of its first line, and how many it has; one : the stretch that is compared; others :
+    shape (k,), those with which it is compared; span : shape (3,), first line, line after the last and width of the
+    pieces (`band`); shift : lines by which the others are shifted: shifted ones share nothing but the shape of their
+    band. Returns shape (k,), 0 where a stretch does not hold the band.
     """
     out = np.zeros(others.size)
     low, high = span[0], span[1]
@@ -134,10 +117,7 @@ def drift(x: Complex, y: Complex) -> float:
     Two signals of one source keep step: their phases differ by no more at the end than at the beginning. Of two
     others a Fourier line apart the difference turns once over the record.
 
-    Parameters
-    ----------
-    x, y : complex ndarray of shape (m,)
-        Lines of the same numbers, not tapered.
+    x, y : complex, shape (m,), lines of the same numbers, not tapered.
     """
     size = next_fast_len(max(4 * x.size, 4 * DRIFT_BLOCKS))
     product = ifft(x, size) * np.conj(ifft(y, size))
@@ -168,14 +148,8 @@ def lag(x: Complex, y: Complex, duration_s: float, most_s: float) -> Lag:
     A steady wave tells no delay, for its phase is known up to whole turns alone; what tells is how its size and its
     phase change over time, and the deviation says how well (Carter 1987).
 
-    Parameters
-    ----------
-    x, y : complex ndarray of shape (m,)
-        Lines of the same numbers.
-    duration_s : float
-        Line k is the frequency k / duration_s [s].
-    most_s : float
-        Largest lag looked for, either way [s].
+    x, y : complex, shape (m,), lines of the same numbers; duration_s : line k is the frequency k / duration_s [s];
+    most_s : largest lag looked for, either way [s].
     """
     cross = np.conj(x) * y
     power = float(np.sqrt(np.sum(np.abs(x) ** 2) * np.sum(np.abs(y) ** 2)))
@@ -197,3 +171,44 @@ def lag(x: Complex, y: Complex, duration_s: float, most_s: float) -> Lag:
     slope = 2 * math.pi * max(width, 1e-9) / duration_s
     deviation = math.sqrt(max(1.0 - best, 1e-4) / (2 * max(best, 1e-9) * free)) / slope
     return Lag(at * step, deviation, best)
+
+
+RIDGE = 1e-9
+"""Share of a column's power that is added to it: rounded trends have pasts that depend on each other."""
+
+
+def granger_f(signals: Floats, lags: int) -> Floats:
+    """F statistics of every signal's past in foreseeing every other beside that one's own past.
+
+    signals : shape (k, n), samples of one clock; lags : samples of the past that are used. Returns shape (k, k), F[i,
+    j]: signal i foresees signal j; 0 on the diagonal, and everywhere where n is under four times the constants of a
+    model.
+    """
+    k, n = signals.shape
+    rows = n - lags
+    out = np.zeros((k, k))
+    if rows < 4 * (2 * lags + 1):
+        return out
+    past = np.stack([signals[:, lags - 1 - i : n - 1 - i] for i in range(lags)], axis=1).reshape(
+        k * lags, rows
+    )
+    now = signals[:, lags:]
+    past = past - past.mean(axis=1, keepdims=True)
+    now = now - now.mean(axis=1, keepdims=True)
+    gram, cross = past @ past.T, past @ now.T
+    gram[np.diag_indices_from(gram)] *= 1.0 + RIDGE
+    gram[np.diag_indices_from(gram)] += 1e-300
+    power = np.einsum("ij,ij->i", now, now)
+
+    def left(j: int, columns: Whole) -> float:
+        own = cross[columns, j]
+        return float(power[j] - own @ np.linalg.solve(gram[np.ix_(columns, columns)], own))
+
+    each = [np.arange(i * lags, (i + 1) * lags) for i in range(k)]
+    for j in range(k):
+        alone = left(j, each[j])
+        for i in range(k):
+            both = left(j, np.concatenate((each[j], each[i]))) if i != j else alone
+            if i != j and both > 1e-12 * power[j]:
+                out[i, j] = max(alone - both, 0.0) / lags / (both / (rows - 2 * lags - 1))
+    return out

@@ -13,8 +13,9 @@ import numpy as np
 from scipy.fft import ifft, irfft, next_fast_len
 
 from identification.record import Floats
+from identification.signals.correlation import rhythm
 from identification.signals.robust import robust_deviation
-from identification.signals.spectrum import HALF_BAND, SIDES, Spectrum, band_signal, rhythm
+from identification.signals.spectrum import HALF_BAND, SIDES, Spectrum, band_signal
 
 LEVEL = 1.5
 """Size to which every half-cycle is cut, in medians of the band's absolute value [-]; ours: a sine is cut by nothing

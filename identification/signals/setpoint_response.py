@@ -28,10 +28,7 @@ def without_setpoint(error: Complex, sp: Complex) -> Complex:
     The response is the ratio of cross to auto spectrum over a band that widens with frequency, so steps, square
     waves and the set point of a cascade's inner loop are taken out whole and little else is.
 
-    Parameters
-    ----------
-    error, sp : ndarray of complex, shape (m,)
-        Lines of both signals.
+    error, sp : complex, shape (m,), lines of both signals.
     """
     k = np.arange(error.size)
     half = np.maximum((SMOOTHING * k).astype(np.int64), FEWEST)
@@ -53,18 +50,8 @@ def amplitude_at_rest(error: Floats, sp: Floats, usable: Mask, period: float) ->
     A sine with a straight line is fitted to each stretch of one period, half of one apart, in which every sample is
     usable and whose set point has not moved for two periods before its end; see DIES_S.
 
-    Parameters
-    ----------
-    error, sp : ndarray of shape (n,)
-    usable : ndarray of bool, shape (n,)
-    period : float
-        [samples]
-
-    Returns
-    -------
-    amplitude : float
-        Root mean square of the stretches' amplitudes, in the unit of the error; 0 without a stretch.
-    count : int
+    error, sp : shape (n,); usable : bool, shape (n,); period : [samples]. Returns amplitude : root mean square of the
+    stretches' amplitudes, in the unit of the error; 0 without a stretch.
     """
     n = max(round(period), 4)
     moved = np.convolve(moves(sp), np.ones(round(DIES_S * n)))[: sp.size] > 0

@@ -124,10 +124,7 @@ def band_signal(
 ) -> tuple[Floats, float]:
     """The signal within a factor of a frequency, at about `per_period` samples a period.
 
-    Returns
-    -------
-    ndarray of shape (m,), float
-        The band's signal and its sample interval [s].
+    Returns the band's signal and its sample interval [s].
     """
     first, last = math.ceil(line / factor), min(int(line * factor), s.lines.size - 1)
     m = next_fast_len(max(int(line * per_period), 2 * last + 2, 16), real=True)
@@ -150,16 +147,8 @@ def locked_harmonic(s: Spectrum, period_s: float, order: int = 3, cycle: Spectru
     The mean of z3 exp(-3i phase1) over the mean of |z1|: a triangle gives 1/9, a square 1/3, a sine with noise
     about it nothing, for its third harmonic has no fixed phase.
 
-    Parameters
-    ----------
-    s : Spectrum
-        Of the signal whose harmonic it is.
-    period_s : float
-        Of the fundamental [s].
-    order : int
-        Of the harmonic.
-    cycle : Spectrum or None
-        Of the signal whose fundamental it is, on the same times; None: the same signal.
+    s : of the signal whose harmonic it is; period_s : of the fundamental [s]; order : of the harmonic; cycle : of the
+    signal whose fundamental it is, on the same times; None: the same signal.
     """
     line = s.duration_s / period_s
     if order * line * 1.15 >= s.lines.size - 1:
@@ -178,78 +167,3 @@ def envelope(s: Spectrum, line: float, factor: float = 1.6, per_period: int = 8)
     cut = np.zeros(m, dtype=np.complex128)
     cut[first : last + 1] = 2 * s.lines[first : last + 1]
     return np.abs(np.fft.ifft(cut)) * (m / s.n), s.duration_s / m
-
-
-def autocorrelation(x: Floats, most: int) -> Floats:
-    """Unbiased autocorrelation at lags 0 to most, shape (most + 1,)."""
-    n = x.size
-    size = next_fast_len(n + most + 1, real=True)
-    f = rfft(x, size)
-    r = irfft(f.real**2 + f.imag**2, size)[: most + 1]
-    if r[0] <= 0:
-        return np.zeros(most + 1)
-    return r / r[0] * n / (n - np.arange(most + 1))
-
-
-@dataclass(frozen=True, slots=True)
-class Rhythm:
-    """What an autocorrelation says about one period.
-
-    period_s : lag of the first peak [s]; first, second, third : heights of the peaks [-]; trough : depth of the
-    first trough [-]; regularity : mean over three standard deviations of the zero crossings' intervals [-]
-    (Thornhill, Huang, Zhang 2003).
-    """
-
-    period_s: float
-    first: float
-    second: float
-    third: float
-    trough: float
-    regularity: float
-
-
-def _peak(r: Floats, low: float, high: float) -> tuple[float, float]:
-    """Lag and height of the highest point between two lags, by parabola."""
-    a, b = max(int(low), 1), min(int(high) + 2, r.size - 1)
-    if b <= a:
-        return float("nan"), 0.0
-    k = a + int(np.argmax(r[a:b]))
-    if k <= a or k + 1 >= r.size:
-        return float(k), float(r[k])
-    curve = r[k - 1] - 2 * r[k] + r[k + 1]
-    shift = 0.5 * (r[k - 1] - r[k + 1]) / curve if curve < 0 else 0.0
-    return k + float(np.clip(shift, -1, 1)), float(r[k])
-
-
-def _regularity(r: Floats) -> float:
-    """Mean over three standard deviations of the intervals between up to eleven zero crossings; 0: too few."""
-    below = np.signbit(r)
-    at = np.flatnonzero(below[1:] != below[:-1])
-    if at.size < 4:
-        return 0.0
-    exact = at + r[at] / (r[at] - r[at + 1])
-    gaps = np.diff(exact[:11])
-    spread = float(gaps.std(ddof=1))
-    return float(gaps.mean()) / max(3 * spread, 1e-3 * float(gaps.mean()))
-
-
-def rhythm(x: Floats, dt_s: float, period_s: float) -> Rhythm:
-    """Read the autocorrelation of a band's signal about an expected period.
-
-    Parameters
-    ----------
-    x : ndarray of shape (m,)
-    dt_s : float
-        Its interval [s].
-    period_s : float
-        Where the peak is expected [s].
-    """
-    lag = period_s / dt_s
-    r = autocorrelation(x, min(x.size - 2, int(6 * lag) + 2))
-    at, first = _peak(r, 0.6 * lag, 1.45 * lag)
-    if not math.isfinite(at):
-        return Rhythm(period_s, 0.0, 0.0, 0.0, 0.0, 0.0)
-    trough = -float(r[int(0.25 * at) : int(0.75 * at) + 2].min())
-    second = _peak(r, 1.75 * at, 2.25 * at)[1]
-    third = _peak(r, 2.75 * at, 3.25 * at)[1]
-    return Rhythm(at * dt_s, first, second, third, trough, _regularity(r))

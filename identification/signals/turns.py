@@ -54,24 +54,9 @@ def halves(
 ) -> tuple[Half, ...]:
     """The last half-cycles of a record that are good throughout.
 
-    Parameters
-    ----------
-    op, pv : ndarray of shape (n,)
-        [% of OP, % of span].
-    good : ndarray of bool, shape (n,)
-        True where samples may be used.
-    turns : ndarray of int, shape (t,)
-        Samples at which OP turns.
-    dt_s, period_s : float
-        Sample interval and period of the cycle [s].
-    marks : StemMarks
-    most : int
-        Half-cycles wanted.
-
-    Returns
-    -------
-    tuple of Half
-        Oldest first; none where OP does not turn twice.
+    op, pv : shape (n,) [% of OP, % of span]; good : bool, shape (n,), True where samples may be used; turns : shape
+    (t,), samples at which OP turns; dt_s, period_s : sample interval and period of the cycle [s]; most : half-cycles
+    wanted. Oldest first; none where OP does not turn twice.
     """
     step = max(0.5 * period_s / POINTS, dt_s)
     found: list[Half] = []

@@ -69,18 +69,8 @@ def closed_loop(
 
     The controller is the law of pi.py. The loop starts at rest with PV = sp[0].
 
-    Parameters
-    ----------
-    loop : Loop
-    sp, load : ndarray of shape (n,)
-        Set point, and load plus noise as they add to PV, at each scan [% PV].
-    op_start : float
-        OP of the loop at rest [% OP].
-
-    Returns
-    -------
-    LoopRecord
-        With dt_s the controller's scan and the stem in `position`.
+    sp, load : shape (n,), set point, and load plus noise as they add to PV, at each scan [% PV]; op_start : OP of the
+    loop at rest [% OP]. The record has dt_s of the controller's scan and the stem in `position`.
     """
     h = scan_step(loop)
     d = discretize(loop.process, h)

@@ -60,23 +60,10 @@ def closed_model(
 ) -> tuple[Floats, Floats]:
     """PV and OP, shape (n,) each [% of span], of a model under its PI controller.
 
-    Parameters
-    ----------
-    inputs : ModelInputs
-        Its `op` gives the OP at rest by its first value, and the length.
-    c : ndarray of shape (SIZE,)
-        Parameters of the model; START is where PV stands at first.
-    sp : ndarray of shape (n,)
-        Set point [% PV].
-    kp : float
-        Gain [% OP/% PV].
-    ti_samples : float
-        Integral time [samples].
-
-    Raises
-    ------
-    NotAssessedError
-        Where transport with the flow's speed, or an effect without lines in the kernel, is in the model.
+    inputs : its `op` gives the OP at rest by its first value, and the length; c : shape (SIZE,), parameters of the
+    model; START is where PV stands at first; sp : shape (n,), set point [% PV]; kp : gain [% OP/% PV]; ti_samples :
+    integral time [samples]. Raises NotAssessedError: where transport with the flow's speed, or an effect without
+    lines in the kernel, is in the model.
     """
     if c[Slot.PIPE] != 0 or acting(c):
         raise NotAssessedError(

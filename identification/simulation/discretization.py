@@ -107,16 +107,7 @@ class Discrete:
 def discretize(process: Process, dt_s: float) -> Discrete:
     """Exact zero-order-hold discretization with fractional dead time.
 
-    Parameters
-    ----------
-    process : Fopdt or Integrator
-    dt_s : float
-        Step [s], > 0.
-
-    Returns
-    -------
-    Discrete
-        With gains in % PV per % OP.
+    dt_s : step [s], > 0. Gains come in % PV per % OP.
     """
     if isinstance(process, Integrator):
         gain, found = process.slope, unit_ramp(process.dead_time_s, dt_s)

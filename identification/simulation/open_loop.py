@@ -116,11 +116,7 @@ def through_valve(inputs: ModelInputs, c: Floats) -> Floats:
 def simulate(inputs: ModelInputs, c: Floats) -> Floats:
     """PV's deviation from inputs.level [% PV], shape (n,), that the model gives for the recorded OP.
 
-    Parameters
-    ----------
-    inputs : ModelInputs
-    c : ndarray of shape (SIZE,)
-        Constants (slots.py).
+    c : shape (SIZE,), constants (parameters.py).
     """
     return from_flow(inputs, c, through_valve(inputs, c))
 

@@ -83,12 +83,8 @@ _OWN: dict[str, float] = {}
 def own_slot(name: str, neutral_value: float = 0.0) -> int:
     """A place for a parameter that no kernel knows, which an effect's own act reads.
 
-    Parameters
-    ----------
-    name : str
-        Its name in saved models, upper case, other than any in use.
-    neutral_value : float
-        Its value where the effect does not act.
+    name : its name in saved models, upper case, other than any in use; neutral_value : its value where the effect
+    does not act.
     """
     if name in Slot.__members__ or name in _OWN:
         raise ValueError(f"a parameter {name} is there already; expected a name of its own; choose another")

@@ -56,12 +56,8 @@ def first_slip(op: Floats, breakaway: float, sliding: float) -> float:
     Once OP has covered the stickband (breakaway + sliding) the stem has slipped, wherever it was: it lets go there
     at the latest. A valve whose OP never covers it does not move and stands at the first OP.
 
-    Parameters
-    ----------
-    op : ndarray of shape (n,)
-        Controller output [% OP].
-    breakaway, sliding : float
-        Distances |OP - stem| at which the stem lets go, and at which it comes to rest [% OP].
+    op : shape (n,), controller output [% OP]; breakaway, sliding : distances |OP - stem| at which the stem lets go,
+    and at which it comes to rest [% OP].
     """
     low, high = op[0], op[0]
     for k in range(op.size):
@@ -105,19 +101,8 @@ def constants_of(valve: Valve) -> tuple[float, float, float]:
 def play(op: Floats, width: float, start: float | None = None) -> Floats:
     """Stem position behind play of full width `width`.
 
-    Parameters
-    ----------
-    op : ndarray of shape (n,)
-        Controller output [% OP].
-    width : float
-        Full width of the play [% OP], >= 0.
-    start : float or None
-        Stem position before the first sample [% OP]; None: the middle of the play, op[0].
-
-    Returns
-    -------
-    ndarray of shape (n,)
-        Stem position [% OP].
+    op : shape (n,), controller output [% OP]; width : full width of the play [% OP], >= 0; start : stem position
+    before the first sample [% OP]; None: the middle of the play, op[0]. Returns shape (n,), stem position [% OP].
     """
     return stick_slip(op, width, 0.0, start)
 
@@ -132,21 +117,9 @@ def stick_slip(
     `motion` says. J = 0 is play of width S in all; resting with S = J is the relay of the describing function, height
     and hysteresis S/2.
 
-    Parameters
-    ----------
-    op : ndarray of shape (n,)
-        Controller output [% OP].
-    stickband, slip_jump : float
-        S and J [% OP], S >= 0 and 0 <= J.
-    start : float or None
-        Stem position before the first sample [% OP]; None: op[0].
-    motion : Motion
-        What the stem does after a jump.
-
-    Returns
-    -------
-    ndarray of shape (n,)
-        Stem position [% OP].
+    op : shape (n,), controller output [% OP]; stickband, slip_jump : S and J [% OP], S >= 0 and 0 <= J; start : stem
+    position before the first sample [% OP]; None: op[0]; motion : what the stem does after a jump. Returns shape
+    (n,), stem position [% OP].
     """
     breakaway, sliding, tolerance = constants_of(Stiction(stickband, slip_jump, motion))
     if op.size == 0 or breakaway <= 0.0:

@@ -163,22 +163,10 @@ def memory(op: float, stem: float | None = None) -> Floats:
 def flow(op: Floats, c: Floats, dt_s: float, middle: float) -> Floats:
     """Flow through the valve [% OP].
 
-    Parameters
-    ----------
-    op : ndarray of shape (n,)
-        Recorded OP [% OP].
-    c : ndarray of shape (SIZE,)
-        Constants of the model.
-    dt_s : float
-        Sample interval [s].
-    middle : float
-        OP at which a curved valve has unit gain [% OP].
-
-    Returns
-    -------
-    ndarray of shape (n,)
-        Flow during each sample. A stem with friction starts where OP does, if OP ever leaves there, else where it
-        stands once it has slipped; and from there by PLACE, in distances at which it lets go.
+    op : shape (n,), recorded OP [% OP]; c : shape (SIZE,), constants of the model; dt_s : sample interval [s]; middle
+    : OP at which a curved valve has unit gain [% OP]. Returns shape (n,), flow during each sample. A stem with
+    friction starts where OP does, if OP ever leaves there, else where it stands once it has slipped; and from there
+    by PLACE, in distances at which it lets go.
     """
     x = before_stem(np.ascontiguousarray(op, dtype=np.float64), c, dt_s)
     breakaway, sliding, tolerance = friction_of(c)

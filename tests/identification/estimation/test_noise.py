@@ -15,7 +15,7 @@ from identification.estimation.noise import (
     lag_means,
     whitened,
 )
-from identification.estimation.outliers import OUTLIER, clipped_gain, robust_weights
+from identification.signals.robust import OUTLIER, clipped_gain, robust_weights
 
 
 def test_single_lags_whiten_as_a_filter_does():

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from identification.signals.correlation_time import correlation_time
+from identification.signals.correlation import correlation_time
 from tests.identification.signals import hand_loop
 
 SEEDS = (0, 1, 2)

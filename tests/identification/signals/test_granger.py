@@ -12,7 +12,7 @@ from scipy.signal import lfilter
 from scipy.stats import f as f_law
 from statsmodels.tsa.stattools import grangercausalitytests
 
-from identification.signals.granger import granger_f
+from identification.signals.cross_spectrum import granger_f
 
 
 def coupled(seed: int, n: int = 1500) -> np.ndarray:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+from identification.signals.correlation import rhythm
 from identification.signals.half_cycles import (
     half_cycles,
     levelled_correlation,
@@ -13,7 +14,7 @@ from identification.signals.half_cycles import (
     size_kurtosis,
     usual_prominence,
 )
-from identification.signals.spectrum import band_signal, bands, rhythm, spectrum, tapered_power
+from identification.signals.spectrum import band_signal, bands, spectrum, tapered_power
 
 N = 6000
 T = np.arange(N)

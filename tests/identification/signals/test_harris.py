@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from identification.signals.harris import harris_index
+from identification.signals.correlation import harris_index
 
 N = 4000
 

@@ -6,13 +6,12 @@ import numpy as np
 import pytest
 from scipy.signal import sawtooth, square
 
+from identification.signals.correlation import autocorrelation, rhythm
 from identification.signals.spectrum import (
-    autocorrelation,
     band_signal,
     bands,
     locked_harmonic,
     peak_prominence,
-    rhythm,
     spectrum,
     tapered_power,
     without_line,

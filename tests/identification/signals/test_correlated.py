@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from identification.estimation.candidate import correlated
+from identification.signals.correlation import correlated
 
 
 @pytest.mark.parametrize("pole", [0.0, 0.5, 0.9])

@@ -1,0 +1,70 @@
+"""Filters over whole trends: first order, a notch about one period, straight lines taken out."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from identification.record import Floats
+
+
+@njit(cache=True)
+def _smoothed(x: Floats, pole: float) -> Floats:
+    out = np.empty(x.size)
+    y = x[0]
+    for k in range(x.size):
+        y = x[k] + (y - x[k]) * pole
+        out[k] = y
+    return out
+
+
+def first_order(x: Floats, samples: float) -> Floats:
+    """A signal, shape (n,), behind a first-order filter of a time constant in samples (0: none), at rest at first."""
+    return x if samples <= 0 else _smoothed(x, math.exp(-1.0 / samples))  # type: ignore[no-any-return]
+
+
+def notch(x: Floats, period: float, width: float) -> Floats:
+    """The signal, shape (n,), without a narrow band about one period [samples], `width` of its frequency wide.
+
+    Second-order notch, zeros on the unit circle; gain one far from the band.
+    """
+    w = 2 * math.pi / period
+    radius = math.exp(-0.5 * w * width)
+    level = (1 - 2 * radius * math.cos(w) + radius**2) / (2 - 2 * math.cos(w))
+    return _second_order(np.ascontiguousarray(x), math.cos(w), radius, level)
+
+
+@njit(cache=True)
+def _second_order(x: Floats, cosine: float, radius: float, level: float) -> Floats:
+    out = np.empty_like(x)
+    base = x[0]
+    x1, x2, y1, y2 = base, base, base, base
+    for k in range(x.size):
+        y = level * (x[k] - 2 * cosine * x1 + x2) + 2 * radius * cosine * y1 - radius * radius * y2
+        x2, x1, y2, y1 = x1, x[k], y1, y
+        out[k] = y
+    return out
+
+
+def stretch_ends(n: int, window: int) -> NDArray[np.int64]:
+    """First sample of each of n // window stretches of nearly the same length, and the end of the last."""
+    parts = max(n // max(window, 1), 1)
+    length = np.full(parts, n // parts)
+    length[: n % parts] += 1
+    return np.concatenate(([0], np.cumsum(length)))
+
+
+def without_lines(x: Floats, window: int) -> Floats:
+    """x, shape (n,), less the straight line that suits each stretch best; x where window is 0 or longer than it."""
+    n = x.size
+    if window <= 0 or window >= n:
+        return x
+    ends = stretch_ends(n, window)
+    length = np.diff(ends)
+    time = np.arange(n) - np.repeat(ends[:-1] + 0.5 * (length - 1), length)
+    mean = np.add.reduceat(x, ends[:-1]) / length
+    slope = np.add.reduceat(x * time, ends[:-1]) / np.maximum(np.add.reduceat(time**2, ends[:-1]), 0.5)
+    return x - np.repeat(mean, length) - np.repeat(slope, length) * time
