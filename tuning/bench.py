@@ -12,7 +12,7 @@ import numpy as np
 from identification.models import Backlash, Fopdt, Integrator, Loop, Pid, Process, Valve
 from identification.record import Floats
 from identification.simulation.closed_loop import scan_step
-from identification.simulation.discretization import discretize, respond
+from identification.simulation.lag import discretize, respond
 from tuning.describing import band, is_play
 from tuning.limits import TuningLimits
 from tuning.linear import slowest_s
@@ -65,7 +65,7 @@ def standard_load(loop: Loop, steps: int) -> Floats:
     height = 0.5 * max(band(loop.valve), 0.5)
     d = discretize(loop.process, h)
     at_valve = height * np.array([0.0, 1.0, -0.62, 0.31])[(np.arange(steps) // hold) % 4]
-    load: Floats = respond(at_valve, d.pole, d.now, d.before, d.delay)
+    load: Floats = respond(at_valve, d)
     return load
 
 

@@ -11,7 +11,7 @@ from numba import njit
 from identification.models import Fopdt, Integrator, Loop, Pid, Process
 from identification.record import Floats, Mask
 from identification.simulation.closed_loop import scan_step
-from identification.simulation.discretization import discretize
+from identification.simulation.lag import discretize
 from tuning.describing import Complexes
 
 LOWEST = 1e-6

@@ -11,7 +11,7 @@ import numpy as np
 from identification.models import Fopdt, Integrator, Loop, Pid, Process
 from identification.record import Floats
 from identification.simulation.closed_loop import closed_loop, scan_step
-from identification.simulation.discretization import discretize, respond
+from identification.simulation.lag import discretize, respond
 from tuning.bench import Bench, Candidate, is_harmless, try_out
 from tuning.describing import is_play
 from tuning.limits import TuningLimits
@@ -43,7 +43,7 @@ def rejection(process: Process, controller: Pid) -> Rejection:
     horizon = 20.0 * effective_delay(process, h) + (2.0 * ti if math.isfinite(ti) else 0.0)
     steps = int(min(max(horizon / h, 100), 20_000))
     d = discretize(process, h)
-    load = respond(np.r_[0.0, np.ones(steps)], d.pole, d.now, d.before, d.delay)
+    load = respond(np.r_[0.0, np.ones(steps)], d)
     pv = closed_loop(loop, np.zeros(load.size), load, op_start=0.0).pv
     return Rejection(float(np.abs(pv).max()), ti / abs(controller.kp))
 

@@ -16,8 +16,8 @@ from analyzer.history.series import Series
 from analyzer.loops.spec import LoopSpec
 from analyzer.night.chunk import assess_loop
 from identification.models import Backlash, Fopdt, Loop, Pid, Stiction
-from identification.signals.filters import first_order
 from identification.simulation.closed_loop import closed_loop
+from identification.simulation.lag import first_order
 
 LOOPS = (
     Loop(Fopdt(1.5, 20.0, 4.0), Pid(1.2, 18.0)),

@@ -16,7 +16,7 @@ from analyzer.pages.words import number
 from analyzer.words.units import duration, gain_unit
 from identification.models import Integrator, Pid
 from identification.simulation.closed_loop import scan_step
-from identification.simulation.discretization import discretize
+from identification.simulation.lag import discretize
 from identification.simulation.valve import constants_of
 from reports.pages import (
     Block,

@@ -18,7 +18,7 @@ from identification.controller.pi_regression import (
 from identification.controller.settings import integral_time
 from identification.limits import LIMITS, ControllerLimits
 from identification.record import Floats, Mask
-from identification.signals.filters import first_order
+from identification.simulation.lag import first_order
 from identification.simulation.pi import due_moves, gapped
 
 

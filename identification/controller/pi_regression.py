@@ -13,7 +13,7 @@ import numpy as np
 
 from identification.limits import LIMITS, ControllerLimits
 from identification.record import Floats, Mask
-from identification.signals.filters import first_order
+from identification.simulation.lag import first_order
 
 SHIFTS = (-2.0, -1.0, 0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0)
 """Latenesses of PV that are tried [samples]."""

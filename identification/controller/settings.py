@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit
 
 from identification.record import Floats, LoopRecord, Mask
-from identification.signals.filters import first_order
+from identification.simulation.lag import first_order
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,7 @@ from identification.estimation.hammerstein import stem_blocks
 from identification.estimation.search import Dynamics, Products, variance_left, white_pv, whitened_stem
 from identification.estimation.window import Stems, Window
 from identification.record import Floats
-from identification.simulation.discretization import respond, unit_lag
+from identification.simulation.lag import Lag, respond, unit_lag
 
 
 @njit(cache=True)
@@ -32,31 +32,31 @@ def _scan(
         white = whitened_stem(stem - stem.mean(), ar)
         out[i], whole, known = np.inf, white, 0.0
         for j in range(tries):
-            pole, now, before, delay = unit_lag(begins[j, 0], begins[j, 1], dt_s)
+            lag = unit_lag(begins[j, 0], begins[j, 1], dt_s)
             if begins[j, 0] != known:
-                whole, known = respond(white, pole, 1.0, 0.0, 0), begins[j, 0]
-            products = _later(whole, now, before, delay, rows, x)
-            left = variance_left(x, products, rows, sums, level, pole, begins[j, 0] > 0.5 * n * dt_s)[0]
+                whole, known = respond(white, Lag(lag.pole, 1.0, 0.0, 0)), begins[j, 0]
+            products = _later(whole, lag, rows, x)
+            left = variance_left(x, products, rows, sums, level, lag.pole, begins[j, 0] > 0.5 * n * dt_s)[0]
             out[i] = min(out[i], left)
     return out
 
 
 @njit(cache=True, fastmath={"reassoc", "contract", "nsz"})
-def _later(whole: Floats, now: float, before: float, delay: int, rows: Floats, out: Floats) -> Products:
+def _later(whole: Floats, lag: Lag, rows: Floats, out: Floats) -> Products:
     """The response at one dead time into `out`, from that without any, and its products, summed in any order.
 
     The stem is taken to rest at first."""
-    n = out.size
+    n, delay = out.size, lag.delay
     out[: min(delay, n)] = 0.0
     if delay >= n:
         return 0.0, 0.0, 0.0, 0.0
-    x = now * whole[0]
+    x = lag.now * whole[0]
     out[delay], xv, x1, xt = x, x * rows[0, delay], x * rows[1, delay], x * rows[2, delay]
     xx = x * x1
     v, w, t = rows[0, delay + 1 :], rows[1, delay + 1 :], rows[2, delay + 1 :]
     late, earlier, later = whole[1 : n - delay], whole[: n - delay - 1], out[delay + 1 :]
     for k in range(v.size):
-        x = now * late[k] + before * earlier[k]
+        x = lag.now * late[k] + lag.before * earlier[k]
         weighted = x * w[k]
         later[k] = x
         xv, x1, xt, xx = xv + x * v[k], x1 + weighted, xt + x * t[k], xx + x * weighted

@@ -18,7 +18,7 @@ from numba import njit
 from identification.estimation.window import Stems, Window
 from identification.models import Backlash, Fopdt, Stiction, Valve
 from identification.record import Floats
-from identification.simulation.discretization import respond, respond_in_blocks, unit_lag
+from identification.simulation.lag import respond, unit_lag
 from identification.simulation.valve import RESTS, first_slip, motion_of, stem_step
 
 
@@ -162,11 +162,12 @@ def residual(window: Window, fit: Fit) -> Floats:
     """
     stem = stem_of(window.stems, fit.valve)
     if window.fine:
-        fine = window.dt_s / window.factor
-        steps = unit_lag(fit.time_constant_s, fit.dead_time_s + window.half_block_s, fine)
-        x = respond_in_blocks(stem, *steps, window.factor)
+        lag = unit_lag(
+            fit.time_constant_s, fit.dead_time_s + window.half_block_s, window.dt_s / window.factor
+        )
+        x = respond(stem, lag, window.factor)
     else:
-        x = respond(stem, *unit_lag(fit.time_constant_s, fit.dead_time_s, window.dt_s))
+        x = respond(stem, unit_lag(fit.time_constant_s, fit.dead_time_s, window.dt_s))
     return window.centred - fit.gain * x
 
 

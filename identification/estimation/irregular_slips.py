@@ -16,7 +16,7 @@ from identification.estimation.slip_paths import decoded
 from identification.estimation.slips import Friction, Noise, Response, log_chance
 from identification.estimation.window import Window
 from identification.record import Floats
-from identification.simulation.discretization import unit_lag
+from identification.simulation.lag import unit_lag
 from identification.simulation.valve import play as play_stem
 
 WIDTHS = (0.78, 0.88, 0.98, 1.12)
@@ -87,8 +87,8 @@ class _Trial:
 def _response(window: Window, fit: Fit, mean: float) -> Response:
     """How PV follows a stem whose mean is known [% OP], by a fit."""
     dead_s = fit.dead_time_s + window.half_block_s
-    pole, now, before, delay = unit_lag(fit.time_constant_s, dead_s, window.dt_s / window.factor)
-    return Response(pole, now, before, int(delay), fit.gain, slow_terms(window, fit) - fit.gain * mean)
+    lag = unit_lag(fit.time_constant_s, dead_s, window.dt_s / window.factor)
+    return Response(lag, fit.gain, slow_terms(window, fit) - fit.gain * mean)
 
 
 def _friction(band: float, share: float, rest: int) -> Friction:

@@ -16,7 +16,7 @@ from identification.estimation.noise import every_lag, judged, whitened
 from identification.estimation.window import Window
 from identification.record import Floats, Mask
 from identification.signals.filters import notch
-from identification.simulation.discretization import unit_lag
+from identification.simulation.lag import Lag, stepped, unit_lag
 
 AR_ORDER = 8
 """Order of the noise model; ours: on the simulated plants 12 gives innovations less than 1 % smaller."""
@@ -60,9 +60,7 @@ Products = tuple[float, float, float, float]
 
 
 @njit(cache=True)
-def _response(
-    stem: Floats, pole: float, now: float, before: float, delay: int, rows: Floats, out: Floats
-) -> Products:
+def _response(stem: Floats, lag: Lag, rows: Floats, out: Floats) -> Products:
     """The response of a lag into `out`, as `respond`, and its products; each step of it waits for the one before, and
     the sums are made meanwhile."""
     y, xv, x1, xt, xx = 0.0, 0.0, 0.0, 0.0, 0.0
@@ -70,7 +68,7 @@ def _response(
         out[k] = y
         weighted = y * rows[1, k]
         xv, x1, xt, xx = xv + y * rows[0, k], x1 + weighted, xt + y * rows[2, k], xx + y * weighted
-        y = pole * y + now * stem[max(k - delay, 0)] + before * stem[max(k - delay - 1, 0)]
+        y = stepped(y, lag, stem[max(k - lag.delay, 0)], stem[max(k - lag.delay - 1, 0)])
     return xv, x1, xt, xx
 
 
@@ -115,10 +113,10 @@ def score(
     `rows` and `sums` are those of PV (`_known`); it and `stem` are whitened already (a lag and A(q) commute), `level`
     is A(1).
     """
-    pole, now, before, delay = unit_lag(time_constant_s, dead_time_s, dt_s)
+    lag = unit_lag(time_constant_s, dead_time_s, dt_s)
     x = np.empty_like(stem)
-    products = _response(stem, pole, now, before, delay, rows, x)
-    return variance_left(x, products, rows, sums, level, pole, time_constant_s > 0.5 * x.size * dt_s)
+    products = _response(stem, lag, rows, x)
+    return variance_left(x, products, rows, sums, level, lag.pole, time_constant_s > 0.5 * x.size * dt_s)
 
 
 Dynamics = tuple[float, float]

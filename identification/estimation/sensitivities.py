@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from identification.estimation.noise import every_lag, whitened
 from identification.record import Floats, Mask
-from identification.simulation.discretization import respond_in_blocks, respond_together, unit_lag
+from identification.simulation.lag import respond, respond_together, unit_lag
 
 Indices = NDArray[np.int64]
 BASE = 8
@@ -45,8 +45,7 @@ def innovations(
 ) -> tuple[Floats, Floats, Floats]:
     """Unit response, residual of the model and its innovations, shape (n,) each."""
     n = y.size
-    pole, now, before, delay = unit_lag(math.exp(theta[0]), _dead(theta, dt, factor), dt / factor)
-    x = respond_in_blocks(stem, pole, now, before, delay, factor)
+    x = respond(stem, unit_lag(math.exp(theta[0]), _dead(theta, dt, factor), dt / factor), factor)
     r = np.empty(n)
     free, faded = _decays(theta, n, dt)
     for k in range(n):
@@ -62,11 +61,9 @@ def _responses(
 ) -> Floats:
     """Derivatives of the unit response by log T, dead time and width, shape (3, n)."""
     t_s, dead, step = math.exp(theta[0]), _dead(theta, dt, factor), STEP_DEAD * dt
-    lags, delays = np.empty((3, 3)), np.empty(3, np.int64)
-    trials = ((t_s * STEP_T, dead), (t_s, dead + step), (t_s, dead))
-    for i in range(3):
-        lags[i, 0], lags[i, 1], lags[i, 2], delays[i] = unit_lag(trials[i][0], trials[i][1], dt / factor)
-    out = respond_together((stem, stem, wider), lags, delays, factor)
+    fine = dt / factor
+    lags = unit_lag(t_s * STEP_T, dead, fine), unit_lag(t_s, dead + step, fine), unit_lag(t_s, dead, fine)
+    out = respond_together((stem, stem, wider), lags, factor)
     out[0] = (out[0] - x) / math.log(STEP_T)
     out[1] = (out[1] - x) / step
     out[2] = (out[2] - x) / width_step if width_step > 0 else np.zeros(x.size)

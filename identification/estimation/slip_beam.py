@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from identification.estimation.slips import FAR, SCATTER, Friction, Noise, Response, slip_chance
 from identification.record import Floats
+from identification.simulation.lag import stepped
 
 Indices = NDArray[np.int64]
 RARE = 1e-4
@@ -102,7 +103,7 @@ def _answered(b: Beam, h: int, k: int, r: Response) -> None:
         marks[PENDING] -= 1
         for i in range(marks[PENDING]):
             marks[DUE + i], own[PLACED + i] = marks[DUE + i + 1], own[PLACED + i + 1]
-    own[X] = r.pole * own[X] + r.now * own[LATE] + r.before * before
+    own[X] = stepped(own[X], r.lag, own[LATE], before)
 
 
 @njit(cache=True)
@@ -113,7 +114,7 @@ def _slipped(b: Beam, events: Events, at: tuple[int, int, int, int], place: floa
     own, marks = b.numbers[to], b.marks[to]
     own[STEM], marks[RESTED] = place, k
     own[FAR_LOW] = own[FAR_HIGH] = 0.0
-    own[PLACED + marks[PENDING]], marks[DUE + marks[PENDING]] = place, k + r.delay
+    own[PLACED + marks[PENDING]], marks[DUE + marks[PENDING]] = place, k + r.lag.delay
     marks[PENDING] += 1
     events.parent[event], events.moment[event], events.place[event] = marks[EVENT], k, place
     marks[EVENT] = event
@@ -127,7 +128,7 @@ def shares_of(r: Response, factor: int) -> tuple[float, float, float]:
     left, of_x = 1.0, 0.0
     for _ in range(factor):
         of_x += left
-        left *= r.pole
+        left *= r.lag.pole
     return left, of_x, factor - of_x
 
 

@@ -8,6 +8,7 @@ from typing import NamedTuple
 from numba import njit
 
 from identification.record import Floats
+from identification.simulation.lag import Lag
 
 SCATTER = 0.05
 """Standard deviation of the distance at which a stem lets go, in that distance; ours, the one
@@ -17,13 +18,9 @@ FAR = 3.5
 
 
 class Response(NamedTuple):
-    """How PV follows the stem: the lag's pole and weights, the delay [samples], gain, and PV's slow terms, shape
-    (blocks,)."""
+    """How PV follows the stem: its lag, the gain, and PV's slow terms, shape (blocks,)."""
 
-    pole: float
-    now: float
-    before: float
-    delay: int
+    lag: Lag
     gain: float
     slow: Floats
 

@@ -10,8 +10,7 @@ from identification.mismatch.curves.drawn import Drawing, Shape
 from identification.mismatch.recording import Finding, Recording
 from identification.models import Estimate
 from identification.record import Floats
-from identification.simulation.acts import Act
-from identification.simulation.effect import Variant
+from identification.simulation.effect import Act, Variant
 
 Parameters = Mapping[str, Estimate]
 

@@ -8,10 +8,10 @@ from identification.estimation.candidate import Fitted, Problem
 from identification.estimation.noise import lag_means, whitened
 from identification.estimation.prediction_error import sensitivities
 from identification.record import Floats
+from identification.simulation.lag import lagged
 from identification.simulation.open_loop import simulate, through_valve
 from identification.simulation.parameters import Slot
-from identification.simulation.process import plain_vessel
-from identification.simulation.valve_chain import lagged
+from identification.simulation.vessel import plain_vessel
 
 BOXES = 32
 """Past stretches of OP that may act, each with a weight of its own."""

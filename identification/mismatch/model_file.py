@@ -10,7 +10,7 @@ import numpy as np
 from identification.controller.check import StatedSettings
 from identification.errors import InputError
 from identification.record import Floats
-from identification.simulation.closed_model import closed_model
+from identification.simulation.closed_loop import closed_model
 from identification.simulation.open_loop import ModelInputs, begun_at_rest, simulate
 from identification.simulation.parameters import KNOTS, STEPS, Slot, neutral, places
 

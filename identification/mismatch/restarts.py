@@ -16,7 +16,7 @@ from numba import njit
 from identification.estimation.candidate import Problem
 from identification.record import Floats
 from identification.signals.filters import stretch_ends
-from identification.simulation.acts import Signal, acted
+from identification.simulation.effect import Signal, acted
 from identification.simulation.open_loop import from_flow, simulate
 from identification.simulation.parameters import Slot
 from identification.simulation.valve import stem_step

@@ -11,21 +11,6 @@ from numpy.typing import NDArray
 from identification.record import Floats
 
 
-@njit(cache=True)
-def _smoothed(x: Floats, pole: float) -> Floats:
-    out = np.empty(x.size)
-    y = x[0]
-    for k in range(x.size):
-        y = x[k] + (y - x[k]) * pole
-        out[k] = y
-    return out
-
-
-def first_order(x: Floats, samples: float) -> Floats:
-    """A signal, shape (n,), behind a first-order filter of a time constant in samples (0: none), at rest at first."""
-    return x if samples <= 0 else _smoothed(x, math.exp(-1.0 / samples))  # type: ignore[no-any-return]
-
-
 def notch(x: Floats, period: float, width: float) -> Floats:
     """The signal, shape (n,), without a narrow band about one period [samples], `width` of its frequency wide.
 

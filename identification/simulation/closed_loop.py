@@ -1,15 +1,29 @@
-"""A loop closed from SP and load, as settings are searched with: controller, valve, lag or integrator."""
+"""Loops closed by a PI(D): one from SP and load, as settings are searched with, and the whole model of explain."""
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 from numba import njit
 
+from identification.errors import NotAssessedError
 from identification.models import Fopdt, Loop
 from identification.record import Floats, LoopRecord
-from identification.simulation.discretization import discretize
+from identification.simulation.effect import acting
+from identification.simulation.lag import Lag, discretize, stepped
+from identification.simulation.open_loop import (
+    ModelInputs,
+    counted_from_level,
+    gain_over_record,
+    load_over_record,
+    outflow_head,
+)
+from identification.simulation.parameters import Slot
 from identification.simulation.pi import Law, next_op, per_scan
 from identification.simulation.valve import constants_of, stem_step
+from identification.simulation.valve_chain import Friction, flow_step, friction_of, memory
+from identification.simulation.vessel import at_start, vessel_span
 
 CONTINUOUS_STEPS = 50
 """Steps per dead time (or time constant) that stand for a continuous controller, scan_s = 0; ours: at 50 the
@@ -20,12 +34,11 @@ period of the study's example is within 1 % of the limit."""
 def _closed(
     sp: Floats,
     load: Floats,
-    process: tuple[float, float, float, int],
+    process: Lag,
     valve: tuple[float, float, float],
     law: Law,
     op0: float,
 ) -> tuple[Floats, Floats, Floats]:
-    pole, now, before, delay = process
     breakaway, sliding, tolerance = valve
     n = sp.size
     pv, op, stem = np.empty(n), np.empty(n), np.empty(n)
@@ -46,9 +59,9 @@ def _closed(
         else:
             x = u
         stem[k] = x
-        late = stem[k - delay] - rest if k >= delay else 0.0
-        later = stem[k - delay - 1] - rest if k >= delay + 1 else 0.0
-        y = pole * y + now * late + before * later
+        late = stem[k - process.delay] - rest if k >= process.delay else 0.0
+        later = stem[k - process.delay - 1] - rest if k > process.delay else 0.0
+        y = stepped(y, process, late, later)
     return pv, op, stem
 
 
@@ -73,14 +86,71 @@ def closed_loop(
     loop at rest [% OP]. The record has dt_s of the controller's scan and the stem in `position`.
     """
     h = scan_step(loop)
-    d = discretize(loop.process, h)
     pv, op, stem = _closed(
         np.ascontiguousarray(sp, dtype=np.float64),
         np.ascontiguousarray(load, dtype=np.float64),
-        (d.pole, d.now, d.before, d.delay),
+        discretize(loop.process, h),
         constants_of(loop.valve),
         per_scan(loop.controller, h),
         float(op_start),
     )
     bad = np.zeros(pv.size, dtype=bool)
     return LoopRecord(tag, start_s, h, np.asarray(sp, dtype=np.float64), pv, op, bad, position=stem)
+
+
+CLIP_HI, CLIP_LO = int(Slot.CLIP_HI), int(Slot.CLIP_LO)
+
+
+@njit(cache=True, error_model="numpy")
+def _closed_model(
+    sp: Floats,
+    load: Floats,
+    gain: Floats,
+    c: Floats,
+    law: Law,
+    friction: Friction,
+    m: Floats,
+    frame: tuple[float, float, float, float],
+    start: tuple[float, float],
+) -> tuple[Floats, Floats]:
+    dt_s, middle, level, head = frame
+    op, e1 = start
+    n = sp.size
+    pv, out, flow, free = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
+    flow[0] = flow_step(op, m.copy(), c, friction, dt_s, middle)
+    vessel = at_start(flow[0], c, middle)
+    for k in range(n):
+        x = (1.0 - c[Slot.SHARE]) * vessel[0] + c[Slot.SHARE] * vessel[1]
+        pv[k] = min(max(level + x, c[CLIP_LO]), c[CLIP_HI])
+        e = sp[k] - pv[k]
+        op = next_op(op, law, e, e1, 0.0)
+        e1 = e
+        out[k] = op
+        flow[k] = flow_step(op, m, c, friction, dt_s, middle)
+        vessel = vessel_span((k, k + 1), vessel, (flow, load, gain), c, dt_s, middle, head, free)
+    return pv, out
+
+
+def closed_model(
+    inputs: ModelInputs, c: Floats, sp: Floats, kp: float, ti_samples: float
+) -> tuple[Floats, Floats]:
+    """PV and OP, shape (n,) each [% of span], of a model under its PI controller.
+
+    inputs : its `op` gives the OP at rest by its first value, and the length; c : shape (SIZE,), parameters of the
+    model; START is where PV stands at first; sp : shape (n,), set point [% PV]; kp : gain [% OP/% PV]; ti_samples :
+    integral time [samples]. Raises NotAssessedError: where transport with the flow's speed, or an effect without
+    lines in the kernel, is in the model.
+    """
+    if c[Slot.PIPE] != 0 or acting(c):
+        raise NotAssessedError(
+            "needs a model that can be stepped sample by sample, has one with transport at the flow's speed, or with "
+            "an effect that acts on whole trends: run it open loop"
+        )
+    op0 = float(inputs.op[0])
+    e0 = float(sp[0]) - (inputs.level + float(c[Slot.START]))
+    ti = ti_samples if math.isfinite(ti_samples) else math.inf
+    law = (kp, kp / ti, 0.0, 0.0, 100.0)
+    own = counted_from_level(inputs, c)
+    frame = (inputs.dt_s, inputs.middle, inputs.level, outflow_head(inputs, c))
+    gain, load = gain_over_record(inputs, c), load_over_record(inputs, c)
+    return _closed_model(sp, load, gain, own, law, friction_of(c), memory(op0), frame, (op0, e0))

@@ -13,6 +13,7 @@ from numba import njit
 
 from identification.models import Motion
 from identification.record import Floats
+from identification.simulation.lag import held, lagged
 from identification.simulation.parameters import Slot
 from identification.simulation.valve import SLIDES, TOLERANCES, first_slip, stem_step, thresholds, walk
 
@@ -59,26 +60,6 @@ def servo_step(
 
 
 @njit(cache=True)
-def lag_step(at: float, x: float, lag_s: float, dt_s: float) -> tuple[float, float]:
-    """Mean over a sample, and value after it, of a first-order lag of a held signal."""
-    pole = math.exp(-dt_s / lag_s)
-    return x + (at - x) * ((1.0 - pole) * lag_s / dt_s), x + (at - x) * pole
-
-
-@njit(cache=True)
-def lagged(x: Floats, lag_s: float, dt_s: float) -> Floats:
-    """Mean over each sample, shape (n,), of a first-order lag of a held signal."""
-    out = np.empty_like(x)
-    at = x[0]
-    pole = math.exp(-dt_s / lag_s)
-    share = (1.0 - pole) * lag_s / dt_s
-    for k in range(x.size):
-        out[k] = x[k] + (at - x[k]) * share
-        at = x[k] + (at - x[k]) * pole
-    return out
-
-
-@njit(cache=True)
 def second_valve(x: float, c: Floats) -> float:
     """What a second valve adds to the flow at rest [% OP]: it takes over above the split point after a dead zone."""
     above = max(x - c[SPLIT], 0.0)
@@ -111,7 +92,8 @@ def flow_step(op: float, m: Floats, c: Floats, friction: Friction, dt_s: float, 
         extra = second_valve(x, c)
         if c[SPLIT_LAG] > 0.0:
             at = extra if math.isnan(m[SECOND]) else m[SECOND]
-            extra, m[SECOND] = lag_step(at, extra, c[SPLIT_LAG], dt_s)
+            left, mean = held(c[SPLIT_LAG], dt_s)
+            extra, m[SECOND] = extra + (at - extra) * mean, extra + (at - extra) * left
         x += extra
     return x if abs(c[BEND]) < STRAIGHT else curved(x, c[BEND], middle)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from identification.models import Process, Valve
 from identification.record import Floats
-from identification.simulation.discretization import discretize, respond
+from identification.simulation.lag import discretize, respond
 from identification.simulation.valve import stem_position
 
 
@@ -12,4 +12,4 @@ def pv_of(process: Process, valve: Valve, op: Floats, dt_s: float) -> Floats:
     """PV's deviation [% PV], shape (n,), from rest with the stem at its first position."""
     stem = stem_position(op, valve)
     d = discretize(process, dt_s)
-    return respond(stem - stem[0], d.pole, d.now, d.before, d.delay)
+    return respond(stem - stem[0], d)

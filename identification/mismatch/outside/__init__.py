@@ -8,8 +8,7 @@ from collections.abc import Mapping
 from identification.mismatch.catalogue import EFFECTS
 from identification.mismatch.effect import Effect
 from identification.mismatch.outside import gain_with_history, gain_with_rate, recycle, switched_load
-from identification.simulation.acts import bring
-from identification.simulation.effect import Variant
+from identification.simulation.effect import Variant, bring
 
 _ALL = (gain_with_history.EFFECT, gain_with_rate.EFFECT, recycle.EFFECT, switched_load.EFFECT)
 OUTSIDE: Mapping[str, Effect] = {e.name: e for e in _ALL}

@@ -8,10 +8,9 @@ from identification.mismatch.curves.drawn import POINTS, Axis, Drawing, Drawn, S
 from identification.mismatch.curves.valve import step_size
 from identification.mismatch.effect import Block, Effect
 from identification.record import Floats
-from identification.simulation.acts import Act, Signal
-from identification.simulation.effect import Param, Variant
+from identification.simulation.effect import Act, Param, Signal, Variant
+from identification.simulation.lag import lagged
 from identification.simulation.parameters import own_slot
-from identification.simulation.valve_chain import lagged
 
 HURRY, HURRY_T = own_slot("HURRY"), own_slot("HURRY_T", 1.0)
 LAGS = (0.2, 0.6)

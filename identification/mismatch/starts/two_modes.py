@@ -13,7 +13,7 @@ from identification.record import Floats
 from identification.simulation.effect import Variant
 from identification.simulation.open_loop import through_valve
 from identification.simulation.parameters import Slot
-from identification.simulation.process import plain_vessel
+from identification.simulation.vessel import plain_vessel
 
 DELAYS = 40
 """Dead times tried at most, from none to that of the plain loop, which a missing lag or zero has lengthened; a mode

@@ -14,7 +14,7 @@ from identification.estimation.likelihood_ratio import WindowFit, evidence, inno
 from identification.estimation.window import Window, block_means
 from identification.models import Backlash, Fopdt, Loop, Pid
 from identification.simulation.closed_loop import closed_loop
-from identification.simulation.discretization import respond, unit_lag
+from identification.simulation.lag import respond, unit_lag
 from identification.simulation.valve import HALTS, RESTS, SLIDES, first_slip, walk
 from tests.identification.responses import pv_of
 
@@ -134,7 +134,7 @@ def test_lag_agrees_with_slow_twin():
     for k in range(200):
         slow.append(y)
         y = pole * y + (1 - pole) * stem[max(k - 4, 0)]
-    assert respond(stem, *unit_lag(20.0, 4.0, 1.0)) == pytest.approx(np.array(slow), abs=1e-9)
+    assert respond(stem, unit_lag(20.0, 4.0, 1.0)) == pytest.approx(np.array(slow), abs=1e-9)
 
 
 def test_stem_in_blocks_is_the_mean_of_the_stem():
@@ -203,7 +203,7 @@ def test_descent_and_disturbance_tell_one_story():
     """The innovations of what a fit leaves have the variance that the descent reports, in blocks of eight samples."""
     rng = np.random.default_rng(2)
     op = 50 + np.cumsum(rng.normal(0, 0.2, 8 * 600))
-    pv = block_means(respond(op - 50, *unit_lag(300.0, 12.0, 1.0)), 8) + rng.normal(0, 0.05, 600) + 3.0
+    pv = block_means(respond(op - 50, unit_lag(300.0, 12.0, 1.0)), 8) + rng.normal(0, 0.05, 600) + 3.0
     for fine in (False, True):
         window = Window(pv, op, np.ones(600, dtype=bool), 8.0, 8, fine=fine)
         for fit in (fit_linear(window, 400.0), fit_play(window, fit_linear(window, 400.0), 400.0)):

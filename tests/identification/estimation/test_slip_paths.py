@@ -16,6 +16,7 @@ from identification.estimation.slip_paths import decoded
 from identification.estimation.slips import SCATTER, Friction, Noise, Response, log_chance, slip_chance
 from identification.estimation.window import Window
 from identification.record import Floats
+from identification.simulation.lag import Lag
 
 POLE, DELAY, GAIN = 0.7, 2, 1.5
 BREAKAWAY, SLIDING, NOISE = 1.0, 0.2, 0.02
@@ -70,7 +71,7 @@ def test_the_path_is_the_best_of_all_there_are():
 
     every = [worth(s) for n in range(6) for s in itertools.combinations(possible, n)]
     best, stem = max(every, key=lambda found: found[0])
-    r = Response(POLE, 1 - POLE, 0.0, DELAY, GAIN, np.zeros(op.size))
+    r = Response(Lag(POLE, 1 - POLE, 0.0, DELAY), GAIN, np.zeros(op.size))
     counts = np.arange(op.size) > 0
     noise = Noise(np.zeros(1), NOISE**2)
     found, score = decoded(op, pv, counts, r, noise, Friction(BREAKAWAY, SLIDING, 1000), 200)
@@ -99,7 +100,7 @@ def test_chance_of_slips_is_that_of_a_normal_threshold():
 def test_a_stem_does_not_park():
     """A stem that rests longer than it may costs as much each time, so one that moves is told instead."""
     op = 1.05 * np.sin(np.arange(200) * 0.1)
-    r = Response(POLE, 1 - POLE, 0.0, DELAY, GAIN, np.zeros(op.size))
+    r = Response(Lag(POLE, 1 - POLE, 0.0, DELAY), GAIN, np.zeros(op.size))
     every, noise = np.ones(op.size, dtype=bool), Noise(np.zeros(1), 1.0)
     _, free = decoded(op, np.zeros(op.size), every, r, noise, Friction(BREAKAWAY, SLIDING, 1000), 50)
     _, held = decoded(op, np.zeros(op.size), every, r, noise, Friction(BREAKAWAY, SLIDING, 40), 50)

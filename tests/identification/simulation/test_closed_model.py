@@ -7,8 +7,7 @@ import pytest
 
 from identification.errors import NotAssessedError
 from identification.models import Backlash, Fopdt, Integrator, Loop, Motion, Pid, Process, Stiction, Valve
-from identification.simulation.closed_loop import closed_loop
-from identification.simulation.closed_model import closed_model
+from identification.simulation.closed_loop import closed_loop, closed_model
 from identification.simulation.open_loop import ModelInputs, as_parameters, simulate
 from identification.simulation.parameters import Slot
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from identification.simulation.past_pv import RAMP, recalled, returned, switched
+from identification.simulation.open_loop import RAMP, recalled, returned, switched
 
 
 def test_load_is_switched_as_a_schmitt_trigger_does() -> None:

@@ -9,6 +9,7 @@ import numpy as np
 from numba import njit
 
 from identification.record import Floats
+from identification.simulation.lag import held, stepped, unit_lag
 from identification.simulation.parameters import Slot
 
 T, L, K, BIAS, START = (int(s) for s in (Slot.T, Slot.L, Slot.K, Slot.BIAS, Slot.START))
@@ -162,15 +163,6 @@ def risen(x: float, feed: float, basin: float, o: Outflow, rises: Floats, half: 
 
 
 @njit(cache=True, error_model="numpy")
-def held(lag_s: float, h: float) -> tuple[float, float]:
-    """What is left of a first-order lag's distance from its aim after h seconds, and the mean of it meanwhile."""
-    if lag_s <= 0.0 or h <= 0.0:
-        return 0.0, 0.0
-    pole = math.exp(-h / lag_s)
-    return pole, (1.0 - pole) * lag_s / h
-
-
-@njit(cache=True, error_model="numpy")
 def kept(c: Floats, parts: tuple[float, float]) -> tuple[Floats, Floats]:
     """held() of second and third lag, second mode and spilled liquid, by part of a sample, shape (2, 4) each."""
     left, mean = np.empty((2, 4)), np.empty((2, 4))
@@ -269,17 +261,12 @@ def vessel(
 @njit(cache=True, error_model="numpy")
 def plain_vessel(flow: Floats, act: Floats, c: Floats, dt_s: float, base: float) -> Floats:
     """The same, shape (n,), where nothing but K, T, L, bias and start is set: exact and several times faster."""
-    n = flow.size
-    delay = int(c[L] / dt_s)
-    part = c[L] - delay * dt_s
-    older, newer = math.exp(-part / c[T]), math.exp(-(dt_s - part) / c[T])
+    n, lag = flow.size, unit_lag(c[T], c[L], dt_s)
+    gain, bias = c[K], c[BIAS]
     out = np.empty(n)
     x = c[START]
     for k in range(n):
         out[k] = x
-        one, two = flow[max(k - delay - 1, 0)] - base, flow[max(k - delay, 0)] - base
-        feed = c[K] * (one + act[k]) + c[BIAS]
-        x = feed + (x - feed) * older
-        feed = c[K] * (two + act[k]) + c[BIAS]
-        x = feed + (x - feed) * newer
+        later, late = flow[max(k - lag.delay - 1, 0)] - base, flow[max(k - lag.delay, 0)] - base
+        x = stepped(x, lag, gain * (late + act[k]) + bias, gain * (later + act[k]) + bias)
     return out

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from identification.signals.filters import first_order
+from identification.simulation.lag import first_order
 
 
 def test_it_is_the_filter_of_scipy_at_rest_at_the_first_value():
