@@ -12,7 +12,7 @@ from identification.limits import TOML, stated_in
 class TuningLimits:
     """What a proposal must keep.
 
-    Set on the plants of tests/proofs/retuning.py, seeds 1, 2, 11 and 12, and proved on others. A model's forecast of
+    Set on the plants of proofs/retuning.py, seeds 1, 2, 11 and 12, and proved on others. A model's forecast of
     the error is within 8 % on nine in ten of those with play, hence error_aim. With stick-slip, gains down to 0.3 of
     the present one nearly doubled some errors, hence gain_down. On an integrator with play Ti of 60 delays leaves 3 %
     of the travel that 10 delays make, so integral_factor_ramp need not be larger.

@@ -22,7 +22,7 @@ REPLICATES = 2000
 DRIFTS = np.array([0.0, 0.2, 0.4, 0.6, 0.8, 0.9, 0.97])
 """Correlations of one day with the next that are weighed, each as likely at first as any other; ours: where nothing
 changed, even a figure that wanders over six weeks is then called changed 4 times in 100, and with 0.8 as the
-highest 14 times; without any, 9 % of the loops of tests/proofs/honesty.py are."""
+highest 14 times; without any, 9 % of the loops of proofs/honesty.py are."""
 PERCENTILES = (2.5, 97.5)
 
 

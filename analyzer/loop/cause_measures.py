@@ -22,7 +22,7 @@ from a machine and a loop at its limit of stability are both above it, and not t
 PLAIN = 0.08
 """Harmonics left over the fundamental [-] below which they say nothing, for a cycle near a sine leaves none whatever
 makes it; ours: without it a loop that a tank with play feeds is blamed for a valve of its own, at 85 %, and of .01 to
-.08 the last tells most of the loops kept apart from the fit (tests/proofs/cause_weights.py)."""
+.08 the last tells most of the loops kept apart from the fit (proofs/cause_weights.py)."""
 
 
 def _signed_log(x: float) -> float:

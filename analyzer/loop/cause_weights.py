@@ -2,7 +2,7 @@
 
 Each sign counts along a broken line, and the odds of the causes are products over the signs, as in a scorecard (Good
 1950, weight of evidence). Which way a sign may point is fixed by physics; how much it weighs is fitted. Weights and
-knots are one whole, written by `python -m tests.proofs.cause_weights`, which says on what they were fitted and how
+knots are one whole, written by `python -m proofs.cause_weights`, which says on what they were fitted and how
 they do on loops that they were not.
 """
 

@@ -33,7 +33,7 @@ def intervals(window: Window, fit: Fit, valve: bool, limits: AdviceLimits) -> di
 
     Gain and time constant are left out where the record tells their ratio alone (advice.lag_factor). Of a
     valve that jumps PV tells jump times slope; only slips beyond the first of a half cycle part the two, so both
-    are told within wide limits. tests/proofs/coverage.md says how often the intervals hold the truth.
+    are told within wide limits. proofs/coverage.md says how often the intervals hold the truth.
     """
     spread = np.sqrt(np.maximum(np.diag(covariance(window, fit, free_width=valve)), 0.0))
     t = fit.time_constant_s

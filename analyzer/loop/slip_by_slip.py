@@ -19,7 +19,7 @@ def told_slip_by_slip(verdict: Verdict, period_s: float, limits: CauseLimits) ->
 
     The cause stays: what is asked is how the valve fails that PV and OP convict already. Where its stem is told slip
     by slip, the window has it as if it had been recorded. Settings are sought on the verdict before: sought on this
-    one, whose stem takes up part of what the load did, they left 7 of 24 sticking loops of tests/proofs/retuning.py
+    one, whose stem takes up part of what the load did, they left 7 of 24 sticking loops of proofs/retuning.py
     (seeds 21, 22, 81, 82) with no smaller error, one with a larger by 47 %. Sought on the verdict before, they left
     none of 14 (81, 82).
 

@@ -14,11 +14,11 @@ NINETY = 1.645
 WIDER = 1.35
 """Times that errors exceed what curvature and scores tell; ours: no model is the plant, slips that OP's resolution
 hides or makes leave the likelihood rough. The 90 % quantile of their ratio is 2.25 over 58 simulated loops with play
-(tests/proofs/coverage.py, seed 9) and 2.1 over 170 sealed effects (tests/concealed/intervals.py, seed 501), where it
+(proofs/coverage.py, seed 9) and 2.1 over 170 sealed effects (proofs/concealed/intervals.py, seed 501), where it
 should be 1.64; what other seeds say stands beside both commands."""
 SLOPE_ALONE = 2.0
 """Times wider still where a cycling record tells gain over time constant alone: ours; of 68 vessels that integrate
-and cycle (tests/proofs/coverage.py, seed 603) errors are 2.1 times those of processes that settle (604), in the same
+and cycle (proofs/coverage.py, seed 603) errors are 2.1 times those of processes that settle (604), in the same
 deviations, at noise models of 8 to 110 lags and blocks of one to ten samples alike."""
 JUMPING = 1.25
 """Times wider still, of the time constant behind a valve that jumps: ours; of 114 such loops of dry friction (seeds

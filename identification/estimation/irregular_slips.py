@@ -34,7 +34,7 @@ FOLLOWED = 4
 """Trials that are followed, of each share of the jump two at most."""
 HOPELESS = -80.0
 """Gain [nat] over the play that one of the first two at least has, else no other is followed; ours: of 21 stems of
-dry friction (tests/proofs/coverage.py, seed 607) four had less, of 25 with play (608, 609) all."""
+dry friction (proofs/coverage.py, seed 607) four had less, of 25 with play (608, 609) all."""
 ROUNDS = 5
 """Turns of decoding and fitting; ours: of six followed by hand the last turns gained a few nat."""
 HOT = (8.0, 4.0, 2.0, 1.0)

@@ -16,7 +16,7 @@ from analyzer.comparison.before_after import (
 )
 from analyzer.comparison.block_bootstrap import Side, difference, drift_factor, replicates
 from analyzer.comparison.spans import HOUR_S, Span, gridded, spans_around
-from tests.proofs.honesty import examined
+from proofs.honesty import examined
 
 CHANGED_S = 1000 * 86400.0
 WEEK = 168
@@ -161,7 +161,7 @@ def test_intervals_cover_the_truth() -> None:
 def test_unchanged_plants_are_called_unchanged() -> None:
     """Of 12 simulated plants in which nothing was changed, hardly a figure is called better or worse.
 
-    The whole proof, 200 plants, is tests/proofs/honesty.py.
+    The whole proof, 200 plants, is proofs/honesty.py.
     """
     found = [f for f, _ in examined(12, 1, first=5000)]
     calls = [c.verdict for f in found for c in f.primary]

@@ -17,7 +17,7 @@ from analyzer.loop.quality import prepare
 from analyzer.plantwide.source import Peer
 from analyzer.plantwide.verdict import followers_of, trace
 from identification.errors import NotAssessedError
-from tests.untidy.recorder import swinging_door
+from proofs.untidy.recorder import swinging_door
 
 SKETCHES = {
     "healthy flow": Sketch(

@@ -11,7 +11,7 @@ import pytest
 from analyzer.loop.cause_measures import NAMES
 from analyzer.loop.cause_weights import chances, parted, pushes, weights
 from analyzer.loop.decisions import CAUSES, Cause
-from tests.proofs.cause_weights import WAYS, fitted
+from proofs.cause_weights import WAYS, fitted
 
 LOW, HIGH = -3.0, 8.0
 

@@ -14,7 +14,7 @@ from scipy.signal import lfilter, square
 from analyzer.loop.assessments import hourly
 from analyzer.loop.oscillation import Oscillation, Oscillations, counting, detect
 from identification.record import LoopRecord
-from tests.untidy.draw import draw
+from proofs.untidy.draw import draw
 
 N = 7200
 T = np.arange(N)

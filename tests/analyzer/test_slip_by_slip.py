@@ -9,8 +9,8 @@ import pytest
 from analyzer.loop.advice import propose
 from analyzer.words import settings as words
 from identification.models import Pid
+from proofs.coverage import FAMILIES, assessed, made
 from tests.analyzer.plant import CONFIG
-from tests.proofs.coverage import FAMILIES, assessed, made
 
 PLAY, STICKS = FAMILIES[:2]
 

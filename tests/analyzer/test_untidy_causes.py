@@ -19,11 +19,11 @@ from analyzer.loop.measure import measure
 from analyzer.loop.oscillation import counting, detect
 from analyzer.loop.quality import prepare
 from analyzer.loops.spec import LoopSpec
-from tests.proofs.sensitivity import SKETCHES, Cell, made
-from tests.proofs.untidy import NAMED, recorded
-from tests.untidy.draw import draw
-from tests.untidy.loop import Plant, Stem, run
-from tests.untidy.recorder import rounded
+from proofs.sensitivity import SKETCHES, Cell, made
+from proofs.untidy.draw import draw
+from proofs.untidy.loop import Plant, Stem, run
+from proofs.untidy.recorder import rounded
+from proofs.untidy_loops import NAMED, recorded
 
 
 def verdict_of(sp: np.ndarray, pv: np.ndarray, op: np.ndarray, step_s: float, kind: str) -> str:

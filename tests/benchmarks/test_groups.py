@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tests.benchmarks.groups import row
+from benchmarks.groups import row
 
 
 def test_the_benchmark_measures_a_plant(tmp_path):

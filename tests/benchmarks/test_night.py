@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from analyzer.history.export import open_export
 from analyzer.loops.tags import find_loops
-from tests.benchmarks.night import measured, plant, stated, table
+from benchmarks.night import measured, plant, stated, table
 
 
 def test_the_benchmark_measures_every_loop(tmp_path):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tests.benchmarks.plant_night import line, make, night, tenth
+from benchmarks.plant_night import line, make, night, tenth
 
 
 def test_a_plants_night_is_run_and_measured_end_to_end(tmp_path):

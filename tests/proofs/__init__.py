@@ -1,1 +1,0 @@
-"""Proofs that are commands of their own; a fixed share of each runs as a test."""

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from tests.proofs.negative_controls import judged
-from tests.proofs.nulls import FAMILIES
+from proofs.negative_controls import judged
+from proofs.nulls import FAMILIES
 
 RECORDS = 15
 

@@ -11,8 +11,8 @@ import pytest
 from click.testing import CliRunner
 
 from analyzer.cli import main
-from tests.coupled.__main__ import written
-from tests.coupled.draw import draw
+from proofs.coupled.__main__ import written
+from proofs.coupled.draw import draw
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from identification.mismatch.answer import AT_REST, WANDERS, answer, untold_gain
 from identification.mismatch.diagnosis import explain
 from identification.mismatch.experiment import coarser_by, is_experiment
 from identification.models import Estimate
-from tests.proofs.experiments import Plant, asked, carried_misfit, drawn, slow_mode
+from proofs.experiments import Plant, asked, carried_misfit, drawn, slow_mode
 
 
 def test_only_an_output_that_nobody_closed_is_an_experiment() -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from identification.mismatch.proof import anchored
 from identification.signals.filters import without_lines
-from tests.proofs.plain_loop import KINDS, of_recording, of_simulated
+from proofs.plain_loop import KINDS, of_recording, of_simulated
 
 FIELD = Path(__file__).parents[4] / "shared" / "recordings" / "field"
 

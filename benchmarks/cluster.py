@@ -1,0 +1,68 @@
+"""A night on a cluster of two workers beside two processes: python -m benchmarks.cluster [--loops 100]
+
+A scheduler and two workers of one thread each, over TCP on loopback, do the night that `--jobs 2` does, in turns.
+Wall time of the run alone; the workers are warm from one night before. Writes cluster.md here.
+"""
+
+from __future__ import annotations
+
+import argparse
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+
+from benchmarks.plant_night import Plant, make, tenth
+from tests.analyzer.dask_cluster import dask_cluster
+
+OUT = Path(__file__).with_suffix(".md")
+TURNS = 3
+"""Nights of each, of which the median counts."""
+
+
+def night_s(plant: Plant, folder: Path, *how: str) -> float:
+    """Wall time of a night [s]."""
+    with tempfile.TemporaryDirectory(dir=folder) as place:
+        command = [sys.executable, "-m", "analyzer.cli", "run", *map(str, plant.exports)]
+        command += ["--loops", str(plant.loops_csv), "--store", f"{place}/store", *how]
+        begun = time.perf_counter()
+        subprocess.run(command, check=True, capture_output=True)
+        return time.perf_counter() - begun
+
+
+def main() -> None:
+    """Measure and write the table beside this file."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--loops", type=int, default=100)
+    loops = parser.parse_args().loops
+    pa.set_cpu_count(1)
+    with tempfile.TemporaryDirectory() as made:
+        folder = Path(made)
+        plant = make(folder, loops, 24.0, 1, tenth)
+        with dask_cluster(folder) as (address, _):
+            ways = {"--jobs 2": ("--jobs", "2"), "--scheduler, two workers": ("--scheduler", address)}
+            for how in ways.values():
+                night_s(plant, folder, *how)
+            taken = {name: [] for name in ways}
+            for _ in range(TURNS):
+                for name, how in ways.items():
+                    taken[name].append(night_s(plant, folder, *how))
+    local, remote = (float(np.median(x)) for x in taken.values())
+    rows = "\n".join(
+        f"| {name} | {np.median(x):.1f} | {min(x):.1f} | {max(x):.1f} |" for name, x in taken.items()
+    )
+    head = "| how | median s | least | most |\n|---|--:|--:|--:|"
+    text = f"{head}\n{rows}\n\nOver the processes: {remote / local - 1:+.0%}."
+    print(text)
+    command = f"`python -m benchmarks.cluster --loops {loops}`"
+    OUT.write_text(f"# A night on a cluster\n\n{command}, two cores\n\n{text}\n")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,128 @@
+"""What the plant-wide pass costs as a plant grows: python -m benchmarks.groups [--loops 1000 3000 10000]
+
+Waves as a night of 24 h leaves them: of every loop one to five, of three in ten an oscillation, a third of those in
+groups of 2 to 40 loops that share one, periods from 20 s to 50 min. Time on one core over that of the floor, which is
+reading the waves' table and an rfft of its lines; memory at its peak. Each size runs in a process of its own.
+Writes groups.md here.
+"""
+
+from __future__ import annotations
+
+import argparse
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as pq
+
+from analyzer.config import PlantLimits
+from analyzer.loop.decisions import Cause
+from analyzer.plantwide.source import Peer
+from analyzer.plantwide.table import waves_in, waves_table
+from analyzer.plantwide.verdict import trace
+from analyzer.plantwide.wave import BESIDE, REACH, Wave
+
+OUT = Path(__file__).with_suffix(".md")
+DAY_S = 86_400.0
+PERIODS = (20.0, 3000.0)
+PART = 2**16
+"""Lines of one transform of the floor."""
+GROUPED = 0.1
+"""Share of loops in groups."""
+
+
+def shape(rng: np.random.Generator, period: float) -> tuple[int, np.ndarray, np.ndarray]:
+    """First line, noise and a wave of its own about a period, shape (m,) each."""
+    line = DAY_S / period
+    first = max(int(line / REACH) - BESIDE, 0)
+    at = np.arange(first, int(line * REACH) + BESIDE)
+    noise = 0.05 * (rng.standard_normal(at.size) + 1j * rng.standard_normal(at.size))
+    width = max(0.01 * line, 1.0)
+    own = rng.standard_normal(at.size) + 1j * rng.standard_normal(at.size)
+    return first, noise, own * np.exp(-0.5 * ((at - line) / width) ** 2)
+
+
+def wave(rng: np.random.Generator, loop: str, period: float, shared: np.ndarray | None, own: bool) -> Wave:
+    """One wave of a loop: noise, and a wave that it shares or has to itself."""
+    first, noise, mine = shape(rng, period)
+    lines = noise + (shared if shared is not None else mine if own else 0.0)
+    clear = 60.0 if own else 2.0
+    return Wave(loop, period, 1, own, 0.0, DAY_S, first, clear, 0.5, 0.1, lines.astype(np.complex64))
+
+
+def plant(loops: int, seed: int = 1) -> list[Wave]:
+    """Waves of a plant."""
+    rng = np.random.default_rng(seed)
+    out: list[Wave] = []
+    at = 0
+    while at < loops:
+        size = int(rng.integers(2, 41)) if rng.random() < GROUPED / 10 else 1
+        size = min(size, loops - at)
+        period = float(np.exp(rng.uniform(*np.log(PERIODS))))
+        shared = shape(rng, period)[2] if size > 1 else None
+        for k in range(at, at + size):
+            out.append(wave(rng, f"L{k:06d}", period, shared, size > 1 or rng.random() < 0.22))
+            for _ in range(int(rng.integers(0, 5))):
+                out.append(wave(rng, f"L{k:06d}", float(np.exp(rng.uniform(*np.log(PERIODS)))), None, False))
+        at += size
+    return out
+
+
+def peak_mb() -> float:
+    """Largest memory of this process since it began [MB]; the resource module would count its parent's as well."""
+    kept = Path("/proc/self/status").read_text().split("VmHWM:")[1]
+    return float(kept.split()[0]) / 1024
+
+
+def measured(path: Path) -> tuple[float, float, float, int, int]:
+    """Time of the floor and of the pass [s], peak memory [MB], waves, groups of a table of waves."""
+    trace(plant(20), {}, PlantLimits())  # compiles, or loads what was compiled
+    begun = time.perf_counter()
+    table = pq.read_table(path)
+    lines = table.column("real").combine_chunks().flatten().to_numpy()
+    for part in range(0, lines.size - PART + 1, PART):
+        np.fft.rfft(lines[part : part + PART])
+    floor = time.perf_counter() - begun
+    count, names = table.num_rows, set(table.column("loop").to_pylist())
+    del table, lines
+    begun = time.perf_counter()
+    found = trace(waves_in(pq.read_table(path)), {name: Peer(Cause.LOAD) for name in names}, PlantLimits())
+    took = time.perf_counter() - begun
+    return floor, took, peak_mb(), count, len(found)
+
+
+def row(loops: int, folder: Path) -> str:
+    """One size: made here, measured in a process of its own."""
+    path = folder / f"{loops}.parquet"
+    pq.write_table(waves_table(plant(loops)), path, compression="zstd")
+    command = [sys.executable, "-m", "benchmarks.groups", "--alone", str(path)]
+    said = subprocess.run(command, capture_output=True, text=True, check=True).stdout.split()
+    floor, took, memory = map(float, said[:3])
+    return (
+        f"| {loops} | {said[3]} | {said[4]} | {floor:.2f} | {took:.1f} | {took / floor:.1f} | {memory:.0f} |"
+    )
+
+
+def main() -> None:
+    """Measure sizes and write."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("--loops", type=int, nargs="+", default=[1000, 3000, 10_000])
+    parser.add_argument("--alone", type=Path, help=argparse.SUPPRESS)
+    options = parser.parse_args()
+    if options.alone:
+        print(*measured(options.alone))
+        return
+    lines = ["| loops | waves | groups | floor [s] | pass [s] | over floor | memory [MB] |", "|" + "--:|" * 7]
+    with tempfile.TemporaryDirectory() as folder:
+        for loops in options.loops:
+            lines.append(row(loops, Path(folder)))
+            print(lines[-1], flush=True)
+    text = "`python -m benchmarks.groups`, one core, both within one run of the same machine."
+    OUT.write_text(f"# What the plant-wide pass costs\n\n{text}\n\n" + "\n".join(lines) + "\n")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,1 @@
+"""Proofs that are commands of their own; a fixed share of each runs as a test."""

@@ -1,0 +1,91 @@
+"""Whether `run` and `explain` name one valve fault: python -m proofs.agreement FOLDER ... [--jobs 2]
+
+Folders of recordings as ../shared/recordings has them (an export a recording, loops.csv). Both commands are asked
+about each recording as a whole. Counted are the recordings on which either names play or stick-slip: on how many both
+name the same, on how many the other names another fault of the valve, on how many it names none. Writes
+proofs/agreement.md.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections import Counter
+from functools import partial
+from multiprocessing import Pool
+from pathlib import Path
+
+from analyzer import api
+from analyzer.loop.decisions import Cause
+from analyzer.night.plant import PlantLoop
+from identification.errors import NotAssessedError
+
+OUT = Path(__file__).with_suffix(".md")
+FAULTS = ("stiction", "backlash")
+Row = tuple[str, str, str]
+"""Recording, what run names, what explain names."""
+
+
+def named_by_run(loop: PlantLoop) -> str:
+    """The valve's fault, or else the cause, as `run` has it."""
+    try:
+        verdict = api.assess(loop).verdict
+    except NotAssessedError:
+        return "abstained"
+    return str(verdict.fault if verdict.cause is Cause.VALVE else verdict.cause)
+
+
+def named_by_explain(loop: PlantLoop) -> str:
+    """The verdict of `explain`."""
+    try:
+        return str(api.explain(loop).said.verdict)
+    except NotAssessedError:
+        return "abstained"
+
+
+def asked(path: Path, loops: Path) -> Row:
+    """Both answers on one recording."""
+    loop = api.read(path, loops=loops).loop(path.stem)
+    return path.stem, named_by_run(loop), named_by_explain(loop)
+
+
+def table(sets: dict[str, list[Row]]) -> str:
+    """Counts of each folder, and the recordings on which the two differ."""
+    lines = [
+        "| recordings | either names a valve fault | the same | another | named by run alone | by explain alone |",
+        "|---|---|---|---|---|---|",
+    ]
+    apart: list[Row] = []
+    for name, rows in sets.items():
+        either = [r for r in rows if r[1] in FAULTS or r[2] in FAULTS]
+        kinds: Counter[str] = Counter()
+        for r in either:
+            both = r[1] in FAULTS and r[2] in FAULTS
+            kinds[
+                "same" if r[1] == r[2] else "other" if both else "run" if r[1] in FAULTS else "explain"
+            ] += 1
+        counts = (len(either), kinds["same"], kinds["other"], kinds["run"], kinds["explain"])
+        lines.append(f"| {name} ({len(rows)}) | " + " | ".join(str(c) for c in counts) + " |")
+        apart += [r for r in either if r[1] != r[2]]
+    lines += ["", *(f"- {name}: run {by_run}, explain {by_explain}" for name, by_run, by_explain in apart)]
+    return "\n".join(lines)
+
+
+def main() -> None:
+    """Ask both about all recordings and write the table beside this file."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("folders", nargs="+", type=Path)
+    parser.add_argument("--jobs", type=int, default=2)
+    options = parser.parse_args()
+    sets = {}
+    with Pool(options.jobs) as pool:
+        for folder in options.folders:
+            ask = partial(asked, loops=folder / "loops.csv")
+            sets[folder.name] = pool.map(ask, sorted(folder.glob("*.parquet")), chunksize=1)
+    text = table(sets)
+    words = " ".join(f"../shared/recordings/{f.name}" for f in options.folders)
+    OUT.write_text(f"# What run and explain name\n\n`python -m proofs.agreement {words}`\n\n{text}\n")
+    print(text)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,121 @@
+#!/usr/bin/env python3
+"""Do the intervals of an effect's parameters hold the truth? The right effect fitted to sealed cases, no other tried.
+
+intervals.py OUT.md --each 12 --seed 71 [--keep FILE]: that many cases of every effect with parameters to compare, at
+plain, masked and concealed strength in turn, made by the sealed generator and fitted with the right effect alone.
+"""
+
+import argparse
+import os
+import pathlib
+import pickle
+import sys
+import tempfile
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2]))
+
+import numpy as np
+import pandas as pd
+
+from analyzer.commands.options import opened
+from analyzer.config import Config
+from analyzer.explain.case import case
+from analyzer.loops.spec import spec_of
+from identification.estimation.prediction_error import descend
+from identification.mismatch.answer import parameters_of
+from identification.mismatch.catalogue import CANDIDATES
+from identification.mismatch.diagnosis import inputs_of, without_spikes
+from identification.mismatch.forward_selection import compete, integrating_or_first_order, prepared
+from identification.mismatch.starts.screening import candidate_inputs
+from proofs.concealed.effects import NAMES
+from proofs.concealed.make import read_residuals, seal
+from proofs.concealed.plan import Case
+from proofs.concealed.proof import share, table
+from proofs.concealed.score import KIN, SHARED, kin, parameters
+
+LEVELS = ("plain", "masked", "concealed")
+
+
+def compared_names() -> list[str]:
+    """Effects whose parameters truth and answer share, and that are fitted."""
+    fitted = {v.name for v in CANDIDATES if v.params}
+    return [e.name for e in NAMES if any(kin(e.name, f, KIN) for f in fitted)]
+
+
+def fitted(cases: pathlib.Path, tag: str, effect: str):
+    """Problem and fit of the right effect on one sealed case."""
+    source, specs, _ = opened((cases / f"{tag}-fit.parquet",), cases / "loops.csv")
+    spec = spec_of(specs, tag)
+    s = case(spec, specs, source.read(list(spec.tags) + [t for o in specs for t in o.tags]), Config()).subject
+    inputs = inputs_of(s)
+    begun = prepared(inputs, s.pv - inputs.level, without_spikes(s.pv, s.usable))
+    p, plain = integrating_or_first_order(*begun, s.kind)
+    x = candidate_inputs(p, plain, s.circumstances)
+    rows = tuple(v for v in CANDIDATES if kin(v.name, effect, KIN))
+    best = compete(x, plain, rows)[0]
+    return x.p, descend(x.p, best.fit.model, x.p.limits.search.full_steps)
+
+
+def said(p, fit) -> dict:
+    """The answer's parameters as the scorer reads them."""
+    row = fit.model.added[-1]
+    found = parameters_of(p, fit, row)
+    shown = {k: {"value": e.value, "low": e.low, "high": e.high} for k, e in found.items()}
+    return {"effects": [{"name": row.name, "parameters": shown}]}
+
+
+def kept(each: int, seed: int) -> list:
+    """(truth, problem, fit) of every case that could be sealed and fitted."""
+    out, rng = [], np.random.default_rng(seed)
+    with tempfile.TemporaryDirectory() as folder:
+        place = pathlib.Path(folder)
+        library = read_residuals(None)
+        for name in compared_names():
+            for i in range(each):
+                todo = Case("L0", ((name, LEVELS[i % len(LEVELS)]),), "", int(rng.integers(2**31)))
+                try:
+                    rows, tag, truth = seal(place, library, todo)
+                    pd.DataFrame(rows).to_csv(place / "loops.csv", index=False)
+                    if not set(truth["hidden"]) & set(SHARED) and "T_up" not in truth["hidden"]:
+                        break
+                    out.append((truth, *fitted(place, tag, name)))
+                except (RuntimeError, ValueError, IndexError) as error:
+                    print(f"{name}: {error}", file=sys.stderr)
+            print(f"\r{name}: {len(out)} cases", end="", file=sys.stderr, flush=True)
+    return out
+
+
+def report(cases: list) -> str:
+    """The table: how many intervals hold the truth, by parameter."""
+    rows = pd.DataFrame([r for truth, p, fit in cases for r in parameters(truth, said(p, fit))])
+    lines = [
+        [effect, name, len(g), f"{100 * g.error.abs().median():.0f} %", share(g.inside.astype(bool))]
+        for (effect, name), g in rows.groupby(["effect", "parameter"])
+    ]
+    lines.append(
+        ["all", "", len(rows), f"{100 * rows.error.abs().median():.0f} %", share(rows.inside.astype(bool))]
+    )
+    return table(["effect", "parameter", "cases", "median error", "truth within interval"], lines)
+
+
+def main() -> None:
+    ap = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    ap.add_argument("out", type=pathlib.Path)
+    ap.add_argument("--each", type=int, default=12)
+    ap.add_argument("--seed", type=int, default=71)
+    ap.add_argument("--keep", type=pathlib.Path, help="keep the fits here, to try other intervals on them")
+    a = ap.parse_args()
+    cases = kept(a.each, a.seed)
+    if a.keep:
+        a.keep.write_bytes(pickle.dumps(cases))
+    head = (
+        "# Do the intervals of effects hold the truth?\n\n"
+        f"`python proofs/concealed/intervals.py OUT.md --each {a.each} --seed {a.seed}`; intervals are of 90 %.\n\n"
+    )
+    a.out.write_text(head + report(cases) + "\n")
+    print("\n" + report(cases))
+
+
+if __name__ == "__main__":
+    main()

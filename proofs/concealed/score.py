@@ -1,0 +1,185 @@
+#!/usr/bin/env python3
+"""Compares answers with truths: right names, blocks, false alarms, recovered misfit, parameters.
+
+score.py CASES OUT [--out PROOF.md]
+"""
+
+import argparse
+import json
+import pathlib
+import sys
+
+import numpy as np
+import pandas as pd
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2]))
+
+TWINS = [{"valve-characteristic", "nonlinear-gain"}]  # one mark when OP alone moves PV
+KIN = [*TWINS, {"sensor-lag", "second-lag"}, {"stiction", "positioner"}]
+ABSTAINED = {"none", "unexplained"}
+SHARED = {  # parameter of the truth: the name that an answer gives it
+    "backlash": "backlash_pct",
+    "stick_S": "stickband_pct",
+    "stick_J": "slip_jump_pct",
+    "rate": "rate_pct_per_s",
+    "vmax": "limit_pct",
+    "bend": "curve",
+    "positioner_lag": "positioner_lag_s",
+    "deadband": "deadband_pct",
+    "split_at": "split_pct",
+    "split_ratio": "gain_ratio",
+    "T2": "second_lag_s",
+    "lag": "second_lag_s",
+    "slow_share": "slow_share",
+    "slow_T": "slow_time_constant_s",
+    "ratio_down_up": "ratio_down_up",
+    "gain_slope": "gain_slope",
+    "root": "root",
+    "cap": "cap_pct",
+    "flow_delay": "flow_share",
+    "gain_drift": "gain_drift",
+    "quant": "step_pct",
+    "pv_clip": "clip_pct",
+    "pv_late_by_s": "shift_s",
+    "Kp": "kp",
+    "Ti": "ti_s",
+    "gap": "gap_pct",
+    "period": "period_s",
+    "coupling_gain": "coupling_gain",
+}
+SAID_AS = {"sensor-lag": "second-lag"}  # named alike, since OP and PV cannot tell them apart
+
+
+def said_of(out: pathlib.Path, tag: str) -> dict:
+    """The answer as given; without one the verdict is `no answer`."""
+    try:
+        said = json.loads((out / f"{tag}.json").read_text())
+        return said if isinstance(said, dict) and "verdict" in said else {"verdict": "no answer"}
+    except (OSError, ValueError):
+        return {"verdict": "no answer"}
+
+
+def recovered(cases: pathlib.Path, out: pathlib.Path, tag: str, truth: dict) -> float:
+    """Share of the recoverable misfit power that the answer recovers on the later recording; or NaN."""
+    plain, floor = truth.get("later_plain", 0.0) ** 2, truth.get("later_true", 1.0) ** 2
+    if plain < 1.1 * floor:
+        return np.nan
+    try:
+        pv = pd.read_parquet(cases / f"{tag}-later.parquet")[f"{tag}.PV"].to_numpy(float)
+        left = float(np.var(pv - pd.read_parquet(out / f"{tag}.sim.parquet")["PV"].to_numpy(float)))
+    except (OSError, KeyError, ValueError):
+        return 0.0
+    return float(np.clip((plain - left) / (plain - floor), -1.0, 1.2)) if np.isfinite(left) else 0.0
+
+
+def kin(a: str, b: str, groups: list[set[str]]) -> bool:
+    """Whether two names are the same or belong to one group."""
+    return a == b or any({a, b} <= g for g in groups)
+
+
+def right_name(truth: dict, said: dict) -> tuple[bool, bool]:
+    """Right strictly, and right when kin and named alternatives count too."""
+    due = truth.get("pair", [truth["effect"]])
+    if truth.get("outside"):
+        return said["verdict"] == "unexplained", said["verdict"] in ABSTAINED
+    strict = any(kin(said["verdict"], d, TWINS) for d in due)
+    others = [a for e in said.get("effects", [])[:1] for a in e.get("alternatives", [])]
+    return strict, strict or any(kin(said["verdict"], d, KIN) or d in others for d in due)
+
+
+def parameters(truth: dict, said: dict) -> list[dict]:
+    """Parameters that truth and answer share: relative error, and whether the interval holds the truth."""
+    found = []
+    given = {
+        k: v
+        for e in said.get("effects", [])
+        if e["name"] in (truth["effect"], SAID_AS.get(truth["effect"]))
+        for k, v in e["parameters"].items()
+    }
+    hidden = dict(truth.get("hidden", {}))
+    if "T_up" in hidden:
+        hidden["ratio_down_up"] = hidden["T_down"] / hidden["T_up"]
+    for key, true in hidden.items():
+        hit = given.get(SHARED.get(key, ""))
+        if hit is None or not true or hit.get("value") is None:
+            continue
+        low, high = hit.get("low"), hit.get("high")
+        inside = low <= true <= high if low is not None and high is not None else None
+        row = {"effect": truth["effect"], "parameter": key, "true": true, "found": hit["value"]}
+        found.append(row | {"error": hit["value"] / true - 1.0, "inside": inside})
+    return found
+
+
+def plain_errors(out: pathlib.Path, tag: str, truth: dict) -> dict[str, float]:
+    """Relative errors of the plain loop's gain, time constant and dead time in the saved model."""
+    try:
+        found = json.loads((out / f"{tag}.model.json").read_text())["constants"]
+        return {f"{k}_error": found.get(k, 0.0) / truth["base"][k] - 1.0 for k in "KTL"}
+    except (OSError, ValueError, KeyError, AttributeError):
+        return {}
+
+
+def judge(cases: pathlib.Path, out: pathlib.Path) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """One row a case, and one row a shared parameter."""
+    rows, params = [], []
+    for tag, truth in json.loads((cases / "truth.json").read_text()).items():
+        said = said_of(out, tag)
+        strict, lenient = right_name(truth, said)
+        keep = {k: truth.get(k) for k in ("effect", "level", "kind", "oddity", "energy", "strength")}
+        names = {e["name"] for e in said.get("effects", [])}
+        rows.append(
+            keep
+            | {"loop": tag, "verdict": said["verdict"], "strict": strict, "lenient": lenient}
+            | {"block": said.get("block") == truth["block"], "group": group_of(truth)}
+            | {"both": names >= set(truth.get("pair", [])), "recovered": recovered(cases, out, tag, truth)}
+            | {"seconds": seconds_of(out, tag)}
+            | plain_errors(out, tag, truth)
+        )
+        params += [{"loop": tag, "level": truth["level"]} | p for p in parameters(truth, said)]
+    return pd.DataFrame(rows), pd.DataFrame(params)
+
+
+def group_of(truth: dict) -> str:
+    """Which share of the set a case belongs to."""
+    if truth["effect"] == "none":
+        return "none"
+    if truth.get("outside"):
+        return "outside"
+    if "pair" in truth:
+        return "pair"
+    return "information" if "energy" in truth else "size"
+
+
+def seconds_of(out: pathlib.Path, tag: str) -> float:
+    """Time that the explanation took [s]."""
+    try:
+        return float(json.loads((out / f"{tag}.log.json").read_text())["explain"]["seconds"])
+    except (OSError, ValueError, KeyError):
+        return float("nan")
+
+
+def report(cases: pathlib.Path, out: pathlib.Path, proof: pathlib.Path | None) -> str:
+    """Text of the results; written with its picture when `proof` names a file."""
+    from proofs.concealed.proof import draw, place, section
+
+    rows, params = judge(cases, out)
+    if proof is None:
+        return section(rows, params, None)
+    picture = proof.with_name(f"{proof.stem.lower()}-concealed.png")
+    draw(rows, picture)
+    text = section(rows, params, picture.name)
+    place(proof, text)
+    return text
+
+
+def main() -> None:
+    ap = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    ap.add_argument("cases", type=pathlib.Path)
+    ap.add_argument("answers", type=pathlib.Path)
+    ap.add_argument("--out", type=pathlib.Path, help="file that takes the results' section, e.g. PROOF.md")
+    a = ap.parse_args()
+    print(report(a.cases, a.answers, a.out))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,145 @@
+"""How exports of other makes are read: python -m proofs.dialects.score [CASE...]
+
+The exports of `make.py`, written by a hand that did not know the readers, are read and compared with their truths
+sample by sample. Without CASE it writes score.md here.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import tempfile
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from analyzer.history.export import open_export
+from analyzer.history.options import ReadOptions
+from analyzer.history.series import Series
+from identification.errors import TriageError
+from proofs.dialects.make import main as make
+
+OUT = Path(__file__).with_suffix(".md")
+CLOSE_S = 0.03
+"""Stamps this close are one [s]: serials of days have no more digits."""
+WARNS = ("state ", "in autumn", "in spring", "out of order", "no date", "since the start", "repeat a stamp")
+"""Words of notes that tell a reader that something could not be known."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of a case: right, wrong or refused; what was wrong, or the refusal; whether it was warned of."""
+
+    case: str
+    family: str
+    kind: str
+    said: str
+    detail: str = ""
+    warned: bool = False
+
+
+def differences(series: Series, want: Mapping[str, Any], uncertain: list[int]) -> str:
+    """What is wrong about the good samples of a tag; '' where nothing is."""
+    t = np.array(want["t"], float)
+    v = np.array([np.nan if x is None else x for x in want["v"]], float)
+    kept = ~series.bad & np.isfinite(series.value)
+    stamp, value = series.stamp_s[kept], series.value[kept]
+    if stamp.size == 0:
+        return f"none of {np.isfinite(v).sum()} good samples" if np.isfinite(v).any() else ""
+    near = np.clip(np.searchsorted(stamp, t - CLOSE_S), 0, stamp.size - 1)
+    there = np.abs(stamp[near] - t) < CLOSE_S
+    good = np.isfinite(v)
+    missing = int((good & ~there).sum())
+    other = int((good & there & (np.abs(value[near] - v) > 1e-6 * np.maximum(1.0, np.abs(v)))).sum())
+    doubtful = np.zeros(t.size, bool)
+    doubtful[uncertain] = True
+    bad = int((~good & there & ~doubtful).sum())
+    ordered = np.sort(t)
+    place = np.clip(np.searchsorted(ordered, stamp - CLOSE_S), 0, t.size - 1)
+    extra = int((np.abs(ordered[place] - stamp) > 2 * CLOSE_S).sum())
+    told = {"missing": missing, "of another value": other, "bad read as good": bad, "too many": extra}
+    return ", ".join(f"{n} {what}" for what, n in told.items() if n)
+
+
+def name_of(tag: str, aliases: list[str], held: tuple[str, ...]) -> str | None:
+    """The tag, or a fair other name of it, as the reader has it."""
+    folded = {name.casefold(): name for name in held}
+    return next((folded[n.casefold()] for n in (tag, *aliases) if n.casefold() in folded), None)
+
+
+def outcome(case: Mapping[str, Any], folder: Path) -> Outcome:
+    """Read one case and compare it."""
+    head = case["case"], case["family"], case["kind"]
+    try:
+        options = ReadOptions(**case["options"], scratch=folder)
+        export = open_export([folder / p for p in case["paths"]], options)
+        names = {t: name_of(t, case.get("aliases", {}).get(t, []), export.tags) for t in case["tags"]}
+        held = [n for n in names.values() if n is not None]
+        series = export.read(held) if held else {}
+        notes = " / ".join(export.notes)
+    except TriageError as error:
+        return Outcome(*head, "refused", str(error))
+    wrong = [f"no tag {tag}" for tag, name in names.items() if name is None]
+    for tag, name in names.items():
+        if name is not None:
+            found = differences(series[name], case["tags"][tag], case.get("uncertain", {}).get(tag, []))
+            wrong += [f"{tag}: {found}"] if found else []
+    warned = any(word in notes for word in WARNS)
+    return Outcome(*head, "wrong" if wrong else "right", "; ".join(wrong), warned)
+
+
+def outcomes(folder: Path, only: list[str] | None = None) -> list[Outcome]:
+    """All cases, or some of them, made in a folder and read."""
+    make(folder)
+    cases = json.loads((folder / "truth.json").read_text(encoding="utf-8"))
+    return [outcome(case, folder) for case in cases if not only or case["case"] in only]
+
+
+def table(found: list[Outcome]) -> str:
+    """Counts by family as Markdown, and what is not right."""
+    lines = ["| family | exports | right | refused | wrong |", "|---|--:|--:|--:|--:|"]
+    plain = [o for o in found if o.kind == "plain"]
+    for family in sorted({o.family for o in plain}):
+        said = Counter(o.said for o in plain if o.family == family)
+        lines.append(f"| {family} | {said.total()} | {said['right']} | {said['refused']} | {said['wrong']} |")
+    said = Counter(o.said for o in plain)
+    lines.append(f"| all | {len(plain)} | {said['right']} | {said['refused']} | {said['wrong']} |")
+    lines += ["", "Refused or wrong though they can be read:", ""]
+    lines += [f"- {o.case}: {o.said}. {o.detail.rsplit('/', 1)[-1]}" for o in plain if o.said != "right"]
+    refuse = [o for o in found if o.kind == "refuse"]
+    lines += ["", f"To be refused: {sum(o.said == 'refused' for o in refuse)} of {len(refuse)} are."]
+    lines += ["", "What nobody can know from the file (right, or told):", ""]
+    for o in found:
+        if o.kind == "unknowable":
+            told = "right" if o.said == "right" else "refused" if o.said == "refused" else "read as it can be"
+            lines.append(
+                f"- {o.case}: {told}, {'with' if o.warned else 'without'} a word on what is not known"
+            )
+    return "\n".join(lines)
+
+
+def main() -> None:
+    """Print the table and write it beside this file."""
+    only = sys.argv[1:]
+    with tempfile.TemporaryDirectory() as folder:
+        found = outcomes(Path(folder), only)
+    if only:
+        for o in found:
+            print(o)
+        return
+    text = table(found)
+    print(text)
+    about = (
+        "Exports in the manner of products, by a hand that did not know the readers, against their truths."
+    )
+    OUT.write_text(
+        f"# Exports of other makes\n\n`python -m proofs.dialects.score`\n\n{about}\n\n{text}\n", "utf-8"
+    )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,134 @@
+"""What `explain` tells of untidy loops: python -m proofs.explained [FOLDER ...] [--loops 150] [--seed 9]
+
+Folders as ../shared/wild has them (an export a loop, loops.csv, truth.json), and loops of proofs/untidy of a seed
+that set no threshold. A loop shows its cause, and shows it clearly, as in untidy_loops.py. Counted are clear loops
+with a worn valve of which a play or stick-slip is told, healthy loops given an effect of valve or process, and
+loops with another cause given an effect of the valve. Writes proofs/explained.md.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import subprocess
+import sys
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Mapping
+from multiprocessing import Pool
+from pathlib import Path
+from typing import Any
+
+from analyzer import api
+from identification.errors import NotAssessedError
+
+OUT = Path(__file__).with_suffix(".md")
+WORN = ("stiction", "backlash")
+Row = tuple[str, str, frozenset[str], float]
+"""True cause, verdict, blocks of the effects told, seconds."""
+
+
+def shows(t: Mapping[str, Any]) -> bool:
+    """Whether the cause shows in the recorded error; True of a healthy loop."""
+    plain = t["swell"] >= 1.5 and t["steady"] >= 0.75 and t["rhythm"] >= 0.15
+    return t["cause"] == "healthy" or (plain and t["cycles"] >= 5 and t["samples_a_cycle"] >= 4)
+
+
+def clear(t: Mapping[str, Any]) -> bool:
+    """Whether it shows so plainly that it should be told."""
+    return shows(t) and t["swell"] >= 2 and t["samples_a_cycle"] >= 8 and not t["packed"]
+
+
+def asked(task: tuple[Path, str, str, bool]) -> Row:
+    """One loop explained; that a process integrates is no fault of one that does."""
+    folder, name, cause, integrating = task
+    begun = time.process_time()
+    try:
+        loop = api.read(folder / f"{name}.parquet", loops=folder / "loops.csv").loop(name)
+        said = api.explain(loop).said
+    except NotAssessedError:
+        return cause, "abstained", frozenset(), time.process_time() - begun
+    told = () if said.verdict in ("unexplained", "none") else said.effects
+    blocks = frozenset(e.block for e in told if not (integrating and e.name == "integrator"))
+    return cause, said.verdict, blocks, time.process_time() - begun
+
+
+def line(name: str, rows: list[Row]) -> str:
+    """A set's counts as a row of the table."""
+    worn = [r for r in rows if r[0] in WORN]
+    well = [r for r in rows if r[0] == "healthy"]
+    other = [r for r in rows if r[0] not in (*WORN, "healthy")]
+    named = sum(r[1] in WORN for r in worn)
+    kind = sum(r[1] == r[0] for r in worn)
+    wronged = sum(bool(r[2] & {"valve", "process"}) for r in well)
+    blamed = sum("valve" in r[2] for r in other)
+    most = max(r[3] for r in rows)
+    cells = [
+        name,
+        f"{named} of {len(worn)}",
+        kind,
+        f"{wronged} of {len(well)}",
+        f"{blamed} of {len(other)}",
+        f"{most:.0f}",
+    ]
+    return "| " + " | ".join(str(c) for c in cells) + " |"
+
+
+def called(name: str, rows: list[Row]) -> str:
+    """What the worn valves of a set were called, as a sentence."""
+    counts = Counter(r[1] for r in rows if r[0] in WORN)
+    return f"{name}: " + ", ".join(f"{verdict} {count}" for verdict, count in counts.most_common()) + "."
+
+
+def judged(folder: Path, jobs: int) -> list[Row]:
+    """All loops of a folder that are healthy or show their cause clearly."""
+    truth = json.loads((folder / "truth.json").read_text())
+    tasks = [
+        (folder, n, t["cause"], bool(t["plant"].get("integrating")))
+        for n, t in truth.items()
+        if (shows(t) if t["cause"] == "healthy" else clear(t))
+    ]
+    with Pool(jobs) as pool:
+        return pool.map(asked, tasks, chunksize=1)
+
+
+def main() -> None:
+    """Explain all loops and write the tables beside this file."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("folders", nargs="*", type=Path)
+    parser.add_argument("--loops", type=int, default=150)
+    parser.add_argument("--seed", type=int, default=9)
+    parser.add_argument("--jobs", type=int, default=2)
+    options = parser.parse_args()
+    sets = {f"{f.parent.name}/{f.name}": judged(f, options.jobs) for f in options.folders}
+    with tempfile.TemporaryDirectory() as own:
+        draw = [
+            sys.executable,
+            "-m",
+            "proofs.untidy",
+            own,
+            "--loops",
+            str(options.loops),
+            "--seed",
+            str(options.seed),
+        ]
+        subprocess.run(draw, check=True)
+        sets[f"own, seed {options.seed}"] = judged(Path(own), options.jobs)
+    lines = [
+        "| loops | worn valve told | its kind right | healthy given valve or process | valve given to another cause "
+        "| longest, s of processor |",
+        "|---|---|---|---|---|---|",
+        *(line(name, rows) for name, rows in sets.items()),
+        "",
+        *(called(name, rows) for name, rows in sets.items()),
+    ]
+    text = "\n".join(lines)
+    words = " ".join(f"../shared/wild/{f.name}" for f in options.folders)
+    command = f"python -m proofs.explained {words} --loops {options.loops} --seed {options.seed}"
+    OUT.write_text(f"# Untidy loops explained\n\n`{command}`\n\n{text}\n")
+    print(text)
+
+
+if __name__ == "__main__":
+    main()

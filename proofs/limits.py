@@ -1,0 +1,138 @@
+"""What each number that decides something does when it is moved by a fifth: python -m proofs.limits [--jobs 2]
+
+Every limit of `triage config` is moved down and up by 20 % (whole numbers by one at least, the ends of its range
+kept), and the stage that it belongs to is asked again: quality, oscillation and figures of 240 untidy loops
+(proofs/untidy), oscillation of 900 records without any (nulls.py) too, the causes of those that can be fitted,
+settings of 60 that are stated wrong by half, advice on 30 simulated loops, groups of coupled plants (proofs/coupled),
+comparisons of weeks, recorder, controller and effects of sealed cases (proofs/concealed). A limit that no answer
+notices is set to both ends of its range, which switches most of them off: what an answer notices then is a guard that
+stands well clear of the sample; what none notices even so is listed apart.
+Sections of resources and of how nights are cut (workers, opening, nights) decide no finding and are left
+out. Writes proofs/limits.md.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+from functools import cache
+from multiprocessing import Pool
+from pathlib import Path
+from typing import Any
+
+from identification.limits import KEY, Limit
+from proofs.limits_samples import DEFAULT, OF_FITS
+from proofs.limits_stages import STAGES
+
+OUT = Path(__file__).with_suffix(".md")
+STEP = 0.2
+
+
+def moved(value: float, said: Limit, way: float) -> float:
+    """A limit moved by a fifth within its range; whole numbers by one at least."""
+    new = value * (1.0 + way * STEP)
+    if isinstance(value, int):
+        new = value + (max(round(abs(new - value)), 1) if way > 0 else -max(round(abs(new - value)), 1))
+    kept = min(max(new, said.least), said.most)
+    return int(kept) if isinstance(value, int) else kept
+
+
+@dataclass(frozen=True)
+class Effect:
+    """A limit with how many answers change when it is lowered and raised; None where its range ends there.
+
+    at_ends : how many do at the end of its range where most do; None where a fifth of it is noticed already.
+    """
+
+    section: str
+    name: str
+    value: float
+    lower: int | None
+    higher: int | None
+    answers: int
+    at_ends: int | None = None
+
+    @property
+    def noticed(self) -> bool:
+        """Whether any answer changes."""
+        return bool(self.lower) or bool(self.higher)
+
+
+@cache
+def usual(section: str, by_measures: bool = False) -> list[Any]:
+    """What a stage answers by the defaults; of causes, by what was measured."""
+    return STAGES[section](replace(DEFAULT) if by_measures else DEFAULT)
+
+
+def effect(job: tuple[str, str]) -> Effect:
+    """What moving one limit does."""
+    section, name = job
+    own = getattr(DEFAULT, section)
+    said = next(f.metadata[KEY] for f in fields(own) if f.name == name)
+    value, base = getattr(own, name), usual(section, section == "cause" and name not in OF_FITS)
+
+    def changed(new: float) -> int | None:
+        if new == value:
+            return None
+        asked = STAGES[section](replace(DEFAULT, **{section: replace(own, **{name: new})}))
+        return sum(a != b for a, b in zip(base, asked, strict=False)) + abs(len(base) - len(asked))
+
+    lower, higher = (changed(moved(value, said, way)) for way in (-1.0, 1.0))
+    found = Effect(section, name, value, lower, higher, len(base))
+    if found.noticed:
+        return found
+    ends = [changed(type(value)(end)) for end in (said.least, said.most)]
+    return replace(found, at_ends=max(n or 0 for n in ends))
+
+
+def jobs(sections: Sequence[str]) -> list[tuple[str, str]]:
+    """Every limit that is one number."""
+    found = []
+    for section in sections:
+        for f in fields(getattr(DEFAULT, section)):
+            if KEY in f.metadata and isinstance(getattr(getattr(DEFAULT, section), f.name), int | float):
+                found.append((section, f.name))
+    return found
+
+
+def table(found: Sequence[Effect]) -> str:
+    """Effects as Markdown, those that nothing notices first by name."""
+    clear = [e for e in found if e.at_ends]
+    silent = [f"`{e.section}.{e.name}`" for e in found if e.at_ends == 0]
+    head = (
+        f"{len(found)} limits moved by a fifth; {len(found) - len(clear) - len(silent)} change an answer of this "
+        f"sample, {len(clear)} more do at an end of their range. What none of its answers notices even so: "
+        f"{', '.join(silent) or 'nothing'}."
+    )
+    lines = ["| limit | value | lowered | raised | at an end | of answers |", "|---|--:|--:|--:|--:|--:|"]
+    for e in found:
+        cells = ("–" if n is None else str(n) for n in (e.lower, e.higher, e.at_ends))
+        lines.append(f"| {e.section}.{e.name} | {e.value:g} | {' | '.join(cells)} | {e.answers} |")
+    return "\n".join([head, "", *lines, ""])
+
+
+def main() -> None:
+    """Move every limit, ask, write."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--sections", nargs="+", choices=list(STAGES), default=list(STAGES))
+    parser.add_argument("--out", type=Path, default=OUT)
+    options = parser.parse_args()
+    todo, found = jobs(options.sections), []
+    with Pool(options.jobs) as pool:
+        for e in pool.imap(effect, todo):
+            found.append(e)
+            print(
+                f"\r{len(found)} of {len(todo)} {e.section}.{e.name} {e.lower} {e.higher}      ",
+                end="",
+                flush=True,
+            )
+    text = table(found)
+    asked = "" if options.sections == list(STAGES) else " --sections " + " ".join(options.sections)
+    options.out.write_text(f"# What each limit does\n\n`python -m proofs.limits{asked}`: {text}")
+    print("\n" + text)
+
+
+if __name__ == "__main__":
+    main()

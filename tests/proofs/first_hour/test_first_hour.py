@@ -1,0 +1,32 @@
+"""A new user's mistakes are answered in one line, or by a list that says what the trends can show."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from proofs.first_hour.__main__ import answered
+from proofs.first_hour.cases import LISTED, MISTAKES, Mistake
+
+PAGE = Path(__file__).resolve().parents[3] / "docs" / "first-hour.md"
+
+
+@pytest.mark.parametrize("mistake", MISTAKES, ids=lambda m: m.what)
+def test_each_mistake_is_answered(mistake: Mistake, tmp_path: Path) -> None:
+    """Exit status, sentence and, where a night was written, action and reason are those of the page."""
+    status, said, action, reason = answered(mistake, tmp_path)
+    assert status == mistake.status, said
+    assert mistake.said in said
+    assert "Traceback" not in said
+    if mistake.what in LISTED:
+        wanted, part = LISTED[mistake.what]
+        assert action == wanted
+        assert part in reason
+
+
+def test_the_page_names_them_all() -> None:
+    """docs/first-hour.md has a row for each."""
+    text = PAGE.read_text("utf-8")
+    assert len(MISTAKES) >= 20
+    assert all(f"| {m.what} |" in text for m in MISTAKES)
