@@ -21,9 +21,8 @@ import pyarrow.parquet as pq
 from analyzer.config import PlantLimits
 from analyzer.loop.decisions import Cause
 from analyzer.plantwide.source import Peer
-from analyzer.plantwide.table import waves_in, waves_table
 from analyzer.plantwide.verdict import trace
-from analyzer.plantwide.wave import BESIDE, REACH, Wave
+from analyzer.plantwide.wave import BESIDE, REACH, Wave, waves_in, waves_table
 
 OUT = Path(__file__).with_suffix(".md")
 DAY_S = 86_400.0

@@ -30,7 +30,7 @@ from analyzer.loops.settings_in_force import in_force, settings_from
 from analyzer.loops.spec import LoopSpec
 from analyzer.night.nights import Night, cut
 from analyzer.pages import compared as settings_page
-from analyzer.plantwide.table import waves_table
+from analyzer.plantwide.wave import waves_table
 from analyzer.store.rows import Lost, hour_rows, lost_row, night_row
 from analyzer.store.store import Store, rows_table, write_table
 from analyzer.words import settings as words

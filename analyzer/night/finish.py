@@ -19,7 +19,7 @@ from analyzer.loop.decisions import Status
 from analyzer.night.calmed import REMEMBERED, calmed
 from analyzer.pages.reading import read_nights
 from analyzer.plantwide.night import traced_night
-from analyzer.plantwide.table import waves_in
+from analyzer.plantwide.wave import waves_in
 from analyzer.store.store import Store, rows_table
 
 MEMORY = 30

@@ -8,14 +8,13 @@ groups.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from analyzer.config import PlantLimits
-from analyzer.plantwide.clock import on_one_clock
-from analyzer.plantwide.foresight import foresight
+from analyzer.plantwide.compare import foresight, on_one_clock
 from analyzer.plantwide.wave import Wave
 from identification.record import Floats
 from identification.signals.cross_spectrum import Whole, band, chance_coherence, coherences, drift, tapered
@@ -54,118 +53,108 @@ class Group:
         """Names of its loops."""
         return tuple(m.wave.loop for m in self.members)
 
+    @property
+    def waves(self) -> dict[str, Wave]:
+        """The waves of its loops by name."""
+        return {m.wave.loop: m.wave for m in self.members}
 
-@dataclass(frozen=True, slots=True)
-class _Packed:
-    """Waves of one clock, tapered, one after the other as `coherences` takes them, by rising frequency.
+    def shared(self, other: Group) -> int:
+        """How many loops it has in common with another."""
+        return len(set(self.loops) & set(other.loops))
 
-    loop numbers their loops; own_noise is the inverse of their prominences [-].
-    """
-
-    waves: list[Wave]
-    flat: np.ndarray
-    offset: Whole
-    first: Whole
-    count: Whole
-    log_line: Floats
-    loop: Whole
-    own_noise: Floats
+    def with_lacking(self, more: Iterable[Member]) -> Group:
+        """The group with those of some members whose loops it lacks."""
+        return Group((*self.members, *(m for m in more if m.wave.loop not in self.loops)))
 
 
-def _packed(waves: Sequence[Wave]) -> _Packed:
-    rising = sorted(waves, key=lambda w: w.line)
-    lines = [tapered(w.lines).astype(np.complex64) for w in rising]
-    count = np.array([x.size for x in lines], dtype=np.int64)
-    offset = np.concatenate(([0], np.cumsum(count)[:-1])).astype(np.int64)
-    first = np.array([w.first + 1 for w in rising], dtype=np.int64)
-    log_line = np.log(np.array([w.line for w in rising]))
-    numbers = {name: i for i, name in enumerate(dict.fromkeys(w.loop for w in rising))}
-    loop = np.array([numbers[w.loop] for w in rising], dtype=np.int64)
-    own_noise = 1.0 / np.maximum([w.prominence for w in rising], 1.0)
-    return _Packed(rising, np.concatenate(lines), offset, first, count, log_line, loop, own_noise)
+class _Neighbours:
+    """Waves of one clock by rising frequency, and which of them move with which; each is asked once."""
+
+    def __init__(self, waves: Sequence[Wave], limits: PlantLimits) -> None:
+        self.waves = sorted(waves, key=lambda w: w.line)
+        self._limits = limits
+        lines = [tapered(w.lines).astype(np.complex64) for w in self.waves]
+        count = np.array([x.size for x in lines], dtype=np.int64)
+        offset = np.concatenate(([0], np.cumsum(count)[:-1])).astype(np.int64)
+        first = np.array([w.first + 1 for w in self.waves], dtype=np.int64)
+        self._packed: tuple[np.ndarray, Whole, Whole, Whole] = np.concatenate(lines), offset, first, count
+        self._log_line = np.log(np.array([w.line for w in self.waves]))
+        self._loop = np.array([w.loop for w in self.waves])
+        self._own_noise = 1.0 / np.maximum([w.prominence for w in self.waves], 1.0)
+        self._known: dict[int, dict[int, float]] = {}
+
+    def near(self, line: float, reach: float) -> Whole:
+        """Numbers of the waves whose period differs from that of a line by a logarithm of `reach` at most."""
+        at = math.log(line)
+        return np.arange(*np.searchsorted(self._log_line, (at - reach, at + reach)))
+
+    def moving_with(self, one: int) -> dict[int, float]:
+        """Waves that move with one and their coherences, the most coherent first; one wave a loop."""
+        if one not in self._known:
+            self._known[one] = self._one_a_loop(self._coherent_with(one))
+        return self._known[one]
+
+    def second_ring(self, one: int) -> dict[int, float]:
+        """Waves that move with two of those that move with a leader, though not with the leader itself."""
+        joined = self.moving_with(one)
+        inside = {self._loop[j] for j in (one, *joined)}
+        seen: dict[int, list[float]] = {}
+        for j in list(joined)[:ASKED]:
+            for k, level in self.moving_with(j).items():
+                if self._loop[k] not in inside:
+                    seen.setdefault(k, []).append(level)
+        enough = min(2, len(joined))
+        return self._one_a_loop((k, max(levels)) for k, levels in seen.items() if len(levels) >= enough)
+
+    def _one_a_loop(self, levels: Iterable[tuple[int, float]]) -> dict[int, float]:
+        best: dict[str, tuple[int, float]] = {}
+        for k, level in sorted(levels, key=lambda t: -t[1]):
+            best.setdefault(self.waves[k].loop, (k, level))
+        return dict(best.values())
+
+    def _coherent_with(self, one: int) -> Iterable[tuple[int, float]]:
+        limits, wave = self._limits, self.waves[one]
+        near = self.near(wave.line, limits.same_period)
+        near = near[self._loop[near] != wave.loop]
+        low, high, width = band(wave.line)
+        strict, loose = (
+            max(limits.coherent, chance_coherence(high - low, width, c))
+            for c in (limits.chance, limits.chance_in_step)
+        )
+        found = self._coherences(one, near)
+        own = 1.0 - limits.lost - limits.lost_to_noise * (self._own_noise[one] + self._own_noise[near])
+        near, found = _kept((found >= loose) & (found >= own), near, found)
+        over = found / np.maximum(self._by_chance(one, near), 1e-9)
+        near, found, over = _kept(over >= limits.over_chance, near, found, over)
+        drifts = np.array([self._drift(wave, self.waves[j]) for j in near])
+        sure = (found >= strict) & (drifts <= limits.drift)
+        sure |= (over >= limits.over_chance_in_step) & (drifts <= limits.drift_in_step)
+        return zip(near[sure].tolist(), found[sure].tolist(), strict=True)
+
+    def _coherences(self, one: int, others: Whole, shift: int = 0) -> Floats:
+        span = np.array(band(self.waves[one].line), dtype=np.int64)
+        return np.asarray(coherences(*self._packed, one, others, span, shift))
+
+    def _by_chance(self, one: int, others: Whole) -> Floats:
+        """The largest coherence of shifted lines, which share nothing but the shape of their band, shape (k,)."""
+        if not others.size:
+            return np.zeros(0)
+        low, high, _ = band(self.waves[one].line)
+        far = max((high - low) // 2, 4)
+        shifts = np.unique(np.linspace(3, far, SHIFTS // 2).astype(int))
+        found = [self._coherences(one, others, int(sign * s)) for s in shifts for sign in (-1, 1)]
+        return np.asarray(np.max(found, axis=0))
+
+    @staticmethod
+    def _drift(one: Wave, other: Wave) -> float:
+        """Turns over the record by which the phases of two waves drift apart, about the first one's period."""
+        low, high, _ = band(one.line)
+        x, y = (w.lines[low - w.first : high - w.first] for w in (one, other))
+        return abs(drift(x, y))
 
 
-def _coherent(p: _Packed, one: int, others: Whole, shift: int = 0) -> Floats:
-    span = np.array(band(p.waves[one].line), dtype=np.int64)
-    return np.asarray(coherences(p.flat, p.offset, p.first, p.count, one, others, span, shift))
-
-
-def _by_chance(p: _Packed, one: int, others: Whole) -> Floats:
-    """The largest coherence of shifted lines, which share nothing but the shape of their band, shape (k,)."""
-    low, high, _ = band(p.waves[one].line)
-    far = max((high - low) // 2, 4)
-    shifts = np.unique(np.linspace(3, far, SHIFTS // 2).astype(int))
-    found = [_coherent(p, one, others, int(sign * s)) for s in shifts for sign in (-1, 1)]
-    return np.asarray(np.max(found, axis=0))
-
-
-def _expected(p: _Packed, one: int, others: Whole, limits: PlantLimits) -> Floats:
-    """Coherence that two parts of one wave have at least, shape (k,): surroundings tell what each adds of its own."""
-    return 1.0 - limits.lost - limits.lost_to_noise * (p.own_noise[one] + p.own_noise[others])
-
-
-def _drift(one: Wave, other: Wave) -> float:
-    """Turns over the record by which the phases of two waves drift apart, about the first one's period."""
-    low, high, _ = band(one.line)
-    x, y = (w.lines[low - w.first : high - w.first] for w in (one, other))
-    return abs(drift(x, y))
-
-
-def _joining(p: _Packed, one: int, limits: PlantLimits) -> list[tuple[int, float]]:
-    """Waves that move with one, by falling coherence; one wave a loop."""
-    at = p.log_line[one]
-    ends = np.searchsorted(p.log_line, (at - limits.same_period, at + limits.same_period))
-    near = np.arange(*ends)
-    near = near[p.loop[near] != p.loop[one]]
-    if not near.size:
-        return []
-    found = _coherent(p, one, near)
-    low, high, width = band(p.waves[one].line)
-    strict, loose = (
-        max(limits.coherent, chance_coherence(high - low, width, c))
-        for c in (limits.chance, limits.chance_in_step)
-    )
-    enough = (found >= loose) & (found >= _expected(p, one, near, limits))
-    near, found = near[enough], found[enough]
-    if not near.size:
-        return []
-    over = found / np.maximum(_by_chance(p, one, near), 1e-9)
-    enough = over >= limits.over_chance
-    near, found, over = near[enough], found[enough], over[enough]
-    drifts = np.array([_drift(p.waves[one], p.waves[j]) for j in near])
-    sure = (found >= strict) & (over >= limits.over_chance) & (drifts <= limits.drift)
-    sure |= (over >= limits.over_chance_in_step) & (drifts <= limits.drift_in_step)
-    ranked = sorted(zip(near[sure].tolist(), found[sure].tolist(), strict=True), key=lambda t: -t[1])
-    best: dict[str, tuple[int, float]] = {}
-    for j, level in ranked:
-        best.setdefault(p.waves[j].loop, (j, level))
-    return list(best.values())
-
-
-def _second_ring(
-    p: _Packed, one: int, joined: list[tuple[int, float]], limits: PlantLimits
-) -> list[tuple[int, float]]:
-    """Waves that move with two of those that a leader has joined, though not with the leader itself."""
-    inside = {p.waves[one].loop, *(p.waves[j].loop for j, _ in joined)}
-    seen: dict[int, list[float]] = {}
-    for j, _ in joined[:ASKED]:
-        for k, level in _joining(p, j, limits):
-            if p.waves[k].loop not in inside:
-                seen.setdefault(k, []).append(level)
-    best: dict[str, tuple[int, float]] = {}
-    for k, levels in sorted(seen.items(), key=lambda t: -max(t[1])):
-        if len(levels) >= min(2, len(joined)):
-            best.setdefault(p.waves[k].loop, (k, max(levels)))
-    return list(best.values())
-
-
-def _is_wave(members: Sequence[Wave], limits: PlantLimits) -> bool:
-    """Whether it is an oscillation at all that loops share, and not the load of neighbours: one of them shows it by
-    itself, or several hint at it."""
-    if any(w.own for w in members):
-        return True
-    hints = sum(w.prominence >= limits.hint_prominence for w in members)
-    return hints >= limits.hints
+def _kept(which: np.ndarray, *arrays: np.ndarray) -> list[np.ndarray]:
+    return [x[which] for x in arrays]
 
 
 def groups_of(waves: Sequence[Wave], limits: PlantLimits) -> list[Group]:
@@ -180,23 +169,38 @@ def groups_of(waves: Sequence[Wave], limits: PlantLimits) -> list[Group]:
     known = [w for w in on_one_clock(waves) if w.cycles >= limits.follow_cycles and np.any(w.lines)]
     if not known:
         return []
-    p = _packed(known)
-    leading = [i for i, w in enumerate(p.waves) if w.own or w.prominence >= limits.hint_prominence]
-    order = sorted(leading, key=lambda i: (not p.waves[i].own, -p.waves[i].prominence))
+    beside = _Neighbours(known, limits)
+    merged = (_with_foresight(g, beside, limits) for g in _merged(_led(beside, limits), limits))
+    return sorted(merged, key=lambda g: (-len(g.members), g.loops))
+
+
+def _shows(wave: Wave, limits: PlantLimits) -> bool:
+    """Whether a wave is seen, or hinted at, in its loop alone."""
+    return wave.own or wave.prominence >= limits.hint_prominence
+
+
+def _led(beside: _Neighbours, limits: PlantLimits) -> list[Group]:
+    """Groups about the clearest waves, in that order."""
+    leading = [i for i, w in enumerate(beside.waves) if _shows(w, limits)]
+    order = sorted(leading, key=lambda i: (not beside.waves[i].own, -beside.waves[i].prominence))
     taken: set[int] = set()
     found: list[Group] = []
     for i in order:
         if i in taken:
             continue
-        joined = _joining(p, i, limits)
-        joined += _second_ring(p, i, joined, limits)
-        members = [p.waves[i], *(p.waves[j] for j, _ in joined)]
-        if not joined or not _is_wave(members, limits):
-            continue
-        taken.update((i, *(j for j, _ in joined)))
-        found.append(Group((Member(p.waves[i], 1.0), *(Member(p.waves[j], c) for j, c in joined))))
-    merged = [_with_foresight(g, p, limits) for g in _merged(found, limits)]
-    return sorted(merged, key=lambda g: (-len(g.members), g.loops))
+        levels = {i: 1.0} | beside.moving_with(i) | beside.second_ring(i)
+        members = tuple(Member(beside.waves[j], level) for j, level in levels.items())
+        if len(members) > 1 and _is_wave(members, limits):
+            taken.update(levels)
+            found.append(Group(members))
+    return found
+
+
+def _is_wave(members: Sequence[Member], limits: PlantLimits) -> bool:
+    """Whether it is an oscillation at all that loops share, and not the load of neighbours: one of them shows it by
+    itself, or several hint at it."""
+    hints = sum(m.wave.prominence >= limits.hint_prominence for m in members)
+    return hints >= limits.hints or any(m.wave.own for m in members)
 
 
 def _merged(groups: Sequence[Group], limits: PlantLimits) -> list[Group]:
@@ -205,7 +209,7 @@ def _merged(groups: Sequence[Group], limits: PlantLimits) -> list[Group]:
     for group in sorted(groups, key=lambda g: (-g.period_s, -len(g.members))):
         for k, other in enumerate(kept):
             if _is_same(group, other, limits) or _is_harmonic(group, other, limits):
-                kept[k] = _joined(other, group)
+                kept[k] = other.with_lacking(group.members)
                 break
         else:
             kept.append(group)
@@ -216,8 +220,7 @@ def _is_same(one: Group, other: Group, limits: PlantLimits) -> bool:
     """Whether two groups have one period and most of the smaller one's loops in common."""
     if abs(math.log(one.period_s / other.period_s)) > limits.same_period:
         return False
-    shared = len(set(one.loops) & set(other.loops))
-    return 2 * shared > min(len(one.loops), len(other.loops))
+    return 2 * one.shared(other) > min(len(one.loops), len(other.loops))
 
 
 def _is_harmonic(one: Group, other: Group, limits: PlantLimits) -> bool:
@@ -229,24 +232,17 @@ def _is_harmonic(one: Group, other: Group, limits: PlantLimits) -> bool:
     return bool(tied & set(other.loops))
 
 
-def _joined(group: Group, more: Group) -> Group:
-    """A group with the loops of another one that it lacks."""
-    return Group((*group.members, *(m for m in more.members if m.wave.loop not in group.loops)))
-
-
-def _with_foresight(group: Group, p: _Packed, limits: PlantLimits) -> Group:
+def _with_foresight(group: Group, beside: _Neighbours, limits: PlantLimits) -> Group:
     """A group with loops that move with it too loosely to be coherent, and yet foresee it: a source that sticks and
     slips without a rhythm moves others by what of it their filters let through."""
-    inside = {m.wave.loop: m.wave for m in group.members}
+    inside = group.waves
     clearest = sorted(inside.values(), key=lambda w: -w.prominence)[:HEARD]
     best: dict[str, tuple[float, Wave]] = {}
-    at = math.log(group.members[0].wave.line)
-    begin, end = np.searchsorted(p.log_line, (at - limits.near_period, at + limits.near_period))
-    for wave in p.waves[begin:end]:
-        shows = wave.own or wave.prominence >= limits.hint_prominence
-        if wave.loop in inside or wave.harmonic != 1 or not shows:
+    for k in beside.near(group.members[0].wave.line, limits.near_period):
+        wave = beside.waves[k]
+        if wave.loop in inside or wave.harmonic != 1 or not _shows(wave, limits):
             continue
         level = foresight(wave, clearest)
         if level >= limits.foresight and level > best.get(wave.loop, (0.0, wave))[0]:
             best[wave.loop] = level, wave
-    return Group((*group.members, *(Member(wave, 0.0) for _, wave in best.values())))
+    return group.with_lacking(Member(wave, 0.0) for _, wave in best.values())

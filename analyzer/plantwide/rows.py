@@ -9,7 +9,7 @@ from typing import Any
 
 from analyzer.config import PlantLimits
 from analyzer.loop.decisions import GroupRole, counts
-from analyzer.plantwide.verdict import Follower, Source, Traced, amplitude_pct, oscillating_pct
+from analyzer.plantwide.verdict import Follower, Source, Traced
 from analyzer.plantwide.wave import Wave
 
 Row = Mapping[str, Any]
@@ -45,7 +45,7 @@ def group_rows(
     """A row for each loop of a group that is told, the source first, then by amplitude."""
     known = {c.loop: c for c in found.candidates}
     out = []
-    for loop, wave in found.waves.items():
+    for loop, wave in found.group.waves.items():
         if loop not in rows:
             continue
         link, candidate = found.links.get(loop), known.get(loop)
@@ -60,7 +60,7 @@ def group_rows(
                 "parent": found.parents.get(loop),
                 "coherence": link.coherence if link else 1.0,
                 "lag_s": link.lag_s if link else 0.0,
-                "wave_amplitude_pct": amplitude_pct(wave),
+                "wave_amplitude_pct": wave.amplitude_pct,
                 "wave_share_pct": 100.0 * min(wave.share, 1.0),
                 "gain_pct": gain_pct(wave, rows[loop]["average_absolute_error_pct"]),
                 "group_signs": json.dumps({k: round(v, 3) for k, v in candidate.signs.items()})
@@ -94,7 +94,7 @@ def wave_columns(row: Row, found: Follower, limits: PlantLimits) -> dict[str, An
     wave = found.wave
     if wave is None or counts(row["oscillating_pct"]) or wave.share < limits.weak_share:
         return {}
-    share, amplitude = oscillating_pct(wave), amplitude_pct(wave)
+    share, amplitude = wave.oscillating_pct, wave.amplitude_pct
     hours = (row["usable_h"] or 0.0) * share / 100.0
     return {
         "oscillating_pct": share,

@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-from scipy.fft import ifft, next_fast_len
-
 from analyzer.config import PlantLimits
 from analyzer.loop.decisions import Action, Cause, Fault
+from analyzer.plantwide.compare import Lags
 from analyzer.plantwide.groups import Group, groups_of
-from analyzer.plantwide.source import Candidate, Peer, lag_between, ranked, signs_of
+from analyzer.plantwide.source import Candidate, Peer, candidates_of
 from analyzer.plantwide.wave import Wave
-from identification.record import Floats
 
 LAG_KNOWN = 0.5
 """Standard deviation of a lag over the lag up to which it is told; ours: two deviations from nothing."""
@@ -22,8 +18,6 @@ MOST_IN_TREE = 40
 """Loops of a group up to which the way from loop to loop is told."""
 BY_WAY = 0.02
 """Coherence by which a loop has to go better with another follower than with the source; ours: less is chance."""
-ENVELOPE = 0.5
-"""A wave is on where its envelope is over half of what it exceeds a tenth of the time, as an oscillation's is."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,11 +70,6 @@ class Traced:
         """The likeliest source."""
         return self.candidates[0].loop
 
-    @property
-    def waves(self) -> dict[str, Wave]:
-        """The waves of the group by loop."""
-        return {m.wave.loop: m.wave for m in self.group.members}
-
 
 def follows(
     own: Mapping[Cause, float], source: Source, limits: PlantLimits, wave: Wave | None = None
@@ -108,53 +97,51 @@ def may_follow(own: Peer, other: Peer, level: float, limits: PlantLimits) -> boo
     return other.cause is Cause.VALVE and other.evidence >= own.evidence
 
 
-def traced(group: Group, peers: Mapping[str, Peer], limits: PlantLimits) -> Traced | None:
+def _traced(group: Group, peers: Mapping[str, Peer], limits: PlantLimits) -> Traced | None:
     """A group with its candidates and followers; None where no verdict of its loops is known."""
-    found = signs_of(group, peers)
-    if not found:
+    lags = Lags(m.wave for m in group.members)
+    candidates = candidates_of(lags, peers, limits)
+    if not candidates:
         return None
-    candidates = ranked(found, limits)
-    links = _links(group, candidates[0])
-    sure = candidates[0].confidence_pct >= limits.source_pct
+    best = candidates[0]
+    links = _links(group, best, lags)
     followers = [
         loop
         for loop, link in links.items()
-        if sure and loop in peers and may_follow(peers[loop], peers[link.loop], link.coherence, limits)
+        if best.confidence_pct >= limits.source_pct
+        and loop in peers
+        and may_follow(peers[loop], peers[best.loop], link.coherence, limits)
     ]
-    return Traced(group, candidates, links, _parents(group, candidates[0].loop), frozenset(followers))
+    return Traced(group, candidates, links, _parents(best.loop, lags), frozenset(followers))
 
 
-def _links(group: Group, best: Candidate) -> dict[str, Source]:
+def _links(group: Group, best: Candidate, lags: Lags) -> dict[str, Source]:
     """How the other loops of a group go with its likeliest source."""
-    first = next(m.wave for m in group.members if m.wave.loop == best.loop)
     out = {}
     for member in group.members:
-        if member.wave.loop == best.loop:
-            continue
-        lag = lag_between(first, member.wave)
-        level = max(lag.coherence, member.coherence)
-        known = lag.lag_s if lag.deviation_s < LAG_KNOWN * abs(lag.lag_s) else None
-        out[member.wave.loop] = Source(best.loop, level, best.confidence_pct, known)
+        loop = member.wave.loop
+        if loop != best.loop:
+            lag = lags.between(best.loop, loop)
+            known = lag.lag_s if lag.deviation_s < LAG_KNOWN * abs(lag.lag_s) else None
+            out[loop] = Source(best.loop, max(lag.coherence, member.coherence), best.confidence_pct, known)
     return out
 
 
-def _parents(group: Group, source: str) -> dict[str, str]:
+def _parents(source: str, lags: Lags) -> dict[str, str]:
     """The loop from which each other one seems to have the wave: the tree of greatest coherence from the source on.
 
     Coherence falls along the way, for each loop adds something of its own; of large groups all hang on the source.
     """
-    waves = {m.wave.loop: m.wave for m in group.members}
-    if len(waves) > MOST_IN_TREE:
-        return {loop: source for loop in waves if loop != source}
-    best = {
-        loop: (lag_between(waves[source], w).coherence, source) for loop, w in waves.items() if loop != source
-    }
+    others = [loop for loop in lags.waves if loop != source]
+    if len(lags.waves) > MOST_IN_TREE:
+        return dict.fromkeys(others, source)
+    best = {loop: (lags.between(source, loop).coherence, source) for loop in others}
     out: dict[str, str] = {}
     while best:
         loop = max(best, key=lambda name: (best[name][0], name))
         out[loop] = best.pop(loop)[1]
-        for other, (level, _) in list(best.items()):
-            found = lag_between(waves[loop], waves[other]).coherence
+        for other, (level, _) in best.items():
+            found = lags.between(loop, other).coherence
             if found > level + BY_WAY:
                 best[other] = found, loop
     return out
@@ -162,7 +149,7 @@ def _parents(group: Group, source: str) -> dict[str, str]:
 
 def trace(waves: Sequence[Wave], peers: Mapping[str, Peer], limits: PlantLimits) -> list[Traced]:
     """The groups of a night, traced to their sources, those of more loops first."""
-    found = (traced(g, peers, limits) for g in groups_of(waves, limits))
+    found = (_traced(g, peers, limits) for g in groups_of(waves, limits))
     return [t for t in found if t is not None]
 
 
@@ -172,12 +159,12 @@ def followers_of(found: Sequence[Traced]) -> dict[str, tuple[Source, Wave]]:
     A loop that leads one group follows nobody in another where its wave is smaller.
     """
     out: dict[str, tuple[Source, Wave]] = {}
-    leads = {t.source: amplitude_pct(t.waves[t.source]) for t in found if t.followers}
+    leads = {t.source: t.group.waves[t.source].amplitude_pct for t in found if t.followers}
     for t in found:
-        waves = t.waves
+        waves = t.group.waves
         for loop in t.followers:
-            size = amplitude_pct(waves[loop])
-            if leads.get(loop, 0.0) < size and (loop not in out or size > amplitude_pct(out[loop][1])):
+            size = waves[loop].amplitude_pct
+            if leads.get(loop, 0.0) < size and (loop not in out or size > out[loop][1].amplitude_pct):
                 out[loop] = t.links[loop], waves[loop]
     return {loop: (_rooted(loop, out), wave) for loop, (_, wave) in out.items()}
 
@@ -191,28 +178,3 @@ def _rooted(loop: str, found: Mapping[str, tuple[Source, Wave]]) -> Source:
         level = min(at.coherence, further.coherence)
         at = Source(further.loop, level, min(at.confidence_pct, further.confidence_pct))
     return at
-
-
-def amplitude_pct(wave: Wave) -> float:
-    """Half of peak to peak of a wave over the whole record [% of span]."""
-    line = wave.line
-    low, high = round(line / 1.2) - wave.first, round(line * 1.2) - wave.first
-    return float(np.sqrt(np.sum(np.abs(wave.lines[max(low, 0) : high + 1]) ** 2)))
-
-
-def envelope(wave: Wave) -> Floats:
-    """Amplitude of a wave over its record [% of span], shape (m,)."""
-    size = next_fast_len(max(4 * wave.lines.size, 16))
-    return np.asarray(np.abs(ifft(wave.lines, size)) * size)
-
-
-def oscillating_pct(wave: Wave) -> float:
-    """Share of the time that a wave is on [%]."""
-    level = envelope(wave)
-    width = max(round(2 * level.size / wave.cycles), 1)
-    smooth = np.sqrt(
-        np.convolve(np.pad(level**2, width, mode="reflect"), np.ones(width) / width, mode="same")
-    )
-    smooth = smooth[width:-width]
-    top = float(np.quantile(smooth, 0.9))
-    return 100.0 * float(np.mean(smooth >= ENVELOPE * top)) if top > 0 and math.isfinite(top) else 0.0

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, fields
 
 import numpy as np
-from scipy.fft import irfft
+import pyarrow as pa
+from scipy.fft import ifft, irfft, next_fast_len
 
 from analyzer.config import PlantLimits
 from analyzer.loop.oscillation import Oscillations, peaks
@@ -23,6 +25,8 @@ HARMONICS = (2, 3)
 """Harmonics that are looked at; ours: higher ones drown in noise."""
 APART = 1.2
 """Ratio from which two peaks of one loop are two waves."""
+ENVELOPE = 0.5
+"""A wave is on where its envelope is over half of what it exceeds a tenth of the time, as an oscillation's is."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,17 +66,29 @@ class Wave:
         """Periods that the record holds."""
         return self.duration_s / self.period_s
 
+    @property
+    def amplitude_pct(self) -> float:
+        """Half of peak to peak over the whole record [% of span]."""
+        low, high = round(self.line / 1.2) - self.first, round(self.line * 1.2) - self.first
+        return float(np.sqrt(np.sum(np.abs(self.lines[max(low, 0) : high + 1]) ** 2)))
+
+    @property
+    def oscillating_pct(self) -> float:
+        """Share of the time that the wave is on [%]."""
+        size = next_fast_len(max(4 * self.lines.size, 16))
+        power = (np.abs(ifft(self.lines, size)) * size) ** 2
+        width = max(round(2 * size / self.cycles), 1)
+        padded = np.pad(power, width, mode="reflect")
+        level = np.sqrt(np.convolve(padded, np.ones(width) / width, mode="same"))[width:-width]
+        top = float(np.quantile(level, 0.9))
+        return 100.0 * float(np.mean(level >= ENVELOPE * top)) if top > 0 and math.isfinite(top) else 0.0
+
 
 def _centred(s: Spectrum, line: float) -> float:
     """Period [s] at the centre of the power about a frequency [lines]."""
     at = np.arange(math.floor(line / APART), min(math.ceil(line * APART), s.lines.size - 1) + 1)
     power = np.abs(s.lines[at]) ** 2
     return s.duration_s / float(power @ at / power.sum())
-
-
-def _nonlinearity(s: Spectrum, period_s: float) -> float:
-    """Size of the locked harmonics together, over that of the fundamental [-]."""
-    return math.hypot(*(locked_harmonic(s, period_s, m) for m in HARMONICS))
 
 
 def _thinned(error: Floats, dt_s: float, start_s: float, period_s: float) -> tuple[float, int, Floats]:
@@ -89,38 +105,40 @@ def _thinned(error: Floats, dt_s: float, start_s: float, period_s: float) -> tup
     return few * dt_s, (begin + skip) // few + count - means.size, means.astype(np.float32)
 
 
-def _cut(
-    loop: str,
-    s: Spectrum,
-    power: Floats,
-    error: Floats,
-    period_s: float,
-    start_s: float,
-    harmonic: int,
-    own: bool,
-) -> Wave | None:
-    """The wave about one period; `power` of each line and `error` over time are those of the spectrum."""
+@dataclass(frozen=True, slots=True)
+class _Source:
+    """What the waves of one loop are cut from: its spectrum, the power of each line, its error over time."""
+
+    loop: str
+    spectrum: Spectrum
+    start_s: float
+    power: Floats
+    error: Floats
+
+
+def _cut(of: _Source, period_s: float, harmonic: int, own: bool) -> Wave | None:
+    """The wave about one period, None where the spectrum does not hold enough of it."""
+    s = of.spectrum
     line = s.duration_s / period_s
     low = max(math.floor(line / REACH) - BESIDE, 0)
     high = min(math.ceil(line * REACH) + BESIDE, s.lines.size - 1)
     if line * 1.1 > s.lines.size - 1 or high - low < 2 * BESIDE:
         return None
     near = slice(math.floor(line / APART), math.ceil(line * APART) + 1)
-    above = float(power[max(math.ceil(line / (2 * APART)), 1) :].sum())
-    share = float(power[near].sum()) / above if above > 0 else 0.0
+    above = float(of.power[max(math.ceil(line / (2 * APART)), 1) :].sum())
     return Wave(
-        loop,
+        of.loop,
         period_s,
         harmonic,
         own,
-        start_s,
+        of.start_s,
         s.duration_s,
         low,
-        peak_prominence(power, line),
-        share,
-        _nonlinearity(s, period_s),
+        peak_prominence(of.power, line),
+        float(of.power[near].sum()) / above if above > 0 else 0.0,
+        math.hypot(*(locked_harmonic(s, period_s, m) for m in HARMONICS)),
         (s.lines[low : high + 1] * (2.0 / s.n)).astype(np.complex64),
-        *_thinned(error, s.dt_s, start_s, period_s),
+        *_thinned(of.error, s.dt_s, of.start_s, period_s),
     )
 
 
@@ -151,7 +169,38 @@ def waves_of(loop: str, found: Oscillations, end_s: float, limits: PlantLimits) 
             wanted.append((period, 1, False))
         if len(wanted) >= limits.waves:
             break
-    start_s = end_s - s.duration_s
-    error, power = irfft(s.lines, s.n), s.lines.real**2 + s.lines.imag**2
-    cut = (_cut(loop, s, power, error, p, start_s, m, own) for p, m, own in wanted)
+    power = s.lines.real**2 + s.lines.imag**2
+    source = _Source(loop, s, end_s - s.duration_s, power, irfft(s.lines, s.n))
+    cut = (_cut(source, *asked) for asked in wanted)
     return tuple(w for w in cut if w is not None)
+
+
+SCALARS = [f.name for f in fields(Wave) if f.name not in ("lines", "trend")]
+
+
+def waves_table(waves: Sequence[Wave]) -> pa.Table:
+    """A row a wave."""
+    columns = {name: [getattr(w, name) for w in waves] for name in SCALARS}
+    real = [w.lines.real.astype(np.float32) for w in waves]
+    imag = [w.lines.imag.astype(np.float32) for w in waves]
+    trend = [w.trend.astype(np.float32) for w in waves]
+    return pa.table({**columns, "real": real, "imag": imag, "trend": trend})
+
+
+def waves_in(table: pa.Table | None) -> list[Wave]:
+    """The waves of a table, none without one."""
+    if table is None or not table.num_rows:
+        return []
+    known = table.select(SCALARS).to_pylist()
+    real, imag, trend = (_stretches(table.column(name)) for name in ("real", "imag", "trend"))
+    return [Wave(**s, lines=x + 1j * y, trend=t) for s, x, y, t in zip(known, real, imag, trend, strict=True)]
+
+
+def _stretches(column: pa.ChunkedArray) -> list[np.ndarray]:
+    """The lists of a column as arrays, without a Python object for each number."""
+    out = []
+    for chunk in column.chunks:
+        flat = chunk.flatten().to_numpy(zero_copy_only=False)
+        ends = np.cumsum(chunk.value_lengths().to_numpy(zero_copy_only=False))
+        out += np.split(flat, ends[:-1]) if ends.size else []
+    return out

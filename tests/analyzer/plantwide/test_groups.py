@@ -13,9 +13,8 @@ from analyzer.loop.decisions import Cause
 from analyzer.loop.oscillation import detect
 from analyzer.plantwide.groups import Group, groups_of
 from analyzer.plantwide.source import Peer
-from analyzer.plantwide.table import waves_in, waves_table
 from analyzer.plantwide.verdict import Traced, followers_of, may_follow, trace
-from analyzer.plantwide.wave import Wave, waves_of
+from analyzer.plantwide.wave import Wave, waves_in, waves_of, waves_table
 from tests.analyzer.plant import CONFIG, START_S, record
 
 HOURS_8 = 28_800

@@ -1,0 +1,137 @@
+"""Waves compared: put on one clock, which of two is later, and whose past foresees the others."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy.fft import fft, ifft, next_fast_len
+
+from analyzer.plantwide.wave import Wave
+from identification.record import Floats
+from identification.signals.cross_spectrum import Lag, band, granger_f, lag, tapered
+
+SAME = 0.02
+"""Difference of spans [periods] that is none; ours."""
+FINE = 8
+"""Samples of the envelope for each line."""
+COVERED = 0.8
+"""Share of the common span that a record has to cover to be compared at all; ours."""
+LAG_PERIODS, LAG_LEAST_S = 4.0, 900.0
+"""Lags looked for reach so many periods, and so far at least [s]: clocks of two historians differ by minutes."""
+FORESEEN = 12
+"""Steps of the past by which others are foreseen: half of a period to a whole one."""
+LEAST_STEPS = 300
+"""Steps that trends have in common at least where foresight is asked for; ours: 12 for each constant."""
+LEAST_F, PLAIN = 3.0, 10.0
+"""F from which foresight is more than chance (one in a thousand by chance), and ratio of both ways that is plain."""
+Span = tuple[float, float]
+"""Start [s since 1970-01-01 UTC] and duration [s]."""
+
+
+def on_one_clock(waves: Sequence[Wave]) -> list[Wave]:
+    """The waves that can be compared, all over the span that most of them have."""
+    if not waves:
+        return []
+    counted = Counter((w.start_s, w.duration_s) for w in waves)
+    span = max(counted, key=lambda span: (counted[span], span[1]))
+    moved = (_on_span(w, span) for w in waves)
+    return [w for w in moved if w is not None]
+
+
+def _on_span(wave: Wave, span: Span) -> Wave | None:
+    """The wave with the lines that it has over another span; None where its record covers too little of that."""
+    start, length = span
+    if abs(wave.start_s - start) + abs(wave.duration_s - length) <= SAME * wave.period_s:
+        return wave
+    begin, end = max(start, wave.start_s), min(start + length, wave.start_s + wave.duration_s)
+    if end - begin < COVERED * length:
+        return None
+    count = wave.lines.size
+    size = next_fast_len(FINE * count)
+    padded = np.zeros(size, dtype=np.complex128)
+    padded[:count] = wave.lines
+    envelope = ifft(padded) * size  # of the lines from wave.first on
+    fresh = next_fast_len(max(math.ceil(FINE * count * length / wave.duration_s), 16))
+    t = start + np.arange(fresh) * (length / fresh)
+    at = (t - wave.start_s) / wave.duration_s * size
+    inside = (at >= 0) & (at <= size - 1)
+    real = np.interp(at, np.arange(size), envelope.real)
+    imag = np.interp(at, np.arange(size), envelope.imag)
+    z = np.where(inside, real + 1j * imag, 0.0)
+    low = math.ceil(wave.first * length / wave.duration_s)
+    turns = wave.first * (t - wave.start_s) / wave.duration_s - low * (t - start) / length
+    lines = fft(z * np.exp(2j * np.pi * turns)) / fresh
+    most = max(math.floor((wave.first + count) * length / wave.duration_s) - low, 1)
+    return replace(wave, start_s=start, duration_s=length, first=low, lines=lines[:most].astype(np.complex64))
+
+
+class Lags:
+    """How much later each of some loops is than each other one; a pair is compared once."""
+
+    def __init__(self, waves: Iterable[Wave]) -> None:
+        self.waves = {w.loop: w for w in waves}
+        self._known: dict[tuple[str, str], Lag] = {}
+
+    def between(self, one: str, other: str) -> Lag:
+        """How much later the second loop's wave is than the first one's."""
+        pair = one, other
+        if pair not in self._known:
+            self._known[pair] = lag_between(self.waves[one], self.waves[other])
+        return self._known[pair]
+
+
+def lag_between(one: Wave, other: Wave) -> Lag:
+    """How much later a second wave is than a first one of the same clock."""
+    low, high, _ = band(one.line)
+    low = max(low, one.first + 1, other.first + 1)
+    high = min(high, one.first + one.lines.size - 1, other.first + other.lines.size - 1)
+    if high - low < 4:
+        return Lag(0.0, math.inf, 0.0)
+    x, y = (tapered(w.lines[low - w.first - 1 : high - w.first + 1]) for w in (one, other))
+    return lag(x, y, one.duration_s, max(LAG_PERIODS * one.period_s, LAG_LEAST_S))
+
+
+def _on_common_steps(waves: Sequence[Wave]) -> tuple[list[int], Floats]:
+    """Which of some waves have trends whose steps lie on each other, and those trends, shape (k, n)."""
+    step = max((w.step_s for w in waves if w.trend.size), default=0.0)
+    found: list[tuple[int, int, Floats]] = []
+    for i, w in enumerate(waves):
+        few = round(step / w.step_s) if w.trend.size else 0
+        if few < 1 or abs(few * w.step_s / step - 1.0) > 1e-6:
+            continue
+        skip = -w.trend_first % few
+        count = (w.trend.size - skip) // few
+        means = w.trend[skip : skip + count * few].reshape(count, few).mean(axis=1)
+        found.append((i, (w.trend_first + skip) // few, means))
+    begin = max((first for _, first, _ in found), default=0)
+    end = min((first + x.size for _, first, x in found), default=0)
+    if end - begin < LEAST_STEPS:
+        return [], np.zeros((0, 0))
+    return [i for i, *_ in found], np.array([x[begin - first : end - first] for _, first, x in found], float)
+
+
+def foresees(waves: Sequence[Wave]) -> Floats:
+    """Mean over the others of how much better each foresees them than they foresee it (-1 to 1), by Granger's F."""
+    out = np.zeros(len(waves))
+    known, trends = _on_common_steps(waves)
+    if len(known) < 2:
+        return out
+    f = granger_f(trends, FORESEEN)
+    clear = np.maximum(f, f.T) >= LEAST_F
+    ratio = np.log(np.maximum(f, 0.1) / np.maximum(f.T, 0.1)) / math.log(PLAIN)
+    out[known] = np.where(clear, np.clip(ratio, -1.0, 1.0), 0.0).sum(axis=1) / (len(known) - 1)
+    return out
+
+
+def foresight(one: Wave, others: Sequence[Wave]) -> float:
+    """F with which one wave's past foresees others, in the median; 0 where theirs foresees it as well or better."""
+    known, trends = _on_common_steps([one, *others])
+    if len(known) < 2 or known[0] != 0:
+        return 0.0
+    f = granger_f(trends, FORESEEN)
+    forth, back = float(np.median(f[0, 1:])), float(np.median(f[1:, 0]))
+    return forth if forth > back else 0.0
