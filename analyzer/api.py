@@ -1,7 +1,7 @@
 """What a notebook needs: read an export, assess a loop, fit, simulate, tune, explain, read a store into pandas.
 
 Heavy parts are imported when they are used. From the project's folder:
->>> from analyzer import api as triage
+>>> import analyzer as triage
 >>> plant = triage.read("sample_data/mill.parquet", loops="sample_data/loops.csv", changes="sample_data/changes.csv")
 >>> len(plant.loops), plant.nights[0]
 (18, '2026-03-02')
@@ -72,7 +72,7 @@ class Identified:
 def fit(loop: PlantLoop) -> Identified:
     """Process and valve from the trends of a loop.
 
-    >>> from analyzer import api as triage
+    >>> import analyzer as triage
     >>> plant = triage.read("sample_data/mill.parquet", loops="sample_data/loops.csv")
     >>> model = triage.fit(plant.loop("TIC2106", night="2026-03-03"))
     >>> type(model.process).__name__, type(model.valve).__name__
@@ -97,7 +97,7 @@ def simulate(
     """A closed loop under set point and load, stepped at the controller's scan; see `closed_loop`.
 
     >>> import numpy as np
-    >>> from analyzer import api as triage
+    >>> import analyzer as triage
     >>> from identification.models import Backlash, Fopdt, Pid
     >>> still = np.zeros(7200)
     >>> load = np.where(np.arange(7200) < 10, 0.0, 5.0)

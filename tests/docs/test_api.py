@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import doctest
 import re
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+import analyzer
 from analyzer import api
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -20,6 +23,26 @@ def test_examples_of_the_api(monkeypatch: pytest.MonkeyPatch) -> None:
     found = doctest.testmod(api)
     assert found.attempted >= 12
     assert found.failed == 0
+
+
+def test_the_package_gives_the_functions_of_the_page() -> None:
+    """`import analyzer as triage` has every function that the page lists, and no other name of its own."""
+    page = (ROOT / "docs" / "python.md").read_text()
+    assert sorted(re.findall(r"^\| `(\w+)\(", page, re.M)) == sorted(analyzer.__all__)
+    assert all(callable(getattr(analyzer, name)) for name in analyzer.__all__)
+    assert set(analyzer.__all__) < set(dir(analyzer))
+    with pytest.raises(AttributeError, match="'asses'"):
+        analyzer.asses  # noqa: B018
+
+
+def test_a_command_does_not_wait_for_the_functions() -> None:
+    """`triage rank` imports neither pandas nor the API, and the package explain stays callable once imported."""
+    script = (
+        "import sys, analyzer.cli, analyzer; assert 'analyzer.api' not in sys.modules;"
+        "assert not {'pandas', 'scipy', 'numba'} & set(sys.modules);"
+        "import analyzer.explain; assert callable(analyzer.explain)"
+    )
+    subprocess.run([sys.executable, "-c", script], check=True)
 
 
 def test_page_on_python(monkeypatch: pytest.MonkeyPatch) -> None:
