@@ -100,14 +100,15 @@ def rank(
 
     Example: triage rank store --top 20 --format markdown
     """
-    from analyzer.pages.rank import hidden_loops, ranked, rendered
+    from analyzer.pages.lists import rendered, rendered_groups
+    from analyzer.pages.rank import hidden_loops, ranked
     from analyzer.store.store import Store
 
     if groups:
-        from analyzer.pages import group_list
+        from analyzer.pages.groups import grouped
 
-        found, name = group_list.grouped(Store(store), night, top)
-        click.echo(group_list.rendered(found, form, name))
+        found, name = grouped(Store(store), night, top)
+        click.echo(rendered_groups(found, form, name))
         return
     asked = None if lane is None else Lane(lane.replace("-", " "))
     rows, name = ranked(Store(store), column, None, night, ascending, area, asked)

@@ -29,7 +29,7 @@ from analyzer.loops.tags import controller, match, read_loops
 from analyzer.night import batch
 from analyzer.pages.news import news_lines
 from analyzer.pages.rank import ranked
-from analyzer.pages.view import read_night
+from analyzer.pages.reading import read_night
 from analyzer.store.store import Store
 
 SAMPLE = Path(__file__).resolve().parents[1] / "sample_data"

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from analyzer.comparison.spans import Span
     from analyzer.config import ChangeLimits
     from analyzer.loops.changes import TuningChange
-    from analyzer.pages.report import Spans
+    from analyzer.pages.changes import Spans
     from analyzer.store.store import Store
     from reports.pages import Page
 
@@ -52,7 +52,7 @@ def _asked(
     """The changes that the command line names."""
     from analyzer.history.stated_time import parse_time
     from analyzer.loops.changes import TuningChange, read_changes
-    from analyzer.pages.report import detected
+    from analyzer.pages.changes import detected
 
     if find:
         return detected(store, [loop] if loop else None, limits)
@@ -128,7 +128,7 @@ def report(
     """
     from analyzer.config_file import read_config
     from analyzer.pages.before_after import page
-    from analyzer.pages.report import Spans, cases
+    from analyzer.pages.changes import Spans, cases
     from analyzer.store.store import Store
 
     kept, limits = Store(store), read_config(config)
@@ -178,14 +178,14 @@ def pages(store: Path, night: str | None, top: int, form: str, single_file: bool
 
 
 def _dated(store: Store) -> set[str]:
-    from analyzer.pages.archive import name_of
+    from analyzer.pages.night import name_of
 
     return {f"{name_of(night)}.html" for night in store.nights()}
 
 
 def _stands(store: Store, out: Path, night: str) -> bool:
     """Whether a night's dated page was written after its results."""
-    from analyzer.pages.archive import name_of
+    from analyzer.pages.night import name_of
 
     page, results = out / f"{name_of(night)}.html", store.path / "nights" / f"{night}.parquet"
     return page.exists() and page.stat().st_mtime > results.stat().st_mtime

@@ -4,20 +4,31 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from analyzer.comparison.before_after import LIMITS, Change, Grade, LoopComparison, Verdict, grade
+import numpy as np
+
+from analyzer.comparison.before_after import (
+    LIMITS,
+    MEASURES,
+    Change,
+    Grade,
+    LoopComparison,
+    Measure,
+    Verdict,
+    grade,
+)
 from analyzer.config import ComparisonLimits
 from analyzer.history.plant_clock import UTC_NAME
 from analyzer.loops.changes import TuningChange
-from analyzer.pages.change_case import TONES, Case, outcome
-from analyzer.pages.change_charts import PRIMARY, average_chart, per_loop_chart
-from analyzer.pages.headings import heading
-from analyzer.pages.trends import trend_block
-from analyzer.pages.words import KINDS, interval, number, setting, signed, stamp
+from analyzer.pages.changes import Case, outcome
+from analyzer.pages.loop_pictures import trend_block
+from analyzer.pages.words import KINDS, counted, heading, interval, plain_cell, setting, signed, stamp
 from reports.pages import (
     Block,
     Cell,
     Column,
     Facts,
+    IntervalBar,
+    IntervalChart,
     Listing,
     Mark,
     Page,
@@ -27,6 +38,18 @@ from reports.pages import (
     Tiles,
 )
 
+PRIMARY = tuple(m for m in MEASURES if m.primary)
+"""The study's four figures."""
+TONES = {
+    Grade.CLEAR: "better",
+    Grade.MODEST: "better",
+    Grade.PARTIAL: "unclear",
+    Grade.NONE: "unclear",
+    Grade.MIXED: "worse",
+    Grade.WORSE: "worse",
+    Grade.INCOMPARABLE: "incomparable",
+}
+"""Colours of outcomes."""
 TREND_BUCKETS = 4000
 """Buckets of a trend on this page: two weeks at two pixels a bucket, 64 kB a loop; ours."""
 
@@ -67,12 +90,12 @@ def _row(change: Change, found: LoopComparison) -> tuple[Cell, ...]:
         Cell(found.loop),
         Cell(change.measure.title),
         Cell(change.measure.unit),
-        Cell(number(d.before), d.before),
-        Cell(number(d.after), d.after),
+        plain_cell(d.before),
+        plain_cell(d.after),
         Cell(signed(change.value_pct), change.value_pct),
         Cell(interval(change)),
-        Cell(number(d.low), d.low),
-        Cell(number(d.high), d.high),
+        plain_cell(d.low),
+        plain_cell(d.high),
         Cell(change.verdict.value, kind=KINDS[change.verdict]),
         Cell(remark),
     )
@@ -155,6 +178,45 @@ def loop_section(case: Case, number_: int, zone: str = UTC_NAME) -> Section:
             blocks.append(trend_block(f"trend-{number_}", title, thin, marks, case.scale))
     title = f"{found.loop} {case.description}".strip()
     return Section(title, tuple(blocks))
+
+
+def _bar(change: Change, group: str) -> IntervalBar:
+    ends = change.interval_pct
+    low, high = ends if ends else (None, None)
+    text = f"{signed(change.value_pct)} %" if ends else change.verdict.value
+    title, kind = change.measure.short_title, KINDS[change.verdict]
+    return IntervalBar(group, title, change.value_pct, low, high, kind, text)
+
+
+def per_loop_chart(cases: Sequence[Case]) -> IntervalChart:
+    """Change per loop and assessment (the study's Figure 12)."""
+    bars = tuple(_bar(c, case.found.loop) for case in cases for c in case.found.primary)
+    caption = "Bars: change in % of the span before; lines: its interval. Less is better in all four."
+    return IntervalChart("change-per-loop", "Change per loop and assessment", "% of before", bars, caption)
+
+
+def _average(cases: Sequence[Case], measure: Measure) -> IntervalBar:
+    """Mean of the comparable loops' changes; errors of different loops taken as independent."""
+    changes = [c for case in cases for c in case.found.primary if c.measure == measure]
+    known = [c for c in changes if c.verdict is not Verdict.INCOMPARABLE and c.value_pct is not None]
+    group = counted(len(known), "loop")
+    if not known:
+        return IntervalBar(group, measure.short_title, None, None, None, "incomparable", "nothing comparable")
+    values = np.array([c.value_pct for c in known], float)
+    ends = np.array([c.interval_pct for c in known], float)
+    down, up = (float(np.sqrt(((ends[:, k] - values) ** 2).sum()) / len(known)) for k in (0, 1))
+    mean = float(values.mean())
+    low, high = max(mean - down, -100.0), mean + up
+    verdict = Verdict.UNCLEAR if low <= 0 <= high else Verdict.BETTER if mean < 0 else Verdict.WORSE
+    text = f"{signed(mean)} %"
+    return IntervalBar(group, measure.short_title, mean, low, high, KINDS[verdict], text)
+
+
+def average_chart(cases: Sequence[Case]) -> IntervalChart:
+    """Average change of all comparable loops (the study's Figure 13)."""
+    bars = tuple(_average(cases, m) for m in PRIMARY)
+    caption = "Mean over the loops that can be compared; loops that were not better count as they are."
+    return IntervalChart("average-change", "Average change", "% of before", bars, caption)
 
 
 METHOD = (

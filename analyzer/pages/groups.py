@@ -1,4 +1,4 @@
-"""Groups that share an oscillation: a table for the morning page, a page for each, a part of each member's page."""
+"""Groups that share an oscillation: their list, the table of the morning page, a page each, a part of a member's."""
 
 from __future__ import annotations
 
@@ -6,19 +6,98 @@ import json
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from analyzer.columns import GROUPS
+import numpy as np
+
+from analyzer.columns import GROUP_LIST, GROUPS, row_of
 from analyzer.loop.decisions import GroupRole
-from analyzer.pages.group_list import sentence, with_settings
-from analyzer.pages.group_pictures import aligned, graph, heat_map
-from analyzer.pages.reading import Thinned
-from analyzer.pages.view import Night
-from analyzer.pages.words import counted, duration, number
-from analyzer.plantwide.view import GroupView
-from reports.pages import Cell, Column, Facts, Page, Section, Table, Text
+from analyzer.pages.reading import Thinned, proposal
+from analyzer.pages.words import Row, cause_cell, counted, duration, number, plain_cell
+from analyzer.plantwide.view import GroupView, read_groups
+from analyzer.store.store import Store
+from analyzer.words.present import figure
+from identification.signals.spectrum import PER_OCTAVE
+from reports.pages import (
+    Arrow,
+    Band,
+    Cell,
+    Column,
+    Facts,
+    Graph,
+    HeatMap,
+    Mark,
+    Node,
+    Page,
+    Section,
+    Table,
+    Text,
+    Trend,
+)
 from reports.texts import slug
 
-Row = Mapping[str, Any]
 DECLARED = {c.name: c for c in GROUPS}
+MOST = 12
+"""Loops that are drawn beneath each other; ours: more do not fit on a screen."""
+PERIODS = 12.0
+"""Periods that the aligned trends show."""
+FLOOR_DB = 30.0
+"""Level under a loop's peak from which a colour is empty [dB]."""
+FIGURES = ("coherence", "lag_s", "wave_amplitude_pct", "wave_share_pct", "gain_pct")
+
+
+def grouped(
+    store: Store, night: str | None = None, top: int | None = None
+) -> tuple[list[dict[str, Any]], str]:
+    """Rows of the groups of a night, those that cost most first.
+
+    Raises
+    ------
+    InputError
+        Where there is no such store or night.
+    """
+    name = night or store.require()
+    store.read("nights", name, ["loop"])
+    return [group_row(g) for g in read_groups(store, name)][:top], name
+
+
+def group_row(g: GroupView) -> dict[str, Any]:
+    """What is told of a group."""
+    source = g.source
+    own = g.loops[source["loop"]] if source else None
+    told = {
+        "group": g.number,
+        "group_period_s": g.period_s,
+        "loops": float(len(g.rows)),
+        "fix_first": source["loop"] if source else None,
+        "source_pct": source["source_pct"] if source else None,
+        "candidates": json.dumps({r["loop"]: round(r["source_pct"], 1) for r in g.candidates}),
+        "unseen_pct": g.unseen_pct,
+        "source_cause": own["cause"] if own else None,
+        "source_action": action_there(g),
+        "others_gain_pct": g.gain_pct,
+        "members": json.dumps([r["loop"] for r in g.rows]),
+        "sentence": sentence(g),
+    }
+    return row_of(told, GROUP_LIST)
+
+
+def action_there(g: GroupView) -> str:
+    """The action at the source with the settings to type in, where there are any."""
+    return proposal(g.loops[g.source["loop"]], g.action) if g.source else g.action
+
+
+def _candidates(g: GroupView) -> str:
+    return ", ".join(f"{r['loop']} {r['source_pct']:.0f} %" for r in g.candidates)
+
+
+def sentence(g: GroupView) -> str:
+    """One cause, so many loops: what is shared, where it starts, what the others would gain."""
+    head = f"One oscillation of {duration(g.period_s)} in {len(g.rows)} loops"
+    if g.source is not None:
+        loop, pct = g.source["loop"], g.source["source_pct"]
+        tail = f"it starts at {loop} ({pct:.0f} %)"
+    else:
+        tail = f"it starts at one of {_candidates(g)}, or outside what is recorded ({g.unseen_pct:.0f} %)"
+    return f"{head}; {tail}; without it the others' average errors fall by {figure(g.gain_pct)} % of span together"
 
 
 def page_name(number: str) -> str:
@@ -26,10 +105,10 @@ def page_name(number: str) -> str:
     return f"group-{number}"
 
 
-def _heading(name: str, wide: bool = False) -> Column:
+def _heading(name: str) -> Column:
     declared = DECLARED[name]
     unit = f" [{declared.unit}]" if declared.unit else ""
-    return Column(name, declared.heading + unit, declared.is_number, declared.hint, wide)
+    return Column(name, declared.heading + unit, declared.is_number, declared.hint)
 
 
 MORNING = (
@@ -37,7 +116,7 @@ MORNING = (
     Column("loops", "Loops", True),
     Column("group_period_s", "Period", True, DECLARED["group_period_s"].hint),
     Column(
-        "fix_first", "Fix first", wide=True, hint="Loop at which the oscillation starts, with its confidence."
+        "fix_first", "Fix first", False, "Loop at which the oscillation starts, with its confidence.", True
     ),
     Column("action", "Action there", wide=True),
     Column(
@@ -47,26 +126,21 @@ MORNING = (
 )
 
 
-def morning_table(night: Night, groups: Sequence[GroupView]) -> Table:
+def morning_table(groups: Sequence[GroupView]) -> Table:
     """One cause, several loops: the groups of a night, those that cost most first."""
-    rows = tuple(_morning_row(night, g) for g in groups)
-    return Table(
-        "groups", "", MORNING, rows, "Repair or retune the first loop, then look at the others again."
-    )
+    note = "Repair or retune the first loop, then look at the others again."
+    return Table("groups", "", MORNING, tuple(map(_morning_row, groups)), note)
 
 
-def _morning_row(night: Night, g: GroupView) -> tuple[Cell, ...]:
-    named = ", ".join(f"{r['loop']} {r['source_pct']:.0f} %" for r in g.candidates)
-    others = ", ".join(r["loop"] for r in g.rows if r is not g.source)
-    href = f"{page_name(g.number)}.html"
+def _morning_row(g: GroupView) -> tuple[Cell, ...]:
     return (
-        Cell(f"group {g.number}", kind="strong", href=href),
+        Cell(f"group {g.number}", kind="strong", href=f"{page_name(g.number)}.html"),
         Cell(str(len(g.rows)), len(g.rows)),
         Cell(duration(g.period_s), g.period_s),
-        Cell(named or "not clear"),
-        Cell(with_settings(g) or "undecided: look at the candidates"),
-        Cell(number(g.gain_pct), g.gain_pct),
-        Cell(others),
+        Cell(_candidates(g) or "not clear"),
+        Cell(action_there(g) or "undecided: look at the candidates"),
+        plain_cell(g.gain_pct),
+        Cell(", ".join(r["loop"] for r in g.rows if r is not g.source)),
     )
 
 
@@ -75,32 +149,24 @@ MEMBERS = (
     _heading("role"),
     _heading("source_pct"),
     Column("cause", "Cause"),
-    *(_heading(n) for n in ("coherence", "lag_s", "wave_amplitude_pct", "wave_share_pct", "gain_pct")),
+    *map(_heading, FIGURES),
 )
 
 
-def _percent(value: float) -> str:
-    return f"{value:.0f}" if value >= 1 else "under 1"
-
-
 def _members(g: GroupView, paged: frozenset[str]) -> Table:
-    rows = []
-    for r in g.rows:
-        name = r["loop"]
-        href = f"{slug(name)}.html" if name in paged else ""
-        figures = ("coherence", "lag_s", "wave_amplitude_pct", "wave_share_pct", "gain_pct")
-        cells = [Cell(number(r[n]), r[n]) for n in figures]
-        cause = g.loops[name]["cause"] or ""
-        rows.append(
-            (
-                Cell(name, kind="strong", href=href),
-                Cell(r["role"]),
-                Cell(_percent(r["source_pct"]), r["source_pct"]),
-                Cell(cause, kind=cause if cause in ("valve", "tuning", "load") else ""),
-                *cells,
-            )
-        )
-    return Table("members", "", MEMBERS, tuple(rows), "Lags that the night cannot tell are left empty.")
+    rows = tuple(_member(g, r, paged) for r in g.rows)
+    return Table("members", "", MEMBERS, rows, "Lags that the night cannot tell are left empty.")
+
+
+def _member(g: GroupView, row: Row, paged: frozenset[str]) -> tuple[Cell, ...]:
+    name, pct = row["loop"], row["source_pct"]
+    return (
+        Cell(name, kind="strong", href=f"{slug(name)}.html" if name in paged else ""),
+        Cell(row["role"]),
+        Cell(f"{pct:.0f}" if pct >= 1 else "under 1", pct),
+        cause_cell(g.loops[name]["cause"]),
+        *(plain_cell(row[n]) for n in FIGURES),
+    )
 
 
 SIGN_WORDS = {
@@ -134,7 +200,7 @@ def page(g: GroupView, trends: Mapping[str, Thinned], night: str, paged: frozens
     """A group's page."""
     facts = [("Period", duration(g.period_s)), ("Loops", str(len(g.rows)))]
     if g.source is not None:
-        facts += [("Fix first", g.source["loop"]), ("Action there", with_settings(g))]
+        facts += [("Fix first", g.source["loop"]), ("Action there", action_there(g))]
     facts += [
         ("Others gain", f"{number(g.gain_pct)} % of span"),
         ("It starts elsewhere", f"{g.unseen_pct:.0f} %"),
@@ -147,13 +213,8 @@ def page(g: GroupView, trends: Mapping[str, Thinned], night: str, paged: frozens
         *((Section("Trends and spectra", tuple(pictures)),) if pictures else ()),
     )
     subtitle = f"{counted(len(g.rows), 'loop')}, night {night}."
-    return Page(
-        page_name(g.number),
-        f"Group {g.number}: one oscillation",
-        subtitle,
-        sections,
-        (("All loops", "index.html"),),
-    )
+    links = (("All loops", "index.html"),)
+    return Page(page_name(g.number), f"Group {g.number}: one oscillation", subtitle, sections, links)
 
 
 def of_loop(g: GroupView, loop: str, trends: Mapping[str, Thinned]) -> Section:
@@ -167,3 +228,84 @@ def of_loop(g: GroupView, loop: str, trends: Mapping[str, Thinned]) -> Section:
     beneath = [loop, *[r["loop"] for r in g.rows if r["loop"] != loop][:1]]
     picture = aligned(g, trends, beneath)
     return Section("Moves with other loops", (Text(tuple(said)), *((picture,) if picture else ())))
+
+
+def graph(g: GroupView) -> Graph:
+    """The way of the oscillation from loop to loop."""
+    shown = [r for r in g.rows if r["role"] != GroupRole.SHARES or r is g.rows[0]][:MOST]
+    by_name = {r["loop"]: r for r in shown}
+    first = shown[0]["loop"]
+    depth = {first: 0}
+
+    def column(name: str) -> int:
+        if name not in depth:
+            depth[name] = 1  # of a ring, were there one
+            parent = by_name[name]["parent"]
+            depth[name] = 1 + column(parent if parent in by_name else first)
+        return depth[name]
+
+    nodes = tuple(Node(n, _node_text(r), str(r["role"]), column(n)) for n, r in by_name.items())
+    arrows = tuple(
+        Arrow(r["parent"] if r["parent"] in by_name else first, n, _arrow_text(r))
+        for n, r in by_name.items()
+        if n != first
+    )
+    left = len(g.rows) - len(shown)
+    caption = "From left to right as coherence falls; lags are behind the likeliest source."
+    caption += f" {left} more not drawn." if left else ""
+    return Graph("way", "Where it starts and whom it moves", nodes, arrows, caption)
+
+
+def _node_text(r: Row) -> str:
+    role = f"{r['role']} {r['source_pct']:.0f} %" if r["source_pct"] >= 1 else str(r["role"])
+    return f"{role}, {number(r['wave_amplitude_pct'])} %"
+
+
+def _arrow_text(r: Row) -> str:
+    lag = r["lag_s"]
+    return f"{lag:+.0f} s" if lag is not None else f"{r['coherence']:.2f}"
+
+
+def heat_map(g: GroupView) -> HeatMap | None:
+    """Spectra of the members beneath each other; None where the night kept none."""
+    kept = [(r["loop"], json.loads(s)) for r in g.rows[:MOST] if (s := g.loops[r["loop"]]["spectrum"])]
+    if not kept:
+        return None
+    count = max(len(s["db"]) for _, s in kept)
+    longest = max(s["period_s"] for _, s in kept)
+    shares = np.full((len(kept), count), np.nan)
+    for i, (_, s) in enumerate(kept):
+        level = np.array(s["db"], dtype=float)
+        at = round(PER_OCTAVE * np.log2(longest / s["period_s"])) + np.arange(level.size)
+        inside = at < count
+        near = at[inside]
+        shares[i, near] = np.clip(1.0 + (level[inside] - level.max()) / FLOOR_DB, 0.0, 1.0)
+    periods = longest / 2.0 ** (np.arange(count) / PER_OCTAVE)
+    mark = Mark(g.period_s, duration(g.period_s))
+    caption = "Depth of colour: level of the error in each band under the loop's own peak, 30 dB to nothing."
+    loops = tuple(n for n, _ in kept)
+    return HeatMap(
+        "spectra", "Spectra", "period [s]", periods[::-1], loops, shares[:, ::-1], (mark,), caption
+    )
+
+
+def aligned(g: GroupView, trends: Mapping[str, Thinned], only: Sequence[str] = ()) -> Trend | None:
+    """PV of the members beneath each other over some periods; None where the trends are too coarse to show any."""
+    names = [r["loop"] for r in g.rows if r["loop"] in trends and (not only or r["loop"] in only)]
+    names = sorted(names, key=only.index)[:MOST] if only else names[:MOST]
+    if not names:
+        return None
+    first = trends[names[0]]
+    middle = 0.5 * (first.time_s[0] + first.time_s[-1])
+    lead = first.between(middle - 0.5 * PERIODS * g.period_s, middle + 0.5 * PERIODS * g.period_s)
+    if lead.time_s.size < 4 * PERIODS:
+        return None
+    bands = []
+    for i, name in enumerate(names):
+        t = trends[name]
+        low, high = (np.interp(lead.time_s, t.time_s, t.extremes[f"pv_{end}"]) for end in ("min", "max"))
+        bands.append(Band(f"{name}.PV", "pv", i, low, high))
+    top = "" if only else ", the likeliest source on top"
+    caption = f"PV [% of span] over {PERIODS:g} periods in the middle of the night{top}."
+    title = "Trends, aligned"
+    return Trend("aligned", title, lead.time_s, lead.gap, tuple(bands), tuple(names), (), caption)

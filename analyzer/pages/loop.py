@@ -3,31 +3,37 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from analyzer.columns import BY_NAME
 from analyzer.explain.agreement import agreement
 from analyzer.explain.page_words import title
-from analyzer.loop.decisions import CAUSES, Fault
+from analyzer.loop.decisions import CAUSES, Fault, Status
 from analyzer.pages.cost import mark
-from analyzer.pages.engineering import Scale, beside, scale_of
-from analyzer.pages.headings import heading, titled
-from analyzer.pages.loop_history import history
+from analyzer.pages.loop_pictures import close_span, pv_over_op, rhythm_plots, trend_block, turn_panels
+from analyzer.pages.maintenance import work_order
 from analyzer.pages.reading import Thinned
-from analyzer.pages.rhythm import rhythm_plots
-from analyzer.pages.trends import LEAST_PCT, close_span, trend_block
-from analyzer.pages.turns import turn_panels
-from analyzer.pages.words import duration, number
-from analyzer.pages.work_order import work_order
+from analyzer.pages.words import (
+    Row,
+    Scale,
+    beside,
+    cause_cell,
+    cell,
+    duration,
+    heading,
+    headings,
+    number,
+    plain_cell,
+    scale_of,
+    titled,
+)
 from analyzer.words.units import row_settings
 from identification.mismatch.words import check
 from reports.pages import Block, Cell, Column, Facts, Line, Listing, Page, Plot, Section, Table, Text
 from reports.texts import slug
 
-Row = Mapping[str, Any]
 WEEK = 7
 FIGURES = (
     *("oscillation_significance", "oscillating_pct", "average_absolute_error_pct", "variability_pct"),
@@ -37,8 +43,8 @@ FIGURES = (
     *("error_memory_ti", "loss"),
 )
 MODEL = (
-    *("gain", "time_constant_s", "slope_pct_per_s", "dead_time_s"),
-    *("backlash_pct", "stickband_pct", "slip_jump_pct"),
+    *("gain", "time_constant_s", "slope_pct_per_s", "dead_time_s", "backlash_pct", "stickband_pct"),
+    "slip_jump_pct",
 )
 LEVELS = frozenset({"sp_mean_pct", "pv_mean_pct"})
 """Figures that are places and no sizes: their own unit has another zero."""
@@ -49,55 +55,11 @@ CYCLES = (
     ("expected with the new settings", "expected_period_s", "expected_pv_amplitude_pct"),
 )
 COLUMNS = (
-    *(
-        "loop",
-        "type",
-        "area",
-        "description",
-        "pv_unit",
-        "op_unit",
-        "status",
-        "reason",
-        "action",
-        "cause",
-        "valve_fault",
-    ),
-    *(
-        "pv_lo",
-        "pv_hi",
-        "close_first_s",
-        "close_last_s",
-        "lanes",
-        "evidence",
-        "valve_size",
-        "timezone",
-        "lack",
-        "turns",
-    ),
-    *(
-        "source_loop",
-        "group",
-        "osc_valve_pct",
-        "osc_tuning_pct",
-        "osc_load_pct",
-        "kp",
-        "ti",
-        "kp_new",
-        "ti_new",
-    ),
-    *(
-        "settings_from",
-        "form",
-        "gain_unit",
-        "ti_unit",
-        "signs",
-        "notes",
-        "advice",
-        "start_s",
-        "percent_of",
-        *FIGURES,
-        *MODEL,
-    ),
+    *("loop", "type", "area", "description", "pv_unit", "op_unit", "status", "reason", "action", "cause"),
+    *("valve_fault", "pv_lo", "pv_hi", "close_first_s", "close_last_s", "lanes", "evidence", "valve_size"),
+    *("timezone", "lack", "turns", "source_loop", "group", "osc_valve_pct", "osc_tuning_pct", "osc_load_pct"),
+    *("kp", "ti", "kp_new", "ti_new", "settings_from", "form", "gain_unit", "ti_unit", "signs", "notes"),
+    *("advice", "start_s", "percent_of", *FIGURES, *MODEL),
     *(name for _, period, amplitude in CYCLES for name in (period, amplitude)),
 )
 """What a loop's page reads of the table of nights."""
@@ -161,7 +123,7 @@ def _evidence(row: Row) -> Section:
     signs = sorted(json.loads(row["signs"] or "[]"), key=lambda s: -s["strength"])
     rows = tuple(
         (
-            Cell(s["points_to"], kind=s["points_to"] if s["points_to"] in CAUSES else ""),
+            cause_cell(s["points_to"]),
             Cell(f"{s['strength']:.2f}", s["strength"]),
             Cell(f"{s['text']} ({s['figures']})" if s.get("figures") else s["text"]),
         )
@@ -174,20 +136,6 @@ def _evidence(row: Row) -> Section:
     if row["notes"]:
         blocks.append(Text((f"About the data: {row['notes']}.",), "note"))
     return Section("Evidence", tuple(blocks))
-
-
-def _pv_op(thin: Thinned, row: Row) -> Plot:
-    scale = scale_of(row)
-    close = close_span(row, thin)
-    part = thin.between(*close) if close else thin
-    shown = ~part.gap
-    pv, op = scale.of(part.middle("pv")[shown]), part.middle("op")[shown]
-    line = Line("PV over OP", op, pv, joined=close is not None)
-    caption = "A cloud along a line: a sound valve. An ellipse or a parallelogram: lag, play or stick-slip."
-    middle, half = float(np.median(pv)) if pv.size else 0.0, 0.5 * LEAST_PCT * scale.span / 100.0
-    title = "PV over OP, " + ("the last ten periods" if close else "the last night")
-    reach = (middle - half, middle + half)
-    return Plot("pv-op", title, "OP [%]", f"PV [{scale.label}]", (line,), (), caption, reach=reach)
 
 
 def _figure(name: str, row: Row, scale: Scale) -> tuple[str, str]:
@@ -207,7 +155,7 @@ def _limit_cycle(row: Row) -> list[Section]:
         heading("period_s"),
         Column("amplitude_pct", "PV amplitude %", True),
     )
-    rows = tuple((Cell(name), Cell(duration(p), p), Cell(number(a), a)) for name, p, a in known)
+    rows = tuple((Cell(name), Cell(duration(p), p), plain_cell(a)) for name, p, a in known)
     return [Section("Limit cycle", (Table("limit-cycle", "", columns, rows),))]
 
 
@@ -215,8 +163,33 @@ def _trends(thin: Thinned | None, row: Row) -> list[Section]:
     if thin is None or thin.time_s.size < 2:
         return []
     last = thin.between(row["start_s"] or 0.0, float("inf"))
-    pictures = (_pv_op(last, row), *rhythm_plots(last, row["period_s"]))
+    pictures = (pv_over_op(last, row), *rhythm_plots(last, row["period_s"]))
     return [Section("PV over OP, and its rhythm", pictures)]
+
+
+HISTORY = (
+    *headings("night", "cause", "oscillation_significance", "oscillating_pct", "period_s"),
+    *headings("average_absolute_error_pct", "valve_travel_pct_per_h", "variability_pct"),
+    heading("action", wide=True),
+)
+
+
+def _night(row: Row) -> tuple[Cell, ...]:
+    """One night's cells; the last says why where the loop was not assessed."""
+    cells = tuple(cell(row, column.key) for column in HISTORY)
+    return cells if row["status"] == Status.OK else (*cells[:-1], Cell(f"{row['status']}: {row['reason']}"))
+
+
+def history(rows: Sequence[Row]) -> Section:
+    """A table of a loop's nights, the last first, and a picture of how its oscillation grew or fell."""
+    blocks: list[Block] = [Table("history", "", HISTORY, tuple(_night(r) for r in reversed(rows)))]
+    known = [(i - len(rows) + 1.0, r["oscillation_significance"]) for i, r in enumerate(rows)]
+    points = np.array([(x, y) for x, y in known if y is not None], float)
+    if len(points) > 2:
+        line, shown = Line("significance", points[:, 0], points[:, 1]), BY_NAME["oscillation_significance"]
+        title, axis = f"{shown.title} over the nights", "nights before this one"
+        blocks.insert(0, Plot("nights", title, axis, shown.unit, (line,), reach=(0.0, 1.0)))
+    return Section("Over the nights", tuple(blocks))
 
 
 def _explained(found: Row | None, row: Row) -> list[Section]:

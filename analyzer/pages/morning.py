@@ -8,48 +8,39 @@ from dataclasses import replace
 from analyzer.columns import BY_NAME
 from analyzer.loop.decisions import CAUSES, Cause, Status
 from analyzer.pages import maintenance
-from analyzer.pages.areas import area_table
 from analyzer.pages.cost import MARK, OF_RECORDED, SIGNIFICANCE, cost_column, mark
 from analyzer.pages.groups import morning_table
-from analyzer.pages.headings import heading, headings
-from analyzer.pages.lead import first_things
+from analyzer.pages.loop_pictures import close_span, sparkline
 from analyzer.pages.news import since
-from analyzer.pages.plant_history import NightSum, history
-from analyzer.pages.plant_map import plant_map
-from analyzer.pages.trends import close_span, sparkline
-from analyzer.pages.view import Night, Row, linked, needs_a_look, oscillates
-from analyzer.pages.words import counted, duration, number
+from analyzer.pages.plant import NightSum, area_table, history, plant_map
+from analyzer.pages.reading import Night, linked, needs_a_look, oscillates
+from analyzer.pages.summary import first_things
+from analyzer.pages.words import Row, cause_cell, cell, counted, heading, headings, marked_cell
 from analyzer.plantwide.view import GroupView
 from analyzer.words.units import changed_settings, row_settings
 from reports.pages import Cell, Column, Listing, Page, Section, Sparkline, Table, Tiles
 
-
-def _value(row: Row, name: str, digits: str = "") -> Cell:
-    value = row[name]
-    text = number(value) if not digits or value is None else f"{value:{digits}}"
-    return Cell(text + mark(row, name), value)
-
-
-def _cause(row: Row) -> Cell:
-    cause = row["cause"] or ""
-    return Cell(cause, kind=cause if cause in CAUSES else "")
-
-
-BEFORE_COST = (
-    heading("loop"),
-    heading("description", wide=True),
-    Column("trend", "Ten periods of PV"),
-)
+BEFORE_COST = (heading("loop"), heading("description", wide=True), Column("trend", "Ten periods of PV"))
 AFTER_COST = (
-    heading("period_s"),
-    heading("cause"),
-    heading("reason", wide=True),
-    heading("action"),
+    *(heading("period_s"), heading("cause"), heading("reason", wide=True), heading("action")),
     Column("settings", "Settings, now and new", wide=True),
     Column("note", "Note", wide=True, hint="Newest note: triage note STORE LOOP TEXT"),
 )
 FOLLOWER = "\u2514 "
 """Before the name of a loop that stands under the one it follows."""
+ALL_SHARES = ("oscillating_pct", "osc_valve_pct", "osc_tuning_pct", "osc_load_pct")
+ALL_COSTS = ("average_absolute_error_pct", "valve_travel_pct_per_h", "variability_pct")
+ALL = (
+    *headings(
+        "loop", "description", "type", "area", SIGNIFICANCE, *ALL_SHARES, "cause", *ALL_COSTS, "action"
+    ),
+    replace(heading("percent_of"), csv_only=True),
+)
+LOST = (*headings("loop", "status"), heading("reason", wide=True))
+LINKS = (
+    ("Hand-over to maintenance", f"{maintenance.NAME}.html"),
+    ("All loops as CSV", "csv/index-ranking.csv"),
+)
 
 
 def _spark(night: Night, row: Row) -> Sparkline | None:
@@ -58,22 +49,21 @@ def _spark(night: Night, row: Row) -> Sparkline | None:
 
 
 def _settings(row: Row) -> str:
-    if row["kp_new"] is not None or row["ti_new"] is not None:
-        return changed_settings(row)
-    return row_settings(row)
+    known = row["kp_new"] is not None or row["ti_new"] is not None
+    return changed_settings(row) if known else row_settings(row)
 
 
 def _worst_row(night: Night, row: Row, follows: bool, by: str) -> tuple[Cell, ...]:
     name = linked(night, row["loop"])
     return (
         replace(name, text=FOLLOWER + name.text) if follows else name,
-        Cell(row["description"] or ""),
+        cell(row, "description"),
         Cell("", figure=_spark(night, row)),
-        Cell(number(row[by]) + mark(row, by), row[by]),
-        Cell(duration(row["period_s"]), row["period_s"]),
-        _cause(row),
-        Cell(row["reason"] or ""),
-        Cell(row["action"] or ""),
+        marked_cell(row, by),
+        cell(row, "period_s"),
+        cause_cell(row["cause"]),
+        cell(row, "reason"),
+        cell(row, "action"),
         Cell(_settings(row)),
         Cell(night.note(row["loop"])),
     )
@@ -89,37 +79,19 @@ def worst_table(night: Night) -> Table:
     noted = any(row[-1].text for row in rows)
     columns = (*BEFORE_COST, heading(by), *(AFTER_COST if noted else AFTER_COST[:-1]))
     rows = tuple(row[: len(columns)] for row in rows)
-    return Table(
-        "worst", "", columns, rows, said.strip(), searchable=len(rows) > 10, facet="cause", cards=True
-    )
-
-
-ALL_SHARES = ("oscillating_pct", "osc_valve_pct", "osc_tuning_pct", "osc_load_pct")
-ALL_COSTS = ("average_absolute_error_pct", "valve_travel_pct_per_h", "variability_pct")
-ALL = (
-    *headings(
-        *(
-            "loop",
-            "description",
-            "type",
-            "area",
-            "oscillation_significance",
-            *ALL_SHARES,
-            "cause",
-            *ALL_COSTS,
-        ),
-        "action",
-    ),
-    replace(heading("percent_of"), csv_only=True),
-)
+    return Table("worst", "", columns, rows, said.strip(), len(rows) > 10, "cause", cards=True)
 
 
 def _all_row(night: Night, row: Row) -> tuple[Cell, ...]:
-    texts = tuple(Cell(row[c] or "") for c in ("description", "type", "area"))
-    shares = tuple(_value(row, c, ".0f") for c in ALL_SHARES)
-    costs = tuple(_value(row, c) for c in ALL_COSTS)
-    first = (linked(night, row["loop"]), *texts, _value(row, "oscillation_significance"))
-    return (*first, *shares, _cause(row), *costs, Cell(row["action"] or ""), Cell(row["percent_of"] or ""))
+    return (
+        linked(night, row["loop"]),
+        *(cell(row, c) for c in ("description", "type", "area")),
+        marked_cell(row, SIGNIFICANCE),
+        *(marked_cell(row, c, ".0f") for c in ALL_SHARES),
+        cause_cell(row["cause"]),
+        *(marked_cell(row, c) for c in ALL_COSTS),
+        *(cell(row, c) for c in ("action", "percent_of")),
+    )
 
 
 def ranking(night: Night) -> Table:
@@ -141,16 +113,9 @@ def _tiles(night: Night) -> Tiles:
 
 def lost_table(night: Night) -> Table:
     """Loops that were not assessed, and why."""
-    columns = (*headings("loop", "status"), heading("reason", wide=True))
     lost = sorted((r for r in night.rows if r["status"] != Status.OK), key=lambda r: r["loop"])
-    rows = tuple((Cell(r["loop"]), Cell(r["status"] or ""), Cell(r["reason"] or "")) for r in lost)
-    return Table("not-assessed", "", columns, rows, searchable=len(rows) > 12)
-
-
-LINKS = (
-    ("Hand-over to maintenance", f"{maintenance.NAME}.html"),
-    ("All loops as CSV", "csv/index-ranking.csv"),
-)
+    rows = tuple(tuple(cell(r, column.key) for column in LOST) for r in lost)
+    return Table("not-assessed", "", LOST, rows, searchable=len(rows) > 12)
 
 
 def page(
@@ -163,19 +128,18 @@ def page(
 
     links : to other nights, after those to the sheet and the CSV.
     """
-    lost = sum(r["status"] != Status.OK for r in night.rows)
     seen = [r for r in night.rows if r["loop"] not in night.hidden]
     first = Listing(tuple(("", text) for text in first_things(seen, groups)))
-    drawn = plant_map(night)
+    drawn, lost = plant_map(night), lost_table(night)
     sections = (
         Section("First", (first, _tiles(night))),
         since(night),
         Section("Loops worth a look", (worst_table(night),)),
-        *((Section("One cause, several loops", (morning_table(night, groups),)),) if groups else ()),
+        *((Section("One cause, several loops", (morning_table(groups),)),) if groups else ()),
         *((Section("The plant", (drawn, *history(sums))),) if drawn is not None else ()),
         Section("Areas", (area_table(night.rows),)),
         Section("All loops", (ranking(night),)),
-        Section(f"Not assessed ({lost})", (lost_table(night),)),
+        Section(f"Not assessed ({len(lost.rows)})", (lost,)),
     )
     by = BY_NAME[cost_column(night.rows)].title.lower()
     subtitle = f"{counted(len(night.rows), 'loop')}, the worst first by {by}."

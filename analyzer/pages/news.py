@@ -8,9 +8,8 @@ import numpy as np
 
 from analyzer.lanes.figures import FIGURE, lanes_in
 from analyzer.loop.decisions import Cause, Lane, Status
-from analyzer.pages.headings import heading
-from analyzer.pages.view import Night, Row, linked, oscillates, proposal
-from analyzer.pages.words import number
+from analyzer.pages.reading import Night, linked, oscillates, proposal
+from analyzer.pages.words import Row, cell, heading
 from reports.pages import Block, Cell, Column, Section, Table, Text
 
 HALVED = 0.5
@@ -130,10 +129,6 @@ def news_lines(night: Night) -> list[str]:
     return [f"{loop} {text}" for _, loop, text in told]
 
 
-def _significance(row: Row) -> Cell:
-    return Cell(number(row["oscillation_significance"]), row["oscillation_significance"])
-
-
 NEWS = (
     heading("loop"),
     Column("news", "Since the night before"),
@@ -150,8 +145,7 @@ def news_table(night: Night, tones: Sequence[str], name: str, title: str) -> Tab
         (
             linked(night, row["loop"]),
             Cell(text, kind=tone),
-            _significance(night.before[row["loop"]]),
-            _significance(row),
+            *(cell(r, "oscillation_significance") for r in (night.before[row["loop"]], row)),
             Cell(proposal(row)),
         )
         for row, text, tone in found

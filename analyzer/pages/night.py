@@ -1,27 +1,31 @@
-"""All pages of a night: the morning page, then the worst loops one by one, each with its explanation if any."""
+"""All pages of a night: the morning page, one for each of the worst loops, and morning pages under their dates."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 from analyzer.explain.night import known
-from analyzer.pages import archive, group_pictures, groups, loop, maintenance, morning
-from analyzer.pages.plant_history import read_sums
-from analyzer.pages.reading import read_nights, read_trends
-from analyzer.pages.view import read_night
-from analyzer.plantwide.view import read_groups
+from analyzer.pages import groups, loop, maintenance, morning
+from analyzer.pages.plant import NightSum, read_sums
+from analyzer.pages.reading import Night, Thinned, read_night, read_nights, read_trends
+from analyzer.plantwide.view import GroupView, read_groups
 from analyzer.store.store import Store
 from reports.page_file import PageFileError, loads
-from reports.pages import Page
+from reports.pages import Block, Page, Section, Table, TreeMap
 
+MOST_DATED = 31
+"""Nights that have a page; the store has the others."""
+SHOWN = 50
+"""Loops worth a look that a dated page lists at most."""
+LATEST = ("Latest night", "index.html")
 HISTORY = 60
 """Nights of history on a loop's page; ours: two months, as a maintenance round takes."""
 
 
 def pages(store: Store, name: str | None = None, top: int = 50) -> Iterator[Page]:
-    """The morning page of a night (the latest by default) and the pages of its worst loops.
+    """The morning page of a night (the latest by default), its sheets, and the pages of its groups and worst loops.
 
     Raises
     ------
@@ -30,34 +34,41 @@ def pages(store: Store, name: str | None = None, top: int = 50) -> Iterator[Page
     """
     night = read_night(store, name, top)
     shared = read_groups(store, night.name)
-    dated = [n for n in store.nights() if n <= night.name][-archive.MOST :]
-    yield morning.page(night, shared, read_sums(store, night.name), archive.neighbours(dated, night.name))
+    nights = [n for n in store.nights() if n <= night.name]
+    links = neighbours(nights[-MOST_DATED:], night.name)
+    yield morning.page(night, shared, read_sums(store, night.name), links)
     yield maintenance.page(night)
-    nights = [n for n in store.nights() if n <= night.name][-HISTORY:]
+    members = {r["loop"] for g in shared for r in g.rows[: groups.MOST]}
+    trends = read_trends(store, members, [night.name])
+    for g in shared:
+        yield groups.page(g, trends, night.name, night.paged)
+    yield from _loop_pages(store, night, nights[-HISTORY:], shared, {**trends, **night.trends})
+
+
+def _loop_pages(
+    store: Store,
+    night: Night,
+    nights: Sequence[str],
+    shared: Sequence[GroupView],
+    around: Mapping[str, Thinned],
+) -> Iterator[Page]:
+    """The worst loops one by one, each with its settings compared and its explanation, if the night kept any."""
     rows = read_nights(store, nights, loop.COLUMNS, night.paged)
     trends = read_trends(store, night.paged, nights[-loop.WEEK :])
-    beside = read_trends(
-        store, {r["loop"] for g in shared for r in g.rows[: group_pictures.MOST]}, [night.name]
-    )
     by_number = {g.number: g for g in shared}
-    for g in shared:
-        yield groups.page(g, beside, night.name, night.paged)
     explained = {r["loop"]: r for r in known(store, night.name)}
     compared = _compared(store, night.name)
-    for worst in night.worst:
-        tag = worst["loop"]
+    for tag in (worst["loop"] for worst in night.worst):
         own = [r for r in rows if r["loop"] == tag]
-        drawn = explanation(explained.get(tag))
-        settings = kept_page(compared.get(tag))
+        drawn, settings = explanation(explained.get(tag)), kept_page(compared.get(tag))
         group = by_number.get(own[-1]["group"] or "")
         said = [n.said(night.zone) for n in night.notes.get(tag, ())]
-        part = None if group is None else groups.of_loop(group, tag, {**beside, **night.trends})
+        part = None if group is None else groups.of_loop(group, tag, around)
         about = loop.page(own, trends.get(tag), explained.get(tag), drawn, part, said, settings)
         yield about
-        if settings is not None:
-            yield replace(settings, links=(*about.links[:1], (tag, f"{about.name}.html")))
-        if drawn is not None:
-            yield replace(drawn, links=(*about.links[:1], (tag, f"{about.name}.html")))
+        for more in (settings, drawn):
+            if more is not None:
+                yield replace(more, links=(*about.links[:1], (tag, f"{about.name}.html")))
 
 
 def dated_pages(store: Store, name: str | None, written: Callable[[str], bool]) -> Iterator[Page]:
@@ -71,11 +82,55 @@ def dated_pages(store: Store, name: str | None, written: Callable[[str], bool]) 
         Told a night; True where its page was written after its results.
     """
     last = name or store.require()
-    nights = [n for n in store.nights() if n <= last][-archive.MOST :]
+    nights = [n for n in store.nights() if n <= last][-MOST_DATED:]
     sums = read_sums(store, last)
     for night in nights:
         if night in nights[-2:] or not written(night):
-            yield archive.page(store, night, nights, sums)
+            yield dated_page(store, night, nights, sums)
+
+
+def name_of(night: str) -> str:
+    """The file of a night's page, without its ending."""
+    return f"morning-{night}"
+
+
+def neighbours(nights: Sequence[str], night: str) -> tuple[tuple[str, str], ...]:
+    """Links from a night to those before and after it among some, oldest first."""
+    at = list(nights).index(night)
+    around = (("Previous night", at - 1), ("Next night", at + 1))
+    return tuple((text, f"{name_of(nights[k])}.html") for text, k in around if 0 <= k < len(nights))
+
+
+def dated_page(store: Store, night: str, nights: Sequence[str], sums: Sequence[NightSum]) -> Page:
+    """A night's morning page without links to loops' pages, which are those of the latest night alone.
+
+    Parameters
+    ----------
+    store : Store
+    night : str
+    nights : sequence of str
+        All nights that have a page, oldest first.
+    sums : sequence of NightSum
+        The plant's figures of these nights and others.
+    """
+    own = [s for s in sums if s.name <= night]
+    found = morning.page(read_night(store, night, SHOWN), read_groups(store, night), own)
+    links = (*neighbours(nights, night), LATEST)
+    return replace(found, name=name_of(night), sections=tuple(map(_unlinked, found.sections)), links=links)
+
+
+def _unlinked(section: Section) -> Section:
+    return replace(section, blocks=tuple(map(_without_links, section.blocks)))
+
+
+def _without_links(block: Block) -> Block:
+    if isinstance(block, Table):
+        rows = tuple(tuple(replace(c, href="") for c in row) for row in block.rows)
+        return replace(block, rows=rows)
+    if isinstance(block, TreeMap):
+        groups = tuple(replace(g, tiles=tuple(replace(t, href="") for t in g.tiles)) for g in block.groups)
+        return replace(block, groups=groups)
+    return block
 
 
 def _compared(store: Store, night: str) -> dict[str, str]:

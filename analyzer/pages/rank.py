@@ -1,25 +1,19 @@
-"""The morning list from a store, as table, CSV, JSON or Markdown; reads what it shows and no more."""
+"""The loops of a night in the order of the morning; reads what is shown and no more."""
 
 from __future__ import annotations
 
-import csv
-import io
-import json
 import math
-import os
 from collections.abc import Mapping, Sequence
-from shutil import get_terminal_size
 from typing import Any
 
 from analyzer.columns import BY_NAME, LISTED, NOTED, RANKING, names
 from analyzer.lanes.figures import FIGURE, lanes_in
 from analyzer.loop.decisions import Cause, Due, Lane
-from analyzer.pages.cost import LOSS, MARK, OF_RECORDED, SIGNIFICANCE, compares, cost_column, mark
+from analyzer.pages.cost import LOSS, SIGNIFICANCE, compares, cost_column
 from analyzer.store import notes
 from analyzer.store.notes import Note
 from analyzer.store.store import Store
 from identification.errors import InputError
-from reports.texts import harmless, visible
 
 LANE_FIGURES = tuple(name for name in FIGURE.values() if name not in names(RANKING))
 """Figures of lanes that the contract's columns do not hold."""
@@ -29,8 +23,6 @@ LIST_COLUMNS = (*KEPT, *names(NOTED))
 """Columns of CSV and JSON: the contract's, then what says in which units settings stand, and the advice in full."""
 MOST_NAMES = 10
 """Areas that are named in an error."""
-WIDEST, PIPED = 240, 180
-"""Characters of a line of a wide table, and of one that no terminal shows."""
 Row = Mapping[str, Any]
 
 
@@ -132,86 +124,3 @@ def _within(rows: list[dict[str, Any]], area: str | None) -> list[dict[str, Any]
         named = ", ".join(known[:MOST_NAMES]) or "none: loops.csv states no areas"
         raise InputError(f"area {area!r}", f"one of {named}", "correct --area")
     return found
-
-
-def rendered(rows: Sequence[Row], form: str, night: str, wide: bool = False, lane: Lane | None = None) -> str:
-    """Rows as text in one of the formats; a `wide` table keeps all its columns, one of a lane shows its figure."""
-    if form in ("table", "markdown"):
-        from analyzer.words.present import markdown_table, shown_of
-        from reports.markdown import escaped
-
-        shown = shown_of(rows, None if lane is None else FIGURE[lane])
-        if not rows:
-            return f"Night {night}: no loop is in the lane {lane}" if lane else f"Night {night}: no loops"
-        text = (
-            as_table(rows, night, WIDEST if wide else None, shown)
-            if form == "table"
-            else markdown_table(rows, shown)
-        )
-        marked = any(mark(row, column) for row in rows for column in shown)
-        return f"{text}\n\n{escaped(MARK) if form == 'markdown' else MARK} {OF_RECORDED}" if marked else text
-    return {"csv": as_csv, "json": as_json}[form](rows, night)
-
-
-def as_csv(rows: Sequence[Row], night: str) -> str:
-    """All columns as CSV, empty where not assessed, texts of the plant harmless to spreadsheets."""
-    out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(LIST_COLUMNS)
-    writer.writerows([_cell(r[c]) for c in LIST_COLUMNS] for r in rows)
-    return out.getvalue().rstrip("\n")
-
-
-def _cell(value: Any) -> Any:
-    """A cell that no spreadsheet takes for a formula; empty where nothing is known."""
-    if value is None:
-        return ""
-    return harmless(visible(value)) if isinstance(value, str) else value
-
-
-def as_json(rows: Sequence[Row], night: str) -> str:
-    """All columns as a JSON list of objects, null where not assessed."""
-    return json.dumps([{c: r[c] for c in LIST_COLUMNS} for r in rows], indent=1)
-
-
-def as_table(
-    rows: Sequence[Row], night: str, width: int | None = None, columns: Sequence[str] | None = None
-) -> str:
-    """The columns for people as a table; those worth least go where `width` (the terminal's by default) is short."""
-    from analyzer.words.present import SHOWN, WITH_UNITS, brief, fitting
-    from reports.plain import Heading, table
-
-    width = width or (get_terminal_size().columns if interactive() else PIPED)
-    shown = [brief(row, columns or SHOWN) for row in rows]
-    kept = fitting(shown, width)
-    headings = [
-        Heading(c.heading, c.is_number and c.name not in WITH_UNITS, c.name == "reason")
-        for c in map(BY_NAME.__getitem__, kept)
-    ]
-    head, body = table(headings, [[cells[name] for name in kept] for cells in shown], width)
-    rule = " " + "\u2500" * (max(map(len, (head, *(line for lines in body for line in lines)))) - 1)
-    coloured = _coloured if interactive() and not os.environ.get("NO_COLOR") else None
-    lines = [
-        coloured(line, row["loop"], row["cause"]) if coloured and not k else line
-        for row, lines in zip(rows, body, strict=True)
-        for k, line in enumerate(lines)
-    ]
-    return "\n".join([f"Night {night}", "", head, rule, *lines])
-
-
-def _coloured(line: str, loop: str, cause: str | None) -> str:
-    """A row's first line with its loop in the colour of its cause."""
-    import click
-
-    from analyzer.words.present import CAUSE_STYLES
-
-    colour = CAUSE_STYLES.get(cause or "")
-    shown = visible(loop)
-    return line if colour is None else line.replace(shown, click.style(shown, fg=colour), 1)
-
-
-def interactive() -> bool:
-    """Whether the output is read on a terminal."""
-    import sys
-
-    return sys.stdout.isatty()

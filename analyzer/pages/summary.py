@@ -1,18 +1,80 @@
-"""The morning on one screen: what to do first, what changed, the worst loops with what to type in."""
+"""The morning on one screen: what a shift leader does first, what changed, the worst loops with what to type in."""
 
 from __future__ import annotations
 
-from analyzer.loop.decisions import CAUSES, Action, Status
-from analyzer.pages.lead import first_things
+from collections.abc import Callable, Sequence
+
+from analyzer.lanes.figures import lanes_in
+from analyzer.loop.decisions import CAUSES, Action, Cause, Due, Fault, GroupRole, Lane, Status
+from analyzer.pages.cost import cost, cost_column
+from analyzer.pages.maintenance import work_order
 from analyzer.pages.news import news_lines
-from analyzer.pages.view import Night, Row, needs_a_look, oscillates, read_night
-from analyzer.pages.words import counted
-from analyzer.pages.work_order import work_order
-from analyzer.plantwide.view import read_groups
+from analyzer.pages.reading import Night, needs_a_look, oscillates, read_night
+from analyzer.pages.words import Row, counted, duration, enumerated
+from analyzer.plantwide.view import GroupView, read_groups
 from analyzer.store.store import Store
 from analyzer.words.units import changed_settings
 from reports.pages import Cell, Column, Listing, Page, Section, Table, Text
 
+FIRST = 3
+"""Sentences at most."""
+NAMED = 3
+"""Loops that a sentence names; the rest is counted."""
+CALM = "No loop needs a touch this morning."
+
+
+def _is_retune(row: Row, cause: bool) -> bool:
+    return row["action"] == Action.RETUNE and (row["cause"] == Cause.VALVE) is cause
+
+
+def _is_unstated(row: Row) -> bool:
+    return row["action"] == Action.CHECK_SETTINGS and None in (row["kp"], row["ti"])
+
+
+HALVE = "Halve the gain of {names} or go to manual"
+Work = tuple[Callable[[Row], bool], str, str]
+WORK: tuple[Work, ...] = (
+    (
+        lambda r: _is_retune(r, True),
+        "Type new settings into {names}: its valve has play, and new settings calm what a repair can wait for.",
+        "Type new settings into {names}: their valves have play, and new settings calm what a repair can wait for.",
+    ),
+    (lambda r: _is_retune(r, False), *2 * ("Type new settings into {names}: too tight for the process.",)),
+    (
+        lambda r: r["action"] == Action.REPAIR_VALVE and r["due"] != Due.SHUTDOWN,
+        "Stroke the valve of {names}: it {fault}.",
+        "Stroke the valves of {names}: each {fault}.",
+    ),
+    (
+        lambda r: r["action"] == Action.CHECK_MEASUREMENT,
+        *2 * ("Check the measurement of {names}: frozen, or far from its set point with OP free.",),
+    ),
+    (
+        lambda r: r["action"] == Action.CHECK_SETTINGS and not _is_unstated(r),
+        *2 * ("Compare the settings of {names} with loops.csv: the trends show others.",),
+    ),
+    (
+        _is_unstated,
+        "State Kp and Ti of {names} in loops.csv, as its controller has them: new settings wait for that.",
+        "State Kp and Ti of {names} in loops.csv, as their controllers have them: new settings wait for that.",
+    ),
+    (
+        lambda r: r["cause"] == Cause.TUNING and r["action"] == Action.NEEDS_DATA,
+        f"{HALVE}: it swings, too tight for its process; settings wait for other data.",
+        f"{HALVE}: they swing, too tight for their processes; settings wait for other data.",
+    ),
+    (
+        lambda r: Lane.AT_LIMIT in lanes_in(r) and r["cause"] != Cause.TUNING,
+        *2 * ("See why OP of {names} rests at its limit: valve size, or what feeds it.",),
+    ),
+)
+"""Kinds of work: which rows ask for it, and the sentence for one loop and for several."""
+AT_SHUTDOWN: Work = (
+    lambda r: r["action"] == Action.REPAIR_VALVE and r["due"] == Due.SHUTDOWN,
+    "At the next shutdown look at the valve of {names}: worn, though its loop is calm.",
+    "At the next shutdown look at the valves of {names}: worn, though their loops are calm.",
+)
+"""Work that is worth nothing tonight."""
 WORST = 10
 """Loops that are listed."""
 NEWS = 8
@@ -23,6 +85,55 @@ COLUMNS = (
     Column("do", "Do", wide=True),
     Column("note", "Note", wide=True),
 )
+
+
+def listed(names: Sequence[str]) -> str:
+    """Names in a sentence, the first few of them."""
+    more = len(names) - NAMED
+    return ", ".join(names[:NAMED]) + f" and {more} more" if more > 0 else enumerated(list(names))
+
+
+def first_things(rows: Sequence[Row], groups: Sequence[GroupView] = ()) -> tuple[str, ...]:
+    """At most three sentences, the one that gains most first; one that says so where there is nothing to do."""
+    by_loop, by = {r["loop"]: r for r in rows}, cost_column(rows)
+    told: set[str] = set()
+    found: list[tuple[float, str]] = []
+    for group in groups:
+        source = by_loop.get(group.source["loop"]) if group.source else None
+        others = [r["loop"] for r in group.rows if r["role"] == GroupRole.FOLLOWER and r["loop"] in by_loop]
+        if source is None or not others:
+            continue
+        members = [source["loop"], *others]
+        told |= set(members)
+        found.append((sum(cost(by_loop[m], by) for m in members), _of_group(source, others)))
+    left = sorted((r for r in rows if r["loop"] not in told), key=lambda r: (-cost(r, by), r["loop"]))
+    for work in (*WORK, AT_SHUTDOWN):
+        mine = [r for r in left if work[0](r)]
+        if mine:
+            worth = 0.0 if work is AT_SHUTDOWN else sum(cost(r, by) for r in mine)
+            found.append((worth, _asked(work, mine)))
+    ordered = sorted(found, key=lambda pair: -pair[0])
+    return tuple(text for _, text in ordered[:FIRST]) or (CALM,)
+
+
+def _asked(work: Work, rows: Sequence[Row]) -> str:
+    """The sentence of a kind of work on some loops."""
+    sticks = sum(r["valve_fault"] == Fault.STICTION for r in rows)
+    fault = "sticks" if sticks == len(rows) else "has play" if sticks == 0 else "sticks or has play"
+    _, one, several = work
+    return (one if len(rows) == 1 else several).format(names=listed([r["loop"] for r in rows]), fault=fault)
+
+
+def _of_group(source: Row, others: Sequence[str]) -> str:
+    name, moved = source["loop"], f"it also moves {listed(others)}"
+    unasked = source["action"] is None and source["cause"] == Cause.VALVE  # of a night that got no advice
+    if source["action"] == Action.REPAIR_VALVE or unasked:
+        return f"Fix {name}'s valve: {moved}."
+    if source["action"] == Action.RETUNE:
+        return f"Type new settings into {name}: {moved}."
+    if source["cause"] == Cause.LOAD:
+        return f"Find what moves {name} every {duration(source['period_s'])} from outside: {moved}."
+    return f"Look at {name} first: {moved}."
 
 
 def _do(row: Row) -> str:

@@ -1,15 +1,22 @@
-"""Figures and times in words, the same on every page."""
+"""Figures, times, columns and cells, the same on every page."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
+from analyzer.columns import BY_NAME
 from analyzer.comparison.before_after import Change, Verdict
 from analyzer.history.plant_clock import stamp
+from analyzer.loop.decisions import CAUSES
+from analyzer.pages.cost import mark
 from analyzer.words.units import duration
+from reports.pages import Cell, Column, Floats
 
-__all__ = ["KINDS", "counted", "duration", "interval", "number", "setting", "signed", "stamp"]
+__all__ = ["duration", "stamp"]  # of the words that are not chosen here
 
+Row = Mapping[str, Any]
 KINDS = {
     Verdict.BETTER: "better",
     Verdict.WORSE: "worse",
@@ -52,3 +59,90 @@ def setting(value: Any) -> str:
 def counted(n: int, what: str) -> str:
     """A number with its noun."""
     return f"{n} {what}" if n == 1 else f"{n} {what}s"
+
+
+def enumerated(names: list[str]) -> str:
+    """Names in a sentence."""
+    return names[0] if len(names) == 1 else ", ".join(names[:-1]) + " and " + names[-1]
+
+
+def heading(name: str, wide: bool = False) -> Column:
+    """A column of the store as one of a page; `wide` ones may wrap."""
+    declared = BY_NAME[name]
+    return Column(name, declared.heading, declared.is_number, declared.hint, wide)
+
+
+def headings(*names: str) -> tuple[Column, ...]:
+    """The headings of several columns."""
+    return tuple(heading(name) for name in names)
+
+
+def titled(name: str, text: str) -> tuple[str, str]:
+    """A figure as a fact: the column's title, and a text with the column's unit."""
+    declared = BY_NAME[name]
+    return declared.title, f"{text} {declared.unit}".strip()
+
+
+def plain_cell(value: float | None) -> Cell:
+    """A number that is no column of the store."""
+    return Cell(number(value), value)
+
+
+def cell(row: Row, name: str) -> Cell:
+    """What a row holds in a column of the store: three digits, a period in the unit that reads best, or a text."""
+    value = row[name]
+    if not BY_NAME[name].is_number:
+        return Cell(value or "")
+    return Cell(duration(value) if name == "period_s" else number(value), value)
+
+
+def marked_cell(row: Row, name: str, digits: str = "") -> Cell:
+    """A figure, marked where it compares with no other loop's."""
+    value = row[name]
+    text = number(value) if not digits or value is None else f"{value:{digits}}"
+    return Cell(text + mark(row, name), value)
+
+
+def cause_cell(cause: str | None) -> Cell:
+    """A cause in its colour."""
+    return Cell(cause or "", kind=cause if cause in CAUSES else "")
+
+
+@dataclass(frozen=True, slots=True)
+class Scale:
+    """What percent of span means for a loop: PV at 0 %, the span, and the unit; '' for one that is not stated."""
+
+    low: float
+    span: float
+    unit: str
+
+    @property
+    def label(self) -> str:
+        """The unit on an axis."""
+        return self.unit or "own unit"
+
+    def of(self, percent: Floats) -> Floats:
+        """PV or SP in its own unit."""
+        return self.low + percent * (self.span / 100.0)
+
+
+PERCENT = "% of span"
+PLAIN = Scale(0.0, 100.0, PERCENT)
+"""Percent as it is, where the night does not say what it means."""
+
+
+def scale_of(row: Row) -> Scale:
+    """What percent means in a row of the night."""
+    low, high = row.get("pv_lo"), row.get("pv_hi")
+    if low is None or high is None or not high > low:
+        return PLAIN
+    return Scale(low, high - low, row["pv_unit"] or "")
+
+
+def beside(name_unit: str, value: float | None, scale: Scale) -> str:
+    """A figure in % of span in the loop's own unit too, in brackets; '' where that says nothing new."""
+    if value is None or name_unit != PERCENT or not scale.unit or scale is PLAIN:
+        return ""
+    if scale.unit == "%" and scale.span == 100.0:
+        return ""
+    return f" ({number(value * scale.span / 100.0)} {scale.unit})"

@@ -13,8 +13,8 @@ from analyzer.loop.decisions import Action, Lane, Status
 from analyzer.loops.spec import LoopSpec
 from analyzer.night import chunk
 from analyzer.night.nights import Night
+from analyzer.pages.maintenance import work_order
 from analyzer.pages.rank import worst_first
-from analyzer.pages.work_order import work_order
 from tests.analyzer.plant import CONFIG, START_S, Sketch, series, simulate, spec
 from tests.identification.signals import hand_loop
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from analyzer.pages.lead import CALM, first_things, listed
+from analyzer.pages.summary import CALM, first_things, listed
 from analyzer.plantwide.view import GroupView
 
 ROW: dict[str, Any] = {

@@ -6,7 +6,7 @@ import pytest
 
 from analyzer.lanes.figures import FIGURE
 from analyzer.pages.news import news_lines, news_table
-from analyzer.pages.view import Night
+from analyzer.pages.reading import Night
 
 NO_LANES: dict[str, object] = {"lanes": None, **dict.fromkeys(FIGURE.values(), 0.0)}
 CALM = {"loop": "L", "status": "ok", "oscillating_pct": 0.0, "oscillation_significance": 0.0, "cause": "none"}

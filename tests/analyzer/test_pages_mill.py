@@ -13,7 +13,7 @@ from analyzer.history.export import ReadOptions, open_export
 from analyzer.loops.changes import read_changes
 from analyzer.loops.tags import match, read_loops
 from analyzer.pages import before_after
-from analyzer.pages.report import Case, Spans, cases, detected
+from analyzer.pages.changes import Case, Spans, cases, detected
 from analyzer.store.store import Store
 from reports.markdown import render
 

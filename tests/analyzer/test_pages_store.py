@@ -11,15 +11,11 @@ import pytest
 
 from analyzer.loops.changes import TuningChange
 from analyzer.pages import before_after, morning, night
-from analyzer.pages.areas import score
-from analyzer.pages.engineering import Scale
-from analyzer.pages.reading import read_hours, read_trends
-from analyzer.pages.report import Spans, cases, detected
-from analyzer.pages.rhythm import rhythm_plots
-from analyzer.pages.trend_rhythm import autocorrelation
-from analyzer.pages.turns import turn_panels
-from analyzer.pages.view import read_night
-from analyzer.pages.wear import wear_texts
+from analyzer.pages.changes import Spans, cases, detected, wear_texts
+from analyzer.pages.loop_pictures import autocorrelation, rhythm_plots, turn_panels
+from analyzer.pages.plant import score
+from analyzer.pages.reading import read_hours, read_night, read_trends
+from analyzer.pages.words import Scale
 from analyzer.store.store import Store
 from identification.errors import InputError
 from reports import html

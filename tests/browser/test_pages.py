@@ -15,7 +15,7 @@ import pytest
 
 from analyzer.loops.changes import TuningChange
 from analyzer.pages import before_after, night
-from analyzer.pages.report import Spans, cases
+from analyzer.pages.changes import Spans, cases
 from reports.folder import write_html
 from tests.reports.small_store import NASTY, START_S, small_store
 

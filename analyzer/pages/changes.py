@@ -1,0 +1,202 @@
+"""Changes of controllers with what came of them: found in a store, compared, in words, in wear and money."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from analyzer.comparison.before_after import (
+    LIMITS,
+    Change,
+    Grade,
+    LoopComparison,
+    Span,
+    Verdict,
+    compare,
+    follows,
+    grade,
+)
+from analyzer.comparison.spans import spans_around
+from analyzer.config import ChangeLimits, ComparisonLimits
+from analyzer.loop.decisions import counts
+from analyzer.loops.changes import TuningChange, behaviour_change, stated_changes
+from analyzer.pages.reading import Thinned, nights_within, read_hours, read_nights, read_trends
+from analyzer.pages.words import PLAIN, Row, Scale, enumerated, number, scale_of
+from analyzer.store.store import Store
+from analyzer.words.units import gain_unit
+
+COLUMNS = (
+    *(
+        "loop",
+        "night",
+        "description",
+        "type",
+        "gain_unit",
+        "ti_unit",
+        "pv_unit",
+        "op_unit",
+        "form",
+        "kp",
+        "ti",
+    ),
+    *("start_s", "status", "source_loop", "oscillating_pct", "extra", "pv_lo", "pv_hi"),
+)
+CHANGES = ChangeLimits()
+"""The limits in force where none are given."""
+GRADES = {
+    Grade.CLEAR: "improved clearly in all four",
+    Grade.MODEST: "improved modestly",
+    Grade.MIXED: "in part better, in part worse",
+    Grade.WORSE: "worse",
+    Grade.NONE: "no clear change",
+}
+HOURS_A_YEAR = 8760.0
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """A change with what came of it."""
+
+    change: TuningChange
+    found: LoopComparison
+    description: str
+    units: str
+    trend: Thinned | None
+    wear: tuple[str, ...] = ()
+    scale: Scale = PLAIN
+
+
+@dataclass(frozen=True, slots=True)
+class Spans:
+    """How long to look: days each side, or spans stated outright."""
+
+    days: float = 7.0
+    before: Span | None = None
+    after: Span | None = None
+
+    def of(self, change: TuningChange, others: Sequence[float]) -> tuple[Span, Span]:
+        """Spans before and after a change."""
+        before, after = spans_around(change.time_s, self.days, others)
+        return self.before or before, self.after or after
+
+
+def detected(
+    store: Store, loops: Sequence[str] | None = None, limits: ChangeLimits = CHANGES
+) -> list[TuningChange]:
+    """Changes that nobody stated: settings that differ between nights, and steps of a controller's
+    behaviour."""
+    nights = store.nights()
+    rows = read_nights(store, nights, COLUMNS, loops)
+    tags = list(dict.fromkeys(r["loop"] for r in rows))
+    hours = read_hours(store, tags, nights)
+    found = []
+    for tag in tags:
+        stated = stated_changes([r for r in rows if r["loop"] == tag])
+        seen = behaviour_change(tag, hours[tag], limits) if tag in hours else None
+        found += stated or ([seen] if seen else [])
+    return found
+
+
+def _around(spans: Sequence[tuple[Span, Span]]) -> Span:
+    ends = [s for pair in spans for s in pair]
+    return Span(min(s.first_s for s in ends), max(s.last_s for s in ends))
+
+
+def _source(rows: Sequence[Row], limits: ComparisonLimits) -> str:
+    oscillating = [counts(r["oscillating_pct"]) for r in rows]
+    return follows([r["source_loop"] for r in rows], oscillating, limits)
+
+
+def _units(row: Row) -> str:
+    gain = gain_unit(row["gain_unit"], row["pv_unit"], row["op_unit"])
+    return f"{row['form'] or 'ideal'} form, Kp in {gain}, Ti in {row['ti_unit'] or 's'}"
+
+
+def cases(
+    store: Store, changes: Sequence[TuningChange], spans: Spans, limits: ComparisonLimits = LIMITS
+) -> tuple[list[Case], list[tuple[str, str]]]:
+    """Every change with what came of it, and those that could not be looked at, with the reason.
+
+    Parameters
+    ----------
+    store : Store
+    changes : sequence of TuningChange
+        Several of one loop end each other's spans.
+    spans : Spans
+    limits : ComparisonLimits
+    """
+    if not changes:
+        return [], []
+    of = [spans.of(c, [o.time_s for o in changes if o.loop == c.loop and o != c]) for c in changes]
+    nights = nights_within(store, _around(of))
+    loops = {c.loop for c in changes}
+    rows = read_nights(store, nights, COLUMNS, loops)
+    hours, trends = read_hours(store, loops, nights), read_trends(store, loops, nights)
+    found: list[Case] = []
+    missing: list[tuple[str, str]] = []
+    for change, (before, after) in zip(changes, of, strict=True):
+        own = [r for r in rows if r["loop"] == change.loop]
+        if change.loop not in hours or not own:
+            missing.append((change.loop, "the store holds no hours of it around the change"))
+            continue
+        result = compare(change.loop, hours[change.loop], before, after, _source(own, limits), limits)
+        found.append(_case(change, result, own[-1], trends.get(change.loop)))
+    return found, missing
+
+
+def _case(change: TuningChange, result: LoopComparison, row: Row, trend: Thinned | None) -> Case:
+    told = (row["description"] or "", _units(row), trend)
+    return Case(change, result, *told, wear_texts(result, row), scale_of(row))
+
+
+def outcome(found: LoopComparison) -> str:
+    """A loop's outcome in one phrase."""
+    kind = grade(found)
+    if kind is Grade.PARTIAL:
+        better = [c.measure.short_title.lower() for c in found.primary if c.verdict is Verdict.BETTER]
+        text = f"improved only in {enumerated(better)}"
+    elif kind is Grade.INCOMPARABLE:
+        text = "not comparable: " + ("; ".join(found.reasons) or "no hourly figures on both sides")
+    else:
+        text = GRADES[kind]
+    if found.source_loop:
+        text += f"; the cause lies in the neighbour {found.source_loop}, whose oscillation it follows"
+    return text
+
+
+def _stated(row: Row, name: str) -> float | None:
+    """A number of the plant: a column of the night, or of its JSON of the plant's own columns."""
+    held = json.loads(row.get("extra") or "{}") | {k: v for k, v in row.items() if v is not None}
+    try:
+        value = float(held[name])
+    except (KeyError, TypeError, ValueError):
+        return None
+    return value if math.isfinite(value) and value > 0 else None
+
+
+def _change(found: LoopComparison, name: str) -> Change | None:
+    """The change of a figure, where it is clear."""
+    unclear = (Verdict.INCOMPARABLE, Verdict.UNCLEAR)
+    return next((c for c in found.changes if c.measure.name == name and c.verdict not in unclear), None)
+
+
+def wear_texts(found: LoopComparison, row: Row) -> tuple[str, ...]:
+    """What the change means in valve life and in the plant's own cost of error, from numbers that loops.csv states
+    alone.
+
+    valve_life_travel_pct : travel after which a valve is overhauled [% of stroke, summed]
+    cost_per_error_pct_h : what one percent of average absolute error costs an hour [cost_unit]
+    """
+    texts = []
+    travel, life = _change(found, "valve_travel_pct_per_h"), _stated(row, "valve_life_travel_pct")
+    if travel is not None and life is not None:
+        a, b = (life / max(v, 1e-9) / HOURS_A_YEAR for v in (travel.found.before, travel.found.after))
+        texts.append(f"Valve life at this travel: {number(a)} years before, {number(b)} years after.")
+    error, cost = _change(found, "average_absolute_error_pct"), _stated(row, "cost_per_error_pct_h")
+    if error is not None and cost is not None:
+        unit = json.loads(row.get("extra") or "{}").get("cost_unit", "") or "units of cost"
+        low, high = (number(-end * cost * HOURS_A_YEAR) for end in (error.found.high, error.found.low))
+        texts.append(f"Saved by the smaller error: {low} to {high} {unit} a year at the stated cost.")
+    return tuple(texts)

@@ -1,0 +1,204 @@
+"""Pictures of a loop: its trends, PV over OP, the rhythm of its error, and the half-cycles that convict."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from analyzer.loop.decisions import Cause
+from analyzer.pages.reading import Thinned
+from analyzer.pages.words import PLAIN, Row, Scale, duration, scale_of
+from identification.record import Mask
+from identification.signals.correlation import lag_sums
+from reports.pages import Band, Floats, Line, Mark, Panels, Plot, Sparkline, Text, Trend
+
+SPARK_BUCKETS = 100
+"""Buckets of a sparkline: a pixel and a fifth each."""
+CAPTION = (
+    "Least and greatest of each bucket of {step}. Drag, or the wheel with Ctrl, zooms; shift-drag or arrows move; "
+    "two fingers do both; double click shows all."
+)
+LEAST_PCT = 2.0
+"""Height of an axis at least [% of span]; ours: less would show noise as if it were a swing."""
+SEGMENTS = 4
+"""Parts that the spectrum is averaged over."""
+LEAST_SAMPLES = 64
+"""Buckets that autocorrelation and spectrum need at least."""
+LEAST_BUCKETS = 2.5
+"""Buckets a period needs to be seen in a thinned trend [-]; below 2 it is folded (Nyquist)."""
+SHOWN_PERIODS = 8.0
+"""Length of the autocorrelation shown [periods]."""
+SAID = {
+    Cause.VALVE: "Thick: OP has turned and moves, the stem does not follow yet. PV stands there, or goes on, "
+    "and answers only afterwards; behind a sound valve it would answer at once.",
+    Cause.TUNING: "PV follows OP from the turn on, time and again: the valve answers, the swing is the loop's own.",
+    Cause.LOAD: "PV turns before OP does, or without it: what moves PV comes from outside, OP only follows.",
+}
+STANDS = "OP moves, the stem stands"
+
+
+def close_span(row: Row, thin: Thinned) -> tuple[float, float] | None:
+    """First and last time [s] of the ten periods that a page opens on; None where the night names none."""
+    first, last = row.get("close_first_s"), row.get("close_last_s")
+    if first is None or last is None or thin.between(first, last).time_s.size < 3:
+        return None
+    return first, last
+
+
+def trend_block(
+    name: str,
+    title: str,
+    thin: Thinned,
+    marks: Sequence[Mark] = (),
+    scale: Scale = PLAIN,
+    opening: tuple[float, float] | None = None,
+) -> Trend:
+    """SP, PV over OP on linked axes, in the loop's own unit, opened on a span of time where one is named."""
+    bands = []
+    for s in ("pv", "sp", "op"):
+        low, high = (thin.extremes[f"{s}_{end}"] for end in ("min", "max"))
+        own = (low, high) if s == "op" else (scale.of(low), scale.of(high))
+        bands.append(Band(s.upper(), s, int(s == "op"), *own))
+    step = (thin.time_s[-1] - thin.time_s[0]) / max(thin.time_s.size - 1, 1)
+    panels = (f"SP, PV [{scale.label}]", "OP [%]")
+    caption, least = CAPTION.format(step=f"{step:.3g} s"), (LEAST_PCT * scale.span / 100.0, LEAST_PCT)
+    times = (thin.time_s, thin.gap)
+    return Trend(
+        name, title, *times, tuple(bands), panels, tuple(marks), caption, opening=opening, least=least
+    )
+
+
+def sparkline(thin: Thinned, span: tuple[float, float] | None = None) -> Sparkline:
+    """The PV as a cell's picture, of a span of time where one is named; gaps are closed."""
+    first, last = span or (float("-inf"), float("inf"))
+    known = thin.between(first, last).coarser(SPARK_BUCKETS)
+    shown = ~known.gap
+    return Sparkline(known.extremes["pv_min"][shown], known.extremes["pv_max"][shown])
+
+
+def _held(middle: float, scale: Scale) -> tuple[float, float]:
+    """Ends that an axis of PV around a value reaches at least."""
+    half = 0.5 * LEAST_PCT * scale.span / 100.0
+    return middle - half, middle + half
+
+
+def pv_over_op(thin: Thinned, row: Row) -> Plot:
+    """The plane of PV over OP, of the ten periods where the night names them."""
+    scale, close = scale_of(row), close_span(row, thin)
+    part = thin.between(*close) if close else thin
+    pv, op = scale.of(part.middle("pv")[~part.gap]), part.middle("op")[~part.gap]
+    line = Line("PV over OP", op, pv, joined=close is not None)
+    caption = "A cloud along a line: a sound valve. An ellipse or a parallelogram: lag, play or stick-slip."
+    title = "PV over OP, " + ("the last ten periods" if close else "the last night")
+    reach = _held(float(np.median(pv)) if pv.size else 0.0, scale)
+    return Plot("pv-op", title, "OP [%]", f"PV [{scale.label}]", (line,), (), caption, reach=reach)
+
+
+def rhythm_plots(thin: Thinned, period_s: float | None) -> tuple[Plot | Text, ...]:
+    """Autocorrelation and spectrum of the error, or a sentence on why the trend cannot show them."""
+    if thin.time_s.size < LEAST_SAMPLES or int((~thin.gap).sum()) < LEAST_SAMPLES:
+        return (Text(("Too few samples for autocorrelation and spectrum.",), "note"),)
+    error, step = _even_error(thin.time_s, thin.middle("sp") - thin.middle("pv"), ~thin.gap)
+    if period_s is not None and period_s < LEAST_BUCKETS * step:
+        text = f"The stored trend, a bucket each {step:.0f} s, cannot show a period of {duration(period_s)}."
+        return (Text((text,), "note"),)
+    return _correlation(error, step, period_s), _spectrum(error, step, period_s)
+
+
+def _even_error(time_s: Floats, error: Floats, known: Mask) -> tuple[Floats, float]:
+    """Error [% of span] on an even grid, drawn straight where it is not known, its mean taken off, and the grid's
+    step [s]."""
+    step = float(np.median(np.diff(time_s)))
+    grid = np.arange(time_s[0], time_s[-1] + 0.5 * step, step)
+    filled = np.interp(grid, time_s[known], error[known])
+    return filled - filled.mean(), step
+
+
+def autocorrelation(x: Floats) -> Floats:
+    """Autocorrelation of a signal without mean at lags 0 to n/2, shape (n // 2,); 1 at lag 0."""
+    n = x.size
+    found = lag_sums(x, n // 2)[: n // 2]
+    return found / found[0] if found[0] > 0 else np.zeros(n // 2)
+
+
+def _correlation(error: Floats, step: float, period_s: float | None) -> Plot:
+    found = autocorrelation(error)
+    most = int(SHOWN_PERIODS * period_s / step) + 1 if period_s else min(240, found.size)
+    lag = np.arange(found.size, dtype=float)[:most] * (step / 60.0)
+    marks = (Mark(period_s / 60.0, duration(period_s)),) if period_s else ()
+    line = Line("autocorrelation", lag, found[:most])
+    caption = "A sustained oscillation keeps its height from period to period; noise dies away."
+    return Plot("autocorrelation", "Autocorrelation of the error", "lag [min]", "–", (line,), marks, caption)
+
+
+def _spectrum(error: Floats, step: float, period_s: float | None) -> Plot:
+    """The share of the error's power at each frequency, by Welch's periodogram (1967)."""
+    from scipy.signal import welch  # its import takes longer than a page
+
+    n = max(error.size // SEGMENTS, LEAST_SAMPLES // 2)
+    frequency, power = welch(error, 1.0 / step, nperseg=min(n, error.size))
+    per_hour, share = 3600.0 * frequency, 100.0 * power / max(float(power.sum()), 1e-12)
+    shown = per_hour <= (6.0 * 3600.0 / period_s if period_s else per_hour[-1])
+    marks = (Mark(3600.0 / period_s, duration(period_s)),) if period_s else ()
+    line = Line("power", per_hour[shown], share[shown])
+    caption = "Share of the error's power; a valve's cycle shows lines at odd multiples as well."
+    return Plot("spectrum", "Spectrum of the error", "cycles per hour", "% of power", (line,), marks, caption)
+
+
+def turn_panels(row: Row, scale: Scale) -> Panels | None:
+    """A night's half-cycles laid over one another from each turn of OP, and the plane of PV over OP; None where the
+    night kept none."""
+    kept = json.loads(row.get("turns") or "null")
+    if not kept:
+        return None
+    halves = [_HalfCycle.of(h, scale, kept["step_s"]) for h in kept["halves"]]
+    delay = f", PV {kept['dead_s']:.3g} s later" if kept["dead_s"] > 0 else ""
+    pv, minutes = f"PV [{scale.label}]", "min since OP's turn"
+    op_lines = _laid_over([(h.minutes, h.turned(h.op), h.stuck) for h in halves])
+    pv_lines = _laid_over([(h.minutes, h.turned(h.pv), h.stuck) for h in halves])
+    plane = _laid_over([(h.op, h.late, h.stuck) for h in halves])
+    reach = _held(float(np.median(halves[0].late)), scale)
+    plots = (
+        Plot("turns-op", "OP since its turn", minutes, "OP [%]", op_lines, reach=(0.0, 0.0)),
+        Plot("turns-pv", "PV since OP's turn", minutes, pv, pv_lines, reach=(0.0, 0.0)),
+        Plot("turns-plane", f"PV over OP{delay}", "OP [%]", pv, plane, reach=reach),
+    )
+    said = SAID.get(row["cause"], "Half-cycles laid over one another.")
+    title = f"The last {len(halves)} half-cycles, from each turn of OP (falling ones turned over)"
+    return Panels("turns", title, plots, said)
+
+
+@dataclass(frozen=True)
+class _HalfCycle:
+    """A half-cycle in the units of its axes; `late` is PV the dead time later, so that no delay looks like play."""
+
+    minutes: Floats
+    op: Floats
+    pv: Floats
+    late: Floats
+    stuck: slice
+
+    @classmethod
+    def of(cls, kept: Row, scale: Scale, step_s: float) -> _HalfCycle:
+        """As the store kept it."""
+        op, pv, late = (np.array(kept[name], dtype=np.float64) for name in ("op", "pv", "late"))
+        first, last = kept["stuck"]
+        stuck = slice(first, last + 1 if last > first else last)
+        return cls(
+            np.arange(op.size, dtype=np.float64) * (step_s / 60.0), op, scale.of(pv), scale.of(late), stuck
+        )
+
+    def turned(self, y: Floats) -> Floats:
+        """A signal since the turn, that of a falling half turned over so that all lie on one another."""
+        way = 1.0 if self.op[-1] >= self.op[0] else -1.0
+        return way * (y - y[0])
+
+
+def _laid_over(paths: Sequence[tuple[Floats, Floats, slice]]) -> tuple[Line, ...]:
+    """Paths over one another, where the stem stands marked on top."""
+    lines = [Line("since the turn", x, y) for x, y, _ in paths]
+    stuck = [Line(STANDS, x[part], y[part], kind="stuck") for x, y, part in paths if x[part].size > 1]
+    return (*lines, *stuck)

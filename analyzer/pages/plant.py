@@ -1,0 +1,153 @@
+"""The plant as a whole: its areas, its map of what each loop costs, and its figures over the nights."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from datetime import date
+
+import numpy as np
+
+from analyzer.columns import BY_NAME
+from analyzer.loop.decisions import CAUSES, Cause, Status, counts
+from analyzer.pages.cost import LOSS, SIGNIFICANCE, cost, cost_column
+from analyzer.pages.reading import Night, linked, needs_a_look, read_nights
+from analyzer.pages.words import Row, heading, number, plain_cell
+from analyzer.store.store import Store
+from reports.pages import Block, Cell, Column, Floats, Line, Panels, Plot, Table, Tile, TileGroup, TreeMap
+
+WORST = 5
+AREAS = (
+    heading("area"),
+    Column("score", "Score", True, "Share of the assessed loops, by importance, that need no touch"),
+    *(Column(name, name.capitalize(), True) for name in ("loops", "assessed", *CAUSES, Cause.UNDECIDED)),
+    Column("significance", "Signif.", True, "Sum of the oscillation significance"),
+    Column("worst", "Worst five", wide=True),
+)
+MOST_TILES = 15
+"""Loops of an area that are drawn by themselves; the rest is one rectangle."""
+KEYS = (
+    *((cause, cause) for cause in CAUSES),
+    ("unclear", "another reason to look"),
+    ("calm", "nothing to do"),
+)
+SUMMED = ("loop", "status", "oscillating_pct", "cause", "importance", LOSS, SIGNIFICANCE)
+MOST_NIGHTS = 60
+"""Nights that are shown."""
+LEAST_NIGHTS = 3
+"""Nights from which a curve says something."""
+
+
+def by_area(rows: Sequence[Row]) -> dict[str, list[Row]]:
+    """Rows by the name of their area, '' where none is stated."""
+    return {a: [r for r in rows if (r["area"] or "") == a] for a in sorted({r["area"] or "" for r in rows})}
+
+
+def score(rows: Sequence[Row]) -> float | None:
+    """Share of assessed loops, by importance, with no fault found [%]; None where none is assessed."""
+    weights = [
+        (1.0 if r["importance"] is None else r["importance"], r["cause"] in (Cause.NONE, None))
+        for r in rows
+        if r["status"] == Status.OK
+    ]
+    total = sum(w for w, _ in weights)
+    return 100.0 * sum(w for w, good in weights if good) / total if total > 0 else None
+
+
+def _area(name: str, rows: Sequence[Row]) -> tuple[Cell, ...]:
+    assessed = [r for r in rows if r["status"] == Status.OK]
+    worst = sorted((r for r in assessed if r["cause"] != Cause.NONE), key=lambda r: -(r[SIGNIFICANCE] or 0.0))
+    numbers = [len(rows), len(assessed)]
+    numbers += [sum(r["cause"] == c for r in assessed) for c in (*CAUSES, Cause.UNDECIDED)]
+    return (
+        Cell(name or "no area stated"),
+        plain_cell(score(rows)),
+        *(Cell(str(n), float(n)) for n in numbers),
+        plain_cell(sum(r[SIGNIFICANCE] or 0.0 for r in assessed)),
+        Cell(", ".join(f"{r['loop']} ({number(r[SIGNIFICANCE])})" for r in worst[:WORST])),
+    )
+
+
+def area_table(rows: Sequence[Row]) -> Table:
+    """Areas with their worst loops, the lowest score first."""
+    cells = [_area(name, own) for name, own in by_area(rows).items()]
+    cells.sort(key=lambda c: 101.0 if c[1].number is None else c[1].number)
+    note = "Score: share of the assessed loops, by importance, in which no fault was found; 100 is best."
+    return Table("areas", "", AREAS, tuple(cells), note)
+
+
+def _tile(night: Night, row: Row, by: str) -> Tile:
+    kind = "calm" if not needs_a_look(row) else row["cause"] if row["cause"] in CAUSES else "unclear"
+    text = f"{row['loop']}: {number(cost(row, by))}. {row['reason'] or ''}"
+    return Tile(row["loop"], cost(row, by), kind, text, linked(night, row["loop"]).href)
+
+
+def _tiles(night: Night, name: str, rows: Sequence[Row], by: str) -> TileGroup:
+    ordered = sorted(rows, key=lambda r: (-cost(r, by), r["loop"]))
+    tiles = [_tile(night, r, by) for r in ordered[:MOST_TILES]]
+    rest = ordered[MOST_TILES:]
+    if rest:
+        total = sum(cost(r, by) for r in rest)
+        tiles.append(Tile(f"{len(rest)} more", total, "calm", f"{len(rest)} more loops: {number(total)}"))
+    return TileGroup(name or "no area stated", tuple(tiles))
+
+
+def plant_map(night: Night) -> TreeMap | None:
+    """Areas and assessed loops as large as what they cost, coloured by why they are worth a look; None where nothing
+    is lost anywhere."""
+    rows = [r for r in night.rows if r["status"] == Status.OK]
+    by = cost_column(rows)
+    if not any(cost(r, by) > 0 for r in rows):
+        return None
+    what = "average absolute error times importance" if by == LOSS else "oscillation significance"
+    groups = tuple(_tiles(night, area, own, by) for area, own in by_area(rows).items())
+    return TreeMap("plant", f"The plant by area: size is {what}", groups, KEYS)
+
+
+@dataclass(frozen=True, slots=True)
+class NightSum:
+    """One night of the plant: its name, loops that oscillate, those of each cause, and what all cost by a column."""
+
+    name: str
+    oscillate: int
+    causes: Mapping[Cause, int]
+    cost: float
+    by: str = LOSS
+
+
+def summed(name: str, rows: Sequence[Row]) -> NightSum:
+    """The sums of one night's rows."""
+    swinging = [r for r in rows if counts(r["oscillating_pct"])]
+    of = {c: sum(r["cause"] == c for r in swinging) for c in (*CAUSES, Cause.UNDECIDED)}
+    by = cost_column(rows)
+    return NightSum(name, len(swinging), of, sum(cost(r, by) for r in rows), by)
+
+
+def read_sums(store: Store, night: str) -> list[NightSum]:
+    """The sums of a night and of those before it, oldest first."""
+    names = [n for n in store.nights() if n <= night][-MOST_NIGHTS:]
+    return [summed(n, read_nights(store, [n], SUMMED)) for n in names]
+
+
+def history(sums: Sequence[NightSum]) -> tuple[Block, ...]:
+    """Curves over the nights; none where there are too few."""
+    if len(sums) < LEAST_NIGHTS:
+        return ()
+    day = np.array([date.fromisoformat(s.name[:10]).toordinal() for s in sums], float)
+    day -= day[-1]
+    lines = [Line("all that oscillate", day, np.array([s.oscillate for s in sums], float), kind="recorded")]
+    kinds = ((Cause.VALVE, "op"), (Cause.TUNING, "baseline"), (Cause.LOAD, "pv"))
+    lines += [Line(f"by {c}", day, np.array([s.causes[c] for s in sums], float), kind=k) for c, k in kinds]
+    axis = "days before this night"
+    most = max(s.oscillate for s in sums)
+    loops = Plot("oscillating", "Loops that oscillate", axis, "loops", tuple(lines), reach=(0.0, most + 1.0))
+    return (Panels("over-the-nights", "The plant over the nights", (loops, _costs(sums, day, axis))),)
+
+
+def _costs(sums: Sequence[NightSum], day: Floats, axis: str) -> Plot:
+    """What all loops cost together, of the nights whose figure is that of the last one."""
+    by = sums[-1].by
+    cost = np.array([s.cost if s.by == by else np.nan for s in sums])
+    named = BY_NAME[by].heading.lower()
+    title = f"The loops' {named} together, now {number(float(cost[-1]))}"
+    return Plot("loss", title, axis, named, (Line(named, day, cost, kind="recorded"),), reach=(0.0, 1.0))
