@@ -15,12 +15,14 @@ from analyzer.loop.advice import advise
 from analyzer.loop.assess import assess, cause_of, verdict_by_measures
 from analyzer.loop.assessments import assess_span
 from analyzer.loop.dead_valve import dead_valve
+from analyzer.loop.decisions import Status
+from analyzer.loop.finding import Finding, Swing
 from analyzer.loop.fit_for_cause import at_limits
 from analyzer.loop.oscillation import barely_seen, counting, detect
 from analyzer.loop.quality import prepare
 from analyzer.loop.settings_check import differing
 from analyzer.loops.changes import behaviour_change
-from analyzer.plantwide.rows import likely, wave_columns
+from analyzer.plantwide.rows import likely, swing_of
 from analyzer.plantwide.verdict import followers_of, follows, trace
 from analyzer.plantwide.wave import waves_of
 from identification.models import Backlash, Fopdt, Loop, Pid, Stiction
@@ -147,9 +149,10 @@ def of_plant(c: Config) -> list[Any]:
         out += [(t.group.loops, t.source, tuple(likely(t, c.plant))) for t in traced]
         for loop, (source, wave) in sorted(followers_of(traced).items()):
             first = counting(by_name[loop].found)
-            row = {"oscillating_pct": first.oscillating_pct if first else 0.0, "usable_h": 8.0}
+            swing = Swing(0.0, first.oscillating_pct) if first else Swing()
+            alone = Finding(loop, "", Status.OK, swing=swing, known={"usable_h": 8.0})
             said = follows(by_name[loop].confidence, source, c.plant, wave)
-            shown = tuple(wave_columns(row, said, c.plant))
+            shown = swing_of(alone, said, c.plant) != swing
             out.append(
                 (loop, source.loop, {k: round(v) for k, v in said.confidence.items()}, said.strength, shown)
             )

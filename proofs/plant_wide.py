@@ -20,12 +20,13 @@ import numpy as np
 from analyzer.config import Config
 from analyzer.history.series import Series
 from analyzer.loop.advice import Advice
+from analyzer.loop.conclusion import concluded
 from analyzer.loop.decisions import Action, Cause, counts
+from analyzer.loop.finding import Finding
 from analyzer.loops.spec import LoopSpec
 from analyzer.night.chunk import assess_loop
 from analyzer.plantwide.night import TracedNight, traced_night
 from analyzer.store.rows import night_row
-from analyzer.words.present import advised
 from identification.errors import TriageError
 from proofs.coupled.draw import Drawn, Recorded, draw
 
@@ -47,15 +48,14 @@ def recorded(x: Recorded) -> tuple[LoopSpec, dict[str, Series]]:
     return spec, series
 
 
-def assessed(x: Recorded, config: Config) -> tuple[dict[str, Any], tuple[Any, ...]] | None:
-    """Row and waves of one loop; None where it cannot be assessed."""
+def assessed(x: Recorded, config: Config) -> tuple[Finding, tuple[Any, ...]] | None:
+    """Finding and waves of one loop; None where it cannot be assessed."""
     spec, series = recorded(x)
     try:
         found, _ = assess_loop(spec, series, config, advising=False)
     except TriageError:
         return None
-    row = advised(night_row(found, spec, "2026-03-02", config.advice), None, Advice(Action.NONE))
-    return row, found.waves
+    return concluded(found, Advice(Action.NONE), spec, "2026-03-02", config.advice), found.waves
 
 
 def reached(truth: Mapping[str, Truth]) -> dict[str, set[str]]:
@@ -75,9 +75,10 @@ def reached(truth: Mapping[str, Truth]) -> dict[str, set[str]]:
     return out
 
 
-def scored(drawn: Drawn, rows: Mapping[str, Mapping[str, Any]], found: TracedNight) -> Counter[str]:
+def scored(drawn: Drawn, known: Mapping[str, Finding], found: TracedNight) -> Counter[str]:
     """Counts of what was right on one plant."""
     truth, k = drawn.truth, Counter[str]()
+    rows, after = ({n: night_row(f) for n, f in loops.items()} for loops in (known, found.loops))
     groups: dict[str, list[Mapping[str, Any]]] = {}
     for row in found.groups:
         groups.setdefault(row["group"], []).append(row)
@@ -88,9 +89,9 @@ def scored(drawn: Drawn, rows: Mapping[str, Mapping[str, Any]], found: TracedNig
     k["unrelated"] += len(far)
     k["unrelated oscillating"] += sum(counts(rows[n]["oscillating_pct"]) for n in far if n in rows)
     k["unrelated joined"] += sum(any(n in m and m & coupled.keys() for m in members) for n in far)
-    k["unrelated follow"] += sum(bool(found.rows[n]["source_loop"]) for n in far if n in rows)
+    k["unrelated follow"] += sum(bool(after[n]["source_loop"]) for n in far if n in rows)
     for name, t in truth.items():
-        row = found.rows.get(name)
+        row = after.get(name)
         if row is None:
             continue
         if t["role"] == "source":
@@ -125,11 +126,11 @@ def plant(job: tuple[int, int | None, float | None]) -> Counter[str]:
     seed, loops, hours = job
     config, drawn = Config(), draw(seed, loops, hours=hours)
     known = {x.name: a for x in drawn.loops if (a := assessed(x, config)) is not None}
-    rows = {name: row for name, (row, _) in known.items()}
+    alone = {name: finding for name, (finding, _) in known.items()}
     waves = [w for _, own in known.values() for w in own]
     begun = time.perf_counter()
-    found = traced_night(rows, waves, config.plant)
-    k = scored(drawn, rows, found)
+    found = traced_night(alone, waves, config.plant)
+    k = scored(drawn, alone, found)
     k["loops"], k["plants"] = len(drawn.loops), 1
     k["milliseconds"] = round(1000 * (time.perf_counter() - begun))
     return k

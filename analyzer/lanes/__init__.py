@@ -1,1 +1,1 @@
-"""Why a loop is worth a look beside its oscillation."""
+"""Why a loop is worth a look: one object a lane."""

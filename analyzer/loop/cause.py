@@ -30,9 +30,10 @@ import numpy as np
 
 from analyzer.config import CauseLimits
 from analyzer.loop.cause_measures import measures
-from analyzer.loop.cause_signs import Sign, likelihood_told, signs_of, width_text
+from analyzer.loop.cause_signs import likelihood_told, signs_of, width_text
 from analyzer.loop.cause_weights import chances
 from analyzer.loop.decisions import CAUSES, Cause, Fault, Needs
+from analyzer.loop.finding import Sign
 from analyzer.loop.measure import Measured
 from analyzer.loop.oscillation import Oscillation
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
 from analyzer.loop.cause_measures import PLAIN, measures
 from analyzer.loop.cause_weights import pushes
 from analyzer.loop.decisions import AMPLIFICATION, CAUSES, Cause
+from analyzer.loop.finding import Sign
 from analyzer.loop.measure import Measured
 from analyzer.loop.oscillation import Oscillation
 
@@ -19,22 +19,6 @@ AMPLIFIES = 1.7
 2012)."""
 LEAST_NAT = 0.1
 """Push [nat] below which a sign is not worth a line: it moves the odds by a tenth."""
-
-
-@dataclass(frozen=True, slots=True)
-class Sign:
-    """One sign: which cause it points to, how strongly (0 to 1), in words, its name, and the figures behind it."""
-
-    points_to: str
-    strength: float
-    text: str
-    name: str = ""
-    figures: str = ""
-
-    @property
-    def whole(self) -> str:
-        """Words and figures."""
-        return f"{self.text} ({self.figures})" if self.figures else self.text
 
 
 Told = tuple[str, str]

@@ -8,8 +8,8 @@ import numpy as np
 
 from analyzer.config import CauseLimits
 from analyzer.loop.cause import Verdict
-from analyzer.loop.cause_signs import Sign
 from analyzer.loop.decisions import Cause, Fault
+from analyzer.loop.finding import Sign
 from identification.record import LoopRecord
 
 

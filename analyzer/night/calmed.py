@@ -6,7 +6,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from analyzer.loop.decisions import Action, Cause, Due, Status, counts
-from analyzer.words.present import calmed_row
+from analyzer.loop.finding import Before, Finding, Swing, calmed
+from analyzer.words.reason import CALMED as WORDS
 
 Row = Mapping[str, Any]
 REMEMBERED = (
@@ -25,30 +26,31 @@ CALMED = 0.25
 mill five of six retunes leave none to a sixth, which differs from night to night by all of it, one two thirds."""
 
 
-def before_change(row: Row, earlier: Sequence[Row]) -> Row | None:
+def before_change(found: Finding, earlier: Sequence[Row]) -> Row | None:
     """The last of the nights before, oldest first, under other settings than a night's; None where there is none."""
+    now = found.known.get("kp"), found.known.get("ti")
     other = (r for r in reversed(earlier) if r["status"] == Status.OK and r["kp"] is not None)
-    return next((r for r in other if (r["kp"], r["ti"]) != (row["kp"], row["ti"])), None)
+    return next((r for r in other if (r["kp"], r["ti"]) != now), None)
 
 
-def calmed(row: Row, earlier: Sequence[Row]) -> Row:
-    """The row of a night, that of a worn valve whose loop a change of settings has calmed with its repair at the next
+def told_calmed(found: Finding, earlier: Sequence[Row]) -> Finding:
+    """A loop in a night, one with a worn valve that a change of settings has calmed with its repair at the next
     shutdown and no further settings.
 
     Parameters
     ----------
-    row : mapping
-        Of a loop in a night.
+    found : Finding
     earlier : sequence of mapping
         Its rows of the nights before, oldest first.
     """
-    urgent = row["action"] == Action.RETUNE or (
-        row["action"] == Action.REPAIR_VALVE and row["due"] == Due.NOW
-    )
-    if not urgent or row["cause"] != Cause.VALVE or not counts(row["oscillating_pct"]):
-        return row
-    before = before_change(row, earlier)
-    if before is None or not counts(before["oscillating_pct"]):
-        return row
-    most = CALMED * before["oscillation_significance"]
-    return calmed_row(row, before) if row["oscillation_significance"] <= most else row
+    action, due, swing = found.remedy.action, found.remedy.due, found.swing
+    urgent = action is Action.RETUNE or (action is Action.REPAIR_VALVE and due is Due.NOW)
+    if not urgent or found.cause is not Cause.VALVE or swing is None or not found.oscillates:
+        return found
+    row = before_change(found, earlier)
+    if row is None or not counts(row["oscillating_pct"]):
+        return found
+    if swing.significance > CALMED * row["oscillation_significance"]:
+        return found
+    then = Swing(row["oscillation_significance"], row["oscillating_pct"], row["period_s"])
+    return calmed(found, Before(row["night"], then), WORDS)

@@ -17,10 +17,12 @@ from analyzer.config import Config
 from analyzer.history.export import Export
 from analyzer.history.plant_clock import stamp
 from analyzer.history.series import Series
-from analyzer.lanes.rules import standing
+from analyzer.lanes.standing import standing
 from analyzer.loop.advice import Advice, advise
 from analyzer.loop.assess import Assessment, assess
+from analyzer.loop.conclusion import Lost, concluded
 from analyzer.loop.decisions import Action, Cause, Lack, LacksError, Status
+from analyzer.loop.finding import Cell, Finding
 from analyzer.loop.judged_stretch import Earlier, controller_of, earlier_settings
 from analyzer.loop.quality import Prepared, prepare
 from analyzer.loop.sample_clock import interval
@@ -31,10 +33,9 @@ from analyzer.loops.spec import LoopSpec
 from analyzer.night.nights import Night, cut
 from analyzer.pages import compared as settings_page
 from analyzer.plantwide.wave import waves_table
-from analyzer.store.rows import Lost, hour_rows, lost_row, night_row
+from analyzer.store.rows import hour_rows, piece_row
 from analyzer.store.store import Store, rows_table, write_table
 from analyzer.words import settings as words
-from analyzer.words.present import advised
 from identification.errors import NotAssessedError, TriageError
 from reports.page_file import dumps
 
@@ -86,9 +87,9 @@ def _assessed(
 
 @dataclass(slots=True)
 class Rows:
-    """What is kept of the loops of one night: rows of three tables, and assessments."""
+    """What is kept of the loops of one night: findings, settings compared, and assessments."""
 
-    nights: list[dict[str, Any]] = field(default_factory=list)
+    nights: list[Finding] = field(default_factory=list)
     compared: list[dict[str, Any]] = field(default_factory=list)
     found: list[Assessment] = field(default_factory=list)
 
@@ -105,7 +106,7 @@ def _loop_row(
     """Keep the row of one loop and night, whatever happens, and its assessment where there is one."""
     spec = in_force(stated, changes, night.last_s)
     part = {tag: cut(s, night) for tag, s in series.items()}
-    known: dict[str, Any] = {
+    known: dict[str, Cell] = {
         "good_h": _good_h(part.get(spec.pv or "")),
         "timezone": night.zone,
         "settings_from": settings_from(stated, changes, night.last_s, night.zone),
@@ -116,21 +117,19 @@ def _loop_row(
         known |= standing(prepared, controller_of(spec, prepared), spec.type, config).as_row()
         earlier = earlier_settings(stated, changes, prepared)
         found, advice = _assessed(spec, prepared, config, advising, earlier)
-        turns = turn_events(prepared, found) if advising else None
-        known |= _typed_in(earlier, spec, found, night.zone) | {"turns": turns}
-        row = {**night_row(found, spec, night.name, config.advice), **known}
-        row, drawn = advised(row, found.verdict.needs, advice), _settings_row(spec, night.name, advice)
+        known |= _typed_in(earlier, spec, found, night.zone)
+        known["turns"] = turn_events(prepared, found) if advising else None
+        told = concluded(found, advice, spec, night.name, config.advice, **known)
+        drawn = _settings_row(spec, night.name, advice)
     except Exception as error:  # an error of one loop is that loop's result, never the night's end
-        kept.nights.append({**lost_row(spec, night.name, _lost(error, config)), **known})
+        kept.nights.append(_lost(error, config).of(spec, night.name, **known))
         return
-    kept.nights.append(row)
+    kept.nights.append(told)
     kept.compared += drawn
     kept.found.append(found)
 
 
-def _typed_in(
-    earlier: Sequence[Earlier], spec: LoopSpec, found: Assessment, zone: str
-) -> dict[str, str | float | None]:
+def _typed_in(earlier: Sequence[Earlier], spec: LoopSpec, found: Assessment, zone: str) -> dict[str, Cell]:
     """What was typed in last within the night, in words, and since when the verdict is told of it; nothing where
     nothing was."""
     if not earlier:
@@ -189,8 +188,7 @@ def work(task: Task, began: Callable[[int], None] = lambda at: None) -> Done:
         series = _read(task, spec)
         for night in task.nights:
             if isinstance(series, Lost):
-                row = {**lost_row(spec, night.name, series), "timezone": night.zone}
-                kept[night.name].nights.append(row)
+                kept[night.name].nights.append(series.of(spec, night.name, timezone=night.zone))
                 continue
             advising = night is task.nights[-1]
             _loop_row(spec, series, night, task.config, advising, kept[night.name], task.changes)
@@ -203,8 +201,8 @@ def lose(task: Task, reason: str) -> Done:
     """Write the rows of a chunk that no worker could finish."""
     lost = Lost(Status.FAILED, reason)
     for night in task.nights:
-        rows = [{**lost_row(spec, night.name, lost), "timezone": night.zone} for spec in task.specs]
-        _write_pieces(task, night.name, Rows(nights=rows))
+        loops = [lost.of(spec, night.name, timezone=night.zone) for spec in task.specs]
+        _write_pieces(task, night.name, Rows(nights=loops))
     return Done(task.key, len(task.specs))
 
 
@@ -220,7 +218,8 @@ def _write_pieces(task: Task, night: str, kept: Rows) -> None:
         write_table(waves_table(waves), task.store.part(night, "waves", task.key))
     if kept.compared:
         write_table(rows_table(kept.compared, SETTINGS), task.store.part(night, "compared", task.key))
-    write_table(rows_table(kept.nights, NIGHTS), task.store.part(night, "nights", task.key))
+    rows = [piece_row(found) for found in kept.nights]
+    write_table(rows_table(rows, NIGHTS), task.store.part(night, "nights", task.key))
 
 
 def _trend_table(found: Sequence[Assessment]) -> pa.Table:

@@ -6,7 +6,7 @@ newer of two that are alike, so that the same night twice replaces and a good ni
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from typing import Any
 
 import pyarrow as pa
@@ -14,12 +14,13 @@ import pyarrow.compute as pc
 
 from analyzer.columns import BY_NAME, GROUPS, NIGHTS, names
 from analyzer.config import Config, NightLimits
-from analyzer.lanes.words import in_lanes
 from analyzer.loop.decisions import Status
-from analyzer.night.calmed import REMEMBERED, calmed
+from analyzer.loop.finding import in_lanes
+from analyzer.night.calmed import REMEMBERED, told_calmed
 from analyzer.pages.reading import read_nights
 from analyzer.plantwide.night import traced_night
 from analyzer.plantwide.wave import waves_in
+from analyzer.store.rows import finding_of, night_row
 from analyzer.store.store import Store, rows_table
 
 MEMORY = 30
@@ -72,13 +73,14 @@ def finish_night(
     table = store.read_parts(night, "nights", keys)
     if table is None:
         return ()
-    fresh = {r["loop"]: r for r in table.to_pylist()}
+    fresh = {r["loop"]: finding_of(r) for r in table.to_pylist()}
     other = [] if replace else _other_groups(store, night, fresh)
     first = 1 + max((int(r["group"]) for r in other), default=0)
     done = traced_night(fresh, waves_in(store.read_parts(night, "waves", keys)), config.plant, first)
     earlier = _earlier(store, night)
-    rows = {
-        loop: in_lanes(calmed(row, earlier.get(loop, ())), config.lanes) for loop, row in done.rows.items()
+    rows: dict[str, Row] = {
+        loop: night_row(in_lanes(told_calmed(found, earlier.get(loop, ())), config.lanes))
+        for loop, found in done.loops.items()
     }
     old = {} if replace else _known(store, night)
     kept = {loop for loop, row in rows.items() if loop in old and fuller(old[loop], row, config.nights)}
@@ -105,7 +107,7 @@ def _earlier(store: Store, night: str) -> dict[str, list[Row]]:
     return out
 
 
-def _other_groups(store: Store, night: str, mine: Mapping[str, Row]) -> list[Row]:
+def _other_groups(store: Store, night: str, mine: Container[str]) -> list[Row]:
     """The groups that the store has of a night and that hold none of these loops."""
     table = store.read_if_there("groups", night)
     rows = [] if table is None else table.select(names(GROUPS)).to_pylist()

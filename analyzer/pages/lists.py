@@ -10,7 +10,7 @@ from shutil import get_terminal_size
 from typing import Any
 
 from analyzer.columns import BY_NAME, GROUP_LIST, names
-from analyzer.lanes.figures import FIGURE
+from analyzer.lanes.lanes import FIGURE
 from analyzer.loop.decisions import Lane
 from analyzer.pages.cost import MARK, OF_RECORDED, mark
 from analyzer.pages.rank import LIST_COLUMNS

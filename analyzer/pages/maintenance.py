@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from analyzer.lanes.figures import lanes_in
+from analyzer.lanes.lanes import lanes_in
 from analyzer.loop.decisions import Action, Cause, Fault, Lane, Status
 from analyzer.pages.reading import Night, linked
 from analyzer.pages.words import Row, cell, counted, duration, heading, headings, plain_cell

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from analyzer.lanes.figures import FIGURE, lanes_in
+from analyzer.lanes.lanes import FIGURE, lanes_in
 from analyzer.loop.decisions import Cause, Lane, Status
 from analyzer.pages.reading import Night, linked, oscillates, proposal
 from analyzer.pages.words import Row, cell, heading

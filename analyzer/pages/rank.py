@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from analyzer.columns import BY_NAME, LISTED, NOTED, RANKING, names
-from analyzer.lanes.figures import FIGURE, lanes_in
+from analyzer.lanes.lanes import FIGURE, lanes_in
 from analyzer.loop.decisions import Cause, Due, Lane
 from analyzer.pages.cost import LOSS, SIGNIFICANCE, compares, cost_column
 from analyzer.store import notes

@@ -12,7 +12,7 @@ import pyarrow as pa
 
 from analyzer.comparison.block_bootstrap import Floats
 from analyzer.comparison.spans import Span
-from analyzer.lanes.figures import FIGURE
+from analyzer.lanes.lanes import FIGURE
 from analyzer.loop.decisions import Cause, Status, counts
 from analyzer.pages.rank import worst_first
 from analyzer.store import notes

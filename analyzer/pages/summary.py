@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from analyzer.lanes.figures import lanes_in
+from analyzer.lanes.lanes import lanes_in
 from analyzer.loop.decisions import CAUSES, Action, Cause, Due, Fault, GroupRole, Lane, Status
 from analyzer.pages.cost import cost, cost_column
 from analyzer.pages.maintenance import work_order

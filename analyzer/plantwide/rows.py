@@ -8,7 +8,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from analyzer.config import PlantLimits
-from analyzer.loop.decisions import GroupRole, counts
+from analyzer.loop.decisions import GroupRole
+from analyzer.loop.finding import Cell, Finding, Swing
 from analyzer.plantwide.verdict import Follower, Source, Traced
 from analyzer.plantwide.wave import Wave
 
@@ -34,25 +35,33 @@ def _role(loop: str, found: Traced, followers: Mapping[str, Source], limits: Pla
     return GroupRole.CANDIDATE if loop in likely(found, limits) else GroupRole.SHARES
 
 
-def gain_pct(wave: Wave, error_pct: float | None) -> float | None:
+def gain_pct(wave: Wave, error_pct: Cell) -> float | None:
     """Part of the average absolute error that goes with a wave [% of span]."""
-    return None if error_pct is None else error_pct * (1.0 - math.sqrt(max(1.0 - min(wave.share, 1.0), 0.0)))
+    return (
+        None
+        if not isinstance(error_pct, float)
+        else error_pct * (1.0 - math.sqrt(max(1.0 - min(wave.share, 1.0), 0.0)))
+    )
 
 
 def group_rows(
-    number: int, found: Traced, followers: Mapping[str, Source], rows: Mapping[str, Row], limits: PlantLimits
+    number: int,
+    found: Traced,
+    followers: Mapping[str, Source],
+    loops: Mapping[str, Finding],
+    limits: PlantLimits,
 ) -> list[dict[str, Any]]:
     """A row for each loop of a group that is told, the source first, then by amplitude."""
     known = {c.loop: c for c in found.candidates}
     out = []
     for loop, wave in found.group.waves.items():
-        if loop not in rows:
+        if loop not in loops:
             continue
         link, candidate = found.links.get(loop), known.get(loop)
         out.append(
             {
                 "loop": loop,
-                "night": rows[loop]["night"],
+                "night": loops[loop].night,
                 "group": str(number),
                 "role": _role(loop, found, followers, limits),
                 "source_pct": candidate.confidence_pct if candidate else 0.0,
@@ -62,7 +71,7 @@ def group_rows(
                 "lag_s": link.lag_s if link else 0.0,
                 "wave_amplitude_pct": wave.amplitude_pct,
                 "wave_share_pct": 100.0 * min(wave.share, 1.0),
-                "gain_pct": gain_pct(wave, rows[loop]["average_absolute_error_pct"]),
+                "gain_pct": gain_pct(wave, loops[loop].known.get("average_absolute_error_pct")),
                 "group_signs": json.dumps({k: round(v, 3) for k, v in candidate.signs.items()})
                 if candidate
                 else None,
@@ -84,21 +93,16 @@ def own_groups(rows: Sequence[Row]) -> dict[str, str]:
     return {loop: row["group"] for loop, row in best.items()}
 
 
-def is_told(found: Traced, rows: Mapping[str, Row]) -> bool:
+def is_told(found: Traced, loops: Mapping[str, Finding]) -> bool:
     """Whether a group is worth telling: one of its loops counts as oscillating."""
-    return any(loop in rows and counts(rows[loop]["oscillating_pct"]) for loop in found.group.loops)
+    return any(loop in loops and loops[loop].oscillates for loop in found.group.loops)
 
 
-def wave_columns(row: Row, found: Follower, limits: PlantLimits) -> dict[str, Any]:
-    """What a follower's row says of a wave that is no oscillation by itself, where it is a fair part of the error."""
+def swing_of(own: Finding, found: Follower, limits: PlantLimits) -> Swing | None:
+    """What oscillates in a follower: its wave where that is no oscillation by itself and a fair part of the error."""
     wave = found.wave
-    if wave is None or counts(row["oscillating_pct"]) or wave.share < limits.weak_share:
-        return {}
+    if wave is None or own.oscillates or wave.share < limits.weak_share:
+        return own.swing
     share, amplitude = wave.oscillating_pct, wave.amplitude_pct
-    hours = (row["usable_h"] or 0.0) * share / 100.0
-    return {
-        "oscillating_pct": share,
-        "period_s": wave.period_s,
-        "pv_amplitude_pct": amplitude,
-        "oscillation_significance": amplitude * found.source.coherence * hours,
-    }
+    hours = own.number("usable_h") * share / 100.0
+    return Swing(amplitude * found.source.coherence * hours, share, wave.period_s, amplitude)

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from analyzer.config import PlantLimits
-from analyzer.loop.decisions import Action, Cause, Fault
+from analyzer.loop.decisions import Cause
 from analyzer.plantwide.compare import Lags
 from analyzer.plantwide.groups import Group, groups_of
 from analyzer.plantwide.source import Candidate, Peer, candidates_of
@@ -39,16 +39,13 @@ class Follower:
     """The verdict on a loop that follows another one, in place of its own.
 
     source; confidence [%] of each cause; strength of the sign that says so (0 to 1); wave, the loop's part in what is
-    shared; cause, fault and action are those of every follower: a load from outside, and nothing to do here.
+    shared.
     """
 
     source: Source
     confidence: Mapping[Cause, float]
     strength: float
     wave: Wave | None = None
-    cause: Cause = Cause.LOAD
-    fault: Fault = Fault.NONE
-    action: Action = Action.SEE_SOURCE_LOOP
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Mapping
-from typing import Any
-
-from analyzer.loop.decisions import AMPLIFICATION, OF_LOAD, Action, Cause, Due, Fault, Needs, counts
+from analyzer.lanes.lanes import SAID
+from analyzer.loop.decisions import AMPLIFICATION, OF_LOAD, Action, Cause, Due, Fault, Lack, Lane, Status
+from analyzer.loop.finding import Finding, Root
+from analyzer.words.clauses import joined
 from analyzer.words.units import duration
 
-Row = Mapping[str, Any]
 PLAIN = {
     Fault.BACKLASH: "the valve has {width:.2g} % play ({share:.0f} % of OP's range)",
     Fault.STICTION: "the valve sticks by {width:.2g} % ({share:.0f} % of OP's range)",
@@ -26,52 +24,123 @@ BY_HAND = {
 """How a valve's fault is confirmed, and when."""
 STEPS = 4.0
 """Steps of a stroke test to the width of what is looked for; ours: the first three must then move nothing."""
+MOST_NAMES = 5
+"""Followers that are named in a row."""
+SAID_AT_ONCE = (Action.CHECK_SETTINGS, Action.NEEDS_DATA)
+"""Actions whose words belong into the list."""
 
 
-def reason_of(row: Row, needs: Needs | None = None) -> str:
-    """One sentence on what was found and why."""
-    cycle = _cycle(row)
-    cause = Cause(row["cause"])
-    if cause is Cause.VALVE:
-        return f"{cycle}: {valve_text(row)}"
-    if cause is Cause.TUNING:
-        return f"{cycle}: too tight for its process; {_strongest(row, cause, 1, AMPLIFICATION)}"
-    if cause is Cause.LOAD:
-        return f"{cycle}: driven from outside; {_strongest(row, cause, 1, *OF_LOAD)}"
-    if cause is Cause.UNDECIDED:
-        return f"{cycle}; cause undecided: {needs or 'the signs do not agree'}"
+def reason(found: Finding) -> str:
+    """What was found and why, what the lanes add, and since when it is told."""
+    known = {Lane.MANUAL} if found.lack is Lack.AUTOMATIC else set()  # what it lacks has said so already
+    said = [SAID[lane](found) for lane in found.lanes if lane in SAID and lane not in known]
+    text = joined(_whole(found), *said)
+    changed = found.text("settings_changed")
+    if not changed:
+        return text
+    late = found.known.get("judged_since_s") is None
+    return f"before {changed}, too late in the night to judge: {text}" if late else f"since {changed}: {text}"
+
+
+def _whole(found: Finding) -> str:
+    """What was found of the loop, and what it has to do with others."""
+    if found.status is not Status.OK:
+        return found.lacking
+    if found.follows is not None:
+        return f"{cycle_text(found)}: {_follows(found.follows)}"
+    text = _calmed(found) if found.calmed is not None else _alone(found)
+    names = ", ".join(found.moves[:MOST_NAMES]) + (" ..." if len(found.moves) > MOST_NAMES else "")
+    return joined(text, f"it also moves {names}: fix this one first" if names else None)
+
+
+def _alone(found: Finding) -> str:
+    """What was found of the loop by itself, with the test that it asks for."""
+    if found.swing is None:
+        return f"not assessed: {found.remedy.text or found.lacking}"
+    text, more = _cause(found), found.remedy.text
+    at_once = found.remedy.action in SAID_AT_ONCE or found.lack is Lack.OP_RANGE
+    if at_once and more not in (found.lacking, ""):
+        text = joined(text, more)
+    return text + to_stroke(found)
+
+
+def _cause(found: Finding) -> str:
+    """Whether the loop cycles, and why."""
+    cycle = cycle_text(found)
+    if found.cause is Cause.VALVE:
+        return f"{cycle}: {valve_text(found)}"
+    if found.cause is Cause.TUNING:
+        return f"{cycle}: too tight for its process; {_strongest(found, 1, AMPLIFICATION)}"
+    if found.cause is Cause.LOAD:
+        return f"{cycle}: driven from outside; {_strongest(found, 1, *OF_LOAD)}"
+    if found.cause is Cause.UNDECIDED:
+        return f"{cycle}; cause undecided: {found.lacking or 'the signs do not agree'}"
     return cycle
 
 
-def _cycle(row: Row) -> str:
+def cycle_text(found: Finding) -> str:
     """Whether the loop cycles, and for how much of the time where it is too little to count."""
-    share = row["oscillating_pct"]
-    if not share or not row["period_s"]:
+    swing = found.swing
+    if swing is None or not swing.oscillating_pct or not swing.period_s:
         return "does not oscillate"
-    cycle = f"cycles every {duration(row['period_s'])}"
-    return cycle if counts(share) else f"{cycle}, for {share:.0f} % of the time"
+    cycle = f"cycles every {duration(swing.period_s)}"
+    return cycle if found.oscillates else f"{cycle}, for {swing.oscillating_pct:.0f} % of the time"
 
 
-def to_stroke(row: Row) -> str:
+def to_stroke(found: Finding) -> str:
     """The test that a valve's fault asks for; '' where its width is not known or the action is another."""
-    width = row["stickband_pct"] or row["backlash_pct"]
-    if row["action"] != Action.REPAIR_VALVE or not width:
+    width = found.width_pct
+    if found.remedy.action is not Action.REPAIR_VALVE or width is None:
         return ""
-    return BY_HAND[Due(row["due"] or Due.NOW)].format(step=width / STEPS)
+    return BY_HAND[found.remedy.due or Due.NOW].format(step=width / STEPS)
 
 
-def valve_text(row: Row) -> str:
+def valve_text(found: Finding) -> str:
     """What is wrong with the valve, in figures where there are any."""
-    plain, width = PLAIN.get(row["valve_fault"]), row["stickband_pct"] or row["backlash_pct"]
-    if plain is not None and not width and row["valve_size"] is not None:
-        return WITHOUT_WIDTH[row["valve_fault"]].format(share=100 * row["valve_size"])
-    if plain is None or not width or row["valve_size"] is None:
-        return f"the valve is at fault; {_strongest(row, Cause.VALVE, 2)}"
-    return plain.format(width=width, share=100 * row["valve_size"])
+    size, width, fault = found.known.get("valve_size"), found.width_pct, found.fault
+    if fault not in PLAIN or not isinstance(size, float):
+        return f"the valve is at fault; {_strongest(found, 2)}"
+    if width is None:
+        return WITHOUT_WIDTH[fault].format(share=100 * size)
+    return PLAIN[fault].format(width=width, share=100 * size)
 
 
-def _strongest(row: Row, cause: Cause, most: int, *first: str) -> str:
-    """The strongest signs of a cause, those of some names before all others."""
-    signs = [s for s in json.loads(row.get("signs") or "[]") if s["points_to"] == cause]
-    order = sorted(signs, key=lambda s: (s.get("name", "") not in first, -s["strength"]))
-    return "; ".join(s["text"] for s in order[:most])
+def _strongest(found: Finding, most: int, *first: str) -> str:
+    """The strongest signs of the cause, those of some names before all others."""
+    signs = [s for s in found.signs if s.points_to == found.cause]
+    order = sorted(signs, key=lambda s: (s.name not in first, -s.strength))
+    return "; ".join(s.text for s in order[:most])
+
+
+def later(root: Root) -> str:
+    """How much later a loop moves than the one that it follows."""
+    return f" {duration(abs(root.lag_s))} later" if root.lag_s is not None and root.lag_s > 0 else ""
+
+
+def _follows(root: Root) -> str:
+    sure = f"fix that loop first (it starts there with {root.confidence_pct:.0f} %)"
+    return f"follows {root.loop}{later(root)}; {sure}"
+
+
+def following_text(root: Root) -> str:
+    """The sign of a loop that follows another one."""
+    start = f"where the oscillation seems to start (coherence {root.coherence:.2f})"
+    return f"moves with {root.loop}{later(root)}, {start}"
+
+
+CALMED = (
+    "The last change of settings took most of the cycle away; what is left is small beside what nights differ by, so "
+    "no further settings are advised. The valve is still worn: at the next shutdown."
+)
+
+
+def _calmed(found: Finding) -> str:
+    """What is left of a cycle since its settings were changed."""
+    now, before = found.swing, found.calmed
+    if now is None or before is None:
+        return _alone(found)
+    share = 100 * now.significance / before.swing.significance
+    slower = "slower and " if (now.period_s or 0.0) > (before.swing.period_s or 0.0) else ""
+    then = f"every {duration(before.swing.period_s)} until {before.night}"
+    cycle = f"{duration(now.period_s)}, {slower}{share:.0f} % as much as before its settings were changed ({then})"
+    return f"cycles every {cycle}: {valve_text(found)}{to_stroke(found)}"

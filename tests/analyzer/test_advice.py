@@ -21,6 +21,7 @@ from analyzer.loop.advice import (
 )
 from analyzer.loop.assess import Assessment, assess
 from analyzer.loop.cause import NO_CAUSE, not_assessed
+from analyzer.loop.conclusion import concluded
 from analyzer.loop.decisions import Lack, Needs
 from analyzer.loop.oscillation import Oscillations
 from analyzer.loop.quality import prepare
@@ -204,7 +205,7 @@ def test_cycles_too_fast_for_the_sampling_are_not_denied():
     assert "has one every 90 s" in str(found.needs)
     advice = settings(found, TANK)
     assert (advice.action, advice.reason) == ("needs data", str(found.needs))
-    row = night_row(found, spec("L"), "2026-03-02", CONFIG.advice)
+    row = night_row(concluded(found, advice, spec("L"), "2026-03-02", CONFIG.advice))
     assert row["oscillating_pct"] is None
     assert row["cause"] == "undecided"
 

@@ -11,9 +11,11 @@ import pytest
 
 from analyzer.config import PlantLimits
 from analyzer.loop.decisions import CAUSES, Action, Cause, Fault, Lack, LacksError, Needs, Status, counts
+from analyzer.loop.finding import Finding, Remedy, Root, Sign, following
 from analyzer.night import chunk
 from analyzer.night.nights import Night
 from analyzer.plantwide.verdict import Source, follows
+from analyzer.store.rows import night_row
 from tests.analyzer.plant import CONFIG, START_S, series, spec
 
 CONTRACT = {
@@ -42,7 +44,10 @@ def test_a_loop_counts_as_oscillating_from_half_of_the_time_on(share, expected):
 def test_a_follower_is_under_load_whatever_its_own_signs(own):
     """The load is at least as sure as the coherence and ahead of valve and tuning, and nothing is to be done here."""
     found = follows(dict(zip(CAUSES, own, strict=True)), Source("FIC101", 0.9), PlantLimits())
-    assert (found.cause, found.fault, found.action) == (Cause.LOAD, Fault.NONE, Action.SEE_SOURCE_LOOP)
+    alone = Finding("L", "2026-03-02", Status.OK, remedy=Remedy(Action.RETUNE, kp_new=1.0))
+    told = following(alone, Root("FIC101", 0.9, None, 96.0), None, found.confidence, Sign("load", 1.0, ""))
+    assert (told.cause, told.fault, told.action) == (Cause.LOAD, Fault.NONE, Action.SEE_SOURCE_LOOP)
+    assert told.remedy.kp_new is None
     assert found.confidence[Cause.LOAD] >= max(90.0, own[2])
     assert max(found.confidence[Cause.VALVE], found.confidence[Cause.TUNING]) <= 25.0
 
@@ -63,8 +68,8 @@ def row_without(n: int, *roles: str) -> dict[str, object]:
     stated = spec(**dict.fromkeys(roles))
     kept = chunk.Rows()
     chunk._loop_row(stated, found, NIGHT, CONFIG, True, kept)
-    (row,) = kept.nights
-    return row
+    (told,) = kept.nights
+    return night_row(told)
 
 
 def test_the_store_says_what_a_loop_lacks():

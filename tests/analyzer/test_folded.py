@@ -8,6 +8,7 @@ import pytest
 from analyzer.loop.decisions import Lack
 from analyzer.night import chunk
 from analyzer.night.nights import Night
+from analyzer.store import rows
 from tests.analyzer.plant import CONFIG, START_S, series, spec
 
 
@@ -15,13 +16,13 @@ def night_row(ti_s: float) -> dict[str, object]:
     """A loop in a plain swing of 100 s, logged every 10 s, whose controller has this integral time."""
     stamp = START_S + 10.0 * np.arange(2160)
     swing = np.sin(2 * np.pi * stamp / 100.0) + 0.05 * np.random.default_rng(1).normal(size=stamp.size)
-    found = {"L.SP": np.full(stamp.size, 50.0), "L.PV": 50.0 + swing, "L.OP": 50.0 - swing}
-    trends = {tag: series(stamp, x) for tag, x in found.items()}
+    trend = {"L.SP": np.full(stamp.size, 50.0), "L.PV": 50.0 + swing, "L.OP": 50.0 - swing}
+    trends = {tag: series(stamp, x) for tag, x in trend.items()}
     night = Night("2026-03-02", START_S, START_S + 86400.0)
     kept = chunk.Rows()
     chunk._loop_row(spec(kp=1.0, ti=ti_s), trends, night, CONFIG, True, kept)
-    (row,) = kept.nights
-    return row
+    (found,) = kept.nights
+    return rows.night_row(found)
 
 
 @pytest.mark.parametrize(("ti_s", "told"), [(1.0, False), (60.0, True)])

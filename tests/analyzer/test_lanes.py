@@ -7,14 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analyzer.lanes.figures import FIGURE
-from analyzer.lanes.words import action_of, in_lanes
+from analyzer.lanes.lanes import FIGURE, action_of
 from analyzer.loop.decisions import Action, Lane, Status
+from analyzer.loop.finding import Finding, in_lanes
 from analyzer.loops.spec import LoopSpec
 from analyzer.night import chunk
 from analyzer.night.nights import Night
 from analyzer.pages.maintenance import work_order
 from analyzer.pages.rank import worst_first
+from analyzer.store.rows import night_row
 from tests.analyzer.plant import CONFIG, START_S, Sketch, series, simulate, spec
 from tests.identification.signals import hand_loop
 
@@ -48,8 +49,8 @@ def row_of(
     stated = replace(stated, kp=kp, mode="L.MODE" if "mode" in extra else None)
     kept = chunk.Rows()
     chunk._loop_row(stated, found, NIGHT, CONFIG, True, kept)
-    (row,) = kept.nights
-    return in_lanes(row, CONFIG.lanes)
+    (alone,) = kept.nights
+    return night_row(in_lanes(alone, CONFIG.lanes))
 
 
 def lanes(row: dict[str, object]) -> set[str]:
@@ -179,17 +180,17 @@ def test_without_importance_oscillation_comes_first() -> None:
 
 def test_a_failed_loop_asks_for_nothing() -> None:
     """What failed has no action; its reason stands."""
-    row = dict.fromkeys((*FIGURE.values(), "oscillating_pct", "lack", "action", "sp_mean_pct", "pv_mean_pct"))
-    row |= {"settings_changed": None}
-    done = in_lanes({**row, "status": Status.FAILED, "reason": "ValueError: x"}, CONFIG.lanes)
+    failed = Finding("L", "2026-03-02", Status.FAILED, "ValueError: x")
+    done = night_row(in_lanes(failed, CONFIG.lanes))
     assert (done["action"], done["reason"], done["lanes"]) == (None, "ValueError: x", None)
 
 
 def test_an_op_that_rests_at_its_limit_is_not_nothing_to_do():
     """A loop that the first lines say to look at has no action 'none', and its page says what to look for."""
     row = {"status": "ok", "action": "none", "cause": "none", "loop": "TIC1", "lanes": "at limit"}
-    assert action_of(row, (Lane.AT_LIMIT, Lane.LASTING_ERROR)) is Action.UNDECIDED
-    assert action_of(row, ()) is Action.NONE
+    lanes = (Lane.AT_LIMIT, Lane.LASTING_ERROR)
+    assert action_of(Status.OK, Action.NONE, lanes) is Action.UNDECIDED
+    assert action_of(Status.OK, Action.NONE, ()) is Action.NONE
     (_, do), (_, look), _ = work_order({**row, "action": "undecided"})
     assert "limit" in do
     assert "valve's size" in look

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from analyzer.lanes.figures import FIGURE
+from analyzer.lanes.lanes import FIGURE
 from analyzer.pages.news import news_lines, news_table
 from analyzer.pages.reading import Night
 

@@ -9,10 +9,11 @@ import pytest
 from plant import CONFIG, START_S, Sketch, Trends, series, simulate, spec
 
 from analyzer.config import QualityLimits
-from analyzer.lanes.words import in_lanes
+from analyzer.loop.finding import in_lanes
 from analyzer.loop.quality import op_in_range
 from analyzer.night import chunk
 from analyzer.night.nights import Night
+from analyzer.store.rows import night_row
 
 PIPE = Sketch("valve", (12.0, 150.0, 6.0), 0.65, 30.0, backlash=2.5, load_std=0.1)
 NIGHT = Night("2026-03-02", START_S, START_S + 86400.0)
@@ -30,7 +31,7 @@ def row_of(trends: Trends, op_hi: float | None) -> dict[str, object]:
     found = {f"L.{name.upper()}": series(stamp, getattr(trends, name)) for name in ("sp", "pv", "op")}
     kept = chunk.Rows()
     chunk._loop_row(spec("L", kp=0.65, ti=30.0, scan_s=1.0, **stated), found, NIGHT, CONFIG, True, kept)
-    return in_lanes(kept.nights[0], CONFIG.lanes)
+    return night_row(in_lanes(kept.nights[0], CONFIG.lanes))
 
 
 @pytest.fixture(scope="module")

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from analyzer.words.reason import reason_of
+from analyzer.loop.decisions import Cause, Status
+from analyzer.loop.finding import Finding, Sign, Swing
+from analyzer.words.reason import reason
 
 
 @pytest.mark.parametrize(
@@ -18,6 +20,7 @@ from analyzer.words.reason import reason_of
 )
 def test_a_loop_that_cycles_for_a_part_of_the_night_is_not_said_to_be_calm(share: float, said: str) -> None:
     """A cycle of too little time to count is told with its share; only a loop without one does not oscillate."""
-    signs = '[{"points_to": "load", "strength": 1.0, "text": "the cycle keeps its size"}]'
-    row = {"oscillating_pct": share, "period_s": 1086.0 if share else None, "signs": signs}
-    assert reason_of(row | {"cause": "load" if share >= 50 else "none"}) == said
+    signs = (Sign("load", 1.0, "the cycle keeps its size"),)
+    swing = Swing(1.0, share, 1086.0 if share else None, 1.0)
+    cause = Cause.LOAD if share >= 50 else Cause.NONE
+    assert reason(Finding("L", "2026-03-02", Status.OK, swing=swing, cause=cause, signs=signs)) == said

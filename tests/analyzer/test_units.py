@@ -6,8 +6,9 @@ import math
 
 import numpy as np
 
+from analyzer.columns import row_of
+from analyzer.loop.conclusion import stated
 from analyzer.loops.spec import LoopSpec
-from analyzer.store.rows import empty_row
 from analyzer.words.present import brief
 from analyzer.words.units import gain_unit
 from identification.controller.settings import fit_pi
@@ -34,5 +35,5 @@ def test_a_controller_without_integral_action_has_no_integral_time() -> None:
     assert found is not None
     assert abs(found.kp / 2.0 - 1.0) < 0.05
     assert math.isinf(found.ti_s)
-    row = empty_row(LoopSpec("A", kp=2.0, ti=0.0), "2026-03-02")
+    row = row_of({"loop": "A", **stated(LoopSpec("A", kp=2.0, ti=0.0))})
     assert brief(row, ("ti",)) == {"ti": "none"}

@@ -13,7 +13,7 @@ from click.testing import CliRunner
 
 from analyzer.cli import main
 from analyzer.columns import GROUP_LIST, names
-from analyzer.lanes.figures import lanes_in
+from analyzer.lanes.lanes import lanes_in
 from analyzer.loop.decisions import counts
 from analyzer.pages.night import pages
 from analyzer.store.store import Store

@@ -1,21 +1,15 @@
-"""Beside oscillation: loops in manual, at a limit, off their set point, frozen, sluggish, or wearing their valve.
-
-Each lane has one figure and one limit; a loop may stand in several. Figures rest on samples as logged, so that a loop
-that cannot be assessed, all in manual for example, has its lane all the same.
-"""
+"""The figures that lanes rest on: of samples as logged, so that a loop that cannot be assessed, all in manual for
+example, has its lane all the same."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from typing import Any
 
 import numpy as np
 
 from analyzer.config import Config, LaneLimits
-from analyzer.lanes.figures import FIGURE
 from analyzer.loop.assessments import HOUR_S, hour_edges, usable
-from analyzer.loop.decisions import Lane, counts
 from analyzer.loop.quality import Prepared
 from identification.models import Pid
 from identification.record import LoopRecord
@@ -98,24 +92,3 @@ def standing(prepared: Prepared, controller: Pid | None, kind: str, config: Conf
         _lasting_error(record, config.lanes),
         _memory(prepared, controller, kind, config),
     )
-
-
-def lanes_of(row: Mapping[str, Any], limits: LaneLimits) -> tuple[Lane, ...]:
-    """The lanes that a loop's figures put it into."""
-    beyond = {
-        Lane.MANUAL: limits.manual_pct,
-        Lane.AT_LIMIT: limits.at_limits_pct,
-        Lane.LASTING_ERROR: limits.lasting_error_pct,
-        Lane.FROZEN: limits.frozen_pct,
-        Lane.SLUGGISH: limits.error_memory_ti,
-        Lane.TRAVEL: limits.travel_pct_per_h,
-    }
-    found = {lane for lane, limit in beyond.items() if (row[FIGURE[lane]] or 0.0) > limit}
-    slow = (row["error_memory_ti"] or 0.0) > limits.small_gain_memory_ti
-    if slow and (row["gain_room"] or 0.0) > limits.small_gain_room:
-        found.add(Lane.SLUGGISH)
-    if counts(row["oscillating_pct"]):
-        found = (found | {Lane.OSCILLATION}) - {Lane.SLUGGISH}
-    if found & {Lane.AT_LIMIT, Lane.FROZEN}:
-        found -= {Lane.SLUGGISH}
-    return tuple(lane for lane in Lane if lane in found)

@@ -1,0 +1,151 @@
+"""Why a loop is worth a look: oscillating, in manual, at a limit, off its set point, frozen, sluggish, or wearing its
+valve. Each lane is one object: its figure and limit, what hides it, what it says, and what it asks for.
+
+A loop may stand in several. Nothing of the analysis is imported, so that a list is quick.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from analyzer.loop.decisions import Action, Cause, Lane, Status
+
+if TYPE_CHECKING:
+    from analyzer.config import LaneLimits
+    from analyzer.loop.finding import Finding
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """One lane.
+
+    figure : the column that it is ranked by, the largest first; stands : whether a loop stands in it; said : its
+    clause of the reason, None where the reason says it anyway; hidden_by : lanes beside which it says nothing new;
+    of_measurement : whether it asks for a look at the measurement.
+    """
+
+    lane: Lane
+    figure: str
+    stands: Callable[[Finding, LaneLimits], bool]
+    said: Callable[[Finding], str] | None = None
+    hidden_by: frozenset[Lane] = frozenset()
+    of_measurement: bool = False
+
+
+def _beyond(column: str, limit: str) -> Callable[[Finding, LaneLimits], bool]:
+    """Whether a loop's figure is larger than a limit."""
+
+    def stands(found: Finding, limits: LaneLimits) -> bool:
+        return found.number(column) > getattr(limits, limit)
+
+    return stands
+
+
+def _at_limit(found: Finding) -> str:
+    mean = found.known.get("op_mean_pct")
+    side = "" if not isinstance(mean, float) else " lower" if mean < 50 else " upper"
+    text = f"OP rests at its{side} limit for {found.number('at_limits_pct'):.0f} % of the time"
+    from_end_to_end = found.cause is Cause.TUNING  # then nothing is wrong with the valve's size
+    return text if from_end_to_end else f"{text}: look at the valve's size and at what feeds it"
+
+
+def _lasting(found: Finding) -> str:
+    sp, pv = found.known.get("sp_mean_pct"), found.known.get("pv_mean_pct")
+    known = isinstance(sp, float) and isinstance(pv, float)
+    side = (
+        "off"
+        if not known
+        else "below"
+        if found.number("pv_mean_pct") < found.number("sp_mean_pct")
+        else "above"
+    )
+    text = f"PV stays {found.number('lasting_error_pct'):.3g} % of span {side} SP"
+    if Lane.AT_LIMIT in found.lanes:
+        return text
+    return (
+        f"{text} though the loop is in automatic and OP off its limits: do tags and ranges belong together?"
+    )
+
+
+def _slow(found: Finding, limits: LaneLimits) -> bool:
+    """Whether errors last long; shorter where the process bears more gain."""
+    memory, room = found.number("error_memory_ti"), found.number("gain_room")
+    small = memory > limits.small_gain_memory_ti and room > limits.small_gain_room
+    return memory > limits.error_memory_ti or small
+
+
+def _sluggish(found: Finding) -> str:
+    text = f"sluggish: errors last {found.number('error_memory_ti'):.2g} integral times, the gain is small"
+    room = found.number("gain_room")
+    return text if room < 2.0 else f"{text} (the process bears about {room:.1g} times as much)"
+
+
+RULES = (
+    Rule(Lane.OSCILLATION, "oscillation_significance", lambda f, limits: f.oscillates),
+    Rule(
+        Lane.MANUAL,
+        "manual_pct",
+        _beyond("manual_pct", "manual_pct"),
+        lambda f: f"in manual for {f.number('manual_pct'):.0f} % of the time",
+    ),
+    Rule(Lane.AT_LIMIT, "at_limits_pct", _beyond("at_limits_pct", "at_limits_pct"), _at_limit),
+    Rule(
+        Lane.LASTING_ERROR,
+        "lasting_error_pct",
+        _beyond("lasting_error_pct", "lasting_error_pct"),
+        _lasting,
+        of_measurement=True,
+    ),
+    Rule(
+        Lane.FROZEN,
+        "frozen_pct",
+        _beyond("frozen_pct", "frozen_pct"),
+        lambda f: f"PV stands still for {f.number('frozen_pct'):.0f} % of the time while OP moves: frozen",
+        of_measurement=True,
+    ),
+    Rule(
+        Lane.SLUGGISH,
+        "error_memory_ti",
+        _slow,
+        _sluggish,
+        hidden_by=frozenset({Lane.OSCILLATION, Lane.AT_LIMIT, Lane.FROZEN}),
+    ),
+    Rule(
+        Lane.TRAVEL,
+        "valve_travel_pct_per_h",
+        _beyond("valve_travel_pct_per_h", "travel_pct_per_h"),
+        lambda f: f"OP travels {f.number('valve_travel_pct_per_h'):.0f} %/h",
+    ),
+)
+"""All lanes in the order in which they are told."""
+FIGURE: Mapping[Lane, str] = {r.lane: r.figure for r in RULES}
+"""The column that each lane is ranked by, the largest first."""
+SAID: Mapping[Lane, Callable[[Finding], str]] = {r.lane: r.said for r in RULES if r.said is not None}
+"""One clause a lane."""
+NOTHING_SURER = (None, Action.NONE, Action.NEEDS_DATA, Action.CHECK_SETTINGS)
+"""Actions in whose place a doubtful measurement is looked at first: what rests on it is doubtful too."""
+
+
+def lanes_of(found: Finding, limits: LaneLimits) -> tuple[Lane, ...]:
+    """The lanes that a loop's figures put it into."""
+    standing = {r.lane for r in RULES if r.stands(found, limits)}
+    return tuple(r.lane for r in RULES if r.lane in standing and not r.hidden_by & standing)
+
+
+def action_of(status: Status, action: Action | None, lanes: tuple[Lane, ...]) -> Action | None:
+    """The action, or the one that a lane asks for where nothing else is to be done; what holds OP at its limit has to
+    be found out first."""
+    if status is Status.NOT_ASSESSED and action is None:
+        action = Action.NEEDS_DATA
+    if action in NOTHING_SURER and status is not Status.FAILED:
+        asks = [r.lane for r in RULES if r.of_measurement and r.lane in lanes]
+        if asks and not (asks == [Lane.LASTING_ERROR] and Lane.AT_LIMIT in lanes):
+            return Action.CHECK_MEASUREMENT
+    return Action.UNDECIDED if action is Action.NONE and Lane.AT_LIMIT in lanes else action
+
+
+def lanes_in(row: Mapping[str, Any]) -> tuple[str, ...]:
+    """The lanes of a row, as its column `lanes` states them."""
+    return tuple(name for name in (row["lanes"] or "").split(", ") if name)

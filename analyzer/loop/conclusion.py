@@ -1,0 +1,195 @@
+"""What is known of one loop in one night, put together from its assessment and the advice on it."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from analyzer.config import AdviceLimits
+from analyzer.loop.advice import Advice, is_known
+from analyzer.loop.assess import Assessment
+from analyzer.loop.cause import Verdict
+from analyzer.loop.decisions import Action, Cause, Fault, Lack, Status
+from analyzer.loop.finding import Cell, Finding, Remedy, Swing
+from analyzer.loop.oscillation import Oscillations
+from analyzer.loop.tight import gain_room
+from analyzer.loops.spec import LoopSpec
+from analyzer.pages.cost import RECORDED, STATED, loss
+from identification.estimation.hammerstein import Fit
+from identification.estimation.window import Window
+
+Known = dict[str, Cell]
+PER_OP = ("gain", "slope_pct_per_s", "backlash_pct", "stickband_pct", "slip_jump_pct")
+"""Constants in percent of OP, or per percent of it."""
+
+
+def stated(spec: LoopSpec) -> Known:
+    """What loops.csv states of a loop, by column."""
+    return {
+        "type": spec.type,
+        "area": spec.area,
+        "master": spec.master,
+        "description": spec.description,
+        "pv_unit": spec.pv_unit,
+        "op_unit": spec.op_unit,
+        "importance": spec.importance,
+        "percent_of": STATED if spec.has_pv_range else RECORDED,
+        "kp": spec.kp,
+        "ti": spec.ti,
+        "form": str(spec.form),
+        "gain_unit": spec.gain_unit,
+        "ti_unit": spec.ti_unit,
+        "extra": json.dumps(dict(spec.extra)),
+    }
+
+
+@dataclass(frozen=True, slots=True)
+class Lost:
+    """Why a loop has no results: its status, the reason in words, and what the record lacks where that is known."""
+
+    status: Status
+    reason: str
+    lack: Lack | None = None
+
+    def of(self, spec: LoopSpec, night: str, **known: Cell) -> Finding:
+        """The same as a finding, with further columns that are known all the same."""
+        return Finding(spec.loop, night, self.status, self.reason, self.lack, known={**stated(spec), **known})
+
+
+def concluded(
+    a: Assessment, advice: Advice, spec: LoopSpec, night: str, limits: AdviceLimits, **known: Cell
+) -> Finding:
+    """What is known of a loop that was assessed.
+
+    Parameters
+    ----------
+    a : Assessment
+    advice : Advice
+    spec : LoopSpec
+        The settings in force at the night's end.
+    night : str
+    limits : AdviceLimits
+    **known : number or str
+        Further columns.
+    """
+    v = a.verdict
+    lacks = a.needs or v.needs
+    shown = a.needs is None  # the record can show whether the loop oscillates
+    return Finding(
+        spec.loop,
+        night,
+        Status.OK,
+        lacking=str(lacks or ""),
+        lack=advice.lack or (lacks.lack if lacks else None),
+        swing=_swing(a.oscillations) if shown else None,
+        cause=v.cause if shown else Cause.UNDECIDED,
+        fault=v.fault if shown else Fault.UNDECIDED,
+        confidence={c: pct for c, pct in v.confidence.items() if math.isfinite(pct)} if shown else {},
+        signs=tuple(replace(s, strength=round(s.strength, 3)) for s in v.signs),
+        remedy=remedy(advice),
+        known={
+            **stated(spec),
+            **a.night.as_row(),
+            "loss": loss(a.night.average_absolute_error_pct, spec.importance, spec.has_pv_range),
+            **(_cycle(a) if shown else {}),
+            **_measured(a, limits),
+            **_cycles_of(advice),
+            **known,
+        },
+    )
+
+
+def remedy(advice: Advice) -> Remedy:
+    """What an advice comes to."""
+    due = advice.due if advice.action is Action.REPAIR_VALVE else None
+    return Remedy(advice.action, advice.reason, advice.kp_new, advice.ti_new, due)
+
+
+def _swing(found: Oscillations) -> Swing:
+    first = found.first
+    if first is None:
+        return Swing()
+    return Swing(first.significance, first.oscillating_pct, first.period_s, first.amplitude_pct)
+
+
+def _cycle(a: Assessment) -> Known:
+    """How regular the most significant oscillation is, the periods of all, and the ends of its last ten."""
+    first, found = a.oscillations.first, a.oscillations.found
+    out: Known = {"periods": "[]"}
+    if first is not None:
+        periods = [{"period_s": o.period_s, "amplitude_pct": o.amplitude_pct} for o in found]
+        out = {
+            "regularity": first.rhythm.regularity,
+            "prominence": first.prominence,
+            "correlation": first.rhythm.first,
+            "periods": json.dumps(periods),
+            "spectrum": _spectrum(a.oscillations),
+        }
+    return out if a.close_s is None else {**out, "close_first_s": a.close_s[0], "close_last_s": a.close_s[1]}
+
+
+def _spectrum(found: Oscillations) -> str | None:
+    """Power in sixths of an octave as the store keeps it."""
+    s, b = found.spectrum, found.bands
+    if s is None or b is None or not b.line.size:
+        return None
+    level = 10 * np.log10(np.maximum(b.power, 1e-30) * (2.0 / s.n) ** 2)
+    return json.dumps({"period_s": round(s.duration_s / float(b.line[0]), 3), "db": np.round(level).tolist()})
+
+
+def _measured(a: Assessment, limits: AdviceLimits) -> Known:
+    """What the verdict rests on, the model that it tells, and what was noted."""
+    v, m = a.verdict, a.verdict.measured
+    out: Known = {
+        "start_s": a.start_s,
+        "duration_s": a.duration_s,
+        "harris_index": a.harris,
+        "settling_time_s": a.settling_s,
+        "notes": "; ".join((*a.notes, f"cause not assessed: {v.needs}") if v.needs else a.notes),
+    }
+    if m is not None:
+        out |= {
+            "evidence": m.evidence,
+            "valve_size": m.size,
+            "amplification": m.amplification,
+            "gain_room": gain_room(m),
+        }
+    model = _model(v, limits)
+    return {**out, **(model if a.op_scaled else {k: x for k, x in model.items() if k not in PER_OP})}
+
+
+def _model(verdict: Verdict, limits: AdviceLimits) -> Mapping[str, float | None]:
+    m = verdict.measured
+    if m is None or verdict.cause not in (Cause.VALVE, Cause.TUNING):
+        return {}
+    if verdict.cause is Cause.TUNING:
+        return _process(m.linear, m.window, limits)
+    if verdict.fault is Fault.STICTION and m.stick_slip is not None:
+        valve = m.stick_slip.valve
+        columns = {"stickband_pct": valve.stickband, "slip_jump_pct": valve.slip_jump}
+        return {**_process(m.stick_slip, m.window, limits), **columns}
+    return {**_process(m.play, m.window, limits), "backlash_pct": m.play.valve.stickband}
+
+
+def _process(fit: Fit, window: Window, limits: AdviceLimits) -> dict[str, float | None]:
+    """Process constants; gain and time constant apart only where the time constant is well inside the window."""
+    known = is_known(fit, window, limits)
+    return {
+        "gain": fit.gain if known else None,
+        "time_constant_s": fit.time_constant_s if known else None,
+        "slope_pct_per_s": fit.slope,
+        "dead_time_s": fit.dead_time_s + window.half_block_s,
+    }
+
+
+def _cycles_of(advice: Advice) -> Known:
+    """Limit cycles that simulation finds at the present (predicted) and at the new (expected) settings."""
+    out: Known = {}
+    for name, cycle in (("predicted", advice.before), ("expected", advice.after)):
+        if cycle is not None:
+            out |= {f"{name}_period_s": cycle.period_s, f"{name}_pv_amplitude_pct": cycle.pv_amplitude}
+    return out
