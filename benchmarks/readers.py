@@ -44,7 +44,7 @@ OURS = """
 import json, sys, tempfile, time
 from pathlib import Path
 from analyzer.history.export import open_export
-from analyzer.history.options import ReadOptions
+from analyzer.history.table import ReadOptions
 begun = time.process_time()
 export = open_export([Path(sys.argv[1])], ReadOptions(scratch=Path(tempfile.mkdtemp(dir=sys.argv[2]))))
 export.span()

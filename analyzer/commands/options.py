@@ -106,7 +106,7 @@ class Asked:
     """What the command line asks of an export: files, loops, changes of settings, span of time [s, UTC] and limits.
 
     zone : the plant's time zone, of nights, pages and options; reading : how text exports are read, as in
-    analyzer.history.options.
+    analyzer.history.table.
     """
 
     export: tuple[Path, ...]

@@ -27,7 +27,7 @@ MOST_DAYS = 3660
 
 def _span(texts: Sequence[str] | None, option: str, zone: str) -> Span | None:
     from analyzer.comparison.spans import Span
-    from analyzer.history.stated_time import parse_time
+    from analyzer.history.stamps import parse_time
 
     if not texts:
         return None
@@ -50,7 +50,7 @@ def _asked(
     limits: ChangeLimits,
 ) -> list[TuningChange]:
     """The changes that the command line names."""
-    from analyzer.history.stated_time import parse_time
+    from analyzer.history.stamps import parse_time
     from analyzer.loops.changes import TuningChange, read_changes
     from analyzer.pages.changes import detected
 

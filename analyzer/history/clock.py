@@ -12,7 +12,9 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
-from analyzer.history import stamps, zone
+from analyzer.history import stamps, zones
+from analyzer.history.date_order import DateOrder, by_gaps, days_seen
+from analyzer.history.table import as_text, is_text
 
 TICKS_PER_S = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
 EARLIEST_S, LATEST_S = -11_676_096_000.0, 10_413_792_000.0
@@ -30,6 +32,16 @@ class Scale:
     unit_s: float
     origin_s: float = 0.0
     local: bool = False
+
+    @property
+    def note(self) -> str:
+        """How stamps of this scale are read."""
+        said = f"stamps are {'texts' if self is ELAPSED else 'numbers'}, read as {self.name}"
+        if self in SINCE_START.values():
+            said += (
+                ", from 1970 on; state the unit in the column's name, as in 'Time (ms)', where it is another"
+            )
+        return said
 
 
 IN_DAYS = frozenset({"Excel days", "days since year 0", "Julian days"})
@@ -77,12 +89,8 @@ class Clock:
         One column, or a column of dates and one of times of day.
     scale : Scale or None
         Meaning of numbers.
-    day_first : bool or None
-        Order of day and month; None while undecided (then month first).
-    ambiguous : bool
-        True where the dates read either way; then another file may decide.
-    why : str
-        What decided the order, for the notes.
+    order : DateOrder or None
+        What stands first in dates that leave it open; None while undecided (then the month).
     date_format, timezone : str or None
         As in `ReadOptions`.
     local : bool
@@ -91,25 +99,20 @@ class Clock:
         Unit [s] of the last of the columns, which holds what is below the second; 0 where none does.
     offset_s : float or None
         What the column's name states of its zone [s east of Greenwich].
-    year_first : bool
-        True where a year of two digits stands first.
-    doubt : str
-        What of the zone is not known, for the notes.
     winter_s : float or None
         Offset of the stated zone's winter time [s east of Greenwich] where the clock keeps it all the year.
+    doubt : str
+        What of the zone is not known, for the notes.
     """
 
     columns: tuple[int, ...]
     scale: Scale | None = None
-    day_first: bool | None = None
-    ambiguous: bool = False
-    why: str = ""
+    order: DateOrder | None = None
     date_format: str | None = None
     timezone: str | None = None
     local: bool = False
     below_s: float = 0.0
     offset_s: float | None = None
-    year_first: bool = False
     winter_s: float | None = None
     doubt: str = ""
 
@@ -122,10 +125,7 @@ class Clock:
     def _seconds(self, arrays: Sequence[pa.Array]) -> tuple[NDArray[np.float64], bool]:
         if self.below_s > 0:
             second, local = replace(self, below_s=0.0).seconds(arrays[:-1])
-            rest = pc.fill_null(pc.cast(arrays[-1], pa.float64(), safe=False), 0.0).to_numpy(
-                zero_copy_only=False
-            )
-            return second + rest * self.below_s, local
+            return second + numbers(pc.fill_null(arrays[-1], 0)) * self.below_s, local
         column = arrays[0] if len(arrays) == 1 else joined(arrays)
         if self.scale is ELAPSED:
             return counted_s(as_text(column)), False
@@ -144,20 +144,14 @@ class Clock:
             return second - fixed_s, Counter()
         if not local or self.timezone is None:
             return second, Counter()
-        return zone.to_utc(second, self.timezone)
+        return zones.to_utc(second, self.timezone)
 
     @property
     def notes(self) -> tuple[str, ...]:
         """How the stamps are read, where that is not plain from their writing."""
-        kind = "texts" if self.scale is ELAPSED else "numbers"
-        notes = [] if self.scale is None else [f"stamps are {kind}, read as {self.scale.name}"]
-        if self.scale in SINCE_START.values():
-            notes[0] += (
-                ", from 1970 on; state the unit in the column's name, as in 'Time (ms)', where it is another"
-            )
-        if self.why:
-            first = "year" if self.year_first else "day" if self.day_first else "month"
-            notes.append(f"dates are read {first} first: {self.why}")
+        notes = [] if self.scale is None else [self.scale.note]
+        if self.order is not None:
+            notes.append(f"dates are read {self.order.first} first: {self.order.why}")
         if self.local and self.offset_s is not None:
             notes.append(f"stamps are {self.offset_s / 3600.0:+g} h from UTC, as their column's name states")
         elif self.local and self.winter_s is not None:
@@ -175,20 +169,19 @@ class Clock:
         parts = stamps.fields(texts, self.timezone)
         if parts is None:
             return np.full(len(texts), np.nan), True
-        second = stamps.seconds(parts, self._order(parts), self.year_first)
-        return stamps.midnights_told(second, parts), not parts.zoned
+        second = stamps.seconds(parts, self._first(parts))
+        return stamps.midnights_told(second, parts), not parts.stated.any()
 
-    def _order(self, parts: stamps.Fields) -> bool:
-        """Whether these stamps are read day first; where the head left nothing open and these do, they decide."""
-        if self.day_first is not None or not parts.is_open:
-            return bool(self.day_first)
-        seen = stamps.days_seen(parts)
-        return bool(stamps.days_by_gaps(parts) if seen is None else seen)
+    def _first(self, parts: stamps.Fields) -> str:
+        """What stands first in these stamps; where the head left nothing open and these do, they decide."""
+        if self.order is not None:
+            return self.order.first
+        return (days_seen(parts) or by_gaps(parts) if parts.open.any() else None) or "month"
 
 
 def scale_of(column: pa.Array, unit: str = "") -> Scale | None:
     """How the numbers of a column mean a time, by their size and a unit in its name; None where they mean none."""
-    number = pc.cast(column, pa.float64(), safe=False).drop_null().to_numpy()
+    number = numbers(column)
     number = number[np.isfinite(number)]
     if len(number) == 0:
         return None
@@ -215,30 +208,20 @@ def counted_s(texts: pa.Array) -> NDArray[np.float64]:
     """Texts such as 25:10:03 as seconds, shape (n,), NaN where they are none."""
     parts = pc.extract_regex(texts, COUNTED)
     hour, minute, second = (
-        pc.cast(pc.replace_substring(pc.struct_field(parts, name), ",", "."), pa.float64()).to_numpy(
-            zero_copy_only=False
-        )
-        for name in "hms"
+        numbers(pc.replace_substring(pc.struct_field(parts, name), ",", ".")) for name in "hms"
     )
     return np.asarray(3600.0 * hour + 60.0 * minute + second)
 
 
+def numbers(column: pa.Array) -> NDArray[np.float64]:
+    """A column as numbers, shape (n,), NaN where it is empty."""
+    return np.asarray(pc.cast(column, pa.float64(), safe=False).to_numpy(zero_copy_only=False))
+
+
 def is_count(column: pa.Array) -> bool:
     """Whether numbers merely count the rows: whole, and each one more than the one before."""
-    number = pc.cast(column, pa.float64(), safe=False).to_numpy(zero_copy_only=False)
+    number = numbers(column)
     return number.size > 1 and bool((np.diff(number) == 1).all()) and number[0] in (0.0, 1.0)
-
-
-def is_text(kind: pa.DataType) -> bool:
-    """True for the types that hold text."""
-    if pa.types.is_dictionary(kind):
-        return is_text(kind.value_type)
-    return str(kind) in ("string", "large_string", "string_view")
-
-
-def as_text(column: pa.Array) -> pa.Array:
-    """The column as plain strings."""
-    return pc.cast(column, pa.string())
 
 
 def joined(arrays: Sequence[pa.Array]) -> pa.Array:
@@ -256,7 +239,7 @@ def _from_timestamps(column: pa.Array) -> NDArray[np.float64]:
 
 
 def _from_numbers(column: pa.Array, scale: Scale) -> NDArray[np.float64]:
-    number = pc.cast(column, pa.float64(), safe=False).to_numpy(zero_copy_only=False)
+    number = numbers(column)
     digits = 3 if scale.name == "Excel days" else 6
     return np.round(number * scale.unit_s + scale.origin_s, digits)
 

@@ -12,7 +12,7 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import datetime
 from difflib import get_close_matches
 from pathlib import Path
@@ -20,19 +20,14 @@ from pathlib import Path
 import pyarrow as pa
 
 from analyzer.history.converted import converted, converted_parquet
-from analyzer.history.day_order import agreed
-from analyzer.history.dialects import source_of
 from analyzer.history.files import export_files, is_parquet, packed_beside
-from analyzer.history.long import tag_column
-from analyzer.history.options import ReadOptions
+from analyzer.history.layouts import source_of, tag_column
 from analyzer.history.parquet import open_parquet
 from analyzer.history.plant_clock import zone_of
-from analyzer.history.raw import Raw, settle
-from analyzer.history.series import Series
+from analyzer.history.series import MainSpan, NoStampError, Raw, Series, settle
 from analyzer.history.sheet import WHOLE_FILE_BYTES
 from analyzer.history.sniff import open_sheet
-from analyzer.history.stray import MainSpan, NoStampError
-from analyzer.history.table import Source
+from analyzer.history.table import ReadOptions, Source
 from analyzer.history.unpacked import own_scratch, unpacked
 from analyzer.places import at_hand, bring, is_remote
 from identification.errors import InputError
@@ -168,7 +163,7 @@ def open_export(paths: Sequence[Path], options: ReadOptions | None = None) -> Ex
         at_hand(paths, options.scratch or own_scratch()) if any(map(is_remote, paths)) else (paths, {})
     )
     opened, skipped = _readable(paths, options)
-    sources = agreed(opened)
+    sources = _agreed(opened)
     homes: dict[str, tuple[int, ...]] = {}
     for i, source in enumerate(sources):
         homes.update({tag: (*homes.get(tag, ()), i) for tag in source.tags})
@@ -224,6 +219,22 @@ def _readable(paths: Sequence[Path], options: ReadOptions) -> tuple[list[Source]
     if not sources:
         raise skipped[0]
     return sources, [f"left out: {error}" for error in skipped]
+
+
+def _agreed(sources: Sequence[Source]) -> tuple[Source, ...]:
+    """Files whose dates read either way follow a file of the same export whose dates do not; and all keep winter time
+    where one file shows that its clock does."""
+    winter_s = next((s.clock.winter_s for s in sources if s.clock.winter_s is not None), None)
+    if winter_s is not None:
+        sources = [s.with_clock(replace(s.clock, winter_s=winter_s)) if s.clock.local else s for s in sources]
+    sure = next((s for s in sources if s.clock.order is not None and s.clock.order.sure), None)
+    if sure is None or sure.clock.order is None:
+        return tuple(sources)
+    order = replace(sure.clock.order, why=f"as in {sure.path.name}")
+    return tuple(
+        s if s.clock.order is None or s.clock.order.sure else s.with_clock(replace(s.clock, order=order))
+        for s in sources
+    )
 
 
 def counted(met: Counter[str]) -> list[str]:

@@ -11,6 +11,7 @@ import pyarrow as pa
 
 from analyzer.history import stamps
 from analyzer.history.clock import SINCE_START, scale_of
+from analyzer.history.names import WORDS
 
 UNNAMED = "column {}"
 """Name of a column that has none, by its place, from 1."""
@@ -19,7 +20,7 @@ ROWS = 200
 MOSTLY = 0.8
 """Share of a column's cells that are numbers where it holds numbers; the rest is a historian's words; ours."""
 NUMBER = re.compile(r"^[+-]?(?:\d+(?:[.,]\d+)?|[.,]\d+)(?:[eE][+-]?\d+)?$")
-GOOD_OR_BAD = frozenset({"good", "bad", "uncertain", "g", "b", "u", "0", "100", "192"})
+GOOD_OR_BAD = frozenset(WORDS["quality"]["unnamed"])
 
 
 def taken_as(lines: Sequence[str], delimiter: str) -> tuple[str, ...] | None:

@@ -15,9 +15,9 @@ from pathlib import Path
 from analyzer.history.encoding import detect_encoding
 from analyzer.history.headerless import taken_as
 from analyzer.history.names import is_stamp, without_unit
-from analyzer.history.options import ReadOptions
 from analyzer.history.rewritten import rewritten
 from analyzer.history.sheet import Sheet
+from analyzer.history.table import ReadOptions
 from identification.errors import InputError
 
 HEAD_BYTES = 1_000_000

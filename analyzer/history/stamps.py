@@ -1,16 +1,25 @@
-"""Written dates to seconds: one pattern for ISO, either order of day and month, month names, offsets."""
+"""Written dates to seconds: one pattern for ISO, either order of day and month, month names, offsets.
+
+Dates of exports, and a time that a person wrote in changes.csv, in loops.csv or on the command line.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from datetime import datetime, timedelta
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
-from analyzer.history.zone_names import offsets_h
+from analyzer.history.names import WORDS
+from analyzer.history.plant_clock import UTC_NAME
+from analyzer.history.plant_clock import seconds as utc_s
+from analyzer.history.zones import offsets_h
+from identification.errors import InputError
 
 LETTER = r"[^\x00-@\[-`{-\x7f]"
 """A letter of a month's name: whatever is no other ASCII character. The class of all letters of Unicode would make a
@@ -40,44 +49,29 @@ REARRANGED = (
     (r",? (?:at|um|à|kl\.?) (\d{1,2}[:.])", r" \1"),
 )
 """Writings that are brought into the form of the pattern, and what they become."""
-MONTHS = pa.array(  # three letters each: English, German, French, Spanish, Italian, Portuguese, Dutch, Swedish, ...
-    [
-        *("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec"),
-        *("jan", "feb", "mär", "apr", "mai", "jun", "jul", "aug", "sep", "okt", "nov", "dez"),
-        *("jan", "fév", "mar", "avr", "mai", "jui", "jul", "aoû", "sep", "oct", "nov", "déc"),
-        *("ene", "feb", "mar", "abr", "may", "jun", "jul", "ago", "sep", "oct", "nov", "dic"),
-        *("gen", "feb", "mar", "apr", "mag", "giu", "lug", "ago", "set", "ott", "nov", "dic"),
-        *("jan", "fev", "mar", "abr", "mai", "jun", "jul", "ago", "set", "out", "nov", "dez"),
-        *("jan", "feb", "mrt", "apr", "mei", "jun", "jul", "aug", "sep", "okt", "nov", "dec"),
-        *("jan", "feb", "mar", "apr", "maj", "jun", "jul", "aou", "sep", "okt", "nov", "des"),
-        *("tam", "hel", "maa", "huh", "tou", "kes", "hei", "elo", "syy", "lok", "marras", "jou"),  # Finnish
-        *("sty", "lut", "mar", "kwi", "maj", "cze", "lip", "sie", "wrz", "paź", "lis", "gru"),  # Polish
-        *("янв", "фев", "мар", "апр", "май", "июн", "июл", "авг", "сен", "окт", "ноя", "дек"),
-        *("січ", "лют", "бер", "кві", "тра", "чер", "лип", "сер", "вер", "жов", "лис", "гру"),
-        *("oca", "şub", "mar", "nis", "may", "haz", "tem", "ağu", "eyl", "eki", "kas", "ara"),
-        *("ian", "feb", "mar", "apr", "mai", "iun", "iul", "aug", "sep", "oct", "noi", "dec"),
-        *("jan", "feb", "már", "ápr", "máj", "jún", "júl", "ágú", "sze", "okt", "nóv", "dec"),
-        *("ιαν", "φεβ", "μαρ", "απρ", "μαΐ", "ιουν", "ιουλ", "αυγ", "σεπ", "οκτ", "νοε", "δεκ"),
-        *("sau", "vas", "kov", "bal", "geg", "bir", "lie", "rugp", "rugs", "spa", "lap", "gru"),
-        *("jan", "feb", "mrz", "apr", "мая", "cze", "lip", "avg", "sep", "okt", "nov", "dec"),
-        *("led", "úno", "bře", "dub", "kvě", "čer", "čvc", "srp", "zář", "říj", "lis", "pro"),  # Czech
-    ]
-)
+MONTHS = {begins: int(month) for month, words in WORDS["months"].items() for begins in words}
+LONGEST_MONTH = max(map(len, MONTHS))
 CENTURY_TURN = 70
 MOST_OFFSET_S = 14 * 3600.0
 """No zone is further from UTC [s]."""
-
-
-YMD, DMY, MDY, OPEN = 0, 1, 2, 3
-"""Orders in which a date can be written; OPEN where two numbers below 13 leave day and month open."""
+FIRST = {"year": 0, "day": 1, "month": 2}
+"""Orders in which a date can be written, by the part that stands first."""
+YEAR, DAY, MONTH = FIRST.values()
+OPEN = 3
+"""The order of a date whose writing leaves it open, for two numbers stand in front."""
+STATED_FROM_S, STATED_TO_S = 0.0, 4102444800.0
+"""Times before 1970 and from 2100 on are nobody's changes [s since 1970-01-01 UTC]."""
+SHOWN = 40
+"""Characters of a time that an error shows."""
+EXAMPLE = "a time such as 2026-03-09 08:00 or 2026-03-09T08:00:00Z"
 
 
 @dataclass(frozen=True, slots=True)
 class Fields:
     """Parts of written stamps, arrays of shape (n,); `a`, `b`, `c` the date's parts in the order written.
 
-    `order` is each stamp's own: one file may hold stamps of several writings. `short` is True where a year that
-    stands last has two digits at most.
+    `order` is each stamp's own: one file may hold stamps of several writings. `stated` is True where a stamp states
+    its zone, `short` where a year that stands last has two digits at most.
     """
 
     a: NDArray[np.int64]
@@ -91,29 +85,15 @@ class Fields:
     short: NDArray[np.bool_]
 
     @property
-    def zoned(self) -> bool:
-        """Whether any stamp states its zone."""
-        return bool(self.stated.any())
-
-    @property
-    def short_year(self) -> bool:
-        """Whether no year, if it stands last, has more than two digits."""
-        return bool(self.short.all())
-
-    @property
-    def is_open(self) -> bool:
-        """Whether the writing leaves open which number is the day."""
-        return bool((self.readable & (self.order == OPEN)).any())
+    def open(self) -> NDArray[np.bool_]:
+        """Where the writing leaves open which number is the day."""
+        return np.asarray(self.readable & (self.order == OPEN))
 
 
 def fields(texts: pa.Array, timezone: str | None = None) -> Fields | None:
-    """Take written stamps apart; None where not one of them can be read.
+    """Take written stamps apart, shape (n,); None where not one of them can be read.
 
-    Parameters
-    ----------
-    texts : pyarrow.Array of str, shape (n,)
-    timezone : str or None
-        IANA name of the stated zone, whose letters behind stamps mean what they mean there.
+    Letters behind stamps mean what they mean in the stated zone (IANA name), else what they mean everywhere.
     """
     parts = pc.extract_regex(texts, PATTERN)
     if parts.null_count > texts.null_count:
@@ -134,10 +114,14 @@ def fields(texts: pa.Array, timezone: str | None = None) -> Fields | None:
         clock_s,
         offset_s,
         _readable(parts, part, known) & shown & (np.abs(offset_s) <= MOST_OFFSET_S),
-        pc.not_equal(part["z"], "").to_numpy(zero_copy_only=False),
+        _numpy(pc.not_equal(part["z"], "")),
         _written_order(part),
-        pc.less_equal(pc.utf8_length(part["c"]), 2).to_numpy(zero_copy_only=False),
+        _numpy(pc.less_equal(pc.utf8_length(part["c"]), 2)),
     )
+
+
+def _numpy(array: pa.Array) -> NDArray[Any]:
+    return np.asarray(array.to_numpy(zero_copy_only=False))
 
 
 def _readable(parts: pa.Array, part: dict[str, pa.Array], known: Mapping[str, float]) -> NDArray[np.bool_]:
@@ -148,24 +132,26 @@ def _readable(parts: pa.Array, part: dict[str, pa.Array], known: Mapping[str, fl
     if pc.any(pc.not_equal(part["n"], "")).as_py():
         words = pc.and_(pc.match_substring(part["n"], " "), pc.equal(part["z"], ""))
         told = pc.and_(told, pc.invert(words))
-    return np.asarray(told.to_numpy(zero_copy_only=False))
+    return _numpy(told)
 
 
-def seconds(parts: Fields, day_first: bool, year_first: bool = False) -> NDArray[np.float64]:
-    """Seconds since 1970-01-01 of the stamps, offsets removed; NaN where unreadable or no such date."""
-    undecided = DMY if day_first else MDY
-    order = np.where(parts.order == OPEN, YMD if year_first else undecided, parts.order)
-    year = np.where(order == YMD, parts.a, parts.c)
-    month = np.where(order == MDY, parts.a, parts.b)
-    day = np.select([order == YMD, order == DMY], [parts.c, parts.a], parts.b)
-    short = np.where(order == YMD, parts.order == OPEN, parts.short)
+def seconds(parts: Fields, first: str = "month") -> NDArray[np.float64]:
+    """Seconds since 1970-01-01 of the stamps, offsets removed; NaN where unreadable or no such date.
+
+    `first` (of `FIRST`) stands first in dates whose writing leaves it open.
+    """
+    order = np.where(parts.order == OPEN, FIRST[first], parts.order)
+    year = np.where(order == YEAR, parts.a, parts.c)
+    month = np.where(order == MONTH, parts.a, parts.b)
+    day = np.select([order == YEAR, order == DAY], [parts.c, parts.a], parts.b)
+    short = np.where(order == YEAR, parts.order == OPEN, parts.short)
     century = np.where(year < CENTURY_TURN, 2000, 1900)
     year = np.where(short & (year < 100), year + century, year)
     valid = parts.readable & (month >= 1) & (month <= 12) & (day >= 1)
-    first = ((year - 1970) * 12 + np.clip(month, 1, 12) - 1).astype("datetime64[M]")
-    days = first.astype("datetime64[D]").astype(np.int64) + day - 1
-    next_first = (first + 1).astype("datetime64[D]").astype(np.int64)
-    return np.where(valid & (days < next_first), days * 86400.0 + parts.clock_s - parts.offset_s, np.nan)
+    begins = ((year - 1970) * 12 + np.clip(month, 1, 12) - 1).astype("datetime64[M]")
+    days = begins.astype("datetime64[D]").astype(np.int64) + day - 1
+    next_begins = (begins + 1).astype("datetime64[D]").astype(np.int64)
+    return np.where(valid & (days < next_begins), days * 86400.0 + parts.clock_s - parts.offset_s, np.nan)
 
 
 def midnights_told(second: NDArray[np.float64], parts: Fields) -> NDArray[np.float64]:
@@ -183,64 +169,30 @@ def _turns(second: NDArray[np.float64]) -> int:
     return int(min((step < 0).sum(), (step > 0).sum()))
 
 
-def may_be_year_first(parts: Fields) -> bool:
-    """Whether all dates may have a year of two digits in front: 24-11-21 as 21 November 2024."""
-    either = parts.readable & (parts.order == OPEN)
-    b, c = parts.b[either], parts.c[either]
-    short = (c < 100).all() and parts.short_year
-    return bool(
-        either.any() and short and (b >= 1).all() and (b <= 12).all() and (c >= 1).all() and (c <= 31).all()
-    )
-
-
-def days_seen(parts: Fields) -> bool | None:
-    """True where a first number above 12 shows day first, False where a second one does not, else None."""
-    either = parts.readable & (parts.order == OPEN)
-    first, second = (parts.a[either] > 12).any(), (parts.b[either] > 12).any()
-    return None if first == second else bool(first)
-
-
-def days_by_gaps(parts: Fields) -> bool | None:
-    """True where read day first the stamps run without a leap, False where month first they do, None where alike."""
-    day, month = (_largest_gap(parts, first) for first in (True, False))
-    return None if day == month else day < month
-
-
-def _largest_gap(parts: Fields, day_first: bool) -> float:
-    second = np.unique(seconds(parts, day_first))
-    steps = np.diff(second[np.isfinite(second)])
-    return float(steps.max()) if len(steps) else 0.0
-
-
 def _written_order(part: dict[str, pa.Array]) -> NDArray[np.int8]:
     """The order of each stamp, as far as its writing tells."""
-    digits_a, digits_b = (pc.utf8_is_digit(part[name]).to_numpy(zero_copy_only=False) for name in "ab")
-    long_a = pc.equal(pc.utf8_length(part["a"]), 4).to_numpy(zero_copy_only=False)
-    written = np.select([long_a & digits_a, ~digits_a, ~digits_b], [YMD, MDY, DMY], OPEN)
+    digits_a, digits_b = (_numpy(pc.utf8_is_digit(part[name])) for name in "ab")
+    long_a = _numpy(pc.equal(pc.utf8_length(part["a"]), 4))
+    written = np.select([long_a & digits_a, ~digits_a, ~digits_b], [YEAR, MONTH, DAY], OPEN)
     return written.astype(np.int8)
 
 
 def _number(texts: pa.Array) -> NDArray[np.int64]:
-    filled = pc.if_else(pc.equal(texts, ""), "0", texts)
-    return pc.cast(filled, pa.int64()).to_numpy(zero_copy_only=False)
+    return _numpy(pc.cast(pc.if_else(pc.equal(texts, ""), "0", texts), pa.int64()))
 
 
 def _number_or_month(texts: pa.Array) -> NDArray[np.int64]:
-    digits = pc.utf8_is_digit(texts)
-    numbers = _number(pc.if_else(digits, texts, "0"))
-    if pc.all(pc.or_(digits, pc.equal(texts, ""))).as_py():
-        return numbers
-    short = pc.replace_substring_regex(pc.utf8_lower(texts), "^jui[ln].*", "jul")
-    short = pc.if_else(pc.starts_with(pc.utf8_lower(texts), "juin"), "jun", short)
-    short = pc.replace_substring_regex(short, "^červenec.*", "čvc")
-    short = pc.replace_substring_regex(
-        short, "^marras.*", "nov"
-    )  # Finnish; three letters of it are March elsewhere
-    long = pc.match_substring_regex(short, "^(?:ιου|rug)")
-    place = pc.index_in(pc.utf8_slice_codeunits(short, 0, 3), MONTHS)
-    place = pc.if_else(long, pc.index_in(pc.utf8_slice_codeunits(short, 0, 4), MONTHS), place)
-    months = pc.fill_null(place, -1).to_numpy(zero_copy_only=False).astype(np.int64)
-    return np.where(months < 0, numbers, months % 12 + 1)
+    """Numbers, and months by their names; 0 for what is neither."""
+    if pc.all(pc.or_(pc.utf8_is_digit(texts), pc.equal(texts, ""))).as_py():
+        return _number(texts)
+    kinds = pc.dictionary_encode(texts)
+    meant = [int(t) if t.isdecimal() else _month(t.lower()) for t in kinds.dictionary.to_pylist()]
+    return np.array(meant, dtype=np.int64)[_numpy(kinds.indices)]
+
+
+def _month(name: str) -> int:
+    begins = (name[:n] for n in range(LONGEST_MONTH, 0, -1))
+    return next((MONTHS[b] for b in begins if b in MONTHS), 0)
 
 
 def _clock(part: dict[str, pa.Array]) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
@@ -248,24 +200,80 @@ def _clock(part: dict[str, pa.Array]) -> tuple[NDArray[np.float64], NDArray[np.b
     day's end and leap seconds among them."""
     hour, minute, second = (_number(part[name]) for name in "hms")
     letter = pc.utf8_lower(part["p"])
-    noon = pc.equal(letter, "p").to_numpy(zero_copy_only=False)
-    twelve_hours = pc.not_equal(letter, "").to_numpy(zero_copy_only=False)
+    noon = _numpy(pc.equal(letter, "p"))
+    twelve_hours = _numpy(pc.not_equal(letter, ""))
     shown = (hour < np.where(twelve_hours & ~noon, 13, 24)) & (minute < 60) & (second <= 60)
     shown |= (hour == 24) & (minute == 0) & (second == 0) & ~twelve_hours
     hour = np.where(twelve_hours, hour % 12 + 12 * noon, hour)
     fraction = pc.cast(pc.binary_join_element_wise("0.", part["f"], "0", ""), pa.float64())
-    return 3600 * hour + 60 * minute + second + fraction.to_numpy(zero_copy_only=False), shown
+    return 3600 * hour + 60 * minute + second + _numpy(fraction), shown
 
 
 def _offset(zone: pa.Array, known: Mapping[str, float]) -> NDArray[np.float64]:
     """Offset from UTC [s]; 0 where none is written."""
-    place = pc.index_in(pc.utf8_lower(zone), value_set=pa.array(known)).to_numpy(zero_copy_only=False)
-    hours = np.array([*known.values(), 0.0])
-    named = hours[np.where(np.isnan(place), len(known), np.nan_to_num(place)).astype(int)]
+    place = pc.index_in(pc.utf8_lower(zone), value_set=pa.array(known))
+    named = np.array([*known.values(), 0.0])[_numpy(pc.fill_null(place, len(known)))]
     digits = pc.replace_substring_regex(zone, r"^[A-Z]+$|[+:-]", "")
-    hour, minute = (
-        _number(pc.utf8_slice_codeunits(digits, 0, 2)),
-        _number(pc.utf8_slice_codeunits(digits, 2, 4)),
-    )
-    west = pc.starts_with(zone, "-").to_numpy(zero_copy_only=False)
+    hour, minute = (_number(pc.utf8_slice_codeunits(digits, k, k + 2)) for k in (0, 2))
+    west = _numpy(pc.starts_with(zone, "-"))
     return 3600.0 * named + np.where(west, -1.0, 1.0) * (3600 * hour + 60 * minute)
+
+
+def parse_time(text: str, where: str, zone: str = UTC_NAME, day_first: bool | None = None) -> float:
+    """A time that a person wrote as seconds since 1970-01-01 UTC; one that states no zone is of the plant's clock.
+
+    Parameters
+    ----------
+    text : str
+        ISO, or as exports write stamps; dates with points have the day first.
+    where : str
+        Place in the message of an error.
+    zone : str
+        The plant's time zone.
+    day_first : bool or None
+        Order of dates such as 03/04/2026; None: unknown, and such dates are refused.
+
+    Raises
+    ------
+    InputError
+        It is no time, could be read two ways, or lies outside 1970 to 2099.
+    """
+    return float(parse_times([text], [where], zone, day_first)[0])
+
+
+def parse_times(
+    texts: Sequence[str], where: Sequence[str], zone: str = UTC_NAME, day_first: bool | None = None
+) -> NDArray[np.float64]:
+    """The same of many times at once, shape (n,); the first that is none, or reads two ways, is refused."""
+    trimmed = [text.strip() for text in texts]
+    parts = fields(pa.array(trimmed, pa.string()))
+    readable = np.zeros(len(texts), dtype=bool) if parts is None else parts.readable
+    for at in np.flatnonzero(~readable)[:1]:
+        raise InputError(f"{where[at]}: time {trimmed[at][:SHOWN]!r}", EXAMPLE, "correct the time")
+    if parts is None:
+        return np.empty(0)
+    day, sure = _stated_order(parts, trimmed, day_first)
+    local_s = np.where(day, seconds(parts, "day"), seconds(parts, "month"))
+    with np.errstate(invalid="ignore"):
+        of_our_time = (local_s >= STATED_FROM_S) & (local_s < STATED_TO_S)
+    for at in np.flatnonzero(~sure | ~of_our_time)[:1]:
+        seen = f"{where[at]}: time {trimmed[at][:SHOWN]!r}"
+        if not sure[at]:
+            raise InputError(f"{seen} reads two ways", EXAMPLE, "write the year first, with four digits")
+        raise InputError(f"{seen} is no such day", EXAMPLE, "correct the time")
+    at_s = zip(local_s.tolist(), parts.stated.tolist(), strict=True)
+    epoch = datetime(1970, 1, 1)
+    return np.array([s if stated else utc_s(epoch + timedelta(seconds=s), zone) for s, stated in at_s])
+
+
+def _stated_order(
+    parts: Fields, texts: Sequence[str], stated: bool | None
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Whether the day stands first in each date, shape (n,), and whether that is sure."""
+    either = parts.order == OPEN
+    if stated is not None:
+        return either & stated, np.ones(len(texts), dtype=bool)
+    year = either & parts.short & (parts.b >= 1) & (parts.b <= 12) & (parts.c >= 1) & (parts.c <= 31)
+    above = (parts.a > 12) != (parts.b > 12)
+    pointed = np.array(["." in text.split(" ")[0] for text in texts]) | (parts.a == parts.b)
+    return either & np.where(above, parts.a > 12, pointed), ~either | (~year & (above | pointed))

@@ -12,21 +12,11 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
-from analyzer.history.clock import is_text
+from analyzer.history.names import WORDS
+from analyzer.history.table import is_text
 
 BLANK = "cells are blank: no value (a historian that reports by exception leaves unchanged values blank)"
-ERROR_TEXTS = frozenset({
-    "i/o timeout", "bad input", "bad", "bad data", "bad quality", "no data", "pt created",
-    "point created", "scan off", "scan timeout", "calc failed", "calc crash", "calc off",
-    "resize to show all values", "no good data for calculation", "not connect", "not connected",
-    "comm fail", "comm error", "conf error", "configure", "intf shut", "shutdown", "out of serv",
-    "out of service", "over range", "under range", "over ucl", "under lcl", "invalid", "invalid float",
-    "invalid data", "data loss", "access denied", "no access", "no result", "no sample", "no alarm data",
-    "not available", "unavailable", "unknown", "error", "failed", "failure", "timeout", "disconnected",
-    "equip fail", "trace off", "doubtful", "sampled bad", "arc off-line", "arc offline", "dcs failed",
-    "ptfailed", "nan", "-nan", "null", "none", "na", "n/a", "nil", "inf", "-inf", "+inf", "infinity",
-    "-infinity", "-", "--", "---", "*", "***", "x",
-})  # fmt: skip
+ERROR_TEXTS = frozenset(WORDS["values"]["none"])
 ERROR_SHAPES = re.compile(
     r"^(?:\?+|\[-?\d+\].*|#.*|[+-]?1?\.?#(?:qnan|snan|ind|inf).*|[+-]?1\.#.*|<.*>)$", re.IGNORECASE
 )

@@ -8,8 +8,7 @@ import numpy as np
 from numba import njit
 
 from analyzer.config import QualityLimits
-from analyzer.history.series import Series
-from analyzer.history.stray import main_span
+from analyzer.history.series import Series, main_span
 from analyzer.loop.decisions import Lack, LacksError, Needs
 from identification.record import Floats, Mask
 

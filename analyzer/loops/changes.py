@@ -17,7 +17,7 @@ from analyzer.comparison.block_bootstrap import Floats
 from analyzer.config import ChangeLimits
 from analyzer.history.encoding import detect_encoding
 from analyzer.history.plant_clock import UTC_NAME
-from analyzer.history.stated_time import parse_times
+from analyzer.history.stamps import parse_times
 from identification.errors import InputError
 
 COLUMNS = ("loop", "time", "kp_old", "ti_old", "kp_new", "ti_new", "who")

@@ -14,7 +14,7 @@ from typing import Any
 
 from analyzer.history.encoding import detect_encoding
 from analyzer.history.plant_clock import UTC_NAME
-from analyzer.history.stated_time import parse_time
+from analyzer.history.stamps import parse_time
 from analyzer.loops.endings import ROLES
 from identification.errors import InputError
 from identification.models import Form

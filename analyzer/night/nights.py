@@ -12,8 +12,7 @@ import numpy as np
 from analyzer.config import NightLimits
 from analyzer.history import plant_clock
 from analyzer.history.export import Export
-from analyzer.history.series import Series
-from analyzer.history.stray import stamp_text
+from analyzer.history.series import Series, stamp_text
 from analyzer.loops.spec import LoopSpec
 from identification.errors import InputError
 

@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 
 from analyzer.history.export import open_export
-from analyzer.history.options import ReadOptions
 from analyzer.history.series import Series
+from analyzer.history.table import ReadOptions
 from identification.errors import TriageError
 from proofs.dialects.make import main as make
 

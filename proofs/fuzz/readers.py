@@ -24,7 +24,7 @@ SEEDS_BYTES = 6000
 
 def _export(path: Path) -> None:
     from analyzer.history.export import open_export
-    from analyzer.history.options import ReadOptions
+    from analyzer.history.table import ReadOptions
 
     with tempfile.TemporaryDirectory() as scratch:
         found = open_export([path], ReadOptions(scratch=Path(scratch)))

@@ -14,7 +14,7 @@ from click.testing import CliRunner
 from analyzer.cli import main
 from analyzer.config import Config
 from analyzer.history import plant_clock
-from analyzer.history.stated_time import parse_time
+from analyzer.history.stamps import parse_time
 from analyzer.night.nights import nights
 from analyzer.store.store import Store
 from identification.errors import InputError

@@ -7,7 +7,7 @@ from plant import START_S, Sketch, simulate, spec, write_export
 
 from analyzer.config import Config
 from analyzer.history.export import open_export
-from analyzer.history.stated_time import parse_time
+from analyzer.history.stamps import parse_time
 from analyzer.loops.changes import TuningChange
 from analyzer.loops.settings_in_force import in_force, settings_from
 from analyzer.loops.tags import match, read_loops

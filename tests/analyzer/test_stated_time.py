@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from analyzer.history.stated_time import parse_time
+from analyzer.history.stamps import parse_time
 from analyzer.loops.changes import read_changes
 from identification.errors import InputError
 

@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from analyzer.history.export import open_export
-from analyzer.history.options import ReadOptions
+from analyzer.history.table import ReadOptions
 
 BERLIN = ReadOptions(timezone="Europe/Berlin")
 NIGHTS = ("2024-03-30 20:00", "2024-10-26 20:00")

@@ -15,8 +15,8 @@ import pytest
 import analyzer.history.converted as converted_module
 from analyzer.history.converted import Converted
 from analyzer.history.export import Export, open_export
-from analyzer.history.options import ReadOptions
 from analyzer.history.series import Series
+from analyzer.history.table import ReadOptions
 from analyzer.store.lock import scratch
 
 TAGS = [f"FIC{k:03d}.{role}" for k in range(40) for role in ("PV", "OP")]
@@ -190,7 +190,7 @@ import json, resource, sys
 from pathlib import Path
 import analyzer.history.export as export
 export.CONVERTED_BYTES = 1
-from analyzer.history.options import ReadOptions
+from analyzer.history.table import ReadOptions
 found = export.open_export([Path(sys.argv[1])], ReadOptions(scratch=Path(sys.argv[2])))
 found.read(list(found.tags[:4]))
 print(json.dumps(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss))

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from analyzer.history.export import open_export
-from analyzer.history.options import ReadOptions
+from analyzer.history.table import ReadOptions
 from identification.errors import InputError
 
 ROWS = "".join(f"2024-11-21 08:00:{k:02d},{k / 4},{k}\n" for k in range(60))

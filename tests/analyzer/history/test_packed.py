@@ -15,7 +15,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from analyzer.history.export import open_export
-from analyzer.history.options import ReadOptions
+from analyzer.history.table import ReadOptions
 from identification.errors import InputError
 
 ROWS = [f"2026-03-02 00:00:{k:02d},{20 + k},50" for k in range(60)]

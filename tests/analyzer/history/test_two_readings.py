@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from analyzer.history.export import open_export
-from analyzer.history.options import ReadOptions
+from analyzer.history.table import ReadOptions
 
 SECONDS = pd.date_range("2024-11-21 08:00", periods=60, freq="s")
 NUMBER = np.arange(60)

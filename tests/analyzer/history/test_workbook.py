@@ -13,7 +13,7 @@ from click.testing import CliRunner
 from analyzer.cli import main
 from analyzer.history import workbook
 from analyzer.history.export import open_export
-from analyzer.history.options import ReadOptions
+from analyzer.history.table import ReadOptions
 from identification.errors import InputError
 
 openpyxl = pytest.importorskip("openpyxl")

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from analyzer.history.export import open_export
-from analyzer.history.options import ReadOptions
+from analyzer.history.table import ReadOptions
 from identification.errors import InputError
 
 FIRST = datetime(2024, 11, 21, 8, 0, 0, tzinfo=UTC)

@@ -1,16 +1,31 @@
-"""Local clock to UTC: the hour that autumn repeats, the hour that spring leaves out, and clocks that know neither."""
+"""Time zones: letters, hours or names behind stamps and in the names of their columns, and a local clock to UTC.
+
+That is: the hour that autumn repeats, the hour that spring leaves out, and clocks that know neither.
+"""
 
 from __future__ import annotations
 
+import re
 from collections import Counter
+from collections.abc import Mapping
 from datetime import datetime
+from functools import lru_cache
 from itertools import pairwise
-from zoneinfo import ZoneInfo
+from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
+from analyzer.history.names import WORDS, plain
+
+HEADER_ZONE = re.compile(
+    r"(?:^|[\s(\[_])(?P<name>(?i:UTC|GMT|Z|CEST|CET|EEST|EET)|[A-Z]{3,5})?"
+    r"\s*(?P<offset>[+-]\d{1,2}(?::?\d\d)?)?[)\]]?\s*$"
+)
+NAMED_ZONE = re.compile(r"(?P<zone>[A-Z][A-Za-z]+/[A-Za-z_]+(?:/[A-Za-z_]+)?)[)\]]?\s*$")
+"""A zone of the database of time zones at the end of a stamp or a column's name."""
+OFFSETS_H = {name: float(hours) for hours, names in WORDS["zone_letters"]["hours"].items() for name in names}
+SEVERAL = frozenset(WORDS["zone_letters"]["several"])
 MISSING_HOUR = "samples stand in the hour that the time zone leaves out in spring and are left out"
 REPEATED_HOUR = "samples stand in the hour that the time zone repeats in autumn; told apart by their order"
 HOUR_S, DAY_S = 3600.0, 86400.0
@@ -24,23 +39,57 @@ TYPICAL_STEPS = 3.0
 """Typical steps that a step over the change may take where the clock does not run backwards [-]; ours."""
 
 
+@lru_cache
+def offsets_h(timezone: str | None) -> Mapping[str, float]:
+    """Hours east of Greenwich by letters, those of a stated zone among them as it means them."""
+    return {**OFFSETS_H, **own_letters(timezone)}
+
+
+@lru_cache
+def own_letters(timezone: str | None) -> Mapping[str, float]:
+    """What a zone's clock calls itself in winter and summer, and its hours east of Greenwich then."""
+    if timezone is None:
+        return {}
+    days = [datetime(datetime.now().year, month, 1, tzinfo=ZoneInfo(timezone)) for month in (1, 7)]
+    known = [(day.strftime("%Z").lower(), day.utcoffset()) for day in days]
+    return {name: at.total_seconds() / 3600.0 for name, at in known if at is not None and name.isalpha()}
+
+
+def named_zone(text: str) -> str | None:
+    """The zone at the end of a stamp or a column's name, as in '[Europe/Berlin]'; None where none is known there."""
+    found = NAMED_ZONE.search(text[-60:])
+    try:
+        return None if found is None else ZoneInfo(found["zone"]).key
+    except (ZoneInfoNotFoundError, ValueError, OSError):
+        return None
+
+
+def header_offset_s(name: str, timezone: str | None = None) -> float | None:
+    """The offset from UTC that a time column's name states, as in 'Time (UTC+01:00)' [s]; None where none, or where
+    it is what the stated zone calls itself, which may change within the export."""
+    if plain(name) in ("utc", "timeutc", "utctime"):
+        return 0.0
+    found = HEADER_ZONE.search(name[-40:])
+    if found is None or not (found["name"] or found["offset"]):
+        return None
+    if found["offset"] is None:
+        letters = found["name"].lower()
+        hours = None if letters in own_letters(timezone) else OFFSETS_H.get(letters)
+        return None if hours is None else 3600.0 * hours
+    sign, digits = (-1.0 if found["offset"][0] == "-" else 1.0), found["offset"][1:].replace(":", "")
+    return sign * (3600.0 * float(digits[:2]) + 60.0 * float(digits[2:] or 0))
+
+
+def of_several(name: str, timezone: str | None) -> str:
+    """Letters in a time column's name that mean several zones; '' where there are none, or a zone is stated."""
+    found = HEADER_ZONE.search(name[-40:])
+    letters = (found["name"] or "") if found is not None and timezone is None else ""
+    return letters if letters.lower() in SEVERAL else ""
+
+
 def to_utc(local_s: NDArray[np.float64], zone: str) -> tuple[NDArray[np.float64], Counter[str]]:
-    """Seconds of a local clock to seconds of UTC.
-
-    Parameters
-    ----------
-    local_s : ndarray, shape (n,)
-        Local wall clock [s since 1970-01-01 00:00 local], in the order of the file; NaN stays NaN.
-    zone : str
-        IANA name.
-
-    Returns
-    -------
-    ndarray, shape (n,)
-        [s since 1970-01-01 UTC]; NaN in the hour that does not exist.
-    Counter
-        Samples in repeated and in missing hours.
-    """
+    """Seconds of a local wall clock, in the order of the file, to seconds of UTC, shape (n,), and how many lie in
+    repeated and in missing hours; NaN stays NaN, and becomes of the hour that does not exist."""
     falling = np.nansum(np.sign(np.diff(local_s))) < 0
     ordered = local_s[::-1] if falling else local_s
     summer, winter = _offset_readings(ordered, zone)
@@ -58,14 +107,7 @@ def winter_offset_s(local_s: NDArray[np.float64], zone: str) -> float | None:
     """The offset of a zone's winter time [s east of Greenwich] where a clock keeps it all the year; else None.
 
     Such a clock shows the hour that spring leaves out, and the hour that autumn repeats once only; how many samples
-    stand in these hours beside their neighbours tells it, in whatever order the samples are.
-
-    Parameters
-    ----------
-    local_s : ndarray, shape (n,)
-        Local wall clock [s since 1970-01-01 00:00 local], in any order; NaN where unreadable.
-    zone : str
-        IANA name.
+    stand in these hours beside their neighbours tells it, in whatever order the samples are; NaN where unreadable.
     """
     hour, count = np.unique(np.floor(local_s[np.isfinite(local_s)] / HOUR_S), return_counts=True)
     inner = np.flatnonzero(np.diff(hour) <= 2.0)
@@ -105,16 +147,16 @@ def _offset_readings(
     local_s: NDArray[np.float64], zone: str
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Both readings of every stamp: with summer time where the hour is doubtful, and without."""
+    import pandas as pd  # late: letters of zones need none of it
+
     index = pd.DatetimeIndex((np.nan_to_num(local_s) * 1e6).round().astype("datetime64[us]"))
-    readings = []
-    for summer in (True, False):
-        doubtful = np.full(len(index), summer)
-        utc = (
-            index.tz_localize(zone, ambiguous=doubtful, nonexistent="NaT").tz_convert("UTC").tz_localize(None)
-        )
-        offset_s = (utc - index).total_seconds().to_numpy()
-        readings.append(local_s + offset_s)
-    return readings[0], readings[1]
+
+    def reading(summer: bool) -> NDArray[np.float64]:
+        zoned = index.tz_localize(zone, ambiguous=np.full(len(index), summer), nonexistent="NaT")
+        offset = zoned.tz_convert("UTC").tz_localize(None) - index
+        return np.asarray(local_s + offset.total_seconds().to_numpy())
+
+    return reading(True), reading(False)
 
 
 def _second_pass(local_s: NDArray[np.float64], twice: NDArray[np.bool_]) -> NDArray[np.bool_]:

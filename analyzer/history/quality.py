@@ -1,0 +1,228 @@
+"""Quality of samples: which columns hold codes of it, what scheme they follow, and which samples are not good.
+
+OPC DA: the low byte is 192 and above where good, 64 to 127 uncertain, below 64 bad. OPC UA: the two highest
+of 32 bits are 00 good, 01 uncertain, 10 bad. Confidence (0 to 100): good from 50. Uncertain samples are not
+used.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from enum import StrEnum
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+import pyarrow.compute as pc
+from numpy.typing import NDArray
+
+from analyzer.history.names import COLUMNS, LONGEST, QUALITY_NAMES, QUALITY_OF, WORDS, plain
+from analyzer.history.table import Table
+
+GOOD, BAD, NOT_BAD, IS_BAD = (
+    frozenset(WORDS["quality"][kind]) for kind in ("good", "bad", "not_bad", "is_bad")
+)
+DA_GOOD, UA_UNCERTAIN, CONFIDENCE_GOOD, CONFIDENCE_FULL = 192, 0x40000000, 50, 100
+PCS7_GOOD = 0x80
+MOST_FLAG = 10
+"""Codes below this number are a plant's own, of which 0 or 1 is good."""
+INTERPOLATED = 0x00020000
+"""Flag of OPC historical access beside the DA code in the low byte."""
+FLAGGED_INTERPOLATED = "samples are flagged as interpolated, not recorded"
+HEXADECIMAL = re.compile(r"^\s*0[xX][0-9a-fA-F]{1,8}\s*$")
+
+
+class Scheme(StrEnum):
+    """How the codes of one quality column are meant."""
+
+    TEXT = "texts such as Good and Bad"
+    DA = "OPC DA codes, 192 and above good"
+    UA = "codes with 0 good"
+    CONFIDENCE = "confidence in percent, good from 50"
+    FLAG = "flags, 1 good and all else bad"
+    ONE_GOOD = "codes with 1 good, for most are; state --good-quality 0 if it is that"
+    BAD_FLAG = "flags of what is bad: 0, false and blank good"
+    PCS7 = "PCS 7 codes, 128 and above good"
+    IGNITION = "Ignition codes, 192 to 255 good"
+
+
+Codes = NDArray[np.int64]
+IS_GOOD: Mapping[Scheme, Callable[[Codes], NDArray[np.bool_]]] = {
+    Scheme.DA: lambda code: (code >= 0) & ((code & 0xC0) == DA_GOOD),
+    Scheme.UA: lambda code: ((code & 0xFFFFFFFF) < UA_UNCERTAIN) & ~((code > 0) & (code < 0x100)),
+    Scheme.CONFIDENCE: lambda code: code >= CONFIDENCE_GOOD,
+    Scheme.FLAG: lambda code: code == 1,
+    Scheme.ONE_GOOD: lambda code: code == 1,
+    Scheme.PCS7: lambda code: (code >= PCS7_GOOD) & (code < 0x100),
+    Scheme.IGNITION: lambda code: (code >= DA_GOOD) & (code < 0x100),
+}
+"""Which numbers are good; what is no number is good in none."""
+
+
+def mostly_one(columns: Iterable[pa.Array]) -> bool:
+    """Whether of the codes 0 and 1 in some columns' rows most are 1."""
+    number = np.concatenate([np.empty(0), *(_numbers(codes) for codes in columns)])
+    return bool((number == 1).sum() > (number == 0).sum())
+
+
+def scheme_of(name: str, codes: pa.Array, ones: bool | None = None) -> Scheme:
+    """Decide by the column's name and all the codes that occur in it.
+
+    `ones` is whether of the codes 0 and 1 most are 1, as `mostly_one` has it of more rows; None: of these.
+    """
+    number, name = _numbers(codes), plain(name)
+    known = number[np.isfinite(number)].astype(np.int64)
+    if name.endswith(COLUMNS["bad_flag"]) and {*_kinds(codes)} <= NOT_BAD | IS_BAD:
+        return Scheme.BAD_FLAG
+    if name == "dataintegrity":
+        return Scheme.IGNITION
+    if 2 * len(known) < len(codes) - codes.null_count:
+        return Scheme.TEXT
+    if "confidence" in name:
+        return Scheme.CONFIDENCE
+    if name.endswith(COLUMNS["good_flag"]) and set(known.tolist()) <= set(range(10)):
+        return Scheme.FLAG
+    if (known < 0).any() or (known >= UA_UNCERTAIN).any():
+        return Scheme.UA
+    if ((known & 0xFF) >= DA_GOOD).any():
+        return Scheme.DA
+    if (known == PCS7_GOOD).any() and known.max() < 0x100:
+        return Scheme.PCS7
+    if len(known) and known.max() < MOST_FLAG and (mostly_one([codes]) if ones is None else ones):
+        return Scheme.ONE_GOOD
+    return Scheme.CONFIDENCE if len(known) and known.max() == CONFIDENCE_FULL else Scheme.UA
+
+
+def not_good(
+    codes: pa.Array, scheme: Scheme, good: tuple[str, ...] | None
+) -> tuple[NDArray[np.bool_], Counter[str]]:
+    """Samples that the historian does not call good, shape (n,), and how often each such code was met.
+
+    `good` are codes or texts that count as good whatever the scheme says, None where the scheme counts; a blank is
+    bad, but where codes stand only where something is wrong.
+    """
+    encoded = codes if pa.types.is_dictionary(codes.type) else pc.dictionary_encode(codes)
+    place = pc.fill_null(encoded.indices, len(encoded.dictionary)).to_numpy(zero_copy_only=False)
+    kinds = pa.concat_arrays([encoded.dictionary, pa.nulls(1, encoded.dictionary.type)])
+    bad = ~_good(kinds, scheme) if good is None else ~_listed(kinds, good)
+    count = np.bincount(place, minlength=len(kinds))
+    names = kinds.to_pylist()
+    blank = np.array([name is None or str(name).strip() == "" for name in names])
+    if good is None and bad[~blank].all() and 2 * count[blank].sum() > count.sum():
+        bad = bad & ~blank
+    found = Counter(
+        {
+            f"samples have quality '{str(names[i])[:60]}', taken as bad": int(count[i])
+            for i in np.flatnonzero(bad)
+        }
+    )
+    found[FLAGGED_INTERPOLATED] = int(count[_interpolated(kinds, scheme)].sum())
+    return bad[place], +found
+
+
+def quality_columns(table: Table, free: Sequence[int]) -> tuple[dict[int, int], list[str]]:
+    """Value column to quality column of a wide table, by position, and sentences on such as are not understood.
+
+    `free` are the columns that are not the time's.
+
+    A quality column is named for its tag (FIC101.PV_Q, Qual FIC101.PV), or stands right of its values under a bare
+    name that comes several times (Status), or is the only one of its kind and speaks for the whole row.
+    """
+    names = table.names
+    by_name = {names[i]: i for i in reversed(free)}
+    named = {i: by_name[tag] for i in free if (tag := _tag_of(names[i], by_name)) is not None}
+    found = {tag: i for i, tag in named.items() if _is_coded(table, i)}
+    bare = [i for i in free if plain(names[i]) in QUALITY_NAMES and i not in found.values()]
+    values = [i for i in free if i not in bare and i not in found.values()]
+    if len(bare) > 1:
+        return {**{i - 1: i for i in bare if i - 1 in values}, **found}, []
+    for i in bare:
+        if _is_coded(table, i):
+            return {**dict.fromkeys(values, i), **found}, []
+        if _few_kinds(table.head([i])[0]):
+            said = f"column '{names[i]}' looks like quality and is not understood: its codes are not used"
+            return found, [f"{said}; name those that are good with --good-quality if it is"]
+    return found, []
+
+
+def _tag_of(name: str, others: Mapping[str, int]) -> str | None:
+    """The other column that a quality column is named for."""
+    if len(name) > LONGEST:
+        return None
+    tags = (match["tag"] for pattern in QUALITY_OF if (match := pattern.match(name)) is not None)
+    return next((tag for tag in tags if tag in others and tag != name), None)
+
+
+def _is_coded(table: Table, i: int) -> bool:
+    """Whether a column named as quality holds codes: few kinds, whole numbers or known texts.
+
+    A loop's flow may be called Q.
+    """
+    codes = table.head([i])[0].drop_null()
+    if len(codes) == 0:
+        return True
+    if pa.types.is_floating(codes.type) and not pc.all(pc.equal(codes, pc.floor(codes))).as_py():
+        return False
+    return _few_kinds(codes) and _is_understood(codes, scheme_of(table.names[i], codes))
+
+
+def _few_kinds(codes: pa.Array) -> bool:
+    """Whether a column has few distinct values, as codes have."""
+    return len(codes) > 0 and len(codes.unique()) <= max(len(codes) // 10, 8)
+
+
+def _is_understood(codes: pa.Array, scheme: Scheme) -> bool:
+    """Whether codes under a bare name are quality: texts that are known, or numbers that the scheme has."""
+    kinds = {*_kinds(codes)} - {""}
+    if scheme is Scheme.TEXT:
+        known = {k for k in kinds if _good_text(k) or k in BAD or k.startswith("bad")}
+        return bool(kinds) and 2 * len(known) >= len(kinds)
+    if scheme is Scheme.UA:
+        return not kinds.isdisjoint({"0", "0.0"}) or any(k.startswith("0x") for k in kinds)
+    return True
+
+
+def _numbers(codes: pa.Array) -> NDArray[np.float64]:
+    if pa.types.is_dictionary(codes.type):
+        codes = codes.dictionary_decode()
+    found = [int(c, 16) if isinstance(c, str) and HEXADECIMAL.match(c) else c for c in codes.to_pylist()]
+    return pd.to_numeric(pd.Series(found, dtype=object), errors="coerce").to_numpy(dtype=np.float64)
+
+
+def _good(kinds: pa.Array, scheme: Scheme) -> NDArray[np.bool_]:
+    if scheme is Scheme.TEXT:
+        return np.array([_good_text(str(text)) for text in kinds.to_pylist()])
+    if scheme is Scheme.BAD_FLAG:
+        return np.array([_written(code) in NOT_BAD for code in kinds.to_pylist()])
+    number = _numbers(kinds)
+    return np.isfinite(number) & IS_GOOD[scheme](np.nan_to_num(number, nan=-1).astype(np.int64))
+
+
+def _good_text(text: str) -> bool:
+    """Whether a text is good, or one of the words that commas part is, and none of them is bad."""
+    words = [word.strip() for word in re.split(r"[,;|]", text.lower())]
+    return BAD.isdisjoint(words) and any(word in GOOD or word.startswith("good") for word in words)
+
+
+def _written(code: object) -> str:
+    return "" if code is None else str(code).strip().lower()
+
+
+def _kinds(codes: pa.Array) -> list[str]:
+    return [_written(code) for code in codes.unique().to_pylist()]
+
+
+def _listed(kinds: pa.Array, good: tuple[str, ...]) -> NDArray[np.bool_]:
+    wanted = {_canonical(code) for code in good}
+    return np.array([_canonical(code) in wanted for code in kinds.to_pylist()])
+
+
+def _canonical(code: object) -> str:
+    return str(code).strip().lower().removesuffix(".0")
+
+
+def _interpolated(kinds: pa.Array, scheme: Scheme) -> NDArray[np.bool_]:
+    code = np.nan_to_num(_numbers(kinds), nan=0).astype(np.int64)
+    return (scheme is Scheme.DA) & (code > 0) & ((code & INTERPOLATED) != 0)
