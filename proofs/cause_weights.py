@@ -22,8 +22,7 @@ from scipy.optimize import minimize
 
 from analyzer import api
 from analyzer.config import Config
-from analyzer.loop.cause_measures import NAMES, measures
-from analyzer.loop.cause_weights import FILE, parted
+from analyzer.loop.cause_weights import FILE, NAMES, measures, parted
 from analyzer.loop.decisions import CAUSES
 from analyzer.loop.fit_for_cause import unfit_for_cause
 from analyzer.loop.measure import measure

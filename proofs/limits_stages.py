@@ -14,7 +14,7 @@ from analyzer.config import Config
 from analyzer.loop.advice import advise
 from analyzer.loop.assess import assess, cause_of, verdict_by_measures
 from analyzer.loop.assessments import assess_span
-from analyzer.loop.dead_valve import dead_valve
+from analyzer.loop.cause import dead_valve
 from analyzer.loop.decisions import Status
 from analyzer.loop.finding import Finding, Swing
 from analyzer.loop.fit_for_cause import at_limits

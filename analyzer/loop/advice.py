@@ -278,7 +278,7 @@ def _proposed(verdict: Verdict, controller: Pid, period_s: float | None, config:
     window, fit = measured_of(verdict).window, chosen_fit(verdict)
     loop = model_of(verdict, controller)
     if verdict.cause not in (Cause.VALVE, Cause.TUNING):
-        return Proposed(recommend(loop, verdict.cause, limits=config.tuning, source=verdict.source))
+        return Proposed(recommend(loop, verdict.cause, limits=config.tuning))
     if loop.controller.kp * loop.process.slope <= 0.0:
         return Proposed(recommend(loop, verdict.cause, limits=config.tuning))
     if loop.process.dead_time_s > config.advice.beyond_record * window.duration_s:

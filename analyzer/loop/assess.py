@@ -18,8 +18,17 @@ from analyzer.loop.assessments import (
     settling_time,
     usable,
 )
-from analyzer.loop.cause import NO_CAUSE, Verdict, as_hint, hidden_by_grid, judge, not_assessed
-from analyzer.loop.dead_valve import dead_valve, with_dead_valve
+from analyzer.loop.cause import (
+    NO_CAUSE,
+    Verdict,
+    as_hint,
+    dead_valve,
+    hidden_by_grid,
+    judge,
+    not_assessed,
+    told_apart,
+    with_dead_valve,
+)
 from analyzer.loop.decisions import Cause, Lack, LacksError, Needs
 from analyzer.loop.fit_for_cause import unfit_for_cause
 from analyzer.loop.fit_for_settings import too_thin, unfit_for_settings
@@ -29,7 +38,6 @@ from analyzer.loop.oscillation import Oscillation, Oscillations, barely_seen, co
 from analyzer.loop.quality import Prepared
 from analyzer.loop.settings_check import SettingsDiffer, differing
 from analyzer.loop.slip_by_slip import told_slip_by_slip
-from analyzer.loop.told_apart import told_apart
 from analyzer.loop.trends import BUCKETS, FINE_BUCKETS, close_view, thinned
 from analyzer.plantwide.wave import Wave, waves_of
 from analyzer.words import settings as words

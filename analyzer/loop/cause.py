@@ -28,30 +28,33 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analyzer.config import CauseLimits
-from analyzer.loop.cause_measures import measures
+from analyzer.config import CauseLimits, Config
 from analyzer.loop.cause_signs import likelihood_told, signs_of, width_text
-from analyzer.loop.cause_weights import chances
-from analyzer.loop.decisions import CAUSES, Cause, Fault, Needs
+from analyzer.loop.cause_weights import PLAIN, chances, measures
+from analyzer.loop.decisions import CAUSES, OF_LOAD, Cause, Fault, Lack, Needs
 from analyzer.loop.finding import Sign
-from analyzer.loop.measure import Measured
+from analyzer.loop.fit_for_cause import compressed
+from analyzer.loop.measure import PLAYS, Measured
 from analyzer.loop.oscillation import Oscillation
+from analyzer.loop.quality import Prepared
+from analyzer.loop.tight import sensitivity
+from analyzer.words import settings as words
+from identification.record import LoopRecord
 
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
     """The cause of one loop's oscillation.
 
-    cause; confidence [%] of each cause; fault of the valve; signs in words; source : the loop that leads, empty where
-    none is known; needs : what the record lacks for a cause, None where it lacks nothing; measured; dead : the valve
-    no longer moves PV at all; steady : the same by one friction for all slips, where it was told slip by slip since.
+    cause; confidence [%] of each cause; fault of the valve; signs in words; needs : what the record lacks for a
+    cause, None where it lacks nothing; measured; dead : the valve no longer moves PV at all; steady : the same by one
+    friction for all slips, where it was told slip by slip since.
     """
 
     cause: Cause
     confidence: dict[Cause, float]
     fault: Fault
     signs: tuple[Sign, ...] = ()
-    source: str = ""
     needs: Needs | None = None
     measured: Measured | None = None
     dead: bool = False
@@ -184,3 +187,101 @@ def hidden_by_grid(m: Measured, pv_step: float, oscillates: bool, limits: CauseL
 def as_hint(verdict: Verdict, most_pct: float) -> Verdict:
     """A verdict that rests on little: no confidence above `most_pct` [%]."""
     return replace(verdict, confidence={k: min(v, most_pct) for k, v in verdict.confidence.items()})
+
+
+def dead_valve(record: LoopRecord, limits: CauseLimits) -> Sign | None:
+    """A valve that no longer moves PV: OP winds over much of its range, the error stays on one side, PV is still.
+
+    Returns
+    -------
+    Sign or None
+    """
+    good = ~(record.mask("gap") | record.mask("manual"))
+    if record.sp_estimated or good.sum() < 100:
+        return None
+    wound = float(np.ptp(record.op[good]))
+    if wound < limits.wound_pct:
+        return None
+    pv, e = record.pv[good], record.error[good]
+    low, high = np.quantile(pv, [0.05, 0.95])
+    still = float(high - low) <= 0.1 * float(np.median(np.abs(e)))
+    one_sided = max(float((e > 0).mean()), float((e < 0).mean()))
+    if not still or one_sided < 0.95:
+        return None
+    return Sign("valve", 0.9, f"OP winds over {wound:.0f} % while PV stands still off the set point")
+
+
+def with_dead_valve(verdict: Verdict, sign: Sign) -> Verdict:
+    """A verdict of a valve that is plainly at fault without oscillation."""
+    confidence = {Cause.VALVE: 90.0, Cause.TUNING: 0.0, Cause.LOAD: 0.0}
+    return replace(
+        verdict,
+        cause=Cause.VALVE,
+        confidence=confidence,
+        fault=Fault.UNDECIDED,
+        signs=(sign, *verdict.signs),
+        dead=True,
+    )
+
+
+def told_apart(
+    verdict: Verdict, prepared: Prepared, oscillation: Oscillation | None, config: Config
+) -> Verdict:
+    """The verdict, or none where so few samples a cycle, or so coarse a grid, make other causes look like it; where
+    trends on straight segments make a likely valve of a load; where nothing but the want of other causes shows a
+    load, or a valve's play shows beside it; and where the loop that is called too tight is robust."""
+    if oscillation is None or verdict.cause not in CAUSES:
+        return verdict
+    lacking = _hides(verdict, prepared, oscillation, config)
+    if lacking is None:
+        return verdict
+    fault = Fault.UNDECIDED if verdict.cause is Cause.VALVE else verdict.fault
+    hint = as_hint(verdict, 0.9 * config.cause.named_pct)
+    return replace(hint, cause=Cause.UNDECIDED, fault=fault, needs=lacking)
+
+
+def _hides(verdict: Verdict, prepared: Prepared, oscillation: Oscillation, config: Config) -> Needs | None:
+    """What the recording lacks to tell the cause that is named from others; None where it lacks nothing."""
+    limits = config.cause
+    if verdict.cause is Cause.VALVE:
+        sure = verdict.confidence[Cause.VALVE] >= limits.compressed_pct
+        return None if sure else compressed(prepared, None, config.quality)
+    if verdict.cause is Cause.TUNING:
+        return _robust(verdict, oscillation, config) or _rough(verdict, prepared, oscillation, limits)
+    samples = oscillation.period_s / prepared.record.dt_s
+    rough = _rough(verdict, prepared, oscillation, limits)
+    if rough is not None:
+        return rough
+    if samples < limits.samples_told:
+        return Needs(Lack.FASTER, words.too_few(samples, limits.samples_told))
+    if not any(s.points_to == Cause.LOAD and s.name in OF_LOAD for s in verdict.signs):
+        return Needs(Lack.MANUAL_TEST, words.NO_SIGN_OF_A_LOAD)
+    return _beside(verdict, limits)
+
+
+def _rough(
+    verdict: Verdict, prepared: Prepared, oscillation: Oscillation, limits: CauseLimits
+) -> Needs | None:
+    """Finer values, where PV's grid has too few steps in the swing; None where it has enough."""
+    steps = oscillation.amplitude_pct / max(prepared.pv_step, 1e-12)
+    if steps >= (limits.steps_told if verdict.cause is Cause.LOAD else limits.steps_tuning):
+        return None
+    return Needs(Lack.FINER, words.too_rough(prepared.pv_step, oscillation.amplitude_pct))
+
+
+def _robust(verdict: Verdict, oscillation: Oscillation, config: Config) -> Needs | None:
+    """A test in manual, where signs speak for the tuning and the identified loop is robust; None where it is not."""
+    ms = None if verdict.measured is None else sensitivity(verdict.measured, oscillation.period_s)
+    return None if ms is None or ms > config.tuning.ms_most else Needs(Lack.MANUAL_TEST, words.robust(ms))
+
+
+def _beside(verdict: Verdict, limits: CauseLimits) -> Needs | None:
+    """A stroke of the valve, where a load is likely and a play shows all the same; None where it does not."""
+    m = verdict.measured
+    if m is None or m.trials is None or verdict.confidence[Cause.LOAD] >= limits.beside_pct:
+        return None
+    plain = m.evidence > limits.beside_share * (m.expected + limits.evidence)
+    crossed = PLAYS[0] <= m.size <= limits.near_size
+    if not plain or not crossed or m.trials.agreeing < limits.beside_agreeing or m.wave_left > PLAIN:
+        return None
+    return Needs(Lack.STROKE, words.valve_beside(m.size, m.trials.agreeing))

@@ -7,8 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from analyzer.loop.cause_measures import PLAIN, measures
-from analyzer.loop.cause_weights import pushes
+from analyzer.loop.cause_weights import PLAIN, measures, pushes
 from analyzer.loop.decisions import AMPLIFICATION, CAUSES, Cause
 from analyzer.loop.finding import Sign
 from analyzer.loop.measure import Measured

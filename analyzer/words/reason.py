@@ -5,7 +5,6 @@ from __future__ import annotations
 from analyzer.lanes.lanes import SAID
 from analyzer.loop.decisions import AMPLIFICATION, OF_LOAD, Action, Cause, Due, Fault, Lack, Lane, Status
 from analyzer.loop.finding import Finding, Root
-from analyzer.words.clauses import joined
 from analyzer.words.units import duration
 
 PLAIN = {
@@ -144,3 +143,14 @@ def _calmed(found: Finding) -> str:
     then = f"every {duration(before.swing.period_s)} until {before.night}"
     cycle = f"{duration(now.period_s)}, {slower}{share:.0f} % as much as before its settings were changed ({then})"
     return f"cycles every {cycle}: {valve_text(found)}{to_stroke(found)}"
+
+
+def joined(*clauses: str | None) -> str:
+    """Clauses with a semicolon between, those that say nothing left out; a full stop at the end of one goes."""
+    return "; ".join(filter(None, map(_open, clauses)))
+
+
+def _open(clause: str | None) -> str:
+    """A clause to which another one may be added."""
+    text = (clause or "").strip()
+    return text if text[-2:] == ".." else text.removesuffix(".").strip()

@@ -10,8 +10,7 @@ import pytest
 from plant import CONFIG, START_S, Sketch, Trends, prepared, record, series, simulate, spec
 
 from analyzer.loop.assess import Assessment, assess
-from analyzer.loop.cause import judge
-from analyzer.loop.dead_valve import dead_valve
+from analyzer.loop.cause import dead_valve, judge
 from analyzer.loop.decisions import Lack
 from analyzer.loop.quality import prepare
 from analyzer.plantwide.source import Peer

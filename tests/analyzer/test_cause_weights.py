@@ -8,8 +8,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from analyzer.loop.cause_measures import NAMES
-from analyzer.loop.cause_weights import chances, parted, pushes, weights
+from analyzer.loop.cause_weights import NAMES, chances, parted, pushes, weights
 from analyzer.loop.decisions import CAUSES, Cause
 from proofs.cause_weights import WAYS, fitted
 

@@ -8,7 +8,7 @@ import re
 from hypothesis import given
 from hypothesis import strategies as st
 
-from analyzer.words.clauses import joined
+from analyzer.words.reason import joined
 from tuning.reasons import little_less_error, not_tight, robustness
 
 

@@ -8,10 +8,10 @@ import pytest
 from plant import CONFIG, Sketch, prepared, simulate
 
 from analyzer.loop.assess import assess
+from analyzer.loop.cause import told_apart
 from analyzer.loop.decisions import Cause, Lack
 from analyzer.loop.finding import Sign
 from analyzer.loop.oscillation import counting
-from analyzer.loop.told_apart import told_apart
 from identification.models import Fopdt, Loop
 from tuning.linear import margins
 
