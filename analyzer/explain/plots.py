@@ -8,7 +8,7 @@ from analyzer.explain.one_loop import Explained
 from analyzer.explain.page_words import AXES, BROUGHT, CURVES, FEATURES, KINDS, caption
 from analyzer.explain.views import CLOSE, FeatureView, Spectrum
 from analyzer.pages.words import number
-from identification.mismatch.curves.drawn import Shape
+from identification.mismatch.pictures import Shape
 from identification.record import Floats
 from reports.pages import Area, Band, Line, Mark, Panels, Plot, Trend
 

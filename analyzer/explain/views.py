@@ -11,14 +11,13 @@ from analyzer.explain.user_model import Brought
 from identification.estimation.candidate import Fitted
 from identification.mismatch.answer import Answer
 from identification.mismatch.catalogue import fault
-from identification.mismatch.curves.controller import by_stated_law
-from identification.mismatch.curves.drawn import Drawing, Shape
-from identification.mismatch.curves.stretches import busiest
 from identification.mismatch.explanation import Explanation
+from identification.mismatch.fault_pictures import busiest, by_stated_law
 from identification.mismatch.location.features import Group, groups
 from identification.mismatch.location.locate import Located, profile
 from identification.mismatch.location.where import located_in, won_over
 from identification.mismatch.outside import about
+from identification.mismatch.pictures import Drawing, Shape
 from identification.mismatch.proof import course
 from identification.mismatch.recording import Recording
 from identification.record import Floats

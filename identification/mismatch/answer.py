@@ -90,9 +90,8 @@ def finding_effect(finding: Finding | None, s: Recording) -> EffectFound | None:
     """A finding about recorder or controller as an effect."""
     if finding is None:
         return None
-    about = fault(finding.name)
-    shown = about.numbers(finding, s) if about.numbers is not None else {}
-    return EffectFound(about.name, about.block, shown, None)
+    own = fault(finding.name)
+    return EffectFound(own.name, own.block, {n.name: n.estimate(finding, s) for n in own.numbers}, None)
 
 
 def parameters_of(p: Problem, fit: Fitted, row: Variant) -> dict[str, Estimate]:

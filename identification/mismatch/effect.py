@@ -1,4 +1,7 @@
-"""An effect of the catalogue, whole: what it frees in the model, how it is proven, drawn and said."""
+"""An effect of the catalogue, whole: what it frees in the model, how it is proven, drawn and said.
+
+A file of the catalogue takes all that it declares an effect with from here.
+"""
 
 from __future__ import annotations
 
@@ -6,12 +9,26 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
-from identification.mismatch.curves.drawn import Drawing, Shape
+from identification.mismatch.pictures import Drawing, Shape
 from identification.mismatch.recording import Finding, Recording
 from identification.models import Estimate
 from identification.record import Floats
-from identification.simulation.effect import Act, Variant
+from identification.simulation.effect import Act, Param, Signal, Start, Variant, each
+from identification.simulation.parameters import Slot, own_slot
 
+__all__ = ["Act", "Block", "Effect", "Ends", "Estimate", "Fault", "Finding", "Floats", "Friction", "Number"]
+__all__ += [
+    "Param",
+    "Parameters",
+    "Recording",
+    "Signal",
+    "Slot",
+    "Start",
+    "Variant",
+    "each",
+    "exact",
+    "own_slot",
+]
 Parameters = Mapping[str, Estimate]
 
 
@@ -102,12 +119,36 @@ class Effect:
 
 
 @dataclass(frozen=True, slots=True)
+class Number:
+    """A number of a finding, as answered.
+
+    name, unit, title : as answered and as pages call it; of : its name in the finding, where another; times : factor
+    to the finding's; in_time : whether it is a time, which the finding has in samples; share : half width of its
+    interval, in itself; half : the same of its own kind.
+    """
+
+    name: str
+    unit: str
+    title: str
+    of: str = ""
+    times: float = 1.0
+    in_time: bool = False
+    share: float = 0.0
+    half: Callable[[Recording], float] | None = None
+
+    def estimate(self, found: Finding, s: Recording) -> Estimate:
+        """The number of a finding in a recording."""
+        value = self.times * found.values[self.of or self.name] * (s.dt_s if self.in_time else 1.0)
+        return exact(value, self.unit, self.share * abs(value) if self.half is None else self.half(s))
+
+
+@dataclass(frozen=True, slots=True)
 class Fault(Effect):
     """An effect of recorder or controller: it is found in the trends themselves, before any physics is fitted.
 
     order : place among the questions; find : the finding in a recording, None of what the controller's check finds;
     finds : what the controller's check calls it; ends : what is asked after it; censors : whether samples where it
-    is tell no more than that PV is beyond; numbers : the answer's parameters;
+    is tell no more than that PV is beyond; numbers : what is answered of it;
     drawn : its picture, from the finding, the recording and the plain model's PV.
     """
 
@@ -116,8 +157,13 @@ class Fault(Effect):
     finds: str = ""
     ends: Ends = Ends.NOTHING
     censors: bool = False
-    numbers: Callable[[Finding, Recording], dict[str, Estimate]] | None = None
+    numbers: tuple[Number, ...] = ()
     drawn: Callable[[Finding, Recording, Floats], Shape | None] | None = None
+
+    @property
+    def called(self) -> dict[str, str]:
+        """What pages call each of its numbers."""
+        return {n.name: n.title for n in self.numbers}
 
 
 def exact(value: float, unit: str, half: float = 0.0) -> Estimate:

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from identification.mismatch.curves.valve import stem_over_op
-from identification.mismatch.effect import Block, Effect, Friction
-from identification.simulation.effect import Param, Variant, each
-from identification.simulation.parameters import Slot
+from identification.mismatch.effect import Block, Effect, Friction, Param, Slot, Variant, each
+from identification.mismatch.pictures import stem_over_op
+
+PLAY = Param(Slot.STICKBAND, "backlash_pct", "% OP", 1e-4, 2.0, "op", True, title="Play, full width")
 
 EFFECT = Effect(
     name="backlash",
     block=Block.VALVE,
-    sentence=("After each turn of OP the valve waits through a play of {backlash_pct}: check the linkage."),
-    check=("Look at linkage, actuator and positioner feedback; stroke the valve both ways in small steps."),
+    sentence="After each turn of OP the valve waits through a play of {backlash_pct}: check the linkage.",
+    check="Look at linkage, actuator and positioner feedback; stroke the valve both ways in small steps.",
     tests={
         "stiction": (
-            "A slow ramp of OP in manual, then back: after the turn play lets PV go gently, stiction "
-            "in jumps."
+            "A slow ramp of OP in manual, then back: after the turn play lets PV go gently, stiction in jumps."
         ),
         "positioner": (
             "A slow ramp of OP and back, with the stem recorded: a dead band holds at every stop, "
@@ -30,11 +29,5 @@ EFFECT = Effect(
     },
     friction=Friction.PLAY,
     curve=stem_over_op,
-    variants=(
-        Variant(
-            (Param(Slot.STICKBAND, "backlash_pct", "% OP", 1e-4, 2.0, "op", True, title="Play, full width"),),
-            each(Slot.STICKBAND, 0.01, 0.03, 0.08, 0.2, 0.5),
-            {Slot.JUMP: 0.0},
-        ),
-    ),
+    variants=(Variant((PLAY,), each(Slot.STICKBAND, 0.01, 0.03, 0.08, 0.2, 0.5), {Slot.JUMP: 0.0}),),
 )

@@ -2,24 +2,21 @@
 
 from __future__ import annotations
 
-import numpy as np
+from identification.mismatch.effect import Block, Effect, Floats, Param, Slot, Variant, each
+from identification.mismatch.pictures import GAIN, Drawing, Shape, course
+from identification.simulation.open_loop import ModelInputs
 
-from identification.mismatch.curves.course import course, over_record
-from identification.mismatch.curves.drawn import Axis, Drawing, Shape
-from identification.mismatch.effect import Block, Effect
-from identification.record import Floats
-from identification.simulation.effect import Param, Variant, each
-from identification.simulation.parameters import Slot
+DRIFT = Param(Slot.DRIFT, "gain_drift", "per record", -1.9, 1.9, title="Gain drift")
+
+
+def gain(inputs: ModelInputs, c: Floats) -> Floats:
+    """The gain as it drifts, shape (n,)."""
+    return c[Slot.K] * (1.0 + c[Slot.DRIFT] * inputs.clock)  # type: ignore[no-any-return]
 
 
 def gain_over_time(d: Drawing) -> Shape:
     """The gain as it drifts."""
-    at = over_record(d.inputs)
-
-    def read(c: Floats) -> Floats:
-        return np.asarray(c[Slot.K] * (1.0 + c[Slot.DRIFT] * d.inputs.clock[at]))
-
-    return course(d, at, read, Axis("gain", "% PV/% OP"), rest=float(d.plain[Slot.K]))
+    return course(d, GAIN, gain, rest=float(d.plain[Slot.K]))
 
 
 EFFECT = Effect(
@@ -29,10 +26,5 @@ EFFECT = Effect(
     check="Ask what fouled, wore or changed over the recording.",
     timed=True,
     curve=gain_over_time,
-    variants=(
-        Variant(
-            (Param(Slot.DRIFT, "gain_drift", "per record", -1.9, 1.9, title="Gain drift"),),
-            each(Slot.DRIFT, -0.2, 0.2),
-        ),
-    ),
+    variants=(Variant((DRIFT,), each(Slot.DRIFT, -0.2, 0.2)),),
 )

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-from identification.mismatch.curves.process import pv_response
-from identification.mismatch.effect import Block, Effect
-from identification.record import Floats
-from identification.simulation.effect import Variant
-from identification.simulation.parameters import Slot
+from identification.mismatch.effect import Block, Effect, Floats, Slot, Variant
+from identification.mismatch.pictures import pv_response
 
 
 def from_settling(c: Floats) -> None:

@@ -2,49 +2,30 @@
 
 from __future__ import annotations
 
-from identification.mismatch.curves.drawn import Drawing, Shape
-from identification.mismatch.curves.process import pv_response
-from identification.mismatch.effect import Block, Effect
-from identification.simulation.effect import Param, Variant
-from identification.simulation.parameters import Slot
+from identification.mismatch.effect import Block, Effect, Param, Slot, Variant
+from identification.mismatch.pictures import pv_response
 
-
-def pv_after_step(d: Drawing) -> Shape:
-    """PV after a step of OP, drawn to where the shorter mode's work is over."""
-    return pv_response(d, fast_s=float(min(d.best[Slot.MODE_T], d.best[Slot.T])))
-
+SHARE = Param(Slot.SHARE, "opposing_share", "", -5.0, 0.0, title="Opposing share")
+TIME = Param(
+    Slot.MODE_T, "opposing_time_constant_s", "s", 0.1, 1e4, "dt", True, title="Opposing time constant"
+)
+SHARES, TIMES = (-0.01, -0.03, -0.1, -0.3, -0.8), (0.3, 2.0, 8.0, 30.0)
 
 EFFECT = Effect(
     name="inverse-response",
     block=Block.PROCESS,
     needs="every scan",
     sentence="After a move of OP, PV first goes the wrong way.",
-    check=("Expected of boilers, reboilers and the like; tune slower than the wrong-way part lasts."),
+    check="Expected of boilers, reboilers and the like; tune slower than the wrong-way part lasts.",
     tests={
         "flow-dependent-delay": "Steps at two flow levels; the wrong way shows at both.",
         "positioner": "Three steps of OP apart in time: the wrong way must show in each.",
     },
-    curve=pv_after_step,
+    curve=lambda d: pv_response(d, faster=Slot.MODE_T),
     variants=(
         Variant(
-            (
-                Param(Slot.SHARE, "opposing_share", "", -5.0, 0.0, title="Opposing share"),
-                Param(
-                    Slot.MODE_T,
-                    "opposing_time_constant_s",
-                    "s",
-                    0.1,
-                    1e4,
-                    "dt",
-                    True,
-                    title="Opposing time constant",
-                ),
-            ),
-            tuple(
-                {Slot.SHARE: s, Slot.MODE_T: t}
-                for s in (-0.01, -0.03, -0.1, -0.3, -0.8)
-                for t in (0.3, 2.0, 8.0, 30.0)
-            ),
+            (SHARE, TIME),
+            tuple({Slot.SHARE: s, Slot.MODE_T: t} for s in SHARES for t in TIMES),
             modes=(0.005, 0.02, 0.08, 0.25),
             mode_share=(-5.0, -0.002),
         ),

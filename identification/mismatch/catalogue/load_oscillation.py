@@ -4,34 +4,32 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
-from identification.mismatch.curves.course import COURSE_POINTS, course, load_over_time
-from identification.mismatch.curves.drawn import Axis, Drawing, Shape
-from identification.mismatch.effect import Block, Effect, Parameters, exact
-from identification.models import Estimate
-from identification.simulation.effect import Param, Variant
-from identification.simulation.parameters import Slot
+from identification.mismatch.effect import Block, Effect, Estimate, Param, Parameters, Slot, Variant, exact
+from identification.mismatch.pictures import LOAD, Drawing, Shape, course
+from identification.simulation.open_loop import load
 
 PERIODS = 6
 """Periods that are drawn."""
+FREE = (
+    Param(Slot.SINE, "sine_pct", "% OP", -30.0, 30.0, hidden=True),
+    Param(Slot.COSINE, "cosine_pct", "% OP", -30.0, 30.0, hidden=True),
+    Param(Slot.OMEGA, "angular_frequency", "rad/s", 0.0, 10.0, hidden=True),
+)
 
 
 def period_and_amplitude(own: Parameters) -> dict[str, Estimate]:
     """Period [s] and amplitude [% OP]."""
-    w = own["angular_frequency"]
-    low, high = (2 * math.pi / max(x, 1e-9) for x in (w.high, w.low))
-    size = math.hypot(own["sine_pct"].value, own["cosine_pct"].value)
-    half = max(e.high - e.value for e in (own["sine_pct"], own["cosine_pct"]))
-    period = Estimate(2 * math.pi / max(w.value, 1e-9), low, high, "s")
-    return {"period_s": period, "amplitude_pct": exact(size, "% OP", half)}
+    w, sine, cosine = own["angular_frequency"], own["sine_pct"], own["cosine_pct"]
+    period, low, high = (2 * math.pi / max(x, 1e-9) for x in (w.value, w.high, w.low))
+    half = max(e.high - e.value for e in (sine, cosine))
+    size = exact(math.hypot(sine.value, cosine.value), "% OP", half)
+    return {"period_s": Estimate(period, low, high, "s"), "amplitude_pct": size}
 
 
 def few_periods(d: Drawing) -> Shape:
     """The load over its first periods."""
-    samples = PERIODS * 2 * np.pi / max(float(d.best[Slot.OMEGA]) * d.inputs.dt_s, 1e-9)
-    at = np.unique(np.linspace(0, min(samples, d.inputs.op.size - 1), COURSE_POINTS).astype(int))
-    return course(d, at, load_over_time(d, at), Axis("load at the inlet", "% OP"))
+    samples = PERIODS * 2 * math.pi / max(float(d.best[Slot.OMEGA]) * d.inputs.dt_s, 1e-9)
+    return course(d, LOAD, load, last=samples)
 
 
 EFFECT = Effect(
@@ -48,14 +46,5 @@ EFFECT = Effect(
     derived=period_and_amplitude,
     titles={"period_s": "Period", "amplitude_pct": "Amplitude"},
     curve=few_periods,
-    variants=(
-        Variant(
-            (
-                Param(Slot.SINE, "sine_pct", "% OP", -30.0, 30.0, hidden=True),
-                Param(Slot.COSINE, "cosine_pct", "% OP", -30.0, 30.0, hidden=True),
-                Param(Slot.OMEGA, "angular_frequency", "rad/s", 0.0, 10.0, hidden=True),
-            ),
-            ({Slot.SINE: 0.0, Slot.COSINE: 0.0},),
-        ),
-    ),
+    variants=(Variant(FREE, ({Slot.SINE: 0.0, Slot.COSINE: 0.0},)),),
 )

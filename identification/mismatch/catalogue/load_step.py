@@ -2,26 +2,23 @@
 
 from __future__ import annotations
 
-from identification.mismatch.curves.course import course, load_over_time, over_record
-from identification.mismatch.curves.drawn import Axis, Drawing, Shape
-from identification.mismatch.effect import Block, Effect
-from identification.simulation.effect import Param, Variant
-from identification.simulation.parameters import STEPS, Slot
+from identification.mismatch.effect import Block, Effect, Param, Slot, Variant
+from identification.mismatch.pictures import LOAD, Drawing, Shape, course
+from identification.simulation.open_loop import load
+from identification.simulation.parameters import STEPS
 
 PLACE = 6.0
 """Log likelihood [nat] that the choice of a step's place costs; ours: the largest of many by chance."""
 FREE = tuple(
-    Param(int(Slot.STEP) + i, f"size_{i + 1}_pct", "% OP", -50.0, 50.0, title=title)
-    for i, title in enumerate(("First load step", "Second load step", "Third load step"))
+    Param(int(Slot.STEP) + i, f"size_{i + 1}_pct", "% OP", -50.0, 50.0, title=f"{which} load step")
+    for i, which in enumerate(("First", "Second", "Third"))
 )
 
 
 def steps_over_time(d: Drawing) -> Shape:
     """The load, with the places of its steps."""
-    at = over_record(d.inputs)
     acting = [k for i, k in enumerate(d.inputs.step_at[:STEPS]) if d.best[int(Slot.STEP) + i] != 0]
-    places = tuple(float(k * d.inputs.dt_s) for k in acting)
-    return course(d, at, load_over_time(d, at), Axis("load at the inlet", "% OP"), places=places)
+    return course(d, LOAD, load, places=tuple(float(k * d.inputs.dt_s) for k in acting))
 
 
 EFFECT = Effect(
@@ -37,15 +34,13 @@ EFFECT = Effect(
     timed=True,
     spoken={"size": ("size_1_pct",)},
     curve=steps_over_time,
-    variants=(
-        *(
-            Variant(
-                FREE[:count],
-                (dict.fromkeys((p.slot for p in FREE[:count]), 0.0),),
-                label=f"{count}",
-                penalty=PLACE * count,
-            )
-            for count in (1, 2, 3)
-        ),
+    variants=tuple(
+        Variant(
+            FREE[:count],
+            (dict.fromkeys((p.slot for p in FREE[:count]), 0.0),),
+            label=f"{count}",
+            penalty=PLACE * count,
+        )
+        for count in (1, 2, 3)
     ),
 )

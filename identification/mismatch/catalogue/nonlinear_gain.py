@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from identification.mismatch.curves.process import gain_over_pv
-from identification.mismatch.effect import Block, Effect
-from identification.simulation.effect import Param, Variant, each
-from identification.simulation.parameters import Slot
+from identification.mismatch.effect import Block, Effect, Param, Slot, Variant, each
+from identification.mismatch.pictures import gain_over_pv
 
-SLOPE = ("gain_slope", "per 50 % PV", -1.9, 1.9, "1/pv")
-"""Name, unit, bounds and scale of the slope."""
+BY_OUTFLOW, BY_INFLOW = (
+    Param(slot, "gain_slope", "per 50 % PV", -1.9, 1.9, "1/pv", title="Gain slope")
+    for slot in (Slot.SLOPE, Slot.GAIN_SLOPE)
+)
 
 EFFECT = Effect(
     name="nonlinear-gain",
@@ -16,9 +16,7 @@ EFFECT = Effect(
     sentence="The process gain changes with PV (by {gain_slope}).",
     check="Schedule the controller's gain on PV, or tune for where the gain is highest.",
     tests={
-        "gain-drift": (
-            "Go back to the PV of the start and step again: drift stays, a nonlinear gain returns."
-        ),
+        "gain-drift": "Go back to the PV of the start and step again: drift stays, a nonlinear gain returns.",
         "sqrt-outflow": "Vary the inflow at one level: the root follows the level, geometry the place.",
         "direction-asymmetry": "Steps up and down over the same span of PV.",
         "flow-dependent-delay": "Steps at two flows at the same PV: the dead time moves, or the gain does.",
@@ -26,14 +24,9 @@ EFFECT = Effect(
     indistinguishable=("valve-characteristic",),
     curve=gain_over_pv,
     variants=(
-        Variant((Param(Slot.SLOPE, *SLOPE, title="Gain slope"),), each(Slot.SLOPE, -0.15, 0.15)),
+        Variant((BY_OUTFLOW,), each(Slot.SLOPE, -0.15, 0.15)),
         *(
-            Variant(
-                (Param(Slot.GAIN_SLOPE, *SLOPE, title="Gain slope"),),
-                each(Slot.GAIN_SLOPE, -0.15, 0.15),
-                {Slot.SPEED: speed},
-                label=label,
-            )
+            Variant((BY_INFLOW,), each(Slot.GAIN_SLOPE, -0.15, 0.15), {Slot.SPEED: speed}, label=label)
             for speed, label in ((0.0, "gain alone"), (-1.0, "faster with gain"))
         ),
     ),

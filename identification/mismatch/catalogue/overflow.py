@@ -4,21 +4,23 @@ from __future__ import annotations
 
 import numpy as np
 
-from identification.mismatch.curves.drawn import POINTS, Axis, Drawing, Drawn, Shape, banded
-from identification.mismatch.effect import Block, Effect
-from identification.record import Floats
-from identification.simulation.effect import Param, Variant, each
+from identification.mismatch.effect import Block, Effect, Floats, Param, Slot, Start, Variant, each
+from identification.mismatch.pictures import POINTS, Axis, Drawing, Shape, beside_plain
 from identification.simulation.open_loop import ModelInputs, outflow_head
-from identification.simulation.parameters import Slot
 
-FREE = (
+VESSEL = "Overflow of the vessel before at"
+CAP = Param(Slot.CAP, "cap_pct", "% PV", 0.0, 1.0, "pvspan", title="Overflow at")
+OF_VESSEL = (
     Param(Slot.T2, "vessel_before_s", "s", 0.1, 1e4, "dt", True, title="Time constant of the vessel before"),
     Param(Slot.BEGUN, "begun_pct", "% PV", -300.0, 300.0, hidden=True),
-    Param(
-        Slot.UPPER_CAP, "upper_cap_pct", "% PV", 0.0, 1.5, "pvspan", title="Overflow of the vessel before at"
-    ),
+    Param(Slot.UPPER_CAP, "upper_cap_pct", "% PV", 0.0, 1.5, "pvspan", title=VESSEL),
     Param(Slot.PASSED, "passed", "", 0.0, 1.0, title="Share of it that falls on"),
-    Param(Slot.CAP, "cap_pct", "% PV", 0.0, 1.0, "pvspan", title="Overflow at"),
+)
+STARTS: tuple[Start, ...] = tuple(
+    {Slot.T2: t, Slot.UPPER_CAP: upper, Slot.PASSED: s, Slot.CAP: cap}
+    for t in (3.0, 10.0, 30.0, 100.0)
+    for upper, cap in ((0.6, 0.7), (0.8, 0.85), (1.0, 0.95))
+    for s in (0.3, 0.8)
 )
 MORE = 0.3
 """How far beyond the range recorded the picture goes, in that range."""
@@ -40,9 +42,8 @@ def pv_over_free(d: Drawing) -> Shape:
     """PV over what an unbounded vessel would show."""
     low_pv, high_pv = d.inputs.pv_range
     free = np.linspace(low_pv, high_pv + MORE * (high_pv - low_pv), POINTS)
-    y, low, high = banded(lambda c: at_rest(free, d.inputs, c), d)
-    curves = (Drawn("found", free, y, low, high), Drawn("plain", free, free))
-    return Shape(d.name, "curve", Axis("PV of a vessel without overflow", "%"), Axis("PV", "%"), curves)
+    axes = Axis("PV of a vessel without overflow", "%"), Axis("PV", "%")
+    return beside_plain(d, "curve", axes, free, lambda c: at_rest(free, d.inputs, c), free)
 
 
 EFFECT = Effect(
@@ -60,24 +61,13 @@ EFFECT = Effect(
     local=True,
     curve=pv_over_free,
     variants=(
-        Variant(
-            (Param(Slot.CAP, "cap_pct", "% PV", 0.0, 1.0, "pvspan", title="Overflow at"),),
-            each(Slot.CAP, 0.7, 0.85, 0.95),
-        ),
+        Variant((CAP,), each(Slot.CAP, 0.7, 0.85, 0.95)),
         *(
-            Variant(
-                FREE[:count],
-                tuple(
-                    {Slot.T2: t, Slot.UPPER_CAP: c, Slot.PASSED: s, Slot.CAP: cap}
-                    for t in (3.0, 10.0, 30.0, 100.0)
-                    for c, cap in ((0.6, 0.7), (0.8, 0.85), (1.0, 0.95))
-                    for s in (0.3, 0.8)
-                ),
-                label=label,
-                delays=(Slot.T2,),
-                needs="experiment",
+            Variant(free, STARTS, label=label, delays=(Slot.T2,), needs="experiment")
+            for free, label in (
+                (OF_VESSEL, "of the vessel before"),
+                ((*OF_VESSEL, CAP), "of both vessels"),
             )
-            for count, label in ((4, "of the vessel before"), (5, "of both vessels"))
         ),
     ),
 )

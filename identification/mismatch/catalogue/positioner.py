@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from identification.mismatch.curves.drawn import Drawing, Shape
-from identification.mismatch.curves.valve import stem_response
-from identification.mismatch.effect import Block, Effect, Friction
-from identification.simulation.effect import Param, Variant
-from identification.simulation.parameters import Slot
+from identification.mismatch.effect import Block, Effect, Friction, Param, Slot, Variant
+from identification.mismatch.pictures import Drawing, Shape, stem_response
 
 LENGTH = 8.0
 """Length of the drawn response, in lags."""
+FREE = (
+    Param(Slot.SERVO, "positioner_lag_s", "s", 0.2, 200.0, "dt", True, title="Positioner lag"),
+    Param(Slot.DAMPING, "damping", "", 0.1, 1.2, title="Positioner damping"),
+    Param(Slot.DEADBAND, "deadband_pct", "% OP", 0.0, 0.5, "op", title="Dead band"),
+)
 
 
 def stem_after_step(d: Drawing) -> Shape:
@@ -20,24 +22,18 @@ def stem_after_step(d: Drawing) -> Shape:
 EFFECT = Effect(
     name="positioner",
     block=Block.VALVE,
-    sentence=(
-        "The positioner answers late (lag {positioner_lag_s}) and rests within {deadband_pct} of its aim."
-    ),
-    check=("Look at the positioner's gain and dead band; a recorded stem position would settle it."),
+    sentence="The positioner answers late (lag {positioner_lag_s}) and rests within {deadband_pct} of its aim.",
+    check="Look at the positioner's gain and dead band; a recorded stem position would settle it.",
     indistinguishable=("stiction",),
     friction=Friction.HINT,
     curve=stem_after_step,
     variants=(
         Variant(
-            (
-                Param(Slot.SERVO, "positioner_lag_s", "s", 0.2, 200.0, "dt", True, title="Positioner lag"),
-                Param(Slot.DAMPING, "damping", "", 0.1, 1.2, title="Positioner damping"),
-                Param(Slot.DEADBAND, "deadband_pct", "% OP", 0.0, 0.5, "op", title="Dead band"),
-            ),
+            FREE,
             tuple(
-                {Slot.SERVO: w, Slot.DAMPING: 0.45, Slot.DEADBAND: d}
-                for w in (0.5, 2.0, 8.0)
-                for d in (0.02, 0.08)
+                {Slot.SERVO: lag, Slot.DAMPING: 0.45, Slot.DEADBAND: band}
+                for lag in (0.5, 2.0, 8.0)
+                for band in (0.02, 0.08)
             ),
             delays=(Slot.SERVO,),
         ),

@@ -2,24 +2,19 @@
 
 from __future__ import annotations
 
-from identification.mismatch.curves.drawn import Drawing, Shape
-from identification.mismatch.curves.process import pv_response
-from identification.mismatch.effect import Block, Effect
-from identification.simulation.effect import Param, Variant, each
-from identification.simulation.parameters import Slot
+from identification.mismatch.effect import Block, Effect, Param, Slot, Start, Variant, each
+from identification.mismatch.pictures import pv_response
 
 SECOND = Param(Slot.T2, "second_lag_s", "s", 0.1, 1e4, "dt", True, title="Second lag")
-
-
-def pv_after_step(d: Drawing) -> Shape:
-    """PV after a step of OP, drawn to where the shorter lag's work is over."""
-    return pv_response(d, fast_s=float(min(d.best[Slot.T2], d.best[Slot.T])))
-
+THIRD = Param(Slot.T3, "third_lag_s", "s", 0.1, 1e4, "dt", True)
+BEGUN = Param(Slot.BEGUN, "begun_pct", "% PV", -300.0, 300.0, hidden=True)
+LAGS = each(Slot.T2, 0.7, 1.5, 3.0, 6.0, 12.0, 25.0, 50.0, 100.0)
+PAIRS: tuple[Start, ...] = tuple({Slot.T2: t, Slot.T3: 0.5 * t} for t in (1.5, 4.0, 12.0, 40.0))
 
 EFFECT = Effect(
     name="second-lag",
     block=Block.PROCESS,
-    sentence=("Something adds a lag of {second_lag_s}; the transmitter's damping would look the same."),
+    sentence="Something adds a lag of {second_lag_s}; the transmitter's damping would look the same.",
     check="Ask what lies between valve and transmitter; look at the transmitter's damping.",
     tests={
         "sensor-lag": (
@@ -28,26 +23,15 @@ EFFECT = Effect(
         ),
         "inverse-response": "One clean step of OP in manual, sampled at a tenth of the lag or faster.",
         "slow-mode": "A step of OP held for five of the longer time constants.",
-        "rate-limit": ("A step of OP twice as large: a slewing valve takes twice as long, a lag does not."),
+        "rate-limit": "A step of OP twice as large: a slewing valve takes twice as long, a lag does not.",
         "positioner": "A recorded stem position; or steps of OP of several sizes, for a lag scales.",
         "clock-offset": "The controller: does OP answer PV before PV moves?",
     },
     indistinguishable=("sensor-lag",),
-    curve=pv_after_step,
+    curve=lambda d: pv_response(d, faster=Slot.T2),
     variants=(
-        Variant((SECOND,), each(Slot.T2, 0.7, 1.5, 3.0, 6.0, 12.0, 25.0, 50.0, 100.0), delays=(Slot.T2,)),
-        Variant(
-            (SECOND, Param(Slot.T3, "third_lag_s", "s", 0.1, 1e4, "dt", True)),
-            tuple({Slot.T2: t, Slot.T3: 0.5 * t} for t in (1.5, 4.0, 12.0, 40.0)),
-            label="and a third",
-            delays=(Slot.T2, Slot.T3),
-        ),
-        Variant(
-            (SECOND, Param(Slot.BEGUN, "begun_pct", "% PV", -300.0, 300.0, hidden=True)),
-            each(Slot.T2, 0.7, 1.5, 3.0, 6.0, 12.0, 25.0, 50.0, 100.0),
-            label="begun elsewhere",
-            delays=(Slot.T2,),
-            needs="experiment",
-        ),
+        Variant((SECOND,), LAGS, delays=(Slot.T2,)),
+        Variant((SECOND, THIRD), PAIRS, label="and a third", delays=(Slot.T2, Slot.T3)),
+        Variant((SECOND, BEGUN), LAGS, label="begun elsewhere", delays=(Slot.T2,), needs="experiment"),
     ),
 )

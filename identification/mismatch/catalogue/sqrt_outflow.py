@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from identification.mismatch.curves.process import gain_over_pv
-from identification.mismatch.effect import Block, Effect
-from identification.simulation.effect import Param, Variant, each
-from identification.simulation.parameters import Slot
+from identification.mismatch.effect import Block, Effect, Param, Slot, Variant, each
+from identification.mismatch.pictures import gain_over_pv
 
 TIE = 2.0
 """Gain [nat] that it may lack beside a bend in the gain and still be told, being the commoner; ours."""

@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 from identification.estimation.covariance import LEAST_BAND, LEAST_JUMP, reaching
-from identification.mismatch.curves.valve import stem_over_op
-from identification.mismatch.effect import Block, Effect, Friction, Parameters
-from identification.models import Estimate
-from identification.simulation.effect import Param, Variant
-from identification.simulation.parameters import Slot
+from identification.mismatch.effect import Block, Effect, Estimate, Friction, Param, Parameters, Slot, Variant
+from identification.mismatch.pictures import stem_over_op
 from identification.simulation.valve_chain import COASTS
 
 BAND = Param(Slot.STICKBAND, "stickband_pct", "% OP", 1e-4, 2.0, "op", True, title="Stickband")
@@ -19,35 +16,31 @@ BANDS = (0.01, 0.03, 0.08, 0.2, 0.5)
 def as_friction_leaves_it(own: Parameters) -> dict[str, Estimate]:
     """Both within what true friction does to them: it differs from slip to slip, and a slip more or less moves all
     that follow, so the likelihood's own pit is much narrower than what is known."""
-    band, jump = own["stickband_pct"], own["slip_jump_pct"]
+    band, jump = own[BAND.name], own[JUMP.name]
     most = band.value * LEAST_BAND
     return {
-        "stickband_pct": reaching(band, band.value / LEAST_BAND, most),
-        "slip_jump_pct": reaching(jump, jump.value / LEAST_JUMP, most),
+        BAND.name: reaching(band, band.value / LEAST_BAND, most),
+        JUMP.name: reaching(jump, jump.value / LEAST_JUMP, most),
     }
 
 
 EFFECT = Effect(
     name="stiction",
     block=Block.VALVE,
-    sentence=("The valve sticks: it holds through {stickband_pct} of travel and then jumps {slip_jump_pct}."),
-    check=("Look at packing and actuator; stroke the valve in steps under the stickband and watch the stem."),
-    tests={
-        "positioner": "A recorded stem position, or a stem watched by eye while OP ramps slowly.",
-    },
+    sentence="The valve sticks: it holds through {stickband_pct} of travel and then jumps {slip_jump_pct}.",
+    check="Look at packing and actuator; stroke the valve in steps under the stickband and watch the stem.",
+    tests={"positioner": "A recorded stem position, or a stem watched by eye while OP ramps slowly."},
     indistinguishable=("positioner",),
     derived=as_friction_leaves_it,
     friction=Friction.STICKS,
     curve=stem_over_op,
-    variants=(
-        *(
-            Variant(
-                (BAND, JUMP),
-                tuple({Slot.STICKBAND: s, Slot.JUMP: j * s} for s in BANDS for j in (0.4, 0.8)),
-                {Slot.COAST: coast},
-                label=motion,
-            )
-            for motion, coast in COASTS.items()
-        ),
+    variants=tuple(
+        Variant(
+            (BAND, JUMP),
+            tuple({Slot.STICKBAND: s, Slot.JUMP: j * s} for s in BANDS for j in (0.4, 0.8)),
+            {Slot.COAST: coast},
+            label=motion,
+        )
+        for motion, coast in COASTS.items()
     ),
 )

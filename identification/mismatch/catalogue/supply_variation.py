@@ -2,30 +2,21 @@
 
 from __future__ import annotations
 
-import numpy as np
-
-from identification.mismatch.curves.course import course, over_record
-from identification.mismatch.curves.drawn import Axis, Drawing, Shape
-from identification.mismatch.effect import Block, Effect
-from identification.record import Floats
-from identification.simulation.effect import Param, Variant
+from identification.mismatch.effect import Block, Effect, Param, Slot, Variant
+from identification.mismatch.pictures import Axis, Drawing, Shape, course
 from identification.simulation.open_loop import head
-from identification.simulation.parameters import KNOTS, Slot
+from identification.simulation.parameters import KNOTS
+
+AT_REST = Param(Slot.HEAD_BIAS, "flow_at_rest_pct", "% OP", -60.0, 60.0, title="Flow at rest")
+KNOT = tuple(Param(int(Slot.HEAD) + i, f"head_{i + 1}", "", -2.0, 2.0, hidden=True) for i in range(KNOTS))
+ADDED = 1e4
+"""Flow at rest [% OP] beside which a course that is added has no part in the gain; ours."""
 
 
 def supply_over_time(d: Drawing) -> Shape:
     """The supply as it wanders."""
-    at = over_record(d.inputs)
+    return course(d, Axis("supply", "% of its mean"), lambda inputs, c: 100.0 * head(inputs, c))
 
-    def read(c: Floats) -> Floats:
-        return np.asarray(100.0 * head(d.inputs, c)[at])
-
-    return course(d, at, read, Axis("supply", "% of its mean"))
-
-
-KNOT = tuple(Param(int(Slot.HEAD) + i, f"head_{i + 1}", "", -2.0, 2.0, hidden=True) for i in range(KNOTS))
-ADDED = 1e4
-"""Flow at rest [% OP] beside which a course that is added has no part in the gain; ours."""
 
 EFFECT = Effect(
     name="supply-variation",
@@ -33,7 +24,7 @@ EFFECT = Effect(
     sentence="The supply to the valve wanders and changes gain and bias together.",
     check="Look at the supply's pressure or temperature over the same hours.",
     tests={
-        "gain-drift": ("A longer recording: a supply comes back, fouling does not; other loops show it too."),
+        "gain-drift": "A longer recording: a supply comes back, fouling does not; other loops show it too.",
         "load-step": "The supply's own pressure or temperature trend.",
         "coupling": "The supply's own trend beside the other loop's OP.",
     },
@@ -42,10 +33,7 @@ EFFECT = Effect(
     curve=supply_over_time,
     variants=(
         Variant(
-            (
-                Param(Slot.HEAD_BIAS, "flow_at_rest_pct", "% OP", -60.0, 60.0, title="Flow at rest"),
-                *KNOT,
-            ),
+            (AT_REST, *KNOT),
             ({Slot.HEAD_BIAS: 8.0},),
             penalty=-5.0,
             opponent=Variant(KNOT, ({},), fixed={Slot.HEAD_BIAS: ADDED}),

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from identification.mismatch.curves.valve import flow_over_op
-from identification.mismatch.effect import Block, Effect
-from identification.simulation.effect import Param, Variant, each
-from identification.simulation.parameters import Slot
+from identification.mismatch.effect import Block, Effect, Param, Slot, Variant, each
+from identification.mismatch.pictures import flow_over_op
+
+CURVE = Param(Slot.BEND, "curve", "ln gain per 100 % OP", -6.0, 6.0, "1/op", title="Curve")
 
 EFFECT = Effect(
     name="valve-characteristic",
@@ -22,10 +22,5 @@ EFFECT = Effect(
     },
     indistinguishable=("nonlinear-gain",),
     curve=flow_over_op,
-    variants=(
-        Variant(
-            (Param(Slot.BEND, "curve", "ln gain per 100 % OP", -6.0, 6.0, "1/op", title="Curve"),),
-            each(Slot.BEND, -0.3, 0.3),
-        ),
-    ),
+    variants=(Variant((CURVE,), each(Slot.BEND, -0.3, 0.3)),),
 )

@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 
 from identification.mismatch.catalogue import CANDIDATES, EFFECTS
-from identification.mismatch.curves.controller import gap_profile, rebuilt
-from identification.mismatch.curves.drawn import Drawing, Shape, banded
-from identification.mismatch.curves.recorder import grid
-from identification.mismatch.curves.stretches import around, biggest_move, busiest
+from identification.mismatch.fault_pictures import around, biggest_move, busiest, gap_profile, grid, rebuilt
+from identification.mismatch.pictures import Drawing, Shape, banded
+from identification.mismatch.recording import Finding, Recording
 from identification.models import Estimate
 from identification.simulation.effect import Param, Variant
 from identification.simulation.open_loop import ModelInputs
@@ -179,10 +178,17 @@ def test_rebuilt_output_is_the_law() -> None:
 def test_grid_and_gap_are_seen_in_their_pictures() -> None:
     """Teeth stand a step apart; OP stands still under the gap alone."""
     rng = np.random.default_rng(2)
-    teeth = grid("quantization", np.round(rng.normal(50, 3, 5000) / 0.5) * 0.5, 0.5).curves[0]
+    n, every = 5000, np.ones(5000, dtype=bool)
+    coarse = Recording(
+        None, np.round(rng.normal(50, 3, n) / 0.5) * 0.5, np.zeros(n), every, 1.0, np.arange(n)
+    )
+    teeth = grid(Finding({"step_pct": 0.5}, every), coarse, coarse.pv).curves[0]
     np.testing.assert_allclose(np.diff(np.unique(teeth.x)), 0.5)
-    e = rng.normal(0, 1, 5000)
+    e = rng.normal(0, 1, n)
     op = np.cumsum(np.where(np.abs(e) > 0.6, e, 0.0))
-    curve = gap_profile("controller-gap", e, op, 0.6, np.ones(5000, dtype=bool)).curves[0]
+    still = Recording(e, np.zeros(n), op, every, 1.0, np.arange(n))
+    found = gap_profile(Finding({"gap_pct": 0.6}, every), still, still.pv)
+    assert found is not None
+    curve = found.curves[0]
     assert curve.y[curve.x < 0.58].min() > 99
     assert curve.y[curve.x > 0.62].max() < 1

@@ -1,0 +1,143 @@
+"""Physics that is known and has no name in the catalogue: where it explains a recording best, it is told in words
+beside `unexplained`, so that no name of the catalogue is stretched over it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from identification.mismatch.catalogue import EFFECTS
+from identification.mismatch.effect import Act, Block, Effect, Floats, Param, Signal, Slot, Variant, own_slot
+from identification.mismatch.pictures import (
+    FLOW,
+    GAIN,
+    POINTS,
+    TIME,
+    Axis,
+    Drawing,
+    Shape,
+    beside_plain,
+    course,
+    load_over_time,
+    step,
+    step_size,
+)
+from identification.simulation.effect import bring
+from identification.simulation.lag import lagged
+from identification.simulation.open_loop import gain_over_record, load
+
+HURRY, HURRY_T = own_slot("HURRY"), own_slot("HURRY_T", 1.0)
+CHANGES, MEMORIES = (-0.1, 0.1), (8.0, 25.0)
+"""Relative changes of gain per 10 % of PV with which its search begins, and memories, in time constants; ours: what a
+vessel forgets within five is its own dynamics."""
+HURRIED = (0.2, 0.6)
+"""How long a move counts as fast, where the search begins, in time constants; ours."""
+HURRY_DRAWN = 5.0
+"""Length of its picture, in that time."""
+WAYS = tuple(0.8 * 1.12**i for i in range(25))
+"""How long a way back is, where the search begins, in time constants; ours: what comes back is as wide as one."""
+PLACES, BANDS = tuple(0.05 * i for i in range(2, 19)), (0.5, 3.0)
+"""Where a switch is looked for, in the span of PV, and with which bands [% PV]; ours: a start finds its place from a
+twentieth of the span off."""
+
+
+def gain_by_history(d: Drawing) -> Shape:
+    """The gain over the recording, as PV's past makes it."""
+    rest = float(d.plain[Slot.K])
+    return course(d, GAIN, lambda inputs, c: c[Slot.K] * gain_over_record(inputs, c), rest)
+
+
+def hurried(flow: Floats, c: Floats, dt_s: float) -> Floats:
+    """Flow, shape (n,) [% OP], with the square of what it is ahead of its own lag, of the move's sign."""
+    ahead = flow - lagged(flow, float(c[HURRY_T]), dt_s)
+    return flow + c[HURRY] * np.abs(ahead) * ahead / 10.0  # type: ignore[no-any-return]
+
+
+def flow_after_step(d: Drawing) -> Shape:
+    """Flow after a step of OP."""
+    fine = HURRY_DRAWN * float(d.best[HURRY_T]) / POINTS
+    time, op = step(step_size(d), POINTS, fine)
+    return beside_plain(d, "response", (TIME, FLOW), time, lambda c: hurried(op, c, fine), op)
+
+
+HISTORY = Effect(
+    name="gain-with-history",
+    block=Block.PROCESS,
+    sentence="the process gain goes with where PV has been over the last {recall_s}, by {recall} of it per 10 % PV",
+    check="Ask what PV changes slowly in the process: coating, wetting, scale, a catalyst, a bed that fills.",
+    curve=gain_by_history,
+    variants=(
+        Variant(
+            (
+                Param(Slot.RECALL, "recall", "", -5.0, 5.0, title="Gain per 10 % of PV"),
+                Param(Slot.RECALL_T, "recall_s", "s", 5.0, 200.0, "T", True, title="Memory"),
+                Param(Slot.HEAD_BIAS, "flow_at_rest_pct", "% OP", -60.0, 60.0, hidden=True),
+            ),
+            tuple({Slot.RECALL: size, Slot.RECALL_T: memory} for size in CHANGES for memory in MEMORIES),
+        ),
+    ),
+)
+RATE = Effect(
+    name="gain-with-rate",
+    block=Block.VALVE,
+    sentence="moves count for more the faster they are, a sudden one of 10 % by {hurry} of itself, for {hurry_s}",
+    check="Look for a booster, a relief port or a feed that overshoots, and at fast moves of OP beside slow ones.",
+    acts=(Act(HURRY, 0.0, Signal.FLOW, hurried),),
+    curve=flow_after_step,
+    variants=(
+        Variant(
+            (
+                Param(HURRY, "hurry", "", -20.0, 20.0, title="Extra of a move of 10 %"),
+                Param(HURRY_T, "hurry_s", "s", 0.02, 3.0, "T", True, title="Lasts"),
+            ),
+            tuple({HURRY_T: lag} for lag in HURRIED),
+            linear=HURRY,
+        ),
+    ),
+)
+RECYCLE = Effect(
+    name="recycle",
+    block=Block.PROCESS,
+    sentence="{returned} of what leaves comes back to the inlet after {returns_s}",
+    check="Look for a circuit that brings material or heat back: white water, solvent, condensate, a recirculation.",
+    curve=lambda d: course(d, Axis("what comes back", "% OP"), load),
+    variants=(
+        Variant(
+            (
+                Param(Slot.RETURNED, "returned", "", -2.0, 2.0, title="Share that comes back"),
+                Param(Slot.RETURNS_S, "returns_s", "s", 0.5, 20.0, "T", True, title="Way back"),
+            ),
+            tuple({Slot.RETURNS_S: way} for way in WAYS),
+            linear=Slot.RETURNED,
+        ),
+    ),
+)
+SWITCH = Effect(
+    name="switched-load",
+    block=Block.LOAD,
+    sentence="a load of {switched_load_pct} comes on where PV passes {switches_at_pct} and goes where it falls back",
+    check="Look for a switch on PV: a thermostat, a float, a relief valve, a pump or fan that stands by.",
+    curve=load_over_time,
+    variants=(
+        Variant(
+            (
+                Param(Slot.SWITCH, "switched_load_pct", "% OP", -60.0, 60.0, title="Switched load"),
+                Param(Slot.SWITCH_AT, "switches_at_pct", "% PV", 0.0, 1.0, "pvspan", title="Switches at"),
+                Param(Slot.SWITCH_BAND, "switch_band_pct", "% PV", 0.0, 50.0, title="Band of the switch"),
+            ),
+            tuple({Slot.SWITCH_AT: at, Slot.SWITCH_BAND: band} for at in PLACES for band in BANDS),
+            linear=Slot.SWITCH,
+        ),
+    ),
+)
+OUTSIDE: Mapping[str, Effect] = {e.name: e for e in (HISTORY, RATE, RECYCLE, SWITCH)}
+"""All of it by what it is called here."""
+bring(tuple(act for e in OUTSIDE.values() for act in e.acts))
+RIVALS: tuple[Variant, ...] = tuple(v for e in OUTSIDE.values() for v in e.candidates)
+"""What competes with the catalogue and gives no name."""
+
+
+def about(name: str) -> Effect:
+    """The effect of that name, in the catalogue or outside."""
+    return EFFECTS[name] if name in EFFECTS else OUTSIDE[name]

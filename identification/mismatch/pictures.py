@@ -1,0 +1,281 @@
+"""What an effect does, as arrays to draw beside the plain loop: of valve and process, and over the recording.
+
+Each picture is a function of the model's parameters; its band is that function at the ends of their intervals, one
+parameter at a time, the deviations added as squares.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from identification.models import Estimate
+from identification.record import Floats
+from identification.simulation.effect import Variant
+from identification.simulation.open_loop import ModelInputs, load, simulate
+from identification.simulation.parameters import Slot, neutral
+from identification.simulation.valve_chain import flow
+
+POINTS = 241
+"""Points of a static curve."""
+COURSE_POINTS = 600
+"""Points of a course over time."""
+SWEEP = 2.5
+"""Half height of the sweep that draws a valve's loop, in widths of its stickband; ours: both flanks show."""
+STEP_PCT, MOST_STEP_PCT = 10.0, 50.0
+"""Size of the step whose response is drawn and, of a stem's, half of OP's range where that is more, at most that
+[% OP]."""
+STEM_LENGTH, FEWEST_SAMPLES = 1.6, 4
+"""Length of a stem's response, in the time that the stem takes; at least so many samples."""
+PV_LENGTH = 5.0
+"""Length of PV's response, in dead time and all time constants together."""
+EARLY = 0.25
+"""It is drawn to ten of its shortest lags where that is less than this part of the whole."""
+FRICTION = (Slot.STICKBAND, Slot.JUMP, Slot.COAST)
+AT_REST = (Slot.STOP_LO, Slot.STOP_HI, Slot.SPLIT, Slot.RATIO, Slot.SPLIT_DEAD, Slot.BEND)
+DYNAMICS = (Slot.T, Slot.L, Slot.K, Slot.T2, Slot.T3, Slot.SHARE, Slot.MODE_T, Slot.ASYMMETRY, Slot.LEAK)
+"""Parameters of the valve's friction, of its flow once all has come to rest, and of the process's own dynamics."""
+
+Read = Callable[[Floats], Floats]
+
+
+@dataclass(frozen=True, slots=True)
+class Drawn:
+    """One curve: its name, shape (m,) each; low and high bound it where an interval is known."""
+
+    name: str
+    x: Floats
+    y: Floats
+    low: Floats | None = None
+    high: Floats | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Axis:
+    """What an axis counts and in which unit."""
+
+    what: str
+    unit: str
+
+
+TIME, OP, FLOW, STEM = Axis("time", "s"), Axis("OP", "%"), Axis("flow", "% OP"), Axis("stem", "% OP")
+GAIN, LOAD = Axis("gain", "% PV/% OP"), Axis("load at the inlet", "% OP")
+
+
+@dataclass(frozen=True, slots=True)
+class Shape:
+    """What was found, drawn: its kind, both axes, curves (the found one first), places on the horizontal axis.
+
+    kind : loop (the band is two more loops, least and most), curve, response, course or comb.
+    """
+
+    effect: str
+    kind: str
+    x: Axis
+    y: Axis
+    curves: tuple[Drawn, ...] = field(repr=False)
+    places: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Drawing:
+    """What a picture is drawn from.
+
+    inputs : what drove the model; variant : what was added; known : its parameters with intervals, by their answered
+    names; best, plain : parameters of the improved and of the plain model, shape (SIZE,) each.
+    """
+
+    inputs: ModelInputs
+    variant: Variant
+    known: Mapping[str, Estimate]
+    best: Floats = field(repr=False)
+    plain: Floats = field(repr=False)
+
+    @property
+    def name(self) -> str:
+        """The effect's name."""
+        return self.variant.name
+
+    @property
+    def ends(self) -> tuple[tuple[int, float, float], ...]:
+        """Place, low and high end of each parameter whose interval is known."""
+        found = ((int(p.slot), self.known.get(p.name)) for p in self.variant.params)
+        return tuple((slot, e.low, e.high) for slot, e in found if e is not None)
+
+
+def banded(read: Read, d: Drawing) -> tuple[Floats, Floats, Floats]:
+    """What `read` gives of the best parameters, with its least and greatest value, shape (m,) each."""
+    here = read(d.best)
+    below, above = np.zeros_like(here), np.zeros_like(here)
+    for slot, *both in d.ends:
+        moves = np.zeros((3, here.size))
+        for i, value in enumerate(both):
+            other = d.best.copy()
+            other[slot] = value
+            moves[i] = read(other) - here
+        below += moves.min(axis=0) ** 2
+        above += moves.max(axis=0) ** 2
+    return here, here - np.sqrt(below), here + np.sqrt(above)
+
+
+def beside_plain(
+    d: Drawing,
+    kind: str,
+    axes: tuple[Axis, Axis],
+    x: Floats,
+    read: Read,
+    plain: Floats | float,
+    places: tuple[float, ...] = (),
+) -> Shape:
+    """What parameters make of x, with its band, beside what the plain loop has there, shape (m,) each."""
+    y, low, high = banded(read, d)
+    still = np.broadcast_to(np.asarray(plain, dtype=np.float64), x.shape)
+    return Shape(d.name, kind, *axes, (Drawn("found", x, y, low, high), Drawn("plain", x, still)), places)
+
+
+def op_range(inputs: ModelInputs) -> Floats:
+    """OP from its least to its greatest value, shape (POINTS,)."""
+    return np.linspace(float(inputs.op.min()), float(inputs.op.max()), POINTS)
+
+
+def step(size: float, n: int, dt_s: float, back: bool = False) -> tuple[Floats, Floats]:
+    """Time [s] and a step (and, if wanted, the step back), shape (m,)."""
+    time = dt_s * np.arange(-n // 10, (2 if back else 1) * n, dtype=np.float64)
+    on = (time >= 0) & (time < n * dt_s) if back else time >= 0
+    return time, np.where(on, size, 0.0)
+
+
+def valve_alone(
+    c: Floats, op: Floats, keep: tuple[int, ...], middle: float = 50.0, dt_s: float = 1.0
+) -> Floats:
+    """Flow [% OP], shape (m,), of a valve with some of a model's parameters alone."""
+    own = neutral()
+    for slot in keep:
+        own[slot] = c[slot]
+    return flow(op, own, dt_s, middle)
+
+
+def stem_over_op(d: Drawing) -> Shape:
+    """Stem over OP of a valve with play or stick-slip, with the loops of the narrowest and the widest band."""
+    reach = SWEEP * max(float(d.best[Slot.STICKBAND]), 1e-3)
+    one = np.concatenate((np.linspace(-1, 1, POINTS), np.linspace(1, -1, POINTS)))
+    op = d.inputs.middle + reach * np.concatenate((one, one))
+    last = slice(2 * POINTS, None)
+    curves = [Drawn("found", op[last], valve_alone(d.best, op, FRICTION)[last])]
+    for name, i in (("least", 1), ("most", 2)):
+        other = d.best.copy()
+        for place in d.ends:
+            other[place[0]] = place[i]
+        other[Slot.JUMP] = min(other[Slot.JUMP], other[Slot.STICKBAND])
+        curves.append(Drawn(name, op[last], valve_alone(other, op, FRICTION)[last]))
+    curves.append(Drawn("plain", op[last], op[last]))
+    return Shape(d.name, "loop", OP, STEM, tuple(curves))
+
+
+def flow_over_op(d: Drawing) -> Shape:
+    """Flow over OP at rest: characteristic, stop or second valve."""
+    op, ends = op_range(d.inputs), (Slot.STOP_LO, Slot.STOP_HI, Slot.SPLIT)
+    places = tuple(float(d.best[s]) for s in ends if np.isfinite(d.best[s]))
+    middle = d.inputs.middle
+    return beside_plain(d, "curve", (OP, FLOW), op, lambda c: valve_alone(c, op, AT_REST, middle), op, places)
+
+
+def step_size(d: Drawing) -> float:
+    """Size of the step whose stem is drawn [% OP]."""
+    return min(max(STEP_PCT, 0.5 * float(np.ptp(d.inputs.op))), MOST_STEP_PCT)
+
+
+def stem_response(d: Drawing, length_s: float, keep: tuple[int, ...]) -> Shape:
+    """Stem after a step of OP, which takes about `length_s`, with the parameters that are at work."""
+    fine = max(length_s * STEM_LENGTH, FEWEST_SAMPLES * d.inputs.dt_s) / POINTS
+    time, op = step(step_size(d), POINTS, fine)
+    return beside_plain(d, "response", (TIME, STEM), time, lambda c: valve_alone(c, op, keep, dt_s=fine), op)
+
+
+def _pv_length_s(d: Drawing, fast_s: float | None) -> float:
+    c = d.best
+    times = float(c[Slot.T] + c[Slot.L] + c[Slot.T2] + (c[Slot.MODE_T] if c[Slot.SHARE] != 0 else 0.0))
+    if c[Slot.LEAK] == 0:
+        times = float(d.plain[Slot.T] + d.plain[Slot.L])
+    length = min(PV_LENGTH * times, d.inputs.dt_s * d.inputs.op.size)
+    fast = float(c[Slot.L]) + 10.0 * (length if fast_s is None else fast_s)
+    return fast if fast < EARLY * length else length
+
+
+def pv_response(d: Drawing, faster: int | None = None, back: bool = False) -> Shape:
+    """PV after a step of OP (and back down again), of the plain and the improved process.
+
+    Parameters
+    ----------
+    d : Drawing
+    faster : int or None
+        Slot of a lag; where it or the process's own is over early, the picture is cut to that.
+    back : bool
+        Whether the step goes back.
+    """
+    inputs = d.inputs
+    length = _pv_length_s(d, None if faster is None else float(min(d.best[faster], d.best[Slot.T])))
+    dt = min(length / POINTS, inputs.dt_s) if length < POINTS * inputs.dt_s else length / POINTS
+    n = min(int(length / dt), 4 * POINTS)
+    time, op = step(min(STEP_PCT, float(np.ptp(inputs.op))), n, dt, back)
+    drawn = ModelInputs(op, dt, 0.0, inputs.level, (0.0, 100.0))
+
+    def read(c: Floats) -> Floats:
+        process = neutral()  # valve, load, clip and the record's start taken out
+        for slot in DYNAMICS:
+            process[slot] = c[slot]
+        return simulate(drawn, process)
+
+    return beside_plain(d, "response", (TIME, Axis("PV", "% PV")), time, read, read(d.plain))
+
+
+def gain_over_pv(d: Drawing) -> Shape:
+    """Gain of the process over PV: by slope, by its speed, or as a vessel with a rooted outflow."""
+    inputs = d.inputs
+    pv = np.linspace(*inputs.pv_range, POINTS)
+    x = pv - inputs.level
+
+    def read(k: Floats) -> Floats:
+        empty = max(inputs.level, 1.0) / k[Slot.ROOT] if k[Slot.ROOT] > 0 else np.inf
+        root = np.sqrt(np.maximum(1.0 + x / empty, 0.0))
+        bent = np.maximum(1.0 + k[Slot.SLOPE] * x / 50.0, 0.05)
+        scheduled = np.maximum(1.0 + k[Slot.GAIN_SLOPE] * x / 50.0, 0.05)
+        return np.asarray(k[Slot.K] * root * bent * scheduled)
+
+    return beside_plain(d, "curve", (Axis("PV", "%"), GAIN), pv, read, float(d.plain[Slot.K]))
+
+
+def course(
+    d: Drawing,
+    axis: Axis,
+    values: Callable[[ModelInputs, Floats], Floats],
+    rest: float = 0.0,
+    last: float = np.inf,
+    places: tuple[float, ...] = (),
+) -> Shape:
+    """What acts over the recording.
+
+    Parameters
+    ----------
+    d : Drawing
+    axis : Axis
+        What that is.
+    values : callable
+        What acts, shape (n,), of the inputs and the parameters.
+    rest : float
+        What the plain loop has in its place.
+    last : float
+        Sample at which the picture ends, if before the recording does.
+    places : tuple of float
+        Times that are marked [s].
+    """
+    at = np.unique(np.linspace(0, min(last, d.inputs.op.size - 1), COURSE_POINTS).astype(int))
+    time = at * d.inputs.dt_s
+    return beside_plain(d, "course", (TIME, axis), time, lambda c: values(d.inputs, c)[at], rest, places)
+
+
+def load_over_time(d: Drawing) -> Shape:
+    """The load at the inlet over the recording."""
+    return course(d, LOAD, load)
