@@ -22,8 +22,7 @@ from analyzer import api
 from analyzer.explain.case import case, tags_of
 from analyzer.explain.one_loop import explained
 from identification.errors import NotAssessedError
-from identification.mismatch.diagnosis import inputs_of
-from identification.mismatch.forward_selection import prepared
+from identification.mismatch.plain_loop import inputs_of, prepared
 from identification.mismatch.proof import HeldOut, held_out
 from identification.mismatch.recording import Recording
 from identification.record import Floats

@@ -6,9 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from identification.mismatch.diagnosis import restored
+from identification.mismatch.answer import restored, unanswered
 from identification.mismatch.explanation import Explanation
-from identification.mismatch.identifiability import unanswered
 from identification.mismatch.model_file import carried, constants
 from identification.mismatch.proof import Misfit, misfit
 from identification.mismatch.recording import Recording
@@ -101,7 +100,7 @@ def judged(data: Mapping[str, Any], found: Explanation, s: Recording, more: str 
     said = f"Your model leaves {whole.rmse:.3g} % of span rms, the plain loop fitted anew {overall[0].rmse:.3g} %"
     if found.accepted:
         said += f", the improved loop {overall[1].rmse:.3g} %"
-    units = "" if unanswered(found) else wrong_units(constants(dict(data)), restored(found.plain.model))
+    units = "" if unanswered(found) else wrong_units(constants(dict(data)), restored(found.plain.model.c))
     verdict = "" if units else compared(whole.rmse, overall[0].rmse, s.limits.proof.as_good)
     note = "; ".join(x for x in (said, verdict, units, more) if x) + "."
     fitted, held = misfit(s.pv[:cut], out[:cut], window), misfit(s.pv[cut:], out[cut:], window)

@@ -13,13 +13,12 @@ from identification.mismatch.answer import Answer
 from identification.mismatch.catalogue import fault
 from identification.mismatch.explanation import Explanation
 from identification.mismatch.fault_pictures import busiest, by_stated_law
-from identification.mismatch.location.features import Group, groups
-from identification.mismatch.location.locate import Located, profile
-from identification.mismatch.location.where import located_in, won_over
+from identification.mismatch.location import Group, Located, groups, profile
 from identification.mismatch.outside import about
 from identification.mismatch.pictures import Drawing, Shape
 from identification.mismatch.proof import course
 from identification.mismatch.recording import Recording
+from identification.mismatch.where import located_in, won_over
 from identification.record import Floats
 from identification.simulation.open_loop import simulate
 from identification.simulation.parameters import Slot

@@ -12,16 +12,14 @@ from dataclasses import replace
 import numpy as np
 
 from identification.controller.feedback import fed_back
-from identification.estimation.candidate import Model, gain
+from identification.estimation.candidate import gain
 from identification.estimation.prediction_error import descend
 from identification.estimation.start_values import plain_processes
 from identification.mismatch.catalogue import EFFECTS
-from identification.mismatch.cross_validation import is_one_move
-from identification.mismatch.explanation import Explanation
-from identification.mismatch.forward_selection import Candidate
-from identification.mismatch.kept_effects import carried_over
+from identification.mismatch.explanation import Explanation, carried_over
+from identification.mismatch.proof import is_one_move
 from identification.mismatch.recording import Recording
-from identification.mismatch.sets_of_effects import cleared
+from identification.mismatch.selection import without
 
 
 def is_experiment(s: Recording) -> bool:
@@ -59,20 +57,13 @@ def agreed(told: Explanation, by_misfit: Explanation) -> Explanation:
 def most_telling_first(found: Explanation) -> Explanation:
     """The explanation with its effects in the order of what the simulation would miss without each."""
     full = found.p.limits.search.full_steps
-    rows = found.best.model.added
-    missed = {}
-    for row in rows if len(rows) > 1 else ():
-        others = tuple(r for r in rows if r.name != row.name)
-        missed[row.name] = descend(found.p, Model(others, cleared(found.best.model.c, row)), full).loss
-    if not missed:
+    model = found.best.model
+    if len(model.added) < 2:
         return found
-
-    def worth(one: Candidate) -> float:
-        return -missed[one.name]
-
-    ordered = tuple(sorted(rows, key=lambda row: -missed[row.name]))
-    best = replace(found.best, model=replace(found.best.model, added=ordered))
-    return replace(found, best=best, accepted=tuple(sorted(found.accepted, key=worth)))
+    missed = {row.name: descend(found.p, without(model, [row]), full).loss for row in model.added}
+    ordered = tuple(sorted(model.added, key=lambda row: -missed[row.name]))
+    accepted = tuple(sorted(found.accepted, key=lambda c: -missed[c.name]))
+    return replace(found, best=replace(found.best, model=replace(model, added=ordered)), accepted=accepted)
 
 
 def nearer(one: Explanation, other: Explanation) -> Explanation:

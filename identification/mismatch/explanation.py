@@ -1,16 +1,22 @@
-"""What was found in one recording: fits without and with effects, in which order, and how they are proven."""
+"""What was found in one recording: fits without and with effects, in which order, and which of them stand: those
+larger than the recorder's grid that carry over to held-out data."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+
+import numpy as np
 
 from identification.controller.pi_regression import ControlLaw
 from identification.estimation.candidate import Fitted, Problem
+from identification.estimation.prediction_error import descend
 from identification.mismatch.catalogue import EFFECTS, fault
 from identification.mismatch.effect import Ends
-from identification.mismatch.forward_selection import Candidate
-from identification.mismatch.proof import HeldOut, OnOther
-from identification.mismatch.recording import Finding, SeenInCycles
+from identification.mismatch.friction import is_friction
+from identification.mismatch.proof import HeldOut, OnOther, held_out, is_one_move
+from identification.mismatch.recording import STEP, Finding, SeenInCycles
+from identification.mismatch.selection import Candidate, without
+from identification.simulation.open_loop import simulate
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,3 +67,64 @@ class Explanation:
         if lasting and self.controller is None and ends is Ends.SMALLER:
             return None
         return self.recorder or self.controller
+
+
+def beyond_the_grid(found: Explanation) -> Explanation:
+    """The explanation without effects that move PV by less than the steps in which a recorder left it."""
+    step = 0.0 if found.recorder is None else found.recorder.values.get(STEP, 0.0)
+    if step <= 0.0:
+        return found
+    count, kept = len(found.accepted), found
+    while count > int(by_cycles(found)) and mark(kept) < found.p.limits.recorder.grid_mark * step:
+        count -= 1
+        kept = first_effects(found, count)
+    return kept
+
+
+def by_cycles(found: Explanation) -> bool:
+    """Whether the first effect is a faulty valve that the loop's cycles show."""
+    return found.cycles is not None and bool(found.accepted) and is_friction(found.accepted[0].name)
+
+
+def is_stack(found: Explanation) -> bool:
+    """Whether a loop is given as many effects as are looked for: one that the catalogue lacks comes out as a stack of
+    those it has. Rigs in open loop do have several."""
+    return len(found.accepted) >= found.p.limits.search.rounds and not found.p.by_simulation
+
+
+def mark(found: Explanation) -> float:
+    """Standard deviation of what the effects together change in the simulated PV [% PV]."""
+    plain, best = (simulate(found.p.inputs, fit.model.c) for fit in (found.plain, found.best))
+    return float(np.std(best - plain))
+
+
+def carried_over(found: Explanation) -> Explanation:
+    """The explanation with its proof: as many effects, in the order taken, as carry over to held-out data.
+
+    A valve that the loop's cycles show is proven by them.
+    """
+    names = tuple(r.name for r in found.accepted)
+    for count in range(len(names), 0, -1):
+        kept = found if count == len(names) else first_effects(found, count)
+        cycling = count == 1 and by_cycles(found)
+        proof = held_out(kept.p, kept.plain, kept.best, cycle_of(found) if cycling else 0)
+        unproven = not proof.carries and proof.falls and is_one_move(found.p)
+        timed = proof.falls and all(EFFECTS[name].timed for name in names[:count])
+        if proof.carries or unproven or cycling or timed:
+            return replace(kept, proof=proof, refuted=names[count:], unproven=unproven)
+    proof = held_out(found.p, found.plain, found.plain)
+    outside = None if names else found.outside
+    return replace(found, best=found.plain, accepted=(), proof=proof, refuted=names, outside=outside)
+
+
+def cycle_of(found: Explanation) -> int:
+    """Samples of one cycle of a loop whose cycles show a faulty valve."""
+    cycle_s = 0.0 if found.cycles is None else found.cycles.cycle_s
+    return max(round(cycle_s / found.p.inputs.dt_s), found.p.limits.proof.least_cycle)
+
+
+def first_effects(found: Explanation, count: int) -> Explanation:
+    """The explanation with its first effects alone; the others, and what was found beside all, are given up."""
+    model = without(found.best.model, (c.row for c in found.accepted[count:]))
+    best = descend(found.p, model, found.p.limits.search.full_steps)
+    return replace(found, best=best, accepted=found.accepted[:count], outside=None)

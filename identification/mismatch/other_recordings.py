@@ -10,12 +10,11 @@ import numpy as np
 
 from identification.estimation.candidate import problem
 from identification.mismatch.catalogue import EFFECTS
-from identification.mismatch.explanation import Explanation
+from identification.mismatch.explanation import Explanation, by_cycles
 from identification.mismatch.model_file import carried, constants, to_data
 from identification.mismatch.proof import HeldOut, Misfit, OnOther, anchored, course, misfit
 from identification.mismatch.recording import Recording
-from identification.mismatch.sets_of_effects import cleared
-from identification.mismatch.starts.from_cycles import is_friction
+from identification.mismatch.selection import without
 from identification.record import Floats
 from identification.simulation.open_loop import ModelInputs
 from identification.simulation.parameters import Slot
@@ -35,13 +34,10 @@ def simulated_there(found: Explanation, c: Floats, s: Recording, window: int) ->
 
 def on_other(found: Explanation, s: Recording, window: int) -> OnOther:
     """Both models on another recording, the plain one by either criterion, and the better without its effects."""
-    best = found.best.model.c
-    bare = best
-    for row in found.best.model.added:
-        bare = cleared(bare, row)
-    models = (found.plain.model.c, found.proven.drawn[0], best, bare)
-    own, drawn, better, without = (misfit(s.pv, simulated_there(found, c, s, window), window) for c in models)
-    return OnOther(min(own, drawn, key=lambda x: x.rmse), better, without, s.pv.size)
+    best = found.best.model
+    models = (found.plain.model.c, found.proven.drawn[0], best.c, without(best, best.added).c)
+    own, drawn, better, cleared = (misfit(s.pv, simulated_there(found, c, s, window), window) for c in models)
+    return OnOther(min(own, drawn, key=lambda x: x.rmse), better, cleared, s.pv.size)
 
 
 def together(parts: Sequence[Misfit], samples: Sequence[int]) -> Misfit:
@@ -101,12 +97,10 @@ def proven_on(found: Explanation, others: Sequence[Recording]) -> Explanation:
         return found
     proof, each = compared(found, others)
     names = tuple(c.name for c in found.accepted)
-    by_cycles = (
-        found.cycles is not None and is_friction(names[0]) and any(s.cycles is not None for s in others)
-    )
+    cycling = by_cycles(found) and any(s.cycles is not None for s in others)
     samples = [x.samples for x in each]
     there, bare = (together([getattr(x, k) for x in each], samples).rmse for k in ("explained", "without"))
-    if (proof.share > 0.0 and proof.follows and there < bare) or by_cycles:
+    if (proof.share > 0.0 and proof.follows and there < bare) or cycling:
         return replace(found, proof=proof, others=each, unproven=False)
     if all(EFFECTS[name].timed for name in names):
         return replace(found, others=each)

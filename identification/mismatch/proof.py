@@ -1,4 +1,5 @@
-"""Plain and better model on data that were not fitted, each at its best by what is drawn, judged and told.
+"""Does a model with an effect do better on data it was not fitted to than without: asked of each candidate as it is
+taken, by what it foretells one step ahead, and of the explanation as it is told, by what its simulation misses.
 
 A model has two optima: of what it foretells one step ahead, which a load in a closed loop does not bias, and of what
 its simulation misses of PV, which pictures and tables show. Names are found by the first. What is told as gained is
@@ -12,17 +13,106 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from identification.estimation.candidate import Fitted, Model, Problem
-from identification.estimation.noise import NO_NOISE
+from identification.estimation.candidate import Fitted, Model, Problem, bounds, gain
+from identification.estimation.noise import NO_NOISE, whitened
 from identification.estimation.prediction_error import descend
 from identification.estimation.start_values import simulated_best
 from identification.limits import LIMITS, ProofLimits
-from identification.mismatch.cross_validation import early_part, fitted_early, held_out_gain
-from identification.mismatch.restarts import simulated_anew
+from identification.mismatch.effect import Effect
+from identification.mismatch.friction import WEARS, simulated_anew
+from identification.mismatch.starts import at_inlet
+from identification.models import Fopdt
 from identification.record import Floats, Mask
 from identification.signals.filters import without_lines
 from identification.simulation.open_loop import simulate
 from identification.simulation.parameters import Slot
+
+BLOCKS = 20
+"""Parts of a record over which a gain has to be spread."""
+ENDS_OF_SIGNAL = ("opspan", "pvspan")
+"""Scales of constants that are places in a signal's range."""
+ALL = slice(None)
+
+
+def passes(p: Problem, worse: Fitted, better: Fitted, effect: Effect) -> bool:
+    """Whether the effect added last stands: its constants within their range, no valve in good order, spread over the
+    record and, where it is bound to no time, on held-out spans.
+
+    What an effect that is bound to a time will do later does not follow from what it did, so no span is held out.
+    """
+    if runs_out(p, better) or is_in_sound_valves(p, better, effect):
+        return False
+    if effect.needs == "steps":
+        return at_inlet(p, worse)
+    if effect.timed:
+        return True
+    if not effect.local and not is_spread(p, better, worse):
+        return False
+    limits = p.limits.proof
+    least = limits.held_out_loss - limits.held_out_share * gain(better, worse)
+    return held_out_gain(p, fitted_early(p, worse, better)) > least
+
+
+def runs_out(p: Problem, fit: Fitted) -> bool:
+    """Whether a constant of the effect added last ran to the far end of what it may be: the data want another name.
+
+    A bound at zero, and one that is an end of a signal's range, is where an effect begins, and no far end.
+    """
+    edge = p.limits.proof.bound_share
+    for q in fit.model.added[-1].params:
+        if q.scale in ENDS_OF_SIGNAL:
+            continue
+        value, (low, high) = float(fit.model.c[q.slot]), bounds(p.inputs, fit.model.c, q)
+        near = edge * (high - low)
+        at_high = high != 0.0 and value > (high * (1.0 - edge) if q.log else high - near)
+        at_low = not q.log and low != 0.0 and value < low + near
+        if at_high or at_low:
+            return True
+    return False
+
+
+def is_in_sound_valves(p: Problem, fit: Fitted, effect: Effect) -> bool:
+    """Whether an effect is play or stick-slip no wider than a valve in good order has."""
+    return effect.friction in WEARS and float(fit.model.c[Slot.STICKBAND]) < p.limits.proof.sound_valve
+
+
+def is_one_move(p: Problem) -> bool:
+    """Whether OP moves in two parts of the record alone: one experiment, of which no part is left to prove it on."""
+    travel = np.sort([float(np.abs(np.diff(part)).sum()) for part in np.array_split(p.inputs.op, BLOCKS)])
+    return float(travel[-2:].sum()) > p.limits.proof.one_move * float(travel.sum())
+
+
+def is_spread(p: Problem, better: Fitted, worse: Fitted) -> bool:
+    """Whether a share of the gain remains without the two of BLOCKS parts that pay most; True where OP moves in two
+    alone."""
+    if is_one_move(p):
+        return True
+    won = 0.5 * p.weight * (worse.e**2 - better.e**2) / max(better.loss, 1e-30)
+    parts = np.sort([part.sum() for part in np.array_split(won, BLOCKS)])
+    return float(parts[:-2].sum()) > p.limits.proof.spread * float(parts.sum())
+
+
+def early_part(p: Problem) -> tuple[Problem, int]:
+    """The problem with the first part of the record alone to be fitted, and the first sample held out."""
+    cut = int((1.0 - p.limits.proof.held_out) * p.y.size)
+    return replace(p, weight=np.where(np.arange(p.y.size) < cut, p.weight, 0.0)), cut
+
+
+def fitted_early(p: Problem, worse: Fitted, better: Fitted) -> tuple[Fitted, Fitted]:
+    """Both models fitted anew to the first part of the record; a model's START is of its first sample."""
+    early, _ = early_part(p)
+    steps = p.limits.search.screen_steps
+    return descend(early, worse.model, steps), descend(early, better.model, steps)
+
+
+def held_out_gain(p: Problem, fits: tuple[Fitted, Fitted]) -> float:
+    """Gain in log likelihood [nat] on the part held out, of two models fitted to the first part, worse and better."""
+    early, cut = early_part(p)
+    late = p.weight[cut:]
+    whitenings = [whitened(p.y - simulate(p.inputs, fit.model.c), fit.ar, p.edges)[cut:] for fit in fits]
+    losses = [float((late * e) @ e) for e in whitenings]
+    won = 0.5 * (losses[0] - losses[1]) / max(fits[1].loss, 1e-30)
+    return won * fits[1].count / max(early.count, 1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +170,7 @@ class HeldOut:
 
     overall : misfit over the whole record of the models fitted to all of it, which is what pages draw, and drawn :
     their constants, shape (SIZE,) each; window : samples after which the simulations begin anew, 0 for one run over
-    all; placed : whether the stem of a valve with friction is then placed anew too (restarts.py); least_plain : least
+    all; placed : whether the stem of a valve with friction is then placed anew too (friction.py); least_plain : least
     held-out misfit of a plain loop by either criterion [% PV].
     """
 
@@ -131,20 +221,37 @@ def course(p: Problem, c: Floats, window: int, placed: bool) -> Floats:
 
 
 @dataclass(frozen=True, slots=True)
+class Pair:
+    """The plain and the better model as fitted to what is judged, bool, shape (n,), and the process of least squares
+    there."""
+
+    plain: Model
+    better: Model
+    judged: Mask
+    process: Fopdt
+
+
+def pair_of(p: Problem, fits: tuple[Fitted, Fitted], judged: Mask) -> Pair:
+    """The models of two fits, the worse first."""
+    process = simulated_best(p.y, p.inputs.op, judged, p.inputs.dt_s)
+    return Pair(fits[0].model, fits[1].model, judged, process)
+
+
+@dataclass(frozen=True, slots=True)
 class Criterion:
     """How simulations are drawn and judged: begun anew after `window` samples, 0 for never, the stem `placed` anew or
     not."""
 
     p: Problem
-    window: int
-    placed: bool
+    window: int = 0
+    placed: bool = False
 
-    def misfit(self, c: Floats, part: slice) -> Misfit:
+    def misfit(self, c: Floats, part: slice = ALL) -> Misfit:
         """What constants, shape (SIZE,), leave of a part of PV."""
         left = self.p.y - course(self.p, c, self.window, self.placed)
         return _of_what_is_left(left[part], without_lines(self.p.y, self.window)[part])
 
-    def least(self, models: Iterable[Floats], part: slice) -> Floats:
+    def least(self, models: Iterable[Floats], part: slice = ALL) -> Floats:
         """Of models' constants those that leave least of a part."""
         return min(models, key=lambda c: self.misfit(c, part).rmse)
 
@@ -154,63 +261,59 @@ class Criterion:
         q = replace(self.p, edges=NO_NOISE, window=self.window, weight=judged.astype(float))
         return descend(q, Model(told, model.c), q.limits.search.full_steps).model.c
 
-    def candidates(self, plain: Model, better: Model, judged: Mask) -> tuple[list[Floats], list[Floats]]:
+    def candidates(self, pair: Pair) -> tuple[list[Floats], list[Floats]]:
         """Constants of the plain and of the better model by both criteria, each from several starts."""
-        plains = [plain.c, self.nearer(plain, judged)]
-        process = simulated_best(self.p.y, self.p.inputs.op, judged, self.p.inputs.dt_s)
+        plain, better = pair.plain, pair.better
         c = plain.c.copy()
-        c[Slot.K], c[Slot.T], c[Slot.L] = process.gain, process.time_constant_s, process.dead_time_s
-        plains.append(self.nearer(Model((), c), judged))
+        c[Slot.K], c[Slot.T] = pair.process.gain, pair.process.time_constant_s
+        c[Slot.L] = pair.process.dead_time_s
+        plains = [plain.c, self.nearer(plain, pair.judged), self.nearer(Model((), c), pair.judged)]
         if not better.added:
             return plains, plains
-        begun = better.c.copy()
-        best = self.least(plains, slice(None))
+        begun, best = better.c.copy(), self.least(plains)
         for slot in (Slot.K, Slot.T, Slot.L, Slot.BIAS, Slot.START):
             begun[slot] = best[slot]
         starts = [better.c] if any(row.replaces for row in better.added) else [better.c, begun]
-        return plains, [better.c, *(self.nearer(replace(better, c=c), judged) for c in starts)]
+        return plains, [better.c, *(self.nearer(replace(better, c=c), pair.judged) for c in starts)]
+
+    def compared(self, early: Pair, final: Pair, won: float) -> HeldOut:
+        """Both models as fitted to the first part, on the rest; `won` is what innovations gain there [nat]."""
+        _, cut = early_part(self.p)
+        first, rest = slice(cut), slice(cut, None)
+        plains, betters = self.candidates(early)
+        chosen = self.least(plains, first), self.least(betters, first)
+        drawn_plain, drawn_better = (self.least(models) for models in self.candidates(final))
+        return HeldOut(
+            won,
+            (self.misfit(chosen[0], first), self.misfit(chosen[1], first)),
+            (self.misfit(chosen[0], rest), self.misfit(chosen[1], rest)),
+            (self.misfit(drawn_plain), self.misfit(drawn_better)),
+            (drawn_plain, drawn_better),
+            self.window,
+            self.placed,
+            min(self.misfit(c, rest).rmse for c in plains),
+            self.p.limits.proof,
+        )
 
 
 def held_out(p: Problem, worse: Fitted, better: Fitted, cycle: int = 0) -> HeldOut:
-    """Both models fitted anew to the first part of the record and compared on the rest.
+    """Both models fitted anew to the first part of the record and compared on the rest: over the whole of it, and
+    where load drowns the difference there, over windows of some time constants of the plain loop.
 
     cycle : samples of a cycle of a loop whose cycles show a valve with friction, 0 for any other; they are compared
     over such windows too, the stem placed anew in each.
-
-    They are compared over the whole rest, and where load drowns the difference there, over windows of some time
-    constants of the plain loop.
     """
     fits = fitted_early(p, worse, better)
-    c, limits = fits[0].model.c, p.limits.proof
-    memory = limits.window_times * float(c[Slot.T] + c[Slot.L]) / p.inputs.dt_s
-    window = max(int(memory), limits.window_samples)
-    whole = _compared(Criterion(p, 0, False), (worse, better), fits)
+    _, cut = early_part(p)
+    early = pair_of(p, fits, p.usable & (np.arange(p.y.size) < cut))
+    told = early, pair_of(p, (worse, better), p.usable), held_out_gain(p, fits)
+    whole = Criterion(p).compared(*told)
     if whole.carries:
         return whole
-    windowed = _compared(Criterion(p, window, False), (worse, better), fits)
+    c, limits = early.plain.c, p.limits.proof
+    memory = limits.window_times * float(c[Slot.T] + c[Slot.L]) / p.inputs.dt_s
+    windowed = Criterion(p, max(int(memory), limits.window_samples)).compared(*told)
     if cycle:
-        anew = _compared(Criterion(p, cycle, True), (worse, better), fits)
+        anew = Criterion(p, cycle, True).compared(*told)
         return windowed if windowed.carries and windowed.share > anew.share else anew
     return windowed if windowed.carries else whole
-
-
-def _compared(by: Criterion, final: tuple[Fitted, Fitted], early: tuple[Fitted, Fitted]) -> HeldOut:
-    p = by.p
-    _, cut = early_part(p)
-    first, rest, whole = slice(cut), slice(cut, None), slice(None)
-    seen = p.usable & (np.arange(p.y.size) < cut)
-    plains, betters = by.candidates(early[0].model, early[1].model, seen)
-    chosen = by.least(plains, first), by.least(betters, first)
-    drawn = tuple(by.least(x, whole) for x in by.candidates(final[0].model, final[1].model, p.usable))
-    fitted, held = (tuple(by.misfit(c, part) for c in chosen) for part in (first, rest))
-    return HeldOut(
-        held_out_gain(p, early),
-        (fitted[0], fitted[1]),
-        (held[0], held[1]),
-        (by.misfit(drawn[0], whole), by.misfit(drawn[1], whole)),
-        (drawn[0], drawn[1]),
-        by.window,
-        by.placed,
-        min(by.misfit(c, rest).rmse for c in plains),
-        p.limits.proof,
-    )

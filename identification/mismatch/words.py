@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from identification.mismatch.answer import Answer, EffectFound
 from identification.mismatch.catalogue import EFFECTS
-from identification.mismatch.outside import OUTSIDE
+from identification.mismatch.explanation import Explanation, is_stack
+from identification.mismatch.outside import OUTSIDE, about
+
+if TYPE_CHECKING:
+    from identification.mismatch.answer import Answer, EffectFound
 
 NOTHING_LEFT = "The plain loop explains the recording; nothing is left that the data could name."
 NO_NAME = "Something is left that no effect of the catalogue explains."
@@ -19,8 +23,36 @@ CHECKS = {
     "unexplained": "Give it a recording with moves of the set point, or say what else acts on this loop.",
 }
 """What to look at where no effect is named."""
+STRAYS = (
+    "Simulated with one constant friction PV strays all the same, as it does where friction differs from slip to "
+    "slip: the stretches are the proof, not the misfit."
+)
+"""What is said of a valve that the cycles show and a simulation with constant friction does not."""
+ONE_MOVE_ONLY = "rests on one move of OP, of which nothing is left to prove it on; another recording would"
+"""What a recording of one experiment lacks."""
+WANDERS = "does not tell whether the gain wanders too, or a load alone is added"
+"""Caution of a supply whose part in the gain an experiment does not show."""
+STACKED = (
+    "The loop does something that no known cause explains: only {names}, stacked on each other, come near it, and "
+    "one cause is likelier than three."
+)
+"""Why a stack of effects is no name."""
+INSENSITIVE = "needs moves of OP that PV answers; without OP the fit is as good"
+"""What is said where PV does not answer OP."""
+REFUTED = (
+    "What explains {seen} ({names}) does not carry over to {rest}, so nothing is told as found: another recording of "
+    "this loop is needed."
+)
+OVER_OTHERS, OVER_REST = ("the recording", "the other recordings"), ("its first part", "the rest")
+"""Why effects that explain one part and not another are not told."""
+LEFT_OVER = (
+    "The loop does something that no known cause explains: a flexible model without a name does better "
+    "(log likelihood +{nats:.0f})."
+)
 LONGER = "A step of OP each way in manual, held for five time constants, at two operating points."
 """What tells apart what has no line of its own."""
+SPOKEN_S = (600.0, 7200.0)
+"""Times from which minutes and hours are spoken of [s]; ours."""
 
 
 def check(data: Mapping[str, Any]) -> str:
@@ -68,26 +100,54 @@ def seen_ahead(fit: Mapping[str, Any]) -> str:
     )
 
 
-SPOKEN_S = (600.0, 7200.0)
-"""Times from which minutes and hours are spoken of [s]; ours."""
+def note(found: Explanation) -> str:
+    """Why there is no name, or no name alone; empty where there is nothing to say."""
+    if found.refuted and not found.accepted:
+        seen, rest = OVER_OTHERS if found.others else OVER_REST
+        return REFUTED.format(seen=seen, rest=rest, names=" and ".join(found.refuted))
+    if found.left <= 0:
+        stacked = " and ".join(c.name for c in found.accepted)
+        return STACKED.format(names=stacked) if is_stack(found) else ""
+    if found.outside is not None:
+        return ""
+    return LEFT_OVER.format(nats=found.left)
 
 
-class _Spoken(dict[str, str]):
-    def __missing__(self, key: str) -> str:
-        return "?"
+def shown_by_cycles(found: Explanation) -> str:
+    """What the cycles show of a faulty valve, in a sentence."""
+    seen = found.cycles
+    assert seen is not None
+    between = "turns of OP" if seen.cycling else "moves of the stem"
+    text = (
+        f"In {100 * seen.agreeing:.0f} % of {seen.stretches} stretches between {between}, PV goes as behind this "
+        "valve and not as behind a free one."
+    )
+    return text if found.proof is None or found.proof.carries else f"{text} {STRAYS}"
+
+
+def too_short(enough: float, length_s: float, lag_s: float) -> str:
+    """What is needed where the record is short against the time constant."""
+    return (
+        f"needs {enough:.0f} time constants, has {length_s / lag_s:.2g} "
+        f"(a record of {_time(length_s)}, a time constant of about {_time(lag_s)})"
+    )
 
 
 def sentence(said: Answer) -> str:
     """One sentence for the verdict, with the numbers that it needs."""
     if not said.effects:
         return NOTHING_LEFT
-    effect = EFFECTS[said.effects[0].name]
-    shown = {k: _number(v.value, v.unit) for k, v in said.effects[0].parameters.items()}
+    others = [e.name for e in said.effects[1:]]
+    return _filled(said.effects[0]) + (f" Then also: {', '.join(others)}." if others else "")
+
+
+def _filled(found: EffectFound) -> str:
+    """An effect's sentence with its numbers; one that is not known is a question mark."""
+    effect = about(found.name)
+    shown = {k: _number(v.value, v.unit) for k, v in found.parameters.items()}
     for name, parameters in effect.spoken.items():
         shown[name] = next((shown[k] for k in parameters if k in shown), "?")
-    text = effect.sentence.format_map(_Spoken(shown))
-    others = [e.name for e in said.effects[1:]]
-    return text + (f" Then also: {', '.join(others)}." if others else "")
+    return effect.sentence.format_map(defaultdict(lambda: "?", shown))
 
 
 def unexplained_reason(said: Answer) -> str:
@@ -98,9 +158,7 @@ def unexplained_reason(said: Answer) -> str:
 
 def outside_sentence(found: EffectFound) -> str:
     """What explains a loop better than the catalogue does, with its numbers."""
-    effect = OUTSIDE[found.name]
-    shown = {k: _number(v.value, v.unit) for k, v in found.parameters.items()}
-    return f"{BETTER}: {effect.sentence.format_map(_Spoken(shown))}."
+    return f"{BETTER}: {_filled(found)}."
 
 
 PLACES = {
@@ -147,3 +205,9 @@ def _number(value: float, unit: str) -> str:
     if unit == "s" and abs(value) >= SPOKEN_S[0]:
         return f"{value / 60:.3g} min" if abs(value) < SPOKEN_S[1] else f"{value / 3600:.3g} h"
     return f"{value:.3g} {unit}".strip()
+
+
+def _time(seconds: float) -> str:
+    if seconds < 120:
+        return f"{seconds:.3g} s"
+    return f"{seconds / 60:.3g} min" if seconds < 7200 else f"{seconds / 3600:.3g} h"

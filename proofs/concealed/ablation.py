@@ -28,10 +28,10 @@ from analyzer.explain.case import Case, case
 from analyzer.loops.spec import spec_of
 from identification.controller.pi_regression import recovered_law
 from identification.mismatch.catalogue import CANDIDATES, EFFECTS
-from identification.mismatch.diagnosis import inputs_of, without_spikes
-from identification.mismatch.forward_selection import Candidate, compete, integrating_or_first_order, prepared
 from identification.mismatch.model_file import carried, to_data
-from identification.mismatch.starts.screening import candidate_inputs
+from identification.mismatch.plain_loop import inputs_of, prepared, without_spikes
+from identification.mismatch.selection import Candidate, compete, integrating_or_first_order
+from identification.mismatch.starts import candidate_inputs
 from proofs.concealed.proof import interval, place_section, table
 from proofs.concealed.score import KIN, kin
 

@@ -25,9 +25,9 @@ from analyzer.loops.spec import spec_of
 from identification.estimation.prediction_error import descend
 from identification.mismatch.answer import parameters_of
 from identification.mismatch.catalogue import CANDIDATES
-from identification.mismatch.diagnosis import inputs_of, without_spikes
-from identification.mismatch.forward_selection import compete, integrating_or_first_order, prepared
-from identification.mismatch.starts.screening import candidate_inputs
+from identification.mismatch.plain_loop import inputs_of, prepared, without_spikes
+from identification.mismatch.selection import compete, integrating_or_first_order
+from identification.mismatch.starts import candidate_inputs
 from proofs.concealed.effects import NAMES
 from proofs.concealed.make import read_residuals, seal
 from proofs.concealed.plan import Case

@@ -24,8 +24,8 @@ from analyzer.explain.case import Case, case
 from analyzer.explain.one_loop import Explained, explained
 from analyzer.explain.saved_model import saved_model, simulated
 from analyzer.loops.spec import spec_of
-from identification.mismatch.forward_selection import silent
 from identification.mismatch.model_file import to_data
+from identification.mismatch.selection import silent
 from proofs.concealed.proof import place_section, table
 
 STEP, LOOP = "DUCT-03_air_step_1_5_90", "DUCT-09_pi_siso_full"

@@ -20,10 +20,11 @@ from identification.estimation.candidate import Model, gain
 from identification.estimation.prediction_error import descend
 from identification.mismatch.answer import answer
 from identification.mismatch.catalogue import CANDIDATES
-from identification.mismatch.diagnosis import controller_finding_of, inputs_of, recorder_finding_of
+from identification.mismatch.diagnosis import controller_finding_of, recorder_finding_of
 from identification.mismatch.explanation import Explanation
-from identification.mismatch.forward_selection import Candidate, prepared
+from identification.mismatch.plain_loop import inputs_of, prepared
 from identification.mismatch.proof import held_out
+from identification.mismatch.selection import Candidate
 from identification.models import Backlash, Fopdt, Loop, Pid
 from identification.simulation.closed_loop import closed_loop
 from identification.simulation.parameters import Slot

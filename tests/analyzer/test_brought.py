@@ -14,10 +14,8 @@ from analyzer.explain.user_model import compared, judged, within, wrong_units
 from analyzer.loop.quality import Scale
 from identification.errors import InputError
 from identification.limits import LIMITS
-from identification.mismatch.diagnosis import inputs_of
-from identification.mismatch.explanation import Explanation
-from identification.mismatch.forward_selection import prepared
-from identification.mismatch.kept_effects import carried_over
+from identification.mismatch.explanation import Explanation, carried_over
+from identification.mismatch.plain_loop import inputs_of, prepared
 from identification.mismatch.recording import Recording
 from identification.models import Fopdt, Loop, Pid
 from identification.simulation.closed_loop import closed_loop

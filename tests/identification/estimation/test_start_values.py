@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from identification.estimation.start_values import plain_processes
-from identification.mismatch.forward_selection import prepared
+from identification.mismatch.plain_loop import prepared
 from identification.models import Fopdt, Loop, Pid
 from identification.record import LoopRecord
 from identification.simulation.closed_loop import closed_loop

@@ -8,12 +8,9 @@ import numpy as np
 import pytest
 
 from identification.limits import LIMITS
-from identification.mismatch.answer import answer
-from identification.mismatch.diagnosis import inputs_of
-from identification.mismatch.explanation import Explanation
-from identification.mismatch.forward_selection import prepared
-from identification.mismatch.identifiability import brings, too_short, unanswered
-from identification.mismatch.kept_effects import carried_over
+from identification.mismatch.answer import answer, brings, too_short, unanswered
+from identification.mismatch.explanation import Explanation, carried_over
+from identification.mismatch.plain_loop import inputs_of, prepared
 from identification.mismatch.recording import Recording
 from identification.simulation.parameters import Slot
 from tests.identification.scenes import noise, recording

@@ -6,13 +6,16 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from identification.mismatch.location.features import at_limits, hats, least_turn, turns
-from identification.mismatch.location.locate import (
+from identification.mismatch.location import (
     Located,
+    at_limits,
     block_products,
     directions,
+    hats,
+    least_turn,
     located,
     part_of_range,
+    turns,
 )
 
 N = 4000

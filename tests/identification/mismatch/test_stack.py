@@ -8,11 +8,10 @@ import pytest
 
 from identification.estimation.candidate import Model
 from identification.estimation.noise import NO_NOISE
-from identification.mismatch.answer import is_stack
 from identification.mismatch.catalogue import CANDIDATES
-from identification.mismatch.diagnosis import inputs_of
-from identification.mismatch.explanation import Explanation
-from identification.mismatch.forward_selection import Candidate, prepared
+from identification.mismatch.explanation import Explanation, is_stack
+from identification.mismatch.plain_loop import inputs_of, prepared
+from identification.mismatch.selection import Candidate
 from tests.identification.hand_made import Plant, recording
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from identification.mismatch.catalogue import EFFECTS
-from identification.mismatch.location.features import groups
+from identification.mismatch.location import groups
 from identification.mismatch.words import LONGER, PLACES, check, discriminating_test, located_sentence
 
 NAMED_ONLY = {"sensor-lag"}

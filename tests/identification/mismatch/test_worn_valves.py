@@ -12,15 +12,15 @@ from identification.estimation.candidate import Fitted, Model, Problem, problem
 from identification.estimation.prediction_error import descend
 from identification.mismatch.answer import Answer, answer
 from identification.mismatch.catalogue import EFFECTS
-from identification.mismatch.cross_validation import runs_out
-from identification.mismatch.diagnosis import explain, inputs_of
+from identification.mismatch.diagnosis import explain
 from identification.mismatch.explanation import Explanation
-from identification.mismatch.forward_selection import Candidate, applies
-from identification.mismatch.proof import HeldOut, Misfit
+from identification.mismatch.friction import simulated_anew
+from identification.mismatch.plain_loop import inputs_of
+from identification.mismatch.proof import HeldOut, Misfit, runs_out
 from identification.mismatch.recording import Circumstances, Finding, Recording, SeenInCycles
-from identification.mismatch.restarts import simulated_anew
-from identification.mismatch.sets_of_effects import without_the_idle
-from identification.mismatch.starts.screening import CandidateInputs
+from identification.mismatch.rounds import without_the_idle
+from identification.mismatch.selection import Candidate, applies
+from identification.mismatch.starts import CandidateInputs
 from identification.models import Fopdt, Stiction
 from identification.record import Floats
 from identification.simulation.open_loop import as_parameters, simulate

@@ -11,7 +11,7 @@ import numpy as np
 from identification.estimation.candidate import Fitted, Problem
 from identification.estimation.noise import whitened
 from identification.mismatch.explanation import Explanation
-from identification.mismatch.location.locate import Feature, Located, located
+from identification.mismatch.location import Feature, Located, located
 from identification.mismatch.recording import Recording
 from identification.record import Floats, Mask
 from identification.simulation.open_loop import simulate

@@ -1,0 +1,199 @@
+"""Valves with friction, which a descent from a guess does not find: where their search begins, and how far one holds.
+
+True friction differs from slip to slip. Run open over hours, a model of one constant friction loses the stem's place
+at the first slip that comes early or late, and the likelihood with it: its innovations fall into narrow pits. So
+stickband and jump are scanned, or begun where the loop's cycles show them, stretch by stretch. Judged over a cycle,
+from where the stem stood, such a model shows what the valve does to PV: the place is the state at a window's start,
+estimated from the window itself; constants are not touched.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+from numba import njit
+
+from identification.estimation.candidate import Fitted, Model, Problem
+from identification.estimation.noise import whitened
+from identification.estimation.prediction_error import descend, loss_of, residual_fit
+from identification.mismatch.effect import Friction
+from identification.mismatch.outside import about
+from identification.mismatch.recording import SeenInCycles
+from identification.models import Backlash, Stiction, Valve
+from identification.record import Floats
+from identification.signals.filters import stretch_ends
+from identification.simulation.effect import Signal, Variant, acted
+from identification.simulation.open_loop import as_parameters, from_flow, simulate
+from identification.simulation.parameters import Slot
+from identification.simulation.valve import stem_step
+from identification.simulation.valve_chain import before_stem, behind_stem, friction_of
+
+WIDTHS = np.geomspace(0.6, 4.0, 64)
+"""Stickbands tried, in widths of the play that fits best: steps of 3 %, about the width of a pit."""
+JUMPS = (0.15, 0.3, 0.45, 0.6, 0.75, 0.9, 1.0)
+"""Slip jumps tried, in stickbands."""
+FINALISTS, FOLLOWED = 12, 2
+"""Pairs judged with a noise model of their own, and pairs followed to the end."""
+COMPASS = (0.02, 0.007, 0.0025)
+"""Relative steps of the search within a pit."""
+WEARS = (Friction.PLAY, Friction.STICKS)
+"""What a worn valve has."""
+OF_CYCLES = (Slot.T, Slot.L, Slot.K, Slot.STICKBAND, Slot.JUMP, Slot.COAST)
+"""Parameters that the cycles tell."""
+PLACES = 9
+"""Places of the stem that are tried within its friction band; ours: an eighth of the band apart."""
+CARRIED_ON = 0.9
+"""Squares left by another place, in those left by the stem carried on, from which it is placed anew; ours."""
+
+
+def is_friction(name: str) -> bool:
+    """Whether an effect is play or stick-slip, which cycles can show."""
+    return about(name).friction in WEARS
+
+
+def fit_sticking(p: Problem, play: Fitted, row: Variant, rows: tuple[Variant, ...]) -> Fitted:
+    """The best valve that sticks as `row` says, beside `rows`, about a fit whose last row is a play."""
+    fits = []
+    for c in _scanned(p, play, row)[:FOLLOWED]:
+        first = descend(p, Model((*rows, row), _settled(p, c)), p.limits.search.screen_steps)
+        again = replace(first.model, c=_settled(p, first.model.c))
+        fits.append(descend(p, again, p.limits.search.screen_steps))
+    return min(fits, key=lambda fit: fit.loss)
+
+
+def _scanned(p: Problem, play: Fitted, row: Variant) -> list[Floats]:
+    """Constants of the best pairs of stickband and jump, best first."""
+
+    def quick_loss(c: Floats) -> float:
+        return loss_of(p, whitened(p.y - simulate(p.inputs, c), play.ar, p.edges))
+
+    width = float(play.model.c[Slot.STICKBAND])
+    trials = []
+    for w in WIDTHS:
+        for j in JUMPS:
+            c = play.model.c.copy()
+            for slot, value in (row.fixed or {}).items():
+                c[slot] = value
+            c[Slot.STICKBAND], c[Slot.JUMP] = w * width, min(w * j * width, w * width)
+            trials.append(c)
+    return sorted(sorted(trials, key=quick_loss)[:FINALISTS], key=lambda c: residual_fit(p, c).loss)
+
+
+def _settled(p: Problem, c: Floats) -> Floats:
+    """The bottom of the pit: stickband and jump moved by ever smaller steps."""
+    least = residual_fit(p, c).loss
+    for step in COMPASS:
+        moving = True
+        while moving:
+            moving = False
+            for slot, way in ((Slot.STICKBAND, 1), (Slot.STICKBAND, -1), (Slot.JUMP, 1), (Slot.JUMP, -1)):
+                trial = c.copy()
+                trial[slot] *= 1 + way * step
+                trial[Slot.JUMP] = min(trial[Slot.JUMP], trial[Slot.STICKBAND])
+                found = residual_fit(p, trial).loss
+                if found < least * (1 - 1e-7):
+                    c, least, moving = trial, found, True
+    return c
+
+
+def from_cycles(p: Problem, near: Fitted, seen: SeenInCycles, rows: tuple[Variant, ...]) -> list[Fitted]:
+    """Those of some rows that are of friction added to a fit, each followed to the end from what the cycles told."""
+    out = []
+    for row in rows:
+        valve = _valve_for(row, seen.valve) if is_friction(row.name) else None
+        if valve is not None:
+            model = Model((*near.model.added, row), _begun(p, near, seen, valve))
+            out.append(descend(p, model, p.limits.search.full_steps))
+    return out
+
+
+def _valve_for(row: Variant, valve: Backlash | Stiction) -> Valve:
+    """The valve seen as a row of the catalogue can hold it; None where the row is of another motion."""
+    if about(row.name).friction is Friction.PLAY:
+        return Backlash(valve.width if isinstance(valve, Backlash) else valve.stickband)
+    return valve if isinstance(valve, Stiction) and row.label == valve.motion else None
+
+
+def _begun(p: Problem, near: Fitted, seen: SeenInCycles, valve: Valve) -> Floats:
+    """Constants of a fit with process and valve as the cycles told them, shape (SIZE + own,)."""
+    c, told = near.model.c.copy(), as_parameters(seen.process, valve)
+    for slot in OF_CYCLES:
+        c[slot] = told[slot]
+    c[Slot.START] = p.y[0]
+    c[Slot.BIAS] = float(np.mean(p.y)) - c[Slot.K] * float(np.mean(p.inputs.op) - p.inputs.middle)
+    return c
+
+
+def simulated_anew(p: Problem, c: Floats, window: int) -> Floats:
+    """PV's deviation [% PV], shape (n,), of constants, shape (SIZE + own,), the stem placed anew every `window`
+    samples; as simulate() without friction."""
+    inputs, friction = p.inputs, friction_of(c)
+    if friction[0] <= 0.0:
+        return simulate(inputs, c)
+    op = before_stem(np.ascontiguousarray(acted(Signal.OP, inputs.op, c, inputs.dt_s)), c, inputs.dt_s)
+    dead = round(float(c[Slot.L]) / inputs.dt_s)
+    pole = math.exp(-inputs.dt_s / max(float(c[Slot.T]), 1e-9))
+    stem = placed(op, p.y, stretch_ends(op.size, window), dead, pole, float(c[Slot.K]), friction)
+    flow = behind_stem(stem, c, inputs.dt_s, inputs.middle)
+    return from_flow(inputs, c, acted(Signal.FLOW, flow, c, inputs.dt_s))
+
+
+@njit(cache=True)
+def _left(
+    op: Floats,
+    y: Floats,
+    first: int,
+    last: int,
+    dead: int,
+    pole: float,
+    gain: float,
+    friction: tuple[float, float, float],
+    stem: float,
+    x: float,
+    out: Floats,
+) -> tuple[float, float, float]:
+    """Squares about a line that a stem begun at a place leaves of PV; where stem and lag end; `out` is its path."""
+    moving, turned = 0.0, op[first]
+    n = t1 = t2 = r0 = r1 = r2 = 0.0
+    for k in range(first, last):
+        stem, moving, turned = stem_step(stem, moving, turned, op[k], friction[0], friction[1], friction[2])
+        out[k] = stem
+        x = pole * x + (1.0 - pole) * stem
+        if k + dead < y.size:
+            r, t = y[k + dead] - gain * x, float(k - first)
+            n, t1, t2 = n + 1.0, t1 + t, t2 + t * t
+            r0, r1, r2 = r0 + r, r1 + r * t, r2 + r * r
+    if n < 3.0:
+        return 0.0, stem, x
+    spread = t2 - t1 * t1 / n
+    slope = (r1 - t1 * r0 / n) / spread if spread > 0.0 else 0.0
+    return r2 - r0 * r0 / n - slope * (r1 - t1 * r0 / n), stem, x
+
+
+@njit(cache=True)
+def placed(
+    op: Floats,
+    y: Floats,
+    ends: np.ndarray,
+    dead: int,
+    pole: float,
+    gain: float,
+    friction: tuple[float, float, float],
+) -> Floats:
+    """Stem [% OP], shape (n,), placed in each window where it leaves least of PV, or carried on from the last one."""
+    out, trial = np.empty_like(op), np.empty_like(op)
+    stem, x = op[0], op[0]
+    for i in range(ends.size - 1):
+        first, last = ends[i], ends[i + 1]
+        least, stem_on, x_on = _left(op, y, first, last, dead, pole, gain, friction, stem, x, out)
+        least *= CARRIED_ON
+        for j in range(PLACES):
+            place = op[first] + friction[0] * (2.0 * j / (PLACES - 1) - 1.0)
+            left, stem_j, x_j = _left(op, y, first, last, dead, pole, gain, friction, place, x, trial)
+            if left < least:
+                least, stem_on, x_on = left, stem_j, x_j
+                out[first:last] = trial[first:last]
+        stem, x = stem_on, x_on
+    return out

@@ -1,0 +1,153 @@
+"""The plain loop of a recording, and what a flexible model of no name could explain beyond a fit: the ceiling under
+which a named effect has to be near."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from identification.estimation.candidate import Fitted, Model, Problem, correlated, problem
+from identification.estimation.noise import NO_NOISE, lag_means, whitened
+from identification.estimation.prediction_error import descend, sensitivities
+from identification.estimation.start_values import plain_processes
+from identification.limits import LIMITS, ExplainLimits
+from identification.mismatch.recording import Recording
+from identification.record import Floats, Mask
+from identification.signals.robust import robust_weights
+from identification.simulation.lag import lagged
+from identification.simulation.open_loop import ModelInputs, as_parameters, simulate, through_valve
+from identification.simulation.parameters import Slot
+from identification.simulation.vessel import plain_vessel
+
+SPIKE = 20.0
+"""Jumps there and back, in the median change, from which a single value is none of PV's."""
+BOXES = 32
+"""Past stretches of OP that may act, each with a weight of its own."""
+REACH, MOST_REACH = 8.0, 0.2
+"""How far back they go, in time constants plus dead times, and at most, in the recording; ours: a recycle of seven is
+within it."""
+FEWEST = 3.0
+"""A stretch is at least this many samples."""
+
+
+@dataclass(frozen=True, slots=True)
+class Clip:
+    """A transmitter's end: its value [% PV], whether it is the upper one, and where PV stands at it, shape (n,)."""
+
+    value: float
+    upper: bool
+    where: Mask
+
+
+def inputs_of(s: Recording) -> ModelInputs:
+    """What drives the model of a recording."""
+    level = float(np.mean(s.pv))
+    neighbour = s.neighbours[0] - s.neighbours[0].mean() if s.neighbours else None
+    span = (float(s.pv.min()), float(s.pv.max()))
+    return ModelInputs(s.op, s.dt_s, float(s.op.mean()), level, span, (), neighbour, pv=s.pv - level)
+
+
+def without_spikes(pv: Floats, usable: Mask) -> Mask:
+    """Usable samples less single values that stand far off both neighbours."""
+    rise = np.diff(pv)
+    alone = np.zeros(pv.size, dtype=bool)
+    size = np.median(np.abs(rise)) + 1e-9
+    away = np.minimum(np.abs(rise[:-1]), np.abs(rise[1:]))
+    alone[1:-1] = (away > SPIKE * size) & (np.sign(rise[:-1]) != np.sign(rise[1:]))
+    return usable & ~alone
+
+
+def prepared(
+    inputs: ModelInputs,
+    y: Floats,
+    usable: Mask,
+    brought: Floats | None = None,
+    clip: Clip | None = None,
+    limits: ExplainLimits = LIMITS,
+    experiment: bool = False,
+) -> tuple[Problem, Fitted]:
+    """A problem whose outliers count less, and its plain fit; an experiment's is judged by simulation.
+
+    Samples at a clip are left out; those after them still count, and the model is clipped too. `brought` are the
+    constants of the user's own model, shape (SIZE,), one start more.
+    """
+    p = problem(inputs, y, usable, limits, NO_NOISE if experiment else None)
+    if clip is not None:
+        p = replace(p, weight=np.where(clip.where, 0.0, p.weight))
+    first = plain(p, brought, clip)
+    calm = replace(p, weight=robust_weights(first.e, p.weight > 0))
+    fit = descend(calm, first.model, p.limits.search.full_steps)
+    return with_memory(calm, fit) if experiment else (calm, fit)
+
+
+def plain(p: Problem, brought: Floats | None = None, clip: Clip | None = None) -> Fitted:
+    """The plain loop at its optimum, from several starts."""
+    starts = [] if brought is None else [brought.copy()]
+    for process in plain_processes(p.y, p.inputs.op, p.usable, p.inputs.dt_s):
+        c = as_parameters(process)
+        if clip is not None:
+            c[Slot.CLIP_HI if clip.upper else Slot.CLIP_LO] = clip.value
+        c[Slot.START] = p.y[0]
+        c[Slot.BIAS] = float(np.mean(p.y)) - process.gain * float(np.mean(p.inputs.op) - p.inputs.middle)
+        starts.append(c)
+    fits = [descend(p, Model((), c), p.limits.search.full_steps) for c in starts]
+    return min(fits, key=lambda fit: fit.loss)
+
+
+def with_memory(p: Problem, fit: Fitted) -> tuple[Problem, Fitted]:
+    """An experiment and its fit, with the memory of what the most flexible model leaves: the nearest to its noise."""
+    _, left, _ = explained_freely(p, fit)
+    known = replace(p, memory=correlated(left[p.weight > 0]))
+    return known, replace(fit, count=known.independent(fit.e))
+
+
+def ceiling(p: Problem, fit: Fitted) -> tuple[float, int]:
+    """Gain in log likelihood [nat] that the flexible model has over a fit, and the number of its weights.
+
+    The fit's own constants and its noise model follow linearly, so the gain is of what they cannot give.
+    """
+    e, left, count = explained_freely(p, fit)
+    won = 0.5 * float(e @ e - left @ left) / max(fit.loss, 1e-30)
+    return won * fit.count / max(p.count, 1), count
+
+
+def explained_freely(p: Problem, fit: Fitted) -> tuple[Floats, Floats, int]:
+    """Weighted innovations that a fit's own constants cannot lessen and what the flexible model leaves of them, shape
+    (n,) each, and the number of its weights."""
+    c, root = fit.model.c, np.sqrt(p.weight)
+    through = through_valve(p.inputs, c)
+    free = past_moves(p, c, through) + bent_moves(p, c, through)
+    r = p.y - simulate(p.inputs, c)
+    own = np.concatenate((sensitivities(p, fit.model, fit.ar), lag_means(r, p.edges))) * root
+    more = np.stack([whitened(x, fit.ar, p.edges) for x in free]) * root
+    span = np.linalg.qr(own.T)[0]
+    e = fit.e * root
+    e = e - span @ (span.T @ e)
+    more = more.T - span @ (span.T @ more.T)
+    q, scale = np.linalg.qr(more)
+    kept = np.abs(np.diag(scale)) > 1e-8 * np.abs(np.diag(scale)).max()
+    return e, e - q[:, kept] @ (q[:, kept].T @ e), int(kept.sum())
+
+
+def past_moves(p: Problem, c: Floats, through: Floats) -> list[Floats]:
+    """Means of OP behind the valve over past stretches, each shape (n,)."""
+    n, dt_s = through.size, p.inputs.dt_s
+    length_s = min(REACH * float(c[Slot.T] + c[Slot.L]), MOST_REACH * n * dt_s)
+    width = max(round(length_s / BOXES / dt_s), int(FEWEST))
+    total = np.concatenate(([0.0], np.cumsum(through - through.mean())))
+    at = [np.maximum(np.arange(n) - i * width, 0) for i in range(BOXES + 1)]
+    return [(total[at[i]] - total[at[i + 1]]) / width for i in range(BOXES)]
+
+
+def bent_moves(p: Problem, c: Floats, through: Floats) -> list[Floats]:
+    """Responses to OP's fast part by size, to its square and to its cube, each shape (n,)."""
+    c, dt_s, still = c.copy(), p.inputs.dt_s, np.zeros(through.size)
+    c[Slot.K], c[Slot.BIAS], c[Slot.START] = 1.0, 0.0, 0.0
+    moves = []
+    for share in (0.1, 0.5):
+        fast = through - lagged(through, max(share * float(c[Slot.T]), dt_s), dt_s)
+        moves += [fast * np.abs(fast), np.abs(fast)]
+    level = through - through.mean()
+    moves += [level**2, level**3]
+    return [plain_vessel(x - x[0], still, c, dt_s, 0.0) for x in moves]

@@ -1,0 +1,186 @@
+"""Effects taken one by one until nothing passes, looked at again as a set, and what is left beyond them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from identification.estimation.candidate import Fitted, Problem, gain
+from identification.estimation.prediction_error import descend
+from identification.mismatch.catalogue import CANDIDATES, EFFECTS
+from identification.mismatch.effect import Friction
+from identification.mismatch.experiment import is_experiment
+from identification.mismatch.explanation import Explanation
+from identification.mismatch.friction import from_cycles, is_friction
+from identification.mismatch.outside import OUTSIDE, RIVALS, about
+from identification.mismatch.plain_loop import ceiling
+from identification.mismatch.proof import passes
+from identification.mismatch.recording import Recording, SeenInCycles
+from identification.mismatch.selection import (
+    Candidate,
+    Progress,
+    compete,
+    integrating_or_first_order,
+    penalised,
+    penalty,
+    without,
+)
+from identification.mismatch.starts import CandidateInputs, candidate_inputs
+from identification.models import Stiction
+
+
+def physics(found: Explanation, tell: Progress, s: Recording) -> Explanation:
+    """The explanation with the effects of the catalogue that pass, and the gain [nat] of what is left beyond them."""
+    p, best = integrating_or_first_order(found.p, found.plain, s.kind)
+    found, last = one_by_one(replace(found, p=p, plain=best, best=best), tell, s)
+    if len(found.accepted) > 1:
+        found = as_a_set(found, tell, s)
+    return replace(found, left=left_over(found, last))
+
+
+def one_by_one(found: Explanation, tell: Progress, s: Recording) -> tuple[Explanation, list[Candidate]]:
+    """Effects added as long as one passes, first a valve that the cycles show, and the last round's candidates."""
+    limits, candidates = found.p.limits.search, list[Candidate]()
+    rows = (*CANDIDATES, *RIVALS) if has_rivals(s) else CANDIDATES
+    for _ in range(limits.rounds):
+        x = candidate_inputs(found.p, found.best, s.circumstances)
+        candidates = compete(x, found.best, rows, tell)
+        if s.cycles is not None and not found.accepted:
+            candidates = with_cycles(x.p, found.best, s.cycles, candidates)
+        if not found.first:
+            found = replace(found, first=tuple(c for c in candidates if c.name in EFFECTS))
+        winner = chosen(x.p, found, s, candidates)
+        if winner is None:
+            break
+        if winner.name in OUTSIDE:
+            return replace(found, outside=winner), candidates
+        best = descend(x.p, winner.fit.model, limits.full_steps)
+        found = replace(found, p=x.p, best=best, accepted=(*found.accepted, winner))
+    return found, candidates
+
+
+def chosen(p: Problem, found: Explanation, s: Recording, candidates: list[Candidate]) -> Candidate | None:
+    """What is taken of a round's candidates; physics of no name only where it does far better than what is taken so
+    far."""
+    winner = None if found.accepted else shown_by_cycles(s, candidates)
+    winner = winner or proven(p, found.best, candidates)
+    least = p.limits.search.ceiling_share * gain(found.best, found.plain)
+    if winner is not None and winner.name in OUTSIDE and winner.penalised <= least:
+        return proven(p, found.best, [c for c in candidates if c.name in EFFECTS])
+    return winner
+
+
+def has_rivals(s: Recording) -> bool:
+    """Whether physics of no name, which goes with PV as recorded, may be what acts.
+
+    In a loop that cycles, PV of any while ago tells PV, whatever makes it cycle; in an experiment, which is judged by
+    its simulation, what is fed with recorded PV is no simulation.
+    """
+    return s.cycles is None and not s.free_valve and not is_experiment(s)
+
+
+def with_cycles(p: Problem, near: Fitted, seen: SeenInCycles, candidates: list[Candidate]) -> list[Candidate]:
+    """The candidates and those begun where the cycles show a valve, best first; of each name the better."""
+    begun = [penalised(p, near, fit) for fit in from_cycles(p, near, seen, CANDIDATES)]
+    best: dict[str, Candidate] = {}
+    for c in sorted([*candidates, *begun], key=lambda c: -c.penalised):
+        best.setdefault(f"{c.name} {c.row.label}", c)
+    return list(best.values())
+
+
+def shown_by_cycles(s: Recording, candidates: list[Candidate]) -> Candidate | None:
+    """The best play or stick-slip, where the loop's cycles show a faulty valve; None where they do not.
+
+    Cycles that show a jump are believed: a slip now and then late hides it from one constant friction. Where there is
+    no cycle, a slip or two say no more than run read from them.
+    """
+    if s.cycles is None:
+        return None
+    rubs = [c for c in candidates if is_friction(c.name)]
+    sticks = isinstance(s.cycles.valve, Stiction)
+    if sticks or not s.cycles.cycling:
+        wanted = Friction.STICKS if sticks else Friction.PLAY
+        rubs = [*(c for c in rubs if about(c.name).friction is wanted), *rubs]
+    return rubs[0] if rubs else None
+
+
+def proven(p: Problem, near: Fitted, candidates: list[Candidate]) -> Candidate | None:
+    """The best candidate with a gain left after its penalty that passes the proof.
+
+    In an experiment one that is bound to a time is taken where none that lasts does anything: a course of the load
+    can be drawn through whatever the model lacks, and no data can be held out from it.
+    """
+    gains = [c for c in candidates if c.penalised > 0]
+    if p.by_simulation:
+        lasts = any(not about(name).timed for name in near.names)
+        gains = [c for c in gains if not (lasts and about(c.name).timed)]
+        gains.sort(key=lambda c: about(c.name).timed)
+    tried = gains[: p.limits.proof.proven]
+    return next((c for c in tried if passes(p, near, c.fit, about(c.name))), None)
+
+
+def as_a_set(found: Explanation, tell: Progress, s: Recording) -> Explanation:
+    """Several effects looked at again: one in another's place, one that the others have made idle; a valve that the
+    cycles show stays."""
+    p, best, accepted = found.p, found.best, list(found.accepted)
+    told = shown_by_cycles(s, accepted[:1]) is not None
+    if not told:
+        tell("other sets of effects")
+        best, accepted = replacement_step(candidate_inputs(p, best, s.circumstances), best, accepted, tell)
+    best, accepted = without_the_idle(p, best, accepted, int(told))
+    return replace(found, best=best, accepted=tuple(accepted))
+
+
+def replacement_step(
+    x: CandidateInputs, best: Fitted, accepted: list[Candidate], tell: Progress
+) -> tuple[Fitted, list[Candidate]]:
+    """The accepted effects, each given up once for whatever does better beside the others.
+
+    Effects are added one at a time, so the first may have been taken in the place of two that act together.
+    """
+    limits = x.p.limits.search
+    for i, old in enumerate(accepted):
+        near = descend(x.p, without(best.model, [old.row]), limits.full_steps)
+        least = max(gain(best, near) - penalty(x.p, old.row) + limits.tie, 0.0)
+        first = next((c for c in compete(x, near, CANDIDATES, tell, least) if may_replace(x.p, c, old)), None)
+        if first is None or first.penalised <= least or not passes(x.p, near, first.fit, EFFECTS[first.name]):
+            continue
+        best = descend(x.p, first.fit.model, limits.full_steps)
+        accepted = [*accepted[:i], first, *accepted[i + 1 :]]
+    return best, accepted
+
+
+def may_replace(p: Problem, new: Candidate, old: Candidate) -> bool:
+    """Whether a candidate may stand in an effect's place: another, or another way of the same; in an experiment none
+    bound to a time for one that lasts, for through whatever a model lacks a course can be drawn."""
+    bound = EFFECTS[new.name].timed and not EFFECTS[old.name].timed
+    return (new.name, new.row.label) != (old.name, old.row.label) and not (bound and p.by_simulation)
+
+
+def without_the_idle(
+    p: Problem, best: Fitted, accepted: list[Candidate], kept: int
+) -> tuple[Fitted, list[Candidate]]:
+    """The accepted effects less those that the others have made idle, the first `kept` of them left alone.
+
+    An effect may have been taken in the place of one that came after it.
+    """
+    for old in accepted[kept:]:
+        if len(accepted) == 1:
+            break
+        near = descend(p, without(best.model, [old.row]), p.limits.search.full_steps)
+        if gain(best, near) < penalty(p, old.row):
+            best, accepted = near, [c for c in accepted if c.name != old.name]
+    return best, accepted
+
+
+def left_over(found: Explanation, candidates: list[Candidate]) -> float:
+    """Gain [nat] of what explains the recording beyond the effects taken and has no name among them, over the least
+    that counts; 0 where nothing does."""
+    limits = found.p.limits.search
+    won, weights = ceiling(found.p, found.best)
+    least = max(limits.ceiling_penalty, limits.ceiling_share * gain(found.best, found.plain))
+    left = won - 0.5 * weights - least
+    if not found.accepted and any(c.row.needs == "steps" and c.penalised > 0 for c in candidates):
+        left = max(left, candidates[0].penalised)
+    if found.outside is not None:
+        left = max(left, found.outside.penalised)
+    return left if left > 0 else 0.0

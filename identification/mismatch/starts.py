@@ -1,0 +1,282 @@
+"""Where the search for an effect begins: steps and lines located in what a fit leaves, each variant's starts put in
+order, and two-mode processes solved on a grid."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.ndimage import median_filter
+
+from identification.estimation.candidate import Fitted, Model, Problem, scales
+from identification.estimation.noise import whitened
+from identification.estimation.prediction_error import sensitivities
+from identification.mismatch.recording import Circumstances
+from identification.record import Floats, Mask
+from identification.simulation.effect import Variant
+from identification.simulation.open_loop import simulate, through_valve
+from identification.simulation.parameters import STEPS, Slot, neutral
+from identification.simulation.vessel import plain_vessel
+
+ANY = Circumstances()
+"""Nothing that would leave an effect out."""
+LINES = 4
+"""Lines that are tried."""
+LINE_SIDE = 25
+"""Half of the lines whose median is a line's surroundings."""
+LEAD = 200
+"""Samples of rest before a pulse is whitened; ours: the noise model reaches 117 back."""
+JUMPS = 2.0
+"""Times that jumps of PV itself must explain more than load steps before they are believed; ours: in steps that came
+through the process up to 1.2, in bursts of a sensor from 4 on."""
+NEAR, DELAYED = 3, 20
+"""Samples about a step's place in which its onset is looked for, and how much later that of a jump of PV; ours."""
+GAP_SAMPLES = 5
+"""Missing samples from which OP may have moved unseen; ours: an outlier is one or two."""
+FORGOTTEN = 3.0
+"""Time constants after which a gap's OP is forgotten; ours: a twentieth is left."""
+DELAYS = 40
+"""Dead times tried at most for two modes, from none to that of the plain loop, which a missing lag or zero has
+lengthened; a mode that answers at once is found to the sample alone."""
+LONGER = (0.7, 1.0, 1.4, 2.0)
+"""Time constants tried for the first mode, in that of the plain loop."""
+LEADING = 0.95
+"""First coefficient of the noise model that knows nothing: nearly a difference."""
+MODES_KEPT = 2
+"""Starts with two modes that are kept under each noise model."""
+
+
+@dataclass(frozen=True, slots=True)
+class CandidateInputs:
+    """A problem with the places and frequencies at which a load may act, and the circumstances of its recording."""
+
+    p: Problem
+    omegas: tuple[float, ...]
+    known: Circumstances = ANY
+
+
+def candidate_inputs(p: Problem, fit: Fitted, known: Circumstances = ANY) -> CandidateInputs:
+    """Steps and lines located in what a fit leaves."""
+    held = p.inputs.step_at if any(r.needs == "steps" for r in fit.model.added) else step_places(p, fit)
+    located = replace(p, inputs=replace(p.inputs, step_at=held))
+    return CandidateInputs(located, line_frequencies(p, fit), known)
+
+
+def step_places(p: Problem, fit: Fitted) -> tuple[int, ...]:
+    """Samples at which a step of the load explains the innovations best, greedily, shape (STEPS,)."""
+    e = fit.e * (p.weight > 0)
+    shut, pulse = after_gaps(p, fit), step_pulse(p, fit)
+    places: list[int] = []
+    for _ in range(STEPS):
+        at = _best_place(e, pulse, shut)
+        places.append(at)
+        part = pulse[: p.y.size - at]
+        tail = e[at:][: part.size]
+        part = part[: tail.size]
+        e = e.copy()
+        e[at:][: part.size] -= part * float(part @ tail) / max(float(part @ part), 1e-300)
+    return tuple(places)
+
+
+def step_pulse(p: Problem, fit: Fitted) -> Floats:
+    """Whitened response to a step of the load at the first sample, shape (n - LEAD,)."""
+    one = neutral()
+    one[Slot.T], one[Slot.K], one[Slot.STEP] = fit.model.c[Slot.T], fit.model.c[Slot.K], 1.0
+    quiet = replace(p.inputs, op=np.full(p.y.size, p.inputs.middle), step_at=(0,))
+    return _pulse(simulate(quiet, one), p, fit)
+
+
+def _pulse(answer: Floats, p: Problem, fit: Fitted) -> Floats:
+    """An answer whitened after a lead of rest, shape (n - LEAD,)."""
+    return whitened(np.concatenate((np.zeros(LEAD), answer))[: p.y.size], fit.ar, p.edges)[LEAD:]
+
+
+def _best_place(e: Floats, pulse: Floats, shut: Mask) -> int:
+    n, m = e.size, pulse.size
+    size = 1 << math.ceil(math.log2(n + m))
+    cross = np.fft.irfft(np.fft.rfft(e, size) * np.conj(np.fft.rfft(pulse, size)), size)[:n]
+    power = np.cumsum(pulse**2)
+    room = power[np.minimum(n - 1 - np.arange(n), m - 1)]
+    share = cross**2 / np.maximum(room, 1e-3 * power[-1])
+    share[int(0.98 * n) :] = 0.0
+    share[: int(0.01 * n)] = 0.0
+    share[shut] = 0.0
+    return int(np.argmax(share))
+
+
+def after_gaps(p: Problem, fit: Fitted) -> Mask:
+    """True in gaps and until what OP did in them has died away in PV, shape (n,): no step can be told there."""
+    held = round(float(fit.model.c[Slot.L] + FORGOTTEN * fit.model.c[Slot.T]) / p.inputs.dt_s)
+    gone = np.diff(np.concatenate(([0], (~p.usable).astype(np.int8), [0])))
+    out = np.zeros(p.y.size, dtype=bool)
+    for first, last in zip(np.flatnonzero(gone == 1), np.flatnonzero(gone == -1), strict=True):
+        if last - first >= GAP_SAMPLES:
+            out[max(first - 1, 0) : last + held] = True
+    return out
+
+
+def at_inlet(p: Problem, fit: Fitted) -> bool:
+    """Whether the steps found by step_places came through the process, or PV jumped by itself, as a sensor does."""
+    e = fit.e * (p.weight > 0)
+    through, jump = step_pulse(p, fit), _pulse(np.ones(p.y.size), p, fit)
+    came, jumped = 0.0, 0.0
+    for at in dict.fromkeys(p.inputs.step_at):
+        came += max(_share(e, through, at + i) for i in range(-NEAR, NEAR + 1))
+        jumped += max(_share(e, jump, at + i) for i in range(-NEAR, DELAYED))
+    return jumped < JUMPS * came
+
+
+def _share(e: Floats, pulse: Floats, at: int) -> float:
+    """Sum of squares of innovations that a pulse at a sample takes away."""
+    at = min(max(at, 0), e.size - 2)
+    part = pulse[: e.size - at]
+    return float(part @ e[at : at + part.size]) ** 2 / max(float(part @ part), 1e-300)
+
+
+def line_frequencies(p: Problem, fit: Fitted) -> tuple[float, ...]:
+    """Angular frequencies [rad/s] of the lines that stand out most from their surroundings in the innovations."""
+    e = fit.e * (p.weight > 0)
+    power = np.abs(np.fft.rfft(e, 2 * e.size)) ** 2
+    share = power / np.maximum(median_filter(power, 2 * LINE_SIDE, mode="nearest"), 1e-30)
+    share[:8] = 0.0
+    share[power.size // 3 :] = 0.0
+    found = []
+    for _ in range(LINES):
+        k = int(np.argmax(share))
+        found.append(math.pi * k / (e.size * p.inputs.dt_s))
+        share[max(k - 4, 0) : k + 5] = 0.0
+    return tuple(found)
+
+
+def start_models(x: CandidateInputs, near: Fitted, row: Variant) -> list[Model]:
+    """Starts of a row added to a fit; of an oscillating load one a frequency."""
+    on_lines = tuple({int(Slot.OMEGA): w} for w in x.omegas)
+    out = []
+    for start in on_lines if row.needs == "line" else row.starts:
+        c = near.model.c.copy()
+        for slot, value in (row.fixed or {}).items():
+            c[slot] = value
+        for param in row.params:
+            offset, factor = scales(x.p.inputs, near.model.c, param)
+            c[param.slot] = offset + factor * start.get(int(param.slot), 0.0)
+        stood = sum(c[slot] for slot in row.delays) + max(-c[Slot.SHARE] * c[Slot.T], 0.0)
+        if row.enter is not None:
+            row.enter(c)
+        for part in (0.4, 1.0) if stood > 0 else (0.0,):
+            shorter = c.copy()
+            shorter[Slot.L] = max(c[Slot.L] - part * stood, 0.2 * c[Slot.L])
+            out.append(Model((*near.model.added, row), shorter))
+    return out
+
+
+@dataclass(frozen=True, slots=True)
+class Span:
+    """What a fit's own constants follow linearly: orthonormal directions of weighted innovations, shape (n, m)."""
+
+    p: Problem
+    near: Fitted
+    directions: Floats
+
+    def free(self, x: Floats) -> Floats:
+        """Weighted innovations of what is left, shape (n,), that the fit's own constants cannot lessen."""
+        e = whitened(x, self.near.ar, self.p.edges) * np.sqrt(self.p.weight)
+        return e - self.directions @ (self.directions.T @ e)  # type: ignore[no-any-return]
+
+    def left(self, model: Model) -> float:
+        """Sum of squares that a model leaves so."""
+        e = self.free(self.p.y - simulate(self.p.inputs, model.c))
+        return float(e @ e)
+
+    def on_line(self, model: Model) -> Model:
+        """A start with the parameter that PV goes with in a straight line where it leaves least."""
+        slot = model.added[-1].linear
+        if slot is None:
+            return model
+        none, one, c = model.c.copy(), model.c.copy(), model.c.copy()
+        none[slot], one[slot] = 0.0, 1.0
+        still = simulate(self.p.inputs, none)
+        along = self.free(simulate(self.p.inputs, one) - still)
+        c[slot] = float(along @ self.free(self.p.y - still)) / max(float(along @ along), 1e-300)
+        return Model(model.added, c)
+
+
+def span_of(p: Problem, near: Fitted) -> Span:
+    """The directions in which a fit's own constants move its innovations."""
+    moves = sensitivities(p, near.model, near.ar) * np.sqrt(p.weight)
+    return Span(p, near, np.linalg.qr(moves.T)[0])
+
+
+def screened(span: Span, models: list[Model]) -> list[Model]:
+    """Starts ordered by the innovations that they leave once the fit's own constants have followed, linearly."""
+    if len(models) == 1:
+        return models
+    return sorted((span.on_line(model) for model in models), key=span.left)
+
+
+@dataclass(frozen=True, slots=True)
+class Point:
+    """One point of the grid for two modes: dead time, both time constants [s], both gains, what is left."""
+
+    dead_s: float
+    first_s: float
+    other_s: float
+    gains: tuple[float, float]
+    left: float
+
+
+def mode_starts(p: Problem, near: Fitted, row: Variant) -> list[Model]:
+    """Starts of a two-mode row whose second mode has the share of the gain that the row is about."""
+    blind = np.zeros_like(near.ar)
+    blind[:1] = LEADING
+    out = []
+    for ar in (near.ar, blind) if near.ar.size else (near.ar,):
+        for point in [q for q in grid(p, near, row, ar) if _fits_row(q, row)][:MODES_KEPT]:
+            c = near.model.c.copy()
+            c[Slot.T], c[Slot.L] = point.first_s, point.dead_s
+            c[Slot.MODE_T] = max(point.other_s, 0.1 * p.inputs.dt_s)
+            c[Slot.K] = sum(point.gains)
+            c[Slot.SHARE] = point.gains[1] / c[Slot.K]
+            out.append(Model((*near.model.added, row), c))
+    return out
+
+
+def _fits_row(point: Point, row: Variant) -> bool:
+    a, b = point.gains
+    return a + b != 0 and row.mode_share[0] < b / (a + b) < row.mode_share[1]
+
+
+def grid(p: Problem, near: Fitted, row: Variant, ar: Floats) -> list[Point]:
+    """All points of the grid under one noise model, best first; both gains are solved linearly."""
+    t0, dead0 = float(near.model.c[Slot.T]), float(near.model.c[Slot.L])
+    y, level = whitened(p.y, ar, p.edges), whitened(np.ones(p.y.size), ar, p.edges)
+    firsts, others = [t0 * f for f in LONGER], [t0 * f for f in row.modes]
+    found = responses(p, near, {*firsts, *others}, ar)
+    longest = min(math.ceil(dead0 / p.inputs.dt_s), p.y.size - 1)
+    out = []
+    for samples in range(0, longest + 1, longest // DELAYS + 1):
+        late = {t: np.concatenate((np.full(samples, x[0]), x[: x.size - samples])) for t, x in found.items()}
+        for first in firsts:
+            for other in others:
+                gains, left = solved(y, np.stack([late[first], late[other], level]), p.weight)
+                out.append(Point(samples * p.inputs.dt_s, first, other, gains, left))
+    return sorted(out, key=lambda point: point.left)
+
+
+def responses(p: Problem, near: Fitted, times: set[float], ar: Floats) -> dict[float, Floats]:
+    """Whitened unit responses without dead time, each shape (n,), of lags with these time constants [s]."""
+    inputs, c = p.inputs, near.model.c.copy()
+    through, still = through_valve(inputs, c), np.zeros(inputs.op.size)
+    c[Slot.K], c[Slot.BIAS], c[Slot.START], c[Slot.L] = 1.0, 0.0, 0.0, 0.0
+    out = {}
+    for t in times:
+        c[Slot.T] = max(t, 0.1 * inputs.dt_s)
+        out[t] = whitened(plain_vessel(through, still, c, inputs.dt_s, inputs.middle), ar, p.edges)
+    return out
+
+
+def solved(y: Floats, rows: Floats, weight: Floats) -> tuple[tuple[float, float], float]:
+    """Both gains and what is left, of whitened PV on two responses and a level, shape (3, n)."""
+    weighted = rows * weight
+    beta = np.linalg.lstsq(weighted @ rows.T, weighted @ y, rcond=1e-12)[0]
+    return (float(beta[0]), float(beta[1])), float((weight * y) @ y - beta @ (weighted @ y))

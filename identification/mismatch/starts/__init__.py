@@ -1,1 +1,0 @@
-"""Where the search for an effect's parameters begins."""
