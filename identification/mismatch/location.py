@@ -49,15 +49,6 @@ FEWEST_AT_LIMIT = 10
 
 
 @dataclass(frozen=True, slots=True)
-class Motion:
-    """What OP does, shape (n,) each: direction (-1, 0, 1), travel over a window [% OP/s], time since its turn [s]."""
-
-    direction: Floats
-    rate: Floats
-    since_turn: Floats
-
-
-@dataclass(frozen=True, slots=True)
 class Group:
     """Columns that stand for one question, shape (n, k), and the signal they are of, shape (n,), for its profile.
 
@@ -102,23 +93,6 @@ def least_turn(op: Floats) -> float:
     return max(TURN_SHARE * float(high - low), TURN_NOISE * noise, 1e-6)
 
 
-def motion(op: Floats, dt_s: float, window: int) -> Motion:
-    """What OP does.
-
-    Parameters
-    ----------
-    op : ndarray of shape (n,)
-        OP [% OP].
-    dt_s : float
-        Sample interval [s].
-    window : int
-        Samples over which a rate is taken, >= 1.
-    """
-    way, since = turns(op, least_turn(op))
-    back = np.concatenate((np.full(window, op[0]), op[: op.size - window]))[: op.size]
-    return Motion(way, np.abs(op - back) / (window * dt_s), since * dt_s)
-
-
 def hats(x: Floats, pieces: int = PIECES) -> Floats:
     """Straight pieces between even quantiles of a signal, shape (n, k), k <= pieces; none where it stands still."""
     knots = np.unique(np.quantile(x, np.linspace(0.02, 0.98, pieces + 1)))
@@ -150,30 +124,24 @@ def delayed(x: Floats, late: int) -> Floats:
 def groups(pv: Floats, op: Floats, dt_s: float, late: int, memory: int) -> tuple[Group, ...]:
     """The features of a record, each group as far as there is anything in it.
 
-    Parameters
-    ----------
-    pv, op : ndarray of shape (n,)
-        PV [% PV] and OP [% OP].
-    dt_s : float
-        Sample interval [s].
-    late : int
-        Samples after which PV begins to answer OP; OP's features are taken that much later. All features are of the
-        past: an innovation is part of its own PV, and feedback makes it part of every later OP.
-    memory : int
-        Samples that the loop remembers: time constant and dead time.
+    OP's features are taken `late` samples later, when PV begins to answer it; rates and turns count within the
+    `memory` [samples] of the loop. All features are of the past: an innovation is part of its own PV, and feedback
+    makes it part of every later OP.
     """
     o, before = delayed(op, late + PAST), delayed(pv, PAST)
-    m = motion(o, dt_s, max(memory // 4, 1))
-    fading = np.exp(-m.since_turn / (max(memory, 2) * dt_s))
-    rate = ranked(m.rate) - 0.5
+    way, since = turns(o, least_turn(o))
+    since_s, window = since * dt_s, max(memory // 4, 1)
+    travel = np.abs(o - delayed(o, window)) / (window * dt_s)
+    fading = np.exp(-since_s / (max(memory, 2) * dt_s))
+    rate = ranked(travel) - 0.5
     index = dt_s * np.arange(pv.size, dtype=np.float64)
     limit = at_limits(o)
     found = (
         Group("pv_level", hats(before), before),
         Group("op_level", hats(o), o),
-        Group("op_direction", m.direction[:, None], m.direction),
-        Group("op_rate", np.stack([rate, rate * m.direction], axis=1), m.rate, m.direction),
-        Group("after_reversals", np.stack([fading, fading * m.direction], axis=1), m.since_turn, m.direction),
+        Group("op_direction", way[:, None], way),
+        Group("op_rate", np.stack([rate, rate * way], axis=1), travel, way),
+        Group("after_reversals", np.stack([fading, fading * way], axis=1), since_s, way),
         Group("time_in_record", hats(index), index),
         Group("at_limits", limit[:, None].astype(float), limit.astype(float)),
     )
@@ -209,7 +177,6 @@ class Feature:
     p: float
     share: float
     of: str
-    profile: Profile = field(repr=False)
     low: float | None = None
     high: float | None = None
 
@@ -221,12 +188,10 @@ class Feature:
 
 @dataclass(frozen=True, slots=True)
 class Located:
-    """The features, the likeliest first; together : chance that all of them together say as much of nothing;
-    local : power of the misfit that the features give at each sample, in mean squares, shape (n,), 0 where not
-    judged."""
+    """The features, the likeliest first; local : power of the misfit that they give at each sample, in mean squares,
+    shape (n,), 0 where not judged."""
 
     features: tuple[Feature, ...]
-    together: float
     local: Floats = field(repr=False)
 
     @property
@@ -268,24 +233,22 @@ def _basis(x: Floats, scale: float | None = None) -> Floats:
     return np.asarray(u[:, s > 0.03 * max(scale or s[0], 1e-12)])
 
 
-def chances(bases: list[Floats], y: Floats, blocks: int, seed: int) -> tuple[Floats, Floats, float]:
-    """Chance of each group over all groups, (groups,); each response's excess, (groups, 2); chance of all together.
+def chances(bases: list[Floats], y: Floats, blocks: int, seed: int) -> tuple[Floats, Floats]:
+    """Chance of each group over all groups, (groups,), and each response's excess, (groups, 2).
 
     The largest excess over groups and responses is compared with that of every other order of the blocks (Westfall
-    and Young 1993, single step). The last basis is of all groups together and is judged by itself.
+    and Young 1993, single step).
     """
     rng = np.random.default_rng(seed)
-    flat = np.concatenate(bases, axis=1)
     ends = np.cumsum([0, *(b.shape[1] for b in bases)])
-    pairs = block_products(flat, y, blocks)
+    pairs = block_products(np.concatenate(bases, axis=1), y, blocks)
     here = np.arange(blocks)
     seen = _scores(pairs[here, here].sum(axis=0), ends)
     null = np.stack([_scores(pairs[here, rng.permutation(blocks)].sum(axis=0), ends) for _ in range(ORDERS)])
     middle, spread = null.mean(axis=0), np.maximum(null.std(axis=0), 1e-9)
-    most, excess = ((null - middle) / spread).max(axis=2), ((seen - middle) / spread)
-    above = (most[:, :-1].max(axis=1)[None, :] >= excess[:-1].max(axis=1)[:, None]).sum(axis=1)
-    together = float((1 + (most[:, -1] >= excess[-1].max()).sum()) / (ORDERS + 1))
-    return (1 + above) / (ORDERS + 1), excess[:-1], together
+    most, excess = ((null - middle) / spread).max(axis=(1, 2)), (seen - middle) / spread
+    above = (most[None, :] >= excess.max(axis=1)[:, None]).sum(axis=1)
+    return (1 + above) / (ORDERS + 1), excess
 
 
 def block_products(flat: Floats, y: Floats, blocks: int) -> Floats:
@@ -310,13 +273,7 @@ def _scores(products: Floats, ends: np.ndarray) -> Floats:
 
 
 def profile(x: Floats, y: Floats, parts: int = SHOWN) -> Profile:
-    """Innovations along a feature, in parts of as many samples.
-
-    Parameters
-    ----------
-    x, y : ndarray of shape (n,)
-        Feature, and innovations in standard deviations.
-    """
+    """Innovations y, in standard deviations, along a feature x, shape (n,) each, in parts of as many samples."""
     order = np.argsort(x, kind="stable")
     x, y = x[order], y[order]
     levels = np.flatnonzero(np.diff(x, prepend=x[0] - 1.0))
@@ -341,42 +298,24 @@ def part_of_range(height: Floats) -> tuple[int, int] | None:
     return int(firsts[run]), int(lasts[run]) - 1
 
 
-def nothing(n: int) -> Located:
-    """What is said of a record too short to be located in."""
-    return Located((), 1.0, np.zeros(n))
-
-
 def located(
     e: Floats, pv: Floats, op: Floats, judged: Mask, dt_s: float, late: int, memory: int, seed: int = 0
 ) -> Located:
-    """Where innovations are large or keep one sign.
+    """Where innovations e [% PV], shape (n,), are large or keep one sign; a record too short is located nowhere.
 
-    Parameters
-    ----------
-    e : ndarray of shape (n,)
-        Innovations of the plain loop [% PV].
-    pv, op : ndarray of shape (n,)
-        Trends [% of span].
-    judged : ndarray of bool, shape (n,)
-        False where an innovation does not count.
-    dt_s : float
-        Sample interval [s].
-    late, memory : int
-        Samples of dead time, and of dead time and time constant together.
-    seed : int
-        Of the block orders.
+    late, memory : samples of dead time, and of dead time and time constant together; seed : of the block orders.
     """
     count = int(judged.sum())
     wanted = max(BLOCK_MEMORIES * memory, SHORTEST_BLOCK)
     blocks = min(max(int(count / wanted), FEWEST_BLOCKS), MOST_BLOCKS)
     if count // blocks < max(memory, SHORTEST_BLOCK) or float(np.ptp(e[judged])) == 0.0:
-        return nothing(e.size)
+        return Located((), np.zeros(e.size))
     found = groups(pv, op, dt_s, late, memory)
     columns = [g.columns[judged] for g in found]
     y = responses(e[judged])
     bases = directions(columns)
     whole = _basis(np.concatenate(columns, axis=1) - np.concatenate(columns, axis=1).mean(axis=0))
-    p, excess, together = chances([*bases, whole], y, blocks, seed)
+    p, excess = chances(bases, y, blocks, seed)
     size = max(float(np.sqrt(np.mean(e[judged] ** 2))), 1e-300)
     features = [
         _feature(g, basis, y, float(p[i]), excess[i], e[judged] / size, judged)
@@ -384,7 +323,7 @@ def located(
     ]
     local = np.zeros(e.size)
     local[judged] = np.maximum(_along(whole, y[:, :1])[:, 0], 0.0)
-    return Located(tuple(sorted(features, key=lambda f: (f.p, -f.share))), together, local)
+    return Located(tuple(sorted(features, key=lambda f: (f.p, -f.share))), local)
 
 
 def _feature(
@@ -396,4 +335,4 @@ def _feature(
     drawn = profile(g.signal[judged], along)
     run = part_of_range(drawn.power if by == 0 else np.abs(drawn.mean))
     low, high = (None, None) if run is None else (float(drawn.low[run[0]]), float(drawn.high[run[1]]))
-    return Feature(g.name, p, float(own[by]), ("power", "sign")[by], drawn, low, high)
+    return Feature(g.name, p, float(own[by]), ("power", "sign")[by], low, high)

@@ -11,7 +11,7 @@ import numpy as np
 from identification.estimation.candidate import Fitted, Problem
 from identification.estimation.noise import whitened
 from identification.mismatch.explanation import Explanation
-from identification.mismatch.location import Feature, Located, located
+from identification.mismatch.location import Located, located
 from identification.mismatch.recording import Recording
 from identification.record import Floats, Mask
 from identification.simulation.open_loop import simulate
@@ -31,8 +31,8 @@ FEWEST_MEMORY = 2
 """A loop is taken to remember at least this many samples."""
 
 
-def carrying(won: Floats) -> list[tuple[int, int]]:
-    """Parts that together carry CARRIES of a gain, neighbours joined: first and last (excluded) sample of each."""
+def carrying(won: Floats, dt_s: float) -> list[list[float]]:
+    """Parts that together carry CARRIES of a gain, neighbours joined: first and last (excluded) time of each [s]."""
     edges = np.linspace(0, won.size, PARTS + 1).astype(int)
     parts = np.maximum([won[a:b].sum() for a, b in pairwise(edges)], 0.0)
     order = np.argsort(-parts)
@@ -41,12 +41,12 @@ def carrying(won: Floats) -> list[tuple[int, int]]:
     chosen[order[:count]] = 1
     turn = np.diff(np.concatenate(([0], chosen, [0])))
     firsts, lasts = np.flatnonzero(turn == 1), np.flatnonzero(turn == -1)
-    return [(int(edges[a]), int(edges[b])) for a, b in zip(firsts, lasts, strict=True)]
+    return [[int(edges[a]) * dt_s, int(edges[b]) * dt_s] for a, b in zip(firsts, lasts, strict=True)]
 
 
-def masked_spans(where: Mask) -> list[tuple[int, int]]:
-    """Spans of a mask, by the parts that hold most of it; the whole record where it is True throughout."""
-    return [(0, where.size)] if where.all() else carrying(where.astype(float))
+def masked_spans(where: Mask, dt_s: float) -> list[list[float]]:
+    """Spans of a mask [s], by the parts that hold most of it; the whole record where it is True throughout."""
+    return [[0.0, where.size * dt_s]] if where.all() else carrying(where.astype(float), dt_s)
 
 
 def ranges(x: Floats, weight: Floats) -> list[float]:
@@ -97,20 +97,23 @@ def won_over(p: Problem, plain: Fitted, best: Fitted) -> tuple[Floats, Floats]:
 def features_said(found: Located) -> list[dict[str, Any]]:
     """The features as data: name, chance, whether they carry the misfit, by what, in which part of their range."""
     return [
-        {"name": f.name, "p": f.p, "carries": f.carries, "share": f.share, "by": f.of, "range": _part(f)}
+        {
+            "name": f.name,
+            "p": f.p,
+            "carries": f.carries,
+            "share": f.share,
+            "by": f.of,
+            "range": [] if f.low is None or f.high is None else [f.low, f.high],
+        }
         for f in found.features
     ]
-
-
-def _part(f: Feature) -> list[float]:
-    return [] if f.low is None or f.high is None else [f.low, f.high]
 
 
 def where_of(found: Explanation, s: Recording, block: str, at: Located) -> dict[str, Any]:
     """Where the misfit is: signals, spans [s], ranges, direction of OP, periods [s] and the features that carry it.
 
     Of an effect of the physics it is where the plain model loses to the better one; of recorder and controller,
-    where the finding is; of what has no name, where the plain loop's innovations are large.
+    where the finding is; of what has no name, where the innovations are large.
 
     Parameters
     ----------
@@ -121,12 +124,11 @@ def where_of(found: Explanation, s: Recording, block: str, at: Located) -> dict[
     at : Located
         Of the plain loop's innovations (of the last model's, where something is left over).
     """
-    marked = found.finding
-    told: dict[str, Any] = {"features": features_said(at), "after_reversals": _carries(at, "after_reversals")}
+    p, marked, signals = found.p, found.finding, SIGNALS.get(block, ["OP", "PV"])
+    after = any(f.name == "after_reversals" for f in at.carrying)
+    told: dict[str, Any] = {"features": features_said(at), "after_reversals": after}
     if marked is not None:
-        spans = masked_spans(marked.where[: s.pv.size])
-        return {"signals": SIGNALS.get(block, ["OP", "PV"]), "spans": _seconds(spans, s.dt_s)} | told
-    p = found.p
+        return {"signals": signals, "spans": masked_spans(marked.where[: s.pv.size], s.dt_s)} | told
     if found.accepted:
         won, difference = won_over(p, found.plain, found.best)
     elif found.left > 0:
@@ -135,18 +137,10 @@ def where_of(found: Explanation, s: Recording, block: str, at: Located) -> dict[
     else:
         return {"signals": [], "spans": []} | told
     return {
-        "signals": SIGNALS.get(block, ["OP", "PV"]),
-        "spans": _seconds(carrying(won), s.dt_s),
+        "signals": signals,
+        "spans": carrying(won, s.dt_s),
         "pv_range": ranges(s.pv, won),
         "op_range": ranges(s.op, won),
         "direction": direction(s.op, won),
         "band_s": band(difference, s.dt_s),
     } | told
-
-
-def _carries(at: Located, name: str) -> bool:
-    return any(f.name == name for f in at.carrying)
-
-
-def _seconds(spans: list[tuple[int, int]], dt_s: float) -> list[list[float]]:
-    return [[a * dt_s, b * dt_s] for a, b in spans]

@@ -1,7 +1,5 @@
 """Backlash: after each turn of OP the stem waits until the play is taken up."""
 
-from __future__ import annotations
-
 from identification.mismatch.effect import Block, Effect, Friction, Param, Slot, Variant, each
 from identification.mismatch.pictures import stem_over_op
 

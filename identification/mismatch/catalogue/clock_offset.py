@@ -1,7 +1,5 @@
 """PV stamped by another clock than OP."""
 
-from __future__ import annotations
-
 from identification.controller.check import LATE_SAMPLES, ControllerFault
 from identification.mismatch.effect import Block, Fault, Number
 from identification.mismatch.fault_pictures import other_clock

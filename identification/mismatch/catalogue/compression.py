@@ -1,7 +1,5 @@
 """A historian that keeps few points and draws straight lines between them."""
 
-from __future__ import annotations
-
 from identification.mismatch import recording_faults
 from identification.mismatch.effect import Block, Ends, Fault, Number
 from identification.mismatch.fault_pictures import straight_lines

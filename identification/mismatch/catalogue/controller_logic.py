@@ -1,7 +1,5 @@
 """Something beside the control law moves OP or holds it: tracking, overrides, a hand."""
 
-from __future__ import annotations
-
 from identification.controller.check import ControllerFault
 from identification.mismatch.effect import Block, Fault, Number
 from identification.mismatch.fault_pictures import outside_law

@@ -1,7 +1,5 @@
 """A controller that runs with other settings than stated."""
 
-from __future__ import annotations
-
 from identification.controller.check import ControllerFault
 from identification.mismatch.effect import Block, Fault, Number
 from identification.mismatch.fault_pictures import other_settings

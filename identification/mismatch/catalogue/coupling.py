@@ -1,7 +1,5 @@
 """Another loop of the export that moves this one, through a gain and a lag."""
 
-from __future__ import annotations
-
 from identification.mismatch.effect import Block, Effect, Param, Slot, Variant
 from identification.mismatch.pictures import load_over_time
 

@@ -1,7 +1,5 @@
 """PV that rises and falls with different time constants."""
 
-from __future__ import annotations
-
 import math
 
 from identification.mismatch.effect import Block, Effect, Estimate, Param, Parameters, Slot, Variant, each

@@ -1,7 +1,5 @@
 """A dead time that shrinks when the flow grows: transport through a pipe."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from identification.mismatch.effect import Block, Effect, Floats, Param, Slot, Variant, each

@@ -1,7 +1,5 @@
 """A process gain that changes over the recording: fouling, wear."""
 
-from __future__ import annotations
-
 from identification.mismatch.effect import Block, Effect, Floats, Param, Slot, Variant, each
 from identification.mismatch.pictures import GAIN, Drawing, Shape, course
 from identification.simulation.open_loop import ModelInputs

@@ -1,7 +1,5 @@
 """A process that integrates: its gain over time constant is all there is to know."""
 
-from __future__ import annotations
-
 from identification.mismatch.effect import Block, Effect, Floats, Slot, Variant
 from identification.mismatch.pictures import pv_response
 

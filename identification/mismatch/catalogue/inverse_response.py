@@ -1,7 +1,5 @@
 """A share of each move that acts the other way, faster or slower than the rest."""
 
-from __future__ import annotations
-
 from identification.mismatch.effect import Block, Effect, Param, Slot, Variant
 from identification.mismatch.pictures import pv_response
 

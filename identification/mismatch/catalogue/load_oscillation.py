@@ -1,7 +1,5 @@
 """A sine that enters at the process's inlet."""
 
-from __future__ import annotations
-
 import math
 
 from identification.mismatch.effect import Block, Effect, Estimate, Param, Parameters, Slot, Variant, exact

@@ -1,7 +1,5 @@
 """Load that comes in as up to three steps at the process's inlet."""
 
-from __future__ import annotations
-
 from identification.mismatch.effect import Block, Effect, Param, Slot, Variant
 from identification.mismatch.pictures import LOAD, Drawing, Shape, course
 from identification.simulation.open_loop import load

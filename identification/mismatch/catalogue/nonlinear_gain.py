@@ -1,7 +1,5 @@
 """A process gain that changes with PV, by its outflow or by its inflow, with or without the speed."""
 
-from __future__ import annotations
-
 from identification.mismatch.effect import Block, Effect, Param, Slot, Variant, each
 from identification.mismatch.pictures import gain_over_pv
 

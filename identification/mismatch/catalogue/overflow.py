@@ -1,7 +1,5 @@
 """A vessel that spills over above a level."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from identification.mismatch.effect import Block, Effect, Floats, Param, Slot, Start, Variant, each

@@ -1,7 +1,5 @@
 """A position loop of second order that rests within a dead band of its aim."""
 
-from __future__ import annotations
-
 from identification.mismatch.effect import Block, Effect, Friction, Param, Slot, Variant
 from identification.mismatch.pictures import Drawing, Shape, stem_response
 

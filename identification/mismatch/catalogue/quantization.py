@@ -1,7 +1,5 @@
 """A transmitter or its card that knows few values."""
 
-from __future__ import annotations
-
 from identification.mismatch import recording_faults
 from identification.mismatch.effect import Block, Ends, Fault, Number
 from identification.mismatch.fault_pictures import grid

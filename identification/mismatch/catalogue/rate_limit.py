@@ -1,7 +1,5 @@
 """A stem that moves no faster than so much a second."""
 
-from __future__ import annotations
-
 from identification.mismatch.effect import Block, Effect, Param, Slot, Variant, each
 from identification.mismatch.pictures import stem_response, step_size
 

@@ -1,7 +1,5 @@
 """Polling that scatters: values stand at other times than their stamps say."""
 
-from __future__ import annotations
-
 from identification.mismatch import recording_faults
 from identification.mismatch.effect import Block, Ends, Fault, Number
 from identification.mismatch.fault_pictures import spacings

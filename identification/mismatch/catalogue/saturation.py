@@ -1,7 +1,5 @@
 """A valve that does nothing more beyond a position: a stop, a hand valve, a pump at its end."""
 
-from __future__ import annotations
-
 from identification.mismatch.effect import Block, Effect, Param, Slot, Variant, each
 from identification.mismatch.pictures import flow_over_op
 

@@ -1,7 +1,5 @@
 """One lag more, or two: between valve and process, or in the transmitter, which the data cannot tell."""
 
-from __future__ import annotations
-
 from identification.mismatch.effect import Block, Effect, Param, Slot, Start, Variant, each
 from identification.mismatch.pictures import pv_response
 

@@ -1,7 +1,5 @@
 """A transmitter whose range ends before the process does."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from identification.mismatch import recording_faults

@@ -1,7 +1,5 @@
 """A share of each move that arrives with a time constant of its own, much later."""
 
-from __future__ import annotations
-
 from identification.mismatch.effect import Block, Effect, Param, Slot, Variant
 from identification.mismatch.pictures import pv_response
 

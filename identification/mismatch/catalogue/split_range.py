@@ -1,7 +1,5 @@
 """A second valve that takes over above a point, after a dead zone and perhaps a lag."""
 
-from __future__ import annotations
-
 from identification.mismatch.effect import Block, Effect, Param, Slot, Start, Variant
 from identification.mismatch.pictures import flow_over_op
 

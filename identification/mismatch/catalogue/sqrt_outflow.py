@@ -1,7 +1,5 @@
 """A vessel whose outflow grows with the root of its level."""
 
-from __future__ import annotations
-
 from identification.mismatch.effect import Block, Effect, Param, Slot, Variant, each
 from identification.mismatch.pictures import gain_over_pv
 

@@ -1,7 +1,5 @@
 """Stiction: the stem holds through the stickband and then jumps; behind the jump it rests, halts or slides."""
 
-from __future__ import annotations
-
 from identification.estimation.covariance import LEAST_BAND, LEAST_JUMP, reaching
 from identification.mismatch.effect import Block, Effect, Estimate, Friction, Param, Parameters, Slot, Variant
 from identification.mismatch.pictures import stem_over_op

@@ -1,7 +1,5 @@
 """A supply to the valve that wanders slowly and changes gain and bias together."""
 
-from __future__ import annotations
-
 from identification.mismatch.effect import Block, Effect, Param, Slot, Variant
 from identification.mismatch.pictures import Axis, Drawing, Shape, course
 from identification.simulation.open_loop import head

@@ -1,7 +1,5 @@
 """A trim whose gain changes along the stroke: local gain exp(curve (z - middle)/100)."""
 
-from __future__ import annotations
-
 from identification.mismatch.effect import Block, Effect, Param, Slot, Variant, each
 from identification.mismatch.pictures import flow_over_op
 
