@@ -16,19 +16,9 @@ from identification.record import Floats
 from identification.simulation.effect import Act, Param, Signal, Start, Variant, each
 from identification.simulation.parameters import Slot, own_slot
 
-__all__ = ["Act", "Block", "Effect", "Ends", "Estimate", "Fault", "Finding", "Floats", "Friction", "Number"]
-__all__ += [
-    "Param",
-    "Parameters",
-    "Recording",
-    "Signal",
-    "Slot",
-    "Start",
-    "Variant",
-    "each",
-    "exact",
-    "own_slot",
-]
+__all__ = ["Act", "Block", "Effect", "Ends", "Estimate", "Fault", "Finding", "Floats", "Friction"]
+__all__ += ["Number", "Param", "Parameters", "Recording", "Signal", "Slot", "Start", "Variant"]
+__all__ += ["each", "exact", "own_slot"]
 Parameters = Mapping[str, Estimate]
 
 

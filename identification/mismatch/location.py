@@ -13,6 +13,7 @@ import numpy as np
 from numba import njit
 from scipy.ndimage import binary_opening
 
+from identification.controller.check import runs
 from identification.record import Floats, Mask
 from identification.signals.robust import robust_deviation
 
@@ -290,12 +291,11 @@ def part_of_range(height: Floats) -> tuple[int, int] | None:
     if height.size < 4:
         return None
     line = 0.5 * float(height.max() + np.median(height))
-    edge = np.diff(np.concatenate(([0], (height > line).astype(np.int8), [0])))
-    firsts, lasts = np.flatnonzero(edge == 1), np.flatnonzero(edge == -1)
-    if firsts.size == 0:
+    high = runs(height > line)
+    if not high:
         return None
-    run = int(np.argmax([height[a:b].sum() for a, b in zip(firsts, lasts, strict=True)]))
-    return int(firsts[run]), int(lasts[run]) - 1
+    first, last = max(high, key=lambda run: height[run[0] : run[1]].sum())
+    return int(first), int(last) - 1
 
 
 def located(

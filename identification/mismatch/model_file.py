@@ -73,21 +73,26 @@ def constants(data: dict[str, Any]) -> Floats:
     return c
 
 
-def carried(data: dict[str, Any], op: Floats, pv: Floats, dt_s: float) -> Floats:
-    """PV [% PV], shape (n,), that a saved model gives for another recording's OP, with a constant bias freed."""
-    c = constants(data)
+def inputs_for(data: dict[str, Any], op: Floats, pv: Floats, dt_s: float) -> ModelInputs:
+    """Another recording as what drives a saved model."""
     level = float(data.get("level_pv_pct", np.mean(pv)))
     middle = float(data.get("middle_op_pct", np.mean(op)))
-    inputs = ModelInputs(op, dt_s, middle, level, (float(pv.min()), float(pv.max())))
+    return ModelInputs(op, dt_s, middle, level, (float(pv.min()), float(pv.max())))
+
+
+def carried(data: dict[str, Any], op: Floats, pv: Floats, dt_s: float) -> Floats:
+    """PV [% PV], shape (n,), that a saved model gives for another recording's OP, with a constant bias freed."""
+    c, inputs = constants(data), inputs_for(data, op, pv, dt_s)
+    inside = (pv < c[Slot.CLIP_HI] - 1e-6) & (pv > c[Slot.CLIP_LO] + 1e-6)
     bias, out = 0.0, pv
     for _ in range(BIAS_PASSES):
         free = c.copy()
-        free[Slot.START] = float(pv[0]) - level - bias
+        free[Slot.START] = float(pv[0]) - inputs.level - bias
         for clip in (Slot.CLIP_HI, Slot.CLIP_LO):
             free[clip] = math.copysign(math.inf, neutral()[clip])
         free = begun_at_rest(inputs, free) if c[Slot.BEGUN] != 0.0 else free
-        out = level + simulate(inputs, free)
-        bias = _bias(pv, out, c)
+        out = inputs.level + simulate(inputs, free)
+        bias = float(np.mean(pv[inside] - out[inside])) if inside.any() else 0.0
     out = np.clip(out + bias, c[Slot.CLIP_LO], c[Slot.CLIP_HI])
     late = float(data.get("late_s", 0.0)) / dt_s
     if late:
@@ -106,16 +111,6 @@ def carried_closed(
     NotAssessedError
         The model cannot be stepped sample by sample (closed_model).
     """
-    c = constants(data)
-    level = float(data.get("level_pv_pct", np.mean(pv)))
-    middle = float(data.get("middle_op_pct", np.mean(op)))
-    c[Slot.START] = float(pv[0]) - level
-    inputs = ModelInputs(op, dt_s, middle, level, (float(pv.min()), float(pv.max())))
+    c, inputs = constants(data), inputs_for(data, op, pv, dt_s)
+    c[Slot.START] = float(pv[0]) - inputs.level
     return closed_model(inputs, c, sp, stated.kp, stated.ti)
-
-
-def _bias(pv: Floats, out: Floats, c: Floats) -> float:
-    inside = (pv < c[Slot.CLIP_HI] - 1e-6) & (pv > c[Slot.CLIP_LO] + 1e-6)
-    if not inside.any():
-        return 0.0
-    return float(np.mean(pv[inside] - out[inside]))

@@ -11,12 +11,11 @@ import numpy as np
 from identification.estimation.candidate import problem
 from identification.mismatch.catalogue import EFFECTS
 from identification.mismatch.explanation import Explanation, by_cycles
-from identification.mismatch.model_file import carried, constants, to_data
+from identification.mismatch.model_file import carried, constants, inputs_for, to_data
 from identification.mismatch.proof import HeldOut, Misfit, OnOther, anchored, course, misfit
 from identification.mismatch.recording import Recording
 from identification.mismatch.selection import without
 from identification.record import Floats
-from identification.simulation.open_loop import ModelInputs
 from identification.simulation.parameters import Slot
 
 
@@ -24,11 +23,9 @@ def simulated_there(found: Explanation, c: Floats, s: Recording, window: int) ->
     """PV [% PV], shape (n,), that constants give for another recording's OP, anchored in windows."""
     data = to_data("", found.p.inputs, c, found.best.names, found.late_s, None)
     if window and found.proven.placed:
-        inputs = found.p.inputs
-        here = ModelInputs(s.op, s.dt_s, inputs.middle, inputs.level, (float(s.pv.min()), float(s.pv.max())))
-        c = constants(data)
-        c[Slot.START] = float(s.pv[0]) - inputs.level
-        return inputs.level + course(problem(here, s.pv - inputs.level, s.usable), c, window, True)
+        c, here = constants(data), inputs_for(data, s.op, s.pv, s.dt_s)
+        c[Slot.START] = float(s.pv[0]) - here.level
+        return here.level + course(problem(here, s.pv - here.level, s.usable), c, window, True)
     return anchored(s.pv, carried(data, s.op, s.pv, s.dt_s), window)
 
 
@@ -49,35 +46,34 @@ def together(parts: Sequence[Misfit], samples: Sequence[int]) -> Misfit:
     return Misfit(left, 100.0 * (1.0 - left / max(own, 1e-12)))
 
 
-def windows_of(found: Explanation, s: Recording) -> tuple[int, ...]:
-    """Windows in which models are compared there [samples]: the whole, and what own proof or loop ask for."""
+def window_of(found: Explanation, s: Recording) -> int:
+    """Samples there over which models are compared where the whole shows the load alone, as own proof or loop ask."""
     if found.proven.window:
-        return 0, max(round(found.proven.window * found.p.inputs.dt_s / s.dt_s), 1)
-    c = found.plain.model.c
-    limits = found.p.limits.proof
+        return max(round(found.proven.window * found.p.inputs.dt_s / s.dt_s), 1)
+    c, limits = found.plain.model.c, found.p.limits.proof
     memory = limits.window_times * float(c[Slot.T] + c[Slot.L]) / s.dt_s
-    return 0, max(math.ceil(min(memory, 1e9)), limits.window_samples)
+    return max(math.ceil(min(memory, 1e9)), limits.window_samples)
 
 
 def compared(found: Explanation, others: Sequence[Recording]) -> tuple[HeldOut, tuple[OnOther, ...]]:
     """The proof on other recordings: over the whole of each, or over windows where the whole shows the load alone."""
-    whole, windowed = (_compared(found, others, at) for at in (0, 1))
-    return whole if whole[0].carries else windowed
+    whole = _compared(found, others, [0] * len(others), False)
+    if whole[0].carries:
+        return whole
+    return _compared(found, others, [window_of(found, s) for s in others], found.proven.placed)
 
 
 def _compared(
-    found: Explanation, others: Sequence[Recording], at: int
+    found: Explanation, others: Sequence[Recording], windows: Sequence[int], placed: bool
 ) -> tuple[HeldOut, tuple[OnOther, ...]]:
-    """The same over the whole (0) or over windows (1)."""
-    p = found.p
-    each = tuple(on_other(found, s, windows_of(found, s)[at]) for s in others)
+    """The same over windows of each recording, 0 for the whole."""
+    p, drawn = found.p, found.proven.drawn
+    each = tuple(on_other(found, s, window) for s, window in zip(others, windows, strict=True))
     samples = [x.samples for x in each]
     held = together([x.baseline for x in each], samples), together([x.explained for x in each], samples)
-    window = round(windows_of(found, others[0])[at] * others[0].dt_s / p.inputs.dt_s)
-    placed = bool(at and found.proven.placed)
-    drawn = found.proven.drawn
-    courses = [course(p, c, window, placed) for c in drawn]
-    seen = misfit(p.y, courses[0], window), misfit(p.y, courses[1], window)
+    window = round(windows[0] * others[0].dt_s / p.inputs.dt_s)
+    plain, better = (misfit(p.y, course(p, c, window, placed), window) for c in drawn)
+    seen = plain, better
     return HeldOut(0.0, seen, held, seen, drawn, window, placed, limits=p.limits.proof), each
 
 
@@ -85,13 +81,7 @@ def proven_on(found: Explanation, others: Sequence[Recording]) -> Explanation:
     """The explanation, kept where it carries over to other recordings, given up where it does not.
 
     An effect bound to a time says nothing of another recording; a valve that the cycles there show too keeps its
-    name.
-
-    Parameters
-    ----------
-    found : Explanation
-    others : sequence of Recording
-        Of the same loop, in the percent of the recording that was fitted.
+    name. The others are of the same loop, in the percent of the recording that was fitted.
     """
     if not others or not found.accepted:
         return found

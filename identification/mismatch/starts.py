@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.ndimage import median_filter
 
+from identification.controller.check import runs
 from identification.estimation.candidate import Fitted, Model, Problem, scales
 from identification.estimation.noise import whitened
 from identification.estimation.prediction_error import sensitivities
@@ -108,9 +109,8 @@ def _best_place(e: Floats, pulse: Floats, shut: Mask) -> int:
 def after_gaps(p: Problem, fit: Fitted) -> Mask:
     """True in gaps and until what OP did in them has died away in PV, shape (n,): no step can be told there."""
     held = round(float(fit.model.c[Slot.L] + FORGOTTEN * fit.model.c[Slot.T]) / p.inputs.dt_s)
-    gone = np.diff(np.concatenate(([0], (~p.usable).astype(np.int8), [0])))
     out = np.zeros(p.y.size, dtype=bool)
-    for first, last in zip(np.flatnonzero(gone == 1), np.flatnonzero(gone == -1), strict=True):
+    for first, last in runs(~p.usable):
         if last - first >= GAP_SAMPLES:
             out[max(first - 1, 0) : last + held] = True
     return out

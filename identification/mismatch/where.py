@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from identification.controller.check import runs
 from identification.estimation.candidate import Fitted, Problem
 from identification.estimation.noise import whitened
 from identification.mismatch.explanation import Explanation
@@ -37,11 +38,9 @@ def carrying(won: Floats, dt_s: float) -> list[list[float]]:
     parts = np.maximum([won[a:b].sum() for a, b in pairwise(edges)], 0.0)
     order = np.argsort(-parts)
     count = int(np.searchsorted(np.cumsum(parts[order]), CARRIES * parts.sum())) + 1
-    chosen = np.zeros(PARTS, dtype=np.int8)
-    chosen[order[:count]] = 1
-    turn = np.diff(np.concatenate(([0], chosen, [0])))
-    firsts, lasts = np.flatnonzero(turn == 1), np.flatnonzero(turn == -1)
-    return [[int(edges[a]) * dt_s, int(edges[b]) * dt_s] for a, b in zip(firsts, lasts, strict=True)]
+    chosen = np.zeros(PARTS, dtype=bool)
+    chosen[order[:count]] = True
+    return [[int(edges[a]) * dt_s, int(edges[b]) * dt_s] for a, b in runs(chosen)]
 
 
 def masked_spans(where: Mask, dt_s: float) -> list[list[float]]:
