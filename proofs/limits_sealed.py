@@ -17,8 +17,7 @@ from analyzer.loops.spec import spec_of
 from identification.controller.check import StatedSettings
 from identification.mismatch.answer import answer
 from identification.mismatch.diagnosis import controller_finding_of, explain, recorder_finding_of
-from identification.mismatch.recording import STEP, Finding, Recording
-from identification.mismatch.recording_faults import unlogged
+from identification.mismatch.recording import STEP, Finding, Recording, unlogged
 from proofs.concealed.make import seal
 from proofs.concealed.plan import Case, plan
 from proofs.limits_samples import DEFAULT, tried

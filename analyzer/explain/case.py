@@ -26,8 +26,7 @@ from identification.estimation.hammerstein import process_of
 from identification.estimation.likelihood_ratio import WindowFit
 from identification.estimation.trials import trials_between_moves
 from identification.mismatch.experiment import coarser_by, is_experiment
-from identification.mismatch.recording import Recording, SeenInCycles
-from identification.mismatch.recording_faults import least_jump
+from identification.mismatch.recording import Recording, SeenInCycles, least_jump
 from identification.models import Pid
 from identification.record import Floats
 

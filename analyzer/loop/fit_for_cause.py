@@ -12,7 +12,7 @@ from analyzer.loop.quality import Prepared
 from analyzer.loop.sample_clock import constant_for
 from analyzer.words import settings as words
 from identification.limits import RecorderLimits
-from identification.mismatch.recording_faults import least_jump
+from identification.mismatch.recording import least_jump
 from identification.record import LoopRecord
 
 

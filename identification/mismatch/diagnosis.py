@@ -1,6 +1,6 @@
 """From one recording to its explanation: recorder, controller, plain loop, then effects until nothing passes.
 
-Read on in the order of the walk: recording_faults, plain_loop, rounds, selection (starts, friction), proof,
+Read on in the order of the walk: the catalogue's faults, plain_loop, rounds, selection (starts, friction), proof,
 explanation, experiment; answer then puts the explanation in numbers.
 """
 
@@ -13,13 +13,12 @@ import numpy as np
 
 from identification.controller.check import LATE_SAMPLES, judge
 from identification.controller.pi_regression import ControlLaw, shifted, unstated_law
-from identification.mismatch import recording_faults
 from identification.mismatch.catalogue import CONTROLLER_FAULTS, RECORDER_FAULTS, fault
 from identification.mismatch.effect import Ends
 from identification.mismatch.experiment import agreed, is_experiment
 from identification.mismatch.explanation import Explanation, beyond_the_grid, carried_over
 from identification.mismatch.plain_loop import Clip, inputs_of, prepared, without_spikes
-from identification.mismatch.recording import Finding, Recording
+from identification.mismatch.recording import Finding, Recording, straightened, unlogged
 from identification.mismatch.rounds import physics
 from identification.mismatch.selection import Progress, silent
 from identification.record import Floats
@@ -36,7 +35,7 @@ def explain(s: Recording, tell: Progress = silent, brought: Floats | None = None
     brought : ndarray of shape (SIZE,) or None
         Constants of the user's own model, with which the plain loop's search begins beside its own starts.
     """
-    held = recording_faults.unlogged(s.stamp_s, s.pv.size, s.dt_s, s.limits.recorder)
+    held = unlogged(s.stamp_s, s.pv.size, s.dt_s, s.limits.recorder)
     s = replace(s, usable=s.usable & ~held)
     recorder = recorder_finding_of(s)
     controller, law = controller_finding_of(s, recorder)
@@ -81,7 +80,7 @@ def controller_finding_of(s: Recording, recorder: Finding | None) -> tuple[Findi
     that gives OP, stated or not."""
     if s.sp is None or ends(recorder) is Ends.ALL:
         return None, None
-    if any(recording_faults.straightened(x, s.limits.recorder.straight_law) for x in (s.pv, s.op)):
+    if any(straightened(x, s.limits.recorder.straight_law) for x in (s.pv, s.op)):
         return None, None
     free = s.usable & (s.op > 0.05) & (s.op < 99.95)
     if s.stated is None:

@@ -1,12 +1,14 @@
-"""One recording to be explained, and what is found in it before any physics is fitted."""
+"""One recording to be explained, what is found in it before any physics is fitted, and how its trends look."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from identification.controller.check import StatedSettings
-from identification.limits import LIMITS, ExplainLimits
+from identification.limits import LIMITS, ExplainLimits, RecorderLimits
 from identification.models import Backlash, Estimate, Fopdt, Stiction
 from identification.record import Floats, Mask
 
@@ -90,3 +92,62 @@ class Finding:
     values: Mapping[str, float]
     where: Mask = field(repr=False)
     name: str = ""
+
+
+def straight(pv: Floats) -> Mask:
+    """True where a moving trend is straight through three samples, shape (n,)."""
+    out = np.zeros(pv.size, dtype=bool)
+    rise = np.diff(pv)
+    tiny = 2e-7 * max(float(np.abs(pv).max()), 1e-3)
+    out[1:-1] = (np.abs(np.diff(rise)) < 3 * tiny) & (np.abs(rise[1:]) > 10 * tiny)
+    return out
+
+
+def level_gaps(pv: Floats) -> Floats:
+    """Differences of neighbouring values that occur, in the middle nine tenths of the range; shape (levels - 1,)."""
+    low, high = np.quantile(pv, [0.05, 0.95])
+    return np.diff(np.unique(pv[(pv >= low) & (pv <= high)]))
+
+
+def straightened(x: Floats, share: float) -> bool:
+    """Whether at least that share of a trend lies on straight lines that no grid makes."""
+    return float(straight(x).mean()) >= share and not on_grid(level_gaps(x))
+
+
+def on_grid(gaps: Floats) -> bool:
+    """Whether differences of values are multiples of the smallest that is common."""
+    if gaps.size < 5:
+        return True
+    unit = float(np.quantile(gaps, 0.1))
+    return float(np.mean(np.abs(gaps / unit - np.round(gaps / unit)) < 0.05)) > 0.6
+
+
+def least_jump(pv: Floats, limits: RecorderLimits = LIMITS.recorder) -> float:
+    """The least move [% PV] of a trend that stands and then jumps, far over its own resolution; 0 of any other.
+
+    A sensor that sticks makes such a trend, or a historian that keeps changes of some size alone.
+    """
+    moves, gaps = np.abs(np.diff(pv)), np.diff(np.unique(pv))
+    moves = moves[moves > 0.0]
+    if moves.size < limits.jumps or moves.size > (1.0 - limits.stands) * pv.size:
+        return 0.0
+    jump = float(np.quantile(moves, 0.02))
+    low, high = np.quantile(pv, [0.05, 0.95])
+    coarse = jump > limits.jump_steps * float(np.quantile(gaps, 0.1)) and jump > limits.jump_share * (
+        high - low
+    )
+    return jump if coarse else 0.0
+
+
+def unlogged(stamp_s: Floats, n: int, dt_s: float, limits: RecorderLimits = LIMITS.recorder) -> Mask:
+    """True where a record of n samples holds a value over from before because none was logged, shape (n,).
+
+    Nothing is marked where the record does not begin with the first stamp and end with the last.
+    """
+    out = np.zeros(n, dtype=bool)
+    at = (stamp_s - stamp_s[0]) / dt_s if stamp_s.size else stamp_s
+    if stamp_s.size < 2 or abs(float(at[-1]) - (n - 1)) > 1.5:
+        return out
+    for k in np.flatnonzero(np.diff(at) > limits.missed):
+        out[int(np.ceil(at[k] + 0.5)) : int(np.floor(at[k + 1] + 0.5))] = True
+    return out

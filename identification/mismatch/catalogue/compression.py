@@ -1,8 +1,17 @@
 """A historian that keeps few points and draws straight lines between them."""
 
-from identification.mismatch import recording_faults
-from identification.mismatch.effect import Block, Ends, Fault, Number
+from identification.mismatch.effect import Block, Ends, Fault, Finding, Number, Recording
 from identification.mismatch.fault_pictures import straight_lines
+from identification.mismatch.recording import straight, straightened
+
+
+def straight_segments(s: Recording) -> Finding | None:
+    """Straight segments whose breaks stand on no grid (swinging door and the like)."""
+    if not straightened(s.pv, s.limits.recorder.straight):
+        return None
+    found = straight(s.pv)
+    return Finding({"straight_share": float(found.mean())}, found)
+
 
 EFFECT = Fault(
     name="compression",
@@ -11,7 +20,7 @@ EFFECT = Fault(
     check="Switch compression and exception off for PV, SP and OP, then ask again.",
     caption="Straight segments between few stored points: what happened between them is not known.",
     order=0,
-    find=lambda s: recording_faults.compression(s.pv, s.limits.recorder),
+    find=straight_segments,
     ends=Ends.ALL,
     numbers=(Number("straight_share", "", "Samples on straight lines"),),
     drawn=straight_lines,

@@ -1,11 +1,39 @@
 """A transmitter or its card that knows few values."""
 
-from identification.mismatch import recording_faults
-from identification.mismatch.effect import Block, Ends, Fault, Number
-from identification.mismatch.fault_pictures import grid
+import numpy as np
 
+from identification.mismatch.effect import Block, Ends, Fault, Finding, Floats, Number, Recording
+from identification.mismatch.fault_pictures import grid
+from identification.mismatch.recording import STEP, level_gaps
+
+OFTEN, FEWEST = 0.2, 4
+"""Share of the mean count from which a value is one at which PV dwells, and samples there at least; ours."""
 SURE = 0.01
 """Half width of the interval, in the step found; ours."""
+
+
+def coarse_grid(s: Recording) -> Finding | None:
+    """Values on a grid coarser than a historian's, the coarser where percent is of the recorded range."""
+    gaps, limits = level_gaps(s.pv), s.limits.recorder
+    least = limits.grid_step if s.ranged else limits.grid_step_of_range
+    if gaps.size == 0 or gaps.size * 20 > s.pv.size or float(gaps.mean()) < least:
+        return None
+    if float(gaps.max()) > 4.0 * float(gaps.mean()):
+        return None
+    return Finding({STEP: grid_unit(s.pv)}, np.ones(s.pv.size, dtype=bool))
+
+
+def grid_unit(pv: Floats) -> float:
+    """The step of values [% PV]: their mean distance where PV dwells, so that none between is left out.
+
+    A finer rounding over a converter's steps makes some longer and some shorter, and the mean is theirs.
+    """
+    levels, counts = np.unique(pv, return_counts=True)
+    often = counts >= max(OFTEN * pv.size / levels.size, FEWEST)
+    gaps = np.diff(levels)
+    dwelt = gaps[often[1:] & often[:-1]]
+    return float(dwelt.mean() if dwelt.size >= FEWEST - 1 else np.median(gaps))
+
 
 EFFECT = Fault(
     name="quantization",
@@ -15,7 +43,7 @@ EFFECT = Fault(
     caption="How often each value of PV was recorded: a coarse sensor leaves gaps between teeth.",
     tests={"stiction": "The grid: plateaus of a sticking valve do not share one."},
     order=2,
-    find=lambda s: recording_faults.quantization(s.pv, s.ranged, s.limits.recorder),
+    find=coarse_grid,
     ends=Ends.SMALLER,
     numbers=(Number("step_pct", "% PV", "Step of values", share=SURE),),
     drawn=grid,

@@ -1,11 +1,23 @@
 """Polling that scatters: values stand at other times than their stamps say."""
 
-from identification.mismatch import recording_faults
-from identification.mismatch.effect import Block, Ends, Fault, Number
+import numpy as np
+
+from identification.mismatch.effect import Block, Ends, Fault, Finding, Number, Recording
 from identification.mismatch.fault_pictures import spacings
 
 SURE = 0.1
 """Half width of the interval, in the scatter found; ours."""
+
+
+def scattered(s: Recording) -> Finding | None:
+    """Stamps that scatter about a uniform clock by more than logging does, gaps left out."""
+    spacing = np.diff(s.stamp_s) / s.dt_s
+    spacing = spacing[(spacing > 0.02) & (spacing < 1.98)]
+    jitter = float(np.std(spacing)) / np.sqrt(2.0) if spacing.size > 10 else 0.0
+    if jitter < s.limits.recorder.jitter:
+        return None
+    return Finding({"jitter_samples": jitter}, np.ones(s.stamp_s.size, dtype=bool))
+
 
 EFFECT = Fault(
     name="sampling",
@@ -14,7 +26,7 @@ EFFECT = Fault(
     check="Poll at a fixed rate, or record at the controller.",
     caption="Time between samples: a sound recorder has one narrow peak.",
     order=1,
-    find=lambda s: recording_faults.sampling(s.stamp_s, s.dt_s, s.limits.recorder),
+    find=scattered,
     ends=Ends.ALL,
     numbers=(Number("jitter_samples", "samples", "Scatter of stamps", share=SURE),),
     drawn=spacings,

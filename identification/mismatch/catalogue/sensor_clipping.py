@@ -2,9 +2,22 @@
 
 import numpy as np
 
-from identification.mismatch import recording_faults
-from identification.mismatch.effect import Block, Fault, Number, Recording
+from identification.mismatch.effect import Block, Fault, Finding, Number, Recording
 from identification.mismatch.fault_pictures import range_end
+
+
+def clipped(s: Recording) -> Finding | None:
+    """PV standing at exactly its highest or lowest value far more often than at those next to it."""
+    levels, counts = np.unique(s.pv, return_counts=True)
+    if levels.size < 12:
+        return None
+    best, limits = None, s.limits.recorder
+    for end, near in ((-1, counts[-7:-1]), (0, counts[1:7])):
+        top = int(counts[end])
+        enough = top >= limits.clip_samples and top > limits.clip_ratio * float(near.mean())
+        if enough and (best is None or top > best.where.sum()):
+            best = Finding({"clip_pct": float(levels[end])}, s.pv == levels[end])
+    return best
 
 
 def step(s: Recording) -> float:
@@ -19,7 +32,7 @@ EFFECT = Fault(
     check="Widen the transmitter's range, or keep SP inside it.",
     caption="PV stands at the end of its range while the model goes on beyond it.",
     order=3,
-    find=lambda s: recording_faults.clipped(s.pv, s.limits.recorder),
+    find=clipped,
     censors=True,
     numbers=(Number("clip_pct", "% PV", "Range ends at", half=step),),
     drawn=range_end,
