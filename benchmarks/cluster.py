@@ -6,7 +6,6 @@ Wall time of the run alone; the workers are warm from one night before. Writes c
 
 from __future__ import annotations
 
-import argparse
 import subprocess
 import sys
 import tempfile
@@ -17,9 +16,9 @@ import numpy as np
 import pyarrow as pa
 
 from benchmarks.plant_night import Plant, make, tenth
+from proofs.common import command, command_line, publish, table
 from tests.analyzer.dask_cluster import dask_cluster
 
-OUT = Path(__file__).with_suffix(".md")
 TURNS = 3
 """Nights of each, of which the median counts."""
 
@@ -36,11 +35,7 @@ def night_s(plant: Plant, folder: Path, *how: str) -> float:
 
 def main() -> None:
     """Measure and write the table beside this file."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--loops", type=int, default=100)
-    loops = parser.parse_args().loops
+    loops = command_line(__doc__, loops=100).loops
     pa.set_cpu_count(1)
     with tempfile.TemporaryDirectory() as made:
         folder = Path(made)
@@ -54,14 +49,10 @@ def main() -> None:
                 for name, how in ways.items():
                     taken[name].append(night_s(plant, folder, *how))
     local, remote = (float(np.median(x)) for x in taken.values())
-    rows = "\n".join(
-        f"| {name} | {np.median(x):.1f} | {min(x):.1f} | {max(x):.1f} |" for name, x in taken.items()
-    )
-    head = "| how | median s | least | most |\n|---|--:|--:|--:|"
-    text = f"{head}\n{rows}\n\nOver the processes: {remote / local - 1:+.0%}."
-    print(text)
-    command = f"`python -m benchmarks.cluster --loops {loops}`"
-    OUT.write_text(f"# A night on a cluster\n\n{command}, two cores\n\n{text}\n")
+    rows = ([name, *(f"{f(x):.1f}" for f in (np.median, min, max))] for name, x in taken.items())
+    text = table("how | median s | least | most", rows, numbers=True)
+    said = f"Over the processes: {remote / local - 1:+.0%}."
+    publish(__file__, "A night on a cluster", f"{command(__file__, loops=loops)}, two cores", text, said)
 
 
 if __name__ == "__main__":

@@ -23,8 +23,8 @@ from analyzer.loop.decisions import Cause
 from analyzer.plantwide.source import Peer
 from analyzer.plantwide.verdict import trace
 from analyzer.plantwide.wave import BESIDE, REACH, Wave, waves_in, waves_table
+from proofs.common import command, parser_of, publish, table
 
-OUT = Path(__file__).with_suffix(".md")
 DAY_S = 86_400.0
 PERIODS = (20.0, 3000.0)
 PART = 2**16
@@ -93,34 +93,33 @@ def measured(path: Path) -> tuple[float, float, float, int, int]:
     return floor, took, peak_mb(), count, len(found)
 
 
-def row(loops: int, folder: Path) -> str:
+def row(loops: int, folder: Path) -> list[str]:
     """One size: made here, measured in a process of its own."""
     path = folder / f"{loops}.parquet"
     pq.write_table(waves_table(plant(loops)), path, compression="zstd")
-    command = [sys.executable, "-m", "benchmarks.groups", "--alone", str(path)]
-    said = subprocess.run(command, capture_output=True, text=True, check=True).stdout.split()
+    alone = [sys.executable, "-m", "benchmarks.groups", "--alone", str(path)]
+    said = subprocess.run(alone, capture_output=True, text=True, check=True).stdout.split()
     floor, took, memory = map(float, said[:3])
-    return (
-        f"| {loops} | {said[3]} | {said[4]} | {floor:.2f} | {took:.1f} | {took / floor:.1f} | {memory:.0f} |"
-    )
+    measured_s = (f"{floor:.2f}", f"{took:.1f}", f"{took / floor:.1f}", f"{memory:.0f}")
+    return [str(loops), said[3], said[4], *measured_s]
 
 
 def main() -> None:
     """Measure sizes and write."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("--loops", type=int, nargs="+", default=[1000, 3000, 10_000])
+    parser = parser_of(__doc__, loops=[1000, 3000, 10000])
     parser.add_argument("--alone", type=Path, help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.alone:
         print(*measured(options.alone))
         return
-    lines = ["| loops | waves | groups | floor [s] | pass [s] | over floor | memory [MB] |", "|" + "--:|" * 7]
+    lines = []
     with tempfile.TemporaryDirectory() as folder:
         for loops in options.loops:
             lines.append(row(loops, Path(folder)))
             print(lines[-1], flush=True)
-    text = "`python -m benchmarks.groups`, one core, both within one run of the same machine."
-    OUT.write_text(f"# What the plant-wide pass costs\n\n{text}\n\n" + "\n".join(lines) + "\n")
+    about = f"{command(__file__)}, one core, both within one run of the same machine."
+    heads = "loops | waves | groups | floor [s] | pass [s] | over floor | memory [MB]"
+    publish(__file__, "What the plant-wide pass costs", about, table(heads, lines, numbers=True))
 
 
 if __name__ == "__main__":

@@ -20,12 +20,12 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 import numpy as np
 
 from analyzer.pages import night
+from proofs.common import command, publish, table
+from proofs.valve_loops import backlash_case, stick_case
 from reports.folder import write_html
 from tests.reports.small_store import small_store
-from tests.tuning.tuning_cases import backlash_case, stick_case
 from tuning.recommend import recommend
 
-OUT = Path(__file__).with_suffix(".md")
 RUNS = 3
 LOOPS = (10_000, 100_000)
 FORMS = ("csv", "table")
@@ -88,17 +88,9 @@ def rows() -> list[tuple[str, float, str, float]]:
 
 def main() -> None:
     """Time everything and write the page."""
-    lines = [
-        "# How long a person waits",
-        "",
-        "`python -m benchmarks.latency`, processor time, least of three runs.",
-        "",
-        "| what | s | floor | s | ratio |",
-        "|---|---|---|---|---|",
-    ]
-    lines += [f"| {what} | {s:.3f} | {floor} | {f:.4f} | {s / f:.1f} |" for what, s, floor, f in rows()]
-    OUT.write_text("\n".join(lines) + "\n")
-    print(OUT.read_text())
+    shown = ((what, f"{s:.3f}", floor, f"{f:.4f}", f"{s / f:.1f}") for what, s, floor, f in rows())
+    about = f"{command(__file__)}, processor time, least of three runs."
+    publish(__file__, "How long a person waits", about, table("what | s | floor | s | ratio", shown))
 
 
 if __name__ == "__main__":

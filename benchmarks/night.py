@@ -7,7 +7,6 @@ else the machine does falls on both. Without --export a plant of 24 h at 1 s is 
 
 from __future__ import annotations
 
-import argparse
 import os
 import tempfile
 import time
@@ -31,9 +30,9 @@ from analyzer.loop.quality import prepare
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import controller, find_loops, match, read_loops
 from identification.errors import TriageError
-from tests.analyzer.plant import Sketch, simulate, write_export
+from proofs.common import command, parser_of, publish
+from proofs.plant import Sketch, simulate, write_export
 
-OUT = Path(__file__).with_suffix(".md")
 REPEATS = 3
 """Runs of each, of which the fastest counts."""
 HEALTHY = (
@@ -157,9 +156,7 @@ def table(costs: Sequence[Cost]) -> str:
 
 def main() -> None:
     """Measure and write the table beside this file."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = parser_of(__doc__)
     parser.add_argument("--loops", type=int, default=60, help="loops of the simulated plant")
     parser.add_argument("--hours", type=float, default=24.0, help="length of its night")
     parser.add_argument("--export", type=Path, help="a wide Parquet export to measure on instead")
@@ -179,14 +176,15 @@ def main() -> None:
         )
         costs = measured(path, export, stated(specs, sketches) if sketches else specs)
     text = table(costs)
-    print(text)
-    if options.export is None:
-        command = f"`python -m benchmarks.night --loops {options.loops} --hours {options.hours:g}`"
+    if options.export is not None:
+        print(text)
+    else:
+        shown = command(__file__, loops=options.loops, hours=options.hours)
         about = (
             "Night: reading, quality, oscillation, cause and assessments of one loop. Floor: pyarrow reads the same\n"
             "columns and numpy takes one rfft of each. One core, interleaved loop by loop, the fastest of three runs."
         )
-        OUT.write_text(f"# What a night costs\n\n{command}\n\n{about}\n\n{text}\n")
+        publish(__file__, "What a night costs", shown, about, text)
 
 
 if __name__ == "__main__":

@@ -14,7 +14,6 @@ names no cause but counts the cycles that show stiction: their median share stan
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 import subprocess
@@ -34,9 +33,9 @@ from analyzer.loop.assess import assess
 from analyzer.loop.decisions import Cause
 from analyzer.loop.quality import prepare
 from benchmarks.night import HEALTHY
-from tests.analyzer.plant import START_S, Sketch, Trends, series, simulate, spec
+from proofs.common import command, parser_of, publish
+from proofs.plant import START_S, Sketch, Trends, series, simulate, spec
 
-OUT = Path(__file__).with_suffix(".md")
 HOURS = 6.0
 EACH = 6
 """Records of a kind."""
@@ -157,19 +156,14 @@ def table(made: Sequence[Record], own: Sequence[Answer], other: Sequence[Answer]
 
 def main() -> None:
     """Ask both and write the table beside this file."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = parser_of(__doc__)
     parser.add_argument("--peer", type=Path, required=True, help="the Python of its environment")
     options = parser.parse_args()
     made = records()
     ours(made[0])
     text = table(made, [ours(r) for r in made], theirs(made, options.peer))
     about = "Medians of processor time of a record of 6 h at 1 s; see the docstring for what is compared."
-    OUT.write_text(
-        f"# Beside stictionanalyser\n\n`python -m benchmarks.peer --peer PYTHON`\n\n{about}\n\n{text}\n"
-    )
-    print(text)
+    publish(__file__, "Beside stictionanalyser", command(__file__, peer="PYTHON"), about, text)
 
 
 if __name__ == "__main__":

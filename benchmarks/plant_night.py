@@ -9,7 +9,6 @@ plants of 100, 1,000 and 10,000 loops of 2 h at 5 s instead. Writes plant_night.
 
 from __future__ import annotations
 
-import argparse
 import csv
 import os
 import resource
@@ -31,7 +30,8 @@ import pyarrow.parquet as pq
 from analyzer.loop.decisions import COUNTS_PCT
 from analyzer.store.store import Store
 from benchmarks.night import FAULTY, HEALTHY
-from tests.analyzer.plant import Sketch, Trends, simulate, write_export
+from proofs.common import parser_of, publish
+from proofs.plant import Sketch, Trends, simulate, write_export
 
 OUT = Path(__file__).with_suffix(".md")
 GROWTH = Path(__file__).with_name("plant_growth.md")
@@ -178,12 +178,7 @@ def measured(
 
 def main() -> None:
     """Measure and write the table beside this file."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--loops", type=int, default=1500)
-    parser.add_argument("--hours", type=float, default=24.0)
-    parser.add_argument("--jobs", type=int, default=2)
+    parser = parser_of(__doc__, loops=1500, hours=24.0, jobs=2)
     parser.add_argument("--growth", action="store_true", help="100, 1,000 and 10,000 loops of 2 h at 5 s")
     options = parser.parse_args()
     pa.set_cpu_count(1)
@@ -196,8 +191,7 @@ def main() -> None:
         title, out = "What a plant's night costs", OUT
         command = f"--loops {options.loops} --hours {options.hours:g} --jobs {options.jobs}"
     about = "Processor time of all processes of `triage run`, advice, groups and store included; see the docstring."
-    head = f"# {title}\n\n`python -m benchmarks.plant_night {command}`\n\n{about}\n\n"
-    out.write_text(f"{head}{text}\n")
+    publish(out, title, f"`python -m benchmarks.plant_night {command}`", about, text)
 
 
 if __name__ == "__main__":

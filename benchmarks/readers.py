@@ -7,7 +7,6 @@ time and peak memory. Writes readers.md here.
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 import subprocess
@@ -20,7 +19,8 @@ import pyarrow as pa
 import pyarrow.csv as csv
 import pyarrow.parquet as pq
 
-OUT = Path(__file__).with_suffix(".md")
+from proofs.common import command, command_line, publish, table
+
 ROLES = ("SP", "PV", "OP")
 
 PEAK = """
@@ -116,31 +116,20 @@ def measured(code: str, *arguments: str) -> tuple[float, float]:
 
 def main() -> None:
     """Measure, print, and write the table beside this file."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--loops", type=int, default=60)
-    parser.add_argument("--hours", type=float, default=6.0)
-    wanted = parser.parse_args()
-    lines = [
-        "| format | MB | pyarrow s | ours s | ratio | pyarrow MB | ours MB |",
-        "|---|--:|--:|--:|--:|--:|--:|",
-    ]
+    wanted = command_line(__doc__, loops=60, hours=6.0)
+    rows = []
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         for kind, path in exports(folder, wanted.loops, wanted.hours).items():
             floor_s, floor_mb = measured(PEAK + FLOOR, str(path))
             ours_s, ours_mb = measured(PEAK + OURS, str(path), name)
             size = path.stat().st_size / 1e6
-            lines.append(
-                f"| {kind} | {size:.0f} | {floor_s:.2f} | {ours_s:.2f} | {ours_s / floor_s:.1f} | {floor_mb:.0f} "
-                f"| {ours_mb:.0f} |"
-            )
-    text = "\n".join(lines)
-    print(text)
-    command = f"`python -m benchmarks.readers --loops {wanted.loops} --hours {wanted.hours:g}`"
+            times = (f"{floor_s:.2f}", f"{ours_s:.2f}", f"{ours_s / floor_s:.1f}")
+            rows.append((kind, f"{size:.0f}", *times, f"{floor_mb:.0f}", f"{ours_mb:.0f}"))
+    shown = command(__file__, loops=wanted.loops, hours=wanted.hours)
     about = "All loops of an export at 1 s, three tags each, read as a night reads them, over one read of the file."
-    OUT.write_text(f"# What reading costs\n\n{command}\n\n{about}\n\n{text}\n", encoding="utf-8")
+    text = table("format | MB | pyarrow s | ours s | ratio | pyarrow MB | ours MB", rows, numbers=True)
+    publish(__file__, "What reading costs", shown, about, text)
 
 
 if __name__ == "__main__":

@@ -9,7 +9,6 @@ beside python-control's. Writes side_by_side.md beside this file. The others are
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import io
 import subprocess
@@ -19,7 +18,6 @@ import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from importlib.util import find_spec
-from pathlib import Path
 
 import numpy as np
 
@@ -30,10 +28,10 @@ from identification.estimation.hammerstein import process_of
 from identification.models import Backlash, Fopdt, Loop, Pid
 from identification.record import Floats, LoopRecord
 from identification.simulation.closed_loop import closed_loop
-from tests.analyzer.plant import START_S, run, wander
+from proofs.common import command, command_line, publish
+from proofs.plant import START_S, run, wander
 from tuning.describing import backlash, stick_slip
 
-OUT = Path(__file__).with_suffix(".md")
 SCANS = 3600
 """Scans of a record, one a second."""
 ACTUATOR_S = 0.6
@@ -323,12 +321,7 @@ def speed_table() -> str:
 
 def main() -> None:
     """Measure and write the tables beside this file."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--records", type=int, default=8)
-    options = parser.parse_args()
-    command = f"`python -m benchmarks.side_by_side --records {options.records}`"
+    options = command_line(__doc__, records=8)
     about = (
         f"Medians over {options.records} records of {SCANS} scans in closed loop, set point steps under coloured\n"
         "load, dead times of no whole scans. The others but AIC are told the structure and the whole scans of dead\n"
@@ -337,9 +330,7 @@ def main() -> None:
     )
     missing = "" if find_spec("sippy_unipi") else "\n\nsippy_unipi is not installed and was left out."
     tables = [identification_table(identification(options.records)), describing_table(), speed_table()]
-    text = "\n\n".join(["# Side by side", command, about + missing, *tables]) + "\n"
-    OUT.write_text(text)
-    print(text)
+    publish(__file__, "Side by side", command(__file__, records=options.records), about + missing, *tables)
 
 
 if __name__ == "__main__":

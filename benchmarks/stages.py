@@ -7,7 +7,6 @@ here.
 
 from __future__ import annotations
 
-import argparse
 import tempfile
 import time
 from collections.abc import Callable
@@ -28,8 +27,8 @@ from analyzer.loop.quality import prepare
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import find_loops
 from benchmarks.night import fastest, floor, plant, stated
+from proofs.common import command, command_line, publish
 
-OUT = Path(__file__).with_suffix(".md")
 EXPLAINED = 6
 """Loops that are explained; each takes seconds."""
 STAGES = ("read", "prepare", "detection", "cause", "figures and the rest", "advice")
@@ -89,12 +88,7 @@ def table(costs: list[Cost]) -> str:
 
 def main() -> None:
     """Measure and write the table beside this file."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--loops", type=int, default=24)
-    parser.add_argument("--hours", type=float, default=24.0)
-    options = parser.parse_args()
+    options = command_line(__doc__, loops=24, hours=24.0)
     pa.set_cpu_count(1)
     config = Config()
     with tempfile.TemporaryDirectory() as folder:
@@ -108,11 +102,9 @@ def main() -> None:
         costs = [cost(path, export, spec, config) for spec in (*warm, *specs)][len(warm) :]
         ill = [s for s, c in zip(specs, costs, strict=True) if c.oscillates][: EXPLAINED + 1]
         taken = [explanation_s(export, spec, config) for spec in ill][1:]
-    command = f"`python -m benchmarks.stages --loops {options.loops} --hours {options.hours:g}`"
-    text = table(costs)
+    shown = command(__file__, loops=options.loops, hours=options.hours)
     said = f"An explanation takes {np.median(taken):.1f} s of processor time, median of {len(taken)} loops."
-    print(f"{text}\n\n{said}")
-    OUT.write_text(f"# What each stage costs\n\n{command}\n\n{text}\n\n{said}\n")
+    publish(__file__, "What each stage costs", shown, table(costs), said)
 
 
 if __name__ == "__main__":

@@ -8,7 +8,6 @@ proofs/agreement.md.
 
 from __future__ import annotations
 
-import argparse
 from collections import Counter
 from functools import partial
 from multiprocessing import Pool
@@ -18,8 +17,8 @@ from analyzer import api
 from analyzer.loop.decisions import Cause
 from analyzer.night.plant import PlantLoop
 from identification.errors import NotAssessedError
+from proofs.common import command, command_line, publish
 
-OUT = Path(__file__).with_suffix(".md")
 FAULTS = ("stiction", "backlash")
 Row = tuple[str, str, str]
 """Recording, what run names, what explain names."""
@@ -72,19 +71,15 @@ def table(sets: dict[str, list[Row]]) -> str:
 
 def main() -> None:
     """Ask both about all recordings and write the table beside this file."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("folders", nargs="+", type=Path)
-    parser.add_argument("--jobs", type=int, default=2)
-    options = parser.parse_args()
+    options = command_line(__doc__, folders="+", jobs=2)
     sets = {}
     with Pool(options.jobs) as pool:
         for folder in options.folders:
             ask = partial(asked, loops=folder / "loops.csv")
             sets[folder.name] = pool.map(ask, sorted(folder.glob("*.parquet")), chunksize=1)
     text = table(sets)
-    words = " ".join(f"../shared/recordings/{f.name}" for f in options.folders)
-    OUT.write_text(f"# What run and explain name\n\n`python -m proofs.agreement {words}`\n\n{text}\n")
-    print(text)
+    places = (f"../shared/recordings/{f.name}" for f in options.folders)
+    publish(__file__, "What run and explain name", command(__file__, *places), text)
 
 
 if __name__ == "__main__":

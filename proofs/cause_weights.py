@@ -10,7 +10,6 @@ Writes analyzer/loop/cause_weights.json and proofs/cause_weights.md.
 
 from __future__ import annotations
 
-import argparse
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -32,13 +31,13 @@ from analyzer.loops.tags import controller
 from identification.errors import TriageError
 from identification.models import Pid
 from identification.record import Floats
+from proofs.common import command, command_line, publish, table
 from proofs.coupled.draw import draw as draw_plant
 from proofs.explained import shows as shows_truth
 from proofs.plant_wide import recorded as recorded_loop
 from proofs.untidy.draw import CYCLES, draw
 from proofs.untidy_loops import NAMED, clear, recorded, shows
 
-OUT = Path(__file__).with_suffix(".md")
 WEIGHTS = Path(api.__file__).parent / "loop" / FILE
 LONG = (150.0, 900.0)
 KNOTS = (0.33, 0.67)
@@ -199,7 +198,7 @@ def written(loops: Sequence[Told]) -> None:
     )
 
 
-def line(name: str, loops: Sequence[Told], chances: object) -> str:
+def line(name: str, loops: Sequence[Told], chances: object) -> list[object]:
     """How the loops of a set are told by probability alone, as a row of the table."""
     plain = [t for t in loops if t.clear]
     pairs = [(t.cause, max((p := chances(t.found)), key=p.get), max(p.values())) for t in plain]  # type: ignore[operator]
@@ -209,15 +208,12 @@ def line(name: str, loops: Sequence[Told], chances: object) -> str:
         cells.append(f"{sum(inside)} of {len(inside)}")
     blamed = sum(a != "valve" and b == "valve" for a, b, _ in pairs)
     cells.append(f"{blamed} of {sum(a != 'valve' for a, _, _ in pairs)}")
-    return "| " + " | ".join(str(c) for c in cells) + " |"
+    return cells
 
 
 def main() -> None:
     """Draw, measure, fit and write."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("folders", nargs="*", type=Path)
-    parser.add_argument("--jobs", type=int, default=2)
-    options = parser.parse_args()
+    options = command_line(__doc__, folders="*", jobs=2)
     with Pool(options.jobs) as pool:
 
         def drawn(seeds: list[int], lengths: tuple[float, float] = CYCLES, worn: bool = False) -> list[Told]:
@@ -240,17 +236,13 @@ def main() -> None:
     written(fit)
     from analyzer.loop.cause_weights import chances
 
-    head = (
-        "| loops kept apart | clear | likeliest is right | right below .6 | .6 to .8 | above .8 "
-        "| valve likeliest of other causes |\n|---|---|---|---|---|---|---|"
+    heads = (
+        "loops kept apart | clear | likeliest is right | right below .6 | .6 to .8 | above .8 "
+        "| valve likeliest of other causes"
     )
-    lines = [head, *(line(name, loops, chances) for name, loops in apart.items())]
-    words = " ".join(f"../shared/wild/{f.name}" for f in options.folders)
-    text = f"Fitted on {len(fit)} loops.\n\n" + "\n".join(lines)
-    OUT.write_text(
-        f"# What the signs of a cause weigh\n\n`python -m proofs.cause_weights {words}`\n\n{text}\n"
-    )
-    print(text)
+    text = table(heads, (line(name, loops, chances) for name, loops in apart.items()))
+    shown = command(__file__, *(f"../shared/wild/{f.name}" for f in options.folders))
+    publish(__file__, "What the signs of a cause weigh", shown, f"Fitted on {len(fit)} loops.", text)
 
 
 if __name__ == "__main__":

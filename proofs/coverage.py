@@ -8,12 +8,10 @@ Counted is how often the interval told holds the true value. Writes coverage.md 
 
 from __future__ import annotations
 
-import argparse
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from multiprocessing import get_context
-from pathlib import Path
 
 import numpy as np
 
@@ -25,11 +23,11 @@ from analyzer.loop.quality import prepare
 from identification.errors import NotAssessedError
 from identification.models import Estimate, Pid
 from identification.record import Floats
+from proofs.common import command, command_line, publish
 from proofs.concealed.plant import Drive, Pi, Plant, close_loop
 from proofs.concealed.scene import KINDS, Rng, draw_plant, load_path, noise_path, setpoints
-from tests.analyzer.plant import CONFIG, START_S, series, spec
+from proofs.plant import CONFIG, START_S, series, spec
 
-OUT = Path(__file__).with_suffix(".md")
 FAMILIES = ("play", "stick-slip", "set point moves")
 SAMPLES = 9000
 ATTEMPTS = 40
@@ -187,23 +185,13 @@ def row(family: str, name: str, mine: Sequence[Held]) -> str:
 
 def main() -> None:
     """Make and judge all loops, write the table beside this file."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--loops", type=int, default=240)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--jobs", type=int, default=2)
-    options = parser.parse_args()
+    options = command_line(__doc__, loops=240, seed=1, jobs=2)
     each = math.ceil(options.loops / len(FAMILIES))
     cases = [(family, options.seed * 100_000 + k) for family in FAMILIES for k in range(each)]
     with get_context("spawn").Pool(options.jobs) as pool:
         results = pool.map(held, cases, chunksize=4)
-    text = table(results, cases)
-    about = (
-        f"`python -m proofs.coverage --loops {options.loops} --seed {options.seed}`; intervals are of 90 %."
-    )
-    OUT.write_text(f"# Do intervals hold the truth?\n\n{about}\n\n{text}\n")
-    print(text)
+    shown = f"{command(__file__, loops=options.loops, seed=options.seed)}; intervals are of 90 %."
+    publish(__file__, "Do intervals hold the truth?", shown, table(results, cases))
 
 
 if __name__ == "__main__":

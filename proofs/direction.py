@@ -7,20 +7,18 @@ it is read by which way has the larger F. The lag is that of the plant-wide pass
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import io
 import warnings
-from pathlib import Path
 
 import numpy as np
 from statsmodels.tsa.stattools import grangercausalitytests
 
 from identification.signals.cross_spectrum import Lag, band, lag, tapered
 from identification.signals.spectrum import spectrum
+from proofs.common import command, command_line, publish, table
 from proofs.coupled.draw import draw
 
-OUT = Path(__file__).with_suffix(".md")
 A_PERIOD = 12
 """Samples a period that Granger's test is given."""
 SHOWS = 1.25
@@ -50,10 +48,7 @@ def lead(one: np.ndarray, other: np.ndarray, dt_s: float, period_s: float) -> La
 
 def main() -> None:
     """Draw, ask both, count."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("--plants", type=int, default=30)
-    parser.add_argument("--seed", type=int, default=3000)
-    options = parser.parse_args()
+    options = command_line(__doc__, plants=30, seed=3000)
     by_granger, by_lag, sure = [], [], []
     for seed in range(options.seed, options.seed + options.plants):
         drawn = draw(seed, 30, hours=8.0)
@@ -72,18 +67,14 @@ def main() -> None:
             by_lag.append(found.lag_s > 0)
             sure.append(abs(found.lag_s) > 2 * found.deviation_s)
     told = np.array(sure)
-    lines = [
-        f"`python -m proofs.direction --plants {options.plants} --seed {options.seed}`: {told.size} pairs.",
-        "",
-        "| who is first, by | right |",
-        "|---|--:|",
-        f"| Granger's F, {A_PERIOD} samples a period | {100 * np.mean(by_granger):.0f} % |",
-        f"| sign of the lag | {100 * np.mean(by_lag):.0f} % |",
-        f"| … of the {told.sum()} that are over two deviations | {100 * np.mean(np.array(by_lag)[told]):.0f} % |",
-        "",
-    ]
-    OUT.write_text("# Who moves first\n\n" + "\n".join(lines))
-    print("\n".join(lines))
+    right = {
+        f"Granger's F, {A_PERIOD} samples a period": by_granger,
+        "sign of the lag": by_lag,
+        f"… of the {told.sum()} that are over two deviations": np.array(by_lag)[told],
+    }
+    rows = ((way, f"{100 * np.mean(found):.0f} %") for way, found in right.items())
+    shown = f"{command(__file__, plants=options.plants, seed=options.seed)}: {told.size} pairs."
+    publish(__file__, "Who moves first", shown, table("who is first, by | right", rows, numbers=True))
 
 
 if __name__ == "__main__":

@@ -10,7 +10,6 @@ plant, under other moves and another load, is what the saved constants are carri
 
 from __future__ import annotations
 
-import argparse
 import pathlib
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -25,6 +24,7 @@ from identification.mismatch.model_file import carried, to_data
 from identification.mismatch.proof import misfit
 from identification.mismatch.recording import Recording
 from identification.record import Floats
+from proofs.common import parser_of
 
 N, PARTS, DT = 1500, 20, 1.0
 """Samples of a recording, Euler's steps in one, and its interval [s]."""
@@ -212,11 +212,9 @@ def table(plants: int, seed: int) -> str:
 
 
 def main() -> None:
-    ap = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    ap.add_argument("--plants", type=int, default=20)
-    ap.add_argument("--seed", type=int, default=1)
-    ap.add_argument("--out", type=pathlib.Path)
-    a = ap.parse_args()
+    parser = parser_of(__doc__, plants=20, seed=1)
+    parser.add_argument("--out", type=pathlib.Path)
+    a = parser.parse_args()
     text = (
         "# Experiments in open loop\n\n"
         f"`python -m proofs.experiments --plants {a.plants} --seed {a.seed}`\n\n"

@@ -8,7 +8,6 @@ loops with another cause given an effect of the valve. Writes proofs/explained.m
 
 from __future__ import annotations
 
-import argparse
 import json
 import subprocess
 import sys
@@ -22,8 +21,8 @@ from typing import Any
 
 from analyzer import api
 from identification.errors import NotAssessedError
+from proofs.common import command, command_line, publish, table
 
-OUT = Path(__file__).with_suffix(".md")
 WORN = ("stiction", "backlash")
 Row = tuple[str, str, frozenset[str], float]
 """True cause, verdict, blocks of the effects told, seconds."""
@@ -54,7 +53,7 @@ def asked(task: tuple[Path, str, str, bool]) -> Row:
     return cause, said.verdict, blocks, time.process_time() - begun
 
 
-def line(name: str, rows: list[Row]) -> str:
+def line(name: str, rows: list[Row]) -> list[object]:
     """A set's counts as a row of the table."""
     worn = [r for r in rows if r[0] in WORN]
     well = [r for r in rows if r[0] == "healthy"]
@@ -64,7 +63,7 @@ def line(name: str, rows: list[Row]) -> str:
     wronged = sum(bool(r[2] & {"valve", "process"}) for r in well)
     blamed = sum("valve" in r[2] for r in other)
     most = max(r[3] for r in rows)
-    cells = [
+    return [
         name,
         f"{named} of {len(worn)}",
         kind,
@@ -72,7 +71,6 @@ def line(name: str, rows: list[Row]) -> str:
         f"{blamed} of {len(other)}",
         f"{most:.0f}",
     ]
-    return "| " + " | ".join(str(c) for c in cells) + " |"
 
 
 def called(name: str, rows: list[Row]) -> str:
@@ -95,39 +93,21 @@ def judged(folder: Path, jobs: int) -> list[Row]:
 
 def main() -> None:
     """Explain all loops and write the tables beside this file."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("folders", nargs="*", type=Path)
-    parser.add_argument("--loops", type=int, default=150)
-    parser.add_argument("--seed", type=int, default=9)
-    parser.add_argument("--jobs", type=int, default=2)
-    options = parser.parse_args()
+    options = command_line(__doc__, folders="*", loops=150, seed=9, jobs=2)
     sets = {f"{f.parent.name}/{f.name}": judged(f, options.jobs) for f in options.folders}
     with tempfile.TemporaryDirectory() as own:
-        draw = [
-            sys.executable,
-            "-m",
-            "proofs.untidy",
-            own,
-            "--loops",
-            str(options.loops),
-            "--seed",
-            str(options.seed),
-        ]
-        subprocess.run(draw, check=True)
+        wanted = ("--loops", str(options.loops), "--seed", str(options.seed))
+        subprocess.run([sys.executable, "-m", "proofs.untidy", own, *wanted], check=True)
         sets[f"own, seed {options.seed}"] = judged(Path(own), options.jobs)
-    lines = [
-        "| loops | worn valve told | its kind right | healthy given valve or process | valve given to another cause "
-        "| longest, s of processor |",
-        "|---|---|---|---|---|---|",
-        *(line(name, rows) for name, rows in sets.items()),
-        "",
-        *(called(name, rows) for name, rows in sets.items()),
-    ]
-    text = "\n".join(lines)
-    words = " ".join(f"../shared/wild/{f.name}" for f in options.folders)
-    command = f"python -m proofs.explained {words} --loops {options.loops} --seed {options.seed}"
-    OUT.write_text(f"# Untidy loops explained\n\n`{command}`\n\n{text}\n")
-    print(text)
+    heads = (
+        "loops | worn valve told | its kind right | healthy given valve or process | valve given to another cause "
+        "| longest, s of processor"
+    )
+    text = table(heads, (line(name, rows) for name, rows in sets.items()))
+    names = "\n".join(called(name, rows) for name, rows in sets.items())
+    places = (f"../shared/wild/{f.name}" for f in options.folders)
+    shown = command(__file__, *places, loops=options.loops, seed=options.seed)
+    publish(__file__, "Untidy loops explained", shown, text, names)
 
 
 if __name__ == "__main__":

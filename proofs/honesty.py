@@ -9,7 +9,6 @@ Nothing is changed in the middle, yet the weeks are compared there.
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
@@ -26,6 +25,7 @@ from analyzer.loop.oscillation import detect
 from identification.models import Backlash, Fopdt, Loop, Pid, Stiction
 from identification.record import LoopRecord
 from identification.simulation.closed_loop import closed_loop
+from proofs.common import parser_of
 
 SCAN_S = 5.0
 DAYS = 14
@@ -142,9 +142,7 @@ def examined(plants: int, jobs: int, first: int = 0) -> Iterator[tuple[LoopCompa
 
 def main() -> None:
     """Print how many figures were called better or worse; exit 1 where it is more than 5 %."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--plants", type=int, default=200)
-    parser.add_argument("--jobs", type=int, default=2)
+    parser = parser_of(__doc__, plants=200, jobs=2)
     parser.add_argument("--first", type=int, default=0, help="first seed")
     options = parser.parse_args()
     pairs = list(examined(options.plants, options.jobs, options.first))

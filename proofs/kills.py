@@ -8,7 +8,6 @@ has a hash seed of its own, as on a plant. Writes kills.md here.
 
 from __future__ import annotations
 
-import argparse
 import os
 import random
 import signal
@@ -23,9 +22,10 @@ from pathlib import Path
 
 import pyarrow.parquet as pq
 
-from tests.analyzer.plant import START_S, Sketch, simulate, write_export
+from proofs.common import command as shown
+from proofs.common import command_line, publish, table
+from proofs.plant import START_S, Sketch, simulate, write_export
 
-OUT = Path(__file__).with_suffix(".md")
 LOOPS, HOURS = 24, 40.0
 CHANGED_H = 30.0
 """When settings of some loops are changed, within the second night [h after the start]."""
@@ -97,11 +97,7 @@ def killed(export: Path, store: Path, after_s: float) -> str:
 
 def main() -> None:
     """Kill, compare, print and write the table beside this file."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--kills", type=int, default=50)
-    wanted = parser.parse_args().kills
+    wanted = command_line(__doc__, kills=50).kills
     draw, at, same = random.Random(1), Counter[str](), 0
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -120,15 +116,13 @@ def main() -> None:
                 continue
             at[where] += 1
             same += tables(store) == whole
-    lines = ["| killed | times |", "|---|--:|", *(f"| {where} | {n} |" for where, n in sorted(at.items()))]
-    text = "\n".join([*lines, "", f"{same} of {wanted} stores are those of the undisturbed run."])
-    print(text)
+    said = f"{same} of {wanted} stores are those of the undisturbed run."
     about = (
         f"{LOOPS} loops of {HOURS:g} h at 1 s with loops.csv and changes.csv, two workers; signal 9 to the parent,\n"
         "whose workers end with it; each process with a hash seed of its own."
     )
-    head = f"# A night killed at random points\n\n`python -m proofs.kills --kills {wanted}`"
-    OUT.write_text(f"{head}\n\n{about}\n\n{text}\n", encoding="utf-8")
+    counts = table("killed | times", sorted(at.items()), numbers=True)
+    publish(__file__, "A night killed at random points", shown(__file__, kills=wanted), about, counts, said)
 
 
 if __name__ == "__main__":

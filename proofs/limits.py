@@ -13,7 +13,6 @@ out. Writes proofs/limits.md.
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cache
@@ -22,6 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from identification.limits import KEY, Limit
+from proofs.common import parser_of
 from proofs.limits_samples import DEFAULT, OF_FITS
 from proofs.limits_stages import STAGES
 
@@ -114,10 +114,8 @@ def table(found: Sequence[Effect]) -> str:
 
 def main() -> None:
     """Move every limit, ask, write."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("--jobs", type=int, default=2)
+    parser = parser_of(__doc__, jobs=2, out=OUT)
     parser.add_argument("--sections", nargs="+", choices=list(STAGES), default=list(STAGES))
-    parser.add_argument("--out", type=Path, default=OUT)
     options = parser.parse_args()
     todo, found = jobs(options.sections), []
     with Pool(options.jobs) as pool:

@@ -25,8 +25,8 @@ from identification.record import LoopRecord
 from proofs.coupled.draw import draw as draw_plant
 from proofs.nulls import FAMILIES
 from proofs.nulls import record as null
+from proofs.plant import Sketch, prepared, record, simulate
 from proofs.untidy.draw import draw
-from tests.analyzer.plant import Sketch, prepared, record, simulate
 
 LOOPS, MOST = 240, 12_000
 """Untidy loops, and samples of each at most."""

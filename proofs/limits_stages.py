@@ -48,7 +48,7 @@ from proofs.limits_samples import (
     wound,
 )
 from proofs.limits_sealed import of_controller, of_effects, of_recorder
-from tests.analyzer.plant import prepared, series, simulate, spec
+from proofs.plant import prepared, series, simulate, spec
 from tuning.recommend import recommend
 
 

@@ -5,9 +5,7 @@ Writes proofs/negative_controls.md.
 
 from __future__ import annotations
 
-import argparse
 from multiprocessing import Pool
-from pathlib import Path
 
 import numpy as np
 
@@ -17,9 +15,8 @@ from analyzer.loop.assess import convicted
 from analyzer.loop.oscillation import counting, detect
 from analyzer.loop.quality import prepare
 from analyzer.loops.spec import LoopSpec
+from proofs.common import command, command_line, publish, table
 from proofs.nulls import FAMILIES, record
-
-OUT = Path(__file__).with_suffix(".md")
 
 
 def judged(case: tuple[str, int]) -> tuple[str, bool, bool]:
@@ -39,30 +36,25 @@ def judged(case: tuple[str, int]) -> tuple[str, bool, bool]:
     return family, claimed, verdict.cause == "valve"
 
 
-def table(records: int, jobs: int) -> str:
+def told(records: int, jobs: int) -> str:
     """A Markdown table: family, records, oscillation claimed, valve blamed."""
     cases = [(family, seed) for family in FAMILIES for seed in range(records)]
     with Pool(jobs) as pool:
         results = pool.map(judged, cases, chunksize=50)
-    lines = ["| family | records | oscillation claimed | valve blamed | either % |", "|---|---|---|---|---|"]
+    rows = []
     for family in FAMILIES:
         mine = [r for r in results if r[0] == family]
         either = sum(o or v for _, o, v in mine)
         claimed, blamed = sum(o for _, o, _ in mine), sum(v for _, _, v in mine)
-        lines.append(f"| {family} | {len(mine)} | {claimed} | {blamed} | {100 * either / len(mine):.2f} |")
-    return "\n".join(lines)
+        rows.append([family, len(mine), claimed, blamed, f"{100 * either / len(mine):.2f}"])
+    return table("family | records | oscillation claimed | valve blamed | either %", rows)
 
 
 def main() -> None:
     """Run all records and write the table beside this file."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--records", type=int, default=1000)
-    parser.add_argument("--jobs", type=int, default=2)
-    options = parser.parse_args()
-    text = table(options.records, options.jobs)
-    command = f"python -m proofs.negative_controls --records {options.records}"
-    OUT.write_text(f"# Negative controls\n\n`{command}`\n\n{text}\n")
-    print(text)
+    options = command_line(__doc__, records=1000, jobs=2)
+    text = told(options.records, options.jobs)
+    publish(__file__, "Negative controls", command(__file__, records=options.records), text)
 
 
 if __name__ == "__main__":

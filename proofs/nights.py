@@ -8,7 +8,6 @@ once more under both; each morning's news stand beside the truth. Writes nights.
 
 from __future__ import annotations
 
-import argparse
 import sys
 import tempfile
 from collections import Counter
@@ -31,6 +30,7 @@ from analyzer.pages.news import news_lines
 from analyzer.pages.rank import ranked
 from analyzer.pages.reading import read_night
 from analyzer.store.store import Store
+from proofs.common import command_line
 
 SAMPLE = Path(__file__).resolve().parents[1] / "sample_data"
 if str(SAMPLE) not in sys.path:
@@ -181,11 +181,7 @@ def _said(found: list[Advised]) -> str:
 
 def main() -> None:
     """Run all nights and write the page."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--jobs", type=int, default=2)
-    jobs = parser.parse_args().jobs
+    jobs = command_line(__doc__, jobs=2).jobs
     about = (__doc__ or "").split("\n\n")[1].replace("\n", " ").replace(" Writes nights.md here.", "")
     lines = [
         "# Two weeks night by night, advice beside truth",

@@ -9,7 +9,6 @@ constant of over a quarter of a record is no settling process. Writes proofs/pla
 
 from __future__ import annotations
 
-import argparse
 from functools import partial
 from multiprocessing import Pool
 from pathlib import Path
@@ -26,8 +25,8 @@ from identification.mismatch.plain_loop import inputs_of, prepared
 from identification.mismatch.proof import HeldOut, held_out
 from identification.mismatch.recording import Recording
 from identification.record import Floats
+from proofs.common import command_line, publish, table
 
-OUT = Path(__file__).with_suffix(".md")
 KINDS = ("set-point steps", "OP at its limit", "slow drift", "steps in manual")
 N = 2000
 
@@ -112,37 +111,29 @@ def of_recording(path: Path) -> tuple[str, float | None]:
     return path.stem, ratio(e.found.proven, c.subject.pv, c.subject.op)
 
 
-def summary(name: str, ratios: list[float]) -> str:
+def summary(name: str, ratios: list[float]) -> list[str]:
     """One row of the table."""
     over = sum(r > 1.05 for r in ratios)
-    return f"| {name} | {len(ratios)} | {np.median(ratios):.3f} | {max(ratios):.3f} | {over} |"
+    return [name, str(len(ratios)), f"{np.median(ratios):.3f}", f"{max(ratios):.3f}", str(over)]
 
 
 def main() -> None:
     """Ask all, write the table."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("folders", nargs="*", type=Path)
-    parser.add_argument("--loops", type=int, default=200)
-    parser.add_argument("--seed", type=int, default=5000)
-    parser.add_argument("--jobs", type=int, default=2)
-    a = parser.parse_args()
-    lines = ["# The plain loop shown beside a least-squares lag with dead time", "", f"Seed {a.seed}.", ""]
-    lines += ["| loops | how many | median ratio | largest | over 1.05 |", "|---|---|---|---|---|"]
+    a = command_line(__doc__, folders="*", loops=200, seed=5000, jobs=2)
+    rows = []
     with Pool(a.jobs) as pool:
         for kind in KINDS:
-            lines.append(
-                summary(kind, pool.map(partial(of_simulated, kind), range(a.seed, a.seed + a.loops)))
-            )
+            seeds = range(a.seed, a.seed + a.loops)
+            rows.append(summary(kind, pool.map(partial(of_simulated, kind), seeds)))
         each = []
         for folder in a.folders:
             found = pool.map(of_recording, sorted(folder.glob("*.parquet")), chunksize=1)
             each += [(name, r) for name, r in found if r is not None]
-            lines.append(summary(folder.name, [r for _, r in found if r is not None]))
-    lines += ["", *(f"- {name}: {r:.3f}" for name, r in each if r > 1.05)]
-    OUT.write_text("\n".join(lines).rstrip() + "\n")
-    print(OUT.read_text())
+            rows.append(summary(folder.name, [r for _, r in found if r is not None]))
+    text = table("loops | how many | median ratio | largest | over 1.05", rows)
+    wide = "\n".join(f"- {name}: {r:.3f}" for name, r in each if r > 1.05)
+    title = "The plain loop shown beside a least-squares lag with dead time"
+    publish(__file__, title, f"Seed {a.seed}.", text, *([wide] if wide else []))
 
 
 if __name__ == "__main__":

@@ -7,7 +7,6 @@ assessed as in a night, then the plant-wide pass is asked. Writes proofs/plant_w
 
 from __future__ import annotations
 
-import argparse
 import time
 from collections import Counter
 from collections.abc import Mapping
@@ -28,6 +27,7 @@ from analyzer.night.chunk import assess_loop
 from analyzer.plantwide.night import TracedNight, traced_night
 from analyzer.store.rows import night_row
 from identification.errors import TriageError
+from proofs.common import parser_of
 from proofs.coupled.draw import Drawn, Recorded, draw
 
 OUT = Path(__file__).with_suffix(".md")
@@ -168,15 +168,11 @@ def table(k: Counter[str], command: str) -> str:
 
 def main() -> None:
     """Draw, ask, count, write."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("--plants", type=int, default=200)
-    parser.add_argument("--seed", type=int, default=2000)
+    parser = parser_of(__doc__, plants=200, seed=2000, jobs=1, out=OUT)
     parser.add_argument("--loops", type=int, help="Loops of a plant; drawn from 30 to 300 where not given.")
     parser.add_argument(
         "--hours", type=float, help="Length of the records; drawn from 6 to 24 h where not given."
     )
-    parser.add_argument("--jobs", type=int, default=1)
-    parser.add_argument("--out", type=Path, default=OUT)
     o = parser.parse_args()
     jobs = [(o.seed + i, o.loops, o.hours) for i in range(o.plants)]
     total: Counter[str] = Counter()

@@ -7,7 +7,6 @@ the cycle's own amplitude. Writes recorded.md here and docs/figures/recorded.png
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -21,10 +20,10 @@ from analyzer.loop.decisions import Cause, counts
 from analyzer.loop.oscillation import detect
 from analyzer.loop.quality import prepare
 from identification.errors import NotAssessedError
+from proofs.common import command, command_line, publish, table
+from proofs.plant import CONFIG, START_S, Sketch, Trends, prepared, series, simulate, spec
 from proofs.untidy.recorder import swinging_door
-from tests.analyzer.plant import CONFIG, START_S, Sketch, Trends, prepared, series, simulate, spec
 
-OUT = Path(__file__).with_suffix(".md")
 FIGURE = Path(__file__).resolve().parents[1] / "docs" / "figures" / "recorded.png"
 HOURS = 6.0
 SKETCHES = {
@@ -110,16 +109,15 @@ def answered(job: tuple[Cell, int]) -> Answer:
     return Answer(True, told, str(a.verdict.cause), width)
 
 
-def line(cell: Cell, answers: Sequence[Answer]) -> str:
+def line(cell: Cell, answers: Sequence[Answer]) -> list[str]:
     """A row of the table."""
     n = len(answers)
     right = sum(a.cause == SKETCHES[cell.name].cause for a in answers)
     named = sum(a.cause in NAMES for a in answers)
     widths = [a.width for a in answers if a.width is not None]
     shares = (sum(a.found for a in answers), right, named - right, n - sum(a.assessed for a in answers))
-    cells = " | ".join(f"{100 * s / n:.0f}" for s in shares)
     width = f"{float(np.median(widths)):.2f}" if widths and SKETCHES[cell.name].cause == "valve" else ""
-    return f"| {cell.name} | {cell.much:g} | {cells} | {width} |"
+    return [cell.name, f"{cell.much:g}", *(f"{100 * s / n:.0f}" for s in shares), width]
 
 
 def draw(results: dict[Cell, list[Answer]]) -> None:
@@ -149,10 +147,7 @@ def draw(results: dict[Cell, list[Answer]]) -> None:
 
 def main() -> None:
     """Ask all, write table and picture."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--records", type=int, default=8)
-    parser.add_argument("--jobs", type=int, default=2)
-    options = parser.parse_args()
+    options = command_line(__doc__, records=8, jobs=2)
     cells = [Cell(name, way, much) for way, levels in WAYS.items() for name in SKETCHES for much in levels]
     jobs = [(cell, seed) for cell in cells for seed in range(options.records)]
     with get_context("spawn").Pool(options.jobs) as pool:
@@ -160,28 +155,17 @@ def main() -> None:
     results: dict[Cell, list[Answer]] = {}
     for (cell, _), found in zip(jobs, answers, strict=True):
         results.setdefault(cell, []).append(found)
-    lines = [
-        "# What the recorder leaves of each cause",
-        "",
-        f"`python -m proofs.recorded --records {options.records}`, drawn in docs/figures/recorded.png",
-        "",
+    parts = [
+        f"{command(__file__, records=options.records)}, drawn in docs/figures/recorded.png",
         f"Records of {HOURS:g} h. Not assessed: the night says what the recording lacks, and nothing else. Width is "
         "that of the valve's fault over the true one, the median where the valve is named.",
     ]
     for way, levels in WAYS.items():
-        lines += ["", f"## {way.capitalize()}", ""]
-        head = (
-            f"| loop | {way} | oscillation found % | right cause % | wrong cause % | not assessed % | width |"
-        )
-        lines += [head, "|---|---|---|---|---|---|---|"]
-        lines += [
-            line(Cell(name, way, much), results[Cell(name, way, much)])
-            for name in SKETCHES
-            for much in levels
-        ]
-    OUT.write_text("\n".join(lines) + "\n", encoding="utf-8")
+        heads = f"loop | {way} | oscillation found % | right cause % | wrong cause % | not assessed % | width"
+        mine = (Cell(name, way, much) for name in SKETCHES for much in levels)
+        parts += [f"## {way.capitalize()}", table(heads, (line(cell, results[cell]) for cell in mine))]
     draw(results)
-    print("\n".join(lines))
+    publish(__file__, "What the recorder leaves of each cause", *parts)
 
 
 if __name__ == "__main__":

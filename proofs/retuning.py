@@ -9,7 +9,6 @@ and under the new tuning. Writes retuning.md and retuning.png beside this file.
 
 from __future__ import annotations
 
-import argparse
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
@@ -24,6 +23,7 @@ from analyzer.loops.tags import match, read_loops
 from analyzer.night import batch
 from analyzer.pages.rank import ranked
 from analyzer.store.store import Store
+from proofs.common import command, command_line, publish
 from proofs.retuning_outcome import (
     STATED_INTEGRAL,
     STATED_INTEGRAL_RAMP,
@@ -36,7 +36,6 @@ from proofs.retuning_outcome import (
 from proofs.retuning_plant import COUNTS, Floats, Rig, Trends, drawn
 from proofs.retuning_table import draw, each, failures, groups, rejections
 
-OUT = Path(__file__).with_suffix(".md")
 FIGURE = Path(__file__).with_suffix(".png")
 START = pd.Timestamp("2026-03-02")
 ABOUT = """Each seed has {counts}; {levels} of them integrating levels.
@@ -128,8 +127,8 @@ def examined(seed: int, counts: dict[str, tuple[int, int]] = COUNTS) -> list[Out
     return [outcome(rig, rows[rig.name], proposed(rig, rows[rig.name])) for rig in rigs]
 
 
-def report(found: Sequence[Outcome], command: str) -> str:
-    """The page beside this file."""
+def report(found: Sequence[Outcome]) -> tuple[str, ...]:
+    """The page beside this file, below its command."""
     counts = ", ".join(f"{lags + ramps} {kind}" for kind, (lags, ramps) in COUNTS.items())
     about = ABOUT.format(
         counts=counts,
@@ -138,29 +137,17 @@ def report(found: Sequence[Outcome], command: str) -> str:
         lag=STATED_INTEGRAL,
         ramp=STATED_INTEGRAL_RAMP,
     )
-    parts = (
-        groups(found),
-        failures(found),
-        rejections(found),
-        "![Travel and error](retuning.png)",
-        each(found),
-    )
-    return "\n\n".join(["# New settings on plants of another make", f"`{command}`", about, *parts]) + "\n"
+    picture = "![Travel and error](retuning.png)"
+    return about, groups(found), failures(found), rejections(found), picture, each(found)
 
 
 def main() -> None:
     """Examine all loops of some seeds, write the page and the picture."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--seed", type=int, nargs="+", default=[21, 22])
-    options = parser.parse_args()
+    options = command_line(__doc__, seed=[21, 22])
     found = [o for seed in options.seed for o in examined(seed)]
-    command = f"python -m proofs.retuning --seed {' '.join(map(str, options.seed))}"
-    text = report(found, command)
-    OUT.write_text(text)
     draw(found, FIGURE)
-    print(text)
+    shown = command(__file__, seed=options.seed)
+    publish(__file__, "New settings on plants of another make", shown, *report(found))
 
 
 if __name__ == "__main__":

@@ -7,7 +7,6 @@ docs/figures/sensitivity.png.
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache
@@ -20,9 +19,9 @@ from analyzer.loop.assess import assess
 from analyzer.loop.decisions import counts
 from analyzer.loop.oscillation import detect
 from identification.errors import NotAssessedError
-from tests.analyzer.plant import CONFIG, Sketch, Trends, prepared, simulate
+from proofs.common import command, command_line, publish, table
+from proofs.plant import CONFIG, Sketch, Trends, prepared, simulate
 
-OUT = Path(__file__).with_suffix(".md")
 FIGURE = Path(__file__).resolve().parents[1] / "docs" / "figures" / "sensitivity.png"
 TANK = Sketch("valve", (60.0, 1800.0, 9.0), 0.9, 40.0, backlash=2.5)
 PASSED_ON = "play, noise passed on to OP"
@@ -118,16 +117,15 @@ def shares(records: int, jobs: int) -> list[Share]:
     return out
 
 
-def table(found: Sequence[Share]) -> str:
+def told(found: Sequence[Share]) -> str:
     """A Markdown table of all cells."""
-    lines = [
-        "| loop | amplitude over noise | periods | oscillation found % | right cause % | wrong cause % |",
-        "|---|---|---|---|---|---|",
-    ]
-    for s in found:
-        shown = f"{s.found:.0f} | {s.right:.0f} | {s.wrong:.0f}"
-        lines.append(f"| {s.cell.name} | {s.cell.ratio:g} | {s.cell.periods:g} | {shown} |")
-    return "\n".join(lines)
+    heads = "loop | amplitude over noise | periods | oscillation found % | right cause % | wrong cause %"
+    rows = (
+        [s.cell.name, *(f"{x:g}" for x in (s.cell.ratio, s.cell.periods))]
+        + [f"{share:.0f}" for share in (s.found, s.right, s.wrong)]
+        for s in found
+    )
+    return table(heads, rows)
 
 
 def draw(found: Sequence[Share], path: Path) -> None:
@@ -184,24 +182,17 @@ def draw(found: Sequence[Share], path: Path) -> None:
 
 def main() -> None:
     """Run all records, write the table beside this file and the picture."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--records", type=int, default=12)
-    parser.add_argument("--jobs", type=int, default=2)
-    options = parser.parse_args()
+    options = command_line(__doc__, records=12, jobs=2)
     found = shares(options.records, options.jobs)
-    text = table(found)
-    command = f"`python -m proofs.sensitivity --records {options.records}`, drawn in docs/figures"
+    shown = f"{command(__file__, records=options.records)}, drawn in docs/figures"
     about = (
         "Amplitude is that of the cycle without noise; noise is white at 1 s. Passed on to OP at every scan it\n"
         "dithers the stem through the play, and below an amplitude of about twice the noise there is no cycle left\n"
         f"to find. Records of varying noise hold {AT_PERIODS:g} periods; those of varying length have an amplitude\n"
         f"{AT_RATIO:g} times the noise."
     )
-    OUT.write_text(f"# What is found, and what is explained\n\n{command}\n\n{about}\n\n{text}\n")
     draw(found, FIGURE)
-    print(text)
+    publish(__file__, "What is found, and what is explained", shown, about, told(found))
 
 
 if __name__ == "__main__":

@@ -6,7 +6,6 @@ the settings stated as they are, and with the gain or the integral time stated w
 
 from __future__ import annotations
 
-import argparse
 import tempfile
 from dataclasses import replace
 from pathlib import Path
@@ -18,10 +17,10 @@ from analyzer.loop.oscillation import counting, detect
 from analyzer.loop.quality import prepare
 from analyzer.loop.settings_check import differing
 from analyzer.loops.tags import controller, match, read_loops
+from proofs.common import command, command_line, publish, table
 from proofs.retuning import COUNTS, write_export, write_loops
 from proofs.retuning_plant import drawn
 
-OUT = Path(__file__).with_suffix(".md")
 STATED = ((1.0, 1.0), (2.0, 1.0), (0.5, 1.0), (1.3, 1.0), (1.0, 3.0), (1.0, 1 / 3))
 """What gain and integral time are stated as, over the true ones [-]."""
 
@@ -51,26 +50,14 @@ def told(seed: int) -> list[list[bool]]:
 
 def main() -> None:
     """Count over all loops of some seeds and write the table."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--seed", type=int, nargs="+", default=[71, 72])
-    seeds = parser.parse_args().seed
+    seeds = command_line(__doc__, seed=[71, 72]).seed
     rows = [row for seed in seeds for row in told(seed)]
-    lines = [
-        "# Are stated settings those of the controller?",
-        "",
-        f"`python -m proofs.settings --seed {' '.join(map(str, seeds))}`",
-        "",
-        "| Kp stated over true | Ti stated over true | told as others |",
-        "|---|---|---|",
-    ]
-    lines += [
-        f"| {k:.3g} | {t:.3g} | {sum(row[i] for row in rows)} of {len(rows)} |"
+    counts = (
+        (f"{k:.3g}", f"{t:.3g}", f"{sum(row[i] for row in rows)} of {len(rows)}")
         for i, (k, t) in enumerate(STATED)
-    ]
-    OUT.write_text("\n".join(lines) + "\n")
-    print(OUT.read_text())
+    )
+    text = table("Kp stated over true | Ti stated over true | told as others", counts)
+    publish(__file__, "Are stated settings those of the controller?", command(__file__, seed=seeds), text)
 
 
 if __name__ == "__main__":

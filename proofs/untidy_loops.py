@@ -8,10 +8,8 @@ proofs/untidy_loops.md.
 
 from __future__ import annotations
 
-import argparse
 from dataclasses import replace
 from multiprocessing import Pool
-from pathlib import Path
 
 import numpy as np
 
@@ -22,9 +20,9 @@ from analyzer.loop.oscillation import counting, detect
 from analyzer.loop.quality import Prepared, prepare
 from analyzer.loops.spec import LoopSpec
 from identification.models import Pid
+from proofs.common import command, command_line, publish, table
 from proofs.untidy.draw import CAUSES, Drawn, draw
 
-OUT = Path(__file__).with_suffix(".md")
 NAMED = {"stiction": "valve", "backlash": "valve", "tuning": "tuning", "load": "load", "healthy": "none"}
 SAID = ("valve", "tuning", "load", "undecided", "none")
 
@@ -65,39 +63,29 @@ def recorded(drawn: Drawn, config: Config) -> tuple[Prepared, Pid | None]:
     return prepare(spec, series, config.quality), stated
 
 
-def table(results: list[tuple[str, bool, bool, bool, str]]) -> str:
+def told(results: list[tuple[str, bool, bool, bool, str]]) -> str:
     """A Markdown table: cause, loops that show it, found, clear ones, what was named of these."""
-    lines = [
-        "| cause | show it | oscillation found | clear | " + " | ".join(f"named {s}" for s in SAID) + " |",
-        "|---|---|---|---|" + "---|" * len(SAID),
-    ]
+    rows = []
     for cause in CAUSES:
         mine = [r for r in results if r[0] == cause and r[1]]
         plain = [r for r in mine if r[2] or cause == "healthy"]
         named = [sum(r[4] == s for r in plain) for s in SAID]
-        cells = [cause, len(mine), sum(r[3] for r in mine), len(plain), *named]
-        lines.append("| " + " | ".join(str(c) for c in cells) + " |")
+        rows.append([cause, len(mine), sum(r[3] for r in mine), len(plain), *named])
     ill = [r for r in results if r[0] != "healthy"]
     right = sum(r[2] and r[4] == NAMED[r[0]] for r in ill)
-    lines.append("")
-    lines.append(f"Found {sum(r[1] and r[3] for r in ill)} of {sum(r[1] for r in ill)}; ")
-    lines[-1] += f"cause right {right} of {sum(r[2] for r in ill)} clear ones."
-    return "\n".join(lines)
+    heads = " | ".join(["cause | show it | oscillation found | clear", *(f"named {s}" for s in SAID)])
+    found = f"Found {sum(r[1] and r[3] for r in ill)} of {sum(r[1] for r in ill)}"
+    right_of = f"cause right {right} of {sum(r[2] for r in ill)} clear ones."
+    return f"{table(heads, rows)}\n\n{found}; {right_of}"
 
 
 def main() -> None:
     """Judge all loops and write the table beside this file."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("--loops", type=int, default=300)
-    parser.add_argument("--seed", type=int, default=4)
-    parser.add_argument("--jobs", type=int, default=2)
-    options = parser.parse_args()
+    options = command_line(__doc__, loops=300, seed=4, jobs=2)
     seeds = [100_000 * options.seed + k for k in range(options.loops)]
     with Pool(options.jobs) as pool:
-        text = table(pool.map(judged, seeds, chunksize=10))
-    command = f"python -m proofs.untidy_loops --loops {options.loops} --seed {options.seed}"
-    OUT.write_text(f"# Untidy loops\n\n`{command}`\n\n{text}\n")
-    print(text)
+        text = told(pool.map(judged, seeds, chunksize=10))
+    publish(__file__, "Untidy loops", command(__file__, loops=options.loops, seed=options.seed), text)
 
 
 if __name__ == "__main__":

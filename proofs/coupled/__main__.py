@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import csv
 import json
 from pathlib import Path
@@ -10,6 +9,7 @@ from pathlib import Path
 import pandas as pd
 
 import proofs.coupled
+from proofs.common import parser_of
 from proofs.coupled.draw import Drawn, draw, stamps
 
 COLUMNS = ("loop", "type", "area", "master", "kp", "ti", "scan_s", "pv_lo", "pv_hi", "op_lo", "op_hi")
@@ -36,12 +36,8 @@ def written(folder: Path, drawn: Drawn, seed: int) -> None:
 
 def main() -> None:
     """Draw and write."""
-    parser = argparse.ArgumentParser(
-        description=proofs.coupled.__doc__, formatter_class=argparse.RawTextHelpFormatter
-    )
+    parser = parser_of(proofs.coupled.__doc__, plants=1, seed=1)
     parser.add_argument("folder", type=Path)
-    parser.add_argument("--plants", type=int, default=1)
-    parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--loops", type=int)
     options = parser.parse_args()
     for seed in range(options.seed, options.seed + options.plants):

@@ -21,9 +21,9 @@ from analyzer.history.export import open_export
 from analyzer.history.series import Series
 from analyzer.history.table import ReadOptions
 from identification.errors import TriageError
+from proofs.common import publish
 from proofs.dialects.make import main as make
 
-OUT = Path(__file__).with_suffix(".md")
 CLOSE_S = 0.03
 """Stamps this close are one [s]: serials of days have no more digits."""
 WARNS = ("state ", "in autumn", "in spring", "out of order", "no date", "since the start", "repeat a stamp")
@@ -131,14 +131,10 @@ def main() -> None:
         for o in found:
             print(o)
         return
-    text = table(found)
-    print(text)
     about = (
         "Exports in the manner of products, by a hand that did not know the readers, against their truths."
     )
-    OUT.write_text(
-        f"# Exports of other makes\n\n`python -m proofs.dialects.score`\n\n{about}\n\n{text}\n", "utf-8"
-    )
+    publish(__file__, "Exports of other makes", "`python -m proofs.dialects.score`", about, table(found))
 
 
 if __name__ == "__main__":

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import csv
 import json
 from dataclasses import asdict
@@ -12,6 +11,7 @@ import numpy as np
 import pandas as pd
 
 import proofs.untidy
+from proofs.common import parser_of
 from proofs.untidy.draw import Drawn, draw
 
 COLUMNS = ("loop", "type", "scan_s", "pv_lo", "pv_hi", "op_lo", "op_hi", "kp", "ti")
@@ -32,12 +32,8 @@ def written(folder: Path, name: str, drawn: Drawn) -> dict[str, object]:
 
 def main() -> None:
     """Draw and write."""
-    parser = argparse.ArgumentParser(
-        description=proofs.untidy.__doc__, formatter_class=argparse.RawTextHelpFormatter
-    )
+    parser = parser_of(proofs.untidy.__doc__, loops=90, seed=1)
     parser.add_argument("folder", type=Path)
-    parser.add_argument("--loops", type=int, default=90)
-    parser.add_argument("--seed", type=int, default=1)
     options = parser.parse_args()
     options.folder.mkdir(parents=True, exist_ok=True)
     truth, rows = {}, []

@@ -8,7 +8,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from plant import CONFIG, START_S, Sketch, prepared, series, simulate, spec
 
 from analyzer.loop.advice import (
     advise,
@@ -28,6 +27,7 @@ from analyzer.loop.quality import prepare
 from analyzer.loop.reconstructed_load import load_of, scan_noise
 from analyzer.store.rows import night_row
 from identification.models import Backlash, Fopdt, Integrator, Pid
+from proofs.plant import CONFIG, START_S, Sketch, prepared, series, simulate, spec
 from tuning.limits import LIMITS
 from tuning.linear import margins
 

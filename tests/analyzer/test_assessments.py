@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from plant import CONFIG, START_S, record
 
 from analyzer.loop.assess import assess, unassessable
 from analyzer.loop.assessments import (
@@ -27,6 +26,7 @@ from analyzer.loop.decisions import Lack
 from analyzer.loop.oscillation import detect
 from analyzer.loop.quality import Prepared, Scale
 from identification.record import LoopRecord
+from proofs.plant import CONFIG, START_S, record
 
 FIGURES = CONFIG.figures
 N = 9000

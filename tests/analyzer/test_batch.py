@@ -12,7 +12,6 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from click.testing import CliRunner
-from plant import CONFIG, START_S, Sketch, Trends, simulate, write_export
 
 from analyzer.cli import main
 from analyzer.columns import NIGHTS, names
@@ -21,6 +20,7 @@ from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import find_loops
 from analyzer.night import batch, chunk
 from analyzer.store.store import Store
+from proofs.plant import CONFIG, START_S, Sketch, Trends, simulate, write_export
 
 LOOPS = 40
 BROKEN = "L17"

@@ -6,11 +6,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
-from plant import CONFIG, START_S, run, series, spec, wander
 
 from analyzer.loop.assess import assess
 from analyzer.loop.quality import Prepared, prepare
 from identification.models import Pid
+from proofs.plant import CONFIG, START_S, run, series, spec, wander
 
 PERIOD_S, EVERY_S, HOURS = 3600, 15, 20
 KEPT = slice(None, None, EVERY_S)

@@ -7,7 +7,6 @@ from functools import cache
 
 import numpy as np
 import pytest
-from plant import CONFIG, START_S, Sketch, Trends, prepared, record, series, simulate, spec
 
 from analyzer.loop.assess import Assessment, assess
 from analyzer.loop.cause import dead_valve, judge
@@ -16,6 +15,7 @@ from analyzer.loop.quality import prepare
 from analyzer.plantwide.source import Peer
 from analyzer.plantwide.verdict import followers_of, trace
 from identification.errors import NotAssessedError
+from proofs.plant import CONFIG, START_S, Sketch, Trends, prepared, record, series, simulate, spec
 from proofs.untidy.recorder import swinging_door
 
 SKETCHES = {

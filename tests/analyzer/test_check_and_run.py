@@ -6,9 +6,9 @@ import json
 
 import pytest
 from click.testing import CliRunner
-from plant import Sketch, simulate, write_export
 
 from analyzer.cli import main
+from proofs.plant import Sketch, simulate, write_export
 
 FLOW = Sketch("none", (1.1, 12.0, 4.0), 0.3, 20.0, kind="flow")
 

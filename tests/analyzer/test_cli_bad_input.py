@@ -9,9 +9,9 @@ import numpy as np
 import pandas as pd
 import pytest
 from click.testing import CliRunner, Result
-from plant import START_S
 
 from analyzer.cli import main
+from proofs.plant import START_S
 
 N = 600
 COMMANDS = ("check", "run")

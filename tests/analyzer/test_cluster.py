@@ -14,10 +14,10 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner, Result
 from dask_cluster import Process, dask_cluster, whole_cluster
-from plant import write_export
 from test_batch import quiet, tables
 
 from analyzer.cli import main
+from proofs.plant import write_export
 
 pytest.importorskip("distributed", reason="the extra 'cluster' is not installed")
 LOOPS = 24

@@ -17,7 +17,7 @@ from analyzer.config import Config
 from analyzer.config_file import configured, document, limit_of, read_config
 from analyzer.loops.changes import TuningChange
 from analyzer.store.store import Store
-from tests.analyzer.plant import START_S, Sketch, simulate, write_export
+from proofs.plant import START_S, Sketch, simulate, write_export
 from tests.reports.small_store import small_store
 
 TANK = Sketch("valve", (60.0, 1800.0, 9.0), 0.9, 40.0, backlash=2.5)

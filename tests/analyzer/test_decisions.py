@@ -16,7 +16,7 @@ from analyzer.night import chunk
 from analyzer.night.nights import Night
 from analyzer.plantwide.verdict import Source, follows
 from analyzer.store.rows import night_row
-from tests.analyzer.plant import CONFIG, START_S, series, spec
+from proofs.plant import CONFIG, START_S, series, spec
 
 CONTRACT = {
     Cause: "valve|tuning|load|none|undecided",

@@ -18,7 +18,6 @@ import pyarrow.compute as pc
 import pyarrow.parquet as pq
 import pytest
 from click.testing import CliRunner, Result
-from plant import START_S, write_export
 from test_batch import quiet, tables
 
 from analyzer.cli import main
@@ -26,6 +25,7 @@ from analyzer.commands import run as run_cli
 from analyzer.store.lock import locked
 from analyzer.store.store import Store
 from identification.errors import InputError
+from proofs.plant import START_S, write_export
 
 LOOPS = 24
 linux = pytest.mark.skipif(sys.platform != "linux", reason="processes are looked for in /proc")

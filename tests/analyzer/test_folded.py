@@ -9,7 +9,7 @@ from analyzer.loop.decisions import Lack
 from analyzer.night import chunk
 from analyzer.night.nights import Night
 from analyzer.store import rows
-from tests.analyzer.plant import CONFIG, START_S, series, spec
+from proofs.plant import CONFIG, START_S, series, spec
 
 
 def night_row(ti_s: float) -> dict[str, object]:

@@ -16,7 +16,7 @@ from analyzer.commands.options import MOST_SAID, one_line
 from analyzer.explain.saved_model import checked
 from analyzer.store.store import Store
 from identification.errors import InputError
-from tests.analyzer.plant import Sketch, simulate, write_export
+from proofs.plant import Sketch, simulate, write_export
 from tests.analyzer.test_batch import stopped
 from tests.reports.small_store import small_store
 

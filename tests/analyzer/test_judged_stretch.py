@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from plant import CONFIG, SAMPLE_DATA, START_S, Trends, prepared, run, spec, wander
 
 from analyzer.history.export import open_export
 from analyzer.loop.assess import assess
@@ -17,6 +16,7 @@ from analyzer.night import batch
 from analyzer.store.store import Store
 from identification.models import Pid
 from identification.record import LoopRecord
+from proofs.plant import CONFIG, SAMPLE_DATA, START_S, Trends, prepared, run, spec, wander
 
 HOUR = 3600
 DAY_S = 86400.0

@@ -16,7 +16,7 @@ from analyzer.night.nights import Night
 from analyzer.pages.maintenance import work_order
 from analyzer.pages.rank import worst_first
 from analyzer.store.rows import night_row
-from tests.analyzer.plant import CONFIG, START_S, Sketch, series, simulate, spec
+from proofs.plant import CONFIG, START_S, Sketch, series, simulate, spec
 from tests.identification.signals import hand_loop
 
 NIGHT = Night("2026-03-02", START_S, START_S + 86400.0)

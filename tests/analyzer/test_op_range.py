@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from plant import CONFIG, START_S, Sketch, Trends, series, simulate, spec
 
 from analyzer.config import QualityLimits
 from analyzer.loop.finding import in_lanes
@@ -14,6 +13,7 @@ from analyzer.loop.quality import op_in_range
 from analyzer.night import chunk
 from analyzer.night.nights import Night
 from analyzer.store.rows import night_row
+from proofs.plant import CONFIG, START_S, Sketch, Trends, series, simulate, spec
 
 PIPE = Sketch("valve", (12.0, 150.0, 6.0), 0.65, 30.0, backlash=2.5, load_std=0.1)
 NIGHT = Night("2026-03-02", START_S, START_S + 86400.0)

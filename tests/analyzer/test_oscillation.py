@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from plant import CONFIG, START_S, record
 from scipy.signal import lfilter, square
 
 from analyzer.loop.assessments import hourly
 from analyzer.loop.oscillation import Oscillation, Oscillations, counting, detect
 from identification.record import LoopRecord
+from proofs.plant import CONFIG, START_S, record
 from proofs.untidy.draw import draw
 
 N = 7200

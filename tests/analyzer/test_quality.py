@@ -6,12 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from plant import START_S, series, spec
 
 from analyzer.config import QualityLimits
 from analyzer.history.series import Series
 from analyzer.loop.quality import Prepared, prepare
 from identification.errors import NotAssessedError
+from proofs.plant import START_S, series, spec
 
 N = 8000
 T = np.arange(N, dtype=float)

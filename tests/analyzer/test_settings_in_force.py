@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import pytest
-from plant import START_S, Sketch, simulate, spec, write_export
 
 from analyzer.config import Config
 from analyzer.history.export import open_export
@@ -14,6 +13,7 @@ from analyzer.loops.tags import match, read_loops
 from analyzer.night import batch
 from analyzer.store.store import Store
 from identification.errors import InputError
+from proofs.plant import START_S, Sketch, simulate, spec, write_export
 
 LOOP = spec("L", kp=1.0, ti=10.0)
 FIRST = TuningChange("L", 100.0, 1.0, 10.0, 2.0, 20.0)

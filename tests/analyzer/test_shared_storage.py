@@ -13,7 +13,6 @@ from typing import Any
 
 import pytest
 from click.testing import CliRunner, Result
-from plant import write_export
 from test_batch import cycling, quiet, tables
 from test_cluster import cluster  # noqa: F401
 
@@ -23,6 +22,7 @@ from analyzer.store import lock as store_lock
 from analyzer.store import version as store_version
 from analyzer.store.lock import OWNER, locked
 from identification.errors import InputError
+from proofs.plant import write_export
 
 pytest.importorskip("upath", reason="the extra 'remote' is not installed")
 pytest.importorskip("s3fs", reason="the extra 'remote' is not installed")

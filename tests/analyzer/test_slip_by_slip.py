@@ -10,7 +10,7 @@ from analyzer.loop.advice import propose
 from analyzer.words import settings as words
 from identification.models import Pid
 from proofs.coverage import FAMILIES, assessed, made
-from tests.analyzer.plant import CONFIG
+from proofs.plant import CONFIG
 
 PLAY, STICKS = FAMILIES[:2]
 

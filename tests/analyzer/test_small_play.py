@@ -10,7 +10,7 @@ import pytest
 
 from analyzer.loop.assess import Assessment
 from analyzer.night.chunk import assess_loop
-from tests.analyzer.plant import CONFIG, START_S, series, spec
+from proofs.plant import CONFIG, START_S, series, spec
 
 HOURS = 5
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from plant import CONFIG, Sketch, Trends, prepared
 
 from analyzer.loop.assess import assess
 from analyzer.loop.decisions import Lack
+from proofs.plant import CONFIG, Sketch, Trends, prepared
 
 HEALTHY = Sketch("none", (1.2, 60.0, 10.0), 1.2, 60.0, noise=0.1, load_std=1.0)
 

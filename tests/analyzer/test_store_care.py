@@ -18,7 +18,7 @@ from analyzer.columns import NIGHTS
 from analyzer.store import version as store_version
 from analyzer.store.care import problems
 from analyzer.store.store import Store
-from tests.analyzer.plant import Sketch, simulate, write_export
+from proofs.plant import Sketch, simulate, write_export
 from tests.reports.small_store import small_store
 
 MILL = Path(__file__).resolve().parents[2] / "sample_data"

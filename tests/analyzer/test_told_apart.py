@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
-from plant import CONFIG, Sketch, prepared, simulate
 
 from analyzer.loop.assess import assess
 from analyzer.loop.cause import told_apart
@@ -13,6 +12,7 @@ from analyzer.loop.decisions import Cause, Lack
 from analyzer.loop.finding import Sign
 from analyzer.loop.oscillation import counting
 from identification.models import Fopdt, Loop
+from proofs.plant import CONFIG, Sketch, prepared, simulate
 from tuning.linear import margins
 
 SINE = Sketch("load", (1.4, 90.0, 10.0), 0.8, 60.0, sine=1.0, sine_s=840.0, load_std=0.05)

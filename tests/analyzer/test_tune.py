@@ -10,9 +10,9 @@ import numpy as np
 import pandas as pd
 import pytest
 from click.testing import CliRunner, Result
-from plant import START_S, Sketch, Trends, simulate
 
 from analyzer.cli import main
+from proofs.plant import START_S, Sketch, Trends, simulate
 
 TANK = Sketch("valve", (60.0, 1800.0, 9.0), 0.9, 40.0, backlash=2.5)
 STATED = "0.9,40,0,100"

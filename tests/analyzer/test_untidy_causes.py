@@ -8,8 +8,6 @@ from functools import cache
 
 import numpy as np
 import pytest
-from plant import CONFIG, START_S, series, spec
-from plant import prepared as sketched
 from scipy.signal import lfilter
 
 from analyzer.loop.advice import withheld
@@ -19,6 +17,8 @@ from analyzer.loop.measure import measure
 from analyzer.loop.oscillation import counting, detect
 from analyzer.loop.quality import prepare
 from analyzer.loops.spec import LoopSpec
+from proofs.plant import CONFIG, START_S, series, spec
+from proofs.plant import prepared as sketched
 from proofs.sensitivity import SKETCHES, Cell, made
 from proofs.untidy.draw import draw
 from proofs.untidy.loop import Plant, Stem, run

@@ -7,7 +7,7 @@ from benchmarks.groups import row
 
 def test_the_benchmark_measures_a_plant(tmp_path):
     """A plant of 200 loops is traced in a process of its own, and its row tells time over the floor and memory."""
-    cells = [c.strip() for c in row(200, tmp_path).strip("|").split("|")]
+    cells = row(200, tmp_path)
     assert cells[0] == "200"
     assert int(cells[2]) > 0
     assert all(float(c) > 0 for c in cells[3:])

@@ -14,7 +14,7 @@ import pytest
 
 from analyzer.night.run_log import RunLog
 from analyzer.store.store import Store
-from tests.analyzer.plant import Sketch, simulate, write_export
+from proofs.plant import Sketch, simulate, write_export
 
 ROOT = Path(__file__).resolve().parents[2]
 DEPLOY = ROOT / "docs" / "deploy"

@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tuning_cases import backlash_case
 
 from identification.models import Backlash, Fopdt, Loop, Pid
 from identification.record import LoopRecord
+from proofs.valve_loops import backlash_case
 from tuning.bench import assumed_uncertainty
 from tuning.limits import LIMITS
 from tuning.predict import NAMES, assess, autocorrelation_peak, predict

@@ -5,9 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tuning_cases import backlash_case, level_case, load, stick_case
 
 from identification.models import Backlash, Fopdt, Integrator, Loop, Pid, Stiction
+from proofs.valve_loops import backlash_case, level_case, load, stick_case
 from tuning.bench import assumed_uncertainty
 from tuning.limit_cycle import confirm
 from tuning.limits import LIMITS

@@ -15,7 +15,7 @@ from analyzer.plantwide.groups import Group, groups_of
 from analyzer.plantwide.source import Peer
 from analyzer.plantwide.verdict import Traced, followers_of, may_follow, trace
 from analyzer.plantwide.wave import Wave, waves_in, waves_of, waves_table
-from tests.analyzer.plant import CONFIG, START_S, record
+from proofs.plant import CONFIG, START_S, record
 
 HOURS_8 = 28_800
 LIMITS = CONFIG.plant

@@ -8,7 +8,7 @@ import pytest
 from analyzer.loop.assess import assess
 from analyzer.loop.quality import prepare
 from identification.estimation.stem_position import seen
-from tests.analyzer.plant import CONFIG, START_S, Sketch, Trends, series, simulate, spec
+from proofs.plant import CONFIG, START_S, Sketch, Trends, series, simulate, spec
 
 PLAY = Sketch("valve", (60.0, 1800.0, 9.0), 0.9, 40.0, backlash=2.5)
 STICKING = Sketch("valve", (1.5, 40.0, 8.0), 0.8, 40.0, stickband=3.0, slip_jump=1.5)

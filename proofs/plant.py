@@ -17,7 +17,7 @@ from analyzer.loops.spec import LoopSpec
 from identification.models import Pid
 from identification.record import Floats, LoopRecord
 
-SAMPLE_DATA = Path(__file__).resolve().parents[2] / "sample_data"
+SAMPLE_DATA = Path(__file__).resolve().parents[1] / "sample_data"
 if str(SAMPLE_DATA) not in sys.path:
     sys.path.append(str(SAMPLE_DATA))
 
