@@ -2,14 +2,23 @@
 
 A wide table becomes one file, of which each loop reads its columns. Of a long one, whose tags may be interleaved line
 by line, the rows go into some dozens of files by tag, so that a loop's tags are read from a few of them.
+
+A copy is laid whole or not at all, so that a run that goes on takes it up: it is known by the file's name, size and
+both ends, by how it was read, and by this program's version.
 """
 
 from __future__ import annotations
 
+import hashlib
+import json
+import os
+import shutil
+import tempfile
 import zlib
-from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Collection, Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
 from functools import lru_cache, partial
+from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
@@ -18,18 +27,18 @@ import pyarrow.compute as pc
 import pyarrow.parquet as pq
 from pyarrow import csv
 
-from analyzer.history.laid_copy import Laid, laid
+from analyzer.history.files import ends_of, own_scratch
 from analyzer.history.parquet import ParquetTable
 from analyzer.history.sheet import (
     HEAD_ROWS,
-    WHOLE_SHARE,
     Sheet,
     as_far_as_numbers_go,
-    lines_of,
+    is_swallowed,
     reading,
+    told,
     unreadable,
 )
-from analyzer.history.unpacked import own_scratch
+from analyzer.history.table import trimmed
 from identification.errors import InputError
 
 BUCKETS = 64
@@ -38,6 +47,9 @@ BATCH_ROWS = 500_000
 """Rows of a Parquet file that are handed on at a time."""
 HELD_ROWS = 32_768
 """Rows of a file that are held before they are written: 64 files of 50 bytes a row hold 100 MB."""
+DONE = "done.json"
+"""What a copy says of itself; written last."""
+NAMED = "converted-"
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +76,7 @@ class Converted:
         """First rows of some columns."""
         with pq.ParquetFile(self._largest()) as file:
             batch = next(file.iter_batches(batch_size=HEAD_ROWS, columns=[str(i) for i in columns]))
-        return [self._tidy(batch.column(str(i))) for i in columns]
+        return [trimmed(batch.column(str(i)), self.unquoted) for i in columns]
 
     def read(self, columns: Sequence[int], where: tuple[int, Sequence[str]] | None = None) -> list[pa.Array]:
         """Whole columns, or the rows where the tag's column holds one of some texts.
@@ -89,15 +101,7 @@ class Converted:
     def _columns(self, path: Path, columns: Sequence[int]) -> list[pa.Array]:
         with pq.ParquetFile(path) as file:
             table = file.read(columns=sorted({str(i) for i in columns}))
-        return [self._tidy(table.column(str(i))) for i in columns]
-
-    def _tidy(self, column: pa.Array | pa.ChunkedArray) -> pa.Array:
-        """One array; texts trimmed, of quotes too where those were taken as they stand."""
-        array = column.combine_chunks() if isinstance(column, pa.ChunkedArray) else column
-        array = pa.concat_arrays(array.chunks) if isinstance(array, pa.ChunkedArray) else array
-        if not pa.types.is_string(array.type):
-            return array
-        return pc.utf8_trim(array, ' \t"') if self.unquoted else pc.utf8_trim_whitespace(array)
+        return [trimmed(table.column(str(i)), self.unquoted) for i in columns]
 
     def _file(self, k: int) -> Path:
         return self.folder / f"{k:03d}.parquet"
@@ -131,20 +135,79 @@ def converted(sheet: Sheet, tag: int, scratch: Path | None) -> Converted:
     """
     written = sheet.encoding, sheet.delimiter, sheet.decimal, sheet.skip_rows, sheet.names
     how = (*written, sheet.as_written, sheet.unquoted, tag)
-    place = scratch or own_scratch()
-    folder, done = laid(place, sheet.path, sheet.bytes, how, partial(_streamed, sheet, tag))
-    types = tuple(pq.read_schema(_any_file(sheet, folder)).types)
-    notes = (*sheet.found, *done.notes)
-    start = sheet.path, folder, 1 if tag < 0 else BUCKETS, sheet.names, types, notes
+    folder, done = _laid(scratch, sheet.path, sheet.bytes, how, partial(_streamed, sheet, tag))
+    first = next(folder.glob("*.parquet"), None)
+    if first is None:
+        expected = "rows of as many columns as the header"
+        raise InputError(f"{sheet.path}: no row", expected, "export it again")
+    count, types = 1 if tag < 0 else BUCKETS, tuple(pq.read_schema(first).types)
+    start = sheet.path, folder, count, sheet.names, types, (*sheet.found, *done.notes)
     return Converted(*start, sheet.decimal, sheet.first_row, tag, done.tags, done.unquoted)
 
 
-def _any_file(sheet: Sheet, folder: Path) -> Path:
-    """One of the files of a copy."""
-    found = next(folder.glob("*.parquet"), None)
-    if found is None:
-        raise InputError(f"{sheet.path}: no row", "rows of as many columns as the header", "export it again")
-    return found
+def converted_parquet(table: ParquetTable, tag: int, scratch: Path | None) -> Converted:
+    """The same of a long Parquet file, of which each loop's read would decode all."""
+    room = 4 * table.path.stat().st_size
+    folder, done = _laid(scratch, table.path, room, (table.names, tag), partial(_parted, table, tag))
+    start = table.path, folder, BUCKETS, table.names, table.types, table.notes
+    return Converted(*start, ".", None, tag, done.tags)
+
+
+def holds_copies(place: Path) -> bool:
+    """Whether a directory of copies holds a whole one."""
+    return any(place.glob(f"{NAMED}*/{DONE}"))
+
+
+def forget_halves(place: Path) -> None:
+    """Remove what a process that died left half done in a directory of copies."""
+    for left in place.iterdir():
+        if left.is_dir() and not (left / DONE).exists():
+            shutil.rmtree(left, ignore_errors=True)
+
+
+@dataclass(frozen=True, slots=True)
+class Laid:
+    """What a pass over an export found out: notes, the tags met in their order, and whether quotes were no quotes."""
+
+    notes: tuple[str, ...] = ()
+    tags: tuple[str, ...] = ()
+    unquoted: bool = False
+
+
+def _laid(
+    scratch: Path | None, path: Path, room: int, how: tuple[object, ...], lay: Callable[[Path], Laid]
+) -> tuple[Path, Laid]:
+    """The folder of a copy of a file that is read so, and what it says of itself.
+
+    Where there is none yet it is laid by `lay`, in `room` bytes.
+    """
+    place = scratch or own_scratch()
+    mark = hashlib.blake2b(ends_of(path), digest_size=16)
+    mark.update(repr((path.name, how, version("loop-triage"))).encode())
+    folder = place / f"{NAMED}{mark.hexdigest()}"
+    found = _said(folder)
+    if found is not None:
+        return folder, found
+    if shutil.disk_usage(place).free < room:
+        seen = f"{path}: no room for a copy of {room / 1e9:.1f} GB in {place}"
+        raise InputError(seen, "free disk", "make room")
+    made = Path(tempfile.mkdtemp(prefix=NAMED, dir=place))
+    done = lay(made)
+    (made / DONE).write_text(json.dumps(asdict(done)), encoding="utf-8")
+    shutil.rmtree(folder, ignore_errors=True)
+    os.replace(made, folder)
+    return folder, done
+
+
+def _said(folder: Path) -> Laid | None:
+    """What a whole copy says of itself; None where there is none, or a file of it lost its end with the power."""
+    try:
+        found = json.loads((folder / DONE).read_text(encoding="utf-8"))
+        for path in folder.glob("*.parquet"):
+            pq.read_metadata(path)
+        return Laid(tuple(found["notes"]), tuple(found["tags"]), found["unquoted"])
+    except (pa.ArrowException, OSError, ValueError, TypeError, KeyError):
+        return None
 
 
 def _streamed(sheet: Sheet, tag: int, folder: Path) -> Laid:
@@ -152,108 +215,12 @@ def _streamed(sheet: Sheet, tag: int, folder: Path) -> Laid:
     width = len(sheet.names)
     try:
         done = as_far_as_numbers_go(sheet.encoding, width, partial(_pass, sheet, tag, folder))
-        rows = pq_rows(folder) + done.left_out
-        if rows < WHOLE_SHARE * (lines_of(sheet) - sheet.skip_rows) - 1 and not sheet.unquoted:
+        if is_swallowed(sheet, done.rows + done.left_out):
             sheet = replace(sheet, unquoted=True)
             done = as_far_as_numbers_go(sheet.encoding, width, partial(_pass, sheet, tag, folder))
-            done.notes.append("a quote is not closed: quotes are taken as they stand")
     except (UnicodeError, pa.ArrowInvalid) as error:
         raise unreadable(sheet.path, error) from error
-    if done.left_out:
-        lost = f"{done.left_out} lines do not have as many columns as the header and are left out"
-        done.notes.append(lost)
-    return Laid(tuple(done.notes), tuple(done.tags), sheet.unquoted)
-
-
-def converted_parquet(table: ParquetTable, tag: int, scratch: Path | None) -> Converted:
-    """The same of a long Parquet file, of which each loop's read would decode all.
-
-    Raises
-    ------
-    InputError
-        The disk has no room.
-    """
-    place, room = scratch or own_scratch(), 4 * table.path.stat().st_size
-    folder, done = laid(place, table.path, room, (table.names, tag), partial(_parted, table, tag))
-    start = table.path, folder, BUCKETS, table.names, table.types, table.notes
-    return Converted(*start, ".", None, tag, done.tags)
-
-
-def _parted(table: ParquetTable, tag: int, folder: Path) -> Laid:
-    """A table's rows laid into a folder."""
-    stream = _Stream(folder, tag)
-    names = [str(i) for i in range(len(table.names))]
-    with pq.ParquetFile(table.path) as file:
-        for batch in file.iter_batches(batch_size=BATCH_ROWS):
-            if batch.num_rows:
-                stream.take(pa.RecordBatch.from_arrays([_plain(a) for a in batch.columns], names=names))
-    stream.close()
-    return Laid((), tuple(stream.tags))
-
-
-def _plain(array: pa.Array) -> pa.Array:
-    """An array whose batches are of one type, dictionaries decoded."""
-    return array.dictionary_decode() if pa.types.is_dictionary(array.type) else array
-
-
-def pq_rows(folder: Path) -> int:
-    """Rows of all files of a folder."""
-    return sum(pq.read_metadata(path).num_rows for path in folder.glob("*.parquet"))
-
-
-class _Stream:
-    """One pass over a sheet: files, lines left out, the tags met."""
-
-    def __init__(self, folder: Path, tag: int) -> None:
-        self.folder, self.tag = folder, tag
-        self.left_out, self.notes = 0, list[str]()
-        self.tags: dict[str, int] = {}
-        self._held: dict[int, list[pa.RecordBatch]] = {}
-        self._rows: dict[int, int] = {}
-        self._writers: dict[int, pq.ParquetWriter] = {}
-
-    def take(self, batch: pa.RecordBatch) -> None:
-        """Hand a batch's rows to their files."""
-        if self.tag < 0:
-            self._put(0, batch)
-            return
-        coded = pc.dictionary_encode(batch.column(self.tag), null_encoding="encode")
-        names = [str(name or "").strip(' \t"') for name in coded.dictionary.to_pylist()]
-        for name in names:
-            if name and name not in self.tags:
-                self.tags[name] = _bucket(name, BUCKETS)
-        of_kind = np.array(
-            [_bucket(name, BUCKETS) for name in names], dtype=np.uint8
-        )  # small, for a quick sort
-        bucket = of_kind[coded.indices.to_numpy(zero_copy_only=False)]
-        order = np.argsort(bucket, kind="stable")
-        sorted_batch, cuts = (
-            batch.take(pa.array(order)),
-            np.searchsorted(bucket[order], np.arange(BUCKETS + 1)),
-        )
-        for k in np.unique(bucket):
-            self._put(int(k), sorted_batch.slice(cuts[k], cuts[k + 1] - cuts[k]))
-
-    def _put(self, k: int, batch: pa.RecordBatch) -> None:
-        self._held.setdefault(k, []).append(batch)
-        self._rows[k] = self._rows.get(k, 0) + batch.num_rows
-        if self._rows[k] >= HELD_ROWS:
-            self._write(k)
-
-    def _write(self, k: int) -> None:
-        table = pa.Table.from_batches(self._held.pop(k))
-        if k not in self._writers:
-            path = self.folder / f"{k:03d}.parquet"
-            self._writers[k] = pq.ParquetWriter(path, table.schema, compression="snappy")
-        self._writers[k].write_table(table.combine_chunks())
-        self._rows[k] = 0
-
-    def close(self) -> None:
-        """Write what is held and close all files."""
-        for k in list(self._held):
-            self._write(k)
-        for writer in self._writers.values():
-            writer.close()
+    return Laid(tuple(told(sheet.unquoted, done.left_out)), tuple(done.tags), sheet.unquoted)
 
 
 def _pass(sheet: Sheet, tag: int, folder: Path, encoding: str, texts: Collection[int]) -> _Stream:
@@ -265,8 +232,73 @@ def _pass(sheet: Sheet, tag: int, folder: Path, encoding: str, texts: Collection
     as_text = {*texts, tag} - {-1}
     with csv.open_csv(sheet.path, **reading(sheet, columns, encoding, left_out, as_text)) as reader:
         for batch in reader:
-            if batch.num_rows:
-                stream.take(batch)
+            stream.take(batch)
     stream.close()
     stream.left_out = len(left_out)
     return stream
+
+
+def _parted(table: ParquetTable, tag: int, folder: Path) -> Laid:
+    """A table's rows laid into a folder, dictionaries decoded: their batches are not of one type."""
+    stream = _Stream(folder, tag)
+    names = [str(i) for i in range(len(table.names))]
+    with pq.ParquetFile(table.path) as file:
+        for batch in file.iter_batches(batch_size=BATCH_ROWS):
+            plain = [a.dictionary_decode() if pa.types.is_dictionary(a.type) else a for a in batch.columns]
+            stream.take(pa.RecordBatch.from_arrays(plain, names=names))
+    stream.close()
+    return Laid((), tuple(stream.tags))
+
+
+class _Stream:
+    """One pass over an export: files, rows, lines left out, the tags met and the file of each."""
+
+    def __init__(self, folder: Path, tag: int) -> None:
+        self.folder, self.tag = folder, tag
+        self.rows = self.left_out = 0
+        self.tags: dict[str, int] = {}
+        self._held: dict[int, list[pa.RecordBatch]] = {}
+        self._waiting: dict[int, int] = {}
+        self._writers: dict[int, pq.ParquetWriter] = {}
+
+    def take(self, batch: pa.RecordBatch) -> None:
+        """Hand a batch's rows to their files."""
+        if batch.num_rows == 0:
+            return
+        self.rows += batch.num_rows
+        if self.tag < 0:
+            self._put(0, batch)
+            return
+        coded = pc.dictionary_encode(batch.column(self.tag), null_encoding="encode")
+        names = [str(name or "").strip(' \t"') for name in coded.dictionary.to_pylist()]
+        self.tags.update({name: _bucket(name, BUCKETS) for name in names if name and name not in self.tags})
+        of_kind = np.array([_bucket(name, BUCKETS) for name in names], dtype=np.uint8)  # small: sorted fast
+        bucket = of_kind[coded.indices.to_numpy(zero_copy_only=False)]
+        order = np.argsort(bucket, kind="stable")
+        ordered, cuts = (
+            batch.take(pa.array(order)),
+            np.searchsorted(bucket[order], np.arange(BUCKETS + 1)),
+        )
+        for k in np.unique(bucket):
+            self._put(int(k), ordered.slice(cuts[k], cuts[k + 1] - cuts[k]))
+
+    def _put(self, k: int, batch: pa.RecordBatch) -> None:
+        self._held.setdefault(k, []).append(batch)
+        self._waiting[k] = self._waiting.get(k, 0) + batch.num_rows
+        if self._waiting[k] >= HELD_ROWS:
+            self._write(k)
+
+    def _write(self, k: int) -> None:
+        table = pa.Table.from_batches(self._held.pop(k))
+        if k not in self._writers:
+            path = self.folder / f"{k:03d}.parquet"
+            self._writers[k] = pq.ParquetWriter(path, table.schema, compression="snappy")
+        self._writers[k].write_table(table.combine_chunks())
+        self._waiting[k] = 0
+
+    def close(self) -> None:
+        """Write what is held and close all files."""
+        for k in list(self._held):
+            self._write(k)
+        for writer in self._writers.values():
+            writer.close()

@@ -8,8 +8,8 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
+from analyzer.history.files import own_scratch
 from analyzer.history.names import LONGEST
-from analyzer.history.unpacked import own_scratch
 
 DELIMITERS = (";", "\t", "|", ",")
 TITLE = re.compile(

@@ -13,6 +13,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from pyarrow import csv
 
+from analyzer.history.table import trimmed
 from identification.errors import InputError
 
 WHOLE_FILE_BYTES = 64_000_000  # files below are read at once and kept for the next loop's read
@@ -58,12 +59,7 @@ class Sheet:
     def notes(self) -> tuple[str, ...]:
         """How the file is written, and the lines of it that do not fit its header."""
         loaded = _loaded(self, self._wanted([0]))
-        told = []
-        if loaded.unquoted:
-            told.append("a quote is not closed: quotes are taken as they stand")
-        if loaded.left_out:
-            told.append(f"{loaded.left_out} lines do not have as many columns as the header and are left out")
-        return (*self.found, *told)
+        return (*self.found, *told(loaded.unquoted, loaded.left_out))
 
     def head(self, columns: Sequence[int]) -> list[pa.Array]:
         """First rows of some columns."""
@@ -99,9 +95,8 @@ def _loaded(sheet: Sheet, columns: tuple[int, ...]) -> Loaded:
     """Some columns of the whole file."""
     try:
         loaded = as_far_as_numbers_go(sheet.encoding, len(sheet.names), partial(_parsed, sheet, columns))
-        lines = _lines(sheet.path, sheet.changed_ns) - sheet.skip_rows
         rows = len(loaded.columns[columns[0]]) + loaded.left_out
-        if rows >= WHOLE_SHARE * lines - 1 or sheet.unquoted:
+        if not is_swallowed(sheet, rows):
             return loaded
         plain = replace(sheet, unquoted=True)
         again = as_far_as_numbers_go(sheet.encoding, len(sheet.names), partial(_parsed, plain, columns))
@@ -128,9 +123,17 @@ def as_far_as_numbers_go(encoding: str, width: int, read: Callable[[str, Collect
                 raise
 
 
-def lines_of(sheet: Sheet) -> int:
-    """Lines of a sheet's file that hold anything, within one."""
-    return _lines(sheet.path, sheet.changed_ns)
+def is_swallowed(sheet: Sheet, rows: int) -> bool:
+    """Whether so few of a sheet's lines came back as rows that an open quote has swallowed the rest."""
+    lines = _lines(sheet.path, sheet.changed_ns) - sheet.skip_rows
+    return rows < WHOLE_SHARE * lines - 1 and not sheet.unquoted
+
+
+def told(unquoted: bool, left_out: int) -> list[str]:
+    """Sentences on quotes that are none, and on lines that do not fit their header."""
+    quotes = ["a quote is not closed: quotes are taken as they stand"] if unquoted else []
+    lost = f"{left_out} lines do not have as many columns as the header and are left out"
+    return [*quotes, lost] if left_out else quotes
 
 
 @lru_cache(maxsize=KEPT_READS)
@@ -145,17 +148,15 @@ def _lines(path: Path, changed_ns: int) -> int:
 
 
 def unreadable(path: Path, error: Exception) -> InputError:
-    return InputError(
-        f"{path}: {str(error)[:120]}",
-        "delimited text in one encoding",
-        "state --encoding or export the file again",
-    )
+    """What is said of text that cannot be read to its end."""
+    remedy = "state --encoding or export the file again"
+    return InputError(f"{path}: {str(error)[:120]}", "delimited text in one encoding", remedy)
 
 
 def _parsed(sheet: Sheet, columns: tuple[int, ...], encoding: str, texts: Collection[int]) -> Loaded:
     left_out: list[int] = []
     table = csv.read_csv(sheet.path, **reading(sheet, columns, encoding, left_out, texts))
-    return Loaded({i: _tidy(table.column(str(i)), sheet.unquoted) for i in columns}, len(left_out))
+    return Loaded({i: trimmed(table.column(str(i)), sheet.unquoted) for i in columns}, len(left_out))
 
 
 @lru_cache(maxsize=KEPT_READS)
@@ -164,7 +165,7 @@ def _first_block(sheet: Sheet) -> dict[int, pa.Array]:
     columns = tuple(range(len(sheet.names)))
     with csv.open_csv(sheet.path, **reading(sheet, columns, sheet.encoding, [], ())) as reader:
         batch = reader.read_next_batch().slice(0, HEAD_ROWS)
-    return {i: _tidy(pa.chunked_array([batch.column(i)]), sheet.unquoted) for i in columns}
+    return {i: trimmed(batch.column(i), sheet.unquoted) for i in columns}
 
 
 def reading(
@@ -203,12 +204,3 @@ def reading(
             decimal_point=sheet.decimal,
         ),
     }
-
-
-def _tidy(column: pa.ChunkedArray, unquoted: bool) -> pa.Array:
-    """One array; texts trimmed, of quotes too where those were taken as they stand."""
-    chunks = column.combine_chunks()
-    array = chunks.chunk(0) if isinstance(chunks, pa.ChunkedArray) else chunks
-    if not pa.types.is_string(array.type):
-        return array
-    return pc.utf8_trim(array, ' \t"') if unquoted else pc.utf8_trim_whitespace(array)

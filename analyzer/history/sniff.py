@@ -1,4 +1,4 @@
-"""How a delimited text is written: encoding, delimiter, decimal mark, where its header stands."""
+"""How a delimited text is written: encoding, delimiter, decimal mark, and its header, or its columns without one."""
 
 from __future__ import annotations
 
@@ -12,9 +12,12 @@ from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
+import pyarrow as pa
+
+from analyzer.history import stamps
+from analyzer.history.clock import SINCE_START, scale_of
 from analyzer.history.encoding import detect_encoding
-from analyzer.history.headerless import taken_as
-from analyzer.history.names import is_stamp, without_unit
+from analyzer.history.names import WORDS, is_stamp, without_unit
 from analyzer.history.rewritten import rewritten
 from analyzer.history.sheet import Sheet
 from analyzer.history.table import ReadOptions
@@ -22,8 +25,7 @@ from identification.errors import InputError
 
 HEAD_BYTES = 1_000_000
 HEAD_LINES = 200
-DELIMITERS = (",", ";", "\t", "|")
-DELIMITER_NAMES = {",": "comma", ";": "semicolon", "\t": "tab", "|": "bar"}
+DELIMITERS = {",": "comma", ";": "semicolon", "\t": "tab", "|": "bar"}
 NO_DATA_LINE = re.compile(r"^(?:#.*|\[\w+\]|sep=.?|)$", re.IGNORECASE)
 COMMA_NUMBER = re.compile(r"^[+-]?\d+,\d+(?:[eE][+-]?\d+)?$")
 POINT_NUMBER = re.compile(r"^[+-]?\d*\.\d+(?:[eE][+-]?\d+)?$")
@@ -35,6 +37,11 @@ JSON = re.compile(r"^(?:\{\s*[\"}]|\[\s*[\[{\"])")
 PREAMBLE = 30
 """Lines of a preamble at most under which a header is looked for; ours."""
 STAMP = re.compile(r"^\d{1,4}[-/.]\w{1,9}[-/.]\d{1,4}\b|^\d{1,2}:\d\d\b")
+UNNAMED = "column {}"
+"""Name of a column that has none, by its place, from 1."""
+MOSTLY = 0.8
+"""Share of a column's cells that are numbers where it holds numbers; the rest is a historian's words; ours."""
+QUALITIES = frozenset(WORDS["quality"]["unnamed"])
 
 
 def open_sheet(path: Path, options: ReadOptions) -> Sheet:
@@ -55,19 +62,24 @@ def open_sheet(path: Path, options: ReadOptions) -> Sheet:
         return open_sheet(plain, replace(options, delimiter="\t", encoding="utf-8"))
     lines, above = _after_data_mark(first)
     delimiter = options.delimiter or _delimiter(path, lines)
-    guessed = taken_as(lines, delimiter)
+    guessed = _taken_as(lines, delimiter)
     place, header = (-1, list(guessed)) if guessed is not None else _header(path, lines, delimiter)
-    rows = _split([line for line in lines[place + 1 :] if not NO_DATA_LINE.match(line.strip())], delimiter)
+    rows = _split(_filled(lines[place + 1 :]), delimiter)
     if not rows:
         raise InputError(f"{path}: a header and no rows", "at least one sample", "export a period with data")
-    names = _padded(tuple(name.strip() for name in header), rows)
+    width = Counter(len(row) for row in rows).most_common(1)[0][0]  # rows may end with a delimiter
+    names = (*(name.strip() for name in header), *[""] * (width - len(header)))
     decimal, doubt = (options.decimal, "") if options.decimal else detect_decimal(rows, delimiter)
     stat = path.stat()
     skipped = place + 1 + above
     sheet = Sheet(path, stat.st_mtime_ns, stat.st_size, encoding, delimiter, decimal, skipped, names)
     said = [] if guessed is None else [f"no header: columns are taken as {', '.join(guessed)}"]
     said += [doubt] if doubt else []
-    return _described(replace(sheet, as_written=options.date_format is not None), tuple(said))
+    sheet = replace(sheet, as_written=options.date_format is not None)
+    types = tuple(array.type for array in sheet.head(range(len(names))))
+    between, mark = DELIMITERS.get(delimiter, repr(delimiter)), "comma" if decimal == "," else "point"
+    note = f"delimited text: {between} between columns, decimal {mark}, encoding {encoding}"
+    return replace(sheet, types=types, found=(note, *said))
 
 
 def detect_decimal(rows: Sequence[Sequence[str]], delimiter: str) -> tuple[str, str]:
@@ -77,7 +89,7 @@ def detect_decimal(rows: Sequence[Sequence[str]], delimiter: str) -> tuple[str, 
     where it is the comma of a file whose columns commas part.
     """
     cells = [cell.strip() for row in rows for cell in row]
-    marked = {",": _all(COMMA_NUMBER, cells), ".": _all(POINT_NUMBER, cells)}
+    marked = {",": list(filter(COMMA_NUMBER.match, cells)), ".": list(filter(POINT_NUMBER.match, cells))}
     mark = "," if len(marked[","]) > len(marked["."]) else "."
     other = "." if mark == "," else ","
     if not marked[mark] or not all(GROUP.match(cell) for cell in marked[mark]):
@@ -92,10 +104,6 @@ def detect_decimal(rows: Sequence[Sequence[str]], delimiter: str) -> tuple[str, 
     return mark, f"{seen} with a decimal {name}; state --decimal '{other}' if it groups thousands"
 
 
-def _all(pattern: re.Pattern[str], cells: Sequence[str]) -> list[str]:
-    return [cell for cell in cells if pattern.match(cell)]
-
-
 def _head(path: Path) -> bytes:
     with path.open("rb") as file:
         head = file.read(HEAD_BYTES)
@@ -108,16 +116,13 @@ def _lines(path: Path, head: bytes, encoding: str) -> list[str]:
     try:
         text = codecs.getincrementaldecoder(encoding)().decode(head)
     except (LookupError, UnicodeError) as error:
-        raise InputError(
-            f"{path}: not readable as {encoding}", "text in the stated encoding", "state another encoding"
-        ) from error
-    if "\x00" in text:
-        raise InputError(f"{path}: binary content", "delimited text or Parquet", "export as CSV or Parquet")
+        seen = f"{path}: not readable as {encoding}"
+        raise InputError(seen, "text in the stated encoding", "state another encoding") from error
+    other = "binary content" if "\x00" in text else "a JSON document" if JSON.match(text.lstrip()) else ""
+    if other:
+        raise InputError(f"{path}: {other}", "delimited text or Parquet", "export as CSV or Parquet")
     lines = re.split(r"\r\n|\n|\r", text)
-    whole = lines if len(head) < HEAD_BYTES else lines[:-1]
-    if JSON.match(text.lstrip()):
-        raise InputError(f"{path}: a JSON document", "delimited text or Parquet", "export as CSV or Parquet")
-    return whole
+    return lines if len(head) < HEAD_BYTES else lines[:-1]
 
 
 def _after_data_mark(lines: list[str]) -> tuple[list[str], int]:
@@ -131,16 +136,28 @@ def _split(lines: Sequence[str], delimiter: str) -> list[list[str]]:
     return list(csv.reader(io.StringIO("\n".join(lines)), delimiter=delimiter))
 
 
-def _widths(lines: Sequence[str], delimiter: str) -> Counter[int]:
-    return Counter(len(row) for row in _split(lines, delimiter) if len(row) > 1)
+def _cells(line: str, delimiter: str) -> list[str]:
+    return next(iter(_split([line], delimiter)), [])
+
+
+def _filled(lines: Sequence[str]) -> list[str]:
+    """Lines that may hold data: no comments, marks of sections or blanks."""
+    return [line for line in lines if not NO_DATA_LINE.match(line.strip())]
+
+
+def _shape(body: Sequence[str], delimiter: str) -> tuple[int, int]:
+    """How many lines a delimiter parts into the same number of columns, and how many columns; 0 and 0 where none."""
+    widths = Counter(len(row) for row in _split(body, delimiter) if len(row) > 1)
+    width, lines = (widths.most_common(1) or [(0, 0)])[0]
+    return lines, width
 
 
 def _delimiter(path: Path, lines: Sequence[str]) -> str:
     """The delimiter that splits most lines into the same number of columns, the header among them."""
-    body = [line for line in lines if not NO_DATA_LINE.match(line.strip())]
-    scores = {mark: _score(body, mark) for mark in DELIMITERS}
-    best = max(DELIMITERS, key=lambda mark: scores[mark])
-    if scores[best] == (0, 0):
+    body = _filled(lines)
+    shapes = {mark: _shape(body, mark) for mark in DELIMITERS}
+    best = max(DELIMITERS, key=lambda mark: shapes[mark])
+    if shapes[best] == (0, 0):
         raise InputError(
             f"{path}: no columns; the first line is '{body[0][:60] if body else ''}'",
             "columns separated by comma, semicolon, tab or bar",
@@ -149,31 +166,21 @@ def _delimiter(path: Path, lines: Sequence[str]) -> str:
     return best
 
 
-def _score(body: Sequence[str], mark: str) -> tuple[int, int]:
-    widths = _widths(body, mark)
-    if not widths:
-        return 0, 0
-    width, lines = widths.most_common(1)[0]
-    return lines, width
-
-
 def _header(path: Path, lines: Sequence[str], delimiter: str) -> tuple[int, list[str]]:
     """Line number (from 0) and cells of the header: of the lines as wide as the table above its data the first with a
     name of a time column, else the first."""
-    body = [line for line in lines if not NO_DATA_LINE.match(line.strip())]
-    width = _widths(body, delimiter).most_common(1)[0][0]
+    width = _shape(_filled(lines), delimiter)[1]
     above: list[tuple[int, list[str]]] = []
     for place, line in enumerate(lines):
-        cells = next(iter(_split([line], delimiter)), [])
+        cells = _cells(line, delimiter)
         if NO_DATA_LINE.match(line.strip()) or len(cells) < max(2, width - 1):
             continue
         if not _is_data(cells):
             above.append((place, cells))
             continue
         named = next(((k, names) for k, names in above if _names_all(names)), None)
-        below = None if named is not None else _header_below(lines, place, delimiter, width)
-        found = named or below or next(iter(above), None)
-        return found if found is not None else _commented(path, lines, place, delimiter)
+        found = named or _header_below(lines, place, delimiter, width) or next(iter(above), None)
+        return found or _commented(path, lines, place, delimiter)
     if above:
         return above[0]
     raise InputError(f"{path}: no header", f"a line of {width} names above the samples", "add a header line")
@@ -197,9 +204,7 @@ def _header_below(
 
     Within a few lines, with a name of a time column among its cells; a table without a header has none.
     """
-    rows = [(k, next(iter(_split([lines[k]], delimiter)), [])) for k in range(start + 1, len(lines))][
-        :PREAMBLE
-    ]
+    rows = [(k, _cells(lines[k], delimiter)) for k in range(start + 1, len(lines))][:PREAMBLE]
     for (place, cells), (_, after) in pairwise(rows):
         if len(cells) >= width - 1 and _names_time(cells) and not _is_data(cells) and _is_data(after):
             return place, cells
@@ -208,10 +213,9 @@ def _header_below(
 
 def _commented(path: Path, lines: Sequence[str], data: int, delimiter: str) -> tuple[int, list[str]]:
     """A header that stands behind the last comment sign above the data."""
-    wide = len(_split([lines[data]], delimiter)[0])
-    above = _split([lines[data - 1].lstrip("# ")], delimiter) if data else []
-    if above and len(above[0]) == wide and not _is_data(above[0]):
-        return data - 1, above[0]
+    above = _cells(lines[data - 1].lstrip("# "), delimiter) if data else []
+    if len(above) == len(_cells(lines[data], delimiter)) and not _is_data(above):
+        return data - 1, above
     raise InputError(
         f"{path}: no header; row {data + 1} is already data ('{lines[data][:60]}')",
         "a line of column names above the samples",
@@ -221,22 +225,51 @@ def _commented(path: Path, lines: Sequence[str], data: int, delimiter: str) -> t
 
 def _is_data(cells: Sequence[str]) -> bool:
     filled = [cell.strip() for cell in cells if cell.strip()]
-    return any(STAMP.match(cell) for cell in filled) or sum(map(_is_number, filled)) * 2 > len(filled)
+    return any(STAMP.match(cell) for cell in filled) or len(list(filter(NUMBER.match, filled))) * 2 > len(
+        filled
+    )
 
 
-def _is_number(cell: str) -> bool:
-    return NUMBER.match(cell) is not None
+def _taken_as(lines: Sequence[str], delimiter: str) -> tuple[str, ...] | None:
+    """Names for the columns of a table without a header, of tag, stamp, value and quality or of a stamp and numbers;
+    None for any other.
+
+    Only where each of the first rows has the same shape: a stamp, a text that is none of the rest, and a number; or a
+    stamp first and behind it numbers alone, which are named by their places (loops.csv may tell what they are).
+    """
+    rows = [row for row in csv.reader(io.StringIO("\n".join(lines[:HEAD_LINES])), delimiter=delimiter) if row]
+    if len(rows) < 3 or len({len(row) for row in rows}) != 1 or len(rows[0]) < 3:
+        return None
+    columns = [[cell.strip() for cell in column] for column in zip(*rows, strict=True)]
+    kinds = [_kind(column) for column in columns]
+    if kinds[0] == "stamp" and set(kinds[1:]) == {"number"}:
+        return ("timestamp", *(UNNAMED.format(i + 1) for i in range(1, len(columns))))
+    if len(columns) > 8 or kinds.count("stamp") != 1 or "text" not in kinds or "number" not in kinds:
+        return None
+    tag = max(_places(kinds, "text"), key=lambda i: (len(set(columns[i])), -i))
+    value = max(_places(kinds, "number"), key=lambda i: (len(set(columns[i])), -i))
+    names = [UNNAMED.format(i + 1) for i in range(len(columns))]
+    names[tag], names[kinds.index("stamp")], names[value] = "tag", "timestamp", "value"
+    free = [i for i in range(len(columns)) if names[i].startswith("column")]
+    coded = [i for i in free if {cell.lower() for cell in columns[i]} <= QUALITIES]
+    if coded:
+        names[max(coded, key=lambda i: (kinds[i] == "quality", i))] = "quality"
+    return tuple(names)
 
 
-def _padded(names: tuple[str, ...], rows: Sequence[Sequence[str]]) -> tuple[str, ...]:
-    """Rows that end with a delimiter have a last column without a name."""
-    width = Counter(len(row) for row in rows).most_common(1)[0][0]
-    return names + ("",) * (width - len(names))
+def _places(kinds: Sequence[str], kind: str) -> list[int]:
+    return [i for i, found in enumerate(kinds) if found == kind]
 
 
-def _described(sheet: Sheet, said: tuple[str, ...] = ()) -> Sheet:
-    types = tuple(array.type for array in sheet.head(range(len(sheet.names))))
-    named = DELIMITER_NAMES.get(sheet.delimiter, repr(sheet.delimiter))
-    mark = "comma" if sheet.decimal == "," else "point"
-    note = f"delimited text: {named} between columns, decimal {mark}, encoding {sheet.encoding}"
-    return replace(sheet, types=types, found=(note, *said))
+def _kind(cells: Sequence[str]) -> str:
+    """'stamp', 'number', 'quality' or 'text' for what all cells of a column are; '' where they are not alike."""
+    numbers = [float(cell.replace(",", ".")) for cell in cells if NUMBER.match(cell)]
+    if NUMBER.match(cells[0]) and len(numbers) >= MOSTLY * len(cells):
+        scale = scale_of(pa.array(numbers))
+        return "number" if scale is None or scale in SINCE_START.values() else "stamp"
+    if {cell.lower() for cell in cells} <= QUALITIES:
+        return "quality"
+    parts = stamps.fields(pa.array(cells))
+    if parts is not None and parts.readable.all():
+        return "stamp"
+    return "text" if all(cell and not NUMBER.match(cell) for cell in cells) else ""

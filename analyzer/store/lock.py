@@ -23,7 +23,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from analyzer.history.laid_copy import forget_halves, holds_copies
+from analyzer.history.converted import forget_halves, holds_copies
 from analyzer.places import answering, content, is_remote
 from identification.errors import InputError
 
