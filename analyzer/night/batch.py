@@ -24,9 +24,9 @@ from analyzer.night.chunk import Done, Task, assess_loop
 from analyzer.night.finish import finish_night, is_empty
 from analyzer.night.nights import Night, nights_of
 from analyzer.night.workers import Died, Workers
-from analyzer.store import version as store_version
 from analyzer.store.lock import locked
 from analyzer.store.store import Store
+from analyzer.store.table import OF_A_NIGHT
 from identification.errors import InputError
 
 __all__ = ["Batch", "Outcome", "assess_loop", "run"]
@@ -149,8 +149,8 @@ def _is_readable(store: Store, nights: Sequence[Night], key: str) -> bool:
     """Whether a chunk's pieces can be read; a damaged one is not done, and is worked on again."""
     try:
         for night in nights:
-            for table in ("nights", "hours", "trends", "waves"):
-                store.read_parts(night.name, table, [key])
+            for table in (t for t in OF_A_NIGHT if t.in_pieces):
+                store.read_parts(night.name, table.name, [key])
     except InputError:
         return False
     return True
@@ -193,7 +193,7 @@ def run(
     if not batch.specs:
         raise no_loops(batch.export.tags)
     with locked(batch.store.path):
-        store_version.upgrade(batch.store.path)
+        batch.store.upgrade()
         nights = batch.nights()
         said = [line for night in nights for line in batch.store.set_aside_damaged(night.name)]
         keys, met = _begun(batch.store, nights, batch.identity, resume), Counter[str]()

@@ -34,7 +34,8 @@ from analyzer.night.nights import Night, cut
 from analyzer.pages import compared as settings_page
 from analyzer.plantwide.wave import waves_table
 from analyzer.store.rows import hour_rows, piece_row
-from analyzer.store.store import Store, rows_table, write_table
+from analyzer.store.store import Store
+from analyzer.store.table import rows_table, write_table
 from analyzer.words import settings as words
 from identification.errors import NotAssessedError, TriageError
 from reports.page_file import dumps
@@ -164,9 +165,7 @@ def _lost(error: Exception, config: Config) -> Lost:
 def _good_h(pv: Series | None) -> float:
     """Hours of good samples of a PV as logged [h]."""
     good = 0 if pv is None else int((~pv.bad).sum())
-    if pv is None or good < 2:
-        return 0.0
-    return good * interval(pv.stamp_s) / 3600.0
+    return good * interval(pv.stamp_s) / 3600.0 if pv is not None and good > 1 else 0.0
 
 
 def _read(task: Task, spec: LoopSpec) -> dict[str, Series] | Lost:
@@ -208,24 +207,22 @@ def lose(task: Task, reason: str) -> Done:
 
 def _write_pieces(task: Task, night: str, kept: Rows) -> None:
     """The piece of the table of nights comes last: where it is, the chunk is whole."""
-    hours = [row for a in kept.found for row in hour_rows(a, night)]
-    if hours:
-        write_table(rows_table(hours, HOURS), task.store.part(night, "hours", task.key))
-    if kept.found:
-        write_table(_trend_table(kept.found), task.store.part(night, "trends", task.key))
-    waves = [wave for a in kept.found for wave in a.waves]
-    if waves:
-        write_table(waves_table(waves), task.store.part(night, "waves", task.key))
-    if kept.compared:
-        write_table(rows_table(kept.compared, SETTINGS), task.store.part(night, "compared", task.key))
-    rows = [piece_row(found) for found in kept.nights]
-    write_table(rows_table(rows, NIGHTS), task.store.part(night, "nights", task.key))
+    made = {
+        "hours": rows_table([row for a in kept.found for row in hour_rows(a, night)], HOURS),
+        "trends": _trend_table(kept.found),
+        "waves": waves_table([wave for a in kept.found for wave in a.waves]),
+        "compared": rows_table(kept.compared, SETTINGS),
+        "nights": rows_table([piece_row(found) for found in kept.nights], NIGHTS),
+    }
+    for name, table in made.items():
+        if table is not None and table.num_rows:
+            write_table(table, task.store.part(night, name, task.key))
 
 
-def _trend_table(found: Sequence[Assessment]) -> pa.Table:
+def _trend_table(found: Sequence[Assessment]) -> pa.Table | None:
     tables = []
     for a in found:
         columns = {k: pa.array(v) for k, v in a.trend.items()}
         n = len(a.trend["time_s"])
         tables.append(pa.table({"loop": pa.array([a.loop] * n).dictionary_encode(), **columns}))
-    return pa.concat_tables(tables).unify_dictionaries()
+    return pa.concat_tables(tables).unify_dictionaries() if tables else None

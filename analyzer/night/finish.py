@@ -10,7 +10,6 @@ from collections.abc import Container, Mapping, Sequence
 from typing import Any
 
 import pyarrow as pa
-import pyarrow.compute as pc
 
 from analyzer.columns import BY_NAME, GROUPS, NIGHTS, names
 from analyzer.config import Config, NightLimits
@@ -21,8 +20,11 @@ from analyzer.pages.reading import read_nights
 from analyzer.plantwide.night import traced_night
 from analyzer.plantwide.wave import waves_in
 from analyzer.store.rows import finding_of, night_row
-from analyzer.store.store import Store, rows_table
+from analyzer.store.store import Store
+from analyzer.store.table import KEPT, of_loops, rows_table
 
+JOINED = tuple(t.name for t in KEPT if t.in_pieces and t.name != "nights")
+"""Tables whose pieces are taken as they are; the table of nights and that of groups are made of theirs."""
 MEMORY = 30
 """Nights before that are looked at for the last one under other settings; ours: a month."""
 WORTH = {Status.OK: 2, Status.NOT_ASSESSED: 1}
@@ -87,7 +89,7 @@ def finish_night(
     beside = [loop for loop in old if loop not in rows]
     joined = [old[k] if k in kept else rows[k] for k in order if k in rows] + [old[k] for k in beside]
     mine = [loop for loop in rows if loop not in kept]
-    for name in ("hours", "trends", "compared"):  # one at a time: trends are most of a night
+    for name in JOINED:  # one at a time: trends are most of a night
         before = None if replace else store.read_if_there(name, night)
         store.write(name, night, _joined(before, store.read_parts(night, name, keys), mine))
     groups = [*other, *done.groups]
@@ -126,18 +128,10 @@ def _known(store: Store, night: str) -> dict[str, Row]:
 
 def _joined(before: pa.Table | None, piece: pa.Table | None, mine: Sequence[str]) -> pa.Table | None:
     """Rows of a table of the store, those of some loops taken from a piece."""
-    wanted = pa.array(mine, pa.string())
-    tables = []
-    if before is not None:
-        tables.append(before.filter(pc.invert(pc.is_in(_loops(before), value_set=wanted))))
-    if piece is not None:
-        tables.append(piece.filter(pc.is_in(_loops(piece), value_set=wanted)))
+    tables = [] if before is None else [of_loops(before, mine, others=True)]
+    tables += [] if piece is None else [of_loops(piece, mine)]
     tables = [t for t in tables if t.num_rows] or tables[:1]
     return pa.concat_tables(tables, promote_options="default").unify_dictionaries() if tables else None
-
-
-def _loops(table: pa.Table) -> pa.ChunkedArray:
-    return pc.cast(table.column("loop"), pa.string())
 
 
 def _told(

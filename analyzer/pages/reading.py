@@ -18,7 +18,7 @@ from analyzer.pages.rank import worst_first
 from analyzer.store import notes
 from analyzer.store.notes import Note, is_hidden, last
 from analyzer.store.store import Store
-from analyzer.store.table import TREND, read_stored, stored_names
+from analyzer.store.table import TREND, read_stored
 from analyzer.words.units import row_settings
 from reports.pages import Cell
 from reports.texts import slug
@@ -77,7 +77,7 @@ def _tables(
 ) -> list[pa.Table]:
     if not loops:
         return []
-    paths = [store.path / table / f"{night}.parquet" for night in nights]
+    paths = [store.file(table, night) for night in nights]
     where = [("loop", "in", sorted(loops))]
     return [read_stored(p, columns, where) for p in paths if p.exists()]
 
@@ -88,12 +88,7 @@ def read_nights(
     """Rows of several nights, oldest first; columns that a night lacks are None."""
     rows: list[dict[str, Any]] = []
     for night in nights if loops is None or loops else ():
-        path = store.path / "nights" / f"{night}.parquet"
-        names = set(stored_names(path))
-        held = [c for c in columns if c in names]
-        where = [("loop", "in", sorted(loops))] if loops is not None else None
-        found = read_stored(path, held, where).to_pylist()
-        rows += [{**dict.fromkeys(columns), **row, "night": night} for row in found]
+        rows += [{**row, "night": night} for row in store.rows("nights", night, columns, loops)]
     return rows
 
 

@@ -9,8 +9,7 @@ from typing import Any
 from analyzer.columns import GROUPS, names
 from analyzer.loop.decisions import Action, Cause, GroupRole
 from analyzer.store.store import Store
-from analyzer.store.table import REMEDY
-from identification.errors import InputError
+from analyzer.store.table import no_column
 
 Row = Mapping[str, Any]
 OF_LOOPS = (
@@ -27,16 +26,8 @@ OF_LOOPS = (
         "gain_unit",
         "ti_unit",
     ),
-    *(
-        "pv_unit",
-        "op_unit",
-        "description",
-        "area",
-        "master",
-        "spectrum",
-        "average_absolute_error_pct",
-        "start_s",
-    ),
+    *("pv_unit", "op_unit", "description", "area", "master", "spectrum", "average_absolute_error_pct"),
+    "start_s",
 )
 """What is read of the rows of the night."""
 ALWAYS = ("loop", "group", "role", "source_pct", "coherence", "group_period_s")
@@ -92,23 +83,18 @@ class GroupView:
 
 def read_groups(store: Store, night: str) -> list[GroupView]:
     """The groups of a night, those that cost most first; none where the store has no such table."""
-    table = store.read_if_there("groups", night)
-    if table is None:
+    if not store.file("groups", night).exists():
         return []
-    empty = dict.fromkeys(names(GROUPS))
-    rows = [empty | r for r in table.select([c for c in empty if c in table.column_names]).to_pylist()]
+    rows = store.rows("groups", night, names(GROUPS))
     wanted = {r["loop"] for r in rows}
-    held = store.read("nights", night)
-    known = held.select([c for c in OF_LOOPS if c in held.column_names]).to_pylist()
-    loops = {r["loop"]: dict.fromkeys(OF_LOOPS) | r for r in known if r["loop"] in wanted}
+    loops = {r["loop"]: r for r in store.rows("nights", night, OF_LOOPS) if r["loop"] in wanted}
     by_number: dict[str, list[Row]] = {}
     for row in rows:
         if row["loop"] in loops:  # a store that was put together by hand may lack some
             by_number.setdefault(row["group"], []).append(row)
-    lacking = [name for name in ALWAYS if name not in table.column_names]
+    lacking = set(ALWAYS) - set(store.columns("groups", night))
     if by_number and lacking:
-        path = store.path / "groups" / f"{night}.parquet"
-        raise InputError(f"{path}: no column {lacking[0]}", "a table that 'triage run' wrote", REMEDY)
+        raise no_column(store.file("groups", night), min(lacking))
     found = [GroupView(number, tuple(_sorted(own)), loops) for number, own in by_number.items()]
     return sorted(found, key=lambda g: (-g.gain_pct, int(g.number)))
 

@@ -9,17 +9,15 @@ from datetime import date, timedelta
 from pathlib import Path
 
 from analyzer.store import notes
-from analyzer.store import version as store_version
-from analyzer.store.store import TABLES, Store, is_night
 from analyzer.store.lock import LEFT_OVER_S
-from analyzer.store.table import read_stored
+from analyzer.store.store import MAKE_ONE, SCHEMA, Store, is_night
+from analyzer.store.table import KEPT, read_stored
 from identification.errors import InputError
 from reports.whole_file import SUFFIX
 
 NEVER = "1900-01-01"
 """A day before all nights."""
-BULKY = ("hours", "trends")
-"""Tables that pages of recent nights draw from; the longest part of a store."""
+AGAIN = "restore it from a backup, or delete it and run its night anew"
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +39,7 @@ class Sizes:
 
 def sizes(store: Store) -> Sizes:
     """What a store holds."""
-    tables = sum(len(list((store.path / t).glob("*.parquet"))) for t in TABLES)
+    tables = sum(len(list((store.path / t.name).glob("*.parquet"))) for t in KEPT)
     total = sum(p.stat().st_size for p in store.path.rglob("*") if p.is_file())
     return Sizes(len(store.nights()), tables, total)
 
@@ -55,15 +53,19 @@ def problems(store: Store) -> Iterator[Problem]:
         There is no such directory.
     """
     if not store.path.is_dir():
-        raise InputError(
-            f"{store.path}: no such directory", "a store", "run 'triage run EXPORT --store DIR' first"
-        )
-    yield from _version(store.path)
+        raise InputError(f"{store.path}: no such directory", "a store", MAKE_ONE)
+    yield from _version(store)
     whole = set(store.nights())
-    for table in TABLES:
-        for path in sorted((store.path / table).glob("*")):
-            yield from _table(path, table, whole)
-    yield from _notes(store.path)
+    for table in KEPT:
+        for path in sorted((store.path / table.name).glob("*")):
+            found = _wrong(path, whole)
+            if found is not None:
+                yield found
+    lines = notes.broken(store.path)
+    if lines:
+        yield Problem(
+            f"{store.path / notes.FILE}: {lines} lines are no notes", "nothing: they are passed over"
+        )
     for night in store.begun():
         yield Problem(
             f"{store.path / 'parts' / night}: a run that was begun and not finished",
@@ -71,40 +73,33 @@ def problems(store: Store) -> Iterator[Problem]:
         )
 
 
-def _version(store: Path) -> Iterator[Problem]:
+def _version(store: Store) -> Iterator[Problem]:
     try:
-        found = store_version.version_of(store)
-        store_version.require_known(store)
+        found = store.version()
+        store.require_known()
     except InputError as error:
         yield Problem(error.seen, error.remedy)
         return
-    if found < store_version.SCHEMA and (store / "nights").is_dir():
-        yield Problem(f"{store}: tables of version {found}", "the next run brings them up to date")
+    if found < SCHEMA and (store.path / "nights").is_dir():
+        yield Problem(f"{store.path}: tables of version {found}", "the next run brings them up to date")
 
 
-def _table(path: Path, table: str, whole: set[str]) -> Iterator[Problem]:
+def _wrong(path: Path, whole: set[str]) -> Problem | None:
+    """What is wrong with something among the nights of a table, if anything."""
     if path.suffix == SUFFIX:
-        yield Problem(
-            f"{path}: left over from a process that died", "'triage store prune' deletes it after a day"
-        )
-    elif path.suffix == ".damaged":
-        yield Problem(f"{path}: a damaged table that a run has set aside", "delete it when nobody needs it")
-    elif path.suffix != ".parquet" or not is_night(path.stem):
-        yield Problem(f"{path}: not the name of a table of a night", "move it away")
-    else:
-        try:
-            read_stored(path)
-        except InputError as error:
-            yield Problem(error.seen, "restore it from a backup, or delete it and run its night anew")
-            return
-        if table != "nights" and path.stem not in whole:
-            yield Problem(f"{path}: no night of that name in nights", "run the night again, or delete it")
-
-
-def _notes(store: Path) -> Iterator[Problem]:
-    lines = notes.broken(store)
-    if lines:
-        yield Problem(f"{store / notes.FILE}: {lines} lines are no notes", "nothing: they are passed over")
+        seen = f"{path}: left over from a process that died"
+        return Problem(seen, "'triage store prune' deletes it after a day")
+    if path.suffix == ".damaged":
+        return Problem(f"{path}: a damaged table that a run has set aside", "delete it when nobody needs it")
+    if path.suffix != ".parquet" or not is_night(path.stem):
+        return Problem(f"{path}: not the name of a table of a night", "move it away")
+    try:
+        read_stored(path)
+    except InputError as error:
+        return Problem(error.seen, AGAIN)
+    if path.stem not in whole:
+        return Problem(f"{path}: no night of that name in nights", "run the night again, or delete it")
+    return None
 
 
 def pruned(store: Store, keep_d: int, detail_d: int | None, dry: bool = False) -> list[Path]:
@@ -120,7 +115,7 @@ def pruned(store: Store, keep_d: int, detail_d: int | None, dry: bool = False) -
     keep_d : int
         Days of nights that are kept.
     detail_d : int or None
-        Days of which hours and trends are kept, None as long as the nights.
+        Days of which bulky tables, hours and trends, are kept, None as long as the nights.
     dry : bool
         Only say what would go.
     """
@@ -129,15 +124,12 @@ def pruned(store: Store, keep_d: int, detail_d: int | None, dry: bool = False) -
     first = _days_before(latest, keep_d)
     detailed = first if detail_d is None else _days_before(latest, detail_d)
     gone = []
-    for table in TABLES:
-        oldest = max(first, detailed) if table in BULKY else first
-        for path in sorted((store.path / table).glob("*.parquet")):
-            if is_night(path.stem) and path.stem < oldest:
-                gone.append(path)
+    for table in KEPT:
+        oldest = max(first, detailed) if table.bulky else first
+        gone += [path for path in store.files(table.name) if path.stem < oldest]
     now = time.time()
-    for path in sorted(store.path.rglob(f".*{SUFFIX}")):
-        if now - path.stat().st_mtime > LEFT_OVER_S:
-            gone.append(path)
+    half_written = sorted(store.path.rglob(f".*{SUFFIX}"))
+    gone += [path for path in half_written if now - path.stat().st_mtime > LEFT_OVER_S]
     if not dry:
         for path in gone:
             path.unlink(missing_ok=True)

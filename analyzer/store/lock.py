@@ -1,13 +1,13 @@
 """One run on a store at a time: the lock, and who holds it.
 
-The lock is the system's own (filelock: flock or its like), so it ends with its owner, however that ends; the text
-beside it is for people.
+In a directory the lock is the system's own (filelock: flock or its like), so it ends with its owner, however that
+ends, and the signature beside it is for people. Shared storage has no locks: there the signature holds the store, and
+is written anew while its run lives.
 """
 
 from __future__ import annotations
 
 import contextlib
-import getpass
 import json
 import math
 import os
@@ -18,13 +18,14 @@ import tempfile
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from analyzer.history.converted import forget_halves, holds_copies
 from analyzer.places import answering, content, is_remote
+from analyzer.store.notes import user
 from identification.errors import InputError
 
 if TYPE_CHECKING:
@@ -40,6 +41,8 @@ ALIVE_S, DEAD_S = 60.0, 600.0
 """How often a holder of shared storage signs anew, and the age from which its signature is a dead run's [s]; ours."""
 LEFT_OVER_S = 86_400.0
 """Age from which something half done is left over from a process that died [s]; ours."""
+Signature = dict[str, Any]
+"""User, host, process, since when, a mark of its own, and when it last signed (alive_s [s])."""
 
 
 @contextmanager
@@ -77,35 +80,42 @@ def scratch(store: Path, resume: bool = False) -> Iterator[Path]:
             shutil.rmtree(place, ignore_errors=True)
 
 
+def _lock(folder: Path) -> BaseFileLock | None:
+    """The lock of a directory, held; None where somebody else holds it."""
+    from filelock import FileLock, Timeout
+
+    lock = FileLock(folder / LOCK)
+    try:
+        lock.acquire(timeout=0)
+    except Timeout:
+        return None
+    return lock
+
+
 def _held_scratch(store: Path, resume: bool) -> tuple[Path, BaseFileLock]:
     """A directory of copies and the lock that says that it is in use: the newest that nobody uses where a run goes
     on, else a new one. Others that nobody uses are removed."""
-    from filelock import FileLock, Timeout
-
     for left in store.glob(f"{MAKING}{SCRATCH}*"):
         if time.time() - _changed_s(left) > LEFT_OVER_S:
             shutil.rmtree(left, ignore_errors=True)
     taken: tuple[Path, BaseFileLock] | None = None
     for left in sorted(store.glob(f"{SCRATCH}*"), key=_changed_s, reverse=True):
-        lock = FileLock(left / LOCK)
-        try:
-            lock.acquire(timeout=0)
-        except (Timeout, OSError):
-            continue
-        if resume and taken is None and holds_copies(left):
-            taken = left, lock
-            continue
-        lock.release()
-        shutil.rmtree(left, ignore_errors=True)
+        with contextlib.suppress(OSError):
+            lock = _lock(left)
+            if lock is None:
+                continue
+            if resume and taken is None and holds_copies(left):
+                taken = left, lock
+                continue
+            lock.release()
+            shutil.rmtree(left, ignore_errors=True)
     if taken is not None:
         forget_halves(taken[0])
         return taken
     made = Path(tempfile.mkdtemp(prefix=f"{MAKING}{SCRATCH}", dir=store))
-    lock = FileLock(made / LOCK)
-    lock.acquire(timeout=0)
-    place = made.with_name(made.name.removeprefix(MAKING))  # others see it once it is locked
-    made.rename(place)
-    return place, lock
+    own = _lock(made)
+    assert own is not None  # nobody knows of the directory yet
+    return made.rename(made.with_name(made.name.removeprefix(MAKING))), own  # others see it once it is locked
 
 
 def _changed_s(path: Path) -> float:
@@ -124,38 +134,37 @@ def locked(store: Path) -> Iterator[None]:
     InputError
         Another run holds it; says who, where and since when.
     """
-    if is_remote(store):
-        with _signed(store):
-            yield
-        return
-    from filelock import FileLock, Timeout
-
-    store.mkdir(parents=True, exist_ok=True)
-    lock = FileLock(store / LOCK)
-    try:
-        lock.acquire(timeout=0)
-    except Timeout as error:
-        raise _in_use(store) from error
-    try:
-        _sign(store)
+    mine = _signature_of_this()
+    with ExitStack() as held:
+        if is_remote(store):
+            _require_unsigned(store)
+            _sign(store, mine)
+            held.callback(_unsign, store, mine)
+            held.enter_context(_renewed(store, mine))
+        else:
+            store.mkdir(parents=True, exist_ok=True)
+            lock = _lock(store)
+            if lock is None:
+                raise _in_use(store)
+            held.callback(lock.release)
+            held.callback(_unsign, store, mine)
+            _sign(store, mine)
         yield
-    finally:
-        with contextlib.suppress(OSError):
-            (store / OWNER).unlink()
-        lock.release()
 
 
-@contextmanager
-def _signed(store: Path) -> Iterator[None]:
-    """Hold a store of shared storage, which has no locks, by a signature that is written anew while the run lives."""
+def _require_unsigned(store: Path) -> None:
+    """Raise InputError where a signature of shared storage is not that of a dead run."""
     with answering(store):
-        held = _signature(store)
-    alive_s = (held or {}).get("alive_s")
+        alive_s = _signature(store).get("alive_s")
     if isinstance(alive_s, int | float) and time.time() - alive_s < DEAD_S:
         left = max(math.ceil((DEAD_S + alive_s - time.time()) / 60.0), 1)
         raise _in_use(store, f"; if it died, its hold ends in {left} min, then --resume goes on with it")
-    mine, ended = secrets.token_hex(8), threading.Event()
-    _sign(store, mine)
+
+
+@contextmanager
+def _renewed(store: Path, mine: Signature) -> Iterator[None]:
+    """Sign anew from time to time, in a thread, until the end."""
+    ended = threading.Event()
 
     def live() -> None:
         while not ended.wait(ALIVE_S):
@@ -169,48 +178,47 @@ def _signed(store: Path) -> Iterator[None]:
     finally:
         ended.set()
         alive.join()
-        with contextlib.suppress(OSError):  # what stays is a dead run's in ten minutes
-            if (_signature(store) or {}).get("mark") == mine:
-                (store / OWNER).unlink(missing_ok=True)
 
 
 def _in_use(store: Path, more: str = "") -> InputError:
+    owner = "another run"
+    with contextlib.suppress(OSError, KeyError):  # as far as it is written down
+        known = _signature(store)
+        owner = f"process {known['process']} of {known['user']} on {known['host']} since {known['since']}"
     return InputError(
-        f"{store}: in use by {_owner(store)}",
+        f"{store}: in use by {owner}",
         "one run on a store at a time",
         f"wait until that run ends, or give another --store{more}",
     )
 
 
-def _sign(store: Path, mark: str = "") -> None:
-    """Write down who holds the store."""
-    now = datetime.now(UTC).strftime("%Y-%m-%d %H:%M:%S UTC")
-    owner = {"user": _user(), "host": socket.gethostname(), "process": os.getpid(), "since": now}
-    if mark:
-        owner |= {"mark": mark, "alive_s": time.time()}
-    (store / OWNER).write_text(json.dumps(owner), encoding="utf-8")
+def _signature_of_this() -> Signature:
+    """Who holds a store that this process holds from now on."""
+    return {
+        "user": user() or "a user without a name",
+        "host": socket.gethostname(),
+        "process": os.getpid(),
+        "since": datetime.now(UTC).strftime("%Y-%m-%d %H:%M:%S UTC"),
+        "mark": secrets.token_hex(8),
+    }
 
 
-def _user() -> str:
-    try:
-        return getpass.getuser()
-    except (OSError, KeyError, ImportError):
-        return "a user without a name"
+def _sign(store: Path, mine: Signature) -> None:
+    """Write down who holds the store, and that it lives."""
+    (store / OWNER).write_text(json.dumps(mine | {"alive_s": time.time()}), encoding="utf-8")
 
 
-def _owner(store: Path) -> str:
-    """Who holds the store, as far as it is written down."""
-    try:
-        owner = _signature(store)
-        return f"process {owner['process']} of {owner['user']} on {owner['host']} since {owner['since']}"  # type: ignore[index]
-    except (OSError, KeyError, TypeError):
-        return "another run"
+def _unsign(store: Path, mine: Signature) -> None:
+    """Take away a signature that is still one's own; what stays on shared storage is a dead run's in ten minutes."""
+    with contextlib.suppress(OSError):
+        if _signature(store).get("mark") == mine["mark"]:
+            (store / OWNER).unlink(missing_ok=True)
 
 
-def _signature(store: Path) -> dict[str, Any] | None:
-    """What the holder of a store has written down; None where that is nothing, or no signature."""
+def _signature(store: Path) -> Signature:
+    """What the holder of a store has written down; empty where that is nothing, or no signature."""
     try:
         found = json.loads(content(store / OWNER).decode("utf-8"))
     except (FileNotFoundError, ValueError):
-        return None
-    return found if isinstance(found, dict) else None
+        return {}
+    return found if isinstance(found, dict) else {}

@@ -15,8 +15,8 @@ from dataclasses import asdict, dataclass
 from io import FileIO
 from pathlib import Path
 
-from analyzer.places import is_remote
 from analyzer.history.plant_clock import stamp
+from analyzer.places import is_remote
 from identification.errors import InputError
 from reports.texts import visible
 
@@ -92,18 +92,24 @@ def new(loop: str, text: str, owner: str | None, hidden_until: str) -> Note:
     return Note(loop, time.time(), told, visible(user() if owner is None else owner), hidden_until)
 
 
+def _lines(store: Path) -> list[str]:
+    try:
+        return (store / FILE).read_text(encoding="utf-8", errors="replace").split("\n")
+    except OSError:
+        return []
+
+
 def read(store: Path) -> dict[str, tuple[Note, ...]]:
     """The notes of a store by loop, oldest first; lines that are none are passed over."""
-    try:
-        lines = (store / FILE).read_text(encoding="utf-8", errors="replace").split("\n")
-    except OSError:
-        return {}
     out: dict[str, list[Note]] = {}
-    for line in lines:
-        found = _parsed(line)
-        if found is not None:
-            out.setdefault(found.loop, []).append(found)
+    for note in filter(None, map(_parsed, _lines(store))):
+        out.setdefault(note.loop, []).append(note)
     return {loop: tuple(sorted(own, key=lambda n: n.time_s)) for loop, own in out.items()}
+
+
+def broken(store: Path) -> int:
+    """Lines of a store's notes that are none."""
+    return sum(bool(line.strip()) and _parsed(line) is None for line in _lines(store))
 
 
 def _parsed(line: str) -> Note | None:
@@ -117,15 +123,6 @@ def _parsed(line: str) -> Note | None:
     if not all(isinstance(x, str) for x in (loop, text, owner, until)) or not 0.0 <= at_s <= LATEST_S:
         return None
     return Note(loop, at_s, visible(text), visible(owner), visible(until))
-
-
-def broken(store: Path) -> int:
-    """Lines of a store's notes that are none."""
-    try:
-        lines = (store / FILE).read_text(encoding="utf-8", errors="replace").split("\n")
-    except OSError:
-        return 0
-    return sum(bool(line.strip()) and _parsed(line) is None for line in lines)
 
 
 def last(notes: Mapping[str, tuple[Note, ...]], loop: str) -> Note | None:

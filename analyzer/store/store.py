@@ -1,7 +1,8 @@
-"""Results kept as Parquet: nights, hours, trends; written under a temporary name and renamed.
+"""Results kept as Parquet, a file a night and table; written under a temporary name and renamed.
 
 STORE/nights/NIGHT.parquet   one row a loop (docs/columns.md)
 STORE/hours/NIGHT.parquet    one row a loop and hour
+STORE/groups/NIGHT.parquet   one row a loop and group
 STORE/explained/NIGHT.parquet  one row a loop that was explained
 STORE/compared/NIGHT.parquet  one row a loop for which settings were sought, of the newest night alone
 STORE/trends/NIGHT.parquet   thinned trends, one row a loop and bucket
@@ -11,39 +12,29 @@ STORE/notes.jsonl            what people wrote; STORE/store.json the version of 
 
 from __future__ import annotations
 
+import contextlib
+import json
 import secrets
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterator, Sequence
+from contextlib import nullcontext
 from datetime import date
 from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
 
-from analyzer.store import version as store_version
-from analyzer.columns import Column
-from analyzer.columns import require_declared
-from analyzer.places import is_remote, remove_tree
-from analyzer.store.table import read_stored, stored_names, write_table
+from analyzer.columns import NIGHTS
+from analyzer.places import answering, content, is_remote, remove_tree
+from analyzer.store.table import KEPT, of_loops, read_stored, stored_names, with_empty, write_table
 from identification.errors import InputError
+from reports.whole_file import whole_file
 
-
-def rows_table(rows: Sequence[Mapping[str, Any]], columns: Sequence[Column]) -> pa.Table:
-    """Rows as a table with the types that its columns declare, empty where not known.
-
-    Raises
-    ------
-    ValueError
-        For a cell whose column is declared nowhere.
-    """
-    for row in rows:
-        require_declared(row, columns)
-    fields = [pa.field(c.name, pa.float64() if c.is_number else pa.string()) for c in columns]
-    arrays = [pa.array([row.get(f.name) for row in rows], type=f.type) for f in fields]
-    return pa.Table.from_arrays(arrays, schema=pa.schema(fields))
-
-
-TABLES = ("nights", "hours", "trends", "groups", "explained", "compared")
-"""Tables of a night."""
+SCHEMA = 2
+"""Version of the tables. 1: no lanes, no half-cycles; a store without a version is one. 2: every column that is
+declared."""
+VERSION_FILE = "store.json"
+"""Name within the store."""
+MAKE_ONE = "run 'triage run EXPORT --store DIR' first"
 
 
 def is_night(name: str) -> bool:
@@ -60,9 +51,17 @@ class Store:
     def __init__(self, path: Path) -> None:
         self.path = path
 
+    def file(self, table: str, night: str) -> Path:
+        """Where one night of one table lies."""
+        return self.path / table / f"{night}.parquet"
+
+    def files(self, table: str) -> list[Path]:
+        """What a table has of nights; files of other names are nobody's nights."""
+        return sorted(p for p in (self.path / table).glob("*.parquet") if is_night(p.stem))
+
     def nights(self) -> list[str]:
-        """Names of the nights that are complete, oldest first; files of other names are nobody's nights."""
-        return sorted(p.stem for p in (self.path / "nights").glob("*.parquet") if is_night(p.stem))
+        """Names of the nights that are complete, oldest first."""
+        return [p.stem for p in self.files("nights")]
 
     def zone(self) -> str:
         """The plant's time zone as the latest night states it, UTC where none does."""
@@ -80,19 +79,19 @@ class Store:
         InputError
             Where the path is no store, is one of a newer version, or holds no complete night.
         """
-        store_version.require_known(self.path)
+        self.require_known()
         nights = self.nights()
         if not nights:
             empty = "nothing there" if is_remote(self.path) else "no such directory"
             seen = "no complete night in it" if self.path.exists() else empty
-            raise InputError(f"{self.path}: {seen}", "a store", "run 'triage run EXPORT --store DIR' first")
+            raise InputError(f"{self.path}: {seen}", "a store", MAKE_ONE)
         return nights[-1]
 
     def read(self, table: str, night: str, columns: Sequence[str] | None = None, **where: str) -> pa.Table:
         """One night of one table; `where` filters on equality (loop="...")."""
         filters = [(k, "=", v) for k, v in where.items()] or None
         try:
-            return read_stored(self.path / table / f"{night}.parquet", columns, filters)
+            return read_stored(self.file(table, night), columns, filters)
         except FileNotFoundError as error:
             known = ", ".join(self.nights()[-3:]) or "none"
             raise InputError(
@@ -108,57 +107,38 @@ class Store:
             Where the store holds no such night.
         """
         try:
-            return stored_names(self.path / table / f"{night}.parquet")
+            return stored_names(self.file(table, night))
         except FileNotFoundError:
             return self.read(table, night).column_names
 
-    def part(self, night: str, table: str, key: str) -> Path:
-        """Where a piece of a night that is being worked on lies."""
-        return self.path / "parts" / night / f"{table}-{key}.parquet"
-
-    def parts(self, night: str, table: str) -> list[Path]:
-        """Pieces of a night that are complete."""
-        return sorted((self.path / "parts" / night).glob(f"{table}-*.parquet"))
-
-    @property
-    def run_file(self) -> Path:
-        """Where the run whose pieces lie here is written down."""
-        return self.path / "parts" / "run.json"
-
-    def whole_chunks(self, night: str) -> list[str]:
-        """Keys of the chunks whose last piece, that of the table of nights, is there."""
-        return [p.stem.removeprefix("nights-") for p in self.parts(night, "nights")]
-
-    def begun(self) -> list[str]:
-        """Nights that were begun and not finished."""
-        return sorted(p.name for p in (self.path / "parts").glob("*") if p.is_dir())
-
-    def read_parts(self, night: str, table: str, keys: Sequence[str]) -> pa.Table | None:
-        """The pieces of one table of a night that some chunks have written, None where there are none."""
-        paths = [self.part(night, table, key) for key in keys]
-        found = [read_stored(p) for p in paths if p.exists()]
-        return pa.concat_tables(found) if found else None
+    def rows(
+        self, table: str, night: str, columns: Sequence[str], loops: Collection[str] | None = None
+    ) -> list[dict[str, Any]]:
+        """Rows of one night, of some loops or of all; columns that its table lacks are None."""
+        names = set(self.columns(table, night))
+        where = None if loops is None else [("loop", "in", sorted(loops))]
+        found = read_stored(self.file(table, night), [c for c in columns if c in names], where)
+        return [{**dict.fromkeys(columns), **row} for row in found.to_pylist()]
 
     def read_if_there(self, table: str, night: str) -> pa.Table | None:
         """One night of one table, None where the store has none."""
-        return self.read(table, night) if (self.path / table / f"{night}.parquet").exists() else None
+        return _if_there(self.file(table, night))
 
     def write(self, table: str, night: str, rows: pa.Table | None) -> None:
         """Keep one night of one table; where there are no rows, keep none."""
-        path = self.path / table / f"{night}.parquet"
         if rows is None:
-            path.unlink(missing_ok=True)
+            self.file(table, night).unlink(missing_ok=True)
         else:
-            write_table(rows, path)
+            write_table(rows, self.file(table, night))
 
     def set_aside_damaged(self, night: str) -> list[str]:
         """Rename the tables of a night that cannot be read, so that it can be written anew; sentences on them."""
         said = []
-        for table in TABLES:
-            path = self.path / table / f"{night}.parquet"
+        for table in KEPT:
             try:
-                self.read_if_there(table, night)
+                self.read_if_there(table.name, night)
             except InputError as error:
+                path = self.file(table.name, night)
                 aside = path.with_name(f"{path.name}.{secrets.token_hex(4)}.damaged")
                 path.rename(aside)
                 said.append(f"{error.seen}; set aside as {aside.name}, and written anew")
@@ -167,19 +147,119 @@ class Store:
     def forget_explained(self, night: str, loops: Sequence[str] | None) -> None:
         """Drop the explanations of some loops of a night, of all where None: their records have been replaced."""
         table = self.read_if_there("explained", night)
-        if table is None:
-            return
-        gone = set(table.column("loop").to_pylist() if loops is None else loops)
-        stay = table.filter(pa.array([name not in gone for name in table.column("loop").to_pylist()]))
-        self.write("explained", night, stay if stay.num_rows else None)
+        if table is not None:
+            stay = table.slice(0, 0) if loops is None else of_loops(table, loops, others=True)
+            self.write("explained", night, stay if stay.num_rows else None)
 
     def forget_compared(self) -> None:
         """Drop the settings compared of all nights but the newest: they are for tomorrow, and large."""
         newest = self.nights()[-1:]
-        for path in (self.path / "compared").glob("*.parquet"):
-            if is_night(path.stem) and path.stem not in newest:
+        for path in self.files("compared"):
+            if path.stem not in newest:
                 path.unlink(missing_ok=True)
+
+    @property
+    def run_file(self) -> Path:
+        """Where the run whose pieces lie here is written down."""
+        return self.path / "parts" / "run.json"
+
+    def part(self, night: str, table: str, key: str) -> Path:
+        """Where a piece of a night that is being worked on lies."""
+        return self.path / "parts" / night / f"{table}-{key}.parquet"
+
+    def whole_chunks(self, night: str) -> list[str]:
+        """Keys of the chunks whose last piece, that of the table of nights, is there."""
+        pieces = (self.path / "parts" / night).glob("nights-*.parquet")
+        return sorted(p.stem.removeprefix("nights-") for p in pieces)
+
+    def begun(self) -> list[str]:
+        """Nights that were begun and not finished."""
+        return sorted(p.name for p in (self.path / "parts").glob("*") if p.is_dir())
+
+    def read_parts(self, night: str, table: str, keys: Sequence[str]) -> pa.Table | None:
+        """The pieces of one table of a night that some chunks have written, None where there are none."""
+        pieces = (_if_there(self.part(night, table, key)) for key in keys)
+        found = [piece for piece in pieces if piece is not None]
+        return pa.concat_tables(found) if found else None
 
     def drop_parts(self) -> None:
         """Forget all pieces, and the run that they are of."""
         remove_tree(self.path / "parts")
+
+    def version(self) -> int:
+        """The version of its tables, 1 where it states none.
+
+        Raises
+        ------
+        InputError
+            What states it is damaged.
+        """
+        path = self.path / VERSION_FILE
+        try:
+            with answering(self.path) if is_remote(self.path) else nullcontext():
+                return _stated(path)
+        except (OSError, ValueError, TypeError, KeyError, RecursionError) as error:
+            right = json.dumps({"schema": SCHEMA})
+            raise InputError(
+                f"{path}: damaged, and nothing else: {self._standing()}",
+                right,
+                f"write {right} into it and go on",
+            ) from error
+
+    def _standing(self) -> str:
+        """Which nights there are, in words."""
+        nights = self.nights()
+        if not nights:
+            return "no night is in the store"
+        several = f" to {nights[-1]}" if len(nights) > 1 else ""
+        return f"the tables of {len(nights)} nights, {nights[0]}{several}, stand as they were"
+
+    def require_known(self) -> None:
+        """Raise InputError where a newer version of this program wrote the store."""
+        found = self.version()
+        if found > SCHEMA:
+            seen = f"{self.path}: tables of version {found}"
+            raise InputError(seen, f"version {SCHEMA} at most", "install a newer triage")
+
+    def upgrade(self) -> int:
+        """Bring its tables up to date in place, one by one, and say so in it; returns how many were changed.
+
+        From 1 to 2 tables of nights get every column that is declared, empty where nothing is known. An upgrade that
+        was cut short is done again from where it stood; a table is whole at any time.
+
+        Raises
+        ------
+        InputError
+            The store is of a newer version.
+        """
+        self.require_known()
+        changed = sum(self._filled()) if self.version() < SCHEMA else 0
+        path = self.path / VERSION_FILE
+        if self.version() < SCHEMA or not path.exists():
+            with whole_file(path, kept=True) as temporary:
+                temporary.write_text(json.dumps({"schema": SCHEMA}) + "\n", encoding="utf-8")
+        return changed
+
+    def _filled(self) -> Iterator[bool]:
+        """Add what tables of nights lack; whether each lacked something."""
+        for path in sorted((self.path / "nights").glob("*.parquet")):
+            with contextlib.suppress(InputError):  # a damaged table stays for `store check` to name
+                held = set(stored_names(path))
+                lacking = [c for c in NIGHTS if c.name not in held]
+                if lacking:
+                    write_table(with_empty(read_stored(path), lacking), path)
+                yield bool(lacking)
+
+
+def _if_there(path: Path) -> pa.Table | None:
+    try:
+        return read_stored(path)
+    except FileNotFoundError:
+        return None
+
+
+def _stated(path: Path) -> int:
+    try:
+        return int(json.loads(content(path).decode("utf-8"))["schema"])
+    except (FileNotFoundError, NotADirectoryError):
+        return 1

@@ -1,35 +1,108 @@
-"""A table of the store as a file: read and checked, or one line on what is wrong with it; written whole."""
+"""The tables of a night: which there are, and how one is read, checked and written whole as a file."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from analyzer.columns import Kind
-from analyzer.columns import BY_NAME, EXPLAINED, GROUPS, HOURS, SETTINGS
+from analyzer.columns import (
+    EXPLAINED,
+    GROUPS,
+    HOURS,
+    NIGHTS,
+    SETTINGS,
+    Column,
+    Kind,
+    require_declared,
+)
 from analyzer.loop.decisions import Action
 from analyzer.places import is_remote
 from analyzer.words.units import SECONDS
 from identification.errors import InputError
 from reports.whole_file import whole_file
 
-DECLARED = {**{c.name: c for c in (*HOURS, *EXPLAINED, *GROUPS, *SETTINGS)}, **BY_NAME}
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """A table of a night, kept in STORE/name/NIGHT.parquet.
+
+    columns, those that its rows declare, none where they are declared here (trends) or beside what alone reads them
+    (waves); in_pieces, whether chunks write it while a night is worked on; kept, whether a finished night has it;
+    bulky, whether it may go before its night does.
+    """
+
+    name: str
+    columns: Sequence[Column] = ()
+    in_pieces: bool = True
+    kept: bool = True
+    bulky: bool = False
+
+
+OF_A_NIGHT = (
+    Table("nights", NIGHTS),
+    Table("hours", HOURS, bulky=True),
+    Table("trends", bulky=True),
+    Table("waves", kept=False),
+    Table("groups", GROUPS, in_pieces=False),
+    Table("explained", EXPLAINED, in_pieces=False),
+    Table("compared", SETTINGS),
+)
+"""All there are; whoever deletes begins with the first, without which there is no night."""
+KEPT = tuple(t for t in OF_A_NIGHT if t.kept)
+TREND = ("time_s", *(f"{signal}_{end}" for signal in ("sp", "pv", "op") for end in ("min", "max")), "bad")
+"""Columns of a table of trends beside `loop`, all of them numbers."""
+DECLARED = {c.name: c for table in reversed(OF_A_NIGHT) for c in table.columns}
 """Every column that a table of results may have, by name, but for those of trends."""
-PARSED = frozenset(c.name for c in (*BY_NAME.values(), *GROUPS) if c.kind is Kind.JSON)
+PARSED = frozenset(c.name for c in (*NIGHTS, *GROUPS) if c.kind is Kind.JSON)
 """Columns that hold JSON; pages that are kept whole are not among them: those of another version are passed over."""
 WORDS: Mapping[str, Sequence[str]] = {"action": tuple(Action), "ti_unit": (*SECONDS, "repeats/min")}
 """Columns that hold one of a few words."""
-TREND = ("time_s", *(f"{signal}_{end}" for signal in ("sp", "pv", "op") for end in ("min", "max")), "bad")
-"""Columns of a table of trends beside `loop`, all of them numbers."""
+WRITTEN = "a table that 'triage run' wrote"
 REMEDY = (
     "'triage store check' names all such: restore them from a backup, or delete them and run the night anew"
 )
+
+
+def rows_table(rows: Sequence[Mapping[str, Any]], columns: Sequence[Column]) -> pa.Table:
+    """Rows as a table with the types that its columns declare, empty where not known.
+
+    Raises
+    ------
+    ValueError
+        For a cell whose column is declared nowhere.
+    """
+    for row in rows:
+        require_declared(row, columns)
+    fields = [pa.field(c.name, _kind_of(c)) for c in columns]
+    arrays = [pa.array([row.get(f.name) for row in rows], type=f.type) for f in fields]
+    return pa.Table.from_arrays(arrays, schema=pa.schema(fields))
+
+
+def with_empty(table: pa.Table, columns: Sequence[Column]) -> pa.Table:
+    """A table with some columns more in which nothing is known."""
+    for c in columns:
+        table = table.append_column(c.name, pa.nulls(table.num_rows, _kind_of(c)))
+    return table
+
+
+def _kind_of(column: Column) -> pa.DataType:
+    return pa.float64() if column.is_number else pa.string()
+
+
+def of_loops(table: pa.Table, loops: Sequence[str], others: bool = False) -> pa.Table:
+    """Its rows of some loops, or of all others."""
+    import pyarrow.compute as pc
+
+    held = pc.cast(table.column("loop"), pa.string())
+    wanted = pc.is_in(held, value_set=pa.array(loops, pa.string()))
+    return table.filter(pc.invert(wanted) if others else wanted)
 
 
 def write_table(table: pa.Table, path: Path) -> None:
@@ -51,62 +124,57 @@ def read_stored(
         The file is damaged, or holds other columns than results have.
     """
     wanted = list(columns) if columns else None
-    try:
-        with _opened(path) as held:
-            if filters is not None:
-                table = pq.read_table(held, columns=wanted, filters=filters, page_checksum_verification=True)
-            else:  # read_table would import pandas, which takes longer than the rest
-                with pq.ParquetFile(held, page_checksum_verification=True) as file:
-                    table = file.read(columns=wanted)
-    except FileNotFoundError:
-        raise
-    except (pa.ArrowException, OSError, ValueError) as error:
-        raise _damaged(path, error) from error
+    with _opened(path) as held:
+        if filters is not None:
+            table = pq.read_table(held, columns=wanted, filters=filters, page_checksum_verification=True)
+        else:  # read_table would import pandas, which takes longer than the rest
+            with pq.ParquetFile(held, page_checksum_verification=True) as file:
+                table = file.read(columns=wanted)
     _require_declared(path, table.schema, wanted)
     _require_meant(path, table)
     return table
 
 
-@contextmanager
-def _opened(path: Path) -> Iterator[Any]:
-    """A path as Parquet's reader takes it: itself, or an open object of shared storage."""
-    if not is_remote(path):
-        yield path
-        return
-    with path.open("rb") as held:
-        yield held
-
-
 def stored_names(path: Path) -> list[str]:
     """Names of the columns of a table of the store; errors as of `read_stored`."""
-    try:
-        with _opened(path) as held, pq.ParquetFile(held, page_checksum_verification=True) as file:
-            schema = file.schema_arrow
-    except FileNotFoundError:
-        raise
-    except (pa.ArrowException, OSError, ValueError) as error:
-        raise _damaged(path, error) from error
+    with _opened(path) as held, pq.ParquetFile(held, page_checksum_verification=True) as file:
+        schema = file.schema_arrow
     _require_declared(path, schema, None)
     return list(schema.names)
 
 
-def _damaged(path: Path, error: Exception) -> InputError:
-    seen = " ".join(str(error).split())[:100] or type(error).__name__
-    return InputError(f"{path}: damaged ({seen})", "a table that 'triage run' wrote", REMEDY)
+@contextmanager
+def _opened(path: Path) -> Iterator[Any]:
+    """A path as Parquet's reader takes it: itself, or an open object of shared storage."""
+    try:
+        if is_remote(path):
+            with path.open("rb") as held:
+                yield held
+        else:
+            yield path
+    except FileNotFoundError:
+        raise
+    except (pa.ArrowException, OSError, ValueError) as error:
+        seen = " ".join(str(error).split())[:100] or type(error).__name__
+        raise InputError(f"{path}: damaged ({seen})", WRITTEN, REMEDY) from error
+
+
+def no_column(path: Path, column: str) -> InputError:
+    """What is said of a table without a column that every one of its kind has."""
+    return InputError(f"{path}: no column {column}", WRITTEN, REMEDY)
 
 
 def _require_declared(path: Path, schema: pa.Schema, wanted: list[str] | None) -> None:
     """Raise InputError where a table has no loops, or a declared column is of another kind."""
     if (wanted is None or "loop" in wanted) and "loop" not in schema.names:
-        raise InputError(f"{path}: no column loop", "a table that 'triage run' wrote", REMEDY)
+        raise no_column(path, "loop")
     for field in schema:
         declared = DECLARED.get(field.name)
         if declared is None and field.name not in TREND:
             continue
         numbers = declared is None or declared.is_number
         if not _holds(field.type, numbers):
-            kind = "numbers" if numbers else "text"
-            raise _of_another_kind(path, field.name, str(field.type), kind)
+            raise _of_another_kind(path, field.name, str(field.type), "numbers" if numbers else "text")
 
 
 def _of_another_kind(path: Path, column: str, held: str, wanted: str) -> InputError:

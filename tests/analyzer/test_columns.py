@@ -14,7 +14,8 @@ import pytest
 from analyzer.columns import EXPLAINED, HOURS, NIGHTS, Column, names, row_of
 from analyzer.config import Config
 from analyzer.night.finish import finish_night
-from analyzer.store.store import Store, rows_table, write_table
+from analyzer.store.store import Store
+from analyzer.store.table import rows_table, write_table
 
 ROOT = Path(__file__).resolve().parents[2]
 TABLES = (NIGHTS, HOURS, EXPLAINED)

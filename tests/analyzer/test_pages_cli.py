@@ -11,7 +11,8 @@ from click.testing import CliRunner, Result
 
 from analyzer.columns import NIGHTS, row_of
 from analyzer.commands.report import pages, report
-from analyzer.store.store import Store, rows_table, write_table
+from analyzer.store.store import Store
+from analyzer.store.table import rows_table, write_table
 from identification.errors import InputError
 from tests.reports.small_store import NASTY, small_store
 

@@ -18,7 +18,8 @@ from analyzer.cli import main
 from analyzer.columns import NIGHTS, row_of
 from analyzer.pages import lists
 from analyzer.pages.lists import as_table
-from analyzer.store.store import Store, rows_table, write_table
+from analyzer.store.store import Store
+from analyzer.store.table import rows_table, write_table
 
 LOOPS = 10_000
 NIGHT = "2026-03-08"

@@ -19,7 +19,7 @@ from test_cluster import cluster  # noqa: F401
 from analyzer import places
 from analyzer.cli import main
 from analyzer.store import lock as store_lock
-from analyzer.store import version as store_version
+from analyzer.store import store as store_module
 from analyzer.store.lock import OWNER, locked
 from identification.errors import InputError
 from proofs.plant import write_export
@@ -190,7 +190,7 @@ def test_an_empty_place_is_no_damage(bucket: str, monkeypatch: pytest.MonkeyPatc
     def denied(path: Path) -> bytes:
         raise PermissionError("Access Denied")
 
-    monkeypatch.setattr(store_version, "content", denied)
+    monkeypatch.setattr(store_module, "content", denied)
     told = CliRunner().invoke(main, ["rank", f"{bucket}/empty"])
     assert "s3://mill/empty: Access Denied" in told.stderr
     assert "damaged" not in told.stderr

@@ -15,7 +15,7 @@ from click.testing import CliRunner, Result
 
 from analyzer.cli import main
 from analyzer.columns import NIGHTS
-from analyzer.store import version as store_version
+from analyzer.store import store as store_module
 from analyzer.store.care import problems
 from analyzer.store.store import Store
 from proofs.plant import Sketch, simulate, write_export
@@ -28,7 +28,7 @@ MILL = Path(__file__).resolve().parents[2] / "sample_data"
 def store(tmp_path: Path) -> Store:
     """Five nights of six loops, by this version."""
     kept = small_store(tmp_path / "store", loops=6, nights=5)
-    store_version.upgrade(kept.path)
+    kept.upgrade()
     return kept
 
 
@@ -138,14 +138,14 @@ def test_a_column_of_other_text_is_named(store: Store, tmp_path: Path, table: st
 @pytest.mark.parametrize("text", ["", "{", "[]", '{"schema": "new"}'])
 def test_a_damaged_version_tells_of_the_nights(store: Store, text: str) -> None:
     """A store whose version is unreadable says that its nights stand, and what to write; so written it is ranked."""
-    (store.path / store_version.FILE).write_text(text)
+    (store.path / store_module.VERSION_FILE).write_text(text)
     result = asked("rank", store.path)
     assert result.exit_code == 2
     assert "5 nights, 2026-03-02 to 2026-03-06, stand as they were" in result.stderr
     assert "delete" not in result.stderr
     right = '{"schema": 2}'
     assert f"write {right} into it" in result.stderr
-    (store.path / store_version.FILE).write_text(right)
+    (store.path / store_module.VERSION_FILE).write_text(right)
     assert asked("rank", store.path).exit_code == 0
 
 
@@ -206,9 +206,9 @@ def test_an_older_store_is_brought_up_to_date(store: Store) -> None:
     path = store.path / "nights" / f"{store.nights()[0]}.parquet"
     table = pq.read_table(path)
     pq.write_table(table.drop_columns(["lanes", "turns"]), path)
-    (store.path / store_version.FILE).unlink()
-    assert store_version.version_of(store.path) == 1
-    assert (store_version.upgrade(store.path), store_version.upgrade(store.path)) == (1, 0)
+    (store.path / store_module.VERSION_FILE).unlink()
+    assert store.version() == 1
+    assert (store.upgrade(), store.upgrade()) == (1, 0)
     again = pq.read_table(path)
     assert set(again.column_names) >= {c.name for c in NIGHTS}
     assert again.column("loop").to_pylist() == table.column("loop").to_pylist()
@@ -217,7 +217,7 @@ def test_an_older_store_is_brought_up_to_date(store: Store) -> None:
 
 def test_a_newer_store_is_left_alone(store: Store, tmp_path: Path) -> None:
     """A store that a newer version wrote is neither read nor written, and the line says what to install."""
-    (store.path / store_version.FILE).write_text(json.dumps({"schema": 99}))
+    (store.path / store_module.VERSION_FILE).write_text(json.dumps({"schema": 99}))
     export = write_export(
         tmp_path / "x.parquet", {"L0": simulate(Sketch("none", (1.0, 20.0, 3.0), 1.0, 20.0), 0.2)}
     )
@@ -237,7 +237,7 @@ def test_a_damaged_night_is_written_anew(tmp_path: Path) -> None:
     table = path / "nights" / f"{store.nights()[0]}.parquet"
     good = pq.read_table(table)
     damage(table, "cut")
-    (path / store_version.FILE).unlink()
+    (path / store_module.VERSION_FILE).unlink()
     result = asked("run", export, "--store", path)
     assert result.exit_code == 0, result.stderr
     assert "set aside as" in result.stderr

@@ -10,7 +10,8 @@ import numpy as np
 import pyarrow as pa
 
 from analyzer.columns import HOURS, NIGHTS, row_of
-from analyzer.store.store import Store, rows_table, write_table
+from analyzer.store.store import Store
+from analyzer.store.table import rows_table, write_table
 
 NASTY = (
     "<script>alert(1)</script>",

@@ -143,7 +143,7 @@ def test_a_second_run_of_some_loops_keeps_the_others_group(run_plant: RunPlant, 
 def test_a_night_without_groups_says_so(tmp_path, form):
     """A store whose night has no groups lists none and fails nowhere."""
     from analyzer.columns import NIGHTS
-    from analyzer.store.store import rows_table, write_table
+    from analyzer.store.table import rows_table, write_table
 
     path = tmp_path / "nights" / "2026-03-02.parquet"
     write_table(rows_table([{"loop": "FIC1", "status": "ok"}], NIGHTS), path)

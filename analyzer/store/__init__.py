@@ -1,0 +1,1 @@
+"""Results kept as Parquet, and what looks after them."""
