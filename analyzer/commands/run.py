@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from analyzer.loops.spec import LoopSpec
     from analyzer.night.batch import Batch, Outcome
     from analyzer.night.nights import Night
-    from analyzer.night.run_log import RunLog
+    from analyzer.night.run_files import RunLog
 
 STOPPED = 128
 """Exit status of a run that a signal has stopped, less the signal's number: what shells and schedulers expect."""
@@ -116,7 +116,7 @@ def run(
     """
     from importlib.metadata import version
 
-    from analyzer.night.run_log import RunLog
+    from analyzer.night.run_files import RunLog
 
     log, begun_s = RunLog(log_file), time.monotonic()
     export = " ".join(map(str, asked.export))

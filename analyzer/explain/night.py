@@ -17,8 +17,9 @@ from analyzer.history.export import Export
 from analyzer.loop.decisions import Action, Cause, Status, counts
 from analyzer.loops.spec import LoopSpec
 from analyzer.night.nights import Night, cut
-from analyzer.night.workers import Died, Workers
-from analyzer.store.store import Store, rows_table, write_table
+from analyzer.night.workers import Died, executor
+from analyzer.store.store import Store
+from analyzer.store.table import rows_table
 from identification.errors import TriageError
 
 if TYPE_CHECKING:
@@ -107,10 +108,7 @@ def questions(batch: Batch, rows: Sequence[Mapping[str, Any]], night: Night) -> 
 def _rows(asked: Sequence[Question], jobs: int, config: Config) -> Iterator[Row]:
     from analyzer.explain.answer_data import abstained
 
-    if jobs == 0:
-        yield from map(answered, asked)
-        return
-    with Workers(min(jobs, max(len(asked), 1)), answered, config.workers) as workers:
+    with executor(jobs, len(asked), answered, config.workers) as workers:
         for q in asked:
             workers.submit(q)
         for result in workers.results():
@@ -123,14 +121,13 @@ def _rows(asked: Sequence[Question], jobs: int, config: Config) -> Iterator[Row]
 
 def known(store: Store, night: str) -> list[Row]:
     """Rows that the store holds of a night; none where nothing was explained."""
-    if not (store.path / TABLE / f"{night}.parquet").exists():
-        return []
-    return store.read(TABLE, night).to_pylist()
+    held = store.read_if_there(TABLE, night)
+    return [] if held is None else held.to_pylist()
 
 
 def keep(store: Store, night: str, rows: Sequence[Row]) -> None:
     """Write what is explained so far."""
-    write_table(rows_table(rows, EXPLAINED), store.path / TABLE / f"{night}.parquet")
+    store.write(TABLE, night, rows_table(rows, EXPLAINED))
 
 
 def run(

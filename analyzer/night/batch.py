@@ -19,17 +19,17 @@ from analyzer.loop.decisions import Status
 from analyzer.loops.changes import TuningChange
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import no_loops
-from analyzer.night import chunk, cluster, run_identity
-from analyzer.night.chunk import Done, Task, assess_loop
+from analyzer.night import chunk
+from analyzer.night.chunk import Done, Task
+from analyzer.night.cluster import Cluster
 from analyzer.night.finish import finish_night, is_empty
 from analyzer.night.nights import Night, nights_of
-from analyzer.night.workers import Died, Workers
+from analyzer.night.run_files import RunIdentity, identity, require_same, write_identity
+from analyzer.night.workers import Died, Executor, executor
 from analyzer.store.lock import locked
 from analyzer.store.store import Store
 from analyzer.store.table import OF_A_NIGHT
 from identification.errors import InputError
-
-__all__ = ["Batch", "Outcome", "assess_loop", "run"]
 
 CHUNKS, FEWEST, MOST = 16, 4, 16
 """Tasks of a run that is small, and loops per task: enough to carry its four small tables, few enough for a smooth
@@ -55,10 +55,10 @@ class Batch:
     zone: str = UTC_NAME
 
     @property
-    def identity(self) -> run_identity.RunIdentity:
+    def identity(self) -> RunIdentity:
         """What a run that goes on with its pieces must have in common with it."""
         own = (*self.specs, *self.changes, self.zone)
-        return run_identity.identity(self.export, own, self.since_s, self.until_s, self.config)
+        return identity(self.export, own, self.since_s, self.until_s, self.config)
 
     def nights(self) -> list[Night]:
         """The nights that the span holds, oldest first."""
@@ -89,13 +89,13 @@ def _tasks(batch: Batch, nights: Sequence[Night], known: set[str]) -> list[Task]
     left = [s for s in batch.specs if s.loop not in known]
     size = chunk_size(len(left))
     mark = uuid.uuid4().hex[:8]  # a worker of a killed run may write yet; its pieces have another mark
+    about = batch.store, batch.config
     return [
         Task(
             batch.export,
             tuple(left[i : i + size]),
             tuple(nights),
-            batch.store,
-            batch.config,
+            *about,
             f"{mark}-{i:06d}",
             tuple(batch.changes),
         )
@@ -105,13 +105,12 @@ def _tasks(batch: Batch, nights: Sequence[Night], known: set[str]) -> list[Task]
 
 def _results(tasks: Sequence[Task], jobs: int, config: Config, scheduler: str | None) -> Iterator[Done]:
     """What the chunks give, on a cluster, on worker processes or, with no jobs, in this process, unprotected."""
+    workers: Executor[Task, Done]
     if scheduler is not None:
-        yield from cluster.results(scheduler, tasks)
-        return
-    if jobs == 0:
-        yield from map(chunk.work, tasks)
-        return
-    with Workers[Task, Done](min(jobs, max(len(tasks), 1)), chunk.work, config.workers) as workers:
+        workers = Cluster(scheduler, chunk.work)
+    else:
+        workers = executor(jobs, len(tasks), chunk.work, config.workers)
+    with workers:
         for task in tasks:
             workers.submit(task)
         for result in workers.results():
@@ -121,9 +120,15 @@ def _results(tasks: Sequence[Task], jobs: int, config: Config, scheduler: str | 
                 yield result
 
 
-def _mourned(workers: Workers[Task, Done], died: Died[Task]) -> Iterator[Done]:
-    """The loop that was in hand is tried once alone, then given up with the reason; others go to other workers."""
+def _mourned(workers: Executor[Task, Done], died: Died[Task]) -> Iterator[Done]:
+    """The loop that was in hand is tried once alone, then given up with the reason; others go to other workers. Where
+    it is not known which it was, each is tried by itself."""
     task, at = died.task, died.at
+    if at is None and len(task.specs) > 1:
+        for k, spec in enumerate(task.specs):
+            workers.submit(replace(task, specs=(spec,), key=f"{task.key}-{k}", alone=True))
+        return
+    at = at or 0
     others, hand = task.specs[:at] + task.specs[at + 1 :], task.specs[at : at + 1]
     if others:
         workers.submit(replace(task, specs=others, key=f"{task.key}-{len(others)}"))
@@ -133,15 +138,15 @@ def _mourned(workers: Workers[Task, Done], died: Died[Task]) -> Iterator[Done]:
         yield chunk.lose(replace(task, specs=hand, key=f"{task.key}-lost"), died.why)
 
 
-def _begun(store: Store, nights: Sequence[Night], mine: run_identity.RunIdentity, resume: bool) -> list[str]:
+def _begun(store: Store, nights: Sequence[Night], mine: RunIdentity, resume: bool) -> list[str]:
     """Keys of the chunks that a stopped run left whole; all else of it is forgotten."""
     if resume:
-        run_identity.check_same(store.run_file, mine)
+        require_same(store.run_file, mine)
         keys = [key for key in store.whole_chunks(nights[-1].name) if _is_readable(store, nights, key)]
     else:
         store.drop_parts()
         keys = []
-    run_identity.write(store.run_file, mine)
+    write_identity(store.run_file, mine)
     return keys
 
 
@@ -227,12 +232,8 @@ def _finished(
 def _outcome(batch: Batch, nights: Sequence[Night], notes: Sequence[str]) -> Outcome:
     """The outcome as the last night's table has it, for the loops of this run."""
     wanted = {s.loop for s in batch.specs}
-    table = batch.store.read("nights", nights[-1].name, ["loop", "status", "reason"]).to_pylist()
-    lost = [
-        (r["loop"], r["reason"], r["status"])
-        for r in table
-        if r["loop"] in wanted and r["status"] != Status.OK
-    ]
-    unassessed = tuple((loop, why) for loop, why, status in lost if status == Status.NOT_ASSESSED)
-    failed = tuple((loop, why) for loop, why, status in lost if status != Status.NOT_ASSESSED)
-    return Outcome(tuple(nights), unassessed, failed, tuple(notes))
+    rows = batch.store.read("nights", nights[-1].name, ["loop", "status", "reason"]).to_pylist()
+    lost = [r for r in rows if r["loop"] in wanted and r["status"] != Status.OK]
+    unassessed = [(r["loop"], r["reason"]) for r in lost if r["status"] == Status.NOT_ASSESSED]
+    failed = [(r["loop"], r["reason"]) for r in lost if r["status"] != Status.NOT_ASSESSED]
+    return Outcome(tuple(nights), tuple(unassessed), tuple(failed), tuple(notes))

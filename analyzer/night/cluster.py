@@ -1,19 +1,18 @@
-"""The same batch on a Dask cluster: each chunk a task, its pieces written into the store that all machines share.
+"""Tasks on a Dask cluster: what they write goes into the store that all machines share.
 
-Answers do not depend on where they are computed. A worker that dies costs no loop: its chunk goes to another; one
-that ends several workers is parted into its loops, and a loop that does so alone is lost with the reason.
+Answers do not depend on where they are computed. A worker that dies costs nothing: its task goes to another; one that
+ends several workers comes back as `Died`.
 """
 
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator
 from concurrent.futures import CancelledError
-from dataclasses import replace
-from typing import Any
+from contextlib import contextmanager
+from typing import Any, Generic
 
-from analyzer.night import chunk
-from analyzer.night.chunk import Done, Task
+from analyzer.night.workers import Died, R, T
 from identification.errors import InputError
 
 CONNECT = "10s"
@@ -21,77 +20,74 @@ CONNECT = "10s"
 WHY = "ended several workers of the cluster"
 
 
-def results(address: str, tasks: Sequence[Task]) -> Iterator[Done]:
-    """What the chunks give, as they come.
-
-    Parameters
-    ----------
-    address : str
-        Of the scheduler, tcp://HOST:PORT.
-    tasks : sequence of Task
+class Cluster(Generic[T, R]):
+    """The workers of a scheduler at an address, tcp://HOST:PORT, carry out one function on many tasks.
 
     Raises
     ------
     InputError
         Dask is not installed, no scheduler answers there, or it died before all was done.
     """
-    try:
-        from distributed import Client
-        from distributed.comm import CommClosedError
-    except ImportError as error:
-        raise InputError(
-            f"--scheduler {address}: no Dask here",
-            "the extra 'cluster'",
-            "pip install 'loop-triage[cluster]'",
-        ) from error
-    try:
-        client: Any = Client(address, timeout=CONNECT, set_as_default=False)
-    except (OSError, ValueError, TimeoutError) as error:
-        seen = f"--scheduler {address}: no scheduler answers"
-        raise InputError(
-            seen, "the address that 'dask scheduler' prints", "start it, or correct it"
-        ) from error
-    logging.getLogger("distributed.client").setLevel(
-        logging.CRITICAL
-    )  # what ends the run is told in one line below
-    with client:
+
+    def __init__(self, address: str, function: Callable[[T], R]) -> None:
+        self._address, self._function = address, function
+        self._tasks: dict[Any, T] = {}
+        self._coming: Any = None
+
+    def __enter__(self) -> Cluster[T, R]:
         try:
-            yield from _gathered(client, tasks)
-        except (CancelledError, CommClosedError) as error:
-            seen, kept = f"--scheduler {address}: lost in mid-run", "what is done is kept in the store"
+            from distributed import Client, as_completed
+        except ImportError as error:
             raise InputError(
-                seen,
-                "a scheduler that lives until the run ends",
-                f"{kept}: start the scheduler again, then the same command with --resume",
+                f"--scheduler {self._address}: no Dask here",
+                "the extra 'cluster'",
+                "pip install 'loop-triage[cluster]'",
             ) from error
-
-
-def _gathered(client: Any, tasks: Sequence[Task]) -> Iterator[Done]:
-    """What the chunks give, as they come; those that ended several workers in parts."""
-    from distributed import KilledWorker, as_completed
-
-    waiting = {_submitted(client, task): task for task in tasks}
-    coming = as_completed(list(waiting), loop=client.loop)
-    for future in coming:
-        task = waiting.pop(future)
         try:
-            yield future.result()
-        except KilledWorker:
-            if len(task.specs) == 1:
-                yield chunk.lose(replace(task, key=f"{task.key}-lost"), WHY)
-                continue
-            for again in _parted(task):
-                future = _submitted(client, again)
-                waiting[future] = again
-                coming.add(future)
+            self._client: Any = Client(self._address, timeout=CONNECT, set_as_default=False)
+        except (OSError, ValueError, TimeoutError) as error:
+            raise InputError(
+                f"--scheduler {self._address}: no scheduler answers",
+                "the address that 'dask scheduler' prints",
+                "start it, or correct it",
+            ) from error
+        # what ends the run is told in one line below
+        logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
+        self._coming = as_completed([], loop=self._client.loop)
+        return self
 
+    def __exit__(self, *_: object) -> None:
+        self._client.close()
 
-def _submitted(client: Any, task: Task) -> Any:
-    return client.submit(chunk.work, task, key=f"triage-{task.key}", pure=False)
+    def submit(self, task: T, alone: bool = False) -> None:
+        """Add a task."""
+        with self._told():
+            future = self._client.submit(self._function, task, pure=False)
+            self._tasks[future] = task
+            self._coming.add(future)
 
+    def results(self) -> Iterator[R | Died[T]]:
+        """What comes back, as it comes."""
+        from distributed import KilledWorker
 
-def _parted(task: Task) -> list[Task]:
-    """A chunk as tasks of one loop each."""
-    return [
-        replace(task, specs=(spec,), key=f"{task.key}-{k}", alone=True) for k, spec in enumerate(task.specs)
-    ]
+        with self._told():
+            for future in self._coming:
+                task = self._tasks.pop(future)
+                try:
+                    yield future.result()
+                except KilledWorker:
+                    yield Died(task, None, WHY, again=False)
+
+    @contextmanager
+    def _told(self) -> Iterator[None]:
+        """The end of the scheduler in one line."""
+        from distributed.comm import CommClosedError
+
+        try:
+            yield
+        except (CancelledError, CommClosedError) as error:
+            raise InputError(
+                f"--scheduler {self._address}: lost in mid-run",
+                "a scheduler that lives until the run ends",
+                "what is done is kept in the store: start the scheduler again, then the same command with --resume",
+            ) from error

@@ -10,8 +10,8 @@ from itertools import pairwise
 import numpy as np
 
 from analyzer.config import NightLimits
-from analyzer.history import plant_clock
 from analyzer.history.export import Export
+from analyzer.history.plant_clock import UTC_NAME, date_of, midnights
 from analyzer.history.series import Series, stamp_text
 from analyzer.loops.spec import LoopSpec
 from identification.errors import InputError
@@ -27,16 +27,14 @@ class Night:
     name: str
     first_s: float
     last_s: float
-    zone: str = plant_clock.UTC_NAME
+    zone: str = UTC_NAME
 
 
 def _named(first_s: float, last_s: float, zone: str) -> Night:
-    return Night(plant_clock.date_of((first_s + last_s) / 2, zone), first_s, last_s, zone)
+    return Night(date_of((first_s + last_s) / 2, zone), first_s, last_s, zone)
 
 
-def daily(
-    first_s: float, last_s: float, limits: NightLimits, zone: str = plant_clock.UTC_NAME
-) -> list[Night]:
+def daily(first_s: float, last_s: float, limits: NightLimits, zone: str = UTC_NAME) -> list[Night]:
     """Cut a span of time at the plant's midnights; a short first or last piece joins its neighbour.
 
     Raises
@@ -52,15 +50,13 @@ def daily(
             "state the part that is meant with --since and --until",
         )
     least_s = 3600.0 * limits.least_piece_h
-    cuts = plant_clock.midnights(first_s, last_s, zone)
+    cuts = midnights(first_s, last_s, zone)
     inner = [c for c in cuts if c - first_s >= least_s and last_s - c >= least_s]
     edges = [first_s, *inner, last_s + 1.0]
     return [_named(a, b, zone) for a, b in pairwise(edges)]
 
 
-def nights(
-    spans: Sequence[tuple[float, float]], limits: NightLimits, zone: str = plant_clock.UTC_NAME
-) -> list[Night]:
+def nights(spans: Sequence[tuple[float, float]], limits: NightLimits, zone: str = UTC_NAME) -> list[Night]:
     """The nights of an export from the spans of its loops [s].
 
     Where the median loop has over whole_h (36 h), the export is cut into days; else each loop is assessed whole, in
@@ -106,7 +102,7 @@ def nights_of(
     limits: NightLimits,
     since_s: float = -math.inf,
     until_s: float = math.inf,
-    zone: str = plant_clock.UTC_NAME,
+    zone: str = UTC_NAME,
 ) -> list[Night]:
     """The nights of an export within a span of time, cut at the plant's midnights.
 

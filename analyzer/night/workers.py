@@ -1,4 +1,6 @@
-"""Worker processes that may die: each has a pipe of its own, so that what kills one harms no other.
+"""Who carries out tasks: this process, worker processes that may die, or a cluster (cluster.py), by one interface.
+
+Each worker process has a pipe of its own, so that what kills one harms no other.
 
 A pool whose workers share a queue ends with the first of them that the system kills. Here a worker says which item
 of its task it has in hand; when it dies, that item is known and the rest is given to others. Workers end with the
@@ -19,7 +21,7 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection, wait
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, Protocol, TypeVar
 
 from analyzer.config import WorkerLimits
 
@@ -41,14 +43,57 @@ OUT_OF_TIME = -int(getattr(signal, "SIGXCPU", 24))
 class Died(Generic[T]):
     """A worker died over a task, or was ended.
 
-    task : what it worked on; at : number of the item in hand; why, in words; again : whether the item may
-    succeed on another try (not where it took too long).
+    task : what it worked on; at : number of the item in hand, None where that is not known; why, in words; again :
+    whether the item may succeed on another try (not where it took too long).
     """
 
     task: T
-    at: int
+    at: int | None
     why: str
     again: bool
+
+
+class Executor(Protocol[T, R]):
+    """Carries out one function on many tasks, for as long as it is entered."""
+
+    def __enter__(self) -> Executor[T, R]: ...
+
+    def __exit__(self, *_: object) -> None: ...
+
+    def submit(self, task: T, alone: bool = False) -> None:
+        """Add a task; those that are to run alone wait until nothing else does."""
+
+    def results(self) -> Iterator[R | Died[T]]:
+        """What comes back, as it comes, until no task is left; tasks may be added meanwhile.
+
+        Raises
+        ------
+        Exception
+            Whatever the function raised: an error of an item is the function's business.
+        """
+
+
+@dataclass(slots=True)
+class Here(Generic[T, R]):
+    """This process carries out the tasks, one after the other, unprotected."""
+
+    function: Callable[[T], R]
+    _waiting: deque[T] = field(default_factory=deque)
+
+    def __enter__(self) -> Here[T, R]:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._waiting.clear()
+
+    def submit(self, task: T, alone: bool = False) -> None:
+        """Add a task."""
+        self._waiting.append(task)
+
+    def results(self) -> Iterator[R | Died[T]]:
+        """What comes back, task by task."""
+        while self._waiting:
+            yield self.function(self._waiting.popleft())
 
 
 @dataclass(slots=True)
@@ -91,17 +136,11 @@ class Workers(Generic[T, R]):
         self.stop()
 
     def submit(self, task: T, alone: bool = False) -> None:
-        """Add a task; those that are to run alone wait until nothing else does."""
+        """Add a task."""
         (self._alone if alone else self._waiting).append(task)
 
     def results(self) -> Iterator[R | Died[T]]:
-        """What comes back, as it comes, until no task is left; tasks may be added meanwhile.
-
-        Raises
-        ------
-        Exception
-            Whatever the function raised: an error of an item is the function's business.
-        """
+        """What comes back, as it comes."""
         while self._waiting or self._alone or any(w.busy for w in self._workers):
             self._feed()
             yield from self._gathered()
@@ -168,6 +207,13 @@ class Workers(Generic[T, R]):
         worker.pipe.close()
         self._workers.remove(worker)
         return Died(worker.task, worker.at, why, again)
+
+
+def executor(
+    jobs: int, tasks: int, function: Callable[..., R], limits: WorkerLimits
+) -> Here[Any, R] | Workers[Any, R]:
+    """Worker processes for so many tasks; this process where there are to be no jobs."""
+    return Workers(min(jobs, max(tasks, 1)), function, limits) if jobs else Here(function)
 
 
 def _cause_of_death(status: int | None, limits: WorkerLimits) -> str:

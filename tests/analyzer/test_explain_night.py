@@ -63,7 +63,7 @@ class DyingWorkers:
     def __exit__(self, *_: object) -> None:
         return
 
-    def submit(self, task: Question) -> None:
+    def submit(self, task: Question, alone: bool = False) -> None:
         self.tasks.append(task)
 
     def results(self) -> Iterator[dict[str, Any] | Died[Question]]:
@@ -120,7 +120,7 @@ def test_one_failing_loop_never_stops_the_night(store: Store, monkeypatch: pytes
 def test_dead_worker_costs_its_loop_alone(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
     """Where every second worker dies, every second loop says so and the others have their answers."""
     monkeypatch.setattr(explain_night, "_explained", told)
-    monkeypatch.setattr(explain_night, "Workers", DyingWorkers)
+    monkeypatch.setattr("analyzer.night.workers.Workers", DyingWorkers)
     rows = run(batch_in(store), NIGHT, 2)
     dead = [r for r in rows if "SIGKILL" in r["reason"]]
     assert abs(2 * len(dead) - len(rows)) <= 1

@@ -1,12 +1,17 @@
-"""By what a run is known: the bytes of its export, its loops, its options and this program's version.
+"""What a run writes down of itself: by what it is known, and a log of what it does.
 
-A stopped run is gone on with only by the same run; pieces of two exports are never mixed.
+A stopped run is gone on with only by the same run; pieces of two exports are never mixed. The log is one that a
+person can grep and a program can split: one line an event, appended, logfmt.
+
+2026-03-03T01:00:02Z triage[4711] lost loop=FIC2101 status="not assessed" reason="no PV tag FIC2101.PV in the export"
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
+import os
+import sys
 from collections.abc import Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import asdict, dataclass, fields, is_dataclass
@@ -19,6 +24,10 @@ from analyzer.history.export import Export
 from analyzer.history.files import ends_of
 from analyzer.loops.spec import LoopSpec
 from identification.errors import InputError
+from reports.texts import visible
+
+PLAIN = frozenset("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789._:/+-%")
+"""Characters of values that need no quotes."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,13 +77,13 @@ def _plain(value: Any) -> object:
     raise TypeError(f"{type(value).__name__} has no stated order")
 
 
-def write(path: Path, run: RunIdentity) -> None:
+def write_identity(path: Path, run: RunIdentity) -> None:
     """Write a run down beside its pieces."""
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(json.dumps(asdict(run)), encoding="utf-8")
 
 
-def check_same(path: Path, run: RunIdentity) -> None:
+def require_same(path: Path, run: RunIdentity) -> None:
     """Raise InputError where the pieces at `path` are of another run; nothing where there are none."""
     try:
         stopped = RunIdentity(**json.loads(path.read_text(encoding="utf-8")))
@@ -87,3 +96,37 @@ def check_same(path: Path, run: RunIdentity) -> None:
             "--resume with the same EXPORT, --loops, --changes, --since, --until, --config and version",
             "give them again, or leave out --resume to give up what the stopped run had done",
         )
+
+
+def logfmt(value: object) -> str:
+    """A value as one word or one quoted text, in printable characters alone."""
+    text = f"{value:.6g}" if isinstance(value, float) else str(value)
+    shown = visible(text)
+    if shown and set(shown) <= PLAIN:
+        return shown
+    return '"' + shown.replace("\\", "\\\\").replace('"', '\\"') + '"'
+
+
+class RunLog:
+    """Where a run says what it does; nowhere without a path.
+
+    A log that cannot be written costs one line on stderr, and never the night.
+    """
+
+    def __init__(self, path: Path | None) -> None:
+        self._path = path
+
+    def say(self, event: str, **facts: object) -> None:
+        """Append one line: time [UTC], process, event, and facts as name=value."""
+        if self._path is None:
+            return
+        now = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
+        told = "".join(f" {name}={logfmt(value)}" for name, value in facts.items())
+        line = f"{now} triage[{os.getpid()}] {event}{told}\n".encode()
+        try:
+            self._path.parent.mkdir(parents=True, exist_ok=True)
+            with self._path.open("ab", buffering=0) as file:
+                file.write(line)
+        except OSError as error:
+            print(f"triage: no log is kept: {self._path}: {error.strerror}", file=sys.stderr)
+            self._path = None
