@@ -63,6 +63,16 @@ class LoopRecord:
         return self.sp - self.pv
 
     @property
+    def stem(self) -> Floats:
+        """Stem position where recorded, else OP [% of OP span], shape (n,)."""
+        return self.op if self.position is None else self.position
+
+    @property
+    def usable(self) -> Mask:
+        """True where a sample is good and the loop in automatic, shape (n,)."""
+        return ~(self.bad | self.mask("manual"))
+
+    @property
     def time_s(self) -> Floats:
         """Seconds since the first sample, shape (n,)."""
         return np.asarray(np.arange(self.pv.size) * self.dt_s, dtype=np.float64)

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from identification.models import Backlash, Motion, Stiction, Valve
 from identification.record import Floats
-from identification.simulation.valve import stem_position, thresholds
+from identification.simulation.valve import thresholds
 
 Complexes = NDArray[np.complex128]
 
@@ -26,21 +26,10 @@ TABLE_SIZE = 4000
 
 
 def backlash(amplitude: ArrayLike, width: float) -> Complexes:
-    """Describing function of play.
+    """Describing function of play of full width `width` [% OP] at amplitudes > 0 of OP [% OP], of any shape.
 
     Johansson et al. (2012), the source study's Eq. (1), with d = width/2. Zero up to A = d, where the stem
     does not move.
-
-    Parameters
-    ----------
-    amplitude : float or ndarray of any shape
-        Amplitude of OP [% OP], > 0.
-    width : float
-        Full width of the play [% OP], >= 0.
-
-    Returns
-    -------
-    ndarray of complex, the shape of `amplitude`
     """
     share = np.minimum(0.5 * width / np.asarray(amplitude, dtype=np.float64), 1.0)
     u = 1.0 - 2.0 * share
@@ -68,24 +57,12 @@ def jumps_at(amplitude: float, valve: Stiction) -> int:
 
 
 def stick_slip(amplitude: ArrayLike, stickband: float, slip_jump: float, jumps: int = 1) -> Complexes:
-    """Describing function of two-parameter stick-slip with a given number of jumps per half cycle.
+    """Describing function of two-parameter stick-slip with a given number of jumps per half cycle, at least one.
 
     A cycle with n jumps is the sum of n relays of height J/2 that switch at h_k = S/2 + J(k - (n+1)/2),
     k = 1..n, each of which has the textbook describing function (Atherton 1982). One jump with S = J = 2d is
-    the source study's Eq. (2). Derived here; the tests hold it against the projection of the operator.
-
-    Parameters
-    ----------
-    amplitude : float or ndarray of any shape
-        Amplitude of OP [% OP], within `jump_range`; nan outside the switching levels.
-    stickband, slip_jump : float
-        S and J [% OP].
-    jumps : int
-        Jumps per half cycle, >= 1.
-
-    Returns
-    -------
-    ndarray of complex, the shape of `amplitude`
+    the source study's Eq. (2). Derived here; the tests hold it against the projection of the operator. The amplitude
+    [% OP], of any shape, lies within `jump_range`; nan outside the switching levels.
     """
     a = np.asarray(amplitude, dtype=np.float64)
     level = 0.5 * stickband + slip_jump * (np.arange(1, jumps + 1) - 0.5 * (jumps + 1))
@@ -100,18 +77,7 @@ def sliding(amplitude: ArrayLike, stickband: float, slip_jump: float) -> Complex
 
     From OP's trough the stem rests at -(A - f_d) up to the angle p with cos p = 1 - S/A, then follows at the
     distance f_d = (S - J)/2 (Choudhury, Thornhill, Shah 2005); the half cycle's integral is derived here.
-    J = 0 is play of width S.
-
-    Parameters
-    ----------
-    amplitude : float or ndarray of any shape
-        Amplitude of OP [% OP]; up to S/2 the stem rests and N is 0.
-    stickband, slip_jump : float
-        S and J [% OP].
-
-    Returns
-    -------
-    ndarray of complex, the shape of `amplitude`
+    J = 0 is play of width S. At amplitudes [% OP] of any shape; up to S/2 the stem rests and N is 0.
     """
     a = np.asarray(amplitude, dtype=np.float64)
     gap = thresholds(stickband, slip_jump)[1]
@@ -136,42 +102,36 @@ def band(valve: Valve) -> float:
     return valve.width if isinstance(valve, Backlash) else valve.stickband
 
 
+def moves_by_jumps(valve: Valve) -> bool:
+    """Whether the stem moves by whole jumps alone, and so has a describing function for each number of them."""
+    return isinstance(valve, Stiction) and valve.motion is Motion.RESTS and not is_play(valve)
+
+
+def describing_function(valve: Backlash | Stiction, amplitude: ArrayLike, jumps: int = 1) -> Complexes:
+    """N(A) of a faulty valve at amplitudes [% OP] of any shape; `jumps` a half cycle where it moves by jumps."""
+    if isinstance(valve, Backlash) or is_play(valve):
+        return backlash(amplitude, band(valve))
+    if valve.motion is not Motion.RESTS:
+        return sliding(amplitude, valve.stickband, valve.slip_jump)
+    return stick_slip(amplitude, valve.stickband, valve.slip_jump, jumps)
+
+
 def describe(valve: Valve, amplitude: float) -> complex:
     """N(A) of any valve at one amplitude [% OP]; with several cycles possible, that of fewest jumps."""
     if valve is None or band(valve) <= 0.0:
         return 1.0 + 0.0j
-    if isinstance(valve, Backlash) or is_play(valve):
-        return complex(backlash(amplitude, band(valve)))
-    if valve.motion is not Motion.RESTS:
-        return complex(sliding(amplitude, valve.stickband, valve.slip_jump))
-    jumps = jumps_at(amplitude, valve)
-    return complex(stick_slip(amplitude, valve.stickband, valve.slip_jump, jumps)) if jumps else 0j
+    jumps = jumps_at(amplitude, valve) if isinstance(valve, Stiction) and moves_by_jumps(valve) else 1
+    return complex(describing_function(valve, amplitude, jumps)) if jumps else 0j
 
 
-def numeric(valve: Valve, amplitude: float, start: float | None = None, samples: int = 20_000) -> complex:
-    """N(A) by projecting the simulated operator's output on the fundamental.
-
-    Parameters
-    ----------
-    valve : Backlash, Stiction or None
-    amplitude : float
-        Amplitude of OP [% OP], > 0.
-    start : float or None
-        Stem position at OP's trough [% OP]; None: where a symmetric cycle of fewest jumps has it.
-    samples : int
-        Samples a period.
-
-    Returns
-    -------
-    complex
-        From the last of three periods.
-    """
-    phase = 2.0 * np.pi * np.arange(3 * samples) / samples
-    if start is None and isinstance(valve, Stiction) and not is_play(valve) and valve.motion is Motion.RESTS:
-        start = -0.5 * jumps_at(amplitude, valve) * valve.slip_jump
-    stem = stem_position(-amplitude * np.cos(phase), valve, start)[-samples:]
-    wave = np.exp(-1j * phase[-samples:])
-    return complex(-2.0 / (samples * amplitude) * np.sum(stem * wave))
+def curve(valve: Valve, points: int = 400) -> tuple[Floats, Complexes]:
+    """Amplitudes [% OP] and N(A), shape (points,), up to 100 half widths, or of stick-slip with one jump."""
+    if valve is None or band(valve) <= 0.0:
+        return np.ones(1), np.ones(1, dtype=np.complex128)
+    amplitude = 0.5 * band(valve) * (1.0 + np.geomspace(1e-4, 100.0, points))
+    if isinstance(valve, Stiction) and moves_by_jumps(valve):
+        amplitude = np.linspace(*jump_range(valve, 1), points)
+    return amplitude, describing_function(valve, amplitude)
 
 
 @dataclass(frozen=True, slots=True)
@@ -211,6 +171,12 @@ def _play_branch(width: float) -> Branch:
     return _branch(0, width / (1.0 + np.cos(moving)), n)
 
 
+def _jump_branch(valve: Stiction, jumps: int) -> Branch:
+    low, high = jump_range(valve, jumps)
+    amplitude = low + (high - low) * np.linspace(0.0, 1.0, TABLE_SIZE) ** 2
+    return _branch(jumps, amplitude, describing_function(valve, amplitude, jumps))
+
+
 @lru_cache(maxsize=64)
 def branches(valve: Valve) -> tuple[Branch, ...]:
     """The pieces of N(A): one for play, one per number of jumps for stick-slip, none for a healthy valve."""
@@ -222,16 +188,5 @@ def branches(valve: Valve) -> tuple[Branch, ...]:
     if valve.motion is not Motion.RESTS:
         amplitude = width / (1.0 + np.cos(np.linspace(0.0, np.pi, TABLE_SIZE + 1)[:-1]))
         return (_branch(1, amplitude, sliding(amplitude * (1 + 1e-12), width, valve.slip_jump)),)
-    return _jump_branches(valve)
-
-
-def _jump_branches(valve: Stiction) -> tuple[Branch, ...]:
-    share = np.linspace(0.0, 1.0, TABLE_SIZE) ** 2
-    found = []
-    for jumps in range(1, min(MAX_JUMPS, int(np.ceil(6 * valve.stickband / valve.slip_jump))) + 1):
-        low, high = jump_range(valve, jumps)
-        amplitude = low + (high - low) * share
-        found.append(
-            _branch(jumps, amplitude, stick_slip(amplitude, valve.stickband, valve.slip_jump, jumps))
-        )
-    return tuple(found)
+    most = min(MAX_JUMPS, int(np.ceil(6 * valve.stickband / valve.slip_jump)))
+    return tuple(_jump_branch(valve, jumps) for jumps in range(1, most + 1))

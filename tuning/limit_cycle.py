@@ -1,6 +1,6 @@
-"""The limit cycle of a loop with play or stick-slip: predicted by harmonic balance, confirmed by simulation.
+"""The limit cycle of a loop with play or stick-slip, confirmed by simulation.
 
-Where prediction and simulation differ, simulation counts.
+Where the harmonic balance predicts another, simulation counts.
 """
 
 from __future__ import annotations
@@ -13,20 +13,9 @@ import numpy as np
 from identification.models import Fopdt, Integrator, Loop, Motion, Stiction
 from identification.record import Floats, LoopRecord
 from identification.simulation.closed_loop import closed_loop, scan_step
-from tuning.balance import Balance, harmonic_balance, predicted_cycle
 from tuning.describing import band
-from tuning.linear import integral_s, slowest_s
-
-__all__ = [
-    "Balance",
-    "Confirmed",
-    "Cycle",
-    "confirm",
-    "harmonic_balance",
-    "kicked",
-    "measure",
-    "predicted_cycle",
-]
+from tuning.frequency_response import integral_s, slowest_s
+from tuning.harmonic_balance import Balance, predicted_cycle
 
 PERIODS = 30
 """Predicted periods that a confirmation simulates at first; ours: the study's loops settle within ten."""
@@ -79,58 +68,37 @@ def _rising(x: Floats) -> Floats:
     return k + x[k] / (x[k] - x[k + 1])
 
 
-def measure(pv: Floats, op: Floats, stem: Floats, dt_s: float) -> Cycle | None:
-    """The cycle in a stretch of a settled loop.
-
-    Parameters
-    ----------
-    pv, op, stem : ndarray of shape (n,)
-        [% PV], [% OP], [% OP].
-    dt_s : float
-        Sample interval [s].
-
-    Returns
-    -------
-    Cycle or None
-        None where the stem rests or fewer than two periods are seen.
-    """
-    at = _rising(pv - 0.5 * (pv.max() + pv.min()))
-    if at.size < 3 or np.ptp(stem) == 0.0:
+def _measured(r: LoopRecord) -> Cycle | None:
+    """The cycle in a stretch of a settled loop; None where the stem rests or fewer than two periods are seen."""
+    at = _rising(r.pv - 0.5 * (r.pv.max() + r.pv.min()))
+    if at.size < 3 or np.ptp(r.stem) == 0.0:
         return None
     whole = slice(math.ceil(at[0]), math.floor(at[-1]) + 1)
-    travel = float(np.abs(np.diff(stem[whole])).sum())
+    travel = float(np.abs(np.diff(r.stem[whole])).sum())
     return Cycle(
-        period_s=float((at[-1] - at[0]) / (at.size - 1) * dt_s),
-        op_amplitude=0.5 * float(np.ptp(op[whole])),
-        pv_amplitude=0.5 * float(np.ptp(pv[whole])),
-        stem_travel=float(travel / ((at[-1] - at[0]) * dt_s) * 3600.0),
+        period_s=float((at[-1] - at[0]) / (at.size - 1) * r.dt_s),
+        op_amplitude=0.5 * float(np.ptp(r.op[whole])),
+        pv_amplitude=0.5 * float(np.ptp(r.pv[whole])),
+        stem_travel=float(travel / ((at[-1] - at[0]) * r.dt_s) * 3600.0),
     )
 
 
-def _unlimited(loop: Loop) -> Loop:
-    return replace(loop, controller=replace(loop.controller, op_lo=-NO_LIMIT, op_hi=NO_LIMIT))
-
-
-def kicked(loop: Loop, steps: int, kick: float) -> tuple[Floats, Floats, Floats, float]:
-    """PV, OP, stem (shape (steps,)) and step [s] of the loop at rest after a step of PV by `kick` [% PV].
+def _kicked(loop: Loop, steps: int, kick: float) -> LoopRecord:
+    """The loop at rest, its output limits out of the way, after a step of PV by `kick` [% PV].
 
     Halfway the load of a stem that moves by whole jumps is trimmed so that rest would lie midway between two
     of its places. The share of a jump that a load asks for sets how lopsided and slow the cycle is; half a
     jump gives the symmetric and fastest one, which is also what the balance describes.
     """
-    free, valve, half = _unlimited(loop), loop.valve, steps // 2
+    free = replace(loop, controller=replace(loop.controller, op_lo=-NO_LIMIT, op_hi=NO_LIMIT))
+    valve, half = loop.valve, steps // 2
     load = np.full(steps, kick)
     load[0] = 0.0
     if isinstance(valve, Stiction) and valve.motion is Motion.RESTS and isinstance(loop.process, Fopdt):
-        stem = _stem(closed_loop(free, np.zeros(half), load[:half], op_start=0.0))[-1]
+        stem = closed_loop(free, np.zeros(half), load[:half], op_start=0.0).stem[-1]
         rests = -loop.process.gain * (stem + valve.slip_jump * np.array([-0.5, 0.5]))
         load[half:] = rests[np.argmin(np.abs(rests - kick))]
-    r = closed_loop(free, np.zeros(steps), load, op_start=0.0)
-    return r.pv, r.op, _stem(r), r.dt_s
-
-
-def _stem(record: LoopRecord) -> Floats:
-    return record.op if record.position is None else record.position
+    return closed_loop(free, np.zeros(steps), load, op_start=0.0)
 
 
 def _verdict(op: Floats, width: float) -> str:
@@ -144,19 +112,8 @@ def _verdict(op: Floats, width: float) -> str:
     return "steady" if abs(now / before - 1.0) < STEADY else "moves"
 
 
-def confirm(loop: Loop, periods: int = PERIODS) -> Confirmed:
-    """The limit cycle that simulation finds after a kick, without noise.
-
-    Parameters
-    ----------
-    loop : Loop
-    periods : int
-        Predicted periods to simulate at first; the record is made longer until it settles.
-
-    Returns
-    -------
-    Confirmed
-    """
+def confirm(loop: Loop) -> Confirmed:
+    """The limit cycle that simulation finds after a kick, without noise."""
     predicted = predicted_cycle(loop)
     width = band(loop.valve)
     if width <= 0.0:
@@ -166,7 +123,7 @@ def confirm(loop: Loop, periods: int = PERIODS) -> Confirmed:
     scale = max(4.0 * slowest_s(loop), _ramp_s(loop))
     if predicted is not None:
         kick, scale = max(kick, 3.0 * predicted.pv_amplitude), predicted.period_s
-    steps = int(min(max(periods * scale / h, 2000), MOST_STEPS))
+    steps = int(min(max(PERIODS * scale / h, 2000), MOST_STEPS))
     found = _settle(loop, steps, kick, width, predicted)
     for factor in OTHER_KICKS if _jumps(loop) else ():
         if found.cycle is not None:
@@ -193,13 +150,13 @@ def _ramp_s(loop: Loop) -> float:
 def _settle(loop: Loop, steps: int, kick: float, width: float, predicted: Balance | None) -> Confirmed:
     """Simulate ever longer until the loop rests or cycles steadily with four periods in the last quarter."""
     while True:
-        pv, op, stem, h = kicked(loop, steps, kick)
-        verdict = _verdict(op, width)
+        record = _kicked(loop, steps, kick)
+        verdict = _verdict(record.op, width)
         if verdict == "decays":
             return Confirmed(None, True, predicted)
-        n = pv.size // 4
-        cycle = measure(pv[-n:], op[-n:], stem[-n:], h)
-        if verdict == "steady" and cycle is not None and cycle.period_s * 4 < n * h:
+        last = record.span(steps - steps // 4, steps)
+        cycle = _measured(last)
+        if verdict == "steady" and cycle is not None and cycle.period_s * 4 < last.duration_s:
             return Confirmed(cycle, True, predicted)
         if verdict == "grows" or 3 * steps > MOST_STEPS:
             return Confirmed(cycle, False, predicted)

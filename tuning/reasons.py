@@ -5,13 +5,12 @@ from __future__ import annotations
 import math
 
 from identification.models import Backlash, Integrator, Loop, Pid
-from tuning.bench import Bench, Candidate
 from tuning.decisions import Cause
 from tuning.describing import band, is_play
+from tuning.frequency_response import integral_s
 from tuning.limit_cycle import Confirmed, Cycle
 from tuning.limits import TuningLimits
-from tuning.linear import integral_s
-from tuning.search import rejection
+from tuning.search import Bench, Candidate, rejection
 
 
 def load(source: str) -> str:

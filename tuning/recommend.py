@@ -12,14 +12,23 @@ from identification.models import Fopdt, Loop, Pid
 from identification.record import Floats
 from identification.simulation.closed_loop import scan_step
 from tuning import reasons
-from tuning.bench import Bench, Candidate, assumed_uncertainty, bench, mean_error, standard_load
 from tuning.decisions import Action, Cause
 from tuning.describing import band, is_play
+from tuning.frequency_response import integral_s, maximum_sensitivity
 from tuning.limit_cycle import Confirmed, confirm
 from tuning.limits import LIMITS, TuningLimits
-from tuning.linear import integral_s, margins
 from tuning.rules import TAU_C_PER_DELAY, effective_delay, simc
-from tuning.search import robust, rounded, search
+from tuning.search import (
+    Bench,
+    Candidate,
+    assumed_uncertainty,
+    bench,
+    mean_error,
+    robust,
+    rounded,
+    search,
+    standard_load,
+)
 
 CONFIRMED = 15
 """Candidates whose limit cycle is simulated, from the best down, before the search gives up."""
@@ -38,19 +47,10 @@ ours: two shrinkings make the closed loop as slow as the dead time, SIMC's tight
 class Proposal:
     """What to do about a loop.
 
-    action : Action
-    controller : Pid or None
-        The new settings; None unless action is retune.
-    reason : str
-        Why, with figures.
-    meanwhile : Pid or None
-        With the action to repair the valve: settings that are better than the present ones until then.
-    before, after : Confirmed or None
-        Simulated limit cycle without noise at the present and at the new settings.
-    ms_before, ms : float or None
-        Maximum sensitivity at the present and at the new settings [-]; inf where unstable.
-    candidates : tuple of Candidate
-        What was considered, best first.
+    reason, why, with figures; controller, the new settings, None unless action is retune; meanwhile, with the action
+    to repair the valve, settings that are better than the present ones until then; before and after, the simulated
+    limit cycle without noise at the present and at the new settings; ms_before and ms, their maximum sensitivity [-],
+    inf where unstable; candidates, what was considered, best first.
     """
 
     action: Action
@@ -82,31 +82,19 @@ def recommend(
     limits: TuningLimits = LIMITS,
     source: str = "",
 ) -> Proposal:
-    """The proposal for one loop.
+    """The proposal for one loop: identified process and valve with the present controller.
 
     Parameters
     ----------
-    loop : Loop
-        Identified process and valve with the present controller.
     cause : str
-        Why the loop is in trouble, one of tuning.decisions.Cause.
+        Why the loop is in trouble, one of tuning.decisions.Cause; ValueError for any other.
     uncertainty : sequence of Loop
         Other loops that the data allow; empty: corners around the loop (tuning.limits).
     load : ndarray of shape (n,) or None
-        Load and noise as they add to PV, on the controller's clock [% PV]; None, or one too short to tell
-        (tuning.limits): steps at the valve.
-    limits : TuningLimits
+        Load and noise as they add to PV, on the controller's clock [% PV]; ValueError where it is not finite.
+        None, or one too short to tell (tuning.limits): steps at the valve.
     source : str
         Name of the loop from which the load comes, if known.
-
-    Returns
-    -------
-    Proposal
-
-    Raises
-    ------
-    ValueError
-        For a cause that is none of the five, and for a load that is not finite everywhere.
     """
     _check(cause, load)
     if cause == Cause.LOAD:
@@ -122,7 +110,7 @@ def recommend(
 
 def _tight(loop: Loop, others: Sequence[Loop], load: Floats | None, limits: TuningLimits) -> Proposal:
     """SIMC for a loop that swings by its tuning: the nominal, or on a known load the one of least error."""
-    now = margins(loop).ms
+    now = maximum_sensitivity(loop)
     if now <= limits.ms_most:
         return Proposal(Action.UNDECIDED, reasons.not_tight(now), ms_before=now)
     found = _simc_settings(loop, others, -FASTER if load is not None else 0, limits)
@@ -131,15 +119,13 @@ def _tight(loop: Loop, others: Sequence[Loop], load: Floats | None, limits: Tuni
     new, ms = found[0]
     if load is not None:
         new, ms = min(found, key=lambda pair: mean_error((loop, *others), pair[0], load))
-        left = max(mean_error((one,), new, load) / _error_now(one, load) for one in (loop, *others))
+        left = max(
+            mean_error((one,), new, load) / max(mean_error((one,), one.controller, load), 1e-9)
+            for one in (loop, *others)
+        )
         if left > 1.0 - limits.worth_error:
             return Proposal(Action.UNDECIDED, reasons.little_less_error(left, now), ms_before=now)
     return Proposal(Action.RETUNE, reasons.tight(loop, new, now, ms), new, ms_before=now, ms=ms)
-
-
-def _error_now(loop: Loop, load: Floats) -> float:
-    """Average absolute error of a loop at its present settings on a load [% PV]."""
-    return max(mean_error((loop,), loop.controller, load), 1e-9)
 
 
 def _simc_settings(
@@ -151,22 +137,18 @@ def _simc_settings(
     """
     h = scan_step(loop)
     tau_c = TAU_C_PER_DELAY * effective_delay(loop.process, h)
+    most = (limits.ms_most, *(limits.ms_most_sample for _ in others))
+    lags = [one.process.time_constant_s for one in others if isinstance(one.process, Fopdt)]
     found = []
     for k in range(first, STEPS):
         nominal = simc(loop.process, tau_c * SLOWER**k, h)
-        for ti in dict.fromkeys((nominal.ti_s, min(nominal.ti_s, _shortest(others, nominal.ti_s)))):
+        for ti in dict.fromkeys((nominal.ti_s, min([nominal.ti_s, *lags]))):
             new = replace(loop.controller, kp=rounded(nominal.kp), ti_s=rounded(ti), td_s=0.0)
-            ms = robust(loop, others, new, limits)
+            ms = robust((loop, *others), new, most)
             found += [] if ms is None else [(new, ms)]
         if len(found) >= ENOUGH:
             break
     return found
-
-
-def _shortest(others: Sequence[Loop], otherwise: float) -> float:
-    """The shortest time constant of the samples [s]."""
-    lags = (one.process.time_constant_s for one in others if isinstance(one.process, Fopdt))
-    return min(lags, default=otherwise)
 
 
 def _valve(loop: Loop, others: Sequence[Loop], load: Floats | None, limits: TuningLimits) -> Proposal:
@@ -179,7 +161,7 @@ def _valve(loop: Loop, others: Sequence[Loop], load: Floats | None, limits: Tuni
     if load is None:
         load = standard_load(loop, limits.most_steps)
     table = bench(loop, others, load, limits)
-    now = margins(loop).ms
+    now = maximum_sensitivity(loop)
     if table.travel[0] <= 0.0:
         return Proposal(Action.UNDECIDED, reasons.no_travel(loop), before=before, ms_before=now)
     candidates = search(table)

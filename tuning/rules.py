@@ -6,7 +6,7 @@ import math
 from dataclasses import replace
 
 from identification.models import Fopdt, Integrator, Pid, Process
-from tuning.linear import integral_s
+from tuning.frequency_response import integral_s
 
 TAU_C_PER_DELAY = 1.5
 """Closed-loop time constant over dead time of the nominal tuning (the source study, section 5)."""
@@ -27,25 +27,9 @@ def simc(process: Process, tau_c: float | None = None, scan_s: float = 0.0) -> P
     """SIMC settings of a PI controller (Grimholt, Skogestad 2012).
 
     Kp = T/(K (tau_c + L)), Ti = min(T, 4 (tau_c + L)); for an integrator Kp = 1/(slope (tau_c + L)),
-    Ti = 4 (tau_c + L).
-
-    Parameters
-    ----------
-    process : Fopdt or Integrator
-    tau_c : float or None
-        Closed-loop time constant [s]; None: 1.5 times the dead time, the source study's nominal tuning.
-    scan_s : float
-        Scan [s]; half of it counts as dead time. 0 takes the dead time as it is.
-
-    Returns
-    -------
-    Pid
-        With the scan given and the gain's sign that of the process.
-
-    Raises
-    ------
-    ValueError
-        For a process without gain, or an integrator without dead time, scan and tau_c.
+    Ti = 4 (tau_c + L). tau_c is the closed-loop time constant [s]; None: 1.5 times the dead time, the source study's
+    nominal tuning. Half the scan counts as dead time. ValueError for a process without gain, or an integrator without
+    dead time, scan and tau_c.
     """
     delay = effective_delay(process, scan_s)
     sum_s = delay + (TAU_C_PER_DELAY * delay if tau_c is None else tau_c)
@@ -67,18 +51,8 @@ def lambda_settings(process: Process, scan_s: float = 0.0) -> Pid:
     """Lambda settings of a PI controller: Kp = T/(K (lambda + L)), Ti = T (Dahlin 1968).
 
     lambda is the time constant, three dead times at least. For an integrator lambda is three dead times, Ti = 2
-    lambda + L and Kp = Ti/(slope (lambda + L)^2) (Chien, Fruehauf 1990).
-
-    Parameters
-    ----------
-    process : Fopdt or Integrator
-    scan_s : float
-        Scan [s]; half of it counts as dead time.
-
-    Raises
-    ------
-    ValueError
-        For a process without gain, or an integrator without dead time and scan.
+    lambda + L and Kp = Ti/(slope (lambda + L)^2) (Chien, Fruehauf 1990). Half the scan counts as dead time.
+    ValueError for a process without gain, or an integrator without dead time and scan.
     """
     delay, slope = effective_delay(process, scan_s), process.slope
     if slope == 0.0 or delay <= 0.0:
@@ -100,9 +74,3 @@ def backlash_rule(process: Process, controller: Pid) -> Pid:
     if isinstance(process, Integrator):
         return controller
     return replace(controller, ti_s=max(integral_s(controller), process.time_constant_s))
-
-
-def stick_slip_rule(process: Process, controller: Pid) -> Pid:
-    """The study, section 5: lower gain and longer Ti cut the travel; here half the gain, Ti as for play."""
-    ruled = backlash_rule(process, controller)
-    return replace(ruled, kp=0.5 * controller.kp)

@@ -25,8 +25,8 @@ from identification.estimation.hammerstein import Fit, process_of
 from identification.estimation.window import Window
 from identification.models import Integrator, Loop, Pid, Process, Valve
 from identification.record import Floats
+from tuning.frequency_response import integral_s, is_stable
 from tuning.limit_cycle import Cycle, confirm
-from tuning.linear import integral_s, is_stable
 from tuning.recommend import Proposal, recommend
 from tuning.search import rounded
 

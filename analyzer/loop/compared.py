@@ -12,11 +12,10 @@ from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import as_stated
 from identification.models import Loop, Pid
 from identification.record import Floats
-from tuning.compared import Tried, rivals, tried
+from tuning.forecast import Tried, alternatives, run, settled, tried
+from tuning.frequency_response import integral_s
+from tuning.harmonic_balance import TravelMap, travel_map
 from tuning.limits import TuningLimits
-from tuning.linear import integral_s
-from tuning.maps import TravelMap, travel_map
-from tuning.predict import run, settled
 from tuning.rules import simc
 
 MAP_POINTS, SPREAD = 24, 12.0
@@ -111,7 +110,7 @@ def compared(
     """
     if load.size < limits.least_steps or loop.process.slope * loop.controller.kp <= 0.0:
         return None
-    settings = rivals(loop, new)
+    settings = alternatives(loop, new)
     return Comparison(
         loop,
         load,

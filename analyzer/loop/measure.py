@@ -40,7 +40,7 @@ from identification.signals.spectrum import (
     spectrum,
     tapered_power,
 )
-from tuning.linear import is_stable, loop_response
+from tuning.frequency_response import is_stable, loop_response
 
 HARMONICS = (2, 3)
 """Harmonics of a cycle that a valve's model must explain: beyond the third few samples a cycle are left."""

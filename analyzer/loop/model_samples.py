@@ -11,7 +11,7 @@ from identification.estimation.hammerstein import Fit
 from identification.estimation.window import Window
 from identification.models import Fopdt, Integrator, Loop, Process
 from identification.record import Floats
-from tuning.bench import scaled_valve
+from tuning.search import scaled_valve
 
 
 def uncertain(window: Window, fit: Fit, loop: Loop, samples: int = 6, seed: int = 0) -> tuple[Loop, ...]:

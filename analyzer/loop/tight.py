@@ -5,7 +5,7 @@ from __future__ import annotations
 from analyzer.loop.measure import Measured
 from identification.estimation.hammerstein import process_of
 from identification.models import Fopdt, Loop
-from tuning.linear import margins
+from tuning.frequency_response import maximum_sensitivity
 from tuning.rules import simc
 
 
@@ -32,7 +32,9 @@ def sensitivity(m: Measured, period_s: float) -> float | None:
     process, controller = process_of(m.window, m.linear), m.controller
     if controller is None or process.gain * controller.kp <= 0.0:
         return None
-    return min(float(margins(Loop(x, controller)).ms) for x in (process, cautious(process, period_s)))
+    return min(
+        float(maximum_sensitivity(Loop(x, controller))) for x in (process, cautious(process, period_s))
+    )
 
 
 def gain_room(m: Measured) -> float | None:

@@ -32,10 +32,10 @@ from identification.estimation.hammerstein import Fit
 from identification.models import Estimate, Loop, Pid, Process, Valve
 from identification.record import Floats
 from tuning.describing import describe
+from tuning.forecast import Forecast, predict, run
+from tuning.frequency_response import integral_s
+from tuning.harmonic_balance import curves, travel_map
 from tuning.limit_cycle import Confirmed, confirm
-from tuning.linear import integral_s
-from tuning.maps import curves, travel_map
-from tuning.predict import Forecast, predict, run
 from tuning.recommend import Proposal
 from tuning.rules import simc
 

@@ -20,7 +20,7 @@ from analyzer.loops.settings_in_force import in_force
 from analyzer.loops.spec import LoopSpec, spec_of
 from analyzer.night.nights import cut, nights_of
 from identification.errors import InputError, NotAssessedError
-from tuning.linear import slowest_s
+from tuning.frequency_response import slowest_s
 
 NO_MODEL = "needs PV that moves with OP, so that a model can be identified"
 

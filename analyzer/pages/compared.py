@@ -34,12 +34,11 @@ from reports.pages import (
     WhatIf,
 )
 from reports.texts import slug
-from tuning.compared import LAMBDA, LONGER, NOW, RECOMMENDED, SIMC, Tried
 from tuning.describing import band, is_play
+from tuning.forecast import LAMBDA, LEAST_PRELUDE, LONGER, NOW, PRELUDE, RECOMMENDED, SIMC, Tried
+from tuning.frequency_response import slowest_s
 from tuning.limit_cycle import KICK
 from tuning.limits import WARM_UP
-from tuning.linear import slowest_s
-from tuning.predict import LEAST_PRELUDE, PRELUDE
 from tuning.rules import simc
 
 INTEGRATOR = {

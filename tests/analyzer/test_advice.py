@@ -28,8 +28,8 @@ from analyzer.loop.reconstructed_load import load_of, scan_noise
 from analyzer.store.rows import night_row
 from identification.models import Backlash, Fopdt, Integrator, Pid
 from proofs.plant import CONFIG, START_S, Sketch, prepared, series, simulate, spec
+from tuning.frequency_response import maximum_sensitivity
 from tuning.limits import LIMITS
-from tuning.linear import margins
 
 ROLES = ("sp", "pv", "op")
 TANK = Sketch("valve", (60.0, 1800.0, 9.0), 0.9, 40.0, backlash=2.5)
@@ -94,7 +94,7 @@ def test_proposal_is_stable_on_the_true_process(tank, pipe):
         ).proposal.controller
         loop = sought_for(found.verdict, sketch.controller, CONFIG.advice)[0]
         true = replace(loop, process=Fopdt(*sketch.process), controller=new)
-        assert margins(true).ms < LIMITS.ms_most_sample
+        assert maximum_sensitivity(true) < LIMITS.ms_most_sample
 
 
 def test_samples_spread_about_the_fit(tank):

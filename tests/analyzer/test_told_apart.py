@@ -13,7 +13,7 @@ from analyzer.loop.finding import Sign
 from analyzer.loop.oscillation import counting
 from identification.models import Fopdt, Loop
 from proofs.plant import CONFIG, Sketch, prepared, simulate
-from tuning.linear import margins
+from tuning.frequency_response import maximum_sensitivity
 
 SINE = Sketch("load", (1.4, 90.0, 10.0), 0.8, 60.0, sine=1.0, sine_s=840.0, load_std=0.05)
 
@@ -58,9 +58,9 @@ def test_no_tuning_is_told_against_its_own_sensitivity(loaded):
     assert "robust (Ms 1." in str(told.needs)
     m = replace(accused.measured, controller=replace(accused.measured.controller, kp=8 * SINE.kp))
     assert (
-        margins(Loop(Fopdt(*SINE.process), SINE.controller)).ms
+        maximum_sensitivity(Loop(Fopdt(*SINE.process), SINE.controller))
         < 2.0
-        < margins(Loop(Fopdt(*SINE.process), m.controller)).ms
+        < maximum_sensitivity(Loop(Fopdt(*SINE.process), m.controller))
     )
     tight = told_apart(replace(accused, measured=m), made, counting(found.oscillations), CONFIG)
     assert tight.cause == "tuning"

@@ -17,7 +17,7 @@ from analyzer.pages.compared import page
 from identification.models import Backlash, Fopdt, Form, Loop, Motion, Stiction
 from reports.folder import write_html
 from tests.browser.test_pages import CHROMIUM, DRIVER, browser, opened, wait
-from tuning.compared import tried
+from tuning.forecast import tried
 
 pytestmark = pytest.mark.skipif(not (CHROMIUM and DRIVER), reason="needs chromium and chromedriver")
 __all__ = ["browser"]

@@ -7,18 +7,28 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from identification.models import Backlash, Motion, Stiction
+from identification.simulation.valve import stem_position
 from tuning.describing import (
     backlash,
     branches,
     describe,
     jump_range,
     jumps_at,
-    numeric,
+    moves_by_jumps,
     sliding,
     stick_slip,
 )
 
 WIDTHS = st.floats(0.05, 10.0)
+SAMPLES = 20_000
+
+
+def numeric(valve: Backlash | Stiction, amplitude: float) -> complex:
+    """N(A) by projecting the last of three periods of the simulated operator on the fundamental."""
+    phase = 2.0 * np.pi * np.arange(3 * SAMPLES) / SAMPLES
+    start = -0.5 * jumps_at(amplitude, valve) * valve.slip_jump if moves_by_jumps(valve) else None
+    stem = stem_position(-amplitude * np.cos(phase), valve, start)[-SAMPLES:]
+    return complex(-2.0 / (SAMPLES * amplitude) * np.sum(stem * np.exp(-1j * phase[-SAMPLES:])))
 
 
 @given(WIDTHS, st.floats(1.001, 500.0))

@@ -10,8 +10,9 @@ from hypothesis import strategies as st
 
 from identification.models import Backlash, Fopdt, Integrator, Loop, Pid, Stiction
 from tuning.describing import stick_slip
-from tuning.limit_cycle import confirm, harmonic_balance, predicted_cycle
-from tuning.linear import loop_response
+from tuning.frequency_response import loop_response
+from tuning.harmonic_balance import harmonic_balance, predicted_cycle
+from tuning.limit_cycle import confirm
 
 LEVEL = Loop(Fopdt(80, 200, 1), Pid(1, 10, scan_s=0), Backlash(1.0))
 SCANNED = replace(LEVEL, controller=Pid(1, 10, scan_s=1))

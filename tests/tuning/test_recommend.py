@@ -8,14 +8,13 @@ import pytest
 
 from identification.models import Backlash, Fopdt, Integrator, Loop, Pid, Stiction
 from proofs.valve_loops import backlash_case, level_case, load, stick_case
-from tuning.bench import assumed_uncertainty
+from tuning.forecast import assess, run, settled
+from tuning.frequency_response import integral_s, maximum_sensitivity
 from tuning.limit_cycle import confirm
 from tuning.limits import LIMITS
-from tuning.linear import integral_s, margins
-from tuning.predict import assess, run, settled
 from tuning.recommend import recommend
 from tuning.rules import backlash_rule, simc
-from tuning.search import allowed, rejection
+from tuning.search import allowed, assumed_uncertainty, rejection
 
 STUDY = Loop(Fopdt(80, 200, 1), Pid(1, 10), Backlash(1.0))
 
@@ -51,9 +50,9 @@ def test_proposals_keep_robustness_and_load_rejection(proposals):
     for case, p in proposals:
         if p.controller is None:
             continue
-        assert margins(replace(case.loop, controller=p.controller)).ms <= LIMITS.ms_most
+        assert maximum_sensitivity(replace(case.loop, controller=p.controller)) <= LIMITS.ms_most
         for one in assumed_uncertainty(case.loop, LIMITS):
-            assert margins(replace(one, controller=p.controller)).ms <= LIMITS.ms_most_sample
+            assert maximum_sensitivity(replace(one, controller=p.controller)) <= LIMITS.ms_most_sample
         most, got = allowed(case.loop, LIMITS), rejection(case.loop.process, p.controller)
         assert got.peak <= most.peak
         assert got.integral <= most.integral * (1 + 1e-9)
@@ -156,7 +155,7 @@ def test_uncertainty_samples_are_respected():
     wild = replace(STUDY, process=Fopdt(200, 200, 1))
     p = recommend(STUDY, "valve", uncertainty=[wild])
     if p.controller is not None:
-        assert margins(replace(wild, controller=p.controller)).ms <= LIMITS.ms_most_sample
+        assert maximum_sensitivity(replace(wild, controller=p.controller)) <= LIMITS.ms_most_sample
 
 
 def test_tight_tuning_gets_simc():

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from identification.models import Fopdt, Integrator, Pid
-from tuning.rules import backlash_rule, effective_delay, simc, stick_slip_rule
+from tuning.rules import backlash_rule, effective_delay, simc
 
 
 def test_nominal_tuning_of_the_study():
@@ -48,4 +48,3 @@ def test_rule_for_play():
     assert backlash_rule(process, Pid(1, 10)) == Pid(1, 200)
     assert backlash_rule(process, Pid(1, 300)) == Pid(1, 300)
     assert backlash_rule(Integrator(0.4, 1), Pid(1, 10)) == Pid(1, 10)
-    assert stick_slip_rule(process, Pid(1, 10)) == Pid(0.5, 200)

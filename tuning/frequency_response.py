@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
@@ -16,24 +15,14 @@ from tuning.describing import Complexes
 
 LOWEST = 1e-6
 """Lowest frequency looked at, over that of the slowest of time constant, integral time and dead time."""
-POINTS = 900
-"""Frequencies of a grid."""
+POINTS, LOOKED_AT = 900, 400
+"""Frequencies of a grid, and of that on which the sensitivity is looked at."""
+CIRCLE = 500
+"""Points of the half circle on which stability is judged, besides eight for each scan of dead time."""
 MOST_DELAY = 4000
 """Scans of dead time that stability is judged with at most [-]; ours: beyond it the loop is judged at a scan of that
 share of the dead time, which shifts its phase by 1/8000 of the dead time's own, so that no grid grows with the data.
 """
-
-
-@dataclass(frozen=True, slots=True)
-class Margins:
-    """Robustness of a loop's linear part.
-
-    stable : whether the closed loop without its valve is stable.
-    ms : maximum sensitivity, max abs(1/(1 + L)) (Astrom, Hagglund 2006); inf where it is not stable.
-    """
-
-    stable: bool
-    ms: float
 
 
 def integral_s(controller: Pid) -> float:
@@ -46,8 +35,13 @@ def _rate(controller: Pid) -> float:
     return 1.0 / integral_s(controller)
 
 
-def process_continuous(process: Process, omega: Floats) -> Complexes:
-    """G(iw) [% PV / % OP] of the continuous process, shape (m,), at omega [rad/s] of shape (m,)."""
+def process_response(process: Process, scan_s: float, omega: Floats) -> Complexes:
+    """G [% PV / % OP] at omega [rad/s], shape (m,): behind the scan's zero-order hold, exact, or continuous where
+    scan_s is 0."""
+    if scan_s > 0:
+        d = discretize(process, scan_s)
+        back = np.exp(-1j * omega * scan_s)
+        return (d.now + d.before * back) * back ** (d.delay + 1) / (1.0 - d.pole * back)
     s = 1j * omega
     late = np.exp(-s * process.dead_time_s)
     if isinstance(process, Integrator):
@@ -55,38 +49,15 @@ def process_continuous(process: Process, omega: Floats) -> Complexes:
     return process.gain * late / (process.time_constant_s * s + 1.0)
 
 
-def process_sampled(process: Process, scan_s: float, omega: Floats) -> Complexes:
-    """Pulse response of the process behind its zero-order hold at z = exp(i w h), shape (m,); exact."""
-    d = discretize(process, scan_s)
-    back = np.exp(-1j * omega * scan_s)
-    return (d.now + d.before * back) * back ** (d.delay + 1) / (1.0 - d.pole * back)
-
-
-def controller_continuous(controller: Pid, omega: Floats) -> Complexes:
-    """C(iw) [% OP / % PV] of the ideal PID, shape (m,)."""
-    s = 1j * omega
-    return np.asarray(controller.kp * (1.0 + _rate(controller) / s + controller.td_s * s), np.complex128)
-
-
-def controller_sampled(controller: Pid, omega: Floats) -> Complexes:
-    """C(z) of the velocity form with backward Euler, at z = exp(i w h), shape (m,)."""
-    h = controller.scan_s
-    step = 1.0 - np.exp(-1j * omega * h)
-    return controller.kp * (1.0 + _rate(controller) * h / step + controller.td_s / h * step)
-
-
 def controller_response(controller: Pid, omega: Floats) -> Complexes:
-    """C at omega [rad/s], shape (m,): sampled at its scan, or continuous where scan_s is 0."""
-    if controller.scan_s > 0:
-        return controller_sampled(controller, omega)
-    return controller_continuous(controller, omega)
-
-
-def process_response(process: Process, scan_s: float, omega: Floats) -> Complexes:
-    """G at omega [rad/s], shape (m,): behind the scan's hold, or continuous where scan_s is 0."""
-    if scan_s > 0:
-        return process_sampled(process, scan_s, omega)
-    return process_continuous(process, omega)
+    """C [% OP / % PV] at omega [rad/s], shape (m,): the velocity form with backward Euler at its scan, or the ideal
+    PID, continuous, where scan_s is 0."""
+    kp, h = controller.kp, controller.scan_s
+    if h > 0:
+        step = 1.0 - np.exp(-1j * omega * h)
+        return kp * (1.0 + _rate(controller) * h / step + controller.td_s / h * step)
+    s = 1j * omega
+    return np.asarray(kp * (1.0 + _rate(controller) / s + controller.td_s * s), np.complex128)
 
 
 def loop_response(loop: Loop, omega: Floats) -> Complexes:
@@ -123,24 +94,20 @@ def frequencies(loop: Loop, points: int = POINTS, lowest: float = LOWEST) -> Flo
     return spaced(lowest / slowest_s(loop), top, points)
 
 
+Scanned = tuple[float, float, float, int]
+"""Pole, now, before and delay of a process on its scan."""
+
+
 @njit(cache=True)
-def _phase(
-    pole: float,
-    now: float,
-    before: float,
-    delay: int,
-    kp: float,
-    rate: float,
-    td: float,
-    low: float,
-    points: int,
-) -> float:
+def _phase(process: Scanned, kp: float, law: tuple[float, float], low: float, points: int) -> float:
     """Phase [rad] that the characteristic polynomial in 1/z goes through along the upper unit circle.
 
-    Its points are `points` even ones and as many in even ratios from `low` [rad] on. `rate` is the scan over the
-    integral time, `td` the derivative time over the scan. A controller without integral leaves a factor 1 - 1/z on
-    the circle, which is taken out.
+    Its points are `points` even ones and as many in even ratios from `low` [rad] on. The law is the scan over the
+    integral time, and the derivative time over the scan. A controller without integral leaves a factor 1 - 1/z on the
+    circle, which is taken out.
     """
+    pole, now, before, delay = process
+    rate, td = law
     total, last, i, j = 0.0, 0.0, 0, 0
     ratio = math.log(math.pi / low) / (points - 1)
     while i < points or j < points:
@@ -164,69 +131,43 @@ def _phase(
     return total
 
 
-def stable_gains(loop: Loop, kp: Floats, points: int = 500) -> Mask:
-    """True for each gain at which the sampled linear loop is stable.
+def stable_gains(loop: Loop, kp: Floats) -> Mask:
+    """True for each gain [% OP / % PV], shape (n,), at which the sampled linear loop is stable.
 
     A continuous controller is taken at the step that the simulator gives it. The polynomial in 1/z has its
     unstable roots inside the unit circle; their number is the winding of its values along the circle.
-
-    Parameters
-    ----------
-    loop : Loop
-        Its own gain and its valve do not count.
-    kp : ndarray of shape (n,)
-        Gains [% OP / % PV].
-    points : int
-        Points on the half circle, besides eight for each scan of dead time.
-
-    Returns
-    -------
-    ndarray of bool, shape (n,)
     """
     h = max(scan_step(loop), loop.process.dead_time_s / MOST_DELAY)
     d, c = discretize(loop.process, h), loop.controller
-    process = d.pole, d.now, d.before, d.delay
-    law = _rate(c) * h, c.td_s / h, 1e-3 * h / max(slowest_s(loop), h), points + 8 * d.delay
-    turned = np.array([_phase(*process, float(k), *law) for k in np.asarray(kp)])
+    process, law = (d.pole, d.now, d.before, d.delay), (_rate(c) * h, c.td_s / h)
+    low, points = 1e-3 * h / max(slowest_s(loop), h), CIRCLE + 8 * d.delay
+    turned = np.array([_phase(process, float(k), law, low, points) for k in np.asarray(kp)])
     return np.abs(turned) < 0.5 * np.pi
 
 
-def is_stable(loop: Loop, points: int = 500) -> bool:
+def is_stable(loop: Loop) -> bool:
     """Whether the sampled linear loop, its valve left out, is stable."""
-    return bool(stable_gains(loop, np.array([loop.controller.kp]), points)[0])
+    return bool(stable_gains(loop, np.array([loop.controller.kp]))[0])
 
 
-def margins(loop: Loop, points: int = 400) -> Margins:
-    """Stability and maximum sensitivity of the loop's linear part.
-
-    Parameters
-    ----------
-    loop : Loop
-        Its valve is left out.
-    points : int
-        Frequencies at which the sensitivity is looked at.
-
-    Returns
-    -------
-    Margins
-    """
+def maximum_sensitivity(loop: Loop) -> float:
+    """Ms of the loop's linear part, max abs(1/(1 + L)) (Astrom, Hagglund 2006), its valve left out; inf where it is
+    not stable."""
     if not is_stable(loop):
-        return Margins(False, math.inf)
-    omega, c = frequencies(loop, points, lowest=1e-2), loop.controller
+        return math.inf
+    omega, c = frequencies(loop, LOOKED_AT, lowest=1e-2), loop.controller
     if c.scan_s <= 0:
-        return Margins(True, float(np.max(1.0 / np.abs(1.0 + loop_response(loop, omega)))))
+        return float(np.max(1.0 / np.abs(1.0 + loop_response(loop, omega))))
     d = discretize(loop.process, c.scan_s)
-    process, law = (d.pole, d.now, d.before, d.delay), (c.kp, _rate(c) * c.scan_s, c.td_s / c.scan_s)
-    return Margins(True, 1.0 / _least_distance(process, law, omega * c.scan_s))
+    process, law = (d.pole, d.now, d.before, d.delay), (_rate(c) * c.scan_s, c.td_s / c.scan_s)
+    return 1.0 / float(_least_distance(process, c.kp, law, omega * c.scan_s))
 
 
 @njit(cache=True)
-def _least_distance(
-    process: tuple[float, float, float, int], law: tuple[float, float, float], angles: Floats
-) -> float:
+def _least_distance(process: Scanned, kp: float, law: tuple[float, float], angles: Floats) -> float:
     """Least distance of the sampled loop's response to -1 over some angles [rad] of z, shape (m,)."""
     pole, now, before, delay = process
-    kp, rate, td = law
+    rate, td = law
     least = math.inf
     for k in range(angles.size):
         w = complex(math.cos(angles[k]), -math.sin(angles[k]))

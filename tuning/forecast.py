@@ -1,21 +1,22 @@
-"""What a change of tuning would do: both tunings simulated on the same load, with intervals."""
+"""What settings would do: each pair simulated on the same load, a change of tuning with intervals."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from itertools import pairwise
 
 import numpy as np
 
-from identification.models import Estimate, Loop, Pid
+from identification.models import Estimate, Integrator, Loop, Pid
 from identification.record import Floats, LoopRecord
 from identification.signals.correlation import lag_sums
 from identification.simulation.closed_loop import closed_loop, scan_step
 from tuning.describing import band, is_play
+from tuning.frequency_response import integral_s, maximum_sensitivity, slowest_s
 from tuning.limit_cycle import KICK
 from tuning.limits import WARM_UP
-from tuning.linear import slowest_s
+from tuning.rules import backlash_rule, lambda_settings, simc
 
 BLOCKS = 12
 """Blocks that a record is cut into for the bootstrap; ours: a block holds cycles enough to be counted."""
@@ -23,6 +24,9 @@ PRELUDE, LEAST_PRELUDE = 6.0, 300
 """Length of the time between kick and record over the loop's slowest time, and scans at least; ours."""
 DRAWS = 200
 """Bootstrap draws over all loops together."""
+SEED = 0
+NOW, RECOMMENDED, SIMC, LAMBDA, LONGER = "now", "recommended", "SIMC", "lambda", "Ti not below T"
+"""Names of the settings compared."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,14 +104,13 @@ def autocorrelation_peak(error: Floats) -> float:
 
 
 def assess(record: LoopRecord) -> Assessed:
-    """Assessments of a simulated record, its stem in `position` (OP where it has none)."""
+    """Assessments of a simulated record."""
     e = record.error
     hours = record.duration_s / 3600.0
-    stem = record.op if record.position is None else record.position
     sigma = float(np.std(e))
     return Assessed(
         average_absolute_error=float(np.mean(np.abs(e))),
-        stem_travel=float(np.abs(np.diff(stem)).sum()) / hours,
+        stem_travel=float(np.abs(np.diff(record.stem)).sum()) / hours,
         op_travel=float(np.abs(np.diff(record.op)).sum()) / hours,
         oscillation=float(np.sqrt(2.0)) * sigma * autocorrelation_peak(e),
         variability=2.0 * sigma,
@@ -139,36 +142,16 @@ def _estimates(value: Floats, draws: Floats, units: bool = True) -> dict[str, Es
     }
 
 
-def predict(
-    loop: Loop, controller: Pid, load: Floats, uncertainty: Sequence[Loop] = (), seed: int = 0
-) -> Forecast:
-    """Both tunings on the same load, on the identified loop and on its uncertainty samples.
+def predict(loop: Loop, controller: Pid, load: Floats, uncertainty: Sequence[Loop] = ()) -> Forecast:
+    """The present and a new controller on the same load, on the identified loop and on its uncertainty samples.
 
-    Parameters
-    ----------
-    loop : Loop
-        With its present controller.
-    controller : Pid
-        The new one.
-    load : ndarray of shape (n,)
-        Load and noise as they add to PV, on the controller's clock [% PV]; n >= 120.
-    uncertainty : sequence of Loop
-        Other loops that the data allow; their controllers are not used.
-    seed : int
-        Of the block bootstrap (Kunsch 1989, blocks that do not overlap).
-
-    Returns
-    -------
-    Forecast
-
-    Raises
-    ------
-    ValueError
-        For a load of fewer than ten scans a block.
+    The load, shape (n,), and noise add to PV on the controller's clock [% PV]; ValueError for fewer than ten scans a
+    block. Of `uncertainty`, other loops that the data allow, the controllers are not used. Blocks do not overlap
+    (Kunsch 1989).
     """
     if load.size < 10 * BLOCKS:
         raise ValueError(f"a forecast needs {10 * BLOCKS} scans of load, has {load.size}")
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(SEED)
     cases = [replace(one, controller=loop.controller) for one in (loop, *uncertainty)]
     old = [_blocks(settled(run(one, load))) for one in cases]
     new = [_blocks(settled(run(replace(one, controller=controller), load))) for one in cases]
@@ -188,3 +171,55 @@ def _change(before: Floats, after: Floats) -> Floats:
     nothing = before <= 1e-12
     ratio = after / np.where(nothing, 1.0, before) - 1.0
     return np.where(nothing, 0.0, ratio)
+
+
+@dataclass(frozen=True, slots=True)
+class Tried:
+    """One pair of settings on the load.
+
+    controller; ms, maximum sensitivity [-], inf where the linear loop is unstable; stem_travel [%/h]; error, average
+    of its absolute value [% PV]; peak, largest of it [% PV]; integral_s, Ti/|Kp| [s], integral of the error that a
+    step of the load at OP leaves, inf without integral action.
+    """
+
+    name: str
+    controller: Pid
+    ms: float
+    stem_travel: float
+    error: float
+    peak: float
+    integral_s: float
+
+
+def alternatives(loop: Loop, new: Pid | None) -> dict[str, Pid]:
+    """Settings to compare: the present ones, the recommended if any, and the rules'; those that equal earlier ones
+    are left out."""
+    now, h = loop.controller, scan_step(loop)
+    found = {NOW: now} | ({} if new is None else {RECOMMENDED: new})
+    rules = {SIMC: simc(loop.process, scan_s=h), LAMBDA: lambda_settings(loop.process, h)}
+    found |= {name: replace(now, kp=pid.kp, ti_s=pid.ti_s, td_s=0.0) for name, pid in rules.items()}
+    if not isinstance(loop.process, Integrator):
+        found[LONGER] = backlash_rule(loop.process, now)
+    seen: dict[tuple[float, float], str] = {}
+    for name, pid in found.items():
+        seen.setdefault((float(f"{pid.kp:.3g}"), float(f"{pid.ti_s:.3g}")), name)
+    return {name: found[name] for name in seen.values()}
+
+
+def tried(loop: Loop, load: Floats, settings: Mapping[str, Pid]) -> tuple[Tried, ...]:
+    """Settings one by one, in their order, on a loop under a load on the controller's clock [% PV], shape (n,)."""
+    return tuple(_tried(name, replace(loop, controller=pid), load) for name, pid in settings.items())
+
+
+def _tried(name: str, loop: Loop, load: Floats) -> Tried:
+    record, c = settled(run(loop, load)), loop.controller
+    figures = assess(record)
+    return Tried(
+        name,
+        c,
+        maximum_sensitivity(loop),
+        figures.stem_travel,
+        figures.average_absolute_error,
+        peak=float(np.max(np.abs(record.error), initial=0.0)),
+        integral_s=integral_s(c) / abs(c.kp),
+    )

@@ -10,9 +10,15 @@ from scipy.optimize import fsolve
 
 from identification.models import Backlash, Fopdt, Integrator, Loop, Pid, Stiction
 from tuning.describing import backlash
-from tuning.limit_cycle import confirm, harmonic_balance, predicted_cycle
-from tuning.linear import is_stable
-from tuning.maps import curves, largest_cycling_ratio, travel_map
+from tuning.frequency_response import is_stable
+from tuning.harmonic_balance import (
+    curves,
+    harmonic_balance,
+    largest_cycling_ratio,
+    predicted_cycle,
+    travel_map,
+)
+from tuning.limit_cycle import confirm
 
 LEVEL = Loop(Fopdt(80, 200, 1), Pid(1, 10, scan_s=0), Backlash(1.0))
 TABLE = {

@@ -11,9 +11,8 @@ import pytest
 
 from identification.models import Backlash, Fopdt, Integrator, Loop, Pid, Process
 from identification.simulation.closed_loop import closed_loop
-from tuning.compared import LAMBDA, LONGER, NOW, RECOMMENDED, SIMC, rivals, tried
-from tuning.linear import margins
-from tuning.predict import run, settled
+from tuning.forecast import LAMBDA, LONGER, NOW, RECOMMENDED, SIMC, alternatives, run, settled, tried
+from tuning.frequency_response import maximum_sensitivity
 from tuning.rules import lambda_settings
 
 PIPE = Loop(Fopdt(1.5, 40.0, 4.0), Pid(1.2, 15.0), Backlash(2.0))
@@ -32,7 +31,7 @@ def test_lambda_makes_the_loop_as_slow_as_lambda() -> None:
 def test_lambda_keeps_three_dead_times() -> None:
     """A process of mostly dead time, and a level, get lambda of three dead times: as robust as SIMC (Ms 1.7)."""
     for process in (Fopdt(2.0, 5.0, 10.0), Integrator(0.01, 10.0)):
-        assert margins(Loop(process, replace(lambda_settings(process), scan_s=0.5))).ms < 1.7
+        assert maximum_sensitivity(Loop(process, replace(lambda_settings(process), scan_s=0.5))) < 1.7
 
 
 @pytest.mark.parametrize("process", [Fopdt(0.0, 10.0, 1.0), Integrator(0.1, 0.0)])
@@ -44,17 +43,17 @@ def test_lambda_says_what_it_lacks(process: Process) -> None:
 
 def test_present_settings_come_first_and_none_twice() -> None:
     """The present settings lead, the recommended follow, and a rule that says the same as another is left out."""
-    assert list(rivals(PIPE, Pid(0.5, 60.0))) == [NOW, RECOMMENDED, SIMC, LAMBDA, LONGER]
+    assert list(alternatives(PIPE, Pid(0.5, 60.0))) == [NOW, RECOMMENDED, SIMC, LAMBDA, LONGER]
     long = replace(PIPE, controller=Pid(1.2, 90.0))
-    assert LONGER not in rivals(long, None)
-    assert RECOMMENDED not in rivals(long, None)
-    assert LONGER not in rivals(replace(PIPE, process=Integrator(0.04, 4.0)), None)
+    assert LONGER not in alternatives(long, None)
+    assert RECOMMENDED not in alternatives(long, None)
+    assert LONGER not in alternatives(replace(PIPE, process=Integrator(0.04, 4.0)), None)
 
 
 def test_figures_are_those_of_a_plain_simulation() -> None:
     """Travel, error and peak are sums over the simulated record, and the present settings' cycle shows in them."""
     load = 0.1 * np.random.default_rng(2).standard_normal(6000)
-    found = {t.name: t for t in tried(PIPE, load, rivals(PIPE, Pid(0.5, 60.0)))}
+    found = {t.name: t for t in tried(PIPE, load, alternatives(PIPE, Pid(0.5, 60.0)))}
     record = settled(run(PIPE, load))
     stem, error = record.position, record.sp - record.pv
     assert stem is not None

@@ -8,10 +8,10 @@ import pytest
 from identification.models import Backlash, Fopdt, Loop, Pid
 from identification.record import LoopRecord
 from proofs.valve_loops import backlash_case
-from tuning.bench import assumed_uncertainty
+from tuning.forecast import NAMES, assess, autocorrelation_peak, predict
 from tuning.limits import LIMITS
-from tuning.predict import NAMES, assess, autocorrelation_peak, predict
 from tuning.rules import backlash_rule
+from tuning.search import assumed_uncertainty
 
 
 def record(error, stem):
