@@ -23,7 +23,7 @@ from analyzer import api
 from analyzer.config import Config
 from analyzer.loop.cause_weights import FILE, NAMES, measures, parted
 from analyzer.loop.decisions import CAUSES
-from analyzer.loop.fit_for_cause import unfit_for_cause
+from analyzer.loop.fitness import unfit_for_cause
 from analyzer.loop.measure import measure
 from analyzer.loop.oscillation import counting, detect
 from analyzer.loop.quality import Prepared, prepare

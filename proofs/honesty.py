@@ -17,8 +17,7 @@ import numpy as np
 from scipy.signal import lfilter
 from scipy.stats import ttest_ind
 
-from analyzer.comparison.before_after import MEASURES, LoopComparison, Verdict, compare
-from analyzer.comparison.spans import gridded, spans_around
+from analyzer.comparison.before_after import MEASURES, LoopComparison, Verdict, compare, gridded, spans_around
 from analyzer.config import Config
 from analyzer.loop.assessments import hourly
 from analyzer.loop.oscillation import detect

@@ -13,7 +13,7 @@ from analyzer.config import Config
 from analyzer.history.series import Series
 from analyzer.loop.assess import Assessment, assess
 from analyzer.loop.decisions import Cause
-from analyzer.loop.fit_for_cause import unfit_for_cause
+from analyzer.loop.fitness import unfit_for_cause
 from analyzer.loop.measure import Measured, measure
 from analyzer.loop.oscillation import Oscillations, counting, detect
 from analyzer.loop.quality import Prepared, prepare

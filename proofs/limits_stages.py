@@ -17,7 +17,7 @@ from analyzer.loop.assessments import assess_span
 from analyzer.loop.cause import dead_valve
 from analyzer.loop.decisions import Status
 from analyzer.loop.finding import Finding, Swing
-from analyzer.loop.fit_for_cause import at_limits
+from analyzer.loop.fitness import at_limits
 from analyzer.loop.oscillation import barely_seen, counting, detect
 from analyzer.loop.quality import prepare
 from analyzer.loop.settings_check import differing

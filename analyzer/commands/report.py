@@ -13,7 +13,7 @@ from analyzer.commands.options import PLACE, config_option, say
 from identification.errors import InputError
 
 if TYPE_CHECKING:
-    from analyzer.comparison.spans import Span
+    from analyzer.comparison.before_after import Span
     from analyzer.config import ChangeLimits
     from analyzer.loops.changes import TuningChange
     from analyzer.pages.changes import Spans
@@ -26,7 +26,7 @@ MOST_DAYS = 3660
 
 
 def _span(texts: Sequence[str] | None, option: str, zone: str) -> Span | None:
-    from analyzer.comparison.spans import Span
+    from analyzer.comparison.before_after import Span
     from analyzer.history.stamps import parse_time
 
     if not texts:

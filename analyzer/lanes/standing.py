@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from analyzer.config import Config, LaneLimits
-from analyzer.loop.assessments import HOUR_S, hour_edges, usable
+from analyzer.loop.assessments import HOUR_S, hour_edges
 from analyzer.loop.quality import Prepared
 from identification.models import Pid
 from identification.record import LoopRecord
@@ -47,7 +47,7 @@ def _lasting_error(record: LoopRecord, limits: LaneLimits) -> float | None:
     """The typical hour's mean error; None without a recorded set point or without an hour that is half usable."""
     if record.sp_estimated:
         return None
-    use, error = usable(record), record.error
+    use, error = record.usable, record.error
     hours = [
         abs(float(error[a:b][use[a:b]].mean()))
         for a, b, _ in hour_edges(record)
@@ -59,7 +59,7 @@ def _lasting_error(record: LoopRecord, limits: LaneLimits) -> float | None:
 def _memory(prepared: Prepared, controller: Pid | None, kind: str, config: Config) -> float | None:
     """The error's correlation time in Ti; None where it says nothing, for the loop is at its set point as far as a
     transmitter tells, or compression would make it longer."""
-    record, use = prepared.record, usable(prepared.record)
+    record, use = prepared.record, prepared.record.usable
     if controller is None or kind == AVERAGING or prepared.compressed_share > config.lanes.straight_share:
         return None
     if float(use.mean()) < config.quality.usable_share:
@@ -84,7 +84,7 @@ def standing(prepared: Prepared, controller: Pid | None, kind: str, config: Conf
     """
     record, op = prepared.record, prepared.op_known
     scaled = op and prepared.op_scaled
-    good, use = ~record.bad, usable(record)
+    good, use = ~record.bad, record.usable
     return Standing(
         _percent(record.mask("manual"), good) if op else None,
         _percent(record.mask("saturated"), use if use.any() else good) if scaled else None,

@@ -8,14 +8,12 @@ from dataclasses import dataclass, field, replace
 from analyzer.config import AdviceLimits, Config
 from analyzer.loop.assess import Assessment
 from analyzer.loop.cause import Verdict
-from analyzer.loop.compared import Comparison, compared
 from analyzer.loop.decisions import Action, Cause, Due, Fault, Lack, Needs
-from analyzer.loop.fit_for_settings import too_thin
+from analyzer.loop.fitness import too_thin
+from analyzer.loop.identified import cautious, load_of, uncertain
 from analyzer.loop.measure import Measured
-from analyzer.loop.model_samples import uncertain
 from analyzer.loop.oscillation import counting
-from analyzer.loop.reconstructed_load import load_of
-from analyzer.loop.tight import cautious
+from analyzer.loop.settings_side_by_side import Comparison, compared
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import as_stated
 from analyzer.words import settings as words

@@ -16,7 +16,6 @@ from analyzer.loop.assessments import (
     assess_span,
     hourly,
     settling_time,
-    usable,
 )
 from analyzer.loop.cause import (
     NO_CAUSE,
@@ -30,15 +29,14 @@ from analyzer.loop.cause import (
     with_dead_valve,
 )
 from analyzer.loop.decisions import Cause, Lack, LacksError, Needs
-from analyzer.loop.fit_for_cause import unfit_for_cause
-from analyzer.loop.fit_for_settings import too_thin, unfit_for_settings
+from analyzer.loop.fitness import too_thin, unfit_for_cause, unfit_for_settings
 from analyzer.loop.judged_stretch import Earlier, judged_stretch
 from analyzer.loop.measure import Measured, measure, time_scale
 from analyzer.loop.oscillation import Oscillation, Oscillations, barely_seen, counting, detect
+from analyzer.loop.page_trends import BUCKETS, FINE_BUCKETS, close_view, thinned
 from analyzer.loop.quality import Prepared
 from analyzer.loop.settings_check import SettingsDiffer, differing
 from analyzer.loop.slip_by_slip import told_slip_by_slip
-from analyzer.loop.trends import BUCKETS, FINE_BUCKETS, close_view, thinned
 from analyzer.plantwide.wave import Wave, waves_of
 from analyzer.words import settings as words
 from identification.errors import NotAssessedError
@@ -90,7 +88,7 @@ class Assessment:
 def unassessable(record: LoopRecord, config: Config) -> Needs | None:
     """What the record lacks for an assessment; None where it can support one."""
     q = config.quality
-    share = float(usable(record).mean())
+    share = float(record.usable.mean())
     if len(record) < q.samples:
         return Needs(Lack.SAMPLES, f"needs {q.samples} samples, has {len(record)}")
     if share >= q.usable_share:
@@ -264,10 +262,10 @@ def assess(
     of_all = found if whole else of_all
     dead_time = _dead_time(verdict)
     night = _known(assess_span(record, config.figures), _in_percent(prepared))
-    judged_h = float(usable(part.record).sum()) * record.dt_s / HOUR_S
+    judged_h = float(part.record.usable.sum()) * record.dt_s / HOUR_S
     if judged_h < config.advice.least_h or too_thin(record.dt_s, stretch.controller, config) is not None:
         verdict = as_hint(verdict, config.advice.hint_pct)
-    harris = harris_index(record.error, usable(record), record.dt_s, dead_time) if dead_time else None
+    harris = harris_index(record.error, record.usable, record.dt_s, dead_time) if dead_time else None
     first, close = counting(found), _close(part.record, found, stretch.first)
     return Assessment(
         record.tag,

@@ -8,17 +8,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import asdict, dataclass
+from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 
 from analyzer.config import FigureLimits
 from analyzer.loop.oscillation import Oscillations
-from analyzer.loop.span_sums import Trends, crossings_of, sums_of, travel_of
 from identification.record import Floats, LoopRecord, Mask
 from identification.signals.robust import robust_deviation
 
 HOUR_S = 3600.0
+ROUNDING = 1e-9
+"""Moves under this [% of OP] are rounding and turn nothing: a signal may stand exactly at the edge of the band."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +53,7 @@ class Assessments:
 
     def as_row(self) -> Mapping[str, float | None]:
         """The figures by name."""
-        return {f.name: getattr(self, f.name) for f in fields(self)}
+        return asdict(self)
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,14 +69,101 @@ class Hour:
     oscillating_pct: float
 
 
-def usable(record: LoopRecord) -> Mask:
-    """True where a sample is good and the loop in automatic, shape (n,)."""
-    return ~(record.bad | record.mask("manual"))
+class Trends(NamedTuple):
+    """Set point, PV and OP of a span [% of span], and where OP is at a limit, shape (n,) each."""
+
+    sp: Floats
+    pv: Floats
+    op: Floats
+    saturated: Mask
+
+
+class Sums(NamedTuple):
+    """Over the samples that are good and in automatic: means of |e|, SP, PV and OP, standard deviations of e and PV
+    [% of span], shares of time at limits and in good service [-], and how often e crosses the noise band; the set
+    point's travel over the whole span."""
+
+    absolute_error: float
+    sp: float
+    pv: float
+    op: float
+    error_deviation: float
+    pv_deviation: float
+    at_limits: float
+    service: float
+    crossings: int
+    sp_travel: float
+
+
+@njit(cache=True)
+def crossings_of(e: Floats, use: Mask, band: float) -> int:
+    """How often an error, where it may be used, goes from beyond one side of a band to beyond the other."""
+    side, count = 0, 0
+    for k in range(e.size):
+        if not use[k] or abs(e[k]) <= band:
+            continue
+        now = 1 if e[k] > 0 else -1
+        count += side == -now
+        side = now
+    return count
+
+
+@njit(cache=True)
+def travel_of(signal: Floats, use: Mask, step: int, deadband: float) -> tuple[float, int]:
+    """Travel and reversals of every `step`-th sample of a signal beyond a deadband, shape (n,).
+
+    Moves between usable neighbours make one path: what a signal moved during a gap is not known.
+    """
+    half, x, stem = 0.5 * deadband, 0.0, 0.0
+    path, way, turns = 0.0, 0.0, 0
+    for k in range(step, signal.size, step):
+        if use[k] and use[k - step]:
+            x += signal[k] - signal[k - step]
+        if abs(x - stem) <= half:
+            continue
+        new = x - half if x > stem else x + half
+        moved = new - stem
+        stem = new
+        path += abs(moved)
+        if abs(moved) > ROUNDING:
+            now = 1.0 if moved > 0 else -1.0
+            turns += way == -now
+            way = now
+    return path, turns
+
+
+@njit(cache=True)
+def sums_of(x: Trends, use: Mask, small_error: float, band: float) -> Sums:
+    """Sums over the samples that may be used, at least one.
+
+    small_error : under which a loop is in good service; band : beyond which the error has a side [% of span].
+    """
+    count, size, e, pv, op, sp, limits, service = 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0, 0
+    for k in range(x.pv.size):
+        if use[k]:
+            error = x.sp[k] - x.pv[k]
+            count += 1
+            size, e, pv = size + abs(error), e + error, pv + x.pv[k]
+            op, sp = op + x.op[k], sp + x.sp[k]
+            limits += x.saturated[k]
+            service += abs(error) < small_error and not x.saturated[k]
+    e, pv, ee, vv = e / count, pv / count, 0.0, 0.0
+    for k in range(x.pv.size):
+        if use[k]:
+            ee += (x.sp[k] - x.pv[k] - e) ** 2
+            vv += (x.pv[k] - pv) ** 2
+    sides = crossings_of(x.sp - x.pv, use, band)
+    moved = np.abs(np.diff(x.sp)).sum()
+    spread = math.sqrt(ee / count), math.sqrt(vv / count)
+    shares = limits / count, service / count
+    return Sums(
+        size / count, sp / count, pv, op / count, spread[0], spread[1], shares[0], shares[1], sides, moved
+    )
 
 
 def at_limits_share(record: LoopRecord) -> float:
     """Share of the usable time with OP at a limit [-]; in manual a limit limits nothing."""
-    use = usable(record)
+    use = record.usable
     return float(record.mask("saturated")[use].mean()) if use.any() else 0.0
 
 
@@ -84,35 +174,16 @@ def noise_band(pv: Floats) -> float:
     return robust_deviation(np.diff(pv)) / math.sqrt(2)
 
 
-def travel(signal: Floats, deadband: float) -> tuple[float, int]:
-    """Travel and reversals of a signal beyond a deadband, both over its whole length."""
-    return travel_of(signal, np.ones(signal.size, dtype=bool), 1, deadband)  # type: ignore[no-any-return]
-
-
-def crossings(error: Floats, band: float) -> int:
-    """How often the error goes from beyond one side of a band to beyond the other."""
-    return crossings_of(error, np.ones(error.size, dtype=bool), band)  # type: ignore[no-any-return]
-
-
 def assess_span(record: LoopRecord, limits: FigureLimits, noise: float | None = None) -> Assessments:
-    """The figures of one span of a record.
-
-    Parameters
-    ----------
-    record : LoopRecord
-    limits : FigureLimits
-    noise : float or None
-        Noise band of PV [% of span], measured here where None.
-    """
-    use = usable(record)
+    """The figures of one span of a record; `noise`, the noise band of PV [% of span], measured here where None."""
+    use = record.usable
     count = int(use.sum())
     hours = count * record.dt_s / HOUR_S
     total = len(record) * record.dt_s / HOUR_S
     if count < 2 or hours < limits.least_share * min(total, 1.0):
         return Assessments(hours)
-    stem = record.op if record.position is None else record.position
     step = max(round(limits.travel_grid_s / record.dt_s), 1)
-    path, turns = travel_of(stem, use, step, limits.travel_deadband_pct)
+    path, turns = travel_of(record.stem, use, step, limits.travel_deadband_pct)
     band = noise_band(record.pv[use]) if noise is None else noise
     trends = Trends(record.sp, record.pv, record.op, record.mask("saturated"))
     sums = sums_of(trends, use, limits.small_error_pct, 2 * band)
@@ -169,7 +240,7 @@ def hourly(
     record: LoopRecord, found: Oscillations, limits: FigureLimits, noise: float | None = None
 ) -> list[Hour]:
     """The figures of each clock hour of a record; `noise`, the noise band of PV, measured here where None."""
-    band = noise_band(record.pv[usable(record)]) if noise is None else noise
+    band = noise_band(record.pv[record.usable]) if noise is None else noise
     rows = []
     for a, b, start in hour_edges(record):
         significance, share = _hourly_oscillation(found, record, start, a, b)

@@ -33,11 +33,11 @@ from analyzer.loop.cause_signs import likelihood_told, signs_of, width_text
 from analyzer.loop.cause_weights import PLAIN, chances, measures
 from analyzer.loop.decisions import CAUSES, OF_LOAD, Cause, Fault, Lack, Needs
 from analyzer.loop.finding import Sign
-from analyzer.loop.fit_for_cause import compressed
+from analyzer.loop.fitness import compressed
+from analyzer.loop.identified import sensitivity
 from analyzer.loop.measure import PLAYS, Measured
 from analyzer.loop.oscillation import Oscillation
 from analyzer.loop.quality import Prepared
-from analyzer.loop.tight import sensitivity
 from analyzer.words import settings as words
 from identification.record import LoopRecord
 

@@ -15,8 +15,8 @@ from analyzer.loop.assess import Assessment
 from analyzer.loop.cause import Verdict
 from analyzer.loop.decisions import Action, Cause, Fault, Lack, Status
 from analyzer.loop.finding import Cell, Finding, Remedy, Swing
+from analyzer.loop.identified import gain_room
 from analyzer.loop.oscillation import Oscillations
-from analyzer.loop.tight import gain_room
 from analyzer.loops.spec import LoopSpec
 from analyzer.pages.cost import RECORDED, STATED, loss
 from identification.estimation.hammerstein import Fit

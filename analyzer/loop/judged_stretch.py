@@ -13,7 +13,7 @@ from itertools import pairwise
 import numpy as np
 
 from analyzer.config import Config
-from analyzer.loop.assessments import HOUR_S, usable
+from analyzer.loop.assessments import HOUR_S
 from analyzer.loop.quality import Prepared
 from analyzer.loops.changes import TuningChange
 from analyzer.loops.settings_in_force import settings_before
@@ -74,7 +74,7 @@ def _in_automatic(record: LoopRecord, first: int, last: int, config: Config) -> 
     """The longest stretch between long spans in manual, where it holds most of what is in automatic; else all."""
     least = max(round(config.quality.manual_s / record.dt_s), 1)
     a, b = max(_runs(record.mask("manual"), first, last, least), key=lambda ends: ends[1] - ends[0])
-    use = usable(record)
+    use = record.usable
     most = use[a:b].sum() >= config.quality.automatic_share * use[first:last].sum()
     return (a, b) if most and b - a >= config.quality.samples else (first, last)
 
@@ -97,7 +97,7 @@ def judged_stretch(
     """
     cuts = [round((e.until_s - record.start_s) / record.dt_s) for e in earlier]
     edges = [0, *(min(max(c, 0), len(record)) for c in cuts), len(record)]
-    use = usable(record)
+    use = record.usable
     good = [int(use[a:b].sum()) for a, b in pairwise(edges)]
     least = max(config.advice.least_h * HOUR_S / record.dt_s, config.quality.samples)
     at = len(good) - 1 if not earlier or good[-1] >= least else int(np.argmax(good))

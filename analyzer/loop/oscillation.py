@@ -82,17 +82,12 @@ class Oscillations:
         return self.found[0] if self.found else None
 
 
-def fill(x: Floats, bad: Mask) -> Floats:
-    """The signal with straight lines over what must not be used, shape (n,)."""
-    if not bad.any():
-        return x
-    good = np.flatnonzero(~bad)
-    return np.interp(np.arange(x.size), good, x[good])
-
-
 def error_spectrum(record: LoopRecord) -> Spectrum:
     """Spectrum of the error without what the set point explains."""
-    found = spectrum(fill(record.error, record.bad), record.dt_s)
+    error, good = record.error, np.flatnonzero(~record.bad)
+    if good.size < error.size:
+        error = np.interp(np.arange(error.size), good, error[good])
+    found = spectrum(error, record.dt_s)
     if record.sp_estimated or float(np.ptp(record.sp)) == 0.0:
         return found
     sp = spectrum(record.sp, record.dt_s)
@@ -219,8 +214,7 @@ def _lasts(record: LoopRecord, o: Oscillation, limits: OscillationLimits) -> boo
     moving = moves(record.sp)
     if record.sp_estimated or not moving.any() or moving.mean() > limits.programme_moves:
         return True
-    use = ~(record.bad | record.mask("manual"))
-    left, count = amplitude_at_rest(record.error, record.sp, use, o.period_s / record.dt_s)
+    left, count = amplitude_at_rest(record.error, record.sp, record.usable, o.period_s / record.dt_s)
     if count >= limits.rest_stretches:
         return left >= limits.rest_share * o.amplitude_pct
     begun = int(np.sum(moving[1:] & ~moving[:-1]))
@@ -241,18 +235,7 @@ def counting(found: Oscillations) -> Oscillation | None:
 
 
 def detect(record: LoopRecord, limits: OscillationLimits) -> Oscillations:
-    """Find the oscillations of a loop.
-
-    Parameters
-    ----------
-    record : LoopRecord
-    limits : OscillationLimits
-
-    Returns
-    -------
-    Oscillations
-        Empty for noise, drift, ramps, steps and constants.
-    """
+    """The oscillations of a loop; none for noise, drift, ramps, steps and constants."""
     s = error_spectrum(record)
     resolution = float(np.max(np.abs(record.error))) * 1e-9
     if s.n < 16 or s.variance <= resolution**2:
@@ -275,6 +258,3 @@ def detect(record: LoopRecord, limits: OscillationLimits) -> Oscillations:
         return Oscillations(spectrum=s, bands=b)
     first = sized[0]
     return Oscillations(tuple(r[0] for r in sized), first[1], first[2], first[3], s, b)
-
-
-__all__ = ["WIDE_BAND", "Oscillation", "Oscillations", "detect", "error_spectrum", "fill"]

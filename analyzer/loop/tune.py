@@ -23,8 +23,8 @@ from analyzer.loop.advice import (
 from analyzer.loop.assess import Assessment
 from analyzer.loop.cause import Verdict
 from analyzer.loop.decisions import Cause
+from analyzer.loop.identified import load_of
 from analyzer.loop.intervals import intervals
-from analyzer.loop.reconstructed_load import load_of
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import as_stated
 from identification.errors import NotAssessedError

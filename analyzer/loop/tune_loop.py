@@ -11,7 +11,7 @@ from analyzer.history.plant_clock import UTC_NAME
 from analyzer.loop.advice import withheld
 from analyzer.loop.assess import assess
 from analyzer.loop.decisions import Action, Cause, Needs
-from analyzer.loop.fit_for_cause import at_limits, unfit_for_cause
+from analyzer.loop.fitness import at_limits, unfit_for_cause
 from analyzer.loop.judged_stretch import controller_of, earlier_settings
 from analyzer.loop.quality import Prepared, prepare
 from analyzer.loop.tune import Tuning, lines, pictures, tune
@@ -72,7 +72,7 @@ def proposal(
 
 def _drawn(t: Tuning, spec: LoopSpec, pv_span: float, config: Config, night: str) -> dict[str, bytes]:
     """Pictures by file name, and the page on which settings are compared and tried."""
-    from analyzer.loop.compared import compared
+    from analyzer.loop.settings_side_by_side import compared
     from analyzer.pages.compared import page
     from reports.html import render
     from reports.pictures import as_file

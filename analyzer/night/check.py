@@ -10,8 +10,7 @@ from analyzer.history.plant_clock import UTC_NAME, stamp
 from analyzer.history.series import Series
 from analyzer.loop.assess import hidden, unassessable
 from analyzer.loop.decisions import Needs
-from analyzer.loop.fit_for_cause import unfit_for_cause
-from analyzer.loop.fit_for_settings import too_thin, unfit_for_settings
+from analyzer.loop.fitness import too_thin, unfit_for_cause, unfit_for_settings
 from analyzer.loop.judged_stretch import controller_of
 from analyzer.loop.oscillation import detect
 from analyzer.loop.quality import Prepared, prepare

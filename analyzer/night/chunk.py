@@ -24,9 +24,9 @@ from analyzer.loop.conclusion import Lost, concluded
 from analyzer.loop.decisions import Action, Cause, Lack, LacksError, Status
 from analyzer.loop.finding import Cell, Finding
 from analyzer.loop.judged_stretch import Earlier, controller_of, earlier_settings
+from analyzer.loop.page_trends import turn_events
 from analyzer.loop.quality import Prepared, prepare
 from analyzer.loop.sample_clock import interval
-from analyzer.loop.turn_events import turn_events
 from analyzer.loops.changes import TuningChange
 from analyzer.loops.settings_in_force import in_force, settings_from
 from analyzer.loops.spec import LoopSpec

@@ -17,8 +17,8 @@ from analyzer.comparison.before_after import (
     compare,
     follows,
     grade,
+    spans_around,
 )
-from analyzer.comparison.spans import spans_around
 from analyzer.config import ChangeLimits, ComparisonLimits
 from analyzer.loop.decisions import counts
 from analyzer.loops.changes import TuningChange, behaviour_change, stated_changes

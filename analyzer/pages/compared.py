@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from analyzer.loop.compared import SPREAD, Comparison, Shown
+from analyzer.loop.settings_side_by_side import SPREAD, Comparison, Shown
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import unit_ratio
 from analyzer.pages.words import number
@@ -176,7 +176,7 @@ def field(c: Comparison) -> Field | None:
 
 
 def _kick(c: Comparison) -> dict[str, float]:
-    """What sets a loop with play going, as tuning.predict.run does it.
+    """What sets a loop with play going, as tuning.forecast.run does it.
 
     Kick [% PV times gain], the slowest time beside Ti [s], times of it that the loop is left alone, scans at least.
     """

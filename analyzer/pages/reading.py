@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
+from analyzer.comparison.before_after import Span
 from analyzer.comparison.block_bootstrap import Floats
-from analyzer.comparison.spans import Span
 from analyzer.lanes.lanes import FIGURE
 from analyzer.loop.decisions import Cause, Status, counts
 from analyzer.pages.rank import worst_first

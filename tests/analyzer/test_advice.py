@@ -22,9 +22,9 @@ from analyzer.loop.assess import Assessment, assess
 from analyzer.loop.cause import NO_CAUSE, not_assessed
 from analyzer.loop.conclusion import concluded
 from analyzer.loop.decisions import Lack, Needs
+from analyzer.loop.identified import load_of, scan_noise
 from analyzer.loop.oscillation import Oscillations
 from analyzer.loop.quality import prepare
-from analyzer.loop.reconstructed_load import load_of, scan_noise
 from analyzer.store.rows import night_row
 from identification.models import Backlash, Fopdt, Integrator, Pid
 from proofs.plant import CONFIG, START_S, Sketch, prepared, series, simulate, spec

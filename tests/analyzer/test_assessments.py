@@ -14,13 +14,12 @@ from analyzer.loop.assess import assess, unassessable
 from analyzer.loop.assessments import (
     HOUR_S,
     assess_span,
-    crossings,
+    crossings_of,
     hour_edges,
     hourly,
     noise_band,
     settling_time,
-    travel,
-    usable,
+    travel_of,
 )
 from analyzer.loop.decisions import Lack
 from analyzer.loop.oscillation import detect
@@ -123,7 +122,8 @@ def test_figures_agree_with_slow_twin(seed, dt_s):
 @example([1.0, 0.0, 0.11365059655144008], 0.11365059655144008)
 def test_travel_agrees_with_slow_twin(signal, deadband):
     """Travel and reversals beyond a deadband are those of a pointer pushed along in a slot."""
-    path, turns = travel(np.array(signal), deadband)
+    x = np.array(signal)
+    path, turns = travel_of(x, np.ones(x.size, dtype=bool), 1, deadband)
     slow_path, slow_turns = slow_travel(signal, deadband)
     assert path == pytest.approx(slow_path, abs=1e-9)
     assert turns == slow_turns
@@ -133,7 +133,7 @@ def test_travel_agrees_with_slow_twin(signal, deadband):
 @given(st.lists(st.floats(-5, 5), min_size=1, max_size=80), st.floats(0, 3))
 def test_crossings_agree_with_slow_twin(error, band):
     """Crossings are changes of side beyond the band."""
-    assert crossings(np.array(error), band) == slow_crossings(error, band)
+    assert crossings_of(np.array(error), np.ones(len(error), dtype=bool), band) == slow_crossings(error, band)
 
 
 def test_travel_of_a_night_is_on_its_grid():
@@ -251,7 +251,7 @@ def test_every_sample_lies_in_one_hour(begin_s, dt_s, n):
 def test_usable_is_good_and_automatic():
     """A sample is usable where it is neither bad nor in manual."""
     r = night(41)
-    assert np.array_equal(usable(r), [not b and not m for b, m in zip(r.bad, r.mask("manual"), strict=True)])
+    assert np.array_equal(r.usable, [not b and not m for b, m in zip(r.bad, r.mask("manual"), strict=True)])
 
 
 def test_settling_time_of_a_lag():

@@ -6,16 +6,19 @@ import numpy as np
 import pytest
 
 from analyzer.comparison.before_after import (
+    HOUR_S,
     LIMITS,
     MEASURES,
+    Span,
     Verdict,
     compare,
     follows,
     grade,
+    gridded,
     reasons_against,
+    spans_around,
 )
 from analyzer.comparison.block_bootstrap import Side, difference, drift_factor, replicates
-from analyzer.comparison.spans import HOUR_S, Span, gridded, spans_around
 from proofs.honesty import examined
 
 CHANGED_S = 1000 * 86400.0

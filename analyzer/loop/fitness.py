@@ -1,4 +1,4 @@
-"""What trends lack for a cause to be told from them."""
+"""What trends lack for a cause to be told from them, or for new settings to be sought on them."""
 
 from __future__ import annotations
 
@@ -8,11 +8,12 @@ from analyzer.config import Config, QualityLimits
 from analyzer.loop.assessments import at_limits_share
 from analyzer.loop.decisions import Lack, Needs
 from analyzer.loop.oscillation import Oscillation
-from analyzer.loop.quality import Prepared
+from analyzer.loop.quality import Prepared, op_range
 from analyzer.loop.sample_clock import constant_for
 from analyzer.words import settings as words
 from identification.limits import RecorderLimits
 from identification.mismatch.recording import least_jump
+from identification.models import Pid
 from identification.record import LoopRecord
 
 
@@ -69,3 +70,18 @@ def _scattered(record: LoopRecord, q: QualityLimits) -> Needs | None:
         return None
     wanted = f"{100 * q.run_share:.0f} % of the time in runs of {q.run_samples} good samples"
     return Needs(Lack.UNBROKEN, f"needs {wanted}, has {100 * share:.0f} %")
+
+
+def unfit_for_settings(prepared: Prepared, config: Config) -> Needs | None:
+    """What these trends lack for new settings; None where nothing that they show by themselves."""
+    if not prepared.op_scaled:
+        return Needs(Lack.OP_RANGE, op_range(prepared.scale, prepared.record.op))
+    return compressed(prepared, None, config.quality)
+
+
+def too_thin(dt_s: float, controller: Pid | None, config: Config) -> Needs | None:
+    """What sampling new settings take, where the controller acts several times between two samples, unseen."""
+    samples = config.settings.ti_samples
+    if controller is None or dt_s <= controller.ti_s / samples:
+        return None
+    return Needs(Lack.FASTER, words.too_thin(dt_s, controller.ti_s, samples))

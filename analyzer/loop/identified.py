@@ -1,0 +1,116 @@
+"""What tuning takes of an identified loop: how tight it is, the load of its night, and what else it may be."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from analyzer.loop.measure import Measured
+from identification.estimation.gauss_newton import covariance
+from identification.estimation.hammerstein import Fit, disturbance, process_of
+from identification.estimation.window import Window
+from identification.models import Fopdt, Integrator, Loop, Pid, Process
+from identification.record import Floats
+from identification.signals.robust import robust_deviation
+from tuning.frequency_response import maximum_sensitivity
+from tuning.rules import simc
+from tuning.search import scaled_valve
+
+MOST_SCANS = 20_000
+"""Scans of reconstructed load that settings are tried on at most."""
+
+
+def cautious(process: Fopdt, period_s: float | None) -> Fopdt:
+    """A process with its time constant raised to two periods at the same slope.
+
+    A cycle tells gain over time constant; a time constant much beyond the period cannot be told from it, and an
+    integral time after one that is too short makes a loop swing that should be calmed.
+    """
+    t = max(process.time_constant_s, 2.0 * (period_s or 0.0))
+    return Fopdt(process.slope * t, t, process.dead_time_s)
+
+
+def sensitivity(m: Measured, period_s: float) -> float | None:
+    """Ms of the identified loop [-], inf where it is unstable; None where no settings are known, or they act the
+    wrong way. The smaller of those with the process as identified and as settings are sought for it.
+
+    Parameters
+    ----------
+    m : Measured
+    period_s : float
+        Of the oscillation [s].
+    """
+    process, controller = process_of(m.window, m.linear), m.controller
+    if controller is None or process.gain * controller.kp <= 0.0:
+        return None
+    return min(
+        float(maximum_sensitivity(Loop(x, controller))) for x in (process, cautious(process, period_s))
+    )
+
+
+def gain_room(m: Measured) -> float | None:
+    """SIMC's gain for the identified process over the present one [-]; None where no settings are known, or they act
+    the wrong way, or the set point did not move: a load alone does not tell how late PV answers OP."""
+    process, controller = process_of(m.window, m.linear), m.controller
+    if not m.excited or controller is None or process.gain * controller.kp <= 0.0:
+        return None
+    return abs(simc(process, scan_s=controller.scan_s).kp / controller.kp)
+
+
+def load_of(window: Window, fit: Fit, controller: Pid, seed: int = 0) -> Floats:
+    """Load and noise [% PV] that the model leaves, on the scan's clock, the latest `MOST_SCANS`, shape (m,).
+
+    The window's blocks have lost the noise from scan to scan. OP still has it, times the gain, and it dithers the
+    stem; white noise of that size is added.
+    """
+    scan_s = controller.scan_s or window.dt_s
+    left = disturbance(window, fit)
+    clock = np.arange(int(window.duration_s / scan_s)) * scan_s
+    load = np.interp(clock, np.arange(left.size) * window.dt_s, left)[-MOST_SCANS:]
+    if window.factor > 1:
+        load += scan_noise(window, controller) * np.random.default_rng(seed).normal(size=load.size)
+    return np.asarray(load, dtype=np.float64)
+
+
+def scan_noise(window: Window, controller: Pid) -> float:
+    """Standard deviation of PV's noise from sample to sample [% PV], read from OP's second differences.
+
+    Those of white noise have sqrt(6) times its deviation; the median leaves steps aside (Rousseeuw, Croux 1993).
+    """
+    jumps = np.abs(np.diff(window.op, 2))
+    if jumps.size == 0 or controller.kp == 0:
+        return 0.0
+    return robust_deviation(jumps) / math.sqrt(6.0) / abs(controller.kp)
+
+
+def uncertain(window: Window, fit: Fit, loop: Loop, samples: int = 6, seed: int = 0) -> tuple[Loop, ...]:
+    """Loops drawn from the fit's covariance, of the same controller and the same kind of process."""
+    dead_time_s = fit.dead_time_s + window.half_block_s
+    lag, gain = math.log(fit.time_constant_s), math.log(abs(fit.gain))
+    mean = np.array([lag, dead_time_s, fit.valve.stickband, gain])
+    relative = np.array([1.0, 1.0, 1.0, 1.0 / fit.gain])
+    spread = covariance(window, fit, free_width=loop.valve is not None) * np.outer(relative, relative)
+    scale = np.sqrt(np.maximum(np.diag(spread), 1e-24))
+    unit = spread / np.outer(scale, scale) + 1e-9 * np.eye(mean.size)
+    # not by singular vectors, whose signs are a matter of rounding
+    root = scale[:, None] * np.linalg.cholesky(unit)
+    draws = mean + np.random.default_rng(seed).normal(size=(samples, mean.size)) @ root.T
+    return tuple(_drawn(draw, fit, loop) for draw in draws)
+
+
+def _drawn(draw: Floats, fit: Fit, loop: Loop) -> Loop:
+    """The loop at one draw of log time constant, dead time, stickband and log gain.
+
+    The lag stays within a factor of ten, slope and dead time within three. Gain over time constant is drawn well
+    where the two by themselves are not: their errors go together.
+    """
+    log_t = min(max(draw[0], math.log(fit.time_constant_s) - 2.3), math.log(fit.time_constant_s) + 2.3)
+    off = draw[3] - draw[0] - math.log(abs(fit.slope))
+    slope = fit.slope * math.exp(min(max(off, -math.log(3.0)), math.log(3.0)))
+    longest = 3.0 * max(loop.process.dead_time_s, loop.controller.scan_s)
+    dead, t = min(max(float(draw[1]), 0.0), longest), math.exp(log_t)
+    is_ramp = isinstance(loop.process, Integrator)
+    process: Process = Integrator(slope, dead) if is_ramp else Fopdt(slope * t, t, dead)
+    factor = max(float(draw[2]), 0.2 * fit.valve.stickband) / max(fit.valve.stickband, 1e-9)
+    return Loop(process, loop.controller, scaled_valve(loop.valve, factor))

@@ -1,0 +1,132 @@
+"""Trends as the pages draw them: thinned, with ten periods fine, and the last ten half-cycles of an oscillation."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from analyzer.loop.decisions import Cause, Fault
+from analyzer.loop.oscillation import Oscillations, counting
+from analyzer.loop.quality import Prepared
+from identification.estimation.hammerstein import Fit
+from identification.estimation.trials import turns_of
+from identification.record import LoopRecord
+from identification.signals.turns import StemMarks, halves
+
+if TYPE_CHECKING:
+    from analyzer.loop.assess import Assessment
+
+BUCKETS = 1200
+"""Buckets a day: 72 s each, about a pixel of a screen's width."""
+FINE_BUCKETS = 6000
+"""Buckets a day of a loop that oscillates, so that its cycle can be zoomed into."""
+PERIODS = 10.0
+"""Periods of the close view that a page opens on."""
+CLOSE_BUCKETS = 600
+"""Buckets of the close view at most, 60 a period; fewer where the record has fewer samples."""
+HALVES = 10
+"""Half-cycles that are kept."""
+SEARCHED_PERIODS = 30.0
+"""Periods from the close view's end back in which they are looked for; ours: those with gaps are passed over."""
+QUICK = 0.2
+"""Time constant over a half-cycle up to which PV comes to rest within it and can be seen to stand [-]; ours."""
+
+
+def close_view(record: LoopRecord, found: Oscillations) -> tuple[int, int] | None:
+    """First and last sample (excluded) of the last ten periods of the oscillation; None where there is none."""
+    if found.first is None or found.active is None or not found.active.any():
+        return None
+    skipped = len(record) * record.dt_s - found.active.size * found.active_dt_s
+    end_s = skipped + (int(np.flatnonzero(found.active)[-1]) + 1) * found.active_dt_s
+    last = min(round(end_s / record.dt_s), len(record))
+    first = max(last - round(PERIODS * found.first.period_s / record.dt_s), 0)
+    return (first, last) if last - first > 2 else None
+
+
+def _edges(n: int, buckets: int, close: tuple[int, int] | None) -> np.ndarray:
+    """First samples of the buckets, shape (b,): even, but finer within the close view."""
+    even = (np.arange(buckets) * n) // buckets
+    if close is None:
+        return even
+    first, last = close
+    step = max(-(-(last - first) // CLOSE_BUCKETS), 1)
+    if step >= n / buckets:
+        return even
+    return np.unique(
+        np.concatenate((even[even < first], np.arange(first, last, step), even[even >= last], [0]))
+    )
+
+
+def thinned(
+    record: LoopRecord, a_day: int = BUCKETS, close: tuple[int, int] | None = None
+) -> Mapping[str, np.ndarray]:
+    """Columns time_s and, for SP, PV and OP, least and greatest of each bucket [% of span], shape (b,).
+
+    Buckets are the record's own samples where there are fewer of these, and finer between the samples of `close`.
+    """
+    n = len(record)
+    buckets = min(n, max(round(a_day * record.duration_s / 86400.0), 400))
+    edges = _edges(n, buckets, close)
+    out: dict[str, np.ndarray] = {"time_s": record.start_s + edges * record.dt_s}
+    for name in ("sp", "pv", "op"):
+        for end, least_or_greatest in (("min", np.minimum), ("max", np.maximum)):
+            found = least_or_greatest.reduceat(getattr(record, name), edges)
+            out[f"{name}_{end}"] = found.astype(np.float32)
+    out["bad"] = np.logical_and.reduceat(record.bad, edges)
+    return out
+
+
+def _fit(found: Assessment) -> Fit | None:
+    """The fit that the page's marks rest on: that of the valve at fault, else of the plain loop."""
+    v, m = found.verdict, found.verdict.measured
+    if m is None:
+        return None
+    if v.cause is not Cause.VALVE:
+        return m.linear
+    return m.stick_slip if v.fault is Fault.STICTION and m.stick_slip is not None else m.play
+
+
+def _marks(faulty: Fit | None, fit: Fit | None, period_s: float) -> StemMarks:
+    """What the marks need: of a slow process PV does not come to rest, and the mark begins at the turn."""
+    if fit is None:
+        return StemMarks(0.0, 0.0, 0.0)
+    quick = fit.time_constant_s <= QUICK * 0.5 * period_s
+    answered = fit.dead_time_s + 2.0 * fit.time_constant_s if quick else 0.0
+    return StemMarks(0.0 if faulty is None else float(faulty.valve.stickband), fit.dead_time_s, answered)
+
+
+def turn_events(prepared: Prepared, found: Assessment) -> str | None:
+    """Half-cycles as JSON: step_s, dead_s, of each start_s (of the epoch), op, pv, late and stuck; None without."""
+    record, first = prepared.record, counting(found.oscillations)
+    if first is None or not prepared.op_known or found.close_s is None or found.needs is not None:
+        return None
+    end = round((found.close_s[1] - record.start_s) / record.dt_s)
+    begin = max(end - round(SEARCHED_PERIODS * first.period_s / record.dt_s), 0)
+    part = slice(begin, end)
+    fit = _fit(found)
+    marks = _marks(fit if found.verdict.cause is Cause.VALVE else None, fit, first.period_s)
+    turns = turns_of(record.op[part], first.period_s / record.dt_s)
+    good = record.usable[part]
+    kept = halves(record.op[part], record.pv[part], good, turns, record.dt_s, first.period_s, marks, HALVES)
+    if len(kept) < 2:
+        return None
+    start = record.start_s + begin * record.dt_s
+    return json.dumps(
+        {
+            "step_s": kept[0].step_s,
+            "dead_s": round(marks.dead_s, 3),
+            "halves": [
+                {
+                    "start_s": round(start + h.start_s, 3),
+                    "op": np.round(h.op, 3).tolist(),
+                    "pv": np.round(h.pv, 3).tolist(),
+                    "late": np.round(h.late, 3).tolist(),
+                    "stuck": list(h.stuck),
+                }
+                for h in kept
+            ],
+        }
+    )
