@@ -6,7 +6,6 @@ carried onto the clock of the loop's record.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
@@ -15,7 +14,6 @@ import numpy as np
 
 from analyzer.config import QualityLimits
 from analyzer.history.series import Series
-from analyzer.loop.controller_mode import manual_mask
 from analyzer.loop.decisions import Lack, LacksError, Needs
 from analyzer.loop.sample_clock import (
     archived_share,
@@ -32,6 +30,23 @@ from identification.record import Floats, LoopRecord, Mask
 
 RECORDED_RANGE = (0.005, 0.995)
 """Quantiles of PV that stand for its span where none is stated; contract of loops.csv."""
+MANUAL_TEXTS = ["man", "iman", "lo", "manual", "hand", "local", "rout", "0", "off", "oos", "init"]
+"""Mode texts, lower case, that mean that the controller does not move OP."""
+AUTOMATIC_TEXTS = [
+    "aut",
+    "auto",
+    "automatic",
+    "cas",
+    "casc",
+    "cascade",
+    "rcas",
+    "rsp",
+    "remote",
+    "spc",
+    "1",
+    "on",
+]
+"""Mode texts, lower case, that mean that it does."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,34 +103,24 @@ def scale_of(spec: LoopSpec, pv: Floats) -> Scale:
     return Scale(low, high - low if high > low else 1.0, op_low, op_high - op_low, True)
 
 
-def _enough(pv: Series | None, spec: LoopSpec, limits: QualityLimits) -> Series:
+def _trimmed(pv: Series | None, spec: LoopSpec, limits: QualityLimits) -> tuple[Series, float]:
+    """PV between its first and last good sample, and the interval of its samples [s]."""
     if pv is None:
         raise LacksError(Needs(Lack.PV, f"no PV tag {spec.pv or spec.loop + '.PV'} in the export"))
     good = int((~pv.bad).sum())
-    if pv.stamp_s.size == 0 or good == 0:
+    if good == 0:
         raise LacksError(Needs(Lack.SAMPLES, "needs PV samples, has none that is good"))
     if good < limits.samples:
         raise LacksError(Needs(Lack.SAMPLES, f"needs {limits.samples} good PV samples, has {good}"))
-    return pv
-
-
-def _interval(pv: Series) -> float:
-    """The interval of the samples [s]."""
-    dt = interval(pv.stamp_s)
+    trimmed = without_stray_ends(pv)
+    dt = interval(trimmed.stamp_s)
     if not dt > 0:
         raise LacksError(Needs(Lack.SAMPLES, "needs samples at different times, has one stamp"))
-    return dt
+    return trimmed, dt
 
 
 def prepare(spec: LoopSpec, series: Mapping[str, Series], limits: QualityLimits) -> Prepared:
-    """One loop's raw samples on one clock, with masks.
-
-    Parameters
-    ----------
-    spec : LoopSpec
-        With the tags that the export has.
-    series : mapping of tag to Series
-    limits : QualityLimits
+    """One loop's raw samples on one clock, with masks; the spec has the tags that the export has.
 
     Raises
     ------
@@ -123,8 +128,7 @@ def prepare(spec: LoopSpec, series: Mapping[str, Series], limits: QualityLimits)
         Where there is no PV, or too little of it; the text says what is needed and what there is.
     """
     series = _numeric(spec, series, limits)
-    trimmed = without_stray_ends(_enough(series.get(spec.pv or ""), spec, limits))
-    dt = _interval(trimmed)
+    trimmed, dt = _trimmed(series.get(spec.pv or ""), spec, limits)
     clock = clock_of(trimmed, dt, limits)
     pv, gap = onto_clock(trimmed, clock, dt, limits)
     scale = scale_of(spec, pv[~gap])
@@ -133,24 +137,23 @@ def prepare(spec: LoopSpec, series: Mapping[str, Series], limits: QualityLimits)
     sp, sp_gap = _signal(series, spec.sp, clock, dt, limits)
     sp_known = spec.sp is not None and not sp_gap.all()
     sp = scale.pv_pct(sp) if sp_known else np.full(clock.size, float(np.median(pv[~gap])))
-    op = scale.op_pct(op) if spec.op and not op_gap.all() else np.full(clock.size, math.nan)
+    op_known = bool(spec.op) and not op_gap.all() and bool(np.isfinite(scale.op_pct(op)).all())
     position, _ = _signal(series, spec.position, clock, dt, limits)
     has_position = bool(spec.position and spec.position in series)
-    step = resolution(pv)
-    masks = _masks(spec, series, limits, clock, dt, pv, sp, op, gap | (op_gap if spec.op else False), step)
     record = LoopRecord(
         spec.loop,
         float(clock[0]),
         dt,
         sp,
         pv,
-        op if np.isfinite(op).all() else np.zeros(clock.size),
-        masks["gap"] | masks["stale"],
+        scale.op_pct(op) if op_known else np.zeros(clock.size),
+        gap | op_gap if spec.op else gap,
         scale.op_pct(position) if has_position else None,
         not sp_known,
-        MappingProxyType(masks),
     )
-    return _described(record, scale, op, step, limits)
+    step = resolution(pv)
+    masked = _masked(record, clock, series.get(spec.mode or ""), op_known, step, limits)
+    return _described(masked, scale, op_known, step, limits)
 
 
 def _numeric(spec: LoopSpec, series: Mapping[str, Series], limits: QualityLimits) -> dict[str, Series]:
@@ -200,36 +203,47 @@ def op_in_range(op: Floats, q: QualityLimits) -> bool:
     return not beside or low == high or resting >= q.resting_share
 
 
-def _masks(
-    spec: LoopSpec,
-    series: Mapping[str, Series],
-    q: QualityLimits,
-    clock: Floats,
-    dt: float,
-    pv: Floats,
-    sp: Floats,
-    op: Floats,
-    gap: Mask,
-    pv_step: float,
-) -> dict[str, Mask]:
-    none = np.zeros(clock.size, dtype=bool)
-    known_op = bool(np.isfinite(op).all())
-    stale = constant_stretches(pv, dt, q.stale_s, q.stale_samples) & ~gap
-    if stale.any() and (not known_op or float(np.ptp(op[stale])) == 0.0):
+def _masked(
+    record: LoopRecord, clock: Floats, mode: Series | None, op_known: bool, pv_step: float, q: QualityLimits
+) -> LoopRecord:
+    """The record, whose bad samples are its gaps, with its masks."""
+    op, gap, none = record.op, record.bad, np.zeros(clock.size, dtype=bool)
+    stale = constant_stretches(record.pv, record.dt_s, q.stale_s, q.stale_samples) & ~gap
+    if stale.any() and (not op_known or float(np.ptp(op[stale])) == 0.0):
         stale = none
-    ranged = known_op and op_in_range(op, q)
+    ranged = op_known and op_in_range(op, q)
     saturated = (op <= q.limit_pct) | (op >= 100 - q.limit_pct) if ranged else none
-    mode = series.get(spec.mode or "")
-    manual = manual_mask(mode, clock, dt, op, sp - pv, q) if known_op else none
-    coarse = none if pv_step == 0 else np.ones(clock.size, dtype=bool)
-    return {
+    manual = _manual(mode, clock, record, q) if op_known else none
+    masks = {
         "gap": gap,
         "stale": stale,
-        "compressed": straight(pv),
-        "quantized": coarse,
+        "compressed": straight(record.pv),
+        "quantized": none if pv_step == 0 else np.ones(clock.size, dtype=bool),
         "saturated": saturated,
         "manual": manual & ~saturated if mode is None else manual,
     }
+    return replace(record, bad=gap | stale, masks=MappingProxyType(masks))
+
+
+def _manual(mode: Series | None, clock: Floats, record: LoopRecord, q: QualityLimits) -> Mask:
+    """True where the controller is in manual: by its mode, else where OP stands still while the error moves."""
+    found = None if mode is None else _mode_mask(mode, clock)
+    if found is not None:
+        return found
+    still = constant_stretches(record.op, record.dt_s, q.manual_s, q.manual_samples)
+    moves = still.any() and float(np.std(record.error[still])) > 1e-9
+    return still if moves else np.zeros(still.size, dtype=bool)
+
+
+def _mode_mask(mode: Series, clock: Floats) -> Mask | None:
+    at = np.clip(np.searchsorted(mode.stamp_s, clock, side="right") - 1, 0, None)
+    if mode.text is not None:
+        texts = np.array([str(t).strip().lower() for t in mode.text], dtype=object)
+        known = np.isin(texts, MANUAL_TEXTS) | np.isin(texts, AUTOMATIC_TEXTS)
+        return np.isin(texts, MANUAL_TEXTS)[at] if known.any() else None
+    if mode.bad.all():
+        return None
+    return (mode.value == 0)[at] & ~mode.bad[at]
 
 
 def op_range(scale: Scale, op: Floats) -> str:
@@ -243,28 +257,27 @@ def op_range(scale: Scale, op: Floats) -> str:
 
 
 def _described(
-    record: LoopRecord, scale: Scale, op: Floats, pv_step: float, limits: QualityLimits
+    record: LoopRecord, scale: Scale, op_known: bool, pv_step: float, limits: QualityLimits
 ) -> Prepared:
-    known_op = bool(np.isfinite(op).all())
     compressed = float(record.mask("compressed").mean())
     notes = []
     if scale.recorded:
         notes.append("no PV range stated: percent of the recorded range")
     if record.sp_estimated:
         notes.append("no SP recorded: estimated as the median of PV")
-    if not known_op:
+    if not op_known:
         notes.append("no OP recorded: no cause can be told")
-    op_scaled = not known_op or op_in_range(op, limits)
+    op_scaled = not op_known or op_in_range(record.op, limits)
     if not op_scaled:
-        notes.append(op_range(scale, op))
+        notes.append(op_range(scale, record.op))
     for name in ("gap", "stale", "saturated", "manual"):
         share = float(record.mask(name).mean())
         if share > 0.005:
             notes.append(f"{name} {100 * share:.0f} % of the time")
     if compressed > 0.3:
         notes.append(f"compressed: {100 * compressed:.0f} % of the samples lie on straight segments")
-    op_step = resolution(record.op) if known_op else 0.0
+    op_step = resolution(record.op) if op_known else 0.0
     if pv_step > 0:
         notes.append(f"PV on a grid of {pv_step:.3g} % of span")
-    archived = min(archived_share(x) for x in ((record.pv, record.op) if known_op else (record.pv,)))
-    return Prepared(record, scale, pv_step, op_step, compressed, tuple(notes), known_op, op_scaled, archived)
+    archived = min(archived_share(x) for x in ((record.pv, record.op) if op_known else (record.pv,)))
+    return Prepared(record, scale, pv_step, op_step, compressed, tuple(notes), op_known, op_scaled, archived)
