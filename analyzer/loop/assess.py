@@ -30,7 +30,7 @@ from analyzer.loop.cause import (
 )
 from analyzer.loop.decisions import Cause, Lack, LacksError, Needs
 from analyzer.loop.fitness import too_thin, unfit_for_cause, unfit_for_settings
-from analyzer.loop.judged_stretch import Earlier, judged_stretch
+from analyzer.loop.judged_stretch import Earlier, Stretch, judged_stretch
 from analyzer.loop.measure import Measured, measure, time_scale
 from analyzer.loop.oscillation import Oscillation, Oscillations, barely_seen, counting, detect
 from analyzer.loop.page_trends import BUCKETS, FINE_BUCKETS, close_view, thinned
@@ -217,6 +217,38 @@ def _hours(
     return tuple(replace(h, figures=_known(h.figures, _in_percent(prepared))) for h in hours)
 
 
+@dataclass(frozen=True, slots=True)
+class _Judged:
+    """What a stretch of a record comes to: what oscillates in all of the record and in the stretch, why, and where
+    the settings are not the stated ones."""
+
+    part: Prepared
+    of_all: Oscillations
+    found: Oscillations
+    verdict: Verdict
+    settings: SettingsDiffer | None
+
+
+def _judged(prepared: Prepared, stretch: Stretch, config: Config, kind: str) -> _Judged:
+    """The verdict on the stretch that is judged; one that rests on little is a hint."""
+    record = prepared.record
+    part = replace(prepared, record=record.span(stretch.first, stretch.last))
+    of_all = detect(record, config.oscillation)
+    whole = len(part.record) == len(record)
+    found = of_all if whole else detect(part.record, config.oscillation)
+    settings = None if stretch.outdated else _settings(part, found, stretch.controller, config)
+    stated = settings.recorded if settings else stretch.controller
+    found, verdict = convicted(part, found, stated, config, kind)
+    if _hours_in(part.record) < config.advice.least_h or too_thin(record.dt_s, stretch.controller, config):
+        verdict = as_hint(verdict, config.advice.hint_pct)
+    return _Judged(part, found if whole else of_all, found, verdict, settings)
+
+
+def _hours_in(record: LoopRecord) -> float:
+    """Good hours in automatic [h]."""
+    return float(record.usable.sum()) * record.dt_s / HOUR_S
+
+
 def assess(
     prepared: Prepared,
     controller: Pid | None,
@@ -245,51 +277,48 @@ def assess(
     NotAssessedError
         Where the record cannot support it.
     """
-    record = prepared.record
-    lacking = unassessable(record, config)
+    lacking = unassessable(prepared.record, config)
     if lacking is not None:
         raise LacksError(lacking)
     if not prepared.op_scaled:  # settings in percent mean nothing beside such an OP
         controller, earlier = None, [replace(e, controller=None) for e in earlier]
-    of_all = detect(record, config.oscillation)
-    stretch = judged_stretch(record, controller, earlier, config)
-    part = replace(prepared, record=record.span(stretch.first, stretch.last))
-    whole = len(part.record) == len(record)
-    found = of_all if whole else detect(part.record, config.oscillation)
-    settings = None if stretch.outdated else _settings(part, found, stretch.controller, config)
-    stated = settings.recorded if settings else stretch.controller
-    found, verdict = convicted(part, found, stated, config, kind)
-    of_all = found if whole else of_all
-    dead_time = _dead_time(verdict)
+    stretch = judged_stretch(prepared.record, controller, earlier, config)
+    return _assessment(prepared, stretch, _judged(prepared, stretch, config, kind), config)
+
+
+def _assessment(prepared: Prepared, stretch: Stretch, judged: _Judged, config: Config) -> Assessment:
+    """The figures of the whole record beside what was judged."""
+    record, found = prepared.record, judged.found
     night = _known(assess_span(record, config.figures), _in_percent(prepared))
-    judged_h = float(part.record.usable.sum()) * record.dt_s / HOUR_S
-    if judged_h < config.advice.least_h or too_thin(record.dt_s, stretch.controller, config) is not None:
-        verdict = as_hint(verdict, config.advice.hint_pct)
-    harris = harris_index(record.error, record.usable, record.dt_s, dead_time) if dead_time else None
-    first, close = counting(found), _close(part.record, found, stretch.first)
+    dead_time = _dead_time(judged.verdict)
+    close = _close(judged.part.record, found, stretch.first)
+    end_s = record.start_s + record.duration_s
     return Assessment(
-        record.tag,
-        record.start_s,
-        record.duration_s,
-        night,
-        _hours(prepared, of_all, night.noise_band_pct, config),
-        found,
-        verdict,
-        settings,
-        harris,
-        settling_time(record, night.noise_band_pct or 0.0),
-        waves_of(record.tag, of_all, record.start_s + record.duration_s, config.plant),
-        thinned(record, FINE_BUCKETS if first else BUCKETS, close),
-        prepared.notes,
-        hidden(part.record, found, stretch.controller, config),
-        None
-        if close is None
-        else (record.start_s + close[0] * record.dt_s, record.start_s + close[1] * record.dt_s),
-        unfit_for_settings(prepared, config),
-        judged_h,
-        stretch.outdated,
-        prepared.op_scaled,
+        loop=record.tag,
+        start_s=record.start_s,
+        duration_s=record.duration_s,
+        night=night,
+        hours=_hours(prepared, judged.of_all, night.noise_band_pct, config),
+        oscillations=found,
+        verdict=judged.verdict,
+        settings=judged.settings,
+        harris=harris_index(record.error, record.usable, record.dt_s, dead_time) if dead_time else None,
+        settling_s=settling_time(record, night.noise_band_pct or 0.0),
+        waves=waves_of(record.tag, judged.of_all, end_s, config.plant),
+        trend=thinned(record, FINE_BUCKETS if counting(found) else BUCKETS, close),
+        notes=prepared.notes,
+        needs=hidden(judged.part.record, found, stretch.controller, config),
+        close_s=None if close is None else (_at(record, close[0]), _at(record, close[1])),
+        for_settings=unfit_for_settings(prepared, config),
+        judged_h=_hours_in(judged.part.record),
+        outdated=stretch.outdated,
+        op_scaled=prepared.op_scaled,
     )
+
+
+def _at(record: LoopRecord, sample: int) -> float:
+    """The time of a sample [s]."""
+    return record.start_s + sample * record.dt_s
 
 
 def _close(part: LoopRecord, found: Oscillations, first: int) -> tuple[int, int] | None:
