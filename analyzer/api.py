@@ -29,7 +29,7 @@ from identification.record import Floats, LoopRecord
 if TYPE_CHECKING:
     import pandas as pd
 
-    from analyzer.explain.one_loop import Explained
+    from analyzer.explain.explained import Explained
     from analyzer.loop.assess import Assessment
     from analyzer.loop.tune import Tuning
 
@@ -155,7 +155,7 @@ def explain(loop: PlantLoop) -> Explained:
         OP or PV is missing or never moves.
     """
     from analyzer.explain.case import case, tags_of
-    from analyzer.explain.one_loop import explained
+    from analyzer.explain.explained import explained
     from analyzer.night.nights import cut
 
     plant, spec = loop.plant, loop.spec

@@ -6,6 +6,7 @@ import os
 import sys
 from copy import copy
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
@@ -14,8 +15,11 @@ from analyzer.commands import notes as notes_cli
 from analyzer.commands import report as report_cli
 from analyzer.commands import run as run_cli
 from analyzer.commands import store as store_cli
-from analyzer.commands.options import PLACE, SOME_LOST, Asked, export_options, say, told
+from analyzer.commands.options import PLACE, SOME_LOST, export_options, say, told
 from analyzer.loop.decisions import Lane
+
+if TYPE_CHECKING:
+    from analyzer.night.asked import Asked
 
 for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_name, "1")

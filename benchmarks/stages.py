@@ -18,7 +18,7 @@ import pyarrow as pa
 
 from analyzer.config import Config
 from analyzer.explain.case import case, pid_of
-from analyzer.explain.one_loop import explained
+from analyzer.explain.explained import explained
 from analyzer.history.export import Export, open_export
 from analyzer.loop.advice import advise
 from analyzer.loop.assess import assess, cause_of

@@ -10,10 +10,10 @@ from typing import Any
 
 import pandas as pd
 
-from analyzer.commands.options import opened
 from analyzer.config import Config
 from analyzer.explain.case import case
 from analyzer.loops.spec import spec_of
+from analyzer.night.asked import opened
 from identification.controller.check import StatedSettings
 from identification.mismatch.answer import answer
 from identification.mismatch.diagnosis import controller_finding_of, explain, recorder_finding_of

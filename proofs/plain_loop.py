@@ -19,7 +19,7 @@ from scipy.signal import lfilter
 
 from analyzer import api
 from analyzer.explain.case import case, tags_of
-from analyzer.explain.one_loop import explained
+from analyzer.explain.explained import explained
 from identification.errors import NotAssessedError
 from identification.mismatch.plain_loop import inputs_of, prepared
 from identification.mismatch.proof import HeldOut, held_out

@@ -3,87 +3,24 @@
 from __future__ import annotations
 
 import json
-import math
 import sys
 import time
-from contextlib import nullcontext, suppress
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from analyzer.commands.options import NOTHING_DONE, PLACE, Asked, export_options, say
-from identification.errors import InputError, NotAssessedError
+from analyzer.commands.options import NOTHING_DONE, PLACE, export_options, say
+from identification.errors import NotAssessedError
 
 if TYPE_CHECKING:
-    from analyzer.explain.case import Case
-    from analyzer.explain.one_loop import Explained
-    from analyzer.explain.parts import Part
-    from analyzer.history.series import Series
-    from analyzer.loops.spec import LoopSpec
+    from analyzer.explain.explained import Explained
+    from analyzer.night.asked import Asked
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
 def main() -> None:
     """What physics a loop's plain model lacks, and the model carried to another recording."""
-
-
-Trends = tuple["LoopSpec", tuple["LoopSpec", ...], dict[str, "Series"]]
-"""A loop, all loops of its export, and the trends that explaining it reads."""
-
-
-def _read(asked: Asked, tag: str) -> Trends:
-    """A loop of an export with its trends."""
-    from analyzer.explain.case import tags_of
-    from analyzer.loops.spec import spec_of
-    from analyzer.night.nights import Night, cut
-
-    source, specs, _ = asked.opened()
-    spec = spec_of(specs, tag)
-    if spec.pv is None:
-        raise InputError(f"{tag}: no PV tag in the export", f"{tag}.PV", "check --loops and the export")
-    first, last = source.span(spec.pv)  # without stray stamps, which would stretch a record over centuries
-    whole_span = Night("", first, last + 1.0)
-    series = {tag: cut(x, whole_span) for tag, x in source.read(tags_of(spec, specs)).items()}
-    series = asked.within(series)
-    if series[spec.pv].stamp_s.size == 0:
-        raise InputError(f"{tag}: no samples between --since and --until", "a span of the export", "widen it")
-    return spec, specs, series
-
-
-def _whole(asked: Asked, tag: str) -> tuple[Case, Series]:
-    """A loop's case over all of an export, and its PV."""
-    from analyzer.explain.case import case
-    from analyzer.loops.settings_in_force import in_force
-
-    spec, specs, series = _read(asked, tag)
-    pv = series[spec.pv or ""]
-    spec = in_force(spec, asked.changes, float(pv.stamp_s[-1]))
-    return case(spec, specs, series, asked.config, None), pv
-
-
-def _cases(asked: Asked, tag: str, held_out: tuple[Path, ...]) -> tuple[Case, dict[str, Case]]:
-    """The case to be explained, and those held out by name: parts under other settings, and other exports."""
-    from analyzer.explain.case import MOST_SAMPLES, case
-    from analyzer.explain.parts import parts, said_of
-
-    spec, specs, series = _read(asked, tag)
-    judged = parts(spec, series, asked.changes, asked.zone)
-    kept: list[tuple[Part, Case]] = []
-    for part in judged:
-        with nullcontext() if len(judged) == 1 else suppress(NotAssessedError):  # OP stands still in it
-            most = None if kept else MOST_SAMPLES
-            kept.append((part, case(part.spec, specs, dict(part.series), asked.config, most)))
-    if not kept:
-        raise NotAssessedError(f"{tag}: needs OP and PV that move in one part of its settings, has none")
-    first = kept[0][1]
-    first = replace(first, shortened=f"{said_of([part for part, _ in kept])} {first.shortened}".strip())
-    others = {part.name: c for part, c in kept[1:]}
-    for path in held_out:
-        elsewhere = replace(asked, export=(path,), since_s=-math.inf, until_s=math.inf)
-        others[path.name if path.name not in others else str(path)] = _whole(elsewhere, tag)[0]
-    return first, others
 
 
 @main.command()
@@ -121,14 +58,14 @@ def explain(
 
     Example: triage explain export.parquet --loops loops.csv --loop FIC101
     """
-    from analyzer.explain.answer_data import abstained
-    from analyzer.explain.one_loop import explained
-    from analyzer.explain.saved_model import read_model, write_model
+    from analyzer.explain.explained import abstained, explained
+    from analyzer.explain.models import read_model, write_model
+    from analyzer.explain.recordings import cases
 
     tell = _Candidates()
     try:
         brought = read_model(model, tag) if model is not None else None
-        case, others = _cases(asked, tag, held_out)
+        case, others = cases(asked, tag, held_out)
         found = explained(case, tell, brought, others)
     except NotAssessedError as error:
         _show(abstained(tag, str(error)), None, form, out, asked.zone)
@@ -187,9 +124,10 @@ def simulate(
 
     Example: triage simulate model.json week2.parquet --loops loops.csv --loop FIC101 --out week2-sim.parquet
     """
-    from analyzer.explain.saved_model import read_model, simulated
+    from analyzer.explain.models import read_model, simulated
+    from analyzer.explain.recordings import whole
 
-    case, raw = _whole(asked, tag)
+    case, raw = whole(asked, tag)
     pv, op = simulated(case, read_model(model, tag), raw.stamp_s, closed_loop)
     write_trends(out, raw.stamp_s, pv, op)
 

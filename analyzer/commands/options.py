@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 import sys
 import warnings
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
 from datetime import datetime
 from functools import wraps
 from pathlib import Path
@@ -21,11 +20,7 @@ from reports.texts import visible, visible_lines
 from reports.whole_file import is_full
 
 if TYPE_CHECKING:
-    from analyzer.config import Config
-    from analyzer.history.export import Export
-    from analyzer.history.series import Series
-    from analyzer.loops.changes import TuningChange
-    from analyzer.loops.spec import LoopSpec
+    from analyzer.night.asked import Asked
 
 
 class Place(click.ParamType):
@@ -101,51 +96,6 @@ def utc_seconds(at: datetime | None, zone: str, otherwise: float) -> float:
     return otherwise if at is None else seconds(at, zone)
 
 
-@dataclass(frozen=True, slots=True)
-class Asked:
-    """What the command line asks of an export: files, loops, changes of settings, span of time [s, UTC] and limits.
-
-    zone : the plant's time zone, of nights, pages and options; reading : how text exports are read, as in
-    analyzer.history.table.
-    """
-
-    export: tuple[Path, ...]
-    loops: Path | None
-    changes: tuple[TuningChange, ...]
-    since_s: float
-    until_s: float
-    config: Config
-    zone: str
-    reading: Mapping[str, Any]
-
-    def opened(self) -> tuple[Export, tuple[LoopSpec, ...], tuple[str, ...]]:
-        """The export, its loops with their tags, and what there is to say about them."""
-        source, specs, notes = opened(self.export, self.loops, **self.reading)
-        return source, specs, (*notes, *_of_no_loop(self.changes, specs))
-
-    def within(self, series: Mapping[str, Series]) -> dict[str, Series]:
-        """The samples within the span of time that is asked for."""
-        from analyzer.night.nights import Night, cut
-
-        span = Night("", self.since_s, self.until_s)
-        return {tag: cut(found, span) for tag, found in series.items()}
-
-
-MOST_NAMES = 10
-"""Loops that are named in a note; the rest is counted."""
-
-
-def _of_no_loop(changes: Sequence[TuningChange], specs: Sequence[LoopSpec]) -> tuple[str, ...]:
-    """A note on changes of loops that are not among those that are read."""
-    known = {spec.loop for spec in specs}
-    strange = sorted({change.loop for change in changes} - known)
-    if not strange:
-        return ()
-    more = f" and {len(strange) - MOST_NAMES} more" if len(strange) > MOST_NAMES else ""
-    named = ", ".join(strange[:MOST_NAMES]) + more
-    return (f"--changes: {named}: no such loop is read; these changes are left aside: correct the name",)
-
-
 def _asked(
     export: tuple[Path, ...],
     loops: Path | None,
@@ -158,6 +108,7 @@ def _asked(
     """The command line's options read and checked."""
     from analyzer.config_file import read_config
     from analyzer.loops.changes import read_changes
+    from analyzer.night.asked import Asked
 
     zone = str(zone_of(reading["timezone"]))
     dated = () if changes is None else tuple(read_changes(changes, zone, reading["day_first"]))
@@ -238,26 +189,3 @@ def export_options(command: Callable[..., Any]) -> Callable[..., Any]:
     for option in reversed(OPTIONS):
         found = option(found)
     return found
-
-
-def opened(
-    export: Sequence[Path], loops: Path | None, **reading: Any
-) -> tuple[Export, tuple[LoopSpec, ...], tuple[str, ...]]:
-    """The export, its loops with their tags, and what there is to say about them."""
-    from analyzer.history.export import ReadOptions, open_export
-    from analyzer.loops.spec import unknown_columns
-    from analyzer.loops.tags import find_loops, match, read_loops
-
-    reading["good_quality"] = tuple(reading.get("good_quality") or ()) or None
-    source = open_export(list(export), ReadOptions(**reading))
-    if loops is None:
-        return source, find_loops(source.tags), ()
-    stated = read_loops(loops, str(zone_of(reading.get("timezone"))), reading.get("day_first"))
-    specs, notes = match(stated, source.tags)
-    own = unknown_columns(stated)
-    if own:
-        notes = (
-            f"{loops}: columns {', '.join(own)} mean nothing here and are kept as the plant's own",
-            *notes,
-        )
-    return source, specs, notes

@@ -18,7 +18,6 @@ from analyzer.commands.options import (
     NOTHING_DONE,
     PLACE,
     SOME_LOST,
-    Asked,
     export_options,
     say,
     what_failed,
@@ -30,6 +29,7 @@ if TYPE_CHECKING:
     from analyzer.config import WorkerLimits
     from analyzer.history.export import Export
     from analyzer.loops.spec import LoopSpec
+    from analyzer.night.asked import Asked
     from analyzer.night.batch import Batch, Outcome
     from analyzer.night.nights import Night
     from analyzer.night.run_files import RunLog

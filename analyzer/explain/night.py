@@ -61,7 +61,7 @@ def flagged(row: Mapping[str, Any]) -> bool:
 
 def answered(q: Question, began: Callable[[int], None] = lambda at: None) -> Row:
     """The row of one loop, whatever happens; runs in a worker process."""
-    from analyzer.explain.answer_data import abstained
+    from analyzer.explain.explained import abstained
 
     page = ""
     try:
@@ -76,7 +76,7 @@ def answered(q: Question, began: Callable[[int], None] = lambda at: None) -> Row
 def _explained(q: Question) -> tuple[dict[str, Any], str]:
     """The answer as data, and its page."""
     from analyzer.explain.case import case
-    from analyzer.explain.one_loop import explained
+    from analyzer.explain.explained import explained
     from analyzer.explain.page import page
     from reports.page_file import dumps
 
@@ -106,7 +106,7 @@ def questions(batch: Batch, rows: Sequence[Mapping[str, Any]], night: Night) -> 
 
 
 def _rows(asked: Sequence[Question], jobs: int, config: Config) -> Iterator[Row]:
-    from analyzer.explain.answer_data import abstained
+    from analyzer.explain.explained import abstained
 
     with executor(jobs, len(asked), answered, config.workers) as workers:
         for q in asked:

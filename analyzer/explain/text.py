@@ -6,35 +6,54 @@ from collections.abc import Mapping, Sequence
 from textwrap import wrap
 from typing import Any
 
-from analyzer.explain.page_words import (
-    FEATURES,
-    HIDDEN,
-    MOVED,
-    ROWS,
-    called,
-    carried_by,
-    chance,
-    figure,
-    found_in,
-    interval,
-    rms,
-    share,
-    spans_said,
-    title,
-)
+from analyzer.explain import tables
+from analyzer.explain.words import places, share, title
 from analyzer.pages.words import number
-from identification.mismatch.words import check, discriminating_test, seen_ahead, two_plain_loops
+from identification.mismatch.words import check, seen_ahead, two_plain_loops
+from reports.pages import Table
 
 WIDTH = 110
 """Columns of text."""
 Rows = Sequence[Sequence[str]]
 
 
+def lines(data: Mapping[str, Any]) -> list[str]:
+    """The answer as lines of text.
+
+    Parameters
+    ----------
+    data : mapping
+        The contract's answer.
+    """
+    head = f"{data['loop']}: {title(data['verdict']) if data['fit'] else 'not told'}"
+    block = f" ({data['block']})" if data["block"] != "none" else ""
+    out = [head + block, *wrap(data["reason"], WIDTH), *wrap(check(data), WIDTH)]
+    out += _part("Parameters (90 % intervals)", _texts(tables.parameters(data)), (2,))
+    out += _part("Controller, as SP, PV and OP show it", _controller(data), (1,))
+    out += _part("Misfit, rms in % of span", _fit(data), (1, 2, 3, 4))
+    out += _part("On the recordings held out", _others(data), (1, 3, 4))
+    out += _told(seen_ahead(data["fit"])) + _told(two_plain_loops(data["fit"]))
+    out += _told(data["fit"].get("brought", {}).get("note", ""))
+    for first in data["effects"][:1]:
+        if first["held_out_share"] is not None:
+            removed = share(first["held_out_share"])
+            out += _told(f"{first['name']} removes {removed} of the held-out misfit's mean square.")
+    out += _part("Where", _where(data))
+    out += _part("The plain loop's constants moved", _moved(data), (1, 3))
+    return out + _part("Could also be, and what would tell", _texts(tables.alternatives(data)))
+
+
+def _told(sentence: str) -> list[str]:
+    return ["", *wrap(sentence, WIDTH)] if sentence else []
+
+
+def _part(name: str, rows: Rows, numeric: Sequence[int] = ()) -> list[str]:
+    return ["", name, *columns(rows, numeric)] if rows else []
+
+
 def columns(rows: Rows, numeric: Sequence[int] = ()) -> list[str]:
     """Rows as lines whose columns line up, numbers to the right; the last column wraps."""
-    if not rows:
-        return []
-    widths = [max(len(r[i]) for r in rows) for i in range(len(rows[0]))]
+    widths = [max(map(len, cells)) for cells in zip(*rows, strict=True)]
     left = 2 + sum(widths[:-1]) + 2 * (len(widths) - 1)
     out = []
     for row in rows:
@@ -49,17 +68,8 @@ def columns(rows: Rows, numeric: Sequence[int] = ()) -> list[str]:
     return out
 
 
-def _part(name: str, rows: Rows, numeric: Sequence[int] = ()) -> list[str]:
-    return ["", name, *columns(rows, numeric)] if rows else []
-
-
-def _parameters(data: Mapping[str, Any]) -> Rows:
-    return [
-        (x["name"], called(k), number(v["value"]), interval(v), v["unit"])
-        for x in found_in(data)
-        for k, v in x["parameters"].items()
-        if k not in HIDDEN
-    ]
+def _texts(table: Table) -> list[tuple[str, ...]]:
+    return [tuple(cell.text for cell in row) for row in table.rows]
 
 
 def _controller(data: Mapping[str, Any]) -> Rows:
@@ -72,73 +82,29 @@ def _controller(data: Mapping[str, Any]) -> Rows:
 
 
 def _fit(data: Mapping[str, Any]) -> Rows:
-    shown = [k for k in ROWS if k in data["fit"] and (k != "explained" or data["moved"])]
-    rows = [
-        (ROWS[k], *(x for part in ("fitted", "held_out") for x in _misfit(data["fit"][k][part])), "")
-        for k in shown
-    ]
+    rows = [(*row, "") for row in _texts(tables.fit(data))]
     return [("", "fitted", "fit %", "held out", "fit %", ""), *rows] if rows else []
 
 
 def _others(data: Mapping[str, Any]) -> Rows:
     rows = [
-        (x["recording"], rms(x["baseline"]["rmse"]), "→", rms(x["explained"]["rmse"]), share(x["share"]))
-        for x in data.get("held_out_on", [])
+        (name, plain, "→", better, removed) for name, plain, better, removed in _texts(tables.others(data))
     ]
     return [("", "plain", "", "improved", "removed"), *rows] if rows else []
 
 
-def _misfit(m: Mapping[str, float]) -> tuple[str, str]:
-    return rms(m["rmse"]), f"{m['fit_pct']:.1f}"
-
-
-def _where(where: Mapping[str, Any]) -> Rows:
-    rows = [("spans", spans_said(where["spans"]))] if where.get("spans") else []
-    for key, name, unit in (("pv_range", "PV", "%"), ("op_range", "OP", "%"), ("band_s", "periods", "s")):
-        if where.get(key):
-            rows.append((name, f"{number(where[key][0])} to {figure(where[key][1], unit)}"))
-    if where.get("direction"):
-        rows.append(("direction of OP", where["direction"]))
-    features = where.get("features", [])
-    rows += [
-        (FEATURES[f["name"]], f"{carried_by(f)} (chance {chance(f['p'])})") for f in features if f["carries"]
-    ]
-    rest = [FEATURES[f["name"]] for f in features if not f["carries"]]
-    return [*rows, ("not tied to", ", ".join(rest))] if rest else rows
-
-
 def _moved(data: Mapping[str, Any]) -> Rows:
-    return [(MOVED[k][0], number(a), "→", number(b), MOVED[k][1]) for k, (a, b) in data["moved"].items()]
+    return [(name, before, "→", after, unit) for name, before, after, _, unit in _texts(tables.moved(data))]
 
 
-def lines(data: Mapping[str, Any]) -> list[str]:
-    """The answer as lines of text.
-
-    Parameters
-    ----------
-    data : mapping
-        The contract's answer.
-    """
-    head = f"{data['loop']}: {title(data['verdict']) if data['fit'] else 'not told'}"
-    block = f" ({data['block']})" if data["block"] != "none" else ""
-    out = [head + block, *wrap(data["reason"], WIDTH), *(wrap(check(data), WIDTH) if check(data) else [])]
-    out += _part("Parameters (90 % intervals)", _parameters(data), (2,))
-    out += _part("Controller, as SP, PV and OP show it", _controller(data), (1,))
-    out += _part("Misfit, rms in % of span", _fit(data), (1, 2, 3, 4))
-    out += _part("On the recordings held out", _others(data), (1, 3, 4))
-    for told in (seen_ahead(data["fit"]), two_plain_loops(data["fit"])):
-        out += ["", *wrap(told, WIDTH)] if told else []
-    if "brought" in data["fit"]:
-        out += ["", *wrap(data["fit"]["brought"]["note"], WIDTH)]
-    first = data["effects"][0] if data["effects"] else None
-    if first is not None and first["held_out_share"] is not None:
-        out += [
-            "",
-            f"{first['name']} removes {share(first['held_out_share'])} of the held-out misfit's mean square.",
-        ]
-    out += _part("Where", _where(data["where"]))
-    out += _part("The plain loop's constants moved", _moved(data), (1, 3))
-    if first is not None:
-        tests = [(a, discriminating_test(first["name"], a)) for a in first["alternatives"]]
-        out += _part("Could also be, and what would tell", tests)
-    return out
+def _where(data: Mapping[str, Any]) -> Rows:
+    rows = [
+        (name if name.isupper() else name[:1].lower() + name[1:], text)
+        for name, text in places(data["where"])
+    ]
+    features = _texts(tables.features(data))
+    rows += [
+        (name, f"{how} (chance {chance})") for name, chance, carries, how in features if carries == "yes"
+    ]
+    rest = ", ".join(name for name, _, carries, _ in features if carries == "no")
+    return [*rows, ("not tied to", rest)] if rest else rows

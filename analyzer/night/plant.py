@@ -137,9 +137,9 @@ def read(
     InputError
         The export or a table cannot be used; the text says what was seen, what was expected and what to do.
     """
-    from analyzer.commands.options import opened
     from analyzer.config import Config as Defaults
     from analyzer.loops.changes import read_changes
+    from analyzer.night.asked import opened
 
     paths = [export] if isinstance(export, str | Path) else list(export)
     source, specs, notes = opened([Path(p) for p in paths], None if loops is None else Path(loops), **reading)

@@ -8,8 +8,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from analyzer.columns import BY_NAME
-from analyzer.explain.agreement import agreement
-from analyzer.explain.page_words import title
+from analyzer.explain.words import agreement, title
 from analyzer.loop.decisions import CAUSES, Fault, Status
 from analyzer.pages.cost import mark
 from analyzer.pages.loop_pictures import close_span, pv_over_op, rhythm_plots, trend_block, turn_panels

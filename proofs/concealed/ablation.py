@@ -22,10 +22,10 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2]))
 import numpy as np
 import pandas as pd
 
-from analyzer.commands.options import opened
 from analyzer.config import Config
 from analyzer.explain.case import Case, case
 from analyzer.loops.spec import spec_of
+from analyzer.night.asked import opened
 from identification.controller.pi_regression import recovered_law
 from identification.mismatch.catalogue import CANDIDATES, EFFECTS
 from identification.mismatch.model_file import carried, to_data

@@ -18,10 +18,10 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2]))
 import numpy as np
 import pandas as pd
 
-from analyzer.commands.options import opened
 from analyzer.config import Config
 from analyzer.explain.case import case
 from analyzer.loops.spec import spec_of
+from analyzer.night.asked import opened
 from identification.estimation.prediction_error import descend
 from identification.mismatch.answer import parameters_of
 from identification.mismatch.catalogue import CANDIDATES

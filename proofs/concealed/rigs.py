@@ -18,12 +18,12 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2]))
 
 import numpy as np
 
-from analyzer.commands.options import opened
 from analyzer.config import Config
 from analyzer.explain.case import Case, case
-from analyzer.explain.one_loop import Explained, explained
-from analyzer.explain.saved_model import saved_model, simulated
+from analyzer.explain.explained import Explained, explained
+from analyzer.explain.models import saved_model, simulated
 from analyzer.loops.spec import spec_of
+from analyzer.night.asked import opened
 from identification.mismatch.model_file import to_data
 from identification.mismatch.selection import silent
 from proofs.concealed.proof import place_section, table

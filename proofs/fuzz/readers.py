@@ -45,7 +45,7 @@ def _changes(path: Path) -> None:
 
 
 def _model(path: Path) -> None:
-    from analyzer.explain.saved_model import read_model
+    from analyzer.explain.models import read_model
 
     read_model(path, "FIC1")
 
@@ -115,7 +115,7 @@ def main() -> None:
     fill(Path(sys.argv[1]))
     with atheris.instrument_imports(include=["analyzer"]):
         import analyzer.config_file
-        import analyzer.explain.saved_model
+        import analyzer.explain.models
         import analyzer.history.export
         import analyzer.loops.changes
         import analyzer.loops.tags  # noqa: F401

@@ -8,11 +8,9 @@ from functools import cache
 import numpy as np
 
 from analyzer.config import Config
-from analyzer.explain.answer_data import as_data
 from analyzer.explain.case import Case, case
-from analyzer.explain.one_loop import Explained
-from analyzer.explain.user_model import judged
-from analyzer.explain.views import views
+from analyzer.explain.explained import Explained, as_data
+from analyzer.explain.models import judged
 from analyzer.history.series import Series
 from analyzer.loops.spec import LoopSpec
 from identification.controller.check import judge
@@ -102,6 +100,4 @@ def explanation(kind: str) -> Explained:
         "middle_op_pct": 50.0,
     }
     brought = judged(model, found, s) if kind == "backlash" else None
-    return Explained(
-        asked, found, said, as_data(asked, said, brought), views(found, s, said, brought), brought
-    )
+    return Explained(asked, found, said, as_data(asked, said, brought), brought)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from analyzer.explain.agreement import STROKE, agreement
+from analyzer.explain.words import STROKE, agreement
 
 
 @pytest.mark.parametrize(

@@ -8,9 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from analyzer.explain.one_loop import plain_start
-from analyzer.explain.saved_model import read_model, scale_of
-from analyzer.explain.user_model import compared, judged, within, wrong_units
+from analyzer.explain.models import (
+    compared,
+    judged,
+    plain_start,
+    read_model,
+    scale_of,
+    within,
+    wrong_units,
+)
 from analyzer.loop.quality import Scale
 from identification.errors import InputError
 from identification.limits import LIMITS

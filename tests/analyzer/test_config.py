@@ -11,11 +11,11 @@ import pytest
 from click.testing import CliRunner, Result
 
 from analyzer.cli import main
-from analyzer.commands.explain import _cases, _whole
-from analyzer.commands.options import Asked
 from analyzer.config import Config
 from analyzer.config_file import configured, document, limit_of, read_config
+from analyzer.explain.recordings import cases, whole
 from analyzer.loops.changes import TuningChange
+from analyzer.night.asked import Asked
 from analyzer.store.store import Store
 from proofs.plant import START_S, Sketch, simulate, write_export
 from tests.reports.small_store import small_store
@@ -182,8 +182,8 @@ def test_explain_and_simulate_work_on_the_span_with_its_settings(export: Path):
     loops = export.with_name("loops.csv")
     loops.write_text("loop,type,pv_lo,pv_hi,kp,ti\nLIC1,level,0,100,0.9,40\n")
     request = Asked((export,), loops, changes, *hour, Config(), "UTC", {})
-    case, pv = _whole(request, "LIC1")
-    explained, held_out = _cases(request, "LIC1", ())
+    case, pv = whole(request, "LIC1")
+    explained, held_out = cases(request, "LIC1", ())
     assert not held_out
     assert explained.spec == case.spec
     assert (pv.stamp_s[0], pv.stamp_s[-1]) == (hour[0], hour[1] - 1.0)

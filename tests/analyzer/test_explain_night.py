@@ -11,7 +11,7 @@ import pytest
 
 from analyzer.config import Config
 from analyzer.explain import night as explain_night
-from analyzer.explain.answer_data import abstained
+from analyzer.explain.explained import abstained
 from analyzer.explain.night import Question, answered, flagged, keep, known, questions, row_of, run
 from analyzer.loops.spec import LoopSpec
 from analyzer.night.batch import Batch

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from analyzer.explain import page as pages
-from analyzer.explain.answer_data import abstained
-from analyzer.explain.page_words import change, interval
-from analyzer.explain.plots import trends
+from analyzer.explain.drawings import close_part, simulations, trends
+from analyzer.explain.explained import abstained
 from analyzer.explain.text import columns, lines
+from analyzer.explain.words import change, interval
 from reports.folder import write_markdown
 from reports.html import render
 from reports.markdown import render as as_markdown
@@ -59,7 +59,7 @@ def test_page_of_play_shows_both_models_and_the_users(tmp_path: Path) -> None:
     page = pages.page(e)
     whole = next(b for b in blocks(page) if isinstance(b, Trend))
     assert {"recorded", "baseline", "model", "brought"} <= {b.kind for b in whole.bands}
-    size = {k: float(np.std(e.case.subject.pv - x)) for k, x in e.views.simulated.items()}
+    size = {k: float(np.std(e.case.subject.pv - x)) for k, x in simulations(e).items()}
     assert size["model"] < size["baseline"] < size["brought"]
     fit = next(t for t in page.tables() if t.name == "fit")
     assert [row[0].text for row in fit.rows] == ["plain loop", "improved loop", "your model"]
@@ -75,10 +75,9 @@ def test_marked_spans_and_close_look_lie_in_the_recording() -> None:
     first, last = whole.time_s[0], whole.time_s[0] + N
     assert whole.spans
     assert all(first <= a < b <= last for a, b in whole.spans)
-    assert e.views.close is not None
-    begin, end = e.views.close
-    assert 0 <= begin < end <= N
-    assert closer.time_s.size == end - begin
+    part = close_part(e)
+    assert 0 <= part.start < part.stop <= N
+    assert closer.time_s.size == part.stop - part.start
 
 
 def test_where_tells_what_carries_play() -> None:

@@ -13,7 +13,7 @@ from click.testing import CliRunner, Result
 
 from analyzer.cli import main
 from analyzer.commands.options import MOST_SAID, one_line
-from analyzer.explain.saved_model import checked
+from analyzer.explain.models import checked
 from analyzer.store.store import Store
 from identification.errors import InputError
 from proofs.plant import Sketch, simulate, write_export

@@ -1,4 +1,5 @@
-"""Words of the explanation's page: names of parameters and features, headings, figures with their units."""
+"""The words of an explanation's text and page: names of parameters and features, figures with their units, and how
+it goes together with the night's verdict."""
 
 from __future__ import annotations
 
@@ -6,8 +7,11 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+from analyzer.loop.decisions import Cause, Fault
 from analyzer.pages.words import duration, number
-from identification.mismatch.catalogue import EFFECTS
+from identification.mismatch import effect
+from identification.mismatch.catalogue import EFFECTS, fault
+from identification.mismatch.effect import Block, Ends
 from identification.mismatch.outside import OUTSIDE
 from identification.mismatch.words import ALONG, place
 
@@ -34,12 +38,11 @@ FEATURES = {
 AXES = {
     "pv_level": "PV [%]",
     "op_level": "OP [%]",
-    "op_direction": "down, still, up",
     "op_rate": "size of OP's rate [%/s]",
     "after_reversals": "time since OP turned [s]",
     "time_in_record": "time [s]",
-    "at_limits": "no, yes",
 }
+"""Axes of the features that are drawn."""
 TITLES = {"none": "the plain loop explains it", "unexplained": "no name for what is left"}
 BROUGHT = "your model"
 ROWS = {"baseline": "plain loop", "explained": "improved loop", "brought": BROUGHT}
@@ -84,11 +87,6 @@ def title(verdict: str) -> str:
 def called(name: str) -> str:
     """A parameter's name on a page."""
     return PARAMETERS.get(name, name.replace("_", " "))
-
-
-def found_in(data: Mapping[str, Any]) -> list[Mapping[str, Any]]:
-    """What an answer as data tells of with parameters: its effects, and physics that has no name."""
-    return [*data["effects"], *([data["outside"]] if "outside" in data else [])]
 
 
 def figure(value: float | None, unit: str = "") -> str:
@@ -142,8 +140,63 @@ def carried_by(feature: Mapping[str, Any]) -> str:
     return f"{how} {place(feature)}"
 
 
-def spans_said(spans: list[list[float]]) -> str:
-    """Spans as times into the recording."""
-    return ", ".join(f"{duration(a) or '0 s'} to {duration(b)}" for a, b in spans[:4]) + (
-        " and more" if len(spans) > 4 else ""
-    )
+def places(where: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Spans, ranges, periods and direction of OP that carry the misfit, each with its name."""
+    out = []
+    if where.get("spans"):
+        shown = ", ".join(f"{duration(a) or '0 s'} to {duration(b)}" for a, b in where["spans"][:4])
+        out.append(("Spans", shown + (" and more" if len(where["spans"]) > 4 else "")))
+    for key, name, unit in (("pv_range", "PV", "%"), ("op_range", "OP", "%"), ("band_s", "Periods", "s")):
+        if where.get(key):
+            out.append((name, f"{number(where[key][0])} to {figure(where[key][1], unit)}"))
+    if where.get("direction"):
+        out.append(("Direction of OP", where["direction"]))
+    return out
+
+
+STROKE = "stroke the valve both ways in steps of a quarter of its band and watch the stem"
+"""What settles a question about a valve."""
+AGREE = "Verdict and explanation agree on the valve."
+OTHER_KIND = (
+    "Both find the valve; the night's verdict calls it {kind}, the explanation {verdict}, which a sampling like this "
+    f"hardly tells apart: {STROKE}."
+)
+STOPPED = (
+    "The explanation stops at what the recorder did, so it neither bears out nor contradicts the verdict."
+)
+NOT_BORNE_OUT = (
+    "The night's verdict is a valve fault; the explanation does not bear it out on the part of the recording "
+    f"that it had not seen: {STROKE} before it is repaired."
+)
+VALVE_ALONE = (
+    "The explanation finds something at the valve; the night's verdict does not hold it to be what makes the "
+    "loop oscillate."
+)
+
+
+def agreement(row: Mapping[str, Any], verdict: str, block: str) -> str:
+    """One sentence on how a night's verdict and its explanation go together; empty where neither is about a valve.
+
+    The verdict asks why a loop oscillates, from the whole night with the controller in the loop; the explanation asks
+    which physics a simulation of PV from the recorded OP lacks, proven on a part that it has not seen. A cause of the
+    oscillation is the verdict's to name, so the explanation asks the verdict on its own recording first (case.py). A
+    kind of fault is the explanation's where it is proven on held-out data. What still differs, for the night and the
+    recording explained need not be the same, is said here, with what would settle it.
+
+    Parameters
+    ----------
+    row : mapping
+        The loop's row of the night: cause, valve_fault.
+    verdict, block : str
+        The explanation's name and block.
+    """
+    known = EFFECTS.get(verdict)
+    friction = known is not None and known.friction is not None
+    if row["cause"] != Cause.VALVE:
+        return VALVE_ALONE if friction or block == Block.VALVE else ""
+    if friction:
+        kind = row.get("valve_fault") or Fault.UNDECIDED
+        same = kind in (verdict, Fault.UNDECIDED, Fault.NONE)
+        return AGREE if same else OTHER_KIND.format(kind=kind, verdict=verdict)
+    unasked = isinstance(known, effect.Fault) and fault(verdict).ends is not Ends.NOTHING
+    return STOPPED if unasked else NOT_BORNE_OUT

@@ -1,0 +1,255 @@
+"""What an explanation's page draws: recording and simulations, misfit by feature and period, what was found."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from analyzer.explain.explained import Explained
+from analyzer.explain.words import AXES, BROUGHT, CURVES, FEATURES, KINDS, ROWS, caption
+from analyzer.pages.words import number
+from identification.estimation.candidate import Fitted
+from identification.mismatch.catalogue import fault
+from identification.mismatch.fault_pictures import busiest, by_stated_law
+from identification.mismatch.location import Feature, Group, Located, groups, profile
+from identification.mismatch.outside import about
+from identification.mismatch.pictures import Drawing, Shape
+from identification.mismatch.proof import course
+from identification.mismatch.where import located_in, won_over
+from identification.record import Floats
+from identification.simulation.open_loop import simulate
+from identification.simulation.parameters import Slot
+from reports.pages import Area, Band, Line, Mark, Panels, Plot, Trend
+
+WHOLE = 1500
+"""Buckets of the trend over the whole recording: a screen's width."""
+CLOSE, LEAST_CLOSE = 900, 240
+"""Samples of the close look at most and at least."""
+CLOSE_MEMORIES = 15.0
+"""Length of the close look in memories of the loop (dead time and time constant)."""
+NEARLY_ALL = 0.9
+"""Spans that hold more than this share of a recording are not marked: they tell nothing."""
+SEEN = 0.2
+"""Errors are drawn on an axis that reaches this part of their size to either side at least."""
+SEGMENTS = 8
+"""Parts that a spectrum is averaged over."""
+LONGEST_SEGMENT, SHORTEST_SEGMENT = 4096, 64
+"""Samples of such a part at most and at least; ours."""
+SPECTRUM_POINTS = 120
+"""Points of a spectrum."""
+POWERS = ("op_rate", "after_reversals")
+"""Features drawn over powers of ten: most of a record is near zero of them."""
+UNDRAWN = ("op_direction", "at_limits")
+"""Features of two or three values, which a table says better."""
+ERRORS = 2.0
+"""Half width of a profile's band in standard errors."""
+LABELS = {"baseline": ROWS["baseline"], "model": "improved", "brought": BROUGHT}
+SHORT = {"baseline": ROWS["baseline"], "model": ROWS["explained"]}
+ORDER = {"recorded": 0, "plain": 1, "stated": 1, "limit": 1, "least": 2, "most": 2, "points": 3, "found": 4}
+"""What is drawn above what."""
+
+
+def recorded(e: Explained) -> Floats:
+    """PV, its clock set right [% of span], shape (n,)."""
+    return e.found.p.inputs.level + e.found.p.y
+
+
+def simulations(e: Explained) -> dict[str, Floats]:
+    """PV by baseline, model and brought [% of span], anchored as for the proof, shape (n,) each."""
+    p, proof = e.found.p, e.found.proven
+    names = ("baseline", "model") if e.found.accepted else ("baseline",)
+    drawn = dict(zip(names, proof.drawn, strict=False))
+    out = {k: p.inputs.level + course(p, c, proof.window, proof.placed) for k, c in drawn.items()}
+    return out if e.brought is None else out | {"brought": e.brought.simulated}
+
+
+def trends(e: Explained) -> tuple[Trend, ...]:
+    """The whole recording, and the stretch that tells most at full resolution."""
+    marked = "Shaded: the spans that carry the misfit. " if e.said.where.get("spans") else ""
+    how = "Drag, or the wheel with Ctrl, zooms; shift-drag or arrows move, double click shows all."
+    drawn, n = signals(e), e.case.subject.pv.size
+    first = trend(e, drawn, slice(0, n), WHOLE, ("recording", "The whole recording", marked + how))
+    part = close_part(e)
+    if part.stop - part.start >= n:
+        return (first,)
+    title = "A closer look where the misfit is" if marked else "A closer look where OP moves most"
+    return first, trend(e, drawn, part, CLOSE, ("closer", title, "Each sample, as recorded."))
+
+
+def signals(e: Explained) -> list[tuple[str, str, int, Floats]]:
+    """Label, colour, panel and values of all that is drawn over time."""
+    s, pv, simulated = e.case.subject, recorded(e), simulations(e)
+    out = [] if s.sp is None else [("SP", "sp", 0, s.sp)]
+    out.append(("PV, clock set right" if e.found.late_s else "PV recorded", "recorded", 0, pv))
+    out += [(LABELS[k], k, 0, x) for k, x in simulated.items()]
+    out += [(f"left by {LABELS[k]}", k, 1, pv - x) for k, x in simulated.items()]
+    return [*out, ("OP", "op", 2, s.op)]
+
+
+def trend(
+    e: Explained,
+    drawn: list[tuple[str, str, int, Floats]],
+    part: slice,
+    buckets: int,
+    words: tuple[str, str, str],
+) -> Trend:
+    """A part of what is drawn over time, with the spans that matter marked; its name, title and caption."""
+    r, usable = e.case.prepared.record, e.case.subject.usable
+    n = part.stop - part.start
+    edges = (np.arange(min(buckets, n)) * n) // min(buckets, n)
+    bands = []
+    for label, kind, panel, x in drawn:
+        low, high = (f.reduceat(x[part], edges) for f in (np.minimum, np.maximum))
+        bands.append(Band(label, kind, panel, low, high))
+    gap = np.logical_and.reduceat(~usable[part], edges)
+    spans = tuple((r.start_s + a, r.start_s + b) for a, b in e.said.where.get("spans", []))
+    whole = sum(b - a for a, b in spans) > NEARLY_ALL * usable.size * r.dt_s
+    time = r.start_s + (part.start + edges) * r.dt_s
+    panels = ("PV [% of span]", "left over [%]", "OP [%]")
+    name, title, said = words
+    return Trend(name, title, time, gap, tuple(bands), panels, (), said, () if whole else spans)
+
+
+def close_part(e: Explained) -> slice:
+    """The stretch of the close look: where the verdict rests most, or where OP travels most."""
+    s, c = e.case.subject, e.found.plain.model.c
+    memory = CLOSE_MEMORIES * float(c[Slot.T] + c[Slot.L]) / s.dt_s
+    length = min(int(np.clip(memory, LEAST_CLOSE, CLOSE)), s.pv.size)
+    w = weight(e)
+    return busiest(np.cumsum(w), length) if w.any() else busiest(s.op, length, s.usable)
+
+
+def weight(e: Explained) -> Floats:
+    """How much each sample matters for the verdict, shape (n,)."""
+    found, n = e.found, e.case.subject.pv.size
+    if found.finding is not None and not found.finding.where.all():
+        return np.concatenate((found.finding.where.astype(float), np.zeros(n)))[:n]
+    if found.accepted:
+        return np.maximum(won_over(found.p, found.plain, found.best)[0], 0.0)
+    return located_in(found.p, found.plain, e.case.subject).local if found.left > 0 else np.zeros(n)
+
+
+def misfit_panels(e: Explained) -> Panels:
+    """The one-step errors along each feature that a table does not say better, and the spectrum, before and after."""
+    found, s = e.found, e.case.subject
+    at: Located = located_in(found.p, found.plain, s)
+    known, c = {f.name: f for f in at.features}, found.plain.model.c
+    late, memory = float(c[Slot.L]) / s.dt_s, float(c[Slot.L] + c[Slot.T]) / s.dt_s
+    along = groups(s.pv, s.op, s.dt_s, min(round(late), s.pv.size // 4), max(round(memory), 2))
+    plots = [feature_plot(e, g, known.get(g.name)) for g in along if g.name not in UNDRAWN]
+    said = (
+        "One-step errors: simulation plus noise model against PV, sample by sample; bands are two standard errors. "
+        "A sound model lies flat."
+    )
+    plots.append(spectrum_plot(e))
+    return Panels("misfit", "The misfit along what the loop was doing", tuple(plots), said)
+
+
+def feature_plot(e: Explained, g: Group, f: Feature | None) -> Plot:
+    """Mean (or size) of the one-step errors along one feature, before and after, with two standard errors."""
+    judged, by = e.found.p.weight > 0, "sign" if f is None else f.of
+    fits = {"baseline": e.found.plain} | ({"model": e.found.best} if e.found.accepted else {})
+    log = g.name in POWERS and float(g.signal[judged].max(initial=0.0)) > 0
+    lines, areas = [], []
+    for kind, fit in fits.items():
+        x, y, half = errors_along(g, fit, judged, by)
+        if log:
+            x = np.maximum(x, 0.5 * np.min(x[x > 0], initial=np.inf))
+        lines.append(Line(SHORT[kind], x, y, kind=kind))
+        areas.append(Area(x, y - half, y + half, kind))
+    along = " along OP's direction" if by == "sign" and g.sense is not None else ""
+    label = "size of errors [% PV]" if by == "power" else f"mean error{along} [% PV]"
+    size = float(np.sqrt(np.mean(fit.e[judged] ** 2)))
+    reach = (1 - SEEN, 1 + SEEN) if by == "power" else (-SEEN, SEEN)
+    ends, words = (reach[0] * size, reach[1] * size), (FEATURES[g.name], AXES[g.name], label)
+    return Plot(
+        f"misfit-{g.name}", *words, tuple(lines), (), note_of(f), tuple(areas), "x" if log else "", ends
+    )
+
+
+def errors_along(g: Group, fit: Fitted, judged: np.ndarray, by: str) -> tuple[Floats, Floats, Floats]:
+    """Places along a feature, mean (or size) of a fit's one-step errors there, and two standard errors, (m,) each."""
+    errors = fit.e[judged] if by == "power" or g.sense is None else fit.e[judged] * g.sense[judged]
+    found = profile(g.signal[judged], errors)
+    y = np.sqrt(found.power) if by == "power" else found.mean
+    half = ERRORS * np.sqrt(found.power / found.count) / (np.sqrt(2.0) if by == "power" else 1.0)
+    return 0.5 * (found.low + found.high), y, half
+
+
+def note_of(f: Feature | None) -> str:
+    """Whether a feature carries the misfit, under its plot; empty where it was not tested."""
+    if f is None:
+        return ""
+    return f"Carries the misfit (chance {max(f.p, 0.01):.2g})." if f.carries else "Does not carry the misfit."
+
+
+def spectrum_plot(e: Explained) -> Plot:
+    """Spectrum of what the simulations leave, as its part of the rms per octave of period."""
+    pv, dt_s = recorded(e), e.case.subject.dt_s
+    left = {k: pv - x for k, x in simulations(e).items() if k != "brought"}
+    lines = tuple(Line(SHORT[k], *spectrum(x, dt_s), kind=k) for k, x in left.items())
+    note = "Load and noise are in it as well: they stay."
+    title = "Spectrum of what is left"
+    return Plot("misfit-spectrum", title, "period [s]", "% PV per octave", lines, (), note, (), "x")
+
+
+def spectrum(x: Floats, dt_s: float) -> tuple[Floats, Floats]:
+    """Periods [s] and a signal's part of the rms per octave there [its unit], shape (m,) each."""
+    from scipy.signal import welch  # its import takes longer than most explanations
+
+    segment = max(min(x.size // SEGMENTS, LONGEST_SEGMENT), SHORTEST_SEGMENT)
+    f, power = welch(x, 1.0 / dt_s, nperseg=min(segment, x.size))
+    size = np.sqrt(np.log(2.0) * f[1:] * power[1:])
+    keep = np.unique(np.geomspace(1, size.size, SPECTRUM_POINTS).astype(int)) - 1
+    smooth = np.sqrt([np.mean(size[max(k - k // 8, 0) : k + k // 8 + 1] ** 2) for k in keep])
+    return 1.0 / f[1:][keep], smooth
+
+
+def found_plot(e: Explained) -> Plot | None:
+    """The picture of what has no name and explains the loop best, else of the first effect found."""
+    found, said, finding = e.found, e.said, e.found.finding
+    inputs = found.p.inputs
+    if finding is not None:
+        free = found.plain.model.c.copy()
+        free[Slot.CLIP_HI], free[Slot.CLIP_LO] = np.inf, -np.inf
+        drawn = fault(finding.name).drawn
+        shape = (
+            None if drawn is None else drawn(finding, e.case.subject, inputs.level + simulate(inputs, free))
+        )
+        return _shown(shape)
+    if said.outside is not None and found.outside is not None:
+        fit, added, known = found.outside.fit, found.outside.row, said.outside.parameters
+    elif found.accepted:
+        fit, added, known = found.best, found.best.model.added[0], said.effects[0].parameters
+    else:
+        return None
+    curve = about(added.name).curve
+    drawing = Drawing(inputs, added, known, fit.model.c, found.plain.model.c)
+    return _shown(None if curve is None else curve(drawing))
+
+
+def _shown(shape: Shape | None) -> Plot | None:
+    if shape is None:
+        return None
+    what = f"{shape.y.what} over {shape.x.what}"
+    return shape_plot(shape, "shape", what[:1].upper() + what[1:])
+
+
+def law_plot(e: Explained) -> Plot | None:
+    """OP rebuilt by the stated settings where nothing is wrong with them."""
+    sound = e.found.controller is None and e.found.law is not None
+    shape = by_stated_law("controller", e.case.subject) if sound else None
+    return None if shape is None else shape_plot(shape, "law", "OP rebuilt and recorded")
+
+
+def shape_plot(shape: Shape, name: str, title: str) -> Plot:
+    """A shape as a plot: what was recorded below, what was found above."""
+    lines, areas = [], []
+    for d in sorted(shape.curves, key=lambda d: ORDER[d.name]):
+        kind = KINDS.get(d.name, "recorded" if d.name == "recorded" else "model")
+        lines.append(Line(CURVES[d.name], d.x, d.y, d.name != "points", kind))
+        if d.low is not None and d.high is not None:
+            areas.append(Area(d.x, d.low, d.high, kind))
+    marks = tuple(Mark(x, number(x)) for x in shape.places)
+    across, along = (f"{a.what} [{a.unit}]" if a.unit else a.what for a in (shape.x, shape.y))
+    said = caption(shape.effect, shape.kind)
+    return Plot(name, title, across, along, tuple(lines), marks, said, tuple(areas))

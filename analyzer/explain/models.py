@@ -1,0 +1,227 @@
+"""Models of a loop in files: the one found is kept, one that a user brings is read with suspicion, judged and run."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from analyzer.explain.case import Case
+from analyzer.loop.quality import Scale
+from identification.errors import InputError
+from identification.mismatch.answer import Answer, restored, unanswered
+from identification.mismatch.diagnosis import transmitter_end
+from identification.mismatch.explanation import Explanation
+from identification.mismatch.model_file import VERSION, carried, carried_closed, constants, to_data
+from identification.mismatch.proof import Misfit, misfit
+from identification.mismatch.recording import Recording
+from identification.record import Floats
+from identification.simulation.parameters import Slot, neutral
+
+LARGEST = 1e9
+"""Size of a model's numbers at most, in percent and seconds; ours."""
+RUNAWAY_PCT = 1e5
+"""Size of simulated PV and OP at most [%]; ours: a thousand ranges are no plant."""
+SPAN_DIFFERS = 0.01
+"""Relative difference of two PV spans from which a model's percent are not the record's; ours."""
+HUNDRED = (60.0, 160.0)
+"""Ratios of two gains that look like percent against fractions; ours: a refit moves a gain by less."""
+TIMES = (((40.0, 90.0), "minutes"), ((2400.0, 5400.0), "hours"))
+"""Ratios of two time constants that look like minutes, or hours, against seconds."""
+SAVED, ANEW = "a model saved by `triage explain`", "save it anew"
+RUNS = "a model that can be run on this recording"
+SCALE = ("pv_low", "pv_span", "op_low", "op_span")
+
+
+def saved_model(c: Case, found: Explanation, said: Answer) -> dict[str, Any]:
+    """The model found, the plain loop where nothing was, as data to be written."""
+    s = c.prepared.scale
+    scale = dict(zip(SCALE, (s.low, s.span, s.op_low, s.op_span), strict=True))
+    names = tuple(e.name for e in said.effects)
+    data = to_data(c.spec.loop, found.p.inputs, found.best.model.c, names, found.late_s, scale)
+    end = transmitter_end(found.recorder, c.subject.pv)
+    if end is not None:
+        data["constants"]["CLIP_HI" if end.upper else "CLIP_LO"] = end.value
+    return data
+
+
+def write_model(data: Mapping[str, Any], path: Path) -> None:
+    """Write a model."""
+    path.write_text(json.dumps(data, indent=1))
+
+
+def read_model(path: Path, loop: str) -> dict[str, Any]:
+    """Read a model of that loop.
+
+    Raises
+    ------
+    InputError
+        It is no model, or another loop's.
+    """
+    try:
+        data = json.loads(path.read_text(encoding="utf-8"))
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"{path}: {error}", SAVED, ANEW) from None
+    if not isinstance(data, dict) or "constants" not in data:
+        raise InputError(f"{path}: no model", SAVED, ANEW)
+    if data.get("loop") != loop:
+        raise InputError(f"{path}: a model of {data.get('loop')}", f"one of {loop}", "check MODEL and --loop")
+    checked(data, path)
+    return data
+
+
+def checked(data: Mapping[str, Any], path: Path) -> None:
+    """Raise InputError where a number of a model is none."""
+    held = data["constants"] if isinstance(data["constants"], dict) else {}
+    placed = {k: data.get(k, 0.0) for k in ("middle_op_pct", "level_pv_pct", "late_s")}
+    scale = data["scale"] if isinstance(data.get("scale"), dict) else {}
+    for name, value in {**held, **placed, **scale}.items():
+        number = not isinstance(value, bool) and isinstance(value, int | float)
+        if not number or not abs(value) <= LARGEST:  # false of NaN
+            seen, most = f"{path}: {name} is {str(value)[:40]}", f"a number of at most {LARGEST:g} in size"
+            raise InputError(seen, most, "correct it or save the model anew")
+    for name in ("pv_span", "op_span"):
+        if name in scale and not scale[name] > 0:
+            raise InputError(f"{path}: {name} is {scale[name]:g}", "a span above 0", "save the model anew")
+    if not held.get("CLIP_LO", -LARGEST) < held.get("CLIP_HI", LARGEST) or held.get("RATE", 1.0) <= 0:
+        seen = f"{path}: limits that nothing fits between"
+        raise InputError(seen, "CLIP_LO below CLIP_HI, RATE above 0", "save the model anew")
+    if data.get("version", VERSION) != VERSION:
+        seen = f"{path}: a model of version {str(data['version'])[:20]}"
+        raise InputError(seen, f"version {VERSION}", "save it anew with this triage")
+    constants(dict(data))
+
+
+def plain_start(brought: Mapping[str, Any]) -> Floats:
+    """Constants of the plain loop in a model, shape (SIZE,): the rest of it is judged, not believed."""
+    own, out = constants(dict(brought)), neutral()
+    for slot in (Slot.T, Slot.L, Slot.K):
+        out[slot] = own[slot]
+    return out
+
+
+@dataclass(frozen=True, slots=True)
+class Brought:
+    """The user's model: PV as it simulates it [% PV], shape (n,), its misfit on both parts, one line about it."""
+
+    simulated: Floats = field(repr=False)
+    fitted: Misfit
+    held_out: Misfit
+    note: str
+
+    def as_data(self) -> dict[str, Any]:
+        """The entry `brought` of the answer's `fit`."""
+        return {"fitted": asdict(self.fitted), "held_out": asdict(self.held_out), "note": self.note}
+
+
+def judged(data: Mapping[str, Any], found: Explanation, s: Recording, more: str = "") -> Brought:
+    """The user's model on the recording explained, its mean freed, beside the plain loop refitted.
+
+    more : what else there is to say of it.
+    """
+    out = carried(dict(data), s.op, s.pv, s.dt_s)
+    cut = int((1.0 - s.limits.proof.held_out) * s.pv.size)
+    window, (plain, better) = found.proven.window, found.proven.overall
+    own = misfit(s.pv, out, window).rmse
+    said = f"Your model leaves {own:.3g} % of span rms, the plain loop fitted anew {plain.rmse:.3g} %"
+    if found.accepted:
+        said += f", the improved loop {better.rmse:.3g} %"
+    units = "" if unanswered(found) else wrong_units(constants(dict(data)), restored(found.plain.model.c))
+    verdict = "" if units else compared(own, plain.rmse, s.limits.proof.as_good)
+    note = "; ".join(x for x in (said, verdict, units, more) if x) + "."
+    fitted, held = misfit(s.pv[:cut], out[:cut], window), misfit(s.pv[cut:], out[cut:], window)
+    return Brought(out, fitted, held, note)
+
+
+def compared(own: float, plain: float, as_good: float) -> str:
+    """How a model does against the plain loop fitted anew, from both misfits."""
+    if own > as_good * plain:
+        return "it does worse than the plain loop can"
+    better = own * as_good < plain
+    return "it does better than the plain loop can" if better else "it does as well as the plain loop"
+
+
+def within(ratio: float, ends: tuple[float, float]) -> bool:
+    """Whether a ratio, or its inverse, lies between two ends."""
+    size = abs(ratio)
+    return ends[0] <= size <= ends[1] or (size > 0 and ends[0] <= 1.0 / size <= ends[1])
+
+
+def wrong_units(own: Floats, found: Mapping[str, float]) -> str:
+    """What looks wrong with a model's units against the process as identified; empty where nothing does.
+
+    Parameters
+    ----------
+    own : ndarray of shape (SIZE,)
+        Constants of the user's model.
+    found : mapping
+        gain [% PV/% OP] and time_constant_s of the plain loop fitted to the recording.
+    """
+    gain, lag_s = found["gain"], found["time_constant_s"]
+    its, said = f"its gain, {own[Slot.K]:.3g},", []
+    if within(own[Slot.K] / gain, HUNDRED):
+        said.append(f"{its} is about 100 times off {gain:.3g}, as percent are off fractions")
+    elif own[Slot.K] / gain < 0:
+        said.append(f"{its} has another sign than {gain:.3g} found")
+    for ends, unit in TIMES:
+        if within(own[Slot.T] / lag_s, ends):
+            size = f"{own[Slot.T]:.3g} s against {lag_s:.3g} s"
+            said.append(
+                f"its time constant, {size} found, looks like {unit} taken for seconds or the reverse"
+            )
+    return "; ".join(said)
+
+
+def span_note(now: Scale, brought: Mapping[str, Any]) -> str:
+    """What to say where a model was made with another PV span than the record now has; empty where not."""
+    scale = brought.get("scale")
+    then = scale.get("pv_span") if isinstance(scale, dict) else None
+    if not isinstance(then, int | float) or abs(then / now.span - 1.0) < SPAN_DIFFERS:
+        return ""
+    spans = f"it was made with a PV span of {then:.4g}, this record has {now.span:.4g}"
+    return f"{spans}: its gain is off by their ratio"
+
+
+def scale_of(data: Mapping[str, Any], now: Scale) -> Scale:
+    """What percent means to a saved model: what it meant in the recording that was fitted.
+
+    Without a stated range percent is of the range recorded, and the next recording has another.
+    """
+    then = data.get("scale")
+    if not isinstance(then, dict) or not all(isinstance(then.get(n), int | float) for n in SCALE):
+        return now
+    low, span, op_low, op_span = (float(then[n]) for n in SCALE)
+    return Scale(low, span, op_low, op_span, now.recorded)
+
+
+def simulated(c: Case, data: dict[str, Any], stamps: Floats, closed: bool) -> tuple[Floats, Floats]:
+    """PV and OP in their own units at each stamp, from a saved model run open loop or, if wished, closed.
+
+    Raises
+    ------
+    InputError
+        The loop is to be closed and its controller is not known.
+    """
+    r, law = c.prepared.record, c.subject.stated
+    scale, now = scale_of(data, c.prepared.scale), c.prepared.scale
+    sp, pv = (scale.pv_pct(now.low + x * now.span / 100.0) for x in (r.sp, r.pv))
+    op = scale.op_pct(now.op_low + r.op * now.op_span / 100.0)
+    if closed and law is None:
+        seen = f"{c.spec.loop}: no settings of its controller"
+        raise InputError(seen, "kp and ti", "state them in loops.csv")
+    try:
+        if closed and law is not None:
+            pv, op = carried_closed(data, sp, op, pv, r.dt_s, law)
+        else:
+            pv = carried(data, op, pv, r.dt_s)
+    except (ZeroDivisionError, OverflowError, FloatingPointError) as error:
+        raise InputError(f"{c.spec.loop}: {error}", RUNS, "save the model anew") from error
+    if not (np.abs(pv).max() <= RUNAWAY_PCT and np.abs(op).max() <= RUNAWAY_PCT):  # false of NaN
+        raise InputError(f"{c.spec.loop}: PV or OP runs away", RUNS, "save the model anew")
+    at = r.start_s + r.time_s
+    pv_at = np.interp(stamps, at, scale.low + pv * scale.span / 100.0)
+    return pv_at, np.interp(stamps, at, scale.op_low + op * scale.op_span / 100.0)

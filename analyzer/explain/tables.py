@@ -1,0 +1,187 @@
+"""The tables of an explanation, from the answer as data: text and page show the same cells."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from analyzer.explain.words import (
+    FEATURES,
+    HIDDEN,
+    MOVED,
+    ROWS,
+    called,
+    carried_by,
+    chance,
+    change,
+    interval,
+    rms,
+    share,
+)
+from analyzer.pages.words import number
+from identification.mismatch.forward_selection import Candidate
+from identification.mismatch.words import discriminating_test
+from reports.pages import Cell, Column, Table
+
+Data = Mapping[str, Any]
+HARDLY = 0.05
+"""Relative change of the plain loop's constants under which they count as kept."""
+BENT = "What was left out had to be made up for by these; with it they move back."
+KEPT = "They hardly move: what was left out had not bent them."
+SHOWN = 12
+"""Names shown of those that were tried."""
+
+
+def parameters(data: Data) -> Table:
+    """Parameters with intervals of all effects, and of physics that has no name."""
+    columns = (
+        Column("effect", "Effect"),
+        Column("parameter", "Parameter"),
+        Column("value", "Value", True),
+        Column("interval", "90 % interval", True),
+        Column("unit", "Unit"),
+    )
+    rows = tuple(
+        (
+            Cell(x["name"]),
+            Cell(called(k)),
+            Cell(number(v["value"]), v["value"]),
+            Cell(interval(v)),
+            Cell(v["unit"]),
+        )
+        for x in [*data["effects"], *([data["outside"]] if "outside" in data else [])]
+        for k, v in x["parameters"].items()
+        if k not in HIDDEN
+    )
+    return Table("parameters", "Parameters", columns, rows)
+
+
+def moved(data: Data) -> Table:
+    """The plain loop's constants before and after."""
+    columns = (
+        Column("constant", "Of the plain loop"),
+        Column("before", "Plain", True),
+        Column("after", "Improved", True),
+        Column("change", "Change", True),
+        Column("unit", "Unit"),
+    )
+    rows = tuple(
+        (
+            Cell(MOVED[k][0]),
+            Cell(number(a), a),
+            Cell(number(b), b),
+            Cell(change(a, b)),
+            Cell(MOVED[k][1]),
+        )
+        for k, (a, b) in data["moved"].items()
+    )
+    most = max((abs(b / a - 1) if a else 0.0 for a, b in data["moved"].values()), default=0.0)
+    note = KEPT if most < HARDLY else BENT
+    return Table("moved", "How the plain loop's constants moved", columns, rows, note)
+
+
+def fit(data: Data, note: str = "") -> Table:
+    """Misfit of the simulations, fitted and held out."""
+    columns = (
+        Column("model", "Simulation"),
+        Column("fitted", "rms, fitted", True),
+        Column("fitted_fit", "Fit %", True),
+        Column("held", "rms, held out", True),
+        Column("held_fit", "Fit %", True),
+    )
+    shown = [k for k in ROWS if k in data["fit"] and (k != "explained" or data["moved"])]
+    rows = []
+    for key in shown:
+        cells = [Cell(ROWS[key])]
+        for part in ("fitted", "held_out"):
+            m = data["fit"][key][part]
+            cells += [_rms(m), Cell(f"{m['fit_pct']:.1f}", m["fit_pct"])]
+        rows.append(tuple(cells))
+    return Table("fit", "", columns, tuple(rows), note)
+
+
+def others(data: Data) -> Table:
+    """Misfit of both simulations on each other recording that was held out."""
+    columns = (
+        Column("recording", "Held out"),
+        Column("plain", "rms, plain", True),
+        Column("improved", "rms, improved", True),
+        Column("removed", "Misfit removed", True),
+    )
+    rows = tuple(
+        (
+            Cell(x["recording"]),
+            _rms(x["baseline"]),
+            _rms(x["explained"]),
+            Cell(share(x["share"]), x["share"]),
+        )
+        for x in data.get("held_out_on", [])
+    )
+    return Table("others", "On the recordings held out", columns, rows)
+
+
+def _rms(misfit: Mapping[str, float]) -> Cell:
+    return Cell(rms(misfit["rmse"]), misfit["rmse"])
+
+
+def features(data: Data) -> Table:
+    """What the misfit is tied to."""
+    columns = (
+        Column("feature", "Tied to"),
+        Column("p", "Chance", True, "Of as much on errors tied to nothing, over all rows together"),
+        Column("carries", "Carries it"),
+        Column("place", "How", wide=True),
+    )
+    rows = tuple(
+        (
+            Cell(FEATURES[f["name"]], kind="strong" if f["carries"] else ""),
+            Cell(chance(f["p"]), f["p"]),
+            Cell("yes" if f["carries"] else "no"),
+            Cell(carried_by(f)),
+        )
+        for f in data["where"].get("features", [])
+    )
+    note = (
+        "The plain loop's one-step errors in one joint regression: each row is what it adds to the others; chances "
+        "from blocks in other orders."
+    )
+    return Table("where", "", columns, rows, note)
+
+
+def alternatives(data: Data) -> Table:
+    """Names that fit as well or look alike, and what would tell them from the one that is told."""
+    columns = (Column("name", "Could also be"), Column("test", "What would tell them apart", wide=True))
+    rows = tuple(
+        (Cell(other, kind="strong"), Cell(discriminating_test(first["name"], other)))
+        for first in data["effects"][:1]
+        for other in first["alternatives"]
+    )
+    return Table("alternatives", "", columns, rows)
+
+
+def tried(first: tuple[Candidate, ...], taken: tuple[Candidate, ...]) -> Table:
+    """What was tried in the first round, the best of each name, the likeliest first."""
+    columns = (
+        Column("name", "Added to the plain loop"),
+        Column("gain", "Gain", True, "Log likelihood [nat]"),
+        Column("net", "After its penalty", True, "Less what its constants and the search cost"),
+        Column("said", ""),
+    )
+    names = {c.name for c in taken}
+    best = {c.name: c for c in sorted(first, key=lambda c: c.penalised)}
+    rows = tuple(
+        (Cell(c.name), _nats(c.gain), _nats(c.penalised), Cell(_standing(c, names)))
+        for c in sorted(best.values(), key=lambda c: -c.penalised)[:SHOWN]
+    )
+    note = "Each name was fitted with all constants free; the best of so many gains about five nat by chance."
+    return Table("candidates", "", columns, rows, note)
+
+
+def _nats(value: float) -> Cell:
+    return Cell(str(round(value)), value)
+
+
+def _standing(c: Candidate, taken: set[str]) -> str:
+    if c.name in taken:
+        return "taken"
+    return "does not pay" if c.penalised <= 0 else "less, or not proven"

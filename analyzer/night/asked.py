@@ -1,0 +1,75 @@
+"""What is asked of an export: files and loops, changes of settings, a span of time, limits."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from analyzer.config import Config
+from analyzer.history.export import Export, ReadOptions, open_export
+from analyzer.history.plant_clock import zone_of
+from analyzer.history.series import Series
+from analyzer.loops.changes import TuningChange
+from analyzer.loops.spec import LoopSpec, unknown_columns
+from analyzer.loops.tags import find_loops, match, read_loops
+from analyzer.night.nights import Night, cut
+
+MOST_NAMES = 10
+"""Loops that are named in a note; the rest is counted."""
+Opened = tuple[Export, tuple[LoopSpec, ...], tuple[str, ...]]
+"""An export, its loops with their tags, and what there is to say about them."""
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """Files, loops.csv, changes of settings, span of time [s since 1970-01-01 UTC] and limits.
+
+    zone : the plant's time zone, of nights, pages and options; reading : how text exports are read, as in
+    analyzer.history.table.
+    """
+
+    export: tuple[Path, ...]
+    loops: Path | None
+    changes: tuple[TuningChange, ...]
+    since_s: float
+    until_s: float
+    config: Config
+    zone: str
+    reading: Mapping[str, Any]
+
+    def opened(self) -> Opened:
+        """The export, its loops with their tags, and what there is to say about them and about the changes."""
+        source, specs, notes = opened(self.export, self.loops, **self.reading)
+        return source, specs, (*notes, *_of_no_loop(self.changes, specs))
+
+    def within(self, series: Mapping[str, Series]) -> dict[str, Series]:
+        """The samples within the span of time that is asked for."""
+        span = Night("", self.since_s, self.until_s)
+        return {tag: cut(found, span) for tag, found in series.items()}
+
+
+def opened(export: Sequence[Path], loops: Path | None, **reading: Any) -> Opened:
+    """An export and its loops, which are found by their tags' endings where no loops.csv is given."""
+    reading["good_quality"] = tuple(reading.get("good_quality") or ()) or None
+    source = open_export(list(export), ReadOptions(**reading))
+    if loops is None:
+        return source, find_loops(source.tags), ()
+    stated = read_loops(loops, str(zone_of(reading.get("timezone"))), reading.get("day_first"))
+    specs, notes = match(stated, source.tags)
+    own = unknown_columns(stated)
+    if own:
+        kept = f"{loops}: columns {', '.join(own)} mean nothing here and are kept as the plant's own"
+        notes = (kept, *notes)
+    return source, specs, notes
+
+
+def _of_no_loop(changes: Sequence[TuningChange], specs: Sequence[LoopSpec]) -> tuple[str, ...]:
+    """A note on changes of loops that are not among those that are read."""
+    strange = sorted({change.loop for change in changes} - {spec.loop for spec in specs})
+    if not strange:
+        return ()
+    more = f" and {len(strange) - MOST_NAMES} more" if len(strange) > MOST_NAMES else ""
+    named = ", ".join(strange[:MOST_NAMES]) + more
+    return (f"--changes: {named}: no such loop is read; these changes are left aside: correct the name",)
