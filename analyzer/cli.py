@@ -4,18 +4,23 @@ from __future__ import annotations
 
 import os
 import sys
-from copy import copy
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from analyzer.commands import explain as explain_cli
-from analyzer.commands import notes as notes_cli
-from analyzer.commands import report as report_cli
-from analyzer.commands import run as run_cli
-from analyzer.commands import store as store_cli
-from analyzer.commands.options import PLACE, SOME_LOST, export_options, say, told
+from analyzer.commands import explain, notes, report, run, store
+from analyzer.commands.options import (
+    FILE,
+    NIGHT,
+    SOME_LOST,
+    STORE,
+    export_options,
+    formats,
+    of_loop,
+    say,
+    told,
+)
 from analyzer.loop.decisions import Lane
 
 if TYPE_CHECKING:
@@ -25,9 +30,6 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
 """Loops run side by side, one a process, on matrices of a few columns: threads of linear algebra only get in their
 way. Set before numpy is imported."""
-
-
-LANES = [lane.replace(" ", "-") for lane in Lane]
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
@@ -63,7 +65,7 @@ def check(asked: Asked) -> None:
 
 
 @main.command()
-@click.argument("store", type=PLACE)
+@STORE
 @click.option(
     "--by",
     "column",
@@ -71,34 +73,22 @@ def check(asked: Asked) -> None:
     "oscillation_significance.",
 )
 @click.option("--top", type=click.IntRange(1), help="Number of loops shown.")
-@click.option("--night", help="Night to show, e.g. 2026-03-08. Default: the latest.")
+@NIGHT
 @click.option("--ascending", is_flag=True, help="Smallest first.")
 @click.option("--area", help="Loops of this area alone.")
-@click.option("--lane", type=click.Choice(LANES), help="Loops of this lane alone, by its figure.")
+@click.option(
+    "--lane",
+    type=click.Choice([lane.replace(" ", "-") for lane in Lane]),
+    callback=lambda _ctx, _param, value: None if value is None else Lane(value.replace("-", " ")),
+    help="Loops of this lane alone, by its figure.",
+)
 @click.option("--groups", is_flag=True, help="Loops that share an oscillation, and where each starts.")
 @click.option("--all", "everything", is_flag=True, help="Loops that notes hide from the table, too.")
 @click.option("--wide", is_flag=True, help="All columns of the table, however narrow the terminal.")
-@click.option(
-    "--format",
-    "form",
-    type=click.Choice(["table", "csv", "json", "markdown"]),
-    default="table",
-    show_default=True,
-    help="Output format.",
-)
+@formats("table", "csv", "json", "markdown", text="Output format.")
 @told
 def rank(
-    store: Path,
-    column: str | None,
-    top: int | None,
-    night: str | None,
-    ascending: bool,
-    area: str | None,
-    lane: str | None,
-    groups: bool,
-    everything: bool,
-    wide: bool,
-    form: str,
+    store: Path, top: int | None, groups: bool, everything: bool, wide: bool, form: str, **by: Any
 ) -> None:
     """The morning list: loops of one night, the worst first.
 
@@ -111,24 +101,21 @@ def rank(
     if groups:
         from analyzer.pages.groups import grouped
 
-        found, name = grouped(Store(store), night, top)
+        found, name = grouped(Store(store), by["night"], top)
         click.echo(rendered_groups(found, form, name))
         return
-    asked = None if lane is None else Lane(lane.replace("-", " "))
-    rows, name = ranked(Store(store), column, None, night, ascending, area, asked)
+    rows, name = ranked(Store(store), **by)
     hidden = () if everything or form in ("csv", "json") else hidden_loops(rows, name)
     shown = [r for r in rows if r["loop"] not in hidden][:top]
-    click.echo(rendered(shown, form, name, wide, asked))
+    click.echo(rendered(shown, form, name, wide, by["lane"]))
     if hidden:
         say(f"hidden by their notes (--all shows them): {', '.join(hidden)}", err=True)
 
 
 @main.command()
 @export_options
-@click.option("--loop", "tag", required=True, help="The loop to tune.")
-@click.option(
-    "--out", type=click.Path(path_type=Path), help="Directory for pictures, and a page to try settings on."
-)
+@of_loop("The loop to tune.")
+@click.option("--out", type=FILE, help="Directory for pictures, and a page to try settings on.")
 def tune(asked: Asked, tag: str, out: Path | None) -> None:
     """One loop: model, limit cycle predicted, new Kp and Ti with reasons, forecast, travel map.
 
@@ -163,19 +150,11 @@ def config() -> None:
     click.echo(document(Config()))
 
 
-def registered(command: click.Command) -> click.Command:
-    """A command of another module with errors told as here."""
-    own = copy(command)
-    if command.callback is not None:
-        own.callback = told(command.callback)
-    return own
-
-
-for page_command in (run_cli.run, *report_cli.COMMANDS, *notes_cli.COMMANDS):
-    main.add_command(registered(page_command))
-main.add_command(store_cli.store)
-for model_command in explain_cli.main.commands.values():
-    main.add_command(model_command)
+for command in (
+    *(run.run, report.report, report.pages, notes.note, notes.summary, store.store),
+    *(explain.explain, explain.simulate),
+):
+    main.add_command(command)
 
 
 if __name__ == "__main__":

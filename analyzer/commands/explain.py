@@ -1,50 +1,36 @@
-"""The commands `explain` and `simulate`: parse, call, print."""
+"""The commands `explain` and `simulate`: what physics a loop's plain model lacks, and the model run elsewhere."""
 
 from __future__ import annotations
 
 import json
 import sys
-import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from analyzer.commands.options import NOTHING_DONE, PLACE, export_options, say
+from analyzer.commands.options import FILE, NOTHING_DONE, PLACE, export_options, formats, of_loop, say
 from identification.errors import NotAssessedError
 
 if TYPE_CHECKING:
-    from analyzer.explain.explained import Explained
     from analyzer.night.asked import Asked
+    from reports.pages import Page
 
 
-@click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
-def main() -> None:
-    """What physics a loop's plain model lacks, and the model carried to another recording."""
-
-
-@main.command()
+@click.command()
 @export_options
-@click.option("--loop", "tag", required=True, help="Loop to explain.")
-@click.option(
-    "--model", type=click.Path(path_type=Path), help="Your own saved model: judged beside the refitted one."
-)
+@of_loop("Loop to explain.")
+@click.option("--model", type=FILE, help="Your own saved model: judged beside the refitted one.")
 @click.option(
     "--held-out",
     multiple=True,
     type=PLACE,
     help="Another recording of the loop, on which the explanation is proven; may be given again.",
 )
-@click.option("--save-model", type=click.Path(path_type=Path), help="Write the model found, for `simulate`.")
-@click.option(
-    "--format",
-    "form",
-    type=click.Choice(["text", "json", "html", "markdown"]),
-    default="text",
-    show_default=True,
-    help="Output format; html is one file that needs no network.",
-)
-@click.option("--out", type=click.Path(path_type=Path), help="Folder for the page and Markdown's pictures.")
+@click.option("--save-model", type=FILE, help="Write the model found, for `simulate`.")
+@formats("text", "json", "html", "markdown", text="Output format; html is one file that needs no network.")
+@click.option("--out", type=FILE, help="Folder for the page and Markdown's pictures.")
 def explain(
     asked: Asked,
     tag: str,
@@ -58,27 +44,28 @@ def explain(
 
     Example: triage explain export.parquet --loops loops.csv --loop FIC101
     """
+    from analyzer.commands.progress import trying
     from analyzer.explain.explained import abstained, explained
     from analyzer.explain.models import read_model, write_model
+    from analyzer.explain.page import abstention, page
     from analyzer.explain.recordings import cases
 
-    tell = _Candidates()
     try:
-        brought = read_model(model, tag) if model is not None else None
-        case, others = cases(asked, tag, held_out)
-        found = explained(case, tell, brought, others)
+        with trying() as tell:
+            brought = read_model(model, tag) if model is not None else None
+            case, others = cases(asked, tag, held_out)
+            found = explained(case, tell, brought, others)
     except NotAssessedError as error:
-        _show(abstained(tag, str(error)), None, form, out, asked.zone)
+        data = abstained(tag, str(error))
+        _show(data, lambda: abstention(data), form, out)
         click.echo(f"triage: {error}", err=True)
         sys.exit(NOTHING_DONE)
-    finally:
-        tell("")
     if save_model is not None:
         write_model(found.model(), save_model)
-    _show(found.data, found, form, out, asked.zone)
+    _show(found.data, lambda: page(found, asked.zone), form, out)
 
 
-def _show(data: dict[str, Any], found: Explained | None, form: str, out: Path | None, zone: str) -> None:
+def _show(data: dict[str, Any], page: Callable[[], Page], form: str, out: Path | None) -> None:
     """Print the answer in a format, or write its page into a folder."""
     if form == "json":
         click.echo(json.dumps(data))
@@ -87,78 +74,36 @@ def _show(data: dict[str, Any], found: Explained | None, form: str, out: Path | 
 
         say("\n".join(lines(data)))
     else:
-        _show_page(data, found, form, out, zone)
+        from reports import folder, html, markdown
+
+        if out is None:
+            click.echo(html.render(page(), True) if form == "html" else markdown.render(page(), ""))
+            return
+        drawn = [page()]
+        written = folder.write_html(drawn, out, True) if form == "html" else folder.write_markdown(drawn, out)
+        for path in written:
+            click.echo(f"written: {path}", err=True)
 
 
-def _show_page(data: dict[str, Any], found: Explained | None, form: str, out: Path | None, zone: str) -> None:
-    from analyzer.explain import page as pages
-    from reports import folder, html, markdown
-
-    page = pages.abstention(data) if found is None else pages.page(found, zone)
-    if out is None:
-        click.echo(html.render(page, True) if form == "html" else markdown.render(page, ""))
-        return
-    written = folder.write_html([page], out, True) if form == "html" else folder.write_markdown([page], out)
-    for path in written:
-        click.echo(f"written: {path}", err=True)
-
-
-@main.command()
-@click.argument("model", type=click.Path(path_type=Path))
+@click.command()
+@click.argument("model", type=FILE)
 @export_options
-@click.option("--loop", "tag", required=True, help="Loop to simulate.")
-@click.option(
-    "--out", required=True, type=click.Path(path_type=Path), help="Parquet file: timestamp, PV, OP."
-)
+@of_loop("Loop to simulate.")
+@click.option("--out", required=True, type=FILE, help="Parquet file: timestamp, PV, OP.")
 @click.option(
     "--closed-loop", is_flag=True, help="Run the stated controller from SP instead of the recorded OP."
 )
-def simulate(
-    model: Path,
-    asked: Asked,
-    tag: str,
-    out: Path,
-    closed_loop: bool,
-) -> None:
+def simulate(model: Path, asked: Asked, tag: str, out: Path, closed_loop: bool) -> None:
     """Run a saved model over another recording of its loop; a constant bias is freed, nothing else.
 
     Example: triage simulate model.json week2.parquet --loops loops.csv --loop FIC101 --out week2-sim.parquet
     """
+    import pandas as pd
+
     from analyzer.explain.models import read_model, simulated
     from analyzer.explain.recordings import whole
 
     case, raw = whole(asked, tag)
     pv, op = simulated(case, read_model(model, tag), raw.stamp_s, closed_loop)
-    write_trends(out, raw.stamp_s, pv, op)
-
-
-QUIET_S = 5.0
-"""Seconds between two lines on what is being tried, where nobody looks at a terminal [s]."""
-
-
-class _Candidates:
-    """Tells what is being tried: in a line that wipes itself out on a terminal, in one now and then elsewhere."""
-
-    def __init__(self) -> None:
-        self.begun = self.said = time.monotonic()
-        if not sys.stderr.isatty():
-            click.echo("explain: reading the export, fitting the plain loop", err=True)
-
-    def __call__(self, name: str) -> None:
-        if sys.stderr.isatty():
-            click.echo(f"\r\033[K{f'trying {name}' if name else ''}", nl=False, err=True)
-        elif name and time.monotonic() - self.said >= QUIET_S:
-            self.said = time.monotonic()
-            click.echo(f"explain: {self.said - self.begun:.0f} s, trying {name}", err=True)
-
-
-def write_trends(out: Path, stamps: Any, pv: Any, op: Any) -> None:
-    """Write columns timestamp, PV and OP."""
-    import pandas as pd
-
-    stamp = pd.to_datetime((stamps * 1e6).round().astype("int64"), unit="us")
+    stamp = pd.to_datetime((raw.stamp_s * 1e6).round().astype("int64"), unit="us")
     pd.DataFrame({"timestamp": stamp, "PV": pv, "OP": op}).to_parquet(out, index=False)
-
-
-if __name__ == "__main__":
-    main()

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import click
 
-from analyzer.commands.options import PLACE, say
+from analyzer.commands.options import NIGHT, STORE, formats, say, told
 
 
 @click.command()
-@click.argument("store", type=PLACE)
+@STORE
 @click.argument("loop")
 @click.argument("text", required=False)
 @click.option("--owner", help="Who looks after it. Default: the user of this computer.")
@@ -21,6 +21,7 @@ from analyzer.commands.options import PLACE, say
     metavar="DATE",
     help="Leave the loop out of lists until this night.",
 )
+@told
 def note(store: Path, loop: str, text: str | None, owner: str | None, hide_until: datetime | None) -> None:
     """What was seen or done about a loop, kept in the store and shown in lists and on pages.
 
@@ -52,16 +53,10 @@ def note(store: Path, loop: str, text: str | None, owner: str | None, hide_until
 
 
 @click.command()
-@click.argument("store", type=PLACE)
-@click.option("--night", help="Night to show, e.g. 2026-03-08. Default: the latest.")
-@click.option(
-    "--format",
-    "form",
-    type=click.Choice(["text", "html", "markdown"]),
-    default="text",
-    show_default=True,
-    help="html is one mail without scripts.",
-)
+@STORE
+@NIGHT
+@formats("text", "html", "markdown", text="html is one mail without scripts.")
+@told
 def summary(store: Path, night: str | None, form: str) -> None:
     """The morning on one screen, to be mailed: what to do first, what changed, the worst loops.
 
@@ -79,7 +74,3 @@ def summary(store: Path, night: str | None, form: str) -> None:
     found = replace(page(kept, night), made=made(kept), zone=kept.zone())
     draw = {"text": plain.render, "html": html.mail, "markdown": lambda p: markdown.render(p, "")}[form]
     click.echo(draw(found).rstrip("\n"))
-
-
-COMMANDS = (note, summary)
-"""To be added to the command line; errors are told there."""

@@ -1,12 +1,17 @@
-"""Progress of long work on the terminal: a bar where somebody looks, a line now and then where nobody does."""
+"""Progress of long work on the terminal: a line that changes where somebody looks, one now and then elsewhere."""
 
 from __future__ import annotations
 
 import sys
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+import click
+
 Report = Callable[[int, int], None]
+QUIET_S = 5.0
+"""Seconds between two lines on what is being tried, where nobody looks at a terminal [s]."""
 
 
 @contextmanager
@@ -35,3 +40,25 @@ def _tenths(what: str) -> Report:
             print(f"{what}: {done} of {total}", file=sys.stderr, flush=True)
 
     return report
+
+
+@contextmanager
+def trying() -> Iterator[Callable[[str], None]]:
+    """A callable to be told what is tried."""
+    watched, begun = sys.stderr.isatty(), time.monotonic()
+    said_s = begun
+    if not watched:
+        click.echo("explain: reading the export, fitting the plain loop", err=True)
+
+    def tell(name: str) -> None:
+        nonlocal said_s
+        if watched:
+            click.echo(f"\r\033[K{f'trying {name}' if name else ''}", nl=False, err=True)
+        elif name and time.monotonic() - said_s >= QUIET_S:
+            said_s = time.monotonic()
+            click.echo(f"explain: {said_s - begun:.0f} s, trying {name}", err=True)
+
+    try:
+        yield tell
+    finally:
+        tell("")

@@ -1,66 +1,63 @@
-"""The commands that write pages: parse, call, say what was written."""
+"""The commands that write pages: `report` and `pages`."""
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from analyzer.commands.options import PLACE, config_option, say
+from analyzer.commands.options import CONFIG, FILE, NIGHT, SOME_LOST, STORE, Command, formats, say, told
 from identification.errors import InputError
 
 if TYPE_CHECKING:
     from analyzer.comparison.before_after import Span
     from analyzer.config import ChangeLimits
     from analyzer.loops.changes import TuningChange
-    from analyzer.pages.changes import Spans
     from analyzer.store.store import Store
     from reports.pages import Page
 
-SOME_LOST = 1
 MOST_DAYS = 3660
 """Longest span that is compared [d]: ten years."""
 
 
-def _span(texts: Sequence[str] | None, option: str, zone: str) -> Span | None:
-    from analyzer.comparison.before_after import Span
-    from analyzer.history.stamps import parse_time
+@dataclass(frozen=True, slots=True)
+class Folder:
+    """Where pages are written, in which format, and whether each is to stand by itself."""
 
-    if not texts:
-        return None
-    first, last = (parse_time(t, option, zone) for t in texts)
-    if last <= first:
-        raise InputError(f"{option} {texts[0]} {texts[1]}", "an end after the start", "swap them")
-    if last - first > MOST_DAYS * 86400.0:
-        raise InputError(
-            f"{option} {texts[0]} {texts[1]}", f"at most {MOST_DAYS} days", "give a shorter span"
-        )
-    return Span(first, last)
+    form: str
+    single_file: bool
+    out: Path
+
+    def write(self, store: Store, pages: Sequence[Page]) -> None:
+        """Write a store's pages and their tables, and say where."""
+        from reports.folder import write_csv, write_html, write_markdown
+
+        head, zone, html = made(store), store.zone(), self.form == "html"
+        pages = [replace(page, made=head, zone=zone) for page in pages]
+        paths = write_html(pages, self.out, self.single_file) if html else write_markdown(pages, self.out)
+        for page in pages:
+            write_csv(page, self.out)
+        click.echo(f"{paths[0]}" + (f" and {len(paths) - 1} more" if len(paths) > 1 else ""))
 
 
-def _asked(
-    store: Store,
-    changes: Path | None,
-    loop: str | None,
-    changed: str | None,
-    find: bool,
-    limits: ChangeLimits,
-) -> list[TuningChange]:
-    """The changes that the command line names."""
-    from analyzer.history.stamps import parse_time
-    from analyzer.loops.changes import TuningChange, read_changes
-    from analyzer.pages.changes import detected
+def into_folder(single_text: str) -> Callable[[Command], Command]:
+    """--format, --single-file and --out, handed over as one `folder`; errors told as by `told`."""
+    single = click.option("--single-file", is_flag=True, help=single_text)
+    where = click.option("--out", required=True, type=FILE, help="Folder to write into.")
 
-    if find:
-        return detected(store, [loop] if loop else None, limits)
-    if changes is not None:
-        return [c for c in read_changes(changes, store.zone()) if loop in (None, c.loop)]
-    if loop is not None and changed is not None:
-        return [TuningChange(loop, parse_time(changed, "--changed", store.zone()))]
-    raise InputError("no change named", "--changes FILE, --loop TAG --changed TIME, or --find", "name one")
+    def collecting(command: Command) -> Command:
+        @wraps(command)
+        def collected(form: str, single_file: bool, out: Path, **given: Any) -> Any:
+            return command(folder=Folder(form, single_file, out), **given)
+
+        return formats("html", "markdown")(single(where(told(collected))))
+
+    return collecting
 
 
 def made(store: Store) -> str:
@@ -74,28 +71,9 @@ def made(store: Store) -> str:
     return f"triage {version('loop-triage')}, store {name}, made {stamp(time.time(), zone)}; times in {zone}"
 
 
-def _written(store: Store, pages: Sequence[Page], form: str, out: Path, single_file: bool) -> None:
-    from dataclasses import replace
-
-    from reports.folder import write_csv, write_html, write_markdown
-
-    head, zone = made(store), store.zone()
-    pages = [replace(page, made=head, zone=zone) for page in pages]
-    paths = write_html(pages, out, single_file) if form == "html" else write_markdown(pages, out)
-    for page in pages:
-        write_csv(page, out)
-    click.echo(f"{paths[0]}" + (f" and {len(paths) - 1} more" if len(paths) > 1 else ""))
-
-
-def _subtitle(spans: Spans, store: Path) -> str:
-    stated = spans.before is not None or spans.after is not None
-    span = "The stated spans" if stated else f"{spans.days:g} days"
-    return f"{span} before against after the change, from {store.name}."
-
-
 @click.command()
-@click.argument("store", type=PLACE)
-@click.option("--changes", type=click.Path(path_type=Path), help="CSV: loop, time, kp_old ... ti_new, who.")
+@STORE
+@click.option("--changes", type=FILE, help="CSV: loop, time, kp_old ... ti_new, who.")
 @click.option("--loop", help="One loop's tag.")
 @click.option("--changed", help="When that loop was changed, e.g. 2026-03-09T08:00Z.")
 @click.option("--find", is_flag=True, help="Offer changes seen in the loops' behaviour, for confirmation.")
@@ -104,23 +82,16 @@ def _subtitle(spans: Spans, store: Path) -> str:
 )
 @click.option("--before", nargs=2, help="Span before, start and end, instead of --days.")
 @click.option("--after", nargs=2, help="Span after, start and end, instead of --days.")
-@click.option("--format", "form", type=click.Choice(["html", "markdown"]), default="html", show_default=True)
-@click.option("--single-file", is_flag=True, help="Everything in the page itself.")
-@click.option("--out", required=True, type=click.Path(path_type=Path), help="Folder to write into.")
-@config_option
+@into_folder("Everything in the page itself.")
+@CONFIG
 def report(
     store: Path,
-    changes: Path | None,
-    loop: str | None,
-    changed: str | None,
-    find: bool,
     days: float,
     before: tuple[str, str] | None,
     after: tuple[str, str] | None,
-    form: str,
-    single_file: bool,
-    out: Path,
+    folder: Folder,
     config: Path | None,
+    **named: Any,
 ) -> None:
     """Before and after: what changes of controllers brought, with intervals and verdicts.
 
@@ -137,27 +108,63 @@ def report(
     if not days <= MOST_DAYS:  # NaN passes the range that the option states
         raise InputError(f"--days {days}", f"1 to {MOST_DAYS}", "correct it")
     spans = Spans(days, _span(before, "--before", zone), _span(after, "--after", zone))
-    asked = _asked(kept, changes, loop, changed, find, limits.changes)
-    found, missing = cases(kept, asked, spans, limits.before_after)
+    found, missing = cases(kept, _changes(kept, limits.changes, **named), spans, limits.before_after)
     if not found:
         why = "; ".join(f"{tag}: {reason}" for tag, reason in missing) or "no change found"
         raise InputError(why, "loops and times that the store holds", "check the tags and times")
-    _written(kept, [page(found, missing, _subtitle(spans, store), find, zone)], form, out, single_file)
+    span = "The stated spans" if before or after else f"{days:g} days"
+    subtitle = f"{span} before against after the change, from {store.name}."
+    folder.write(kept, [page(found, missing, subtitle, named["find"], zone)])
     for tag, reason in missing:
         say(f"{tag}: {reason}", err=True)
     sys.exit(SOME_LOST if missing else 0)
 
 
+def _span(texts: Sequence[str] | None, option: str, zone: str) -> Span | None:
+    from analyzer.comparison.before_after import Span
+    from analyzer.history.stamps import parse_time
+
+    if not texts:
+        return None
+    first, last = (parse_time(t, option, zone) for t in texts)
+    seen = f"{option} {texts[0]} {texts[1]}"
+    if last <= first:
+        raise InputError(seen, "an end after the start", "swap them")
+    if last - first > MOST_DAYS * 86400.0:
+        raise InputError(seen, f"at most {MOST_DAYS} days", "give a shorter span")
+    return Span(first, last)
+
+
+def _changes(
+    store: Store,
+    limits: ChangeLimits,
+    changes: Path | None,
+    loop: str | None,
+    changed: str | None,
+    find: bool,
+) -> list[TuningChange]:
+    """The changes that the command line names, or those that the loops' behaviour shows."""
+    from analyzer.history.stamps import parse_time
+    from analyzer.loops.changes import TuningChange, read_changes
+    from analyzer.pages.changes import detected
+
+    if find:
+        return detected(store, [loop] if loop else None, limits)
+    if changes is not None:
+        return [c for c in read_changes(changes, store.zone()) if loop in (None, c.loop)]
+    if loop is not None and changed is not None:
+        return [TuningChange(loop, parse_time(changed, "--changed", store.zone()))]
+    raise InputError("no change named", "--changes FILE, --loop TAG --changed TIME, or --find", "name one")
+
+
 @click.command()
-@click.argument("store", type=PLACE)
-@click.option("--night", help="Night to show, e.g. 2026-03-08. Default: the latest.")
+@STORE
+@NIGHT
 @click.option(
     "--top", default=50, show_default=True, type=click.IntRange(0), help="Loops with a page of their own."
 )
-@click.option("--format", "form", type=click.Choice(["html", "markdown"]), default="html", show_default=True)
-@click.option("--single-file", is_flag=True, help="Style and scripts in each page itself.")
-@click.option("--out", required=True, type=click.Path(path_type=Path), help="Folder to write into.")
-def pages(store: Path, night: str | None, top: int, form: str, single_file: bool, out: Path) -> None:
+@into_folder("Style and scripts in each page itself.")
+def pages(store: Path, night: str | None, top: int, folder: Folder) -> None:
     """The morning page of a night and a page for each of its worst loops.
 
     Example: triage pages store --out pages --top 50
@@ -168,19 +175,15 @@ def pages(store: Path, night: str | None, top: int, form: str, single_file: bool
     kept = Store(store)
     kept.require()
     found = list(night_pages.pages(kept, night, top))
-    if form == "html":
-        found += night_pages.dated_pages(kept, night, lambda name: _stands(kept, out, name))
-    _written(kept, found, form, out, single_file)
-    if form == "html":
+    if folder.form == "html":
+        found += night_pages.dated_pages(kept, night, lambda name: _stands(kept, folder.out, name))
+    folder.write(kept, found)
+    if folder.form == "html":
+        from analyzer.pages.night import name_of
         from reports.folder import forget_stale
 
-        forget_stale(out, [f"{page.name}.html" for page in found], kept_names=_dated(kept))
-
-
-def _dated(store: Store) -> set[str]:
-    from analyzer.pages.night import name_of
-
-    return {f"{name_of(night)}.html" for night in store.nights()}
+        dated = {f"{name_of(night)}.html" for night in kept.nights()}
+        forget_stale(folder.out, [f"{page.name}.html" for page in found], kept_names=dated)
 
 
 def _stands(store: Store, out: Path, night: str) -> bool:
@@ -189,7 +192,3 @@ def _stands(store: Store, out: Path, night: str) -> bool:
 
     page, results = out / f"{name_of(night)}.html", store.path / "nights" / f"{night}.parquet"
     return page.exists() and page.stat().st_mtime > results.stat().st_mtime
-
-
-COMMANDS = (report, pages)
-"""To be added to the command line; errors are told there."""

@@ -1,4 +1,4 @@
-"""The command `run`: parse, call, say what was done; and how it ends when it is stopped."""
+"""The command `run`: the nightly batch, what it says of itself, and how it ends when it is stopped."""
 
 from __future__ import annotations
 
@@ -10,18 +10,11 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import FrameType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from analyzer.commands.options import (
-    NOTHING_DONE,
-    PLACE,
-    SOME_LOST,
-    export_options,
-    say,
-    what_failed,
-)
+from analyzer.commands.options import NOTHING_DONE, PLACE, SOME_LOST, export_options, say, what_failed
 from identification.errors import InputError, TriageError
 from reports.whole_file import is_full
 
@@ -77,6 +70,18 @@ def stoppable() -> Iterator[None]:
             signal.signal(number, handler)
 
 
+@dataclass(frozen=True, slots=True)
+class How:
+    """Worker processes, whether pieces of a stopped run are gone on with, whether what the store has of the nights is
+    forgotten first, the address of a scheduler, if any, and whether flagged loops are explained."""
+
+    jobs: int
+    resume: bool
+    replacing: bool
+    scheduler: str | None
+    explaining: bool
+
+
 @click.command()
 @export_options
 @click.option(
@@ -95,16 +100,7 @@ def stoppable() -> Iterator[None]:
     help="File to which a line is appended for each thing that happened.",
 )
 @click.option("--explain", "explaining", is_flag=True, help="Explain the last night's flagged loops as well.")
-def run(
-    asked: Asked,
-    store: Path,
-    jobs: int,
-    resume: bool,
-    replacing: bool,
-    explaining: bool,
-    log_file: Path | None,
-    scheduler: str | None,
-) -> None:
+def run(asked: Asked, store: Path, log_file: Path | None, **how: Any) -> None:
     """The nightly batch: assess every loop and keep the results in a store.
 
     An export of several days is kept day by day; new settings are advised on for the last of them. A second export of
@@ -120,10 +116,10 @@ def run(
 
     log, begun_s = RunLog(log_file), time.monotonic()
     export = " ".join(map(str, asked.export))
-    log.say("begin", version=version("loop-triage"), store=store, export=export, jobs=jobs)
+    log.say("begin", version=version("loop-triage"), store=store, export=export, jobs=how["jobs"])
     try:
         with stoppable():
-            outcome, loops = _night(asked, store, log, How(jobs, resume, replacing, scheduler), explaining)
+            outcome, loops = _night(asked, store, log, How(**how))
     except StoppedError as stopped:
         log.say("stopped", signal=stopped, status=STOPPED + stopped.number)
         with suppress(OSError):  # the terminal may be gone
@@ -134,7 +130,8 @@ def run(
         if isinstance(error, OSError) and is_full(error):
             raise InputError(what_failed(error), "room to write", f"make room; {_go_on(store)}") from error
         raise
-    status = _status(outcome, loops)
+    lost = NOTHING_DONE if len(outcome.failed) + len(outcome.unassessed) == loops else SOME_LOST
+    status = lost if outcome.failed or lost == NOTHING_DONE else 0
     log.say("end", status=status, night=outcome.nights[-1].name, seconds=time.monotonic() - begun_s)
     sys.exit(status)
 
@@ -143,18 +140,7 @@ def _go_on(store: Path) -> str:
     return f"what is done is kept in {store}: go on with the same command and --resume"
 
 
-@dataclass(frozen=True, slots=True)
-class How:
-    """Worker processes, whether pieces of a stopped run are gone on with, whether what the store has of the nights is
-    forgotten first, and the address of a scheduler, if any."""
-
-    jobs: int
-    resume: bool
-    replacing: bool
-    scheduler: str | None
-
-
-def _night(asked: Asked, place: Path, log: RunLog, how: How, explaining: bool) -> tuple[Outcome, int]:
+def _night(asked: Asked, place: Path, log: RunLog, how: How) -> tuple[Outcome, int]:
     """The export read, assessed and, where it is asked for, explained; the outcome and the number of loops."""
     from analyzer.night.batch import Batch
     from analyzer.store.lock import scratch
@@ -167,7 +153,7 @@ def _night(asked: Asked, place: Path, log: RunLog, how: How, explaining: bool) -
         span = asked.since_s, asked.until_s
         batch = Batch(source, specs, Store(place), asked.config, *span, asked.changes, asked.zone)
         outcome = _assessed(batch, how, log)
-        if explaining and len(outcome.unassessed) + len(outcome.failed) < len(specs):
+        if how.explaining and len(outcome.unassessed) + len(outcome.failed) < len(specs):
             _explained(batch, how, outcome.nights[-1])
     return outcome, len(specs)
 
@@ -215,12 +201,6 @@ def find_out(asked: Asked, began: Callable[[int], None]) -> tuple[Export, Sequen
     return source, specs, notes
 
 
-def _status(outcome: Outcome, loops: int) -> int:
-    if len(outcome.failed) + len(outcome.unassessed) == loops:
-        return NOTHING_DONE
-    return SOME_LOST if outcome.failed else 0
-
-
 def _say(notes: Sequence[str], log: RunLog) -> None:
     for note in notes:
         say(f"triage: {note}", err=True)
@@ -228,32 +208,27 @@ def _say(notes: Sequence[str], log: RunLog) -> None:
 
 
 def _assessed(batch: Batch, how: How, log: RunLog) -> Outcome:
-    """Run the batch with progress and say what came of it."""
+    """Run the batch with progress and say what came of it: what was lost, how many were assessed, of which night."""
     from analyzer.commands.progress import bar
     from analyzer.night import batch as nightly
 
     with bar("loops") as progress:
         outcome = nightly.run(batch, how.jobs, how.resume, how.replacing, how.scheduler, progress)
-    more = len(outcome.notes) - FEW
     _say(outcome.notes[:FEW], log)
-    if more > 0:
+    if len(outcome.notes) > FEW:
+        more = len(outcome.notes) - FEW
         _say([f"{more} further notes on what was read; 'triage check' prints them all"], log)
     for status, lost_loops in (("not assessed", outcome.unassessed), ("failed", outcome.failed)):
         for loop, reason in lost_loops:
             say(f"{loop}: {reason}", err=True)
             log.say("lost", loop=loop, status=status, reason=reason)
-    _say_assessed(batch, outcome, log)
-    return outcome
-
-
-def _say_assessed(batch: Batch, outcome: Outcome, log: RunLog) -> None:
-    """How many loops were assessed, and of which night."""
-    nights, loops = outcome.nights, len(batch.specs)
-    done, failed = loops - len(outcome.unassessed) - len(outcome.failed), len(outcome.failed)
+    nights, loops, failed = outcome.nights, len(batch.specs), len(outcome.failed)
+    done = loops - len(outcome.unassessed) - failed
+    log.say("assessed", loops=done, of=loops, failed=failed, nights=len(nights))
     several = f" ({len(nights)} nights from {nights[0].name})" if len(nights) > 1 else ""
     said = f"{done} of {loops} loops assessed{f', {failed} failed' if failed else ''}"
-    log.say("assessed", loops=done, of=loops, failed=failed, nights=len(nights))
     click.echo(f"{said}, night {nights[-1].name}{several}, in {batch.store.path}", err=True)
+    return outcome
 
 
 def _explained(batch: Batch, how: How, night: Night) -> None:

@@ -8,10 +8,9 @@ from pathlib import Path
 
 import click
 
-from analyzer.commands.options import PLACE, told
+from analyzer.commands.options import PLACE, SOME_LOST, told
 from identification.errors import InputError
 
-SOME_WRONG = 1
 DAYS = {"d": 1, "w": 7, "y": 365}
 SHOWN = 20
 """Files that are named; the rest is counted."""
@@ -62,7 +61,7 @@ def check(path: Path) -> None:
     held = store_care.sizes(kept)
     size = f"{held.nights} nights, {held.tables} tables, {held.bytes / 1e6:.1f} MB"
     click.echo(f"{path}: {size}; " + (f"{found} to look at" if found else "all whole"))
-    sys.exit(SOME_WRONG if found else 0)
+    sys.exit(SOME_LOST if found else 0)
 
 
 @store.command()

@@ -19,7 +19,7 @@ from analyzer.explain.words import (
     share,
 )
 from analyzer.pages.words import number
-from identification.mismatch.forward_selection import Candidate
+from identification.mismatch.selection import Candidate
 from identification.mismatch.words import discriminating_test
 from reports.pages import Cell, Column, Table
 
