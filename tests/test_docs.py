@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -37,6 +38,17 @@ def test_ci_runs_the_readme_tests():
     command = re.search(r"\.venv/bin/python -m pytest.*", shell_blocks()[1])
     assert command is not None
     assert command.group(0) in (ROOT / ".ci" / "run").read_text(encoding="utf-8")
+
+
+def test_floors_are_those_of_the_project():
+    """.ci/oldest pins each dependency of a user at the version from which pyproject.toml allows it, once."""
+    asked = [sys.executable, str(ROOT / ".ci" / "floors.py"), str(ROOT / "pyproject.toml")]
+    pins = subprocess.run(asked, capture_output=True, text=True, check=True).stdout.split()
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    assert [pin.replace("==", ">=") for pin in pins[: len(project["dependencies"])]] == project[
+        "dependencies"
+    ]
+    assert len({pin.split("==")[0] for pin in pins}) == len(pins)
 
 
 @pytest.mark.parametrize("name", sorted(main.commands))
