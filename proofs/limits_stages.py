@@ -22,8 +22,8 @@ from analyzer.loop.oscillation import barely_seen, counting, detect
 from analyzer.loop.quality import prepare
 from analyzer.loop.settings_check import differing
 from analyzer.loops.changes import behaviour_change
-from analyzer.plantwide.rows import likely, swing_of
-from analyzer.plantwide.verdict import followers_of, follows, trace
+from analyzer.plantwide.night import likely, swing_of
+from analyzer.plantwide.verdict import follower_confidence, followers_of, trace
 from analyzer.plantwide.wave import waves_of
 from identification.models import Backlash, Fopdt, Loop, Pid, Stiction
 from identification.record import LoopRecord
@@ -151,11 +151,10 @@ def of_plant(c: Config) -> list[Any]:
             first = counting(by_name[loop].found)
             swing = Swing(0.0, first.oscillating_pct) if first else Swing()
             alone = Finding(loop, "", Status.OK, swing=swing, known={"usable_h": 8.0})
-            said = follows(by_name[loop].confidence, source, c.plant, wave)
-            shown = swing_of(alone, said, c.plant) != swing
-            out.append(
-                (loop, source.loop, {k: round(v) for k, v in said.confidence.items()}, said.strength, shown)
-            )
+            sure = follower_confidence(by_name[loop].confidence, source, c.plant)
+            shown = swing_of(alone, source, wave, c.plant) != swing
+            told = {k: round(v) for k, v in sure.items()}
+            out.append((loop, source.loop, told, c.plant.follower_sign, shown))
     return out
 
 

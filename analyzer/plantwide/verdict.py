@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from analyzer.config import PlantLimits
 from analyzer.loop.decisions import Cause
+from analyzer.loop.finding import Root
 from analyzer.plantwide.compare import Lags
 from analyzer.plantwide.groups import Group, groups_of
 from analyzer.plantwide.source import Candidate, Peer, candidates_of
@@ -21,34 +22,6 @@ BY_WAY = 0.02
 
 
 @dataclass(frozen=True, slots=True)
-class Source:
-    """The loop that another one follows.
-
-    coherence of the two [-]; confidence_pct of the group in it [%]; lag_s, how much later the follower is [s], None
-    where that cannot be told.
-    """
-
-    loop: str
-    coherence: float
-    confidence_pct: float = 100.0
-    lag_s: float | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class Follower:
-    """The verdict on a loop that follows another one, in place of its own.
-
-    source; confidence [%] of each cause; strength of the sign that says so (0 to 1); wave, the loop's part in what is
-    shared.
-    """
-
-    source: Source
-    confidence: Mapping[Cause, float]
-    strength: float
-    wave: Wave | None = None
-
-
-@dataclass(frozen=True, slots=True)
 class Traced:
     """A group with its candidates, the likeliest first.
 
@@ -58,7 +31,7 @@ class Traced:
 
     group: Group
     candidates: tuple[Candidate, ...]
-    links: Mapping[str, Source]
+    links: Mapping[str, Root]
     parents: Mapping[str, str]
     followers: frozenset[str]
 
@@ -68,16 +41,12 @@ class Traced:
         return self.candidates[0].loop
 
 
-def follows(
-    own: Mapping[Cause, float], source: Source, limits: PlantLimits, wave: Wave | None = None
-) -> Follower:
-    """The verdict on a follower, from its own confidences [%] and its source.
-
-    The load is at least as sure as the coherence; what else the loop shows comes from the source.
-    """
-    load = max(own[Cause.LOAD], 100.0 * source.coherence)
-    rest = {c: min(own[c], limits.follower_most_pct) for c in (Cause.VALVE, Cause.TUNING)}
-    return Follower(source, {Cause.LOAD: load, **rest}, limits.follower_sign, wave)
+def follower_confidence(own: Mapping[Cause, float], root: Root, limits: PlantLimits) -> dict[Cause, float]:
+    """The confidences of a follower [%], from its own and its source: the load is at least as sure as the coherence;
+    what else the loop shows comes from the source."""
+    load = max(own.get(Cause.LOAD, 0.0), 100.0 * root.coherence)
+    rest = {c: min(own.get(c, 0.0), limits.follower_most_pct) for c in (Cause.VALVE, Cause.TUNING)}
+    return {Cause.LOAD: load, **rest}
 
 
 def may_follow(own: Peer, other: Peer, level: float, limits: PlantLimits) -> bool:
@@ -112,7 +81,7 @@ def _traced(group: Group, peers: Mapping[str, Peer], limits: PlantLimits) -> Tra
     return Traced(group, candidates, links, _parents(best.loop, lags), frozenset(followers))
 
 
-def _links(group: Group, best: Candidate, lags: Lags) -> dict[str, Source]:
+def _links(group: Group, best: Candidate, lags: Lags) -> dict[str, Root]:
     """How the other loops of a group go with its likeliest source."""
     out = {}
     for member in group.members:
@@ -120,7 +89,7 @@ def _links(group: Group, best: Candidate, lags: Lags) -> dict[str, Source]:
         if loop != best.loop:
             lag = lags.between(best.loop, loop)
             known = lag.lag_s if lag.deviation_s < LAG_KNOWN * abs(lag.lag_s) else None
-            out[loop] = Source(best.loop, max(lag.coherence, member.coherence), best.confidence_pct, known)
+            out[loop] = Root(best.loop, max(lag.coherence, member.coherence), known, best.confidence_pct)
     return out
 
 
@@ -150,12 +119,12 @@ def trace(waves: Sequence[Wave], peers: Mapping[str, Peer], limits: PlantLimits)
     return [t for t in found if t is not None]
 
 
-def followers_of(found: Sequence[Traced]) -> dict[str, tuple[Source, Wave]]:
+def followers_of(found: Sequence[Traced]) -> dict[str, tuple[Root, Wave]]:
     """The source that each follower has, in its larger wave where it follows in two groups.
 
     A loop that leads one group follows nobody in another where its wave is smaller.
     """
-    out: dict[str, tuple[Source, Wave]] = {}
+    out: dict[str, tuple[Root, Wave]] = {}
     leads = {t.source: t.group.waves[t.source].amplitude_pct for t in found if t.followers}
     for t in found:
         waves = t.group.waves
@@ -166,12 +135,12 @@ def followers_of(found: Sequence[Traced]) -> dict[str, tuple[Source, Wave]]:
     return {loop: (_rooted(loop, out), wave) for loop, (_, wave) in out.items()}
 
 
-def _rooted(loop: str, found: Mapping[str, tuple[Source, Wave]]) -> Source:
+def _rooted(loop: str, found: Mapping[str, tuple[Root, Wave]]) -> Root:
     """The source at the end of the chain: a follower's follower follows the loop that leads both."""
     at, seen = found[loop][0], {loop}
     while at.loop in found and at.loop not in seen:
         seen.add(at.loop)
         further = found[at.loop][0]
         level = min(at.coherence, further.coherence)
-        at = Source(further.loop, level, min(at.confidence_pct, further.confidence_pct))
+        at = Root(further.loop, level, None, min(at.confidence_pct, further.confidence_pct))
     return at

@@ -9,7 +9,7 @@ import pytest
 
 from analyzer.loop.decisions import Action, Cause, Due, Fault, Status
 from analyzer.loop.finding import Finding, Remedy, Root, Swing
-from analyzer.night.calmed import told_calmed
+from analyzer.night.finish import told_calmed
 from analyzer.words.reason import reason
 
 NOW = Finding(

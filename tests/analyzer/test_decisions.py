@@ -14,7 +14,7 @@ from analyzer.loop.decisions import CAUSES, Action, Cause, Fault, Lack, LacksErr
 from analyzer.loop.finding import Finding, Remedy, Root, Sign, following
 from analyzer.night import chunk
 from analyzer.night.nights import Night
-from analyzer.plantwide.verdict import Source, follows
+from analyzer.plantwide.verdict import follower_confidence
 from analyzer.store.rows import night_row
 from proofs.plant import CONFIG, START_S, series, spec
 
@@ -43,13 +43,14 @@ def test_a_loop_counts_as_oscillating_from_half_of_the_time_on(share, expected):
 @pytest.mark.parametrize("own", [(0.0, 0.0, 0.0), (99.0, 80.0, 10.0), (10.0, 99.0, 96.0)])
 def test_a_follower_is_under_load_whatever_its_own_signs(own):
     """The load is at least as sure as the coherence and ahead of valve and tuning, and nothing is to be done here."""
-    found = follows(dict(zip(CAUSES, own, strict=True)), Source("FIC101", 0.9), PlantLimits())
+    root = Root("FIC101", 0.9, None, 96.0)
+    confidence = follower_confidence(dict(zip(CAUSES, own, strict=True)), root, PlantLimits())
     alone = Finding("L", "2026-03-02", Status.OK, remedy=Remedy(Action.RETUNE, kp_new=1.0))
-    told = following(alone, Root("FIC101", 0.9, None, 96.0), None, found.confidence, Sign("load", 1.0, ""))
+    told = following(alone, root, None, confidence, Sign("load", 1.0, ""))
     assert (told.cause, told.fault, told.action) == (Cause.LOAD, Fault.NONE, Action.SEE_SOURCE_LOOP)
     assert told.remedy.kp_new is None
-    assert found.confidence[Cause.LOAD] >= max(90.0, own[2])
-    assert max(found.confidence[Cause.VALVE], found.confidence[Cause.TUNING]) <= 25.0
+    assert confidence[Cause.LOAD] >= max(90.0, own[2])
+    assert max(confidence[Cause.VALVE], confidence[Cause.TUNING]) <= 25.0
 
 
 def test_what_a_record_lacks_travels_between_processes():
