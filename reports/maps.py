@@ -28,7 +28,7 @@ NAMES, WIDTH, ROW, FOOT = 120.0, 640.0, 20.0, 44.0
 FIELD = (62.0, 420.0, 270.0, 40.0)
 """Of a field: room for the vertical axis, width, height, room below for the other axis."""
 TITLED = 16.0
-"""How far down from the top a field's vertical axis has its name, where no figure stands."""
+"""How far down from the top a field's vertical axis has its name, where no long figure stands."""
 FAINT = 0.12
 """Opacity of a field's least value."""
 BOX = (150.0, 38.0)
@@ -93,7 +93,8 @@ def field(f: Field) -> Drawing:
     for tick in log_ticks(float(f.x[0]), float(f.x[-1])):
         body += tick_x(x.at(tick), along, f"{tick:g}")
     for tick in log_ticks(float(f.y[0]), float(f.y[-1])):
-        body += tick_y(y.at(tick), across, f"{tick:g}" if y.at(tick) > TITLED else "")
+        down, text = y.at(tick), f"{tick:g}"
+        body += tick_y(down, across, text if down > TITLED or len(text) < 4 else "")
     body.append(written(left + width / 2, height + 32, f.x_label, "middle", "axis"))
     body.append(written(4, 12, f.y_label, "start", "axis"))
     for place in f.places:

@@ -217,33 +217,17 @@ def _curves(t: Tuning, title: str) -> Plot:
 
 def _map(t: Tuning, title: str) -> Field:
     """Valve travel of each pair of settings, where the loop comes to rest, and where it is unstable."""
-    from reports.pages import Field, Place
+    from analyzer.pages.compared import travel_field
+    from reports.pages import Place
 
     c, new = t.model.controller, t.proposal.controller
-    sign = math.copysign(1.0, c.kp)
     kp = c.kp * np.geomspace(1 / SPREAD, SPREAD, MAP_POINTS)
     now_s = _finite_ti(c, t.model.process)
     top = max(SPREAD * now_s, 3 * new.ti_s if new else 0.0)
     found = travel_map(t.model, kp, np.geomspace(now_s / 4, top, MAP_POINTS))
     places = [Place(abs(c.kp), now_s, "now", "now")]
     places += [Place(abs(new.kp), new.ti_s, "proposed", "recommended")] if new else []
-    return Field(
-        "travel-map",
-        f"{title}: predicted travel",
-        "Kp [%/%]",
-        "Ti [s]",
-        sign * found.kp,
-        found.ti_s,
-        3600.0 * found.travel,
-        found.rests,
-        found.unstable,
-        tuple(places),
-        (
-            ("swings", "limit cycle, the darker the more OP travels"),
-            ("calm", "comes to rest"),
-            ("unstable", "unstable"),
-        ),
-    )
+    return travel_field(found, places, f"{title}: predicted travel", "OP")
 
 
 def _finite_ti(controller: Pid, process: Process) -> float:

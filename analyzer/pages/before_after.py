@@ -21,7 +21,7 @@ from analyzer.history.plant_clock import UTC_NAME
 from analyzer.loops.changes import TuningChange
 from analyzer.pages.changes import Case, outcome
 from analyzer.pages.loop_pictures import trend_block
-from analyzer.pages.words import KINDS, counted, heading, interval, plain_cell, setting, signed, stamp
+from analyzer.pages.words import KINDS, columns, counted, interval, plain_cell, setting, signed, stamp, texts
 from reports.pages import (
     Block,
     Cell,
@@ -68,21 +68,6 @@ def _tiles(cases: Sequence[Case]) -> Tiles:
     return Tiles(((str(len(cases)), "changes looked at", ""), *shown))
 
 
-COLUMNS = (
-    heading("loop"),
-    Column("assessment", "Assessment"),
-    Column("unit", "Unit"),
-    Column("before", "Before", True, "Mean over the usable hours before the change"),
-    Column("after", "After", True, "Mean over the usable hours after the change"),
-    Column("change_pct", "Change %", True, "After less before, in % of before"),
-    Column("interval", "Interval"),
-    Column("low", "From", True, csv_only=True, hint="Lower end of the difference, in the figure's unit"),
-    Column("high", "To", True, csv_only=True, hint="Upper end of the difference, in the figure's unit"),
-    Column("verdict", "Verdict"),
-    Column("remark", "Remark", wide=True),
-)
-
-
 def _row(change: Change, found: LoopComparison) -> tuple[Cell, ...]:
     d = change.found
     remark = "; ".join(found.reasons) or (f"follows {found.source_loop}" if found.source_loop else "")
@@ -104,7 +89,7 @@ def _row(change: Change, found: LoopComparison) -> tuple[Cell, ...]:
 def figures(cases: Sequence[Case], primary: bool, name: str, title: str) -> Table:
     """Figures before and after of all loops (the study's Figure 11)."""
     rows = [_row(c, case.found) for case in cases for c in case.found.changes if c.measure.primary == primary]
-    return Table(name, title, COLUMNS, tuple(rows), searchable=len(rows) > 12, facet="verdict")
+    return Table(name, title, columns("figures"), tuple(rows), searchable=len(rows) > 12, facet="verdict")
 
 
 def _settings(change: TuningChange, units: str) -> str:
@@ -113,18 +98,6 @@ def _settings(change: TuningChange, units: str) -> str:
     pairs = (("Kp", change.kp_old, change.kp_new), ("Ti", change.ti_old, change.ti_new))
     said = ", ".join(f"{name} {setting(old)} → {setting(new)}" for name, old, new in pairs)
     return f"{said} ({units})"
-
-
-IN_SHORT = (
-    heading("loop"),
-    Column("description", "Description", wide=True),
-    Column("settings", "Settings", wide=True),
-    *(
-        Column(m.name, f"{m.short_title}, % of before", True, "Change, with its interval", True)
-        for m in PRIMARY
-    ),
-    Column("outcome", "Outcome", wide=True),
-)
 
 
 def _in_short(case: Case) -> tuple[Cell, ...]:
@@ -150,7 +123,10 @@ def _change_cell(change: Change | None) -> Cell:
 def in_short(cases: Sequence[Case]) -> Table:
     """A row a loop."""
     note = "Change of each figure in % of what it was before, with its interval; less is better in all four."
-    return Table("loops", "", IN_SHORT, tuple(map(_in_short, cases)), note, cards=True)
+    *first, last = columns("changes")
+    hint = "Change, with its interval"
+    four = (Column(m.name, f"{m.short_title}, % of before", True, hint, True) for m in PRIMARY)
+    return Table("loops", "", (*first, *four, last), tuple(map(_in_short, cases)), note, cards=True)
 
 
 def _span(first_s: float, last_s: float, usable_h: float, zone: str) -> str:
@@ -219,25 +195,13 @@ def average_chart(cases: Sequence[Case]) -> IntervalChart:
     return IntervalChart("average-change", "Average change", "% of before", bars, caption)
 
 
-METHOD = (
-    "Every figure is the mean of the loop's hourly figures over usable hours (good samples, in automatic); "
-    "the hour of the change and the one after it are left out. Oscillation significance is amplitude times "
-    "regularity times hours of oscillation, a day.",
-    "Intervals: days of 24 hours are drawn at random (circular block bootstrap); the spread is widened for "
-    "few days (Student's t) and for days that drift. Where nothing changed, at most {error:.0f} % of loops "
-    "get any of their four assessments called better or worse.",
-    "Not compared, and never counted: mean SP or PV differing by over {m.set_point_pct:g} % of span, mean OP "
-    "by over {m.load_pct:g} %, time in automatic by over {m.mode_points:g} points, OP at a limit for over "
-    "{m.limit_points:g} % of the time, set point travel more than {m.sp_travel_ratio:g}-fold, under "
-    "{m.least_days:g} usable days a side or under {share:.0f} % of a span.",
-    "Modest: all four better, and one of them by less than {m.modest_pct:g} %. Changes under "
-    "{m.least_pct:g} % are not called better or worse.",
-)
-
-
 def _method(limits: ComparisonLimits) -> Section:
     said = {"m": limits, "error": 100 * (1 - limits.confidence), "share": 100 * limits.usable_share}
-    return Section("How the figures are made", (Text(tuple(t.format(**said) for t in METHOD)),), closed=True)
+    return Section(
+        "How the figures are made",
+        (Text(tuple(t.format(**said) for t in texts("method").values())),),
+        closed=True,
+    )
 
 
 OFFERED = "These changes were not stated but seen in the loops' behaviour: confirm them first."

@@ -28,20 +28,8 @@ from analyzer.store.store import Store
 from analyzer.words.units import gain_unit
 
 COLUMNS = (
-    *(
-        "loop",
-        "night",
-        "description",
-        "type",
-        "gain_unit",
-        "ti_unit",
-        "pv_unit",
-        "op_unit",
-        "form",
-        "kp",
-        "ti",
-    ),
-    *("start_s", "status", "source_loop", "oscillating_pct", "extra", "pv_lo", "pv_hi"),
+    *("loop", "night", "description", "type", "gain_unit", "ti_unit", "pv_unit", "op_unit", "form", "kp"),
+    *("ti", "start_s", "status", "source_loop", "oscillating_pct", "extra", "pv_lo", "pv_hi"),
 )
 CHANGES = ChangeLimits()
 """The limits in force where none are given."""

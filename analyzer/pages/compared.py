@@ -4,24 +4,23 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from analyzer.loop.settings_side_by_side import SPREAD, Comparison, Shown
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import unit_ratio
-from analyzer.pages.words import number
+from analyzer.pages.words import columns, number
 from analyzer.words.units import duration, gain_unit
-from identification.models import Integrator, Pid
+from identification.models import Integrator
 from identification.simulation.closed_loop import scan_step
 from identification.simulation.lag import discretize
 from identification.simulation.valve import constants_of
 from reports.pages import (
     Block,
     Cell,
-    Column,
     Field,
     Line,
     Page,
@@ -37,6 +36,7 @@ from reports.texts import slug
 from tuning.describing import band, is_play
 from tuning.forecast import LAMBDA, LEAST_PRELUDE, LONGER, NOW, PRELUDE, RECOMMENDED, SIMC, Tried
 from tuning.frequency_response import slowest_s
+from tuning.harmonic_balance import TravelMap
 from tuning.limit_cycle import KICK
 from tuning.limits import WARM_UP
 from tuning.rules import simc
@@ -53,22 +53,6 @@ MEANING = {
     LAMBDA: "Kp = T/(K (lambda + L)), Ti = T, lambda = T, 3 L at least; knows no valve",
     LONGER: "the present gain, Ti raised to the time constant: the source study's rule for play",
 }
-COLUMNS = (
-    Column("name", "Settings"),
-    Column("kp", "Kp", True),
-    Column("ti", "Ti", True),
-    Column("travel", "Stem travel %/h", True),
-    Column("error", "Average absolute error", True),
-    Column("peak", "Largest error", True),
-    Column(
-        "rejection",
-        "After a load step, times now",
-        True,
-        "Integral of the error that a step of the load leaves, Ti/Kp, over that of the present settings",
-    ),
-    Column("ms", "Ms", True, "Maximum sensitivity of the linear loop: 1.4 to 2 is robust"),
-    Column("meaning", "What it is", wide=True),
-)
 CAUTION = (
     "Recommended are only settings that keep robustness, load rejection and error on all that the night's data "
     "allow, with little more gain: a valve that jumps looks like one with play behind a process of less gain."
@@ -90,52 +74,38 @@ def _rejection(t: Tried, now: Tried) -> Cell:
     return Cell(number(ratio), ratio, _against(ratio, 1.0))
 
 
-def _ti(seconds_or_none: float, unit: str) -> str:
-    return "none" if seconds_or_none == 0 else f"{seconds_or_none:.3g} {unit}"
-
-
 def table(c: Comparison, spec: LoopSpec, unit: str) -> Table:
     """The settings with what they do on the load."""
-    scale, now = c.pv_span / 100.0, c.tried[0]
-    gain = gain_unit(spec.gain_unit, spec.pv_unit, spec.op_unit)
-    meaning = MEANING | (INTEGRATOR if isinstance(c.loop.process, Integrator) else {})
-    rows = []
-    for t in c.tried:
-        kp, ti = c.stated[t.name]
-        ms = "unstable" if math.isinf(t.ms) else f"{t.ms:.2f}"
-        rows.append(
-            (
-                Cell(t.name, kind="strong" if t.name == RECOMMENDED else ""),
-                Cell(f"{kp:.3g} {gain}", kp),
-                Cell(_ti(ti, spec.ti_unit), ti),
-                Cell(number(t.stem_travel), t.stem_travel, _against(t.stem_travel, now.stem_travel)),
-                Cell(f"{number(scale * t.error)} {unit}", t.error, _against(t.error, now.error)),
-                Cell(f"{number(scale * t.peak)} {unit}", t.peak, _against(t.peak, now.peak)),
-                _rejection(t, now),
-                Cell(ms, None if math.isinf(t.ms) else t.ms),
-                Cell(meaning[t.name]),
-            )
-        )
+    rows = tuple(_row(t, c, spec, unit) for t in c.tried)
+    lasts = duration(c.load.size * scan_step(c.loop))
     note = (
-        f"Each simulated on the {duration(c.load.size * scan_step(c.loop))} of load that the night leaves behind the "
-        f"identified loop. {CAUTION}"
+        f"Each simulated on the {lasts} of load that the night leaves behind the identified loop. {CAUTION}"
     )
-    return Table("settings", "", COLUMNS, tuple(rows), note)
+    return Table("settings", "", columns("settings"), rows, note)
+
+
+def _row(t: Tried, c: Comparison, spec: LoopSpec, unit: str) -> tuple[Cell, ...]:
+    scale, now, (kp, ti) = c.pv_span / 100.0, c.tried[0], c.stated[t.name]
+    meaning = MEANING | (INTEGRATOR if isinstance(c.loop.process, Integrator) else {})
+    ms = "unstable" if math.isinf(t.ms) else f"{t.ms:.2f}"
+    return (
+        Cell(t.name, kind="strong" if t.name == RECOMMENDED else ""),
+        Cell(f"{kp:.3g} {gain_unit(spec.gain_unit, spec.pv_unit, spec.op_unit)}", kp),
+        Cell("none" if ti == 0 else f"{ti:.3g} {spec.ti_unit}", ti),
+        Cell(number(t.stem_travel), t.stem_travel, _against(t.stem_travel, now.stem_travel)),
+        Cell(f"{number(scale * t.error)} {unit}", t.error, _against(t.error, now.error)),
+        Cell(f"{number(scale * t.peak)} {unit}", t.peak, _against(t.peak, now.peak)),
+        _rejection(t, now),
+        Cell(ms, None if math.isinf(t.ms) else t.ms),
+        Cell(meaning[t.name]),
+    )
 
 
 def _plot(t: Tried, shown: Shown, scale: float, unit: str, reach: float) -> Plot:
     line = Line("SP − PV", shown.time_s / 60.0, scale * shown.error)
     words = f"travel {number(t.stem_travel)} %/h, error {number(scale * t.error)} {unit}"
-    return Plot(
-        f"tried-{slug(t.name)}",
-        t.name,
-        "minutes",
-        f"SP − PV [{unit}]",
-        (line,),
-        (),
-        words,
-        reach=(-reach, reach),
-    )
+    name, axis, ends = f"tried-{slug(t.name)}", f"SP − PV [{unit}]", (-reach, reach)
+    return Plot(name, t.name, "minutes", axis, (line,), (), words, reach=ends)
 
 
 def panels(c: Comparison, unit: str) -> Panels:
@@ -146,33 +116,41 @@ def panels(c: Comparison, unit: str) -> Panels:
     return Panels("tried", "The error under each of them, on the same load", plots)
 
 
-def field(c: Comparison) -> Field | None:
-    """The travel of the limit cycle over Kp and Ti, with the settings as points; None where the valve is free."""
-    if c.travel is None:
-        return None
-    sign = math.copysign(1.0, c.loop.controller.kp)
-    inside = [t for t in c.tried if math.isfinite(t.controller.ti_s)]
-    kinds = {NOW: "now", RECOMMENDED: "recommended"}
-    places = tuple(
-        Place(abs(t.controller.kp), t.controller.ti_s, t.name, kinds.get(t.name, "rule")) for t in inside
-    )
-    sticks = not is_play(c.loop.valve)
-    swings = "limit cycle, the darker the more the stem travels"
-    calm = ("calm", "comes to rest") if not sticks else ("calm", "comes to rest (seldom with stick-slip)")
+def travel_field(found: TravelMap, places: Sequence[Place], title: str, moves: str, rest: str = "") -> Field:
+    """The travel of the limit cycle over Kp and Ti, with settings as points.
+
+    moves, rest : what travels, and what is said of settings at rest.
+    """
+    keys = (("swings", f"limit cycle, the darker the more {moves} travels"), ("calm", f"comes to rest{rest}"))
     return Field(
         "travel-map",
-        "Travel by describing function, without load",
+        title,
         "Kp [%/%]",
         "Ti [s]",
-        sign * c.travel.kp,
-        c.travel.ti_s,
-        3600.0 * c.travel.travel,
-        c.travel.rests,
-        c.travel.unstable,
-        places,
-        (("swings", swings), calm, ("unstable", "unstable")),
-        "Kp in percent of OP over percent of PV, whatever unit the controller has.",
+        np.abs(found.kp),
+        found.ti_s,
+        3600.0 * found.travel,
+        found.rests,
+        found.unstable,
+        tuple(places),
+        (*keys, ("unstable", "unstable")),
     )
+
+
+def field(c: Comparison) -> Field | None:
+    """The travel map with all settings that are compared; None where the valve is free."""
+    if c.travel is None:
+        return None
+    kinds = {NOW: "now", RECOMMENDED: "recommended"}
+    places = [
+        Place(abs(t.controller.kp), t.controller.ti_s, t.name, kinds.get(t.name, "rule"))
+        for t in c.tried
+        if math.isfinite(t.controller.ti_s)
+    ]
+    rest = "" if is_play(c.loop.valve) else " (seldom with stick-slip)"
+    title = "Travel by describing function, without load"
+    caption = "Kp in percent of OP over percent of PV, whatever unit the controller has."
+    return replace(travel_field(c.travel, places, title, "the stem", rest), caption=caption)
 
 
 def _kick(c: Comparison) -> dict[str, float]:
@@ -190,8 +168,8 @@ def _kick(c: Comparison) -> dict[str, float]:
     }
 
 
-def _named(name: str, pid: Pid) -> dict[str, Any]:
-    return {"name": name, "kp": pid.kp, "ti_s": pid.ti_s if math.isfinite(pid.ti_s) else None}
+def _finite(x: float) -> float | None:
+    return x if math.isfinite(x) else None
 
 
 def model(c: Comparison, spec: LoopSpec, unit: str) -> str:
@@ -199,14 +177,11 @@ def model(c: Comparison, spec: LoopSpec, unit: str) -> str:
     loop, h = c.loop, scan_step(c.loop)
     d, pid = discretize(loop.process, h), c.loop.controller
     breakaway, sliding, tolerance = constants_of(loop.valve)
+    settings = [{"name": t.name, "kp": t.controller.kp, "ti_s": _finite(t.controller.ti_s)} for t in c.tried]
     return json.dumps(
         {
             "process": {"pole": d.pole, "now": d.now, "before": d.before, "delay": d.delay},
-            "valve": {
-                "breakaway": breakaway,
-                "sliding": sliding,
-                "tolerance": tolerance if math.isfinite(tolerance) else None,
-            },
+            "valve": {"breakaway": breakaway, "sliding": sliding, "tolerance": _finite(tolerance)},
             "scan_s": h,
             "td_s": pid.td_s,
             "op_lo": pid.op_lo,
@@ -214,7 +189,7 @@ def model(c: Comparison, spec: LoopSpec, unit: str) -> str:
             "op_start": 0.5 * (pid.op_lo + pid.op_hi),
             "warm_up": WARM_UP,
             "prelude": _kick(c),
-            "settings": [_named(t.name, t.controller) for t in c.tried],
+            "settings": settings,
             "ti_middle_s": simc(loop.process, scan_s=h).ti_s,
             "spread": SPREAD,
             "opening_h": max(float(s.time_s[-1]) for s in c.shown.values()) / 3600.0,
@@ -241,9 +216,6 @@ def page(loop: str, night: str, c: Comparison, spec: LoopSpec) -> Page:
     said = "The load adds to PV as it did in the night; what the model lacks, and a load that changes, are not in it."
     tried = WhatIf("try", "Kp and Ti moved, the night simulated again", model(c, spec, unit), c.load, said)
     hint = Text((HINT,))
-    return Page(
-        f"{slug(loop)}-settings",
-        f"{loop}: settings",
-        f"settings compared and tried on night {night}",
-        (Section("Settings compared", tuple(first)), Section("Try settings", (hint, tried))),
-    )
+    sections = Section("Settings compared", tuple(first)), Section("Try settings", (hint, tried))
+    subtitle = f"settings compared and tried on night {night}"
+    return Page(f"{slug(loop)}-settings", f"{loop}: settings", subtitle, sections)

@@ -11,7 +11,7 @@ import numpy as np
 from analyzer.columns import GROUP_LIST, GROUPS, row_of
 from analyzer.loop.decisions import GroupRole
 from analyzer.pages.reading import Thinned, proposal
-from analyzer.pages.words import Row, cause_cell, counted, duration, number, plain_cell
+from analyzer.pages.words import Row, cause_cell, columns, counted, duration, number, plain_cell, texts
 from analyzer.plantwide.view import GroupView, read_groups
 from analyzer.store.store import Store
 from analyzer.words.present import figure
@@ -111,25 +111,10 @@ def _heading(name: str) -> Column:
     return Column(name, declared.heading + unit, declared.is_number, declared.hint)
 
 
-MORNING = (
-    Column("group", "Group"),
-    Column("loops", "Loops", True),
-    Column("group_period_s", "Period", True, DECLARED["group_period_s"].hint),
-    Column(
-        "fix_first", "Fix first", False, "Loop at which the oscillation starts, with its confidence.", True
-    ),
-    Column("action", "Action there", wide=True),
-    Column(
-        "gain", "Others gain", True, "Average absolute error that would go in the other loops, % of span."
-    ),
-    Column("members", "Others", wide=True),
-)
-
-
 def morning_table(groups: Sequence[GroupView]) -> Table:
     """One cause, several loops: the groups of a night, those that cost most first."""
     note = "Repair or retune the first loop, then look at the others again."
-    return Table("groups", "", MORNING, tuple(map(_morning_row, groups)), note)
+    return Table("groups", "", columns("groups"), tuple(map(_morning_row, groups)), note)
 
 
 def _morning_row(g: GroupView) -> tuple[Cell, ...]:
@@ -169,31 +154,18 @@ def _member(g: GroupView, row: Row, paged: frozenset[str]) -> tuple[Cell, ...]:
     )
 
 
-SIGN_WORDS = {
-    "valve": "its own valve is at fault",
-    "best_valve": "its valve has the most evidence of the group",
-    "tuning": "its own tuning oscillates",
-    "oscillates": "it oscillates by itself",
-    "first": "it moves before the others",
-    "foresees": "its past foresees the others",
-    "central": "the others go with it best",
-    "clear": "its wave is the clearest",
-    "share": "most of its error is the wave",
-    "nonlinear": "its wave is bent most",
-}
-
-
 def _signs(g: GroupView) -> Table:
     """Why there: the signs of the likeliest candidates side by side."""
     shown = [r for r in g.rows[:5] if r["group_signs"]]
-    columns = (Column("sign", "Sign", wide=True), *(Column(r["loop"], r["loop"], True) for r in shown))
+    sign = Column("sign", "Sign", wide=True)
+    heads = (sign, *(Column(r["loop"], r["loop"], True) for r in shown))
     kept = [json.loads(r["group_signs"]) for r in shown]
     rows = tuple(
         (Cell(text), *(Cell(f"{signs.get(k, 0.0):.2f}", signs.get(k, 0.0)) for signs in kept))
-        for k, text in SIGN_WORDS.items()
+        for k, text in texts("signs").items()
     )
     note = "From 0 to 1; who is first from -1 to 1. triage config says what each adds to the odds."
-    return Table("signs", "", columns, rows, note)
+    return Table("signs", "", heads, rows, note)
 
 
 def page(g: GroupView, trends: Mapping[str, Thinned], night: str, paged: frozenset[str]) -> Page:

@@ -20,9 +20,8 @@ from analyzer.pages.words import (
     beside,
     cause_cell,
     cell,
+    columns,
     duration,
-    heading,
-    headings,
     number,
     plain_cell,
     scale_of,
@@ -30,7 +29,7 @@ from analyzer.pages.words import (
 )
 from analyzer.words.units import row_settings
 from identification.mismatch.words import check
-from reports.pages import Block, Cell, Column, Facts, Line, Listing, Page, Plot, Section, Table, Text
+from reports.pages import Block, Cell, Facts, Line, Listing, Page, Plot, Section, Table, Text
 from reports.texts import slug
 
 WEEK = 7
@@ -114,11 +113,6 @@ def _verdict(row: Row) -> Section:
 
 
 def _evidence(row: Row) -> Section:
-    columns = (
-        Column("points_to", "Points to"),
-        Column("strength", "Strength", True),
-        Column("sign", "Sign", wide=True),
-    )
     signs = sorted(json.loads(row["signs"] or "[]"), key=lambda s: -s["strength"])
     rows = tuple(
         (
@@ -128,7 +122,9 @@ def _evidence(row: Row) -> Section:
         )
         for s in signs
     )
-    blocks: list[Block] = [Table("evidence", "", columns, rows)] if rows else [Text(("No sign of a fault.",))]
+    blocks: list[Block] = (
+        [Table("evidence", "", columns("evidence"), rows)] if rows else [Text(("No sign of a fault.",))]
+    )
     known = [titled(k, number(row[k])) for k in (*MODEL, *LIKELIHOOD) if row[k] is not None]
     if known:
         blocks.append(Facts(tuple(known)))
@@ -149,13 +145,8 @@ def _limit_cycle(row: Row) -> list[Section]:
     known = [(name, row[p], row[a]) for name, p, a in CYCLES if row[p] is not None]
     if len(known) < 2:
         return []
-    columns = (
-        Column("cycle", "Limit cycle"),
-        heading("period_s"),
-        Column("amplitude_pct", "PV amplitude %", True),
-    )
     rows = tuple((Cell(name), Cell(duration(p), p), plain_cell(a)) for name, p, a in known)
-    return [Section("Limit cycle", (Table("limit-cycle", "", columns, rows),))]
+    return [Section("Limit cycle", (Table("limit-cycle", "", columns("limit-cycle"), rows),))]
 
 
 def _trends(thin: Thinned | None, row: Row) -> list[Section]:
@@ -166,22 +157,15 @@ def _trends(thin: Thinned | None, row: Row) -> list[Section]:
     return [Section("PV over OP, and its rhythm", pictures)]
 
 
-HISTORY = (
-    *headings("night", "cause", "oscillation_significance", "oscillating_pct", "period_s"),
-    *headings("average_absolute_error_pct", "valve_travel_pct_per_h", "variability_pct"),
-    heading("action", wide=True),
-)
-
-
 def _night(row: Row) -> tuple[Cell, ...]:
     """One night's cells; the last says why where the loop was not assessed."""
-    cells = tuple(cell(row, column.key) for column in HISTORY)
+    cells = tuple(cell(row, column.key) for column in columns("history"))
     return cells if row["status"] == Status.OK else (*cells[:-1], Cell(f"{row['status']}: {row['reason']}"))
 
 
 def history(rows: Sequence[Row]) -> Section:
     """A table of a loop's nights, the last first, and a picture of how its oscillation grew or fell."""
-    blocks: list[Block] = [Table("history", "", HISTORY, tuple(_night(r) for r in reversed(rows)))]
+    blocks: list[Block] = [Table("history", "", columns("history"), tuple(map(_night, reversed(rows))))]
     known = [(i - len(rows) + 1.0, r["oscillation_significance"]) for i, r in enumerate(rows)]
     points = np.array([(x, y) for x, y in known if y is not None], float)
     if len(points) > 2:

@@ -8,9 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analyzer.loop.decisions import Cause
 from analyzer.pages.reading import Thinned
-from analyzer.pages.words import PLAIN, Row, Scale, duration, scale_of
+from analyzer.pages.words import PLAIN, Row, Scale, duration, scale_of, texts
 from identification.record import Mask
 from identification.signals.correlation import lag_sums
 from reports.pages import Band, Floats, Line, Mark, Panels, Plot, Sparkline, Text, Trend
@@ -31,12 +30,6 @@ LEAST_BUCKETS = 2.5
 """Buckets a period needs to be seen in a thinned trend [-]; below 2 it is folded (Nyquist)."""
 SHOWN_PERIODS = 8.0
 """Length of the autocorrelation shown [periods]."""
-SAID = {
-    Cause.VALVE: "Thick: OP has turned and moves, the stem does not follow yet. PV stands there, or goes on, "
-    "and answers only afterwards; behind a sound valve it would answer at once.",
-    Cause.TUNING: "PV follows OP from the turn on, time and again: the valve answers, the swing is the loop's own.",
-    Cause.LOAD: "PV turns before OP does, or without it: what moves PV comes from outside, OP only follows.",
-}
 STANDS = "OP moves, the stem stands"
 
 
@@ -166,7 +159,7 @@ def turn_panels(row: Row, scale: Scale) -> Panels | None:
         Plot("turns-pv", "PV since OP's turn", minutes, pv, pv_lines, reach=(0.0, 0.0)),
         Plot("turns-plane", f"PV over OP{delay}", "OP [%]", pv, plane, reach=reach),
     )
-    said = SAID.get(row["cause"], "Half-cycles laid over one another.")
+    said = texts("half_cycles").get(row["cause"], "Half-cycles laid over one another.")
     title = f"The last {len(halves)} half-cycles, from each turn of OP (falling ones turned over)"
     return Panels("turns", title, plots, said)
 

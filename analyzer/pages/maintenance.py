@@ -2,96 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 from analyzer.lanes.lanes import lanes_in
 from analyzer.loop.decisions import Action, Cause, Fault, Lane, Status
 from analyzer.pages.reading import Night, linked
-from analyzer.pages.words import Row, cell, counted, duration, heading, headings, plain_cell
+from analyzer.pages.words import Row, cell, columns, counted, duration, plain_cell, texts
 from analyzer.words.reason import STEPS
 from analyzer.words.units import changed_settings
-from reports.pages import Cell, Column, Page, Section, Table
+from reports.pages import Cell, Page, Section, Table
 
-NEXT_NIGHT = "Look at this loop again the night after."
-BY_HAND = {
-    Fault.STICTION: "PV, or the stem, stands for two or three steps and then jumps by about {width:.2g} %",
-    Fault.BACKLASH: "PV, or the stem, answers the turn down only after about {width:.2g} %",
-}
-"""What a stroke test shows of a valve at fault."""
-DEAD, OUTSIDE, AT_LIMIT = "dead", "outside", "at limit"
-"""Cases of an action that have an order of their own."""
-ORDERS: Mapping[str, tuple[str, str, str]] = {
-    Action.RETUNE: (
-        "type in {settings} ({form} form), bumpless, while the loop is calm",
-        "{expected}",
-        "After a week, triage report STORE --loop {loop} --changed TIME --out report shows whether it helped.",
-    ),
-    Action.REPAIR_VALVE: (
-        "in manual, with the process calm, move OP in steps of {step} %, four times up and four times down, "
-        "and wait each time",
-        "{answer}; then look at positioner feedback, linkage, packing and actuator",
-        "Until it is repaired the loop goes on cycling; what was tried is told below.",
-    ),
-    DEAD: (
-        "in manual, with the process calm, move OP by 5 % up and down",
-        "PV, or the stem, does not answer: air supply, positioner, linkage, a closed hand valve",
-        NEXT_NIGHT,
-    ),
-    Action.SEE_SOURCE_LOOP: (
-        "leave this loop's valve and settings alone; work on {source} first",
-        "both trends beneath each other: {source} leads, or both turn together",
-        NEXT_NIGHT,
-    ),
-    Action.CHECK_SETTINGS: (
-        "compare the controller's settings with loops.csv and correct what is wrong",
-        "{advice}",
-        "New settings, if any, come with the next night.",
-    ),
-    Action.CHECK_MEASUREMENT: (
-        "compare PV in the historian with display and transmitter, and its range with that in loops.csv",
-        "{reason}",
-        "What else is said of this loop rests on its PV.",
-    ),
-    Action.NEEDS_DATA: (
-        "give it what it lacks{lack}",
-        "{advice}",
-        "It is assessed as soon as a night has it.",
-    ),
-    OUTSIDE: (
-        "nothing at this loop: what moves it comes from outside, and no loop of the night moves first",
-        "what else has a period of {period}: a batch, a pump, a loop not exported",
-        "Other settings would follow the load better or worse, not stop it.",
-    ),
-    Action.NONE: ("nothing tonight", "{advice}", ""),
-    AT_LIMIT: (
-        "see why OP rests at its limit: no settings bring PV to SP while it does",
-        "the valve's size, a closed hand valve or bypass, pressure and temperature of what feeds it",
-        NEXT_NIGHT,
-    ),
-    Action.UNDECIDED: (
-        "put the controller in manual for some periods while the process is calm",
-        "a swing that stops is the loop's own (valve or tuning); one that goes on comes from outside",
-        'Note what was seen: triage note STORE {loop} "..."',
-    ),
-}
-"""What to do, what to look for, and what comes after."""
-ELSE = {
-    Action.CHECK_SETTINGS: "a gain or an integral time that is not as stated",
-    Action.CHECK_MEASUREMENT: "a frozen or shifted signal",
-    Action.NEEDS_DATA: "{reason}",
-}
-"""What to look for where the night says nothing of it."""
 NAME = "maintenance"
 TRAVELLED = 20
 """Valves that are listed for their travel alone."""
-FAULTY = (
-    *headings("loop", "description", "area", "valve_fault"),
-    Column("width", "Width %", True, "Play or stickband, % of OP"),
-    heading("valve_travel_pct_per_h"),
-    Column("test", "Test", wide=True),
-    Column("found", "Found, by whom", wide=True),
-)
-WORN = headings("loop", "description", "area", "valve_travel_pct_per_h", "cause", "action")
 
 
 def _width(row: Row) -> float | None:
@@ -101,7 +22,7 @@ def _width(row: Row) -> float | None:
 
 def _answer(row: Row) -> str:
     """What a valve at fault does in a stroke test; '' where it does not answer."""
-    width, kind = _width(row), BY_HAND.get(row["valve_fault"], "")
+    width, kind = _width(row), texts("by_hand").get(row["valve_fault"], "")
     return kind.format(width=width) if width else ""
 
 
@@ -121,11 +42,11 @@ def _case(row: Row) -> str:
     """The order that a row asks for."""
     action = Action(row["action"])
     if action is Action.REPAIR_VALVE and not _answer(row):
-        return DEAD
+        return "dead valve"
     if action is Action.NONE and row["cause"] == Cause.LOAD:
-        return OUTSIDE
+        return "moved from outside"
     if action is Action.UNDECIDED and row["cause"] == Cause.NONE and Lane.AT_LIMIT in lanes_in(row):
-        return AT_LIMIT
+        return "at limit"
     return action
 
 
@@ -153,8 +74,9 @@ def work_order(row: Row) -> tuple[tuple[str, str], ...]:
         said |= {"answer": _answer(row), "step": _step(row)}
     if row["action"] == Action.RETUNE:
         said |= {"settings": changed_settings(row), "expected": _expected(row)}
-    do, look, after = (text.format(**said) for text in ORDERS[_case(row)])
-    return ("Do", do), ("Look for", look or ELSE.get(row["action"], "").format(**said)), ("Then", after)
+    order = {part: text.format(**said) for part, text in texts("orders")[_case(row)].items()}
+    look = order["look"] or order.get("else", "")
+    return ("Do", order["do"]), ("Look for", look), ("Then", order["after"])
 
 
 def _cells(night: Night, row: Row) -> tuple[Cell, ...]:
@@ -178,7 +100,7 @@ def faulty(night: Night) -> Table:
         "then look at positioner feedback, linkage, packing and actuator. "
         "With new settings a loop can wait for the shutdown."
     )
-    return Table("valves", "", FAULTY, tuple(_cells(night, r) for r in rows), note, cards=True)
+    return Table("valves", "", columns("valves"), tuple(_cells(night, r) for r in rows), note, cards=True)
 
 
 def worn(night: Night) -> Table:
@@ -186,9 +108,9 @@ def worn(night: Night) -> Table:
     rows = [r for r in night.rows if r["valve_travel_pct_per_h"] is not None]
     rows.sort(key=lambda r: -r["valve_travel_pct_per_h"])
     shown = rows[:TRAVELLED]
-    cells = tuple((linked(night, r["loop"]), *(cell(r, c.key) for c in WORN[1:])) for r in shown)
+    cells = tuple((linked(night, r["loop"]), *(cell(r, c.key) for c in columns("travel")[1:])) for r in shown)
     note = "Travel of OP, or of the stem where it is recorded; where the loop is tight, its settings wear the valve."
-    return Table("travel", "", WORN, cells, note, cards=True)
+    return Table("travel", "", columns("travel"), cells, note, cards=True)
 
 
 def page(night: Night) -> Page:

@@ -15,28 +15,15 @@ from analyzer.pages.news import since
 from analyzer.pages.plant import NightSum, area_table, history, plant_map
 from analyzer.pages.reading import Night, linked, needs_a_look, oscillates
 from analyzer.pages.summary import first_things
-from analyzer.pages.words import Row, cause_cell, cell, counted, heading, headings, marked_cell
+from analyzer.pages.words import Row, cause_cell, cell, columns, counted, heading, marked_cell
 from analyzer.plantwide.view import GroupView
 from analyzer.words.units import changed_settings, row_settings
-from reports.pages import Cell, Column, Listing, Page, Section, Sparkline, Table, Tiles
+from reports.pages import Cell, Listing, Page, Section, Sparkline, Table, Tiles
 
-BEFORE_COST = (heading("loop"), heading("description", wide=True), Column("trend", "Ten periods of PV"))
-AFTER_COST = (
-    *(heading("period_s"), heading("cause"), heading("reason", wide=True), heading("action")),
-    Column("settings", "Settings, now and new", wide=True),
-    Column("note", "Note", wide=True, hint="Newest note: triage note STORE LOOP TEXT"),
-)
 FOLLOWER = "\u2514 "
 """Before the name of a loop that stands under the one it follows."""
 ALL_SHARES = ("oscillating_pct", "osc_valve_pct", "osc_tuning_pct", "osc_load_pct")
 ALL_COSTS = ("average_absolute_error_pct", "valve_travel_pct_per_h", "variability_pct")
-ALL = (
-    *headings(
-        "loop", "description", "type", "area", SIGNIFICANCE, *ALL_SHARES, "cause", *ALL_COSTS, "action"
-    ),
-    replace(heading("percent_of"), csv_only=True),
-)
-LOST = (*headings("loop", "status"), heading("reason", wide=True))
 LINKS = (
     ("Hand-over to maintenance", f"{maintenance.NAME}.html"),
     ("All loops as CSV", "csv/index-ranking.csv"),
@@ -77,9 +64,10 @@ def worst_table(night: Night) -> Table:
     said = f"Hidden by their notes: {', '.join(hidden)}." if hidden else ""
     said += f" {MARK} {OF_RECORDED}." if any(mark(r, by) for r in night.worst) else ""
     noted = any(row[-1].text for row in rows)
-    columns = (*BEFORE_COST, heading(by), *(AFTER_COST if noted else AFTER_COST[:-1]))
-    rows = tuple(row[: len(columns)] for row in rows)
-    return Table("worst", "", columns, rows, said.strip(), len(rows) > 10, "cause", cards=True)
+    declared = columns("worst") if noted else columns("worst")[:-1]
+    shown = (*declared[:3], heading(by), *declared[3:])
+    rows = tuple(row[: len(shown)] for row in rows)
+    return Table("worst", "", shown, rows, said.strip(), len(rows) > 10, "cause", cards=True)
 
 
 def _all_row(night: Night, row: Row) -> tuple[Cell, ...]:
@@ -98,7 +86,8 @@ def ranking(night: Night) -> Table:
     """All loops of the night."""
     marked = any(mark(row, name) for row in night.rows for name in (SIGNIFICANCE, *ALL_COSTS))
     note = f"{MARK} {OF_RECORDED}." if marked else ""
-    return Table("ranking", "", ALL, tuple(_all_row(night, r) for r in night.rows), note, True, "cause")
+    rows = tuple(_all_row(night, r) for r in night.rows)
+    return Table("ranking", "", columns("ranking"), rows, note, True, "cause")
 
 
 def _tiles(night: Night) -> Tiles:
@@ -114,8 +103,9 @@ def _tiles(night: Night) -> Tiles:
 def lost_table(night: Night) -> Table:
     """Loops that were not assessed, and why."""
     lost = sorted((r for r in night.rows if r["status"] != Status.OK), key=lambda r: r["loop"])
-    rows = tuple(tuple(cell(r, column.key) for column in LOST) for r in lost)
-    return Table("not-assessed", "", LOST, rows, searchable=len(rows) > 12)
+    shown = columns("not-assessed")
+    rows = tuple(tuple(cell(r, column.key) for column in shown) for r in lost)
+    return Table("not-assessed", "", shown, rows, searchable=len(rows) > 12)
 
 
 def page(

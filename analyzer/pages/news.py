@@ -9,8 +9,8 @@ import numpy as np
 from analyzer.lanes.lanes import FIGURE, lanes_in
 from analyzer.loop.decisions import Cause, Lane, Status
 from analyzer.pages.reading import Night, linked, oscillates, proposal
-from analyzer.pages.words import Row, cell, heading
-from reports.pages import Block, Cell, Column, Section, Table, Text
+from analyzer.pages.words import Row, cell, columns
+from reports.pages import Block, Cell, Section, Table, Text
 
 HALVED = 0.5
 """A loop got better where its significance fell to this share of what is usual for it [-]; ours."""
@@ -129,15 +129,6 @@ def news_lines(night: Night) -> list[str]:
     return [f"{loop} {text}" for _, loop, text in told]
 
 
-NEWS = (
-    heading("loop"),
-    Column("news", "Since the night before"),
-    Column("before", "Signif. before", True),
-    Column("now", "Signif. now", True),
-    heading("action", wide=True),
-)
-
-
 def news_table(night: Night, tones: Sequence[str], name: str, title: str) -> Table:
     """Loops of which there is something new, of the colours asked for."""
     found = [(row, *_news(night, row)) for row in night.rows]
@@ -151,7 +142,7 @@ def news_table(night: Night, tones: Sequence[str], name: str, title: str) -> Tab
         for row, text, tone in found
         if text and tone in tones
     )
-    return Table(name, f"{title} ({len(rows)})", NEWS, rows)
+    return Table(name, f"{title} ({len(rows)})", columns("news"), rows)
 
 
 def _news_blocks(night: Night) -> tuple[Block, ...]:

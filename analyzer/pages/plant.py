@@ -12,18 +12,11 @@ from analyzer.columns import BY_NAME
 from analyzer.loop.decisions import CAUSES, Cause, Status, counts
 from analyzer.pages.cost import LOSS, SIGNIFICANCE, cost, cost_column
 from analyzer.pages.reading import Night, linked, needs_a_look, read_nights
-from analyzer.pages.words import Row, heading, number, plain_cell
+from analyzer.pages.words import Row, columns, number, plain_cell
 from analyzer.store.store import Store
-from reports.pages import Block, Cell, Column, Floats, Line, Panels, Plot, Table, Tile, TileGroup, TreeMap
+from reports.pages import Block, Cell, Floats, Line, Panels, Plot, Table, Tile, TileGroup, TreeMap
 
 WORST = 5
-AREAS = (
-    heading("area"),
-    Column("score", "Score", True, "Share of the assessed loops, by importance, that need no touch"),
-    *(Column(name, name.capitalize(), True) for name in ("loops", "assessed", *CAUSES, Cause.UNDECIDED)),
-    Column("significance", "Signif.", True, "Sum of the oscillation significance"),
-    Column("worst", "Worst five", wide=True),
-)
 MOST_TILES = 15
 """Loops of an area that are drawn by themselves; the rest is one rectangle."""
 KEYS = (
@@ -73,7 +66,7 @@ def area_table(rows: Sequence[Row]) -> Table:
     cells = [_area(name, own) for name, own in by_area(rows).items()]
     cells.sort(key=lambda c: 101.0 if c[1].number is None else c[1].number)
     note = "Score: share of the assessed loops, by importance, in which no fault was found; 100 is best."
-    return Table("areas", "", AREAS, tuple(cells), note)
+    return Table("areas", "", columns("areas"), tuple(cells), note)
 
 
 def _tile(night: Night, row: Row, by: str) -> Tile:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta
 from typing import Any
 
@@ -52,13 +52,10 @@ class Thinned:
         if n <= most:
             return self
         edges = (np.arange(most) * n) // most
-        joined = {
-            k: (np.minimum if k.endswith("_min") else np.maximum).reduceat(v, edges)
-            for k, v in self.extremes.items()
-        }
-        return replace(
-            self, time_s=self.time_s[edges], extremes=joined, gap=np.logical_and.reduceat(self.gap, edges)
-        )
+        joined = {}
+        for name, x in self.extremes.items():
+            joined[name] = (np.minimum if name.endswith("_min") else np.maximum).reduceat(x, edges)
+        return Thinned(self.time_s[edges], joined, np.logical_and.reduceat(self.gap, edges))
 
 
 def nights_within(store: Store, span: Span | None) -> list[str]:
@@ -120,49 +117,27 @@ def read_trends(store: Store, loops: Collection[str], nights: Sequence[str]) -> 
 
 
 def _thinned(table: pa.Table) -> Thinned:
-    columns = {
-        c: table.column(c).to_numpy(zero_copy_only=False).astype(float)
-        for c in table.column_names
-        if c != "loop"
-    }
-    _, order = np.unique(columns["time_s"], return_index=True)
-    time_s, gap = columns["time_s"][order], columns["bad"][order] > 0.5
-    extremes = {f"{s}_{end}": columns[f"{s}_{end}"][order] for s in SIGNALS for end in ("min", "max")}
+    held = {c: table.column(c).to_numpy(zero_copy_only=False).astype(float) for c in TREND}
+    _, order = np.unique(held["time_s"], return_index=True)
+    held = {c: v[order] for c, v in held.items()}
+    time_s = held["time_s"]
     step = np.diff(time_s)
     jumps = np.flatnonzero(step > 3 * np.median(step)) + 1 if step.size else np.array([], int)
-    time_s = np.insert(time_s, jumps, time_s[jumps - 1] + 1.0)
+    names = [f"{s}_{end}" for s in SIGNALS for end in ("min", "max")]
     return Thinned(
-        time_s,
-        {k: np.insert(v, jumps, v[jumps - 1]) for k, v in extremes.items()},
-        np.insert(gap, jumps, True),
+        np.insert(time_s, jumps, time_s[jumps - 1] + 1.0),
+        {name: np.insert(held[name], jumps, held[name][jumps - 1]) for name in names},
+        np.insert(held["bad"] > 0.5, jumps, True),
     )
 
 
 NIGHT_COLUMNS = (
-    *(
-        "loop",
-        "type",
-        "area",
-        "description",
-        "importance",
-        "status",
-        "oscillation_significance",
-        "lanes",
-        "loss",
-    ),
-    *(
-        "oscillating_pct",
-        "osc_valve_pct",
-        "osc_tuning_pct",
-        "osc_load_pct",
-        "cause",
-        "valve_fault",
-        "period_s",
-    ),
-    *("source_loop", "average_absolute_error_pct", "valve_travel_pct_per_h", "variability_pct", "kp", "ti"),
-    *("kp_new", "ti_new", "action", "reason", "form", "gain_unit", "ti_unit", "pv_unit", "op_unit", "group"),
-    *("close_first_s", "close_last_s", "timezone", "backlash_pct", "stickband_pct", "advice", "due"),
-    *("settings_changed", "judged_since_s", "percent_of", *FIGURE.values()),
+    *("loop", "type", "area", "description", "importance", "status", "oscillation_significance", "lanes"),
+    *("oscillating_pct", "osc_valve_pct", "osc_tuning_pct", "osc_load_pct", "cause", "valve_fault", "loss"),
+    *("period_s", "source_loop", "average_absolute_error_pct", "valve_travel_pct_per_h", "kp", "ti"),
+    *("variability_pct", "kp_new", "ti_new", "action", "reason", "form", "gain_unit", "ti_unit", "pv_unit"),
+    *("op_unit", "group", "close_first_s", "close_last_s", "timezone", "backlash_pct", "stickband_pct"),
+    *("advice", "due", "settings_changed", "judged_since_s", "percent_of", *FIGURE.values()),
 )
 """What the pages of a night read of its rows."""
 REMEMBERED = ("loop", "status", "oscillation_significance", "oscillating_pct", "cause", "lanes")
@@ -227,11 +202,9 @@ def followers_under(rows: Sequence[Row]) -> list[Row]:
     present = {r["loop"] for r in rows}
     under: dict[str, list[Row]] = {}
     for row in rows:
-        if row["source_loop"] in present:
-            under.setdefault(row["source_loop"], []).append(row)
-    tops = [r for r in rows if r["source_loop"] not in present]
+        under.setdefault(row["source_loop"] if row["source_loop"] in present else "", []).append(row)
     out: list[Row] = []
-    for row in tops:
+    for row in under.pop("", []):
         out += [row, *under.pop(row["loop"], [])]
     return out + [r for rest in under.values() for r in rest]
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 from analyzer.lanes.lanes import lanes_in
 from analyzer.loop.decisions import CAUSES, Action, Cause, Due, Fault, GroupRole, Lane, Status
@@ -10,81 +10,21 @@ from analyzer.pages.cost import cost, cost_column
 from analyzer.pages.maintenance import work_order
 from analyzer.pages.news import news_lines
 from analyzer.pages.reading import Night, needs_a_look, oscillates, read_night
-from analyzer.pages.words import Row, counted, duration, enumerated
+from analyzer.pages.words import Row, columns, counted, duration, enumerated, texts
 from analyzer.plantwide.view import GroupView, read_groups
 from analyzer.store.store import Store
 from analyzer.words.units import changed_settings
-from reports.pages import Cell, Column, Listing, Page, Section, Table, Text
+from reports.pages import Cell, Listing, Page, Section, Table, Text
 
 FIRST = 3
 """Sentences at most."""
 NAMED = 3
 """Loops that a sentence names; the rest is counted."""
 CALM = "No loop needs a touch this morning."
-
-
-def _is_retune(row: Row, cause: bool) -> bool:
-    return row["action"] == Action.RETUNE and (row["cause"] == Cause.VALVE) is cause
-
-
-def _is_unstated(row: Row) -> bool:
-    return row["action"] == Action.CHECK_SETTINGS and None in (row["kp"], row["ti"])
-
-
-HALVE = "Halve the gain of {names} or go to manual"
-Work = tuple[Callable[[Row], bool], str, str]
-WORK: tuple[Work, ...] = (
-    (
-        lambda r: _is_retune(r, True),
-        "Type new settings into {names}: its valve has play, and new settings calm what a repair can wait for.",
-        "Type new settings into {names}: their valves have play, and new settings calm what a repair can wait for.",
-    ),
-    (lambda r: _is_retune(r, False), *2 * ("Type new settings into {names}: too tight for the process.",)),
-    (
-        lambda r: r["action"] == Action.REPAIR_VALVE and r["due"] != Due.SHUTDOWN,
-        "Stroke the valve of {names}: it {fault}.",
-        "Stroke the valves of {names}: each {fault}.",
-    ),
-    (
-        lambda r: r["action"] == Action.CHECK_MEASUREMENT,
-        *2 * ("Check the measurement of {names}: frozen, or far from its set point with OP free.",),
-    ),
-    (
-        lambda r: r["action"] == Action.CHECK_SETTINGS and not _is_unstated(r),
-        *2 * ("Compare the settings of {names} with loops.csv: the trends show others.",),
-    ),
-    (
-        _is_unstated,
-        "State Kp and Ti of {names} in loops.csv, as its controller has them: new settings wait for that.",
-        "State Kp and Ti of {names} in loops.csv, as their controllers have them: new settings wait for that.",
-    ),
-    (
-        lambda r: r["cause"] == Cause.TUNING and r["action"] == Action.NEEDS_DATA,
-        f"{HALVE}: it swings, too tight for its process; settings wait for other data.",
-        f"{HALVE}: they swing, too tight for their processes; settings wait for other data.",
-    ),
-    (
-        lambda r: Lane.AT_LIMIT in lanes_in(r) and r["cause"] != Cause.TUNING,
-        *2 * ("See why OP of {names} rests at its limit: valve size, or what feeds it.",),
-    ),
-)
-"""Kinds of work: which rows ask for it, and the sentence for one loop and for several."""
-AT_SHUTDOWN: Work = (
-    lambda r: r["action"] == Action.REPAIR_VALVE and r["due"] == Due.SHUTDOWN,
-    "At the next shutdown look at the valve of {names}: worn, though its loop is calm.",
-    "At the next shutdown look at the valves of {names}: worn, though their loops are calm.",
-)
-"""Work that is worth nothing tonight."""
 WORST = 10
 """Loops that are listed."""
 NEWS = 8
 """Changes that are listed."""
-COLUMNS = (
-    Column("loop", "Loop"),
-    Column("reason", "What", wide=True),
-    Column("do", "Do", wide=True),
-    Column("note", "Note", wide=True),
-)
 
 
 def listed(names: Sequence[str]) -> str:
@@ -107,21 +47,36 @@ def first_things(rows: Sequence[Row], groups: Sequence[GroupView] = ()) -> tuple
         told |= set(members)
         found.append((sum(cost(by_loop[m], by) for m in members), _of_group(source, others)))
     left = sorted((r for r in rows if r["loop"] not in told), key=lambda r: (-cost(r, by), r["loop"]))
-    for work in (*WORK, AT_SHUTDOWN):
-        mine = [r for r in left if work[0](r)]
-        if mine:
-            worth = 0.0 if work is AT_SHUTDOWN else sum(cost(r, by) for r in mine)
+    for work in texts("work"):
+        mine = [r for r in left if work in _work(r)]
+        if mine:  # what waits for a shutdown is worth nothing tonight
+            worth = 0.0 if work == "shutdown" else sum(cost(r, by) for r in mine)
             found.append((worth, _asked(work, mine)))
     ordered = sorted(found, key=lambda pair: -pair[0])
     return tuple(text for _, text in ordered[:FIRST]) or (CALM,)
 
 
-def _asked(work: Work, rows: Sequence[Row]) -> str:
+def _work(row: Row) -> set[str]:
+    """The kinds of work that a row asks for."""
+    tuning = row["cause"] == Cause.TUNING
+    kinds = {
+        Action.RETUNE: "retune a worn valve's loop" if row["cause"] == Cause.VALVE else "retune",
+        Action.REPAIR_VALVE: "shutdown" if row["due"] == Due.SHUTDOWN else "stroke",
+        Action.CHECK_MEASUREMENT: "measurement",
+        Action.CHECK_SETTINGS: "unstated" if None in (row["kp"], row["ti"]) else "settings",
+        Action.NEEDS_DATA: "halve" if tuning else "",
+    }
+    at_limit = Lane.AT_LIMIT in lanes_in(row) and not tuning
+    return {kinds.get(row["action"], ""), "limit" if at_limit else ""}
+
+
+def _asked(work: str, rows: Sequence[Row]) -> str:
     """The sentence of a kind of work on some loops."""
     sticks = sum(r["valve_fault"] == Fault.STICTION for r in rows)
     fault = "sticks" if sticks == len(rows) else "has play" if sticks == 0 else "sticks or has play"
-    _, one, several = work
-    return (one if len(rows) == 1 else several).format(names=listed([r["loop"] for r in rows]), fault=fault)
+    said = texts("work")[work]
+    text = said["one"] if len(rows) == 1 else said.get("several", said["one"])
+    return text.format(names=listed([r["loop"] for r in rows]), fault=fault)
 
 
 def _of_group(source: Row, others: Sequence[str]) -> str:
@@ -167,7 +122,7 @@ def page(store: Store, name: str | None = None) -> Page:
         (Cell(r["loop"], kind="strong"), Cell(r["reason"] or ""), Cell(_do(r)), Cell(night.note(r["loop"])))
         for r in night.worst
     )
-    shown = COLUMNS if any(row[3].text for row in rows) else COLUMNS[:3]
+    shown = columns("summary")[: 4 if any(row[3].text for row in rows) else 3]
     rows = tuple(row[: len(shown)] for row in rows)
     left = sum(needs_a_look(r) and r["loop"] not in night.hidden for r in night.rows) - len(rows)
     note = f"{left} more in the list." if left > 0 else ""

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
 from typing import Any
 
 from analyzer.columns import BY_NAME
@@ -66,15 +69,34 @@ def enumerated(names: list[str]) -> str:
     return names[0] if len(names) == 1 else ", ".join(names[:-1]) + " and " + names[-1]
 
 
-def heading(name: str, wide: bool = False) -> Column:
-    """A column of the store as one of a page; `wide` ones may wrap."""
+@cache
+def texts(subject: str) -> dict[str, Any]:
+    """What texts.toml says of a subject."""
+    return _stated("texts.toml")[subject]
+
+
+@cache
+def _stated(name: str) -> dict[str, Any]:
+    return tomllib.loads((files("analyzer.pages") / name).read_text("utf-8"))
+
+
+def heading(name: str, **more: bool) -> Column:
+    """A column of the store as one of a page."""
     declared = BY_NAME[name]
-    return Column(name, declared.heading, declared.is_number, declared.hint, wide)
+    return Column(name, declared.heading, declared.is_number, declared.hint, **more)
 
 
-def headings(*names: str) -> tuple[Column, ...]:
-    """The headings of several columns."""
-    return tuple(heading(name) for name in names)
+@cache
+def columns(table: str) -> tuple[Column, ...]:
+    """The columns of a table of a page, as tables.toml declares them."""
+    return tuple(_column(stated) for stated in _stated("tables.toml")[table])
+
+
+def _column(stated: str | dict[str, Any]) -> Column:
+    if isinstance(stated, dict):
+        return Column(**stated)
+    name, *more = stated.split()
+    return heading(name, **dict.fromkeys(more, True))
 
 
 def titled(name: str, text: str) -> tuple[str, str]:
