@@ -273,29 +273,42 @@ def propose(verdict: Verdict, controller: Pid, period_s: float | None, config: C
 
 
 def _proposed(verdict: Verdict, controller: Pid, period_s: float | None, config: Config) -> Proposed:
-    window, fit = measured_of(verdict).window, chosen_fit(verdict)
+    """The proposal on the model of a verdict that is sought on."""
     loop = model_of(verdict, controller)
-    if verdict.cause not in (Cause.VALVE, Cause.TUNING):
+    right_way = loop.controller.kp * loop.process.slope > 0.0
+    if not right_way or verdict.cause not in (Cause.VALVE, Cause.TUNING):
         return Proposed(recommend(loop, verdict.cause, limits=config.tuning))
-    if loop.controller.kp * loop.process.slope <= 0.0:
-        return Proposed(recommend(loop, verdict.cause, limits=config.tuning))
-    if loop.process.dead_time_s > config.advice.beyond_record * window.duration_s:
-        why = words.beyond_record(loop.process.dead_time_s, window.duration_s)
-        return Proposed(Proposal(Action.UNDECIDED, why))
-    if verdict.cause is Cause.TUNING:
-        slow = replace(loop, process=cautious(process_of(window, fit), period_s))
-        others = (loop, *uncertain(window, fit, loop)[:2])
-        load = load_of(window, fit, controller)
-        return Proposed(recommend(slow, verdict.cause, others, load, config.tuning), loop, load)
-    if not is_stable(loop):
-        return Proposed(Proposal(Action.UNDECIDED, words.UNSTABLE))
-    sought, fit, others = sought_for(verdict, controller, config.advice)
+    unknown = _not_known_well(loop, verdict, config)
+    if unknown is not None:
+        return Proposed(Proposal(Action.UNDECIDED, unknown))
+    of_cause = _for_tuning if verdict.cause is Cause.TUNING else _for_valve
+    return of_cause(verdict, loop, period_s, config)
+
+
+def _not_known_well(loop: Loop, verdict: Verdict, config: Config) -> str | None:
+    """Why a model gives no settings, in words; None where it does."""
+    duration_s, dead_time_s = measured_of(verdict).window.duration_s, loop.process.dead_time_s
+    if dead_time_s > config.advice.beyond_record * duration_s:
+        return words.beyond_record(dead_time_s, duration_s)
+    return words.UNSTABLE if verdict.cause is Cause.VALVE and not is_stable(loop) else None
+
+
+def _for_tuning(verdict: Verdict, loop: Loop, period_s: float | None, config: Config) -> Proposed:
+    window, fit = measured_of(verdict).window, chosen_fit(verdict)
+    slow = replace(loop, process=cautious(process_of(window, fit), period_s))
+    others = (loop, *uncertain(window, fit, loop)[:2])
+    load = load_of(window, fit, loop.controller)
+    return Proposed(recommend(slow, verdict.cause, others, load, config.tuning), loop, load)
+
+
+def _for_valve(verdict: Verdict, loop: Loop, period_s: float | None, config: Config) -> Proposed:
+    sought, fit, others = sought_for(verdict, loop.controller, config.advice)
     rests = confirm(sought).cycle is None
     if rests and period_s is None:
         return Proposed(Proposal(Action.REPAIR_VALVE, words.CALM))
-    if rests and math.isinf(integral_s(controller)):
+    if rests and math.isinf(integral_s(loop.controller)):
         return Proposed(Proposal(Action.CHECK_SETTINGS, words.NO_INTEGRAL))
-    load = load_of(window, fit, controller)
+    load = load_of(measured_of(verdict).window, fit, loop.controller)
     return Proposed(recommend(sought, verdict.cause, others, load, config.tuning), sought, load)
 
 
