@@ -158,12 +158,9 @@ def predicted_cycle(loop: Loop) -> Balance | None:
 
 @dataclass(frozen=True, slots=True)
 class Curves:
-    """Figure 3: N(A) and -1/(G C) in the complex plane.
+    """Figure 3: N(A) and -1/(G C) in the complex plane, and where they meet.
 
-    valve : ndarray of complex, shape (m,), with its amplitudes [% OP] in `amplitude`.
-    linear : ndarray of complex, shape (k,), with its frequencies [rad/s] in `omega`.
-    crossings : tuple of Balance
-        Where they meet.
+    valve has its amplitudes [% OP] in `amplitude`, shape (m,); linear its frequencies [rad/s] in `omega`, shape (k,).
     """
 
     amplitude: Floats

@@ -50,11 +50,8 @@ class Cycle:
 class Confirmed:
     """What simulation says: a cycle, none, or no answer.
 
-    cycle : Cycle or None
-    settled : bool
-        False where neither a steady cycle nor rest was reached; `cycle` then is the last one seen.
-    predicted : Balance or None
-        The largest stable solution of the harmonic balance.
+    settled is False where neither a steady cycle nor rest was reached, and `cycle` the last one seen; predicted is
+    the largest stable solution of the harmonic balance.
     """
 
     cycle: Cycle | None

@@ -137,8 +137,7 @@ class Grade(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """One figure before and after; percent of before, None where before is zero; why not comparable, else
-    ''."""
+    """One figure before and after; percent of before, None where before is zero."""
 
     measure: Measure
     found: Difference
@@ -163,8 +162,7 @@ class Change:
 
 @dataclass(frozen=True, slots=True)
 class LoopComparison:
-    """A loop before and after: its changes, or why there are none; reasons against comparing; the source
-    loop."""
+    """A loop before and after: its changes, reasons against comparing, and the source loop."""
 
     loop: str
     before: Span
@@ -230,10 +228,6 @@ def _verdict(found: Difference, measure: Measure, limits: ComparisonLimits) -> V
     return Verdict.BETTER if (found.value < 0) == measure.lower_is_better else Verdict.WORSE
 
 
-def _scaled(found: Difference, factor: float) -> Difference:
-    return Difference(found.before * factor, found.after * factor, found.low * factor, found.high * factor)
-
-
 def change_of(
     hours: Hours,
     spans: tuple[Span, Span],
@@ -246,7 +240,8 @@ def change_of(
     if min(before.weight.sum(), after.weight.sum()) <= 0:
         return None
     family = sum(m.primary == measure.primary for m in MEASURES)
-    found = _scaled(difference(before, after, 1 - (1 - limits.confidence) / family), measure.scale)
+    d = difference(before, after, 1 - (1 - limits.confidence) / family)
+    found = Difference(*(x * measure.scale for x in (d.before, d.after, d.low, d.high)))
     return Change(measure, found, _verdict(found, measure, limits) if comparable else Verdict.INCOMPARABLE)
 
 

@@ -28,13 +28,8 @@ PERCENTILES = (2.5, 97.5)
 
 @dataclass(frozen=True, slots=True)
 class Side:
-    """Hourly figures of one span on a grid of whole hours.
-
-    value : array of float, shape (h,)
-        The figure of each hour, anything where its weight is 0.
-    weight : array of float, shape (h,)
-        Usable share of each hour [h], 0 where the figure is not known.
-    """
+    """Hourly figures of one span on a grid of whole hours, shape (h,): the value of each hour, and its usable share
+    as weight [h], 0 where the figure is not known."""
 
     value: Floats
     weight: Floats
@@ -45,8 +40,7 @@ class Side:
         return float((self.value * self.weight).sum() / self.weight.sum())
 
     def days(self) -> tuple[Floats, Floats]:
-        """Means and weights of the blocks of 24 h from the span's start, shape (d,) each; empty blocks left
-        out."""
+        """Means and numbers of the blocks of 24 h from the span's start, shape (d,) each; empty ones left out."""
         edges = np.arange(0, self.value.size, BLOCK_H)
         weight = np.add.reduceat(self.weight, edges)
         total = np.add.reduceat(self.value * self.weight, edges)
@@ -70,10 +64,7 @@ class Difference:
 
 
 def replicates(side: Side, rng: np.random.Generator) -> Floats:
-    """Means of circular blocks of 24 h drawn with replacement, shape (REPLICATES,).
-
-    Politis and Romano 1992: the circular block bootstrap.
-    """
+    """Means of circular blocks of 24 h drawn with replacement, shape (REPLICATES,) (Politis and Romano 1992)."""
     n = side.value.size
     width = min(BLOCK_H, n)
     starts = rng.integers(0, n, (REPLICATES, max(round(n / width), 1)))
@@ -91,9 +82,8 @@ def _block_sums(x: Floats, width: int) -> Floats:
 def drift_factor(before: Side, after: Side) -> float:
     """How much wider an interval is when the days may drift than when they are independent [-], at least 1.
 
-    The daily means are taken as two levels and a first-order autoregression. The variance of the difference
-    of means is averaged over its correlation, weighed by the restricted likelihood (Patterson and Thompson
-    1971).
+    The daily means are two levels and a first-order autoregression; the variance of the difference of means is
+    averaged over its correlation, weighed by the restricted likelihood (Patterson and Thompson 1971).
     """
     (left, at), (right, then) = before.days(), after.days()
     y = np.concatenate([left, right])
@@ -102,9 +92,7 @@ def drift_factor(before: Side, after: Side) -> float:
     side = np.repeat([0, 1], [left.size, right.size])
     design = np.stack([side == 0, side == 1], axis=1).astype(float)
     lag = np.abs(np.subtract.outer(*[np.concatenate([at, then + before.value.size / BLOCK_H])] * 2))
-    found = [_drift(y, design, lag, rho) for rho in DRIFTS]
-    likelihood = np.array([f[0] for f in found])
-    variance = np.array([f[1] for f in found])
+    likelihood, variance = np.array([_drift(y, design, lag, rho) for rho in DRIFTS]).T
     weights = np.exp(likelihood - likelihood.max())
     mean = float((weights * variance).sum() / weights.sum())
     return float(np.sqrt(max(mean / variance[0], 1.0)))
@@ -124,8 +112,7 @@ def _drift(y: Floats, design: Floats, lag: Floats, rho: float) -> tuple[float, f
 
 
 def student(before: Side, after: Side, spread: tuple[float, float], level: float) -> float:
-    """Student's quantile over the normal one, with Welch's degrees of freedom and a small sample's bias
-    [-]."""
+    """Student's quantile over the normal one [-], with Welch's degrees of freedom and a small sample's bias."""
     n = max(before.days()[0].size, 2), max(after.days()[0].size, 2)
     parts = [s * s for s in spread]
     if sum(parts) <= 0:
@@ -138,14 +125,8 @@ def student(before: Side, after: Side, spread: tuple[float, float], level: float
 def difference(before: Side, after: Side, level: float, seed: int = 0) -> Difference:
     """The difference of two spans with an interval that holds the truth with probability `level`.
 
-    Parameters
-    ----------
-    before, after : Side
-        After begins where before ends; each with some usable hour.
-    level : float
-        Probability [-], already corrected for how many figures are looked at.
-    seed : int
-        Of the random draws; the same seed draws the same hours for every figure of a loop.
+    After begins where before ends, each with some usable hour. The level [-] is already corrected for how many
+    figures are looked at. One seed draws the same hours for every figure of a loop.
     """
     rng = np.random.default_rng(seed)
     left, right = replicates(before, rng), replicates(after, rng)

@@ -33,13 +33,8 @@ def cautious(process: Fopdt, period_s: float | None) -> Fopdt:
 
 def sensitivity(m: Measured, period_s: float) -> float | None:
     """Ms of the identified loop [-], inf where it is unstable; None where no settings are known, or they act the
-    wrong way. The smaller of those with the process as identified and as settings are sought for it.
-
-    Parameters
-    ----------
-    m : Measured
-    period_s : float
-        Of the oscillation [s].
+    wrong way. The smaller of those with the process as identified and as settings are sought for it, of a cycle of
+    period_s [s].
     """
     process, controller = process_of(m.window, m.linear), m.controller
     if controller is None or process.gain * controller.kp <= 0.0:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from itertools import chain, pairwise
 
 import numpy as np
 
@@ -19,8 +19,9 @@ from analyzer.loops.changes import TuningChange
 from analyzer.loops.settings_in_force import settings_before
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import controller as stated_controller
+from identification.controller.check import runs
 from identification.models import Pid
-from identification.record import LoopRecord
+from identification.record import LoopRecord, Mask
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,19 +62,17 @@ def earlier_settings(
     return tuple(Earlier(until_s, old, controller_of(old, prepared)) for until_s, old in before)
 
 
-def _runs(out: np.ndarray, first: int, last: int, least: int) -> list[tuple[int, int]]:
+def _between_runs(out: Mask, first: int, last: int, least: int) -> list[tuple[int, int]]:
     """Stretches of the samples first to last between runs of True in `out` of at least so many."""
-    edge = np.flatnonzero(np.diff(np.concatenate(([0], out[first:last].astype(np.int8), [0])))) + first
-    begins, ends = edge[::2], edge[1::2]
-    long = ends - begins >= least
-    starts, stops = [first, *ends[long].tolist()], [*begins[long].tolist(), last]
-    return [(a, b) for a, b in zip(starts, stops, strict=True) if b > a]
+    long = ((first + a, first + b) for a, b in runs(out[first:last]) if b - a >= least)
+    edges = [first, *chain.from_iterable(long), last]
+    return [(a, b) for a, b in zip(edges[::2], edges[1::2], strict=True) if b > a]
 
 
 def _in_automatic(record: LoopRecord, first: int, last: int, config: Config) -> tuple[int, int]:
     """The longest stretch between long spans in manual, where it holds most of what is in automatic; else all."""
     least = max(round(config.quality.manual_s / record.dt_s), 1)
-    a, b = max(_runs(record.mask("manual"), first, last, least), key=lambda ends: ends[1] - ends[0])
+    a, b = max(_between_runs(record.mask("manual"), first, last, least), key=lambda ends: ends[1] - ends[0])
     use = record.usable
     most = use[a:b].sum() >= config.quality.automatic_share * use[first:last].sum()
     return (a, b) if most and b - a >= config.quality.samples else (first, last)
@@ -84,16 +83,8 @@ def judged_stretch(
 ) -> Stretch:
     """The stretch that a verdict rests on: the part since the last change of settings, in automatic.
 
-    Where too little of it is good to judge new settings, the part of the record with most good samples.
-
-    Parameters
-    ----------
-    record : LoopRecord
-    controller : Pid or None
-        Settings in force at the record's end.
-    earlier : sequence of Earlier
-        Those before, oldest first.
-    config : Config
+    Where too little of it is good to judge new settings, the part of the record with most good samples. The
+    controller is the one in force at the record's end; those before it, oldest first.
     """
     cuts = [round((e.until_s - record.start_s) / record.dt_s) for e in earlier]
     edges = [0, *(min(max(c, 0), len(record)) for c in cuts), len(record)]

@@ -18,7 +18,7 @@ from identification.record import LoopRecord
 
 @dataclass(frozen=True, slots=True)
 class SettingsDiffer:
-    """StatedSettings settings that are not those of the controller.
+    """Stated settings that are not those of the controller.
 
     stated, recorded : in percent and seconds; explained_stated, explained_recorded : share of the variance of OP's
     increments that each explains [-].
@@ -44,20 +44,8 @@ def differing(
 ) -> SettingsDiffer | None:
     """The recorded settings where they are plainly not the stated ones, in the whole record or in its later half.
 
-    Settings that were changed within the record show in its later half, and those are the ones in force.
-
-    Parameters
-    ----------
-    record : LoopRecord
-    stated : Pid
-    scale_s : float
-        Period, or other time scale on which the loop moves [s].
-    limits : SettingsLimits
-
-    Returns
-    -------
-    SettingsDiffer or None
-        None where they agree or the record cannot tell.
+    Settings that were changed within the record show in its later half, and those are the ones in force. scale_s is
+    the period, or another time scale on which the loop moves [s]. None where they agree or the record cannot tell.
     """
     later = record.span(len(record) // 2, len(record))
     return _differing(later, stated, scale_s, limits) or _differing(record, stated, scale_s, limits)
@@ -66,14 +54,11 @@ def differing(
 def _differing(
     record: LoopRecord, stated: Pid, scale_s: float, limits: SettingsLimits
 ) -> SettingsDiffer | None:
-    """The recorded settings where they are plainly not the stated ones, in the whole of a record."""
     shortest = limits.ti_samples * record.dt_s
     if stated.td_s > 0 or stated.ti_s < shortest or record.mask("compressed").mean() > limits.straight_share:
         return None
     found = compare_laws(record, scale_s, stated.kp, stated.ti_s, limits.gain)
-    if found is None or not shortest <= found.ti_s < math.inf:
-        return None
-    if found.explained < limits.explained:
+    if found is None or not shortest <= found.ti_s < math.inf or found.explained < limits.explained:
         return None
     share = found.explained_given
     apart = max(_factor(found.kp, stated.kp), _factor(found.ti_s, stated.ti_s))

@@ -62,13 +62,17 @@ def _piece(loop: Loop, controller: Pid, load: Floats, period_s: float) -> Shown:
     return Shown(part.time_s[::every] - part.time_s[0], part.error[::every], part.op[::every])
 
 
+def middle_ti(loop: Loop) -> float:
+    """Integral time [s] about which a map is drawn: the present one, SIMC's where the integral is off."""
+    ti = integral_s(loop.controller)
+    return ti if math.isfinite(ti) else simc(loop.process, scan_s=max(loop.controller.scan_s, 1.0)).ti_s
+
+
 def _map(loop: Loop, settings: Sequence[Pid]) -> TravelMap | None:
     """The travel map about the present settings, reaching to the others."""
     if loop.valve is None:
         return None
-    c = loop.controller
-    now_s = integral_s(c)
-    now_s = now_s if math.isfinite(now_s) else simc(loop.process, scan_s=max(c.scan_s, 1.0)).ti_s
+    c, now_s = loop.controller, middle_ti(loop)
     gains = np.array([abs(pid.kp / c.kp) for pid in settings])
     times = np.array([pid.ti_s for pid in settings if math.isfinite(pid.ti_s)])
     low, high = min(1.0 / SPREAD, gains.min() / BEYOND), max(SPREAD, gains.max() * BEYOND)
@@ -86,27 +90,10 @@ def compared(
     pv_span: float,
     limits: TuningLimits,
 ) -> Comparison | None:
-    """The settings side by side.
+    """Present, recommended and textbook settings of an identified loop; None where its load is too short for that.
 
-    Parameters
-    ----------
-    loop : Loop
-        Identified, with its present controller.
-    load : ndarray of shape (n,)
-        Load and noise on the controller's clock [% PV].
-    new : Pid or None
-        The recommended settings.
-    period_s : float
-        Of the recorded cycle [s].
-    spec : LoopSpec
-    pv_span : float
-        Span of PV in its own unit.
-    limits : TuningLimits
-
-    Returns
-    -------
-    Comparison or None
-        None where the load is too short to compare on.
+    load is load and noise on the controller's clock [% PV], shape (n,); period_s, of the recorded cycle [s]; pv_span,
+    the span of PV in its own unit.
     """
     if load.size < limits.least_steps or loop.process.slope * loop.controller.kp <= 0.0:
         return None

@@ -25,6 +25,7 @@ from analyzer.loop.cause import Verdict
 from analyzer.loop.decisions import Cause
 from analyzer.loop.identified import load_of
 from analyzer.loop.intervals import intervals
+from analyzer.loop.settings_side_by_side import middle_ti
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import as_stated
 from identification.errors import NotAssessedError
@@ -33,11 +34,9 @@ from identification.models import Estimate, Loop, Pid, Process, Valve
 from identification.record import Floats
 from tuning.describing import describe
 from tuning.forecast import Forecast, predict, run
-from tuning.frequency_response import integral_s
 from tuning.harmonic_balance import curves, travel_map
 from tuning.limit_cycle import Confirmed, confirm
 from tuning.recommend import Proposal
-from tuning.rules import simc
 
 if TYPE_CHECKING:
     from reports.pages import Field, Panels, Picture, Plot
@@ -222,18 +221,12 @@ def _map(t: Tuning, title: str) -> Field:
 
     c, new = t.model.controller, t.proposal.controller
     kp = c.kp * np.geomspace(1 / SPREAD, SPREAD, MAP_POINTS)
-    now_s = _finite_ti(c, t.model.process)
+    now_s = middle_ti(t.model)
     top = max(SPREAD * now_s, 3 * new.ti_s if new else 0.0)
     found = travel_map(t.model, kp, np.geomspace(now_s / 4, top, MAP_POINTS))
     places = [Place(abs(c.kp), now_s, "now", "now")]
     places += [Place(abs(new.kp), new.ti_s, "proposed", "recommended")] if new else []
     return travel_field(found, places, f"{title}: predicted travel", "OP")
-
-
-def _finite_ti(controller: Pid, process: Process) -> float:
-    """Integral time [s] for a map's axis; SIMC's where the integral is off."""
-    ti = integral_s(controller)
-    return ti if math.isfinite(ti) else simc(process, scan_s=max(controller.scan_s, 1.0)).ti_s
 
 
 def _trends(t: Tuning, new: Pid, title: str) -> Panels:
@@ -245,7 +238,7 @@ def _trends(t: Tuning, new: Pid, title: str) -> Panels:
     for name, kind, c in (("now", "pv", t.model.controller), ("proposed", "brought", new)):
         r = run(replace(t.model, controller=c), t.load)
         last = slice(-min(len(r), int(15 * (t.period_s or 600) / r.dt_s)), None)
-        hours, stem = r.time_s[last] / 3600.0, r.op if r.position is None else r.position
+        hours, stem = r.time_s[last] / 3600.0, r.stem
         pv.append(Line(name, hours, r.pv[last], kind=kind))
         op.append(Line(name, hours, r.op[last], kind=kind))
         op.append(Line(f"stem, {name}", hours, stem[last], kind=f"{kind} stem"))
