@@ -121,13 +121,9 @@ def tune(asked: Asked, tag: str, out: Path | None) -> None:
 
     Example: triage tune export.parquet --loops loops.csv --loop LIC2107 --out pictures
     """
-    from analyzer.loop.tune_loop import proposal
+    from analyzer.loop.tune import proposal
 
-    source, specs, _ = asked.opened()
-    span = asked.since_s, asked.until_s
-    lines, pictures = proposal(
-        source, specs, tag, asked.config, span, out is not None, asked.changes, asked.zone
-    )
+    lines, pictures = proposal(asked, tag, out is not None)
     for line in lines:
         say(line)
     if out is not None:

@@ -1,4 +1,4 @@
-"""What `triage tune` says of one loop: the model with intervals, the limit cycle, the proposal, the forecast."""
+"""What `triage tune` says and draws of one loop: its last night read, assessed and tuned, new settings forecast."""
 
 from __future__ import annotations
 
@@ -18,33 +18,49 @@ from analyzer.loop.advice import (
     tuned,
     uncertain,
     valve_of,
+    withheld,
 )
-from analyzer.loop.assess import Assessment
+from analyzer.loop.assess import Assessment, assess
 from analyzer.loop.cause import Verdict
-from analyzer.loop.decisions import Cause
+from analyzer.loop.decisions import Action, Cause, Needs
+from analyzer.loop.fitness import at_limits, unfit_for_cause
 from analyzer.loop.identified import load_of
 from analyzer.loop.intervals import intervals
+from analyzer.loop.judged_stretch import controller_of, earlier_settings
+from analyzer.loop.quality import Prepared, prepare
 from analyzer.loop.settings_side_by_side import middle_ti
-from analyzer.loops.spec import LoopSpec
+from analyzer.loops.settings_in_force import in_force
+from analyzer.loops.spec import LoopSpec, spec_of
 from analyzer.loops.tags import as_stated
-from identification.errors import NotAssessedError
+from analyzer.night.nights import cut, nights_of
+from identification.errors import InputError, NotAssessedError
 from identification.estimation.hammerstein import Fit
 from identification.models import Estimate, Loop, Pid, Process, Valve
 from identification.record import Floats
 from tuning.describing import describe
 from tuning.forecast import Forecast, predict, run
+from tuning.frequency_response import slowest_s
 from tuning.harmonic_balance import curves, travel_map
 from tuning.limit_cycle import Confirmed, confirm
 from tuning.recommend import Proposal
 
 if TYPE_CHECKING:
+    from analyzer.night.asked import Asked
     from reports.pages import Field, Panels, Picture, Plot
 
 MAP_POINTS = 36
 """Points of the map along each axis."""
 NO_MODEL = "needs trends from which a model can be identified"
+NO_MOVES = "needs PV that moves with OP, so that a model can be identified"
 SPREAD = 20.0
 """The map reaches this factor below and above the present settings."""
+FORECAST = {
+    "average_absolute_error": "average absolute error",
+    "stem_travel": "stem travel",
+    "oscillation": "oscillation",
+    "variability": "variability",
+}
+"""Figures of a forecast as they are called."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,6 +80,11 @@ class Tuning:
     proposal: Proposal
     forecast: Forecast | None
     load: Floats
+
+    @property
+    def new(self) -> Pid | None:
+        """The settings proposed, or those until a repair; None where there are none."""
+        return self.proposal.controller or self.proposal.meanwhile
 
 
 def _model(verdict: Verdict, controller: Pid, limits: AdviceLimits) -> tuple[Loop, Fit, tuple[Loop, ...]]:
@@ -157,14 +178,8 @@ def _cycle(t: Tuning) -> list[str]:
 def _forecast(t: Tuning) -> list[str]:
     if t.forecast is None:
         return []
-    names = {
-        "average_absolute_error": "average absolute error",
-        "stem_travel": "stem travel",
-        "oscillation": "oscillation",
-        "variability": "variability",
-    }
     lines = ["forecast on the reconstructed load (90 % intervals):"]
-    for key, name in names.items():
+    for key, name in FORECAST.items():
         b, a, c = t.forecast.before[key], t.forecast.after[key], t.forecast.change[key]
         change = f"{100 * c.value:+.0f} % ({100 * c.low:+.0f} to {100 * c.high:+.0f})"
         lines.append(f"  {name}: {b.value:.3g} to {a.value:.3g} {b.unit}, {change}")
@@ -189,8 +204,7 @@ def pictures(t: Tuning, title: str) -> tuple[Picture, ...]:
     out: tuple[Picture, ...] = ()
     if t.model.valve is not None:
         out = (_curves(t, title), _map(t, title))
-    new = t.proposal.controller or t.proposal.meanwhile
-    return out if new is None else (*out, _trends(t, new, title))
+    return out if t.new is None else (*out, _trends(t, t.new, title))
 
 
 def _curves(t: Tuning, title: str) -> Plot:
@@ -246,3 +260,54 @@ def _trends(t: Tuning, new: Pid, title: str) -> Panels:
         Plot("forecast-op", "Valve", "hours", "OP, stem [%]", tuple(op)),
     )
     return Panels("forecast", f"{title}: both tunings on the same load", plots)
+
+
+def _unfit(prepared: Prepared, config: Config) -> Needs | None:
+    """What the trends lack for a model, the nearest first; None where nothing is known."""
+    limited = at_limits(prepared.record, config.quality) if prepared.op_known else None
+    return limited or unfit_for_cause(prepared, None, config)
+
+
+def proposal(asked: Asked, loop: str, drawn: bool) -> tuple[list[str], dict[str, bytes]]:
+    """Lines of text and, if wanted, pictures by file name for the last night of one loop.
+
+    Raises
+    ------
+    InputError, NotAssessedError
+        Where the loop or its settings are not known, or its trends give no model.
+    """
+    export, specs, _ = asked.opened()
+    row, config = spec_of(specs, loop), asked.config
+    night = nights_of(export, [row], config.nights, asked.since_s, asked.until_s, asked.zone)[-1]
+    spec = in_force(row, asked.changes, night.last_s)
+    prepared = prepare(spec, {t: cut(s, night) for t, s in export.read(spec.tags).items()}, config.quality)
+    stated = controller_of(spec, prepared)
+    if stated is None:
+        seen = f"{loop}: no kp and ti in loops.csv"
+        raise InputError(seen, "both", "state them, so that new ones can be compared")
+    found = assess(prepared, stated, config, spec.type, earlier_settings(row, asked.changes, prepared))
+    head = [f"{loop}, night {night.name}: cause {found.verdict.cause}"]
+    text = head + [f"sign of {s.points_to}: {s.whole}" for s in found.verdict.signs]
+    if found.verdict.measured is None:
+        needs = _unfit(prepared, config)
+        if found.verdict.cause is not Cause.VALVE:
+            raise NotAssessedError(f"{loop}: {needs or found.verdict.needs or NO_MOVES}")
+        return [*text, f"action: {Action.REPAIR_VALVE}", f"no settings: {needs or NO_MOVES}"], {}
+    tuning = tune(found, stated, config, withheld(found, spec, stated, prepared.scale.span, config))
+    text += lines(tuning, spec, prepared.scale.span)
+    return text, _drawn(tuning, spec, prepared.scale.span, config, night.name) if drawn else {}
+
+
+def _drawn(t: Tuning, spec: LoopSpec, pv_span: float, config: Config, night: str) -> dict[str, bytes]:
+    """Pictures by file name, and the page on which settings are compared and tried."""
+    from analyzer.loop.settings_side_by_side import compared
+    from analyzer.pages.compared import page
+    from reports.html import render
+    from reports.pictures import as_file
+
+    files = {f"{p.name}.svg": as_file(p).encode() for p in pictures(t, spec.loop)}
+    period_s = t.period_s or 10.0 * slowest_s(t.model)
+    found = compared(t.model, t.load, t.new, period_s, spec, pv_span, config.tuning)
+    if found is not None:
+        files["settings.html"] = render(page(spec.loop, night, found, spec), True).encode()
+    return files
