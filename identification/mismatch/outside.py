@@ -7,22 +7,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from identification.mismatch import pictures
 from identification.mismatch.catalogue import EFFECTS
 from identification.mismatch.effect import Act, Block, Effect, Floats, Param, Signal, Slot, Variant, own_slot
-from identification.mismatch.pictures import (
-    FLOW,
-    GAIN,
-    POINTS,
-    TIME,
-    Axis,
-    Drawing,
-    Shape,
-    beside_plain,
-    course,
-    load_over_time,
-    step,
-    step_size,
-)
+from identification.mismatch.pictures import Axis, Drawing, Shape
 from identification.simulation.effect import bring
 from identification.simulation.lag import lagged
 from identification.simulation.open_loop import gain_over_record, load
@@ -45,7 +33,7 @@ twentieth of the span off."""
 def gain_by_history(d: Drawing) -> Shape:
     """The gain over the recording, as PV's past makes it."""
     rest = float(d.plain[Slot.K])
-    return course(d, GAIN, lambda inputs, c: c[Slot.K] * gain_over_record(inputs, c), rest)
+    return pictures.course(d, pictures.GAIN, lambda inputs, c: c[Slot.K] * gain_over_record(inputs, c), rest)
 
 
 def hurried(flow: Floats, c: Floats, dt_s: float) -> Floats:
@@ -56,9 +44,10 @@ def hurried(flow: Floats, c: Floats, dt_s: float) -> Floats:
 
 def flow_after_step(d: Drawing) -> Shape:
     """Flow after a step of OP."""
-    fine = HURRY_DRAWN * float(d.best[HURRY_T]) / POINTS
-    time, op = step(step_size(d), POINTS, fine)
-    return beside_plain(d, "response", (TIME, FLOW), time, lambda c: hurried(op, c, fine), op)
+    fine = HURRY_DRAWN * float(d.best[HURRY_T]) / pictures.POINTS
+    time, op = pictures.step(pictures.step_size(d), pictures.POINTS, fine)
+    axes = pictures.TIME, pictures.FLOW
+    return pictures.beside_plain(d, "response", axes, time, lambda c: hurried(op, c, fine), op)
 
 
 HISTORY = Effect(
@@ -101,7 +90,7 @@ RECYCLE = Effect(
     block=Block.PROCESS,
     sentence="{returned} of what leaves comes back to the inlet after {returns_s}",
     check="Look for a circuit that brings material or heat back: white water, solvent, condensate, a recirculation.",
-    curve=lambda d: course(d, Axis("what comes back", "% OP"), load),
+    curve=lambda d: pictures.course(d, Axis("what comes back", "% OP"), load),
     variants=(
         Variant(
             (
@@ -118,7 +107,7 @@ SWITCH = Effect(
     block=Block.LOAD,
     sentence="a load of {switched_load_pct} comes on where PV passes {switches_at_pct} and goes where it falls back",
     check="Look for a switch on PV: a thermostat, a float, a relief valve, a pump or fan that stands by.",
-    curve=load_over_time,
+    curve=pictures.load_over_time,
     variants=(
         Variant(
             (

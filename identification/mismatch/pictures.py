@@ -205,16 +205,8 @@ def _pv_length_s(d: Drawing, fast_s: float | None) -> float:
 
 
 def pv_response(d: Drawing, faster: int | None = None, back: bool = False) -> Shape:
-    """PV after a step of OP (and back down again), of the plain and the improved process.
-
-    Parameters
-    ----------
-    d : Drawing
-    faster : int or None
-        Slot of a lag; where it or the process's own is over early, the picture is cut to that.
-    back : bool
-        Whether the step goes back.
-    """
+    """PV after a step of OP (and back down again), of the plain and the improved process; cut where the lag of the
+    slot `faster`, or the process's own, is over early."""
     inputs = d.inputs
     length = _pv_length_s(d, None if faster is None else float(min(d.best[faster], d.best[Slot.T])))
     dt = min(length / POINTS, inputs.dt_s) if length < POINTS * inputs.dt_s else length / POINTS
@@ -255,22 +247,8 @@ def course(
     last: float = np.inf,
     places: tuple[float, ...] = (),
 ) -> Shape:
-    """What acts over the recording.
-
-    Parameters
-    ----------
-    d : Drawing
-    axis : Axis
-        What that is.
-    values : callable
-        What acts, shape (n,), of the inputs and the parameters.
-    rest : float
-        What the plain loop has in its place.
-    last : float
-        Sample at which the picture ends, if before the recording does.
-    places : tuple of float
-        Times that are marked [s].
-    """
+    """What acts over the recording, shape (n,), as `values` gives it of inputs and parameters, beside what the plain
+    loop has in its place; up to the sample `last`, with some times [s] marked."""
     at = np.unique(np.linspace(0, min(last, d.inputs.op.size - 1), COURSE_POINTS).astype(int))
     time = at * d.inputs.dt_s
     return beside_plain(d, "course", (TIME, axis), time, lambda c: values(d.inputs, c)[at], rest, places)

@@ -61,18 +61,10 @@ def compete(
     tell: Progress = silent,
     least: float = 0.0,
 ) -> list[Candidate]:
-    """All rows as candidates of a fit, best first; the better half followed to the end.
+    """All rows as candidates of a fit to which each is added, best first; the better half followed to the end.
 
-    Parameters
-    ----------
-    x : CandidateInputs
-    near : Fitted
-        The fit to which each row is added.
-    rows : tuple of Variant
-    tell : callable
-        Is told each row's name before it is tried.
-    least : float
-        What a candidate has to come to, penalty taken off, to be of any use [nat].
+    tell : is told each row's name before it is tried; least : what a candidate has to come to, penalty taken off, to
+    be of any use [nat].
     """
     p, span = x.p, span_of(x.p, near)
     starts, firsts = [], []

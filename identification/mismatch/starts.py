@@ -4,7 +4,9 @@ order, and two-mode processes solved on a grid."""
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 from scipy.ndimage import median_filter
@@ -214,53 +216,33 @@ def screened(span: Span, models: list[Model]) -> list[Model]:
     return sorted((span.on_line(model) for model in models), key=span.left)
 
 
-@dataclass(frozen=True, slots=True)
-class Point:
-    """One point of the grid for two modes: dead time, both time constants [s], both gains, what is left."""
-
-    dead_s: float
-    first_s: float
-    other_s: float
-    gains: tuple[float, float]
-    left: float
-
-
 def mode_starts(p: Problem, near: Fitted, row: Variant) -> list[Model]:
     """Starts of a two-mode row whose second mode has the share of the gain that the row is about."""
     blind = np.zeros_like(near.ar)
     blind[:1] = LEADING
     out = []
     for ar in (near.ar, blind) if near.ar.size else (near.ar,):
-        for point in [q for q in grid(p, near, row, ar) if _fits_row(q, row)][:MODES_KEPT]:
-            c = near.model.c.copy()
-            c[Slot.T], c[Slot.L] = point.first_s, point.dead_s
-            c[Slot.MODE_T] = max(point.other_s, 0.1 * p.inputs.dt_s)
-            c[Slot.K] = sum(point.gains)
-            c[Slot.SHARE] = point.gains[1] / c[Slot.K]
-            out.append(Model((*near.model.added, row), c))
+        models = [model for _, model in sorted(grid(p, near, row, ar), key=lambda point: point[0])]
+        low, high = row.mode_share
+        out += [model for model in models if low < model.c[Slot.SHARE] < high][:MODES_KEPT]
     return out
 
 
-def _fits_row(point: Point, row: Variant) -> bool:
-    a, b = point.gains
-    return a + b != 0 and row.mode_share[0] < b / (a + b) < row.mode_share[1]
-
-
-def grid(p: Problem, near: Fitted, row: Variant, ar: Floats) -> list[Point]:
-    """All points of the grid under one noise model, best first; both gains are solved linearly."""
-    t0, dead0 = float(near.model.c[Slot.T]), float(near.model.c[Slot.L])
+def grid(p: Problem, near: Fitted, row: Variant, ar: Floats) -> Iterator[tuple[float, Model]]:
+    """What each point of the grid leaves under one noise model, and its model; both gains are solved linearly."""
+    dt_s, t0, dead0 = p.inputs.dt_s, float(near.model.c[Slot.T]), float(near.model.c[Slot.L])
     y, level = whitened(p.y, ar, p.edges), whitened(np.ones(p.y.size), ar, p.edges)
     firsts, others = [t0 * f for f in LONGER], [t0 * f for f in row.modes]
     found = responses(p, near, {*firsts, *others}, ar)
-    longest = min(math.ceil(dead0 / p.inputs.dt_s), p.y.size - 1)
-    out = []
+    longest = min(math.ceil(dead0 / dt_s), p.y.size - 1)
     for samples in range(0, longest + 1, longest // DELAYS + 1):
         late = {t: np.concatenate((np.full(samples, x[0]), x[: x.size - samples])) for t, x in found.items()}
-        for first in firsts:
-            for other in others:
-                gains, left = solved(y, np.stack([late[first], late[other], level]), p.weight)
-                out.append(Point(samples * p.inputs.dt_s, first, other, gains, left))
-    return sorted(out, key=lambda point: point.left)
+        for first, other in product(firsts, others):
+            (one, two), left = solved(y, np.stack([late[first], late[other], level]), p.weight)
+            c = near.model.c.copy()
+            c[Slot.T], c[Slot.L], c[Slot.MODE_T] = first, samples * dt_s, max(other, 0.1 * dt_s)
+            c[Slot.K], c[Slot.SHARE] = one + two, two / (one + two) if one + two != 0 else np.inf
+            yield left, Model((*near.model.added, row), c)
 
 
 def responses(p: Problem, near: Fitted, times: set[float], ar: Floats) -> dict[float, Floats]:

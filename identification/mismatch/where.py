@@ -114,14 +114,7 @@ def where_of(found: Explanation, s: Recording, block: str, at: Located) -> dict[
     Of an effect of the physics it is where the plain model loses to the better one; of recorder and controller,
     where the finding is; of what has no name, where the innovations are large.
 
-    Parameters
-    ----------
-    found : Explanation
-    s : Recording
-    block : str
-        Block of the verdict.
-    at : Located
-        Of the plain loop's innovations (of the last model's, where something is left over).
+    block : of the verdict; at : of the plain loop's innovations, of the last model's where something is left over.
     """
     p, marked, signals = found.p, found.finding, SIGNALS.get(block, ["OP", "PV"])
     after = any(f.name == "after_reversals" for f in at.carrying)

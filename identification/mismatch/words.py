@@ -51,8 +51,8 @@ LEFT_OVER = (
 )
 LONGER = "A step of OP each way in manual, held for five time constants, at two operating points."
 """What tells apart what has no line of its own."""
-SPOKEN_S = (600.0, 7200.0)
-"""Times from which minutes and hours are spoken of [s]; ours."""
+MINUTES_S, MINUTES_OF_RECORD_S, HOURS_S = 600.0, 120.0, 7200.0
+"""Times from which minutes are spoken of, of a parameter and of a record, and hours [s]; ours."""
 
 
 def check(data: Mapping[str, Any]) -> str:
@@ -127,10 +127,9 @@ def shown_by_cycles(found: Explanation) -> str:
 
 def too_short(enough: float, length_s: float, lag_s: float) -> str:
     """What is needed where the record is short against the time constant."""
-    return (
-        f"needs {enough:.0f} time constants, has {length_s / lag_s:.2g} "
-        f"(a record of {_time(length_s)}, a time constant of about {_time(lag_s)})"
-    )
+    length, lag = (_time(x, MINUTES_OF_RECORD_S) for x in (length_s, lag_s))
+    needs = f"needs {enough:.0f} time constants, has {length_s / lag_s:.2g}"
+    return f"{needs} (a record of {length}, a time constant of about {lag})"
 
 
 def sentence(said: Answer) -> str:
@@ -152,13 +151,8 @@ def _filled(found: EffectFound) -> str:
 
 def unexplained_reason(said: Answer) -> str:
     """What is left, where it lives, and why it has no name."""
-    why = said.note or (NO_NAME if said.outside is None else outside_sentence(said.outside))
+    why = said.note or (NO_NAME if said.outside is None else f"{BETTER}: {_filled(said.outside)}.")
     return f"{why} {located_sentence(said.where)}".strip()
-
-
-def outside_sentence(found: EffectFound) -> str:
-    """What explains a loop better than the catalogue does, with its numbers."""
-    return f"{BETTER}: {_filled(found)}."
 
 
 PLACES = {
@@ -202,12 +196,10 @@ def located_sentence(where: Mapping[str, Any]) -> str:
 def _number(value: float, unit: str) -> str:
     if math.isinf(value):
         return "none"
-    if unit == "s" and abs(value) >= SPOKEN_S[0]:
-        return f"{value / 60:.3g} min" if abs(value) < SPOKEN_S[1] else f"{value / 3600:.3g} h"
-    return f"{value:.3g} {unit}".strip()
+    return _time(value, MINUTES_S) if unit == "s" else f"{value:.3g} {unit}".strip()
 
 
-def _time(seconds: float) -> str:
-    if seconds < 120:
+def _time(seconds: float, minutes_from: float) -> str:
+    if abs(seconds) < minutes_from:
         return f"{seconds:.3g} s"
-    return f"{seconds / 60:.3g} min" if seconds < 7200 else f"{seconds / 3600:.3g} h"
+    return f"{seconds / 60:.3g} min" if abs(seconds) < HOURS_S else f"{seconds / 3600:.3g} h"
