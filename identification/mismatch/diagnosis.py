@@ -1,7 +1,7 @@
 """From one recording to its explanation: recorder, controller, plain loop, then effects until nothing passes.
 
-Read on in the order of the walk: the catalogue's faults, plain_loop, rounds, selection (starts, friction), proof,
-explanation, experiment; answer then puts the explanation in numbers.
+Read on in the order of the walk: recording, the faults of catalogue/, plain_loop, rounds, selection (with starts and
+friction), proof, explanation, experiment and other_recordings; then answer, with where and location, and words.
 """
 
 from __future__ import annotations
