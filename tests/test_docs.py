@@ -33,6 +33,14 @@ def test_readme_starts_with_two_commands():
     assert "pytest" in blocks[1]
 
 
+def test_the_walk_names_modules_that_exist():
+    """Each module and folder that the walk through the rooms names is there."""
+    walk = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+    named = set(re.findall(r"\b(?:analyzer|identification|tuning|reports)/[\w/]+(?:\.py)?", walk))
+    assert len(named) > 25
+    assert sorted(path for path in named if not (ROOT / path).exists()) == []
+
+
 def test_ci_runs_the_readme_tests():
     """.ci/run runs the test command of the README."""
     command = re.search(r"\.venv/bin/python -m pytest.*", shell_blocks()[1])
