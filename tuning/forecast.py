@@ -62,18 +62,16 @@ class Forecast:
     change: dict[str, Estimate]
 
 
-def run(loop: Loop, load: Floats, op_start: float | None = None) -> LoopRecord:
+def run(loop: Loop, load: Floats) -> LoopRecord:
     """The loop at a constant set point of 0 under a load on the controller's clock, shape (n,) [% PV].
 
-    op_start [% OP] is the OP at rest; None takes the middle of the controller's range. A loop with play
-    is kicked once before the record begins: from rest a small load would leave it inside its play, where a
-    plant that cycles is not. Stick-slip needs no kick, for integral action drives it off.
+    OP rests in the middle of the controller's range. A loop with play is kicked once before the record begins: from
+    rest a small load would leave it inside its play, where a plant that cycles is not. Stick-slip needs no kick, for
+    integral action drives it off.
     """
-    c = loop.controller
-    start = 0.5 * (c.op_lo + c.op_hi) if op_start is None else op_start
-    before = _prelude(loop, load)
+    c, before = loop.controller, _prelude(loop, load)
     whole = np.concatenate((before, load))
-    record = closed_loop(loop, np.zeros(whole.size), whole, op_start=start)
+    record = closed_loop(loop, np.zeros(whole.size), whole, op_start=0.5 * (c.op_lo + c.op_hi))
     return record.span(before.size, whole.size)
 
 

@@ -30,7 +30,7 @@ def time_scale(record: LoopRecord, oscillation: Oscillation | None, controller: 
 
 def latest_fit_stretch(record: LoopRecord, n: int) -> int:
     """First sample of the latest stretch of n samples with the fewest out of use."""
-    out = record.bad | record.mask("manual")
+    out = ~record.usable
     seen = np.concatenate(([0], np.cumsum(out)))
     firsts = np.arange(len(record) - n, -1, -max(n // 4, 1))
     return int(firsts[int(np.argmin(seen[firsts + n] - seen[firsts]))])
@@ -42,7 +42,7 @@ def window_of(record: LoopRecord, scale_s: float, limits: CauseLimits, kind: str
     n = min(len(record) // factor, limits.window) * factor
     first = latest_fit_stretch(record, n)
     part = record.span(first, first + n)
-    usable = block_means((~(part.bad | part.mask("manual"))).astype(np.float64), factor) > 0.99
+    usable = block_means(part.usable.astype(np.float64), factor) > 0.99
     known = {name: (t, dead) for name, t, dead in limits.fast_process}
     most = known.get(kind.lower(), (math.inf, math.inf))
     op = np.ascontiguousarray(part.op)
