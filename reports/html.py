@@ -88,10 +88,8 @@ def sort_key(cell: Cell) -> str:
 
 @cache
 def _environment() -> Environment:
-    loader = PackageLoader("reports")
-    env = Environment(
-        loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    )
+    env = Environment(loader=PackageLoader("reports"), autoescape=True, undefined=StrictUndefined)
+    env.trim_blocks = env.lstrip_blocks = True
     env.filters.update(picture=cell_figure, sort_key=sort_key, keys=keys, trend_data=trend_data)
     env.filters.update(what_if_data=what_if_data, block=lambda block: type(block).__name__)
     env.filters["drawn"] = lambda block: Markup("").join(drawn for _, drawn in drawings(block))
@@ -113,29 +111,11 @@ def policy(single_file: bool) -> str:
     return "; ".join((*parts, "base-uri 'none'", "form-action 'none'"))
 
 
-def render(page: Page, single_file: bool = False, assets: str = "assets/") -> str:
-    """A page as HTML.
-
-    Parameters
-    ----------
-    page : Page
-    single_file : bool
-        Whether style and scripts are written into the page; else it asks for them in `assets`.
-    assets : str
-        Folder of the assets relative to the page, ending in '/'.
-    """
+def render(page: Page, single_file: bool = False) -> str:
+    """A page as HTML; style and scripts are written into a `single_file`, else it asks for them in assets/."""
     inlined = {a: Markup(asset(a)) for a in ASSETS} if single_file else {}
-    return (
-        _environment()
-        .get_template("page.html.j2")
-        .render(
-            page=visible_parts(page),
-            policy=Markup(policy(single_file)),
-            single_file=single_file,
-            assets=assets,
-            inlined=inlined,
-        )
-    )
+    parts = {"policy": Markup(policy(single_file)), "single_file": single_file, "inlined": inlined}
+    return _environment().get_template("page.html.j2").render(page=visible_parts(page), **parts)
 
 
 def mail(page: Page) -> str:

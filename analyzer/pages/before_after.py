@@ -86,10 +86,10 @@ def _row(change: Change, found: LoopComparison) -> tuple[Cell, ...]:
     )
 
 
-def figures(cases: Sequence[Case], primary: bool, name: str, title: str) -> Table:
+def figures(cases: Sequence[Case], primary: bool, name: str) -> Table:
     """Figures before and after of all loops (the study's Figure 11)."""
     rows = [_row(c, case.found) for case in cases for c in case.found.changes if c.measure.primary == primary]
-    return Table(name, title, columns("figures"), tuple(rows), searchable=len(rows) > 12, facet="verdict")
+    return Table(name, "", columns("figures"), tuple(rows), searchable=len(rows) > 12, facet="verdict")
 
 
 def _settings(change: TuningChange, units: str) -> str:
@@ -225,8 +225,8 @@ def page(
         Section("In short", tuple(short)),
         *((Section("In pictures", charts),) if charts else ()),
         *(loop_section(c, i, zone) for i, c in enumerate(cases)),
-        Section("Figures before and after", (figures(cases, True, "figures", ""),), closed=True),
-        Section("Other figures", (figures(cases, False, "other-figures", ""),), closed=True),
+        Section("Figures before and after", (figures(cases, True, "figures"),), closed=True),
+        Section("Other figures", (figures(cases, False, "other-figures"),), closed=True),
         _method(cases[0].found.limits if cases else LIMITS),
     )
     return Page("before-after", "What the changes brought", subtitle, sections, zone=zone)

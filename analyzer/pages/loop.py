@@ -193,7 +193,6 @@ def page(
     shared: Section | None = None,
     notes: Sequence[str] = (),
     settings: Page | None = None,
-    index: str = "index.html",
 ) -> Page:
     """A loop's page.
 
@@ -213,8 +212,6 @@ def page(
         What people wrote about it, oldest first.
     settings : Page or None
         The page on which settings are compared and tried, which is linked; its first section stands here too.
-    index : str
-        The morning page.
     """
     row = rows[-1]
     scale = scale_of(row)
@@ -234,7 +231,7 @@ def page(
     sections.insert(-1, Section("Figures of the night, for experts", (Facts(figures),), closed=True))
     known = [row["description"], row["type"], row["area"], f"night {row['night']}"]
     group = row["group"] if shared is not None else None
-    links = (("All loops", index), *_links(more, settings, group))
+    links = (("All loops", "index.html"), *_links(more, settings, group))
     return Page(slug(row["loop"]), row["loop"], ", ".join(k for k in known if k), tuple(sections), links)
 
 

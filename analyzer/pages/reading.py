@@ -58,15 +58,12 @@ class Thinned:
         return Thinned(self.time_s[edges], joined, np.logical_and.reduceat(self.gap, edges))
 
 
-def nights_within(store: Store, span: Span | None) -> list[str]:
-    """Names of the nights that may hold something of a span; all where it is None."""
-    names = store.nights()
-    if span is None:
-        return names
+def nights_within(store: Store, span: Span) -> list[str]:
+    """Names of the nights that may hold something of a span."""
     around = timedelta(days=AROUND_D)
     first = (datetime.fromtimestamp(span.first_s, UTC) - around).strftime("%Y-%m-%d")
     last = (datetime.fromtimestamp(span.last_s, UTC) + around).strftime("%Y-%m-%d")
-    return [n for n in names if first <= n <= last]
+    return [n for n in store.nights() if first <= n <= last]
 
 
 def _tables(

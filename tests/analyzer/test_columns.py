@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
+import tomllib
+from importlib.resources import files
 from pathlib import Path
 
 import pyarrow as pa
@@ -14,6 +16,7 @@ import pytest
 from analyzer.columns import EXPLAINED, HOURS, NIGHTS, Column, names, row_of
 from analyzer.config import Config
 from analyzer.night.finish import finish_night
+from analyzer.pages.words import columns as page_columns
 from analyzer.store.store import Store
 from analyzer.store.table import rows_table, write_table
 
@@ -87,3 +90,11 @@ def test_a_night_of_another_version_is_joined(tmp_path: Path):
     found = pq.read_table(tmp_path / "nights" / f"{night}.parquet")
     assert found.column_names == list(names(NIGHTS))
     assert found.column("loop").to_pylist() == ["NEW", "OLD"]
+
+
+def test_the_tables_of_pages_name_columns_that_there_are() -> None:
+    """Each table of tables.toml holds columns of the store or its own, each once."""
+    stated = tomllib.loads((files("analyzer.pages") / "tables.toml").read_text("utf-8"))
+    for table in stated:
+        keys = [column.key for column in page_columns(table)]
+        assert len(keys) == len(set(keys)), table
