@@ -28,15 +28,7 @@ if TYPE_CHECKING:
 TABLE = "explained"
 QUIET = (Cause.NONE, Action.NONE, "", None)
 """Causes and actions that are none."""
-ASKED = [
-    "loop",
-    "status",
-    "oscillating_pct",
-    "oscillation_significance",
-    "cause",
-    "action",
-    "source_loop",
-]
+ASKED = ["loop", "status", "oscillating_pct", "oscillation_significance", "cause", "action", "source_loop"]
 """Columns that say whether a loop is worth an explanation, and whose loop leads it."""
 Row = dict[str, Any]
 

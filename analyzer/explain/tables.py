@@ -18,10 +18,10 @@ from analyzer.explain.words import (
     rms,
     share,
 )
-from analyzer.pages.words import number
+from analyzer.pages.words import columns, plain_cell
 from identification.mismatch.selection import Candidate
 from identification.mismatch.words import discriminating_test
-from reports.pages import Cell, Column, Table
+from reports.pages import Cell, Table
 
 Data = Mapping[str, Any]
 HARDLY = 0.05
@@ -34,61 +34,28 @@ SHOWN = 12
 
 def parameters(data: Data) -> Table:
     """Parameters with intervals of all effects, and of physics that has no name."""
-    columns = (
-        Column("effect", "Effect"),
-        Column("parameter", "Parameter"),
-        Column("value", "Value", True),
-        Column("interval", "90 % interval", True),
-        Column("unit", "Unit"),
-    )
     rows = tuple(
-        (
-            Cell(x["name"]),
-            Cell(called(k)),
-            Cell(number(v["value"]), v["value"]),
-            Cell(interval(v)),
-            Cell(v["unit"]),
-        )
+        (Cell(x["name"]), Cell(called(k)), plain_cell(v["value"]), Cell(interval(v)), Cell(v["unit"]))
         for x in [*data["effects"], *([data["outside"]] if "outside" in data else [])]
         for k, v in x["parameters"].items()
         if k not in HIDDEN
     )
-    return Table("parameters", "Parameters", columns, rows)
+    return Table("parameters", "Parameters", columns("effects_found"), rows)
 
 
 def moved(data: Data) -> Table:
     """The plain loop's constants before and after."""
-    columns = (
-        Column("constant", "Of the plain loop"),
-        Column("before", "Plain", True),
-        Column("after", "Improved", True),
-        Column("change", "Change", True),
-        Column("unit", "Unit"),
-    )
     rows = tuple(
-        (
-            Cell(MOVED[k][0]),
-            Cell(number(a), a),
-            Cell(number(b), b),
-            Cell(change(a, b)),
-            Cell(MOVED[k][1]),
-        )
+        (Cell(MOVED[k][0]), plain_cell(a), plain_cell(b), Cell(change(a, b)), Cell(MOVED[k][1]))
         for k, (a, b) in data["moved"].items()
     )
     most = max((abs(b / a - 1) if a else 0.0 for a, b in data["moved"].values()), default=0.0)
     note = KEPT if most < HARDLY else BENT
-    return Table("moved", "How the plain loop's constants moved", columns, rows, note)
+    return Table("moved", "How the plain loop's constants moved", columns("constants_moved"), rows, note)
 
 
 def fit(data: Data, note: str = "") -> Table:
     """Misfit of the simulations, fitted and held out."""
-    columns = (
-        Column("model", "Simulation"),
-        Column("fitted", "rms, fitted", True),
-        Column("fitted_fit", "Fit %", True),
-        Column("held", "rms, held out", True),
-        Column("held_fit", "Fit %", True),
-    )
     shown = [k for k in ROWS if k in data["fit"] and (k != "explained" or data["moved"])]
     rows = []
     for key in shown:
@@ -97,27 +64,16 @@ def fit(data: Data, note: str = "") -> Table:
             m = data["fit"][key][part]
             cells += [_rms(m), Cell(f"{m['fit_pct']:.1f}", m["fit_pct"])]
         rows.append(tuple(cells))
-    return Table("fit", "", columns, tuple(rows), note)
+    return Table("fit", "", columns("simulations"), tuple(rows), note)
 
 
 def others(data: Data) -> Table:
     """Misfit of both simulations on each other recording that was held out."""
-    columns = (
-        Column("recording", "Held out"),
-        Column("plain", "rms, plain", True),
-        Column("improved", "rms, improved", True),
-        Column("removed", "Misfit removed", True),
-    )
     rows = tuple(
-        (
-            Cell(x["recording"]),
-            _rms(x["baseline"]),
-            _rms(x["explained"]),
-            Cell(share(x["share"]), x["share"]),
-        )
+        (Cell(x["recording"]), _rms(x["baseline"]), _rms(x["explained"]), Cell(share(x["share"]), x["share"]))
         for x in data.get("held_out_on", [])
     )
-    return Table("others", "On the recordings held out", columns, rows)
+    return Table("others", "On the recordings held out", columns("held_out"), rows)
 
 
 def _rms(misfit: Mapping[str, float]) -> Cell:
@@ -126,12 +82,6 @@ def _rms(misfit: Mapping[str, float]) -> Cell:
 
 def features(data: Data) -> Table:
     """What the misfit is tied to."""
-    columns = (
-        Column("feature", "Tied to"),
-        Column("p", "Chance", True, "Of as much on errors tied to nothing, over all rows together"),
-        Column("carries", "Carries it"),
-        Column("place", "How", wide=True),
-    )
     rows = tuple(
         (
             Cell(FEATURES[f["name"]], kind="strong" if f["carries"] else ""),
@@ -145,28 +95,21 @@ def features(data: Data) -> Table:
         "The plain loop's one-step errors in one joint regression: each row is what it adds to the others; chances "
         "from blocks in other orders."
     )
-    return Table("where", "", columns, rows, note)
+    return Table("where", "", columns("misfit_tied_to"), rows, note)
 
 
 def alternatives(data: Data) -> Table:
     """Names that fit as well or look alike, and what would tell them from the one that is told."""
-    columns = (Column("name", "Could also be"), Column("test", "What would tell them apart", wide=True))
     rows = tuple(
         (Cell(other, kind="strong"), Cell(discriminating_test(first["name"], other)))
         for first in data["effects"][:1]
         for other in first["alternatives"]
     )
-    return Table("alternatives", "", columns, rows)
+    return Table("alternatives", "", columns("alternatives"), rows)
 
 
 def tried(first: tuple[Candidate, ...], taken: tuple[Candidate, ...]) -> Table:
     """What was tried in the first round, the best of each name, the likeliest first."""
-    columns = (
-        Column("name", "Added to the plain loop"),
-        Column("gain", "Gain", True, "Log likelihood [nat]"),
-        Column("net", "After its penalty", True, "Less what its constants and the search cost"),
-        Column("said", ""),
-    )
     names = {c.name for c in taken}
     best = {c.name: c for c in sorted(first, key=lambda c: c.penalised)}
     rows = tuple(
@@ -174,7 +117,7 @@ def tried(first: tuple[Candidate, ...], taken: tuple[Candidate, ...]) -> Table:
         for c in sorted(best.values(), key=lambda c: -c.penalised)[:SHOWN]
     )
     note = "Each name was fitted with all constants free; the best of so many gains about five nat by chance."
-    return Table("candidates", "", columns, rows, note)
+    return Table("candidates", "", columns("effects_tried"), rows, note)
 
 
 def _nats(value: float) -> Cell:
