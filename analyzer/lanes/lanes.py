@@ -34,15 +34,6 @@ class Rule:
     of_measurement: bool = False
 
 
-def _beyond(column: str, limit: str) -> Callable[[Finding, LaneLimits], bool]:
-    """Whether a loop's figure is larger than a limit."""
-
-    def stands(found: Finding, limits: LaneLimits) -> bool:
-        return found.number(column) > getattr(limits, limit)
-
-    return stands
-
-
 def _at_limit(found: Finding) -> str:
     mean = found.known.get("op_mean_pct")
     side = "" if not isinstance(mean, float) else " lower" if mean < 50 else " upper"
@@ -87,21 +78,26 @@ RULES = (
     Rule(
         Lane.MANUAL,
         "manual_pct",
-        _beyond("manual_pct", "manual_pct"),
+        lambda f, limits: f.number("manual_pct") > limits.manual_pct,
         lambda f: f"in manual for {f.number('manual_pct'):.0f} % of the time",
     ),
-    Rule(Lane.AT_LIMIT, "at_limits_pct", _beyond("at_limits_pct", "at_limits_pct"), _at_limit),
+    Rule(
+        Lane.AT_LIMIT,
+        "at_limits_pct",
+        lambda f, limits: f.number("at_limits_pct") > limits.at_limits_pct,
+        _at_limit,
+    ),
     Rule(
         Lane.LASTING_ERROR,
         "lasting_error_pct",
-        _beyond("lasting_error_pct", "lasting_error_pct"),
+        lambda f, limits: f.number("lasting_error_pct") > limits.lasting_error_pct,
         _lasting,
         of_measurement=True,
     ),
     Rule(
         Lane.FROZEN,
         "frozen_pct",
-        _beyond("frozen_pct", "frozen_pct"),
+        lambda f, limits: f.number("frozen_pct") > limits.frozen_pct,
         lambda f: f"PV stands still for {f.number('frozen_pct'):.0f} % of the time while OP moves: frozen",
         of_measurement=True,
     ),
@@ -115,7 +111,7 @@ RULES = (
     Rule(
         Lane.TRAVEL,
         "valve_travel_pct_per_h",
-        _beyond("valve_travel_pct_per_h", "travel_pct_per_h"),
+        lambda f, limits: f.number("valve_travel_pct_per_h") > limits.travel_pct_per_h,
         lambda f: f"OP travels {f.number('valve_travel_pct_per_h'):.0f} %/h",
     ),
 )
