@@ -5,7 +5,7 @@ from __future__ import annotations
 import signal
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -19,9 +19,6 @@ from identification.errors import InputError, TriageError
 from reports.whole_file import is_full
 
 if TYPE_CHECKING:
-    from analyzer.config import WorkerLimits
-    from analyzer.history.export import Export
-    from analyzer.loops.spec import LoopSpec
     from analyzer.night.asked import Asked
     from analyzer.night.batch import Batch, Outcome
     from analyzer.night.nights import Night
@@ -29,9 +26,6 @@ if TYPE_CHECKING:
 
 STOPPED = 128
 """Exit status of a run that a signal has stopped, less the signal's number: what shells and schedulers expect."""
-OPENED_BYTES_S, FETCHED_S = 1e6, 3600.0
-"""Speed that an export's opening has at least beyond its limit [bytes/s], and the time more that one of shared
-storage may take [s]; ours: text is laid beside as Parquet at fifty times the first."""
 FEW = 10
 """Notes on what was read that are printed; the rest is counted."""
 
@@ -142,13 +136,14 @@ def _go_on(store: Path) -> str:
 
 def _night(asked: Asked, place: Path, log: RunLog, how: How) -> tuple[Outcome, int]:
     """The export read, assessed and, where it is asked for, explained; the outcome and the number of loops."""
+    from analyzer.night.asked import opened_apart
     from analyzer.night.batch import Batch
     from analyzer.store.lock import scratch
     from analyzer.store.store import Store
 
     with scratch(place, how.resume) as copies:
         reading = {**asked.reading, "scratch": copies}
-        source, specs, notes = _opened(replace(asked, reading=reading))
+        source, specs, notes = opened_apart(replace(asked, reading=reading))
         _say(notes, log)
         span = asked.since_s, asked.until_s
         batch = Batch(source, specs, Store(place), asked.config, *span, asked.changes, asked.zone)
@@ -156,49 +151,6 @@ def _night(asked: Asked, place: Path, log: RunLog, how: How) -> tuple[Outcome, i
         if how.explaining and len(outcome.unassessed) + len(outcome.failed) < len(specs):
             _explained(batch, how, outcome.nights[-1])
     return outcome, len(specs)
-
-
-def _opened(asked: Asked) -> tuple[Export, Sequence[LoopSpec], Sequence[str]]:
-    """The export found out about in a worker process: a damaged file may take memory or time without end.
-
-    Raises
-    ------
-    InputError
-        The export cannot be used, or the process that read it died.
-    """
-    from analyzer.night.workers import Died, Workers
-
-    with Workers(1, find_out, _allowed(asked)) as workers:
-        workers.submit(asked)
-        (found,) = workers.results()
-    if isinstance(found, Died):
-        raise InputError(
-            f"{asked.export[0]}: reading it ended without a result ({found.why})",
-            "files that are whole and fit into memory",
-            "export them again or in parts; 'triage check FILE' on each finds the one",
-        )
-    return found
-
-
-def _allowed(asked: Asked) -> WorkerLimits:
-    """What opening the export may cost, by its size; of shared storage the copying is not known beforehand."""
-    from analyzer.places import is_remote
-
-    near = [path for path in asked.export if not is_remote(path)]
-    files = [file for path in near for file in (path.rglob("*") if path.is_dir() else [path])]
-    more_s = sum(file.stat().st_size for file in files if file.is_file()) / OPENED_BYTES_S
-    more_s += FETCHED_S * (len(near) < len(asked.export))
-    limits = asked.config.opening
-    return replace(limits, processor_s=limits.processor_s + more_s, wall_s=limits.wall_s + 6.0 * more_s)
-
-
-def find_out(asked: Asked, began: Callable[[int], None]) -> tuple[Export, Sequence[LoopSpec], Sequence[str]]:
-    """What a worker finds out about an export, its span of time included."""
-    source, specs, notes = asked.opened()
-    for spec in specs:
-        if spec.pv is not None:
-            source.span(spec.pv)
-    return source, specs, notes
 
 
 def _say(notes: Sequence[str], log: RunLog) -> None:

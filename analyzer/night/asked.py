@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from analyzer.config import Config
+from analyzer.config import Config, WorkerLimits
 from analyzer.history.export import Export, ReadOptions, open_export
 from analyzer.history.plant_clock import zone_of
 from analyzer.history.series import Series
@@ -15,9 +15,15 @@ from analyzer.loops.changes import TuningChange
 from analyzer.loops.spec import LoopSpec, unknown_columns
 from analyzer.loops.tags import find_loops, match, read_loops
 from analyzer.night.nights import Night, cut
+from analyzer.night.workers import Died, Workers
+from analyzer.places import is_remote
+from identification.errors import InputError
 
 MOST_NAMES = 10
 """Loops that are named in a note; the rest is counted."""
+OPENED_BYTES_S, FETCHED_S = 1e6, 3600.0
+"""Speed that an export's opening has at least beyond its limit [bytes/s], and the time more that one of shared
+storage may take [s]; ours: text is laid beside as Parquet at fifty times the first."""
 Opened = tuple[Export, tuple[LoopSpec, ...], tuple[str, ...]]
 """An export, its loops with their tags, and what there is to say about them."""
 
@@ -73,3 +79,42 @@ def _of_no_loop(changes: Sequence[TuningChange], specs: Sequence[LoopSpec]) -> t
     more = f" and {len(strange) - MOST_NAMES} more" if len(strange) > MOST_NAMES else ""
     named = ", ".join(strange[:MOST_NAMES]) + more
     return (f"--changes: {named}: no such loop is read; these changes are left aside: correct the name",)
+
+
+def opened_apart(asked: Asked) -> Opened:
+    """The same, found out about in a worker process: a damaged file may take memory or time without end.
+
+    Raises
+    ------
+    InputError
+        The export cannot be used, or the process that read it died.
+    """
+    with Workers(1, find_out, _allowed(asked)) as workers:
+        workers.submit(asked)
+        (found,) = workers.results()
+    if isinstance(found, Died):
+        raise InputError(
+            f"{asked.export[0]}: reading it ended without a result ({found.why})",
+            "files that are whole and fit into memory",
+            "export them again or in parts; 'triage check FILE' on each finds the one",
+        )
+    return found
+
+
+def _allowed(asked: Asked) -> WorkerLimits:
+    """What opening the export may cost, by its size; of shared storage the copying is not known beforehand."""
+    near = [path for path in asked.export if not is_remote(path)]
+    files = [file for path in near for file in (path.rglob("*") if path.is_dir() else [path])]
+    more_s = sum(file.stat().st_size for file in files if file.is_file()) / OPENED_BYTES_S
+    more_s += FETCHED_S * (len(near) < len(asked.export))
+    limits = asked.config.opening
+    return replace(limits, processor_s=limits.processor_s + more_s, wall_s=limits.wall_s + 6.0 * more_s)
+
+
+def find_out(asked: Asked, began: Callable[[int], None]) -> Opened:
+    """What a worker finds out about an export, its span of time included."""
+    source, specs, notes = asked.opened()
+    for spec in specs:
+        if spec.pv is not None:
+            source.span(spec.pv)
+    return source, specs, notes
