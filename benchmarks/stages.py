@@ -17,7 +17,7 @@ import numpy as np
 import pyarrow as pa
 
 from analyzer.config import Config
-from analyzer.explain.case import case, pid_of
+from analyzer.explain.case import case
 from analyzer.explain.explained import explained
 from analyzer.history.export import Export, open_export
 from analyzer.loop.advice import advise
@@ -25,7 +25,7 @@ from analyzer.loop.assess import assess, cause_of
 from analyzer.loop.oscillation import counting, detect
 from analyzer.loop.quality import prepare
 from analyzer.loops.spec import LoopSpec
-from analyzer.loops.tags import find_loops
+from analyzer.loops.tags import controller, find_loops
 from benchmarks.night import fastest, floor, plant, stated
 from proofs.common import command, command_line, publish
 
@@ -48,7 +48,7 @@ def cost(path: Path, export: Export, spec: LoopSpec, config: Config) -> Cost:
     floor_s, _ = fastest(lambda: floor(path, spec.tags))
     read_s, series = fastest(lambda: export.read(spec.tags))
     prepare_s, prepared = fastest(lambda: prepare(spec, series, config.quality))
-    pid = pid_of(spec, prepared)
+    pid = controller(spec, prepared.scale.span)
     detect_s, seen = fastest(lambda: detect(prepared.record, config.oscillation))
     cause_s, _ = fastest(lambda: cause_of(prepared, seen, pid, config, spec.type))
     whole_s, found = fastest(lambda: assess(prepared, pid, config, spec.type))

@@ -27,7 +27,6 @@ from identification.estimation.likelihood_ratio import WindowFit
 from identification.estimation.trials import trials_between_moves
 from identification.mismatch.experiment import coarser_by, is_experiment
 from identification.mismatch.recording import Recording, SeenInCycles, least_jump
-from identification.models import Pid
 from identification.record import Floats
 
 
@@ -125,13 +124,9 @@ def seen_in_cycles(verdict: Verdict, limits: AdviceLimits) -> SeenInCycles | Non
 def verdict_on(spec: LoopSpec, prepared: Prepared, config: Config) -> Verdict:
     """What a night would say of the whole recording: why it oscillates, or of which valve it rests."""
     seen = detect(prepared.record, config.oscillation)
-    found, said = convicted(prepared, seen, pid_of(spec, prepared), config, spec.type)
+    stated = controller(spec, prepared.scale.span)
+    found, said = convicted(prepared, seen, stated, config, spec.type)
     return said if counting(found) is not None or said.cause is Cause.VALVE else NO_CAUSE
-
-
-def pid_of(spec: LoopSpec, prepared: Prepared) -> Pid | None:
-    """The stated controller in percent and seconds; None where it is not known."""
-    return controller(spec, prepared.scale.span)
 
 
 MOST_SAMPLES, STRETCH_SAMPLES = 40_000, 15_000
