@@ -84,8 +84,8 @@ def _cells(f: Field) -> list[str]:
     return out
 
 
-def field(f: Field) -> Drawing:
-    """Cells coloured by their value, two axes, and named points."""
+def field(f: Field, alone: bool = False) -> Drawing:
+    """Cells coloured by their value, two axes, and named points; `alone`, without the figure under an axis's name."""
     left, width, height, foot = FIELD
     across, along = (left, left + width), (0.0, height)
     x, y = Axis.of_cells(f.x, *across), Axis.of_cells(f.y, height, 0.0)
@@ -94,7 +94,7 @@ def field(f: Field) -> Drawing:
         body += tick_x(x.at(tick), along, f"{tick:g}")
     for tick in log_ticks(float(f.y[0]), float(f.y[-1])):
         down, text = y.at(tick), f"{tick:g}"
-        body += tick_y(down, across, text if down > TITLED or len(text) < 4 else "")
+        body += tick_y(down, across, "" if alone and down < TITLED and len(text) > 3 else text)
     body.append(written(left + width / 2, height + 32, f.x_label, "middle", "axis"))
     body.append(written(4, 12, f.y_label, "start", "axis"))
     for place in f.places:

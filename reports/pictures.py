@@ -35,8 +35,11 @@ def asset(name: str) -> str:
     return (files("reports") / "templates" / "assets" / name).read_text("utf-8")
 
 
-def drawings(block: Picture, zone: str = "UTC") -> list[tuple[str, Drawing]]:
-    """The drawings of a block, each with a title where there are several; times stand on the clock of a zone."""
+def drawings(block: Picture, zone: str = "UTC", alone: bool = False) -> list[tuple[str, Drawing]]:
+    """The drawings of a block, each with a title where there are several; times stand on the clock of a zone.
+
+    alone : whether they are drawn for a file of its own.
+    """
     match block:
         case Plot():
             return [("", plots.plot(block))]
@@ -49,7 +52,7 @@ def drawings(block: Picture, zone: str = "UTC") -> list[tuple[str, Drawing]]:
         case HeatMap():
             return [("", maps.heat_map(block))]
         case Field():
-            return [("", maps.field(block))]
+            return [("", maps.field(block, alone))]
         case Graph():
             return [("", maps.graph(block))]
         case TreeMap():
@@ -90,7 +93,7 @@ def keys(block: Picture) -> Markup:
 def as_file(block: Picture, zone: str = "UTC") -> str:
     """A picture as an SVG file that needs no other: title, keys, drawings, and the colours of the style sheet."""
     block = visible_parts(block)
-    shown = drawings(block, zone)
+    shown = drawings(block, zone, alone=True)
     width = max([plots.PLOT[0], *(d.width for _, d in shown)])
     wide = ROOM if len(shown) > 1 else width
     body, top = _headed(block, wide)
