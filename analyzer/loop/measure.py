@@ -11,7 +11,7 @@ from analyzer.config import CauseLimits
 from analyzer.loop.assessments import at_limits_share
 from analyzer.loop.fit_window import answering, time_scale, window_of
 from analyzer.loop.oscillation import Oscillation
-from identification.controller.settings import fit_pi
+from identification.controller.pi_regression import fit_pi
 from identification.errors import NotAssessedError
 from identification.estimation.backlash_stiction import (
     SCREENED,

@@ -11,7 +11,7 @@ import math
 from dataclasses import dataclass, replace
 
 from analyzer.config import SettingsLimits
-from identification.controller.settings import compare_laws
+from identification.controller.pi_regression import compare_laws
 from identification.models import Pid
 from identification.record import LoopRecord
 

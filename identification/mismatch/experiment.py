@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from identification.controller.feedback import fed_back
+from identification.controller.pi_regression import fed_back
 from identification.estimation.candidate import gain
 from identification.estimation.prediction_error import descend
 from identification.estimation.start_values import plain_processes

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from identification.controller.feedback import fed_back
+from identification.controller.pi_regression import fed_back
 
 
 def closed(seed: int, n: int = 2000) -> tuple[np.ndarray, np.ndarray]:
