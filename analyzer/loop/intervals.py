@@ -23,9 +23,10 @@ from identification.estimation.covariance import (
     reaching,
 )
 from identification.estimation.gauss_newton import covariance
-from identification.estimation.hammerstein import Fit, ValveTrial
+from identification.estimation.hammerstein import Fit
 from identification.estimation.window import Window
 from identification.models import Estimate
+from identification.simulation.valve import StemLaw
 
 
 def intervals(window: Window, fit: Fit, valve: bool, limits: AdviceLimits) -> dict[str, Estimate]:
@@ -64,7 +65,7 @@ def _lag_wider(fit: Fit, valve: bool) -> float:
     return WIDER * JUMPING if fit.valve.slip_jump > 0 else 1.0
 
 
-def _jumping(window: Window, valve: ValveTrial, found: dict[str, Estimate]) -> dict[str, Estimate]:
+def _jumping(window: Window, valve: StemLaw, found: dict[str, Estimate]) -> dict[str, Estimate]:
     """What is told of a valve that jumps, within what PV leaves open.
 
     Slip jump from half of the found one to the whole stickband, slope and gain by what their product with the jump

@@ -23,7 +23,7 @@ from identification.estimation.backlash_stiction import (
 )
 from identification.estimation.expected_evidence import expected_evidence
 from identification.estimation.gauss_newton import descend
-from identification.estimation.hammerstein import IDEAL, Fit, process_of, residual
+from identification.estimation.hammerstein import Fit, process_of, residual
 from identification.estimation.likelihood_ratio import WindowFit, evidence, stem_moves, with_load_step
 from identification.estimation.noise import judged
 from identification.estimation.search import AR_ORDER, prepare
@@ -40,6 +40,7 @@ from identification.signals.spectrum import (
     spectrum,
     tapered_power,
 )
+from identification.simulation.valve import IDEAL
 from tuning.frequency_response import is_stable, loop_response
 
 HARMONICS = (2, 3)

@@ -17,7 +17,7 @@ from analyzer.words.units import duration, gain_unit
 from identification.models import Integrator
 from identification.simulation.closed_loop import scan_step
 from identification.simulation.lag import discretize
-from identification.simulation.valve import constants_of
+from identification.simulation.valve import law_of
 from reports.pages import (
     Block,
     Cell,
@@ -176,7 +176,7 @@ def model(c: Comparison, spec: LoopSpec, unit: str) -> str:
     """What a page needs to simulate the loop with other settings, as JSON."""
     loop, h = c.loop, scan_step(c.loop)
     d, pid = discretize(loop.process, h), c.loop.controller
-    breakaway, sliding, tolerance = constants_of(loop.valve)
+    breakaway, sliding, tolerance = law_of(loop.valve)
     settings = [{"name": t.name, "kp": t.controller.kp, "ti_s": _finite(t.controller.ti_s)} for t in c.tried]
     return json.dumps(
         {

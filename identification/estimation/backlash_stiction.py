@@ -6,15 +6,17 @@ from dataclasses import replace
 
 import numpy as np
 
+from identification.estimation.descent import compass
 from identification.estimation.fine_scan import scan
 from identification.estimation.gauss_newton import descend
-from identification.estimation.hammerstein import IDEAL, Fit, ValveTrial, sticking
+from identification.estimation.hammerstein import Fit
 from identification.estimation.noise import arx_noise
 from identification.estimation.search import (
     AR_ORDER,
     INPUT_LAGS,
     Dynamics,
     Prepared,
+    WhitePv,
     prepare,
     search,
     starts,
@@ -22,7 +24,7 @@ from identification.estimation.search import (
 )
 from identification.estimation.window import Window
 from identification.record import Floats
-from identification.simulation.valve import HALTS, RESTS, SLIDES
+from identification.simulation.valve import HALTS, IDEAL, RESTS, SLIDES, StemLaw, sticking
 
 SCREEN_SHARES = (0.1, 0.3, 0.55, 0.8)
 """Stickbands that a loop without an evident fault is screened with, as shares of OP's range; ours: a play of any
@@ -50,6 +52,8 @@ FINALISTS = 8
 """Candidates of the fine scan, per behaviour and noise model, that are followed to the end; ours."""
 COMPASS = (0.02, 0.007, 0.0025)
 """Relative steps of the search within a pit."""
+PIT_MOVES = ((1, 0), (-1, 0), (0, 1), (0, -1))
+"""Steps of stickband and jump that are tried in a pit."""
 SHORT = 1000
 """Blocks of a record that is so short that every candidate can be tried on it; ours."""
 FOLLOWED_SHORT = 5
@@ -94,7 +98,7 @@ def generic_noise() -> Floats:
     return out
 
 
-def _ranked(window: Window, ar: Floats, valves: list[ValveTrial], begins: list[Dynamics]) -> list[Fit]:
+def _ranked(window: Window, ar: Floats, valves: list[StemLaw], begins: list[Dynamics]) -> list[Fit]:
     """Valves with dynamics searched anew under one noise model, best first."""
     trials, pv = [], white_pv(window, ar)
     for valve in valves:
@@ -103,7 +107,7 @@ def _ranked(window: Window, ar: Floats, valves: list[ValveTrial], begins: list[D
     return sorted(trials, key=lambda fit: fit.sigma2)
 
 
-def _chosen(window: Window, near: Fit, valves: list[ValveTrial], period_s: float, followed: int) -> list[Fit]:
+def _chosen(window: Window, near: Fit, valves: list[StemLaw], period_s: float, followed: int) -> list[Fit]:
     """The best few of valves tried under two noise models."""
     begins = [(near.time_constant_s, near.dead_time_s), *starts(window, period_s)]
     noises = generic_noise(), near.ar
@@ -158,7 +162,7 @@ def fit_stick_slip(window: Window, play: Fit, period_s: float) -> Fit:
     return max([_likeliest(window, begun), *_finely(window, play)], key=lambda fit: fit.log_likelihood)
 
 
-def _coarse(window: Window, play: Fit) -> list[ValveTrial]:
+def _coarse(window: Window, play: Fit) -> list[StemLaw]:
     """Stickbands up to OP's range, with stems that rest and stems that slide."""
     reach = max(window.op_range, 1e-9)
     near = play.valve.stickband / reach
@@ -189,17 +193,13 @@ def _finely(window: Window, play: Fit) -> list[Fit]:
 
 def _bottom(window: Window, fit: Fit) -> Fit:
     """Stickband and jump moved by ever smaller steps to the least innovations, the rest following at the end."""
-    valve, least = fit.valve, fit.sigma2
     dynamics, pv = (fit.time_constant_s, fit.dead_time_s), white_pv(window, fit.ar)
-    for step in COMPASS:
-        moved = True
-        while moved:
-            moved = False
-            for wider, jumpier in ((1, 0), (-1, 0), (0, 1), (0, -1)):
-                width = valve.stickband * (1 + wider * step)
-                jump = min(valve.slip_jump * (1 + 2 * jumpier * step), width)
-                trial = sticking(width, jump / width, valve.tolerance)
-                found = pv.behind(trial).score(*dynamics)[0]
-                if found < least * (1 - 1e-7):
-                    valve, least, moved = trial, found, True
+
+    def tried(pv: WhitePv, valve: StemLaw, move: tuple[int, int], step: float) -> tuple[StemLaw, float]:
+        width = valve.stickband * (1 + move[0] * step)
+        jump = min(valve.slip_jump * (1 + 2 * move[1] * step), width)
+        trial = sticking(width, jump / width, valve.tolerance)
+        return trial, pv.behind(trial).score(*dynamics)[0]
+
+    valve, _ = compass(pv, fit.valve, fit.sigma2, tried, PIT_MOVES, COMPASS, 1e-7)
     return descend(window, replace(fit, valve=valve))

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from identification.estimation.descent import nats
 from identification.estimation.noise import Edges, edges_for, judged
 from identification.limits import LIMITS, ExplainLimits
 from identification.record import Floats, Mask
@@ -106,7 +107,7 @@ class Fitted:
 
 def gain(better: Fitted, worse: Fitted) -> float:
     """Gain in log likelihood [nat]."""
-    return 0.5 * better.count * math.log(max(worse.loss, 1e-30) / max(better.loss, 1e-30))
+    return nats(better.count, worse.loss, better.loss)
 
 
 def scales(inputs: ModelInputs, c: Floats, param: Param) -> tuple[float, float]:

@@ -8,10 +8,11 @@ from dataclasses import replace
 import numpy as np
 
 from identification.estimation.backlash_stiction import begin
-from identification.estimation.hammerstein import IDEAL, Fit, ValveTrial, residual, sticking
+from identification.estimation.hammerstein import Fit, residual
 from identification.estimation.search import prepare, search, starts
 from identification.estimation.window import Window
 from identification.record import Floats
+from identification.simulation.valve import IDEAL, StemLaw, sticking
 
 
 def expected_evidence(window: Window, linear: Fit, width: float, period_s: float) -> float:
@@ -36,6 +37,6 @@ def expected_evidence(window: Window, linear: Fit, width: float, period_s: float
     return 0.5 * linear.count * math.log1p(left / linear.sigma2)
 
 
-def _pv(window: Window, linear: Fit, valve: ValveTrial) -> Floats:
+def _pv(window: Window, linear: Fit, valve: StemLaw) -> Floats:
     """PV of a process behind a valve, free of load and noise [% PV], shape (n,)."""
     return window.centred - residual(window, replace(linear, valve=valve))

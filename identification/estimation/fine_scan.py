@@ -10,6 +10,7 @@ from identification.estimation.search import Dynamics, Products, variance_left, 
 from identification.estimation.window import Stems, Window
 from identification.record import Floats
 from identification.simulation.lag import Lag, respond, unit_lag
+from identification.simulation.valve import StemLaw
 
 
 @njit(cache=True)
@@ -27,8 +28,8 @@ def _scan(
     out, x = np.empty(pairs.shape[0]), np.empty(n)
     for i in range(pairs.shape[0]):
         width, share = pairs[i, 0], pairs[i, 1]
-        breakaway, sliding = 0.5 * width * (1 + share), 0.5 * width * (1 - share)
-        stem = stem_blocks(stems.op, stems.low, stems.high, breakaway, sliding, tolerance, stems.factor)
+        law = StemLaw(0.5 * width * (1 + share), 0.5 * width * (1 - share), tolerance)
+        stem = stem_blocks(stems, law)
         white = whitened_stem(stem - stem.mean(), ar)
         out[i], whole, known = np.inf, white, 0.0
         for j in range(tries):

@@ -1,4 +1,9 @@
-"""All constants of a lag behind a valve at once to the least innovations variance."""
+"""All constants of a lag behind a valve at once to the least innovations variance: the night's fast descent.
+
+Constants stand in one vector theta: log T, dead time [s], stickband [% OP], gain, coefficients of 1, t, decay and the
+load's step, and the noise model of single lags. It is the residual of `explain`'s plain loop behind a valve
+(prediction_error.py), its noise model fitted beside the rest; tests hold the two to one optimum.
+"""
 
 from __future__ import annotations
 
@@ -7,13 +12,17 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
+from numba.extending import register_jitable
+from numpy.typing import NDArray
 
 from identification.estimation.covariance import inverse, scattered
-from identification.estimation.hammerstein import Fit, ValveTrial, stem_behind
-from identification.estimation.noise import judged
-from identification.estimation.sensitivities import BASE, Indices, damped_step, innovations, sensitivities
+from identification.estimation.descent import Descent, down
+from identification.estimation.hammerstein import Fit, stem_of
+from identification.estimation.noise import every_lag, judged, whitened
 from identification.estimation.window import Stems, Window
-from identification.record import Floats, Mask
+from identification.record import Floats
+from identification.simulation.lag import respond, respond_together, unit_lag
+from identification.simulation.valve import StemLaw
 
 ITERATIONS = 25
 """Gauss-Newton steps at most; ours: nine in ten fits stop before the fifteenth."""
@@ -21,21 +30,23 @@ SETTLED = 0.01
 """Gain in log likelihood [nat] below which the steps stop."""
 NARROWEST = 0.2
 """Stickband after a step, in terms of that before, that is tried no more."""
-
-Valve = tuple[float, float, float]
-"""Breakaway, sliding distance and tolerance [% OP]."""
+BASE = 8
+"""Constants before the noise model."""
+STEP_T = 1.01
+"""Factor of the time constant over which its derivative is taken."""
+STEP_DEAD = 0.05
+"""Share of a block over which the dead time's derivative is taken."""
 
 
 class _Bench(NamedTuple):
     """What all points of a descent share: PV less its mean, the stems known beforehand, the load's step, the samples
-    judged, what is held, whether the stickband is free, the interval, samples of a stem in a block, and the ranges of
-    log time constant and dead time."""
+    judged, whether the stickband is free, the interval of blocks, samples of a stem in a block, and the ranges of log
+    time constant and dead time."""
 
     y: Floats
     stems: Stems
     extra: Floats
-    at: Indices
-    held: Mask
+    at: NDArray[np.int64]
     free_width: bool
     dt_s: float
     factor: int
@@ -43,20 +54,21 @@ class _Bench(NamedTuple):
 
 
 def _bench(window: Window, order: int, free_width: bool) -> _Bench:
-    held = np.zeros(BASE + order, dtype=bool)
-    held[2], held[7] = not free_width, window.step_at <= 0
     most_t, most_dead = window.bounds
-    least_dead = -window.half_block_s if window.fine else 0.0
     return _Bench(
         window.centred,
         window.stems,
         window.extra,
         np.flatnonzero(judged(window.usable, order)),
-        held,
         free_width,
         window.dt_s,
         window.factor if window.fine else 1,
-        (math.log(0.05 * window.dt_s), math.log(most_t), least_dead, most_dead),
+        (
+            math.log(0.05 * window.dt_s),
+            math.log(most_t),
+            -window.half_block_s if window.fine else 0.0,
+            most_dead,
+        ),
     )
 
 
@@ -65,7 +77,7 @@ class _Point(NamedTuple):
     square."""
 
     theta: Floats
-    valve: Valve
+    valve: StemLaw
     stem: Floats
     x: Floats
     r: Floats
@@ -74,66 +86,130 @@ class _Point(NamedTuple):
 
 
 @njit(cache=True)
-def _point(b: _Bench, theta: Floats, valve: Valve) -> _Point:
-    stem = stem_behind(b.stems, *valve)
-    x, r, white = innovations(b.y, stem, b.extra, theta, b.dt_s, b.factor)
-    e = white[b.at]
+def _dead(b: _Bench, theta: Floats) -> float:
+    """The dead time from the stem's own samples on [s]: a block's mean stands later than its first sample."""
+    return theta[1] + 0.5 * (b.factor - 1) * b.dt_s / b.factor  # type: ignore[no-any-return]
+
+
+@njit(cache=True)
+def _decays(b: _Bench, theta: Floats) -> tuple[float, float]:
+    """What a decay starts from and its factor a block; none where the time constant outlasts half the window."""
+    t_s = math.exp(theta[0])
+    return 0.0 if t_s > 0.5 * b.y.size * b.dt_s else 1.0, math.exp(-b.dt_s / t_s)
+
+
+@njit(cache=True)
+def _point(b: _Bench, theta: Floats, valve: StemLaw) -> _Point:
+    n, stem = b.y.size, stem_of(b.stems, valve)
+    x = respond(stem, unit_lag(math.exp(theta[0]), _dead(b, theta), b.dt_s / b.factor), b.factor)
+    r = np.empty(n)
+    free, faded = _decays(b, theta)
+    for k in range(n):
+        t = 2.0 * k / n - 1.0
+        r[k] = b.y[k] - theta[3] * x[k] - theta[4] - theta[5] * t - theta[6] * free - theta[7] * b.extra[k]
+        free *= faded
+    e = whitened(r, theta[BASE:], every_lag(theta.size - BASE))[b.at]
     return _Point(theta, valve, stem, x, r, e, float(np.dot(e, e)) / e.size)
 
 
 @njit(cache=True)
-def _widened(valve: Valve, step: float) -> Valve:
+def _widened(valve: StemLaw, step: float) -> StemLaw:
     """The valve with a stickband wider by a step, its jump share kept."""
-    stickband = valve[0] + valve[1]
-    share = (valve[0] - valve[1]) / stickband if stickband > 0 else 0.0
+    stickband = valve.breakaway + valve.sliding
+    share = (valve.breakaway - valve.sliding) / stickband if stickband > 0 else 0.0
     wider = stickband + step
-    return 0.5 * wider * (1 + share), 0.5 * wider * (1 - share), valve[2]
+    return StemLaw(0.5 * wider * (1 + share), 0.5 * wider * (1 - share), valve.tolerance)
+
+
+@njit(cache=True)
+def _responses(b: _Bench, p: _Point) -> Floats:
+    """Derivatives of the unit response by log T, dead time and stickband, shape (3, n)."""
+    fine, t_s, dead, step = b.dt_s / b.factor, math.exp(p.theta[0]), _dead(b, p.theta), STEP_DEAD * b.dt_s
+    wider, width_step = p.stem, 0.0
+    if b.free_width:
+        width_step = 0.01 * (p.valve.breakaway + p.valve.sliding)
+        wider = stem_of(b.stems, _widened(p.valve, width_step))
+    lags = unit_lag(t_s * STEP_T, dead, fine), unit_lag(t_s, dead + step, fine), unit_lag(t_s, dead, fine)
+    out = respond_together((p.stem, p.stem, wider), lags, b.factor)
+    out[0] = (out[0] - p.x) / math.log(STEP_T)
+    out[1] = (out[1] - p.x) / step
+    out[2] = (out[2] - p.x) / width_step if width_step > 0 else np.zeros(p.x.size)
+    return out
+
+
+@njit(cache=True)
+def _of_slow_terms(b: _Bench, theta: Floats, out: Floats) -> None:
+    """Derivatives by the coefficients of 1, t and decay into `out`, shape (3, m): their innovations have closed forms
+    from the order of the noise model on."""
+    n, ar, order = b.y.size, theta[BASE:], theta.size - BASE
+    level, back = 1.0, 0.0
+    for i in range(order):
+        level -= ar[i]
+        back += ar[i] * (i + 1)
+    free, faded = _decays(b, theta)
+    decay = faded**order
+    for i in range(order):
+        decay -= ar[i] * faded ** (order - 1 - i)
+    decay, seen = free * decay, order
+    for i in range(b.at.size):
+        while seen < b.at[i]:
+            decay, seen = decay * faded, seen + 1
+        out[0, i] = -level
+        out[1, i] = -((2.0 * b.at[i] / n - 1.0) * level + 2.0 / n * back)
+        out[2, i] = -decay
 
 
 @njit(cache=True)
 def _slopes(b: _Bench, p: _Point) -> Floats:
-    """Derivatives of the innovations judged, shape (8 + order, m)."""
-    wider, width_step = p.stem, 0.0
-    if b.free_width:
-        width_step = 0.01 * (p.valve[0] + p.valve[1])
-        wider = stem_behind(b.stems, *_widened(p.valve, width_step))
-    stems = (p.stem, wider)
-    return sensitivities(p.x, p.r, stems, width_step, b.extra, p.theta, b.dt_s, b.factor, b.at)  # type: ignore[no-any-return]
+    """Derivatives of the innovations judged, shape (8 + order, m), by theta; zero by what is held."""
+    order = p.theta.size - BASE
+    out, edges = np.zeros((BASE + order, b.at.size)), every_lag(order)
+    responses = -p.theta[3] * _responses(b, p)
+    for j in range(5):
+        if (j == 2 and not b.free_width) or (j == 4 and b.extra[-1] == 0.0):
+            continue
+        row = responses[j] if j < 3 else -p.x if j == 3 else -b.extra
+        white, to = whitened(row, p.theta[BASE:], edges), j if j < 4 else 7
+        for k in range(b.at.size):
+            out[to, k] = white[b.at[k]]
+    _of_slow_terms(b, p.theta, out[4:7])
+    for i in range(order):
+        for k in range(b.at.size):
+            out[BASE + i, k] = -p.r[b.at[k] - 1 - i]
+    return out
 
 
-@njit(cache=True)
-def _moved(b: _Bench, p: _Point, step: Floats) -> tuple[bool, Floats, Valve]:
-    """Whether a step stays within what is searched, and the constants and the valve after it."""
-    theta, valve, width = p.theta + step, p.valve, p.valve[0] + p.valve[1]
+@register_jitable  # type: ignore[untyped-decorator]
+def _curved(b: _Bench, p: _Point, taken: int) -> tuple[bool, Floats, Floats]:
+    """Gauss-Newton matrix and slope at a point; it is always worth going on."""
+    rows = _slopes(b, p)
+    return True, np.dot(rows, rows.T), -np.dot(rows, p.e)
+
+
+@register_jitable  # type: ignore[untyped-decorator]
+def _stepped(b: _Bench, p: _Point, step: Floats) -> _Point:
+    """The point behind a step; the same one, which wins nothing, where it leaves what is searched."""
+    theta, valve = p.theta + step, p.valve
     theta[0] = min(max(theta[0], b.ranges[0]), b.ranges[1])
     theta[1] = min(max(theta[1], b.ranges[2]), b.ranges[3])
-    if not b.free_width:
-        return True, theta, valve
-    theta[2] = width + step[2]
-    return theta[2] > NARROWEST * width, theta, _widened(valve, step[2])
+    if b.free_width:
+        width = p.valve.breakaway + p.valve.sliding
+        theta[2], valve = width + step[2], _widened(p.valve, step[2])
+        if theta[2] <= NARROWEST * width:
+            return p
+    return _point(b, theta, valve)  # type: ignore[no-any-return]
 
 
 @njit(cache=True)
-def _descend(b: _Bench, theta: Floats, valve: Valve) -> _Point:
+def _descend(b: _Bench, theta: Floats, valve: StemLaw) -> _Point:
     """Damped Gauss-Newton steps to the least mean square of the innovations judged."""
-    best, damping, fresh = _point(b, theta, valve), 1e-3, True
-    gram, slope = np.empty((theta.size, theta.size)), np.empty(theta.size)
-    for _ in range(ITERATIONS):
-        if fresh:
-            rows = _slopes(b, best)
-            gram, slope, fresh = np.dot(rows, rows.T), -np.dot(rows, best.e), False
-        inside, moved, other = _moved(b, best, damped_step(gram, slope, damping, b.held))
-        trial = _point(b, moved, other) if inside else best
-        if not trial.loss < best.loss:
-            damping *= 10
-            if damping > 1e4:
-                break
-            continue
-        gained = 0.5 * best.e.size * math.log(best.loss / max(trial.loss, 1e-300))
-        best, damping, fresh = trial, max(damping / 5, 1e-7), True
-        if gained < SETTLED:
-            break
-    return best
+    return down(
+        b,
+        _point(b, theta, valve),
+        _curved,
+        _stepped,
+        Descent(ITERATIONS, ITERATIONS, b.at.size, SETTLED, 10.0, 5.0, ITERATIONS),
+    )  # type: ignore[no-any-return]
 
 
 def _theta(fit: Fit) -> Floats:
@@ -141,8 +217,8 @@ def _theta(fit: Fit) -> Floats:
     return np.concatenate((head, fit.base, fit.ar))
 
 
-def _constants(valve: ValveTrial) -> Valve:
-    return float(valve.breakaway), float(valve.sliding), float(valve.tolerance)
+def _law(valve: StemLaw) -> StemLaw:
+    return StemLaw(float(valve.breakaway), float(valve.sliding), float(valve.tolerance))
 
 
 def covariance(window: Window, fit: Fit, free_width: bool = False) -> Floats:
@@ -151,10 +227,10 @@ def covariance(window: Window, fit: Fit, free_width: bool = False) -> Floats:
     The noise model's and the slow terms' share is in it (covariance.py).
     """
     b = _bench(window, fit.ar.size, free_width)
-    found = _point(b, _theta(fit), _constants(fit.valve))
+    found = _point(b, _theta(fit), _law(fit.valve))
     slopes = _slopes(b, found)
     gram = slopes @ slopes.T
-    free = np.array([j for j in range(gram.shape[0]) if not b.held[j] and gram[j, j] > 0])
+    free = np.flatnonzero(np.diag(gram) > 0)
     inside = inverse(gram[np.ix_(free, free)])
     out = np.zeros_like(gram)
     out[np.ix_(free, free)] = scattered(inside, (slopes[free] * found.e).T, found.loss)
@@ -167,13 +243,13 @@ def descend(window: Window, fit: Fit, free_width: bool = False) -> Fit:
     Time constant, dead time, gain, slow terms and the noise model, and with `free_width` the stickband, move at
     once, because they trade against each other along narrow valleys.
     """
-    best = _descend(_bench(window, fit.ar.size, free_width), _theta(fit), _constants(fit.valve))
+    best = _descend(_bench(window, fit.ar.size, free_width), _theta(fit), _law(fit.valve))
     theta = best.theta
     return Fit(
         float(theta[3]),
         float(math.exp(theta[0])),
         float(theta[1]),
-        ValveTrial(*best.valve),
+        StemLaw(*best.valve),
         max(best.loss, 1e-14),
         int(best.e.size),
         theta[BASE:].copy(),

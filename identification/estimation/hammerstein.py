@@ -9,57 +9,17 @@ scanned.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
 
+from identification.estimation.descent import nats
 from identification.estimation.window import Stems, Window
-from identification.models import Backlash, Fopdt, Stiction, Valve
+from identification.models import Fopdt
 from identification.record import Floats
 from identification.simulation.lag import respond, unit_lag
-from identification.simulation.valve import RESTS, first_slip, motion_of, stem_step
-
-
-@dataclass(frozen=True, slots=True)
-class ValveTrial:
-    """Valve constants in the form the kernels use.
-
-    breakaway, sliding [% OP]: (S + J)/2 and (S - J)/2; tolerance [% OP]: OP's turning that a sliding stem
-    ignores, or HALTS or RESTS (valve.py).
-    """
-
-    breakaway: float = 0.0
-    sliding: float = 0.0
-    tolerance: float = RESTS
-
-    @property
-    def stickband(self) -> float:
-        """S [% OP]; the width of the play where slip_jump is 0."""
-        return self.breakaway + self.sliding
-
-    @property
-    def slip_jump(self) -> float:
-        """J [% OP]."""
-        return self.breakaway - self.sliding
-
-    @property
-    def valve(self) -> Valve:
-        """The valve of models.py that these constants are: ideal, play or stick-slip."""
-        if self.breakaway <= 0.0:
-            return None
-        if self.slip_jump <= 0.0:
-            return Backlash(float(self.stickband))
-        return Stiction(float(self.stickband), float(self.slip_jump), motion_of(self.tolerance))
-
-
-IDEAL = ValveTrial()
-
-
-def sticking(stickband: float, jump_share: float, tolerance: float = RESTS) -> ValveTrial:
-    """Valve of stickband S [% OP] and slip jump J = jump_share S."""
-    return ValveTrial(0.5 * stickband * (1 + jump_share), 0.5 * stickband * (1 - jump_share), tolerance)
+from identification.simulation.valve import RESTS, StemLaw, first_slip, stem_step
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,7 +34,7 @@ class Fit:
     gain: float
     time_constant_s: float
     dead_time_s: float
-    valve: ValveTrial
+    valve: StemLaw
     sigma2: float
     count: int
     ar: Floats
@@ -83,7 +43,7 @@ class Fit:
     @property
     def log_likelihood(self) -> float:
         """Gaussian log likelihood of the innovations, up to a constant."""
-        return -0.5 * self.count * math.log(self.sigma2)
+        return -nats(self.count, self.sigma2, 1.0)
 
     @property
     def slope(self) -> float:
@@ -92,67 +52,57 @@ class Fit:
 
 
 @njit(cache=True)
-def _resting_blocks(
-    op: Floats, low: Floats, high: Floats, breakaway: float, sliding: float, factor: int
-) -> Floats:
+def _resting_blocks(s: Stems, law: StemLaw) -> Floats:
     """The same of a stem that rests after each move, where the direction of motion need not be remembered."""
-    out = np.empty(low.size)
-    stem = first_slip(op, breakaway, sliding)
-    for k in range(low.size):
-        if high[k] - stem <= breakaway and stem - low[k] <= breakaway:
+    out = np.empty(s.low.size)
+    stem = first_slip(s.op, law)
+    for k in range(s.low.size):
+        if s.high[k] - stem <= law.breakaway and stem - s.low[k] <= law.breakaway:
             out[k] = stem
             continue
         total = 0.0
-        for i in range(k * factor, (k + 1) * factor):
-            gap = op[i] - stem
-            if gap > breakaway:
-                stem = op[i] - sliding
-            elif gap < -breakaway:
-                stem = op[i] + sliding
+        for i in range(k * s.factor, (k + 1) * s.factor):
+            gap = s.op[i] - stem
+            if gap > law.breakaway:
+                stem = s.op[i] - law.sliding
+            elif gap < -law.breakaway:
+                stem = s.op[i] + law.sliding
             total += stem
-        out[k] = total / factor
+        out[k] = total / s.factor
     return out
 
 
 @njit(cache=True)
-def stem_blocks(
-    op: Floats, low: Floats, high: Floats, breakaway: float, sliding: float, tolerance: float, factor: int
-) -> Floats:
+def stem_blocks(s: Stems, law: StemLaw) -> Floats:
     """Stem behind OP as means of blocks, shape (n // factor,), of a valve with breakaway > 0.
 
-    `low` and `high` are OP's extremes in each block: a stem at rest that lies within reach of both rests on.
+    A stem at rest within reach of OP's extremes in a block rests on.
     """
-    if tolerance == RESTS:
-        return _resting_blocks(op, low, high, breakaway, sliding, factor)
-    out = np.empty(low.size)
-    stem, moving, turned = first_slip(op, breakaway, sliding), 0.0, op[0]
-    for k in range(low.size):
-        if moving == 0.0 and high[k] - stem <= breakaway and stem - low[k] <= breakaway:
-            out[k] = stem
+    if law.tolerance == RESTS:
+        return _resting_blocks(s, law)  # type: ignore[no-any-return]
+    out = np.empty(s.low.size)
+    stem = (first_slip(s.op, law), 0.0, s.op[0])
+    for k in range(s.low.size):
+        if stem[1] == 0.0 and s.high[k] - stem[0] <= law.breakaway and stem[0] - s.low[k] <= law.breakaway:
+            out[k] = stem[0]
             continue
         total = 0.0
-        for i in range(k * factor, (k + 1) * factor):
-            stem, moving, turned = stem_step(stem, moving, turned, op[i], breakaway, sliding, tolerance)
-            total += stem
-        out[k] = total / factor
+        for i in range(k * s.factor, (k + 1) * s.factor):
+            stem = stem_step(stem, s.op[i], law)
+            total += stem[0]
+        out[k] = total / s.factor
     return out
 
 
 @njit(cache=True)
-def stem_behind(stems: Stems, breakaway: float, sliding: float, tolerance: float) -> Floats:
-    """Stem less its mean [% OP] behind a valve's constants: the recorded one where there is one."""
-    if breakaway <= 0.0:
-        return stems.ideal
-    if stems.recorded.size:
-        return stems.recorded
-    stem = stem_blocks(stems.op, stems.low, stems.high, breakaway, sliding, tolerance, stems.factor)
+def stem_of(s: Stems, law: StemLaw) -> Floats:
+    """Stem less its mean [% OP], shape (m,), behind a valve: the recorded one where there is one."""
+    if law.breakaway <= 0.0:
+        return s.ideal
+    if s.recorded.size:
+        return s.recorded
+    stem = stem_blocks(s, law)
     return stem - stem.mean()
-
-
-def stem_of(stems: Stems, valve: ValveTrial) -> Floats:
-    """Stem less its mean [% OP], shape (m,), of the stems of a window."""
-    found = stem_behind(stems, valve.breakaway, valve.sliding, valve.tolerance)
-    return np.asarray(found, dtype=np.float64)
 
 
 def residual(window: Window, fit: Fit) -> Floats:

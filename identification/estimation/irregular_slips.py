@@ -8,8 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from identification.estimation.descent import compass
 from identification.estimation.gauss_newton import descend
-from identification.estimation.hammerstein import Fit, ValveTrial, residual, slow_terms, sticking
+from identification.estimation.hammerstein import Fit, residual, slow_terms
 from identification.estimation.likelihood_ratio import WindowFit, evidence
 from identification.estimation.noise import every_lag, judged, whitened
 from identification.estimation.slip_paths import decoded
@@ -17,6 +18,7 @@ from identification.estimation.slips import Friction, Noise, Response, log_chanc
 from identification.estimation.window import Window
 from identification.record import Floats
 from identification.simulation.lag import unit_lag
+from identification.simulation.valve import StemLaw, sticking
 from identification.simulation.valve import play as play_stem
 
 WIDTHS = (0.78, 0.88, 0.98, 1.12)
@@ -145,7 +147,7 @@ def _chosen(tried: list[_Trial]) -> list[_Trial]:
     return out[:FOLLOWED]
 
 
-def _path(window: Window, fit: Fit, valve: ValveTrial, stem: Floats) -> SlipPath:
+def _path(window: Window, fit: Fit, valve: StemLaw, stem: Floats) -> SlipPath:
     """The process behind a stem, as if that had been recorded."""
     found = descend(replace(window, position=stem), replace(fit, valve=valve))
     return SlipPath(found, stem, log_chance(window.op, stem, valve.breakaway))
@@ -171,31 +173,25 @@ def _followed(window: Window, play: Fit, begun: _Trial, rest: int) -> SlipPath:
     return best
 
 
-def _moved(window: Window, best: SlipPath, wider: float, jumpier: float, later: float) -> SlipPath | None:
-    """The path under another stickband, jump and dead time; None where these are none, or it has no slips."""
-    v = best.fit.valve
+def _settled(window: Window, best: SlipPath) -> SlipPath:
+    """Stickband, jump and dead time moved by ever smaller steps to the most probable path."""
+    return compass(window, best, -best.worth, _moved, MOVES, STEPS, worth=WORTH, most=MOST_MOVES)[0]
+
+
+def _moved(window: Window, best: SlipPath, move: tuple[int, int, int], step: float) -> tuple[SlipPath, float]:
+    """The path under another stickband, jump and dead time; worth nothing where there is none with slips."""
+    v, (wider, jumpier, later) = best.fit.valve, (step * m for m in move)
     band, share = v.stickband * (1.0 + wider), v.slip_jump / v.stickband + 2.0 * jumpier
     dead_s = best.fit.dead_time_s + later * DEAD_STEPS * window.dt_s
     if not 0.0 < share <= 1.0 or dead_s < 0.0:
-        return None
+        return best, math.inf
     gain = best.fit.gain * v.slip_jump / (band * share)  # a slip moves PV by gain times jump
     fit, f = replace(best.fit, dead_time_s=dead_s, gain=gain), _friction(band, share, window.op.size)
     stem = _decoded_by(window, fit, float(best.stem.mean()), f, 1.0)
-    return _path(window, fit, sticking(band, share), stem) if _slips(stem) >= FEWEST else None
-
-
-def _settled(window: Window, best: SlipPath) -> SlipPath:
-    """Stickband, jump and dead time moved by ever smaller steps to the most probable path."""
-    taken = 0
-    for step in STEPS:
-        moving = True
-        while moving and taken < MOST_MOVES:
-            moving = False
-            for move in MOVES:
-                path = _moved(window, best, *(step * m for m in move))
-                if path is not None and path.worth > best.worth + WORTH:
-                    best, moving, taken = path, True, taken + 1
-    return best
+    if _slips(stem) < FEWEST:
+        return best, math.inf
+    path = _path(window, fit, sticking(band, share), stem)
+    return path, -path.worth
 
 
 def fit_irregular(

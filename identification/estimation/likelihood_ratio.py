@@ -7,11 +7,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from identification.estimation.gauss_newton import descend
-from identification.estimation.hammerstein import Fit, ValveTrial, disturbance, stem_of
+from identification.estimation.hammerstein import Fit, disturbance, stem_of
 from identification.estimation.noise import every_lag, judged, whitened
 from identification.estimation.window import Window
 from identification.record import Floats, Mask
 from identification.signals.robust import clipped_gain
+from identification.simulation.valve import StemLaw
 
 
 def innovations(window: Window, fit: Fit) -> Floats:
@@ -39,14 +40,14 @@ STEP_PENALTY = 6.0
 """Gain in log likelihood [nat] that one step of the load at any time costs: log of the blocks, nearly."""
 
 
-def moves_begun(window: Window, valve: ValveTrial) -> np.ndarray:
+def moves_begun(window: Window, valve: StemLaw) -> np.ndarray:
     """Blocks at which the stem of a valve sets out or turns, shape (m,)."""
     moved = np.sign(np.diff(stem_of(window.stems_in_blocks, valve)))
     set_out = np.concatenate(([0.0], moved))
     return np.flatnonzero((set_out[1:] != set_out[:-1]) & (set_out[1:] != 0))
 
 
-def stem_moves(window: Window, valve: ValveTrial) -> int:
+def stem_moves(window: Window, valve: StemLaw) -> int:
     """How often the stem of a valve sets out or turns: stretches of motion in one direction with rest between."""
     return int(moves_begun(window, valve).size)
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from identification.estimation.candidate import Fitted, Model, Problem, bounds
 from identification.estimation.covariance import inverse, scattered
+from identification.estimation.descent import Descent, damped_step, down, nats
 from identification.estimation.noise import fitted, lag_means, whitened
 from identification.record import Floats
 from identification.signals.filters import without_lines
@@ -22,19 +23,22 @@ PLACES = (-1.0, -0.5, 0.0, 0.5, 1.0)
 """Where a stem may stand first, from OP on, in distances at which it lets go; ours."""
 WORTH = 3.0
 """Gain [nat] of another place from which it is taken: what a parameter costs; ours."""
+TRIALS = 5
+"""Dampings tried for a step."""
 FAR = 3e3
 """A model whose residual reaches this [% PV] has run away and is the worst there is."""
 
 
 @dataclass(frozen=True, slots=True)
 class Residual:
-    """What given constants leave, and the noise model that suits it best.
+    """What a model leaves, and the noise model that suits it best.
 
     simulated : what they give [% PV], shape (n,); ar : noise model, shape (groups,). What each sample counts is in
     the rest: columns, lag means of the residual, shape (groups, n), gram, their products, white, the innovations,
     shape (n,), and loss, their mean square.
     """
 
+    model: Model
     simulated: Floats
     columns: Floats
     gram: Floats
@@ -43,19 +47,19 @@ class Residual:
     loss: float
 
 
-def residual_fit(p: Problem, c: Floats) -> Residual:
-    """Residual, noise model and innovations at given constants."""
-    simulated = simulate(p.inputs, c)
+def residual_fit(p: Problem, model: Model) -> Residual:
+    """Residual, noise model and innovations of a model."""
+    simulated = simulate(p.inputs, model.c)
     r = without_lines(p.y - simulated, p.window)
     groups, root, total = p.edges.size - 1, np.sqrt(p.weight), float(p.weight.sum())
     if not float(np.abs(r).max()) < FAR:
         none = np.zeros((groups, r.size)), np.zeros((groups, groups)), np.zeros(groups)
-        return Residual(simulated, *none, FAR * root, FAR**2)
+        return Residual(model, simulated, *none, FAR * root, FAR**2)
     columns, weighted = lag_means(r, p.edges), r * root
     columns *= root
     ar, gram = fitted(columns, weighted)
     white = weighted - ar @ columns
-    return Residual(simulated, columns, gram, ar, white, float(white @ white) / total)
+    return Residual(model, simulated, columns, gram, ar, white, float(white @ white) / total)
 
 
 def loss_of(p: Problem, e: Floats) -> float:
@@ -106,17 +110,9 @@ def moved(p: Problem, model: Model, step: Floats) -> Model:
     return replace(model, c=c)
 
 
-def newton(gram: Floats, slope: Floats, damping: float) -> Floats:
-    """A damped Gauss-Newton step in scaled constants."""
-    scale = np.sqrt(np.diag(gram)) + 1e-12 * math.sqrt(float(np.trace(gram))) + 1e-150
-    unit = gram / np.outer(scale, scale)
-    if not (np.isfinite(unit).all() and np.isfinite(slope).all()):
-        return np.zeros(scale.size)
-    return np.linalg.lstsq(unit + damping * np.eye(scale.size), slope / scale, rcond=1e-11)[0] / scale
-
-
-def curvature(p: Problem, model: Model, found: Residual) -> tuple[Floats, Floats]:
+def curvature(p: Problem, found: Residual) -> tuple[Floats, Floats]:
     """Gauss-Newton matrix of the constants with the noise model eliminated, and the slope."""
+    model = found.model
     moves = sensitivities(p, model, found.ar, found.simulated) * np.sqrt(p.weight)
     own, groups = found.columns, found.ar.size
     inner = found.gram + 1e-10 * np.trace(found.gram) / max(groups, 1) * np.eye(groups)
@@ -141,25 +137,24 @@ def is_out_of_reach(p: Problem, found: Residual, gram: Floats, slope: Floats, ai
     """Whether steps that win several times what the next one promises would not come to the loss aimed at."""
     if math.isinf(aim):
         return False
-    promised = float(slope @ newton(gram, slope, 1e-6)) / max(float(found.white @ found.white), 1e-300)
+    promised = float(slope @ damped_step(gram, slope, 1e-6)) / max(float(found.white @ found.white), 1e-300)
     return math.log(max(found.loss, 1e-300) / aim) > p.limits.search.promises * max(promised, 0.0)
+
+
+def _with_place(model: Model, place: float) -> Model:
+    c = model.c.copy()
+    c[Slot.PLACE] = place
+    return replace(model, c=c)
 
 
 def placed(p: Problem, model: Model) -> Model:
     """The model with its stem's first place where PV says that it stood; none has slipped before a record begins."""
     if not model.c[Slot.STICKBAND] > 0.0:
         return model
-    losses: dict[float, float] = {}
-    for place in (float(model.c[Slot.PLACE]), *PLACES):
-        c = model.c.copy()
-        c[Slot.PLACE] = place
-        losses.setdefault(place, residual_fit(p, c).loss)
-    first, best = float(model.c[Slot.PLACE]), min(losses, key=lambda place: losses[place])
-    if not 0.5 * p.count * math.log(losses[first] / max(losses[best], 1e-300)) > WORTH:
-        return model
-    c = model.c.copy()
-    c[Slot.PLACE] = best
-    return replace(model, c=c)
+    first = float(model.c[Slot.PLACE])
+    losses = {place: residual_fit(p, _with_place(model, place)).loss for place in (first, *PLACES)}
+    best = min(losses, key=lambda place: losses[place])
+    return _with_place(model, best) if nats(p.count, losses[first], losses[best]) > WORTH else model
 
 
 def descend(p: Problem, model: Model, steps: int, aim: float = math.inf) -> Fitted:
@@ -175,26 +170,18 @@ def descend(p: Problem, model: Model, steps: int, aim: float = math.inf) -> Fitt
 
 def _descend(p: Problem, model: Model, steps: int, aim: float) -> Fitted:
     """Follow a model to the least innovations by damped Gauss-Newton steps."""
-    best, damping, failed = residual_fit(p, model.c), 1e-3, 0
-    for step in range(steps):
-        gram, slope = curvature(p, model, best)
-        if step > 0 and is_out_of_reach(p, best, gram, slope, aim):
-            break
-        while failed < 5:
-            trial = moved(p, model, newton(gram, slope, damping))
-            found = residual_fit(p, trial.c)
-            if found.loss < best.loss:
-                break
-            damping, failed = damping * 20, failed + 1
-        else:
-            break
-        won = 0.5 * p.count * math.log(best.loss / max(found.loss, 1e-300))
-        model, best = trial, found
-        damping, failed = max(damping / 10, 1e-7), 0
-        if won < p.limits.search.settled:
-            break
+
+    def curved(p: Problem, found: Residual, taken: int) -> tuple[bool, Floats, Floats]:
+        gram, slope = curvature(p, found)
+        return taken == 0 or not is_out_of_reach(p, found, gram, slope, aim), gram, slope
+
+    def stepped(p: Problem, found: Residual, step: Floats) -> Residual:
+        return residual_fit(p, moved(p, found.model, step))
+
+    ends = Descent(steps, TRIALS * steps, p.count, p.limits.search.settled, 20.0, 10.0, TRIALS - 1)
+    best = down(p, residual_fit(p, model), curved, stepped, ends)
     e = innovations_of(p, best)
-    return Fitted(model, best.loss, p.independent(e), best.ar, e)
+    return Fitted(best.model, best.loss, p.independent(e), best.ar, e)
 
 
 def innovations_of(p: Problem, found: Residual) -> Floats:
@@ -207,8 +194,8 @@ def innovations_of(p: Problem, found: Residual) -> Floats:
 
 def deviations(p: Problem, fit: Fitted) -> Floats:
     """Standard deviations of the free constants (of logarithms where so searched), shape (m,); see covariance.py."""
-    found = residual_fit(p, fit.model.c)
-    gram, _ = curvature(p, fit.model, found)
+    found = residual_fit(p, fit.model)
+    gram, _ = curvature(p, found)
     if not np.isfinite(gram).all():
         return np.full(gram.shape[0], np.inf)
     moves = sensitivities(p, fit.model, found.ar, found.simulated) * np.sqrt(p.weight)

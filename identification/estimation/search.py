@@ -7,16 +7,20 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
+from numba.extending import register_jitable
 
-from identification.estimation.hammerstein import ValveTrial, stem_of
+from identification.estimation.descent import compass
+from identification.estimation.hammerstein import stem_of
 from identification.estimation.noise import every_lag, judged, whitened
 from identification.estimation.window import Window
 from identification.record import Floats, Mask
 from identification.signals.filters import notch
 from identification.simulation.lag import Lag, stepped, unit_lag
+from identification.simulation.valve import StemLaw
 
 AR_ORDER = 8
 """Order of the noise model; ours: on the simulated plants 12 gives innovations less than 1 % smaller."""
@@ -25,6 +29,8 @@ INPUT_LAGS = 10
 
 FADED = 1e-17
 """A decay under this share of its start is over; numbers have sixteen digits."""
+MOVES = ((1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0), (1.0, -1.0))
+"""Steps of log time constant and dead time that are tried."""
 NOTCH_WIDTH = 0.15
 """Width of the band that is left out when the process is wanted in spite of a load with a line; ours."""
 
@@ -136,7 +142,7 @@ class WhitePv:
     sums: Floats
     notch_period: float
 
-    def behind(self, valve: ValveTrial) -> Prepared:
+    def behind(self, valve: StemLaw) -> Prepared:
         """The same with the stem behind one valve."""
         stem = _filtered(stem_of(self.window.stems_in_blocks, valve), self.ar, self.notch_period)
         return Prepared(self.window, valve, self.ar, self.rows, self.sums, stem)
@@ -147,7 +153,7 @@ class Prepared:
     """A window, a valve and a noise model, whitened once for many dynamics."""
 
     window: Window
-    valve: ValveTrial
+    valve: StemLaw
     ar: Floats
     rows: Floats
     sums: Floats
@@ -185,64 +191,57 @@ def white_pv(window: Window, ar: Floats, notch_period: float = 0.0) -> WhitePv:
     return WhitePv(window, ar, rows, sums, notch_period)
 
 
-def prepare(window: Window, valve: ValveTrial, ar: Floats, notch_period: float = 0.0) -> Prepared:
+def prepare(window: Window, valve: StemLaw, ar: Floats, notch_period: float = 0.0) -> Prepared:
     """Whiten PV and the stem with one noise model; notch_period in blocks, 0: none."""
     return white_pv(window, ar, notch_period).behind(valve)
 
 
+class _Scored(NamedTuple):
+    """What candidates of one valve are scored by: see `score`; and the largest time constant and dead time [s]."""
+
+    rows: Floats
+    sums: Floats
+    stem: Floats
+    level: float
+    dt_s: float
+    most: Dynamics
+
+
 @njit(cache=True)
-def _least(
-    rows: Floats,
-    sums: Floats,
-    stem: Floats,
-    level: float,
-    dt: float,
-    begins: Floats,
-    bounds: tuple[float, float],
-    halvings: int,
-) -> tuple[float, float, float]:
+def _left(s: _Scored, t: float, dead_s: float) -> float:
+    return score(s.rows, s.sums, s.stem, s.level, math.exp(t), dead_s, s.dt_s)[0]  # type: ignore[no-any-return]
+
+
+@register_jitable  # type: ignore[untyped-decorator]
+def _tried(s: _Scored, at: Dynamics, move: Dynamics, step: float) -> tuple[Dynamics, float]:
+    """Log time constant and dead time moved by a step of .4 and of two blocks, and the variance left there."""
+    t, d = at[0] + move[0] * 0.4 * step, at[1] + move[1] * 2.0 * s.dt_s * step
+    if d < 0 or d > s.most[1] or t < math.log(0.05 * s.dt_s) or t > math.log(s.most[0]):
+        return (t, d), np.inf
+    return (t, d), _left(s, t, d)
+
+
+@njit(cache=True)
+def _least(s: _Scored, begins: Floats, halvings: int) -> Dynamics:
     """Best of the starts (rows of log time constant and dead time), then compass search from there."""
-    best_t, best_d, least = begins[0, 0], begins[0, 1], np.inf
+    best, least = (begins[0, 0], begins[0, 1]), np.inf
     for i in range(begins.shape[0]):
-        found = score(rows, sums, stem, level, math.exp(begins[i, 0]), begins[i, 1], dt)[0]
+        found = _left(s, begins[i, 0], begins[i, 1])
         if found < least:
-            best_t, best_d, least = begins[i, 0], begins[i, 1], found
-    low_t, high_t = math.log(0.05 * dt), math.log(bounds[0])
-    step_t, step_d = 0.4, 2.0 * dt
-    moves = ((1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0), (1.0, -1.0))
-    for _ in range(halvings):
-        moved = True
-        while moved:
-            moved = False
-            for m_t, m_d in moves:
-                t, d = best_t + m_t * step_t, best_d + m_d * step_d
-                if d < 0 or d > bounds[1] or t < low_t or t > high_t:
-                    continue
-                found = score(rows, sums, stem, level, math.exp(t), d, dt)[0]
-                if found < least * (1 - 1e-6):
-                    best_t, best_d, least, moved = t, d, found, True
-        step_t, step_d = step_t / 2, step_d / 2
-    return math.exp(best_t), best_d, least
+            best, least = (begins[i, 0], begins[i, 1]), found
+    (t, dead_s), _ = compass(s, best, least, _tried, MOVES, 0.5 ** np.arange(float(halvings)), 1e-6)
+    return math.exp(t), dead_s
 
 
 def search(prepared: Prepared, begins: list[Dynamics], halvings: int = 3) -> Dynamics:
     """Time constant and dead time [s] of least innovations variance: the best start, then compass search."""
-    most_t, most_dead = prepared.window.bounds
-    dt = prepared.window.dt_s
-    first = np.array(
-        [[math.log(min(max(t, 0.06 * dt), 0.95 * most_t)), min(d, most_dead)] for t, d in begins]
+    w = prepared.window
+    most_t, most_dead = w.bounds
+    scored = _Scored(
+        prepared.rows, prepared.sums, prepared.white_stem, prepared.level, w.dt_s, (most_t, most_dead)
     )
-    t, dead, _ = _least(
-        prepared.rows,
-        prepared.sums,
-        prepared.white_stem,
-        prepared.level,
-        dt,
-        first,
-        (most_t, most_dead),
-        halvings,
-    )
-    return t, dead
+    first = [[math.log(min(max(t, 0.06 * w.dt_s), 0.95 * most_t)), min(d, most_dead)] for t, d in begins]
+    return _least(scored, np.array(first), halvings)  # type: ignore[no-any-return]
 
 
 def starts(window: Window, period_s: float) -> list[Dynamics]:

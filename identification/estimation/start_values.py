@@ -7,12 +7,12 @@ import math
 import numpy as np
 
 from identification.estimation.backlash_stiction import begin, generic_noise
-from identification.estimation.hammerstein import IDEAL
 from identification.estimation.noise import arx_noise
 from identification.estimation.search import AR_ORDER, INPUT_LAGS, Dynamics, prepare, search
 from identification.estimation.window import Window
 from identification.models import Fopdt
 from identification.record import Floats, Mask
+from identification.simulation.valve import IDEAL
 
 SHORTEST = 1.5
 """Shortest time constant tried [samples]."""

@@ -7,10 +7,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from identification.estimation.hammerstein import ValveTrial, sticking
+from identification.estimation.descent import compass
 from identification.record import Floats
 from identification.signals.robust import robust_deviation
-from identification.simulation.valve import RESTS, first_slip, walk
+from identification.simulation.valve import StemLaw, first_slip, sticking, walk
 
 WIDTHS = tuple(float(w) for w in np.geomspace(0.03, 1.2, 60))
 """Plays tried, in OP's range: steps of a sixteenth."""
@@ -32,29 +32,25 @@ class Seen:
     """A valve as its position shows it: its play, the stick-slip where it has one, and the share of the stem's way
     that its slips make."""
 
-    play: ValveTrial
-    jumping: ValveTrial | None
+    play: StemLaw
+    jumping: StemLaw | None
     by_slips: float
 
 
-def left(op: Floats, position: Floats, valve: ValveTrial) -> float:
+def left(op: Floats, position: Floats, law: StemLaw) -> float:
     """Mean square that a valve leaves of a position, an offset between both signals freed [% of span squared]."""
-    start = first_slip(op, valve.breakaway, valve.sliding)
-    return float(np.var(position - walk(op, valve.breakaway, valve.sliding, valve.tolerance, start)))
+    return float(np.var(position - walk(op, law, first_slip(op, law))))
 
 
-def closed_in(op: Floats, position: Floats, width: float) -> ValveTrial:
+def closed_in(op: Floats, position: Floats, width: float) -> StemLaw:
     """The play after its width [% OP] has been moved by ever smaller steps."""
-    least = left(op, position, sticking(width, 0.0))
-    for step in COMPASS:
-        moved = True
-        while moved:
-            moved = False
-            for factor in (1 + step, 1 - step):
-                found = left(op, position, sticking(width * factor, 0.0))
-                if found < least * (1 - 1e-9):
-                    width, least, moved = width * factor, found, True
-    return sticking(width, 0.0, RESTS)
+
+    def tried(op: Floats, width: float, way: int, step: float) -> tuple[float, float]:
+        other = width * (1 + way * step)
+        return other, left(op, position, sticking(other, 0.0))
+
+    width, _ = compass(op, width, left(op, position, sticking(width, 0.0)), tried, (1, -1), COMPASS, 1e-9)
+    return sticking(width, 0.0)
 
 
 def least_move(position: Floats) -> float:
@@ -100,10 +96,10 @@ def seen(op: Floats, position: Floats) -> Seen | None:
     found = slips(op, position - offset)
     large = found[found[:, 2] > 0.5 * np.max(found[:, 2], initial=0.0)]
     band = 0.5 * least_move(position)
-    way = float(np.abs(np.diff(walk(position, band, band, RESTS, float(position[0])))).sum())
+    way = float(np.abs(np.diff(walk(position, StemLaw(band, band), float(position[0])))).sum())
     by_slips = min(float(found[:, 2].sum()) / max(way, 1e-9), 1.0)
     if len(large) >= SLIPS and by_slips > BY_SLIPS:
         go, rest = float(np.median(large[:, 0])), float(np.median(large[:, 1]))
         if go > max(rest, 0.0):
-            return Seen(play, sticking(go + rest, (go - rest) / (go + rest), RESTS), by_slips)
+            return Seen(play, sticking(go + rest, (go - rest) / (go + rest)), by_slips)
     return Seen(play, None, by_slips) if left(op, position, play) < (1.0 - LEAST_SHARE) * apart else None

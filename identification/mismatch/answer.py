@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from identification.estimation.candidate import Fitted, Problem
 from identification.estimation.covariance import half_width
+from identification.estimation.descent import nats
 from identification.estimation.prediction_error import deviations, residual_fit
 from identification.mismatch import words
 from identification.mismatch.catalogue import EFFECTS, fault
@@ -122,8 +123,7 @@ def brings(p: Problem, fit: Fitted) -> float:
     """Log likelihood [nat] that OP brings to a fit: over the same with no gain, its mean and start as recorded."""
     c = fit.model.c.copy()
     c[Slot.K], c[Slot.BIAS], c[Slot.START] = 0.0, float(np.mean(p.y)), float(p.y[0])
-    without = residual_fit(p, c).loss
-    return 0.5 * fit.count * math.log(max(without, 1e-300) / max(fit.loss, 1e-300))
+    return nats(fit.count, residual_fit(p, replace(fit.model, c=c)).loss, fit.loss)
 
 
 def unanswered(found: Explanation) -> str:

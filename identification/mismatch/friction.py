@@ -16,6 +16,7 @@ import numpy as np
 from numba import njit
 
 from identification.estimation.candidate import Fitted, Model, Problem
+from identification.estimation.descent import compass
 from identification.estimation.noise import whitened
 from identification.estimation.prediction_error import descend, loss_of, residual_fit
 from identification.mismatch.effect import Friction
@@ -27,7 +28,7 @@ from identification.signals.filters import stretch_ends
 from identification.simulation.effect import Signal, Variant, acted
 from identification.simulation.open_loop import as_parameters, from_flow, simulate
 from identification.simulation.parameters import Slot
-from identification.simulation.valve import stem_step
+from identification.simulation.valve import StemLaw, stem_step
 from identification.simulation.valve_chain import before_stem, behind_stem, friction_of
 
 WIDTHS = np.geomspace(0.6, 4.0, 64)
@@ -38,6 +39,8 @@ FINALISTS, FOLLOWED = 12, 2
 """Pairs judged with a noise model of their own, and pairs followed to the end."""
 COMPASS = (0.02, 0.007, 0.0025)
 """Relative steps of the search within a pit."""
+PIT_MOVES = ((Slot.STICKBAND, 1), (Slot.STICKBAND, -1), (Slot.JUMP, 1), (Slot.JUMP, -1))
+"""What is moved in a pit, and which way."""
 WEARS = (Friction.PLAY, Friction.STICKS)
 """What a worn valve has."""
 OF_CYCLES = (Slot.T, Slot.L, Slot.K, Slot.STICKBAND, Slot.JUMP, Slot.COAST)
@@ -78,24 +81,23 @@ def _scanned(p: Problem, play: Fitted, row: Variant) -> list[Floats]:
                 c[slot] = value
             c[Slot.STICKBAND], c[Slot.JUMP] = w * width, min(w * j * width, w * width)
             trials.append(c)
-    return sorted(sorted(trials, key=quick_loss)[:FINALISTS], key=lambda c: residual_fit(p, c).loss)
+    return sorted(
+        sorted(trials, key=quick_loss)[:FINALISTS], key=lambda c: residual_fit(p, Model((), c)).loss
+    )
 
 
 def _settled(p: Problem, c: Floats) -> Floats:
     """The bottom of the pit: stickband and jump moved by ever smaller steps."""
-    least = residual_fit(p, c).loss
-    for step in COMPASS:
-        moving = True
-        while moving:
-            moving = False
-            for slot, way in ((Slot.STICKBAND, 1), (Slot.STICKBAND, -1), (Slot.JUMP, 1), (Slot.JUMP, -1)):
-                trial = c.copy()
-                trial[slot] *= 1 + way * step
-                trial[Slot.JUMP] = min(trial[Slot.JUMP], trial[Slot.STICKBAND])
-                found = residual_fit(p, trial).loss
-                if found < least * (1 - 1e-7):
-                    c, least, moving = trial, found, True
-    return c
+    return compass(p, c, residual_fit(p, Model((), c)).loss, _moved, PIT_MOVES, COMPASS, 1e-7)[0]
+
+
+def _moved(p: Problem, c: Floats, move: tuple[Slot, int], step: float) -> tuple[Floats, float]:
+    """Constants with stickband or jump moved by a relative step, and the loss that they leave."""
+    slot, way = move
+    trial = c.copy()
+    trial[slot] *= 1 + way * step
+    trial[Slot.JUMP] = min(trial[Slot.JUMP], trial[Slot.STICKBAND])
+    return trial, residual_fit(p, Model((), trial)).loss
 
 
 def from_cycles(p: Problem, near: Fitted, seen: SeenInCycles, rows: tuple[Variant, ...]) -> list[Fitted]:
@@ -130,7 +132,7 @@ def simulated_anew(p: Problem, c: Floats, window: int) -> Floats:
     """PV's deviation [% PV], shape (n,), of constants, shape (SIZE + own,), the stem placed anew every `window`
     samples; as simulate() without friction."""
     inputs, friction = p.inputs, friction_of(c)
-    if friction[0] <= 0.0:
+    if friction.breakaway <= 0.0:
         return simulate(inputs, c)
     op = before_stem(np.ascontiguousarray(acted(Signal.OP, inputs.op, c, inputs.dt_s)), c, inputs.dt_s)
     dead = round(float(c[Slot.L]) / inputs.dt_s)
@@ -149,17 +151,17 @@ def _left(
     dead: int,
     pole: float,
     gain: float,
-    friction: tuple[float, float, float],
+    friction: StemLaw,
     stem: float,
     x: float,
     out: Floats,
 ) -> tuple[float, float, float]:
     """Squares about a line that a stem begun at a place leaves of PV; where stem and lag end; `out` is its path."""
-    moving, turned = 0.0, op[first]
+    state = (stem, 0.0, op[first])
     n = t1 = t2 = r0 = r1 = r2 = 0.0
     for k in range(first, last):
-        stem, moving, turned = stem_step(stem, moving, turned, op[k], friction[0], friction[1], friction[2])
-        out[k] = stem
+        state = stem_step(state, op[k], friction)
+        out[k] = stem = state[0]
         x = pole * x + (1.0 - pole) * stem
         if k + dead < y.size:
             r, t = y[k + dead] - gain * x, float(k - first)
@@ -180,7 +182,7 @@ def placed(
     dead: int,
     pole: float,
     gain: float,
-    friction: tuple[float, float, float],
+    friction: StemLaw,
 ) -> Floats:
     """Stem [% OP], shape (n,), placed in each window where it leaves least of PV, or carried on from the last one."""
     out, trial = np.empty_like(op), np.empty_like(op)
@@ -190,7 +192,7 @@ def placed(
         least, stem_on, x_on = _left(op, y, first, last, dead, pole, gain, friction, stem, x, out)
         least *= CARRIED_ON
         for j in range(PLACES):
-            place = op[first] + friction[0] * (2.0 * j / (PLACES - 1) - 1.0)
+            place = op[first] + friction.breakaway * (2.0 * j / (PLACES - 1) - 1.0)
             left, stem_j, x_j = _left(op, y, first, last, dead, pole, gain, friction, place, x, trial)
             if left < least:
                 least, stem_on, x_on = left, stem_j, x_j

@@ -21,8 +21,8 @@ from identification.simulation.open_loop import (
 )
 from identification.simulation.parameters import Slot
 from identification.simulation.pi import Law, next_op, per_scan
-from identification.simulation.valve import constants_of, stem_step
-from identification.simulation.valve_chain import Friction, flow_step, friction_of, memory
+from identification.simulation.valve import StemLaw, law_of, stem_step
+from identification.simulation.valve_chain import flow_step, friction_of, memory
 from identification.simulation.vessel import at_start, vessel_span
 
 CONTINUOUS_STEPS = 50
@@ -35,16 +35,14 @@ def _closed(
     sp: Floats,
     load: Floats,
     process: Lag,
-    valve: tuple[float, float, float],
+    valve: StemLaw,
     law: Law,
     op0: float,
 ) -> tuple[Floats, Floats, Floats]:
-    breakaway, sliding, tolerance = valve
     n = sp.size
     pv, op, stem = np.empty(n), np.empty(n), np.empty(n)
-    y, u, x = 0.0, op0, op0
-    moving, turned = 0.0, op0
-    rest = op0
+    y, u = 0.0, op0
+    moved, rest = (op0, 0.0, op0), op0
     e1 = sp[0] - (sp[0] + load[0])
     y1 = sp[0] + load[0]
     y2 = y1
@@ -54,11 +52,8 @@ def _closed(
         u = next_op(u, law, e, e1, pv[k] - 2 * y1 + y2)
         e1, y2, y1 = e, y1, pv[k]
         op[k] = u
-        if breakaway > 0:
-            x, moving, turned = stem_step(x, moving, turned, u, breakaway, sliding, tolerance)
-        else:
-            x = u
-        stem[k] = x
+        moved = stem_step(moved, u, valve)
+        stem[k] = moved[0] if valve.breakaway > 0 else u
         late = stem[k - process.delay] - rest if k >= process.delay else 0.0
         later = stem[k - process.delay - 1] - rest if k > process.delay else 0.0
         y = stepped(y, process, late, later)
@@ -90,7 +85,7 @@ def closed_loop(
         np.ascontiguousarray(sp, dtype=np.float64),
         np.ascontiguousarray(load, dtype=np.float64),
         discretize(loop.process, h),
-        constants_of(loop.valve),
+        law_of(loop.valve),
         per_scan(loop.controller, h),
         float(op_start),
     )
@@ -108,7 +103,7 @@ def _closed_model(
     gain: Floats,
     c: Floats,
     law: Law,
-    friction: Friction,
+    friction: StemLaw,
     m: Floats,
     frame: tuple[float, float, float, float],
     start: tuple[float, float],

@@ -15,7 +15,15 @@ from identification.models import Motion
 from identification.record import Floats
 from identification.simulation.lag import held, lagged
 from identification.simulation.parameters import Slot
-from identification.simulation.valve import SLIDES, TOLERANCES, first_slip, stem_step, thresholds, walk
+from identification.simulation.valve import (
+    SLIDES,
+    TOLERANCES,
+    StemLaw,
+    first_slip,
+    stem_step,
+    thresholds,
+    walk,
+)
 
 COASTS = {Motion.RESTS: -1.0, Motion.HALTS: -0.5, Motion.SLIDES: 0.0}
 """The parameter COAST of what a stem in motion does."""
@@ -72,20 +80,16 @@ def curved(x: float, bend: float, middle: float) -> float:
     return middle + math.expm1(min(max(bend * (x - middle) / 100.0, -30.0), 30.0)) * (100.0 / bend)
 
 
-Friction = tuple[float, float, float]
-"""Breakaway, sliding distance and tolerance [% OP]; breakaway 0 is no friction."""
-
-
 @njit(cache=True)
-def flow_step(op: float, m: Floats, c: Floats, friction: Friction, dt_s: float, middle: float) -> float:
+def flow_step(op: float, m: Floats, c: Floats, friction: StemLaw, dt_s: float, middle: float) -> float:
     """Mean flow over a sample [% OP]; the valve's memory `m` is moved on."""
     x = op
     if not math.isinf(c[RATE]):
         x, m[SLEWED] = slew_step(m[SLEWED], x, c[RATE] * dt_s)
     if c[SERVO] > 0.0:
         x, m[SERVED], m[SPEED] = servo_step(m[SERVED], m[SPEED], x, c[SERVO], c[DAMPING], c[DEADBAND], dt_s)
-    if friction[0] > 0.0:
-        m[STEM], m[MOVING], m[TURNED] = stem_step(m[STEM], m[MOVING], m[TURNED], x, *friction)
+    if friction.breakaway > 0.0:
+        m[STEM], m[MOVING], m[TURNED] = stem_step((m[STEM], m[MOVING], m[TURNED]), x, friction)
         x = m[STEM]
     x = min(max(x, c[STOP_LO]), c[STOP_HI])
     if not math.isinf(c[SPLIT]):
@@ -131,10 +135,10 @@ def behind_stem(x: Floats, c: Floats, dt_s: float, middle: float) -> Floats:
     return x
 
 
-def friction_of(c: Floats) -> Friction:
+def friction_of(c: Floats) -> StemLaw:
     """Friction of a model's valve."""
     away, sliding = thresholds(float(c[Slot.STICKBAND]), float(c[Slot.JUMP]))
-    return away, max(sliding, 0.0), BEHAVIOUR.get(float(c[Slot.COAST]), SLIDES)
+    return StemLaw(away, max(sliding, 0.0), BEHAVIOUR.get(float(c[Slot.COAST]), SLIDES))
 
 
 def memory(op: float, stem: float | None = None) -> Floats:
@@ -151,9 +155,9 @@ def flow(op: Floats, c: Floats, dt_s: float, middle: float) -> Floats:
     by PLACE, in distances at which it lets go.
     """
     x = before_stem(np.ascontiguousarray(op, dtype=np.float64), c, dt_s)
-    breakaway, sliding, tolerance = friction_of(c)
-    if breakaway > 0:
-        moves = float(np.abs(x - x[0]).max()) > breakaway
-        start = float(x[0]) if moves else first_slip(x, breakaway, sliding)
-        x = walk(x, breakaway, sliding, tolerance, start + float(c[Slot.PLACE]) * breakaway)
+    law = friction_of(c)
+    if law.breakaway > 0:
+        moves = float(np.abs(x - x[0]).max()) > law.breakaway
+        start = float(x[0]) if moves else first_slip(x, law)
+        x = walk(x, law, start + float(c[Slot.PLACE]) * law.breakaway)
     return np.asarray(behind_stem(x, c, dt_s, middle))

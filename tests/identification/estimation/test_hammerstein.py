@@ -9,13 +9,13 @@ import pytest
 
 from identification.estimation.backlash_stiction import better_linear, fit_linear, fit_play, fit_stick_slip
 from identification.estimation.gauss_newton import descend
-from identification.estimation.hammerstein import process_of, stem_blocks, sticking
+from identification.estimation.hammerstein import process_of, stem_blocks
 from identification.estimation.likelihood_ratio import WindowFit, evidence, innovations
-from identification.estimation.window import Window, block_means
+from identification.estimation.window import Stems, Window, block_means
 from identification.models import Backlash, Fopdt, Loop, Pid
 from identification.simulation.closed_loop import closed_loop
 from identification.simulation.lag import respond, unit_lag
-from identification.simulation.valve import HALTS, RESTS, SLIDES, first_slip, walk
+from identification.simulation.valve import HALTS, RESTS, SLIDES, StemLaw, first_slip, sticking, walk
 from tests.identification.responses import pv_of
 
 N = 3000
@@ -141,9 +141,11 @@ def test_stem_in_blocks_is_the_mean_of_the_stem():
     """Stem positions of blocks are means of the stem walked sample by sample, whatever it does in motion."""
     op = steps(80, 1200) + np.cumsum(np.random.default_rng(81).normal(0, 0.1, 1200))
     blocks = op.reshape(200, 6)
-    for breakaway, sliding, tolerance in product((0.4, 1.0, 4.0), (0.2, 0.4), (RESTS, HALTS, SLIDES, 0.15)):
-        slow = walk(op, breakaway, sliding, tolerance, first_slip(op, breakaway, sliding))
-        quick = stem_blocks(op, blocks.min(1), blocks.max(1), breakaway, sliding, tolerance, 6)
+    stems = Stems(op, blocks.min(1), blocks.max(1), np.empty(0), np.empty(0), 6)
+    for constants in product((0.4, 1.0, 4.0), (0.2, 0.4), (RESTS, HALTS, SLIDES, 0.15)):
+        law = StemLaw(*constants)
+        slow = walk(op, law, first_slip(op, law))
+        quick = stem_blocks(stems, law)
         assert quick == pytest.approx(block_means(slow, 6))
 
 

@@ -11,7 +11,7 @@ from identification.estimation.backlash_stiction import generic_noise
 from identification.estimation.candidate import Model, problem
 from identification.estimation.gauss_newton import covariance
 from identification.estimation.gauss_newton import descend as descend_lag
-from identification.estimation.hammerstein import Fit, ValveTrial
+from identification.estimation.hammerstein import Fit
 from identification.estimation.prediction_error import descend as descend_any
 from identification.estimation.prediction_error import deviations
 from identification.estimation.window import Window
@@ -20,6 +20,7 @@ from identification.mismatch.model_file import constants, to_data
 from identification.record import Floats
 from identification.simulation.open_loop import ModelInputs
 from identification.simulation.parameters import Slot, neutral
+from identification.simulation.valve import StemLaw
 
 GAIN, LAG, DEAD, BAND, N = 1.3, 20.0, 4.0, 2.0, 4000
 FIRST = 420
@@ -54,7 +55,7 @@ def test_both_fits_find_the_same_constants(seed: int) -> None:
     good = np.ones(N, dtype=bool)
     window = Window(pv, op, good, 1.0)
     begun = Fit(
-        1.1 * GAIN, 0.9 * LAG, DEAD, ValveTrial(BAND / 2, BAND / 2, 0.0), 1.0, N, generic_noise(), np.zeros(4)
+        1.1 * GAIN, 0.9 * LAG, DEAD, StemLaw(BAND / 2, BAND / 2, 0.0), 1.0, N, generic_noise(), np.zeros(4)
     )
     one = descend_lag(window, begun, free_width=True)
     spread = np.sqrt(np.diag(covariance(window, one, free_width=True)))

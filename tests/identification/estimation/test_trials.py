@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from identification.estimation.backlash_stiction import fit_linear, fit_play
-from identification.estimation.hammerstein import ValveTrial
 from identification.estimation.likelihood_ratio import WindowFit
 from identification.estimation.trials import (
     Trials,
@@ -20,7 +19,7 @@ from identification.estimation.trials import (
 )
 from identification.estimation.window import Window
 from identification.models import Backlash, Fopdt
-from identification.simulation.valve import RESTS
+from identification.simulation.valve import RESTS, StemLaw
 from tests.identification.responses import pv_of
 
 N = 4000
@@ -114,5 +113,5 @@ def test_a_stem_that_never_moves_is_no_trial():
     op = 50 + np.sin(np.arange(N) / 50.0)
     window = Window(0.1 * np.random.default_rng(1).standard_normal(N), op, np.ones(N, dtype=bool), 1.0)
     plain = fit_linear(window, PERIOD)
-    still = replace(plain, valve=ValveTrial(5.0, 5.0, RESTS))
+    still = replace(plain, valve=StemLaw(5.0, 5.0, RESTS))
     assert trials_between_moves(WindowFit(window, still), WindowFit(window, plain)) is None

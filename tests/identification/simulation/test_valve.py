@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 from identification.models import Backlash
 from identification.simulation.valve import (
     HALTS,
-    RESTS,
     SLIDES,
+    StemLaw,
     first_slip,
     play,
     stem_position,
@@ -68,7 +68,7 @@ def test_play_has_one_path_once_op_has_covered_it(op, width, where):
     """From any start within the play, the stem joins the path from first_slip once OP has covered the width."""
     x = np.array(op)
     covered = np.flatnonzero(np.maximum.accumulate(x) - np.minimum.accumulate(x) > width)
-    known = play(x, width, first_slip(x, width / 2, width / 2))
+    known = play(x, width, first_slip(x, StemLaw(width / 2, width / 2)))
     free = play(x, width, x[0] + where * width / 2)
     after = covered[0] if covered.size else x.size
     assert known[after:] == pytest.approx(free[after:], abs=1e-9)
@@ -77,10 +77,10 @@ def test_play_has_one_path_once_op_has_covered_it(op, width, where):
 def test_stick_slip_that_needs_more_than_half_of_the_range_moves():
     """A valve that lets go at 0.9 of OP's amplitude beyond its middle still cycles: its start is not OP's middle."""
     op = np.sin(np.linspace(0, 20 * np.pi, 2001))
-    breakaway, sliding = thresholds(1.2, 1.0)
-    stem = walk(op, breakaway, sliding, RESTS, first_slip(op, breakaway, sliding))
+    law = StemLaw(*thresholds(1.2, 1.0))
+    stem = walk(op, law, first_slip(op, law))
     assert np.ptp(stem[200:]) > 1.0
-    assert np.ptp(walk(op, breakaway, sliding, RESTS, 0.0)) == 0.0
+    assert np.ptp(walk(op, law, 0.0)) == 0.0
 
 
 def dry_stem(op: np.ndarray, static: float, kinetic: float) -> np.ndarray:
@@ -103,7 +103,7 @@ def test_dry_friction_halts_with_op():
     op = np.concatenate([np.linspace(0, 3, 31), np.full(5, 3.0), np.linspace(3, 4, 11)[1:], np.full(3, 4.0)])
     breakaway, sliding = thresholds(2.0, 1.0)
     true = dry_stem(op, breakaway, sliding)
-    halts, slides = (walk(op, breakaway, sliding, t, 0.0) for t in (HALTS, SLIDES))
+    halts, slides = (walk(op, StemLaw(breakaway, sliding, t), 0.0) for t in (HALTS, SLIDES))
     after = op.size - 3 - 6
     assert true[after] == pytest.approx(true[35], abs=1e-3)
     assert halts[after] == pytest.approx(halts[35])
