@@ -16,8 +16,7 @@ from pathlib import Path
 from analyzer.explain.case import MOST_SAMPLES, Case, case, tags_of
 from analyzer.history.plant_clock import stamp
 from analyzer.history.series import Series
-from analyzer.loops.changes import TuningChange
-from analyzer.loops.settings_in_force import in_force
+from analyzer.loops.changes import TuningChange, in_force
 from analyzer.loops.spec import LoopSpec, spec_of
 from analyzer.night.asked import Asked
 from analyzer.night.nights import Night, cut

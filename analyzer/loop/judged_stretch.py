@@ -15,8 +15,7 @@ import numpy as np
 from analyzer.config import Config
 from analyzer.loop.assessments import HOUR_S
 from analyzer.loop.quality import Prepared
-from analyzer.loops.changes import TuningChange
-from analyzer.loops.settings_in_force import settings_before
+from analyzer.loops.changes import TuningChange, settings_before
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import controller as stated_controller
 from identification.controller.check import runs

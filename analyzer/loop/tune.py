@@ -29,7 +29,7 @@ from analyzer.loop.intervals import intervals
 from analyzer.loop.judged_stretch import controller_of, earlier_settings
 from analyzer.loop.quality import Prepared, prepare
 from analyzer.loop.settings_side_by_side import middle_ti
-from analyzer.loops.settings_in_force import in_force
+from analyzer.loops.changes import in_force
 from analyzer.loops.spec import LoopSpec, spec_of
 from analyzer.loops.tags import as_stated
 from analyzer.night.nights import cut, nights_of

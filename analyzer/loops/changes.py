@@ -1,4 +1,5 @@
-"""Changes of controllers: read from changes.csv, given on the command line, or seen in a loop's behaviour."""
+"""Changes of controllers: read from changes.csv, given on the command line, or seen in a loop's behaviour; and which
+settings were in force at a time, by them and by the dates of loops.csv."""
 
 from __future__ import annotations
 
@@ -6,7 +7,7 @@ import csv
 import io
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -15,13 +16,15 @@ import numpy as np
 
 from analyzer.comparison.block_bootstrap import Floats
 from analyzer.config import ChangeLimits
-from analyzer.history.encoding import detect_encoding
-from analyzer.history.plant_clock import UTC_NAME
+from analyzer.history.plant_clock import UTC_NAME, date_of
 from analyzer.history.stamps import parse_times
+from analyzer.loops.spec import LoopSpec, csv_text
 from identification.errors import InputError
 
 COLUMNS = ("loop", "time", "kp_old", "ti_old", "kp_new", "ti_new", "who")
 DAY_S = 86400.0
+SETTINGS = ("kp", "ti", "td", "form", "gain_unit", "ti_unit", "scan_s")
+"""What a dated row of loops.csv changes; tags, ranges and texts are those of the last row."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,15 +68,8 @@ def read_changes(path: Path, zone: str = UTC_NAME, day_first: bool | None = None
         Where the file cannot be opened, holds no change, lacks a column, or a cell is neither time nor
         number.
     """
-    try:
-        data = Path(path).read_bytes()
-    except OSError as error:
-        raise InputError(f"{path}: cannot be opened", "a CSV of changes", "correct --changes") from error
-    text = data.decode(detect_encoding(data), errors="replace").lstrip("\ufeff")
-    first = text.split("\n", 1)[0]
-    if max(map(len, text.split("\n"))) > csv.field_size_limit():
-        raise InputError(f"{path}: a line of more than 128 kB", "one row a change", "correct the file")
-    reader = csv.DictReader(io.StringIO(text, newline=""), delimiter=max(",;\t", key=first.count))
+    text, delimiter = csv_text(path, "change")
+    reader = csv.DictReader(io.StringIO(text, newline=""), delimiter=delimiter)
     names = {(n or "").strip().lower(): n for n in reader.fieldnames or ()}
     for required in ("loop", "time"):
         if required not in names:
@@ -151,3 +147,75 @@ def _daily_spread(y: Floats, at: Floats) -> float:
     day = ((at - at[0]) // DAY_S).astype(int)
     medians = [float(np.median(y[day == d])) for d in np.unique(day)]
     return float(np.std(medians, ddof=1)) if len(medians) > 1 else 0.0
+
+
+def _dated(spec: LoopSpec, at_s: float) -> LoopSpec:
+    """A loop with the settings of the last of its rows that was valid at a time, of the first where none was."""
+    if not spec.earlier:
+        return spec
+    valid = [s for s in (*spec.earlier, spec) if s.valid_from_s is None or s.valid_from_s <= at_s]
+    row = valid[-1] if valid else spec.earlier[0]
+    if row is spec:
+        return spec
+    return replace(spec, valid_from_s=row.valid_from_s, **{name: getattr(row, name) for name in SETTINGS})
+
+
+def in_force(spec: LoopSpec, changes: Sequence[TuningChange], at_s: float) -> LoopSpec:
+    """A loop with the settings that were in force at a time [s since 1970-01-01 UTC], after changes of any loops.
+
+    Those of its row of loops.csv that was valid then, and of the last change before it; before the first change the
+    old ones that it states; where neither is known, those of loops.csv.
+    """
+    spec = _dated(spec, at_s)
+    own = sorted((c for c in changes if c.loop == spec.loop), key=lambda c: c.time_s)
+    changed = {}
+    for kind in ("kp", "ti"):
+        new = [getattr(c, f"{kind}_new") for c in own if c.time_s <= at_s]
+        old = [getattr(c, f"{kind}_old") for c in own if c.time_s > at_s]
+        value = next((v for v in (*reversed(new), *old) if v is not None), None)
+        if value is not None and value != getattr(spec, kind):
+            changed[kind] = value
+    return replace(spec, **changed) if changed else spec
+
+
+def settings_before(
+    spec: LoopSpec, changes: Sequence[TuningChange], first_s: float, last_s: float
+) -> tuple[tuple[float, LoopSpec], ...]:
+    """What was in force within a span before its last settings: until when [s], and the loop with them, oldest first.
+
+    `spec` is as loops.csv states it, the ends of the span are in s since 1970-01-01 UTC.
+    """
+    dated = [s.valid_from_s for s in (*spec.earlier, spec) if s.valid_from_s is not None]
+    times = {*dated, *(c.time_s for c in changes if c.loop == spec.loop)}
+    inside = sorted(t for t in times if first_s < t < last_s)
+    before = [in_force(spec, changes, t) for t in (first_s, *inside)]
+    return tuple(
+        (t, old)
+        for t, old, new in zip(inside, before[:-1], before[1:], strict=True)
+        if any(getattr(old, name) != getattr(new, name) for name in SETTINGS)
+    )
+
+
+def settings_from(spec: LoopSpec, changes: Sequence[TuningChange], at_s: float, zone: str) -> str:
+    """Where the settings in force at a time stand, with the date from which they hold; '' where none are stated.
+
+    `spec` is as loops.csv states it, the date is the plant's.
+    """
+    now = in_force(spec, changes, at_s)
+    if now.kp is None and now.ti is None:
+        return ""
+    dated = _dated(spec, at_s)
+    own = sorted(c.time_s for c in changes if c.loop == spec.loop)
+    before = [t for t in own if t <= at_s]
+    if (now.kp, now.ti) != (dated.kp, dated.ti) and not before:
+        return f"changes.csv, before {date_of(own[0], zone)}"
+    if before and _tells(changes, spec.loop, before[-1]):
+        return f"changes.csv, from {date_of(before[-1], zone)}"
+    since = dated.valid_from_s if spec.earlier else None
+    return "loops.csv" if since is None else f"loops.csv, from {date_of(since, zone)}"
+
+
+def _tells(changes: Sequence[TuningChange], loop: str, time_s: float) -> bool:
+    """Whether a change says what was typed in."""
+    last = [c for c in changes if c.loop == loop and c.time_s == time_s]
+    return any(c.kp_new is not None or c.ti_new is not None for c in last)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import math
+import tomllib
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -15,10 +16,12 @@ from typing import Any
 from analyzer.history.encoding import detect_encoding
 from analyzer.history.plant_clock import UTC_NAME
 from analyzer.history.stamps import parse_time
-from analyzer.loops.endings import ROLES
 from identification.errors import InputError
 from identification.models import Form
 
+STATED: dict[str, Any] = tomllib.loads(Path(__file__).with_name("loops.toml").read_text(encoding="utf-8"))
+"""What tags end in, what other systems call the columns, and what is assumed where a row is silent."""
+ROLES = ("sp", "pv", "op", "mode", "position")
 TEXTS = ("loop", "description", "type", "area", "master", "pv_unit")
 NUMBERS = ("pv_lo", "pv_hi", "op_lo", "op_hi", "kp", "ti", "td", "scan_s", "importance")
 MEANT: Mapping[str, tuple[float, float, bool]] = {
@@ -43,33 +46,7 @@ VALID_FROM = "valid_from"
 COLUMNS = (*TEXTS, *ROLES, *NUMBERS, *CHOICES, VALID_FROM)
 OWN_COLUMNS = ("op_unit", "sp_unit")  # near to a known name, and yet none misspelt
 MISSPELT = 0.75
-OTHER_NAMES: Mapping[str, str] = {
-    **dict.fromkeys(
-        ("gain", "kc", "k_p", "p_gain", "proportional", "proportional_gain", "controller_gain"), "kp"
-    ),
-    **dict.fromkeys(("band", "pb", "xp", "proportional_band"), "kp' with gain_unit 'band"),
-    **dict.fromkeys(
-        ("reset", "integral", "tn", "t_i", "integral_time", "reset_time", "repeats", "reset_rate"), "ti"
-    ),
-    **dict.fromkeys(("rate", "derivative", "tv", "t_d", "derivative_time"), "td"),
-    **dict.fromkeys(("setpoint", "sp_tag"), "sp"),
-    **dict.fromkeys(("pv_tag", "measurement"), "pv"),
-    **dict.fromkeys(("op_tag", "output", "out", "mv", "co"), "op"),
-    **dict.fromkeys(("pv_min", "range_lo", "range_min", "lrv", "pv_low"), "pv_lo"),
-    **dict.fromkeys(("pv_max", "range_hi", "range_max", "urv", "pv_high"), "pv_hi"),
-    **dict.fromkeys(("scan", "scan_time", "scan_rate", "execution_s"), "scan_s"),
-    **dict.fromkeys(("eu", "unit", "units", "engineering_unit"), "pv_unit"),
-}
-"""What other systems call a column; such a column left aside would be a setting lost without a word."""
-DEFAULTS: Mapping[str, str] = {
-    "form": "form ideal",
-    "gain_unit": "gain in percent",
-    "ti_unit": "ti in s",
-    "op_lo": "OP from 0",
-    "op_hi": "OP to 100",
-    "pv_lo": "PV range as recorded",
-    "scan_s": "scan as recorded",
-}
+OTHER_NAMES = {other: ours for ours, others in STATED["other_names"].items() for other in others}
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,7 +109,7 @@ class LoopSpec:
     @property
     def defaults(self) -> tuple[str, ...]:
         """What is assumed because the row is silent, for the output to say."""
-        return tuple(text for column, text in DEFAULTS.items() if column not in self.stated)
+        return tuple(text for column, text in STATED["defaults"].items() if column not in self.stated)
 
 
 def read_loops(path: Path, zone: str = UTC_NAME, day_first: bool | None = None) -> tuple[LoopSpec, ...]:
@@ -149,9 +126,8 @@ def read_loops(path: Path, zone: str = UTC_NAME, day_first: bool | None = None) 
     """
     header, rows = _table(Path(path))
     _check_header(path, header)
-    specs = tuple(
-        _spec(path, row, dict(zip(header, cells, strict=False)), zone, day_first) for row, cells in rows
-    )
+    cells = [(row, dict(zip(header, filled, strict=False))) for row, filled in rows]
+    specs = tuple(_spec(path, row, own, zone, day_first) for row, own in cells)
     if not specs:
         raise InputError(f"{path}: no loops", "one row a loop below the header", "add the loops")
     _check_unique(path, [(row, spec) for (row, _), spec in zip(rows, specs, strict=True)])
@@ -163,11 +139,9 @@ def _dated(specs: Sequence[LoopSpec]) -> tuple[LoopSpec, ...]:
     rows: dict[str, list[LoopSpec]] = {}
     for spec in specs:
         rows.setdefault(spec.loop, []).append(spec)
-    ordered = (
-        sorted(own, key=lambda s: -math.inf if s.valid_from_s is None else s.valid_from_s)
-        for own in rows.values()
-    )
-    return tuple(replace(own[-1], earlier=tuple(own[:-1])) if len(own) > 1 else own[0] for own in ordered)
+    for own in rows.values():
+        own.sort(key=lambda s: -math.inf if s.valid_from_s is None else s.valid_from_s)
+    return tuple(replace(own[-1], earlier=tuple(own[:-1])) for own in rows.values())
 
 
 def unknown_columns(specs: Sequence[LoopSpec]) -> tuple[str, ...]:
@@ -175,19 +149,30 @@ def unknown_columns(specs: Sequence[LoopSpec]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(name for spec in specs for name in spec.extra if name not in OWN_COLUMNS))
 
 
+def csv_text(path: Path, of: str) -> tuple[str, str]:
+    """What a CSV of loops or of changes holds, and its delimiter.
+
+    Raises
+    ------
+    InputError
+        It cannot be opened, or has a line beyond all measure.
+    """
+    try:
+        data = Path(path).read_bytes()
+    except OSError as error:
+        seen = f"{path}: cannot be opened ({error.strerror or error})"
+        raise InputError(seen, f"a CSV of {of}s", f"correct --{of}s") from error
+    text = data.decode(detect_encoding(data), errors="replace").lstrip("\ufeff")
+    if max(map(len, text.split("\n"))) > csv.field_size_limit():
+        raise InputError(f"{path}: a line of more than 128 kB", f"one row a {of}", "correct the file")
+    first = next((line for line in text.splitlines() if line.strip()), "")
+    return text, max(",;\t", key=first.count)
+
+
 def _table(path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
     """Header in lower case, and the filled rows with their numbers as an editor counts them."""
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise InputError(
-            f"{path}: cannot be opened ({error.strerror or error})", "a CSV of loops", "correct --loops"
-        ) from error
-    text = data.decode(detect_encoding(data), errors="replace")
-    if max(map(len, text.split("\n"))) > csv.field_size_limit():
-        raise InputError(f"{path}: a line of more than 128 kB", "one row a loop", "correct the file")
-    first = next((line for line in text.splitlines() if line.strip()), "")
-    reader = csv.reader(io.StringIO(text, newline=""), delimiter=max(",;\t", key=first.count))
+    text, delimiter = csv_text(path, "loop")
+    reader = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter)
     rows = [(reader.line_num, [cell.strip() for cell in cells]) for cells in reader]
     rows = [(row, cells) for row, cells in rows if any(cells) and not cells[0].startswith("#")]
     if not rows:
@@ -199,19 +184,16 @@ def _check_header(path: Path, header: Sequence[str]) -> None:
     for name in header:
         near = [] if name in (*COLUMNS, *OWN_COLUMNS) else get_close_matches(name, COLUMNS, 1, MISSPELT)
         if near and near[0] not in header:
-            raise InputError(
-                f"{path}: column '{name}'", f"'{near[0]}'", f"did you mean '{near[0]}'? Rename it"
-            )
+            remedy = f"did you mean '{near[0]}'? Rename it"
+            raise InputError(f"{path}: column '{name}'", f"'{near[0]}'", remedy)
     for name in header if "loop" in header else ():
         meant = OTHER_NAMES.get(name.replace(" ", "_"), "")
         if meant and meant.split("'")[0] not in header:
-            raise InputError(
-                f"{path}: column '{name}'", f"'{meant}'", f"rename it to '{meant}', or remove it"
-            )
+            remedy = f"rename it to '{meant}', or remove it"
+            raise InputError(f"{path}: column '{name}'", f"'{meant}'", remedy)
     if "loop" not in header:
-        raise InputError(
-            f"{path}: no column 'loop' among {', '.join(header[:8])}", "a column 'loop'", "add it"
-        )
+        seen = f"{path}: no column 'loop' among {', '.join(header[:8])}"
+        raise InputError(seen, "a column 'loop'", "add it")
     twice = [name for name, count in Counter(header).items() if count > 1 and name]
     if twice:
         raise InputError(f"{path}: column '{twice[0]}' stands twice", "each column once", "remove one")
@@ -245,9 +227,8 @@ def _number(path: Path, row: int, name: str, cell: str) -> float:
     if sized and (number >= 0.0 or name in SIGNED):
         return number
     expected = f"a number{'' if name in SIGNED else ', not below 0'}, of {least:g} to {most:g} in size"
-    raise InputError(
-        f"{path}, row {row}, column '{name}': '{cell[:40]}'", expected, "correct the cell or empty it"
-    )
+    seen = f"{path}, row {row}, column '{name}': '{cell[:40]}'"
+    raise InputError(seen, expected, "correct the cell or empty it")
 
 
 def _choice(path: Path, row: int, name: str, cell: str) -> str:
@@ -292,6 +273,5 @@ def spec_of(specs: Sequence[LoopSpec], loop: str) -> LoopSpec:
         if spec.loop == loop:
             return spec
     near = ", ".join(get_close_matches(loop, [s.loop for s in specs], n=3)) or "none is near"
-    raise InputError(
-        f"loop {loop} is not among the {len(specs)} loops", f"one of them ({near})", "correct --loop"
-    )
+    seen = f"loop {loop} is not among the {len(specs)} loops"
+    raise InputError(seen, f"one of them ({near})", "correct --loop")

@@ -8,11 +8,16 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from analyzer.loops.endings import ROLES, loops_of
-from analyzer.loops.spec import LoopSpec, read_loops
+from analyzer.loops.spec import ROLES, STATED, LoopSpec, read_loops
 from identification.errors import InputError
 from identification.models import Form, Pid
 
+ENDINGS: Mapping[str, Mapping[str, Sequence[str]]] = STATED["endings"]
+"""By control system and role."""
+_KNOWN = {ending for roles in ENDINGS.values() for endings in roles.values() for ending in endings}
+_ENDINGS = "|".join(re.escape(ending) for ending in sorted(_KNOWN))
+_SPLIT = re.compile(rf"^(?P<loop>.+?)(?:[._:/]| (?=\w{{4,}}$))(?P<ending>{_ENDINGS})$", re.IGNORECASE)
+_BLOCK = re.compile(r"^(?P<module>.+)/[^/]+$")
 UNNAMED = re.compile(r"column \d+")
 """Name of a column of a table without a header."""
 __all__ = ["LoopSpec", "as_stated", "controller", "find_loops", "match", "no_loops", "read_loops"]
@@ -21,6 +26,45 @@ __all__ = ["LoopSpec", "as_stated", "controller", "find_loops", "match", "no_loo
 def find_loops(tags: Iterable[str]) -> tuple[LoopSpec, ...]:
     """Loops with at least a PV, found by the endings of the tags."""
     return tuple(LoopSpec(loop, **tags_of) for loop, tags_of in loops_of(tags).items())  # type: ignore[arg-type]
+
+
+def loops_of(tags: Iterable[str]) -> dict[str, dict[str, str]]:
+    """Loops with at least a PV: name to the tag of each role ('sp', 'pv', 'op', 'mode', 'position').
+
+    A function block is left out of the name where its module has no other: FIC1/PID1/PV.CV is of loop FIC1.
+    """
+    groups: dict[str, dict[str, str]] = {}
+    for tag in tags:
+        split = _SPLIT.match(tag)
+        if split:
+            groups.setdefault(split["loop"], {}).setdefault(split["ending"].upper(), tag)
+    found = {loop: _roles(endings) for loop, endings in groups.items()}
+    return _without_blocks({loop: roles for loop, roles in found.items() if "pv" in roles})
+
+
+def _roles(endings: Mapping[str, str]) -> dict[str, str]:
+    """Tags by role, as the control system has it that explains most endings."""
+    readings = [
+        {
+            role: next(endings[e] for e in system[role] if e in endings)
+            for role in ROLES
+            if not endings.keys().isdisjoint(system.get(role, ()))
+        }
+        for system in ENDINGS.values()
+    ]
+    roles = max(readings, key=lambda roles: ("pv" in roles, len(roles)))
+    for role in ("sp", "op"):
+        others = (ending for system in ENDINGS.values() for ending in system.get(role, ()))
+        free = (endings[e] for e in others if e in endings and endings[e] not in roles.values())
+        if role not in roles and (tag := next(free, None)) is not None:
+            roles[role] = tag
+    return roles
+
+
+def _without_blocks(loops: dict[str, dict[str, str]]) -> dict[str, dict[str, str]]:
+    modules = {loop: match["module"] for loop in loops if (match := _BLOCK.match(loop))}
+    single = {loop: module for loop, module in modules.items() if list(modules.values()).count(module) == 1}
+    return {single.get(loop, loop) if single.get(loop) not in loops else loop: loops[loop] for loop in loops}
 
 
 def no_loops(tags: Sequence[str]) -> InputError:
@@ -116,7 +160,8 @@ def controller(spec: LoopSpec, pv_span: float | None) -> Pid | None:
     gain = 100 / spec.kp if spec.gain_unit == "band" else spec.kp
     ti_s, td_s = _seconds(spec.ti, spec.ti_unit), _derivative_s(spec)
     kp, ti_s, td_s = _to_ideal(spec.form, gain, ti_s, td_s)
-    return Pid(kp * unit_ratio(spec, pv_span), ti_s, td_s, **_scan(spec))
+    scan = {} if spec.scan_s is None else {"scan_s": spec.scan_s}
+    return Pid(kp * unit_ratio(spec, pv_span), ti_s, td_s, **scan)
 
 
 def as_stated(pid: Pid, spec: LoopSpec, pv_span: float | None) -> tuple[float, float]:
@@ -131,34 +176,23 @@ def as_stated(pid: Pid, spec: LoopSpec, pv_span: float | None) -> tuple[float, f
     return kp, _stated_time(ti_s, spec.ti_unit)
 
 
-def _scan(spec: LoopSpec) -> dict[str, float]:
-    return {} if spec.scan_s is None else {"scan_s": spec.scan_s}
-
-
 def unit_ratio(spec: LoopSpec, pv_span: float | None) -> float:
     """Percent of OP per percent of PV, for one unit of the stated gain."""
     if spec.gain_unit != "engineering":
         return 1.0
     if not pv_span:
-        raise InputError(
-            f"{spec.loop}: gain in engineering units and no PV range",
-            "pv_lo and pv_hi",
-            "state them in loops.csv",
-        )
+        seen = f"{spec.loop}: gain in engineering units and no PV range"
+        raise InputError(seen, "pv_lo and pv_hi", "state them in loops.csv")
     return pv_span / (spec.op_hi - spec.op_lo)
 
 
 def _seconds(ti: float, unit: str) -> float:
     """Integral time [s]; infinite where 0 switches the integral action off."""
-    if ti == 0:
-        return math.inf
-    return {"s": ti, "min": 60 * ti, "repeats/min": 60 / ti}[unit]
+    return math.inf if ti == 0 else {"s": ti, "min": 60 * ti, "repeats/min": 60 / ti}[unit]
 
 
 def _stated_time(ti_s: float, unit: str) -> float:
-    if math.isinf(ti_s):
-        return 0.0
-    return {"s": ti_s, "min": ti_s / 60, "repeats/min": 60 / ti_s}[unit]
+    return 0.0 if math.isinf(ti_s) else {"s": ti_s, "min": ti_s / 60, "repeats/min": 60 / ti_s}[unit]
 
 
 def _derivative_s(spec: LoopSpec) -> float:
@@ -168,9 +202,7 @@ def _derivative_s(spec: LoopSpec) -> float:
 def _to_ideal(form: Form, gain: float, ti_s: float, td_s: float) -> tuple[float, float, float]:
     if form is Form.PARALLEL:
         return gain, abs(gain) * ti_s, td_s / abs(gain)
-    if form is Form.IDEAL or td_s == 0:
-        return gain, ti_s, td_s
-    if math.isinf(ti_s):
+    if form is Form.IDEAL or td_s == 0 or math.isinf(ti_s):
         return gain, ti_s, td_s
     return gain * (1 + td_s / ti_s), ti_s + td_s, ti_s * td_s / (ti_s + td_s)
 

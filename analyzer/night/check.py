@@ -14,8 +14,7 @@ from analyzer.loop.fitness import too_thin, unfit_for_cause, unfit_for_settings
 from analyzer.loop.judged_stretch import controller_of
 from analyzer.loop.oscillation import detect
 from analyzer.loop.quality import Prepared, prepare
-from analyzer.loops.changes import TuningChange
-from analyzer.loops.settings_in_force import in_force
+from analyzer.loops.changes import TuningChange, in_force
 from analyzer.loops.spec import LoopSpec
 from identification.errors import TriageError
 

@@ -27,8 +27,7 @@ from analyzer.loop.judged_stretch import Earlier, controller_of, earlier_setting
 from analyzer.loop.page_trends import turn_events
 from analyzer.loop.quality import Prepared, prepare
 from analyzer.loop.sample_clock import interval
-from analyzer.loops.changes import TuningChange
-from analyzer.loops.settings_in_force import in_force, settings_from
+from analyzer.loops.changes import TuningChange, in_force, settings_from
 from analyzer.loops.spec import LoopSpec
 from analyzer.night.nights import Night, cut
 from analyzer.pages import compared as settings_page

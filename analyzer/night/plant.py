@@ -96,7 +96,7 @@ class Plant:
             Its trends hold too little to be put on a clock.
         """
         from analyzer.loop.quality import prepare
-        from analyzer.loops.settings_in_force import in_force
+        from analyzer.loops.changes import in_force
         from analyzer.loops.spec import spec_of
         from analyzer.night.nights import cut
         from identification.errors import InputError

@@ -7,8 +7,7 @@ import pytest
 from analyzer.config import Config
 from analyzer.history.export import open_export
 from analyzer.history.stamps import parse_time
-from analyzer.loops.changes import TuningChange
-from analyzer.loops.settings_in_force import in_force, settings_from
+from analyzer.loops.changes import TuningChange, in_force, settings_from
 from analyzer.loops.tags import match, read_loops
 from analyzer.night import batch
 from analyzer.store.store import Store
