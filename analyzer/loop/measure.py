@@ -21,10 +21,15 @@ from identification.estimation.backlash_stiction import (
     fit_play,
     fit_stick_slip,
 )
-from identification.estimation.expected_evidence import expected_evidence
+from identification.estimation.evidence import (
+    WindowFit,
+    evidence,
+    expected_evidence,
+    stem_moves,
+    with_load_step,
+)
 from identification.estimation.gauss_newton import descend
 from identification.estimation.hammerstein import Fit, process_of, residual
-from identification.estimation.likelihood_ratio import WindowFit, evidence, stem_moves, with_load_step
 from identification.estimation.noise import judged
 from identification.estimation.search import AR_ORDER, prepare
 from identification.estimation.stem_position import Seen, seen

@@ -9,12 +9,12 @@ from typing import NamedTuple
 import numpy as np
 
 from identification.estimation.descent import compass
+from identification.estimation.evidence import WindowFit, evidence
 from identification.estimation.gauss_newton import descend
 from identification.estimation.hammerstein import Fit, residual, slow_terms
-from identification.estimation.likelihood_ratio import WindowFit, evidence
 from identification.estimation.noise import every_lag, judged, whitened
+from identification.estimation.slip_beam import Friction, Noise, Response, log_chance
 from identification.estimation.slip_paths import decoded
-from identification.estimation.slips import Friction, Noise, Response, log_chance
 from identification.estimation.window import Window
 from identification.record import Floats
 from identification.simulation.lag import unit_lag

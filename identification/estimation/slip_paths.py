@@ -20,6 +20,9 @@ from identification.estimation.slip_beam import (
     Beam,
     Block,
     Events,
+    Friction,
+    Noise,
+    Response,
     X,
     best_paths,
     divided,
@@ -27,7 +30,6 @@ from identification.estimation.slip_beam import (
     room,
     shares_of,
 )
-from identification.estimation.slips import Friction, Noise, Response
 from identification.record import Floats, Mask
 
 PLACES = 13

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from identification.estimation.likelihood_ratio import WindowFit, innovations, moves_begun
+from identification.estimation.evidence import WindowFit, innovations, moves_begun
 from identification.estimation.noise import judged
 from identification.record import Floats
 from identification.signals.robust import clipped_gain

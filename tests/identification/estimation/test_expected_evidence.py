@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from identification.estimation.backlash_stiction import fit_linear, fit_play
-from identification.estimation.expected_evidence import expected_evidence
+from identification.estimation.evidence import expected_evidence
 from identification.estimation.window import Window
 from identification.models import Backlash, Fopdt
 from tests.identification.responses import pv_of

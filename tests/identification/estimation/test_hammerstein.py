@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from identification.estimation.backlash_stiction import better_linear, fit_linear, fit_play, fit_stick_slip
+from identification.estimation.evidence import WindowFit, evidence, innovations
 from identification.estimation.gauss_newton import descend
 from identification.estimation.hammerstein import process_of, stem_blocks
-from identification.estimation.likelihood_ratio import WindowFit, evidence, innovations
 from identification.estimation.window import Stems, Window, block_means
 from identification.models import Backlash, Fopdt, Loop, Pid
 from identification.simulation.closed_loop import closed_loop

@@ -11,9 +11,16 @@ from scipy.stats import norm
 
 from identification.estimation.backlash_stiction import fit_linear, fit_play, generic_noise
 from identification.estimation.irregular_slips import fit_irregular
-from identification.estimation.slip_beam import STUCK
+from identification.estimation.slip_beam import (
+    SCATTER,
+    STUCK,
+    Friction,
+    Noise,
+    Response,
+    log_chance,
+    slip_chance,
+)
 from identification.estimation.slip_paths import decoded
-from identification.estimation.slips import SCATTER, Friction, Noise, Response, log_chance, slip_chance
 from identification.estimation.window import Window
 from identification.record import Floats
 from identification.simulation.lag import Lag

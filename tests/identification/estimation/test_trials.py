@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from identification.estimation.backlash_stiction import fit_linear, fit_play
-from identification.estimation.likelihood_ratio import WindowFit
+from identification.estimation.evidence import WindowFit
 from identification.estimation.trials import (
     Trials,
     gains,
