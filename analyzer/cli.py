@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from analyzer.commands import explain, notes, report, run, store
+from analyzer.commands import explain, report, run, store
 from analyzer.commands.options import (
     FILE,
     NIGHT,
@@ -147,7 +147,7 @@ def config() -> None:
 
 
 for command in (
-    *(run.run, report.report, report.pages, notes.note, notes.summary, store.store),
+    *(run.run, report.report, report.pages, store.note, store.summary, store.store),
     *(explain.explain, explain.simulate),
 ):
     main.add_command(command)

@@ -44,7 +44,7 @@ def explain(
 
     Example: triage explain export.parquet --loops loops.csv --loop FIC101
     """
-    from analyzer.commands.progress import trying
+    from analyzer.commands.options import trying
     from analyzer.explain.explained import abstained, explained
     from analyzer.explain.models import read_model, write_model
     from analyzer.explain.page import abstention, page

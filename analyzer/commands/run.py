@@ -161,7 +161,7 @@ def _say(notes: Sequence[str], log: RunLog) -> None:
 
 def _assessed(batch: Batch, how: How, log: RunLog) -> Outcome:
     """Run the batch with progress and say what came of it: what was lost, how many were assessed, of which night."""
-    from analyzer.commands.progress import bar
+    from analyzer.commands.options import bar
     from analyzer.night import batch as nightly
 
     with bar("loops") as progress:
@@ -185,7 +185,7 @@ def _assessed(batch: Batch, how: How, log: RunLog) -> Outcome:
 
 def _explained(batch: Batch, how: How, night: Night) -> None:
     """Explain the flagged loops of a night, with progress, and say how many."""
-    from analyzer.commands.progress import bar
+    from analyzer.commands.options import bar
     from analyzer.explain import night as explain_night
 
     with bar("explained") as progress:

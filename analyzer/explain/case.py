@@ -22,9 +22,8 @@ from analyzer.loops.tags import controller
 from analyzer.words.settings import stands_and_jumps
 from identification.controller.check import StatedSettings
 from identification.errors import NotAssessedError
-from identification.estimation.evidence import WindowFit
+from identification.estimation.evidence import WindowFit, trials_between_moves
 from identification.estimation.hammerstein import process_of
-from identification.estimation.trials import trials_between_moves
 from identification.mismatch.experiment import coarser_by, is_experiment
 from identification.mismatch.recording import Recording, SeenInCycles, least_jump
 from identification.record import Floats

@@ -7,7 +7,7 @@ import numpy as np
 from analyzer.explain.explained import Explained
 from analyzer.explain.words import AXES, BROUGHT, CURVES, FEATURES, KINDS, ROWS, caption
 from analyzer.pages.words import number
-from identification.estimation.candidate import Fitted
+from identification.estimation.prediction_error import Fitted
 from identification.mismatch.catalogue import fault
 from identification.mismatch.fault_pictures import busiest, by_stated_law
 from identification.mismatch.location import Feature, Group, Located, groups, profile

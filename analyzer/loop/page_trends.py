@@ -11,8 +11,8 @@ import numpy as np
 from analyzer.loop.decisions import Cause, Fault
 from analyzer.loop.oscillation import Oscillations, counting
 from analyzer.loop.quality import Prepared
+from identification.estimation.evidence import turns_of
 from identification.estimation.hammerstein import Fit
-from identification.estimation.trials import turns_of
 from identification.record import LoopRecord
 from identification.signals.turns import StemMarks, halves
 

@@ -13,8 +13,7 @@ from identification.estimation.evidence import WindowFit, evidence
 from identification.estimation.gauss_newton import descend
 from identification.estimation.hammerstein import Fit, residual, slow_terms
 from identification.estimation.noise import every_lag, judged, whitened
-from identification.estimation.slip_beam import Friction, Noise, Response, log_chance
-from identification.estimation.slip_paths import decoded
+from identification.estimation.slip_beam import Friction, Noise, Response, decoded, log_chance
 from identification.estimation.window import Window
 from identification.record import Floats
 from identification.simulation.lag import unit_lag

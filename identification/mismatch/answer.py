@@ -8,10 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from identification.estimation.candidate import Fitted, Problem
 from identification.estimation.covariance import half_width
 from identification.estimation.descent import nats
-from identification.estimation.prediction_error import deviations, residual_fit
+from identification.estimation.prediction_error import Fitted, Problem, deviations, residual_fit
 from identification.mismatch import words
 from identification.mismatch.catalogue import EFFECTS, fault
 from identification.mismatch.effect import Block, exact

@@ -12,8 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from identification.controller.pi_regression import fed_back
-from identification.estimation.candidate import gain
-from identification.estimation.prediction_error import descend
+from identification.estimation.prediction_error import descend, gain
 from identification.estimation.start_values import plain_processes
 from identification.mismatch.catalogue import EFFECTS
 from identification.mismatch.explanation import Explanation, carried_over

@@ -8,8 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from identification.controller.pi_regression import ControlLaw
-from identification.estimation.candidate import Fitted, Problem
-from identification.estimation.prediction_error import descend
+from identification.estimation.prediction_error import Fitted, Problem, descend
 from identification.mismatch.catalogue import EFFECTS, fault
 from identification.mismatch.effect import Ends
 from identification.mismatch.friction import is_friction

@@ -15,10 +15,9 @@ from dataclasses import replace
 import numpy as np
 from numba import njit
 
-from identification.estimation.candidate import Fitted, Model, Problem
 from identification.estimation.descent import compass
 from identification.estimation.noise import whitened
-from identification.estimation.prediction_error import descend, loss_of, residual_fit
+from identification.estimation.prediction_error import Fitted, Model, Problem, descend, loss_of, residual_fit
 from identification.mismatch.effect import Friction
 from identification.mismatch.outside import about
 from identification.mismatch.recording import SeenInCycles

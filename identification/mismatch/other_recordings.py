@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from identification.estimation.candidate import problem
+from identification.estimation.prediction_error import problem
 from identification.mismatch.catalogue import EFFECTS
 from identification.mismatch.explanation import Explanation, by_cycles
 from identification.mismatch.model_file import carried, constants, inputs_for, to_data

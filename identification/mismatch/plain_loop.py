@@ -7,9 +7,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identification.estimation.candidate import Fitted, Model, Problem, correlated, problem
 from identification.estimation.noise import NO_NOISE, lag_means, whitened
-from identification.estimation.prediction_error import descend, sensitivities
+from identification.estimation.prediction_error import (
+    Fitted,
+    Model,
+    Problem,
+    correlated,
+    descend,
+    problem,
+    sensitivities,
+)
 from identification.estimation.start_values import plain_processes
 from identification.limits import LIMITS, ExplainLimits
 from identification.mismatch.recording import Recording

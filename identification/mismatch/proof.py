@@ -13,9 +13,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from identification.estimation.candidate import Fitted, Model, Problem, bounds, gain
 from identification.estimation.noise import NO_NOISE, whitened
-from identification.estimation.prediction_error import descend
+from identification.estimation.prediction_error import Fitted, Model, Problem, bounds, descend, gain
 from identification.estimation.start_values import simulated_best
 from identification.limits import LIMITS, ProofLimits
 from identification.mismatch.effect import Effect

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from identification.estimation.candidate import Fitted, Problem, gain
-from identification.estimation.prediction_error import descend
+from identification.estimation.prediction_error import Fitted, Problem, descend, gain
 from identification.mismatch.catalogue import CANDIDATES, EFFECTS
 from identification.mismatch.effect import Friction
 from identification.mismatch.experiment import is_experiment

@@ -7,8 +7,7 @@ import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 
-from identification.estimation.candidate import Fitted, Model, Problem, gain
-from identification.estimation.prediction_error import descend
+from identification.estimation.prediction_error import Fitted, Model, Problem, descend, gain
 from identification.mismatch.catalogue import CANDIDATES
 from identification.mismatch.effect import Friction
 from identification.mismatch.friction import fit_sticking

@@ -12,9 +12,8 @@ import numpy as np
 from scipy.ndimage import median_filter
 
 from identification.controller.check import runs
-from identification.estimation.candidate import Fitted, Model, Problem, scales
 from identification.estimation.noise import whitened
-from identification.estimation.prediction_error import sensitivities
+from identification.estimation.prediction_error import Fitted, Model, Problem, scales, sensitivities
 from identification.mismatch.recording import Circumstances
 from identification.record import Floats, Mask
 from identification.simulation.effect import Variant

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from identification.controller.check import runs
-from identification.estimation.candidate import Fitted, Problem
 from identification.estimation.noise import whitened
+from identification.estimation.prediction_error import Fitted, Problem
 from identification.mismatch.explanation import Explanation
 from identification.mismatch.location import Located, located
 from identification.mismatch.recording import Recording

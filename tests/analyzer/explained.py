@@ -14,8 +14,7 @@ from analyzer.explain.models import judged
 from analyzer.history.series import Series
 from analyzer.loops.spec import LoopSpec
 from identification.controller.check import judge
-from identification.estimation.candidate import Model, gain
-from identification.estimation.prediction_error import descend
+from identification.estimation.prediction_error import Model, descend, gain
 from identification.mismatch.answer import answer
 from identification.mismatch.catalogue import CANDIDATES
 from identification.mismatch.diagnosis import controller_finding_of, recorder_finding_of

@@ -17,10 +17,10 @@ from identification.estimation.slip_beam import (
     Friction,
     Noise,
     Response,
+    decoded,
     log_chance,
     slip_chance,
 )
-from identification.estimation.slip_paths import decoded
 from identification.estimation.window import Window
 from identification.record import Floats
 from identification.simulation.lag import Lag

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from identification.estimation.backlash_stiction import fit_linear, fit_play
-from identification.estimation.evidence import WindowFit
-from identification.estimation.trials import (
+from identification.estimation.evidence import (
     Trials,
+    WindowFit,
     gains,
     trials,
     trials_between_moves,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from identification.estimation.candidate import scales
+from identification.estimation.prediction_error import scales
 from identification.mismatch.catalogue import CANDIDATES, CONTROLLER_FAULTS, EFFECTS, RECORDER_FAULTS
 from identification.mismatch.effect import Fault
 from identification.mismatch.outside import OUTSIDE, RIVALS

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from identification.controller.check import StatedSettings
-from identification.estimation.candidate import Fitted, Model, Problem, problem
-from identification.estimation.prediction_error import descend
+from identification.estimation.prediction_error import Fitted, Model, Problem, descend, problem
 from identification.mismatch.answer import Answer, answer
 from identification.mismatch.catalogue import EFFECTS
 from identification.mismatch.diagnosis import explain
