@@ -77,17 +77,17 @@ class Measured:
     evidence: float
     size: float
     jump: float
-    line_linear: float
-    line_valve: float
     amplification: float | None
     stable: bool
-    consistency: float
-    harmonic: float
     saturated: float
     controller: Pid | None
     window: Window
     moves: int
     excited: bool
+    line_linear: float = 0.0
+    line_valve: float = 0.0
+    consistency: float = 1.0
+    harmonic: float = 0.0
     trials: Trials | None = None
     kurtosis: float = 3.0
     wave_left: float = 0.0
@@ -162,33 +162,48 @@ def measure(
     linear, play, stick, best, gained, jump = fits
     hopeless = oscillation is None and gained < _hopeful(window, due, limits)
     op_range = _op_range(window, scale, oscillation is not None)
-    size = best.valve.stickband / max(op_range, 1e-9)
     amplification, stable = _amplification(process_of(window, linear), controller, scale)
     told, (fine_linear, fine_play, fine_stick) = _refined(window, (linear, play, stick), best, hopeless)
-    wave = error if oscillation is not None else None
-    shown = trials(WindowFit(window, best), WindowFit(window, linear), scale) if wave is not None else None
-    return Measured(
-        fine_linear,
-        fine_play,
-        fine_stick,
-        gained,
-        size,
-        jump,
-        _prominence(residual(window, linear), window.dt_s, scale) if oscillation is not None else 0.0,
-        _prominence(residual(window, best), window.dt_s, scale) if oscillation is not None else 0.0,
-        amplification,
-        stable,
-        _consistency(window, linear, scale) if oscillation is not None else 1.0,
-        locked_harmonic(wave, scale) if wave is not None else 0.0,
-        at_limits_share(record),
-        controller,
-        told,
-        stem_moves(window, best.valve),
-        bool(due.any()),
-        shown,
-        size_kurtosis(wave, wave.duration_s / scale) if wave is not None else 3.0,
-        _wave_left(window, best, scale) if wave is not None else 0.0,
-        expected_evidence(window, linear, _play(size) * op_range, scale) if wave is not None else 0.0,
+    seen_alone = Measured(
+        linear=fine_linear,
+        play=fine_play,
+        stick_slip=fine_stick,
+        evidence=gained,
+        size=best.valve.stickband / max(op_range, 1e-9),
+        jump=jump,
+        amplification=amplification,
+        stable=stable,
+        saturated=at_limits_share(record),
+        controller=controller,
+        window=told,
+        moves=stem_moves(window, best.valve),
+        excited=bool(due.any()),
+    )
+    if oscillation is None:
+        return seen_alone
+    return _of_a_cycle(seen_alone, WindowFit(window, best), WindowFit(window, linear), scale, op_range, error)
+
+
+def _of_a_cycle(
+    m: Measured, best: WindowFit, linear: WindowFit, scale: float, op_range: float, error: Spectrum | None
+) -> Measured:
+    """What a cycle of this period shows beside: in the load that the fits leave, and in the wave of the error."""
+    window = best.window
+    found = replace(
+        m,
+        line_linear=_prominence(residual(window, linear.fit), window.dt_s, scale),
+        line_valve=_prominence(residual(window, best.fit), window.dt_s, scale),
+        consistency=_consistency(window, linear.fit, scale),
+    )
+    if error is None:
+        return found
+    return replace(
+        found,
+        harmonic=locked_harmonic(error, scale),
+        trials=trials(best, linear, scale),
+        kurtosis=size_kurtosis(error, error.duration_s / scale),
+        wave_left=_wave_left(window, best.fit, scale),
+        expected=expected_evidence(window, linear.fit, _play(m.size) * op_range, scale),
     )
 
 

@@ -184,7 +184,7 @@ def run(
     resume : bool
         Go on with the pieces of a run that was stopped, instead of starting anew.
     replacing : bool
-        Forget what the store has of these nights, instead of adding to it.
+        Forget what the store has of these nights.
     scheduler : str or None
         Address of a Dask scheduler whose workers do the loops, instead of processes of this machine.
     progress : callable

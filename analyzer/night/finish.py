@@ -86,26 +86,38 @@ def finish_night(
     fresh = {r["loop"]: finding_of(r) for r in table.to_pylist()}
     other = [] if replace else _other_groups(store, night, fresh)
     first = 1 + max((int(r["group"]) for r in other), default=0)
-    done = traced_night(fresh, waves_in(store.read_parts(night, "waves", keys)), config.plant, first)
-    earlier = _earlier(store, night)
-    rows: dict[str, Row] = {
-        loop: night_row(in_lanes(told_calmed(found, earlier.get(loop, ())), config.lanes))
-        for loop, found in done.loops.items()
-    }
+    waves = waves_in(store.read_parts(night, "waves", keys))
+    done = traced_night(fresh, waves, config.plant, first)
+    rows = _rows(done.loops, _earlier(store, night), config)
     old = {} if replace else _known(store, night)
     kept = {loop for loop, row in rows.items() if loop in old and fuller(old[loop], row, config.nights)}
     beside = [loop for loop in old if loop not in rows]
     joined = [old[k] if k in kept else rows[k] for k in order if k in rows] + [old[k] for k in beside]
     mine = [loop for loop in rows if loop not in kept]
-    for name in JOINED:  # one at a time: trends are most of a night
-        before = None if replace else store.read_if_there(name, night)
-        store.write(name, night, _joined(before, store.read_parts(night, name, keys), mine))
+    _join_others(store, night, keys, mine, replace)
     groups = [*other, *done.groups]
     store.write("groups", night, rows_table(groups, GROUPS) if groups else None)
     store.write("nights", night, rows_table(joined, NIGHTS))
     store.forget_explained(night, None if replace else mine)
     store.forget_compared()
     return _told(night, rows, old, kept, beside)
+
+
+def _rows(
+    loops: Mapping[str, Finding], earlier: Mapping[str, Sequence[Row]], config: Config
+) -> dict[str, Row]:
+    """The rows of a night's loops, those calmed by a change of settings told so, each with its lanes."""
+    return {
+        loop: night_row(in_lanes(told_calmed(found, earlier.get(loop, ())), config.lanes))
+        for loop, found in loops.items()
+    }
+
+
+def _join_others(store: Store, night: str, keys: Sequence[str], mine: Sequence[str], replace: bool) -> None:
+    """Join the tables beside that of the night, one at a time: trends are most of a night."""
+    for name in JOINED:
+        before = None if replace else store.read_if_there(name, night)
+        store.write(name, night, _joined(before, store.read_parts(night, name, keys), mine))
 
 
 def _earlier(store: Store, night: str) -> dict[str, list[Row]]:

@@ -229,10 +229,15 @@ def page(
         history(rows),
     ]
     sections.insert(-1, Section("Figures of the night, for experts", (Facts(figures),), closed=True))
-    known = [row["description"], row["type"], row["area"], f"night {row['night']}"]
     group = row["group"] if shared is not None else None
     links = (("All loops", "index.html"), *_links(more, settings, group))
-    return Page(slug(row["loop"]), row["loop"], ", ".join(k for k in known if k), tuple(sections), links)
+    return Page(slug(row["loop"]), row["loop"], _subtitle(row), tuple(sections), links)
+
+
+def _subtitle(row: Row) -> str:
+    """What loop it is, and which night."""
+    known = [row["description"], row["type"], row["area"], f"night {row['night']}"]
+    return ", ".join(k for k in known if k)
 
 
 def _links(more: Page | None, settings: Page | None, group: str | None) -> Iterator[tuple[str, str]]:
