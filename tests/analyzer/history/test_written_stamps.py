@@ -54,12 +54,16 @@ def test_a_month_in_another_language(tmp_path: Path, month: str) -> None:
     check(written(tmp_path / "x.csv", lambda at: f"{at:%d}. {month} {at:%Y %H:%M:%S}"))
 
 
-@pytest.mark.parametrize("june", ["Ιουνίου", "июня", "Haziran", "czerwca", "juin", "birželio", "kesäkuuta"])
-def test_june_is_not_july(tmp_path: Path, june: str) -> None:
-    """Months whose names begin alike are told apart."""
-    path = written(tmp_path / "x.csv", lambda at: f"{at:%d} {june} {at:%Y %H:%M:%S}")
+JUNE = ("Ιουνίου", "июня", "Haziran", "czerwca", "juin", "birželio", "kesäkuuta", "června")
+JULY = ("Ιουλίου", "июля", "Temmuz", "lipca", "juillet", "liepos", "heinäkuuta", "července", "červenec")
+
+
+@pytest.mark.parametrize(("name", "month"), [*((n, 6) for n in JUNE), *((n, 7) for n in JULY)])
+def test_june_is_not_july(tmp_path: Path, name: str, month: int) -> None:
+    """Months whose names begin alike are told apart, in the form that stands beside a day."""
+    path = written(tmp_path / "x.csv", lambda at: f"{at:%d} {name} {at:%Y %H:%M:%S}")
     stamp_s = open_export([path]).read(["a.PV"])["a.PV"].stamp_s
-    assert stamp_s[0] == datetime(2024, 6, 21, 8, tzinfo=UTC).timestamp()
+    assert stamp_s[0] == datetime(2024, month, 21, 8, tzinfo=UTC).timestamp()
 
 
 SHOWN = (
