@@ -51,14 +51,14 @@ def check(asked: Asked) -> None:
     Example: triage check export.csv --loops loops.csv
     """
     from analyzer.loops.tags import no_loops
-    from analyzer.night.check import lines
+    from analyzer.night.check import check_lines
 
     source, specs, notes = asked.opened()
     lost = 0
     if not specs:
-        say("\n".join(line for line, _ in lines(source, specs, notes, asked.config, asked.within)))
+        say("\n".join(line for line, _ in check_lines(source, specs, notes, asked.config, asked.within)))
         raise no_loops(source.tags)
-    for line, bad in lines(source, specs, notes, asked.config, asked.within, asked.changes, asked.zone):
+    for line, bad in check_lines(source, specs, notes, asked.config, asked.within, asked.changes, asked.zone):
         lost += bad
         say(line)
     sys.exit(SOME_LOST if lost else 0)
@@ -123,8 +123,8 @@ def tune(asked: Asked, tag: str, out: Path | None) -> None:
     """
     from analyzer.loop.tune import proposal
 
-    lines, pictures = proposal(asked, tag, out is not None)
-    for line in lines:
+    check_lines, pictures = proposal(asked, tag, out is not None)
+    for line in check_lines:
         say(line)
     if out is not None:
         out.mkdir(parents=True, exist_ok=True)
@@ -141,9 +141,9 @@ def config() -> None:
     Example: triage config > limits.toml; edit it; triage run export.parquet --config limits.toml --store store
     """
     from analyzer.config import Config
-    from analyzer.config_file import document
+    from analyzer.config_file import limits_document
 
-    click.echo(document(Config()))
+    click.echo(limits_document(Config()))
 
 
 for command in (

@@ -149,10 +149,10 @@ def _part(title: str, columns: Sequence[Column]) -> str:
     return "\n".join([f"## {title}", "", _line(TITLES), _line(["---"] * len(TITLES)), *lines])
 
 
-def document() -> str:
+def columns_document() -> str:
     """All columns as a page in Markdown."""
     return "\n".join([HEAD, *(_part(title, _TABLES[table]) + "\n" for table, title in PARTS.items())])
 
 
 if __name__ == "__main__":
-    print(document(), end="")
+    print(columns_document(), end="")

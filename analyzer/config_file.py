@@ -114,7 +114,7 @@ def _range(said: Limit) -> str:
     return f"from {said.least:g} to {said.most:g}{unit}"
 
 
-def document(config: Config) -> str:
+def limits_document(config: Config) -> str:
     """Limits as TOML, each with unit, range, meaning and source as a comment."""
     parts = [_part(f.name, getattr(config, f.name)) for f in fields(config)]
     return "\n".join(

@@ -48,12 +48,12 @@ def explain(
     from analyzer.explain.explained import abstained, explained
     from analyzer.explain.models import read_model, write_model
     from analyzer.explain.page import abstention, page
-    from analyzer.explain.recordings import cases
+    from analyzer.explain.recordings import asked_cases
 
     try:
         with trying() as tell:
             brought = read_model(model, tag) if model is not None else None
-            case, others = cases(asked, tag, held_out)
+            case, others = asked_cases(asked, tag, held_out)
             found = explained(case, tell, brought, others)
     except NotAssessedError as error:
         data = abstained(tag, str(error))
@@ -70,9 +70,9 @@ def _show(data: dict[str, Any], page: Callable[[], Page], form: str, out: Path |
     if form == "json":
         click.echo(json.dumps(data))
     elif form == "text":
-        from analyzer.explain.text import lines
+        from analyzer.explain.text import answer_lines
 
-        say("\n".join(lines(data)))
+        say("\n".join(answer_lines(data)))
     else:
         from reports import folder, html, markdown
 

@@ -14,7 +14,7 @@ from typing import Any
 
 import click
 
-from analyzer.history.plant_clock import seconds, zone_of
+from analyzer.history.plant_clock import utc_seconds, zone_of
 from analyzer.places import place, refused
 from identification.errors import InputError, TriageError
 from reports.texts import visible, visible_lines
@@ -165,8 +165,8 @@ def export_options(command: Command) -> Command:
         zone = str(zone_of(reading["timezone"]))
         dated = () if changes is None else tuple(read_changes(changes, zone, reading["day_first"]))
         since, until = given.pop("since"), given.pop("until")
-        first = -math.inf if since is None else seconds(since, zone)
-        last = math.inf if until is None else seconds(until, zone)
+        first = -math.inf if since is None else utc_seconds(since, zone)
+        last = math.inf if until is None else utc_seconds(until, zone)
         if last <= first:
             raise InputError(f"--since {since} --until {until}", "an end after the start", "swap them")
         asked = Asked(export, loops, dated, first, last, read_config(config), zone, reading)

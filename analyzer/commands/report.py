@@ -99,7 +99,7 @@ def report(
     """
     from analyzer.config_file import read_config
     from analyzer.pages.before_after import page
-    from analyzer.pages.changes import Spans, cases
+    from analyzer.pages.changes import Spans, change_cases
     from analyzer.store.store import Store
 
     kept, limits = Store(store), read_config(config)
@@ -108,7 +108,7 @@ def report(
     if not days <= MOST_DAYS:  # NaN passes the range that the option states
         raise InputError(f"--days {days}", f"1 to {MOST_DAYS}", "correct it")
     spans = Spans(days, _span(before, "--before", zone), _span(after, "--after", zone))
-    found, missing = cases(kept, _changes(kept, limits.changes, **named), spans, limits.before_after)
+    found, missing = change_cases(kept, _changes(kept, limits.changes, **named), spans, limits.before_after)
     if not found:
         why = "; ".join(f"{tag}: {reason}" for tag, reason in missing) or "no change found"
         raise InputError(why, "loops and times that the store holds", "check the tags and times")

@@ -125,7 +125,7 @@ def note(store: Path, loop: str, text: str | None, owner: str | None, hide_until
         near = ", ".join(get_close_matches(loop, known, n=3)) or "none is near"
         raise InputError(f"loop {loop} is not in night {night}", f"one of its loops ({near})", "correct LOOP")
     if text is None:
-        own = notes.read(store).get(loop, ())
+        own = notes.read_notes(store).get(loop, ())
         zone = kept.zone()
         say("\n".join(n.said(zone) for n in own) or f"{loop}: no notes")
         return

@@ -59,7 +59,7 @@ def stated_law(spec: LoopSpec, prepared: Prepared) -> StatedSettings | None:
     return StatedSettings(pid.kp, pid.ti_s / dt_s, dt_s / (spec.scan_s or dt_s))
 
 
-def neighbours(
+def ops_beside(
     spec: LoopSpec, specs: tuple[LoopSpec, ...], series: Mapping[str, Series], p: Prepared, config: Config
 ) -> tuple[Floats, ...]:
     """OPs of the export's other loops on this loop's clock."""
@@ -176,7 +176,7 @@ def case(
     stamps = raw.stamp_s[~raw.bad]
     stamps = stamps[(stamps >= r.start_s - r.dt_s) & (stamps <= r.start_s + r.duration_s)]
     verdict = verdict_on(spec, whole, config)
-    others = neighbours(spec, specs, series, prepared, config)
+    others = ops_beside(spec, specs, series, prepared, config)
     subject = subject_of(spec, prepared, stamps, verdict, others, config)
     factor = coarser_by(subject) if is_experiment(subject) else 1
     if factor == 1:

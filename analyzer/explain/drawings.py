@@ -48,7 +48,7 @@ ORDER = {"recorded": 0, "plain": 1, "stated": 1, "limit": 1, "least": 2, "most":
 """What is drawn above what."""
 
 
-def recorded(e: Explained) -> Floats:
+def recorded_pv(e: Explained) -> Floats:
     """PV, its clock set right [% of span], shape (n,)."""
     return e.found.p.inputs.level + e.found.p.y
 
@@ -62,7 +62,7 @@ def simulations(e: Explained) -> dict[str, Floats]:
     return out if e.brought is None else out | {"brought": e.brought.simulated}
 
 
-def trends(e: Explained) -> tuple[Trend, ...]:
+def drawn_trends(e: Explained) -> tuple[Trend, ...]:
     """The whole recording, and the stretch that tells most at full resolution."""
     marked = "Shaded: the spans that carry the misfit. " if e.said.where.get("spans") else ""
     how = "Drag, or the wheel with Ctrl, zooms; shift-drag or arrows move, double click shows all."
@@ -77,7 +77,7 @@ def trends(e: Explained) -> tuple[Trend, ...]:
 
 def signals(e: Explained) -> list[tuple[str, str, int, Floats]]:
     """Label, colour, panel and values of all that is drawn over time."""
-    s, pv, simulated = e.case.subject, recorded(e), simulations(e)
+    s, pv, simulated = e.case.subject, recorded_pv(e), simulations(e)
     out = [] if s.sp is None else [("SP", "sp", 0, s.sp)]
     out.append(("PV, clock set right" if e.found.late_s else "PV recorded", "recorded", 0, pv))
     out += [(LABELS[k], k, 0, x) for k, x in simulated.items()]
@@ -184,7 +184,7 @@ def note_of(f: Feature | None) -> str:
 
 def spectrum_plot(e: Explained) -> Plot:
     """Spectrum of what the simulations leave, as its part of the rms per octave of period."""
-    pv, dt_s = recorded(e), e.case.subject.dt_s
+    pv, dt_s = recorded_pv(e), e.case.subject.dt_s
     left = {k: pv - x for k, x in simulations(e).items() if k != "brought"}
     lines = tuple(Line(SHORT[k], *spectrum(x, dt_s), kind=k) for k, x in left.items())
     note = "Load and noise are in it as well: they stay."

@@ -131,13 +131,13 @@ def judged(data: Mapping[str, Any], found: Explanation, s: Recording, more: str 
     if found.accepted:
         said += f", the improved loop {better.rmse:.3g} %"
     units = "" if unanswered(found) else wrong_units(constants(dict(data)), restored(found.plain.model.c))
-    verdict = "" if units else compared(own, plain.rmse, s.limits.proof.as_good)
+    verdict = "" if units else against_plain(own, plain.rmse, s.limits.proof.as_good)
     note = "; ".join(x for x in (said, verdict, units, more) if x) + "."
     fitted, held = misfit(s.pv[:cut], out[:cut], window), misfit(s.pv[cut:], out[cut:], window)
     return Brought(out, fitted, held, note)
 
 
-def compared(own: float, plain: float, as_good: float) -> str:
+def against_plain(own: float, plain: float, as_good: float) -> str:
     """How a model does against the plain loop fitted anew, from both misfits."""
     if own > as_good * plain:
         return "it does worse than the plain loop can"
@@ -186,7 +186,7 @@ def span_note(now: Scale, brought: Mapping[str, Any]) -> str:
     return f"{spans}: its gain is off by their ratio"
 
 
-def scale_of(data: Mapping[str, Any], now: Scale) -> Scale:
+def saved_scale(data: Mapping[str, Any], now: Scale) -> Scale:
     """What percent means to a saved model: what it meant in the recording that was fitted.
 
     Without a stated range percent is of the range recorded, and the next recording has another.
@@ -207,7 +207,7 @@ def simulated(c: Case, data: dict[str, Any], stamps: Floats, closed: bool) -> tu
         The loop is to be closed and its controller is not known.
     """
     r, law = c.prepared.record, c.subject.stated
-    scale, now = scale_of(data, c.prepared.scale), c.prepared.scale
+    scale, now = saved_scale(data, c.prepared.scale), c.prepared.scale
     sp, pv = (scale.pv_pct(now.low + x * now.span / 100.0) for x in (r.sp, r.pv))
     op = scale.op_pct(now.op_low + r.op * now.op_span / 100.0)
     if closed and law is None:

@@ -62,7 +62,7 @@ def answered(q: Question, began: Callable[[int], None] = lambda at: None) -> Row
         data = abstained(q.spec.loop, str(error))
     except Exception as error:  # an error of one loop is that loop's answer, never the night's end
         data = abstained(q.spec.loop, f"not explained: {type(error).__name__}: {error}")
-    return row_of(data, q.night.name, page)
+    return answer_row(data, q.night.name, page)
 
 
 def _explained(q: Question) -> tuple[dict[str, Any], str]:
@@ -80,7 +80,7 @@ def _explained(q: Question) -> tuple[dict[str, Any], str]:
     return found.data, dumps(page(found, q.night.zone))
 
 
-def row_of(data: Mapping[str, Any], night: str, page: str = "") -> Row:
+def answer_row(data: Mapping[str, Any], night: str, page: str = "") -> Row:
     """An answer as a row of the store."""
     texts = {k: data[k] for k in ("loop", "verdict", "block", "reason")}
     return {**texts, "night": night, "answer": json.dumps(data), "page": page}
@@ -106,7 +106,7 @@ def _rows(asked: Sequence[Question], jobs: int, config: Config) -> Iterator[Row]
         for result in workers.results():
             if isinstance(result, Died):
                 q = result.task
-                yield row_of(abstained(q.spec.loop, f"not explained: {result.why}"), q.night.name)
+                yield answer_row(abstained(q.spec.loop, f"not explained: {result.why}"), q.night.name)
             else:
                 yield result
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from analyzer.explain import drawings, tables
 from analyzer.explain.explained import Explained
-from analyzer.explain.words import figure, places, rms, share, title
+from analyzer.explain.words import number_text, places, rms, share, title
 from analyzer.history.plant_clock import UTC_NAME
 from analyzer.pages.words import duration, number, stamp
 from identification.mismatch.words import check, located_sentence, seen_ahead, two_plain_loops
@@ -26,10 +26,12 @@ def page(e: Explained, zone: str = UTC_NAME) -> Page:
     with np.errstate(all="ignore"):  # a model that runs away is drawn as far as it goes
         sections = (
             Section("What it is", _verdict(e)),
-            Section("Recording and simulation", drawings.trends(e)),
+            Section("Recording and simulation", drawings.drawn_trends(e)),
             Section("What was found", _found(e)),
             Section("Where the misfit lives", (*_where(e.data), drawings.misfit_panels(e))),
-            Section("How well it fits", (tables.fit(e.data, _fit_note(e)), *_filled(tables.others(e.data)))),
+            Section(
+                "How well it fits", (tables.misfits(e.data, _fit_note(e)), *_filled(tables.others(e.data)))
+            ),
             Section("What it could also be", _filled(tables.alternatives(e.data))),
             Section("All that was tried", _tried(e), closed=bool(e.found.accepted)),
             Section("Does the controller do what is stated?", _controller(e), closed=True),
@@ -56,15 +58,15 @@ def abstention(data: Data) -> Page:
 def _recorded(e: Explained, zone: str) -> str:
     r = e.case.prepared.record
     begun, length = f"{stamp(r.start_s, zone)} {zone}", duration(len(r) * r.dt_s)
-    return f"{begun}, {length}, a sample each {figure(r.dt_s, 's')}"
+    return f"{begun}, {length}, a sample each {number_text(r.dt_s, 's')}"
 
 
 def _footer(e: Explained) -> str:
     s = e.case.prepared.scale
     unit = f" {e.case.spec.pv_unit}" if e.case.spec.pv_unit else ""
     how = "of the recorded range, for none is stated, " if s.recorded else ""
-    pv = f"{figure(s.low)} to {figure(s.low + s.span)}{unit}"
-    op = f"{figure(s.op_low)} to {figure(s.op_low + s.op_span)}"
+    pv = f"{number_text(s.low)} to {number_text(s.low + s.span)}{unit}"
+    op = f"{number_text(s.op_low)} to {number_text(s.op_low + s.op_span)}"
     return f"Percent of PV are {how}{pv}; percent of OP of {op}. Intervals are 90 %."
 
 
@@ -143,8 +145,8 @@ def _controller(e: Explained) -> tuple[Block, ...]:
     facts = (
         ("Kp as stated, in percent", number(s.stated.kp)),
         ("Kp that gives OP", number(law.kp)),
-        ("Ti as stated", figure(s.stated.ti * s.dt_s, "s")),
-        ("Ti that gives OP", figure(ti_s, "s")),
+        ("Ti as stated", number_text(s.stated.ti * s.dt_s, "s")),
+        ("Ti that gives OP", number_text(ti_s, "s")),
         ("Share of OP explained", share(law.explained)),
     )
     return (Facts(facts), drawn)

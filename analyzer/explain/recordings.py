@@ -82,7 +82,7 @@ def said_of(judged: Sequence[Part]) -> str:
     return f"Settings changed within the recording: explained on {judged[0].name}, held out on {rest}."
 
 
-def trends(asked: Asked, tag: str) -> tuple[LoopSpec, tuple[LoopSpec, ...], dict[str, Series]]:
+def loop_trends(asked: Asked, tag: str) -> tuple[LoopSpec, tuple[LoopSpec, ...], dict[str, Series]]:
     """A loop of an export, all loops of it, and the trends that explaining it reads.
 
     Raises
@@ -105,15 +105,15 @@ def trends(asked: Asked, tag: str) -> tuple[LoopSpec, tuple[LoopSpec, ...], dict
 
 def whole(asked: Asked, tag: str) -> tuple[Case, Series]:
     """A loop's case over all of an export, under its last settings, and its PV."""
-    spec, specs, series = trends(asked, tag)
+    spec, specs, series = loop_trends(asked, tag)
     pv = series[spec.pv or ""]
     spec = in_force(spec, asked.changes, float(pv.stamp_s[-1]))
     return case(spec, specs, series, asked.config, None), pv
 
 
-def cases(asked: Asked, tag: str, held_out: Sequence[Path]) -> tuple[Case, dict[str, Case]]:
+def asked_cases(asked: Asked, tag: str, held_out: Sequence[Path]) -> tuple[Case, dict[str, Case]]:
     """The case to be explained, and those held out by name: parts under other settings, and other exports."""
-    spec, specs, series = trends(asked, tag)
+    spec, specs, series = loop_trends(asked, tag)
     judged = parts(spec, series, asked.changes, asked.zone)
     kept: list[tuple[Part, Case]] = []
     for part in judged:

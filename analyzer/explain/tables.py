@@ -14,11 +14,11 @@ from analyzer.explain.words import (
     carried_by,
     chance,
     change,
-    interval,
+    interval_text,
     rms,
     share,
 )
-from analyzer.pages.words import columns, plain_cell
+from analyzer.pages.words import page_columns, plain_cell
 from identification.mismatch.selection import Candidate
 from identification.mismatch.words import discriminating_test
 from reports.pages import Cell, Table
@@ -35,12 +35,12 @@ SHOWN = 12
 def parameters(data: Data) -> Table:
     """Parameters with intervals of all effects, and of physics that has no name."""
     rows = tuple(
-        (Cell(x["name"]), Cell(called(k)), plain_cell(v["value"]), Cell(interval(v)), Cell(v["unit"]))
+        (Cell(x["name"]), Cell(called(k)), plain_cell(v["value"]), Cell(interval_text(v)), Cell(v["unit"]))
         for x in [*data["effects"], *([data["outside"]] if "outside" in data else [])]
         for k, v in x["parameters"].items()
         if k not in HIDDEN
     )
-    return Table("parameters", "Parameters", columns("effects_found"), rows)
+    return Table("parameters", "Parameters", page_columns("effects_found"), rows)
 
 
 def moved(data: Data) -> Table:
@@ -51,10 +51,10 @@ def moved(data: Data) -> Table:
     )
     most = max((abs(b / a - 1) if a else 0.0 for a, b in data["moved"].values()), default=0.0)
     note = KEPT if most < HARDLY else BENT
-    return Table("moved", "How the plain loop's constants moved", columns("constants_moved"), rows, note)
+    return Table("moved", "How the plain loop's constants moved", page_columns("constants_moved"), rows, note)
 
 
-def fit(data: Data, note: str = "") -> Table:
+def misfits(data: Data, note: str = "") -> Table:
     """Misfit of the simulations, fitted and held out."""
     shown = [k for k in ROWS if k in data["fit"] and (k != "explained" or data["moved"])]
     rows = []
@@ -64,7 +64,7 @@ def fit(data: Data, note: str = "") -> Table:
             m = data["fit"][key][part]
             cells += [_rms(m), Cell(f"{m['fit_pct']:.1f}", m["fit_pct"])]
         rows.append(tuple(cells))
-    return Table("fit", "", columns("simulations"), tuple(rows), note)
+    return Table("fit", "", page_columns("simulations"), tuple(rows), note)
 
 
 def others(data: Data) -> Table:
@@ -73,7 +73,7 @@ def others(data: Data) -> Table:
         (Cell(x["recording"]), _rms(x["baseline"]), _rms(x["explained"]), Cell(share(x["share"]), x["share"]))
         for x in data.get("held_out_on", [])
     )
-    return Table("others", "On the recordings held out", columns("held_out"), rows)
+    return Table("others", "On the recordings held out", page_columns("held_out"), rows)
 
 
 def _rms(misfit: Mapping[str, float]) -> Cell:
@@ -95,7 +95,7 @@ def features(data: Data) -> Table:
         "The plain loop's one-step errors in one joint regression: each row is what it adds to the others; chances "
         "from blocks in other orders."
     )
-    return Table("where", "", columns("misfit_tied_to"), rows, note)
+    return Table("where", "", page_columns("misfit_tied_to"), rows, note)
 
 
 def alternatives(data: Data) -> Table:
@@ -105,7 +105,7 @@ def alternatives(data: Data) -> Table:
         for first in data["effects"][:1]
         for other in first["alternatives"]
     )
-    return Table("alternatives", "", columns("alternatives"), rows)
+    return Table("alternatives", "", page_columns("alternatives"), rows)
 
 
 def tried(first: tuple[Candidate, ...], taken: tuple[Candidate, ...]) -> Table:
@@ -117,7 +117,7 @@ def tried(first: tuple[Candidate, ...], taken: tuple[Candidate, ...]) -> Table:
         for c in sorted(best.values(), key=lambda c: -c.penalised)[:SHOWN]
     )
     note = "Each name was fitted with all constants free; the best of so many gains about five nat by chance."
-    return Table("candidates", "", columns("effects_tried"), rows, note)
+    return Table("candidates", "", page_columns("effects_tried"), rows, note)
 
 
 def _nats(value: float) -> Cell:

@@ -17,7 +17,7 @@ WIDTH = 110
 Rows = Sequence[Sequence[str]]
 
 
-def lines(data: Mapping[str, Any]) -> list[str]:
+def answer_lines(data: Mapping[str, Any]) -> list[str]:
     """The answer as lines of text.
 
     Parameters
@@ -48,10 +48,10 @@ def _told(sentence: str) -> list[str]:
 
 
 def _part(name: str, rows: Rows, numeric: Sequence[int] = ()) -> list[str]:
-    return ["", name, *columns(rows, numeric)] if rows else []
+    return ["", name, *lined_up(rows, numeric)] if rows else []
 
 
-def columns(rows: Rows, numeric: Sequence[int] = ()) -> list[str]:
+def lined_up(rows: Rows, numeric: Sequence[int] = ()) -> list[str]:
     """Rows as lines whose columns line up, numbers to the right; the last column wraps."""
     widths = [max(map(len, cells)) for cells in zip(*rows, strict=True)]
     left = 2 + sum(widths[:-1]) + 2 * (len(widths) - 1)
@@ -82,7 +82,7 @@ def _controller(data: Mapping[str, Any]) -> Rows:
 
 
 def _fit(data: Mapping[str, Any]) -> Rows:
-    rows = [(*row, "") for row in _texts(tables.fit(data))]
+    rows = [(*row, "") for row in _texts(tables.misfits(data))]
     return [("", "fitted", "fit %", "held out", "fit %", ""), *rows] if rows else []
 
 

@@ -89,14 +89,14 @@ def called(name: str) -> str:
     return PARAMETERS.get(name, name.replace("_", " "))
 
 
-def figure(value: float | None, unit: str = "") -> str:
+def number_text(value: float | None, unit: str = "") -> str:
     """A number of three digits with its unit, a dash where it is not known."""
     if value is None or not math.isfinite(value):
         return "–"
     return f"{number(value)} {unit}".strip()
 
 
-def interval(value: Mapping[str, Any]) -> str:
+def interval_text(value: Mapping[str, Any]) -> str:
     """The ends of a parameter's interval, with as many digits as tell them apart; a dash where it has no width."""
     low, high = value["low"], value["high"]
     if low is None or high is None or low == high:
@@ -148,7 +148,7 @@ def places(where: Mapping[str, Any]) -> list[tuple[str, str]]:
         out.append(("Spans", shown + (" and more" if len(where["spans"]) > 4 else "")))
     for key, name, unit in (("pv_range", "PV", "%"), ("op_range", "OP", "%"), ("band_s", "Periods", "s")):
         if where.get(key):
-            out.append((name, f"{number(where[key][0])} to {figure(where[key][1], unit)}"))
+            out.append((name, f"{number(where[key][0])} to {number_text(where[key][1], unit)}"))
     if where.get("direction"):
         out.append(("Direction of OP", where["direction"]))
     return out

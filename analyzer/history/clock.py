@@ -23,7 +23,7 @@ EXCEL_ORIGIN_S = -25569 * 86400.0
 
 
 @dataclass(frozen=True, slots=True)
-class Scale:
+class TimeScale:
     """How a number means a time: second = number * unit_s + origin_s, on a local clock or on UTC."""
 
     name: str
@@ -53,29 +53,29 @@ EXCEL_MOST_SPAN = 4000.0
 LEAST_MS_STEP = 100.0
 """Steps of a clock without a unit from which it counts milliseconds where they are no whole minutes; ours."""
 SINCE_START = {
-    "ms": Scale("milliseconds since the start", 0, 1e11, 1e-3),
-    "s": Scale("seconds since the start", 0, SINCE_START_MOST, 1.0),
-    "min": Scale("minutes since the start", 0, SINCE_START_MOST, 60.0),
-    "h": Scale("hours since the start", 0, SINCE_START_MOST, 3600.0),
-    "d": Scale("days since the start", 0, 2e4, 86400.0),
+    "ms": TimeScale("milliseconds since the start", 0, 1e11, 1e-3),
+    "s": TimeScale("seconds since the start", 0, SINCE_START_MOST, 1.0),
+    "min": TimeScale("minutes since the start", 0, SINCE_START_MOST, 60.0),
+    "h": TimeScale("hours since the start", 0, SINCE_START_MOST, 3600.0),
+    "d": TimeScale("days since the start", 0, 2e4, 86400.0),
 }
 """Clocks that count from the start, by the unit that the column's name states; seconds where it states none."""
-ELAPSED = Scale("hours, minutes and seconds since the start", 0, 0, 1.0)
+ELAPSED = TimeScale("hours, minutes and seconds since the start", 0, 0, 1.0)
 """A clock in text that counts from the start, such as 25:10:03."""
 COUNTED = r"^\s*(?P<h>\d{1,5}):(?P<m>[0-5]\d):(?P<s>[0-5]\d(?:[.,]\d+)?)\s*$"
-SECONDS = Scale("seconds since 1970", 1e8, 3e9, 1.0)
+SECONDS = TimeScale("seconds since 1970", 1e8, 3e9, 1.0)
 SCALES = (
-    Scale("Excel days", 2e4, 8e4, 86400.0, EXCEL_ORIGIN_S, local=True),
-    Scale("days since year 0", 7.1e5, 7.7e5, 86400.0, -719529 * 86400.0, local=True),
-    Scale("Julian days", 2.43e6, 2.49e6, 86400.0, -2440587.5 * 86400.0),
+    TimeScale("Excel days", 2e4, 8e4, 86400.0, EXCEL_ORIGIN_S, local=True),
+    TimeScale("days since year 0", 7.1e5, 7.7e5, 86400.0, -719529 * 86400.0, local=True),
+    TimeScale("Julian days", 2.43e6, 2.49e6, 86400.0, -2440587.5 * 86400.0),
     SECONDS,
-    Scale("seconds since 1904", 3e9, 4.1e9, 1.0, -2082844800.0),
-    Scale("millions of Excel days", 2e10, 8e10, 0.0864, EXCEL_ORIGIN_S, local=True),
-    Scale("milliseconds since 1970", 1e11, 4e12, 1e-3),
-    Scale("microseconds since 1970", 1e14, 4e15, 1e-6),
-    Scale("hundreds of nanoseconds since 1601", 1.1e17, 1.7e17, 1e-7, -11644473600.0),
-    Scale("hundreds of nanoseconds since year 1", 6.2e17, 6.7e17, 1e-7, -62135596800.0),
-    Scale("nanoseconds since 1970", 1e17, 4e18, 1e-9),
+    TimeScale("seconds since 1904", 3e9, 4.1e9, 1.0, -2082844800.0),
+    TimeScale("millions of Excel days", 2e10, 8e10, 0.0864, EXCEL_ORIGIN_S, local=True),
+    TimeScale("milliseconds since 1970", 1e11, 4e12, 1e-3),
+    TimeScale("microseconds since 1970", 1e14, 4e15, 1e-6),
+    TimeScale("hundreds of nanoseconds since 1601", 1.1e17, 1.7e17, 1e-7, -11644473600.0),
+    TimeScale("hundreds of nanoseconds since year 1", 6.2e17, 6.7e17, 1e-7, -62135596800.0),
+    TimeScale("nanoseconds since 1970", 1e17, 4e18, 1e-9),
 )
 
 
@@ -106,7 +106,7 @@ class Clock:
     """
 
     columns: tuple[int, ...]
-    scale: Scale | None = None
+    scale: TimeScale | None = None
     order: DateOrder | None = None
     date_format: str | None = None
     timezone: str | None = None
@@ -126,7 +126,7 @@ class Clock:
         if self.below_s > 0:
             second, local = replace(self, below_s=0.0).seconds(arrays[:-1])
             return second + numbers(pc.fill_null(arrays[-1], 0)) * self.below_s, local
-        column = arrays[0] if len(arrays) == 1 else joined(arrays)
+        column = arrays[0] if len(arrays) == 1 else date_and_time(arrays)
         if self.scale is ELAPSED:
             return counted_s(as_text(column)), False
         if pa.types.is_date(column.type):
@@ -169,7 +169,7 @@ class Clock:
         parts = stamps.fields(texts, self.timezone)
         if parts is None:
             return np.full(len(texts), np.nan), True
-        second = stamps.seconds(parts, self._first(parts))
+        second = stamps.stamp_seconds(parts, self._first(parts))
         return stamps.midnights_told(second, parts), not parts.stated.any()
 
     def _first(self, parts: stamps.Fields) -> str:
@@ -179,7 +179,7 @@ class Clock:
         return (days_seen(parts) or by_gaps(parts) if parts.open.any() else None) or "month"
 
 
-def scale_of(column: pa.Array, unit: str = "") -> Scale | None:
+def time_scale_of(column: pa.Array, unit: str = "") -> TimeScale | None:
     """How the numbers of a column mean a time, by their size and a unit in its name; None where they mean none."""
     number = numbers(column)
     number = number[np.isfinite(number)]
@@ -224,7 +224,7 @@ def is_count(column: pa.Array) -> bool:
     return number.size > 1 and bool((np.diff(number) == 1).all()) and number[0] in (0.0, 1.0)
 
 
-def joined(arrays: Sequence[pa.Array]) -> pa.Array:
+def date_and_time(arrays: Sequence[pa.Array]) -> pa.Array:
     """A column of dates and a column of times of day as one column of text."""
     return pc.binary_join_element_wise(*(_trimmed_midnight(as_text(array)) for array in arrays), " ")
 
@@ -238,7 +238,7 @@ def _from_timestamps(column: pa.Array) -> NDArray[np.float64]:
     return ticks / TICKS_PER_S[column.type.unit]
 
 
-def _from_numbers(column: pa.Array, scale: Scale) -> NDArray[np.float64]:
+def _from_numbers(column: pa.Array, scale: TimeScale) -> NDArray[np.float64]:
     number = numbers(column)
     digits = 3 if scale.name == "Excel days" else 6
     return np.round(number * scale.unit_s + scale.origin_s, digits)

@@ -34,8 +34,8 @@ from analyzer.history.sheet import (
     Sheet,
     as_far_as_numbers_go,
     is_swallowed,
+    quotes_told,
     reading,
-    told,
     unreadable,
 )
 from analyzer.history.table import trimmed
@@ -220,7 +220,7 @@ def _streamed(sheet: Sheet, tag: int, folder: Path) -> Laid:
             done = as_far_as_numbers_go(sheet.encoding, width, partial(_pass, sheet, tag, folder))
     except (UnicodeError, pa.ArrowInvalid) as error:
         raise unreadable(sheet.path, error) from error
-    return Laid(tuple(told(sheet.unquoted, done.left_out)), tuple(done.tags), sheet.unquoted)
+    return Laid(tuple(quotes_told(sheet.unquoted, done.left_out)), tuple(done.tags), sheet.unquoted)
 
 
 def _pass(sheet: Sheet, tag: int, folder: Path, encoding: str, texts: Collection[int]) -> _Stream:

@@ -58,7 +58,7 @@ def by_gaps(parts: stamps.Fields) -> str | None:
 
 
 def _largest_gap(parts: stamps.Fields, first: str) -> float:
-    second = np.unique(stamps.seconds(parts, first))
+    second = np.unique(stamps.stamp_seconds(parts, first))
     return float(np.max(np.diff(second[np.isfinite(second)]), initial=0.0))
 
 
@@ -66,7 +66,7 @@ def _day_is_usual(parts: stamps.Fields, timezone: str | None) -> bool:
     """Whether dates that read either way have the day first: where the month first would lie ahead of us, or as
     is usual in the stated zone."""
     limit = time.time() + AHEAD_S
-    day, month = (bool((stamps.seconds(parts, first) > limit).any()) for first in ("day", "month"))
+    day, month = (bool((stamps.stamp_seconds(parts, first) > limit).any()) for first in ("day", "month"))
     if day != month:
         return month
     return timezone is not None and timezone.startswith(DAY_FIRST_ZONES)
@@ -81,7 +81,7 @@ def _with_short_year(parts: stamps.Fields, pointed: bool) -> DateOrder | None:
     if not _may_begin_with_year(parts):
         return None
     limit = time.time() + AHEAD_S
-    readings = {first: stamps.seconds(parts, first) for first in ("year", "day", "month")}
+    readings = {first: stamps.stamp_seconds(parts, first) for first in ("year", "day", "month")}
     possible = {
         first: found for first, found in readings.items() if np.isfinite(found).all() and found.max() <= limit
     }

@@ -127,7 +127,7 @@ class Export:
         return [f"{_some(names)}: {note}" for note, names in files.items()]
 
     def _sample_notes(self) -> list[str]:
-        return counted(self.met(self._met))
+        return met_told(self.met(self._met))
 
     def _check_known(self, tags: Sequence[str]) -> None:
         missing = [tag for tag in tags if tag not in self._homes]
@@ -236,7 +236,7 @@ def _agreed(sources: Sequence[Source]) -> tuple[Source, ...]:
     )
 
 
-def counted(met: Counter[str]) -> list[str]:
+def met_told(met: Counter[str]) -> list[str]:
     """Sentences on what was met in samples, the most frequent first."""
     return [f"{count} {what}" for what, count in met.most_common()]
 

@@ -157,7 +157,7 @@ def unpacked(path: Path, scratch: Path | None) -> list[Path]:
         start = file.read(5)
     if workbook.is_workbook(path, start):
         _check_parts(path, place)
-        return workbook.as_text(path, Path(tempfile.mkdtemp(prefix="workbook-", dir=place)))
+        return workbook.sheets_as_text(path, Path(tempfile.mkdtemp(prefix="workbook-", dir=place)))
     stream = next((STREAMS[magic] for magic in STREAMS if start.startswith(magic)), None)
     if stream is None and not start.startswith(ZIP):
         return [path]

@@ -42,7 +42,7 @@ def stamp(at_s: float, zone: str | None) -> str:
     return local(at_s, zone).strftime("%Y-%m-%d %H:%M")
 
 
-def seconds(at: datetime, zone: str | None) -> float:
+def utc_seconds(at: datetime, zone: str | None) -> float:
     """A time of the plant's clock [s since 1970-01-01 UTC]; of an hour that stands twice the first one."""
     return (at if at.tzinfo is not None else at.replace(tzinfo=zone_of(zone))).timestamp()
 
@@ -51,7 +51,7 @@ def midnights(first_s: float, last_s: float, zone: str | None) -> list[float]:
     """The plant's midnights strictly between two times [s since 1970-01-01 UTC], 23 to 25 hours apart."""
     day = local(first_s, zone).replace(hour=0, minute=0, second=0, microsecond=0, tzinfo=None)
     out = []
-    while (at := seconds(day, zone)) < last_s:
+    while (at := utc_seconds(day, zone)) < last_s:
         out += [at] if at > first_s else []
         day += timedelta(days=1)
     return out

@@ -59,7 +59,7 @@ class Sheet:
     def notes(self) -> tuple[str, ...]:
         """How the file is written, and the lines of it that do not fit its header."""
         loaded = _loaded(self, self._wanted([0]))
-        return (*self.found, *told(loaded.unquoted, loaded.left_out))
+        return (*self.found, *quotes_told(loaded.unquoted, loaded.left_out))
 
     def head(self, columns: Sequence[int]) -> list[pa.Array]:
         """First rows of some columns."""
@@ -129,7 +129,7 @@ def is_swallowed(sheet: Sheet, rows: int) -> bool:
     return rows < WHOLE_SHARE * lines - 1 and not sheet.unquoted
 
 
-def told(unquoted: bool, left_out: int) -> list[str]:
+def quotes_told(unquoted: bool, left_out: int) -> list[str]:
     """Sentences on quotes that are none, and on lines that do not fit their header."""
     quotes = ["a quote is not closed: quotes are taken as they stand"] if unquoted else []
     lost = f"{left_out} lines do not have as many columns as the header and are left out"

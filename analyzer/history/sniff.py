@@ -15,7 +15,7 @@ from pathlib import Path
 import pyarrow as pa
 
 from analyzer.history import stamps
-from analyzer.history.clock import SINCE_START, scale_of
+from analyzer.history.clock import SINCE_START, time_scale_of
 from analyzer.history.encoding import detect_encoding
 from analyzer.history.names import WORDS, is_stamp, without_unit
 from analyzer.history.rewritten import rewritten
@@ -265,7 +265,7 @@ def _kind(cells: Sequence[str]) -> str:
     """'stamp', 'number', 'quality' or 'text' for what all cells of a column are; '' where they are not alike."""
     numbers = [float(cell.replace(",", ".")) for cell in cells if NUMBER.match(cell)]
     if NUMBER.match(cells[0]) and len(numbers) >= MOSTLY * len(cells):
-        scale = scale_of(pa.array(numbers))
+        scale = time_scale_of(pa.array(numbers))
         return "number" if scale is None or scale in SINCE_START.values() else "stamp"
     if {cell.lower() for cell in cells} <= QUALITIES:
         return "quality"

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from analyzer.history.names import WORDS
 from analyzer.history.plant_clock import UTC_NAME
-from analyzer.history.plant_clock import seconds as utc_s
+from analyzer.history.plant_clock import utc_seconds as utc_s
 from analyzer.history.zones import offsets_h
 from identification.errors import InputError
 
@@ -135,7 +135,7 @@ def _readable(parts: pa.Array, part: dict[str, pa.Array], known: Mapping[str, fl
     return _numpy(told)
 
 
-def seconds(parts: Fields, first: str = "month") -> NDArray[np.float64]:
+def stamp_seconds(parts: Fields, first: str = "month") -> NDArray[np.float64]:
     """Seconds since 1970-01-01 of the stamps, offsets removed; NaN where unreadable or no such date.
 
     `first` (of `FIRST`) stands first in dates whose writing leaves it open.
@@ -253,7 +253,7 @@ def parse_times(
     if parts is None:
         return np.empty(0)
     day, sure = _stated_order(parts, trimmed, day_first)
-    local_s = np.where(day, seconds(parts, "day"), seconds(parts, "month"))
+    local_s = np.where(day, stamp_seconds(parts, "day"), stamp_seconds(parts, "month"))
     with np.errstate(invalid="ignore"):
         of_our_time = (local_s >= STATED_FROM_S) & (local_s < STATED_TO_S)
     for at in np.flatnonzero(~sure | ~of_our_time)[:1]:

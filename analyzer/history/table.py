@@ -49,7 +49,7 @@ class ReadOptions:
     scratch: Path | None = None
 
 
-class Table(Protocol):
+class SourceTable(Protocol):
     """Columns by position; `read` touches no other column.
 
     `path` is the file, `names` and `types` are of its columns, `notes` what was found out about its format,

@@ -45,7 +45,7 @@ def can_be_read() -> bool:
     return importlib.util.find_spec("python_calamine") is not None
 
 
-def as_text(path: Path, folder: Path) -> list[Path]:
+def sheets_as_text(path: Path, folder: Path) -> list[Path]:
     """Each sheet of a workbook that holds a table as a text file of its own under `folder`, in their order.
 
     Raises

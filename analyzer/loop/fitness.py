@@ -84,4 +84,4 @@ def too_thin(dt_s: float, controller: Pid | None, config: Config) -> Needs | Non
     samples = config.settings.ti_samples
     if controller is None or dt_s <= controller.ti_s / samples:
         return None
-    return Needs(Lack.FASTER, words.too_thin(dt_s, controller.ti_s, samples))
+    return Needs(Lack.FASTER, words.sampled_too_thinly(dt_s, controller.ti_s, samples))

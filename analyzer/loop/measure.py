@@ -157,7 +157,7 @@ def measure(
     window = window_of(record, scale, limits, kind)
     _check_judged(window, limits)
     controller = controller or recovered(record, scale)
-    due = answering(record, window, scale)
+    due = due_to_answer(record, window, scale)
     window, fits = _fits(window, scale, due, limits, oscillation)
     linear, play, stick, best, gained, jump = fits
     hopeless = oscillation is None and gained < _hopeful(window, due, limits)
@@ -339,7 +339,7 @@ def window_of(record: LoopRecord, scale_s: float, limits: CauseLimits, kind: str
     )
 
 
-def answering(record: LoopRecord, window: Window, scale_s: float) -> Mask:
+def due_to_answer(record: LoopRecord, window: Window, scale_s: float) -> Mask:
     """True where PV is due to answer a set point move, shape of the window.
 
     From a move for scale_s [s], and on until PV has come to the set point, however long the valve takes.

@@ -178,15 +178,15 @@ def _cycle(t: Tuning) -> list[str]:
 def _forecast(t: Tuning) -> list[str]:
     if t.forecast is None:
         return []
-    lines = ["forecast on the reconstructed load (90 % intervals):"]
+    proposal_lines = ["forecast on the reconstructed load (90 % intervals):"]
     for key, name in FORECAST.items():
         b, a, c = t.forecast.before[key], t.forecast.after[key], t.forecast.change[key]
         change = f"{100 * c.value:+.0f} % ({100 * c.low:+.0f} to {100 * c.high:+.0f})"
-        lines.append(f"  {name}: {b.value:.3g} to {a.value:.3g} {b.unit}, {change}")
-    return lines
+        proposal_lines.append(f"  {name}: {b.value:.3g} to {a.value:.3g} {b.unit}, {change}")
+    return proposal_lines
 
 
-def lines(t: Tuning, spec: LoopSpec, pv_span: float) -> list[str]:
+def proposal_lines(t: Tuning, spec: LoopSpec, pv_span: float) -> list[str]:
     """The proposal in words and figures."""
     out = [f"{name}: {_between(e)}" for name, e in t.estimates.items()]
     if "gain" not in t.estimates:
@@ -215,7 +215,7 @@ def _curves(t: Tuning, title: str) -> Plot:
     reach = 1.4 * float(np.abs(c.valve).max(initial=1.0))
     re, im = c.linear.real, c.linear.imag
     inside = (re > -0.3 * reach) & (re < reach) & (im > -0.8 * reach) & (im < 0.25 * reach)
-    lines = (
+    proposal_lines = (
         Line("valve N(A)", c.valve.real, c.valve.imag, kind="op"),
         Line("−1/(G C)", re[inside], im[inside], kind="pv"),
     )
@@ -224,7 +224,7 @@ def _curves(t: Tuning, title: str) -> Plot:
         Place(n.real, n.imag, f"{b.period_s:.3g} s{'' if b.stable else ', unstable'}", "cycle") for n, b in at
     )
     whole = f"{title}: N(A) and −1/(G C)"
-    return Plot("limit-cycle", whole, "real", "imaginary", lines, reach=(0.0,), places=places)
+    return Plot("limit-cycle", whole, "real", "imaginary", proposal_lines, reach=(0.0,), places=places)
 
 
 def _map(t: Tuning, title: str) -> Field:
@@ -294,7 +294,7 @@ def proposal(asked: Asked, loop: str, drawn: bool) -> tuple[list[str], dict[str,
             raise NotAssessedError(f"{loop}: {needs or found.verdict.needs or NO_MOVES}")
         return [*text, f"action: {Action.REPAIR_VALVE}", f"no settings: {needs or NO_MOVES}"], {}
     tuning = tune(found, stated, config, withheld(found, spec, stated, prepared.scale.span, config))
-    text += lines(tuning, spec, prepared.scale.span)
+    text += proposal_lines(tuning, spec, prepared.scale.span)
     return text, _drawn(tuning, spec, prepared.scale.span, config, night.name) if drawn else {}
 
 

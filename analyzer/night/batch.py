@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from analyzer.config import Config
-from analyzer.history.export import Export, counted
+from analyzer.history.export import Export, met_told
 from analyzer.history.plant_clock import UTC_NAME
 from analyzer.loop.decisions import Status
 from analyzer.loops.changes import TuningChange
@@ -211,7 +211,7 @@ def run(
             met.update(result.met)
             progress(done, of)
         written, more = _finished(batch, nights, keys, replacing)
-        return _outcome(batch, written, (*batch.export.file_notes, *counted(met), *said, *more))
+        return _outcome(batch, written, (*batch.export.file_notes, *met_told(met), *said, *more))
 
 
 def _finished(

@@ -67,7 +67,7 @@ def _dated(changes: Sequence[TuningChange], specs: Sequence[LoopSpec]) -> str:
     return text + (f"; not of {', '.join(others[:MOST_NAMES])}" if others else "")
 
 
-def lines(
+def check_lines(
     export: Export,
     specs: Sequence[LoopSpec],
     notes: Sequence[str],

@@ -20,7 +20,7 @@ from analyzer.plantwide.night import traced_night
 from analyzer.plantwide.wave import waves_in
 from analyzer.store.rows import finding_of, night_row
 from analyzer.store.store import Store
-from analyzer.store.table import KEPT, of_loops, rows_table
+from analyzer.store.table import KEPT, rows_of_loops, rows_table
 from analyzer.words.reason import CALMED as WORDS
 
 JOINED = tuple(t.name for t in KEPT if t.in_pieces and t.name != "nights")
@@ -178,8 +178,8 @@ def _known(store: Store, night: str) -> dict[str, Row]:
 
 def _joined(before: pa.Table | None, piece: pa.Table | None, mine: Sequence[str]) -> pa.Table | None:
     """Rows of a table of the store, those of some loops taken from a piece."""
-    tables = [] if before is None else [of_loops(before, mine, others=True)]
-    tables += [] if piece is None else [of_loops(piece, mine)]
+    tables = [] if before is None else [rows_of_loops(before, mine, others=True)]
+    tables += [] if piece is None else [rows_of_loops(piece, mine)]
     tables = [t for t in tables if t.num_rows] or tables[:1]
     return pa.concat_tables(tables, promote_options="default").unify_dictionaries() if tables else None
 

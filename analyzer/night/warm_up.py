@@ -27,7 +27,7 @@ LOOPS = (
 """A flow under a load that swings, a level behind a play, a flow behind a stem that sticks."""
 
 
-def recorded(loop: Loop, seed: int) -> dict[str, Series]:
+def simulated_series(loop: Loop, seed: int) -> dict[str, Series]:
     """Three hours of a loop at 1 s, as an export has them."""
     rng, n = np.random.default_rng(seed), 10_800
     swing = 2.0 * np.sin(2 * np.pi * np.arange(n) / 600.0) if loop.valve is None else np.zeros(n)
@@ -46,7 +46,7 @@ def main() -> None:
         stated = LoopSpec(
             "L", sp="L.SP", pv="L.PV", op="L.OP", pv_lo=0.0, pv_hi=100.0, kp=pid.kp, ti=pid.ti_s
         )
-        assess_loop(stated, recorded(loop, seed), Config())
+        assess_loop(stated, simulated_series(loop, seed), Config())
     print(f"kernels are ready after {time.monotonic() - begun:.0f} s", file=sys.stderr)
 
 

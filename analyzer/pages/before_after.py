@@ -13,15 +13,25 @@ from analyzer.comparison.before_after import (
     Grade,
     LoopComparison,
     Measure,
-    Verdict,
+    Outcome,
     grade,
 )
 from analyzer.config import ComparisonLimits
 from analyzer.history.plant_clock import UTC_NAME
 from analyzer.loops.changes import TuningChange
-from analyzer.pages.changes import Case, outcome
+from analyzer.pages.changes import ChangeCase, outcome
 from analyzer.pages.loop_pictures import trend_block
-from analyzer.pages.words import KINDS, columns, counted, interval, plain_cell, setting, signed, stamp, texts
+from analyzer.pages.words import (
+    KINDS,
+    change_interval,
+    page_columns,
+    plain_cell,
+    setting,
+    signed,
+    stamp,
+    texts,
+    with_noun,
+)
 from reports.pages import (
     Block,
     Cell,
@@ -54,7 +64,7 @@ TREND_BUCKETS = 4000
 """Buckets of a trend on this page: two weeks at two pixels a bucket, 64 kB a loop; ours."""
 
 
-def _tiles(cases: Sequence[Case]) -> Tiles:
+def _tiles(cases: Sequence[ChangeCase]) -> Tiles:
     kinds = [grade(c.found) for c in cases]
     counts = (
         (kinds.count(Grade.CLEAR), "improved clearly in all four", "better"),
@@ -78,7 +88,7 @@ def _row(change: Change, found: LoopComparison) -> tuple[Cell, ...]:
         plain_cell(d.before),
         plain_cell(d.after),
         Cell(signed(change.value_pct), change.value_pct),
-        Cell(interval(change)),
+        Cell(change_interval(change)),
         plain_cell(d.low),
         plain_cell(d.high),
         Cell(change.verdict.value, kind=KINDS[change.verdict]),
@@ -86,10 +96,10 @@ def _row(change: Change, found: LoopComparison) -> tuple[Cell, ...]:
     )
 
 
-def figures(cases: Sequence[Case], primary: bool, name: str) -> Table:
+def figures(cases: Sequence[ChangeCase], primary: bool, name: str) -> Table:
     """Figures before and after of all loops (the study's Figure 11)."""
     rows = [_row(c, case.found) for case in cases for c in case.found.changes if c.measure.primary == primary]
-    return Table(name, "", columns("figures"), tuple(rows), searchable=len(rows) > 12, facet="verdict")
+    return Table(name, "", page_columns("figures"), tuple(rows), searchable=len(rows) > 12, facet="verdict")
 
 
 def _settings(change: TuningChange, units: str) -> str:
@@ -100,7 +110,7 @@ def _settings(change: TuningChange, units: str) -> str:
     return f"{said} ({units})"
 
 
-def _in_short(case: Case) -> tuple[Cell, ...]:
+def _in_short(case: ChangeCase) -> tuple[Cell, ...]:
     """A loop in one row: what was typed in, the four changes, and what to make of them."""
     by_name = {c.measure.name: c for c in case.found.primary}
     kind = TONES[grade(case.found)]
@@ -114,16 +124,16 @@ def _in_short(case: Case) -> tuple[Cell, ...]:
 
 
 def _change_cell(change: Change | None) -> Cell:
-    if change is None or change.verdict is Verdict.INCOMPARABLE or change.interval_pct is None:
+    if change is None or change.verdict is Outcome.INCOMPARABLE or change.interval_pct is None:
         return Cell("–")
     low, high = (signed(x) for x in change.interval_pct)
     return Cell(f"{signed(change.value_pct)} ({low} … {high})", change.value_pct, KINDS[change.verdict])
 
 
-def in_short(cases: Sequence[Case]) -> Table:
+def in_short(cases: Sequence[ChangeCase]) -> Table:
     """A row a loop."""
     note = "Change of each figure in % of what it was before, with its interval; less is better in all four."
-    *first, last = columns("changes")
+    *first, last = page_columns("changes")
     hint = "Change, with its interval"
     four = (Column(m.name, f"{m.short_title}, % of before", True, hint, True) for m in PRIMARY)
     return Table("loops", "", (*first, *four, last), tuple(map(_in_short, cases)), note, cards=True)
@@ -133,7 +143,7 @@ def _span(first_s: float, last_s: float, usable_h: float, zone: str) -> str:
     return f"{stamp(first_s, zone)} to {stamp(last_s, zone)} {zone}, {usable_h:.0f} usable hours"
 
 
-def loop_section(case: Case, number_: int, zone: str = UTC_NAME) -> Section:
+def loop_section(case: ChangeCase, number_: int, zone: str = UTC_NAME) -> Section:
     """What became of one loop: settings, spans, remarks, trends (the study's Figure 10)."""
     found, change = case.found, case.change
     facts = (
@@ -164,18 +174,18 @@ def _bar(change: Change, group: str) -> IntervalBar:
     return IntervalBar(group, title, change.value_pct, low, high, kind, text)
 
 
-def per_loop_chart(cases: Sequence[Case]) -> IntervalChart:
+def per_loop_chart(cases: Sequence[ChangeCase]) -> IntervalChart:
     """Change per loop and assessment (the study's Figure 12)."""
     bars = tuple(_bar(c, case.found.loop) for case in cases for c in case.found.primary)
     caption = "Bars: change in % of the span before; lines: its interval. Less is better in all four."
     return IntervalChart("change-per-loop", "Change per loop and assessment", "% of before", bars, caption)
 
 
-def _average(cases: Sequence[Case], measure: Measure) -> IntervalBar:
+def _average(cases: Sequence[ChangeCase], measure: Measure) -> IntervalBar:
     """Mean of the comparable loops' changes; errors of different loops taken as independent."""
     changes = [c for case in cases for c in case.found.primary if c.measure == measure]
-    known = [c for c in changes if c.verdict is not Verdict.INCOMPARABLE and c.value_pct is not None]
-    group = counted(len(known), "loop")
+    known = [c for c in changes if c.verdict is not Outcome.INCOMPARABLE and c.value_pct is not None]
+    group = with_noun(len(known), "loop")
     if not known:
         return IntervalBar(group, measure.short_title, None, None, None, "incomparable", "nothing comparable")
     values = np.array([c.value_pct for c in known], float)
@@ -183,12 +193,12 @@ def _average(cases: Sequence[Case], measure: Measure) -> IntervalBar:
     down, up = (float(np.sqrt(((ends[:, k] - values) ** 2).sum()) / len(known)) for k in (0, 1))
     mean = float(values.mean())
     low, high = max(mean - down, -100.0), mean + up
-    verdict = Verdict.UNCLEAR if low <= 0 <= high else Verdict.BETTER if mean < 0 else Verdict.WORSE
+    verdict = Outcome.UNCLEAR if low <= 0 <= high else Outcome.BETTER if mean < 0 else Outcome.WORSE
     text = f"{signed(mean)} %"
     return IntervalBar(group, measure.short_title, mean, low, high, KINDS[verdict], text)
 
 
-def average_chart(cases: Sequence[Case]) -> IntervalChart:
+def average_chart(cases: Sequence[ChangeCase]) -> IntervalChart:
     """Average change of all comparable loops (the study's Figure 13)."""
     bars = tuple(_average(cases, m) for m in PRIMARY)
     caption = "Mean over the loops that can be compared; loops that were not better count as they are."
@@ -208,7 +218,7 @@ OFFERED = "These changes were not stated but seen in the loops' behaviour: confi
 
 
 def page(
-    cases: Sequence[Case],
+    cases: Sequence[ChangeCase],
     missing: Sequence[tuple[str, str]],
     subtitle: str,
     offered: bool = False,
@@ -219,7 +229,7 @@ def page(
     short += [_tiles(cases), in_short(cases)]
     if missing:
         short.append(Listing(tuple((loop, f"not looked at: {why}") for loop, why in missing)))
-    comparable = [c for c in cases if any(x.verdict is not Verdict.INCOMPARABLE for x in c.found.primary)]
+    comparable = [c for c in cases if any(x.verdict is not Outcome.INCOMPARABLE for x in c.found.primary)]
     charts = (average_chart(cases), per_loop_chart(comparable)) if len(comparable) > 1 else ()
     sections = (
         Section("In short", tuple(short)),

@@ -12,8 +12,8 @@ from analyzer.comparison.before_after import (
     Change,
     Grade,
     LoopComparison,
+    Outcome,
     Span,
-    Verdict,
     compare,
     follows,
     grade,
@@ -23,7 +23,7 @@ from analyzer.config import ChangeLimits, ComparisonLimits
 from analyzer.loop.decisions import counts
 from analyzer.loops.changes import TuningChange, behaviour_change, stated_changes
 from analyzer.pages.reading import Thinned, nights_within, read_hours, read_nights, read_trends
-from analyzer.pages.words import PLAIN, Row, Scale, enumerated, number, scale_of
+from analyzer.pages.words import PLAIN, Row, Units, enumerated, number, units_of
 from analyzer.store.store import Store
 from analyzer.words.units import gain_unit
 
@@ -44,7 +44,7 @@ HOURS_A_YEAR = 8760.0
 
 
 @dataclass(frozen=True, slots=True)
-class Case:
+class ChangeCase:
     """A change with what came of it."""
 
     change: TuningChange
@@ -53,7 +53,7 @@ class Case:
     units: str
     trend: Thinned | None
     wear: tuple[str, ...] = ()
-    scale: Scale = PLAIN
+    scale: Units = PLAIN
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,9 +102,9 @@ def _units(row: Row) -> str:
     return f"{row['form'] or 'ideal'} form, Kp in {gain}, Ti in {row['ti_unit'] or 's'}"
 
 
-def cases(
+def change_cases(
     store: Store, changes: Sequence[TuningChange], spans: Spans, limits: ComparisonLimits = LIMITS
-) -> tuple[list[Case], list[tuple[str, str]]]:
+) -> tuple[list[ChangeCase], list[tuple[str, str]]]:
     """Every change with what came of it, and those that could not be looked at, with the reason.
 
     Parameters
@@ -122,7 +122,7 @@ def cases(
     loops = {c.loop for c in changes}
     rows = read_nights(store, nights, COLUMNS, loops)
     hours, trends = read_hours(store, loops, nights), read_trends(store, loops, nights)
-    found: list[Case] = []
+    found: list[ChangeCase] = []
     missing: list[tuple[str, str]] = []
     for change, (before, after) in zip(changes, of, strict=True):
         own = [r for r in rows if r["loop"] == change.loop]
@@ -134,16 +134,16 @@ def cases(
     return found, missing
 
 
-def _case(change: TuningChange, result: LoopComparison, row: Row, trend: Thinned | None) -> Case:
+def _case(change: TuningChange, result: LoopComparison, row: Row, trend: Thinned | None) -> ChangeCase:
     told = (row["description"] or "", _units(row), trend)
-    return Case(change, result, *told, wear_texts(result, row), scale_of(row))
+    return ChangeCase(change, result, *told, wear_texts(result, row), units_of(row))
 
 
 def outcome(found: LoopComparison) -> str:
     """A loop's outcome in one phrase."""
     kind = grade(found)
     if kind is Grade.PARTIAL:
-        better = [c.measure.short_title.lower() for c in found.primary if c.verdict is Verdict.BETTER]
+        better = [c.measure.short_title.lower() for c in found.primary if c.verdict is Outcome.BETTER]
         text = f"improved only in {enumerated(better)}"
     elif kind is Grade.INCOMPARABLE:
         text = "not comparable: " + ("; ".join(found.reasons) or "no hourly figures on both sides")
@@ -166,7 +166,7 @@ def _stated(row: Row, name: str) -> float | None:
 
 def _change(found: LoopComparison, name: str) -> Change | None:
     """The change of a figure, where it is clear."""
-    unclear = (Verdict.INCOMPARABLE, Verdict.UNCLEAR)
+    unclear = (Outcome.INCOMPARABLE, Outcome.UNCLEAR)
     return next((c for c in found.changes if c.measure.name == name and c.verdict not in unclear), None)
 
 

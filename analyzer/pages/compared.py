@@ -12,7 +12,7 @@ import numpy as np
 from analyzer.loop.settings_side_by_side import SPREAD, Comparison, Shown
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import unit_ratio
-from analyzer.pages.words import columns, number
+from analyzer.pages.words import number, page_columns
 from analyzer.words.units import duration, gain_unit
 from identification.models import Integrator
 from identification.simulation.closed_loop import scan_step
@@ -81,7 +81,7 @@ def table(c: Comparison, spec: LoopSpec, unit: str) -> Table:
     note = (
         f"Each simulated on the {lasts} of load that the night leaves behind the identified loop. {CAUTION}"
     )
-    return Table("settings", "", columns("settings"), rows, note)
+    return Table("settings", "", page_columns("settings"), rows, note)
 
 
 def _row(t: Tried, c: Comparison, spec: LoopSpec, unit: str) -> tuple[Cell, ...]:

@@ -10,8 +10,8 @@ import numpy as np
 
 from analyzer.columns import GROUP_LIST, GROUPS, row_of
 from analyzer.loop.decisions import GroupRole
-from analyzer.pages.reading import Thinned, proposal
-from analyzer.pages.words import Row, cause_cell, columns, counted, duration, number, plain_cell, texts
+from analyzer.pages.reading import Thinned, action_text
+from analyzer.pages.words import Row, cause_cell, duration, number, page_columns, plain_cell, texts, with_noun
 from analyzer.plantwide.view import GroupView, read_groups
 from analyzer.store.store import Store
 from analyzer.words.present import figure
@@ -82,7 +82,7 @@ def group_row(g: GroupView) -> dict[str, Any]:
 
 def action_there(g: GroupView) -> str:
     """The action at the source with the settings to type in, where there are any."""
-    return proposal(g.loops[g.source["loop"]], g.action) if g.source else g.action
+    return action_text(g.loops[g.source["loop"]], g.action) if g.source else g.action
 
 
 def _candidates(g: GroupView) -> str:
@@ -114,7 +114,7 @@ def _heading(name: str) -> Column:
 def morning_table(groups: Sequence[GroupView]) -> Table:
     """One cause, several loops: the groups of a night, those that cost most first."""
     note = "Repair or retune the first loop, then look at the others again."
-    return Table("groups", "", columns("groups"), tuple(map(_morning_row, groups)), note)
+    return Table("groups", "", page_columns("groups"), tuple(map(_morning_row, groups)), note)
 
 
 def _morning_row(g: GroupView) -> tuple[Cell, ...]:
@@ -184,12 +184,12 @@ def page(g: GroupView, trends: Mapping[str, Thinned], night: str, paged: frozens
         Section("Why there", (_signs(g),)),
         *((Section("Trends and spectra", tuple(pictures)),) if pictures else ()),
     )
-    subtitle = f"{counted(len(g.rows), 'loop')}, night {night}."
+    subtitle = f"{with_noun(len(g.rows), 'loop')}, night {night}."
     links = (("All loops", "index.html"),)
     return Page(page_name(g.number), f"Group {g.number}: one oscillation", subtitle, sections, links)
 
 
-def of_loop(g: GroupView, loop: str, trends: Mapping[str, Thinned]) -> Section:
+def member_section(g: GroupView, loop: str, trends: Mapping[str, Thinned]) -> Section:
     """The part of a member's page: its place in the group, its trend above the source's."""
     row = next(r for r in g.rows if r["loop"] == loop)
     source = g.source

@@ -16,16 +16,16 @@ from analyzer.pages.maintenance import work_order
 from analyzer.pages.reading import Thinned
 from analyzer.pages.words import (
     Row,
-    Scale,
+    Units,
     beside,
     cause_cell,
     cell,
-    columns,
     duration,
     number,
+    page_columns,
     plain_cell,
-    scale_of,
     titled,
+    units_of,
 )
 from analyzer.words.units import row_settings
 from identification.mismatch.words import check
@@ -97,8 +97,8 @@ def _first(row: Row, thin: Thinned | None) -> Section:
     if thin is not None and thin.time_s.size > 1:
         opening = close_span(row, thin)
         title = "SP, PV and OP" + (", the last ten periods" if opening else "")
-        blocks.append(trend_block("trend", title, thin, (), scale_of(row), opening))
-    events = turn_panels(row, scale_of(row))
+        blocks.append(trend_block("trend", title, thin, (), units_of(row), opening))
+    events = turn_panels(row, units_of(row))
     if events is not None:
         blocks.append(events)
     return Section("What to do", tuple(blocks))
@@ -123,7 +123,7 @@ def _evidence(row: Row) -> Section:
         for s in signs
     )
     blocks: list[Block] = (
-        [Table("evidence", "", columns("evidence"), rows)] if rows else [Text(("No sign of a fault.",))]
+        [Table("evidence", "", page_columns("evidence"), rows)] if rows else [Text(("No sign of a fault.",))]
     )
     known = [titled(k, number(row[k])) for k in (*MODEL, *LIKELIHOOD) if row[k] is not None]
     if known:
@@ -133,7 +133,7 @@ def _evidence(row: Row) -> Section:
     return Section("Evidence", tuple(blocks))
 
 
-def _figure(name: str, row: Row, scale: Scale) -> tuple[str, str]:
+def _figure(name: str, row: Row, scale: Units) -> tuple[str, str]:
     """A figure with its unit, and in the loop's own unit too where it is a percentage of span."""
     term, text = titled(name, number(row[name]) + mark(row, name))
     own = "" if name in LEVELS else beside(BY_NAME[name].unit, row[name], scale)
@@ -146,7 +146,7 @@ def _limit_cycle(row: Row) -> list[Section]:
     if len(known) < 2:
         return []
     rows = tuple((Cell(name), Cell(duration(p), p), plain_cell(a)) for name, p, a in known)
-    return [Section("Limit cycle", (Table("limit-cycle", "", columns("limit-cycle"), rows),))]
+    return [Section("Limit cycle", (Table("limit-cycle", "", page_columns("limit-cycle"), rows),))]
 
 
 def _trends(thin: Thinned | None, row: Row) -> list[Section]:
@@ -159,13 +159,13 @@ def _trends(thin: Thinned | None, row: Row) -> list[Section]:
 
 def _night(row: Row) -> tuple[Cell, ...]:
     """One night's cells; the last says why where the loop was not assessed."""
-    cells = tuple(cell(row, column.key) for column in columns("history"))
+    cells = tuple(cell(row, column.key) for column in page_columns("history"))
     return cells if row["status"] == Status.OK else (*cells[:-1], Cell(f"{row['status']}: {row['reason']}"))
 
 
-def history(rows: Sequence[Row]) -> Section:
+def nights_section(rows: Sequence[Row]) -> Section:
     """A table of a loop's nights, the last first, and a picture of how its oscillation grew or fell."""
-    blocks: list[Block] = [Table("history", "", columns("history"), tuple(map(_night, reversed(rows))))]
+    blocks: list[Block] = [Table("history", "", page_columns("history"), tuple(map(_night, reversed(rows))))]
     known = [(i - len(rows) + 1.0, r["oscillation_significance"]) for i, r in enumerate(rows)]
     points = np.array([(x, y) for x, y in known if y is not None], float)
     if len(points) > 2:
@@ -214,7 +214,7 @@ def page(
         The page on which settings are compared and tried, which is linked; its first section stands here too.
     """
     row = rows[-1]
-    scale = scale_of(row)
+    scale = units_of(row)
     figures = tuple(_figure(k, row, scale) for k in FIGURES if row[k] is not None)
     sections = [
         _first(row, thin),
@@ -226,7 +226,7 @@ def page(
         *_trends(thin, row),
         *_limit_cycle(row),
         *(() if settings is None else settings.sections[:1]),
-        history(rows),
+        nights_section(rows),
     ]
     sections.insert(-1, Section("Figures of the night, for experts", (Facts(figures),), closed=True))
     group = row["group"] if shared is not None else None

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from analyzer.lanes.lanes import lanes_in
 from analyzer.loop.decisions import Action, Cause, Fault, Lane, Status
-from analyzer.pages.reading import Night, linked
-from analyzer.pages.words import Row, cell, columns, counted, duration, plain_cell, texts
+from analyzer.pages.reading import ShownNight, linked
+from analyzer.pages.words import Row, cell, duration, page_columns, plain_cell, texts, with_noun
 from analyzer.words.reason import STEPS
 from analyzer.words.units import changed_settings
 from reports.pages import Cell, Page, Section, Table
@@ -79,7 +79,7 @@ def work_order(row: Row) -> tuple[tuple[str, str], ...]:
     return ("Do", order["do"]), ("Look for", look), ("Then", order["after"])
 
 
-def _cells(night: Night, row: Row) -> tuple[Cell, ...]:
+def _cells(night: ShownNight, row: Row) -> tuple[Cell, ...]:
     return (
         linked(night, row["loop"]),
         *(cell(row, name) for name in ("description", "area")),
@@ -91,7 +91,7 @@ def _cells(night: Night, row: Row) -> tuple[Cell, ...]:
     )
 
 
-def faulty(night: Night) -> Table:
+def faulty(night: ShownNight) -> Table:
     """Valves at fault, those to be repaired first, then by width."""
     rows = [r for r in night.rows if r["status"] == Status.OK and r["cause"] == Cause.VALVE]
     rows.sort(key=lambda r: (r["action"] != Action.REPAIR_VALVE, -(_width(r) or 0.0)))
@@ -100,20 +100,24 @@ def faulty(night: Night) -> Table:
         "then look at positioner feedback, linkage, packing and actuator. "
         "With new settings a loop can wait for the shutdown."
     )
-    return Table("valves", "", columns("valves"), tuple(_cells(night, r) for r in rows), note, cards=True)
+    return Table(
+        "valves", "", page_columns("valves"), tuple(_cells(night, r) for r in rows), note, cards=True
+    )
 
 
-def worn(night: Night) -> Table:
+def worn(night: ShownNight) -> Table:
     """The valves that travel most."""
     rows = [r for r in night.rows if r["valve_travel_pct_per_h"] is not None]
     rows.sort(key=lambda r: -r["valve_travel_pct_per_h"])
     shown = rows[:TRAVELLED]
-    cells = tuple((linked(night, r["loop"]), *(cell(r, c.key) for c in columns("travel")[1:])) for r in shown)
+    cells = tuple(
+        (linked(night, r["loop"]), *(cell(r, c.key) for c in page_columns("travel")[1:])) for r in shown
+    )
     note = "Travel of OP, or of the stem where it is recorded; where the loop is tight, its settings wear the valve."
-    return Table("travel", "", columns("travel"), cells, note, cards=True)
+    return Table("travel", "", page_columns("travel"), cells, note, cards=True)
 
 
-def page(night: Night) -> Page:
+def page(night: ShownNight) -> Page:
     """The sheet of a night."""
     first, second = faulty(night), worn(night)
     sections = (
@@ -121,6 +125,6 @@ def page(night: Night) -> Page:
         Section("Valves that travel most", (second,)),
     )
     subtitle = (
-        f"{counted(len(first.rows), 'valve')} at fault in the night of {night.name}, for the valve shop."
+        f"{with_noun(len(first.rows), 'valve')} at fault in the night of {night.name}, for the valve shop."
     )
     return Page(NAME, "Hand-over to maintenance", subtitle, sections, (("All loops", "index.html"),))

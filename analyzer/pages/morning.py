@@ -12,10 +12,10 @@ from analyzer.pages.cost import MARK, OF_RECORDED, SIGNIFICANCE, cost_column, ma
 from analyzer.pages.groups import morning_table
 from analyzer.pages.loop_pictures import close_span, sparkline
 from analyzer.pages.news import since
-from analyzer.pages.plant import NightSum, area_table, history, plant_map
-from analyzer.pages.reading import Night, linked, needs_a_look, oscillates
+from analyzer.pages.plant import NightSum, area_table, plant_history, plant_map
+from analyzer.pages.reading import ShownNight, linked, needs_a_look, oscillates
 from analyzer.pages.summary import first_things
-from analyzer.pages.words import Row, cause_cell, cell, columns, counted, heading, marked_cell
+from analyzer.pages.words import Row, cause_cell, cell, heading, marked_cell, page_columns, with_noun
 from analyzer.plantwide.view import GroupView
 from analyzer.words.units import changed_settings, row_settings
 from reports.pages import Cell, Listing, Page, Section, Sparkline, Table, Tiles
@@ -30,7 +30,7 @@ LINKS = (
 )
 
 
-def _spark(night: Night, row: Row) -> Sparkline | None:
+def _spark(night: ShownNight, row: Row) -> Sparkline | None:
     trend = night.trends.get(row["loop"])
     return None if trend is None else sparkline(trend, close_span(row, trend))
 
@@ -40,7 +40,7 @@ def _settings(row: Row) -> str:
     return changed_settings(row) if known else row_settings(row)
 
 
-def _worst_row(night: Night, row: Row, follows: bool, by: str) -> tuple[Cell, ...]:
+def _worst_row(night: ShownNight, row: Row, follows: bool, by: str) -> tuple[Cell, ...]:
     name = linked(night, row["loop"])
     return (
         replace(name, text=FOLLOWER + name.text) if follows else name,
@@ -56,7 +56,7 @@ def _worst_row(night: Night, row: Row, follows: bool, by: str) -> tuple[Cell, ..
     )
 
 
-def worst_table(night: Night) -> Table:
+def worst_table(night: ShownNight) -> Table:
     """The loops to touch, the worst first, followers under the loop that moves them."""
     here, by = {r["loop"] for r in night.worst}, cost_column(night.rows)
     rows = tuple(_worst_row(night, r, r["source_loop"] in here, by) for r in night.worst)
@@ -64,13 +64,13 @@ def worst_table(night: Night) -> Table:
     said = f"Hidden by their notes: {', '.join(hidden)}." if hidden else ""
     said += f" {MARK} {OF_RECORDED}." if any(mark(r, by) for r in night.worst) else ""
     noted = any(row[-1].text for row in rows)
-    declared = columns("worst") if noted else columns("worst")[:-1]
+    declared = page_columns("worst") if noted else page_columns("worst")[:-1]
     shown = (*declared[:3], heading(by), *declared[3:])
     rows = tuple(row[: len(shown)] for row in rows)
     return Table("worst", "", shown, rows, said.strip(), len(rows) > 10, "cause", cards=True)
 
 
-def _all_row(night: Night, row: Row) -> tuple[Cell, ...]:
+def _all_row(night: ShownNight, row: Row) -> tuple[Cell, ...]:
     return (
         linked(night, row["loop"]),
         *(cell(row, c) for c in ("description", "type", "area")),
@@ -82,15 +82,15 @@ def _all_row(night: Night, row: Row) -> tuple[Cell, ...]:
     )
 
 
-def ranking(night: Night) -> Table:
+def ranking(night: ShownNight) -> Table:
     """All loops of the night."""
     marked = any(mark(row, name) for row in night.rows for name in (SIGNIFICANCE, *ALL_COSTS))
     note = f"{MARK} {OF_RECORDED}." if marked else ""
     rows = tuple(_all_row(night, r) for r in night.rows)
-    return Table("ranking", "", columns("ranking"), rows, note, True, "cause")
+    return Table("ranking", "", page_columns("ranking"), rows, note, True, "cause")
 
 
-def _tiles(night: Night) -> Tiles:
+def _tiles(night: ShownNight) -> Tiles:
     assessed = [r for r in night.rows if r["status"] == Status.OK]
     causes = [r["cause"] for r in assessed if needs_a_look(r)]
     items = [(f"{len(assessed)} of {len(night.rows)}", "loops assessed", "")]
@@ -100,16 +100,16 @@ def _tiles(night: Night) -> Tiles:
     return Tiles(tuple(items))
 
 
-def lost_table(night: Night) -> Table:
+def lost_table(night: ShownNight) -> Table:
     """Loops that were not assessed, and why."""
     lost = sorted((r for r in night.rows if r["status"] != Status.OK), key=lambda r: r["loop"])
-    shown = columns("not-assessed")
+    shown = page_columns("not-assessed")
     rows = tuple(tuple(cell(r, column.key) for column in shown) for r in lost)
     return Table("not-assessed", "", shown, rows, searchable=len(rows) > 12)
 
 
 def page(
-    night: Night,
+    night: ShownNight,
     groups: Sequence[GroupView] = (),
     sums: Sequence[NightSum] = (),
     links: Sequence[tuple[str, str]] = (),
@@ -126,11 +126,11 @@ def page(
         since(night),
         Section("Loops worth a look", (worst_table(night),)),
         *((Section("One cause, several loops", (morning_table(groups),)),) if groups else ()),
-        *((Section("The plant", (drawn, *history(sums))),) if drawn is not None else ()),
+        *((Section("The plant", (drawn, *plant_history(sums))),) if drawn is not None else ()),
         Section("Areas", (area_table(night.rows),)),
         Section("All loops", (ranking(night),)),
         Section(f"Not assessed ({len(lost.rows)})", (lost,)),
     )
     by = BY_NAME[cost_column(night.rows)].title.lower()
-    subtitle = f"{counted(len(night.rows), 'loop')}, the worst first by {by}."
+    subtitle = f"{with_noun(len(night.rows), 'loop')}, the worst first by {by}."
     return Page("index", f"Loops in the morning of {night.name}", subtitle, sections, (*LINKS, *links))

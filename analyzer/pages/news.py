@@ -8,8 +8,8 @@ import numpy as np
 
 from analyzer.lanes.lanes import FIGURE, lanes_in
 from analyzer.loop.decisions import Cause, Lane, Status
-from analyzer.pages.reading import Night, linked, oscillates, proposal
-from analyzer.pages.words import Row, cell, columns
+from analyzer.pages.reading import ShownNight, action_text, linked, oscillates
+from analyzer.pages.words import Row, cell, page_columns
 from reports.pages import Block, Cell, Section, Table, Text
 
 HALVED = 0.5
@@ -27,7 +27,7 @@ NOTHING = ("", "")
 """No news, in no colour."""
 
 
-def _news(night: Night, row: Row) -> tuple[str, str]:
+def _news(night: ShownNight, row: Row) -> tuple[str, str]:
     """What is new about a loop since the night before, and its colour; '' where nothing is."""
     old = night.before.get(row["loop"])
     if old is None:
@@ -121,7 +121,7 @@ def _cause_news(causes: Sequence[str]) -> tuple[str, str]:
     return f"the cause is now told as {now} (was {then})", "unclear"
 
 
-def news_lines(night: Night) -> list[str]:
+def news_lines(night: ShownNight) -> list[str]:
     """What is new since the night before, a line a loop, what got worse first."""
     found = [(row["loop"], *_news(night, row)) for row in night.rows]
     order = {"worse": 0, "unclear": 1, "better": 2}
@@ -129,7 +129,7 @@ def news_lines(night: Night) -> list[str]:
     return [f"{loop} {text}" for _, loop, text in told]
 
 
-def news_table(night: Night, tones: Sequence[str], name: str, title: str) -> Table:
+def news_table(night: ShownNight, tones: Sequence[str], name: str, title: str) -> Table:
     """Loops of which there is something new, of the colours asked for."""
     found = [(row, *_news(night, row)) for row in night.rows]
     rows = tuple(
@@ -137,15 +137,15 @@ def news_table(night: Night, tones: Sequence[str], name: str, title: str) -> Tab
             linked(night, row["loop"]),
             Cell(text, kind=tone),
             *(cell(r, "oscillation_significance") for r in (night.before[row["loop"]], row)),
-            Cell(proposal(row)),
+            Cell(action_text(row)),
         )
         for row, text, tone in found
         if text and tone in tones
     )
-    return Table(name, f"{title} ({len(rows)})", columns("news"), rows)
+    return Table(name, f"{title} ({len(rows)})", page_columns("news"), rows)
 
 
-def _news_blocks(night: Night) -> tuple[Block, ...]:
+def _news_blocks(night: ShownNight) -> tuple[Block, ...]:
     tables = (
         news_table(night, ("worse", "unclear"), "new", "New"),
         news_table(night, ("better",), "better", "Better"),
@@ -153,7 +153,7 @@ def _news_blocks(night: Night) -> tuple[Block, ...]:
     return tuple(t if t.rows else Text((f"{t.title.split(' (')[0]}: nothing.",), "note") for t in tables)
 
 
-def since(night: Night) -> Section:
+def since(night: ShownNight) -> Section:
     """The section of what changed overnight."""
     if not night.before_name:
         return Section("Since the night before", (Text(("This is the first night in the store.",)),))

@@ -9,7 +9,7 @@ from typing import Any
 from analyzer.explain.night import known
 from analyzer.pages import groups, loop, maintenance, morning
 from analyzer.pages.plant import NightSum, read_sums
-from analyzer.pages.reading import Night, Thinned, read_night, read_nights, read_trends
+from analyzer.pages.reading import ShownNight, Thinned, read_night, read_nights, read_trends
 from analyzer.plantwide.view import GroupView, read_groups
 from analyzer.store.store import Store
 from reports.page_file import PageFileError, loads
@@ -35,7 +35,7 @@ def pages(store: Store, name: str | None = None, top: int = 50) -> Iterator[Page
     night = read_night(store, name, top)
     shared = read_groups(store, night.name)
     nights = [n for n in store.nights() if n <= night.name]
-    links = neighbours(nights[-MOST_DATED:], night.name)
+    links = nights_around(nights[-MOST_DATED:], night.name)
     yield morning.page(night, shared, read_sums(store, night.name), links)
     yield maintenance.page(night)
     members = {r["loop"] for g in shared for r in g.rows[: groups.MOST]}
@@ -47,7 +47,7 @@ def pages(store: Store, name: str | None = None, top: int = 50) -> Iterator[Page
 
 def _loop_pages(
     store: Store,
-    night: Night,
+    night: ShownNight,
     nights: Sequence[str],
     shared: Sequence[GroupView],
     around: Mapping[str, Thinned],
@@ -63,7 +63,7 @@ def _loop_pages(
         drawn, settings = explanation(explained.get(tag)), kept_page(compared.get(tag))
         group = by_number.get(own[-1]["group"] or "")
         said = [n.said(night.zone) for n in night.notes.get(tag, ())]
-        part = None if group is None else groups.of_loop(group, tag, around)
+        part = None if group is None else groups.member_section(group, tag, around)
         about = loop.page(own, trends.get(tag), explained.get(tag), drawn, part, said, settings)
         yield about
         for more in (settings, drawn):
@@ -94,7 +94,7 @@ def name_of(night: str) -> str:
     return f"morning-{night}"
 
 
-def neighbours(nights: Sequence[str], night: str) -> tuple[tuple[str, str], ...]:
+def nights_around(nights: Sequence[str], night: str) -> tuple[tuple[str, str], ...]:
     """Links from a night to those before and after it among some, oldest first."""
     at = list(nights).index(night)
     around = (("Previous night", at - 1), ("Next night", at + 1))
@@ -115,7 +115,7 @@ def dated_page(store: Store, night: str, nights: Sequence[str], sums: Sequence[N
     """
     own = [s for s in sums if s.name <= night]
     found = morning.page(read_night(store, night, SHOWN), read_groups(store, night), own)
-    links = (*neighbours(nights, night), LATEST)
+    links = (*nights_around(nights, night), LATEST)
     return replace(found, name=name_of(night), sections=tuple(map(_unlinked, found.sections)), links=links)
 
 

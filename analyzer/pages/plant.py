@@ -11,8 +11,8 @@ import numpy as np
 from analyzer.columns import BY_NAME
 from analyzer.loop.decisions import CAUSES, Cause, Status, counts
 from analyzer.pages.cost import LOSS, SIGNIFICANCE, cost, cost_column
-from analyzer.pages.reading import Night, linked, needs_a_look, read_nights
-from analyzer.pages.words import Row, columns, number, plain_cell
+from analyzer.pages.reading import ShownNight, linked, needs_a_look, read_nights
+from analyzer.pages.words import Row, number, page_columns, plain_cell
 from analyzer.store.store import Store
 from reports.pages import Block, Cell, Floats, Line, Panels, Plot, Table, Tile, TileGroup, TreeMap
 
@@ -66,16 +66,16 @@ def area_table(rows: Sequence[Row]) -> Table:
     cells = [_area(name, own) for name, own in by_area(rows).items()]
     cells.sort(key=lambda c: 101.0 if c[1].number is None else c[1].number)
     note = "Score: share of the assessed loops, by importance, in which no fault was found; 100 is best."
-    return Table("areas", "", columns("areas"), tuple(cells), note)
+    return Table("areas", "", page_columns("areas"), tuple(cells), note)
 
 
-def _tile(night: Night, row: Row, by: str) -> Tile:
+def _tile(night: ShownNight, row: Row, by: str) -> Tile:
     kind = "calm" if not needs_a_look(row) else row["cause"] if row["cause"] in CAUSES else "unclear"
     text = f"{row['loop']}: {number(cost(row, by))}. {row['reason'] or ''}"
     return Tile(row["loop"], cost(row, by), kind, text, linked(night, row["loop"]).href)
 
 
-def _tiles(night: Night, name: str, rows: Sequence[Row], by: str) -> TileGroup:
+def _tiles(night: ShownNight, name: str, rows: Sequence[Row], by: str) -> TileGroup:
     ordered = sorted(rows, key=lambda r: (-cost(r, by), r["loop"]))
     tiles = [_tile(night, r, by) for r in ordered[:MOST_TILES]]
     rest = ordered[MOST_TILES:]
@@ -85,7 +85,7 @@ def _tiles(night: Night, name: str, rows: Sequence[Row], by: str) -> TileGroup:
     return TileGroup(name or "no area stated", tuple(tiles))
 
 
-def plant_map(night: Night) -> TreeMap | None:
+def plant_map(night: ShownNight) -> TreeMap | None:
     """Areas and assessed loops as large as what they cost, coloured by why they are worth a look; None where nothing
     is lost anywhere."""
     rows = [r for r in night.rows if r["status"] == Status.OK]
@@ -122,7 +122,7 @@ def read_sums(store: Store, night: str) -> list[NightSum]:
     return [summed(n, read_nights(store, [n], SUMMED)) for n in names]
 
 
-def history(sums: Sequence[NightSum]) -> tuple[Block, ...]:
+def plant_history(sums: Sequence[NightSum]) -> tuple[Block, ...]:
     """Curves over the nights; none where there are too few."""
     if len(sums) < LEAST_NIGHTS:
         return ()

@@ -61,7 +61,7 @@ def _read(store: Store, night: str) -> list[dict[str, Any]]:
     wanted = (*KEPT, *LANE_FIGURES, "timezone")
     held = set(store.columns("nights", night))
     rows = store.read("nights", night, [c for c in wanted if c in held]).to_pylist()
-    known = notes.read(store.path)
+    known = notes.read_notes(store.path)
     return [_noted({**dict.fromkeys(wanted), **row}, known) for row in rows]
 
 

@@ -144,7 +144,7 @@ MEMORY = 14
 
 
 @dataclass(frozen=True, slots=True)
-class Night:
+class ShownNight:
     """The rows of a night, the worst first, those of the night before by loop, and trends of the worst.
 
     earlier : rows of the nights before that one by loop, oldest first, with what is remembered of them.
@@ -206,7 +206,7 @@ def followers_under(rows: Sequence[Row]) -> list[Row]:
     return out + [r for rest in under.values() for r in rest]
 
 
-def read_night(store: Store, name: str | None, top: int, drawn: bool = True) -> Night:
+def read_night(store: Store, name: str | None, top: int, drawn: bool = True) -> ShownNight:
     """What the morning page of a night needs, with trends of the worst loops if they are to be drawn."""
     nights = store.nights()
     night = name or store.require()
@@ -217,19 +217,21 @@ def read_night(store: Store, name: str | None, top: int, drawn: bool = True) -> 
     remembered: dict[str, list[Row]] = {}
     for row in read_nights(store, earlier[-1 - MEMORY : -1], REMEMBERED):
         remembered.setdefault(row["loop"], []).append(row)
-    known = notes.read(store.path)
+    known = notes.read_notes(store.path)
     looked = [r for r in rows if needs_a_look(r) and not is_hidden(last(known, r["loop"]), night)]
     worst = tuple(followers_under(looked)[:top])
     trends = read_trends(store, {r["loop"] for r in worst}, [night]) if drawn else {}
-    return Night(night, tuple(rows), before, earlier[-1] if earlier else "", worst, trends, known, remembered)
+    return ShownNight(
+        night, tuple(rows), before, earlier[-1] if earlier else "", worst, trends, known, remembered
+    )
 
 
-def linked(night: Night, loop: str) -> Cell:
+def linked(night: ShownNight, loop: str) -> Cell:
     """The loop's name, leading to its page where there is one."""
     return Cell(loop, kind="strong", href=f"{slug(loop)}.html" if loop in night.paged else "")
 
 
-def proposal(row: Row, action: str = "") -> str:
+def action_text(row: Row, action: str = "") -> str:
     """The action (the row's, unless another is named), with the settings to type in where there are any."""
     action = action or row["action"] or ""
     if row["kp_new"] is None and row["ti_new"] is None:

@@ -9,8 +9,8 @@ from analyzer.loop.decisions import CAUSES, Action, Cause, Due, Fault, GroupRole
 from analyzer.pages.cost import cost, cost_column
 from analyzer.pages.maintenance import work_order
 from analyzer.pages.news import news_lines
-from analyzer.pages.reading import Night, needs_a_look, oscillates, read_night
-from analyzer.pages.words import Row, columns, counted, duration, enumerated, texts
+from analyzer.pages.reading import ShownNight, needs_a_look, oscillates, read_night
+from analyzer.pages.words import Row, duration, enumerated, page_columns, texts, with_noun
 from analyzer.plantwide.view import GroupView, read_groups
 from analyzer.store.store import Store
 from analyzer.words.units import changed_settings
@@ -99,11 +99,13 @@ def _do(row: Row) -> str:
     return "" if row["action"] in (None, Action.NONE) else row["action"]
 
 
-def _counts(night: Night) -> str:
+def _counts(night: ShownNight) -> str:
     assessed = [r for r in night.rows if r["status"] == Status.OK]
     swinging = [r for r in assessed if oscillates(r)]
     of = ", ".join(f"{sum(r['cause'] == c for r in swinging)} by {c}" for c in CAUSES)
-    return f"{len(assessed)} of {counted(len(night.rows), 'loop')} assessed, {len(swinging)} oscillate: {of}."
+    return (
+        f"{len(assessed)} of {with_noun(len(night.rows), 'loop')} assessed, {len(swinging)} oscillate: {of}."
+    )
 
 
 def page(store: Store, name: str | None = None) -> Page:
@@ -122,7 +124,7 @@ def page(store: Store, name: str | None = None) -> Page:
         (Cell(r["loop"], kind="strong"), Cell(r["reason"] or ""), Cell(_do(r)), Cell(night.note(r["loop"])))
         for r in night.worst
     )
-    shown = columns("summary")[: 4 if any(row[3].text for row in rows) else 3]
+    shown = page_columns("summary")[: 4 if any(row[3].text for row in rows) else 3]
     rows = tuple(row[: len(shown)] for row in rows)
     left = sum(needs_a_look(r) and r["loop"] not in night.hidden for r in night.rows) - len(rows)
     note = f"{left} more in the list." if left > 0 else ""

@@ -10,7 +10,7 @@ from importlib.resources import files
 from typing import Any
 
 from analyzer.columns import BY_NAME
-from analyzer.comparison.before_after import Change, Verdict
+from analyzer.comparison.before_after import Change, Outcome
 from analyzer.history.plant_clock import stamp
 from analyzer.loop.decisions import CAUSES
 from analyzer.pages.cost import mark
@@ -21,10 +21,10 @@ __all__ = ["duration", "stamp"]  # of the words that are not chosen here
 
 Row = Mapping[str, Any]
 KINDS = {
-    Verdict.BETTER: "better",
-    Verdict.WORSE: "worse",
-    Verdict.UNCLEAR: "unclear",
-    Verdict.INCOMPARABLE: "incomparable",
+    Outcome.BETTER: "better",
+    Outcome.WORSE: "worse",
+    Outcome.UNCLEAR: "unclear",
+    Outcome.INCOMPARABLE: "incomparable",
 }
 """Colour of each verdict."""
 
@@ -46,7 +46,7 @@ def signed(value: float | None) -> str:
     return text.replace("-", "−")
 
 
-def interval(change: Change) -> str:
+def change_interval(change: Change) -> str:
     """The interval of a change in percent of before, or in the figure's unit where before is zero."""
     ends = change.interval_pct
     if ends is None:
@@ -59,7 +59,7 @@ def setting(value: Any) -> str:
     return "–" if value is None else f"{value:g}"
 
 
-def counted(n: int, what: str) -> str:
+def with_noun(n: int, what: str) -> str:
     """A number with its noun."""
     return f"{n} {what}" if n == 1 else f"{n} {what}s"
 
@@ -87,7 +87,7 @@ def heading(name: str, **more: bool) -> Column:
 
 
 @cache
-def columns(table: str) -> tuple[Column, ...]:
+def page_columns(table: str) -> tuple[Column, ...]:
     """The columns of a table of a page, as tables.toml declares them."""
     return tuple(_column(stated) for stated in _stated("tables.toml")[table])
 
@@ -131,7 +131,7 @@ def cause_cell(cause: str | None) -> Cell:
 
 
 @dataclass(frozen=True, slots=True)
-class Scale:
+class Units:
     """What percent of span means for a loop: PV at 0 %, the span, and the unit; '' for one that is not stated."""
 
     low: float
@@ -149,19 +149,19 @@ class Scale:
 
 
 PERCENT = "% of span"
-PLAIN = Scale(0.0, 100.0, PERCENT)
+PLAIN = Units(0.0, 100.0, PERCENT)
 """Percent as it is, where the night does not say what it means."""
 
 
-def scale_of(row: Row) -> Scale:
+def units_of(row: Row) -> Units:
     """What percent means in a row of the night."""
     low, high = row.get("pv_lo"), row.get("pv_hi")
     if low is None or high is None or not high > low:
         return PLAIN
-    return Scale(low, high - low, row["pv_unit"] or "")
+    return Units(low, high - low, row["pv_unit"] or "")
 
 
-def beside(name_unit: str, value: float | None, scale: Scale) -> str:
+def beside(name_unit: str, value: float | None, scale: Units) -> str:
     """A figure in % of span in the loop's own unit too, in brackets; '' where that says nothing new."""
     if value is None or name_unit != PERCENT or not scale.unit or scale is PLAIN:
         return ""

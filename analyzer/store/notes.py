@@ -99,7 +99,7 @@ def _lines(store: Path) -> list[str]:
         return []
 
 
-def read(store: Path) -> dict[str, tuple[Note, ...]]:
+def read_notes(store: Path) -> dict[str, tuple[Note, ...]]:
     """The notes of a store by loop, oldest first; lines that are none are passed over."""
     out: dict[str, list[Note]] = {}
     for note in filter(None, map(_parsed, _lines(store))):

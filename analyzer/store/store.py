@@ -25,7 +25,7 @@ import pyarrow as pa
 
 from analyzer.columns import NIGHTS
 from analyzer.places import answering, content, is_remote, remove_tree
-from analyzer.store.table import KEPT, of_loops, read_stored, stored_names, with_empty, write_table
+from analyzer.store.table import KEPT, read_stored, rows_of_loops, stored_names, with_empty, write_table
 from identification.errors import InputError
 from reports.whole_file import whole_file
 
@@ -148,7 +148,7 @@ class Store:
         """Drop the explanations of some loops of a night, of all where None: their records have been replaced."""
         table = self.read_if_there("explained", night)
         if table is not None:
-            stay = table.slice(0, 0) if loops is None else of_loops(table, loops, others=True)
+            stay = table.slice(0, 0) if loops is None else rows_of_loops(table, loops, others=True)
             self.write("explained", night, stay if stay.num_rows else None)
 
     def forget_compared(self) -> None:

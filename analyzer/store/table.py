@@ -30,7 +30,7 @@ from reports.whole_file import whole_file
 
 
 @dataclass(frozen=True, slots=True)
-class Table:
+class StoredTable:
     """A table of a night, kept in STORE/name/NIGHT.parquet.
 
     columns, those that its rows declare, none where they are declared here (trends) or beside what alone reads them
@@ -46,13 +46,13 @@ class Table:
 
 
 OF_A_NIGHT = (
-    Table("nights", NIGHTS),
-    Table("hours", HOURS, bulky=True),
-    Table("trends", bulky=True),
-    Table("waves", kept=False),
-    Table("groups", GROUPS, in_pieces=False),
-    Table("explained", EXPLAINED, in_pieces=False),
-    Table("compared", SETTINGS),
+    StoredTable("nights", NIGHTS),
+    StoredTable("hours", HOURS, bulky=True),
+    StoredTable("trends", bulky=True),
+    StoredTable("waves", kept=False),
+    StoredTable("groups", GROUPS, in_pieces=False),
+    StoredTable("explained", EXPLAINED, in_pieces=False),
+    StoredTable("compared", SETTINGS),
 )
 """All there are; whoever deletes begins with the first, without which there is no night."""
 KEPT = tuple(t for t in OF_A_NIGHT if t.kept)
@@ -96,7 +96,7 @@ def _kind_of(column: Column) -> pa.DataType:
     return pa.float64() if column.is_number else pa.string()
 
 
-def of_loops(table: pa.Table, loops: Sequence[str], others: bool = False) -> pa.Table:
+def rows_of_loops(table: pa.Table, loops: Sequence[str], others: bool = False) -> pa.Table:
     """Its rows of some loops, or of all others."""
     import pyarrow.compute as pc
 

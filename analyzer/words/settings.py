@@ -55,7 +55,7 @@ def settings_differ(found: SettingsDiffer, spec: LoopSpec, pv_span: float) -> st
     )
 
 
-def too_thin(dt_s: float, ti_s: float, samples: float) -> str:
+def sampled_too_thinly(dt_s: float, ti_s: float, samples: float) -> str:
     """Why a coarse recording gives no new settings."""
     return (
         f"new settings need a sample every {ti_s / samples:.2g} s or faster for an integral time of {ti_s:.3g} s, "

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from analyzer.explain.models import (
-    compared,
+    against_plain,
     judged,
     plain_start,
     read_model,
-    scale_of,
+    saved_scale,
     within,
     wrong_units,
 )
@@ -92,7 +92,7 @@ def test_ratios_count_both_ways() -> None:
 
 def test_comparison_has_three_outcomes() -> None:
     """Worse, as well and better are told apart at a twentieth."""
-    said = [compared(x, 1.0, LIMITS.proof.as_good).split()[2] for x in (1.06, 1.04, 0.94)]
+    said = [against_plain(x, 1.0, LIMITS.proof.as_good).split()[2] for x in (1.06, 1.04, 0.94)]
     assert said == ["worse", "as", "better"]
 
 
@@ -132,6 +132,6 @@ def test_percent_means_to_a_model_what_it_meant_when_it_was_fitted() -> None:
     """A model fitted where the recorded range was 20 to 60 keeps it over a recording that reaches from 30 to 40."""
     now = Scale(30.0, 10.0, 0.0, 100.0, recorded=True)
     kept = {"scale": {"pv_low": 20.0, "pv_span": 40.0, "op_low": 0.0, "op_span": 10.0}}
-    assert scale_of(kept, now) == Scale(20.0, 40.0, 0.0, 10.0, recorded=True)
-    assert scale_of({}, now) == now
-    assert scale_of({"scale": {"pv_low": "x"}}, now) == now
+    assert saved_scale(kept, now) == Scale(20.0, 40.0, 0.0, 10.0, recorded=True)
+    assert saved_scale({}, now) == now
+    assert saved_scale({"scale": {"pv_low": "x"}}, now) == now

@@ -16,7 +16,7 @@ import pytest
 from analyzer.columns import EXPLAINED, HOURS, NIGHTS, Column, names, row_of
 from analyzer.config import Config
 from analyzer.night.finish import finish_night
-from analyzer.pages.words import columns as page_columns
+from analyzer.pages.words import page_columns as page_columns
 from analyzer.store.store import Store
 from analyzer.store.table import rows_table, write_table
 

@@ -12,8 +12,8 @@ from click.testing import CliRunner, Result
 
 from analyzer.cli import main
 from analyzer.config import Config
-from analyzer.config_file import configured, document, limit_of, read_config
-from analyzer.explain.recordings import cases, whole
+from analyzer.config_file import configured, limit_of, limits_document, read_config
+from analyzer.explain.recordings import asked_cases, whole
 from analyzer.loops.changes import TuningChange
 from analyzer.night.asked import Asked
 from analyzer.store.store import Store
@@ -87,7 +87,7 @@ def test_a_file_changes_what_it_states_and_nothing_else(tmp_path: Path):
         tuning=replace(default.tuning, ms_most=1.8),
     )
     assert found == wanted
-    assert document(found).count("periods = 4.0") == 1
+    assert limits_document(found).count("periods = 4.0") == 1
 
 
 def test_a_byte_order_mark_changes_nothing(tmp_path: Path):
@@ -183,7 +183,7 @@ def test_explain_and_simulate_work_on_the_span_with_its_settings(export: Path):
     loops.write_text("loop,type,pv_lo,pv_hi,kp,ti\nLIC1,level,0,100,0.9,40\n")
     request = Asked((export,), loops, changes, *hour, Config(), "UTC", {})
     case, pv = whole(request, "LIC1")
-    explained, held_out = cases(request, "LIC1", ())
+    explained, held_out = asked_cases(request, "LIC1", ())
     assert not held_out
     assert explained.spec == case.spec
     assert (pv.stamp_s[0], pv.stamp_s[-1]) == (hour[0], hour[1] - 1.0)

@@ -12,7 +12,7 @@ import pytest
 from analyzer.config import Config
 from analyzer.explain import night as explain_night
 from analyzer.explain.explained import abstained
-from analyzer.explain.night import Question, answered, flagged, keep, known, questions, row_of, run
+from analyzer.explain.night import Question, answer_row, answered, flagged, keep, known, questions, run
 from analyzer.loops.spec import LoopSpec
 from analyzer.night.batch import Batch
 from analyzer.night.nights import Night
@@ -151,7 +151,7 @@ def test_loop_page_shows_the_explanation(store: Store) -> None:
     tag = next(t for t in before if t in tags(30))
     evil = "<script>evil</script>"
     data = abstained(tag, evil) | {"verdict": "backlash", "block": "valve"}
-    keep(store, name, [row_of(data, name)])
+    keep(store, name, [answer_row(data, name)])
     after = {p.title: p for p in night_pages.pages(store, name, 8)}
     title = "What the plain loop lacks"
     assert title not in [s.title for s in before[tag].sections]
@@ -168,11 +168,11 @@ def test_kept_page_is_drawn_with_the_night(store: Store) -> None:
     tag = next(t for t in {p.title: p for p in night_pages.pages(store, name, 8)} if t in tags(30))
     data = abstained(tag, "reason") | {"verdict": "backlash", "block": "valve"}
     kept = Page(f"{tag}-explained", f"{tag}: backlash", "", (Section("What it is", (Text(("words",)),)),))
-    keep(store, name, [row_of(data, name, dumps(kept))])
+    keep(store, name, [answer_row(data, name, dumps(kept))])
     after = {p.title: p for p in night_pages.pages(store, name, 8)}
     drawn = after[kept.title]
     assert drawn.sections == kept.sections
     assert [text for text, _ in drawn.links] == ["All loops", tag]
     assert ("The explanation", f"{kept.name}.html") in after[tag].links
-    keep(store, name, [row_of(data, name, "{}")])
+    keep(store, name, [answer_row(data, name, "{}")])
     assert kept.title not in {p.title for p in night_pages.pages(store, name, 8)}

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from analyzer.explain import page as pages
-from analyzer.explain.drawings import close_part, simulations, trends
+from analyzer.explain.drawings import close_part, drawn_trends, simulations
 from analyzer.explain.explained import abstained
-from analyzer.explain.text import columns, lines
-from analyzer.explain.words import change, interval
+from analyzer.explain.text import answer_lines, lined_up
+from analyzer.explain.words import change, interval_text
 from reports.folder import write_markdown
 from reports.html import render
 from reports.markdown import render as as_markdown
@@ -71,7 +71,7 @@ def test_page_of_play_shows_both_models_and_the_users(tmp_path: Path) -> None:
 def test_marked_spans_and_close_look_lie_in_the_recording() -> None:
     """Spans that carry the misfit lie within the recording, and the close look is a part of it."""
     e = explanation("backlash")
-    whole, closer = trends(e)
+    whole, closer = drawn_trends(e)
     first, last = whole.time_s[0], whole.time_s[0] + N
     assert whole.spans
     assert all(first <= a < b <= last for a, b in whole.spans)
@@ -98,7 +98,7 @@ def test_none_shows_what_was_held_out() -> None:
 @pytest.mark.parametrize("kind", KINDS)
 def test_text_is_narrow_and_without_raw_floats(kind: str) -> None:
     """Text keeps within 112 columns and shows no number of more than six digits."""
-    text = lines(explanation(kind).data)
+    text = answer_lines(explanation(kind).data)
     assert max(len(line) for line in text) <= 112
     assert not any(len(word.strip(".,;()").replace(".", "")) > 6 for line in text for word in line.split()
                    if word.strip(".,;()").replace(".", "").isdigit())  # fmt: skip
@@ -106,9 +106,9 @@ def test_text_is_narrow_and_without_raw_floats(kind: str) -> None:
 
 def test_narrow_intervals_keep_their_width() -> None:
     """Ends that agree in three digits are shown with as many as tell them apart, an exact value with a dash."""
-    assert interval({"low": 1.0691, "high": 1.0704}) == "1.069 … 1.07"
-    assert interval({"low": 1.0, "high": 2.0}) == "1 … 2"
-    assert interval({"low": 3.0, "high": 3.0}) == "–"
+    assert interval_text({"low": 1.0691, "high": 1.0704}) == "1.069 … 1.07"
+    assert interval_text({"low": 1.0, "high": 2.0}) == "1 … 2"
+    assert interval_text({"low": 3.0, "high": 3.0}) == "–"
 
 
 @pytest.mark.parametrize(("after", "said"), [(1.001, "0 %"), (0.999, "0 %"), (1.5, "+50 %"), (0.5, "-50 %")])
@@ -119,7 +119,7 @@ def test_changes_have_a_sign_unless_none(after: float, said: str) -> None:
 
 def test_columns_line_up() -> None:
     """Numbers end, and texts begin, at the same place in each row."""
-    rows = columns([("a", "1.5", "short"), ("longer", "10", "words " * 40)], (1,))
+    rows = lined_up([("a", "1.5", "short"), ("longer", "10", "words " * 40)], (1,))
     assert rows[0].index("short") == rows[1].index("words")
     assert rows[0].index("1.5") + 3 == rows[1].index("10") + 2
     assert all(len(r) <= 112 for r in rows)

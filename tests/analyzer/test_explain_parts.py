@@ -12,7 +12,7 @@ import pandas as pd
 import pytest
 
 from analyzer.config import Config
-from analyzer.explain.recordings import FEWEST, cases, parts, said_of
+from analyzer.explain.recordings import FEWEST, asked_cases, parts, said_of
 from analyzer.history.series import Series
 from analyzer.loops.changes import TuningChange
 from analyzer.loops.spec import LoopSpec
@@ -77,7 +77,7 @@ def test_part_in_which_op_stands_still_is_left_out(tmp_path: Path, still: int) -
     start = stamp[0].timestamp()
     changes = (changed(start + 2500, 1.0, 1.5), changed(start + 4000, 1.5, 2.0))
     request = Asked((tmp_path / "x.parquet",), None, changes, -math.inf, math.inf, Config(), "UTC", {})
-    explained, others = cases(request, "A", ())
+    explained, others = asked_cases(request, "A", ())
     moving = [n for i, n in enumerate(lengths) if i != still]
     assert [len(c.prepared.record) for c in (explained, *others.values())] == moving
 

@@ -101,7 +101,7 @@ def test_many_writers_lose_nothing(tmp_path: Path) -> None:
 
     with ThreadPoolExecutor(8) as pool:
         list(pool.map(write, range(40)))
-    assert [n.time_s for n in notes.read(tmp_path)["L"]] == [float(k) for k in range(40)]
+    assert [n.time_s for n in notes.read_notes(tmp_path)["L"]] == [float(k) for k in range(40)]
 
 
 def test_a_broken_line_costs_itself_alone(tmp_path: Path) -> None:
@@ -110,14 +110,14 @@ def test_a_broken_line_costs_itself_alone(tmp_path: Path) -> None:
     with (tmp_path / notes.FILE).open("a", encoding="utf-8") as file:
         file.write('{"loop": "L", "ti\n[]\n')
     notes.add(tmp_path, notes.Note("L", 2.0, "two"))
-    assert [n.text for n in notes.read(tmp_path)["L"]] == ["one", "two"]
+    assert [n.text for n in notes.read_notes(tmp_path)["L"]] == ["one", "two"]
 
 
 def test_half_a_line_swallows_no_note(tmp_path: Path) -> None:
     """Half a line that a full disk left at the end costs itself, and not the note that comes next."""
     (tmp_path / notes.FILE).write_text('{"loop": "L", "time_s": 1.0, "te', encoding="utf-8")
     notes.add(tmp_path, notes.Note("L", 2.0, "two"))
-    assert [n.text for n in notes.read(tmp_path)["L"]] == ["two"]
+    assert [n.text for n in notes.read_notes(tmp_path)["L"]] == ["two"]
 
 
 @pytest.mark.parametrize(
@@ -139,14 +139,14 @@ def test_what_is_no_note_is_passed_over(tmp_path: Path, line: str) -> None:
     """Lines of JSON that are no notes cost nothing but themselves."""
     (tmp_path / notes.FILE).write_text(line + "\n", encoding="utf-8")
     notes.add(tmp_path, notes.Note("L", 2.0, "two"))
-    assert {k: [n.text for n in own] for k, own in notes.read(tmp_path).items()} == {"L": ["two"]}
+    assert {k: [n.text for n in own] for k, own in notes.read_notes(tmp_path).items()} == {"L": ["two"]}
 
 
 def test_a_note_steers_no_terminal(tmp_path: Path) -> None:
     """Escape sequences and marks that turn the writing are escapes, whether typed or found in the file."""
     assert notes.new("L", "a\x1b[2Jb\u202ec", "me", "").text == r"a\x1b[2Jb\u202ec"
     notes.add(tmp_path, notes.Note("L", 1.0, "a\x1b]0;b\u2066", "m\x07e"))
-    (found,) = notes.read(tmp_path)["L"]
+    (found,) = notes.read_notes(tmp_path)["L"]
     assert (found.text, found.owner) == (r"a\x1b]0;b\u2066", r"m\x07e")
 
 

@@ -7,13 +7,13 @@ from pathlib import Path
 
 import pytest
 
-from analyzer.comparison.before_after import Verdict, grade
+from analyzer.comparison.before_after import Outcome, grade
 from analyzer.config import Config
 from analyzer.history.export import ReadOptions, open_export
 from analyzer.loops.changes import read_changes
 from analyzer.loops.tags import match, read_loops
 from analyzer.pages import before_after
-from analyzer.pages.changes import Case, Spans, cases, detected
+from analyzer.pages.changes import ChangeCase, Spans, change_cases, detected
 from analyzer.store.store import Store
 from reports.markdown import render
 
@@ -39,28 +39,28 @@ def store(tmp_path_factory: pytest.TempPathFactory) -> Store:
 
 
 @pytest.fixture(scope="module")
-def found(store: Store) -> dict[str, Case]:
+def found(store: Store) -> dict[str, ChangeCase]:
     """What became of each change."""
-    known, missing = cases(store, read_changes(MILL / "changes.csv"), Spans())
+    known, missing = change_cases(store, read_changes(MILL / "changes.csv"), Spans())
     assert missing == []
     return {c.found.loop: c for c in known}
 
 
-def test_five_loops_improve_clearly(found: dict[str, Case]) -> None:
+def test_five_loops_improve_clearly(found: dict[str, ChangeCase]) -> None:
     """Five of the seven retuned loops improve clearly in all four assessments, as in the study."""
     clear = [loop for loop, c in found.items() if grade(c.found) == "clear"]
     assert clear == ["LIC2102", "TIC2104", "LIC2105", "TIC2106", "LIC2107"]
 
 
-def test_loop_1_improves_modestly(found: dict[str, Case]) -> None:
+def test_loop_1_improves_modestly(found: dict[str, ChangeCase]) -> None:
     """Loop 1 improves modestly, as in the study."""
     assert grade(found["LIC2101"].found) == "modest"
 
 
-def test_loop_3_improves_only_in_travel(found: dict[str, Case]) -> None:
+def test_loop_3_improves_only_in_travel(found: dict[str, ChangeCase]) -> None:
     """Loop 3 improves in valve travel alone, and its neighbour is named as the cause, as in the study."""
     case = found["LIC2103"].found
-    better = [c.measure.name for c in case.primary if c.verdict is Verdict.BETTER]
+    better = [c.measure.name for c in case.primary if c.verdict is Outcome.BETTER]
     assert better == ["valve_travel_pct_per_h"]
     assert case.source_loop == "FIC2110"
     assert "FIC2110" in before_after.outcome(case)
@@ -69,10 +69,10 @@ def test_loop_3_improves_only_in_travel(found: dict[str, Case]) -> None:
 def test_untouched_loops_do_not_change(store: Store) -> None:
     """Loops that nobody touched are called neither better nor worse at the same moment."""
     moment = read_changes(MILL / "changes.csv")[0]
-    known, _ = cases(store, [replace(moment, loop=loop) for loop in OTHERS], Spans())
+    known, _ = change_cases(store, [replace(moment, loop=loop) for loop in OTHERS], Spans())
     calls = {c.found.loop: {x.verdict for x in c.found.primary} for c in known}
     assert len(calls) == len(OTHERS)
-    assert all(v <= {Verdict.UNCLEAR, Verdict.INCOMPARABLE} for v in calls.values())
+    assert all(v <= {Outcome.UNCLEAR, Outcome.INCOMPARABLE} for v in calls.values())
 
 
 def test_changes_are_offered_where_there_were_some(store: Store) -> None:
@@ -95,7 +95,7 @@ def kept_part(text: str) -> str:
     return told + "\n" + "\n".join(map(" | ".join, kept)) + "\n"
 
 
-def test_markdown_says_what_it_said(found: dict[str, Case]) -> None:
+def test_markdown_says_what_it_said(found: dict[str, ChangeCase]) -> None:
     """The report's summary and verdicts in Markdown are those kept beside this test."""
     text = render(before_after.page(list(found.values()), [], "7 days before against after the change."))
     assert kept_part(text) == (Path(__file__).parent / "test_pages_mill.md").read_text("utf-8")

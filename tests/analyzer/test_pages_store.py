@@ -11,11 +11,11 @@ import pytest
 
 from analyzer.loops.changes import TuningChange
 from analyzer.pages import before_after, morning, night
-from analyzer.pages.changes import Spans, cases, detected, wear_texts
+from analyzer.pages.changes import Spans, change_cases, detected, wear_texts
 from analyzer.pages.loop_pictures import autocorrelation, rhythm_plots, turn_panels
 from analyzer.pages.plant import score
 from analyzer.pages.reading import read_hours, read_night, read_trends
-from analyzer.pages.words import Scale
+from analyzer.pages.words import Units
 from analyzer.store.store import Store
 from identification.errors import InputError
 from reports import html
@@ -57,7 +57,7 @@ def test_ranking_holds_the_nights_numbers(store: Store) -> None:
 def test_before_after_means_are_the_hours(store: Store) -> None:
     """Means before and after equal the means of the store's hours, the hours of the change left out."""
     loop = NASTY[0]
-    (case,), missing = cases(store, [TuningChange(loop, CHANGED_S)], Spans())
+    (case,), missing = change_cases(store, [TuningChange(loop, CHANGED_S)], Spans())
     assert missing == []
     hours = read_hours(store, [loop], store.nights())[loop]
     at, name = hours["hour_s"], "average_absolute_error_pct"
@@ -70,7 +70,7 @@ def test_before_after_means_are_the_hours(store: Store) -> None:
 
 def test_loops_that_the_store_lacks_are_named(store: Store) -> None:
     """A change of a loop that the store does not hold is named with the reason, the others are looked at."""
-    found, missing = cases(
+    found, missing = change_cases(
         store, [TuningChange("GONE", CHANGED_S), TuningChange(NASTY[1], CHANGED_S)], Spans()
     )
     assert [c.found.loop for c in found] == [NASTY[1]]
@@ -159,7 +159,7 @@ def test_area_score_weighs_importance() -> None:
 
 def test_wear_is_never_invented(store: Store) -> None:
     """Valve life and cost appear only where the plant states its numbers, and follow from them."""
-    (case,), _ = cases(store, [TuningChange(NASTY[0], CHANGED_S)], Spans())
+    (case,), _ = change_cases(store, [TuningChange(NASTY[0], CHANGED_S)], Spans())
     assert wear_texts(case.found, {}) == ()
     assert wear_texts(case.found, {"extra": '{"valve_life_travel_pct": "nonsense"}'}) == ()
     stated = '{"valve_life_travel_pct": "8760", "cost_per_error_pct_h": "2", "cost_unit": "EUR"}'
@@ -218,7 +218,7 @@ def test_half_cycles_are_drawn_in_the_loops_unit() -> None:
     }
     down = {**up, "op": [16, 14, 12, 10], "pv": [52, 52, 52, 50], "late": [52, 52, 50, 48]}
     row = {"turns": json.dumps({"step_s": 6.0, "dead_s": 6.0, "halves": [up, down]}), "cause": "valve"}
-    drawn = turn_panels(row, Scale(0.0, 200.0, "m3/h"))
+    drawn = turn_panels(row, Units(0.0, 200.0, "m3/h"))
     assert drawn is not None
     over_op, over_pv, plane = drawn.plots
     assert [line.y.tolist() for line in over_op.lines if line.kind == "pv"] == [[0, 2, 4, 6]] * 2
@@ -229,4 +229,4 @@ def test_half_cycles_are_drawn_in_the_loops_unit() -> None:
         [16, 14, 12, 10],
     ]
     assert "m3/h" in plane.y_label
-    assert turn_panels({"turns": None, "cause": "valve"}, Scale(0.0, 1.0, "")) is None
+    assert turn_panels({"turns": None, "cause": "valve"}, Units(0.0, 1.0, "")) is None
