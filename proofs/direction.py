@@ -14,7 +14,7 @@ import warnings
 import numpy as np
 from statsmodels.tsa.stattools import grangercausalitytests
 
-from identification.signals.cross_spectrum import Lag, band, lag, tapered
+from identification.signals.cross_spectrum import Delay, band, lag, tapered
 from identification.signals.spectrum import spectrum
 from proofs.common import command, command_line, publish, table
 from proofs.coupled.draw import draw
@@ -38,7 +38,7 @@ def thinned(x: np.ndarray, samples: float) -> np.ndarray:
     return np.add.reduceat(x, edges) / np.diff(np.append(edges, x.size))
 
 
-def lead(one: np.ndarray, other: np.ndarray, dt_s: float, period_s: float) -> Lag:
+def lead(one: np.ndarray, other: np.ndarray, dt_s: float, period_s: float) -> Delay:
     """Lag of a second error behind a first one."""
     x, y = spectrum(one, dt_s), spectrum(other, dt_s)
     low, high, _ = band(x.duration_s / period_s)

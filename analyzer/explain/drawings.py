@@ -12,7 +12,7 @@ from identification.mismatch.catalogue import fault
 from identification.mismatch.fault_pictures import busiest, by_stated_law
 from identification.mismatch.location import Feature, Group, Located, groups, profile
 from identification.mismatch.outside import about
-from identification.mismatch.pictures import Drawing, Shape
+from identification.mismatch.pictures import Drawing, Picture
 from identification.mismatch.proof import course
 from identification.mismatch.where import located_in, won_over
 from identification.record import Floats
@@ -227,7 +227,7 @@ def found_plot(e: Explained) -> Plot | None:
     return _shown(None if curve is None else curve(drawing))
 
 
-def _shown(shape: Shape | None) -> Plot | None:
+def _shown(shape: Picture | None) -> Plot | None:
     if shape is None:
         return None
     what = f"{shape.y.what} over {shape.x.what}"
@@ -241,7 +241,7 @@ def law_plot(e: Explained) -> Plot | None:
     return None if shape is None else shape_plot(shape, "law", "OP rebuilt and recorded")
 
 
-def shape_plot(shape: Shape, name: str, title: str) -> Plot:
+def shape_plot(shape: Picture, name: str, title: str) -> Plot:
     """A shape as a plot: what was recorded below, what was found above."""
     lines, areas = [], []
     for d in sorted(shape.curves, key=lambda d: ORDER[d.name]):

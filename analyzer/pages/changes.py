@@ -9,10 +9,10 @@ from dataclasses import dataclass
 
 from analyzer.comparison.before_after import (
     LIMITS,
+    Became,
     Change,
     Grade,
     LoopComparison,
-    Outcome,
     Span,
     compare,
     follows,
@@ -143,7 +143,7 @@ def outcome(found: LoopComparison) -> str:
     """A loop's outcome in one phrase."""
     kind = grade(found)
     if kind is Grade.PARTIAL:
-        better = [c.measure.short_title.lower() for c in found.primary if c.verdict is Outcome.BETTER]
+        better = [c.measure.short_title.lower() for c in found.primary if c.verdict is Became.BETTER]
         text = f"improved only in {enumerated(better)}"
     elif kind is Grade.INCOMPARABLE:
         text = "not comparable: " + ("; ".join(found.reasons) or "no hourly figures on both sides")
@@ -166,7 +166,7 @@ def _stated(row: Row, name: str) -> float | None:
 
 def _change(found: LoopComparison, name: str) -> Change | None:
     """The change of a figure, where it is clear."""
-    unclear = (Outcome.INCOMPARABLE, Outcome.UNCLEAR)
+    unclear = (Became.INCOMPARABLE, Became.UNCLEAR)
     return next((c for c in found.changes if c.measure.name == name and c.verdict not in unclear), None)
 
 

@@ -10,7 +10,7 @@ from importlib.resources import files
 from typing import Any
 
 from analyzer.columns import BY_NAME
-from analyzer.comparison.before_after import Change, Outcome
+from analyzer.comparison.before_after import Became, Change
 from analyzer.history.plant_clock import stamp
 from analyzer.loop.decisions import CAUSES
 from analyzer.pages.cost import mark
@@ -21,10 +21,10 @@ __all__ = ["duration", "stamp"]  # of the words that are not chosen here
 
 Row = Mapping[str, Any]
 KINDS = {
-    Outcome.BETTER: "better",
-    Outcome.WORSE: "worse",
-    Outcome.UNCLEAR: "unclear",
-    Outcome.INCOMPARABLE: "incomparable",
+    Became.BETTER: "better",
+    Became.WORSE: "worse",
+    Became.UNCLEAR: "unclear",
+    Became.INCOMPARABLE: "incomparable",
 }
 """Colour of each verdict."""
 

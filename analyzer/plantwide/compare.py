@@ -12,7 +12,7 @@ from scipy.fft import fft, ifft, next_fast_len
 
 from analyzer.plantwide.wave import Wave
 from identification.record import Floats
-from identification.signals.cross_spectrum import Lag, band, granger_f, lag, tapered
+from identification.signals.cross_spectrum import Delay, band, granger_f, lag, tapered
 
 SAME = 0.02
 """Difference of spans [periods] that is none; ours."""
@@ -74,9 +74,9 @@ class Lags:
 
     def __init__(self, waves: Iterable[Wave]) -> None:
         self.waves = {w.loop: w for w in waves}
-        self._known: dict[tuple[str, str], Lag] = {}
+        self._known: dict[tuple[str, str], Delay] = {}
 
-    def between(self, one: str, other: str) -> Lag:
+    def between(self, one: str, other: str) -> Delay:
         """How much later the second loop's wave is than the first one's."""
         pair = one, other
         if pair not in self._known:
@@ -84,13 +84,13 @@ class Lags:
         return self._known[pair]
 
 
-def lag_between(one: Wave, other: Wave) -> Lag:
+def lag_between(one: Wave, other: Wave) -> Delay:
     """How much later a second wave is than a first one of the same clock."""
     low, high, _ = band(one.line)
     low = max(low, one.first + 1, other.first + 1)
     high = min(high, one.first + one.lines.size - 1, other.first + other.lines.size - 1)
     if high - low < 4:
-        return Lag(0.0, math.inf, 0.0)
+        return Delay(0.0, math.inf, 0.0)
     x, y = (tapered(w.lines[low - w.first - 1 : high - w.first + 1]) for w in (one, other))
     return lag(x, y, one.duration_s, max(LAG_PERIODS * one.period_s, LAG_LEAST_S))
 

@@ -13,7 +13,7 @@ from identification.estimation.evidence import WindowFit, evidence
 from identification.estimation.gauss_newton import descend
 from identification.estimation.hammerstein import Fit, residual, slow_terms
 from identification.estimation.noise import every_lag, judged, whitened
-from identification.estimation.slip_beam import Friction, Noise, Response, decoded, log_chance
+from identification.estimation.slip_beam import Noise, Response, SlipDistances, decoded, log_chance
 from identification.estimation.window import Window
 from identification.record import Floats
 from identification.simulation.lag import unit_lag
@@ -92,11 +92,11 @@ def _response(window: Window, fit: Fit, mean: float) -> Response:
     return Response(lag, fit.gain, slow_terms(window, fit) - fit.gain * mean)
 
 
-def _friction(band: float, share: float, rest: int) -> Friction:
-    return Friction(0.5 * band * (1.0 + share), 0.5 * band * (1.0 - share), rest)
+def _friction(band: float, share: float, rest: int) -> SlipDistances:
+    return SlipDistances(0.5 * band * (1.0 + share), 0.5 * band * (1.0 - share), rest)
 
 
-def _decoded(window: Window, r: Response, noise: Noise, f: Friction, most: int) -> tuple[Floats, float]:
+def _decoded(window: Window, r: Response, noise: Noise, f: SlipDistances, most: int) -> tuple[Floats, float]:
     """The most probable stem of a window, and its log probability."""
     return decoded(window.op, window.centred, judged(window.usable, noise.ar.size), r, noise, f, most)
 
@@ -152,7 +152,7 @@ def _path(window: Window, fit: Fit, valve: StemLaw, stem: Floats) -> SlipPath:
     return SlipPath(found, stem, log_chance(window.op, stem, valve.breakaway))
 
 
-def _decoded_by(window: Window, fit: Fit, mean: float, f: Friction, hot: float) -> Floats:
+def _decoded_by(window: Window, fit: Fit, mean: float, f: SlipDistances, hot: float) -> Floats:
     return _decoded(window, _response(window, fit, mean), Noise(fit.ar, hot * fit.sigma2), f, CARRIED)[0]
 
 

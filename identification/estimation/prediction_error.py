@@ -287,7 +287,7 @@ def placed(p: Problem, model: Model) -> Model:
     return _with_place(model, best) if nats(p.count, losses[first], losses[best]) > WORTH else model
 
 
-def descend(p: Problem, model: Model, steps: int, aim: float = math.inf) -> Fitted:
+def descended(p: Problem, model: Model, steps: int, aim: float = math.inf) -> Fitted:
     """Follow a model to the least innovations, its stem placed anew before and behind it where there is friction.
 
     model : where to start; steps : steps at most, each time; aim : loss that is worth anything; from the second step

@@ -34,7 +34,7 @@ class Noise(NamedTuple):
     sigma2: float
 
 
-class Friction(NamedTuple):
+class SlipDistances(NamedTuple):
     """Mean distances |OP - stem| at which a stem lets go and comes to rest [% OP], and its longest rest [samples]."""
 
     breakaway: float
@@ -96,7 +96,7 @@ class Beam(NamedTuple):
     marks: Indices
 
 
-class Block(NamedTuple):
+class SlipBlock(NamedTuple):
     """A block's first sample, the one behind its last, and the extremes of OP in it; and where PV answers a stem at
     rest, at u, what is left of a response x then, and the weights of x and of u in its sum over the block."""
 
@@ -191,7 +191,7 @@ def shares_of(r: Response, factor: int) -> tuple[float, float, float]:
 
 
 @njit(cache=True, inline="always")
-def _rests(numbers: Floats, marks: Indices, h: int, block: Block, f: Friction) -> bool:
+def _rests(numbers: Floats, marks: Indices, h: int, block: SlipBlock, f: SlipDistances) -> bool:
     """Whether nothing becomes of a path over a block: its stem bears OP, and PV answers no slip anew."""
     if marks[h, COMING] != block.first or block.first == 0 or block.last - 1 - marks[h, RESTED] > f.rest:
         return False
@@ -204,7 +204,14 @@ def _rests(numbers: Floats, marks: Indices, h: int, block: Block, f: Friction) -
 
 @njit(cache=True)
 def _through(
-    b: Beam, events: Events, known: tuple[int, int], h: int, last: int, op: Floats, f: Friction, r: Response
+    b: Beam,
+    events: Events,
+    known: tuple[int, int],
+    h: int,
+    last: int,
+    op: Floats,
+    f: SlipDistances,
+    r: Response,
 ) -> tuple[int, int]:
     """A path through the samples before `last`, with a new path for each slip that is likely enough.
 
@@ -233,7 +240,13 @@ def _through(
 
 @njit(cache=True)
 def divided(
-    b: Beam, events: Events, known: tuple[int, int], block: Block, op: Floats, f: Friction, r: Response
+    b: Beam,
+    events: Events,
+    known: tuple[int, int],
+    block: SlipBlock,
+    op: Floats,
+    f: SlipDistances,
+    r: Response,
 ) -> tuple[int, int]:
     """All paths through a block, those that begin in it too; how many paths and events there are."""
     (count, slips), numbers, marks = known, b.numbers, b.marks
@@ -305,7 +318,7 @@ def _traced(events: Events, event: int, n: int) -> Floats:
 
 @njit(cache=True)
 def decoded(
-    op: Floats, y: Floats, counts: Mask, r: Response, n: Noise, f: Friction, most: int
+    op: Floats, y: Floats, counts: Mask, r: Response, n: Noise, f: SlipDistances, most: int
 ) -> tuple[Floats, float]:
     """The stem [% OP], shape of op, of the most probable path, and its log probability.
 
@@ -324,7 +337,7 @@ def decoded(
         low, high = op[first], op[first]
         for u in op[first:last]:
             low, high = min(low, u), max(high, u)
-        at = Block(first, last, low, high, *shares)
+        at = SlipBlock(first, last, low, high, *shares)
         count, slips = divided(b, events, (count, slips), at, op, f, r)
         judge_block(b, count, y[block] - r.slow[block], block, factor, r, n, counts[block])
         if count > 2 * most or (block + 1) % LOOKED == 0:

@@ -26,7 +26,7 @@ NO_WHITENING = np.zeros(1)
 """The noise model of a simulation judged by its own errors: none."""
 
 
-def starts(samples: int, dt_s: float) -> list[Dynamics]:
+def record_starts(samples: int, dt_s: float) -> list[Dynamics]:
     """Time constants and dead times [s] from which the search begins, over all time scales of the record."""
     count = 1 + math.ceil(math.log(max(samples / SHORTEST, APART)) / math.log(APART))
     times = SHORTEST * APART ** np.arange(count)
@@ -41,7 +41,7 @@ def simulated_best(y: Floats, op: Floats, usable: Mask, dt_s: float) -> Fopdt:
 
 def _searched(window: Window, ar: Floats) -> Fopdt:
     prepared = prepare(window, IDEAL, np.ascontiguousarray(ar))
-    fit = begin(prepared, search(prepared, starts(window.y.size, window.dt_s), 2))
+    fit = begin(prepared, search(prepared, record_starts(window.y.size, window.dt_s), 2))
     return Fopdt(fit.gain, fit.time_constant_s, fit.dead_time_s)
 
 

@@ -85,7 +85,7 @@ def answer(found: Explanation, s: Recording) -> Answer:
         effects,
         where_of(found, s, block, at),
         fit_of(proof, s.dt_s) | {"plain_loops": plain_loops(found), "ahead_nat": ahead(found)},
-        moved(found),
+        constants_moved(found),
         (1.0 - proof.overall[1].fit_pct / 100.0) ** 2,
         f"Not told: {lacking}."
         if lacking and (verdict, block) == ("unexplained", "none")
@@ -93,7 +93,7 @@ def answer(found: Explanation, s: Recording) -> Answer:
         (lacking or (words.ONE_MOVE_ONLY if found.unproven else untold_gain(found, effects)))
         if effects
         else "",
-        words.shown_by_cycles(found) if by_cycles(found) else "",
+        words.cycles_told(found) if by_cycles(found) else "",
         outside_of(found) if verdict == "unexplained" else None,
     )
 
@@ -142,7 +142,7 @@ def too_short(found: Explanation, s: Recording) -> str:
     lag, length = float(found.plain.model.c[Slot.T]), s.pv.size * s.dt_s
     if s.kind in INTEGRATING or any(v.replaces for v in found.best.model.added):
         return ""
-    return "" if length >= enough * lag else words.too_short(enough, length, lag)
+    return "" if length >= enough * lag else words.too_short_told(enough, length, lag)
 
 
 def untold_gain(found: Explanation, effects: tuple[EffectFound, ...]) -> str:
@@ -244,7 +244,7 @@ def fit_of(proof: HeldOut, dt_s: float) -> dict[str, Any]:
     return both | {"horizon_s": proof.window * dt_s if proof.window else None}
 
 
-def moved(found: Explanation) -> dict[str, tuple[float, float]]:
+def constants_moved(found: Explanation) -> dict[str, tuple[float, float]]:
     """The plain loop's constants before and after, where effects were added."""
     if not found.accepted:
         return {}

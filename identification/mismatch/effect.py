@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
-from identification.mismatch.pictures import Drawing, Shape
+from identification.mismatch.pictures import Drawing, Picture
 from identification.mismatch.recording import Finding, Recording
 from identification.models import Estimate
 from identification.record import Floats
@@ -88,7 +88,7 @@ class Effect:
     spoken: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     titles: Mapping[str, str] = field(default_factory=dict)
     acts: tuple[Act, ...] = ()
-    curve: Callable[[Drawing], Shape] | None = None
+    curve: Callable[[Drawing], Picture] | None = None
 
     @property
     def candidates(self) -> tuple[Variant, ...]:
@@ -148,7 +148,7 @@ class Fault(Effect):
     ends: Ends = Ends.NOTHING
     censors: bool = False
     numbers: tuple[Number, ...] = ()
-    drawn: Callable[[Finding, Recording, Floats], Shape | None] | None = None
+    drawn: Callable[[Finding, Recording, Floats], Picture | None] | None = None
 
     @property
     def called(self) -> dict[str, str]:

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from identification.controller.pi_regression import fed_back
-from identification.estimation.prediction_error import descend, gain
+from identification.estimation.prediction_error import descended, gain
 from identification.estimation.start_values import plain_processes
 from identification.mismatch.catalogue import EFFECTS
 from identification.mismatch.explanation import Explanation, carried_over
@@ -59,7 +59,7 @@ def most_telling_first(found: Explanation) -> Explanation:
     model = found.best.model
     if len(model.added) < 2:
         return found
-    missed = {row.name: descend(found.p, without(model, [row]), full).loss for row in model.added}
+    missed = {row.name: descended(found.p, without(model, [row]), full).loss for row in model.added}
     ordered = tuple(sorted(model.added, key=lambda row: -missed[row.name]))
     accepted = tuple(sorted(found.accepted, key=lambda c: -missed[c.name]))
     return replace(found, best=replace(found.best, model=replace(model, added=ordered)), accepted=accepted)
@@ -82,12 +82,12 @@ def nearer(one: Explanation, other: Explanation) -> Explanation:
 def is_seconded(found: Explanation, told: Explanation) -> bool:
     """Whether innovations gain what one constant costs by the effects that a simulation's misfit tells: two signs."""
     limits = told.p.limits.search
-    seen = descend(told.p, found.best.model, limits.full_steps)
+    seen = descended(told.p, found.best.model, limits.full_steps)
     return gain(seen, told.plain) > limits.search_penalty + limits.parameter_penalty
 
 
 def judged_by_simulation(found: Explanation, other: Explanation) -> Explanation:
     """An experiment's explanation by innovations, fitted anew to what its simulation misses, as the other one is."""
-    best = descend(other.p, found.best.model, other.p.limits.search.full_steps)
+    best = descended(other.p, found.best.model, other.p.limits.search.full_steps)
     anew = replace(found, p=other.p, plain=other.plain, best=best, left=other.left, by_innovations=found)
     return carried_over(most_telling_first(anew))

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from identification.controller.pi_regression import ControlLaw
-from identification.estimation.prediction_error import Fitted, Problem, descend
+from identification.estimation.prediction_error import Fitted, Problem, descended
 from identification.mismatch.catalogue import EFFECTS, fault
 from identification.mismatch.effect import Ends
 from identification.mismatch.friction import is_friction
@@ -125,5 +125,5 @@ def cycle_of(found: Explanation) -> int:
 def first_effects(found: Explanation, count: int) -> Explanation:
     """The explanation with its first effects alone; the others, and what was found beside all, are given up."""
     model = without(found.best.model, (c.row for c in found.accepted[count:]))
-    best = descend(found.p, model, found.p.limits.search.full_steps)
+    best = descended(found.p, model, found.p.limits.search.full_steps)
     return replace(found, best=best, accepted=found.accepted[:count], outside=None)

@@ -6,7 +6,7 @@ import numpy as np
 
 from identification.controller.check import StatedSettings, runs
 from identification.controller.pi_regression import shifted
-from identification.mismatch.pictures import OP, TIME, Axis, Drawn, Shape
+from identification.mismatch.pictures import OP, TIME, Axis, Drawn, Picture
 from identification.mismatch.recording import Finding, Recording
 from identification.record import Floats, Mask
 from identification.simulation.pi import free_path
@@ -54,36 +54,36 @@ def around(where: Mask, length: int) -> slice:
     return slice(start, start + length)
 
 
-def comb(name: str, axis: Axis, at: Floats, count: np.ndarray) -> Shape:
+def comb(name: str, axis: Axis, at: Floats, count: np.ndarray) -> Picture:
     """How often each of some values occurs."""
     x, none = np.repeat(at, 3), np.zeros(at.size)
     y = np.stack([none, count, none], axis=1).ravel().astype(float)
-    return Shape(name, "comb", axis, Axis("samples", ""), (Drawn("recorded", x, y),))
+    return Picture(name, "comb", axis, Axis("samples", ""), (Drawn("recorded", x, y),))
 
 
-def grid(found: Finding, s: Recording, _: Floats) -> Shape:
+def grid(found: Finding, s: Recording, _: Floats) -> Picture:
     """How often each value of PV occurs within some steps of a coarse sensor."""
     middle = float(np.median(s.pv))
     near = s.pv[np.abs(s.pv - middle) <= 0.5 * STEPS_SHOWN * found.values["step_pct"]]
     return comb(found.name, PV, *np.unique(near, return_counts=True))
 
 
-def spacings(found: Finding, s: Recording, _: Floats) -> Shape:
+def spacings(found: Finding, s: Recording, _: Floats) -> Picture:
     """How often each spacing of two stamps occurs."""
     spacing = np.diff(s.stamp_s)
     count, edge = np.histogram(spacing[(spacing > 0) & (spacing < 2 * s.dt_s)], HISTOGRAM)
     return comb(found.name, Axis("time between samples", "s"), 0.5 * (edge[1:] + edge[:-1]), count)
 
 
-def straight_lines(found: Finding, s: Recording, _: Floats) -> Shape:
+def straight_lines(found: Finding, s: Recording, _: Floats) -> Picture:
     """The busiest stretch of a compressed trend, with the samples that lie on straight lines."""
     part = busiest(s.pv, WINDOW)
     time, x, marked = np.arange(part.start, part.stop) * s.dt_s, s.pv[part], found.where[part]
     curves = (Drawn("points", time[marked], x[marked]), Drawn("recorded", time, x))
-    return Shape(found.name, "course", TIME, PV, curves)
+    return Picture(found.name, "course", TIME, PV, curves)
 
 
-def range_end(found: Finding, s: Recording, free: Floats) -> Shape:
+def range_end(found: Finding, s: Recording, free: Floats) -> Picture:
     """The stretch in which PV stands at its end longest, with the model that goes on."""
     part = around(found.where, WINDOW)
     time = np.arange(part.start, part.stop) * s.dt_s
@@ -93,10 +93,10 @@ def range_end(found: Finding, s: Recording, free: Floats) -> Shape:
         Drawn("recorded", time, s.pv[part]),
         Drawn("limit", time, end),
     )
-    return Shape(found.name, "course", TIME, PV, curves)
+    return Picture(found.name, "course", TIME, PV, curves)
 
 
-def gap_profile(found: Finding, s: Recording, _: Floats) -> Shape | None:
+def gap_profile(found: Finding, s: Recording, _: Floats) -> Picture | None:
     """How often OP stands still, over the size of the error, with the gap's end; None without SP."""
     if s.sp is None:
         return None
@@ -110,7 +110,7 @@ def gap_profile(found: Finding, s: Recording, _: Floats) -> Shape | None:
     middle = 0.5 * (edges[1:] + edges[:-1])
     curve = Drawn("recorded", middle[held], 100.0 * stood[held] / count[held])
     x, y = Axis("size of SP − PV", "%"), Axis("OP stands still", "% of samples")
-    return Shape(found.name, "curve", x, y, (curve,), (width,))
+    return Picture(found.name, "curve", x, y, (curve,), (width,))
 
 
 def rebuilt(e: Floats, op: Floats, kp: float, ti: float) -> Floats:
@@ -122,11 +122,11 @@ def rebuilt(e: Floats, op: Floats, kp: float, ti: float) -> Floats:
 
 def rebuilt_course(
     name: str, s: Recording, part: slice, laws: dict[str, tuple[Floats, StatedSettings]]
-) -> Shape:
+) -> Picture:
     """A stretch of recorded OP, and OP rebuilt from errors, shape (n,), by some laws."""
     time, own = np.arange(part.start, part.stop) * s.dt_s, s.op[part]
     curves = [Drawn(k, time, rebuilt(e[part], own, law.kp, law.ti)) for k, (e, law) in laws.items()]
-    return Shape(name, "course", TIME, OP, (*curves, Drawn("recorded", time, own)))
+    return Picture(name, "course", TIME, OP, (*curves, Drawn("recorded", time, own)))
 
 
 def law_window(s: Recording, ti: float) -> int:
@@ -134,7 +134,7 @@ def law_window(s: Recording, ti: float) -> int:
     return int(np.clip(LAW_WINDOW * ti, WINDOW, min(MOST_WINDOW, s.pv.size)))
 
 
-def by_stated_law(name: str, s: Recording, where: Mask | None = None) -> Shape | None:
+def by_stated_law(name: str, s: Recording, where: Mask | None = None) -> Picture | None:
     """OP about a mask's longest stretch (the busiest where None) and as the stated settings would have moved it.
 
     None without SP or settings.
@@ -146,12 +146,12 @@ def by_stated_law(name: str, s: Recording, where: Mask | None = None) -> Shape |
     return rebuilt_course(name, s, part, {"stated": (s.sp - s.pv, s.stated)})
 
 
-def outside_law(found: Finding, s: Recording, _: Floats) -> Shape | None:
+def outside_law(found: Finding, s: Recording, _: Floats) -> Picture | None:
     """OP about the longest stretch outside the law, and as the stated settings would have moved it."""
     return by_stated_law(found.name, s, found.where)
 
 
-def other_settings(found: Finding, s: Recording, _: Floats) -> Shape | None:
+def other_settings(found: Finding, s: Recording, _: Floats) -> Picture | None:
     """OP over its busiest stretch, rebuilt by the settings found and by those stated; None without SP or settings."""
     if s.sp is None or s.stated is None:
         return None
@@ -160,7 +160,7 @@ def other_settings(found: Finding, s: Recording, _: Floats) -> Shape | None:
     return rebuilt_course(found.name, s, part, {"found": (e, own), "stated": (e, s.stated)})
 
 
-def other_clock(found: Finding, s: Recording, _: Floats) -> Shape | None:
+def other_clock(found: Finding, s: Recording, _: Floats) -> Picture | None:
     """OP about its biggest move, rebuilt with PV as stamped and with its clock set right; None without settings."""
     if s.sp is None or s.stated is None:
         return None

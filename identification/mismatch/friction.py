@@ -17,7 +17,14 @@ from numba import njit
 
 from identification.estimation.descent import compass
 from identification.estimation.noise import whitened
-from identification.estimation.prediction_error import Fitted, Model, Problem, descend, loss_of, residual_fit
+from identification.estimation.prediction_error import (
+    Fitted,
+    Model,
+    Problem,
+    descended,
+    loss_of,
+    residual_fit,
+)
 from identification.mismatch.effect import Friction
 from identification.mismatch.outside import about
 from identification.mismatch.recording import SeenInCycles
@@ -59,9 +66,9 @@ def fit_sticking(p: Problem, play: Fitted, row: Variant, rows: tuple[Variant, ..
     """The best valve that sticks as `row` says, beside `rows`, about a fit whose last row is a play."""
     fits = []
     for c in _scanned(p, play, row)[:FOLLOWED]:
-        first = descend(p, Model((*rows, row), _settled(p, c)), p.limits.search.screen_steps)
+        first = descended(p, Model((*rows, row), _settled(p, c)), p.limits.search.screen_steps)
         again = replace(first.model, c=_settled(p, first.model.c))
-        fits.append(descend(p, again, p.limits.search.screen_steps))
+        fits.append(descended(p, again, p.limits.search.screen_steps))
     return min(fits, key=lambda fit: fit.loss)
 
 
@@ -106,7 +113,7 @@ def from_cycles(p: Problem, near: Fitted, seen: SeenInCycles, rows: tuple[Varian
         valve = _valve_for(row, seen.valve) if is_friction(row.name) else None
         if valve is not None:
             model = Model((*near.model.added, row), _begun(p, near, seen, valve))
-            out.append(descend(p, model, p.limits.search.full_steps))
+            out.append(descended(p, model, p.limits.search.full_steps))
     return out
 
 
@@ -136,7 +143,7 @@ def simulated_anew(p: Problem, c: Floats, window: int) -> Floats:
     op = before_stem(np.ascontiguousarray(acted(Signal.OP, inputs.op, c, inputs.dt_s)), c, inputs.dt_s)
     dead = round(float(c[Slot.L]) / inputs.dt_s)
     pole = math.exp(-inputs.dt_s / max(float(c[Slot.T]), 1e-9))
-    stem = placed(op, p.y, stretch_ends(op.size, window), dead, pole, float(c[Slot.K]), friction)
+    stem = stem_placed(op, p.y, stretch_ends(op.size, window), dead, pole, float(c[Slot.K]), friction)
     flow = behind_stem(stem, c, inputs.dt_s, inputs.middle)
     return from_flow(inputs, c, acted(Signal.FLOW, flow, c, inputs.dt_s))
 
@@ -174,7 +181,7 @@ def _left(
 
 
 @njit(cache=True)
-def placed(
+def stem_placed(
     op: Floats,
     y: Floats,
     ends: np.ndarray,

@@ -201,7 +201,7 @@ class Located:
         return tuple(f for f in self.features if f.carries)
 
 
-def responses(e: Floats) -> Floats:
+def standardized(e: Floats) -> Floats:
     """Power (cut) and sign of innovations about their mean, standardized, shape (n, 2)."""
     power = np.minimum(e**2 / max(float(np.mean(e**2)), 1e-300), MOST_POWER)
     size = max(float(np.sqrt(np.mean(e**2))), 1e-300)
@@ -312,7 +312,7 @@ def located(
         return Located((), np.zeros(e.size))
     found = groups(pv, op, dt_s, late, memory)
     columns = [g.columns[judged] for g in found]
-    y = responses(e[judged])
+    y = standardized(e[judged])
     bases = directions(columns)
     whole = _basis(np.concatenate(columns, axis=1) - np.concatenate(columns, axis=1).mean(axis=0))
     p, excess = chances(bases, y, blocks, seed)

@@ -10,7 +10,7 @@ import numpy as np
 from identification.mismatch import pictures
 from identification.mismatch.catalogue import EFFECTS
 from identification.mismatch.effect import Act, Block, Effect, Floats, Param, Signal, Slot, Variant, own_slot
-from identification.mismatch.pictures import Axis, Drawing, Shape
+from identification.mismatch.pictures import Axis, Drawing, Picture
 from identification.simulation.effect import bring
 from identification.simulation.lag import lagged
 from identification.simulation.open_loop import gain_over_record, load
@@ -30,10 +30,12 @@ PLACES, BANDS = tuple(0.05 * i for i in range(2, 19)), (0.5, 3.0)
 twentieth of the span off."""
 
 
-def gain_by_history(d: Drawing) -> Shape:
+def gain_by_history(d: Drawing) -> Picture:
     """The gain over the recording, as PV's past makes it."""
     rest = float(d.plain[Slot.K])
-    return pictures.course(d, pictures.GAIN, lambda inputs, c: c[Slot.K] * gain_over_record(inputs, c), rest)
+    return pictures.course_picture(
+        d, pictures.GAIN, lambda inputs, c: c[Slot.K] * gain_over_record(inputs, c), rest
+    )
 
 
 def hurried(flow: Floats, c: Floats, dt_s: float) -> Floats:
@@ -42,10 +44,10 @@ def hurried(flow: Floats, c: Floats, dt_s: float) -> Floats:
     return flow + c[HURRY] * np.abs(ahead) * ahead / 10.0  # type: ignore[no-any-return]
 
 
-def flow_after_step(d: Drawing) -> Shape:
+def flow_after_step(d: Drawing) -> Picture:
     """Flow after a step of OP."""
     fine = HURRY_DRAWN * float(d.best[HURRY_T]) / pictures.POINTS
-    time, op = pictures.step(pictures.step_size(d), pictures.POINTS, fine)
+    time, op = pictures.drawn_step(pictures.step_size(d), pictures.POINTS, fine)
     axes = pictures.TIME, pictures.FLOW
     return pictures.beside_plain(d, "response", axes, time, lambda c: hurried(op, c, fine), op)
 
@@ -90,7 +92,7 @@ RECYCLE = Effect(
     block=Block.PROCESS,
     sentence="{returned} of what leaves comes back to the inlet after {returns_s}",
     check="Look for a circuit that brings material or heat back: white water, solvent, condensate, a recirculation.",
-    curve=lambda d: pictures.course(d, Axis("what comes back", "% OP"), load),
+    curve=lambda d: pictures.course_picture(d, Axis("what comes back", "% OP"), load),
     variants=(
         Variant(
             (

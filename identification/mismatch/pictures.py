@@ -65,7 +65,7 @@ GAIN, LOAD = Axis("gain", "% PV/% OP"), Axis("load at the inlet", "% OP")
 
 
 @dataclass(frozen=True, slots=True)
-class Shape:
+class Picture:
     """What was found, drawn: its kind, both axes, curves (the found one first), places on the horizontal axis.
 
     kind : loop (the band is two more loops, least and most), curve, response, course or comb.
@@ -128,11 +128,11 @@ def beside_plain(
     read: Read,
     plain: Floats | float,
     places: tuple[float, ...] = (),
-) -> Shape:
+) -> Picture:
     """What parameters make of x, with its band, beside what the plain loop has there, shape (m,) each."""
     y, low, high = banded(read, d)
     still = np.broadcast_to(np.asarray(plain, dtype=np.float64), x.shape)
-    return Shape(d.name, kind, *axes, (Drawn("found", x, y, low, high), Drawn("plain", x, still)), places)
+    return Picture(d.name, kind, *axes, (Drawn("found", x, y, low, high), Drawn("plain", x, still)), places)
 
 
 def op_range(inputs: ModelInputs) -> Floats:
@@ -140,7 +140,7 @@ def op_range(inputs: ModelInputs) -> Floats:
     return np.linspace(float(inputs.op.min()), float(inputs.op.max()), POINTS)
 
 
-def step(size: float, n: int, dt_s: float, back: bool = False) -> tuple[Floats, Floats]:
+def drawn_step(size: float, n: int, dt_s: float, back: bool = False) -> tuple[Floats, Floats]:
     """Time [s] and a step (and, if wanted, the step back), shape (m,)."""
     time = dt_s * np.arange(-n // 10, (2 if back else 1) * n, dtype=np.float64)
     on = (time >= 0) & (time < n * dt_s) if back else time >= 0
@@ -157,7 +157,7 @@ def valve_alone(
     return flow(op, own, dt_s, middle)
 
 
-def stem_over_op(d: Drawing) -> Shape:
+def stem_over_op(d: Drawing) -> Picture:
     """Stem over OP of a valve with play or stick-slip, with the loops of the narrowest and the widest band."""
     reach = SWEEP * max(float(d.best[Slot.STICKBAND]), 1e-3)
     one = np.concatenate((np.linspace(-1, 1, POINTS), np.linspace(1, -1, POINTS)))
@@ -171,10 +171,10 @@ def stem_over_op(d: Drawing) -> Shape:
         other[Slot.JUMP] = min(other[Slot.JUMP], other[Slot.STICKBAND])
         curves.append(Drawn(name, op[last], valve_alone(other, op, FRICTION)[last]))
     curves.append(Drawn("plain", op[last], op[last]))
-    return Shape(d.name, "loop", OP, STEM, tuple(curves))
+    return Picture(d.name, "loop", OP, STEM, tuple(curves))
 
 
-def flow_over_op(d: Drawing) -> Shape:
+def flow_over_op(d: Drawing) -> Picture:
     """Flow over OP at rest: characteristic, stop or second valve."""
     op, ends = op_range(d.inputs), (Slot.STOP_LO, Slot.STOP_HI, Slot.SPLIT)
     places = tuple(float(d.best[s]) for s in ends if np.isfinite(d.best[s]))
@@ -187,10 +187,10 @@ def step_size(d: Drawing) -> float:
     return min(max(STEP_PCT, 0.5 * float(np.ptp(d.inputs.op))), MOST_STEP_PCT)
 
 
-def stem_response(d: Drawing, length_s: float, keep: tuple[int, ...]) -> Shape:
+def stem_response(d: Drawing, length_s: float, keep: tuple[int, ...]) -> Picture:
     """Stem after a step of OP, which takes about `length_s`, with the parameters that are at work."""
     fine = max(length_s * STEM_LENGTH, FEWEST_SAMPLES * d.inputs.dt_s) / POINTS
-    time, op = step(step_size(d), POINTS, fine)
+    time, op = drawn_step(step_size(d), POINTS, fine)
     return beside_plain(d, "response", (TIME, STEM), time, lambda c: valve_alone(c, op, keep, dt_s=fine), op)
 
 
@@ -204,14 +204,14 @@ def _pv_length_s(d: Drawing, fast_s: float | None) -> float:
     return fast if fast < EARLY * length else length
 
 
-def pv_response(d: Drawing, faster: int | None = None, back: bool = False) -> Shape:
+def pv_response(d: Drawing, faster: int | None = None, back: bool = False) -> Picture:
     """PV after a step of OP (and back down again), of the plain and the improved process; cut where the lag of the
     slot `faster`, or the process's own, is over early."""
     inputs = d.inputs
     length = _pv_length_s(d, None if faster is None else float(min(d.best[faster], d.best[Slot.T])))
     dt = min(length / POINTS, inputs.dt_s) if length < POINTS * inputs.dt_s else length / POINTS
     n = min(int(length / dt), 4 * POINTS)
-    time, op = step(min(STEP_PCT, float(np.ptp(inputs.op))), n, dt, back)
+    time, op = drawn_step(min(STEP_PCT, float(np.ptp(inputs.op))), n, dt, back)
     drawn = ModelInputs(op, dt, 0.0, inputs.level, (0.0, 100.0))
 
     def read(c: Floats) -> Floats:
@@ -223,7 +223,7 @@ def pv_response(d: Drawing, faster: int | None = None, back: bool = False) -> Sh
     return beside_plain(d, "response", (TIME, Axis("PV", "% PV")), time, read, read(d.plain))
 
 
-def gain_over_pv(d: Drawing) -> Shape:
+def gain_over_pv(d: Drawing) -> Picture:
     """Gain of the process over PV: by slope, by its speed, or as a vessel with a rooted outflow."""
     inputs = d.inputs
     pv = np.linspace(*inputs.pv_range, POINTS)
@@ -239,14 +239,14 @@ def gain_over_pv(d: Drawing) -> Shape:
     return beside_plain(d, "curve", (Axis("PV", "%"), GAIN), pv, read, float(d.plain[Slot.K]))
 
 
-def course(
+def course_picture(
     d: Drawing,
     axis: Axis,
     values: Callable[[ModelInputs, Floats], Floats],
     rest: float = 0.0,
     last: float = np.inf,
     places: tuple[float, ...] = (),
-) -> Shape:
+) -> Picture:
     """What acts over the recording, shape (n,), as `values` gives it of inputs and parameters, beside what the plain
     loop has in its place; up to the sample `last`, with some times [s] marked."""
     at = np.unique(np.linspace(0, min(last, d.inputs.op.size - 1), COURSE_POINTS).astype(int))
@@ -254,6 +254,6 @@ def course(
     return beside_plain(d, "course", (TIME, axis), time, lambda c: values(d.inputs, c)[at], rest, places)
 
 
-def load_over_time(d: Drawing) -> Shape:
+def load_over_time(d: Drawing) -> Picture:
     """The load at the inlet over the recording."""
-    return course(d, LOAD, load)
+    return course_picture(d, LOAD, load)

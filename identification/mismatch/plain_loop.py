@@ -13,7 +13,7 @@ from identification.estimation.prediction_error import (
     Model,
     Problem,
     correlated,
-    descend,
+    descended,
     problem,
     sensitivities,
 )
@@ -84,7 +84,7 @@ def prepared(
         p = replace(p, weight=np.where(clip.where, 0.0, p.weight))
     first = plain(p, brought, clip)
     calm = replace(p, weight=robust_weights(first.e, p.weight > 0))
-    fit = descend(calm, first.model, p.limits.search.full_steps)
+    fit = descended(calm, first.model, p.limits.search.full_steps)
     return with_memory(calm, fit) if experiment else (calm, fit)
 
 
@@ -98,7 +98,7 @@ def plain(p: Problem, brought: Floats | None = None, clip: Clip | None = None) -
         c[Slot.START] = p.y[0]
         c[Slot.BIAS] = float(np.mean(p.y)) - process.gain * float(np.mean(p.inputs.op) - p.inputs.middle)
         starts.append(c)
-    fits = [descend(p, Model((), c), p.limits.search.full_steps) for c in starts]
+    fits = [descended(p, Model((), c), p.limits.search.full_steps) for c in starts]
     return min(fits, key=lambda fit: fit.loss)
 
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from identification.estimation.noise import NO_NOISE, whitened
-from identification.estimation.prediction_error import Fitted, Model, Problem, bounds, descend, gain
+from identification.estimation.prediction_error import Fitted, Model, Problem, bounds, descended, gain
 from identification.estimation.start_values import simulated_best
 from identification.limits import LIMITS, ProofLimits
 from identification.mismatch.effect import Effect
@@ -101,7 +101,7 @@ def fitted_early(p: Problem, worse: Fitted, better: Fitted) -> tuple[Fitted, Fit
     """Both models fitted anew to the first part of the record; a model's START is of its first sample."""
     early, _ = early_part(p)
     steps = p.limits.search.screen_steps
-    return descend(early, worse.model, steps), descend(early, better.model, steps)
+    return descended(early, worse.model, steps), descended(early, better.model, steps)
 
 
 def held_out_gain(p: Problem, fits: tuple[Fitted, Fitted]) -> float:
@@ -258,7 +258,7 @@ class Criterion:
         """Constants of a model, its plain loop's moved to where they leave least; an effect's stay as told."""
         told = tuple(replace(row, params=()) for row in model.added)
         q = replace(self.p, edges=NO_NOISE, window=self.window, weight=judged.astype(float))
-        return descend(q, Model(told, model.c), q.limits.search.full_steps).model.c
+        return descended(q, Model(told, model.c), q.limits.search.full_steps).model.c
 
     def candidates(self, pair: Pair) -> tuple[list[Floats], list[Floats]]:
         """Constants of the plain and of the better model by both criteria, each from several starts."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from identification.estimation.prediction_error import Fitted, Problem, descend, gain
+from identification.estimation.prediction_error import Fitted, Problem, descended, gain
 from identification.mismatch.catalogue import CANDIDATES, EFFECTS
 from identification.mismatch.effect import Friction
 from identification.mismatch.experiment import is_experiment
@@ -52,7 +52,7 @@ def one_by_one(found: Explanation, tell: Progress, s: Recording) -> tuple[Explan
             break
         if winner.name in OUTSIDE:
             return replace(found, outside=winner), candidates
-        best = descend(x.p, winner.fit.model, limits.full_steps)
+        best = descended(x.p, winner.fit.model, limits.full_steps)
         found = replace(found, p=x.p, best=best, accepted=(*found.accepted, winner))
     return found, candidates
 
@@ -138,12 +138,12 @@ def replacement_step(
     """
     limits = x.p.limits.search
     for i, old in enumerate(accepted):
-        near = descend(x.p, without(best.model, [old.row]), limits.full_steps)
+        near = descended(x.p, without(best.model, [old.row]), limits.full_steps)
         least = max(gain(best, near) - penalty(x.p, old.row) + limits.tie, 0.0)
         first = next((c for c in compete(x, near, CANDIDATES, tell, least) if may_replace(x.p, c, old)), None)
         if first is None or first.penalised <= least or not passes(x.p, near, first.fit, EFFECTS[first.name]):
             continue
-        best = descend(x.p, first.fit.model, limits.full_steps)
+        best = descended(x.p, first.fit.model, limits.full_steps)
         accepted = [*accepted[:i], first, *accepted[i + 1 :]]
     return best, accepted
 
@@ -165,7 +165,7 @@ def without_the_idle(
     for old in accepted[kept:]:
         if len(accepted) == 1:
             break
-        near = descend(p, without(best.model, [old.row]), p.limits.search.full_steps)
+        near = descended(p, without(best.model, [old.row]), p.limits.search.full_steps)
         if gain(best, near) < penalty(p, old.row):
             best, accepted = near, [c for c in accepted if c.name != old.name]
     return best, accepted

@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 
-from identification.estimation.prediction_error import Fitted, Model, Problem, descend, gain
+from identification.estimation.prediction_error import Fitted, Model, Problem, descended, gain
 from identification.mismatch.catalogue import CANDIDATES
 from identification.mismatch.effect import Friction
 from identification.mismatch.friction import fit_sticking
@@ -115,7 +115,7 @@ def penalised(p: Problem, near: Fitted, fit: Fitted) -> Candidate:
 
 def best_of(p: Problem, near: Fitted, models: list[Model], steps: int, aim: float = math.inf) -> Candidate:
     """The best of some starts, followed for some steps, as far as they come under `aim`."""
-    return penalised(p, near, min((descend(p, m, steps, aim) for m in models), key=lambda f: f.loss))
+    return penalised(p, near, min((descended(p, m, steps, aim) for m in models), key=lambda f: f.loss))
 
 
 def worth_following(p: Problem, least: float) -> float:
@@ -171,8 +171,8 @@ def outdoing(p: Problem, near: Fitted, first: Candidate) -> Candidate:
     c = near.model.c.copy()
     for slot, value in (row.fixed or {}).items():
         c[slot] = value
-    added = descend(p, Model((*near.model.added, row), c), p.limits.search.full_steps)
-    own = descend(p, first.fit.model, p.limits.search.full_steps)
+    added = descended(p, Model((*near.model.added, row), c), p.limits.search.full_steps)
+    own = descended(p, first.fit.model, p.limits.search.full_steps)
     limits, moves = p.limits.proof, float(p.weight @ p.y**2 / p.weight.sum())
     if own.loss < limits.course_leaves * near.loss and near.loss > limits.course_from**2 * moves:
         return penalised(p, near, own)
@@ -224,4 +224,4 @@ def integrating_or_first_order(p: Problem, free: Fitted, kind: str) -> tuple[Pro
     c = free.model.c.copy()
     c[Slot.K] *= longest / c[Slot.T]
     c[Slot.T] = longest
-    return held, descend(held, Model((), c), p.limits.search.full_steps)
+    return held, descended(held, Model((), c), p.limits.search.full_steps)

@@ -221,13 +221,13 @@ def mode_starts(p: Problem, near: Fitted, row: Variant) -> list[Model]:
     blind[:1] = LEADING
     out = []
     for ar in (near.ar, blind) if near.ar.size else (near.ar,):
-        models = [model for _, model in sorted(grid(p, near, row, ar), key=lambda point: point[0])]
+        models = [model for _, model in sorted(grid_of_modes(p, near, row, ar), key=lambda point: point[0])]
         low, high = row.mode_share
         out += [model for model in models if low < model.c[Slot.SHARE] < high][:MODES_KEPT]
     return out
 
 
-def grid(p: Problem, near: Fitted, row: Variant, ar: Floats) -> Iterator[tuple[float, Model]]:
+def grid_of_modes(p: Problem, near: Fitted, row: Variant, ar: Floats) -> Iterator[tuple[float, Model]]:
     """What each point of the grid leaves under one noise model, and its model; both gains are solved linearly."""
     dt_s, t0, dead0 = p.inputs.dt_s, float(near.model.c[Slot.T]), float(near.model.c[Slot.L])
     y, level = whitened(p.y, ar, p.edges), whitened(np.ones(p.y.size), ar, p.edges)
@@ -237,7 +237,7 @@ def grid(p: Problem, near: Fitted, row: Variant, ar: Floats) -> Iterator[tuple[f
     for samples in range(0, longest + 1, longest // DELAYS + 1):
         late = {t: np.concatenate((np.full(samples, x[0]), x[: x.size - samples])) for t, x in found.items()}
         for first, other in product(firsts, others):
-            (one, two), left = solved(y, np.stack([late[first], late[other], level]), p.weight)
+            (one, two), left = both_gains(y, np.stack([late[first], late[other], level]), p.weight)
             c = near.model.c.copy()
             c[Slot.T], c[Slot.L], c[Slot.MODE_T] = first, samples * dt_s, max(other, 0.1 * dt_s)
             c[Slot.K], c[Slot.SHARE] = one + two, two / (one + two) if one + two != 0 else np.inf
@@ -256,7 +256,7 @@ def responses(p: Problem, near: Fitted, times: set[float], ar: Floats) -> dict[f
     return out
 
 
-def solved(y: Floats, rows: Floats, weight: Floats) -> tuple[tuple[float, float], float]:
+def both_gains(y: Floats, rows: Floats, weight: Floats) -> tuple[tuple[float, float], float]:
     """Both gains and what is left, of whitened PV on two responses and a level, shape (3, n)."""
     weighted = rows * weight
     beta = np.linalg.lstsq(weighted @ rows.T, weighted @ y, rcond=1e-12)[0]

@@ -67,7 +67,7 @@ def direction(op: Floats, won: Floats) -> str:
     return "down" if down > 3 * max(up, 0.0) else "both"
 
 
-def band(difference: Floats, dt_s: float) -> list[float]:
+def half_power_periods(difference: Floats, dt_s: float) -> list[float]:
     """Periods [s] between which half of a difference's power lies."""
     power = np.abs(np.fft.rfft(difference - difference.mean())) ** 2
     total = np.cumsum(power)
@@ -134,5 +134,5 @@ def where_of(found: Explanation, s: Recording, block: str, at: Located) -> dict[
         "pv_range": ranges(s.pv, won),
         "op_range": ranges(s.op, won),
         "direction": direction(s.op, won),
-        "band_s": band(difference, s.dt_s),
+        "band_s": half_power_periods(difference, s.dt_s),
     } | told

@@ -113,7 +113,7 @@ def note(found: Explanation) -> str:
     return LEFT_OVER.format(nats=found.left)
 
 
-def shown_by_cycles(found: Explanation) -> str:
+def cycles_told(found: Explanation) -> str:
     """What the cycles show of a faulty valve, in a sentence."""
     seen = found.cycles
     assert seen is not None
@@ -125,7 +125,7 @@ def shown_by_cycles(found: Explanation) -> str:
     return text if found.proof is None or found.proof.carries else f"{text} {STRAYS}"
 
 
-def too_short(enough: float, length_s: float, lag_s: float) -> str:
+def too_short_told(enough: float, length_s: float, lag_s: float) -> str:
     """What is needed where the record is short against the time constant."""
     length, lag = (_time(x, MINUTES_OF_RECORD_S) for x in (length_s, lag_s))
     needs = f"needs {enough:.0f} time constants, has {length_s / lag_s:.2g}"

@@ -134,7 +134,7 @@ def _turns() -> Complex:
 
 
 @dataclass(frozen=True, slots=True)
-class Lag:
+class Delay:
     """How much later a second signal is: lag_s [s], its standard deviation [s], and the coherence at that lag [-]."""
 
     lag_s: float
@@ -142,7 +142,7 @@ class Lag:
     coherence: float
 
 
-def lag(x: Complex, y: Complex, duration_s: float, most_s: float) -> Lag:
+def lag(x: Complex, y: Complex, duration_s: float, most_s: float) -> Delay:
     """Group delay of a second signal behind a first one, by the slope of their phase over the band.
 
     A steady wave tells no delay, for its phase is known up to whole turns alone; what tells is how its size and its
@@ -154,7 +154,7 @@ def lag(x: Complex, y: Complex, duration_s: float, most_s: float) -> Lag:
     cross = np.conj(x) * y
     power = float(np.sqrt(np.sum(np.abs(x) ** 2) * np.sum(np.abs(y) ** 2)))
     if power <= 0:
-        return Lag(0.0, math.inf, 0.0)
+        return Delay(0.0, math.inf, 0.0)
     size = next_fast_len(max(16 * cross.size, 64))
     step = duration_s / size
     found = np.abs(ifft(cross, size)) * size / power
@@ -170,7 +170,7 @@ def lag(x: Complex, y: Complex, duration_s: float, most_s: float) -> Lag:
     free = float(weight.sum() ** 2 / (weight @ weight))
     slope = 2 * math.pi * max(width, 1e-9) / duration_s
     deviation = math.sqrt(max(1.0 - best, 1e-4) / (2 * max(best, 1e-9) * free)) / slope
-    return Lag(at * step, deviation, best)
+    return Delay(at * step, deviation, best)
 
 
 RIDGE = 1e-9

@@ -22,7 +22,7 @@ from analyzer.config import Config
 from analyzer.explain.case import case
 from analyzer.loops.spec import spec_of
 from analyzer.night.asked import opened
-from identification.estimation.prediction_error import descend
+from identification.estimation.prediction_error import descended
 from identification.mismatch.answer import parameters_of
 from identification.mismatch.catalogue import CANDIDATES
 from identification.mismatch.plain_loop import inputs_of, prepared, without_spikes
@@ -54,7 +54,7 @@ def fitted(cases: pathlib.Path, tag: str, effect: str):
     x = candidate_inputs(p, plain, s.circumstances)
     rows = tuple(v for v in CANDIDATES if kin(v.name, effect, KIN))
     best = compete(x, plain, rows)[0]
-    return x.p, descend(x.p, best.fit.model, x.p.limits.search.full_steps)
+    return x.p, descended(x.p, best.fit.model, x.p.limits.search.full_steps)
 
 
 def said(p, fit) -> dict:

@@ -14,7 +14,7 @@ from analyzer.explain.models import judged
 from analyzer.history.series import Series
 from analyzer.loops.spec import LoopSpec
 from identification.controller.check import judge
-from identification.estimation.prediction_error import Model, descend, gain
+from identification.estimation.prediction_error import Model, descended, gain
 from identification.mismatch.answer import answer
 from identification.mismatch.catalogue import CANDIDATES
 from identification.mismatch.diagnosis import controller_finding_of, recorder_finding_of
@@ -60,7 +60,7 @@ def with_play(found: Explanation, width: float) -> Explanation:
     row = next(r for r in CANDIDATES if r.name == "backlash")
     c = found.plain.model.c.copy()
     c[Slot.STICKBAND] = width
-    best = descend(found.p, Model((row,), c), 8)
+    best = descended(found.p, Model((row,), c), 8)
     won = gain(best, found.plain)
     candidate = Candidate(best, won, won - 9.0)
     return Explanation(found.p, found.plain, best, (candidate,), (candidate,), law=found.law)

@@ -3,12 +3,12 @@
 import numpy as np
 
 from identification.mismatch.effect import Block, Effect, Floats, Param, Slot, Variant, each
-from identification.mismatch.pictures import Axis, Drawing, Shape, beside_plain, op_range
+from identification.mismatch.pictures import Axis, Drawing, Picture, beside_plain, op_range
 
 SHARE = Param(Slot.PIPE, "flow_share", "", -0.5, 3.0, title="Share of delay in flow")
 
 
-def delay_over_flow(d: Drawing) -> Shape:
+def delay_over_flow(d: Drawing) -> Picture:
     """Dead time over flow (OP), at a flow that stays."""
     op, about = op_range(d.inputs), max(d.inputs.middle, 1e-3)
 

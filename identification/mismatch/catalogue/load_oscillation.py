@@ -3,7 +3,7 @@
 import math
 
 from identification.mismatch.effect import Block, Effect, Estimate, Param, Parameters, Slot, Variant, exact
-from identification.mismatch.pictures import LOAD, Drawing, Shape, course
+from identification.mismatch.pictures import LOAD, Drawing, Picture, course_picture
 from identification.simulation.open_loop import load
 
 PERIODS = 6
@@ -24,10 +24,10 @@ def period_and_amplitude(own: Parameters) -> dict[str, Estimate]:
     return {"period_s": Estimate(period, low, high, "s"), "amplitude_pct": size}
 
 
-def few_periods(d: Drawing) -> Shape:
+def few_periods(d: Drawing) -> Picture:
     """The load over its first periods."""
     samples = PERIODS * 2 * math.pi / max(float(d.best[Slot.OMEGA]) * d.inputs.dt_s, 1e-9)
-    return course(d, LOAD, load, last=samples)
+    return course_picture(d, LOAD, load, last=samples)
 
 
 EFFECT = Effect(

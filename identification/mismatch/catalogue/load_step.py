@@ -1,7 +1,7 @@
 """Load that comes in as up to three steps at the process's inlet."""
 
 from identification.mismatch.effect import Block, Effect, Param, Slot, Variant
-from identification.mismatch.pictures import LOAD, Drawing, Shape, course
+from identification.mismatch.pictures import LOAD, Drawing, Picture, course_picture
 from identification.simulation.open_loop import load
 from identification.simulation.parameters import STEPS
 
@@ -13,10 +13,10 @@ FREE = tuple(
 )
 
 
-def steps_over_time(d: Drawing) -> Shape:
+def steps_over_time(d: Drawing) -> Picture:
     """The load, with the places of its steps."""
     acting = [k for i, k in enumerate(d.inputs.step_at[:STEPS]) if d.best[int(Slot.STEP) + i] != 0]
-    return course(d, LOAD, load, places=tuple(float(k * d.inputs.dt_s) for k in acting))
+    return course_picture(d, LOAD, load, places=tuple(float(k * d.inputs.dt_s) for k in acting))
 
 
 EFFECT = Effect(

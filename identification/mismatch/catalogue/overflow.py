@@ -3,7 +3,7 @@
 import numpy as np
 
 from identification.mismatch.effect import Block, Effect, Floats, Param, Slot, Start, Variant, each
-from identification.mismatch.pictures import POINTS, Axis, Drawing, Shape, beside_plain
+from identification.mismatch.pictures import POINTS, Axis, Drawing, Picture, beside_plain
 from identification.simulation.open_loop import ModelInputs, outflow_head
 
 VESSEL = "Overflow of the vessel before at"
@@ -36,7 +36,7 @@ def at_rest(free: Floats, inputs: ModelInputs, c: Floats) -> Floats:
     return np.minimum(inputs.level + level, c[Slot.CAP])
 
 
-def pv_over_free(d: Drawing) -> Shape:
+def pv_over_free(d: Drawing) -> Picture:
     """PV over what an unbounded vessel would show."""
     low_pv, high_pv = d.inputs.pv_range
     free = np.linspace(low_pv, high_pv + MORE * (high_pv - low_pv), POINTS)

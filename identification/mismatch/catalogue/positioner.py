@@ -1,7 +1,7 @@
 """A position loop of second order that rests within a dead band of its aim."""
 
 from identification.mismatch.effect import Block, Effect, Friction, Param, Slot, Variant
-from identification.mismatch.pictures import Drawing, Shape, stem_response
+from identification.mismatch.pictures import Drawing, Picture, stem_response
 
 LENGTH = 8.0
 """Length of the drawn response, in lags."""
@@ -12,7 +12,7 @@ FREE = (
 )
 
 
-def stem_after_step(d: Drawing) -> Shape:
+def stem_after_step(d: Drawing) -> Picture:
     """Stem after a step of OP."""
     return stem_response(d, LENGTH * float(d.best[Slot.SERVO]), (Slot.SERVO, Slot.DAMPING, Slot.DEADBAND))
 

@@ -9,7 +9,7 @@ SURE = 0.1
 """Half width of the interval, in the scatter found; ours."""
 
 
-def scattered(s: Recording) -> Finding | None:
+def scattered_stamps(s: Recording) -> Finding | None:
     """Stamps that scatter about a uniform clock by more than logging does, gaps left out."""
     spacing = np.diff(s.stamp_s) / s.dt_s
     spacing = spacing[(spacing > 0.02) & (spacing < 1.98)]
@@ -26,7 +26,7 @@ EFFECT = Fault(
     check="Poll at a fixed rate, or record at the controller.",
     caption="Time between samples: a sound recorder has one narrow peak.",
     order=1,
-    find=scattered,
+    find=scattered_stamps,
     ends=Ends.ALL,
     numbers=(Number("jitter_samples", "samples", "Scatter of stamps", share=SURE),),
     drawn=spacings,

@@ -1,7 +1,7 @@
 """A supply to the valve that wanders slowly and changes gain and bias together."""
 
 from identification.mismatch.effect import Block, Effect, Param, Slot, Variant
-from identification.mismatch.pictures import Axis, Drawing, Shape, course
+from identification.mismatch.pictures import Axis, Drawing, Picture, course_picture
 from identification.simulation.open_loop import head
 from identification.simulation.parameters import KNOTS
 
@@ -11,9 +11,9 @@ ADDED = 1e4
 """Flow at rest [% OP] beside which a course that is added has no part in the gain; ours."""
 
 
-def supply_over_time(d: Drawing) -> Shape:
+def supply_over_time(d: Drawing) -> Picture:
     """The supply as it wanders."""
-    return course(d, Axis("supply", "% of its mean"), lambda inputs, c: 100.0 * head(inputs, c))
+    return course_picture(d, Axis("supply", "% of its mean"), lambda inputs, c: 100.0 * head(inputs, c))
 
 
 EFFECT = Effect(

@@ -12,7 +12,7 @@ from identification.estimation.gauss_newton import covariance
 from identification.estimation.gauss_newton import descend as descend_lag
 from identification.estimation.hammerstein import Fit
 from identification.estimation.prediction_error import Model, deviations, problem
-from identification.estimation.prediction_error import descend as descend_any
+from identification.estimation.prediction_error import descended as descend_any
 from identification.estimation.window import Window
 from identification.mismatch.catalogue import EFFECTS
 from identification.mismatch.model_file import constants, to_data

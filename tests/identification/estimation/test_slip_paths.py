@@ -14,9 +14,9 @@ from identification.estimation.irregular_slips import fit_irregular
 from identification.estimation.slip_beam import (
     SCATTER,
     STUCK,
-    Friction,
     Noise,
     Response,
+    SlipDistances,
     decoded,
     log_chance,
     slip_chance,
@@ -81,7 +81,7 @@ def test_the_path_is_the_best_of_all_there_are():
     r = Response(Lag(POLE, 1 - POLE, 0.0, DELAY), GAIN, np.zeros(op.size))
     counts = np.arange(op.size) > 0
     noise = Noise(np.zeros(1), NOISE**2)
-    found, score = decoded(op, pv, counts, r, noise, Friction(BREAKAWAY, SLIDING, 1000), 200)
+    found, score = decoded(op, pv, counts, r, noise, SlipDistances(BREAKAWAY, SLIDING, 1000), 200)
     assert score >= best - 1e-6  # it may begin at other places too
     np.testing.assert_allclose(np.flatnonzero(np.diff(found)), np.flatnonzero(np.diff(stem)))
     np.testing.assert_allclose(found[5:], stem[5:], atol=1e-12)
@@ -109,8 +109,8 @@ def test_a_stem_does_not_park():
     op = 1.05 * np.sin(np.arange(200) * 0.1)
     r = Response(Lag(POLE, 1 - POLE, 0.0, DELAY), GAIN, np.zeros(op.size))
     every, noise = np.ones(op.size, dtype=bool), Noise(np.zeros(1), 1.0)
-    _, free = decoded(op, np.zeros(op.size), every, r, noise, Friction(BREAKAWAY, SLIDING, 1000), 50)
-    _, held = decoded(op, np.zeros(op.size), every, r, noise, Friction(BREAKAWAY, SLIDING, 40), 50)
+    _, free = decoded(op, np.zeros(op.size), every, r, noise, SlipDistances(BREAKAWAY, SLIDING, 1000), 50)
+    _, held = decoded(op, np.zeros(op.size), every, r, noise, SlipDistances(BREAKAWAY, SLIDING, 40), 50)
     assert held <= free
     assert free - held < 6 * STUCK
 

@@ -9,7 +9,7 @@ import pytest
 
 from identification.mismatch.catalogue import CANDIDATES, EFFECTS
 from identification.mismatch.fault_pictures import around, biggest_move, busiest, gap_profile, grid, rebuilt
-from identification.mismatch.pictures import Drawing, Shape, banded
+from identification.mismatch.pictures import Drawing, Picture, banded
 from identification.mismatch.recording import Finding, Recording
 from identification.models import Estimate
 from identification.simulation.effect import Param, Variant
@@ -31,7 +31,7 @@ def row(name: str) -> Variant:
     return next(r for r in CANDIDATES if r.name == name)
 
 
-def shape(name: str, spread: float = 0.1, **constants: float) -> Shape:
+def shape(name: str, spread: float = 0.1, **constants: float) -> Picture:
     """The shape of an effect with the given constants, each known within a share."""
     plain = neutral()
     plain[Slot.K], plain[Slot.T], plain[Slot.L] = 1.2, 20.0, 5.0

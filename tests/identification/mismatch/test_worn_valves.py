@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from identification.controller.check import StatedSettings
-from identification.estimation.prediction_error import Fitted, Model, Problem, descend, problem
+from identification.estimation.prediction_error import Fitted, Model, Problem, descended, problem
 from identification.mismatch.answer import Answer, answer
 from identification.mismatch.catalogue import EFFECTS
 from identification.mismatch.diagnosis import explain
@@ -201,12 +201,12 @@ def test_idle_effect_goes_again() -> None:
     inputs = inputs_of(s)
     p = problem(inputs, s.pv - inputs.level, s.usable)
     rows = {name: EFFECTS[name].candidates[0] for name in ("backlash", "gain-drift")}
-    fit = descend(p, Model((), as_parameters(Fopdt(1.2, 20.0, 3.4))), 20)
+    fit = descended(p, Model((), as_parameters(Fopdt(1.2, 20.0, 3.4))), 20)
     taken = []
     for name, value in (("gain-drift", 0.01), ("backlash", PLAY.width)):
         c = fit.model.c.copy()
         c[rows[name].params[0].slot] = value
-        fit = descend(p, Model((*fit.model.added, rows[name]), c), 20)
+        fit = descended(p, Model((*fit.model.added, rows[name]), c), 20)
         taken.append(Candidate(fit, 0.0, 0.0))
     best, left = without_the_idle(p, fit, taken, 0)
     assert [c.name for c in left] == ["backlash"] == list(best.names)
