@@ -178,7 +178,6 @@ def run(
 
     Parameters
     ----------
-    batch : Batch
     jobs : int
         Worker processes; 0 works in this one, where a loop that takes all memory takes the run with it.
     resume : bool

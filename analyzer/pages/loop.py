@@ -214,8 +214,6 @@ def page(
         The page on which settings are compared and tried, which is linked; its first section stands here too.
     """
     row = rows[-1]
-    scale = units_of(row)
-    figures = tuple(_figure(k, row, scale) for k in FIGURES if row[k] is not None)
     sections = [
         _first(row, thin),
         *_notes(notes),
@@ -228,10 +226,17 @@ def page(
         *(() if settings is None else settings.sections[:1]),
         nights_section(rows),
     ]
-    sections.insert(-1, Section("Figures of the night, for experts", (Facts(figures),), closed=True))
+    sections.insert(-1, _figures(row))
     group = row["group"] if shared is not None else None
     links = (("All loops", "index.html"), *_links(more, settings, group))
     return Page(slug(row["loop"]), row["loop"], _subtitle(row), tuple(sections), links)
+
+
+def _figures(row: Row) -> Section:
+    """The figures of the night that are known, folded."""
+    scale = units_of(row)
+    figures = tuple(_figure(k, row, scale) for k in FIGURES if row[k] is not None)
+    return Section("Figures of the night, for experts", (Facts(figures),), closed=True)
 
 
 def _subtitle(row: Row) -> str:

@@ -188,6 +188,8 @@ def poured(
     return after, out
 
 
+# A sample has two parts, before and after the dead time's fraction; what is the same in each is worked out once, into
+# locals: for all that a compiler knows the loop might write entries of c.
 @njit(cache=True, error_model="numpy")
 def vessel_span(
     span: tuple[int, int], m: Memory, drive: tuple[Floats, Floats, Floats], c: Floats, dt_s: float, base: float,
@@ -197,9 +199,7 @@ def vessel_span(
 
     m : the vessel's memory before the span; returned as it is behind. drive : flow during each sample, load at the
     inlet [% OP] and relative gain, shape (n,) each, known as far as the span goes; base : the flow that counts as
-    zero; head : level deviation at which a rooted vessel would be empty, with its sign turned. A sample has two
-    parts, before and after the dead time's fraction; what is the same in each is worked out once, into locals: for
-    all that a compiler knows the loop might write entries of c.
+    zero; head : level deviation at which a rooted vessel would be empty, with its sign turned.
     """
     flow, act, gain = drive
     x, mode, basin, z2, z3 = m
