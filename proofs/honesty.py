@@ -17,7 +17,14 @@ import numpy as np
 from scipy.signal import lfilter
 from scipy.stats import ttest_ind
 
-from analyzer.comparison.before_after import MEASURES, Became, LoopComparison, compare, gridded, spans_around
+from analyzer.comparison.before_after import (
+    MEASURES,
+    ChangeVerdict,
+    LoopComparison,
+    compare,
+    gridded,
+    spans_around,
+)
 from analyzer.config import Config
 from analyzer.loop.assessments import hourly
 from analyzer.loop.oscillation import detect
@@ -105,8 +112,10 @@ def examine(seed: int) -> tuple[LoopComparison, list[bool]]:
 
 def called(found: LoopComparison, name: str) -> bool | None:
     """Whether a figure was called better or worse; None where it was not compared."""
-    changes = [c for c in found.changes if c.measure.name == name and c.verdict is not Became.INCOMPARABLE]
-    return changes[0].verdict is not Became.UNCLEAR if changes else None
+    changes = [
+        c for c in found.changes if c.measure.name == name and c.verdict is not ChangeVerdict.INCOMPARABLE
+    ]
+    return changes[0].verdict is not ChangeVerdict.UNCLEAR if changes else None
 
 
 def counted(all_found: list[LoopComparison], naive: list[list[bool]]) -> tuple[list[str], float, float]:

@@ -114,7 +114,7 @@ LIMITS = ComparisonLimits()
 """The limits in force where none are given."""
 
 
-class Became(StrEnum):
+class ChangeVerdict(StrEnum):
     """What became of a figure."""
 
     BETTER = "better"
@@ -141,7 +141,7 @@ class Change:
 
     measure: Measure
     found: Difference
-    verdict: Became
+    verdict: ChangeVerdict
 
     @property
     def value_pct(self) -> float | None:
@@ -221,11 +221,11 @@ def reasons_against(
     return tuple(found)
 
 
-def _verdict(found: Difference, measure: Measure, limits: ComparisonLimits) -> Became:
+def _verdict(found: Difference, measure: Measure, limits: ComparisonLimits) -> ChangeVerdict:
     small = abs(found.value) < max(measure.least, limits.least_pct / 100 * abs(found.before))
     if small or found.low <= 0 <= found.high:
-        return Became.UNCLEAR
-    return Became.BETTER if (found.value < 0) == measure.lower_is_better else Became.WORSE
+        return ChangeVerdict.UNCLEAR
+    return ChangeVerdict.BETTER if (found.value < 0) == measure.lower_is_better else ChangeVerdict.WORSE
 
 
 def change_of(
@@ -242,7 +242,9 @@ def change_of(
     family = sum(m.primary == measure.primary for m in MEASURES)
     d = difference(before, after, 1 - (1 - limits.confidence) / family)
     found = Difference(*(x * measure.scale for x in (d.before, d.after, d.low, d.high)))
-    return Change(measure, found, _verdict(found, measure, limits) if comparable else Became.INCOMPARABLE)
+    return Change(
+        measure, found, _verdict(found, measure, limits) if comparable else ChangeVerdict.INCOMPARABLE
+    )
 
 
 def compare(
@@ -269,10 +271,10 @@ def compare(
 def grade(found: LoopComparison) -> Grade:
     """A loop's four verdicts as one."""
     verdicts = [c.verdict for c in found.primary]
-    better = [c for c in found.primary if c.verdict is Became.BETTER]
+    better = [c for c in found.primary if c.verdict is ChangeVerdict.BETTER]
     if found.reasons or not verdicts:
         return Grade.INCOMPARABLE
-    if Became.WORSE in verdicts:
+    if ChangeVerdict.WORSE in verdicts:
         return Grade.MIXED if better else Grade.WORSE
     if len(better) < len(verdicts):
         return Grade.PARTIAL if better else Grade.NONE

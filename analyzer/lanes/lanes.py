@@ -42,17 +42,16 @@ def _at_limit(found: Finding) -> str:
     return text if from_end_to_end else f"{text}: look at the valve's size and at what feeds it"
 
 
-def _lasting(found: Finding) -> str:
+def _side(found: Finding) -> str:
+    """On which side of SP PV stays; 'off' where the means are not known."""
     sp, pv = found.known.get("sp_mean_pct"), found.known.get("pv_mean_pct")
-    known = isinstance(sp, float) and isinstance(pv, float)
-    side = (
-        "off"
-        if not known
-        else "below"
-        if found.number("pv_mean_pct") < found.number("sp_mean_pct")
-        else "above"
-    )
-    text = f"PV stays {found.number('lasting_error_pct'):.3g} % of span {side} SP"
+    if not isinstance(sp, float) or not isinstance(pv, float):
+        return "off"
+    return "below" if pv < sp else "above"
+
+
+def _lasting(found: Finding) -> str:
+    text = f"PV stays {found.number('lasting_error_pct'):.3g} % of span {_side(found)} SP"
     if Lane.AT_LIMIT in found.lanes:
         return text
     return (

@@ -13,12 +13,12 @@ from analyzer.config import AdviceLimits
 from analyzer.loop.advice import Advice, is_known
 from analyzer.loop.assess import Assessment
 from analyzer.loop.cause import Verdict
+from analyzer.loop.cost import RECORDED, STATED, loss
 from analyzer.loop.decisions import Action, Cause, Fault, Lack, Status
 from analyzer.loop.finding import Cell, Finding, Remedy, Swing
 from analyzer.loop.identified import gain_room
 from analyzer.loop.oscillation import Oscillations
 from analyzer.loops.spec import LoopSpec
-from analyzer.pages.cost import RECORDED, STATED, loss
 from identification.estimation.hammerstein import Fit
 from identification.estimation.window import Window
 

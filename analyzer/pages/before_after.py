@@ -9,8 +9,8 @@ import numpy as np
 from analyzer.comparison.before_after import (
     LIMITS,
     MEASURES,
-    Became,
     Change,
+    ChangeVerdict,
     Grade,
     LoopComparison,
     Measure,
@@ -124,7 +124,7 @@ def _in_short(case: ChangeCase) -> tuple[Cell, ...]:
 
 
 def _change_cell(change: Change | None) -> Cell:
-    if change is None or change.verdict is Became.INCOMPARABLE or change.interval_pct is None:
+    if change is None or change.verdict is ChangeVerdict.INCOMPARABLE or change.interval_pct is None:
         return Cell("–")
     low, high = (signed(x) for x in change.interval_pct)
     return Cell(f"{signed(change.value_pct)} ({low} … {high})", change.value_pct, KINDS[change.verdict])
@@ -184,7 +184,7 @@ def per_loop_chart(cases: Sequence[ChangeCase]) -> IntervalChart:
 def _average(cases: Sequence[ChangeCase], measure: Measure) -> IntervalBar:
     """Mean of the comparable loops' changes; errors of different loops taken as independent."""
     changes = [c for case in cases for c in case.found.primary if c.measure == measure]
-    known = [c for c in changes if c.verdict is not Became.INCOMPARABLE and c.value_pct is not None]
+    known = [c for c in changes if c.verdict is not ChangeVerdict.INCOMPARABLE and c.value_pct is not None]
     group = with_noun(len(known), "loop")
     if not known:
         return IntervalBar(group, measure.short_title, None, None, None, "incomparable", "nothing comparable")
@@ -193,7 +193,13 @@ def _average(cases: Sequence[ChangeCase], measure: Measure) -> IntervalBar:
     down, up = (float(np.sqrt(((ends[:, k] - values) ** 2).sum()) / len(known)) for k in (0, 1))
     mean = float(values.mean())
     low, high = max(mean - down, -100.0), mean + up
-    verdict = Became.UNCLEAR if low <= 0 <= high else Became.BETTER if mean < 0 else Became.WORSE
+    verdict = (
+        ChangeVerdict.UNCLEAR
+        if low <= 0 <= high
+        else ChangeVerdict.BETTER
+        if mean < 0
+        else ChangeVerdict.WORSE
+    )
     text = f"{signed(mean)} %"
     return IntervalBar(group, measure.short_title, mean, low, high, KINDS[verdict], text)
 
@@ -229,7 +235,9 @@ def page(
     short += [_tiles(cases), in_short(cases)]
     if missing:
         short.append(Listing(tuple((loop, f"not looked at: {why}") for loop, why in missing)))
-    comparable = [c for c in cases if any(x.verdict is not Became.INCOMPARABLE for x in c.found.primary)]
+    comparable = [
+        c for c in cases if any(x.verdict is not ChangeVerdict.INCOMPARABLE for x in c.found.primary)
+    ]
     charts = (average_chart(cases), per_loop_chart(comparable)) if len(comparable) > 1 else ()
     sections = (
         Section("In short", tuple(short)),

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 from analyzer.comparison.before_after import (
     LIMITS,
-    Became,
     Change,
+    ChangeVerdict,
     Grade,
     LoopComparison,
     Span,
@@ -23,7 +23,7 @@ from analyzer.config import ChangeLimits, ComparisonLimits
 from analyzer.loop.decisions import counts
 from analyzer.loops.changes import TuningChange, behaviour_change, stated_changes
 from analyzer.pages.reading import Thinned, nights_within, read_hours, read_nights, read_trends
-from analyzer.pages.words import PLAIN, Row, Units, enumerated, number, units_of
+from analyzer.pages.words import PLAIN, PvScale, Row, enumerated, number, pv_scale_of
 from analyzer.store.store import Store
 from analyzer.words.units import gain_unit
 
@@ -53,7 +53,7 @@ class ChangeCase:
     units: str
     trend: Thinned | None
     wear: tuple[str, ...] = ()
-    scale: Units = PLAIN
+    scale: PvScale = PLAIN
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,14 +136,14 @@ def change_cases(
 
 def _case(change: TuningChange, result: LoopComparison, row: Row, trend: Thinned | None) -> ChangeCase:
     told = (row["description"] or "", _units(row), trend)
-    return ChangeCase(change, result, *told, wear_texts(result, row), units_of(row))
+    return ChangeCase(change, result, *told, wear_texts(result, row), pv_scale_of(row))
 
 
 def outcome(found: LoopComparison) -> str:
     """A loop's outcome in one phrase."""
     kind = grade(found)
     if kind is Grade.PARTIAL:
-        better = [c.measure.short_title.lower() for c in found.primary if c.verdict is Became.BETTER]
+        better = [c.measure.short_title.lower() for c in found.primary if c.verdict is ChangeVerdict.BETTER]
         text = f"improved only in {enumerated(better)}"
     elif kind is Grade.INCOMPARABLE:
         text = "not comparable: " + ("; ".join(found.reasons) or "no hourly figures on both sides")
@@ -166,7 +166,7 @@ def _stated(row: Row, name: str) -> float | None:
 
 def _change(found: LoopComparison, name: str) -> Change | None:
     """The change of a figure, where it is clear."""
-    unclear = (Became.INCOMPARABLE, Became.UNCLEAR)
+    unclear = (ChangeVerdict.INCOMPARABLE, ChangeVerdict.UNCLEAR)
     return next((c for c in found.changes if c.measure.name == name and c.verdict not in unclear), None)
 
 

@@ -11,8 +11,8 @@ from typing import Any
 
 from analyzer.columns import BY_NAME, GROUP_LIST, names
 from analyzer.lanes.lanes import FIGURE
+from analyzer.loop.cost import MARK, OF_RECORDED, mark
 from analyzer.loop.decisions import Lane
-from analyzer.pages.cost import MARK, OF_RECORDED, mark
 from analyzer.pages.rank import LIST_COLUMNS
 from analyzer.words.present import (
     CAUSE_STYLES,

@@ -9,14 +9,14 @@ import numpy as np
 
 from analyzer.columns import BY_NAME
 from analyzer.explain.words import agreement, title
+from analyzer.loop.cost import mark
 from analyzer.loop.decisions import CAUSES, Fault, Status
-from analyzer.pages.cost import mark
 from analyzer.pages.loop_pictures import close_span, pv_over_op, rhythm_plots, trend_block, turn_panels
 from analyzer.pages.maintenance import work_order
 from analyzer.pages.reading import Thinned
 from analyzer.pages.words import (
+    PvScale,
     Row,
-    Units,
     beside,
     cause_cell,
     cell,
@@ -24,8 +24,8 @@ from analyzer.pages.words import (
     number,
     page_columns,
     plain_cell,
+    pv_scale_of,
     titled,
-    units_of,
 )
 from analyzer.words.units import row_settings
 from identification.mismatch.words import check
@@ -97,8 +97,8 @@ def _first(row: Row, thin: Thinned | None) -> Section:
     if thin is not None and thin.time_s.size > 1:
         opening = close_span(row, thin)
         title = "SP, PV and OP" + (", the last ten periods" if opening else "")
-        blocks.append(trend_block("trend", title, thin, (), units_of(row), opening))
-    events = turn_panels(row, units_of(row))
+        blocks.append(trend_block("trend", title, thin, (), pv_scale_of(row), opening))
+    events = turn_panels(row, pv_scale_of(row))
     if events is not None:
         blocks.append(events)
     return Section("What to do", tuple(blocks))
@@ -133,7 +133,7 @@ def _evidence(row: Row) -> Section:
     return Section("Evidence", tuple(blocks))
 
 
-def _figure(name: str, row: Row, scale: Units) -> tuple[str, str]:
+def _figure(name: str, row: Row, scale: PvScale) -> tuple[str, str]:
     """A figure with its unit, and in the loop's own unit too where it is a percentage of span."""
     term, text = titled(name, number(row[name]) + mark(row, name))
     own = "" if name in LEVELS else beside(BY_NAME[name].unit, row[name], scale)
@@ -234,7 +234,7 @@ def page(
 
 def _figures(row: Row) -> Section:
     """The figures of the night that are known, folded."""
-    scale = units_of(row)
+    scale = pv_scale_of(row)
     figures = tuple(_figure(k, row, scale) for k in FIGURES if row[k] is not None)
     return Section("Figures of the night, for experts", (Facts(figures),), closed=True)
 

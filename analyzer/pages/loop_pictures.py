@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from analyzer.pages.reading import Thinned
-from analyzer.pages.words import PLAIN, Row, Units, duration, texts, units_of
+from analyzer.pages.words import PLAIN, PvScale, Row, duration, pv_scale_of, texts
 from identification.record import Mask
 from identification.signals.correlation import lag_sums
 from reports.pages import Band, Floats, Line, Mark, Panels, Plot, Sparkline, Text, Trend
@@ -46,7 +46,7 @@ def trend_block(
     title: str,
     thin: Thinned,
     marks: Sequence[Mark] = (),
-    scale: Units = PLAIN,
+    scale: PvScale = PLAIN,
     opening: tuple[float, float] | None = None,
 ) -> Trend:
     """SP, PV over OP on linked axes, in the loop's own unit, opened on a span of time where one is named."""
@@ -72,7 +72,7 @@ def sparkline(thin: Thinned, span: tuple[float, float] | None = None) -> Sparkli
     return Sparkline(known.extremes["pv_min"][shown], known.extremes["pv_max"][shown])
 
 
-def _held(middle: float, scale: Units) -> tuple[float, float]:
+def _held(middle: float, scale: PvScale) -> tuple[float, float]:
     """Ends that an axis of PV around a value reaches at least."""
     half = 0.5 * LEAST_PCT * scale.span / 100.0
     return middle - half, middle + half
@@ -80,7 +80,7 @@ def _held(middle: float, scale: Units) -> tuple[float, float]:
 
 def pv_over_op(thin: Thinned, row: Row) -> Plot:
     """The plane of PV over OP, of the ten periods where the night names them."""
-    scale, close = units_of(row), close_span(row, thin)
+    scale, close = pv_scale_of(row), close_span(row, thin)
     part = thin.between(*close) if close else thin
     pv, op = scale.of(part.middle("pv")[~part.gap]), part.middle("op")[~part.gap]
     line = Line("PV over OP", op, pv, joined=close is not None)
@@ -141,7 +141,7 @@ def _spectrum(error: Floats, step: float, period_s: float | None) -> Plot:
     return Plot("spectrum", "Spectrum of the error", "cycles per hour", "% of power", (line,), marks, caption)
 
 
-def turn_panels(row: Row, scale: Units) -> Panels | None:
+def turn_panels(row: Row, scale: PvScale) -> Panels | None:
     """A night's half-cycles laid over one another from each turn of OP, and the plane of PV over OP; None where the
     night kept none."""
     kept = json.loads(row.get("turns") or "null")
@@ -175,7 +175,7 @@ class _HalfCycle:
     stuck: slice
 
     @classmethod
-    def of(cls, kept: Row, scale: Units, step_s: float) -> _HalfCycle:
+    def of(cls, kept: Row, scale: PvScale, step_s: float) -> _HalfCycle:
         """As the store kept it."""
         op, pv, late = (np.array(kept[name], dtype=np.float64) for name in ("op", "pv", "late"))
         first, last = kept["stuck"]

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from analyzer.columns import BY_NAME
+from analyzer.loop.cost import MARK, OF_RECORDED, SIGNIFICANCE, cost_column, mark
 from analyzer.loop.decisions import CAUSES, Cause, Status
 from analyzer.pages import maintenance
-from analyzer.pages.cost import MARK, OF_RECORDED, SIGNIFICANCE, cost_column, mark
 from analyzer.pages.groups import morning_table
 from analyzer.pages.loop_pictures import close_span, sparkline
 from analyzer.pages.news import since

@@ -9,8 +9,8 @@ from datetime import date
 import numpy as np
 
 from analyzer.columns import BY_NAME
+from analyzer.loop.cost import LOSS, SIGNIFICANCE, cost, cost_column
 from analyzer.loop.decisions import CAUSES, Cause, Status, counts
-from analyzer.pages.cost import LOSS, SIGNIFICANCE, cost, cost_column
 from analyzer.pages.reading import ShownNight, linked, needs_a_look, read_nights
 from analyzer.pages.words import Row, number, page_columns, plain_cell
 from analyzer.store.store import Store

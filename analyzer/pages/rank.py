@@ -8,8 +8,8 @@ from typing import Any
 
 from analyzer.columns import BY_NAME, LISTED, NOTED, RANKING, names
 from analyzer.lanes.lanes import FIGURE, lanes_in
+from analyzer.loop.cost import LOSS, SIGNIFICANCE, compares, cost_column
 from analyzer.loop.decisions import Cause, Due, Lane
-from analyzer.pages.cost import LOSS, SIGNIFICANCE, compares, cost_column
 from analyzer.store import notes
 from analyzer.store.notes import Note
 from analyzer.store.store import Store

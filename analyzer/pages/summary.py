@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from analyzer.lanes.lanes import lanes_in
+from analyzer.loop.cost import cost, cost_column
 from analyzer.loop.decisions import CAUSES, Action, Cause, Due, Fault, GroupRole, Lane, Status
-from analyzer.pages.cost import cost, cost_column
 from analyzer.pages.maintenance import work_order
 from analyzer.pages.news import news_lines
 from analyzer.pages.reading import ShownNight, needs_a_look, oscillates, read_night

@@ -10,10 +10,10 @@ from importlib.resources import files
 from typing import Any
 
 from analyzer.columns import BY_NAME
-from analyzer.comparison.before_after import Became, Change
+from analyzer.comparison.before_after import Change, ChangeVerdict
 from analyzer.history.plant_clock import stamp
+from analyzer.loop.cost import mark
 from analyzer.loop.decisions import CAUSES
-from analyzer.pages.cost import mark
 from analyzer.words.units import duration
 from reports.pages import Cell, Column, Floats
 
@@ -21,10 +21,10 @@ __all__ = ["duration", "stamp"]  # of the words that are not chosen here
 
 Row = Mapping[str, Any]
 KINDS = {
-    Became.BETTER: "better",
-    Became.WORSE: "worse",
-    Became.UNCLEAR: "unclear",
-    Became.INCOMPARABLE: "incomparable",
+    ChangeVerdict.BETTER: "better",
+    ChangeVerdict.WORSE: "worse",
+    ChangeVerdict.UNCLEAR: "unclear",
+    ChangeVerdict.INCOMPARABLE: "incomparable",
 }
 """Colour of each verdict."""
 
@@ -131,7 +131,7 @@ def cause_cell(cause: str | None) -> Cell:
 
 
 @dataclass(frozen=True, slots=True)
-class Units:
+class PvScale:
     """What percent of span means for a loop: PV at 0 %, the span, and the unit; '' for one that is not stated."""
 
     low: float
@@ -149,19 +149,19 @@ class Units:
 
 
 PERCENT = "% of span"
-PLAIN = Units(0.0, 100.0, PERCENT)
+PLAIN = PvScale(0.0, 100.0, PERCENT)
 """Percent as it is, where the night does not say what it means."""
 
 
-def units_of(row: Row) -> Units:
+def pv_scale_of(row: Row) -> PvScale:
     """What percent means in a row of the night."""
     low, high = row.get("pv_lo"), row.get("pv_hi")
     if low is None or high is None or not high > low:
         return PLAIN
-    return Units(low, high - low, row["pv_unit"] or "")
+    return PvScale(low, high - low, row["pv_unit"] or "")
 
 
-def beside(name_unit: str, value: float | None, scale: Units) -> str:
+def beside(name_unit: str, value: float | None, scale: PvScale) -> str:
     """A figure in % of span in the loop's own unit too, in brackets; '' where that says nothing new."""
     if value is None or name_unit != PERCENT or not scale.unit or scale is PLAIN:
         return ""

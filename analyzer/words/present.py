@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from analyzer.columns import BY_NAME
+from analyzer.loop.cost import LOSS, cost_column, mark
 from analyzer.loop.decisions import Cause
-from analyzer.pages.cost import LOSS, cost_column, mark
 from analyzer.words.units import duration, gain_unit
 from reports.texts import visible
 

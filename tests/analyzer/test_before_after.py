@@ -9,7 +9,7 @@ from analyzer.comparison.before_after import (
     HOUR_S,
     LIMITS,
     MEASURES,
-    Became,
+    ChangeVerdict,
     Span,
     compare,
     follows,
@@ -38,7 +38,7 @@ def hours(factor: float = 1.0, seed: int = 0, **after: float) -> dict[str, np.nd
     return found
 
 
-def compared(found: dict[str, np.ndarray]) -> list[Became]:
+def compared(found: dict[str, np.ndarray]) -> list[ChangeVerdict]:
     """Verdicts on the study's four."""
     return [c.verdict for c in compare("L", found, *spans_around(CHANGED_S, 7)).primary]
 
@@ -46,7 +46,7 @@ def compared(found: dict[str, np.ndarray]) -> list[Became]:
 def test_halved_figures_are_better() -> None:
     """Figures that halve are called better, all four, and the interval holds the true change."""
     found = compare("L", hours(0.5), *spans_around(CHANGED_S, 7))
-    assert [c.verdict for c in found.primary] == [Became.BETTER] * 4
+    assert [c.verdict for c in found.primary] == [ChangeVerdict.BETTER] * 4
     assert grade(found) == "clear"
     for change in found.primary:
         low, high = change.interval_pct or (0.0, 0.0)
@@ -55,14 +55,14 @@ def test_halved_figures_are_better() -> None:
 
 def test_doubled_figures_are_worse() -> None:
     """Figures that double are called worse."""
-    assert compared(hours(2.0)) == [Became.WORSE] * 4
+    assert compared(hours(2.0)) == [ChangeVerdict.WORSE] * 4
 
 
 def test_service_is_better_when_higher() -> None:
     """A higher effective service factor is better, not worse."""
     found = compare("L", hours(1.5), *spans_around(CHANGED_S, 7))
     service = next(c for c in found.changes if c.measure.name == "service_pct")
-    assert service.verdict is Became.BETTER
+    assert service.verdict is ChangeVerdict.BETTER
 
 
 def test_small_improvements_are_modest() -> None:
@@ -84,7 +84,7 @@ def test_small_improvements_are_modest() -> None:
 def test_incomparable_spans_are_not_counted(column: str, value: float, said: str) -> None:
     """A week at another set point, level, load, mode, travel or at a limit gives no verdict, and says why."""
     found = compare("L", hours(0.5, **{column: value}), *spans_around(CHANGED_S, 7))
-    assert {c.verdict for c in found.changes} == {Became.INCOMPARABLE}
+    assert {c.verdict for c in found.changes} == {ChangeVerdict.INCOMPARABLE}
     assert any(said in reason for reason in found.reasons)
     assert grade(found) == "incomparable"
 
@@ -169,7 +169,7 @@ def test_unchanged_plants_are_called_unchanged() -> None:
     found = [f for f, _ in examined(12, 1, first=5000)]
     calls = [c.verdict for f in found for c in f.primary]
     assert len(calls) == 48
-    assert sum(c in (Became.BETTER, Became.WORSE) for c in calls) <= 2
+    assert sum(c in (ChangeVerdict.BETTER, ChangeVerdict.WORSE) for c in calls) <= 2
 
 
 def test_constant_figures_do_not_change() -> None:
@@ -179,7 +179,7 @@ def test_constant_figures_do_not_change() -> None:
         found[m.name] = np.full(2 * WEEK, 0.0 if m.primary else 5.0)
     found["at_limits_pct"] = np.zeros(2 * WEEK)
     result = compare("L", found, *spans_around(CHANGED_S, 7))
-    assert {c.verdict for c in result.changes} == {Became.UNCLEAR}
+    assert {c.verdict for c in result.changes} == {ChangeVerdict.UNCLEAR}
     assert all(c.value_pct is None for c in result.primary)
 
 

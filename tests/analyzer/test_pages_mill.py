@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from analyzer.comparison.before_after import Became, grade
+from analyzer.comparison.before_after import ChangeVerdict, grade
 from analyzer.config import Config
 from analyzer.history.export import ReadOptions, open_export
 from analyzer.loops.changes import read_changes
@@ -60,7 +60,7 @@ def test_loop_1_improves_modestly(found: dict[str, ChangeCase]) -> None:
 def test_loop_3_improves_only_in_travel(found: dict[str, ChangeCase]) -> None:
     """Loop 3 improves in valve travel alone, and its neighbour is named as the cause, as in the study."""
     case = found["LIC2103"].found
-    better = [c.measure.name for c in case.primary if c.verdict is Became.BETTER]
+    better = [c.measure.name for c in case.primary if c.verdict is ChangeVerdict.BETTER]
     assert better == ["valve_travel_pct_per_h"]
     assert case.source_loop == "FIC2110"
     assert "FIC2110" in before_after.outcome(case)
@@ -72,7 +72,7 @@ def test_untouched_loops_do_not_change(store: Store) -> None:
     known, _ = change_cases(store, [replace(moment, loop=loop) for loop in OTHERS], Spans())
     calls = {c.found.loop: {x.verdict for x in c.found.primary} for c in known}
     assert len(calls) == len(OTHERS)
-    assert all(v <= {Became.UNCLEAR, Became.INCOMPARABLE} for v in calls.values())
+    assert all(v <= {ChangeVerdict.UNCLEAR, ChangeVerdict.INCOMPARABLE} for v in calls.values())
 
 
 def test_changes_are_offered_where_there_were_some(store: Store) -> None:

@@ -15,7 +15,7 @@ from analyzer.pages.changes import Spans, change_cases, detected, wear_texts
 from analyzer.pages.loop_pictures import autocorrelation, rhythm_plots, turn_panels
 from analyzer.pages.plant import score
 from analyzer.pages.reading import read_hours, read_night, read_trends
-from analyzer.pages.words import Units
+from analyzer.pages.words import PvScale
 from analyzer.store.store import Store
 from identification.errors import InputError
 from reports import html
@@ -218,7 +218,7 @@ def test_half_cycles_are_drawn_in_the_loops_unit() -> None:
     }
     down = {**up, "op": [16, 14, 12, 10], "pv": [52, 52, 52, 50], "late": [52, 52, 50, 48]}
     row = {"turns": json.dumps({"step_s": 6.0, "dead_s": 6.0, "halves": [up, down]}), "cause": "valve"}
-    drawn = turn_panels(row, Units(0.0, 200.0, "m3/h"))
+    drawn = turn_panels(row, PvScale(0.0, 200.0, "m3/h"))
     assert drawn is not None
     over_op, over_pv, plane = drawn.plots
     assert [line.y.tolist() for line in over_op.lines if line.kind == "pv"] == [[0, 2, 4, 6]] * 2
@@ -229,4 +229,4 @@ def test_half_cycles_are_drawn_in_the_loops_unit() -> None:
         [16, 14, 12, 10],
     ]
     assert "m3/h" in plane.y_label
-    assert turn_panels({"turns": None, "cause": "valve"}, Units(0.0, 1.0, "")) is None
+    assert turn_panels({"turns": None, "cause": "valve"}, PvScale(0.0, 1.0, "")) is None
