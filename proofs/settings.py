@@ -1,63 +1,93 @@
 """Are stated settings told from the controller's where they differ? python -m proofs.settings [--seed 71 72]
 
-Loops of the retuning proof's plants, whose physics and controllers share no code with the package, are recorded with
-the settings stated as they are, and with the gain or the integral time stated wrong. Writes settings.md here.
+Controllers of many kinds (proofs/settings_plant.py, which shares no code with the package) are recorded with the
+settings stated as they are, and stated wrong. Writes settings.md here.
 """
 
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+import pandas as pd
+
 from analyzer.config import Config
 from analyzer.history.export import open_export
+from analyzer.loop.judged_stretch import controller_of
 from analyzer.loop.measure import time_scale
 from analyzer.loop.oscillation import counting, detect
 from analyzer.loop.quality import prepare
 from analyzer.loop.settings_check import differing
-from analyzer.loops.tags import controller, match, read_loops
+from analyzer.loops.tags import match, read_loops
+from identification.models import Pid
 from proofs.common import command, command_line, publish, table
-from proofs.retuning import COUNTS, write_export, write_loops
-from proofs.retuning_plant import drawn
+from proofs.settings_plant import recordings
 
-STATED = ((1.0, 1.0), (2.0, 1.0), (0.5, 1.0), (1.3, 1.0), (1.0, 3.0), (1.0, 1 / 3))
-"""What gain and integral time are stated as, over the true ones [-]."""
+STATED: dict[str, Callable[[Pid], Pid]] = {
+    "as they are": lambda c: c,
+    "Kp times 2.5, Ti times 3": lambda c: replace(c, kp=2.5 * c.kp, ti_s=3 * c.ti_s, td_s=c.td_s),
+    "Kp times 2.5": lambda c: replace(c, kp=2.5 * c.kp),
+    "Kp over 2.5": lambda c: replace(c, kp=c.kp / 2.5),
+    "Kp times 1.4": lambda c: replace(c, kp=1.4 * c.kp),
+    "Ti times 3": lambda c: replace(c, ti_s=3 * c.ti_s),
+    "Ti over 3": lambda c: replace(c, ti_s=c.ti_s / 3),
+    "without Td": lambda c: replace(c, td_s=0.0),
+    "sign turned": lambda c: replace(c, kp=-c.kp),
+}
+"""What the controller is stated to be."""
 
 
-def told(seed: int) -> list[list[bool]]:
-    """For each loop of a seed, whether settings stated so are told as others."""
-    config, rigs = Config(), list(drawn(seed, COUNTS))
+def told(seed: int, count: int) -> list[tuple[str, dict[str, bool]]]:
+    """For each loop of a seed its kind, and whether each way to state its settings is told as wrong."""
+    config, made = Config(), recordings(seed, count)
     out = []
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        (folder / "trends").mkdir()
-        for rig in rigs:
-            write_export(rig, folder / "trends")
-        write_loops(rigs, folder / "loops.csv")
-        export = open_export([folder / "trends"])
-        for spec in match(read_loops(folder / "loops.csv"), export.tags)[0]:
+        for r in made:
+            (folder / r.tag).mkdir()
+            r.trends.to_parquet(folder / r.tag / "trends.parquet")
+        pd.DataFrame([r.row for r in made]).to_csv(folder / "loops.csv", index=False)
+        specs = {s.loop: s for s in read_loops(folder / "loops.csv")}
+        for r in made:
+            export = open_export([folder / r.tag])
+            (spec,), *_ = match([specs[r.tag]], export.tags)
             p = prepare(spec, export.read(spec.tags), config.quality)
-            true = controller(spec, p.scale.span)
+            true = controller_of(spec, p)
             assert true is not None
             first = counting(detect(p.record, config.oscillation))
-            wrong = [replace(true, kp=true.kp * k, ti_s=true.ti_s * t) for k, t in STATED]
-            scales = [time_scale(p.record, first, c) for c in wrong]
-            found = [differing(p.record, c, s, config.settings) for c, s in zip(wrong, scales, strict=True)]
-            out.append([f is not None for f in found])
+            found = {}
+            for label, change in STATED.items():
+                stated = change(true)
+                if stated == true and label != "as they are":
+                    continue
+                scale = time_scale(p.record, first, stated)
+                found[label] = differing(p.record, stated, scale, config.settings) is not None
+            out.append((r.kind, found))
     return out
 
 
 def main() -> None:
     """Count over all loops of some seeds and write the table."""
-    seeds = command_line(__doc__, seed=[71, 72]).seed
-    rows = [row for seed in seeds for row in told(seed)]
-    counts = (
-        (f"{k:.3g}", f"{t:.3g}", f"{sum(row[i] for row in rows)} of {len(rows)}")
-        for i, (k, t) in enumerate(STATED)
+    asked = command_line(__doc__, seed=[71, 72], loops=60)
+    rows = [row for seed in asked.seed for row in told(seed, asked.loops)]
+    kinds = sorted({kind for kind, _ in rows})
+
+    def cells(label: str) -> list[str]:
+        each = [[f[label] for kind, f in rows if kind in of and label in f] for of in ([k] for k in kinds)]
+        each.append([x for some in each for x in some])
+        return [label, *(f"{sum(x)} of {len(x)}" if x else "" for x in each)]
+
+    text = table(f"stated | {' | '.join(kinds)} | all", map(cells, STATED))
+    publish(
+        __file__,
+        "Are stated settings those of the controller?",
+        command(__file__, seed=asked.seed, loops=asked.loops),
+        "Loops of which the stated settings are told as not the controller's; of the first row each one is a false "
+        "alarm.",
+        text,
     )
-    text = table("Kp stated over true | Ti stated over true | told as others", counts)
-    publish(__file__, "Are stated settings those of the controller?", command(__file__, seed=seeds), text)
 
 
 if __name__ == "__main__":

@@ -14,7 +14,8 @@ import numpy as np
 
 from analyzer.explain.case import Case
 from analyzer.explain.models import Brought, judged, plain_start, saved_model, span_note
-from identification.controller.pi_regression import ControlLaw, integral_time
+from identification.controller.pi_regression import ControlLaw
+from identification.controller.pid_regression import integral_time
 from identification.mismatch.answer import Answer, answer
 from identification.mismatch.diagnosis import explain
 from identification.mismatch.explanation import Explanation

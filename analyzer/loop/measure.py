@@ -10,7 +10,7 @@ import numpy as np
 from analyzer.config import CauseLimits
 from analyzer.loop.assessments import at_limits_share, noise_band
 from analyzer.loop.oscillation import Oscillation
-from identification.controller.pi_regression import fit_pi
+from identification.controller.pid_regression import fit_pi
 from identification.errors import NotAssessedError
 from identification.estimation.backlash_stiction import (
     SCREENED,

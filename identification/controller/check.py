@@ -11,11 +11,11 @@ import numpy as np
 from identification.controller.pi_regression import (
     ControlLaw,
     centred,
-    integral_time,
     recovered_law,
     span_length,
     trusted,
 )
+from identification.controller.pid_regression import integral_time
 from identification.limits import LIMITS, ControllerLimits
 from identification.record import Floats, Mask
 from identification.simulation.lag import first_order

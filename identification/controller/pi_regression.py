@@ -1,32 +1,20 @@
-"""The PI law that gives OP from SP and PV: two ways to be rid of a bias that drifts, and one regression.
+"""The PI law that gives OP from SP and PV, by levels over spans of an integral time.
 
-By increments over an eighth of a period, drifts of the bias cancel in each and a whole night costs one pass; a filter
-of PV may stand before the law. By levels over spans of an integral time, each with a constant of its own, kp and Ti
-come without the bias that increments of rounded trends bring, and with PV's lateness.
+Each span has a constant of its own; kp and Ti come without the bias that increments of rounded trends bring
+(pid_regression.py), and with PV's lateness and the filter before the controller.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
-from typing import NamedTuple
+from dataclasses import dataclass, field
 
 import numpy as np
-from numba import njit
 
 from identification.limits import LIMITS, ControllerLimits
-from identification.record import Floats, LoopRecord, Mask
+from identification.record import Floats, Mask
 from identification.simulation.lag import first_order
 
-LONGEST_INTEGRAL = 10.0
-"""Integral time, in lengths of the record, from which there is no integral action; ours: over the record it gives a
-tenth of what the gain gives."""
-PV_FILTERS = (0.0, 1.0, 2.0, 3.0, 5.0, 8.0, 13.0, 21.0)
-"""Filters of the controller's PV that are tried [samples]; ours: none is far from one of them."""
-FILTER_WORTH = 0.05
-"""Share of the variance of OP's increments that a longer filter must explain more, to be taken [-]; ours."""
-LONGEST_FILTER = 1.0 / 6.0
-"""Longest filter tried, as a share of the period [-]; beyond it the filter, not the law, would be fitted."""
 SHIFTS = (-2.0, -1.0, 0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0)
 """Latenesses of PV that are tried [samples]."""
 FILTERS = (0.5, 1.0, 2.0, 4.0, 8.0)
@@ -39,130 +27,6 @@ OWN = (1, 2, 3)
 """Moves of OP's own past by which its next is foretold; ours."""
 SEEN = (1, 2, 4, 8)
 """Samples back from which PV's way to now is looked at; ours: as far as a proportional action reaches."""
-
-
-class Products(NamedTuple):
-    """Sums over what is regressed of products of the error (e), of its integral (s) and of OP (m), each without its
-    constant, and how many samples they are of."""
-
-    ee: float
-    es: float
-    ss: float
-    em: float
-    sm: float
-    mm: float
-    used: int
-
-    def explained(self, kp: float, ki: float) -> float:
-        """Share of OP's variance that a law gives [-]."""
-        given = kp * self.em + ki * self.sm
-        squared = kp * kp * self.ee + 2 * kp * ki * self.es + ki * ki * self.ss
-        return (2 * given - squared) / self.mm
-
-    @property
-    def law(self) -> tuple[float, float]:
-        """kp and ki of least squares."""
-        scale = np.sqrt(np.array([self.ee, self.ss]) / max(self.used, 1)) + 1e-300
-        gram = np.array([[self.ee, self.es], [self.es, self.ss]]) / np.outer(scale, scale)
-        kp, ki = np.linalg.lstsq(gram, np.array([self.em, self.sm]) / scale, rcond=None)[0] / scale
-        return float(kp), float(ki)
-
-
-def integral_time(kp: float, ki: float, record_s: float) -> float:
-    """Integral time [s] of a law, inf where its integral does next to nothing in a record of so many seconds."""
-    ti = kp / ki if ki != 0 and kp / ki > 0 else math.inf
-    return ti if ti < LONGEST_INTEGRAL * record_s else math.inf
-
-
-@dataclass(frozen=True, slots=True)
-class ControllerFit:
-    """PI settings found from a record: kp [% OP / % PV], ti_s [s] (inf where no integral action is seen), and the
-    shares of the variance of OP's increments that they give, and that given settings give beside them [-]."""
-
-    kp: float
-    ti_s: float
-    explained: float
-    explained_given: float = 0.0
-
-
-@njit(cache=True)
-def _summed(
-    e: Floats, op: Floats, out_of_law: Mask, dt_s: float, step: int
-) -> tuple[float, float, float, float, float, float, int]:
-    """The sums of `Products` over increments of `step` samples that span none that is out of the law."""
-    ee, es, ss, em, sm, mm, count = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0
-    since, total, mean = 0, 0.0, e.mean()
-    for k in range(e.size):
-        since = 0 if out_of_law[k] else since + 1
-        total += e[k] - mean
-        if k < step:
-            continue
-        total -= e[k - step] - mean
-        if since <= step:
-            continue
-        d, i, m = e[k] - e[k - step], (total + step * mean) * dt_s, op[k] - op[k - step]
-        ee, es, ss = ee + d * d, es + d * i, ss + i * i
-        em, sm, mm, count = em + d * m, sm + i * m, mm + m * m, count + 1
-    return ee, es, ss, em, sm, mm, count
-
-
-def increments(record: LoopRecord, error: Floats, period_s: float) -> Products | None:
-    """Increments of the error and its integral beside those of OP, over an eighth of a period.
-
-    An increment of OP over m samples is kp times that of e plus kp/ti times the integral of e between; over an eighth
-    of a period both are large against the resolution of the trends, and drifts of a bias cancel. None where OP or the
-    error never moves, or too little of the record is in automatic.
-    """
-    step = max(round(period_s / 8 / record.dt_s), 1)
-    if len(record) < 10 * step + 50:
-        return None
-    out_of_law = record.bad | record.mask("manual") | record.mask("saturated")
-    found = Products(*_summed(error, record.op, out_of_law, record.dt_s, step))
-    if found.used < 50 or found.mm <= 0 or float(np.ptp(error)) == 0.0:
-        return None
-    return found
-
-
-def fit_pi(record: LoopRecord, period_s: float) -> ControllerFit | None:
-    """PI settings by least squares on increments; period_s : period, or other time scale on which the loop moves [s].
-
-    None where OP or the error never moves, or too little of the record is in automatic.
-    """
-    found = increments(record, record.error, period_s)
-    return None if found is None else _fit_of(found, record)
-
-
-def _fit_of(x: Products, record: LoopRecord) -> ControllerFit:
-    kp, ki = x.law
-    return ControllerFit(kp, integral_time(kp, ki, record.duration_s), x.explained(kp, ki))
-
-
-def compare_laws(
-    record: LoopRecord, period_s: float, kp: float, ti_s: float, alike: float = 0.0
-) -> ControllerFit | None:
-    """Given settings and the best ones for the record, a PV filter allowed to both.
-
-    Many controllers act on a filtered PV while the raw one is recorded. Left out, a filter of a tenth of the period
-    passes for half the gain and a third of the integral time.
-
-    period_s : period, or other time scale on which the loop moves [s]; kp, ti_s : the given settings [% OP / % PV],
-    [s]; ti_s may be inf; alike : difference of the shares explained below which no filter is tried: the given
-    settings do [-]. None where the record tells no settings.
-    """
-    best, given, error = None, -math.inf, record.error
-    for samples in PV_FILTERS:
-        if samples * record.dt_s > LONGEST_FILTER * period_s:
-            break
-        found = increments(record, first_order(error, samples), period_s)
-        if found is None:
-            return None
-        free = _fit_of(found, record)
-        needed = -math.inf if best is None else best.explained + FILTER_WORTH
-        best = free if best is None or free.explained > needed else best
-        given = max(given, found.explained(kp, kp / ti_s))
-        if best.explained - given < alike:
-            break
-    return None if best is None else replace(best, explained_given=given)
 
 
 @dataclass(frozen=True, slots=True)
@@ -207,8 +71,10 @@ def regress(e: Floats, op: Floats, length: int, keep: Mask) -> tuple[float, floa
     """kp, ki and residual of OP on e and its sum, each span with a constant of its own."""
     rows = np.stack([centred(e, length), centred(np.cumsum(e), length), centred(op, length)])
     use = keep[: rows.shape[1]]
-    (ee, es, em), (_, ss, sm), (*_, mm) = (rows * use) @ rows.T
-    kp, ki = Products(ee, es, ss, em, sm, mm, int(use.sum())).law
+    gram = (rows * use) @ rows.T
+    scale = np.sqrt(np.diag(gram)[:2]) + 1e-300
+    both = gram[:2, :2] / np.outer(scale, scale)
+    kp, ki = (float(x) for x in np.linalg.lstsq(both, gram[:2, 2] / scale, rcond=None)[0] / scale)
     return kp, ki, rows[2] - kp * rows[0] - ki * rows[1]
 
 

@@ -11,7 +11,7 @@ from analyzer.loop.conclusion import stated
 from analyzer.loops.spec import LoopSpec
 from analyzer.words.present import brief
 from analyzer.words.units import gain_unit
-from identification.controller.pi_regression import fit_pi
+from identification.controller.pid_regression import fit_pi
 from identification.models import Fopdt, Loop, Pid
 from identification.simulation.closed_loop import closed_loop
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.controller.pi_regression import fit_pi
+from identification.controller.pid_regression import fit_pi
 from identification.models import Backlash, Fopdt, Loop, Pid
 from identification.record import LoopRecord
 from identification.simulation.closed_loop import closed_loop

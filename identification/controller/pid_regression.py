@@ -1,0 +1,295 @@
+"""One regression of a controller's law on increments: OP's moves over many lengths of time beside those of the error,
+of its integral and of its slope.
+
+Increments cancel drifts of a bias, and what spans a limit, a hole or time in manual is left out. Short ones show the
+proportional and the derivative action, long ones the integral; rounding spoils both, so each length counts by what
+the law explains there. Of what no list states (a filter of PV, one of the slope, whether set point moves act on
+gain and derivative, one sample between PV's stamp and OP's) every law takes what suits it best, a stated one too.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+
+from identification.models import Pid
+from identification.record import Floats, LoopRecord, Mask
+from identification.simulation.lag import first_order
+
+LONGEST_INTEGRAL = 10.0
+"""Integral time, in lengths of the record, from which there is no integral action; ours: over the record it gives a
+tenth of what the gain gives."""
+PV_FILTERS = (0.0, 1.0, 2.0, 3.0, 5.0, 8.0, 13.0, 21.0)
+"""Filters of the controller's PV that are tried [samples]; ours: none is far from one of them."""
+LONGEST_FILTER = 1.0 / 6.0
+"""Longest filter tried, as a share of the period [-]; beyond it the filter, not the law, would be fitted."""
+SLOPE_FILTERS = (0.0, 2.0, 8.0)
+"""Filters of the slope that are tried [samples]; ours."""
+MORE_SLOPE_FILTERS = (0.35, 0.7, 1.2, 4.0)
+"""Those that are tried as well where a derivative is stated [samples]; ours."""
+ON_ERROR = ((1.0, 1.0), (1.0, 0.0), (0.0, 0.0))
+"""What gain and derivative take of the set point's moves: the usual three [-]."""
+LONGER = 4
+"""Factor between lengths of increments; ours."""
+REACH = 4
+"""Longest increments, in integral times: beyond it the integral gathers PV's rounding rather than errors; ours."""
+FEWEST = 50
+"""Increments from which a length counts; ours."""
+CLAMPED = 4
+"""How many times oftener OP stands at a clamp than at the next value: a sine does so 2.4 times [-]."""
+LEAST_AT_END = 5
+"""Samples at the next value that are added, for those of an OP without steps are one each; ours."""
+FEWEST_LEVELS = 8
+"""Values of OP from which its ends are told from its steps; ours."""
+TELLING = 0.5
+"""Share of OP's increments that the best law explains, from which a length of them tells a law [-]; ours."""
+AS_WELL = 1.15
+"""What a law with fewer settings of its own may leave over the freest; ours: the simplest such is the answer."""
+ENOUGH = 1.25
+"""What a stated law may leave over the freest, where that gives OP, to be in force without further question; ours."""
+GIVES = 0.1
+"""What the freest law leaves at some length where it gives OP [-]; ours."""
+WORTH = 0.1
+"""Logarithm of what a filter, or another of the law's usual ways, must take off what is left, to be taken; ours."""
+SMALL = 0.01
+"""Share of OP's variance under which what is left is of scans and rounding, and of no law [-]; ours."""
+
+
+@dataclass(frozen=True, slots=True)
+class Moves:
+    """Mean products of increments over so many samples of error, integral, slope and OP, shape (4, 4), and the mean
+    square by which the integral is unsure, for the controller scans between the samples [(% s)^2]."""
+
+    products: Floats
+    samples: int
+    unsure: float
+
+    def explained(self, gains: Floats) -> float:
+        """Share of OP's variance that gains of error, integral and slope give, shape (3,) [-]."""
+        law = np.append(-gains, 1.0)
+        return 1.0 - float(law @ self.products @ law) / float(self.products[3, 3])
+
+    def blurred(self, gains: Floats) -> float:
+        """Share of OP's variance that the true law would leave for its integral being unsure [-]."""
+        return float(gains[1] ** 2 * self.unsure / self.products[3, 3])
+
+
+@dataclass(frozen=True, slots=True)
+class ControllerFit:
+    """PI settings found from a record: kp [% OP / % PV], ti_s [s] (inf where no integral action is seen), and the
+    share of the variance of OP's increments that they give [-]."""
+
+    kp: float
+    ti_s: float
+    explained: float
+
+
+@dataclass(frozen=True, slots=True)
+class LawsCompared:
+    """A law found beside a stated one, over the increments that tell most against the stated: the shares of OP's
+    variance that each explains there [-]."""
+
+    found: Pid
+    explained: float
+    explained_stated: float
+
+    @property
+    def left(self) -> float:
+        """What the stated law leaves over what the found one does [-]."""
+        return (1.0 - self.explained_stated) / max(1.0 - self.explained, 1e-9)
+
+
+def integral_time(kp: float, ki: float, record_s: float) -> float:
+    """Integral time [s] of a law, inf where its integral does next to nothing in a record of so many seconds."""
+    ti = kp / ki if ki != 0 and kp / ki > 0 else math.inf
+    return ti if ti < LONGEST_INTEGRAL * record_s else math.inf
+
+
+def moves(
+    columns: Floats, out_of_law: Mask, samples: int, step: int = 1, level: bool = False
+) -> Moves | None:
+    """Increments over so many samples, begun every `step`, of the columns, shape (n, 5), that span none that is out
+    of the law; `level`: less their means, for a constant error of PV's makes the integral run away."""
+    since = np.cumsum(out_of_law)
+    inside = since[samples::step] == since[:-samples:step]
+    inside &= ~out_of_law[:-samples:step]
+    rows = (columns[samples::step] - columns[:-samples:step])[inside]
+    if len(rows) < FEWEST:
+        return None
+    rows = rows - rows.mean(axis=0) if level else rows
+    products = rows.T @ rows / len(rows)
+    if not (products[3, 3] > 0 and products[0, 0] > 0):
+        return None
+    return Moves(products[:4, :4], samples, float(products[4, 4]))
+
+
+def _columns(record: LoopRecord, error: Floats, slope: Floats | None = None) -> Floats:
+    """Error, integral [% s], slope [% / s], OP, and what the integral of every second sample lacks, shape (n, 5)."""
+    none = np.zeros(error.size) if slope is None else slope
+    coarser = np.repeat(error[::2], 2)[: error.size]
+    whole, lacking = np.cumsum(error) * record.dt_s, np.cumsum(error - coarser) * record.dt_s
+    return np.column_stack((error, whole, none, record.op, lacking))
+
+
+def clamped(op: Floats) -> Mask:
+    """True where OP rests at an end of its own that it keeps to, shape (n,): one at which it stands far oftener than
+    at the next value, which no wave does."""
+    levels, counts = np.unique(op, return_counts=True)
+    ends = [
+        levels[end]
+        for end, next_to in ((0, 1), (-1, -2))
+        if levels.size > FEWEST_LEVELS and counts[end] > CLAMPED * (counts[next_to] + LEAST_AT_END)
+    ]
+    return np.isin(op, ends)
+
+
+def _out_of_law(record: LoopRecord) -> Mask:
+    return record.bad | record.mask("manual") | record.mask("saturated")
+
+
+def fit_pi(record: LoopRecord, period_s: float) -> ControllerFit | None:
+    """PI settings by least squares on increments over an eighth of a period [s], or of another time scale on which
+    the loop moves; None where OP or the error never moves, or too little of the record is in automatic."""
+    step = max(round(period_s / 8 / record.dt_s), 1)
+    if len(record) < 10 * step + 50:
+        return None
+    found = moves(_columns(record, record.error), _out_of_law(record), step)
+    if found is None:
+        return None
+    gains = _least_squares([found], np.ones(1), np.eye(3)[:2], np.zeros(3))
+    ti_s = integral_time(gains[0], gains[1], record.duration_s)
+    return ControllerFit(float(gains[0]), ti_s, found.explained(gains))
+
+
+def _least_squares(of: list[Moves], weight: Floats, free: Floats, held: Floats) -> Floats:
+    """Gains, shape (3,), that are `held` plus what suits best along the rows of `free`, shape (k, 3)."""
+    total = np.einsum("i,ijk->jk", weight, np.stack([m.products for m in of]))
+    gram, asked = free @ total[:3, :3] @ free.T, free @ (total[:3, 3] - total[:3, :3] @ held)
+    scale = np.sqrt(np.maximum(np.diag(gram), 0.0)) + 1e-150
+    along = np.linalg.lstsq(gram / np.outer(scale, scale), asked / scale, rcond=1e-10)[0] / scale
+    return np.asarray(held + along @ free)
+
+
+def _weights(of: list[Moves]) -> Floats:
+    """Weight of each length of increments: by what its own best law explains of it."""
+    own = [m.explained(_least_squares([m], np.ones(1), np.eye(3), np.zeros(3))) for m in of]
+    share = np.clip(own, 0.0, 1.0)
+    moved = np.array([m.products[3, 3] for m in of])
+    return np.where(share >= TELLING, share / (1.0 + 2 * SMALL - share) / moved, 0.0)
+
+
+def _settings(gains: Floats, record_s: float, stated: Pid) -> Pid | None:
+    """The settings that gains make; None where no controller has them."""
+    kp, ki, kd = (float(g) for g in gains)
+    if kp == 0 or kd / kp < -1e-9:
+        return None
+    ti_s = integral_time(kp, ki, record_s)
+    integral_runs_back = ki / kp < 0 and abs(ki / kp) * record_s > 1.0 / LONGEST_INTEGRAL
+    return None if integral_runs_back else replace(stated, kp=kp, ti_s=ti_s, td_s=max(kd / kp, 0.0))
+
+
+@dataclass(frozen=True, slots=True)
+class _Seen:
+    """A record as one way of the law's sees it: increments of every length, what each weighs, and the freest law."""
+
+    moves: list[Moves]
+    weight: Floats
+    free: Floats
+
+    def left(self, gains: Floats) -> Floats:
+        """Share of OP's variance that gains leave at each length of increments [-]."""
+        return np.array([1.0 - m.explained(gains) for m in self.moves])
+
+    def left_over_all(self, gains: Floats) -> float:
+        """The same, of all of them by their weights [-]."""
+        moved = self.weight * np.array([m.products[3, 3] for m in self.moves])
+        return float(moved @ self.left(gains) / moved.sum())
+
+    def poorness(self, gains: Floats) -> float:
+        """How poorly gains give OP: mean logarithm of what they leave, alike in all ways of the law."""
+        return float(np.mean(np.log(SMALL + self.left(gains))))
+
+    def does(self, gains: Floats) -> bool:
+        """Whether gains give OP about as well as any, and that well."""
+        left, least = self.left(gains), self.left(self.free)
+        blurred = np.array([m.blurred(gains) for m in self.moves])
+        return bool((left - blurred <= ENOUGH * least + SMALL).all() and least.min() < GIVES)
+
+
+def _ways(record: LoopRecord, longest_s: float, stated: Pid) -> Iterator[_Seen]:
+    """The record as the usual ways of the law see it, the plainest first; longest_s : filter of PV [s]."""
+    slope_filters = SLOPE_FILTERS + (MORE_SLOPE_FILTERS if stated.td_s > 0 else ())
+    out_of_law, n = _out_of_law(record) | clamped(record.op), len(record)
+    reach = min(n / 20, max(REACH * stated.ti_s / record.dt_s, LONGER))
+    lengths = [LONGER**k for k in range(12) if LONGER**k <= reach]
+    on_error = ON_ERROR if float(np.ptp(record.sp)) > 0 and not record.sp_estimated else ON_ERROR[:1]
+    filters = [f for f in PV_FILTERS if f == 0.0 or f * record.dt_s <= longest_s]
+    for smooth, late in product(filters, (0, 1)):
+        pv = first_order(record.pv, smooth)
+        pv = np.concatenate((pv[:1], pv[:-1])) if late else pv
+        for (on_gain, on_slope), narrow in product(on_error, slope_filters):
+            slope = np.diff(on_slope * record.sp - pv, prepend=on_slope * record.sp[0] - pv[0]) / record.dt_s
+            columns = _columns(record, record.sp - pv, first_order(slope, narrow))
+            columns[:, 0] = on_gain * record.sp - pv
+            found = [
+                m for k in lengths if (m := moves(columns, out_of_law, k, max(k // 8, 1), True)) is not None
+            ]
+            weight = _weights(found)
+            if weight.any():
+                yield _Seen(found, weight, _least_squares(found, weight, np.eye(3), np.zeros(3)))
+
+
+def compare_laws(record: LoopRecord, period_s: float, stated: Pid) -> LawsCompared | None:
+    """A stated law, and the one that the record shows, which differs in as few settings as explain OP.
+
+    period_s : period, or other time scale on which the loop moves [s]. None where the record tells none; the
+    stated law itself where that does.
+    """
+    gains = np.array([stated.kp, stated.kp / stated.ti_s, stated.kp * stated.td_s])
+    best, given = None, None
+    for seen in _ways(record, LONGEST_FILTER * period_s, stated):
+        if seen.does(gains):
+            return LawsCompared(stated, 1.0, 1.0)
+        if best is None or seen.poorness(seen.free) < best.poorness(best.free) - WORTH:
+            best = seen
+        if given is None or seen.poorness(gains) < given.poorness(gains):
+            given = seen
+    if best is None or given is None:
+        return None
+    found = _simplest(best, gains, record.duration_s, stated)
+    return None if found is None else _most_apart(best, given, gains, *found)
+
+
+def _most_apart(best: _Seen, given: _Seen, gains: Floats, pid: Pid, law: Floats) -> LawsCompared | None:
+    """The law found beside the stated one, over the increments that tell them apart."""
+    stated = {m.samples: m.explained(gains) + m.blurred(gains) for m in given.moves}
+    laws = [
+        LawsCompared(pid, m.explained(law), stated[m.samples])
+        for m, weight in zip(best.moves, best.weight, strict=True)
+        if weight > 0 and m.samples in stated
+    ]
+    return max(laws, key=lambda x: x.left * x.explained, default=None)
+
+
+def _simplest(seen: _Seen, gains: Floats, record_s: float, stated: Pid) -> tuple[Pid, Floats] | None:
+    """The law with the fewest settings that are not the stated ones, and its gains."""
+    p, i, d = np.eye(3)
+    whole, none = gains / gains[0], np.zeros(3)
+    trials = [
+        (d[None], gains * (p + i)),  # td alone
+        (whole[None], none),  # kp alone
+        (i[None], gains * (p + d)),  # ti alone
+        (np.stack((p + whole * d, i)), none),  # kp and ti
+        (np.eye(3), none),
+    ]
+    enough = AS_WELL * seen.left_over_all(seen.free)
+    for along, held in trials:
+        law = _least_squares(seen.moves, seen.weight, along, held)
+        pid = _settings(law, record_s, stated)
+        if pid is not None and seen.left_over_all(law) <= enough:
+            return pid, law
+    return None

@@ -1,0 +1,84 @@
+"""Whether stated settings are those that OP follows, for controllers of every usual kind."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from analyzer.config import Config
+from analyzer.loop.settings_check import SettingsDiffer, differing
+from identification.models import Pid
+from identification.record import LoopRecord
+
+N = 4000
+PI = Pid(2.0, 80.0)
+P = Pid(2.0, math.inf)
+PID = Pid(2.0, 80.0, 10.0)
+
+
+def recorded(pid: Pid, scans: int = 1, top: float = 100.0, seed: int = 3) -> LoopRecord:
+    """A lag of 60 s with a dead time of 8 s under loads that walk, scanned so many times a sample of 1 s."""
+    rng, dt = np.random.default_rng(seed), 1.0 / scans
+    load = np.cumsum(rng.standard_normal(N * scans)) * 0.3 * math.sqrt(dt)
+    load -= np.linspace(0.0, load[-1], load.size)
+    pv, ops, waiting = np.zeros(N * scans), np.zeros(N * scans), [50.0] * (8 * scans)
+    y, integral, last, op = 0.0, 0.0, 0.0, 50.0
+    for k in range(N * scans):
+        waiting.append(op)
+        y += (0.8 * (waiting.pop(0) - 50.0 + load[k]) - y) * dt / 60.0
+        pv[k] = y + 0.01 * rng.standard_normal()
+        due = integral - pid.kp * pv[k] * dt / pid.ti_s
+        wanted = 50.0 - pid.kp * (pv[k] + pid.td_s * (pv[k] - last) / dt) + due
+        integral, last = (due if wanted < top else integral), pv[k]
+        op = ops[k] = round(min(wanted, top), 2)
+    at = slice(0, None, scans)
+    out = np.zeros(N, dtype=bool)
+    return LoopRecord("L", 0.0, 1.0, np.full(N, 50.0), 50.0 + pv[at], ops[at], out)
+
+
+def told(record: LoopRecord, stated: Pid) -> SettingsDiffer | None:
+    """What the check says, on the time scale of the true loop."""
+    return differing(record, stated, 320.0, Config().settings)
+
+
+@pytest.mark.parametrize("pid", [P, PI, PID], ids=["P", "PI", "PID"])
+@pytest.mark.parametrize("top", [100.0, 56.0], ids=["free", "clamped"])
+def test_true_settings_are_let_be(pid, top):
+    """Nothing is told of settings that are those of the controller, at an end of OP that no list states either."""
+    assert told(recorded(pid, top=top), pid) is None
+
+
+@pytest.mark.parametrize("pid", [P, PI, PID], ids=["P", "PI", "PID"])
+@pytest.mark.parametrize("top", [100.0, 56.0], ids=["free", "clamped"])
+def test_wrong_settings_are_told_with_the_true_ones(pid, top):
+    """Gain and integral time stated wrong are told, with those that OP follows."""
+    found = told(recorded(pid, top=top), replace(pid, kp=2.5 * pid.kp, ti_s=3.0 * pid.ti_s))
+    assert found is not None
+    assert found.recorded.kp == pytest.approx(pid.kp, rel=0.25)
+    assert found.recorded.ti_s == pytest.approx(pid.ti_s, rel=0.25)
+
+
+def test_a_scan_faster_than_the_log_hides_nothing():
+    """A PI controller scanned ten times a sample is judged like another."""
+    record = recorded(PI, scans=10)
+    assert told(record, replace(PI, scan_s=0.1)) is None
+    found = told(record, replace(PI, kp=5.0, ti_s=240.0, scan_s=0.1))
+    assert found is not None
+    assert found.recorded.kp == pytest.approx(2.0, rel=0.1)
+    assert found.recorded.ti_s == pytest.approx(80.0, rel=0.1)
+
+
+def test_integral_action_that_is_not_there_is_told():
+    """A controller of gain alone, stated with an integral time, is told to have none."""
+    found = told(recorded(P), replace(P, ti_s=80.0))
+    assert found is not None
+    assert math.isinf(found.recorded.ti_s)
+
+
+def test_a_constant_error_of_pv_is_no_other_integral_time():
+    """PV a little off all night, as its rounding makes it, leaves the true settings alone."""
+    record = recorded(PI)
+    assert told(replace(record, pv=record.pv + 0.05), PI) is None
