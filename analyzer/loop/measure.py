@@ -32,7 +32,7 @@ from identification.estimation.evidence import (
 from identification.estimation.gauss_newton import descend
 from identification.estimation.hammerstein import Fit, process_of, residual
 from identification.estimation.noise import judged
-from identification.estimation.search import AR_ORDER, prepare
+from identification.estimation.search import AR_ORDER, prepare, score
 from identification.estimation.stem_position import Seen, seen
 from identification.estimation.window import Window, block_means
 from identification.models import Fopdt, Loop, Pid
@@ -128,7 +128,7 @@ def _play(size: float) -> float:
 def _consistency(window: Window, fit: Fit, period_s: float) -> float:
     """Gain of the identified process outside the period's band over its gain with it."""
     prepared = prepare(window, IDEAL, fit.ar, period_s / window.dt_s)
-    gain = float(prepared.score(fit.time_constant_s, fit.dead_time_s)[2][0])
+    gain = float(score(prepared, fit.time_constant_s, fit.dead_time_s)[2][0])
     return gain / fit.gain if fit.gain else 0.0
 
 

@@ -75,9 +75,10 @@ class SlipPath(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class _Trial:
-    """A friction, dead time and gain under which a stem was decoded, with its log probability."""
+    """A friction, dead time and gain under which a stem was decoded, with its log probability and its slips."""
 
     score: float
+    slips: int
     band: float
     share: float
     later: float
@@ -96,9 +97,11 @@ def _friction(band: float, share: float, rest: int) -> SlipDistances:
     return SlipDistances(0.5 * band * (1.0 + share), 0.5 * band * (1.0 - share), rest)
 
 
-def _decoded(window: Window, r: Response, noise: Noise, f: SlipDistances, most: int) -> tuple[Floats, float]:
-    """The most probable stem of a window, and its log probability."""
-    return decoded(window.op, window.centred, judged(window.usable, noise.ar.size), r, noise, f, most)
+def _decoded(
+    window: Window, r: Response, noise: Noise, f: SlipDistances, most: int, least: float = -math.inf
+) -> tuple[Floats, float]:
+    """The most probable stem of a window, and its log probability; none where that is under `least`."""
+    return decoded(window.op, window.centred, judged(window.usable, noise.ar.size), r, noise, f, most, least)
 
 
 def _slips(stem: Floats) -> int:
@@ -120,28 +123,30 @@ def _gain(window: Window, play: Fit, band: float, share: float, half: int) -> fl
 
 
 def _screened(window: Window, play: Fit, noise: Floats, rest: int, gains: Gains) -> list[_Trial]:
-    """Frictions and dead times about a play, each with its stem, best first, under a noise model of its own."""
+    """The frictions and dead times about a play that are worth following, each with its stem, best first, under a
+    noise model of its own."""
     left = residual(window, play) - slow_terms(window, play)
     e = whitened(left, noise, every_lag(noise.size))[noise.size :]
     sigma2 = float(np.mean(e[window.usable[noise.size :]] ** 2))
-    mean, out = float(play_stem(window.op, play.valve.stickband).mean()), []
+    mean, out = float(play_stem(window.op, play.valve.stickband).mean()), list[_Trial]()
     for later in LATER:
         for (width, share), gain in gains.items():
             if gain:
                 band = width * play.valve.stickband
                 fit = replace(play, dead_time_s=play.dead_time_s + later * window.dt_s, gain=gain)
                 r, f = _response(window, fit, mean), _friction(band, share, rest)
-                path, score = _decoded(window, r, Noise(noise, sigma2), f, SCREENED)
-                out.append(_Trial(score, band, share, later, gain, path))
-    return sorted(out, key=lambda t: -t.score)
+                least = out[-1].score if len(out) == FOLLOWED else -math.inf
+                path, score = _decoded(window, r, Noise(noise, sigma2), f, SCREENED, least)
+                out = _chosen([*out, _Trial(score, _slips(path), band, share, later, gain, path)])
+    return out
 
 
 def _chosen(tried: list[_Trial]) -> list[_Trial]:
-    """The best trials that differ: of each share of the jump two, at different dead times."""
+    """The best trials that differ, best first: of each share of the jump two, at different dead times."""
     out: list[_Trial] = []
-    for t in tried:
+    for t in sorted(tried, key=lambda t: -t.score):
         same = [c.later for c in out if c.share == t.share]
-        if len(same) < 2 and t.later not in same and _slips(t.stem) >= FEWEST:
+        if len(same) < 2 and t.later not in same and t.slips >= FEWEST:
             out.append(t)
     return out[:FOLLOWED]
 
@@ -216,7 +221,7 @@ def fit_irregular(
 
 def _likeliest(window: Window, play: Fit, noise: Floats, rest: int, gains: Gains) -> SlipPath | None:
     """The most probable path that the best trials come to; None where none is as likely as the play."""
-    begun = _chosen(_screened(window, play, noise, rest, gains))
+    begun = _screened(window, play, noise, rest, gains)
     paths = [_followed(window, play, t, rest) for t in begun[:2]]
     if max((p.worth for p in paths), default=-math.inf) > play.log_likelihood + HOPELESS:
         paths += [_followed(window, play, t, rest) for t in begun[2:]]

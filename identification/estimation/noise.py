@@ -79,6 +79,8 @@ def whitened(x: Floats, ar: Floats, edges: Edges) -> Floats:
     for first in range(0, n, TILE):  # a stretch at a time, lag by lag, for whole vectors that stay at hand
         last = min(first + TILE, n)
         for i in range(single):
+            if ar[i] == 0.0:
+                continue
             begin = max(first, i + 1)
             factor, part, past = ar[i], out[begin:last], x[begin - 1 - i : last - 1 - i]
             for k in range(part.size):

@@ -6,7 +6,6 @@ The search knows blocks alone and solves gain and slow terms linearly; the desce
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -16,7 +15,7 @@ from numba.extending import register_jitable
 from identification.estimation.descent import compass
 from identification.estimation.hammerstein import stem_of
 from identification.estimation.noise import every_lag, judged, whitened
-from identification.estimation.window import Window
+from identification.estimation.window import Stems, Window
 from identification.record import Floats, Mask
 from identification.signals.filters import notch
 from identification.simulation.lag import Lag, stepped, unit_lag
@@ -31,18 +30,34 @@ FADED = 1e-17
 """A decay under this share of its start is over; numbers have sixteen digits."""
 MOVES = ((1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0), (1.0, -1.0))
 """Steps of log time constant and dead time that are tried."""
+COMPASS = (0.02, 0.007, 0.0025)
+"""Relative steps of the search within a pit of stickband and jump."""
+PIT_MOVES = ((1, 0), (-1, 0), (0, 1), (0, -1))
+"""Steps of stickband and jump that are tried in a pit."""
 NOTCH_WIDTH = 0.15
 """Width of the band that is left out when the process is wanted in spite of a load with a line; ours."""
 
 
 @njit(cache=True)
 def solved(gram: Floats, cross: Floats) -> Floats:
-    """Least squares of a matrix of products of which the upper half is filled, shape (4,)."""
-    for i in range(4):
+    """Least squares of a matrix of products of which the upper half is filled, shape (4,), by elimination in place: a
+    library's solver takes longer to call than four rows to eliminate."""
+    n, beta = cross.size, cross.copy()
+    for i in range(n):
         gram[i, i] = gram[i, i] * (1 + 1e-9) + 1e-12
-        for j in range(i):
-            gram[i, j] = gram[j, i]
-    return np.linalg.solve(gram, cross)  # type: ignore[return-value]
+    least = 1e-12 * np.diag(gram)
+    for i in range(n):
+        gram[i, i] = max(gram[i, i], least[i])
+        for j in range(i + 1, n):
+            factor = gram[i, j] / gram[i, i]
+            for k in range(j, n):
+                gram[j, k] -= factor * gram[i, k]
+            beta[j] -= factor * beta[i]
+    for i in range(n - 1, -1, -1):
+        for k in range(i + 1, n):
+            beta[i] -= gram[i, k] * beta[k]
+        beta[i] /= gram[i, i]
+    return beta
 
 
 @njit(cache=True)
@@ -78,97 +93,87 @@ def _response(stem: Floats, lag: Lag, rows: Floats, out: Floats) -> Products:
     return xv, x1, xt, xx
 
 
+Faded = tuple[float, float, float, float, float]
+"""Sums of a decay times PV, a response, 1, t and itself over the samples judged."""
+
+
 @njit(cache=True)
-def variance_left(
-    x: Floats, products: Products, rows: Floats, sums: Floats, level: float, pole: float, outlasts: bool
-) -> tuple[float, int, Floats]:
+def faded_products(x: Floats, rows: Floats, pole: float, outlasts: bool) -> Faded:
+    """Products of the decay of a response; none where its time constant outlasts half the window."""
+    fv, fx, f1, ft, ff = 0.0, 0.0, 0.0, 0.0, 0.0
+    free, k = 0.0 if outlasts else 1.0, 0
+    while k < x.size and free > FADED:
+        weighted = free * rows[1, k]
+        fv, fx, f1 = fv + free * rows[0, k], fx + x[k] * weighted, f1 + weighted
+        ft, ff = ft + free * rows[2, k], ff + free * weighted
+        free *= pole
+        k += 1
+    return fv, fx, f1, ft, ff
+
+
+@njit(cache=True)
+def variance_left(products: Products, faded: Faded, sums: Floats, level: float) -> tuple[float, int, Floats]:
     """Innovations variance, samples judged and coefficients (gain, 1, t, decay) of one response; see `score`."""
     gram, cross = np.zeros((4, 4)), np.zeros(4)
     cross[0], gram[0, 1], gram[0, 2], gram[0, 0] = products
     power, cross[1], cross[2], gram[1, 1], gram[1, 2], gram[2, 2] = sums
-    free, k = 0.0 if outlasts else 1.0, 0
-    while k < x.size and free > FADED:
-        w, t, faded = rows[1, k], rows[2, k], free
-        cross[3] += faded * rows[0, k]
-        gram[0, 3] += faded * x[k] * w
-        gram[1, 3] += faded * w
-        gram[2, 3] += faded * t
-        gram[3, 3] += faded * faded * w
-        free *= pole
-        k += 1
+    cross[3], gram[0, 3], gram[1, 3], gram[2, 3], gram[3, 3] = faded
     beta = solved(gram, cross)
     count = int(sums[3])
     left = max((power - np.dot(beta, cross)) / max(count, 1), 1e-14)
     beta[1] /= level
     beta[2] /= level
-    return left, count, beta  # type: ignore[return-value]
-
-
-@njit(cache=True)
-def score(
-    rows: Floats,
-    sums: Floats,
-    stem: Floats,
-    level: float,
-    time_constant_s: float,
-    dead_time_s: float,
-    dt_s: float,
-) -> tuple[float, int, Floats]:
-    """Innovations variance, samples judged and coefficients (gain, 1, t, decay) of one candidate.
-
-    `rows` and `sums` are those of PV (`_known`); it and `stem` are whitened already (a lag and A(q) commute), `level`
-    is A(1).
-    """
-    lag = unit_lag(time_constant_s, dead_time_s, dt_s)
-    x = np.empty_like(stem)
-    products = _response(stem, lag, rows, x)
-    return variance_left(x, products, rows, sums, level, lag.pole, time_constant_s > 0.5 * x.size * dt_s)
+    return left, count, beta
 
 
 Dynamics = tuple[float, float]
 """Time constant and dead time [s]."""
 
 
-@dataclass(frozen=True, slots=True)
-class WhitePv:
+class WhitePv(NamedTuple):
     """PV of a window under one noise model, whitened once for many valves.
 
-    rows, shape (3, n), and sums, shape (6,): see `_known`; notch_period in blocks, 0: none.
+    stems : those of the window, in blocks; rows, shape (3, n), and sums, shape (6,): see `_known`; ar : the noise
+    model, shape (p,); dt_s : interval of blocks [s]; most : largest time constant and dead time searched [s].
     """
 
-    window: Window
-    ar: Floats
+    stems: Stems
     rows: Floats
     sums: Floats
-    notch_period: float
-
-    def behind(self, valve: StemLaw) -> Prepared:
-        """The same with the stem behind one valve."""
-        stem = _filtered(stem_of(self.window.stems_in_blocks, valve), self.ar, self.notch_period)
-        return Prepared(self.window, valve, self.ar, self.rows, self.sums, stem)
+    ar: Floats
+    dt_s: float
+    most: Dynamics
 
 
-@dataclass(frozen=True, slots=True)
-class Prepared:
-    """A window, a valve and a noise model, whitened once for many dynamics."""
+class Prepared(NamedTuple):
+    """The same with the stem behind one valve, whitened for many dynamics: a lag and A(q) commute."""
 
-    window: Window
+    pv: WhitePv
     valve: StemLaw
-    ar: Floats
-    rows: Floats
-    sums: Floats
-    white_stem: Floats
+    stem: Floats
 
-    @property
-    def level(self) -> float:
-        """A(1)."""
-        return max(1.0 - float(self.ar.sum()), 1e-6)
 
-    def score(self, time_constant_s: float, dead_time_s: float) -> tuple[float, int, Floats]:
-        """Innovations variance, count and coefficients for a time constant and a dead time [s]."""
-        args = (self.rows, self.sums, self.white_stem, self.level)
-        sigma2, count, beta = score(*args, time_constant_s, dead_time_s, self.window.dt_s)
-        return float(sigma2), int(count), np.asarray(beta, dtype=np.float64)
+@njit(cache=True)
+def behind(pv: WhitePv, valve: StemLaw) -> Prepared:
+    """Whitened PV with the whitened stem behind a valve."""
+    return Prepared(pv, valve, whitened_stem(stem_of(pv.stems, valve), pv.ar))
+
+
+@njit(cache=True)
+def score(prepared: Prepared, time_constant_s: float, dead_time_s: float) -> tuple[float, int, Floats]:
+    """Innovations variance, samples judged and coefficients (gain, 1, t, decay) of one candidate."""
+    pv, stem = prepared.pv, prepared.stem
+    lag = unit_lag(time_constant_s, dead_time_s, pv.dt_s)
+    x = np.empty_like(stem)
+    products = _response(stem, lag, pv.rows, x)
+    faded = faded_products(x, pv.rows, lag.pole, time_constant_s > 0.5 * x.size * pv.dt_s)
+    return variance_left(products, faded, pv.sums, level_of(pv.ar))
+
+
+@njit(cache=True)
+def level_of(ar: Floats) -> float:
+    """A(1) of a noise model."""
+    return max(1.0 - ar.sum(), 1e-6)  # type: ignore[no-any-return]
 
 
 @njit(cache=True)
@@ -179,69 +184,68 @@ def whitened_stem(x: Floats, ar: Floats) -> Floats:
     return white
 
 
-def _filtered(x: Floats, ar: Floats, notch_period: float) -> Floats:
-    white = whitened_stem(np.ascontiguousarray(x), ar)
-    return white if notch_period <= 0 else notch(white, notch_period, NOTCH_WIDTH)
-
-
 def white_pv(window: Window, ar: Floats, notch_period: float = 0.0) -> WhitePv:
     """Whiten PV with one noise model; notch_period in blocks, 0: none."""
-    y = _filtered(window.centred, ar, notch_period)
+    y = _notched(whitened_stem(window.centred, ar), notch_period)
     rows, sums = _known(y, judged(window.usable, ar.size), ar.size + int(notch_period))
-    return WhitePv(window, ar, rows, sums, notch_period)
+    return WhitePv(window.stems_in_blocks, rows, sums, ar, window.dt_s, window.bounds)
 
 
 def prepare(window: Window, valve: StemLaw, ar: Floats, notch_period: float = 0.0) -> Prepared:
     """Whiten PV and the stem with one noise model; notch_period in blocks, 0: none."""
-    return white_pv(window, ar, notch_period).behind(valve)
+    whole = behind(white_pv(window, ar, notch_period), valve)
+    return whole._replace(stem=_notched(whole.stem, notch_period))  # type: ignore[no-any-return]
 
 
-class _Scored(NamedTuple):
-    """What candidates of one valve are scored by: see `score`; and the largest time constant and dead time [s]."""
-
-    rows: Floats
-    sums: Floats
-    stem: Floats
-    level: float
-    dt_s: float
-    most: Dynamics
-
-
-@njit(cache=True)
-def _left(s: _Scored, t: float, dead_s: float) -> float:
-    return score(s.rows, s.sums, s.stem, s.level, math.exp(t), dead_s, s.dt_s)[0]  # type: ignore[no-any-return]
+def _notched(x: Floats, period: float) -> Floats:
+    return x if period <= 0 else notch(x, period, NOTCH_WIDTH)
 
 
 @register_jitable  # type: ignore[untyped-decorator]
-def _tried(s: _Scored, at: Dynamics, move: Dynamics, step: float) -> tuple[Dynamics, float]:
+def _tried(p: Prepared, at: Dynamics, move: Dynamics, step: float) -> tuple[Dynamics, float]:
     """Log time constant and dead time moved by a step of .4 and of two blocks, and the variance left there."""
-    t, d = at[0] + move[0] * 0.4 * step, at[1] + move[1] * 2.0 * s.dt_s * step
-    if d < 0 or d > s.most[1] or t < math.log(0.05 * s.dt_s) or t > math.log(s.most[0]):
+    t, d = at[0] + move[0] * 0.4 * step, at[1] + move[1] * 2.0 * p.pv.dt_s * step
+    if d < 0 or d > p.pv.most[1] or t < math.log(0.05 * p.pv.dt_s) or t > math.log(p.pv.most[0]):
         return (t, d), np.inf
-    return (t, d), _left(s, t, d)
+    return (t, d), score(p, math.exp(t), d)[0]
 
 
 @njit(cache=True)
-def _least(s: _Scored, begins: Floats, halvings: int) -> Dynamics:
+def _least(p: Prepared, begins: Floats, halvings: int) -> Dynamics:
     """Best of the starts (rows of log time constant and dead time), then compass search from there."""
     best, least = (begins[0, 0], begins[0, 1]), np.inf
     for i in range(begins.shape[0]):
-        found = _left(s, begins[i, 0], begins[i, 1])
+        found = score(p, math.exp(begins[i, 0]), begins[i, 1])[0]
         if found < least:
             best, least = (begins[i, 0], begins[i, 1]), found
-    (t, dead_s), _ = compass(s, best, least, _tried, MOVES, 0.5 ** np.arange(float(halvings)), 1e-6)
+    (t, dead_s), _ = compass(p, best, least, _tried, MOVES, 0.5 ** np.arange(float(halvings)), 1e-6)
     return math.exp(t), dead_s
 
 
 def search(prepared: Prepared, begins: list[Dynamics], halvings: int = 3) -> Dynamics:
     """Time constant and dead time [s] of least innovations variance: the best start, then compass search."""
-    w = prepared.window
-    most_t, most_dead = w.bounds
-    scored = _Scored(
-        prepared.rows, prepared.sums, prepared.white_stem, prepared.level, w.dt_s, (most_t, most_dead)
-    )
-    first = [[math.log(min(max(t, 0.06 * w.dt_s), 0.95 * most_t)), min(d, most_dead)] for t, d in begins]
-    return _least(scored, np.array(first), halvings)  # type: ignore[no-any-return]
+    (most_t, most_dead), dt_s = prepared.pv.most, prepared.pv.dt_s
+    first = [[math.log(min(max(t, 0.06 * dt_s), 0.95 * most_t)), min(d, most_dead)] for t, d in begins]
+    return _least(prepared, np.array(first), halvings)  # type: ignore[no-any-return]
+
+
+@register_jitable  # type: ignore[untyped-decorator]
+def _valve_tried(
+    at: tuple[WhitePv, Dynamics], valve: StemLaw, move: tuple[int, int], step: float
+) -> tuple[StemLaw, float]:
+    """A valve with stickband or jump moved by a relative step, and the variance that it leaves."""
+    pv, (time_constant_s, dead_time_s) = at
+    width = (valve.breakaway + valve.sliding) * (1 + move[0] * step)
+    share = min((valve.breakaway - valve.sliding) * (1 + 2 * move[1] * step), width) / width
+    other = StemLaw(0.5 * width * (1 + share), 0.5 * width * (1 - share), valve.tolerance)
+    return other, score(behind(pv, other), time_constant_s, dead_time_s)[0]
+
+
+@njit(cache=True)
+def settled(pv: WhitePv, valve: StemLaw, least: float, dynamics: Dynamics) -> StemLaw:
+    """The bottom of a pit: stickband and jump moved by ever smaller steps to the least innovations variance, `least`
+    at first, under given dynamics."""
+    return compass((pv, dynamics), valve, least, _valve_tried, PIT_MOVES, COMPASS, 1e-7)[0]  # type: ignore[no-any-return]
 
 
 def starts(window: Window, period_s: float) -> list[Dynamics]:

@@ -318,9 +318,18 @@ def _traced(events: Events, event: int, n: int) -> Floats:
 
 @njit(cache=True)
 def decoded(
-    op: Floats, y: Floats, counts: Mask, r: Response, n: Noise, f: SlipDistances, most: int
+    op: Floats,
+    y: Floats,
+    counts: Mask,
+    r: Response,
+    n: Noise,
+    f: SlipDistances,
+    most: int,
+    least: float = -math.inf,
 ) -> tuple[Floats, float]:
     """The stem [% OP], shape of op, of the most probable path, and its log probability.
+
+    Paths only lose: once all have come under `least` there is nothing to find, and the log probability is -inf.
 
     op : shape (n * factor,); y : shape (n,), PV less its mean, in blocks of `factor` samples; counts : bool, shape
     (n,), blocks whose innovations are judged; most : paths that are carried side by side.
@@ -343,5 +352,7 @@ def decoded(
         if count > 2 * most or (block + 1) % LOOKED == 0:
             count = best_paths(b, other, count, most, near)
             b, other = other, b
+            if b.numbers[0, SCORE] < least:
+                return op[:0], -math.inf
     best = int(np.argmax(b.numbers[:count, SCORE]))
     return _traced(events, b.marks[best, EVENT], op.size), float(b.numbers[best, SCORE])
