@@ -34,6 +34,10 @@ from identification.signals.spectrum import (
 
 MOST = 3
 """Periods reported per loop."""
+FAR = 3.0
+"""First error, over the usual one after it has come to nothing, from which a record begins on its way; ours."""
+LONGEST_WAY = 0.5
+"""Share of a record that the way to the set point may take [-]; ours."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,15 +86,28 @@ class Oscillations:
         return self.found[0] if self.found else None
 
 
+def begun_up(error: Floats) -> int:
+    """Sample at which the error first comes to nothing, of a record that begins far from its set point; else 0.
+
+    A vessel heated up, or a loop just switched on, is on its way there; what it swings by then hides every cycle.
+    """
+    arrived = int(np.argmax(error * error[0] <= 0.0))
+    if arrived == 0 or arrived > LONGEST_WAY * error.size:
+        return 0
+    usual = math.sqrt(float(np.mean(error[arrived:] ** 2)))
+    return arrived if abs(error[0]) > FAR * usual else 0
+
+
 def error_spectrum(record: LoopRecord) -> Spectrum:
-    """Spectrum of the error without what the set point explains."""
+    """Spectrum of the error, once it has come to the set point, without what the set point explains."""
     error, good = record.error, np.flatnonzero(~record.bad)
     if good.size < error.size:
         error = np.interp(np.arange(error.size), good, error[good])
-    found = spectrum(error, record.dt_s)
-    if record.sp_estimated or float(np.ptp(record.sp)) == 0.0:
+    first = 0 if record.sp_estimated else begun_up(error)
+    found = spectrum(error[first:], record.dt_s)
+    if record.sp_estimated or float(np.ptp(record.sp[first:])) == 0.0:
         return found
-    sp = spectrum(record.sp, record.dt_s)
+    sp = spectrum(record.sp[first:], record.dt_s)
     lines = without_setpoint(found.lines, sp.lines)
     power = float(np.sum(np.abs(lines[1:]) ** 2)) * 2 / found.n**2
     return replace(found, lines=lines, variance=power)

@@ -54,14 +54,9 @@ def without_line(x: Floats) -> Floats:
 
 
 def spectrum(x: Floats, dt_s: float) -> Spectrum:
-    """Transform of a signal, padded by nothing; the length is cut to one that transforms fast."""
-    n = x.size
-    quick = next_fast_len(n, real=True)
-    if quick != n:
-        fast = [k for k in range(n, max(n - 400, 1), -1) if next_fast_len(k, real=True) == k]
-        n = fast[0] if fast else n
-    flat = without_line(x[x.size - n :])
-    return Spectrum(rfft(flat), n, dt_s, float(flat @ flat) / n)
+    """Transform of a signal, of all of it: what is cut or padded would be another share of it at another sampling."""
+    flat = without_line(x)
+    return Spectrum(rfft(flat), x.size, dt_s, float(flat @ flat) / x.size)
 
 
 def tapered_power(s: Spectrum) -> Floats:

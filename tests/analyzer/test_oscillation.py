@@ -271,3 +271,37 @@ def test_healthy_untidy_loops_do_not_oscillate():
     drawn = (draw(seed, "healthy") for seed in range(60))
     claimed = [counting(found_in(record(d.pv, d.sp, dt_s=d.step_s))) is not None for d in drawn]
     assert sum(claimed) <= 1
+
+
+# What sampling has to do with it
+
+
+def cycling_after_a_start(dt_s: float, n: int, seed: int = 7) -> LoopRecord:
+    """A cycle of 600 s about the set point, after a start from far below it, as a recorder at an interval sees it.
+
+    The same noise of the process underneath, and a recorder's own, fresh at each sample.
+    """
+    fine = np.arange(36_000) * 1.0
+    slow = lfilter([0.02], [1, -0.98], np.random.default_rng(seed).standard_normal(fine.size))
+    pv = 50 - 40 * np.exp(-fine / 700) + np.sin(2 * np.pi * fine / 600) * (fine > 2500) + 3 * slow
+    at = np.interp(np.arange(n) * dt_s, fine, pv)
+    return record(at + 0.02 * np.random.default_rng(seed + 1).standard_normal(n), dt_s=dt_s)
+
+
+@pytest.mark.parametrize("dt_s", [2.0, 2.7, 7.0, 13.0, 23.0, 61.0, 73.0])
+def test_sampling_changes_no_answer(dt_s):
+    """From 8 to 300 samples a cycle, period, share of time and significance are those of the process."""
+    usual = first_of(cycling_after_a_start(5.0, 7200))
+    found = first_of(cycling_after_a_start(dt_s, int(36_000 / dt_s)))
+    assert found.period_s == pytest.approx(usual.period_s, rel=0.01)
+    assert found.oscillating_pct == pytest.approx(usual.oscillating_pct, abs=2.0)
+    assert found.significance == pytest.approx(usual.significance, rel=0.05)
+
+
+@pytest.mark.parametrize("dt_s", [2.0, 5.0, 7.0, 23.0, 61.0])
+def test_noise_after_a_start_is_none_at_any_sampling(dt_s):
+    """A start from far below the set point makes no cycle of the noise behind it."""
+    fine = np.arange(36_000) * 1.0
+    slow = lfilter([0.02], [1, -0.98], np.random.default_rng(3).standard_normal(fine.size))
+    at = np.interp(np.arange(int(36_000 / dt_s)) * dt_s, fine, 50 - 40 * np.exp(-fine / 700) + 3 * slow)
+    assert found_in(record(at, dt_s=dt_s)).first is None
