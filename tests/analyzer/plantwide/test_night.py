@@ -20,7 +20,7 @@ from analyzer.store.store import Store
 from reports.html import render
 from reports.pages import Graph, HeatMap, Trend
 from reports.pictures import as_file
-from tests.analyzer.plantwide.conftest import RunPlant
+from tests.analyzer.conftest import RunPlant
 
 Row = Mapping[str, Any]
 
