@@ -50,9 +50,16 @@ def refused(result: Result) -> str:
     return result.stderr
 
 
-def test_play_gets_settings_and_three_pictures(tmp_path, tank):
+@pytest.fixture(scope="module")
+def tuned(tank, tmp_path_factory) -> tuple[str, Path]:
+    """What is said of the tank with its settings as they are, and the folder of its pictures."""
+    folder = tmp_path_factory.mktemp("tuned")
+    return clean(asked(folder, tank, STATED, "--out", str(folder / "pictures")), 0), folder / "pictures"
+
+
+def test_play_gets_settings_and_three_pictures(tuned):
     """A tank with play gets a longer Ti at about its gain, its play within 10 %, a forecast and three pictures."""
-    out = clean(asked(tmp_path, tank, STATED, "--out", str(tmp_path / "pictures")), 0)
+    out, pictures = tuned
     assert "action: retune" in out
     kp, ti = map(float, re.search(r"new settings: kp ([\d.e+]+), ti ([\d.e+]+) s", out).groups())
     assert 0.7 < kp / TANK.kp < 1.4
@@ -60,7 +67,7 @@ def test_play_gets_settings_and_three_pictures(tmp_path, tank):
     play = float(re.search(r"backlash_pct: ([\d.]+)", out)[1])
     assert play == pytest.approx(TANK.backlash, rel=0.1)
     assert re.search(r"stem travel: .* -\d\d %", out)
-    made = {p.name: p.read_bytes() for p in (tmp_path / "pictures").iterdir()}
+    made = {p.name: p.read_bytes() for p in pictures.iterdir()}
     page = made.pop("settings.html").decode()
     assert set(made) == {"limit-cycle.svg", "travel-map.svg", "forecast.svg"}
     assert all(picture.startswith(b"<svg ") for picture in made.values())
@@ -74,10 +81,9 @@ def test_play_gets_settings_and_three_pictures(tmp_path, tank):
     assert "SIMC" in page
 
 
-def test_settings_typed_in_calm_the_tank(tmp_path, tank):
+def test_settings_typed_in_calm_the_tank(tuned):
     """On the true tank, under the same load and noise, the proposal takes four fifths of the stem's travel."""
-    out = clean(asked(tmp_path, tank), 0)
-    kp, ti = map(float, re.search(r"new settings: kp ([\d.e+]+), ti ([\d.e+]+) s", out).groups())
+    kp, ti = map(float, re.search(r"new settings: kp ([\d.e+]+), ti ([\d.e+]+) s", tuned[0]).groups())
     after = simulate(replace(TANK, kp=kp, ti=ti), 4.0)
     before = simulate(TANK, 4.0)
     late = slice(2 * 3600, None)
@@ -85,13 +91,12 @@ def test_settings_typed_in_calm_the_tank(tmp_path, tank):
     assert np.abs(after.pv[late] - 50).mean() < np.abs(before.pv[late] - 50).mean()
 
 
-def test_settings_come_in_the_units_stated(tmp_path, tank):
+def test_settings_come_in_the_units_stated(tmp_path, tuned):
     """StatedSettings in minutes, Ti comes in minutes: the same settings as in seconds over sixty."""
-    seconds = clean(asked(tmp_path, tank), 0)
     (tmp_path / "loops.csv").write_text(f"loop,kp,ti,pv_lo,pv_hi,ti_unit\nL,0.9,{40 / 60},0,100,min\n")
-    files = [str(tmp_path / "export.parquet"), "--loops", str(tmp_path / "loops.csv")]
+    files = [str(tuned[1].parent / "export.parquet"), "--loops", str(tmp_path / "loops.csv")]
     minutes = clean(CliRunner().invoke(main, ["tune", *files, "--loop", "L"]), 0)
-    ti_s, ti_min = (float(re.search(r"ti ([\d.e+]+) (?:s|min) ", x)[1]) for x in (seconds, minutes))
+    ti_s, ti_min = (float(re.search(r"ti ([\d.e+]+) (?:s|min) ", x)[1]) for x in (tuned[0], minutes))
     assert ti_min == pytest.approx(ti_s / 60, rel=0.01)
 
 
