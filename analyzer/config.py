@@ -241,6 +241,7 @@ class LaneLimits:
     small_gain_memory_ti: float = TOML
     small_gain_room: float = TOML
     at_set_point: float = TOML
+    noise: float = TOML
     straight_share: float = TOML
     travel_pct_per_h: float = TOML
 

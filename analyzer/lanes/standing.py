@@ -3,17 +3,18 @@ example, has its lane all the same."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 
 import numpy as np
 
 from analyzer.config import Config, LaneLimits
-from analyzer.loop.assessments import HOUR_S, hour_edges
+from analyzer.loop.assessments import HOUR_S, hour_edges, noise_band
 from analyzer.loop.quality import Prepared
 from identification.models import Pid
 from identification.record import LoopRecord
-from identification.signals.correlation import correlation_time
+from identification.signals.correlation import SMOOTHING, correlation_time
 
 AVERAGING = "level"
 """Type of loops that are slow on purpose: a level buffers flow."""
@@ -58,13 +59,16 @@ def _lasting_error(record: LoopRecord, limits: LaneLimits) -> float | None:
 
 def _memory(prepared: Prepared, controller: Pid | None, kind: str, config: Config) -> float | None:
     """The error's correlation time in Ti; None where it says nothing, for the loop is at its set point as far as a
-    transmitter tells, or compression would make it longer."""
+    transmitter or PV's own grid and noise tell, or compression would make it longer."""
     record, use = prepared.record, prepared.record.usable
     if controller is None or kind == AVERAGING or prepared.compressed_share > config.lanes.straight_share:
         return None
     if float(use.mean()) < config.quality.usable_share:
         return None
-    if float(np.median(np.abs(record.error[use]))) <= max(config.lanes.at_set_point, prepared.pv_step):
+    averaged = max(SMOOTHING * controller.ti_s / record.dt_s, 1.0)
+    noise = config.lanes.noise * noise_band(record.pv) / math.sqrt(averaged)
+    floor = max(config.lanes.at_set_point, prepared.pv_step, noise)
+    if float(np.median(np.abs(record.error[use]))) <= floor:
         return None
     found = correlation_time(record.error, use, record.dt_s, controller.ti_s)
     return None if found is None else found / controller.ti_s

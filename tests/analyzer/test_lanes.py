@@ -78,6 +78,15 @@ def test_a_loop_at_its_set_point_is_not_sluggish() -> None:
     assert Lane.SLUGGISH not in lanes(row_of(small, 0.2))
 
 
+def test_a_loop_within_its_noise_is_not_sluggish() -> None:
+    """Slow errors under PV's own noise, at samples too far apart to average it, are none that a gain would mend."""
+    values = {role: x[::12] for role, x in trends(0.2).items()}
+    noise = np.random.default_rng(1).normal(scale=0.9 * (values["pv"] - 50.0).std(), size=values["pv"].size)
+    row = row_of({**values, "pv": values["pv"] + noise}, 0.2, every_s=12.0)
+    assert row["error_memory_ti"] is None
+    assert Lane.SLUGGISH not in lanes(row)
+
+
 @pytest.mark.parametrize(("share", "sluggish"), [(0.1, 7), (1.0, 0)])
 def test_a_process_that_bears_far_more_gain_is_told(share: float, sluggish: int) -> None:
     """Of ten temperatures whose set point steps, at a tenth of SIMC's gain seven or more are sluggish, at SIMC's own
