@@ -164,7 +164,8 @@ def fit_stick_slip(window: Window, play: Fit, period_s: float) -> Fit:
     """
     short = window.y.size < SHORT
     begun = _chosen(window, play, _coarse(window, play), period_s, FOLLOWED_SHORT if short else FOLLOWED)
-    return max([_likeliest(window, begun), *_finely(window, play)], key=lambda fit: fit.log_likelihood)
+    fits = [_likeliest(window, begun), *pits(window, play, (RESTS, HALTS, SLIDES))]
+    return max(fits, key=lambda fit: fit.log_likelihood)
 
 
 def _coarse(window: Window, play: Fit) -> list[StemLaw]:
@@ -180,7 +181,7 @@ def _coarse(window: Window, play: Fit) -> list[StemLaw]:
     ]
 
 
-def _finely(window: Window, play: Fit) -> list[Fit]:
+def pits(window: Window, play: Fit, tolerances: tuple[float, ...]) -> list[Fit]:
     """The likeliest stick-slips about a play, of the best few of each behaviour at the bottom of their pits.
 
     A slip more or less changes the stem until the next one, so likelihood has many narrow pits in S and J.
@@ -188,7 +189,7 @@ def _finely(window: Window, play: Fit) -> list[Fit]:
     pairs = np.array([(w * play.valve.stickband, j) for w in FINE_WIDTHS for j in FINE_JUMPS])
     begins = [(play.time_constant_s, play.dead_time_s + blocks * window.dt_s) for blocks in LATER]
     out = []
-    for tolerance in (RESTS, HALTS, SLIDES):
+    for tolerance in tolerances:
         left = scan(window, pairs, tolerance, generic_noise(), begins)
         best = [sticking(pairs[i, 0], pairs[i, 1], tolerance) for i in np.argsort(left)[:FINALISTS]]
         fits = _ranked(window, generic_noise(), best, begins)

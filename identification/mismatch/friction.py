@@ -10,21 +10,14 @@ estimated from the window itself; constants are not touched.
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 from numba import njit
 
-from identification.estimation.descent import compass
-from identification.estimation.noise import whitened
-from identification.estimation.prediction_error import (
-    Fitted,
-    Model,
-    Problem,
-    descended,
-    loss_of,
-    residual_fit,
-)
+from identification.estimation.backlash_stiction import generic_noise, pits
+from identification.estimation.hammerstein import Fit
+from identification.estimation.prediction_error import Fitted, Model, Problem, descended
+from identification.estimation.window import Window
 from identification.mismatch.effect import Friction
 from identification.mismatch.outside import about
 from identification.mismatch.recording import SeenInCycles
@@ -33,20 +26,10 @@ from identification.record import Floats
 from identification.signals.filters import stretch_ends
 from identification.simulation.effect import Signal, Variant, acted
 from identification.simulation.open_loop import as_parameters, from_flow, simulate
-from identification.simulation.parameters import Slot
-from identification.simulation.valve import StemLaw, stem_step
+from identification.simulation.parameters import Slot, neutral
+from identification.simulation.valve import StemLaw, stem_step, sticking
 from identification.simulation.valve_chain import before_stem, behind_stem, friction_of
 
-WIDTHS = np.geomspace(0.6, 4.0, 64)
-"""Stickbands tried, in widths of the play that fits best: steps of 3 %, about the width of a pit."""
-JUMPS = (0.15, 0.3, 0.45, 0.6, 0.75, 0.9, 1.0)
-"""Slip jumps tried, in stickbands."""
-FINALISTS, FOLLOWED = 12, 2
-"""Pairs judged with a noise model of their own, and pairs followed to the end."""
-COMPASS = (0.02, 0.007, 0.0025)
-"""Relative steps of the search within a pit."""
-PIT_MOVES = ((Slot.STICKBAND, 1), (Slot.STICKBAND, -1), (Slot.JUMP, 1), (Slot.JUMP, -1))
-"""What is moved in a pit, and which way."""
 WEARS = (Friction.PLAY, Friction.STICKS)
 """What a worn valve has."""
 OF_CYCLES = (Slot.T, Slot.L, Slot.K, Slot.STICKBAND, Slot.JUMP, Slot.COAST)
@@ -63,47 +46,38 @@ def is_friction(name: str) -> bool:
 
 
 def fit_sticking(p: Problem, play: Fitted, row: Variant, rows: tuple[Variant, ...]) -> Fitted:
-    """The best valve that sticks as `row` says, beside `rows`, about a fit whose last row is a play."""
+    """The best valve that sticks as `row` says, beside `rows`, about a fit whose last row is a play: its stem is
+    sought as a night seeks it, and followed to the end beside all that the fit holds."""
+    window, c = _window_behind(p, play.model.c), play.model.c.copy()
+    for slot, value in (row.fixed or {}).items():
+        c[slot] = value
+    near = Fit(
+        float(c[Slot.K]),
+        min(float(c[Slot.T]), window.bounds[0]),
+        float(c[Slot.L]),
+        sticking(float(c[Slot.STICKBAND]), 0.0),
+        play.loss,
+        play.count,
+        generic_noise(),
+        np.zeros(4),
+    )
     fits = []
-    for c in _scanned(p, play, row)[:FOLLOWED]:
-        first = descended(p, Model((*rows, row), _settled(p, c)), p.limits.search.screen_steps)
-        again = replace(first.model, c=_settled(p, first.model.c))
-        fits.append(descended(p, again, p.limits.search.screen_steps))
+    for found in pits(window, near, (friction_of(c).tolerance,)):
+        c = c.copy()
+        c[Slot.STICKBAND], c[Slot.JUMP] = found.valve.stickband, found.valve.slip_jump
+        c[Slot.L] = found.dead_time_s
+        fits.append(descended(p, Model((*rows, row), c), 2 * p.limits.search.screen_steps))
     return min(fits, key=lambda fit: fit.loss)
 
 
-def _scanned(p: Problem, play: Fitted, row: Variant) -> list[Floats]:
-    """Constants of the best pairs of stickband and jump, best first."""
-
-    def quick_loss(c: Floats) -> float:
-        return loss_of(p, whitened(p.y - simulate(p.inputs, c), play.ar, p.edges))
-
-    width = float(play.model.c[Slot.STICKBAND])
-    trials = []
-    for w in WIDTHS:
-        for j in JUMPS:
-            c = play.model.c.copy()
-            for slot, value in (row.fixed or {}).items():
-                c[slot] = value
-            c[Slot.STICKBAND], c[Slot.JUMP] = w * width, min(w * j * width, w * width)
-            trials.append(c)
-    return sorted(
-        sorted(trials, key=quick_loss)[:FINALISTS], key=lambda c: residual_fit(p, Model((), c)).loss
-    )
-
-
-def _settled(p: Problem, c: Floats) -> Floats:
-    """The bottom of the pit: stickband and jump moved by ever smaller steps."""
-    return compass(p, c, residual_fit(p, Model((), c)).loss, _moved, PIT_MOVES, COMPASS, 1e-7)[0]
-
-
-def _moved(p: Problem, c: Floats, move: tuple[Slot, int], step: float) -> tuple[Floats, float]:
-    """Constants with stickband or jump moved by a relative step, and the loss that they leave."""
-    slot, way = move
-    trial = c.copy()
-    trial[slot] *= 1 + way * step
-    trial[Slot.JUMP] = min(trial[Slot.JUMP], trial[Slot.STICKBAND])
-    return trial, residual_fit(p, Model((), trial)).loss
+def _window_behind(p: Problem, c: Floats) -> Window:
+    """What a night fits a lag behind a valve to: OP as the stem meets it, PV less what a model has beside both."""
+    inputs, plain = p.inputs, neutral()
+    for slot in (*OF_CYCLES, Slot.BIAS, Slot.START, Slot.LEAK):
+        plain[slot] = c[slot]
+    op = before_stem(np.ascontiguousarray(acted(Signal.OP, inputs.op, c, inputs.dt_s)), c, inputs.dt_s)
+    y = p.y - simulate(inputs, c) + simulate(inputs, plain)
+    return Window(y, op, p.usable, inputs.dt_s)
 
 
 def from_cycles(p: Problem, near: Fitted, seen: SeenInCycles, rows: tuple[Variant, ...]) -> list[Fitted]:
