@@ -24,7 +24,6 @@ import numpy as np
 from analyzer.config import Config
 from analyzer.loop.measure import measure, time_scale, window_of
 from identification.estimation.backlash_stiction import fit_linear
-from identification.estimation.hammerstein import process_of
 from identification.models import Backlash, Fopdt, Loop, Pid
 from identification.record import Floats, LoopRecord
 from identification.simulation.closed_loop import closed_loop
@@ -83,14 +82,14 @@ def ours(made: Case) -> Model:
     limits = Config().cause
     m = measure(made.record, None, made.controller, limits)
     fit = m.play if m.evidence >= limits.evidence_unexcited else m.linear
-    p = process_of(m.window, fit)
+    p = fit.process
     return p.gain, p.time_constant_s, p.dead_time_s
 
 
 def plain(made: Case) -> Model:
     """The process behind a valve that is taken as ideal."""
     window = window_of(made.record, time_scale(made.record, None, made.controller), Config().cause)
-    p = process_of(window, fit_linear(window, time_scale(made.record, None, made.controller)))
+    p = fit_linear(window, time_scale(made.record, None, made.controller)).process
     return p.gain, p.time_constant_s, p.dead_time_s
 
 

@@ -149,7 +149,7 @@ def held(case: tuple[str, int]) -> list[Held] | str:
     ]
     if told != wanted or verdict.measured is None:
         return told
-    found = intervals(verdict.measured.window, chosen_fit(verdict), family != FAMILIES[2], AdviceLimits())
+    found = intervals(chosen_fit(verdict), family != FAMILIES[2], AdviceLimits())
     return [compared(family, name, found[name], true) for name, true in m.truth.items() if name in found]
 
 

@@ -22,8 +22,7 @@ from analyzer.loops.tags import controller
 from analyzer.words.settings import stands_and_jumps
 from identification.controller.check import StatedSettings
 from identification.errors import NotAssessedError
-from identification.estimation.evidence import WindowFit, trials_between_moves
-from identification.estimation.hammerstein import process_of
+from identification.estimation.evidence import trials_between_moves
 from identification.mismatch.experiment import coarser_by, is_experiment
 from identification.mismatch.recording import Recording, SeenInCycles, least_jump
 from identification.record import Floats
@@ -110,14 +109,13 @@ def seen_in_cycles(verdict: Verdict, limits: AdviceLimits) -> SeenInCycles | Non
         return None
     fit = m.stick_slip if verdict.fault is Fault.STICTION and m.stick_slip is not None else m.play
     valve = fit.valve.valve
-    shown = m.trials or trials_between_moves(WindowFit(m.window, fit), WindowFit(m.window, m.linear))
+    shown = m.trials or trials_between_moves(fit, m.linear)
     if valve is None or shown is None:
         return None
     cycle_s = 2.0 * m.window.duration_s / shown.count
-    process = process_of(m.window, fit)
-    known = intervals(m.window, fit, True, limits)
+    known = intervals(fit, True, limits)
     told = {name: known[name] for name in VALVE_FIGURES if name in known}
-    return SeenInCycles(process, valve, shown.count, shown.agreeing, cycle_s, m.trials is not None, told)
+    return SeenInCycles(fit.process, valve, shown.count, shown.agreeing, cycle_s, m.trials is not None, told)
 
 
 def verdict_on(spec: LoopSpec, prepared: Prepared, config: Config) -> Verdict:

@@ -19,8 +19,7 @@ from analyzer.loops.tags import as_stated
 from analyzer.words import settings as words
 from identification.estimation.covariance import NINETY
 from identification.estimation.gauss_newton import covariance
-from identification.estimation.hammerstein import Fit, process_of
-from identification.estimation.window import Window
+from identification.estimation.hammerstein import Fit
 from identification.models import Integrator, Loop, Pid, Process, Valve
 from identification.record import Floats
 from tuning.frequency_response import integral_s, is_stable
@@ -89,27 +88,27 @@ def valve_of(verdict: Verdict, fit: Fit) -> Valve:
 def model_of(verdict: Verdict, controller: Pid) -> Loop:
     """The closed loop that a verdict's model and the settings make."""
     fit = chosen_fit(verdict)
-    process = process_of(measured_of(verdict).window, fit)
+    process = fit.process
     return Loop(process, controller, valve_of(verdict, fit))
 
 
-def lag_factor(window: Window, fit: Fit, valve: bool, limits: AdviceLimits) -> float | None:
+def lag_factor(fit: Fit, valve: bool, limits: AdviceLimits) -> float | None:
     """Factor from the time constant to its 90 % limits [-]; None where the record tells gain over it alone."""
-    spread = math.sqrt(max(float(covariance(window, fit, free_width=valve)[0, 0]), 0.0))
+    spread = math.sqrt(max(float(covariance(fit, free_width=valve)[0, 0]), 0.0))
     factor = math.exp(min(NINETY * spread, 20.0))
-    known = is_known(fit, window, limits) and factor < limits.most_factor
+    known = is_known(fit, limits) and factor < limits.most_factor
     return factor if known else None
 
 
-def is_known(fit: Fit, window: Window, limits: AdviceLimits) -> bool:
+def is_known(fit: Fit, limits: AdviceLimits) -> bool:
     """Whether the time constant is well inside the window, so that it can be told from an integrator's."""
-    return fit.time_constant_s < limits.longest_share * window.duration_s
+    return fit.time_constant_s < limits.longest_share * fit.window.duration_s
 
 
-def tuned(window: Window, fit: Fit, valve: bool, limits: AdviceLimits) -> Process:
+def tuned(fit: Fit, valve: bool, limits: AdviceLimits) -> Process:
     """The process that settings are sought for: an integrator where the time constant is not known."""
-    process = process_of(window, fit)
-    if lag_factor(window, fit, valve, limits) is None:
+    process = fit.process
+    if lag_factor(fit, valve, limits) is None:
         return Integrator(process.slope, process.dead_time_s)
     return process
 
@@ -237,7 +236,7 @@ def _sticks(m: Measured, controller: Pid, limits: AdviceLimits) -> Loop | None:
     fit = m.stick_slip
     if fit is None or fit.valve.slip_jump <= 0:
         return None
-    return Loop(tuned(m.window, fit, True, limits), controller, fit.valve.valve)
+    return Loop(tuned(fit, True, limits), controller, fit.valve.valve)
 
 
 def _cycles_alone(one: Loop, other: Loop) -> bool:
@@ -253,11 +252,11 @@ def sought_for(verdict: Verdict, controller: Pid, limits: AdviceLimits) -> tuple
     """
     verdict = verdict.for_settings
     m, fit = measured_of(verdict), chosen_fit(verdict)
-    loop = replace(model_of(verdict, controller), process=tuned(m.window, fit, True, limits))
+    loop = replace(model_of(verdict, controller), process=tuned(fit, True, limits))
     other = _sticks(m, controller, limits) if fit is m.play else None
     if other is None or m.stick_slip is None or not _cycles_alone(other, loop):
-        return loop, fit, uncertain(m.window, fit, loop)
-    samples = uncertain(m.window, m.stick_slip, other, 3), uncertain(m.window, fit, loop, 2)
+        return loop, fit, uncertain(fit, loop)
+    samples = uncertain(m.stick_slip, other, 3), uncertain(fit, loop, 2)
     return other, m.stick_slip, (loop, *samples[0], *samples[1])
 
 
@@ -294,10 +293,10 @@ def _not_known_well(loop: Loop, verdict: Verdict, config: Config) -> str | None:
 
 
 def _for_tuning(verdict: Verdict, loop: Loop, period_s: float | None, config: Config) -> Proposed:
-    window, fit = measured_of(verdict).window, chosen_fit(verdict)
-    slow = replace(loop, process=cautious(process_of(window, fit), period_s))
-    others = (loop, *uncertain(window, fit, loop)[:2])
-    load = load_of(window, fit, loop.controller)
+    fit = chosen_fit(verdict)
+    slow = replace(loop, process=cautious(fit.process, period_s))
+    others = (loop, *uncertain(fit, loop)[:2])
+    load = load_of(fit, loop.controller)
     return Proposed(recommend(slow, verdict.cause, others, load, config.tuning), loop, load)
 
 
@@ -308,7 +307,7 @@ def _for_valve(verdict: Verdict, loop: Loop, period_s: float | None, config: Con
         return Proposed(Proposal(Action.REPAIR_VALVE, words.CALM))
     if rests and math.isinf(integral_s(loop.controller)):
         return Proposed(Proposal(Action.CHECK_SETTINGS, words.NO_INTEGRAL))
-    load = load_of(measured_of(verdict).window, fit, loop.controller)
+    load = load_of(fit, loop.controller)
     return Proposed(recommend(sought, verdict.cause, others, load, config.tuning), sought, load)
 
 

@@ -20,7 +20,6 @@ from analyzer.loop.identified import gain_room
 from analyzer.loop.oscillation import Oscillations
 from analyzer.loops.spec import LoopSpec
 from identification.estimation.hammerstein import Fit
-from identification.estimation.window import Window
 
 Known = dict[str, Cell]
 PER_OP = ("gain", "slope_pct_per_s", "backlash_pct", "stickband_pct", "slip_jump_pct")
@@ -167,22 +166,22 @@ def _model(verdict: Verdict, limits: AdviceLimits) -> Mapping[str, float | None]
     if m is None or verdict.cause not in (Cause.VALVE, Cause.TUNING):
         return {}
     if verdict.cause is Cause.TUNING:
-        return _process(m.linear, m.window, limits)
+        return _process(m.linear, limits)
     if verdict.fault is Fault.STICTION and m.stick_slip is not None:
         valve = m.stick_slip.valve
         columns = {"stickband_pct": valve.stickband, "slip_jump_pct": valve.slip_jump}
-        return {**_process(m.stick_slip, m.window, limits), **columns}
-    return {**_process(m.play, m.window, limits), "backlash_pct": m.play.valve.stickband}
+        return {**_process(m.stick_slip, limits), **columns}
+    return {**_process(m.play, limits), "backlash_pct": m.play.valve.stickband}
 
 
-def _process(fit: Fit, window: Window, limits: AdviceLimits) -> dict[str, float | None]:
+def _process(fit: Fit, limits: AdviceLimits) -> dict[str, float | None]:
     """Process constants; gain and time constant apart only where the time constant is well inside the window."""
-    known = is_known(fit, window, limits)
+    known = is_known(fit, limits)
     return {
         "gain": fit.gain if known else None,
         "time_constant_s": fit.time_constant_s if known else None,
         "slope_pct_per_s": fit.slope,
-        "dead_time_s": fit.dead_time_s + window.half_block_s,
+        "dead_time_s": fit.process.dead_time_s,
     }
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from analyzer.loop.measure import Measured
 from identification.estimation.gauss_newton import covariance
-from identification.estimation.hammerstein import Fit, disturbance, process_of
+from identification.estimation.hammerstein import Fit, disturbance
 from identification.estimation.window import Window
 from identification.models import Fopdt, Integrator, Loop, Pid, Process
 from identification.record import Floats
@@ -36,7 +36,7 @@ def sensitivity(m: Measured, period_s: float) -> float | None:
     wrong way. The smaller of those with the process as identified and as settings are sought for it, of a cycle of
     period_s [s].
     """
-    process, controller = process_of(m.window, m.linear), m.controller
+    process, controller = m.linear.process, m.controller
     if controller is None or process.gain * controller.kp <= 0.0:
         return None
     return min(
@@ -47,20 +47,21 @@ def sensitivity(m: Measured, period_s: float) -> float | None:
 def gain_room(m: Measured) -> float | None:
     """SIMC's gain for the identified process over the present one [-]; None where no settings are known, or they act
     the wrong way, or the set point did not move: a load alone does not tell how late PV answers OP."""
-    process, controller = process_of(m.window, m.linear), m.controller
+    process, controller = m.linear.process, m.controller
     if not m.excited or controller is None or process.gain * controller.kp <= 0.0:
         return None
     return abs(simc(process, scan_s=controller.scan_s).kp / controller.kp)
 
 
-def load_of(window: Window, fit: Fit, controller: Pid, seed: int = 0) -> Floats:
+def load_of(fit: Fit, controller: Pid, seed: int = 0) -> Floats:
     """Load and noise [% PV] that the model leaves, on the scan's clock, the latest `MOST_SCANS`, shape (m,).
 
     The window's blocks have lost the noise from scan to scan. OP still has it, times the gain, and it dithers the
     stem; white noise of that size is added.
     """
+    window = fit.window
     scan_s = controller.scan_s or window.dt_s
-    left = disturbance(window, fit)
+    left = disturbance(fit)
     clock = np.arange(int(window.duration_s / scan_s)) * scan_s
     load = np.interp(clock, np.arange(left.size) * window.dt_s, left)[-MOST_SCANS:]
     if window.factor > 1:
@@ -79,13 +80,12 @@ def scan_noise(window: Window, controller: Pid) -> float:
     return robust_deviation(jumps) / math.sqrt(6.0) / abs(controller.kp)
 
 
-def uncertain(window: Window, fit: Fit, loop: Loop, samples: int = 6, seed: int = 0) -> tuple[Loop, ...]:
+def uncertain(fit: Fit, loop: Loop, samples: int = 6, seed: int = 0) -> tuple[Loop, ...]:
     """Loops drawn from the fit's covariance, of the same controller and the same kind of process."""
-    dead_time_s = fit.dead_time_s + window.half_block_s
     lag, gain = math.log(fit.time_constant_s), math.log(abs(fit.gain))
-    mean = np.array([lag, dead_time_s, fit.valve.stickband, gain])
+    mean = np.array([lag, fit.process.dead_time_s, fit.valve.stickband, gain])
     relative = np.array([1.0, 1.0, 1.0, 1.0 / fit.gain])
-    spread = covariance(window, fit, free_width=loop.valve is not None) * np.outer(relative, relative)
+    spread = covariance(fit, free_width=loop.valve is not None) * np.outer(relative, relative)
     scale = np.sqrt(np.maximum(np.diag(spread), 1e-24))
     unit = spread / np.outer(scale, scale) + 1e-9 * np.eye(mean.size)
     # not by singular vectors, whose signs are a matter of rounding

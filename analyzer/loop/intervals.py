@@ -29,24 +29,24 @@ from identification.models import Estimate
 from identification.simulation.valve import StemLaw
 
 
-def intervals(window: Window, fit: Fit, valve: bool, limits: AdviceLimits) -> dict[str, Estimate]:
+def intervals(fit: Fit, valve: bool, limits: AdviceLimits) -> dict[str, Estimate]:
     """Estimates of a fit with 90 % intervals from the curvature of the likelihood and the scatter of its scores.
 
     Gain and time constant are left out where the record tells their ratio alone (advice.lag_factor). Of a
     valve that jumps PV tells jump times slope; only slips beyond the first of a half cycle part the two, so both
     are told within wide limits. proofs/coverage.md says how often the intervals hold the truth.
     """
-    spread = np.sqrt(np.maximum(np.diag(covariance(window, fit, free_width=valve)), 0.0))
-    t = fit.time_constant_s
-    factor = lag_factor(window, fit, valve, limits)
+    spread = np.sqrt(np.maximum(np.diag(covariance(fit, free_width=valve)), 0.0))
+    t, window = fit.time_constant_s, fit.window
+    factor = lag_factor(fit, valve, limits)
     if valve and factor is None:
         spread = spread * SLOPE_ALONE
-    out = {"slope_pct_per_s": _slope(window, fit, valve, SLOPE_ALONE if valve and factor is None else 1.0)}
+    out = {"slope_pct_per_s": _slope(fit, valve, SLOPE_ALONE if valve and factor is None else 1.0)}
     if factor is not None:
         wide = max(factor ** _lag_wider(fit, valve), 1.0 + LEAST_SHARE)
         out["gain"] = _around(fit.gain, half_width(spread[3], LEAST_SHARE * abs(fit.gain)), "%/%")
         out["time_constant_s"] = Estimate(t, t / wide, t * wide, "s")
-    dead_s = fit.dead_time_s + window.half_block_s
+    dead_s = fit.process.dead_time_s
     out["dead_time_s"] = _around(dead_s, half_width(spread[1], LEAST_BLOCK * window.dt_s), "s", least=0.0)
     if valve and window.decoded:
         spread[2] = DECODED * fit.valve.stickband
@@ -85,9 +85,9 @@ def _jumping(window: Window, valve: StemLaw, found: dict[str, Estimate]) -> dict
     return out
 
 
-def _slope(window: Window, fit: Fit, valve: bool, wider: float) -> Estimate:
+def _slope(fit: Fit, valve: bool, wider: float) -> Estimate:
     """Gain over time constant with its interval; the errors of the two are strongly correlated."""
-    c = covariance(window, fit, free_width=valve)
+    c = covariance(fit, free_width=valve)
     relative = c[3, 3] / fit.gain**2 + c[0, 0] - 2 * c[0, 3] / fit.gain
     deviation = wider * math.sqrt(max(relative, 0.0))
     return _around(fit.slope, abs(fit.slope) * half_width(deviation, LEAST_SHARE), "%/(% s)")

@@ -22,7 +22,6 @@ from identification.estimation.backlash_stiction import (
 )
 from identification.estimation.evidence import (
     Trials,
-    WindowFit,
     evidence,
     expected_evidence,
     stem_moves,
@@ -30,7 +29,7 @@ from identification.estimation.evidence import (
     with_load_step,
 )
 from identification.estimation.gauss_newton import descend
-from identification.estimation.hammerstein import Fit, process_of, residual
+from identification.estimation.hammerstein import Fit, residual
 from identification.estimation.noise import judged
 from identification.estimation.search import AR_ORDER, prepare, score
 from identification.estimation.stem_position import Seen, seen
@@ -81,7 +80,6 @@ class Measured:
     stable: bool
     saturated: float
     controller: Pid | None
-    window: Window
     moves: int
     excited: bool
     line_linear: float = 0.0
@@ -92,6 +90,11 @@ class Measured:
     kurtosis: float = 3.0
     wave_left: float = 0.0
     expected: float = 0.0
+
+    @property
+    def window(self) -> Window:
+        """What all of them are fitted to."""
+        return self.linear.window
 
 
 def _op_range(window: Window, scale_s: float, oscillating: bool) -> float:
@@ -112,11 +115,12 @@ def _prominence(x: Floats, dt_s: float, period_s: float) -> float:
     return peak_prominence(tapered_power(s), s.duration_s / period_s)
 
 
-def _wave_left(window: Window, fit: Fit, period_s: float) -> float:
+def _wave_left(fit: Fit, period_s: float) -> float:
     """Second and third harmonic locked to PV's cycle in what a fit leaves of PV, over PV's fundamental."""
+    window = fit.window
     if window.duration_s < FEWEST_CYCLES * period_s:
         return 0.0
-    left, cycle = spectrum(residual(window, fit), window.dt_s), spectrum(window.centred, window.dt_s)
+    left, cycle = spectrum(residual(fit), window.dt_s), spectrum(window.centred, window.dt_s)
     return math.hypot(*(locked_harmonic(left, period_s, order, cycle) for order in HARMONICS))
 
 
@@ -125,9 +129,9 @@ def _play(size: float) -> float:
     return min(max(size, PLAYS[0]), PLAYS[1])
 
 
-def _consistency(window: Window, fit: Fit, period_s: float) -> float:
+def _consistency(fit: Fit, period_s: float) -> float:
     """Gain of the identified process outside the period's band over its gain with it."""
-    prepared = prepare(window, IDEAL, fit.ar, period_s / window.dt_s)
+    prepared = prepare(fit.window, IDEAL, fit.ar, period_s / fit.window.dt_s)
     gain = float(score(prepared, fit.time_constant_s, fit.dead_time_s)[2][0])
     return gain / fit.gain if fit.gain else 0.0
 
@@ -158,12 +162,11 @@ def measure(
     _check_judged(window, limits)
     controller = controller or recovered(record, scale)
     due = due_to_answer(record, window, scale)
-    window, fits = _fits(window, scale, due, limits, oscillation)
-    linear, play, stick, best, gained, jump = fits
+    linear, play, stick, best, gained, jump = _fits(window, scale, due, limits, oscillation)
     hopeless = oscillation is None and gained < _hopeful(window, due, limits)
     op_range = _op_range(window, scale, oscillation is not None)
-    amplification, stable = _amplification(process_of(window, linear), controller, scale)
-    told, (fine_linear, fine_play, fine_stick) = _refined(window, (linear, play, stick), best, hopeless)
+    amplification, stable = _amplification(linear.process, controller, scale)
+    fine_linear, fine_play, fine_stick = _refined((linear, play, stick), best, hopeless)
     seen_alone = Measured(
         linear=fine_linear,
         play=fine_play,
@@ -175,25 +178,24 @@ def measure(
         stable=stable,
         saturated=at_limits_share(record),
         controller=controller,
-        window=told,
-        moves=stem_moves(window, best.valve),
+        moves=stem_moves(best),
         excited=bool(due.any()),
     )
     if oscillation is None:
         return seen_alone
-    return _of_a_cycle(seen_alone, WindowFit(window, best), WindowFit(window, linear), scale, op_range, error)
+    return _of_a_cycle(seen_alone, best, linear, scale, op_range, error)
 
 
 def _of_a_cycle(
-    m: Measured, best: WindowFit, linear: WindowFit, scale: float, op_range: float, error: Spectrum | None
+    m: Measured, best: Fit, linear: Fit, scale: float, op_range: float, error: Spectrum | None
 ) -> Measured:
     """What a cycle of this period shows beside: in the load that the fits leave, and in the wave of the error."""
-    window = best.window
+    dt_s = linear.window.dt_s
     found = replace(
         m,
-        line_linear=_prominence(residual(window, linear.fit), window.dt_s, scale),
-        line_valve=_prominence(residual(window, best.fit), window.dt_s, scale),
-        consistency=_consistency(window, linear.fit, scale),
+        line_linear=_prominence(residual(linear), dt_s, scale),
+        line_valve=_prominence(residual(best), dt_s, scale),
+        consistency=_consistency(linear, scale),
     )
     if error is None:
         return found
@@ -202,20 +204,19 @@ def _of_a_cycle(
         harmonic=locked_harmonic(error, scale),
         trials=trials(best, linear, scale),
         kurtosis=size_kurtosis(error, error.duration_s / scale),
-        wave_left=_wave_left(window, best.fit, scale),
-        expected=expected_evidence(window, linear.fit, _play(m.size) * op_range, scale),
+        wave_left=_wave_left(best, scale),
+        expected=expected_evidence(linear, _play(m.size) * op_range, scale),
     )
 
 
 def _fits(
     window: Window, scale: float, due: Mask, limits: CauseLimits, oscillation: Oscillation | None
-) -> tuple[Window, Fits]:
-    """The candidates' fits, by a recorded stem where one shows a fault, and the window that they are of."""
+) -> Fits:
+    """The candidates' fits, by a recorded stem where one shows a fault."""
     shown = None if window.position is None else seen(window.op, window.position)
     if shown is not None:
-        return window, _shown(window, shown, due, scale)
-    window = replace(window, position=None)
-    return window, _candidates(window, scale, due, limits, oscillation)
+        return _shown(window, shown, due, scale)
+    return _candidates(replace(window, position=None), scale, due, limits, oscillation)
 
 
 def _check_judged(window: Window, limits: CauseLimits) -> None:
@@ -227,19 +228,21 @@ def _check_judged(window: Window, limits: CauseLimits) -> None:
         )
 
 
-def _refined(window: Window, fits: Candidates, best: Fit, hopeless: bool) -> tuple[Window, Candidates]:
-    """Window and fits at the record's own interval, where the dead time is no shorter than a block; the valve's are
-    left as they are where it is `hopeless` to look for its fault."""
+def _refined(fits: Candidates, best: Fit, hopeless: bool) -> Candidates:
+    """Fits at the record's own interval, where the dead time is no shorter than a block; the valve's are left as they
+    are where it is `hopeless` to look for its fault."""
+    window = best.window
     if window.factor == 1 or best.dead_time_s + window.half_block_s < window.dt_s:
-        return window, fits
+        return fits
     fine = replace(window, fine=True)
-    linear, play, stick = fits
+    linear, play = (replace(fit, window=fine) for fit in fits[:2])
+    stick = None if fits[2] is None else replace(fits[2], window=fine)
     if hopeless:
-        return fine, (descend(fine, linear), play, stick)
-    return fine, (
-        descend(fine, linear),
-        descend(fine, play, free_width=window.position is None),
-        None if stick is None else descend(fine, stick),
+        return descend(linear), play, stick
+    return (
+        descend(linear),
+        descend(play, free_width=window.position is None),
+        None if stick is None else descend(stick),
     )
 
 
@@ -256,20 +259,20 @@ def _candidates(
     linear = fit_linear(window, scale_s)
     short = oscillation is None and window.y.size < SHORT
     hopeful = None if oscillation is not None or short else _hopeful(window, due, limits)
-    play = fit_play(window, linear, scale_s, hopeful)
+    play = fit_play(linear, scale_s, hopeful)
     gained = play.log_likelihood - linear.log_likelihood
     if gained < (SCREENED if hopeful is None else hopeful) and not short:
         return linear, play, None, play, gained, 0.0
-    linear = better_linear(window, linear, play)
+    linear = better_linear(linear, play)
     best, stick, jump = play, None, 0.0
     wide = play.valve.stickband > 0.25 * window.op_range
     if short or (wide and (oscillation is not None or gained >= limits.evidence)):
-        stick = fit_stick_slip(window, play, scale_s)
-        jump = evidence(WindowFit(window, stick), WindowFit(window, play))
+        stick = fit_stick_slip(play, scale_s)
+        jump = evidence(stick, play)
         jump -= max(play.log_likelihood - stick.log_likelihood, 0.0)
         best = stick if jump > limits.evidence_jump else play
-    plain = with_load_step(window, linear, due, best.ar)
-    gained = evidence(WindowFit(window, best), plain) - (limits.evidence_jump if best is stick else 0.0)
+    plain = with_load_step(linear, due, best.ar)
+    gained = evidence(best, plain) - (limits.evidence_jump if best is stick else 0.0)
     return linear, play, stick, best, gained, jump
 
 
@@ -277,10 +280,10 @@ def _shown(window: Window, shown: Seen, due: Mask, scale_s: float) -> Fits:
     """The same where the stem is recorded: its fault is seen, and PV answers the stem itself."""
     linear = fit_linear(window, scale_s)
     behind = window if window.position is None else replace(window, op=window.position)
-    play = descend(window, replace(fit_linear(behind, scale_s), valve=shown.play))
+    play = descend(replace(fit_linear(behind, scale_s), window=window, valve=shown.play))
     stick = None if shown.jumping is None else replace(play, valve=shown.jumping)
     best = play if stick is None else stick
-    gained = evidence(WindowFit(window, best), with_load_step(window, linear, due, best.ar))
+    gained = evidence(best, with_load_step(linear, due, best.ar))
     return linear, play, stick, best, gained, 0.0 if stick is None else math.inf
 
 

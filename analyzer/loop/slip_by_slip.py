@@ -10,8 +10,7 @@ from analyzer.loop.decisions import Cause, Fault
 from analyzer.loop.measure import Measured
 from identification.estimation.backlash_stiction import SHORT, generic_noise
 from identification.estimation.gauss_newton import descend
-from identification.estimation.irregular_slips import SlipPath, fit_irregular, path_evidence, told_by
-from identification.estimation.window import Window
+from identification.estimation.irregular_slips import SlipPath, fit_irregular, path_evidence
 
 
 def told_slip_by_slip(verdict: Verdict, period_s: float, limits: CauseLimits) -> Verdict:
@@ -38,24 +37,23 @@ def told_slip_by_slip(verdict: Verdict, period_s: float, limits: CauseLimits) ->
         or m.window.y.size < SHORT
     ):
         return verdict
-    window = replace(m.window, fine=False)
-    play = descend(window, m.play, free_width=True) if m.window.fine else m.play
-    path = fit_irregular(window, play, generic_noise(), period_s, verdict.fault is not Fault.STICTION)
+    blocks = replace(m.play, window=replace(m.window, fine=False))
+    play = descend(blocks, free_width=True) if m.window.fine else m.play
+    path = fit_irregular(play, generic_noise(), period_s, verdict.fault is not Fault.STICTION)
     if path is None:
         return verdict
-    jump = path_evidence(window, path, play)
+    jump = path_evidence(path, play)
     more = jump - max(m.jump, 0.0)
     if more < max(limits.evidence_jump, limits.jump_share * (m.evidence + more)):
         return verdict
-    told = _with_path(m, window, path, jump, more)
+    told = _with_path(m, path, jump, more)
     return replace(verdict, measured=told, fault=fault_of(told, limits), steady=verdict)
 
 
-def _with_path(m: Measured, window: Window, path: SlipPath, jump: float, more: float) -> Measured:
+def _with_path(m: Measured, path: SlipPath, jump: float, more: float) -> Measured:
     """What was measured, with the path's stem and the friction and process behind it."""
-    told = told_by(window, path)
     fit = path.fit
     if m.window.fine:
-        told = replace(told, fine=True)
-        fit = descend(told, fit)
-    return replace(m, window=told, stick_slip=fit, jump=jump, evidence=m.evidence + more)
+        fit = descend(replace(fit, window=replace(fit.window, fine=True)))
+    linear, play = (replace(x, window=fit.window) for x in (m.linear, m.play))
+    return replace(m, linear=linear, play=play, stick_slip=fit, jump=jump, evidence=m.evidence + more)

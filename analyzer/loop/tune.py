@@ -11,7 +11,6 @@ from analyzer.config import AdviceLimits, Config
 from analyzer.loop.advice import (
     Advice,
     chosen_fit,
-    measured_of,
     model_of,
     propose,
     sought_for,
@@ -92,8 +91,7 @@ def _model(verdict: Verdict, controller: Pid, limits: AdviceLimits) -> tuple[Loo
     if verdict.cause is Cause.VALVE:
         return sought_for(verdict, controller, limits)
     fit, model = chosen_fit(verdict), model_of(verdict, controller)
-    window = verdict.measured.window if verdict.measured else None
-    return model, fit, uncertain(window, fit, model) if window else ()
+    return model, fit, uncertain(fit, model) if verdict.measured else ()
 
 
 def identified(found: Assessment, limits: AdviceLimits) -> tuple[Process, Valve, dict[str, Estimate]]:
@@ -107,9 +105,9 @@ def identified(found: Assessment, limits: AdviceLimits) -> tuple[Process, Valve,
     verdict = found.verdict
     if verdict.measured is None:
         raise NotAssessedError(str(verdict.needs or NO_MODEL))
-    window, fit, at_fault = verdict.measured.window, chosen_fit(verdict), verdict.cause is Cause.VALVE
-    process = tuned(window, fit, at_fault, limits)
-    return process, valve_of(verdict, fit), intervals(window, fit, at_fault, limits)
+    fit, at_fault = chosen_fit(verdict), verdict.cause is Cause.VALVE
+    process = tuned(fit, at_fault, limits)
+    return process, valve_of(verdict, fit), intervals(fit, at_fault, limits)
 
 
 def tune(found: Assessment, controller: Pid, config: Config, kept: Advice | None = None) -> Tuning:
@@ -134,13 +132,12 @@ def tune(found: Assessment, controller: Pid, config: Config, kept: Advice | None
         raise NotAssessedError(str(verdict.needs or NO_MODEL))
     first = found.oscillations.first
     period = first.period_s if first else None
-    tried_on = measured_of(verdict.for_settings)
     model, fit, others = _model(verdict, controller, config.advice)
     if kept is not None and kept.reason and kept.action is not None:
         proposal = Proposal(kept.action, kept.reason)
     else:
         proposal = propose(verdict, controller, period, config).proposal
-    load = load_of(tried_on.window, fit, controller)
+    load = load_of(fit, controller)
     new = proposal.controller or proposal.meanwhile
     is_long = load.size >= config.tuning.least_steps
     forecast = predict(model, new, load, others) if new and is_long else None

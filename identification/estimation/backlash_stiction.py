@@ -74,12 +74,14 @@ GENERIC = 0.95
 another valve takes that valve's side, so candidates are ranked by both."""
 
 
-def begin(prepared: Prepared, dynamics: Dynamics) -> Fit:
+def begin(window: Window, prepared: Prepared, dynamics: Dynamics) -> Fit:
     """The fit at given dynamics under a given noise model, a start for the descent."""
     sigma2, count, beta = score(prepared, *dynamics)
     t, dead = dynamics
     base = np.array([beta[1], beta[2], 0.0, 0.0])
-    return Fit(float(beta[0]), t, dead, prepared.valve, float(sigma2), int(count), prepared.pv.ar, base)
+    return Fit(
+        float(beta[0]), t, dead, prepared.valve, float(sigma2), int(count), prepared.pv.ar, base, window
+    )
 
 
 def fit_linear(window: Window, period_s: float) -> Fit:
@@ -92,7 +94,7 @@ def fit_linear(window: Window, period_s: float) -> Fit:
     fits = []
     for ar in (learnt, generic_noise()):
         prepared = prepare(window, IDEAL, ar)
-        fits.append(descend(window, begin(prepared, search(prepared, starts(window, period_s)))))
+        fits.append(descend(begin(window, prepared, search(prepared, starts(window, period_s)))))
     return max(fits, key=lambda fit: fit.log_likelihood)
 
 
@@ -108,69 +110,70 @@ def _ranked(window: Window, ar: Floats, valves: list[StemLaw], begins: list[Dyna
     trials, pv = [], white_pv(window, ar)
     for valve in valves:
         prepared = behind(pv, valve)
-        trials.append(begin(prepared, search(prepared, begins, 2)))
+        trials.append(begin(window, prepared, search(prepared, begins, 2)))
     return sorted(trials, key=lambda fit: fit.sigma2)
 
 
-def _chosen(window: Window, near: Fit, valves: list[StemLaw], period_s: float, followed: int) -> list[Fit]:
+def _chosen(near: Fit, valves: list[StemLaw], period_s: float, followed: int) -> list[Fit]:
     """The best few of valves tried under two noise models."""
-    begins = [(near.time_constant_s, near.dead_time_s), *starts(window, period_s)]
+    begins = [(near.time_constant_s, near.dead_time_s), *starts(near.window, period_s)]
     noises = generic_noise(), near.ar
-    return [fit for ar in noises for fit in _ranked(window, ar, valves, begins)[:followed]]
+    return [fit for ar in noises for fit in _ranked(near.window, ar, valves, begins)[:followed]]
 
 
-def _likeliest(window: Window, fits: list[Fit]) -> Fit:
+def _likeliest(fits: list[Fit]) -> Fit:
     """The likeliest of what fits come to, each followed to its end."""
-    ends = (descend(window, fit, free_width=True) for fit in fits)
+    ends = (descend(fit, free_width=True) for fit in fits)
     return max(ends, key=lambda fit: fit.log_likelihood)
 
 
-def fit_play(window: Window, linear: Fit, period_s: float, hopeful: float | None = None) -> Fit:
+def fit_play(linear: Fit, period_s: float, hopeful: float | None = None) -> Fit:
     """The best play followed by a lag: a screening, and the whole search where it finds anything.
 
     linear : the best fit behind an ideal valve; period_s : scale of the search [s]; hopeful : gain in log likelihood
     [nat] of a quick screening from which the whole search follows; None: the screening is thorough, and SCREENED is
     enough.
     """
+    window = linear.window
     reach = max(window.op_range, 1e-9)
     screened = [sticking(share * reach, 0.0) for share in SCREEN_SHARES]
     followed = len(screened) if hopeful is None else 1
-    best = _likeliest(window, _chosen(window, linear, screened, period_s, followed))
+    best = _likeliest(_chosen(linear, screened, period_s, followed))
     if best.log_likelihood - linear.log_likelihood < (SCREENED if hopeful is None else hopeful):
         return best
     followed = FOLLOWED_SHORT if window.y.size < SHORT else 1
     begun = []
     for part in (SMALL, MIDDLE, LARGE, (best.valve.stickband / reach,)):
         valves = [sticking(share * reach, 0.0) for share in part]
-        begun += _chosen(window, best, valves, period_s, followed)
-    return max(best, _likeliest(window, begun), key=lambda fit: fit.log_likelihood)
+        begun += _chosen(best, valves, period_s, followed)
+    return max(best, _likeliest(begun), key=lambda fit: fit.log_likelihood)
 
 
-def better_linear(window: Window, linear: Fit, play: Fit) -> Fit:
+def better_linear(linear: Fit, play: Fit) -> Fit:
     """The better of the plain fit and one followed from the dynamics that were found behind a play.
 
     The plain process is the play of no width; found from there it is never unfairly behind. Where the two are as
     likely, the one that was searched on its own stays.
     """
-    trial = descend(window, replace(play, valve=IDEAL))
+    trial = descend(replace(play, valve=IDEAL))
     return trial if trial.log_likelihood > linear.log_likelihood + CLEAR else linear
 
 
-def fit_stick_slip(window: Window, play: Fit, period_s: float) -> Fit:
+def fit_stick_slip(play: Fit, period_s: float) -> Fit:
     """The best stick-slip (J > 0) followed by a lag, scanned whole and finely about the play.
 
     play : the best play: its width is near the stickband, for OP tells both by its travel between slips; period_s :
     scale of the search [s].
     """
-    short = window.y.size < SHORT
-    begun = _chosen(window, play, _coarse(window, play), period_s, FOLLOWED_SHORT if short else FOLLOWED)
-    fits = [_likeliest(window, begun), *pits(window, play, (RESTS, HALTS, SLIDES))]
+    short = play.window.y.size < SHORT
+    begun = _chosen(play, _coarse(play), period_s, FOLLOWED_SHORT if short else FOLLOWED)
+    fits = [_likeliest(begun), *pits(play, (RESTS, HALTS, SLIDES))]
     return max(fits, key=lambda fit: fit.log_likelihood)
 
 
-def _coarse(window: Window, play: Fit) -> list[StemLaw]:
+def _coarse(play: Fit) -> list[StemLaw]:
     """Stickbands up to OP's range, with stems that rest and stems that slide."""
-    reach = max(window.op_range, 1e-9)
+    reach = max(play.window.op_range, 1e-9)
     near = play.valve.stickband / reach
     widths = {round(s, 4) for s in MIDDLE + LARGE} | {near, 1.1 * near}
     return [
@@ -181,11 +184,12 @@ def _coarse(window: Window, play: Fit) -> list[StemLaw]:
     ]
 
 
-def pits(window: Window, play: Fit, tolerances: tuple[float, ...]) -> list[Fit]:
+def pits(play: Fit, tolerances: tuple[float, ...]) -> list[Fit]:
     """The likeliest stick-slips about a play, of the best few of each behaviour at the bottom of their pits.
 
     A slip more or less changes the stem until the next one, so likelihood has many narrow pits in S and J.
     """
+    window = play.window
     pairs = np.array([(w * play.valve.stickband, j) for w in FINE_WIDTHS for j in FINE_JUMPS])
     begins = [(play.time_constant_s, play.dead_time_s + blocks * window.dt_s) for blocks in LATER]
     out = []
@@ -193,16 +197,16 @@ def pits(window: Window, play: Fit, tolerances: tuple[float, ...]) -> list[Fit]:
         left = scan(window, pairs, tolerance, generic_noise(), begins)
         best = [sticking(pairs[i, 0], pairs[i, 1], tolerance) for i in np.argsort(left)[:FINALISTS]]
         fits = _ranked(window, generic_noise(), best, begins)
-        out += [_bottom(window, descend(window, fit)) for fit in fits]
+        out += [_bottom(descend(fit)) for fit in fits]
     likeliest = sorted(out, key=lambda fit: -fit.log_likelihood)[:FOLLOWED]
-    return [_bottom(window, fit) for fit in likeliest]
+    return [_bottom(fit) for fit in likeliest]
 
 
-def _bottom(window: Window, fit: Fit) -> Fit:
+def _bottom(fit: Fit) -> Fit:
     """Stickband and jump at the bottom of their pit, the rest following at the end."""
     dynamics = fit.time_constant_s, fit.dead_time_s
-    valve = settled(white_pv(window, fit.ar), fit.valve, fit.sigma2, dynamics)
-    return descend(window, replace(fit, valve=valve))
+    valve = settled(white_pv(fit.window, fit.ar), fit.valve, fit.sigma2, dynamics)
+    return descend(replace(fit, valve=valve))
 
 
 @njit(cache=True)

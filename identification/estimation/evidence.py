@@ -13,50 +13,40 @@ from identification.estimation.gauss_newton import descend
 from identification.estimation.hammerstein import Fit, disturbance, residual, stem_of
 from identification.estimation.noise import every_lag, judged, whitened
 from identification.estimation.search import prepare, search, starts
-from identification.estimation.window import Window
 from identification.record import Floats, Mask
 from identification.signals.robust import clipped_gain
-from identification.simulation.valve import IDEAL, StemLaw, sticking
+from identification.simulation.valve import IDEAL, sticking
 
 
-def innovations(window: Window, fit: Fit) -> Floats:
+def innovations(fit: Fit) -> Floats:
     """Innovations of a fit at the samples judged [% PV]."""
     order = fit.ar.size
-    white = whitened(np.ascontiguousarray(disturbance(window, fit)), fit.ar, every_lag(order))
-    return white[judged(window.usable, order)]
+    white = whitened(np.ascontiguousarray(disturbance(fit)), fit.ar, every_lag(order))
+    return white[judged(fit.window.usable, order)]
 
 
-@dataclass(frozen=True, slots=True)
-class WindowFit:
-    """A fit and the window that it is of (which may hold a step of the load)."""
-
-    window: Window
-    fit: Fit
-
-
-def evidence(ours: WindowFit, theirs: WindowFit) -> float:
+def evidence(ours: Fit, theirs: Fit) -> float:
     """Gain in log likelihood [nat] of one fit over another, no innovation counting for more than outliers do."""
-    mine, other = innovations(ours.window, ours.fit), innovations(theirs.window, theirs.fit)
-    return float(clipped_gain(mine, other).sum())
+    return float(clipped_gain(innovations(ours), innovations(theirs)).sum())
 
 
 STEP_PENALTY = 6.0
 """Gain in log likelihood [nat] that one step of the load at any time costs: log of the blocks, nearly."""
 
 
-def moves_begun(window: Window, valve: StemLaw) -> np.ndarray:
+def moves_begun(fit: Fit) -> np.ndarray:
     """Blocks at which the stem of a valve sets out or turns, shape (m,)."""
-    moved = np.sign(np.diff(stem_of(window.stems_in_blocks, valve)))
+    moved = np.sign(np.diff(stem_of(fit.window.stems_in_blocks, fit.valve)))
     set_out = np.concatenate(([0.0], moved))
     return np.flatnonzero((set_out[1:] != set_out[:-1]) & (set_out[1:] != 0))
 
 
-def stem_moves(window: Window, valve: StemLaw) -> int:
+def stem_moves(fit: Fit) -> int:
     """How often the stem of a valve sets out or turns: stretches of motion in one direction with rest between."""
-    return int(moves_begun(window, valve).size)
+    return int(moves_begun(fit).size)
 
 
-def with_load_step(window: Window, fit: Fit, answering: Mask, noise: Floats) -> WindowFit:
+def with_load_step(fit: Fit, answering: Mask, noise: Floats) -> Fit:
     """The plain process with one step of the load where its largest innovation is, if that is worth its penalty.
 
     A single slip of a stem and a single step of the load look alike; only the slip that also explains why the
@@ -64,21 +54,18 @@ def with_load_step(window: Window, fit: Fit, answering: Mask, noise: Floats) -> 
     bool, shape (n,)) its step is no load: a load does not wait for the operator. `noise` is the noise model of
     the candidate, shape (p,), a second start: one fitted across the step is nearly an integrator.
     """
-    counts = judged(window.usable, fit.ar.size)
-    white = np.where(answering[counts], 0.0, np.abs(innovations(window, fit)))
+    counts = judged(fit.window.usable, fit.ar.size)
+    white = np.where(answering[counts], 0.0, np.abs(innovations(fit)))
     if white.size < 50:
-        return WindowFit(window, fit)
+        return fit
     at = int(np.flatnonzero(counts)[int(np.argmax(white))])
-    stepped = replace(window, step_at=at)
-    trial = max(
-        (descend(stepped, start) for start in (fit, replace(fit, ar=noise))), key=lambda f: f.log_likelihood
-    )
-    if trial.log_likelihood - fit.log_likelihood > STEP_PENALTY:
-        return WindowFit(stepped, trial)
-    return WindowFit(window, fit)
+    stepped = replace(fit, window=replace(fit.window, step_at=at))
+    tried = descend(stepped), descend(replace(stepped, ar=noise))
+    trial = max(tried, key=lambda f: f.log_likelihood)
+    return trial if trial.log_likelihood - fit.log_likelihood > STEP_PENALTY else fit
 
 
-def expected_evidence(window: Window, linear: Fit, width: float, period_s: float) -> float:
+def expected_evidence(linear: Fit, width: float, period_s: float) -> float:
     """Log likelihood [nat] that a play would win over no play, under the noise that the recording has.
 
     PV is simulated behind the play, as large as the process without one makes it, and a process without play is
@@ -86,23 +73,25 @@ def expected_evidence(window: Window, linear: Fit, width: float, period_s: float
     the two models (Kullback 1951). Noise, few samples and a short record make it small. A play that is there brings
     as much to three times as much: noise keeps the plain process from fitting as well as it does here.
 
-    linear : the process behind an ideal valve, fitted to the window in blocks; width : of the play [% OP]; period_s :
+    linear : the process behind an ideal valve, fitted in blocks; width : of the play [% OP]; period_s :
     period of the oscillation [s].
     """
-    blocks = replace(window, fine=False, position=None)
-    free, behind = (_pv(blocks, linear, valve) for valve in (IDEAL, sticking(width, 0.0)))
+    blocks = replace(linear.window, fine=False, position=None)
+    free, behind = (
+        _pv(replace(linear, window=blocks, valve=valve)) for valve in (IDEAL, sticking(width, 0.0))
+    )
     moves = float(np.std(behind))
     if moves == 0.0 or linear.sigma2 <= 0.0:
         return 0.0
     simulated = replace(blocks, y=behind * (float(np.std(free)) / moves))
     prepared = prepare(simulated, IDEAL, linear.ar)
-    left = begin(prepared, search(prepared, starts(simulated, period_s))).sigma2
+    left = begin(simulated, prepared, search(prepared, starts(simulated, period_s))).sigma2
     return 0.5 * linear.count * math.log1p(left / linear.sigma2)
 
 
-def _pv(window: Window, linear: Fit, valve: StemLaw) -> Floats:
+def _pv(fit: Fit) -> Floats:
     """PV of a process behind a valve, free of load and noise [% PV], shape (n,)."""
-    return window.centred - residual(window, replace(linear, valve=valve))
+    return fit.window.centred - residual(fit)
 
 
 TURN = 0.4
@@ -158,16 +147,14 @@ def turns_of(op: Floats, period: float) -> np.ndarray:
     return turning_points(smooth, max(TURN * _usual_range(smooth, max(round(period), 2)), 1e-12))
 
 
-def gains(ours: WindowFit, theirs: WindowFit) -> Floats:
+def gains(ours: Fit, theirs: Fit) -> Floats:
     """Gain in log likelihood of one fit over another at every block [nat], shape (n,), outliers cut."""
-    counts = judged(ours.window.usable, ours.fit.ar.size)
-    mine, other = innovations(ours.window, ours.fit), innovations(theirs.window, theirs.fit)
     out = np.zeros(ours.window.y.size)
-    out[counts] = clipped_gain(mine, other)
+    out[judged(ours.window.usable, ours.ar.size)] = clipped_gain(innovations(ours), innovations(theirs))
     return out
 
 
-def trials(ours: WindowFit, theirs: WindowFit, period_s: float) -> Trials | None:
+def trials(ours: Fit, theirs: Fit, period_s: float) -> Trials | None:
     """Agreement of the stretches between OP's turns that one fit explains PV better; None with fewer than four."""
     window = ours.window
     at = turns_of(window.op_blocks, period_s / window.dt_s)
@@ -182,9 +169,9 @@ def _agreement(gained: Floats) -> Trials:
     return Trials(gained.size, float((gained > 0).mean()), float(gained.mean()) / max(spread, 1e-9))
 
 
-def trials_between_moves(ours: WindowFit, theirs: WindowFit) -> Trials | None:
+def trials_between_moves(ours: Fit, theirs: Fit) -> Trials | None:
     """The same of the stretches that the moves of our valve's stem part, for a loop without cycles; None without a
     move."""
-    at = moves_begun(ours.window, ours.fit.valve)
+    at = moves_begun(ours)
     at = at[at > 0]
     return _agreement(np.add.reduceat(gains(ours, theirs), np.append(0, at))) if at.size else None

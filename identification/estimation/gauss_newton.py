@@ -221,12 +221,12 @@ def _law(valve: StemLaw) -> StemLaw:
     return StemLaw(float(valve.breakaway), float(valve.sliding), float(valve.tolerance))
 
 
-def covariance(window: Window, fit: Fit, free_width: bool = False) -> Floats:
+def covariance(fit: Fit, free_width: bool = False) -> Floats:
     """Covariance of (log T, L, stickband, gain) at a fit, shape (4, 4); zero for what was held.
 
     The noise model's and the slow terms' share is in it (covariance.py).
     """
-    b = _bench(window, fit.ar.size, free_width)
+    b = _bench(fit.window, fit.ar.size, free_width)
     found = _point(b, _theta(fit), _law(fit.valve))
     slopes = _slopes(b, found)
     gram = slopes @ slopes.T
@@ -237,13 +237,13 @@ def covariance(window: Window, fit: Fit, free_width: bool = False) -> Floats:
     return out[:4, :4]
 
 
-def descend(window: Window, fit: Fit, free_width: bool = False) -> Fit:
+def descend(fit: Fit, free_width: bool = False) -> Fit:
     """All constants of a model together to the least innovations variance, by damped Gauss-Newton steps.
 
     Time constant, dead time, gain, slow terms and the noise model, and with `free_width` the stickband, move at
     once, because they trade against each other along narrow valleys.
     """
-    best = _descend(_bench(window, fit.ar.size, free_width), _theta(fit), _law(fit.valve))
+    best = _descend(_bench(fit.window, fit.ar.size, free_width), _theta(fit), _law(fit.valve))
     theta = best.theta
     return Fit(
         float(theta[3]),
@@ -254,4 +254,5 @@ def descend(window: Window, fit: Fit, free_width: bool = False) -> Fit:
         int(best.e.size),
         theta[BASE:].copy(),
         theta[4:BASE].copy(),
+        fit.window,
     )

@@ -9,7 +9,7 @@ scanned.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numba import njit
@@ -28,7 +28,7 @@ class Fit:
 
     gain [% PV/% OP], time_constant_s and dead_time_s [s], valve, sigma2 the innovations variance
     [% PV squared], count the samples judged, ar the noise model of single lags (noise.py), shape (p,), base
-    the coefficients of 1, t, decay and the load's step, shape (4,).
+    the coefficients of 1, t, decay and the load's step, shape (4,), window what it is fitted to.
     """
 
     gain: float
@@ -39,6 +39,12 @@ class Fit:
     count: int
     ar: Floats
     base: Floats
+    window: Window = field(repr=False)
+
+    @property
+    def process(self) -> Fopdt:
+        """The process, its dead time in the record's own samples."""
+        return Fopdt(self.gain, self.time_constant_s, self.dead_time_s + self.window.half_block_s)
 
     @property
     def log_likelihood(self) -> float:
@@ -105,29 +111,24 @@ def stem_of(s: Stems, law: StemLaw) -> Floats:
     return stem - stem.mean()
 
 
-def residual(window: Window, fit: Fit) -> Floats:
+def residual(fit: Fit) -> Floats:
     """PV less the response to the stem [% PV], shape (n,): load and noise, with the model's slow terms in it.
 
     In a fine window the response is stepped at the record's own interval and then averaged over blocks, as PV was.
     """
+    window = fit.window
     stem = stem_of(window.stems, fit.valve)
     if window.fine:
-        lag = unit_lag(
-            fit.time_constant_s, fit.dead_time_s + window.half_block_s, window.dt_s / window.factor
-        )
+        lag = unit_lag(fit.time_constant_s, fit.process.dead_time_s, window.dt_s / window.factor)
         x = respond(stem, lag, window.factor)
     else:
         x = respond(stem, unit_lag(fit.time_constant_s, fit.dead_time_s, window.dt_s))
     return window.centred - fit.gain * x
 
 
-def process_of(window: Window, fit: Fit) -> Fopdt:
-    """The process of a fit, its dead time in the record's own samples."""
-    return Fopdt(fit.gain, fit.time_constant_s, fit.dead_time_s + window.half_block_s)
-
-
-def slow_terms(window: Window, fit: Fit) -> Floats:
+def slow_terms(fit: Fit) -> Floats:
     """Mean, trend, decay and step of PV by a fit [% PV], shape (n,)."""
+    window = fit.window
     n = window.y.size
     t = 2.0 * np.arange(n) / n - 1.0
     decay = np.exp(-np.arange(n) * window.dt_s / fit.time_constant_s)
@@ -136,6 +137,6 @@ def slow_terms(window: Window, fit: Fit) -> Floats:
     return np.asarray(fit.base[0] + fit.base[1] * t + fit.base[2] * decay + fit.base[3] * window.extra)
 
 
-def disturbance(window: Window, fit: Fit) -> Floats:
+def disturbance(fit: Fit) -> Floats:
     """PV less the whole model, slow terms included [% PV], shape (n,)."""
-    return residual(window, fit) - slow_terms(window, fit)
+    return residual(fit) - slow_terms(fit)

@@ -9,9 +9,9 @@ from typing import NamedTuple
 import numpy as np
 
 from identification.estimation.descent import compass
-from identification.estimation.evidence import WindowFit, evidence
+from identification.estimation.evidence import evidence
 from identification.estimation.gauss_newton import descend
-from identification.estimation.hammerstein import Fit, residual, slow_terms
+from identification.estimation.hammerstein import Fit, disturbance, residual, slow_terms
 from identification.estimation.noise import every_lag, judged, whitened
 from identification.estimation.slip_beam import Noise, Response, SlipDistances, decoded, log_chance
 from identification.estimation.window import Window
@@ -61,11 +61,15 @@ Gains = dict[tuple[float, float], float]
 
 
 class SlipPath(NamedTuple):
-    """A stem as decoded [% OP], shape of the window's op, the fit behind it, the log probability of its slips."""
+    """The fit behind a stem as decoded, which its window has as if recorded, and the log probability of its slips."""
 
     fit: Fit
-    stem: Floats
     chance: float
+
+    @property
+    def mean(self) -> float:
+        """Mean of the stem [% OP]."""
+        return float(np.mean(self.fit.window.position))  # type: ignore[arg-type]
 
     @property
     def worth(self) -> float:
@@ -86,11 +90,11 @@ class _Trial:
     stem: Floats
 
 
-def _response(window: Window, fit: Fit, mean: float) -> Response:
+def _response(fit: Fit, mean: float) -> Response:
     """How PV follows a stem whose mean is known [% OP], by a fit."""
-    dead_s = fit.dead_time_s + window.half_block_s
-    lag = unit_lag(fit.time_constant_s, dead_s, window.dt_s / window.factor)
-    return Response(lag, fit.gain, slow_terms(window, fit) - fit.gain * mean)
+    step_s = fit.window.dt_s / fit.window.factor
+    lag = unit_lag(fit.time_constant_s, fit.process.dead_time_s, step_s)
+    return Response(lag, fit.gain, slow_terms(fit) - fit.gain * mean)
 
 
 def _friction(band: float, share: float, rest: int) -> SlipDistances:
@@ -108,25 +112,24 @@ def _slips(stem: Floats) -> int:
     return int((np.diff(stem) != 0).sum())
 
 
-def _gain(window: Window, play: Fit, band: float, share: float, half: int) -> float:
+def _gain(play: Fit, band: float, share: float, half: int) -> float:
     """The gain with which a friction's slips move PV as far in half a period (`half` blocks) as it moves.
 
     0 where it is not far smaller than the play's.
     """
-    stem = residual(window, replace(play, valve=sticking(band, share), gain=-1.0)) - window.centred
-    moved = (
-        float(np.std(x[half:] - x[:-half])) if 0 < half < x.size else 0.0 for x in (window.centred, stem)
-    )
+    centred = play.window.centred
+    stem = residual(replace(play, valve=sticking(band, share), gain=-1.0)) - centred
+    moved = (float(np.std(x[half:] - x[:-half])) if 0 < half < x.size else 0.0 for x in (centred, stem))
     pv, swing = moved
     found = math.copysign(pv / swing, play.gain) if swing > 0.0 else 0.0
     return found if abs(found) < abs(play.gain) / ABSURD else 0.0
 
 
-def _screened(window: Window, play: Fit, noise: Floats, rest: int, gains: Gains) -> list[_Trial]:
+def _screened(play: Fit, noise: Floats, rest: int, gains: Gains) -> list[_Trial]:
     """The frictions and dead times about a play that are worth following, each with its stem, best first, under a
     noise model of its own."""
-    left = residual(window, play) - slow_terms(window, play)
-    e = whitened(left, noise, every_lag(noise.size))[noise.size :]
+    window = play.window
+    e = whitened(disturbance(play), noise, every_lag(noise.size))[noise.size :]
     sigma2 = float(np.mean(e[window.usable[noise.size :]] ** 2))
     mean, out = float(play_stem(window.op, play.valve.stickband).mean()), list[_Trial]()
     for later in LATER:
@@ -134,7 +137,7 @@ def _screened(window: Window, play: Fit, noise: Floats, rest: int, gains: Gains)
             if gain:
                 band = width * play.valve.stickband
                 fit = replace(play, dead_time_s=play.dead_time_s + later * window.dt_s, gain=gain)
-                r, f = _response(window, fit, mean), _friction(band, share, rest)
+                r, f = _response(fit, mean), _friction(band, share, rest)
                 least = out[-1].score if len(out) == FOLLOWED else -math.inf
                 path, score = _decoded(window, r, Noise(noise, sigma2), f, SCREENED, least)
                 out = _chosen([*out, _Trial(score, _slips(path), band, share, later, gain, path)])
@@ -151,39 +154,43 @@ def _chosen(tried: list[_Trial]) -> list[_Trial]:
     return out[:FOLLOWED]
 
 
-def _path(window: Window, fit: Fit, valve: StemLaw, stem: Floats) -> SlipPath:
+def _path(fit: Fit, valve: StemLaw, stem: Floats) -> SlipPath:
     """The process behind a stem, as if that had been recorded."""
-    found = descend(replace(window, position=stem), replace(fit, valve=valve))
-    return SlipPath(found, stem, log_chance(window.op, stem, valve.breakaway))
+    told = replace(fit.window, position=stem, decoded=True)
+    return SlipPath(
+        descend(replace(fit, window=told, valve=valve)), log_chance(told.op, stem, valve.breakaway)
+    )
 
 
-def _decoded_by(window: Window, fit: Fit, mean: float, f: SlipDistances, hot: float) -> Floats:
-    return _decoded(window, _response(window, fit, mean), Noise(fit.ar, hot * fit.sigma2), f, CARRIED)[0]
+def _decoded_by(fit: Fit, mean: float, f: SlipDistances, hot: float) -> Floats:
+    return _decoded(fit.window, _response(fit, mean), Noise(fit.ar, hot * fit.sigma2), f, CARRIED)[0]
 
 
-def _followed(window: Window, play: Fit, begun: _Trial, rest: int) -> SlipPath:
+def _followed(play: Fit, begun: _Trial, rest: int) -> SlipPath:
     """Process and stem found in turns from a trial; the most probable of them."""
     valve, stem = sticking(begun.band, begun.share), begun.stem
+    window = play.window
     later_s = begun.later * window.dt_s
     fit = replace(play, dead_time_s=play.dead_time_s + later_s, gain=begun.gain)
-    best = path = _path(window, fit, valve, stem)
+    best = path = _path(fit, valve, stem)
     for k in range(1, ROUNDS):
         f = _friction(begun.band, begun.share, rest if k == 1 else window.op.size)
-        stem = _decoded_by(window, path.fit, float(path.stem.mean()), f, HOT[min(k - 1, len(HOT) - 1)])
+        stem = _decoded_by(path.fit, path.mean, f, HOT[min(k - 1, len(HOT) - 1)])
         if _slips(stem) < FEWEST:
             break
-        path = _path(window, path.fit, valve, stem)
+        path = _path(path.fit, valve, stem)
         best = max(best, path, key=lambda p: p.worth)
     return best
 
 
-def _settled(window: Window, best: SlipPath) -> SlipPath:
+def _settled(best: SlipPath) -> SlipPath:
     """Stickband, jump and dead time moved by ever smaller steps to the most probable path."""
-    return compass(window, best, -best.worth, _moved, MOVES, STEPS, worth=WORTH, most=MOST_MOVES)[0]
+    return compass(None, best, -best.worth, _moved, MOVES, STEPS, worth=WORTH, most=MOST_MOVES)[0]
 
 
-def _moved(window: Window, best: SlipPath, move: tuple[int, int, int], step: float) -> tuple[SlipPath, float]:
+def _moved(_: None, best: SlipPath, move: tuple[int, int, int], step: float) -> tuple[SlipPath, float]:
     """The path under another stickband, jump and dead time; worth nothing where there is none with slips."""
+    window = best.fit.window
     v, (wider, jumpier, later) = best.fit.valve, (step * m for m in move)
     band, share = v.stickband * (1.0 + wider), v.slip_jump / v.stickband + 2.0 * jumpier
     dead_s = best.fit.dead_time_s + later * DEAD_STEPS * window.dt_s
@@ -191,49 +198,43 @@ def _moved(window: Window, best: SlipPath, move: tuple[int, int, int], step: flo
         return best, math.inf
     gain = best.fit.gain * v.slip_jump / (band * share)  # a slip moves PV by gain times jump
     fit, f = replace(best.fit, dead_time_s=dead_s, gain=gain), _friction(band, share, window.op.size)
-    stem = _decoded_by(window, fit, float(best.stem.mean()), f, 1.0)
+    stem = _decoded_by(fit, best.mean, f, 1.0)
     if _slips(stem) < FEWEST:
         return best, math.inf
-    path = _path(window, fit, sticking(band, share), stem)
+    path = _path(fit, sticking(band, share), stem)
     return path, -path.worth
 
 
-def fit_irregular(
-    window: Window, play: Fit, noise: Floats, period_s: float, any_gain: bool = True
-) -> SlipPath | None:
+def fit_irregular(play: Fit, noise: Floats, period_s: float, any_gain: bool = True) -> SlipPath | None:
     """The most probable path of a sticking stem in a loop that cycles; None where none is as likely as the play.
 
-    window : in blocks, without a recorded stem; play : the best play; noise : shape (order,), a noise model that
+    play : the best play, fitted in blocks, without a recorded stem; noise : shape (order,), a noise model that
     takes no valve's side, under which the search begins; period_s : of the cycle [s]; any_gain : whether gains far
     under the play's are tried too, where its own comes to nothing.
     """
     if play.gain == 0.0:
         return None
+    window = play.window
     rest = max(int(RESTS * period_s * window.factor / window.dt_s), 1)
     bands, half = play.valve.stickband, rest // window.factor // 2
     usual: Gains = {(w, s): play.gain for w in WIDTHS for s in JUMPS}
-    best = _likeliest(window, play, noise, rest, usual)
+    best = _likeliest(play, noise, rest, usual)
     if best is None and any_gain:
-        smaller = {(w, s): _gain(window, play, w * bands, s, half) for w, s in usual}
-        best = _likeliest(window, play, noise, rest, smaller)
-    return None if best is None else _settled(window, best)
+        smaller = {(w, s): _gain(play, w * bands, s, half) for w, s in usual}
+        best = _likeliest(play, noise, rest, smaller)
+    return None if best is None else _settled(best)
 
 
-def _likeliest(window: Window, play: Fit, noise: Floats, rest: int, gains: Gains) -> SlipPath | None:
+def _likeliest(play: Fit, noise: Floats, rest: int, gains: Gains) -> SlipPath | None:
     """The most probable path that the best trials come to; None where none is as likely as the play."""
-    begun = _screened(window, play, noise, rest, gains)
-    paths = [_followed(window, play, t, rest) for t in begun[:2]]
+    begun = _screened(play, noise, rest, gains)
+    paths = [_followed(play, t, rest) for t in begun[:2]]
     if max((p.worth for p in paths), default=-math.inf) > play.log_likelihood + HOPELESS:
-        paths += [_followed(window, play, t, rest) for t in begun[2:]]
+        paths += [_followed(play, t, rest) for t in begun[2:]]
     best = max(paths, key=lambda p: p.worth, default=None)
     return None if best is None or best.worth < play.log_likelihood else best
 
 
-def path_evidence(window: Window, path: SlipPath, rival: Fit) -> float:
+def path_evidence(path: SlipPath, rival: Fit) -> float:
     """Log likelihood [nat] of a path, its slips' chance with it, over a fit of the same window without it."""
-    return evidence(WindowFit(told_by(window, path), path.fit), WindowFit(window, rival)) + path.chance
-
-
-def told_by(window: Window, path: SlipPath) -> Window:
-    """The window with the stem as decoded, behind which the path's fit is one."""
-    return replace(window, position=path.stem, decoded=True)
+    return evidence(path.fit, rival) + path.chance

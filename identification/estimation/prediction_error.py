@@ -192,11 +192,6 @@ def residual_fit(p: Problem, model: Model) -> Residual:
     return Residual(model, simulated, columns, gram, ar, white, float(white @ white) / total)
 
 
-def loss_of(p: Problem, e: Floats) -> float:
-    """Weighted mean square innovation."""
-    return float((p.weight * e) @ e / p.weight.sum())
-
-
 def step_of(inputs: ModelInputs, c: Floats, param: Param) -> float:
     """Step of the numeric derivative of a constant, in its own unit."""
     if param.log:

@@ -41,7 +41,7 @@ def simulated_best(y: Floats, op: Floats, usable: Mask, dt_s: float) -> Fopdt:
 
 def _searched(window: Window, ar: Floats) -> Fopdt:
     prepared = prepare(window, IDEAL, np.ascontiguousarray(ar))
-    fit = begin(prepared, search(prepared, record_starts(window.y.size, window.dt_s), 2))
+    fit = begin(window, prepared, search(prepared, record_starts(window.y.size, window.dt_s), 2))
     return Fopdt(fit.gain, fit.time_constant_s, fit.dead_time_s)
 
 

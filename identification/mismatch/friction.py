@@ -60,9 +60,10 @@ def fit_sticking(p: Problem, play: Fitted, row: Variant, rows: tuple[Variant, ..
         play.count,
         generic_noise(),
         np.zeros(4),
+        window,
     )
     fits = []
-    for found in pits(window, near, (friction_of(c).tolerance,)):
+    for found in pits(near, (friction_of(c).tolerance,)):
         c = c.copy()
         c[Slot.STICKBAND], c[Slot.JUMP] = found.valve.stickband, found.valve.slip_jump
         c[Slot.L] = found.dead_time_s

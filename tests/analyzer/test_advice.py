@@ -70,18 +70,16 @@ def test_play_before_a_known_lag_gets_ti_of_at_least_the_lag(pipe):
 
 def test_unknown_lag_is_sought_as_an_integrator(tank):
     """Where the record tells gain over time constant alone, settings are sought for an integrator of that slope."""
-    m = tank.verdict.measured
     fit = chosen_fit(tank.verdict)
-    assert lag_factor(m.window, fit, True, CONFIG.advice) is None
-    process = tuned(m.window, fit, True, CONFIG.advice)
+    assert lag_factor(fit, True, CONFIG.advice) is None
+    process = tuned(fit, True, CONFIG.advice)
     assert isinstance(process, Integrator)
     assert process.slope == pytest.approx(TANK.process[0] / TANK.process[1], rel=0.1)
 
 
 def test_known_lag_is_sought_as_a_lag(pipe):
     """Where the record tells the time constant, settings are sought for that lag, within a quarter."""
-    m = pipe.verdict.measured
-    process = tuned(m.window, chosen_fit(pipe.verdict), True, CONFIG.advice)
+    process = tuned(chosen_fit(pipe.verdict), True, CONFIG.advice)
     assert isinstance(process, Fopdt)
     assert process.time_constant_s == pytest.approx(PIPE.process[1], rel=0.25)
 
@@ -100,7 +98,7 @@ def test_proposal_is_stable_on_the_true_process(tank, pipe):
 def test_samples_spread_about_the_fit(tank):
     """Samples keep the sign and kind of the process; their slopes spread no more than threefold about the fit's."""
     loop, fit, _ = sought_for(tank.verdict, TANK.controller, CONFIG.advice)
-    samples = uncertain(tank.verdict.measured.window, fit, loop, 40)
+    samples = uncertain(fit, loop, 40)
     ratio = np.array([one.process.slope / loop.process.slope for one in samples])
     assert all(isinstance(one.process, Integrator) for one in samples)
     assert (ratio >= 0.333).all()
@@ -118,7 +116,7 @@ def test_load_keeps_the_noise_of_a_scan(tank):
     m = tank.verdict.measured
     fit = chosen_fit(tank.verdict)
     assert scan_noise(m.window, TANK.controller) == pytest.approx(TANK.noise, rel=0.15)
-    load = load_of(m.window, fit, TANK.controller)
+    load = load_of(fit, TANK.controller)
     assert np.isfinite(load).all()
     jumps = np.median(np.abs(np.diff(load, 2))) * 1.4826 / math.sqrt(6)
     assert jumps == pytest.approx(TANK.noise, rel=0.3)

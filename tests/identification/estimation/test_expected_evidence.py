@@ -25,14 +25,14 @@ def recorded(valve: Backlash | None, noise: float, n: int = N, seed: int = 7) ->
 def expected(noise: float, n: int = N) -> float:
     """Evidence foretold from the loop without a play."""
     sound = recorded(None, noise, n)
-    return expected_evidence(sound, fit_linear(sound, PERIOD), WIDTH, PERIOD)
+    return expected_evidence(fit_linear(sound, PERIOD), WIDTH, PERIOD)
 
 
 def brought(noise: float, seed: int) -> float:
     """Evidence that the play of a worn valve brings."""
     worn = recorded(Backlash(WIDTH), noise, seed=seed)
     linear = fit_linear(worn, PERIOD)
-    return fit_play(worn, linear, PERIOD).log_likelihood - linear.log_likelihood
+    return fit_play(linear, PERIOD).log_likelihood - linear.log_likelihood
 
 
 @pytest.mark.parametrize("noise", [0.5, 1.0, 2.0])
@@ -51,4 +51,4 @@ def test_noise_and_a_short_record_hide_a_play() -> None:
 def test_an_op_that_stands_foretells_nothing() -> None:
     """Behind an OP that does not move no play shows, and none is expected to."""
     still = Window(np.random.default_rng(1).standard_normal(N), np.full(N, 50.0), np.ones(N, dtype=bool), 1.0)
-    assert expected_evidence(still, fit_linear(still, PERIOD), WIDTH, PERIOD) == 0.0
+    assert expected_evidence(fit_linear(still, PERIOD), WIDTH, PERIOD) == 0.0

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from identification.estimation.backlash_stiction import better_linear, fit_linear, fit_play, fit_stick_slip
-from identification.estimation.evidence import WindowFit, evidence, innovations
+from identification.estimation.evidence import evidence, innovations
 from identification.estimation.gauss_newton import descend
-from identification.estimation.hammerstein import process_of, stem_blocks
+from identification.estimation.hammerstein import stem_blocks
 from identification.estimation.window import Stems, Window, block_means
 from identification.models import Backlash, Fopdt, Loop, Pid
 from identification.simulation.closed_loop import closed_loop
@@ -60,8 +60,8 @@ def test_ideal_valve_gives_no_evidence_of_play(seed):
     """Behind an ideal valve a play gains no more than a handful of nats, under half of what a verdict asks."""
     w = window(Fopdt(2.0, 30.0, 5.0), None, 10 + seed)
     linear = fit_linear(w, 120.0)
-    found = fit_play(w, linear, 120.0)
-    assert evidence(WindowFit(w, found), WindowFit(w, better_linear(w, linear, found))) < 5.0
+    found = fit_play(linear, 120.0)
+    assert evidence(found, better_linear(linear, found)) < 5.0
 
 
 @pytest.mark.parametrize("width", [1.0, 2.5, 5.0])
@@ -69,9 +69,9 @@ def test_width_of_play_is_recovered(width):
     """Play of 1 to 5 % behind moving OP is recovered within 0.1 %, with overwhelming evidence."""
     w = window(Fopdt(2.0, 30.0, 5.0), Backlash(width), 20)
     linear = fit_linear(w, 120.0)
-    found = fit_play(w, linear, 120.0)
+    found = fit_play(linear, 120.0)
     assert found.valve.stickband == pytest.approx(width, abs=0.1)
-    assert evidence(WindowFit(w, found), WindowFit(w, better_linear(w, linear, found))) > 100
+    assert evidence(found, better_linear(linear, found)) > 100
 
 
 def test_play_is_recovered_from_its_limit_cycle():
@@ -81,7 +81,7 @@ def test_play_is_recovered_from_its_limit_cycle():
     noise[5:] += 1.0  # a step of the load, without which the stem would never leave its play
     record = closed_loop(loop, np.full(N, 50.0), noise)
     w = Window(record.pv, record.op, np.ones(N, dtype=bool), 1.0)
-    found = fit_play(w, fit_linear(w, 38.0), 38.0)
+    found = fit_play(fit_linear(w, 38.0), 38.0)
     assert found.valve.stickband == pytest.approx(1.0, rel=0.02)
     assert found.slope == pytest.approx(0.4, rel=0.02)
 
@@ -102,9 +102,10 @@ def test_descent_never_loses(free_width):
             count=first.count,
             ar=first.ar * rng.uniform(0, 1),
             base=first.base,
+            window=w,
         )
-        end = descend(w, start, free_width)
-        before, after = (float(np.mean(innovations(w, fit) ** 2)) for fit in (start, end))
+        end = descend(start, free_width)
+        before, after = (float(np.mean(innovations(fit) ** 2)) for fit in (start, end))
         assert after <= before * (1 + 1e-9)
         assert end.sigma2 == pytest.approx(after, rel=1e-6)
 
@@ -113,7 +114,7 @@ def test_evidence_is_antisymmetric_about_nothing():
     """A fit has no evidence over itself."""
     w = window(Fopdt(2.0, 30.0, 5.0), None, 50)
     fit = fit_linear(w, 120.0)
-    assert evidence(WindowFit(w, fit), WindowFit(w, fit)) == 0.0
+    assert evidence(fit, fit) == 0.0
 
 
 def test_unusable_samples_do_not_count():
@@ -193,8 +194,8 @@ def test_stick_slip_is_recovered_from_its_limit_cycle(jump):
     """Stickband, jump and slope of a cycling tank come back within 3, 10 and 10 %, ahead of any play."""
     window = cycling_tank(3, 2.43, jump)
     linear = fit_linear(window, 60.0)
-    play = fit_play(window, linear, 60.0)
-    found = fit_stick_slip(window, play, 60.0)
+    play = fit_play(linear, 60.0)
+    found = fit_stick_slip(play, 60.0)
     assert found.valve.stickband == pytest.approx(2.43, rel=0.03)
     assert found.valve.slip_jump == pytest.approx(jump, rel=0.1)
     assert found.slope == pytest.approx(0.1, rel=0.1)
@@ -208,8 +209,8 @@ def test_descent_and_disturbance_tell_one_story():
     pv = block_means(respond(op - 50, unit_lag(300.0, 12.0, 1.0)), 8) + rng.normal(0, 0.05, 600) + 3.0
     for fine in (False, True):
         window = Window(pv, op, np.ones(600, dtype=bool), 8.0, 8, fine=fine)
-        for fit in (fit_linear(window, 400.0), fit_play(window, fit_linear(window, 400.0), 400.0)):
-            assert float(np.mean(innovations(window, fit) ** 2)) == pytest.approx(fit.sigma2, rel=1e-6)
-    process = process_of(window, fit_linear(window, 400.0))
+        for fit in (fit_linear(window, 400.0), fit_play(fit_linear(window, 400.0), 400.0)):
+            assert float(np.mean(innovations(fit) ** 2)) == pytest.approx(fit.sigma2, rel=1e-6)
+    process = fit_linear(window, 400.0).process
     assert process.time_constant_s == pytest.approx(300.0, rel=0.05)
     assert process.dead_time_s == pytest.approx(12.0, abs=2.0)

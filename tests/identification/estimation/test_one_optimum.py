@@ -10,20 +10,22 @@ import pytest
 from identification.estimation.backlash_stiction import generic_noise
 from identification.estimation.gauss_newton import covariance
 from identification.estimation.gauss_newton import descend as descend_lag
-from identification.estimation.hammerstein import Fit
+from identification.estimation.hammerstein import Fit, residual
 from identification.estimation.prediction_error import Model, deviations, problem
 from identification.estimation.prediction_error import descended as descend_any
 from identification.estimation.window import Window
 from identification.mismatch.catalogue import EFFECTS
 from identification.mismatch.model_file import constants, to_data
 from identification.record import Floats
-from identification.simulation.open_loop import ModelInputs
+from identification.simulation.open_loop import ModelInputs, as_parameters, simulate
 from identification.simulation.parameters import Slot, neutral
-from identification.simulation.valve import StemLaw
+from identification.simulation.valve import HALTS, IDEAL, StemLaw, first_slip, sticking
 
 GAIN, LAG, DEAD, BAND, N = 1.3, 20.0, 4.0, 2.0, 4000
 FIRST = 420
 """Samples left out: from then on OP has turned, and where the stem stood first does not matter."""
+FORGOTTEN = 40 * int(LAG)
+"""Samples after which nothing of a lag's first value is left in sixteen digits."""
 
 
 def cycled(seed: int) -> tuple[Floats, Floats]:
@@ -54,10 +56,18 @@ def test_both_fits_find_the_same_constants(seed: int) -> None:
     good = np.ones(N, dtype=bool)
     window = Window(pv, op, good, 1.0)
     begun = Fit(
-        1.1 * GAIN, 0.9 * LAG, DEAD, StemLaw(BAND / 2, BAND / 2, 0.0), 1.0, N, generic_noise(), np.zeros(4)
+        1.1 * GAIN,
+        0.9 * LAG,
+        DEAD,
+        StemLaw(BAND / 2, BAND / 2, 0.0),
+        1.0,
+        N,
+        generic_noise(),
+        np.zeros(4),
+        window,
     )
-    one = descend_lag(window, begun, free_width=True)
-    spread = np.sqrt(np.diag(covariance(window, one, free_width=True)))
+    one = descend_lag(begun, free_width=True)
+    spread = np.sqrt(np.diag(covariance(one, free_width=True)))
 
     level, middle = float(pv.mean()), float(op.mean())
     inputs = ModelInputs(op, 1.0, middle, level, (float(pv.min()), float(pv.max())))
@@ -82,6 +92,22 @@ def test_both_fits_find_the_same_constants(seed: int) -> None:
     for mine, yours, my_spread, your_spread in pairs:
         assert abs(mine - yours) < min(my_spread, your_spread)
         assert my_spread == pytest.approx(your_spread, rel=0.3)
+
+
+@pytest.mark.parametrize("law", [IDEAL, sticking(BAND, 0.0), sticking(BAND, 0.6), sticking(BAND, 0.6, HALTS)])
+@pytest.mark.parametrize("dead_s", [0.0, 4.0, 4.3])
+def test_the_kernel_leaves_what_the_simulator_leaves(law: StemLaw, dead_s: float) -> None:
+    """The residual of a lag behind a valve is PV less the whole simulator's response, but for a constant, once what
+    PV was at first is forgotten."""
+    pv, op = cycled(6)
+    window = Window(pv, op, np.ones(N, dtype=bool), 1.0)
+    fit = Fit(GAIN, LAG, dead_s, law, 1.0, N, generic_noise(), np.zeros(4), window)
+    inputs = ModelInputs(op, 1.0, float(op.mean()), 0.0, (0.0, 100.0))
+    c = as_parameters(fit.process, law.valve)
+    if law.breakaway > 0.0:
+        c[Slot.PLACE] = (first_slip(op, law) - op[0]) / law.breakaway
+    left = residual(fit) - (pv - simulate(inputs, c))
+    assert float(np.ptp(left[FORGOTTEN:])) < 1e-9
 
 
 def test_where_a_stem_stood_first_is_not_carried_to_another_recording() -> None:

@@ -146,8 +146,8 @@ def asked(scatter: float, seed: int):
     crossings = int((np.diff(np.sign(op - op.mean())) != 0).sum())
     period = 2.0 * op.size / max(crossings, 1)
     period = max(period, 40.0)
-    play = fit_play(window, fit_linear(window, period), period)
-    return play, fit_irregular(window, play, generic_noise(), period)
+    play = fit_play(fit_linear(window, period), period)
+    return play, fit_irregular(play, generic_noise(), period)
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
@@ -190,11 +190,11 @@ def test_a_square_pv_of_a_fast_flow_is_no_play(seed):
         x += (1.0 - math.exp(-1.0 / 12.0)) * (50.0 + 1.1 * (pipe.pop(0) + load - 50.0) - x)
     pv, op = np.array(pv_out[100:]), np.array(op_out[100:])
     window = Window(pv, op, np.ones(pv.size, dtype=bool), 10.0)
-    play = fit_play(window, fit_linear(window, 300.0), 300.0)
+    play = fit_play(fit_linear(window, 300.0), 300.0)
     assert play.gain > 3.0 * 1.1
     if seed == 1:
-        assert fit_irregular(window, play, generic_noise(), 300.0, any_gain=False) is None
-    path = fit_irregular(window, play, generic_noise(), 300.0)
+        assert fit_irregular(play, generic_noise(), 300.0, any_gain=False) is None
+    path = fit_irregular(play, generic_noise(), 300.0)
     assert path is not None
     assert path.worth > play.log_likelihood + 1000.0
     assert path.fit.gain == pytest.approx(1.1, rel=0.25)

@@ -10,7 +10,6 @@ import pytest
 from identification.estimation.backlash_stiction import fit_linear, fit_play
 from identification.estimation.evidence import (
     Trials,
-    WindowFit,
     gains,
     trials,
     trials_between_moves,
@@ -40,7 +39,7 @@ def judged(valve: Backlash | None, seed: int) -> Trials:
     pv = pv_of(Fopdt(1.5, 30.0, 5.0), valve, op, 1.0) + noise
     window = Window(pv, op, np.ones(N, dtype=bool), 1.0)
     linear = fit_linear(window, PERIOD)
-    found = trials(WindowFit(window, fit_play(window, linear, PERIOD)), WindowFit(window, linear), PERIOD)
+    found = trials(fit_play(linear, PERIOD), linear, PERIOD)
     assert found is not None
     return found
 
@@ -80,7 +79,7 @@ def test_gains_add_up_to_the_evidence_of_the_same_scale():
     """A fit has no gain over itself."""
     op = swinging(1)
     window = Window(pv_of(Fopdt(1.5, 30.0, 5.0), None, op, 1.0), op, np.ones(N, dtype=bool), 1.0)
-    rival = WindowFit(window, fit_linear(window, PERIOD))
+    rival = fit_linear(window, PERIOD)
     assert not gains(rival, rival).any()
 
 
@@ -88,7 +87,7 @@ def test_too_few_turns_are_no_trials():
     """A record with two turns of OP has none."""
     op = swinging(1)[:300]
     window = Window(op.copy(), op, np.ones(300, dtype=bool), 1.0)
-    rival = WindowFit(window, fit_linear(window, PERIOD))
+    rival = fit_linear(window, PERIOD)
     assert trials(rival, rival, PERIOD) is None
 
 
@@ -101,8 +100,8 @@ def test_moves_of_a_stem_are_trials_where_nothing_cycles(seed):
         pv_of(Fopdt(1.5, 30.0, 5.0), Backlash(3.0), op, 1.0) + noise, op, np.ones(N, dtype=bool), 1.0
     )
     linear = fit_linear(window, PERIOD)
-    play = WindowFit(window, fit_play(window, linear, PERIOD))
-    found = trials_between_moves(play, WindowFit(window, linear))
+    play = fit_play(linear, PERIOD)
+    found = trials_between_moves(play, linear)
     assert found is not None
     assert found.count == pytest.approx(2 * N / PERIOD, abs=3)
     assert found.agreeing > 0.9
@@ -114,4 +113,4 @@ def test_a_stem_that_never_moves_is_no_trial():
     window = Window(0.1 * np.random.default_rng(1).standard_normal(N), op, np.ones(N, dtype=bool), 1.0)
     plain = fit_linear(window, PERIOD)
     still = replace(plain, valve=StemLaw(5.0, 5.0, RESTS))
-    assert trials_between_moves(WindowFit(window, still), WindowFit(window, plain)) is None
+    assert trials_between_moves(still, plain) is None
