@@ -6,6 +6,7 @@ import contextlib
 import json
 import os
 import pickle
+import shutil
 import signal
 import subprocess
 import sys
@@ -120,20 +121,32 @@ def test_a_killed_worker_costs_no_loop(export, whole, tmp_path):
     assert tables(store) == whole
 
 
-@linux
-def test_a_run_killed_with_signal_9_goes_on_with_resume(export, whole, tmp_path):
-    """After kill -9 of the parent its workers are gone, and --resume, in a process whose sets have another order,
-    makes the store of an undisturbed run."""
-    store = tmp_path / "store"
+@pytest.fixture(scope="module")
+def killed(export: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[int]]:
+    """The store of a run that is killed after its first piece, and the workers that it had."""
+    store = tmp_path_factory.mktemp("killed") / "store"
     with running(export, store) as run:
-        workers = children(run.pid)
+        workers = children(run.pid) if sys.platform == "linux" else []
         run.kill()
         run.wait()
-    again = command(export, store, "--resume")
+    return store, workers
+
+
+@pytest.fixture
+def begun(killed: tuple[Path, list[int]], tmp_path: Path) -> Path:
+    """A copy of the store of a run that was killed after its first piece."""
+    return shutil.copytree(killed[0], tmp_path / "store")
+
+
+@linux
+def test_a_run_killed_with_signal_9_goes_on_with_resume(export, whole, killed, begun):
+    """After kill -9 of the parent its workers are gone, and --resume, in a process whose sets have another order,
+    makes the store of an undisturbed run."""
+    again = command(export, begun, "--resume")
     done = subprocess.run(again, capture_output=True, text=True, check=False, env=seeded(2))
     assert done.returncode == 0, done.stderr
-    assert not set(workers) & {int(p.name) for p in Path("/proc").glob("[0-9]*")}
-    assert tables(store) == whole
+    assert not set(killed[1]) & {int(p.name) for p in Path("/proc").glob("[0-9]*")}
+    assert tables(begun) == whole
 
 
 @linux
@@ -206,13 +219,6 @@ def ran(export: Path, store: Path, *more: str) -> Result:
     return CliRunner().invoke(main, ["run", str(export), *stated(export), "--store", str(store), *more])
 
 
-def begun(export: Path, store: Path) -> None:
-    """A run that is stopped after its first piece."""
-    with running(export, store) as run:
-        run.kill()
-        run.wait()
-
-
 def part(export: Path, out: Path, loops: range, rows: int | None = None) -> Path:
     """An export with some loops of another, cut after some rows."""
     table = pq.read_table(export)
@@ -262,27 +268,24 @@ def test_a_good_night_is_not_lost_to_an_empty_one(export, whole, tmp_path):
     assert tables(store) == whole
 
 
-def test_pieces_of_two_exports_are_never_mixed(export, tmp_path):
+def test_pieces_of_two_exports_are_never_mixed(export, begun, tmp_path):
     """--resume with another export than the stopped run's is refused and says what that run read."""
-    store = tmp_path / "store"
-    begun(export, store)
     other = part(export, tmp_path / "other.parquet", range(16, LOOPS))
-    told = ran(other, store, "--resume")
+    told = ran(other, begun, "--resume")
     assert told.exit_code == 2
     assert "the run that was stopped read night.parquet (24 loops" in told.stderr
-    assert ran(export, store, "--resume").exit_code == 0
+    assert ran(export, begun, "--resume").exit_code == 0
 
 
-def test_a_run_goes_on_with_its_own_limits_alone(export, tmp_path):
+def test_a_run_goes_on_with_its_own_limits_alone(export, begun, tmp_path):
     """--resume with other limits than the stopped run's is refused and names --config among what must be the same."""
-    store, limits = tmp_path / "store", tmp_path / "limits.toml"
+    limits = tmp_path / "limits.toml"
     limits.write_text("[oscillation]\nperiods = 3.5\n")
-    begun(export, store)
-    told = ran(export, store, "--resume", "--config", str(limits))
+    told = ran(export, begun, "--resume", "--config", str(limits))
     assert told.exit_code == 2
     assert "--config" in told.stderr
     limits.write_text("[oscillation]\nperiods = 3.0\n")
-    assert ran(export, store, "--resume", "--config", str(limits)).exit_code == 0
+    assert ran(export, begun, "--resume", "--config", str(limits)).exit_code == 0
 
 
 @pytest.mark.parametrize("year", [1601, 1970, 2106])
