@@ -17,7 +17,6 @@ import pyarrow.parquet as pq
 from analyzer.history.names import check_once
 from identification.errors import InputError
 
-MAGIC = b"PAR1"
 HEAD_ROWS = 1000
 OPEN_FILES = 4
 MANY_ROWS, ROWS_A_BYTE = 5e6, 20.0
