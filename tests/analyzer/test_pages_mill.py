@@ -34,7 +34,7 @@ def store(tmp_path_factory: pytest.TempPathFactory) -> Store:
     specs, _ = match(read_loops(MILL / "loops.csv"), export.tags)
     kept = Store(tmp_path_factory.mktemp("mill"))
     wanted = [s for s in specs if s.loop in (*RETUNED, *OTHERS)]
-    batch.run(batch.Batch(export, wanted, kept, quick), jobs=2)
+    batch.run(batch.Batch(export, wanted, kept, quick))
     return kept
 
 
