@@ -173,7 +173,8 @@ def nights(store: str | Path, table: str = "nights") -> pd.DataFrame:
     store : path
         A folder that `triage run` wrote.
     table : str
-        nights (a row a loop), hours, trends, groups or explained.
+        nights (a row a loop, as that night says by itself), beliefs (what nights say together), hours, trends,
+        groups or explained.
 
     Raises
     ------

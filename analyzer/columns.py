@@ -78,7 +78,10 @@ GROUP_LIST = _TABLES["group_list"]
 """Of a group, as `triage rank --groups` lists it."""
 NIGHTS = (*RANKING, *LISTED, *_TABLES["stored"])
 """Of the table of nights: a row a loop."""
-BY_NAME: Mapping[str, Column] = {c.name: c for c in NIGHTS}
+BELIEVED = _TABLES["believed"]
+"""Of a belief alone."""
+BY_NAME: Mapping[str, Column] = {c.name: c for c in (*NIGHTS, *BELIEVED)}
+"""What a loop's row may hold, with what beliefs add to it."""
 _KEYS = (BY_NAME["loop"], BY_NAME["night"])
 HOURS = (*_KEYS, *_TABLES["hour"], *(c for c in NIGHTS if c.hourly))
 """Of the table of hours: a row a loop and hour."""
@@ -88,6 +91,17 @@ SETTINGS = (*_KEYS, *_TABLES["compared"])
 """Of the table of settings compared: a row a loop."""
 GROUPS = (*_KEYS, *_TABLES["group"])
 """Of the table of groups: a row a loop and group."""
+RESTING = tuple(
+    BY_NAME[name]
+    for name in (
+        *("osc_valve_pct", "osc_tuning_pct", "osc_load_pct", "cause", "valve_fault", "source_loop"),
+        *("backlash_pct", "stickband_pct", "slip_jump_pct", "action", "due", "kp_new", "ti_new"),
+        *("advice", "expected_period_s", "expected_pv_amplitude_pct", "reason", "lanes"),
+    )
+)
+"""Columns of a night's row that rest on all nights: a belief states them anew."""
+BELIEFS = (*_KEYS, *RESTING, *BELIEVED)
+"""Of the table of beliefs: a row a loop and night."""
 
 
 def names(columns: Sequence[Column]) -> tuple[str, ...]:
@@ -131,6 +145,7 @@ PARTS = {
     "group": "Groups that share an oscillation: `groups/*.parquet`, a row a loop and group",
     "group_list": "Groups as listed: `triage rank --groups --format csv` and `json`, a row a group",
     "compared": "Settings compared: `compared/*.parquet`, a row a loop for which they were sought, newest night",
+    "believed": "Beliefs: `beliefs/*.parquet`, a row a loop and night, beside what of the ranking rests on nights",
     "explanation": "Explanations: `explained/*.parquet`, a row a loop that was explained",
 }
 TITLES = ("column", "holds", "title", "unit", "from", "h", "meaning")

@@ -139,6 +139,7 @@ class CauseLimits:
     named_pct: float = TOML
     signs: int = TOML
     grid_steps: float = TOML
+    noise_widths: float = TOML
 
     def needed(self, count: int, excited: bool, oscillating: bool) -> float:
         """Evidence that a valve's fault needs [nat]: a floor, and a share of the samples judged, for no model is
@@ -259,6 +260,58 @@ class NightLimits:
 
 
 @dataclass(frozen=True, slots=True)
+@stated_in("analyzer", "belief")
+class BeliefLimits:
+    """What nights together say of a loop, and from when on it is told."""
+
+    half_life: float = TOML
+    doubt: float = TOML
+    doubt_alone: float = TOML
+    doubt_small: float = TOML
+    doubt_beside: float = TOML
+    doubt_against: float = TOML
+    small: float = TOML
+    conviction: float = TOML
+    most: float = TOML
+    worn_before: float = TOML
+    worn_pct: float = TOML
+    still_worn_pct: float = TOML
+    beside_pct: float = TOML
+    change: float = TOML
+    recent: int = TOML
+    least_deviation: float = TOML
+    between: float = TOML
+    named_pct: float = TOML
+    held_pct: float = TOML
+    comes_back: float = TOML
+    dies_away: float = TOML
+    seldom_pct: float = TOML
+    calmed: float = TOML
+    another_size: float = TOML
+    confirmed: int = TOML
+    vote_lead: float = TOML
+    advised_share: float = TOML
+    pairs: int = TOML
+    settle_nights: int = TOML
+    settle_ratio: float = TOML
+    remembered: int = TOML
+
+
+@dataclass(frozen=True, slots=True)
+@stated_in("analyzer", "wear")
+class WearLimits:
+    """When a valve wears, and how far that is carried on."""
+
+    nights: int = TOML
+    growing_nights: int = TOML
+    least_deviation: float = TOML
+    sure: float = TOML
+    least_growth: float = TOML
+    ahead_d: float = TOML
+    size: float = TOML
+
+
+@dataclass(frozen=True, slots=True)
 @stated_in("analyzer", "before_after")
 class ComparisonLimits:
     """When the spans before and after a change can be compared, and how sure a verdict is."""
@@ -315,6 +368,8 @@ class Config:
     figures: FigureLimits = field(default_factory=FigureLimits)
     lanes: LaneLimits = field(default_factory=LaneLimits)
     nights: NightLimits = field(default_factory=NightLimits)
+    belief: BeliefLimits = field(default_factory=BeliefLimits)
+    wear: WearLimits = field(default_factory=WearLimits)
     before_after: ComparisonLimits = field(default_factory=ComparisonLimits)
     changes: ChangeLimits = field(default_factory=ChangeLimits)
     explain_recorder: RecorderLimits = field(default_factory=RecorderLimits)

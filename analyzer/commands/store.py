@@ -9,7 +9,7 @@ from pathlib import Path
 
 import click
 
-from analyzer.commands.options import NIGHT, PLACE, SOME_LOST, STORE, formats, say, told
+from analyzer.commands.options import CONFIG, NIGHT, PLACE, SOME_LOST, STORE, formats, say, told
 from identification.errors import InputError
 
 DAYS = {"d": 1, "w": 7, "y": 365}
@@ -43,20 +43,24 @@ def store() -> None:
 
 @store.command()
 @click.argument("path", metavar="STORE", type=PLACE)
+@CONFIG
 @told
-def check(path: Path) -> None:
-    """Read every table of a store and say what is damaged, left over or not finished.
+def check(path: Path, config: Path | None) -> None:
+    """Read every table of a store and say what is damaged, left over or not finished, or does not follow from its
+    nights.
 
     Exit status: 0 nothing is wrong, 1 something is, 2 there is no store.
 
     Example: triage store check store
     """
+    from analyzer.belief.nights import unfounded
+    from analyzer.config_file import read_config
     from analyzer.store import care as store_care
     from analyzer.store.store import Store
 
-    kept = Store(path)
+    kept, limits = Store(path), read_config(config)
     found = 0
-    for problem in store_care.problems(kept):
+    for problem in (*store_care.problems(kept), *unfounded(kept, limits)):
         found += 1
         click.echo(f"{problem.seen}: {problem.remedy}")
     held = store_care.sizes(kept)
@@ -91,6 +95,32 @@ def prune(path: Path, keep: str, keep_trends: str | None, dry_run: bool) -> None
     if len(gone) > SHOWN:
         click.echo(f"and {len(gone) - SHOWN} more")
     click.echo(f"{path}: {len(gone)} files {done}, {len(kept.nights())} nights kept")
+
+
+@store.command()
+@click.argument("path", metavar="STORE", type=PLACE)
+@CONFIG
+@told
+def beliefs(path: Path, config: Path | None) -> None:
+    """Make the beliefs of a store anew from its nights: what they say together of each loop.
+
+    Every run keeps them up to date; this is for limits that have changed, and for notes on repairs that came late.
+
+    Example: triage store beliefs store
+    """
+    from analyzer.belief.nights import settle_anew
+    from analyzer.config_file import read_config
+    from analyzer.store.lock import locked
+    from analyzer.store.store import Store
+
+    kept = Store(path)
+    kept.require()
+    with locked(path):
+        lost = settle_anew(kept, read_config(config))
+    for line in lost:
+        click.echo(line)
+    click.echo(f"{path}: beliefs of {len(kept.nights())} nights made anew")
+    sys.exit(SOME_LOST if lost else 0)
 
 
 @click.command()

@@ -1,5 +1,6 @@
-"""Why a loop is worth a look: oscillating, in manual, at a limit, off its set point, frozen, sluggish, or wearing its
-valve. Each lane is one object: its figure and limit, what hides it, what it says, and what it asks for.
+"""Why a loop is worth a look: oscillating, in manual, at a limit, off its set point, frozen, sluggish, moving
+its valve much, or wearing it, which nights together tell (analyzer/belief/wear.py). Each lane is one object:
+its figure and limit, what hides it, what it says, and what it asks for.
 
 A loop may stand in several. Nothing of the analysis is imported, so that a list is quick.
 """
@@ -113,6 +114,7 @@ RULES = (
         lambda f, limits: f.number("valve_travel_pct_per_h") > limits.travel_pct_per_h,
         lambda f: f"OP travels {f.number('valve_travel_pct_per_h'):.0f} %/h",
     ),
+    Rule(Lane.WEAR, "wear_pct_per_month", lambda f, limits: f.number("wear_pct_per_month") > 0.0),
 )
 """All lanes in the order in which they are told."""
 FIGURE: Mapping[Lane, str] = {r.lane: r.figure for r in RULES}

@@ -114,7 +114,12 @@ def tuned(fit: Fit, valve: bool, limits: AdviceLimits) -> Process:
 
 
 def advise(
-    found: Assessment, spec: LoopSpec, controller: Pid | None, pv_span: float, config: Config
+    found: Assessment,
+    spec: LoopSpec,
+    controller: Pid | None,
+    pv_span: float,
+    config: Config,
+    held: Pid | None = None,
 ) -> Advice:
     """The advice on one assessed loop.
 
@@ -127,6 +132,8 @@ def advise(
     pv_span : float
         Span of PV in its own unit, for settings in engineering units.
     config : Config
+    held : Pid or None
+        Settings that nights before have told, in percent and seconds: those are compared with the present ones.
     """
     kept = withheld(found, spec, controller, pv_span, config)
     if not found.op_scaled and found.for_settings is not None:
@@ -134,7 +141,7 @@ def advise(
     oscillation = counting(found.oscillations)
     if kept is not None or controller is None or oscillation is None:
         return kept or _without_settings(found.verdict)
-    return _sought(found, spec, controller, oscillation.period_s, pv_span, config)
+    return _sought(found, spec, controller, oscillation.period_s, pv_span, config, held)
 
 
 def _unscaled(kept: Advice | None, needs: Needs) -> Advice:
@@ -145,7 +152,13 @@ def _unscaled(kept: Advice | None, needs: Needs) -> Advice:
 
 
 def _sought(
-    found: Assessment, spec: LoopSpec, controller: Pid, period_s: float, pv_span: float, config: Config
+    found: Assessment,
+    spec: LoopSpec,
+    controller: Pid,
+    period_s: float,
+    pv_span: float,
+    config: Config,
+    held: Pid | None,
 ) -> Advice:
     """The settings that the tuning package proposes for a loop that oscillates, or what to do instead."""
     proposed = propose(found.verdict, controller, period_s, config)
@@ -156,7 +169,7 @@ def _sought(
         return _lacking(Needs(Lack.LONGER, f"{words.MORE} {proposal.reason}"))
     beside = None
     if proposed.loop is not None and proposed.load is not None:
-        new = proposal.controller or proposal.meanwhile
+        new = held or proposal.controller or proposal.meanwhile
         beside = compared(proposed.loop, proposed.load, new, period_s, spec, pv_span, config.tuning)
     return replace(_stated(proposal, spec, pv_span), compared=beside)
 

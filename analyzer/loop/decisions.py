@@ -74,6 +74,7 @@ class Lane(StrEnum):
     FROZEN = "frozen"
     SLUGGISH = "sluggish"
     TRAVEL = "valve travel"
+    WEAR = "wear"
 
 
 class Due(StrEnum):

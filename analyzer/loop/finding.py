@@ -1,7 +1,7 @@
 """What is known of one loop in one night, as values that programs test; rows and words are made of it alone.
 
-A worker finds it of the loop by itself; the night completes it: whom the loop follows or moves, whether a change of
-settings has calmed it, its lanes. Each step makes a new Finding, and what would contradict itself is not made.
+A worker finds it of the loop by itself; the night completes it: whom the loop follows or moves, and its lanes.
+Each step makes a new Finding, and what would contradict itself is not made.
 """
 
 from __future__ import annotations
@@ -73,22 +73,14 @@ class Root:
 
 
 @dataclass(frozen=True, slots=True)
-class Before:
-    """The last night under other settings: its name, and what the loop did in it."""
-
-    night: str
-    swing: Swing
-
-
-@dataclass(frozen=True, slots=True)
 class Finding:
     """One loop in one night.
 
-    swing, None where the record cannot show whether the loop oscillates; confidence [%] of each cause, none where no
-    verdict was sought; lacking, why there are no results, or what the record lacks for a cause, in words; lack, the
-    same as a value; remedy, what to do; known, all other columns of the loop's row by their names; follows, the loop
-    that moves it; moves, those that it moves; calmed, the night before a change of settings that took most of the
-    cycle away; lanes, why it is worth a look; group, the number of the oscillation that it shares.
+    swing, None where the record cannot show whether the loop oscillates; confidence [%] of each cause, none
+    where no verdict was sought; lacking, why there are no results, or what the record lacks for a cause, in
+    words; lack, the same as a value; remedy, what to do; known, all other columns of the loop's row by their
+    names; follows, the loop that moves it; moves, those that it moves; lanes, why it is worth a look; group,
+    the number of the oscillation that it shares.
     """
 
     loop: str
@@ -105,7 +97,6 @@ class Finding:
     known: Mapping[str, Cell] = field(default_factory=dict)
     follows: Root | None = None
     moves: tuple[str, ...] = ()
-    calmed: Before | None = None
     lanes: tuple[Lane, ...] = ()
     group: str | None = None
 
@@ -167,12 +158,6 @@ def following(
         remedy=Remedy(Action.SEE_SOURCE_LOOP, f"Look at {root.loop} first."),
         follows=root,
     )
-
-
-def calmed(own: Finding, before: Before, text: str) -> Finding:
-    """A loop whose worn valve makes far less of a cycle since its settings were changed: no further settings, and the
-    repair at the next shutdown."""
-    return replace(own, remedy=Remedy(Action.REPAIR_VALVE, text, due=Due.SHUTDOWN), lack=None, calmed=before)
 
 
 def in_lanes(own: Finding, limits: LaneLimits) -> Finding:

@@ -12,6 +12,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
+from analyzer.belief.nights import held_pairs
 from analyzer.config import Config
 from analyzer.history.export import Export, met_told
 from analyzer.history.plant_clock import UTC_NAME
@@ -90,6 +91,7 @@ def _tasks(batch: Batch, nights: Sequence[Night], known: set[str]) -> list[Task]
     size = chunk_size(len(left))
     mark = uuid.uuid4().hex[:8]  # a worker of a killed run may write yet; its pieces have another mark
     about = batch.store, batch.config
+    held = held_pairs(batch.store, nights[0].name)
     return [
         Task(
             batch.export,
@@ -98,6 +100,7 @@ def _tasks(batch: Batch, nights: Sequence[Night], known: set[str]) -> list[Task]
             *about,
             f"{mark}-{i:06d}",
             tuple(batch.changes),
+            held={s.loop: held[s.loop] for s in left[i : i + size] if s.loop in held},
         )
         for i in range(0, len(left), size)
     ]

@@ -6,12 +6,13 @@ An error of one loop is a result of that loop.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import pyarrow as pa
 
+from analyzer.belief.remedy import HeldPair
 from analyzer.columns import HOURS, NIGHTS, SETTINGS
 from analyzer.config import Config
 from analyzer.history.export import Export
@@ -24,9 +25,11 @@ from analyzer.loop.conclusion import Lost, concluded
 from analyzer.loop.decisions import Action, Cause, Lack, LacksError, Status
 from analyzer.loop.finding import Cell, Finding
 from analyzer.loop.judged_stretch import Earlier, controller_of, earlier_settings
+from analyzer.loop.oscillation import counting
 from analyzer.loop.page_trends import turn_events
 from analyzer.loop.quality import Prepared, prepare
 from analyzer.loop.sample_clock import interval
+from analyzer.loop.witness import witness
 from analyzer.loops.changes import TuningChange, in_force, settings_from
 from analyzer.loops.spec import LoopSpec
 from analyzer.night.nights import Night, cut
@@ -46,8 +49,8 @@ week before."""
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """One chunk of loops over some nights, small enough to send to a worker; `key` names its pieces, and `alone` says
-    that it is one loop's second try."""
+    """One chunk of loops over some nights, small enough to send to a worker; `key` names its pieces, `alone`
+    says that it is one loop's second try, and `held` are settings that nights before have told of its loops."""
 
     export: Export
     specs: tuple[LoopSpec, ...]
@@ -57,6 +60,7 @@ class Task:
     key: str
     changes: tuple[TuningChange, ...] = ()
     alone: bool = False
+    held: Mapping[str, HeldPair] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,13 +80,21 @@ def assess_loop(
 
 
 def _assessed(
-    spec: LoopSpec, prepared: Prepared, config: Config, advising: bool, earlier: Sequence[Earlier] = ()
+    spec: LoopSpec,
+    prepared: Prepared,
+    config: Config,
+    advising: bool,
+    earlier: Sequence[Earlier] = (),
+    held: HeldPair | None = None,
 ) -> tuple[Assessment, Advice]:
     stated = controller_of(spec, prepared)
     found = assess(prepared, stated, config, spec.type, earlier)
     if not advising:
         return found, Advice(HISTORY.get(found.verdict.cause))
-    return found, advise(found, spec, stated, prepared.scale.span, config)
+    pair = None
+    if held is not None and held.of == (spec.kp, spec.ti):
+        pair = controller_of(replace(spec, kp=held.kp, ti=held.ti), prepared)
+    return found, advise(found, spec, stated, prepared.scale.span, config, pair)
 
 
 @dataclass(slots=True)
@@ -102,6 +114,7 @@ def _loop_row(
     advising: bool,
     kept: Rows,
     changes: Sequence[TuningChange] = (),
+    held: HeldPair | None = None,
 ) -> None:
     """Keep the row of one loop and night, whatever happens, and its assessment where there is one."""
     spec = in_force(stated, changes, night.last_s)
@@ -116,9 +129,12 @@ def _loop_row(
         known |= {"pv_lo": prepared.scale.low, "pv_hi": prepared.scale.low + prepared.scale.span}
         known |= standing(prepared, controller_of(spec, prepared), spec.type, config).as_row()
         earlier = earlier_settings(stated, changes, prepared)
-        found, advice = _assessed(spec, prepared, config, advising, earlier)
+        found, advice = _assessed(spec, prepared, config, advising, earlier, held)
         known |= _typed_in(earlier, spec, found, night.zone)
         known["turns"] = turn_events(prepared, found) if advising else None
+        known["witness"] = witness(
+            found.verdict, counting(found.oscillations) is not None, prepared.pv_step, config.cause
+        )
         told = concluded(found, advice, spec, night.name, config.advice, **known)
         drawn = _settings_row(spec, night.name, advice)
     except Exception as error:  # an error of one loop is that loop's result, never the night's end
@@ -189,7 +205,8 @@ def work(task: Task, began: Callable[[int], None] = lambda at: None) -> Done:
                 kept[night.name].nights.append(series.of(spec, night.name, timezone=night.zone))
                 continue
             advising = night is task.nights[-1]
-            _loop_row(spec, series, night, task.config, advising, kept[night.name], task.changes)
+            held = task.held.get(spec.loop)
+            _loop_row(spec, series, night, task.config, advising, kept[night.name], task.changes, held)
     for night in task.nights:
         _write_pieces(task, night.name, kept[night.name])
     return Done(task.key, len(task.specs), task.export.met(tag for spec in task.specs for tag in spec.tags))

@@ -11,32 +11,21 @@ from typing import Any
 
 import pyarrow as pa
 
+from analyzer.belief.nights import settle
 from analyzer.columns import BY_NAME, GROUPS, NIGHTS, names
 from analyzer.config import Config, NightLimits
-from analyzer.loop.decisions import Action, Cause, Due, Status, counts
-from analyzer.loop.finding import Before, Finding, Swing, calmed, in_lanes
-from analyzer.pages.reading import read_nights
+from analyzer.loop.decisions import Status
+from analyzer.loop.finding import in_lanes
 from analyzer.plantwide.night import traced_night
 from analyzer.plantwide.wave import waves_in
 from analyzer.store.rows import finding_of, night_row
 from analyzer.store.store import Store
 from analyzer.store.table import KEPT, rows_of_loops, rows_table
-from analyzer.words.reason import CALMED as WORDS
 
 JOINED = tuple(t.name for t in KEPT if t.in_pieces and t.name != "nights")
 """Tables whose pieces are taken as they are; the table of nights and that of groups are made of theirs."""
-MEMORY = 30
-"""Nights before that are looked at for the last one under other settings; ours: a month."""
 WORTH = {Status.OK: 2, Status.NOT_ASSESSED: 1}
 """What a status is worth when two records of one loop meet; a failure is worth nothing."""
-REMEMBERED = (
-    *("loop", "night", "status", "kp", "ti"),
-    *("oscillation_significance", "oscillating_pct", "period_s"),
-)
-"""What is read of the nights before."""
-CALMED = 0.25
-"""Significance over that under the settings before up to which a change has calmed a loop [-]; ours: on the sample
-mill five of six retunes leave none to a sixth, which differs from night to night by all of it, one two thirds."""
 Row = Mapping[str, Any]
 
 
@@ -88,7 +77,7 @@ def finish_night(
     first = 1 + max((int(r["group"]) for r in other), default=0)
     waves = waves_in(store.read_parts(night, "waves", keys))
     done = traced_night(fresh, waves, config.plant, first)
-    rows = _rows(done.loops, _earlier(store, night), config)
+    rows = {loop: night_row(in_lanes(found, config.lanes)) for loop, found in done.loops.items()}
     old = {} if replace else _known(store, night)
     kept = {loop for loop, row in rows.items() if loop in old and fuller(old[loop], row, config.nights)}
     beside = [loop for loop in old if loop not in rows]
@@ -100,17 +89,8 @@ def finish_night(
     store.write("nights", night, rows_table(joined, NIGHTS))
     store.forget_explained(night, None if replace else mine)
     store.forget_compared()
-    return _told(night, rows, old, kept, beside)
-
-
-def _rows(
-    loops: Mapping[str, Finding], earlier: Mapping[str, Sequence[Row]], config: Config
-) -> dict[str, Row]:
-    """The rows of a night's loops, those calmed by a change of settings told so, each with its lanes."""
-    return {
-        loop: night_row(in_lanes(told_calmed(found, earlier.get(loop, ())), config.lanes))
-        for loop, found in loops.items()
-    }
+    lost = settle(store, night, config)
+    return (*lost, *_told(night, rows, old, kept, beside))
 
 
 def _join_others(store: Store, night: str, keys: Sequence[str], mine: Sequence[str], replace: bool) -> None:
@@ -118,45 +98,6 @@ def _join_others(store: Store, night: str, keys: Sequence[str], mine: Sequence[s
     for name in JOINED:
         before = None if replace else store.read_if_there(name, night)
         store.write(name, night, _joined(before, store.read_parts(night, name, keys), mine))
-
-
-def _earlier(store: Store, night: str) -> dict[str, list[Row]]:
-    """The rows of the nights before by loop, oldest first, with what tells whether a change calmed it."""
-    out: dict[str, list[Row]] = {}
-    names = [n for n in store.nights() if n < night][-MEMORY:]
-    for row in read_nights(store, names, REMEMBERED):
-        out.setdefault(row["loop"], []).append(row)
-    return out
-
-
-def before_change(found: Finding, earlier: Sequence[Row]) -> Row | None:
-    """The last of the nights before, oldest first, under other settings than a night's; None where there is none."""
-    now = found.known.get("kp"), found.known.get("ti")
-    other = (r for r in reversed(earlier) if r["status"] == Status.OK and r["kp"] is not None)
-    return next((r for r in other if (r["kp"], r["ti"]) != now), None)
-
-
-def told_calmed(found: Finding, earlier: Sequence[Row]) -> Finding:
-    """A loop in a night, one with a worn valve that a change of settings has calmed with its repair at the next
-    shutdown and no further settings.
-
-    Parameters
-    ----------
-    found : Finding
-    earlier : sequence of mapping
-        Its rows of the nights before, oldest first.
-    """
-    action, due, swing = found.remedy.action, found.remedy.due, found.swing
-    urgent = action is Action.RETUNE or (action is Action.REPAIR_VALVE and due is Due.NOW)
-    if not urgent or found.cause is not Cause.VALVE or swing is None or not found.oscillates:
-        return found
-    row = before_change(found, earlier)
-    if row is None or not counts(row["oscillating_pct"]):
-        return found
-    if swing.significance > CALMED * row["oscillation_significance"]:
-        return found
-    then = Swing(row["oscillation_significance"], row["oscillating_pct"], row["period_s"])
-    return calmed(found, Before(row["night"], then), WORDS)
 
 
 def _other_groups(store: Store, night: str, mine: Container[str]) -> list[Row]:

@@ -26,7 +26,9 @@ from analyzer.pages.words import (
     plain_cell,
     pv_scale_of,
     titled,
+    with_noun,
 )
+from analyzer.words.belief import wear_text
 from analyzer.words.units import row_settings
 from identification.mismatch.words import check
 from reports.pages import Block, Cell, Facts, Line, Listing, Page, Plot, Section, Table, Text
@@ -58,6 +60,9 @@ COLUMNS = (
     *("timezone", "lack", "turns", "source_loop", "group", "osc_valve_pct", "osc_tuning_pct", "osc_load_pct"),
     *("kp", "ti", "kp_new", "ti_new", "settings_from", "form", "gain_unit", "ti_unit", "signs", "notes"),
     *("advice", "start_s", "percent_of", *FIGURES, *MODEL),
+    *("witness", "believed_nights", "believed_since", "worn_pct", "worn_nights", "certain_since"),
+    *("width_pct", "width_low_pct", "width_high_pct", "wear_pct_per_month", "wear_low_pct", "wear_high_pct"),
+    *("wear_since", "reaches_pct", "reaches_from", "reaches_by"),
     *(name for _, period, amplitude in CYCLES for name in (period, amplitude)),
 )
 """What a loop's page reads of the table of nights."""
@@ -164,15 +169,61 @@ def _night(row: Row) -> tuple[Cell, ...]:
 
 
 def nights_section(rows: Sequence[Row]) -> Section:
-    """A table of a loop's nights, the last first, and a picture of how its oscillation grew or fell."""
-    blocks: list[Block] = [Table("history", "", page_columns("history"), tuple(map(_night, reversed(rows))))]
-    known = [(i - len(rows) + 1.0, r["oscillation_significance"]) for i, r in enumerate(rows)]
+    """What a loop's nights say together, a table of them, the last first, and pictures of how its oscillation and the
+    width of its valve's fault grew or fell."""
+    pictures = (_over_nights(rows, "oscillation_significance", "significance"), _widths(rows))
+    table = Table("history", "", page_columns("history"), tuple(map(_night, reversed(rows))))
+    facts = (Facts(_believed(rows[-1])),) if rows[-1]["believed_nights"] else ()
+    return Section("Over the nights", (*facts, *(p for p in pictures if p is not None), table))
+
+
+def _believed(row: Row) -> tuple[tuple[str, str], ...]:
+    """What the nights together say, and how many they are."""
+    out = [
+        (
+            "The verdict rests on",
+            f"{with_noun(int(row['believed_nights']), 'night')} since {row['believed_since']}",
+        )
+    ]
+    if row["worn_nights"]:
+        certain = f", certain since {row['certain_since']}" if row["certain_since"] else ""
+        out.append(("The valve is worn", f"with {row['worn_pct']:.0f} %{certain}"))
+    if row["certain_since"] and row["width_pct"] is not None:
+        ends = f"{number(row['width_low_pct'])} … {number(row['width_high_pct'])}"
+        out.append(("Play or stickband", f"{number(row['width_pct'])} % of OP ({ends})"))
+    if row["wear_pct_per_month"] is not None:
+        out.append(("It wears", wear_text(row)))
+    return tuple(out)
+
+
+def _over_nights(rows: Sequence[Row], column: str, name: str) -> Plot | None:
+    """A figure over the nights; None where fewer than three know it."""
+    known = [(i - len(rows) + 1.0, r[column]) for i, r in enumerate(rows)]
     points = np.array([(x, y) for x, y in known if y is not None], float)
-    if len(points) > 2:
-        line, shown = Line("significance", points[:, 0], points[:, 1]), BY_NAME["oscillation_significance"]
-        title, axis = f"{shown.title} over the nights", "nights before this one"
-        blocks.insert(0, Plot("nights", title, axis, shown.unit, (line,), reach=(0.0, 1.0)))
-    return Section("Over the nights", tuple(blocks))
+    if len(points) < 3:
+        return None
+    shown, line = BY_NAME[column], Line(name, points[:, 0], points[:, 1])
+    title = f"{shown.title} over the nights"
+    return Plot("nights", title, "nights before this one", shown.unit, (line,), reach=(0.0, 1.0))
+
+
+def _widths(rows: Sequence[Row]) -> Plot | None:
+    """Width of the valve's fault as each night tells it, and as they do together; None where fewer than three do."""
+    own = [(i - len(rows) + 1.0, _own_width(r)) for i, r in enumerate(rows)]
+    pooled = [(i - len(rows) + 1.0, r["width_pct"]) for i, r in enumerate(rows) if r["certain_since"]]
+    parts = (("each night", own), ("nights together", pooled))
+    points = [(name, np.array([p for p in part if p[1] is not None], float)) for name, part in parts]
+    if not rows[-1]["certain_since"] or any(len(x) < 3 for _, x in points):
+        return None
+    lines = tuple(Line(name, x[:, 0], x[:, 1]) for name, x in points)
+    title = "Width of the valve's fault over the nights"
+    return Plot("widths", title, "nights before this one", "% of OP", lines, reach=(0.0, 1.0))
+
+
+def _own_width(row: Row) -> float | None:
+    """Width that a night tells by itself."""
+    found = json.loads(row["witness"]).get("width") if row["witness"] else None
+    return found[0] if found else None
 
 
 def _explained(found: Row | None, row: Row) -> list[Section]:

@@ -6,6 +6,7 @@ from analyzer.lanes.lanes import lanes_in
 from analyzer.loop.decisions import Action, Cause, Fault, Lane, Status
 from analyzer.pages.reading import ShownNight, linked
 from analyzer.pages.words import Row, cell, duration, page_columns, plain_cell, texts, with_noun
+from analyzer.words.belief import wear_text
 from analyzer.words.reason import STEPS
 from analyzer.words.units import changed_settings
 from reports.pages import Cell, Page, Section, Table
@@ -91,9 +92,33 @@ def _cells(night: ShownNight, row: Row) -> tuple[Cell, ...]:
     )
 
 
+def is_at_fault(row: Row) -> bool:
+    """Whether a valve is at fault, by making a cycle or for all that nights say of it."""
+    return row["cause"] == Cause.VALVE or row["valve_fault"] in (Fault.BACKLASH, Fault.STICTION)
+
+
+def wearing(night: ShownNight) -> Table:
+    """Valves whose width grows, the fastest first: for the next shutdown."""
+    rows = [r for r in night.rows if r["wear_pct_per_month"] is not None]
+    rows.sort(key=lambda r: -r["wear_pct_per_month"])
+    cells = tuple(
+        (
+            linked(night, r["loop"]),
+            *(cell(r, name) for name in ("description", "area")),
+            plain_cell(r["width_pct"]),
+            plain_cell(r["wear_pct_per_month"]),
+            Cell(r["wear_since"]),
+            Cell(wear_text(r)),
+        )
+        for r in rows
+    )
+    note = "Play or stickband by all nights; growth, its night of beginning and the forecast with 90 % ends."
+    return Table("wear", "", page_columns("wear"), cells, note, cards=True)
+
+
 def faulty(night: ShownNight) -> Table:
     """Valves at fault, those to be repaired first, then by width."""
-    rows = [r for r in night.rows if r["status"] == Status.OK and r["cause"] == Cause.VALVE]
+    rows = [r for r in night.rows if r["status"] == Status.OK and is_at_fault(r)]
     rows.sort(key=lambda r: (r["action"] != Action.REPAIR_VALVE, -(_width(r) or 0.0)))
     note = (
         "Test: in manual, with the process calm, move OP in steps, four up and four down, and wait each time; "
@@ -119,9 +144,10 @@ def worn(night: ShownNight) -> Table:
 
 def page(night: ShownNight) -> Page:
     """The sheet of a night."""
-    first, second = faulty(night), worn(night)
+    first, growing, second = faulty(night), wearing(night), worn(night)
     sections = (
         Section(f"Valves at fault ({len(first.rows)})", (first,)),
+        *((Section(f"Valves that wear ({len(growing.rows)})", (growing,)),) if growing.rows else ()),
         Section("Valves that travel most", (second,)),
     )
     subtitle = (

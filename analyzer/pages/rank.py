@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from analyzer.columns import BY_NAME, LISTED, NOTED, RANKING, names
+from analyzer.columns import BELIEVED, BY_NAME, LISTED, NOTED, RANKING, names
 from analyzer.lanes.lanes import FIGURE, lanes_in
 from analyzer.loop.cost import LOSS, SIGNIFICANCE, compares, cost_column
 from analyzer.loop.decisions import Cause, Due, Lane
@@ -15,10 +15,12 @@ from analyzer.store.notes import Note
 from analyzer.store.store import Store
 from identification.errors import InputError
 
-LANE_FIGURES = tuple(name for name in FIGURE.values() if name not in names(RANKING))
-"""Figures of lanes that the contract's columns do not hold."""
-SORTABLE = (*names(RANKING), "importance", LOSS, *LANE_FIGURES)
-KEPT = names((*RANKING, *LISTED))
+BELIEFS_TOLD = tuple(c for c in BELIEVED if c.name not in ("constants", "state", "news_tone"))
+"""What beliefs add to a list."""
+LANE_FIGURES = tuple(n for n in FIGURE.values() if n not in names((*RANKING, *BELIEFS_TOLD)))
+"""Figures of lanes that the list does not hold."""
+SORTABLE = (*names(RANKING), "importance", LOSS, *LANE_FIGURES, *names(BELIEFS_TOLD))
+KEPT = names((*RANKING, *LISTED, *BELIEFS_TOLD))
 LIST_COLUMNS = (*KEPT, *names(NOTED))
 """Columns of CSV and JSON: the contract's, then what says in which units settings stand, and the advice in full."""
 MOST_NAMES = 10
@@ -59,10 +61,8 @@ def ranked(
 def _read(store: Store, night: str) -> list[dict[str, Any]]:
     """The night's rows; columns that an older version did not write are None."""
     wanted = (*KEPT, *LANE_FIGURES, "timezone")
-    held = set(store.columns("nights", night))
-    rows = store.read("nights", night, [c for c in wanted if c in held]).to_pylist()
     known = notes.read_notes(store.path)
-    return [_noted({**dict.fromkeys(wanted), **row}, known) for row in rows]
+    return [_noted(row, known) for row in store.rows("nights", night, wanted)]
 
 
 def _noted(row: dict[str, Any], known: Mapping[str, tuple[Note, ...]]) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 STORE/nights/NIGHT.parquet   one row a loop (docs/columns.md)
 STORE/hours/NIGHT.parquet    one row a loop and hour
 STORE/groups/NIGHT.parquet   one row a loop and group
+STORE/beliefs/NIGHT.parquet  one row a loop: what this night and those before it say together
 STORE/explained/NIGHT.parquet  one row a loop that was explained
 STORE/compared/NIGHT.parquet  one row a loop for which settings were sought, of the newest night alone
 STORE/trends/NIGHT.parquet   thinned trends, one row a loop and bucket
@@ -23,7 +24,7 @@ from typing import Any
 
 import pyarrow as pa
 
-from analyzer.columns import NIGHTS
+from analyzer.columns import BELIEVED, NIGHTS, RESTING
 from analyzer.places import answering, content, is_remote, remove_tree
 from analyzer.store.table import KEPT, read_stored, rows_of_loops, stored_names, with_empty, write_table
 from identification.errors import InputError
@@ -114,11 +115,34 @@ class Store:
     def rows(
         self, table: str, night: str, columns: Sequence[str], loops: Collection[str] | None = None
     ) -> list[dict[str, Any]]:
-        """Rows of one night, of some loops or of all; columns that its table lacks are None."""
+        """Rows of one night, of some loops or of all, as they are told: in the table of nights with what rests on all
+        nights as beliefs have it. Columns that are not known are None."""
+        if table != "nights":
+            return self.own_rows(table, night, columns, loops)
+        found = self._believed(night, self.own_rows(table, night, [*columns, "loop"], loops), columns)
+        return [{c: row[c] for c in columns} for row in found]
+
+    def own_rows(
+        self, table: str, night: str, columns: Sequence[str], loops: Collection[str] | None = None
+    ) -> list[dict[str, Any]]:
+        """The same as the night by itself has them."""
         names = set(self.columns(table, night))
         where = None if loops is None else [("loop", "in", sorted(loops))]
         found = read_stored(self.file(table, night), [c for c in columns if c in names], where)
         return [{**dict.fromkeys(columns), **row} for row in found.to_pylist()]
+
+    def _believed(
+        self, night: str, rows: list[dict[str, Any]], columns: Sequence[str]
+    ) -> list[dict[str, Any]]:
+        """Rows of a night with what rests on all nights; as they are where the store has no beliefs of the
+        night, or the night has told nothing of a loop."""
+        resting = [c.name for c in (*RESTING, *BELIEVED) if c.name in columns]
+        if not resting or not self.file("beliefs", night).exists():
+            return rows
+        wanted = ["loop", "cause", *(c for c in resting if c != "cause")]
+        told = read_stored(self.file("beliefs", night), wanted).to_pylist()
+        by_loop = {r["loop"]: {c: r[c] for c in resting} for r in told if r["cause"] is not None}
+        return [{**row, **by_loop.get(row["loop"], {})} for row in rows]
 
     def read_if_there(self, table: str, night: str) -> pa.Table | None:
         """One night of one table, None where the store has none."""

@@ -13,6 +13,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from analyzer.columns import (
+    BELIEFS,
     EXPLAINED,
     GROUPS,
     HOURS,
@@ -51,6 +52,7 @@ OF_A_NIGHT = (
     StoredTable("trends", bulky=True),
     StoredTable("waves", kept=False),
     StoredTable("groups", GROUPS, in_pieces=False),
+    StoredTable("beliefs", BELIEFS, in_pieces=False),
     StoredTable("explained", EXPLAINED, in_pieces=False),
     StoredTable("compared", SETTINGS),
 )
@@ -60,7 +62,7 @@ TREND = ("time_s", *(f"{signal}_{end}" for signal in ("sp", "pv", "op") for end 
 """Columns of a table of trends beside `loop`, all of them numbers."""
 DECLARED = {c.name: c for table in reversed(OF_A_NIGHT) for c in table.columns}
 """Every column that a table of results may have, by name, but for those of trends."""
-PARSED = frozenset(c.name for c in (*NIGHTS, *GROUPS) if c.kind is Kind.JSON)
+PARSED = frozenset(c.name for c in (*NIGHTS, *GROUPS, *BELIEFS) if c.kind is Kind.JSON)
 """Columns that hold JSON; pages that are kept whole are not among them: those of another version are passed over."""
 WORDS: Mapping[str, Sequence[str]] = {"action": tuple(Action), "ti_unit": (*SECONDS, "repeats/min")}
 """Columns that hold one of a few words."""

@@ -47,7 +47,7 @@ def _whole(found: Finding) -> str:
         return found.lacking
     if found.follows is not None:
         return f"{cycle_text(found)}: {_follows(found.follows)}"
-    text = _calmed(found) if found.calmed is not None else _alone(found)
+    text = _alone(found)
     names = ", ".join(found.moves[:MOST_NAMES]) + (" ..." if len(found.moves) > MOST_NAMES else "")
     return joined(text, f"it also moves {names}: fix this one first" if names else None)
 
@@ -125,24 +125,6 @@ def following_text(root: Root) -> str:
     """The sign of a loop that follows another one."""
     start = f"where the oscillation seems to start (coherence {root.coherence:.2f})"
     return f"moves with {root.loop}{later(root)}, {start}"
-
-
-CALMED = (
-    "The last change of settings took most of the cycle away; what is left is small beside what nights differ by, so "
-    "no further settings are advised. The valve is still worn: at the next shutdown."
-)
-
-
-def _calmed(found: Finding) -> str:
-    """What is left of a cycle since its settings were changed."""
-    now, before = found.swing, found.calmed
-    if now is None or before is None:
-        return _alone(found)
-    share = 100 * now.significance / before.swing.significance
-    slower = "slower and " if (now.period_s or 0.0) > (before.swing.period_s or 0.0) else ""
-    then = f"every {duration(before.swing.period_s)} until {before.night}"
-    cycle = f"{duration(now.period_s)}, {slower}{share:.0f} % as much as before its settings were changed ({then})"
-    return f"cycles every {cycle}: {valve_text(found)}{to_stroke(found)}"
 
 
 def joined(*clauses: str | None) -> str:

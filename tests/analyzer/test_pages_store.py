@@ -9,6 +9,8 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
+from analyzer.belief.nights import settle_anew
+from analyzer.config import Config
 from analyzer.loops.changes import TuningChange
 from analyzer.pages import before_after, morning, night
 from analyzer.pages.changes import Spans, change_cases, detected, wear_texts
@@ -78,8 +80,10 @@ def test_loops_that_the_store_lacks_are_named(store: Store) -> None:
     assert "GONE" in render(before_after.page(found, missing, ""))
 
 
-def test_morning_page_names_every_loop_once(store: Store) -> None:
+def test_morning_page_names_every_loop_once(tmp_path: Path) -> None:
     """Loops not assessed stand in the list of those with their reason; what is new and better is told."""
+    store = small_store(tmp_path)
+    settle_anew(store, Config())
     view = read_night(store, "2026-03-09", 50)
     page = morning.page(view)
     lost = table(page, "not-assessed")

@@ -1,0 +1,283 @@
+"""The belief in one loop: a step from what was believed the night before, and what is told of it.
+
+A settings change begins the cycle's part anew, for it is the settings that make cycle and advice; a repair begins the
+valve's. What is told contradicts no sure sign of the night itself: a loop that did not oscillate has no cause but a
+worn valve.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from analyzer.belief import cycle, remedy, valve
+from analyzer.belief.cycle import CycleBelief
+from analyzer.belief.pool import Pool
+from analyzer.belief.remedy import Pair, RemedyBelief
+from analyzer.belief.valve import ValveBelief, Witness
+from analyzer.belief.wear import Width
+from analyzer.config import BeliefLimits
+from analyzer.loop.decisions import CAUSES, Action, Cause, Due, Fault, Status, counts
+from identification.estimation.width_profile import WIDTHS
+
+Row = Mapping[str, Any]
+NEEDED, EARLIER = 10.0, 0.1
+"""Evidence needed [nat], and standard deviation of a width's logarithm, of nights that earlier versions kept."""
+CONSTANTS = ("slope", "time_constant_s", "gain", "dead_time_s", "width", "slip_jump")
+"""Constants that nights pool."""
+OF_VALVE = ("width", "slip_jump")
+"""Those of them that a repair changes."""
+
+
+@dataclass(frozen=True, slots=True)
+class Told:
+    """What is told of a loop in a night: cause and confidence [%] of each, fault of the valve, the loop that it
+    follows, what to do and by when, the pair of settings, and whether that is other than what the night says by
+    itself."""
+
+    cause: Cause = Cause.UNDECIDED
+    confidence: Mapping[Cause, float] = field(default_factory=dict)
+    fault: Fault = Fault.UNDECIDED
+    source: str | None = None
+    action: Action | None = None
+    due: Due | None = None
+    pair: Pair | None = None
+    own: bool = True
+    calmed: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Calm:
+    """What the loop did under the settings before: the last night, significance [% h], share [%] and period [s]."""
+
+    night: str
+    significance: float
+    oscillating_pct: float
+    period_s: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class Belief:
+    """What is believed of a loop after a night.
+
+    night, the last that counted; end_s, when its record ended; kp, ti, the settings in force; before, what the
+    loop did under those before."""
+
+    loop: str
+    night: str
+    end_s: float = 0.0
+    kp: float | None = None
+    ti: float | None = None
+    valve: ValveBelief = field(default_factory=ValveBelief)
+    cycle: CycleBelief = field(default_factory=CycleBelief)
+    remedy: RemedyBelief = field(default_factory=RemedyBelief)
+    constants: Mapping[str, Pool] = field(default_factory=dict)
+    widths: tuple[Width, ...] = ()
+    before: Calm | None = None
+    last: Calm | None = None
+    told: Told = field(default_factory=Told)
+
+    def is_calmed(self, limits: BeliefLimits) -> bool:
+        """Whether the last change of settings took most of a cycle away."""
+        then, now = self.before, self.last
+        if then is None or now is None or not counts(then.oscillating_pct):
+            return False
+        return now.significance <= limits.calmed * then.significance
+
+
+def step(before: Belief | None, row: Row, repaired_s: Sequence[float], limits: BeliefLimits) -> Belief | None:
+    """The belief after a night.
+
+    Parameters
+    ----------
+    before : Belief or None
+        That of the night before, None where there is none.
+    row : mapping
+        The loop's row of the night.
+    repaired_s : sequence of float
+        When notes say that its valve was repaired [s since 1970-01-01 UTC].
+    limits : BeliefLimits
+
+    Returns
+    -------
+    Belief or None
+        As it was where the night tells nothing; None where no night has told anything.
+    """
+    if row["status"] != Status.OK or row["oscillating_pct"] is None:
+        return before
+    now = before or Belief(row["loop"], "")
+    share = valve.faded_over(now.night, row["night"], limits) if now.night else 1.0
+    now = _after_changes(now, row, repaired_s)
+    found = cycle.with_night(now.cycle, share, row, limits)
+    now = _with_witness(replace(now, cycle=found), share, row, repaired_s, limits)
+    done = remedy.with_night(now.remedy, share, row, limits)
+    seen = Calm(
+        row["night"],
+        float(row["oscillation_significance"] or 0.0),
+        float(row["oscillating_pct"]),
+        row["period_s"],
+    )
+    end_s = (row["start_s"] or 0.0) + (row["duration_s"] or 0.0)
+    now = replace(now, night=row["night"], end_s=end_s, remedy=done, last=seen)
+    return replace(now, kp=row["kp"], ti=row["ti"], told=tell(now, row, limits))
+
+
+def _after_changes(now: Belief, row: Row, repaired_s: Sequence[float]) -> Belief:
+    """The belief with what a change of settings, or a repair, since the night before has ended begun anew."""
+    settings = row["kp"], row["ti"]
+    if now.night and None not in (now.kp, *settings) and (now.kp, now.ti) != settings:
+        fresh = CycleBelief(top=now.cycle.top, loud=now.cycle.loud)
+        now = replace(now, cycle=fresh, remedy=RemedyBelief(), before=now.last)
+    end_s = (row["start_s"] or 0.0) + (row["duration_s"] or 0.0)
+    if any(now.end_s < at <= end_s for at in repaired_s) and now.night:
+        kept = {k: v for k, v in now.constants.items() if k not in OF_VALVE}
+        fresh = CycleBelief(top=now.cycle.top, loud=now.cycle.loud)
+        now = replace(now, valve=ValveBelief(), constants=kept, widths=(), cycle=fresh, remedy=RemedyBelief())
+    return now
+
+
+def _with_witness(
+    now: Belief, share: float, row: Row, repaired_s: Sequence[float], limits: BeliefLimits
+) -> Belief:
+    """The belief in valve and process with what a night says of them; nothing where it says nothing, or where the
+    valve was repaired within it."""
+    start_s = row["start_s"] or 0.0
+    mixed = any(start_s < at < start_s + (row["duration_s"] or 0.0) for at in repaired_s)
+    constants = {k: pool.faded(share) for k, pool in now.constants.items()}
+    said = None if mixed else said_of(row)
+    if said is None:
+        return replace(now, constants=constants)
+    wrong = valve.doubt(said, now.cycle.cause, counts(row["oscillating_pct"]), limits)
+    found = valve.with_night(now.valve, share, row["night"], said, wrong, limits)
+    if found.since != now.valve.since:  # another valve
+        constants = {k: pool for k, pool in constants.items() if k not in OF_VALVE}
+    better = found.since != now.valve.since and found.width < now.valve.width
+    widths = () if better else now.widths
+    if "width" in said:
+        widths = (*widths, (row["night"], *said["width"]))[-limits.remembered :]
+    for name in CONSTANTS:
+        if name in said:
+            constants[name] = constants.get(name, Pool()).plus(
+                said[name][0], said[name][1], limits.least_deviation
+            )
+    worn = found.is_worn(limits)
+    certain = (now.valve.certain if found.since == now.valve.since else "") or row["night"] if worn else ""
+    return replace(now, valve=replace(found, certain=certain), constants=constants, widths=widths)
+
+
+def said_of(row: Row) -> Witness | None:
+    """What a night says of valve and process; of one that an earlier version kept, what its row tells of a fault."""
+    if row["witness"]:
+        return json.loads(row["witness"])  # type: ignore[no-any-return]
+    width, evidence = row["backlash_pct"] or row["stickband_pct"], row["evidence"]
+    if not width or not evidence or width > WIDTHS[-1]:
+        return None
+    profile = [0.0] * WIDTHS.size
+    profile[int(np.argmin(np.abs(np.log(WIDTHS / width))))] = evidence
+    jump = [0.0, 0.0] if row["backlash_pct"] else [1.0, 0.0]
+    return {"profile": profile, "needed": NEEDED, "op_range": width, "jump": jump, "width": [width, EARLIER]}
+
+
+def tell(now: Belief, row: Row, limits: BeliefLimits) -> Told:
+    """What is told of a loop in a night, by what is believed of it with that night."""
+    own = _own(row)
+    alone = now.cycle.nights == 1 and now.valve.nights <= 1
+    cycles = counts(row["oscillating_pct"])
+    dead = own.cause is Cause.VALVE and own.fault is Fault.UNDECIDED and not cycles
+    told = own
+    if not alone and not dead:
+        told = _of_cycle(now, own, limits) if cycles else _of_calm(now, own, limits)
+    if cycles and told.cause is Cause.VALVE and now.is_calmed(limits):
+        told = _left_alone(told)
+    same = (told.cause, told.fault, told.action, told.source) == (
+        own.cause,
+        own.fault,
+        own.action,
+        own.source,
+    )
+    return replace(told, own=same)
+
+
+def _left_alone(told: Told) -> Told:
+    """Of a loop whose worn valve makes far less of a cycle since its settings were changed: no further settings, and
+    the repair at the next shutdown."""
+    urgent = told.action is Action.RETUNE or (told.action is Action.REPAIR_VALVE and told.due is Due.NOW)
+    if not urgent:
+        return told
+    return replace(told, action=Action.REPAIR_VALVE, due=Due.SHUTDOWN, pair=None, calmed=True)
+
+
+def _own(row: Row) -> Told:
+    """What a night says by itself."""
+    pair = None
+    if row["action"] == Action.RETUNE and row["kp_new"] and row["ti_new"]:
+        pair = Pair(row["night"], *(row[c] for c in remedy.WITH_PAIR))
+    return Told(
+        Cause(row["cause"]),
+        {c: row[f"osc_{c}_pct"] for c in CAUSES if row[f"osc_{c}_pct"] is not None},
+        Fault(row["valve_fault"]),
+        row["source_loop"],
+        Action(row["action"]) if row["action"] else None,
+        Due(row["due"]) if row["due"] else None,
+        pair,
+    )
+
+
+def _of_calm(now: Belief, own: Told, limits: BeliefLimits) -> Told:
+    """Of a loop that did not oscillate in the night: a worn valve, or nothing."""
+    if now.valve.is_worn(limits):
+        fault = now.valve.fault(now.told.fault)
+        confidence = {**own.confidence, Cause.VALVE: now.valve.worn_pct(limits)}
+        if own.action in (Action.CHECK_MEASUREMENT, Action.CHECK_SETTINGS):
+            return Told(Cause.VALVE, confidence, fault, None, own.action)
+        return Told(Cause.VALVE, confidence, fault, None, Action.REPAIR_VALVE, Due.SHUTDOWN)
+    if own.cause is not Cause.VALVE:
+        return own
+    action = Action.NONE if own.action is Action.REPAIR_VALVE else own.action
+    return Told(Cause.NONE, own.confidence, Fault.NONE, None, action)
+
+
+def _of_cycle(now: Belief, own: Told, limits: BeliefLimits) -> Told:
+    """Of a loop that oscillated in the night: its source, else the cause that the nights name, and the valve."""
+    source, worn = now.cycle.source, now.valve.is_worn(limits)
+    if source is not None:
+        if own.source is not None:
+            return own
+        return Told(Cause.LOAD, now.cycle.chances(limits.between), Fault.NONE, source, Action.SEE_SOURCE_LOOP)
+    cause, confidence = now.cycle.cause, now.cycle.chances(limits.between)
+    if cause is Cause.VALVE and not worn:
+        cause = Cause.UNDECIDED
+    surely = now.valve.worn_pct(limits) >= limits.beside_pct
+    fault = now.valve.fault(now.told.fault) if worn and (cause is Cause.VALVE or surely) else Fault.NONE
+    if cause is Cause.UNDECIDED and fault is Fault.NONE:
+        fault = own.fault if own.fault is Fault.UNDECIDED else Fault.NONE
+    told = Told(cause, confidence, fault)
+    return _with_remedy(now, own, told, limits)
+
+
+def _with_remedy(now: Belief, own: Told, told: Told, limits: BeliefLimits) -> Told:
+    """What to do about a cycle of a cause."""
+    if own.action is Action.CHECK_MEASUREMENT or own.due is Due.SHUTDOWN:
+        return replace(told, action=own.action, due=own.due)
+    worn = told.fault in (Fault.BACKLASH, Fault.STICTION)
+    if told.cause not in (Cause.VALVE, Cause.TUNING):
+        if worn:
+            return replace(told, action=Action.REPAIR_VALVE, due=Due.SHUTDOWN)
+        if told.cause is Cause.LOAD:
+            followed = own.cause is not Cause.LOAD or own.action is Action.SEE_SOURCE_LOOP
+            return replace(told, action=Action.NONE if followed else own.action)
+        kept = own.action if own.cause is Cause.UNDECIDED else Action.UNDECIDED
+        return replace(told, action=kept)
+    action, held = now.remedy.action, now.remedy.held
+    if action is Action.RETUNE and held is not None:
+        return replace(told, action=action, pair=held)
+    if told.cause is Cause.VALVE:
+        keeps = action in (Action.CHECK_SETTINGS, Action.REPAIR_VALVE)
+        action = action if keeps else Action.REPAIR_VALVE
+        return replace(told, action=action, due=Due.NOW if action is Action.REPAIR_VALVE else None)
+    keeps = action in (Action.CHECK_SETTINGS, Action.NEEDS_DATA)
+    return replace(told, action=action if keeps else Action.UNDECIDED)

@@ -1,0 +1,239 @@
+"""Beliefs of a store: each night's follow from those of the night before it and from the night, so that neither the
+order of runs nor a night run twice matters, and one command makes them anew."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from analyzer.belief.belief import Belief, step
+from analyzer.belief.pool import Pool
+from analyzer.belief.remedy import HeldPair
+from analyzer.belief.state import belief_of, kept_as
+from analyzer.belief.wear import Wear, wear
+from analyzer.columns import BELIEFS, row_of
+from analyzer.config import Config
+from analyzer.loop.decisions import CAUSES, Lane
+from analyzer.store import notes
+from analyzer.store.care import Problem
+from analyzer.store.notes import Note
+from analyzer.store.store import Store
+from analyzer.store.table import rows_table
+from analyzer.words import belief as words
+from identification.errors import InputError
+
+Row = Mapping[str, Any]
+READ = (
+    *(
+        "loop",
+        "night",
+        "status",
+        "start_s",
+        "duration_s",
+        "kp",
+        "ti",
+        "form",
+        "gain_unit",
+        "ti_unit",
+        "op_unit",
+    ),
+    *(
+        "oscillation_significance",
+        "oscillating_pct",
+        "period_s",
+        "cause",
+        "valve_fault",
+        "source_loop",
+        "lack",
+    ),
+    *(f"osc_{c}_pct" for c in CAUSES),
+    *("action", "due", "kp_new", "ti_new", "advice", "expected_period_s", "expected_pv_amplitude_pct"),
+    *(
+        "lanes",
+        "reason",
+        "witness",
+        "evidence",
+        "settings_changed",
+        "backlash_pct",
+        "stickband_pct",
+        "slip_jump_pct",
+    ),
+)
+"""What beliefs follow from."""
+
+
+def settle(store: Store, night: str, config: Config) -> list[str]:
+    """Write the beliefs of a night and of all after it, and of any before that has none; sentences on loops of which
+    that failed."""
+    names = store.nights()
+    lacking = [n for n in names if not store.file("beliefs", n).exists()]
+    first = min([night, *lacking])
+    earlier = [n for n in names if n < first]
+    try:
+        known = read(store, earlier[-1]) if earlier else {}
+    except (InputError, KeyError, TypeError, ValueError):  # damaged, or of another version
+        return settle_anew(store, config)
+    return _written(store, _followed(store, [n for n in names if n >= first], known, config))
+
+
+def held_pairs(store: Store, night: str) -> dict[str, HeldPair]:
+    """Settings that are told of loops before a night; none where the store has no beliefs before it."""
+    earlier = [n for n in store.nights() if n < night]
+    if not earlier or not store.file("beliefs", earlier[-1]).exists():
+        return {}
+    try:
+        known = read(store, earlier[-1])
+    except (InputError, KeyError, TypeError, ValueError):
+        return {}
+    held = {loop: (b.told.pair, b) for loop, b in known.items()}
+    return {k: HeldPair(pair.kp, pair.ti, (b.kp, b.ti)) for k, (pair, b) in held.items() if pair is not None}
+
+
+def settle_anew(store: Store, config: Config) -> list[str]:
+    """Make all beliefs of a store anew from its nights; sentences as of `settle`."""
+    names = store.nights()
+    return _written(store, _followed(store, names, _of_pruned(store, names), config))
+
+
+def unfounded(store: Store, config: Config) -> list[Problem]:
+    """Beliefs of a store that do not follow from its nights; none where a table of nights is damaged, or an earlier
+    version kept no beliefs."""
+    names = store.nights()
+    if not store.files("beliefs"):
+        return []
+    try:
+        followed = list(_followed(store, names, _of_pruned(store, names), config))
+    except InputError:
+        return []
+    remedy = "'triage store beliefs' makes them anew"
+    paths = [store.file("beliefs", f.night) for f in followed if not _same(store, f)]
+    return [Problem(f"{path}: not what the nights say", remedy) for path in paths]
+
+
+@dataclass(frozen=True, slots=True)
+class Followed:
+    """A night, the rows of its beliefs, and sentences on loops of which they failed."""
+
+    night: str
+    rows: Sequence[Row]
+    lost: Sequence[str]
+
+
+def _written(store: Store, followed: Iterator[Followed]) -> list[str]:
+    lost: list[str] = []
+    for f in followed:
+        store.write("beliefs", f.night, rows_table(f.rows, BELIEFS))
+        lost += f.lost
+    return lost
+
+
+def _same(store: Store, followed: Followed) -> bool:
+    try:
+        held = store.read_if_there("beliefs", followed.night)
+    except InputError:
+        return False
+    kept = [] if held is None else held.to_pylist()
+    return {r["loop"]: r for r in kept} == {r["loop"]: row_of(r, BELIEFS) for r in followed.rows}
+
+
+def read(store: Store, night: str) -> dict[str, Belief]:
+    """The beliefs of a night by loop; errors as of `belief_of` and `Store.read`."""
+    table = store.read("beliefs", night, ["loop", "state"])
+    return {r["loop"]: belief_of(r["state"]) for r in table.to_pylist()}
+
+
+def _of_pruned(store: Store, names: Sequence[str]) -> dict[str, Belief]:
+    """What the oldest night of a store knew of nights before it, which have been deleted."""
+    if not names or not store.file("beliefs", names[0]).exists():
+        return {}
+    try:
+        known = read(store, names[0])
+    except (InputError, KeyError, TypeError, ValueError):
+        return {}
+    return {k: b for k, b in known.items() if min(b.valve.since or names[0], b.cycle.since) < names[0]}
+
+
+def _followed(
+    store: Store, names: Sequence[str], known: Mapping[str, Belief], config: Config
+) -> Iterator[Followed]:
+    """Nights, oldest first, with their beliefs, from what was believed before them."""
+    beliefs = dict(known)
+    repaired = {loop: repairs(own) for loop, own in notes.read_notes(store.path).items()}
+    for name in names:
+        rows = {r["loop"]: r for r in store.own_rows("nights", name, READ)}
+        out, lost = [], []
+        for loop in (*rows, *(k for k in beliefs if k not in rows)):
+            before, row = beliefs.get(loop), rows.get(loop)
+            try:
+                now = _after(before, row, name, repaired.get(loop, ()), config)
+                if now is not None:
+                    out.append(_row(before, now, row, name, config))
+                    beliefs[loop] = now
+            except Exception as error:  # a belief that fails is that loop's alone, and never the night's end
+                lost.append(f"{loop}: no belief of night {name} ({type(error).__name__}: {error})")
+        yield Followed(name, out, lost)
+
+
+def _after(
+    before: Belief | None, row: Row | None, night: str, repaired: Sequence[float], config: Config
+) -> Belief | None:
+    """The belief after a night; as it was where the night has no row, or where it is what a pruned store knew of its
+    oldest night."""
+    if row is None or (before is not None and before.night >= night):
+        return before
+    return step(before, row, repaired, config.belief)
+
+
+def repairs(own: Sequence[Note]) -> list[float]:
+    """When notes of a loop say that its valve was repaired [s since 1970-01-01 UTC]."""
+    return [n.time_s for n in own if words.says_repaired(n.text)]
+
+
+def _row(before: Belief | None, now: Belief, row: Row | None, night: str, config: Config) -> dict[str, Any]:
+    """A belief as a row: what is told where the night tells anything, figures, and what the next night goes on
+    from."""
+    worn = now.valve.worn_pct(config.belief)
+    known: dict[str, Any] = {
+        "loop": now.loop,
+        "night": night,
+        "believed_nights": float(now.cycle.nights),
+        "believed_since": now.cycle.since,
+        "worn_pct": worn if now.valve.nights else None,
+        "worn_nights": float(now.valve.nights),
+        "certain_since": now.valve.certain or None,
+        "constants": _constants(now.constants),
+        "state": kept_as(now),
+    }
+    width = now.constants["width"].pooled if "width" in now.constants else None
+    if width is not None:
+        known |= {"width_pct": width.value, "width_low_pct": width.low, "width_high_pct": width.high}
+    found = wear(now.widths, config.wear) if now.valve.certain else None
+    if found is not None:
+        known |= _worn_by(found)
+    if row is None or now.night != night:
+        return known
+    text, tone = words.news(before, now, row)
+    lanes = ", ".join(filter(None, (row["lanes"], Lane.WEAR if found is not None else None)))
+    told = words.told(now, row) | {"lanes": lanes or None}
+    return known | told | {"news": text or None, "news_tone": tone or None}
+
+
+def _worn_by(found: Wear) -> dict[str, Any]:
+    return {
+        "wear_pct_per_month": found.per_month,
+        "wear_low_pct": found.low,
+        "wear_high_pct": found.high,
+        "wear_since": found.since,
+        "reaches_pct": found.reaches,
+        "reaches_from": found.earliest or None,
+        "reaches_by": found.latest or None,
+    }
+
+
+def _constants(pools: Mapping[str, Pool]) -> str:
+    """Pooled constants: value, ends of the 90 % interval, and spread between nights."""
+    found = {k: p.pooled for k, p in pools.items()}
+    said = {k: [float(f"{x:.4g}") for x in (p.value, p.low, p.high, p.spread)] for k, p in found.items() if p}
+    return json.dumps(said, separators=(",", ":"))

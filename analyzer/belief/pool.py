@@ -1,0 +1,84 @@
+"""A constant that each night estimates with an error of its own, pooled over nights that differ by more than that.
+
+Random effects by moments (DerSimonian, Laird 1986): what the nights scatter beyond their own errors is their spread,
+and the pooled value is known no better than it allows. Sums are kept, not nights, so that each night costs the same.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from identification.estimation.covariance import NINETY, WIDER
+
+UNKNOWN = 2.0
+"""Standard deviation of a logarithm beyond which a night does not know a constant [-]: a factor of seven."""
+
+
+@dataclass(frozen=True, slots=True)
+class Pooled:
+    """A pooled value with its 90 % interval, and the spread between nights as standard deviation of its logarithm."""
+
+    value: float
+    low: float
+    high: float
+    spread: float
+
+
+@dataclass(frozen=True, slots=True)
+class Pool:
+    """Sums over the logarithm x of a constant's size, older nights counting less.
+
+    count; total, of x; weight, of w = one over the variance of x; first, of w x; second, of w x squared; squares,
+    of w squared; sign of the constant."""
+
+    count: float = 0.0
+    total: float = 0.0
+    weight: float = 0.0
+    first: float = 0.0
+    second: float = 0.0
+    squares: float = 0.0
+    sign: float = 1.0
+
+    def faded(self, share: float) -> Pool:
+        """The same as it counts some nights later."""
+        return Pool(
+            share * self.count,
+            share * self.total,
+            share * self.weight,
+            share * self.first,
+            share * self.second,
+            share * self.squares,
+            self.sign,
+        )
+
+    def plus(self, value: float, deviation: float, least: float) -> Pool:
+        """With one night more: its value and the standard deviation of its logarithm, no less than `least`."""
+        if value == 0.0 or not math.isfinite(value) or not deviation <= UNKNOWN:
+            return self
+        x, w = math.log(abs(value)), 1.0 / max(WIDER * deviation, least) ** 2
+        return Pool(
+            self.count + 1.0,
+            self.total + x,
+            self.weight + w,
+            self.first + w * x,
+            self.second + w * x * x,
+            self.squares + w * w,
+            math.copysign(1.0, value),
+        )
+
+    @property
+    def pooled(self) -> Pooled | None:
+        """Value, interval and spread; None without a night."""
+        if self.weight <= 0.0:
+            return None
+        mean = self.first / self.weight
+        left = self.second - self.first * mean - max(self.count - 1.0, 0.0)
+        free = self.weight - self.squares / self.weight
+        between = max(left / free, 0.0) if free > 1e-9 * self.weight and self.count > 1.0 else 0.0
+        own = self.count / self.weight
+        centre = (own * mean + between * self.total / self.count) / (own + between)
+        half = NINETY * math.sqrt(1.0 / self.weight + between / self.count)
+        low, high = math.exp(centre - half), math.exp(centre + half)
+        low, high = sorted((self.sign * low, self.sign * high))
+        return Pooled(self.sign * math.exp(centre), low, high, math.sqrt(between))

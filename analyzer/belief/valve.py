@@ -1,0 +1,211 @@
+"""Is the valve worn, and how widely: evidence of all nights since its last repair, added up width by width.
+
+Each night says of every width how much better a play of it explains PV than an ideal valve (witness.py). The nights
+are added up with forgetting, so that a fault too small for one night is found by several that agree on its width, and
+what one night mistakes for a play of some width the others do not bear out: the best of them is left out, unless it
+would be believed by itself. Where a night and those after it say
+another thing than those before by more than chance (generalized likelihood ratio: Willsky, Jones 1976) the belief
+begins anew there, as it does after a repair.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from datetime import date
+from typing import Any
+
+import numpy as np
+
+from analyzer.config import BeliefLimits
+from analyzer.loop.decisions import Cause, Fault
+from identification.estimation.width_profile import WIDTHS
+from identification.record import Floats
+
+FEWEST = 2
+"""Nights that another valve takes to be told: one can be odd."""
+Witness = Mapping[str, Any]
+"""What a night says, as analyzer/loop/witness.py puts it."""
+Recent = tuple[str, tuple[float, ...]]
+"""A night and what it said of each width, as it counts today [nat]."""
+
+
+@dataclass(frozen=True, slots=True)
+class ValveBelief:
+    """What is believed of a valve.
+
+    since, the first night that counts; nights, how many told something; alone, evidence for each of WIDTHS
+    beyond what a night may be wrong by [nat]; summed, evidence of all nights, and best, that of the best of
+    them; recent, what the last of them said; jump and clear, evidence for a slip jump and what it takes [nat];
+    certain, the night from which on it was believed worn without a break, '' where it is not.
+    """
+
+    since: str = ""
+    nights: int = 0
+    alone: tuple[float, ...] = ()
+    summed: tuple[float, ...] = ()
+    best: tuple[float, ...] = ()
+    recent: tuple[Recent, ...] = ()
+    jump: float = 0.0
+    clear: float = 0.0
+    certain: str = ""
+
+    @property
+    def profile(self) -> Floats:
+        """Evidence for each of WIDTHS [nat], shape of WIDTHS: of all nights but the best, or beyond all doubt."""
+        if not self.summed:
+            return np.zeros(WIDTHS.size)
+        return np.maximum(np.subtract(self.summed, self.best), self.alone)
+
+    @property
+    def width(self) -> float:
+        """The likeliest width [% OP], 0 where none is."""
+        found = self.profile
+        return float(WIDTHS[int(np.argmax(found))]) if found.max() > 0.0 else 0.0
+
+    def worn_pct(self, limits: BeliefLimits) -> float:
+        """Probability that the valve is worn [%]."""
+        found = self.profile
+        odds = limits.worn_before / (1.0 - limits.worn_before) / found.size
+        top = max(float(found.max()), 0.0)
+        worn = odds * float(np.exp(found - top).sum())
+        return 100.0 * worn / (worn + float(np.exp(-top)))
+
+    def is_worn(self, limits: BeliefLimits) -> bool:
+        """Whether it is believed to be worn; one that was stays so until it is no longer likely."""
+        return self.worn_pct(limits) >= (limits.still_worn_pct if self.certain else limits.worn_pct)
+
+    def fault(self, before: Fault | None) -> Fault:
+        """Backlash or stiction by what a slip jump adds, as before where that is not clear."""
+        if self.jump > self.clear:
+            return Fault.STICTION
+        if self.clear == 0.0 or self.jump < 0.5 * self.clear:
+            return Fault.BACKLASH
+        return before if before in (Fault.BACKLASH, Fault.STICTION) else Fault.UNDECIDED
+
+
+def faded_over(before: str, night: str, limits: BeliefLimits) -> float:
+    """How much of what was known in one night counts in a later one [-]."""
+    gap = (date.fromisoformat(night) - date.fromisoformat(before)).days
+    return float(0.5 ** (max(gap, 0) / limits.half_life))
+
+
+@dataclass(frozen=True, slots=True)
+class Doubt:
+    """What a night's likelihood may be wrong by, in the evidence that a verdict of one night needs [-]: as one of
+    several nights, by itself, and in what it says against a width."""
+
+    each: float
+    alone: float
+    against: float
+
+
+def doubt(said: Witness, cause: Cause, oscillates: bool, limits: BeliefLimits) -> Doubt:
+    """What a night may be wrong by, in a loop whose cycles have a cause by all nights: no model is exact, and
+    what it lacks it lacks every night. In a cycle which another cause makes a play is mimicked every night; one
+    that is narrow beside OP's range, in a night now and then."""
+    if oscillates and cause is not Cause.VALVE:
+        beside = limits.doubt_beside if cause is Cause.LOAD else limits.doubt_small
+        return Doubt(beside, beside, beside)
+    width = float(WIDTHS[int(np.argmax(said["profile"]))])
+    narrow = oscillates or width < limits.small * said["op_range"]
+    alone = limits.doubt_small if narrow else limits.doubt_alone
+    return Doubt(limits.doubt, alone, limits.doubt_alone if oscillates else limits.doubt_against)
+
+
+def weighed(said: Witness, wrong_by: float, against: float, limits: BeliefLimits) -> Floats:
+    """What a night says of each width [nat]: beyond what it may be wrong by, what it takes to tell a fault counts
+    `conviction`, and no night counts for more than `most`."""
+    found = np.asarray(said["profile"], dtype=np.float64) / max(said["needed"], 1e-9)
+    found = np.maximum(found - wrong_by, 0.0) + np.minimum(found + against, 0.0)
+    found *= limits.conviction
+    top = float(found.max())
+    if top > limits.most:
+        found = np.where(found > 0.0, found * limits.most / top, found)
+    return np.maximum(found, -limits.most)
+
+
+def with_night(
+    before: ValveBelief,
+    share: float,
+    night: str,
+    said: Witness,
+    wrong: Doubt,
+    limits: BeliefLimits,
+) -> ValveBelief:
+    """The belief with one night more.
+
+    Parameters
+    ----------
+    before : ValveBelief
+    share : float
+        How much of it still counts [-].
+    night : str
+    said : dict
+        The night's witness.
+    wrong : Doubt
+        What it may be wrong by.
+    limits : BeliefLimits
+    """
+    own, alone = (weighed(said, x, wrong.against, limits) for x in (wrong.each, wrong.alone))
+    faded = [(n, share * np.asarray(p)) for n, p in before.recent]
+    recent = [*faded, (night, own)][-limits.recent :]
+    summed = share * np.asarray(before.summed) + own if before.summed else own
+    at = changed_at(summed, [p for _, p in recent], limits.change)
+    if at is not None:
+        return _begun_anew(recent[at:], said)
+    jump, clear = said["jump"]
+    return replace(
+        before,
+        since=before.since or night,
+        nights=before.nights + 1,
+        alone=_kept(share * np.asarray(before.alone) + alone if before.alone else alone),
+        summed=_kept(summed),
+        best=_kept(np.maximum(share * np.asarray(before.best), own) if before.best else np.maximum(own, 0.0)),
+        recent=tuple((n, _kept(p)) for n, p in recent),
+        jump=share * before.jump + jump,
+        clear=share * before.clear + clear,
+    )
+
+
+def _begun_anew(recent: Sequence[tuple[str, Floats]], said: Witness) -> ValveBelief:
+    """The belief in another valve, which the recent nights are of."""
+    each = np.array([p for _, p in recent])
+    best = np.maximum(each.max(axis=0), 0.0)
+    kept = tuple((n, _kept(p)) for n, p in recent)
+    return ValveBelief(
+        recent[0][0],
+        len(recent),
+        _kept(np.minimum(each.sum(axis=0), 0.0)),
+        _kept(each.sum(axis=0)),
+        _kept(best),
+        kept,
+        *said["jump"],
+    )
+
+
+def _kept(x: Floats) -> tuple[float, ...]:
+    """As the store keeps it."""
+    return tuple(round(float(v), 3) for v in x)
+
+
+def changed_at(summed: Floats, recent: Sequence[Floats], least: float) -> int | None:
+    """The first of the recent nights from which on the valve is another one; None where all nights agree.
+
+    Parameters
+    ----------
+    summed : ndarray of shape (w,)
+        Evidence of all nights together [nat].
+    recent : sequence of ndarray of shape (w,)
+        Of the last of them, as they count in it.
+    least : float
+        Gain in log likelihood [nat] of two valves over one from which it is told.
+    """
+    together = max(float(summed.max()), 0.0)
+    after, best, gain = np.zeros(summed.size), None, least
+    for k in range(len(recent) - 1, -1, -1):
+        after = after + recent[k]
+        apart = max(float((summed - after).max()), 0.0) + max(float(after.max()), 0.0)
+        if apart - together > gain and len(recent) - k >= FEWEST:
+            best, gain = k, apart - together
+    return best

@@ -1,0 +1,118 @@
+"""Does a valve wear: from which night on its width grows, how fast, and when it will have grown to a size.
+
+A width that stays and then grows (two straight lines, Bai 1997) is asked for first; what grows is then a state-space
+trend whose slope may drift (statsmodels' smooth trend: Harvey 1989, ch. 2), nights without a width left out.
+"""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import date, timedelta
+
+import numpy as np
+
+from analyzer.config import WearLimits
+from identification.estimation.covariance import NINETY
+from identification.record import Floats
+
+Width = tuple[str, float, float]
+"""A night, the width that it tells [% OP], and the standard deviation of its logarithm."""
+MONTH_D = 30.0
+"""Days of a month, as speeds are told."""
+
+
+@dataclass(frozen=True, slots=True)
+class Wear:
+    """A valve that wears: the night from which its width grows, growth in thirty days with its 90 % interval [%
+    OP], the size that it will reach [% OP], and the days between which it does with 90 %; `latest` is '' where
+    that is not within sight."""
+
+    since: str
+    per_month: float
+    low: float
+    high: float
+    reaches: float
+    earliest: str = ""
+    latest: str = ""
+
+
+def wear(widths: Sequence[Width], limits: WearLimits) -> Wear | None:
+    """Whether a width grows, by the nights that tell it; None where it stays or too few do.
+
+    Parameters
+    ----------
+    widths : sequence of Width
+        Oldest first.
+    limits : WearLimits
+    """
+    if len(widths) < limits.nights:
+        return None
+    days = np.array([date.fromisoformat(night).toordinal() for night, _, _ in widths], dtype=np.float64)
+    width = np.array([w for _, w, _ in widths])
+    deviation = width * np.array([max(s, limits.least_deviation) for _, _, s in widths])
+    bend = _bend(days, width, deviation, limits)
+    if bend is None:
+        return None
+    return _forecast(days[days >= bend], width[days >= bend], limits)
+
+
+def _bend(days: Floats, width: Floats, deviation: Floats, limits: WearLimits) -> float | None:
+    """The day from which on the width grows: the best of all bends, where it is a better story than that nothing
+    does; None where it is not."""
+    weight = 1.0 / deviation
+    flat = _left(np.ones((days.size, 1)), width, weight)[0]
+    best, least, slope = None, math.inf, 0.0
+    for at in days[: -limits.growing_nights]:
+        design = np.column_stack((np.ones(days.size), np.maximum(days - at, 0.0)))
+        left, found = _left(design, width, weight)
+        if left < least:
+            best, least, slope = float(at), left, float(found[1])
+    if best is None or slope <= 0.0:
+        return None
+    spread = max(least / max(days.size - 3, 1), 1.0)  # nights differ by more than their own errors
+    grown = slope * (days[-1] - best)
+    start = float(np.median(width[: limits.growing_nights]))
+    sure = (flat - least) / spread > limits.sure
+    return best if sure and grown > limits.least_growth * start else None
+
+
+def _left(design: Floats, width: Floats, weight: Floats) -> tuple[float, Floats]:
+    """Weighted squares left by a straight line or two, and their constants."""
+    found = np.asarray(np.linalg.lstsq(design * weight[:, None], width * weight, rcond=None)[0], np.float64)
+    return float((((width - design @ found) * weight) ** 2).sum()), found
+
+
+def _forecast(days: Floats, width: Floats, limits: WearLimits) -> Wear | None:
+    """The trend of what grows, carried on until it reaches the next size."""
+    from statsmodels.tsa.statespace.structural import UnobservedComponents
+
+    n = int(days[-1] - days[0]) + 1
+    observed = np.full(n, np.nan)
+    observed[(days - days[0]).astype(int)] = width
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # a variance of zero is a straight line, and no failure
+        fit = UnobservedComponents(observed, level="strend").fit(disp=False, maxiter=200)
+        ahead = fit.get_forecast(int(limits.ahead_d))
+        mean, error = np.asarray(ahead.predicted_mean), np.asarray(ahead.se_mean)
+    slope = float(fit.filtered_state[1, -1])
+    deviation = math.sqrt(max(float(fit.filtered_state_cov[1, 1, -1]), 0.0))
+    if not math.isfinite(slope) or slope - NINETY * deviation <= 0.0:
+        return None
+    now = float(fit.filtered_state[0, -1])
+    size = limits.size if limits.size > now else 2.0 * now
+    last = date.fromordinal(int(days[-1]))
+    since = date.fromordinal(int(days[0])).isoformat()
+    half, around = NINETY * deviation, NINETY * error
+    earliest, latest = _first(mean + around, size, last), _first(mean - around, size, last)
+    return Wear(
+        since, MONTH_D * slope, MONTH_D * (slope - half), MONTH_D * (slope + half), size, earliest, latest
+    )
+
+
+def _first(path: Floats, size: float, last: date) -> str:
+    """The day on which a path reaches a size, '' where it does not."""
+    there = np.flatnonzero(path >= size)
+    return (last + timedelta(days=int(there[0]) + 1)).isoformat() if there.size else ""

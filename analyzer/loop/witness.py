@@ -1,0 +1,112 @@
+"""What one record says of valve and process, whatever its verdict: kept with the night, so that nights can be
+added up."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+
+import numpy as np
+
+from analyzer.config import CauseLimits
+from analyzer.loop.cause import Verdict, fault_of, hidden_by_grid, needed
+from analyzer.loop.decisions import Cause, Fault
+from analyzer.loop.measure import Measured
+from identification.estimation.covariance import DECODED, LEAST_JUMP
+from identification.estimation.gauss_newton import covariance
+from identification.estimation.hammerstein import Fit
+from identification.estimation.width_profile import WIDTHS, width_profile
+from identification.record import Floats
+from identification.signals.robust import robust_deviation
+
+Known = tuple[float, float]
+"""A constant and the standard deviation of its logarithm."""
+
+
+def witness(verdict: Verdict, oscillates: bool, pv_step: float, limits: CauseLimits) -> str | None:
+    """What a record says, as the store keeps it (JSON): the profile of widths and the evidence that it takes to
+    tell a fault [nat], the evidence for a slip jump and what it takes [nat], and constants with the deviation
+    of their logarithms; None where nothing was fitted.
+
+    Parameters
+    ----------
+    verdict : Verdict
+    oscillates : bool
+    pv_step : float
+        PV's grid [% of span], which may hold PV still as a valve would.
+    limits : CauseLimits
+    """
+    m = verdict.for_settings.measured
+    if m is None or hidden_by_grid(m, pv_step, oscillates, limits):
+        return None
+    convicted = oscillates and verdict.cause is Cause.VALVE
+    said = {
+        "profile": [round(float(x), 1) for x in _profile(m, 0.0 if convicted else limits.noise_widths)],
+        "needed": round(needed(m, limits, oscillates), 1),
+        "op_range": float(f"{m.play.valve.stickband / m.size:.4g}") if m.size > 0 else 0.0,
+        "jump": [round(x, 1) for x in _jump(m, limits)],
+        **{
+            k: [float(f"{x:.4g}") for x in known]
+            for k, known in _told(verdict, m, limits, oscillates).items()
+        },
+    }
+    return json.dumps(said, separators=(",", ":"))
+
+
+def _profile(m: Measured, noise_widths: float) -> Floats:
+    """The profile of widths [nat], what speaks for a fault brought to the evidence that outliers leave of it;
+    nothing is said of widths under so many deviations of OP's noise, which crosses such a play now and then."""
+    found = width_profile(m.linear, m.play)
+    crossed = noise_widths * robust_deviation(np.abs(np.diff(m.window.op, 2))) / math.sqrt(6.0) > WIDTHS
+    found[crossed] = 0.0
+    most = float(found.max())
+    if most <= 0.0 or most <= m.evidence:
+        return found
+    return np.where(found > 0.0, found * max(m.evidence, 0.0) / most, found)
+
+
+def _jump(m: Measured, limits: CauseLimits) -> Known:
+    """Evidence for a slip jump and what it takes [nat], none where it was not looked for."""
+    if m.stick_slip is None:
+        return 0.0, 0.0
+    clear = max(limits.evidence_jump, limits.jump_share * m.evidence)
+    share = m.stick_slip.valve.slip_jump / max(m.stick_slip.valve.stickband, 1e-9)
+    return min(m.jump, 10.0 * clear) if share >= limits.least_jump else 0.0, clear
+
+
+def _told(verdict: Verdict, m: Measured, limits: CauseLimits, oscillates: bool) -> Mapping[str, Known]:
+    """Constants of the better fit, the valve's as they are told where that is slip by slip."""
+    found, told = dict(_constants(m, limits, oscillates)), verdict.measured
+    if told is not m and told is not None and told.stick_slip is not None:
+        valve = told.stick_slip.valve
+        found |= {"width": (valve.stickband, DECODED), "slip_jump": (valve.slip_jump, math.log(LEAST_JUMP))}
+    return found
+
+
+def _constants(m: Measured, limits: CauseLimits, oscillates: bool) -> Mapping[str, Known]:
+    """Constants of the better fit: of the valve's where PV speaks for its fault, else of the process alone."""
+    worn = m.evidence >= needed(m, limits, oscillates)
+    sticks = worn and fault_of(m, limits) is Fault.STICTION and m.stick_slip is not None
+    fit = (m.stick_slip if sticks else m.play) if worn else m.linear
+    assert fit is not None
+    spread = covariance(fit, free_width=worn)
+    if not np.isfinite(spread).all() or fit.gain == 0.0:
+        return {}
+    found = _process(fit, spread)
+    if worn:
+        found["width"] = fit.valve.stickband, math.sqrt(spread[2, 2]) / max(fit.valve.stickband, 1e-9)
+        found["slip_jump"] = fit.valve.slip_jump, found["width"][1]
+    return found
+
+
+def _process(fit: Fit, spread: Floats) -> dict[str, Known]:
+    """Slope, time constant, gain and dead time of a fit, by its covariance of (log T, L, stickband, gain)."""
+    dead_s = fit.process.dead_time_s
+    of_slope = spread[0, 0] + spread[3, 3] / fit.gain**2 - 2.0 * spread[0, 3] / fit.gain
+    return {
+        "slope": (fit.slope, math.sqrt(max(of_slope, 0.0))),
+        "time_constant_s": (fit.time_constant_s, math.sqrt(spread[0, 0])),
+        "gain": (fit.gain, math.sqrt(spread[3, 3]) / abs(fit.gain)),
+        "dead_time_s": (dead_s, math.sqrt(spread[1, 1]) / max(dead_s, 1e-9)),
+    }

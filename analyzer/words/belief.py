@@ -1,0 +1,218 @@
+"""What beliefs say: the columns of a loop that rest on all nights, its reason, and what is new of it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from analyzer.loop.decisions import CAUSES, Action, Cause, Fault, counts
+from analyzer.words.reason import joined
+from analyzer.words.units import duration
+
+if TYPE_CHECKING:
+    from analyzer.belief.belief import Belief
+
+Row = Mapping[str, Any]
+REPAIRED = re.compile(
+    r"\b(repaired|replaced|overhauled|exchanged|renewed|repacked|new (valve|actuator|positioner|packing|stem))\b",
+    re.I,
+)
+"""Words of a note that say a valve is another one from then on."""
+NOT_YET = re.compile(
+    r"\b(to be|not|will be|should be|must be|must|needs? to be|order(ed)?|plan(ned)?|next)\b", re.I
+)
+"""Words that say it is not yet done."""
+IS = {Fault.BACKLASH: "plays by", Fault.STICTION: "sticks over"}
+WAS = {
+    Cause.VALVE: "the valve",
+    Cause.TUNING: "the tuning",
+    Cause.LOAD: "a load",
+    Cause.NONE: "nothing",
+    Cause.UNDECIDED: "undecided",
+}
+
+
+def says_repaired(text: str) -> bool:
+    """Whether a note says that a valve was repaired."""
+    return bool(REPAIRED.search(text)) and not NOT_YET.search(text)
+
+
+def width_text(now: Belief) -> str:
+    """What is wrong with a worn valve, with the pooled width and its interval."""
+    pool = now.constants.get("width")
+    width = None if pool is None else pool.pooled
+    fault = now.told.fault if now.told.fault in IS else now.valve.fault(None)
+    verb = IS.get(fault)
+    if verb is None:
+        return "the valve is worn"
+    if width is None:
+        return f"the valve {verb} about {now.valve.width:.2g} % of OP"
+    return f"the valve {verb} {width.value:.2g} % of OP ({width.low:.2g} to {width.high:.2g})"
+
+
+def _pooled(now: Belief) -> str:
+    """The pooled width with its interval, '' where there is none."""
+    pool = now.constants.get("width")
+    width = None if pool is None else pool.pooled
+    return "" if width is None else f"{width.value:.2g} % ({width.low:.2g} to {width.high:.2g}), "
+
+
+def wear_text(row: Row) -> str:
+    """How fast a valve wears, since when, and when it will have reached its next size."""
+    ends = f"{row['wear_low_pct']:.2g} to {row['wear_high_pct']:.2g}"
+    text = f"{row['wear_pct_per_month']:.2g} % of OP in 30 days ({ends}) since {row['wear_since']}"
+    size, first, last = row["reaches_pct"], row["reaches_from"], row["reaches_by"]
+    if first is None:
+        return text
+    when = f"between {first} and {last}" if last else f"after {first}"
+    return f"{text}; reaches {size:.2g} % {when}"
+
+
+def told(now: Belief, row: Row) -> dict[str, Any]:
+    """The columns of a loop's row that rest on all nights."""
+    t = now.told
+    pair = t.pair if t.action is Action.RETUNE else None
+    out: dict[str, Any] = {f"osc_{c}_pct": t.confidence.get(c) for c in CAUSES}
+    out |= {
+        "cause": t.cause,
+        "valve_fault": t.fault,
+        "source_loop": t.source,
+        "action": t.action,
+        "due": t.due,
+        "kp_new": None if pair is None else pair.kp,
+        "ti_new": None if pair is None else pair.ti,
+        "advice": _advice(now, row),
+        "reason": reason(now, row),
+    }
+    if pair is not None:
+        out |= {"expected_period_s": pair.period_s, "expected_pv_amplitude_pct": pair.amplitude_pct}
+    return out | _of_valve(now, row)
+
+
+def _advice(now: Belief, row: Row) -> str | None:
+    """The advice in full: that of the night which the pair is of, else the night's own where it is told."""
+    if now.told.calmed:
+        return CALMED
+    if now.told.action is Action.RETUNE and now.told.pair is not None:
+        return now.told.pair.advice
+    return row["advice"] if row["action"] == now.told.action else ""
+
+
+def _of_valve(now: Belief, row: Row) -> dict[str, Any]:
+    """Play or stickband: the night's own, the pooled one where it has none of the fault that is told."""
+    names = ("backlash_pct", "stickband_pct", "slip_jump_pct")
+    found = {k: p.pooled for k, p in now.constants.items()}
+    width, jump = found.get("width"), found.get("slip_jump")
+    out: dict[str, Any] = dict.fromkeys(names)
+    if now.told.fault is Fault.BACKLASH:
+        out["backlash_pct"] = row["backlash_pct"] or (width and width.value)
+    elif now.told.fault is Fault.STICTION:
+        out["stickband_pct"] = row["stickband_pct"] or (width and width.value)
+        out["slip_jump_pct"] = row["slip_jump_pct"] or (jump and jump.value)
+    return out
+
+
+def reason(now: Belief, row: Row) -> str:
+    """The sentence of a loop: the night's own where the nights agree, else what they say together; with the valve's
+    width over the nights where it is worn."""
+    t, several = now.told, now.valve.nights > 1
+    worn = several and t.fault in IS and now.valve.certain
+    over = (
+        f"{now.valve.nights} nights say {width_text(now)}, certain since {now.valve.certain}"
+        if worn
+        else None
+    )
+    if now.told.calmed:
+        return joined(_calmed(now), over)
+    if t.own:
+        return joined(row["reason"], over)
+    return joined(_together(now, row), over, f"this night alone: {WAS[Cause(row['cause'])]}")
+
+
+CALMED = (
+    "The last change of settings took most of the cycle away; what is left is small beside what nights differ by, so "
+    "no further settings are advised. The valve is still worn: at the next shutdown."
+)
+
+
+def _calmed(now: Belief) -> str:
+    """What is left of a cycle since its settings were changed."""
+    left, then = now.last, now.before
+    assert left is not None
+    assert then is not None
+    share = 100.0 * left.significance / max(then.significance, 1e-9)
+    slower = "slower and " if (left.period_s or 0.0) > (then.period_s or 0.0) else ""
+    before = f"every {duration(then.period_s)} until {then.night}"
+    return (
+        f"cycles every {duration(left.period_s)}, {slower}{share:.0f} % as much as before its settings were changed "
+        f"({before}): {width_text(now)}; at the next shutdown stroke it"
+    )
+
+
+def _together(now: Belief, row: Row) -> str:
+    """What the nights say of the cycle, and of the valve beside it."""
+    t = now.told
+    cycle = (
+        f"cycles every {duration(row['period_s'])}"
+        if counts(row["oscillating_pct"])
+        else "does not oscillate"
+    )
+    nights = f"{now.cycle.nights} nights since {now.cycle.since}"
+    if t.source is not None:
+        return f"{cycle}: follows {t.source} in most of {nights}; fix that loop first"
+    if t.cause is Cause.VALVE:
+        return f"{cycle}: the valve makes it, by {nights}" if counts(row["oscillating_pct"]) else cycle
+    if t.cause is Cause.TUNING:
+        return f"{cycle}: too tight for its process, by {nights}"
+    if t.cause is Cause.LOAD:
+        beside = "; the valve is worn all the same" if t.fault in IS else ""
+        return f"{cycle}: driven from outside, by {nights}{beside}"
+    if t.cause is Cause.UNDECIDED:
+        return f"{cycle}; cause undecided: {nights} do not agree"
+    return cycle
+
+
+def news(before: Belief | None, now: Belief, row: Row) -> tuple[str, str]:
+    """What is new of a loop since the night before, and its colour; '' where nothing is."""
+    if before is None:
+        return "", ""
+    return _swing_news(before, now, row) or _valve_news(before, now) or _cause_news(before, now) or ("", "")
+
+
+def _swing_news(before: Belief, now: Belief, row: Row) -> tuple[str, str] | None:
+    """That a loop began or ceased to oscillate, or does so more or less than it used to."""
+    changed = now.cycle.since != before.cycle.since and now.cycle.nights == 1
+    after = f" since {row['settings_changed'] or 'its settings were changed'}" if changed else ""
+    if now.cycle.loud and not before.cycle.loud:
+        return f"began to oscillate{after}", "worse"
+    if before.cycle.loud and not now.cycle.loud:
+        cycles = counts(row["oscillating_pct"])
+        share = 100.0 * (row["oscillation_significance"] or 0.0) / max(now.cycle.top, 1e-9)
+        return (
+            f"oscillates {share:.0f} % as much as before" if cycles else "stopped oscillating"
+        ) + after, "better"
+    if now.cycle.shift > 0.0:
+        tone = "worse" if now.cycle.shift > 1.0 else "better"
+        return f"oscillates {100 * now.cycle.shift:.0f} % as much as it used to", tone
+    return None
+
+
+def _valve_news(before: Belief, now: Belief) -> tuple[str, str] | None:
+    """That a valve is known to be worn, or to be sound again."""
+    if now.valve.certain and not before.valve.certain:
+        return f"{width_text(now)}: certain by {now.valve.nights} nights", "worse"
+    if before.valve.certain and not now.valve.certain:
+        return "no fault of the valve is seen any more", "better"
+    return None
+
+
+def _cause_news(before: Belief, now: Belief) -> tuple[str, str] | None:
+    """That the cause of a cycle is told as another one, or other settings are advised."""
+    then, cause = before.told.cause, now.told.cause
+    if then in CAUSES and cause in CAUSES and then is not cause:
+        return f"the cause is now told as {cause} (was {then})", "unclear"
+    pairs = before.told.pair, now.told.pair
+    if None not in pairs and pairs[0] != pairs[1] and now.cycle.since == before.cycle.since:
+        return "other settings are advised", "unclear"
+    return None

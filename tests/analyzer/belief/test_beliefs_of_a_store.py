@@ -1,0 +1,183 @@
+"""Beliefs follow from the nights of a store, whatever the order of runs."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from analyzer.belief.nights import settle, settle_anew, unfounded
+from analyzer.columns import NIGHTS, row_of
+from analyzer.config import Config
+from analyzer.pages.rank import ranked
+from analyzer.store import notes
+from analyzer.store.care import pruned
+from analyzer.store.notes import Note
+from analyzer.store.store import Store
+from analyzer.store.table import rows_table
+from tests.analyzer.belief.nights_of_a_loop import CALM, WORN, row, witness
+
+CONFIG = Config()
+
+
+def keep(store: Store, night: dict[str, Any], *others: dict[str, Any]) -> None:
+    """Keep a night of the loop L, and of others, and settle what is believed since."""
+    rows = [row_of({k: v for k, v in r.items() if k != "extra"}, NIGHTS) for r in (night, *others)]
+    store.write("nights", night["night"], rows_table(rows, NIGHTS))
+    settle(store, night["night"], CONFIG)
+
+
+def believed(store: Store) -> dict[str, list[dict[str, Any]]]:
+    """All beliefs of a store."""
+    return {n: store.own_rows("beliefs", n, store.columns("beliefs", n)) for n in store.nights()}
+
+
+def ten_nights() -> list[dict[str, Any]]:
+    """Ten nights of a loop whose small play no night tells by itself, with a retune in their midst."""
+    return [row(k, CALM, witness=witness(0.8, 6.0), ti=100.0 if k < 6 else 400.0) for k in range(10)]
+
+
+def store_of(path: Path, rows: Sequence[dict[str, Any]]) -> Store:
+    """A store that was run night by night in some order."""
+    store = Store(path)
+    for r in rows:
+        keep(store, r)
+    return store
+
+
+def test_the_order_of_runs_does_not_matter(tmp_path: Path) -> None:
+    """Nights in order, backwards, one of them late, and one of them twice give the same beliefs."""
+    rows = ten_nights()
+    first = believed(store_of(tmp_path / "a", rows))
+    assert believed(store_of(tmp_path / "b", rows[::-1])) == first
+    assert believed(store_of(tmp_path / "c", [*rows[:4], *rows[5:], rows[4]])) == first
+    assert believed(store_of(tmp_path / "d", [*rows, rows[4], rows[9]])) == first
+
+
+def test_one_command_makes_them_anew_and_check_sees_where_they_differ(tmp_path: Path) -> None:
+    """Beliefs that are gone, or say another thing than the nights, are named and made anew."""
+    store = store_of(tmp_path / "s", ten_nights())
+    first = believed(store)
+    assert unfounded(store, CONFIG) == []
+    store.file("beliefs", "2026-03-05").unlink()
+    other = store.read("beliefs", "2026-03-08").slice(0, 0)
+    store.write("beliefs", "2026-03-08", other)
+    assert [p.seen.rsplit("/", 1)[1] for p in unfounded(store, CONFIG)] == [
+        "2026-03-05.parquet: not what the nights say",
+        "2026-03-08.parquet: not what the nights say",
+    ]
+    settle_anew(store, CONFIG)
+    assert believed(store) == first
+
+
+def test_a_store_of_an_earlier_version_is_taken_in(tmp_path: Path) -> None:
+    """Nights without beliefs and without witnesses are enough for the next run to know the valve."""
+    store = Store(tmp_path / "s")
+    for k in range(4):
+        old = row(k, WORN, backlash_pct=2.0, evidence=40.0)
+        store.write("nights", old["night"], rows_table([row_of(old, NIGHTS)], NIGHTS))
+    keep(store, row(4, CALM, witness=witness(2.0, 0.0, 0.0)))
+    (told,) = store.rows("nights", "2026-03-06", ("cause", "action", "due", "worn_pct", "certain_since"))
+    assert (told["cause"], told["action"], told["due"]) == ("valve", "repair valve", "next shutdown")
+    assert told["certain_since"] == "2026-03-02"
+
+
+def test_what_is_told_rests_on_the_nights_and_figures_on_their_own(tmp_path: Path) -> None:
+    """The list tells the fault that the nights found together; the night's own row still says what it saw."""
+    store = store_of(tmp_path / "s", ten_nights())
+    (listed,), _ = ranked(store)
+    assert (listed["cause"], listed["valve_fault"], listed["backlash_pct"]) == (
+        "valve",
+        "backlash",
+        pytest.approx(0.8, rel=0.05),
+    )
+    assert "10 nights say the valve plays by 0.8 % of OP" in listed["reason"]
+    (own,) = store.own_rows("nights", "2026-03-11", ("cause", "valve_fault", "oscillating_pct"))
+    assert (own["cause"], own["valve_fault"], own["oscillating_pct"]) == (
+        "none",
+        "none",
+        listed["oscillating_pct"],
+    )
+
+
+def test_a_loop_that_is_not_seen_for_some_nights_is_remembered(tmp_path: Path) -> None:
+    """Nights in manual, and nights of another part of the plant, neither add nor end anything."""
+    rows, other = ten_nights(), {**row(0, CALM), "loop": "M"}
+    store = Store(tmp_path / "s")
+    for k, r in enumerate(rows):
+        if k == 7:
+            keep(
+                store,
+                {**r, "status": "not assessed", "cause": None, "witness": None, "oscillating_pct": None},
+            )
+        elif k == 8:
+            keep(store, {**other, "night": r["night"]})
+        else:
+            keep(store, r)
+    (told,) = store.rows("nights", "2026-03-11", ("cause", "worn_nights"), ["L"])
+    assert (told["cause"], told["worn_nights"]) == ("valve", 8.0)
+    (by_hand,) = store.rows("nights", "2026-03-09", ("cause", "status"), ["L"])
+    assert by_hand == {"cause": None, "status": "not assessed"}
+
+
+def test_a_repair_that_is_noted_late_counts_when_beliefs_are_made_anew(tmp_path: Path) -> None:
+    """A note on a repair ends the belief in the night that it falls into, which is of two valves, and nowhere
+    else."""
+    rows = ten_nights()
+    store = store_of(tmp_path / "s", rows)
+    notes.add(store.path, Note("L", rows[5]["start_s"] - 600.0, "valve replaced"))
+    settle_anew(store, CONFIG)
+    found = {n: store.rows("nights", n, ("worn_nights",))[0]["worn_nights"] for n in store.nights()}
+    assert [found[f"2026-03-0{day}"] for day in (5, 6, 7, 8)] == [4.0, 0.0, 1.0, 2.0]
+
+
+def test_nights_that_were_deleted_are_still_believed(tmp_path: Path) -> None:
+    """Pruned nights stay in what the oldest one left knew, and the check finds nothing wrong with that."""
+    store = store_of(tmp_path / "s", ten_nights())
+    last = believed(store)["2026-03-11"]
+    assert pruned(store, 4, None)
+    assert len(store.nights()) == 5
+    assert unfounded(store, CONFIG) == []
+    settle_anew(store, CONFIG)
+    assert believed(store)["2026-03-11"] == last
+
+
+def test_a_belief_that_fails_is_that_loops_alone(tmp_path: Path) -> None:
+    """One loop whose witness is nonsense is named, the others of the night are believed, and the night stands."""
+    store = Store(tmp_path / "s")
+    broken = {**row(0, CALM, witness=json.dumps({"profile": "x"})), "loop": "B"}
+    rows = [row_of(r, NIGHTS) for r in (row(0, CALM, witness=witness(0.8, 6.0)), broken)]
+    store.write("nights", "2026-03-02", rows_table(rows, NIGHTS))
+    lost = settle(store, "2026-03-02", CONFIG)
+    assert len(lost) == 1
+    assert lost[0].startswith("B: no belief of night 2026-03-02")
+    assert [r["loop"] for r in believed(store)["2026-03-02"]] == ["L"]
+
+
+def test_damaged_beliefs_of_the_night_before_are_made_anew(tmp_path: Path) -> None:
+    """A table of beliefs that cannot be read stops no night: all are made from the nights again."""
+    rows = ten_nights()
+    store = store_of(tmp_path / "s", rows[:9])
+    store.file("beliefs", rows[8]["night"]).write_bytes(b"PAR1 no table PAR1")
+    keep(store, rows[9])
+    assert believed(store) == believed(store_of(tmp_path / "t", rows))
+
+
+def test_beliefs_of_a_night_cost_little(tmp_path: Path) -> None:
+    """A night reads the beliefs of the night before and no older night, however many there are."""
+    rows = ten_nights()
+    store = store_of(tmp_path / "s", rows[:9])
+    asked: list[str] = []
+    own = Store.own_rows
+
+    def counted(self: Store, table: str, night: str, *more: Any) -> list[dict[str, Any]]:
+        asked.append(night)
+        return own(self, table, night, *more)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Store, "own_rows", counted)
+        keep(store, rows[9])
+    assert asked == ["2026-03-11"]

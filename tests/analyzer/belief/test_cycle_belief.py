@@ -1,0 +1,98 @@
+"""Cause and news rest on all nights under one pair of settings."""
+
+from __future__ import annotations
+
+import pytest
+
+from analyzer.words.belief import news, says_repaired, told
+from tests.analyzer.belief.nights_of_a_loop import CALM, LOAD, WORN, followed, row, witness
+
+TUNING = {
+    **{"cause": "tuning", "valve_fault": "none", "action": "retune", "kp_new": 0.5, "ti_new": 200.0},
+    **{"osc_valve_pct": 5.0, "osc_tuning_pct": 90.0, "osc_load_pct": 5.0},
+}
+FOLLOWS = {**LOAD, "action": "see source loop", "source_loop": "S"}
+
+
+def headlines(rows: list[dict[str, object]]) -> list[str]:
+    """News of each night but the first, '' where there are none."""
+    found = followed(rows)
+    return [news(found[k - 1], found[k], rows[k])[0] for k in range(1, len(rows))]
+
+
+def test_one_night_that_says_otherwise_changes_no_cause() -> None:
+    """A load told once among seven nights of a tight tuning is not told; from the first night's own word on the cause
+    stays."""
+    rows = [row(k, LOAD if k == 4 else TUNING) for k in range(8)]
+    assert {b.told.cause for b in followed(rows)} == {"tuning"}
+    assert headlines(rows) == [""] * 7
+
+
+def test_a_follower_stays_one_on_a_night_that_does_not_show_it() -> None:
+    """A loop that follows in most nights is told so on a night that blames its own valve."""
+    rows = [row(k, FOLLOWS) for k in range(5)] + [row(5, WORN, witness=witness(1.0, 20.0))]
+    last = followed(rows)[-1].told
+    assert (last.cause, last.fault, last.source, last.action) == ("load", "none", "S", "see source loop")
+    assert "follows S in most of 6 nights" in told(followed(rows)[-1], rows[-1])["reason"]
+
+
+def test_undecided_nights_that_lean_one_way_decide_together() -> None:
+    """Nights of 48 % against 30 % name a cause together; where each lacks something they lean on nothing."""
+    leaning = {"cause": "undecided", "valve_fault": "none", "action": "undecided"}
+    shares = {"osc_valve_pct": 22.0, "osc_tuning_pct": 48.0, "osc_load_pct": 30.0}
+    assert followed([row(k, leaning, shares) for k in range(6)])[-1].told.cause == "tuning"
+    lacking = [row(k, leaning, shares, lack="faster samples") for k in range(6)]
+    assert followed(lacking)[-1].told.cause == "undecided"
+
+
+@pytest.mark.parametrize(
+    ("nights", "expected"),
+    [
+        ([20, 21, 0, 0, 0], ["", "stopped oscillating", "", ""]),
+        ([20, 21, 2, 0, 3, 0, 2], ["", "oscillates 10 % as much as before", "", "", "", ""]),
+        ([20, 20, 0, 20], ["", "stopped oscillating", "began to oscillate"]),
+        ([20, 8, 20, 8, 20], ["", "", "", ""]),
+        ([20, 20, 8, 8, 8], ["", "", "oscillates 40 % as much as it used to", ""]),
+        ([20, 20, 60, 60, 60], ["", "", "oscillates 300 % as much as it used to", ""]),
+    ],
+)
+def test_news_of_the_swing_have_a_memory(nights: list[float], expected: list[str]) -> None:
+    """What is small beside what there was neither begins nor ends again, and another size takes two nights."""
+    rows = [
+        row(k, LOAD if s else CALM, oscillation_significance=float(s), oscillating_pct=95.0 if s else 0.0)
+        for k, s in enumerate(nights)
+    ]
+    assert headlines(rows) == expected
+
+
+def test_a_loop_that_cycles_for_a_part_of_the_night_has_not_stopped() -> None:
+    """From 95 % to 40 % of the time is no end of an oscillation, to 10 % it is."""
+    part = [row(0, LOAD), row(1, CALM, oscillating_pct=40.0, oscillation_significance=12.0), row(2, LOAD)]
+    assert headlines(part) == ["", ""]
+    few = [row(0, LOAD), row(1, CALM, oscillating_pct=10.0, oscillation_significance=12.0)]
+    assert headlines(few) == ["stopped oscillating"]
+
+
+def test_a_valve_that_becomes_certain_is_news_once() -> None:
+    """The night from which a valve is believed worn says so, with its width; no night after it does."""
+    rows = [row(k, CALM, witness=witness(0.8, 6.0)) for k in range(6)]
+    told_news = headlines(rows)
+    assert sum("the valve plays by" in text for text in told_news) == 1
+    assert [text for text in told_news if text and "certain by" not in text] == []
+
+
+@pytest.mark.parametrize(
+    ("text", "is_done"),
+    [
+        ("Valve repaired, packing renewed", True),
+        ("replaced positioner on 4 March", True),
+        ("new actuator", True),
+        ("to be repaired at the next shutdown", False),
+        ("repair ordered", False),
+        ("must be replaced", False),
+        ("stroked, packing tight", False),
+    ],
+)
+def test_notes_that_say_a_repair_is_done(text: str, is_done: bool) -> None:
+    """A repair counts where it is done, not where it is wanted."""
+    assert says_repaired(text) is is_done

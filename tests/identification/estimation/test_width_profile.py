@@ -1,0 +1,51 @@
+"""The profile of widths peaks at the true play, and speaks for none where there is none."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from analyzer.loop.measure import Measured, measure
+from analyzer.loop.oscillation import counting, detect
+from identification.estimation.width_profile import WIDTHS, width_profile
+from proofs.plant import CONFIG, Sketch, prepared, simulate
+
+LEVEL = Sketch("backlash", (40.0, 1500.0, 8.0), 0.8, 100.0, backlash=0.62)
+QUIET = Sketch("none", (1.2, 60.0, 8.0), 0.8, 60.0)
+MOVED = Sketch("load", (1.4, 90.0, 10.0), 0.8, 120.0, sine=2.0, sine_s=840.0)
+
+
+def measured(sketch: Sketch, seed: int, hours: float = 6.0) -> Measured:
+    """What a night measures of a simulated loop."""
+    record = prepared(simulate(sketch, hours, seed)).record
+    found = detect(record, CONFIG.oscillation)
+    return measure(record, counting(found), sketch.controller, CONFIG.cause, found.spectrum)
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_it_peaks_at_the_play_that_is_there(seed: int) -> None:
+    """A level with a play of .62 % has its peak there, as high as the search's own evidence, and falls off above."""
+    m = measured(LEVEL, seed)
+    found = width_profile(m.linear, m.play)
+    assert WIDTHS[int(found.argmax())] == pytest.approx(0.62, rel=0.05)
+    assert found.max() == pytest.approx(m.play.log_likelihood - m.linear.log_likelihood, rel=0.25)
+    assert found[WIDTHS > 1.1].max() < 0.0
+
+
+@pytest.mark.parametrize(("sketch", "seed"), [(QUIET, 1), (QUIET, 3), (MOVED, 1), (MOVED, 2)])
+def test_it_speaks_for_no_play_of_a_sound_valve(sketch: Sketch, seed: int) -> None:
+    """Noise, drift and a sinusoidal load bring less than 3 nat for any width."""
+    m = measured(sketch, seed)
+    found = width_profile(m.linear, m.play)
+    assert found.max() < 3.0
+
+
+def test_widths_that_cannot_show_are_not_told_apart_from_none() -> None:
+    """Plays far narrower than OP's moves leave PV as it is; those of half its range and more would show, and none
+    wider than it differs from the next."""
+    m = measured(MOVED, 1)
+    found = width_profile(m.linear, m.play)
+    assert found[0] == 0.0
+    assert found[0.5 * np.ptp(m.window.op) < WIDTHS].max() < -100.0
+    beyond = found[np.ptp(m.window.op) * 1.25 < WIDTHS]
+    assert np.ptp(beyond) == 0.0
