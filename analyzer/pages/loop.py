@@ -35,6 +35,8 @@ from reports.pages import Block, Cell, Facts, Line, Listing, Page, Plot, Section
 from reports.texts import slug
 
 WEEK = 7
+MOST_SURE = 99.0
+"""Percent that are told at most: nothing is certain."""
 FIGURES = (
     *("oscillation_significance", "oscillating_pct", "average_absolute_error_pct", "variability_pct"),
     *("valve_travel_pct_per_h", "reversals_per_h", "crossings_per_h", "noise_band_pct", "harris_index"),
@@ -112,6 +114,8 @@ def _first(row: Row, thin: Thinned | None) -> Section:
 def _verdict(row: Row) -> Section:
     """What was found, and what the advice rests on, where the night holds it."""
     blocks: list[Block] = [_facts(row)]
+    if row["believed_nights"]:
+        blocks.append(Facts(_believed(row)))
     if row["advice"]:
         blocks.append(Text((row["advice"],)))
     return Section("What and why", tuple(blocks))
@@ -169,12 +173,11 @@ def _night(row: Row) -> tuple[Cell, ...]:
 
 
 def nights_section(rows: Sequence[Row]) -> Section:
-    """What a loop's nights say together, a table of them, the last first, and pictures of how its oscillation and the
-    width of its valve's fault grew or fell."""
+    """A table of a loop's nights, the last first, and pictures of how its oscillation and the width of its valve's
+    fault grew or fell."""
     pictures = (_over_nights(rows, "oscillation_significance", "significance"), _widths(rows))
     table = Table("history", "", page_columns("history"), tuple(map(_night, reversed(rows))))
-    facts = (Facts(_believed(rows[-1])),) if rows[-1]["believed_nights"] else ()
-    return Section("Over the nights", (*facts, *(p for p in pictures if p is not None), table))
+    return Section("Over the nights", (*(p for p in pictures if p is not None), table))
 
 
 def _believed(row: Row) -> tuple[tuple[str, str], ...]:
@@ -187,7 +190,8 @@ def _believed(row: Row) -> tuple[tuple[str, str], ...]:
     ]
     if row["worn_nights"]:
         certain = f", certain since {row['certain_since']}" if row["certain_since"] else ""
-        out.append(("The valve is worn", f"with {row['worn_pct']:.0f} %{certain}"))
+        sure = "> 99" if row["worn_pct"] > MOST_SURE else f"{row['worn_pct']:.0f}"
+        out.append(("Worn valve", f"{sure} %{certain}"))
     if row["certain_since"] and row["width_pct"] is not None:
         ends = f"{number(row['width_low_pct'])} … {number(row['width_high_pct'])}"
         out.append(("Play or stickband", f"{number(row['width_pct'])} % of OP ({ends})"))
@@ -211,11 +215,13 @@ def _widths(rows: Sequence[Row]) -> Plot | None:
     """Width of the valve's fault as each night tells it, and as they do together; None where fewer than three do."""
     own = [(i - len(rows) + 1.0, _own_width(r)) for i, r in enumerate(rows)]
     pooled = [(i - len(rows) + 1.0, r["width_pct"]) for i, r in enumerate(rows) if r["certain_since"]]
-    parts = (("each night", own), ("nights together", pooled))
-    points = [(name, np.array([p for p in part if p[1] is not None], float)) for name, part in parts]
-    if not rows[-1]["certain_since"] or any(len(x) < 3 for _, x in points):
+    each, together = (np.array([p for p in part if p[1] is not None], float) for part in (own, pooled))
+    if not rows[-1]["certain_since"] or min(len(each), len(together)) < 3:
         return None
-    lines = tuple(Line(name, x[:, 0], x[:, 1]) for name, x in points)
+    lines = (
+        Line("each night", each[:, 0], each[:, 1], joined=False),
+        Line("nights together", together[:, 0], together[:, 1], kind="op"),
+    )
     title = "Width of the valve's fault over the nights"
     return Plot("widths", title, "nights before this one", "% of OP", lines, reach=(0.0, 1.0))
 

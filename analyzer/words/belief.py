@@ -95,8 +95,19 @@ def _advice(now: Belief, row: Row) -> str | None:
     if now.told.calmed:
         return CALMED
     if now.told.action is Action.RETUNE and now.told.pair is not None:
-        return now.told.pair.advice
+        return " ".join(filter(None, (now.told.pair.advice, _spread(now, row))))
     return row["advice"] if row["action"] == now.told.action else ""
+
+
+def _spread(now: Belief, row: Row) -> str:
+    """What else nights have advised; '' where one night alone has."""
+    pairs = now.remedy.pairs
+    if len(pairs) < 2:
+        return ""
+    ends = ((min(x), max(x)) for x in (tuple(p.kp for p in pairs), tuple(p.ti for p in pairs)))
+    kp, ti = (f"{low:.3g} to {high:.3g}" for low, high in ends)
+    told = f"that of {now.told.pair.night} is held" if now.told.pair is not None else ""
+    return f"{len(pairs)} nights advise Kp {kp} and Ti {ti} {row['ti_unit'] or 's'}; {told}."
 
 
 def _of_valve(now: Belief, row: Row) -> dict[str, Any]:
