@@ -31,6 +31,8 @@ CONSTANTS = ("slope", "time_constant_s", "gain", "dead_time_s", "width", "slip_j
 """Constants that nights pool."""
 OF_VALVE = ("width", "slip_jump")
 """Those of them that a repair changes."""
+FIRST = (Action.CHECK_MEASUREMENT, Action.CHECK_SETTINGS)
+"""What is told in the night that finds it: no settings of other nights hold where these are not known."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,7 +116,8 @@ def step(before: Belief | None, row: Row, repaired_s: Sequence[float], limits: B
     now = _after_changes(now, row, repaired_s)
     found = cycle.with_night(now.cycle, share, row, limits)
     now = _with_witness(replace(now, cycle=found), share, row, repaired_s, limits)
-    done = remedy.with_night(now.remedy, share, row, limits)
+    ended = before is not None and before.cycle.loud and not found.loud
+    done = remedy.with_night(RemedyBelief() if ended else now.remedy, share, row, limits)
     seen = Calm(
         row["night"],
         float(row["oscillation_significance"] or 0.0),
@@ -127,15 +130,20 @@ def step(before: Belief | None, row: Row, repaired_s: Sequence[float], limits: B
 
 
 def _after_changes(now: Belief, row: Row, repaired_s: Sequence[float]) -> Belief:
-    """The belief with what a change of settings, or a repair, since the night before has ended begun anew."""
-    settings = row["kp"], row["ti"]
+    """The belief with what a change of settings, stated or seen in OP, or a repair since the night before has ended
+    begun anew."""
+    settings, fresh = (row["kp"], row["ti"]), CycleBelief(top=now.cycle.top, loud=now.cycle.loud)
+    listed = now.remedy.action is Action.CHECK_SETTINGS
     if now.night and None not in (now.kp, *settings) and (now.kp, now.ti) != settings:
-        fresh = CycleBelief(top=now.cycle.top, loud=now.cycle.loud)
+        if listed:  # a list that is put right changes no loop
+            now = replace(now, remedy=RemedyBelief())
+        else:
+            now = replace(now, cycle=fresh, remedy=RemedyBelief(), before=now.last)
+    elif now.night and not listed and row["action"] == Action.CHECK_SETTINGS:
         now = replace(now, cycle=fresh, remedy=RemedyBelief(), before=now.last)
     end_s = (row["start_s"] or 0.0) + (row["duration_s"] or 0.0)
     if any(now.end_s < at <= end_s for at in repaired_s) and now.night:
         kept = {k: v for k, v in now.constants.items() if k not in OF_VALVE}
-        fresh = CycleBelief(top=now.cycle.top, loud=now.cycle.loud)
         now = replace(now, valve=ValveBelief(), constants=kept, widths=(), cycle=fresh, remedy=RemedyBelief())
     return now
 
@@ -232,7 +240,7 @@ def _of_calm(now: Belief, own: Told, limits: BeliefLimits) -> Told:
     if now.valve.is_worn(limits):
         fault = now.valve.fault(now.told.fault)
         confidence = {**own.confidence, Cause.VALVE: now.valve.worn_pct(limits)}
-        if own.action in (Action.CHECK_MEASUREMENT, Action.CHECK_SETTINGS):
+        if own.action in FIRST:
             return Told(Cause.VALVE, confidence, fault, None, own.action)
         return Told(Cause.VALVE, confidence, fault, None, Action.REPAIR_VALVE, Due.SHUTDOWN)
     if own.cause is not Cause.VALVE:
@@ -261,7 +269,7 @@ def _of_cycle(now: Belief, own: Told, limits: BeliefLimits) -> Told:
 
 def _with_remedy(now: Belief, own: Told, told: Told, limits: BeliefLimits) -> Told:
     """What to do about a cycle of a cause."""
-    if own.action is Action.CHECK_MEASUREMENT or own.due is Due.SHUTDOWN:
+    if own.action in FIRST or own.due is Due.SHUTDOWN:
         return replace(told, action=own.action, due=own.due)
     worn = told.fault in (Fault.BACKLASH, Fault.STICTION)
     if told.cause not in (Cause.VALVE, Cause.TUNING):

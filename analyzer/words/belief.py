@@ -224,6 +224,7 @@ def _cause_news(before: Belief, now: Belief) -> tuple[str, str] | None:
     if then in CAUSES and cause in CAUSES and then is not cause:
         return f"the cause is now told as {cause} (was {then})", "unclear"
     pairs = before.told.pair, now.told.pair
-    if None not in pairs and pairs[0] != pairs[1] and now.cycle.since == before.cycle.since:
+    settled = before.remedy.settled and now.cycle.since == before.cycle.since
+    if settled and None not in pairs and pairs[0] != pairs[1]:
         return "other settings are advised", "unclear"
     return None

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
-from analyzer.words.belief import told
+from analyzer.words.belief import news, told
 from tests.analyzer.belief.nights_of_a_loop import CALM, WORN, followed, row, witness
 
 
@@ -64,3 +66,42 @@ def test_a_calm_night_of_a_worn_valve_asks_for_no_settings() -> None:
     rows = [row(k, WORN, witness=witness(2.0, 60.0)) for k in range(3)]
     told = followed([*rows, row(3, CALM, witness=witness(2.0, 0.0, 0.0))])[-1].told
     assert (told.cause, told.action, told.due, told.pair) == ("valve", "repair valve", "next shutdown", None)
+
+
+CHECK: dict[str, Any] = {"action": "check settings", "kp_new": None, "ti_new": None}
+
+
+def test_no_pair_is_held_where_the_settings_in_force_are_others() -> None:
+    """The night that sees other settings in OP than loops.csv states ends what was advised before, and one that
+    cannot see them does not bring it back."""
+    rows = [row(k, WORN, witness=witness(2.0, 60.0)) for k in range(7)]
+    rows += [row(7, WORN, CHECK, witness=witness(2.0, 60.0)), row(8, WORN, witness=witness(2.0, 60.0))]
+    assert [b.told.action for b in followed(rows)] == ["retune"] * 7 + ["check settings"] * 2
+    assert all(b.told.pair is None for b in followed(rows)[7:])
+
+
+def test_a_list_that_is_put_right_is_no_change_of_the_loop() -> None:
+    """Once loops.csv states what was in force, nights count on and what the change had calmed stays calmed."""
+    loud = [row(k, WORN, witness=witness(2.0, 60.0), oscillation_significance=50.0) for k in range(4)]
+    small = {"oscillation_significance": 5.0, "witness": witness(2.0, 60.0)}
+    stale = [row(k, WORN, CHECK, **small) for k in (4, 5, 6)]
+    now = followed([*loud, *stale, row(7, WORN, ti=400.0, **small)])[-1]
+    assert now.cycle.nights == 4
+    assert (now.told.action, now.told.due) == ("repair valve", "next shutdown")
+
+
+def test_a_cycle_that_has_died_away_takes_its_pair_along() -> None:
+    """A pair was proven on the cycle that it was to end: where that is gone, a small one advises anew."""
+    loud = [row(k, WORN, witness=witness(2.0, 60.0), oscillation_significance=50.0) for k in range(4)]
+    small = row(4, WORN, ti_new=900.0, oscillation_significance=0.5, witness=witness(2.0, 60.0))
+    told = followed([*loud, small])[-1].told
+    assert told.pair is not None
+    assert told.pair.ti == 900.0
+
+
+def test_settings_that_settle_are_no_news() -> None:
+    """The pair amid those of three nights, told in place of the first one's, is not told as a change."""
+    rows = [row(k, WORN, ti_new=x, witness=witness(2.0, 60.0)) for k, x in enumerate((400.0, 500.0, 450.0))]
+    beliefs = followed(rows)
+    assert beliefs[1].told.pair != beliefs[2].told.pair
+    assert news(beliefs[1], beliefs[2], rows[2]) == ("", "")
