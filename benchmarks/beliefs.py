@@ -1,0 +1,96 @@
+"""What beliefs cost in a store of 90 nights: python -m benchmarks.beliefs [--loops 1000] [--nights 90]
+
+One day of the sample mill is run, and its rows are repeated as the rows of a plant's loops, night after night. Timed
+are the beliefs of the last night, which follow from those of the night before, over what a night of as many loops
+takes at the sample's time a loop, and all of them made anew. Writes beliefs.md here.
+"""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from datetime import date, timedelta
+from pathlib import Path
+
+import pyarrow as pa
+import pyarrow.compute as pc
+
+from analyzer.belief.nights import settle, settle_anew
+from analyzer.config import Config
+from analyzer.history.export import open_export
+from analyzer.loops.tags import match, read_loops
+from analyzer.night import batch
+from analyzer.store.store import Store
+from proofs.common import command, command_line, publish, table
+
+SAMPLE = Path(__file__).resolve().parents[1] / "sample_data"
+
+
+def sample_night(store: Store) -> tuple[pa.Table, float]:
+    """The rows of the sample's day, and what one of its loops took [s]; the first of two runs compiles."""
+    export = open_export([SAMPLE / "mill-day.csv"])
+    specs = match(read_loops(SAMPLE / "loops.csv"), export.tags)[0]
+    took = 0.0
+    for _ in range(2):
+        started = time.perf_counter()
+        batch.run(batch.Batch(export, specs, store, Config()), 1)
+        took = time.perf_counter() - started
+    return store.read("nights", store.nights()[-1]), took / len(specs)
+
+
+def plant(rows: pa.Table, loops: int, night: str) -> pa.Table:
+    """The sample's rows as those of a plant's loops in a night."""
+    copies = -(-loops // rows.num_rows)
+    out = pa.concat_tables([rows] * copies).slice(0, loops)
+    names = [f"L{k:05d}" for k in range(loops)]
+    for column, values in (("loop", names), ("night", [night] * loops)):
+        out = out.set_column(out.column_names.index(column), column, pa.array(values))
+    started = out.column_names.index("start_s")
+    later = 86400.0 * (date.fromisoformat(night) - date(2026, 3, 2)).days
+    return out.set_column(started, "start_s", pc.add(out.column(started), later))
+
+
+def main() -> None:
+    """Time them and write the page."""
+    given = command_line(__doc__, loops=1000, nights=90)
+    with tempfile.TemporaryDirectory() as folder:
+        rows, each = sample_night(Store(Path(folder) / "sample"))
+        store = Store(Path(folder) / "plant")
+        for k in range(given.nights):
+            night = (date(2026, 3, 2) + timedelta(days=k)).isoformat()
+            store.write("nights", night, plant(rows, given.loops, night))
+        started = time.perf_counter()
+        lost = settle_anew(store, Config())
+        anew = time.perf_counter() - started
+        assert not lost
+        started = time.perf_counter()
+        settle(store, night, Config())
+        last = time.perf_counter() - started
+    publish(
+        __file__,
+        "What beliefs cost",
+        command(__file__, loops=given.loops, nights=given.nights),
+        f"A store of {given.nights} nights of {given.loops:,} loops, on one core.",
+        table(
+            "what | time | a loop and night | share of the night",
+            [
+                ("the night itself", f"{each * given.loops:.0f} s", f"{1e3 * each:.0f} ms", ""),
+                (
+                    "beliefs of the last night",
+                    f"{last:.1f} s",
+                    f"{1e3 * last / given.loops:.2f} ms",
+                    f"{100 * last / (each * given.loops):.1f} %",
+                ),
+                (
+                    "all beliefs anew",
+                    f"{anew:.0f} s",
+                    f"{1e3 * anew / given.loops / given.nights:.2f} ms",
+                    "",
+                ),
+            ],
+        ),
+    )
+
+
+if __name__ == "__main__":
+    main()
