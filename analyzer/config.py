@@ -305,6 +305,7 @@ class WearLimits:
     nights: int = TOML
     growing_nights: int = TOML
     least_deviation: float = TOML
+    scale: float = TOML
     sure: float = TOML
     least_growth: float = TOML
     ahead_d: float = TOML

@@ -1,7 +1,8 @@
 """Does a valve wear: from which night on its width grows, how fast, and when it will have grown to a size.
 
 A width that stays and then grows (two straight lines, Bai 1997) is asked for first; what grows is then a state-space
-trend whose slope may drift (statsmodels' smooth trend: Harvey 1989, ch. 2), nights without a width left out.
+trend whose slope may drift (statsmodels' smooth trend: Harvey 1989, ch. 2), nights without a width left out. All
+widths of one valve may err alike, by what no number of nights shows: the ends know it.
 """
 
 from __future__ import annotations
@@ -96,11 +97,13 @@ def _forecast(days: Floats, width: Floats, limits: WearLimits) -> Wear | None:
         warnings.simplefilter("ignore")  # a variance of zero is a straight line, and no failure
         fit = UnobservedComponents(observed, level="strend").fit(disp=False, maxiter=200)
         ahead = fit.get_forecast(int(limits.ahead_d))
-        mean, error = np.asarray(ahead.predicted_mean), np.asarray(ahead.se_mean)
+        mean = np.asarray(ahead.predicted_mean)
+        error = np.hypot(np.asarray(ahead.se_mean), limits.scale * mean)
     slope = float(fit.filtered_state[1, -1])
-    deviation = math.sqrt(max(float(fit.filtered_state_cov[1, 1, -1]), 0.0))
-    if not math.isfinite(slope) or slope - NINETY * deviation <= 0.0:
+    drift = math.sqrt(max(float(fit.filtered_state_cov[1, 1, -1]), 0.0))
+    if not math.isfinite(slope) or slope - NINETY * drift <= 0.0:
         return None
+    deviation = math.hypot(drift, limits.scale * slope)
     now = float(fit.filtered_state[0, -1])
     size = limits.size if limits.size > now else 2.0 * now
     last = date.fromordinal(int(days[-1]))
