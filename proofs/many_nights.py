@@ -42,6 +42,7 @@ WARM_S = 3600
 KINDS, KIND_SHARES = ("flow", "pressure", "temperature", "level"), (0.3, 0.2, 0.25, 0.25)
 CAUSES, CAUSE_SHARES = ("backlash", "stiction", "tuning", "load", "healthy"), (0.3, 0.15, 0.12, 0.13, 0.3)
 RIGHT = {"backlash": Cause.VALVE, "stiction": Cause.VALVE, "tuning": Cause.TUNING, "load": Cause.LOAD}
+NAMED = (Cause.VALVE, Cause.TUNING, Cause.LOAD)
 WORN = (Fault.BACKLASH, Fault.STICTION)
 COLUMNS = ("loop", "cause", "valve_fault", "action", "ti_new", "status")
 SETTLED = 2
@@ -174,13 +175,14 @@ def nights_of(seed: int, jobs: int) -> tuple[list[Drawn], Store, tempfile.Tempor
 
 @dataclass
 class Counts:
-    """What is counted over plants: loops, pairs of nights, causes and actions that change, causes right on the
-    first and on the last night, nights in which sound valves are blamed and healthy loops advised, and largest
-    over smallest integral time of each loop."""
+    """What is counted over plants: loops, pairs of nights, causes that change, those that were named, actions, causes
+    right on the first and on the last night, nights in which sound valves are blamed and healthy loops advised, and
+    largest over smallest integral time of each loop."""
 
     loops: int = 0
     pairs: int = 0
     cause: int = 0
+    named: int = 0
     action: int = 0
     first: int = 0
     last: int = 0
@@ -195,6 +197,7 @@ class Counts:
         self.loops += 1
         self.pairs += len(rows) - 1
         self.cause += sum(a != b for a, b in pairwise(causes))
+        self.named += sum(a != b for a, b in pairwise(causes) if a in NAMED)
         self.action += sum(a != b for a, b in pairwise(actions))
         self.first += causes[0] == right
         self.last += causes[-1] == right
@@ -209,7 +212,7 @@ class Counts:
     def cells(self, name: str) -> tuple[str, ...]:
         """A row of the table."""
         ratios = np.array(self.ratios or (1.0,))
-        shares = (f"{100 * x / self.pairs:.1f}" for x in (self.cause, self.action))
+        shares = (f"{100 * x / self.pairs:.1f}" for x in (self.cause, self.named, self.action))
         counted = (self.first, self.last, self.blamed, self.advised)
         return (name, *shares, f"{np.median(ratios):.2f}", f"{ratios.max():.2f}", *map(str, counted))
 
@@ -254,16 +257,19 @@ def main() -> None:
             found.add(seed, plant, store)
         print(f"plant {seed} done", file=sys.stderr)
     about = (__doc__ or "").split("\n\n")[1].replace("\n", " ").split(" Writes many_nights.md")[0]
-    heads = "| cause changes % | action changes % | Ti ratio | worst | right first | right last | blamed | advised"
+    heads = (
+        "| cause changes % | of named ones % | action changes % | Ti ratio | worst | right first | right last "
+        "| blamed | advised"
+    )
     publish(
         __file__,
         "Beliefs over nine nights beside what each night says alone",
         command(__file__, seed=given.seed),
         about,
-        f"{found.told.loops} loops. Changes in percent of the pairs of nights; Ti, largest over smallest from "
-        "the third night on, in the median loop and the worst; loops whose cause is right on the first and the last "
-        "night; "
-        "nights in which a sound valve is blamed, and in which a healthy loop is advised.",
+        f"{found.told.loops} loops. Changes in percent of the pairs of nights, of any cause and of a named one "
+        "(valve, tuning or load); Ti, largest over smallest from the third night on, in the median loop and worst; "
+        "loops whose cause is right on the first and the last night; nights in which a sound valve is blamed, and in "
+        "which a healthy loop is advised.",
         table(heads, [found.told.cells("told"), found.alone.cells("each night alone")]),
         "Loops of which not every night says, alone and together, what is true:",
         table("plant | loop | truth | each night alone | told", found.loops),
