@@ -189,6 +189,9 @@ class PlantLimits:
     source_pct: float = TOML
     weak_share: float = TOML
     sure_pct: float = TOML
+    linked: float = TOML
+    in_ratio: float = TOML
+    cascade_period: float = TOML
 
 
 @dataclass(frozen=True, slots=True)

@@ -34,6 +34,7 @@ from analyzer.loops.changes import TuningChange, in_force, settings_from
 from analyzer.loops.spec import LoopSpec
 from analyzer.night.nights import Night, cut
 from analyzer.pages import compared as settings_page
+from analyzer.plantwide.structure import Moves, moves_of, moves_table
 from analyzer.plantwide.wave import waves_table
 from analyzer.store.rows import hour_rows, piece_row
 from analyzer.store.store import Store
@@ -99,10 +100,11 @@ def _assessed(
 
 @dataclass(slots=True)
 class Rows:
-    """What is kept of the loops of one night: findings, settings compared, and assessments."""
+    """What is kept of the loops of one night: findings, settings compared, moves of the signals, and assessments."""
 
     nights: list[Finding] = field(default_factory=list)
     compared: list[dict[str, Any]] = field(default_factory=list)
+    moves: list[Moves] = field(default_factory=list)
     found: list[Assessment] = field(default_factory=list)
 
 
@@ -142,6 +144,7 @@ def _loop_row(
         return
     kept.nights.append(told)
     kept.compared += drawn
+    kept.moves += filter(None, [moves_of(prepared.record)])
     kept.found.append(found)
 
 
@@ -227,6 +230,7 @@ def _write_pieces(task: Task, night: str, kept: Rows) -> None:
         "hours": rows_table([row for a in kept.found for row in hour_rows(a, night)], HOURS),
         "trends": _trend_table(kept.found),
         "waves": waves_table([wave for a in kept.found for wave in a.waves]),
+        "moves": moves_table(kept.moves),
         "compared": rows_table(kept.compared, SETTINGS),
         "nights": rows_table([piece_row(found) for found in kept.nights], NIGHTS),
     }

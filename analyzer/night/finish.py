@@ -16,7 +16,9 @@ from analyzer.columns import BY_NAME, GROUPS, NIGHTS, names
 from analyzer.config import Config, NightLimits
 from analyzer.loop.decisions import Status
 from analyzer.loop.finding import in_lanes
+from analyzer.plantwide.cascade import linked
 from analyzer.plantwide.night import traced_night
+from analyzer.plantwide.structure import links_of, moves_in
 from analyzer.plantwide.wave import waves_in
 from analyzer.store.rows import finding_of, night_row
 from analyzer.store.store import Store
@@ -77,7 +79,9 @@ def finish_night(
     first = 1 + max((int(r["group"]) for r in other), default=0)
     waves = waves_in(store.read_parts(night, "waves", keys))
     done = traced_night(fresh, waves, config.plant, first)
-    rows = {loop: night_row(in_lanes(found, config.lanes)) for loop, found in done.loops.items()}
+    links = links_of(moves_in(store.read_parts(night, "moves", keys)), config.plant)
+    loops = linked(done.loops, links, config.plant)
+    rows = {loop: night_row(in_lanes(found, config.lanes)) for loop, found in loops.items()}
     old = {} if replace else _known(store, night)
     kept = {loop for loop, row in rows.items() if loop in old and fuller(old[loop], row, config.nights)}
     beside = [loop for loop in old if loop not in rows]

@@ -59,7 +59,18 @@ CYCLES = (
 COLUMNS = (
     *("loop", "type", "area", "description", "pv_unit", "op_unit", "status", "reason", "action", "cause"),
     *("valve_fault", "pv_lo", "pv_hi", "close_first_s", "close_last_s", "lanes", "evidence", "valve_size"),
-    *("timezone", "lack", "turns", "source_loop", "group", "osc_valve_pct", "osc_tuning_pct", "osc_load_pct"),
+    *(
+        "timezone",
+        "lack",
+        "turns",
+        "source_loop",
+        "group",
+        "master",
+        "ratio_of",
+        "osc_valve_pct",
+        "osc_tuning_pct",
+        "osc_load_pct",
+    ),
     *("kp", "ti", "kp_new", "ti_new", "settings_from", "form", "gain_unit", "ti_unit", "signs", "notes"),
     *("advice", "start_s", "percent_of", *FIGURES, *MODEL),
     *("witness", "believed_nights", "believed_since", "worn_pct", "worn_nights", "certain_since"),
@@ -76,8 +87,9 @@ def _facts(row: Row) -> Facts:
     facts += [titled(f"osc_{c}_pct", f"{share:.0f}") for c, share in shares if share is not None]
     if row["valve_fault"] not in (None, "", Fault.NONE):
         facts.append(titled("valve_fault", row["valve_fault"]))
-    if row["source_loop"]:
-        facts.append(titled("source_loop", row["source_loop"]))
+    for built in ("source_loop", "master", "ratio_of"):
+        if row[built]:
+            facts.append(titled(built, row[built]))
     if row["period_s"] is not None:
         facts.append(("Period", duration(row["period_s"])))
         facts.append(titled("pv_amplitude_pct", number(row["pv_amplitude_pct"])))

@@ -35,8 +35,8 @@ class StoredTable:
     """A table of a night, kept in STORE/name/NIGHT.parquet.
 
     columns, those that its rows declare, none where they are declared here (trends) or beside what alone reads them
-    (waves); in_pieces, whether chunks write it while a night is worked on; kept, whether a finished night has it;
-    bulky, whether it may go before its night does.
+    (waves, moves); in_pieces, whether chunks write it while a night is worked on; kept, whether a finished night has
+    it; bulky, whether it may go before its night does.
     """
 
     name: str
@@ -51,6 +51,7 @@ OF_A_NIGHT = (
     StoredTable("hours", HOURS, bulky=True),
     StoredTable("trends", bulky=True),
     StoredTable("waves", kept=False),
+    StoredTable("moves", kept=False),
     StoredTable("groups", GROUPS, in_pieces=False),
     StoredTable("beliefs", BELIEFS, in_pieces=False),
     StoredTable("explained", EXPLAINED, in_pieces=False),

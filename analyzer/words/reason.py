@@ -127,6 +127,26 @@ def following_text(root: Root) -> str:
     return f"moves with {root.loop}{later(root)}, {start}"
 
 
+def below_text(below: Finding) -> str:
+    """The sign of a master whose slave has a fault, or answers as a faulty valve would."""
+    what = {Cause.VALVE: "valve is at fault", Cause.TUNING: "tuning is too tight"}.get(
+        below.cause or Cause.NONE
+    )
+    told = f"whose {what}" if what else "which answers as a faulty valve would"
+    return f"its output is the set point of {below.loop}, {told}"
+
+
+def below_first(below: Finding) -> str:
+    """Why a master gets no advice of its own."""
+    return f"{below_text(below)}: mend that first, then look again."
+
+
+def above_text(above: Finding, tie: str) -> str:
+    """The sign of a loop whose set point brings the cycle."""
+    brings = "the output" if tie == "master" else "in a ratio to the PV"
+    return f"its set point is {brings} of {above.loop}, which cycles"
+
+
 def joined(*clauses: str | None) -> str:
     """Clauses with a semicolon between, those that say nothing left out; a full stop at the end of one goes."""
     return "; ".join(filter(None, map(_open, clauses)))

@@ -1,0 +1,90 @@
+"""Loops that hang on each other, judged together: the slave first, for its master has it in place of a valve."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+
+from analyzer.config import PlantLimits
+from analyzer.loop.decisions import Action, Cause, Status
+from analyzer.loop.finding import Finding, Remedy, Root, Sign, following
+from analyzer.plantwide.structure import Link, Tie
+from analyzer.plantwide.verdict import follower_confidence
+from analyzer.words.reason import above_text, below_first, below_text
+
+OWN = (Cause.VALVE, Cause.TUNING)
+"""Causes that are a loop's own."""
+HARMONICS = (1, 2, 3)
+"""Parts of a master's period in which a slave's error may cycle: its SP is a wave of any shape."""
+ACTING = (Action.RETUNE, Action.REPAIR_VALVE)
+
+
+def linked(
+    loops: Mapping[str, Finding], links: Mapping[str, Link], limits: PlantLimits
+) -> dict[str, Finding]:
+    """The loops of a night, those that hang on each other told apart by what they are to each other.
+
+    What loops.csv states stands; where it states no master, what the trends show is told.
+    """
+    done = {k: _built(f, links.get(k)) for k, f in loops.items()}
+    for loop in loops:
+        own = done[loop]
+        above = own.text("master") or own.text("ratio_of")
+        if above in done and above != loop:
+            tie = Tie.MASTER if own.text("master") else Tie.RATIO
+            done[above], done[loop] = _judged(done[above], own, tie, links.get(loop), limits)
+    return done
+
+
+def _built(own: Finding, link: Link | None) -> Finding:
+    """A loop with what it hangs on."""
+    if link is None or own.text("master"):
+        return own
+    column = "master" if link.tie is Tie.MASTER else "ratio_of"
+    return replace(own, known={**own.known, column: link.loop, "link_agreement": link.agreement})
+
+
+def _judged(
+    above: Finding, below: Finding, tie: Tie, link: Link | None, limits: PlantLimits
+) -> tuple[Finding, Finding]:
+    """A loop and the one that hangs on it; as they were where either follows another one already."""
+    if {above.status, below.status} != {Status.OK} or above.follows is not None or below.follows is not None:
+        return above, below
+    level = 1.0 if link is None else min(link.agreement, 1.0)
+    faulty = below.cause in OWN
+    if (
+        tie is Tie.MASTER
+        and (faulty or above.cause is Cause.VALVE)
+        and (above.oscillates or above.cause in OWN)
+    ):
+        cause = Cause.TUNING if below.cause is Cause.TUNING else Cause.VALVE
+        root = Root(below.loop, level, None, max(f.confidence.get(cause, 0.0) for f in (above, below)))
+        if above.cause is Cause.VALVE or _alike(above, below, limits) or not below.oscillates:
+            sign = Sign(Cause.LOAD, limits.follower_sign, below_text(below))
+            return _follows(above, root, sign, limits), replace(below, moves=_with(below, above.loop))
+        if above.remedy.action in ACTING:
+            return replace(above, remedy=Remedy(Action.UNDECIDED, below_first(below))), below
+        return above, below
+    if not faulty and below.oscillates and above.oscillates and _alike(above, below, limits):
+        root = Root(above.loop, level, None, max(above.confidence.values(), default=0.0))
+        sign = Sign(Cause.LOAD, limits.follower_sign, above_text(above, tie))
+        return replace(above, moves=_with(above, below.loop)), _follows(below, root, sign, limits)
+    return above, below
+
+
+def _follows(own: Finding, root: Root, sign: Sign, limits: PlantLimits) -> Finding:
+    return following(own, root, own.swing, follower_confidence(own.confidence, root, limits), sign)
+
+
+def _with(own: Finding, loop: str) -> tuple[str, ...]:
+    return tuple(sorted({*own.moves, loop}))
+
+
+def _alike(above: Finding, below: Finding, limits: PlantLimits) -> bool:
+    """Whether both cycle with one period, the lower one in a whole part of the upper one's."""
+    periods = [f.swing.period_s if f.swing is not None else None for f in (above, below)]
+    if None in periods or not all(periods):
+        return False
+    ratio = math.log(periods[0] / periods[1])  # type: ignore[operator]
+    return min(abs(ratio - math.log(m)) for m in HARMONICS) <= limits.cascade_period

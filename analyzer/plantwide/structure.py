@@ -1,0 +1,147 @@
+"""Which loop hangs on which, as the trends show: a set point that is another loop's output, or goes with its PV.
+
+Of each loop the moves of SP, PV and OP from block to block are kept, each less than three usual ones, so that one
+step of an operator does not outweigh a night; a set point and the output that it is differ by their recording alone.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from enum import StrEnum
+
+import numpy as np
+import pyarrow as pa
+
+from analyzer.config import PlantLimits
+from analyzer.plantwide.wave import stretches
+from identification.record import Floats, LoopRecord
+
+BLOCK_S = 120.0
+"""Length of a block [s]; ours: longer than what recorders and scans delay, short beside a shift."""
+FEWEST = 30
+"""Blocks from which moves are compared; ours."""
+USUAL, MOST = 0.6, 3.0
+"""Quantile of moves that is a usual one, and the largest that counts, in usual ones; ours."""
+STEPS = 40
+"""Steps of a usual move that are kept; ours: a fortieth is far under what recorders add."""
+ROWS = 256
+"""Set points that are compared at a time."""
+Small = np.ndarray[tuple[int], np.dtype[np.int8]]
+
+
+class Tie(StrEnum):
+    """How a loop hangs on another: its set point is the other's output, or keeps a ratio to its PV."""
+
+    MASTER = "master"
+    RATIO = "ratio"
+
+
+@dataclass(frozen=True, slots=True)
+class Link:
+    """The loop that another one hangs on, how, and how well their moves agree [-]."""
+
+    loop: str
+    tie: Tie
+    agreement: float
+
+
+@dataclass(frozen=True, slots=True)
+class Moves:
+    """Moves of one loop's SP, PV and OP between blocks of the clock, the first of them number `first` since 1970, in
+    STEPS of a usual move, shape (n,) each; of no length where a signal stands most of the time."""
+
+    loop: str
+    first: int
+    sp: Small
+    pv: Small
+    op: Small
+
+
+def moves_of(record: LoopRecord) -> Moves | None:
+    """What is kept of a record; None where it is too short."""
+    at = np.floor((record.start_s + record.time_s) / BLOCK_S).astype(np.int64)
+    block = at - at[0]
+    count = int(block[-1]) + 1
+    if count < FEWEST:
+        return None
+    good = ~record.bad
+    kept = np.bincount(block, good.astype(np.float64), count).astype(np.float64)
+
+    def moves(x: Floats) -> Small:
+        return _in_steps(np.bincount(block, np.where(good, x, 0.0), count).astype(np.float64), kept)
+
+    sp = np.empty(0, np.int8) if record.sp_estimated else moves(record.sp)
+    return Moves(record.tag, int(at[0]), sp, moves(record.pv), moves(record.op))
+
+
+def _in_steps(total: Floats, kept: Floats) -> Small:
+    """Moves between means of blocks, nothing where one of two has none."""
+    there = kept > 0
+    move = np.diff(total / np.maximum(kept, 1.0))
+    move[~(there[1:] & there[:-1])] = 0.0
+    usual = float(np.quantile(np.abs(move), USUAL))
+    if not usual > 1e-9 * max(float(np.abs(total).max()), 1.0):
+        return np.empty(0, np.int8)
+    return np.round(STEPS * np.clip(move / usual, -MOST, MOST)).astype(np.int8)
+
+
+def links_of(moves: Sequence[Moves], limits: PlantLimits) -> dict[str, Link]:
+    """The loop that each one hangs on, where one stands out.
+
+    An output is asked for first: the PV of a master's process, or of another slave, moves with the set point as well.
+    """
+    found = _best(moves, "op", Tie.MASTER, limits.linked)
+    return _best(moves, "pv", Tie.RATIO, limits.in_ratio) | found
+
+
+def _best(moves: Sequence[Moves], role: str, tie: Tie, least: float) -> dict[str, Link]:
+    """The loop whose signal each set point agrees with best, by at least so much [-]."""
+    asked = [m for m in moves if m.sp.size]
+    given = [m for m in moves if getattr(m, role).size]
+    if not asked or not given:
+        return {}
+    begin = min(m.first for m in moves)
+    size = max(m.first - begin + max(m.sp.size, m.pv.size, m.op.size) for m in moves)
+    signals = _rows(given, role, begin, size)
+    names = np.array([m.loop for m in given])
+    out = {}
+    for k in range(0, len(asked), ROWS):
+        part = asked[k : k + ROWS]
+        level = np.abs(_rows(part, "sp", begin, size) @ signals.T)
+        level[np.array([m.loop for m in part])[:, None] == names[None]] = 0.0
+        for m, row in zip(part, level, strict=True):
+            best = int(np.argmax(row))
+            if row[best] >= least:
+                out[m.loop] = Link(str(names[best]), tie, float(row[best]))
+    return out
+
+
+def _rows(moves: Sequence[Moves], role: str, begin: int, size: int) -> np.ndarray:
+    """Moves on one clock, each of length one, shape (loops, size)."""
+    out = np.zeros((len(moves), size), np.float32)
+    for row, m in zip(out, moves, strict=True):
+        x = getattr(m, role)
+        row[m.first - begin : m.first - begin + x.size] = x
+        row /= max(math.sqrt(float(row @ row)), 1e-9)
+    return out
+
+
+SIGNALS = ("sp", "pv", "op")
+
+
+def moves_table(moves: Sequence[Moves]) -> pa.Table:
+    """A row a loop."""
+    return pa.table({f.name: [getattr(m, f.name) for m in moves] for f in fields(Moves)})
+
+
+def moves_in(table: pa.Table | None) -> list[Moves]:
+    """The moves of a table, none without one."""
+    if table is None or not table.num_rows:
+        return []
+    known = table.select(["loop", "first"]).to_pylist()
+    return [
+        Moves(**k, sp=s, pv=p, op=o)
+        for k, s, p, o in zip(known, *(stretches(table.column(x)) for x in SIGNALS), strict=True)
+    ]

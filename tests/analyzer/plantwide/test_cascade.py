@@ -1,0 +1,87 @@
+"""Loops that hang on each other: the slave first, and no master is blamed for a valve that it has not."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from analyzer.config import Config
+from analyzer.loop.decisions import CAUSES, Action, Cause, Fault, Status
+from analyzer.loop.finding import Finding, Remedy, Swing
+from analyzer.plantwide.cascade import linked
+from analyzer.plantwide.structure import Link, Tie
+from analyzer.words.reason import reason
+
+LIMITS = Config().plant
+HANGS = {"FIC1": Link("TIC1", Tie.MASTER, 0.98)}
+
+
+def found(
+    loop: str, cause: Cause, period_s: float | None, action: Action = Action.NONE, **known: Any
+) -> Finding:
+    """A loop with a cause, that cycles where it has a period."""
+    swing = Swing() if period_s is None else Swing(20.0, 90.0, period_s, 2.0)
+    pct = {c: 90.0 if c is cause else 5.0 for c in CAUSES}
+    fault = Fault.STICTION if cause is Cause.VALVE else Fault.NONE
+    remedy = Remedy(action, kp_new=1.0, ti_new=10.0) if action is Action.RETUNE else Remedy(action)
+    return Finding(
+        loop, "2026-03-02", Status.OK, swing=swing, cause=cause, fault=fault, confidence=pct, remedy=remedy,
+        known=known,
+    )  # fmt: skip
+
+
+def night(master: Finding, slave: Finding, links: dict[str, Link] = HANGS) -> tuple[Finding, Finding]:
+    """Both as the night tells them."""
+    done = linked({master.loop: master, slave.loop: slave}, links, LIMITS)
+    return done[master.loop], done[slave.loop]
+
+
+def test_a_master_that_a_stuck_slave_swings_follows_it() -> None:
+    """The slave's valve is told at the slave, and the master is sent there without settings of its own."""
+    slave = found("FIC1", Cause.VALVE, 400.0, Action.REPAIR_VALVE)
+    master, below = night(found("TIC1", Cause.TUNING, 360.0, Action.RETUNE), slave)
+    assert master.follows is not None
+    assert master.follows.loop == "FIC1"
+    assert (master.cause, master.action, master.remedy.kp_new) == (Cause.LOAD, Action.SEE_SOURCE_LOOP, None)
+    assert (below.cause, below.moves) == (Cause.VALVE, ("TIC1",))
+    assert "follows FIC1" in reason(master)
+
+
+def test_no_master_is_told_a_valve_fault() -> None:
+    """What looks like a valve in a master is its slave, also where the slave shows nothing."""
+    master, below = night(found("TIC1", Cause.VALVE, 360.0), found("FIC1", Cause.NONE, None))
+    assert (master.cause, master.fault, master.action) == (Cause.LOAD, Fault.NONE, Action.SEE_SOURCE_LOOP)
+    assert below.cause is Cause.NONE
+
+
+def test_a_slave_that_its_tight_master_swings_follows_it() -> None:
+    """A slave whose error cycles in a third of its master's period has the master's cycle; with another period it has
+    one of its own."""
+    tight = found("TIC1", Cause.TUNING, 240.0, Action.RETUNE)
+    master, below = night(tight, found("FIC1", Cause.UNDECIDED, 80.0, Action.UNDECIDED))
+    assert (below.cause, below.action) == (Cause.LOAD, Action.SEE_SOURCE_LOOP)
+    assert (master.cause, master.action, master.moves) == (Cause.TUNING, Action.RETUNE, ("FIC1",))
+    _, apart = night(tight, found("FIC1", Cause.UNDECIDED, 17.0, Action.UNDECIDED))
+    assert apart.follows is None
+
+
+def test_a_master_gets_no_settings_while_its_slave_has_a_fault() -> None:
+    """Cycles of other periods are each loop's own, yet the master waits for its slave."""
+    slave = found("FIC1", Cause.VALVE, 60.0, Action.REPAIR_VALVE)
+    master, _ = night(found("TIC1", Cause.TUNING, 1000.0, Action.RETUNE), slave)
+    assert (master.follows, master.cause, master.action) == (None, Cause.TUNING, Action.UNDECIDED)
+    assert "FIC1" in master.remedy.text
+
+
+def test_what_loops_csv_states_stands() -> None:
+    """A stated master is kept beside what the trends show, and what is shown is told where none is stated."""
+    master, stated = night(found("TIC1", Cause.NONE, None), found("FIC1", Cause.NONE, None, master="X"))
+    assert (stated.text("master"), stated.text("ratio_of")) == ("X", "")
+    _, shown = night(master, found("FIC1", Cause.NONE, None))
+    assert (shown.text("master"), shown.number("link_agreement")) == ("TIC1", 0.98)
+
+
+def test_a_loop_that_follows_a_third_one_is_left_as_it_is() -> None:
+    """What the plant-wide pass has traced elsewhere stays."""
+    loops = {"TIC1": found("TIC1", Cause.TUNING, 300.0), "FIC1": found("FIC1", Cause.NONE, 300.0)}
+    once = linked(loops, HANGS, LIMITS)
+    assert linked(once, HANGS, LIMITS) == once
