@@ -42,6 +42,15 @@ def asked(*arguments: object) -> Result:
     return CliRunner().invoke(main, [str(a) for a in arguments])
 
 
+def within_values(path: Path) -> int:
+    """A place amid the values of the largest column; the bounds in the heads of pages are read by nobody."""
+    group = pq.ParquetFile(path).metadata.row_group(0)
+    largest = max((group.column(k) for k in range(group.num_columns)), key=lambda c: c.total_compressed_size)
+    if not largest.has_dictionary_page:
+        return int(largest.data_page_offset + largest.total_compressed_size // 2)
+    return int(largest.dictionary_page_offset + largest.data_page_offset) // 2
+
+
 def damage(path: Path, how: str) -> None:
     """Break a file."""
     data = path.read_bytes()
@@ -49,11 +58,12 @@ def damage(path: Path, how: str) -> None:
         path.unlink()
         path.mkdir()
         return
+    at = within_values(path)
     broken = {
         "empty": b"",
         "cut": data[: len(data) // 2],
         "garbage": b"\x00garbage" * 100,
-        "middle": data[: len(data) // 3] + b"\xff" * 64 + data[len(data) // 3 + 64 :],
+        "middle": data[:at] + b"\xff" * 8 + data[at + 8 :],
     }
     path.write_bytes(broken[how])
 
