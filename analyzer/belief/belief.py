@@ -278,8 +278,7 @@ def _with_remedy(now: Belief, own: Told, told: Told, limits: BeliefLimits) -> To
         if told.cause is Cause.LOAD:
             followed = own.cause is not Cause.LOAD or own.action is Action.SEE_SOURCE_LOOP
             return replace(told, action=Action.NONE if followed else own.action)
-        kept = own.action if own.cause is Cause.UNDECIDED else Action.UNDECIDED
-        return replace(told, action=kept)
+        return replace(told, action=now.remedy.abstaining)
     action, held = now.remedy.action, now.remedy.held
     if action is Action.RETUNE and held is not None:
         return replace(told, action=action, pair=held)

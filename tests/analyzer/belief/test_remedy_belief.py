@@ -105,3 +105,11 @@ def test_settings_that_settle_are_no_news() -> None:
     beliefs = followed(rows)
     assert beliefs[1].told.pair != beliefs[2].told.pair
     assert news(beliefs[1], beliefs[2], rows[2]) == ("", "")
+
+
+def test_nights_that_abstain_do_not_change_their_word() -> None:
+    """Where nights lack something in turn with nights whose signs disagree, what most of them say is told."""
+    vague = {"cause": "undecided", "valve_fault": "undecided", "kp_new": None, "ti_new": None}
+    words = ["needs data", "needs data", "undecided", "needs data", "undecided", "needs data"]
+    rows = [row(k, WORN, vague, action=word) for k, word in enumerate(words)]
+    assert {b.told.action for b in followed(rows)} == {"needs data"}
