@@ -293,6 +293,7 @@ class BeliefLimits:
     another_size: float = TOML
     confirmed: int = TOML
     vote_lead: float = TOML
+    recorder: float = TOML
     advised_share: float = TOML
     pairs: int = TOML
     settle_nights: int = TOML

@@ -67,7 +67,8 @@ class Belief:
     """What is believed of a loop after a night.
 
     night, the last that counted; end_s, when its record ended; kp, ti, the settings in force; before, what the
-    loop did under those before."""
+    loop did under those before; straight_pct, how much of its PV was on straight segments [%], and recorder, the
+    first night that was recorded so, '' where all were."""
 
     loop: str
     night: str
@@ -82,6 +83,8 @@ class Belief:
     before: Calm | None = None
     last: Calm | None = None
     told: Told = field(default_factory=Told)
+    straight_pct: float | None = None
+    recorder: str = ""
 
     def is_calmed(self, limits: BeliefLimits) -> bool:
         """Whether the last change of settings took most of a cycle away."""
@@ -113,7 +116,7 @@ def step(before: Belief | None, row: Row, repaired_s: Sequence[float], limits: B
         return before
     now = before or Belief(row["loop"], "")
     share = valve.faded_over(now.night, row["night"], limits) if now.night else 1.0
-    now = _after_changes(now, row, repaired_s)
+    now = _recorded(_after_changes(now, row, repaired_s), row, limits)
     found = cycle.with_night(now.cycle, share, row, limits)
     now = _with_witness(replace(now, cycle=found), share, row, repaired_s, limits)
     ended = before is not None and before.cycle.loud and not found.loud
@@ -127,6 +130,18 @@ def step(before: Belief | None, row: Row, repaired_s: Sequence[float], limits: B
     end_s = (row["start_s"] or 0.0) + (row["duration_s"] or 0.0)
     now = replace(now, night=row["night"], end_s=end_s, remedy=done, last=seen)
     return replace(now, kp=row["kp"], ti=row["ti"], told=tell(now, row, limits))
+
+
+def _recorded(now: Belief, row: Row, limits: BeliefLimits) -> Belief:
+    """The belief with what only one recorder shows begun anew, where another one, or its compression, is at work:
+    sizes and constants; the valve is the same."""
+    then, straight = now.straight_pct, row["straight_pct"]
+    now = replace(now, straight_pct=straight)
+    if then is None or straight is None or abs(straight - then) <= limits.recorder:
+        return now
+    same = replace(now.cycle, usual=None, off=0)
+    valve_as_seen = valve.recorded_otherwise(now.valve)
+    return replace(now, cycle=same, valve=valve_as_seen, constants={}, widths=(), recorder=row["night"])
 
 
 def _after_changes(now: Belief, row: Row, repaired_s: Sequence[float]) -> Belief:

@@ -53,6 +53,7 @@ READ = (
     *(
         "lanes",
         "reason",
+        "straight_pct",
         "witness",
         "evidence",
         "settings_changed",

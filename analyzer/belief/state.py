@@ -59,6 +59,8 @@ def belief_of(text: str) -> Belief:
             told["own"],
             told["calmed"],
         ),
+        kept["straight_pct"],
+        kept["recorder"],
     )
 
 

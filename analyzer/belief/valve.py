@@ -84,6 +84,17 @@ class ValveBelief:
         return before if before in (Fault.BACKLASH, Fault.STICTION) else Fault.UNDECIDED
 
 
+def recorded_otherwise(before: ValveBelief) -> ValveBelief:
+    """The belief as another recorder may bear it out: it sees the same valve up to a quarter wider or narrower."""
+
+    def widened(x: tuple[float, ...]) -> tuple[float, ...]:
+        beside = np.pad(np.asarray(x), 1, mode="edge")
+        return tuple(np.max([beside[:-2], beside[1:-1], beside[2:]], axis=0).tolist()) if x else x
+
+    alone, summed, best = map(widened, (before.alone, before.summed, before.best))
+    return replace(before, recent=(), alone=alone, summed=summed, best=best)
+
+
 def faded_over(before: str, night: str, limits: BeliefLimits) -> float:
     """How much of what was known in one night counts in a later one [-]."""
     gap = (date.fromisoformat(night) - date.fromisoformat(before)).days

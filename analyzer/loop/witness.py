@@ -13,6 +13,7 @@ from analyzer.config import CauseLimits
 from analyzer.loop.cause import Verdict, fault_of, hidden_by_grid, needed
 from analyzer.loop.decisions import Cause, Fault
 from analyzer.loop.measure import Measured
+from analyzer.loop.quality import Prepared
 from identification.estimation.covariance import DECODED, LEAST_JUMP
 from identification.estimation.gauss_newton import covariance
 from identification.estimation.hammerstein import Fit
@@ -20,11 +21,13 @@ from identification.estimation.width_profile import WIDTHS, width_profile
 from identification.record import Floats
 from identification.signals.robust import robust_deviation
 
+COMPRESSED = 0.1
+"""Share of PV on straight segments from which slips are not told from what compression cuts [-]; ours, as lanes."""
 Known = tuple[float, float]
 """A constant and the standard deviation of its logarithm."""
 
 
-def witness(verdict: Verdict, oscillates: bool, pv_step: float, limits: CauseLimits) -> str | None:
+def witness(verdict: Verdict, oscillates: bool, prepared: Prepared, limits: CauseLimits) -> str | None:
     """What a record says, as the store keeps it (JSON): the profile of widths and the evidence that it takes to
     tell a fault [nat], the evidence for a slip jump and what it takes [nat], and constants with the deviation
     of their logarithms; None where nothing was fitted.
@@ -33,19 +36,20 @@ def witness(verdict: Verdict, oscillates: bool, pv_step: float, limits: CauseLim
     ----------
     verdict : Verdict
     oscillates : bool
-    pv_step : float
-        PV's grid [% of span], which may hold PV still as a valve would.
+    prepared : Prepared
+        PV's grid may hold PV still as a valve would, and compression cuts turns so that they look like slips.
     limits : CauseLimits
     """
     m = verdict.for_settings.measured
-    if m is None or hidden_by_grid(m, pv_step, oscillates, limits):
+    if m is None or hidden_by_grid(m, prepared.pv_step, oscillates, limits):
         return None
     convicted = oscillates and verdict.cause is Cause.VALVE
+    whole = prepared.compressed_share <= COMPRESSED
     said = {
         "profile": [round(float(x), 1) for x in _profile(m, 0.0 if convicted else limits.noise_widths)],
         "needed": round(needed(m, limits, oscillates), 1),
         "op_range": float(f"{m.play.valve.stickband / m.size:.4g}") if m.size > 0 else 0.0,
-        "jump": [round(x, 1) for x in _jump(m, limits)],
+        "jump": [round(x, 1) for x in (_jump(m, limits) if whole else (0.0, 0.0))],
         **{
             k: [float(f"{x:.4g}") for x in known]
             for k, known in _told(verdict, m, limits, oscillates).items()

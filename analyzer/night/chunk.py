@@ -129,13 +129,14 @@ def _loop_row(
     try:
         prepared = prepare(spec, part, config.quality)
         known |= {"pv_lo": prepared.scale.low, "pv_hi": prepared.scale.low + prepared.scale.span}
+        known["straight_pct"] = 100.0 * prepared.compressed_share
         known |= standing(prepared, controller_of(spec, prepared), spec.type, config).as_row()
         earlier = earlier_settings(stated, changes, prepared)
         found, advice = _assessed(spec, prepared, config, advising, earlier, held)
         known |= _typed_in(earlier, spec, found, night.zone)
         known["turns"] = turn_events(prepared, found) if advising else None
         known["witness"] = witness(
-            found.verdict, counting(found.oscillations) is not None, prepared.pv_step, config.cause
+            found.verdict, counting(found.oscillations) is not None, prepared, config.cause
         )
         told = concluded(found, advice, spec, night.name, config.advice, **known)
         drawn = _settings_row(spec, night.name, advice)

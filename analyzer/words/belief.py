@@ -186,7 +186,7 @@ def _together(now: Belief, row: Row) -> str:
 
 def news(before: Belief | None, now: Belief, row: Row) -> tuple[str, str]:
     """What is new of a loop since the night before, and its colour; '' where nothing is."""
-    if before is None:
+    if before is None or now.recorder == now.night:  # another recorder shows other sizes of the same
         return "", ""
     return _swing_news(before, now, row) or _valve_news(before, now) or _cause_news(before, now) or ("", "")
 

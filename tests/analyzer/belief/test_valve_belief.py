@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from analyzer.words.belief import news
 from identification.estimation.width_profile import WIDTHS
 from tests.analyzer.belief.nights_of_a_loop import (
     CALM,
@@ -109,3 +110,18 @@ def test_the_probability_is_bayes_rule_over_widths() -> None:
     prior = LIMITS.worn_before / WIDTHS.size
     worn = sum(prior * np.exp(x) for x in found.profile)
     assert found.worn_pct(LIMITS) == pytest.approx(100 * worn / (worn + 1 - LIMITS.worn_before))
+
+
+def test_another_recorder_leaves_the_valve_as_worn_as_it_was() -> None:
+    """Where the historian begins to compress, widths and sizes begin anew and the valve's belief does not; nothing of
+    it is news, though the cycle is not seen any more and the width seems to be another."""
+    whole = [row(k, WORN, witness=witness(2.0, 60.0), straight_pct=0.5) for k in range(6)]
+    cut = [row(6 + k, CALM, witness=witness(2.4, 60.0), straight_pct=35.0) for k in range(4)]
+    beliefs = followed([*whole, *cut])
+    assert {b.valve.since for b in beliefs} == {"2026-03-02"}
+    assert all(b.told.fault == "backlash" for b in beliefs[1:])
+    assert beliefs[5].constants["width"].pooled.value == pytest.approx(2.0, rel=0.02)  # type: ignore[union-attr]
+    assert beliefs[-1].constants["width"].pooled.value == pytest.approx(2.4, rel=0.02)  # type: ignore[union-attr]
+    assert [w for _, w, _ in beliefs[-1].widths] == [2.4] * 4
+    said = [news(a, b, r) for a, b, r in zip(beliefs[5:], beliefs[6:], cut, strict=False)]
+    assert said == [("", "")] * 4
