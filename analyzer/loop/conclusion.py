@@ -32,6 +32,7 @@ def stated(spec: LoopSpec) -> Known:
         "type": spec.type,
         "area": spec.area,
         "master": spec.master,
+        "ratio_of": spec.ratio_of,
         "description": spec.description,
         "pv_unit": spec.pv_unit,
         "op_unit": spec.op_unit,

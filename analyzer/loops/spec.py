@@ -22,7 +22,7 @@ from identification.models import Form
 STATED: dict[str, Any] = tomllib.loads(Path(__file__).with_name("loops.toml").read_text(encoding="utf-8"))
 """What tags end in, what other systems call the columns, and what is assumed where a row is silent."""
 ROLES = ("sp", "pv", "op", "mode", "position")
-TEXTS = ("loop", "description", "type", "area", "master", "pv_unit")
+TEXTS = ("loop", "description", "type", "area", "master", "ratio_of", "pv_unit")
 NUMBERS = ("pv_lo", "pv_hi", "op_lo", "op_hi", "kp", "ti", "td", "scan_s", "importance")
 MEANT: Mapping[str, tuple[float, float, bool]] = {
     **dict.fromkeys(("pv_lo", "pv_hi", "op_lo", "op_hi"), (1e-9, 1e12, True)),
@@ -53,13 +53,13 @@ OTHER_NAMES = {other: ours for ours, others in STATED["other_names"].items() for
 class LoopSpec:
     """One row of loops.csv, or one loop found by its tags.
 
-    Tags are None where the row is silent, and after `tags.match` where the export lacks them; `wanted_pv` is
-    then the tag that was looked for. `master` is the loop whose output is this loop's set
-    point. `kp`, `ti`, `td` are as stated, in `gain_unit`, `ti_unit` and `form`;
-    `pv_lo` and `pv_hi` in the PV's own unit, `op_lo` and `op_hi` in the OP's. `extra` holds columns of the
-    plant's own, `stated` the names of the columns that the row fills. `valid_from_s` is when the row's settings came
-    into force [s since 1970-01-01 UTC], None where it does not say; `earlier` holds the loop's rows before it, the
-    oldest first.
+    Tags are None where the row is silent, and after `tags.match` where the export lacks them; `wanted_pv` is then
+    the tag that was looked for. `master` is the loop whose output is this loop's set point, `ratio_of` the one to
+    whose PV it keeps a ratio. `kp`, `ti`, `td` are as stated, in `gain_unit`, `ti_unit` and `form`; `pv_lo` and
+    `pv_hi` in the PV's own unit, `op_lo` and `op_hi` in the OP's. `extra` holds columns of the plant's own,
+    `stated` the names of the columns that the row fills. `valid_from_s` is when the row's settings came into force
+    [s since 1970-01-01 UTC], None where it does not say; `earlier` holds the loop's rows before it, the oldest
+    first.
     """
 
     loop: str
@@ -67,6 +67,7 @@ class LoopSpec:
     type: str = ""
     area: str = ""
     master: str = ""
+    ratio_of: str = ""
     sp: str | None = None
     pv: str | None = None
     op: str | None = None

@@ -16,7 +16,7 @@ from analyzer.columns import BY_NAME, GROUPS, NIGHTS, names
 from analyzer.config import Config, NightLimits
 from analyzer.loop.decisions import Status
 from analyzer.loop.finding import in_lanes
-from analyzer.plantwide.cascade import linked
+from analyzer.plantwide.cascade import led_anew, linked
 from analyzer.plantwide.night import traced_night
 from analyzer.plantwide.structure import links_of, moves_in
 from analyzer.plantwide.wave import waves_in
@@ -88,7 +88,7 @@ def finish_night(
     joined = [old[k] if k in kept else rows[k] for k in order if k in rows] + [old[k] for k in beside]
     mine = [loop for loop in rows if loop not in kept]
     _join_others(store, night, keys, mine, replace)
-    groups = [*other, *done.groups]
+    groups = [*other, *led_anew(done.groups, loops)]
     store.write("groups", night, rows_table(groups, GROUPS) if groups else None)
     store.write("nights", night, rows_table(joined, NIGHTS))
     store.forget_explained(night, None if replace else mine)

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 from analyzer.config import PlantLimits
-from analyzer.loop.decisions import Action, Cause, Status
+from analyzer.loop.decisions import Action, Cause, GroupRole, Status
 from analyzer.loop.finding import Finding, Remedy, Root, Sign, following
 from analyzer.plantwide.structure import Link, Tie
 from analyzer.plantwide.verdict import follower_confidence
@@ -33,13 +34,44 @@ def linked(
         above = own.text("master") or own.text("ratio_of")
         if above in done and above != loop:
             tie = Tie.MASTER if own.text("master") else Tie.RATIO
+            led = done[above].moves
             done[above], done[loop] = _judged(done[above], own, tie, links.get(loop), limits)
+            root = done[above].follows
+            if root is not None and root.loop == loop:
+                _send_on(done, [k for k in led if k != loop], above, root)
     return done
+
+
+def _send_on(done: dict[str, Finding], led: Sequence[str], above: str, root: Root) -> None:
+    """Send those that a master moves on to the loop that the master follows itself."""
+    sent = []
+    for k in led:
+        old = done[k].follows
+        if old is not None and old.loop == above:
+            level, sure = min(old.coherence, root.coherence), min(old.confidence_pct, root.confidence_pct)
+            done[k] = replace(done[k], follows=Root(root.loop, level, None, sure))
+            sent.append(k)
+    done[above] = replace(done[above], moves=())
+    done[root.loop] = replace(done[root.loop], moves=_with(done[root.loop], *sent))
+
+
+def led_anew(rows: Sequence[Mapping[str, Any]], loops: Mapping[str, Finding]) -> list[dict[str, Any]]:
+    """The rows of groups, those led by a master that follows its slave led by that slave."""
+    out = [dict(r) for r in rows]
+    for row in [r for r in out if r["role"] == GroupRole.SOURCE]:
+        root = loops[row["loop"]].follows
+        slave = next((r for r in out if root and (r["group"], r["loop"]) == (row["group"], root.loop)), None)
+        if root is not None:
+            row["role"] = GroupRole.FOLLOWER
+        if slave is not None:
+            slave["role"] = GroupRole.SOURCE
+            slave["source_pct"], row["source_pct"] = row["source_pct"], slave["source_pct"]
+    return out
 
 
 def _built(own: Finding, link: Link | None) -> Finding:
     """A loop with what it hangs on."""
-    if link is None or own.text("master"):
+    if link is None or own.text("master") or own.text("ratio_of"):
         return own
     column = "master" if link.tie is Tie.MASTER else "ratio_of"
     return replace(own, known={**own.known, column: link.loop, "link_agreement": link.agreement})
@@ -77,8 +109,8 @@ def _follows(own: Finding, root: Root, sign: Sign, limits: PlantLimits) -> Findi
     return following(own, root, own.swing, follower_confidence(own.confidence, root, limits), sign)
 
 
-def _with(own: Finding, loop: str) -> tuple[str, ...]:
-    return tuple(sorted({*own.moves, loop}))
+def _with(own: Finding, *loops: str) -> tuple[str, ...]:
+    return tuple(sorted({*own.moves, *loops}))
 
 
 def _alike(above: Finding, below: Finding, limits: PlantLimits) -> bool:

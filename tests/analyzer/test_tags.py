@@ -41,12 +41,13 @@ def test_every_column_is_read(tmp_path: Path) -> None:
     """Every column of the contract is read, and a column of the plant's own is kept."""
     spec = only(
         tmp_path,
-        "loop,description,type,area,sp,pv,op,mode,position,pv_lo,pv_hi,op_lo,op_hi,pv_unit,kp,ti,td,form,gain_unit,"
+        "loop,description,type,area,master,ratio_of,sp,pv,op,mode,position,pv_lo,pv_hi,op_lo,op_hi,pv_unit,kp,ti,td,form,gain_unit,"
         "ti_unit,scan_s,importance,shift\n"
-        "F1,feed,flow,mill,a.SP,a.PV,a.OP,a.M,a.Z,-5,15,4,20,l/s,2.5,0.4,0.1,series,band,min,0.5,3,B\n",
+        "F1,feed,flow,mill,T1,F2,a.SP,a.PV,a.OP,a.M,a.Z,-5,15,4,20,l/s,2.5,0.4,0.1,series,band,min,0.5,3,B\n",
     )
     assert spec.tags == ("a.SP", "a.PV", "a.OP", "a.M", "a.Z")
     assert (spec.description, spec.type, spec.area, spec.pv_unit) == ("feed", "flow", "mill", "l/s")
+    assert (spec.master, spec.ratio_of) == ("T1", "F2")
     assert (spec.pv_lo, spec.pv_hi, spec.op_lo, spec.op_hi) == (-5, 15, 4, 20)
     assert (spec.kp, spec.ti, spec.td, spec.scan_s, spec.importance) == (2.5, 0.4, 0.1, 0.5, 3)
     assert (spec.form, spec.gain_unit, spec.ti_unit) == (Form.SERIES, "band", "min")

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 from analyzer.config import Config
-from analyzer.loop.decisions import CAUSES, Action, Cause, Fault, Status
-from analyzer.loop.finding import Finding, Remedy, Swing
-from analyzer.plantwide.cascade import linked
+from analyzer.loop.decisions import CAUSES, Action, Cause, Fault, GroupRole, Status
+from analyzer.loop.finding import Finding, Remedy, Root, Sign, Swing, following
+from analyzer.plantwide.cascade import led_anew, linked
 from analyzer.plantwide.structure import Link, Tie
 from analyzer.words.reason import reason
 
@@ -85,3 +86,21 @@ def test_a_loop_that_follows_a_third_one_is_left_as_it_is() -> None:
     loops = {"TIC1": found("TIC1", Cause.TUNING, 300.0), "FIC1": found("FIC1", Cause.NONE, 300.0)}
     once = linked(loops, HANGS, LIMITS)
     assert linked(once, HANGS, LIMITS) == once
+
+
+def test_those_that_a_master_moves_follow_its_slave_where_the_slave_is_the_root() -> None:
+    """A group has one root: who followed the master is sent to the slave with it, in the rows of the group too."""
+    root = Root("TIC1", 0.9, 30.0, 80.0)
+    third = following(
+        found("PIC7", Cause.LOAD, 360.0), root, Swing(), dict.fromkeys(CAUSES, 0.0), Sign(Cause.LOAD, 0.9, "")
+    )
+    master = replace(found("TIC1", Cause.TUNING, 360.0, Action.RETUNE), moves=("PIC7",))
+    slave = found("FIC1", Cause.VALVE, 360.0, Action.REPAIR_VALVE)
+    done = linked({f.loop: f for f in (master, slave, third)}, HANGS, LIMITS)
+    assert [done[k].follows and done[k].follows.loop for k in ("TIC1", "PIC7")] == ["FIC1", "FIC1"]
+    assert (done["FIC1"].moves, done["TIC1"].moves) == (("PIC7", "TIC1"), ())
+    roles = {"TIC1": GroupRole.SOURCE, "FIC1": GroupRole.CANDIDATE, "PIC7": GroupRole.FOLLOWER}
+    rows = [{"loop": k, "group": "1", "role": r, "source_pct": 9.0 * (k == "TIC1")} for k, r in roles.items()]
+    told = {r["loop"]: (r["role"], r["source_pct"]) for r in led_anew(rows, done)}
+    assert told["FIC1"] == (GroupRole.SOURCE, 9.0)
+    assert (told["TIC1"][0], told["PIC7"][0]) == (GroupRole.FOLLOWER, GroupRole.FOLLOWER)
