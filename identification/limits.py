@@ -133,8 +133,10 @@ class SearchLimits:
     settles: float = TOML
     start_scatter: float = TOML
     bias_scatter: float = TOML
-    ceiling_penalty: float = TOML
-    ceiling_share: float = TOML
+    left_over: float = TOML
+    left_share: float = TOML
+    rival_share: float = TOML
+    outside_share: float = TOML
     experiment_samples: int = TOML
     samples_a_lag: float = TOML
 

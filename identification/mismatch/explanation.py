@@ -22,14 +22,15 @@ from identification.simulation.open_loop import simulate
 class Explanation:
     """What was found.
 
-    recorder, controller : what was found about them; p : the problem that the fits solve; plain, best : fits without
-    and with the effects; accepted : the candidates taken, in order; first : the candidates of the first round; law :
-    the control law recovered; late_s : PV's lateness that was taken out [s]; left : gain of a flexible model beyond
-    its least, 0 where nothing is left; proof : plain and best on held-out data; refuted : names of effects that
-    explain the fitted part and not the rest; unproven : whether OP moved once, so that nothing is left to prove the
-    effects on; cycles : the faulty valve that the loop's cycles show; others : misfits on other recordings, where
-    some were held out whole; by_innovations : in an experiment, what innovations alone explain; outside : physics of
-    no name that explains it better than any that has one.
+    recorder, controller : what was found about them; p : the problem that the fits solve; plain, best : fits
+    without and with the effects; accepted : the candidates taken, in order; first : the candidates of the first
+    round; law : the control law recovered; late_s : PV's lateness that was taken out [s]; left : gain of what is
+    left and has no name, 0 where nothing is, and left_by : the way of the reference that foretells it
+    (reference.py); proof : plain and best on held-out data; refuted : names of effects that explain the fitted part
+    and not the rest; unproven : whether OP moved once, so that nothing is left to prove the effects on; cycles :
+    the faulty valve that the loop's cycles show; others : misfits on other recordings, where some were held out
+    whole; by_innovations : in an experiment, what innovations alone explain; outside : physics of no name that
+    explains it better than any that has one.
     """
 
     p: Problem = field(repr=False)
@@ -42,6 +43,7 @@ class Explanation:
     law: ControlLaw | None = None
     late_s: float = 0.0
     left: float = 0.0
+    left_by: str = ""
     proof: HeldOut | None = None
     refuted: tuple[str, ...] = ()
     unproven: bool = False

@@ -1,5 +1,4 @@
-"""The plain loop of a recording, and what a flexible model of no name could explain beyond a fit: the ceiling under
-which a named effect has to be near."""
+"""The plain loop of a recording, and what the most flexible model of no name leaves of it."""
 
 from __future__ import annotations
 
@@ -104,24 +103,14 @@ def plain(p: Problem, brought: Floats | None = None, clip: Clip | None = None) -
 
 def with_memory(p: Problem, fit: Fitted) -> tuple[Problem, Fitted]:
     """An experiment and its fit, with the memory of what the most flexible model leaves: the nearest to its noise."""
-    _, left, _ = explained_freely(p, fit)
+    left = left_freely(p, fit)
     known = replace(p, memory=correlated(left[p.weight > 0]))
     return known, replace(fit, count=known.independent(fit.e))
 
 
-def ceiling(p: Problem, fit: Fitted) -> tuple[float, int]:
-    """Gain in log likelihood [nat] that the flexible model has over a fit, and the number of its weights.
-
-    The fit's own constants and its noise model follow linearly, so the gain is of what they cannot give.
-    """
-    e, left, count = explained_freely(p, fit)
-    won = 0.5 * float(e @ e - left @ left) / max(fit.loss, 1e-30)
-    return won * fit.count / max(p.count, 1), count
-
-
-def explained_freely(p: Problem, fit: Fitted) -> tuple[Floats, Floats, int]:
-    """Weighted innovations that a fit's own constants cannot lessen and what the flexible model leaves of them, shape
-    (n,) each, and the number of its weights."""
+def left_freely(p: Problem, fit: Fitted) -> Floats:
+    """What the flexible model leaves of a fit's weighted innovations, shape (n,); the fit's own constants and its
+    noise model follow linearly."""
     c, root = fit.model.c, np.sqrt(p.weight)
     through = through_valve(p.inputs, c)
     free = past_moves(p, c, through) + bent_moves(p, c, through)
@@ -134,7 +123,7 @@ def explained_freely(p: Problem, fit: Fitted) -> tuple[Floats, Floats, int]:
     more = more.T - span @ (span.T @ more.T)
     q, scale = np.linalg.qr(more)
     kept = np.abs(np.diag(scale)) > 1e-8 * np.abs(np.diag(scale)).max()
-    return e, e - q[:, kept] @ (q[:, kept].T @ e), int(kept.sum())
+    return e - q[:, kept] @ (q[:, kept].T @ e)  # type: ignore[no-any-return]
 
 
 def past_moves(p: Problem, c: Floats, through: Floats) -> list[Floats]:

@@ -11,9 +11,9 @@ from identification.mismatch.experiment import is_experiment
 from identification.mismatch.explanation import Explanation
 from identification.mismatch.friction import from_cycles, is_friction
 from identification.mismatch.outside import OUTSIDE, RIVALS, about
-from identification.mismatch.plain_loop import ceiling
 from identification.mismatch.proof import passes
 from identification.mismatch.recording import Recording, SeenInCycles
+from identification.mismatch.reference import Foretold, foretold
 from identification.mismatch.selection import (
     Candidate,
     Progress,
@@ -33,7 +33,8 @@ def physics(found: Explanation, tell: Progress, s: Recording) -> Explanation:
     found, last = one_by_one(replace(found, p=p, plain=best, best=best), tell, s)
     if len(found.accepted) > 1:
         found = as_a_set(found, tell, s)
-    return replace(found, left=left_over(found, last))
+    left = left_over(found, last)
+    return replace(found, left=left.gain, left_by=left.way)
 
 
 def one_by_one(found: Explanation, tell: Progress, s: Recording) -> tuple[Explanation, list[Candidate]]:
@@ -62,7 +63,7 @@ def chosen(p: Problem, found: Explanation, s: Recording, candidates: list[Candid
     far."""
     winner = None if found.accepted else shown_by_cycles(s, candidates)
     winner = winner or proven(p, found.best, candidates)
-    least = p.limits.search.ceiling_share * gain(found.best, found.plain)
+    least = p.limits.search.outside_share * gain(found.best, found.plain)
     if winner is not None and winner.name in OUTSIDE and winner.penalised <= least:
         return proven(p, found.best, [c for c in candidates if c.name in EFFECTS])
     return winner
@@ -171,15 +172,22 @@ def without_the_idle(
     return best, accepted
 
 
-def left_over(found: Explanation, candidates: list[Candidate]) -> float:
-    """Gain [nat] of what explains the recording beyond the effects taken and has no name among them, over the least
-    that counts; 0 where nothing does."""
-    limits = found.p.limits.search
-    won, weights = ceiling(found.p, found.best)
-    least = max(limits.ceiling_penalty, limits.ceiling_share * gain(found.best, found.plain))
-    left = won - 0.5 * weights - least
+def left_over(found: Explanation, candidates: list[Candidate]) -> Foretold:
+    """What explains the recording beyond the effects taken and has no name among them; nothing where nothing does.
+
+    What a reference without a name foretells of the innovations is left; so is what it foretells of the plain loop's
+    on data held out, where effects bound to a time gain hardly more with all of the data: such a course can be drawn
+    through whatever the model lacks, and what time does not bind is not bound to time.
+    """
+    limits, won = found.p.limits.search, gain(found.best, found.plain)
+    left = foretold(found.p, found.best)
+    if left.gain <= max(limits.left_over, limits.left_share * won):
+        left = Foretold()
+    if found.accepted and all(about(c.name).timed for c in found.accepted):
+        rival = foretold(found.p, found.plain, clock=False)
+        left = rival if rival.gain > max(limits.rival_share * won, limits.left_over) else left
     if not found.accepted and any(c.row.needs == "steps" and c.penalised > 0 for c in candidates):
-        left = max(left, candidates[0].penalised)
+        left = Foretold(left.way, max(left.gain, candidates[0].penalised))
     if found.outside is not None:
-        left = max(left, found.outside.penalised)
-    return left if left > 0 else 0.0
+        left = Foretold(left.way, max(left.gain, found.outside.penalised))
+    return left

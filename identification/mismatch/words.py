@@ -46,9 +46,21 @@ REFUTED = (
 OVER_OTHERS, OVER_REST = ("the recording", "the other recordings"), ("its first part", "the rest")
 """Why effects that explain one part and not another are not told."""
 LEFT_OVER = (
-    "The loop does something that no known cause explains: a flexible model without a name does better "
+    "The loop does something that no known cause explains: {by} foretells on data held out what is left "
     "(log likelihood +{nats:.0f})."
 )
+LEFT_BY = {
+    "": "a flexible model",
+    "past": "what OP did long before",
+    "size": "the size of OP's moves",
+    "level": "the level of PV",
+    "switch": "a switch in the flow, on at one level and off at another,",
+    "history": "where PV has been and how far the valve has travelled",
+    "direction": "the direction and speed of the moves",
+    "sensor": "whether PV stands, and the size of its moves,",
+    "clock": "a clock, whose wave is no sine,",
+}
+"""How the ways of the reference are called."""
 LONGER = "A step of OP each way in manual, held for five time constants, at two operating points."
 """What tells apart what has no line of its own."""
 MINUTES_S, MINUTES_OF_RECORD_S, HOURS_S = 600.0, 120.0, 7200.0
@@ -110,7 +122,7 @@ def note(found: Explanation) -> str:
         return STACKED.format(names=stacked) if is_stack(found) else ""
     if found.outside is not None:
         return ""
-    return LEFT_OVER.format(nats=found.left)
+    return LEFT_OVER.format(nats=found.left, by=LEFT_BY[found.left_by])
 
 
 def cycles_told(found: Explanation) -> str:

@@ -26,8 +26,10 @@ from proofs.concealed.plant import close_loop, open_loop
 from proofs.concealed.recorder import leave_out, record
 from proofs.concealed.scene import Rng, Scene, draw_scene
 from proofs.concealed.strange import ODDITIES, OUTSIDE
+from proofs.concealed.unnamed import FIRST_DECK, SECOND_DECK
 
-EFFECTS = CATALOGUE | {e.name: e for e in OUTSIDE}
+EFFECTS = CATALOGUE | {e.name: e for e in (*OUTSIDE, *FIRST_DECK, *SECOND_DECK)}
+DECKS = {"outside": OUTSIDE, "first": FIRST_DECK, "second": SECOND_DECK}
 STARTS = (pd.Timestamp("2026-03-02"), pd.Timestamp("2026-03-09"))
 ATTEMPTS = 12
 UNSEEN = 4.0  # energy that the base may hold beyond a FOPDT
@@ -191,9 +193,9 @@ def main() -> None:
     ap.add_argument("--seed", type=int, default=1)
     ap.add_argument("--residuals", type=pathlib.Path, help="folder of residual series to take loads from")
     ap.add_argument("--jobs", type=int, default=2)
-    ap.add_argument("--outside", action="store_true", help="physics outside the catalogue alone")
+    ap.add_argument("--deck", choices=list(DECKS), help="physics outside the catalogue alone")
     a = ap.parse_args()
-    todo = (outside_alone if a.outside else plan)(a.cases, a.seed)
+    todo = outside_alone(DECKS[a.deck], a.cases, a.seed) if a.deck else plan(a.cases, a.seed)
     make(a.out, todo, a.residuals, a.jobs)
 
 

@@ -1,14 +1,17 @@
 """Which cases a set holds: a third with nothing hidden, singles at four levels, pairs, outside effects."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from proofs.concealed.effects import CATALOGUE, NAMES
+from proofs.concealed.effects import CATALOGUE, NAMES, Effect
 from proofs.concealed.grade import LEVELS
 from proofs.concealed.strange import ODDITIES, OUTSIDE
+from proofs.concealed.unnamed import FIRST_DECK, SECOND_DECK
 
-SHARES = {"none": 1 / 3, "pair": 0.08, "outside": 0.08}
+SHARES = {"none": 1 / 3, "pair": 0.08, "outside": 0.12}
+STRANGE = (*OUTSIDE, *FIRST_DECK, *SECOND_DECK)
 ALONE = {
     "integrator",
     "sqrt-outflow",
@@ -65,7 +68,7 @@ def plan(cases: int, seed: int) -> list[Case]:
     rng = np.random.default_rng(seed)
     count = {k: round(share * cases) for k, share in SHARES.items()}
     odd = dealt(rng, ["plain", *ODDITIES], count["none"])
-    outside = [((e.name, lv),) for e in OUTSIDE for lv in ("plain", "masked", "concealed")]
+    outside = [((e.name, lv),) for e in STRANGE for lv in ("plain", "masked", "concealed")]
     hidden = dealt(rng, outside, count["outside"]) + [one_pair(rng) for _ in range(count["pair"])]
     hidden += singles(rng, cases - len(odd) - len(hidden))
     every = [((), o) for o in odd] + [(h, "") for h in hidden]
@@ -74,9 +77,9 @@ def plan(cases: int, seed: int) -> list[Case]:
     return [Case(f"L{i:04d}", every[j][0], every[j][1], int(seeds[i])) for i, j in enumerate(order)]
 
 
-def outside_alone(cases: int, seed: int) -> list[Case]:
-    """Cases of physics outside the catalogue alone, every kind as often at each of three levels."""
+def outside_alone(deck: Sequence[Effect], cases: int, seed: int) -> list[Case]:
+    """Cases of a deck of physics outside the catalogue, every kind as often at each of three levels."""
     rng = np.random.default_rng(seed)
-    cards = [((e.name, level),) for e in OUTSIDE for level in ("plain", "masked", "concealed")]
+    cards = [((e.name, level),) for e in deck for level in ("plain", "masked", "concealed")]
     hand, seeds = dealt(rng, cards, cases), rng.integers(2**31, size=cases)
     return [Case(f"L{i:04d}", h, "", int(s)) for i, (h, s) in enumerate(zip(hand, seeds, strict=True))]

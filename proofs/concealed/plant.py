@@ -60,6 +60,19 @@ class Plant(NamedTuple):
     switch: float = 0.0  # load [% OP] that is on while PV is high
     switch_at: float = 0.0  # above y0 [%], half a band to either side
     switch_band: float = 1.0
+    regime: float = 0.0  # relative gain change in a second flow regime
+    regime_at: float = 0.0  # flow above v0 [%] in which it begins, half a band to either side
+    regime_band: float = 1.0
+    detour: float = 0.0  # how much later [s] the flow above v0 arrives
+    tired: float = 0.0  # relative gain lost to 10 % of travel
+    tired_s: float = 1.0  # and regained in this time
+    relay: float = 0.0  # load [% OP] that a relay puts on for a time
+    relay_at: float = 0.0  # when PV passes so far [%] above y0
+    relay_s: float = 1.0
+    hold_s: float = 0.0  # the actuator takes a new position only so often
+    purge: float = 0.0  # share of the time in which the sensor is blown out and stands
+    purge_s: float = 1.0  # how often
+    foam: float = 0.0  # what a moving surface adds to the reading
     mount: float = 0.0  # share of a swinging mount
     mount_w: float = 1.0
     mount_z: float = 0.1
@@ -166,6 +179,22 @@ def switched(on: float, x: float, at: float, band: float) -> float:
 
 
 @njit(cache=True)
+def parted(q: float, flow: np.ndarray, far: int, v0: float) -> float:
+    """Flow [%] of two ways: up to `v0` by the short one, above it by one on which it entered `far` steps in."""
+    late = flow[far] if far > 0 else v0
+    return min(q, v0) + max(late, v0) - v0
+
+
+@njit(cache=True)
+def timed(left: float, armed: float, x: float, dt: float, p: Any) -> tuple[float, float]:
+    """What is left [s] of a relay's time, and whether it is armed (1, 0), one step on."""
+    left = max(left - dt, 0.0)
+    if x > p.relay_at and armed > 0.0:
+        return p.relay_s, 0.0
+    return left, 1.0 if x < p.relay_at and left <= 0.0 else armed
+
+
+@njit(cache=True)
 def settle(p: Any, c: Any, sp: float) -> tuple[np.ndarray, np.ndarray]:
     """Valve stages and controller memory of a loop at rest."""
     valve = np.zeros(8)
@@ -184,15 +213,20 @@ def run(p: Any, c: Any, rows: np.ndarray, given: np.ndarray, closed: bool, h: fl
     valve, memory = settle(p, c, rows[0, 0])
     now, back, aided = 0, 0, 0.0
     felt, on, shown = 0.0, 0.0, p.y0
+    lane, weary, left, armed, kept, calm = 0.0, 0.0, 0.0, 1.0, p.v0, 0.0
     for k in range(n):
-        seen = reading(x, rows[3, k], rows[4, k], p)
-        shown = gripped(shown, seen, p.grip)
+        seen = reading(x, rows[3, k], rows[4, k], p) + p.foam * abs(x[0] - calm)
+        blown = p.purge > 0.0 and (k * h) % p.purge_s < p.purge * p.purge_s
+        shown = shown if blown else gripped(shown, seen, p.grip)
         out[0, k] = shown
         u = given[k]
         if closed:
             u = decide(rows[0, k], out[0, k], memory, rows[6, k], rows[7, k], h, c)
         out[1, k] = u
         u = c.res * np.round(u / c.res) if closed and c.res > 0.0 else u
+        if p.hold_s > 0.0:
+            kept = u if (k * h) % p.hold_s < h else kept
+            u = kept
         gain = 1.0 + p.drift * (k / n - 0.5)
         until = (k + 1) * m + (int(rows[5, k + 1]) if k + 1 < n else 0)
         while now < until:
@@ -200,13 +234,22 @@ def run(p: Any, c: Any, rows: np.ndarray, given: np.ndarray, closed: bool, h: fl
             passed[now + 1] = passed[now] + dt * max(1.0 + p.pipe * (flow[now] / p.v0 - 1.0), 0.1)
             now += 1
             q, back = leaves_pipe(flow, passed, now, back, p.L)
+            if p.detour > 0.0:
+                q = parted(q, flow, now - int((p.L + p.detour) / dt), p.v0)
+            lane = switched(lane, q - p.v0, p.regime_at, p.regime_band)
+            weary += abs(flow[now] - flow[now - 1]) / 10.0 - weary * dt / p.tired_s
+            left, armed = timed(left, armed, x[0], dt, p)
+            calm += (x[0] - calm) * dt / (0.3 * p.T)
+            bent = (1.0 + p.regime * lane) * max(1.0 - p.tired * weary, 0.1)
             old = now - int(p.echo_s / dt)
             again = p.echo * past[old] / p.K if old > 0 else 0.0
             aided = aid(aided, p.y0 + x[0], rows[8, k], dt, p)
             felt += (x[0] - felt) * dt / p.recall_s
             on = switched(on, x[0], p.switch_at, p.switch_band)
-            act = rows[1, k] + rows[9, k] + again + aided + p.switch * on
-            feed = p.K * gain * max(1.0 + p.recall * felt / 10.0, 0.1) * ((q - p.v0) * rows[2, k] + act)
+            act = rows[1, k] + rows[9, k] + again + aided + p.switch * on + p.relay * (left > 0.0)
+            feed = (
+                p.K * gain * max(1.0 + p.recall * felt / 10.0, 0.1) * ((q - p.v0) * rows[2, k] * bent + act)
+            )
             advance(x, work, feed, rows[3, k], dt, p)
             past[now] = level_of(x, p) - p.y0
     return out

@@ -1,0 +1,84 @@
+"""What is left of a loop is foretold on held-out data where a law makes it, and not where noise does."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from identification.limits import LIMITS
+from identification.mismatch.plain_loop import inputs_of, prepared
+from identification.mismatch.recording import Recording
+from identification.mismatch.reference import Foretold, foretold, switched
+from proofs.concealed.plant import Drive, Pi, Plant, close_loop, idle
+
+N = 4500
+PLANT = Plant(K=1.1, T=25.0, L=4.0, v0=48.0, y0=52.0)
+CLOCK = np.arange(N)
+
+
+def left_of(
+    plant: Plant, seed: int, act: np.ndarray | None = None, pre: np.ndarray | None = None
+) -> Foretold:
+    """What the plain loop leaves of a plant whose set point moves every 150 s or so under load and noise."""
+    rng = np.random.default_rng(seed)
+    load = np.empty(N)
+    load[0] = 0.0
+    for k, shock in enumerate(rng.normal(0.0, 0.05, N - 1)):
+        load[k + 1] = 0.995 * load[k] + shock
+    still = idle(N, plant)
+    drive = Drive(
+        **{f: getattr(still, f) for f in ("late", "force", "op_hi", "helper", "supply")},
+        sp=plant.y0 + np.repeat(rng.uniform(-6.0, 6.0, N // 150 + 1), 150)[:N],
+        load=load,
+        pre=still.pre if pre is None else pre,
+        post=rng.normal(0.0, 0.03, N),
+        act=still.act if act is None else act,
+    )
+    pv, op = close_loop(plant, Pi(kp=1.2, ti=30.0), drive, 1.0)
+    s = Recording(drive.sp, pv, op, np.ones(N, dtype=bool), 1.0, CLOCK.astype(float))
+    p, fit = prepared(inputs_of(s), s.pv - s.pv.mean(), s.usable)
+    return foretold(p, fit)
+
+
+def test_load_and_noise_are_not_foretold() -> None:
+    """Of twelve plain loops under load and noise nothing is left, by less than half of what would be told."""
+    assert max(left_of(PLANT, seed).gain for seed in range(12)) < 0.5 * LIMITS.search.left_over
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"regime": 0.4, "regime_at": 0.0, "regime_band": 3.0},
+        {"tired": 0.15, "tired_s": 300.0},
+        {"switch": 3.0, "switch_at": 1.0},
+        {"foam": 0.6},
+    ],
+)
+def test_physics_without_a_name_is_left(changes: dict[str, float]) -> None:
+    """Four kinds of physics that no effect has are foretold, past what is told of."""
+    assert left_of(PLANT._replace(**changes), 21).gain > LIMITS.search.left_over
+
+
+@pytest.mark.parametrize(
+    ("changes", "way"),
+    [
+        ({"recall": 1.2, "recall_s": 200.0}, "history"),
+        ({"echo": 0.2, "echo_s": 120.0}, "past"),
+        ({"hurry": 2.0}, "size"),
+    ],
+)
+def test_what_acts_in_one_way_is_left_to_it(changes: dict[str, float], way: str) -> None:
+    """A gain that remembers, a recycle and moves that hurry are each foretold best by what makes them."""
+    assert left_of(PLANT._replace(**changes), 21).way == way
+
+
+def test_a_pump_by_the_clock_is_left() -> None:
+    """A load that is on for a third of every ten minutes is foretold, a small one by nothing but the clock."""
+    assert left_of(PLANT, 22, act=1.0 * (CLOCK % 600 < 200)).gain > LIMITS.search.left_over
+    assert left_of(PLANT, 22, act=0.4 * (CLOCK % 600 < 200)).way == "clock"
+
+
+def test_a_switch_remembers_where_it_was_last() -> None:
+    """Between its ends a switch stands as it was, by hand."""
+    x = np.array([0.0, 2.0, 0.6, -0.4, -2.0, 0.4, 0.9, 1.1])
+    assert switched(x, 0.0, 2.0).tolist() == [0.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0]
