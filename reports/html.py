@@ -16,7 +16,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from reports import svg
-from reports.pages import Band, Bars, Cell, Floats, Page, Sparkline, Trend, WhatIf
+from reports.pages import MOST_LEVEL, Band, Bars, Cell, Floats, Page, Sparkline, Trend, WhatIf, level_step
 from reports.pictures import asset, drawings, keys
 from reports.texts import visible_parts
 
@@ -24,8 +24,8 @@ ASSETS = ("page.css", "uPlot.min.css", "uPlot.iife.min.js", "page.js", "what_if.
 LICENCE = "uPlot.LICENSE.txt"
 FINE_S = 1e-3
 """Step of times that are no whole seconds [s]."""
-MISSING = 65535
-"""Code of a bucket that is not shown; levels run from 0 to 65534."""
+MISSING = MOST_LEVEL + 1
+"""Code of a bucket that is not shown."""
 
 
 def _coded(values: Floats, gap: np.ndarray) -> dict[str, object]:
@@ -33,7 +33,7 @@ def _coded(values: Floats, gap: np.ndarray) -> dict[str, object]:
     range."""
     known = np.isfinite(values) & ~gap
     low, high = (float(values[known].min()), float(values[known].max())) if known.any() else (0.0, 1.0)
-    step = (high - low) / (MISSING - 1) or 1.0
+    step = level_step(low, high)
     level = np.where(known, np.round((np.where(known, values, low) - low) / step), MISSING)
     return {"low": low, "step": step, "data": base64.b64encode(level.astype("<u2").tobytes()).decode()}
 

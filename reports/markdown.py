@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 from reports.pages import (
     Bars,
+    Beside,
     Block,
     Cell,
     Facts,
@@ -70,7 +71,7 @@ def _block(block: Block, folder: str) -> list[str]:
             return [f"- {escaped(term)}: {escaped(detail)}" for term, detail in block.items]
         case Tiles():
             return [f"- **{escaped(figure)}** {escaped(what)}" for figure, what, _ in block.items]
-        case WhatIf():
+        case WhatIf() | Beside():
             return []
         case _:
             if not folder:

@@ -67,7 +67,8 @@ MOST_ROWS = 3000
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """A table; `facet`: key of the column whose values filter it, '' for none; `cards`: on a phone a card a row."""
+    """A table; `facets`: keys of columns whose values filter it; `cards`: on a phone a card a row;
+    `beside`: the page on which rows are laid beside each other, '' for none."""
 
     name: str
     title: str
@@ -75,8 +76,9 @@ class Table:
     rows: tuple[tuple[Cell, ...], ...]
     note: str = ""
     searchable: bool = False
-    facet: str = ""
+    facets: tuple[str, ...] = ()
     cards: bool = False
+    beside: str = ""
 
     @property
     def shown(self) -> tuple[tuple[Cell, ...], ...]:
@@ -219,6 +221,17 @@ class Trend:
 
 
 @dataclass(frozen=True, slots=True)
+class Beside:
+    """Trends of which a reader shows up to `most` under each other on one time axis; ours: as a screen holds."""
+
+    name: str
+    title: str
+    trends: tuple[Trend, ...]
+    caption: str = ""
+    most: int = 6
+
+
+@dataclass(frozen=True, slots=True)
 class HeatMap:
     """Rows of shares as colours over one axis that counts in powers.
 
@@ -333,6 +346,24 @@ class WhatIf:
     caption: str = ""
 
 
+MOST_LEVEL = 65534
+"""Levels of a signal that a page holds, in 16 bits, one of which says that nothing is known."""
+
+
+def level_step(low: float, high: float) -> float:
+    """The step between the levels in which a page holds a signal."""
+    return (high - low) / MOST_LEVEL or 1.0
+
+
+def as_held(x: Floats) -> Floats:
+    """A signal, shape (n,), as a page holds it, so that what is told of it is what the page computes."""
+    if x.size == 0:
+        return x
+    low = float(x.min())
+    step = level_step(low, float(x.max()))
+    return low + step * np.round((x - low) / step)  # type: ignore[no-any-return]
+
+
 @dataclass(frozen=True, slots=True)
 class Text:
     """Paragraphs."""
@@ -364,7 +395,7 @@ class Tiles:
 
 Picture = IntervalChart | Plot | Panels | Trend | HeatMap | Field | Graph | TreeMap
 """Blocks that are drawn."""
-Block = Table | Picture | WhatIf | Text | Listing | Facts | Tiles
+Block = Table | Picture | WhatIf | Beside | Text | Listing | Facts | Tiles
 
 
 @dataclass(frozen=True, slots=True)
@@ -381,7 +412,8 @@ class Page:
     """A page: its file name without ending, its title, one line under it, sections, and links (text,
     href).
 
-    made : what it was made of and when, shown small in its head; zone : time zone of the times on its axes
+    made : what it was made of and when, shown small in its head; zone : time zone of the times on its axes;
+    choices : pages of the same kind, one of which is chosen (text, href), '' being this one
     """
 
     name: str
@@ -392,6 +424,7 @@ class Page:
     footer: str = ""
     made: str = ""
     zone: str = "UTC"
+    choices: tuple[tuple[str, str], ...] = ()
 
     def tables(self) -> tuple[Table, ...]:
         """All tables of the page."""

@@ -161,11 +161,15 @@ def _changes(
 @STORE
 @NIGHT
 @click.option(
-    "--top", default=50, show_default=True, type=click.IntRange(0), help="Loops with a page of their own."
+    "--top",
+    default=200,
+    show_default=True,
+    type=click.IntRange(0),
+    help="Loops with a page, the worst first.",
 )
 @into_folder("Style and scripts in each page itself.")
 def pages(store: Path, night: str | None, top: int, folder: Folder) -> None:
-    """The morning page of a night and a page for each of its worst loops.
+    """The morning page of a night and a page for each of its loops, the worst first.
 
     Example: triage pages store --out pages --top 50
     """

@@ -10,6 +10,7 @@ from pathlib import Path
 import click
 
 from analyzer.commands.options import CONFIG, NIGHT, PLACE, SOME_LOST, STORE, formats, say, told
+from analyzer.store.notes import STATES
 from identification.errors import InputError
 
 DAYS = {"d": 1, "w": 7, "y": 365}
@@ -134,13 +135,24 @@ def beliefs(path: Path, config: Path | None) -> None:
     metavar="DATE",
     help="Leave the loop out of lists until this night.",
 )
+@click.option("--state", type=click.Choice(STATES), help="How far the work has come.")
+@click.option("--due", type=click.DateTime(("%Y-%m-%d",)), metavar="DATE", help="When it is to be done.")
 @told
-def note(store: Path, loop: str, text: str | None, owner: str | None, hide_until: datetime | None) -> None:
+def note(
+    store: Path,
+    loop: str,
+    text: str | None,
+    owner: str | None,
+    hide_until: datetime | None,
+    state: str | None,
+    due: datetime | None,
+) -> None:
     """What was seen or done about a loop, kept in the store and shown in lists and on pages.
 
-    The newest note of a loop counts; without TEXT its notes are printed.
+    The newest note of a loop counts; without TEXT its notes are printed. Notes make the work list, a page of `triage
+    pages`, with owner, state and due date, and what the nights since say.
 
-    Example: triage note store FIC2110 "stroked, packing tight, ordered" --hide-until 2026-04-01
+    Example: triage note store FIC2110 "stroked, packing tight" --state ordered --due 2026-04-01 --owner Laine
     """
     from analyzer.store import notes
     from analyzer.store.store import Store
@@ -154,13 +166,13 @@ def note(store: Path, loop: str, text: str | None, owner: str | None, hide_until
 
         near = ", ".join(get_close_matches(loop, known, n=3)) or "none is near"
         raise InputError(f"loop {loop} is not in night {night}", f"one of its loops ({near})", "correct LOOP")
-    if text is None:
+    if text is None and state is None and due is None:
         own = notes.read_notes(store).get(loop, ())
         zone = kept.zone()
         say("\n".join(n.said(zone) for n in own) or f"{loop}: no notes")
         return
-    until = "" if hide_until is None else hide_until.strftime("%Y-%m-%d")
-    written = notes.new(loop, text, owner, until)
+    until, by = ("" if day is None else day.strftime("%Y-%m-%d") for day in (hide_until, due))
+    written = notes.new(loop, text or state or f"due {by}", owner, until, state or "", by)
     notes.add(store, written)
     say(f"{loop}: {written.said(kept.zone())}")
 

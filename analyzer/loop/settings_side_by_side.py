@@ -12,6 +12,7 @@ from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import as_stated
 from identification.models import Loop, Pid
 from identification.record import Floats
+from reports.pages import as_held
 from tuning.forecast import Tried, alternatives, run, settled, tried
 from tuning.frequency_response import integral_s
 from tuning.harmonic_balance import TravelMap, travel_map
@@ -97,7 +98,7 @@ def compared(
     """
     if load.size < limits.least_steps or loop.process.slope * loop.controller.kp <= 0.0:
         return None
-    settings = alternatives(loop, new)
+    settings, load = alternatives(loop, new), as_held(load)
     return Comparison(
         loop,
         load,

@@ -99,7 +99,9 @@ def _row(change: Change, found: LoopComparison) -> tuple[Cell, ...]:
 def figures(cases: Sequence[ChangeCase], primary: bool, name: str) -> Table:
     """Figures before and after of all loops (the study's Figure 11)."""
     rows = [_row(c, case.found) for case in cases for c in case.found.changes if c.measure.primary == primary]
-    return Table(name, "", page_columns("figures"), tuple(rows), searchable=len(rows) > 12, facet="verdict")
+    return Table(
+        name, "", page_columns("figures"), tuple(rows), searchable=len(rows) > 12, facets=("verdict",)
+    )
 
 
 def _settings(change: TuningChange, units: str) -> str:

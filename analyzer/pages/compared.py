@@ -68,10 +68,38 @@ def _against(value: float, now: float) -> str:
 
 def _rejection(t: Tried, now: Tried) -> Cell:
     """How much of the error a load step leaves, against now."""
-    if not (math.isfinite(t.integral_s) and math.isfinite(now.integral_s)):
+    ratio = _times(t, now)
+    if ratio is None:
         return Cell("–")
-    ratio = t.integral_s / now.integral_s
     return Cell(number(ratio), ratio, _against(ratio, 1.0))
+
+
+def opening(c: Comparison, spec: LoopSpec, unit: str) -> str:
+    """What the recommended settings win and cost, in a sentence; of a loop without them what is compared."""
+    now, new = c.tried[0], next((t for t in c.tried if t.name == RECOMMENDED), None)
+    if new is None:
+        return "No settings are recommended; what the rules know would do this on the night's load."
+    scale, (kp, ti) = c.pv_span / 100.0, c.stated[RECOMMENDED]
+    typed = (
+        f"Kp {kp:.3g} {gain_unit(spec.gain_unit, spec.pv_unit, spec.op_unit)} and Ti {ti:.3g} {spec.ti_unit}"
+    )
+    errors = f"{number(scale * now.error)} to {number(scale * new.error)} {unit}"
+    text = (
+        f"On the night's load {typed} take the stem's travel from {number(now.stem_travel)} to "
+        f"{number(new.stem_travel)} %/h and the average absolute error from {errors}"
+    )
+    ratio = _times(new, now)
+    if ratio is None:
+        return f"{text}."
+    longer = ratio > WORSE
+    cost = f"the error that a lasting load leaves sums up to {number(ratio)} times as much"
+    return f"{text}; the price is that {cost}." if longer else f"{text}, and {cost}."
+
+
+def _times(t: Tried, now: Tried) -> float | None:
+    """Sum of the error that a step of load leaves, over that of the present settings; None where one never ends."""
+    known = math.isfinite(t.integral_s) and math.isfinite(now.integral_s)
+    return t.integral_s / now.integral_s if known else None
 
 
 def table(c: Comparison, spec: LoopSpec, unit: str) -> Table:
@@ -211,7 +239,7 @@ def page(loop: str, night: str, c: Comparison, spec: LoopSpec) -> Page:
     known = spec.pv_lo is not None and spec.pv_hi is not None
     unit = (spec.pv_unit or "own unit") if known else "%"
     drawn = field(c)
-    first: list[Block] = [table(c, spec, unit), panels(c, unit)]
+    first: list[Block] = [Text((opening(c, spec, unit),), "lead"), panels(c, unit), table(c, spec, unit)]
     first += [] if drawn is None else [drawn]
     said = "The load adds to PV as it did in the night; what the model lacks, and a load that changes, are not in it."
     tried = WhatIf("try", "Kp and Ti moved, the night simulated again", model(c, spec, unit), c.load, said)

@@ -31,10 +31,12 @@ from analyzer.pages.words import (
 from analyzer.words.belief import wear_text
 from analyzer.words.units import row_settings
 from identification.mismatch.words import check
-from reports.pages import Block, Cell, Facts, Line, Listing, Page, Plot, Section, Table, Text
+from reports.pages import Block, Cell, Facts, Line, Listing, Page, Panels, Plot, Section, Table, Text
 from reports.texts import slug
 
 WEEK = 7
+OVER_NIGHTS = ("oscillation_significance", "average_absolute_error_pct", "valve_travel_pct_per_h", "period_s")
+"""Figures of a loop that are drawn night by night."""
 MOST_SURE = 99.0
 """Percent that are told at most: nothing is certain."""
 FIGURES = (
@@ -124,12 +126,10 @@ def _first(row: Row, thin: Thinned | None) -> Section:
 
 
 def _verdict(row: Row) -> Section:
-    """What was found, and what the advice rests on, where the night holds it."""
+    """What was found, and on how many nights it rests."""
     blocks: list[Block] = [_facts(row)]
     if row["believed_nights"]:
         blocks.append(Facts(_believed(row)))
-    if row["advice"]:
-        blocks.append(Text((row["advice"],)))
     return Section("What and why", tuple(blocks))
 
 
@@ -149,9 +149,11 @@ def _evidence(row: Row) -> Section:
     known = [titled(k, number(row[k])) for k in (*MODEL, *LIKELIHOOD) if row[k] is not None]
     if known:
         blocks.append(Facts(tuple(known)))
+    if row["advice"]:
+        blocks.append(Text((f"The advice rests on this: {row['advice']}",)))
     if row["notes"]:
         blocks.append(Text((f"About the data: {row['notes']}.",), "note"))
-    return Section("Evidence", tuple(blocks))
+    return Section("Evidence, for experts", tuple(blocks), closed=True)
 
 
 def _figure(name: str, row: Row, scale: PvScale) -> tuple[str, str]:
@@ -187,9 +189,11 @@ def _night(row: Row) -> tuple[Cell, ...]:
 def nights_section(rows: Sequence[Row]) -> Section:
     """A table of a loop's nights, the last first, and pictures of how its oscillation and the width of its valve's
     fault grew or fell."""
-    pictures = (_over_nights(rows, "oscillation_significance", "significance"), _widths(rows))
+    drawn = (*(_over_nights(rows, column) for column in OVER_NIGHTS), _widths(rows))
+    plots = tuple(p for p in drawn if p is not None)
+    pictures = (Panels("nights", "Night by night", plots),) if plots else ()
     table = Table("history", "", page_columns("history"), tuple(map(_night, reversed(rows))))
-    return Section("Over the nights", (*(p for p in pictures if p is not None), table))
+    return Section("Over the nights", (*pictures, table))
 
 
 def _believed(row: Row) -> tuple[tuple[str, str], ...]:
@@ -212,15 +216,17 @@ def _believed(row: Row) -> tuple[tuple[str, str], ...]:
     return tuple(out)
 
 
-def _over_nights(rows: Sequence[Row], column: str, name: str) -> Plot | None:
+def _over_nights(rows: Sequence[Row], column: str) -> Plot | None:
     """A figure over the nights; None where fewer than three know it."""
     known = [(i - len(rows) + 1.0, r[column]) for i, r in enumerate(rows)]
     points = np.array([(x, y) for x, y in known if y is not None], float)
     if len(points) < 3:
         return None
-    shown, line = BY_NAME[column], Line(name, points[:, 0], points[:, 1])
-    title = f"{shown.title} over the nights"
-    return Plot("nights", title, "nights before this one", shown.unit, (line,), reach=(0.0, 1.0))
+    shown = BY_NAME[column]
+    line = Line("each night", points[:, 0], points[:, 1])
+    return Plot(
+        f"nights-{slug(column)}", shown.title, "nights before this one", shown.unit, (line,), reach=(0.0, 0.0)
+    )
 
 
 def _widths(rows: Sequence[Row]) -> Plot | None:
@@ -234,7 +240,7 @@ def _widths(rows: Sequence[Row]) -> Plot | None:
         Line("each night", each[:, 0], each[:, 1], joined=False),
         Line("nights together", together[:, 0], together[:, 1], kind="op"),
     )
-    title = "Width of the valve's fault over the nights"
+    title = "Width of the valve's fault"
     return Plot("widths", title, "nights before this one", "% of OP", lines, reach=(0.0, 1.0))
 
 

@@ -22,10 +22,15 @@ from reports.pages import Cell, Listing, Page, Section, Sparkline, Table, Tiles
 
 FOLLOWER = "\u2514 "
 """Before the name of a loop that stands under the one it follows."""
+FACETS = ("area", "cause", "action")
+"""Columns by which lists are filtered."""
 ALL_SHARES = ("oscillating_pct", "osc_valve_pct", "osc_tuning_pct", "osc_load_pct")
 ALL_COSTS = ("average_absolute_error_pct", "valve_travel_pct_per_h", "variability_pct")
+BESIDE = "side-by-side.html"
 LINKS = (
     ("Hand-over to maintenance", f"{maintenance.NAME}.html"),
+    ("Work list", "work.html"),
+    ("Loops side by side", BESIDE),
     ("All loops as CSV", "csv/index-ranking.csv"),
 )
 
@@ -44,7 +49,7 @@ def _worst_row(night: ShownNight, row: Row, follows: bool, by: str) -> tuple[Cel
     name = linked(night, row["loop"])
     return (
         replace(name, text=FOLLOWER + name.text) if follows else name,
-        cell(row, "description"),
+        *(cell(row, c) for c in ("description", "area")),
         Cell("", figure=_spark(night, row)),
         marked_cell(row, by),
         cell(row, "period_s"),
@@ -60,14 +65,12 @@ def worst_table(night: ShownNight) -> Table:
     """The loops to touch, the worst first, followers under the loop that moves them."""
     here, by = {r["loop"] for r in night.worst}, cost_column(night.rows)
     rows = tuple(_worst_row(night, r, r["source_loop"] in here, by) for r in night.worst)
-    hidden = sorted(night.hidden & {r["loop"] for r in night.rows if needs_a_look(r)})
-    said = f"Hidden by their notes: {', '.join(hidden)}." if hidden else ""
-    said += f" {MARK} {OF_RECORDED}." if any(mark(r, by) for r in night.worst) else ""
+    said = f"{MARK} {OF_RECORDED}." if any(mark(r, by) for r in night.worst) else ""
     noted = any(row[-1].text for row in rows)
     declared = page_columns("worst") if noted else page_columns("worst")[:-1]
-    shown = (*declared[:3], heading(by), *declared[3:])
+    shown = (*declared[:4], heading(by), *declared[4:])
     rows = tuple(row[: len(shown)] for row in rows)
-    return Table("worst", "", shown, rows, said.strip(), len(rows) > 10, "cause", cards=True)
+    return Table("worst", "", shown, rows, said, True, FACETS, True, BESIDE)
 
 
 def _all_row(night: ShownNight, row: Row) -> tuple[Cell, ...]:
@@ -87,7 +90,13 @@ def ranking(night: ShownNight) -> Table:
     marked = any(mark(row, name) for row in night.rows for name in (SIGNIFICANCE, *ALL_COSTS))
     note = f"{MARK} {OF_RECORDED}." if marked else ""
     rows = tuple(_all_row(night, r) for r in night.rows)
-    return Table("ranking", "", page_columns("ranking"), rows, note, True, "cause")
+    return Table("ranking", "", page_columns("ranking"), rows, note, True, FACETS, beside=BESIDE)
+
+
+def waiting(night: ShownNight) -> list[tuple[str, str]]:
+    """Loops that ask for a look and are hidden by a note, with that note."""
+    rows = [r for r in night.rows if r["loop"] in night.hidden and needs_a_look(r)]
+    return [(f"{r['loop']} waits:", night.note(r["loop"])) for r in rows]
 
 
 def _tiles(night: ShownNight) -> Tiles:
@@ -119,7 +128,7 @@ def page(
     links : to other nights, after those to the sheet and the CSV.
     """
     seen = [r for r in night.rows if r["loop"] not in night.hidden]
-    first = Listing(tuple(("", text) for text in first_things(seen, groups)))
+    first = Listing((*(("", text) for text in first_things(seen, groups)), *waiting(night)))
     drawn, lost = plant_map(night), lost_table(night)
     sections = (
         Section("First", (first, _tiles(night))),

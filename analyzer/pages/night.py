@@ -1,4 +1,4 @@
-"""All pages of a night: the morning page, one for each of the worst loops, and morning pages under their dates."""
+"""All pages of a night: the morning page, one for each loop, and morning pages under their dates."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from analyzer.explain.night import known
-from analyzer.pages import groups, loop, maintenance, morning
+from analyzer.pages import groups, loop, maintenance, morning, side_by_side, work
 from analyzer.pages.plant import NightSum, read_sums
 from analyzer.pages.reading import ShownNight, Thinned, read_night, read_nights, read_trends
 from analyzer.plantwide.view import GroupView, read_groups
@@ -24,8 +24,8 @@ HISTORY = 60
 """Nights of history on a loop's page; ours: two months, as a maintenance round takes."""
 
 
-def pages(store: Store, name: str | None = None, top: int = 50) -> Iterator[Page]:
-    """The morning page of a night (the latest by default), its sheets, and the pages of its groups and worst loops.
+def pages(store: Store, name: str | None = None, top: int = 200) -> Iterator[Page]:
+    """The morning page of a night (the latest by default), its sheets, and the pages of its groups and loops.
 
     Raises
     ------
@@ -36,12 +36,15 @@ def pages(store: Store, name: str | None = None, top: int = 50) -> Iterator[Page
     shared = read_groups(store, night.name)
     nights = [n for n in store.nights() if n <= night.name]
     links = nights_around(nights[-MOST_DATED:], night.name)
-    yield morning.page(night, shared, read_sums(store, night.name), links)
+    about = morning.page(night, shared, read_sums(store, night.name), links)
+    yield replace(about, choices=choices(nights[-MOST_DATED:], night.name))
     yield maintenance.page(night)
+    yield side_by_side.page(store, night)
+    yield work.page(store, night)
     members = {r["loop"] for g in shared for r in g.rows[: groups.MOST]}
     trends = read_trends(store, members, [night.name])
     for g in shared:
-        yield groups.page(g, trends, night.name, night.paged)
+        yield groups.page(g, trends, night.name, frozenset(night.paged))
     yield from _loop_pages(store, night, nights[-HISTORY:], shared, {**trends, **night.trends})
 
 
@@ -52,13 +55,13 @@ def _loop_pages(
     shared: Sequence[GroupView],
     around: Mapping[str, Thinned],
 ) -> Iterator[Page]:
-    """The worst loops one by one, each with its settings compared and its explanation, if the night kept any."""
+    """The loops one by one, each with its settings compared and its explanation, if the night kept any."""
     rows = read_nights(store, nights, loop.COLUMNS, night.paged)
     trends = read_trends(store, night.paged, nights[-loop.WEEK :])
     by_number = {g.number: g for g in shared}
     explained = {r["loop"]: r for r in known(store, night.name)}
     compared = _compared(store, night.name)
-    for tag in (worst["loop"] for worst in night.worst):
+    for tag in night.paged:
         own = [r for r in rows if r["loop"] == tag]
         drawn, settings = explanation(explained.get(tag)), kept_page(compared.get(tag))
         group = by_number.get(own[-1]["group"] or "")
@@ -101,6 +104,12 @@ def nights_around(nights: Sequence[str], night: str) -> tuple[tuple[str, str], .
     return tuple((text, f"{name_of(nights[k])}.html") for text, k in around if 0 <= k < len(nights))
 
 
+def choices(nights: Sequence[str], night: str) -> tuple[tuple[str, str], ...]:
+    """Nights that have a page, the latest first, with their pages; '' for the one that is shown."""
+    pages = {n: f"{name_of(n)}.html" for n in nights} | {nights[-1]: LATEST[1], night: ""}
+    return tuple((n, pages[n]) for n in reversed(nights)) if len(nights) > 1 else ()
+
+
 def dated_page(store: Store, night: str, nights: Sequence[str], sums: Sequence[NightSum]) -> Page:
     """A night's morning page without links to loops' pages, which are those of the latest night alone.
 
@@ -116,7 +125,13 @@ def dated_page(store: Store, night: str, nights: Sequence[str], sums: Sequence[N
     own = [s for s in sums if s.name <= night]
     found = morning.page(read_night(store, night, SHOWN), read_groups(store, night), own)
     links = (*nights_around(nights, night), LATEST)
-    return replace(found, name=name_of(night), sections=tuple(map(_unlinked, found.sections)), links=links)
+    return replace(
+        found,
+        name=name_of(night),
+        sections=tuple(map(_unlinked, found.sections)),
+        links=links,
+        choices=choices(nights, night),
+    )
 
 
 def _unlinked(section: Section) -> Section:

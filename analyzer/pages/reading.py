@@ -150,7 +150,8 @@ MEMORY = 14
 class ShownNight:
     """The rows of a night, the worst first, those of the night before by loop, and trends of the worst.
 
-    earlier : rows of the nights before that one by loop, oldest first, with what is remembered of them.
+    earlier : rows of the nights before that one by loop, oldest first, with what is remembered of them; paged : loops
+    that have a page of their own, the worst first.
     """
 
     name: str
@@ -161,6 +162,7 @@ class ShownNight:
     trends: Mapping[str, Thinned] = field(default_factory=dict)
     notes: Mapping[str, tuple[Note, ...]] = field(default_factory=dict)
     earlier: Mapping[str, Sequence[Row]] = field(default_factory=dict)
+    paged: tuple[str, ...] = ()
 
     @property
     def zone(self) -> str:
@@ -176,11 +178,6 @@ class ShownNight:
         """The newest note of a loop, '' where there is none."""
         found = last(self.notes, loop)
         return "" if found is None else found.said(self.zone)
-
-    @property
-    def paged(self) -> frozenset[str]:
-        """Loops that have a page of their own."""
-        return frozenset(r["loop"] for r in self.worst)
 
 
 def oscillates(row: Row | None) -> bool:
@@ -223,9 +220,10 @@ def read_night(store: Store, name: str | None, top: int, drawn: bool = True) -> 
     known = notes.read_notes(store.path)
     looked = [r for r in rows if needs_a_look(r) and not is_hidden(last(known, r["loop"]), night)]
     worst = tuple(followers_under(looked)[:top])
+    paged = tuple(dict.fromkeys(r["loop"] for r in (*worst, *rows)))[:top]
     trends = read_trends(store, {r["loop"] for r in worst}, [night]) if drawn else {}
     return ShownNight(
-        night, tuple(rows), before, earlier[-1] if earlier else "", worst, trends, known, remembered
+        night, tuple(rows), before, earlier[-1] if earlier else "", worst, trends, known, remembered, paged
     )
 
 

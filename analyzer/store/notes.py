@@ -10,7 +10,7 @@ import getpass
 import json
 import os
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from io import FileIO
 from pathlib import Path
@@ -22,24 +22,31 @@ from reports.texts import visible
 
 FILE = "notes.jsonl"
 """Name within the store."""
+STATES = ("open", "ordered", "done", "checked")
+"""How far the work on a loop has come."""
 LATEST_S = 32503680000.0
 """Times of notes beyond the year 3000 are none [s since 1970-01-01 UTC]."""
 
 
 @dataclass(frozen=True, slots=True)
 class Note:
-    """A note: the loop, when [s since 1970-01-01 UTC], what, by whom, and the date until which the loop is hidden."""
+    """A note: the loop, when [s since 1970-01-01 UTC], what, by whom, the date until which the loop is hidden, the
+    state of the work (STATES) and the date by which it is due, '' each where it says nothing of them."""
 
     loop: str
     time_s: float
     text: str
     owner: str = ""
     hidden_until: str = ""
+    state: str = ""
+    due: str = ""
 
     def said(self, zone: str | None) -> str:
         """The note in one line, its time on the plant's clock."""
-        until = f", hidden until {self.hidden_until}" if self.hidden_until else ""
-        return f"{self.text} ({self.owner or 'unknown'}, {stamp(self.time_s, zone)}{until})"
+        more = f", {self.state}" if self.state else ""
+        more += f", due {self.due}" if self.due else ""
+        more += f", hidden until {self.hidden_until}" if self.hidden_until else ""
+        return f"{self.text} ({self.owner or 'unknown'}, {stamp(self.time_s, zone)}{more})"
 
 
 def user() -> str:
@@ -76,7 +83,9 @@ def _ends_a_line(kept: FileIO) -> bool:
     return kept.read(1) == b"\n"
 
 
-def new(loop: str, text: str, owner: str | None, hidden_until: str) -> Note:
+def new(
+    loop: str, text: str, owner: str | None, hidden_until: str = "", state: str = "", due: str = ""
+) -> Note:
     """A note of now.
 
     Raises
@@ -89,7 +98,9 @@ def new(loop: str, text: str, owner: str | None, hidden_until: str) -> Note:
         raise InputError(
             f"an empty note on {loop}", "what was seen or done", 'say it: triage note STORE LOOP "..."'
         )
-    return Note(loop, time.time(), told, visible(user() if owner is None else owner), hidden_until)
+    return Note(
+        loop, time.time(), told, visible(user() if owner is None else owner), hidden_until, state, due
+    )
 
 
 def _lines(store: Path) -> list[str]:
@@ -116,19 +127,41 @@ def _parsed(line: str) -> Note | None:
     """The note of a line; None where it is none, whatever else it is."""
     try:
         kept = json.loads(line)
-        loop, text, owner, until = (kept.get(k, "") for k in ("loop", "text", "owner", "hidden_until"))
+        parts = [kept.get(k, "") for k in ("loop", "text", "owner", "hidden_until", "state", "due")]
         at_s = float(kept["time_s"])
     except (ValueError, TypeError, KeyError, AttributeError, OverflowError, RecursionError):
         return None
-    if not all(isinstance(x, str) for x in (loop, text, owner, until)) or not 0.0 <= at_s <= LATEST_S:
+    if not all(isinstance(x, str) for x in parts) or not 0.0 <= at_s <= LATEST_S:
         return None
-    return Note(loop, at_s, visible(text), visible(owner), visible(until))
+    loop, *told = parts
+    return Note(loop, at_s, *map(visible, told))
 
 
 def last(notes: Mapping[str, tuple[Note, ...]], loop: str) -> Note | None:
     """The newest note of a loop."""
     own = notes.get(loop, ())
     return own[-1] if own else None
+
+
+@dataclass(frozen=True, slots=True)
+class Work:
+    """The work on a loop, by its notes: the newest of them, who has it, how far it has come, when it came there
+    [s since 1970-01-01 UTC], and the date by which it is due, '' for none."""
+
+    note: Note
+    owner: str
+    state: str
+    since_s: float
+    due: str
+
+
+def work_on(notes: Sequence[Note]) -> Work:
+    """The work that a loop's notes make, oldest first: each part as the newest note that speaks of it says."""
+    states = [n for n in notes if n.state]
+    reached = states[-1] if states else notes[0]
+    owner = next((n.owner for n in reversed(notes) if n.owner), "")
+    due = next((n.due for n in reversed(notes) if n.due), "")
+    return Work(notes[-1], owner, reached.state or STATES[0], reached.time_s, due)
 
 
 def is_hidden(note: Note | None, night: str) -> bool:

@@ -13,6 +13,7 @@ from analyzer.columns import NIGHTS, row_of
 from analyzer.commands.report import pages, report
 from analyzer.store.store import Store
 from analyzer.store.table import rows_table, write_table
+from reports.texts import slug
 from tests.reports.small_store import NASTY, small_store
 
 
@@ -84,8 +85,8 @@ def test_pages_of_a_night(store: Store, tmp_path: Path) -> None:
     assert found.exit_code == 0
     names = [p.name for p in tmp_path.glob("*.html")]
     dated = [n for n in names if n.startswith("morning-")]
-    assert {"index.html", "maintenance.html"} <= set(names)
-    assert (len(dated), len(names)) == (14, 14 + 2 + 3)
+    assert {"index.html", "maintenance.html", "side-by-side.html", "work.html"} <= set(names)
+    assert (len(dated), len(names)) == (14, 14 + 4 + 3)
 
 
 def test_nights_are_linked_and_stale_pages_go(tmp_path: Path) -> None:
@@ -98,7 +99,7 @@ def test_nights_are_linked_and_stale_pages_go(tmp_path: Path) -> None:
     assert CliRunner().invoke(pages, [str(kept.path), "--top", "1", "--out", str(out)]).exit_code == 0
     after = {p.name for p in out.glob("*.html")}
     assert "mine.html" in after
-    assert len([n for n in before if n not in after]) == len(before) - 2 - 3 - 1
+    assert len([n for n in before if n not in after]) == len(before) - 4 - 3 - 1
     middle = (out / "morning-2026-03-03.html").read_text(encoding="utf-8")
     assert 'href="morning-2026-03-02.html"' in middle
     assert 'href="morning-2026-03-04.html"' in middle
@@ -118,11 +119,12 @@ def test_commands_are_quick_to_import() -> None:
 
 
 def test_a_calm_night_has_its_page(tmp_path: Path) -> None:
-    """Where no loop is worth a look the morning page is written all the same, and no loop's page beside it."""
+    """Where no loop is worth a look the morning page is written all the same, and the calm loop's page beside it."""
     rows = [row_of({"loop": "FIC1", "night": "2026-03-02", "status": "ok", "cause": "none"})]
     write_table(rows_table(rows, NIGHTS), tmp_path / "store" / "nights" / "2026-03-02.parquet")
     found = CliRunner().invoke(pages, [str(tmp_path / "store"), "--out", str(tmp_path / "out")])
     assert found.exit_code == 0, found.output
-    assert [p.name for p in sorted((tmp_path / "out").glob("*.html"))] == [
-        *("index.html", "maintenance.html", "morning-2026-03-02.html"),
-    ]
+    assert {p.name for p in (tmp_path / "out").glob("*.html")} == {
+        *("index.html", "maintenance.html", "morning-2026-03-02.html", "side-by-side.html", "work.html"),
+        f"{slug('FIC1')}.html",
+    }

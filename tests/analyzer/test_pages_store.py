@@ -178,7 +178,7 @@ def test_everything_is_written(store: Store, tmp_path: Path) -> None:
     pages = list(night.pages(store, None, 3))
     html, text = write_html(pages, tmp_path / "h"), write_markdown(pages, tmp_path / "m")
     tables = [p for page in pages for p in write_csv(page, tmp_path / "c")]
-    assert len(html) == len(text) == 5
+    assert len(html) == len(text) == 7
     assert len(tables) == sum(len(p.tables()) for p in pages)
     named = list((tmp_path / "m").rglob("*.svg"))
     assert len(named) == sum(t.read_text("utf-8").count("![") for t in text)
@@ -205,7 +205,7 @@ def test_a_big_plant_is_small(tmp_path: Path) -> None:
     """The morning page of 1,500 loops is under 1 MB beside its assets, 50 loop pages with a week under 1.5 MB."""
     big = small_store(tmp_path / "store", loops=1500, nights=7, hours=False)
     written = write_html(night.pages(big, None, 50), tmp_path / "out", single_file=True)
-    assert len(written) == 52
+    assert len(written) == 54
     assets = sum(len(html.asset(name)) for name in html.ASSETS)
     assert written[0].stat().st_size - assets < 1e6
     assert max(p.stat().st_size for p in written[1:]) < 1.5e6

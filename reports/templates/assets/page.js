@@ -18,13 +18,17 @@
 
   function sortBy(table, index, direction) {
     const body = table.tBodies[0];
-    const keyed = Array.from(body.rows, (row) => ({ row, key: keyOf(row, index) }));
+    const keyed = [];
+    Array.from(body.rows).forEach((row) => { // one that stands under another goes where that goes
+      if (keyed.length && row.cells[0].textContent.trim().startsWith("\u2514")) keyed[keyed.length - 1].rows.push(row);
+      else keyed.push({ rows: [row], key: keyOf(row, index) });
+    });
     keyed.sort((p, q) => {
       if ((p.key === "") !== (q.key === "")) return p.key === "" ? 1 : -1;
       return direction * compare(p.key, q.key);
     });
     const piece = document.createDocumentFragment();
-    keyed.forEach((k) => piece.appendChild(k.row));
+    keyed.forEach((k) => piece.append(...k.rows));
     body.appendChild(piece);
   }
 
@@ -48,27 +52,28 @@
     const table = document.getElementById(tools.dataset.for);
     const rows = Array.from(table.tBodies[0].rows, (row) => ({ row, text: row.textContent.toLowerCase() }));
     const search = tools.querySelector("input");
-    const select = tools.querySelector("select");
     const said = tools.querySelector("output");
     const heads = Array.from(table.tHead.rows[0].cells);
-    const at = select ? heads.findIndex((h) => h.dataset.key === select.dataset.facet) : -1;
-    if (select) {
-      const values = new Set(rows.map((r) => r.row.cells[at].textContent.trim()).filter((v) => v));
+    const facets = Array.from(tools.querySelectorAll("select"), (select) => (
+      { select, at: heads.findIndex((h) => h.dataset.key === select.dataset.facet) }));
+    const textAt = (row, at) => row.cells[at].textContent.trim();
+    facets.forEach(({ select, at }) => {
+      const values = new Set(rows.map((r) => textAt(r.row, at)).filter((v) => v));
       Array.from(values).sort().forEach((v) => select.add(new Option(v, v)));
-    }
+      select.addEventListener("change", apply);
+    });
     function apply() {
       const words = search.value.toLowerCase().split(/\s+/).filter((w) => w);
       let shown = 0;
       rows.forEach((r) => {
         const fits = words.every((w) => r.text.includes(w)) &&
-          (!select || !select.value || r.row.cells[at].textContent.trim() === select.value);
+          facets.every(({ select, at }) => !select.value || textAt(r.row, at) === select.value);
         r.row.hidden = !fits;
         shown += fits ? 1 : 0;
       });
       said.textContent = shown === rows.length ? rows.length + " rows" : shown + " of " + rows.length + " rows";
     }
     search.addEventListener("input", apply);
-    if (select) select.addEventListener("change", apply);
     apply();
   }
 
@@ -161,7 +166,7 @@
     const plots = [];
     let now = { ...whole };
 
-    function show(min, max) {
+    function show(min, max, alone) {
       const least = Math.min(20 * (whole.max - whole.min) / time.length, whole.max - whole.min);
       const width = Math.min(Math.max(max - min, least), whole.max - whole.min);
       const first = Math.min(Math.max(min, whole.min), whole.max - width);
@@ -169,7 +174,9 @@
       figure.dataset.from = String(now.min);
       figure.dataset.to = String(now.max);
       plots.forEach((u) => u.setScale("x", now));
+      if (!alone) figure.dispatchEvent(new CustomEvent("moved", { bubbles: true, detail: { ...now } }));
     }
+    figure.addEventListener("follow", (event) => show(event.detail.min, event.detail.max, true));
 
     function zoom(factor, share) {
       const at = now.min + (now.max - now.min) * share;
@@ -337,8 +344,73 @@
     figure.dataset.ready = "yes";
   }
 
+  /* Trends of several loops under each other, chosen by boxes or by the page's address, moved as one. */
+  function beside(box) {
+    const most = Number(box.dataset.most), place = box.querySelector(".together"), said = box.querySelector("output");
+    const boxes = Array.from(box.querySelectorAll('input[type="checkbox"]')), search = box.querySelector('input[type="search"]');
+    const drawn = new Map();
+    function apply() {
+      const chosen = boxes.filter((b) => b.checked).map((b) => b.value);
+      drawn.forEach((figure, name) => {
+        if (!chosen.includes(name)) { figure.remove(); drawn.delete(name); }
+      });
+      chosen.filter((name) => !drawn.has(name)).forEach((name) => {
+        const kept = Array.from(box.querySelectorAll("template")).find((t) => t.dataset.of === name);
+        const figure = kept.content.firstElementChild.cloneNode(true), other = drawn.values().next().value;
+        place.append(figure);
+        drawn.set(name, figure);
+        trend(figure);
+        if (other) figure.dispatchEvent(new CustomEvent("follow", { detail: { min: Number(other.dataset.from), max: Number(other.dataset.to) } }));
+      });
+      boxes.forEach((b) => { b.disabled = !b.checked && chosen.length >= most; });
+      said.textContent = chosen.length + " of at most " + most + " chosen";
+      history.replaceState(null, "", "#" + chosen.map(encodeURIComponent).join(","));
+    }
+    place.addEventListener("moved", (event) => drawn.forEach((figure) => {
+      if (figure !== event.target) figure.dispatchEvent(new CustomEvent("follow", { detail: event.detail }));
+    }));
+    search.addEventListener("input", () => boxes.forEach((b) => {
+      b.closest("li").hidden = !b.checked && !b.value.toLowerCase().includes(search.value.toLowerCase().trim());
+    }));
+    const wanted = location.hash.slice(1).split(",").map(decodeURIComponent).slice(0, most);
+    boxes.forEach((b) => { b.checked = wanted.includes(b.value); b.addEventListener("change", apply); });
+    apply();
+    box.dataset.ready = "yes";
+  }
+
+  /* Boxes beside the names of a table's loops, and a button that lays those chosen beside each other. */
+  function choosable(tools) {
+    const table = document.getElementById(tools.dataset.for), button = document.createElement("button");
+    const boxes = Array.from(table.tBodies[0].rows).filter((row) => row.cells[0].querySelector("a")).map((row) => {
+      const box = document.createElement("input"), name = row.cells[0].textContent.trim().replace("\u2514 ", "");
+      box.type = "checkbox";
+      box.value = name;
+      box.setAttribute("aria-label", "Choose " + name);
+      const label = document.createElement("label");
+      label.append(box);
+      row.cells[0].prepend(label, " ");
+      box.addEventListener("change", told);
+      return box;
+    });
+    const chosen = () => boxes.filter((b) => b.checked).map((b) => encodeURIComponent(b.value));
+    function told() {
+      const count = chosen().length;
+      button.textContent = count ? "Lay " + count + " beside each other" : "Choose loops to lay beside each other";
+      button.disabled = count < 2 || count > 6;
+    }
+    button.type = "button";
+    button.addEventListener("click", () => { location.href = tools.dataset.beside + "#" + chosen().join(","); });
+    tools.append(button);
+    told();
+  }
+
   document.querySelectorAll("main table").forEach(sortable);
+  document.querySelectorAll("select.nights").forEach((select) => {
+    select.addEventListener("change", () => { location.href = select.value; });
+  });
   document.querySelectorAll(".tools").forEach(filterable);
+  document.querySelectorAll(".tools[data-beside]").forEach(choosable);
   document.querySelectorAll("figure.trend").forEach(trend);
+  document.querySelectorAll(".beside").forEach(beside);
   addEventListener("beforeprint", () => document.querySelectorAll("details").forEach((d) => { d.open = true; }));
 })();

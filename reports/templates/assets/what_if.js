@@ -14,6 +14,8 @@
     return getComputedStyle(document.documentElement).getPropertyValue("--" + name).trim();
   }
 
+  const FARTHEST = 1000; // a setting that is meant is no farther from the present one
+
   function figureOf(value) {
     if (!isFinite(value)) return "–";
     return Math.abs(value) >= 100 ? value.toFixed(0) : String(Number(value.toPrecision(3)));
@@ -126,6 +128,27 @@
     const hours = Float64Array.from(base.error, (_, k) => k * model.scan_s / 3600);
     const plots = [];
 
+    /* Why a number that was typed in is not taken; empty where it is. */
+    function refused(kind, text, pair) {
+      const value = Number(text), name = kind === "kp" ? "Kp" : "Ti";
+      if (text.trim() === "" || !isFinite(value)) return name + " needs a number.";
+      if (kind === "kp" && (value === 0 || value < 0 !== now.kp < 0)) return "Kp needs a number " + (now.kp < 0 ? "below" : "above") + " 0, as now.";
+      if (kind === "ti" && value < 0) return "Ti needs a number above 0, or 0 for no integral action.";
+      const size = kind === "kp" ? Math.abs(pair[0]) : pair[1];
+      if (isFinite(size) && (size > middle[kind] * FARTHEST || size < middle[kind] / FARTHEST)) return name + " is over " + FARTHEST + " times from the present one.";
+      return "";
+    }
+
+    /* Whether a simulation ran away: its error is far beyond that of the present settings, or OP goes from end to end. */
+    function ranAway(run) {
+      const half = run.error.length >> 1, ends = run.op.filter((u) => u <= model.op_lo || u >= model.op_hi).length;
+      let early = 0, late = 0;
+      for (let k = 0; k < run.error.length; k += 1) {
+        if (k < half) early = Math.max(early, Math.abs(run.error[k])); else late = Math.max(late, Math.abs(run.error[k]));
+      }
+      return !isFinite(late) || late > 1e3 || (ends > 0.2 * run.op.length && late > 0.9 * early);
+    }
+
     function slideOf(kind) {
       const value = kind === "kp" ? Math.abs(set.kp) : set.ti;
       if (!isFinite(value)) return 1000;
@@ -133,12 +156,12 @@
     }
 
     function tried() {
-      const run = simulate(model, load, set.kp, set.ti), after = figures(model, run);
+      const run = simulate(model, load, set.kp, set.ti), after = figures(model, run), lost = ranAway(run);
       body.replaceChildren(...rows.map((name, i) => {
         const row = document.createElement("tr"), change = 100 * (after[i] / before[i] - 1);
         const sign = Math.abs(change) < 0.5 || !isFinite(change) ? "" : change < 0 ? "better" : "worse";
-        [[name, ""], [figureOf(before[i]), "n"], [figureOf(after[i]), "n"],
-          [isFinite(change) ? (change > 0 ? "+" : "") + change.toFixed(0) + " %" : "–", "n " + sign]].forEach(([text, kind], c) => {
+        [[name, ""], [figureOf(before[i]), "n"], [lost ? "unstable" : figureOf(after[i]), "n"],
+          [lost ? "–" : isFinite(change) ? (change > 0 ? "+" : "") + change.toFixed(0) + " %" : "–", "n " + sign]].forEach(([text, kind], c) => {
           const cell = document.createElement(c ? "td" : "th");
           if (!c) cell.scope = "row";
           cell.textContent = text;
@@ -156,7 +179,7 @@
         plots.forEach((u) => u.setScale("x", { min: shown.min, max: shown.max }));
       }
       const stated = convert.stated(set.kp, set.ti);
-      said.textContent = "Kp " + figureOf(stated[0]) + " " + model.law.kp_unit + ", Ti " + figureOf(stated[1]) + " " + model.law.ti_unit +
+      said.textContent = lost ? "Unstable with these settings: OP goes from end to end, or the error grows." : "Kp " + figureOf(stated[0]) + " " + model.law.kp_unit + ", Ti " + figureOf(stated[1]) + " " + model.law.ti_unit +
         ": travel " + figureOf(after[0]) + " %/h, average absolute error " + figureOf(after[1]) + " " + model.pv_unit + ".";
     }
 
@@ -185,7 +208,12 @@
       });
       boxes[kind].addEventListener("change", () => {
         const pair = convert.ideal(Number(boxes.kp.value), Number(boxes.ti.value), model);
-        if (isFinite(pair[0]) && pair[0] !== 0 && pair[1] > 0) set = { kp: Math.sign(now.kp) * Math.abs(pair[0]), ti: pair[1] };
+        const why = refused(kind, boxes[kind].value, pair);
+        const beside = figure.querySelector('.refused[data-of="' + kind + '"]');
+        beside.textContent = why;
+        boxes[kind].setAttribute("aria-invalid", why ? "true" : "false");
+        if (why) return;
+        set = { kp: Math.sign(now.kp) * Math.abs(pair[0]), ti: pair[1] };
         changed();
       });
     });

@@ -1,0 +1,139 @@
+"""The work list: what people have noted of loops, how far it has come, and what the nights since say of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from analyzer.history.plant_clock import stamp
+from analyzer.pages.reading import ShownNight, linked, oscillates, read_nights
+from analyzer.pages.words import Row, cause_cell, cell, page_columns, with_noun
+from analyzer.store.notes import STATES, Work, work_on
+from analyzer.store.store import Store
+from reports.pages import Cell, Page, Section, Table, Text, Tiles
+
+NAME = "work"
+NIGHTS = 62
+"""Nights that are looked at: a month, and the month before it."""
+COMPARED = 7
+"""Nights before a piece of work that are compared with those since; ours: a week."""
+FINISHED = STATES[2:]
+"""States in which the nights since are held against those before."""
+FIGURES = {
+    "average_absolute_error_pct": "average absolute error",
+    "valve_travel_pct_per_h": "valve travel",
+    "loss": "loss",
+}
+"""What is won, and how it is called."""
+READ = ("loop", "status", "oscillating_pct", *FIGURES)
+
+
+@dataclass(frozen=True, slots=True)
+class Sides:
+    """A loop's nights before and since a piece of work."""
+
+    before: Sequence[Row]
+    since: Sequence[Row]
+
+    def means(self, column: str) -> tuple[float, float] | None:
+        """Mean figure before and since; None where a side does not know it."""
+        known = [[r[column] for r in side if r[column] is not None] for side in (self.before, self.since)]
+        return (float(np.mean(known[0])), float(np.mean(known[1]))) if all(known) else None
+
+
+def sides(rows: Sequence[Row], day: str) -> Sides:
+    """A loop's assessed nights, oldest first, parted by the day of the work, which is neither."""
+    told = [r for r in rows if r["status"] == "ok"]
+    return Sides([r for r in told if r["night"] < day][-COMPARED:], [r for r in told if r["night"] > day])
+
+
+def said_since(work: Work, both: Sides) -> str:
+    """What the nights since a piece of work say of it; nothing of work that is not done."""
+    if work.state not in FINISHED:
+        return ""
+    if not both.since:
+        return "no night since"
+    still, was = (sum(oscillates(r) for r in side) for side in (both.since, both.before))
+    text = with_noun(len(both.since), "night")
+    if was and not still:
+        text += ": cured, oscillates in none"
+    elif was or still:
+        text += f": oscillates in {still}, before in {was} of {len(both.before)}"
+    changes = [(both.means(column), name) for column, name in FIGURES.items() if column != "loss"]
+    return ", ".join([text, *(f"{name} {_change(*m)}" for m, name in changes if m is not None and m[0] > 0)])
+
+
+def _change(before: float, since: float) -> str:
+    return f"{100.0 * (since / before - 1.0):+.0f} %".replace("-", "\u2212")
+
+
+def _row(night: ShownNight, row: Row, work: Work, both: Sides) -> tuple[Cell, ...]:
+    late = bool(work.due) and work.due < night.name and work.state not in FINISHED
+    return (
+        linked(night, row["loop"]),
+        *(cell(row, c) for c in ("description", "area")),
+        Cell(work.state, kind="better" if work.state in FINISHED else ""),
+        Cell(work.owner),
+        Cell(work.due, kind="worse" if late else ""),
+        Cell(f"{work.note.text} ({stamp(work.note.time_s, night.zone)[:10]})"),
+        cause_cell(row["cause"]),
+        cell(row, "action"),
+        Cell(said_since(work, both)),
+    )
+
+
+def _order(work: Work) -> tuple[bool, str, float]:
+    """What is not finished first, by its date; then what was reached last."""
+    return work.state in FINISHED, work.due or "9999", -work.since_s
+
+
+def won(night: ShownNight, works: Mapping[str, Work], history: Mapping[str, Sequence[Row]]) -> Tiles | None:
+    """What work that was finished since the start of the month brought; None where none was."""
+    month = night.name[:7]
+    done = [
+        sides(history.get(loop, ()), day)
+        for loop, w in works.items()
+        if w.state in FINISHED and (day := stamp(w.since_s, night.zone)[:10])[:7] == month
+    ]
+    items = []
+    for column, name in FIGURES.items():
+        known = [m for m in (x.means(column) for x in done) if m is not None]
+        before, since = (sum(m[k] for m in known) for k in (0, 1))
+        if before > 0.0:
+            tone = "better" if since < before else "worse"
+            items.append((_change(before, since), f"{name} of {with_noun(len(known), 'loop')}", tone))
+    return Tiles(tuple(items)) if items else None
+
+
+def page(store: Store, night: ShownNight) -> Page:
+    """The work list as it stands after a night."""
+    works = {loop: work_on(notes) for loop, notes in night.notes.items() if notes}
+    names = [n for n in store.nights() if n <= night.name][-NIGHTS:]
+    history: dict[str, list[Row]] = {}
+    for r in read_nights(store, names, READ, works):
+        history.setdefault(r["loop"], []).append(r)
+    rows = {r["loop"]: r for r in night.rows if r["loop"] in works}
+    listed = sorted(rows, key=lambda loop: (_order(works[loop]), loop))
+    cells = tuple(
+        _row(night, rows[k], works[k], sides(history.get(k, ()), stamp(works[k].since_s, night.zone)[:10]))
+        for k in listed
+    )
+    note = f"Since: nights after the day of the note, beside the {COMPARED} before it."
+    table = Table("work-list", "", page_columns("work"), cells, note, True, ("state", "owner", "area"), True)
+    brought = won(night, works, history)
+    empty = Text(('Nothing is noted: triage note STORE LOOP "..." --state open --due DATE.',))
+    sections = (
+        *(() if brought is None else (Section(f"Won since {night.name[:7]}-01", (brought,)),)),
+        Section("Work", (table if cells else empty,)),
+    )
+    links = (("All loops", "index.html"), ("As CSV", f"csv/{NAME}-work-list.csv"))
+    open_ones = sum(works[k].state not in FINISHED for k in rows)
+    return Page(
+        NAME,
+        "Work list",
+        f"{with_noun(open_ones, 'loop')} waiting after the night of {night.name}",
+        sections,
+        links,
+    )
