@@ -109,7 +109,7 @@ def table(c: Comparison, spec: LoopSpec, unit: str) -> Table:
     note = (
         f"Each simulated on the {lasts} of load that the night leaves behind the identified loop. {CAUTION}"
     )
-    return Table("settings", "", page_columns("settings"), rows, note)
+    return Table("settings", "", page_columns("settings"), rows, note, cards=True)
 
 
 def _row(t: Tried, c: Comparison, spec: LoopSpec, unit: str) -> tuple[Cell, ...]:

@@ -114,7 +114,7 @@ def _heading(name: str) -> Column:
 def morning_table(groups: Sequence[GroupView]) -> Table:
     """One cause, several loops: the groups of a night, those that cost most first."""
     note = "Repair or retune the first loop, then look at the others again."
-    return Table("groups", "", page_columns("groups"), tuple(map(_morning_row, groups)), note)
+    return Table("groups", "", page_columns("groups"), tuple(map(_morning_row, groups)), note, cards=True)
 
 
 def _morning_row(g: GroupView) -> tuple[Cell, ...]:
@@ -140,7 +140,7 @@ MEMBERS = (
 
 def _members(g: GroupView, paged: frozenset[str]) -> Table:
     rows = tuple(_member(g, r, paged) for r in g.rows)
-    return Table("members", "", MEMBERS, rows, "Lags that the night cannot tell are left empty.")
+    return Table("members", "", MEMBERS, rows, "Lags that the night cannot tell are left empty.", cards=True)
 
 
 def _member(g: GroupView, row: Row, paged: frozenset[str]) -> tuple[Cell, ...]:
