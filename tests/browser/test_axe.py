@@ -22,10 +22,11 @@ RUN = """const done = arguments[arguments.length - 1];
 
 
 def kinds(folder: Path) -> list[Path]:
-    """One page of each kind: morning, hand-over, a loop's, before and after."""
+    """One page of each kind: morning, hand-over, side by side, work list, before and after, a loop's."""
     here = folder / "folder"
     loop = next(p for p in sorted(here.glob("FIC*.html")))
-    return [here / "index.html", here / "maintenance.html", loop, here / "before-after.html"]
+    names = ("index", "maintenance", "side-by-side", "work", "before-after")
+    return [*(here / f"{name}.html" for name in names), loop]
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
