@@ -351,7 +351,7 @@ MOST_LEVEL = 65534
 
 
 def level_step(low: float, high: float) -> float:
-    """The step between the levels in which a page holds a signal."""
+    """The step between the levels in which a page holds a signal, in its own unit, 1 where it stands still."""
     return (high - low) / MOST_LEVEL or 1.0
 
 

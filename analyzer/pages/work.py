@@ -8,9 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from analyzer.history.plant_clock import stamp
+from analyzer.loop.decisions import Status
 from analyzer.pages.reading import ShownNight, linked, oscillates, read_nights
 from analyzer.pages.words import Row, cause_cell, cell, page_columns, with_noun
-from analyzer.store.notes import STATES, Work, work_on
+from analyzer.store.notes import FINISHED, Work, work_on
 from analyzer.store.store import Store
 from reports.pages import Cell, Page, Section, Table, Text, Tiles
 
@@ -19,8 +20,6 @@ NIGHTS = 62
 """Nights that are looked at: a month, and the month before it."""
 COMPARED = 7
 """Nights before a piece of work that are compared with those since; ours: a week."""
-FINISHED = STATES[2:]
-"""States in which the nights since are held against those before."""
 FIGURES = {
     "average_absolute_error_pct": "average absolute error",
     "valve_travel_pct_per_h": "valve travel",
@@ -45,7 +44,7 @@ class Sides:
 
 def sides(rows: Sequence[Row], day: str) -> Sides:
     """A loop's assessed nights, oldest first, parted by the day of the work, which is neither."""
-    told = [r for r in rows if r["status"] == "ok"]
+    told = [r for r in rows if r["status"] == Status.OK]
     return Sides([r for r in told if r["night"] < day][-COMPARED:], [r for r in told if r["night"] > day])
 
 

@@ -56,13 +56,18 @@ def _send_on(done: dict[str, Finding], led: Sequence[str], above: str, root: Roo
 
 
 def led_anew(rows: Sequence[Mapping[str, Any]], loops: Mapping[str, Finding]) -> list[dict[str, Any]]:
-    """The rows of groups, those led by a master that follows its slave led by that slave."""
+    """The rows of groups, those led by a master that follows its slave led by that slave.
+
+    A loop that leads one group and follows another loop's in a second one leads as before.
+    """
     out = [dict(r) for r in rows]
+    by_place = {(r["group"], r["loop"]): r for r in out}
     for row in [r for r in out if r["role"] == GroupRole.SOURCE]:
         root = loops[row["loop"]].follows
-        slave = next((r for r in out if root and (r["group"], r["loop"]) == (row["group"], root.loop)), None)
-        if root is not None:
-            row["role"] = GroupRole.FOLLOWER
+        if root is None or loops[root.loop].text("master") != row["loop"]:
+            continue
+        row["role"] = GroupRole.FOLLOWER
+        slave = by_place.get((row["group"], root.loop))
         if slave is not None:
             slave["role"] = GroupRole.SOURCE
             slave["source_pct"], row["source_pct"] = row["source_pct"], slave["source_pct"]

@@ -24,6 +24,8 @@ FILE = "notes.jsonl"
 """Name within the store."""
 STATES = ("open", "ordered", "done", "checked")
 """How far the work on a loop has come."""
+FINISHED = STATES[2:]
+"""Those in which it is done: the nights since are held against those before."""
 LATEST_S = 32503680000.0
 """Times of notes beyond the year 3000 are none [s since 1970-01-01 UTC]."""
 
@@ -156,12 +158,18 @@ class Work:
 
 
 def work_on(notes: Sequence[Note]) -> Work:
-    """The work that a loop's notes make, oldest first: each part as the newest note that speaks of it says."""
-    states = [n for n in notes if n.state]
-    reached = states[-1] if states else notes[0]
+    """The work that a loop's notes make, oldest first: each part as the newest note that speaks of it says.
+
+    Work that was done and then checked is done since it was done.
+    """
+    states = [n for n in notes if n.state] or [notes[0]]
+    reached = states[-1]
+    since = next((n for n in reversed(states) if n.state not in FINISHED), None)
+    first = states[states.index(since) + 1] if since is not None and since is not reached else states[0]
     owner = next((n.owner for n in reversed(notes) if n.owner), "")
     due = next((n.due for n in reversed(notes) if n.due), "")
-    return Work(notes[-1], owner, reached.state or STATES[0], reached.time_s, due)
+    since_s = first.time_s if reached.state in FINISHED else reached.time_s
+    return Work(notes[-1], owner, reached.state or STATES[0], since_s, due)
 
 
 def is_hidden(note: Note | None, night: str) -> bool:

@@ -50,7 +50,6 @@ LEFT_OVER = (
     "(log likelihood +{nats:.0f})."
 )
 LEFT_BY = {
-    "": "a flexible model",
     "past": "what OP did long before",
     "size": "the size of OP's moves",
     "level": "the level of PV",
@@ -122,6 +121,8 @@ def note(found: Explanation) -> str:
         return STACKED.format(names=stacked) if is_stack(found) else ""
     if found.outside is not None:
         return ""
+    if not found.left_by:
+        return NO_NAME
     return LEFT_OVER.format(nats=found.left, by=LEFT_BY[found.left_by])
 
 

@@ -47,6 +47,15 @@ def test_each_part_of_the_work_is_as_the_newest_note_says_that_speaks_of_it() ->
     assert work_on(told[:1]).state == "open"
 
 
+def test_work_that_is_checked_is_done_since_it_was_done() -> None:
+    """A check a week later does not part the nights anew; work that is opened again and done is done since then."""
+    states = ("open", "done", "checked", "open", "done")
+    told = [Note("A", float(k), s, "", "", s) for k, s in enumerate(states)]
+    assert [(work_on(told[: k + 1]).state, work_on(told[: k + 1]).since_s) for k in range(5)] == [
+        *(("open", 0.0), ("done", 1.0), ("checked", 1.0), ("open", 3.0), ("done", 4.0)),
+    ]
+
+
 def night(name: str, oscillating: float, error: float) -> dict[str, object]:
     """One night of a loop."""
     figures = {"average_absolute_error_pct": error, "valve_travel_pct_per_h": 10.0 * error, "loss": error}

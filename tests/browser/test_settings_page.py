@@ -128,3 +128,58 @@ def test_sliders_move_the_loop(browser: Any, settings: Path) -> None:
     after, _ = shown(browser)
     assert after < 0.7 * before
     assert "travel" in browser.execute_script("return document.querySelector('.whatif output').textContent")
+
+
+@pytest.mark.parametrize(
+    ("of", "typed", "why"),
+    [
+        ("kp", "0", "Kp needs a number above 0"),
+        ("kp", "-3", "Kp needs a number above 0"),
+        ("kp", "", "Kp needs a number"),
+        ("kp", "1e9", "times from the present one"),
+        ("ti", "-1", "Ti needs a number above 0"),
+    ],
+)
+def test_a_number_that_nobody_means_is_refused_beside_its_field(
+    browser: Any, settings: Path, of: str, typed: str, why: str
+) -> None:
+    """It is told what is wanted, and what was simulated stays; a number that is meant takes the words away."""
+    opened(browser, settings / "stick-slip.html")
+    wait(browser, "return document.querySelector('.whatif').dataset.ready === 'yes'")
+    before = shown(browser)
+    type_in(browser, of, typed)
+    assert why in refused(browser, of)
+    assert shown(browser) == before
+    type_in(browser, of, "0.5" if of == "kp" else "40")
+    assert refused(browser, of) == ""
+
+
+def test_what_runs_away_is_called_unstable(browser: Any, settings: Path) -> None:
+    """Twenty times the gain is no figure with a change in percent."""
+    opened(browser, settings / "free.html")
+    wait(browser, "return document.querySelector('.whatif').dataset.ready === 'yes'")
+    type_in(browser, "kp", "1")
+    wait(browser, "return document.querySelector('.whatif output').textContent.startsWith('Unstable')")
+    cells = browser.execute_script(
+        "return Array.from(document.querySelectorAll('.whatif td.n'), (c) => c.textContent)"
+    )
+    assert cells[1::3] == ["unstable"] * 3
+
+
+def type_in(browser: Any, of: str, text: str) -> None:
+    """Type into a field and leave it."""
+    browser.execute_script(
+        """const box = document.querySelector('.whatif input[type="number"][data-of="' + arguments[0] + '"]');
+        box.value = arguments[1]; box.dispatchEvent(new Event('change'));""",
+        of,
+        text,
+    )
+
+
+def refused(browser: Any, of: str) -> str:
+    """What is said beside a field."""
+    return str(
+        browser.execute_script(
+            "return document.querySelector('.refused[data-of=' + arguments[0] + ']').textContent", of
+        )
+    )

@@ -139,7 +139,8 @@
       return "";
     }
 
-    /* Whether a simulation ran away: its error is far beyond that of the present settings, or OP goes from end to end. */
+    /* Whether a simulation ran away: its error is ten spans, or OP stands at its ends for a fifth of the time while the
+       error does not die away (ours: a loop that recovers from a load is at an end once, and calmer in the second half). */
     function ranAway(run) {
       const half = run.error.length >> 1, ends = run.op.filter((u) => u <= model.op_lo || u >= model.op_hi).length;
       let early = 0, late = 0;

@@ -104,3 +104,13 @@ def test_those_that_a_master_moves_follow_its_slave_where_the_slave_is_the_root(
     told = {r["loop"]: (r["role"], r["source_pct"]) for r in led_anew(rows, done)}
     assert told["FIC1"] == (GroupRole.SOURCE, 9.0)
     assert (told["TIC1"][0], told["PIC7"][0]) == (GroupRole.FOLLOWER, GroupRole.FOLLOWER)
+
+
+def test_a_loop_that_leads_one_group_and_follows_in_another_leads_as_before() -> None:
+    """Only a master gives its lead up, and only to its own slave."""
+    root = Root("PIC9", 0.9, None, 80.0)
+    leads = following(
+        found("FIC2", Cause.LOAD, 360.0), root, Swing(), dict.fromkeys(CAUSES, 0.0), Sign(Cause.LOAD, 0.9, "")
+    )
+    rows = [{"loop": "FIC2", "group": "1", "role": GroupRole.SOURCE, "source_pct": 90.0}]
+    assert led_anew(rows, {"FIC2": leads, "PIC9": found("PIC9", Cause.VALVE, 360.0)}) == rows
