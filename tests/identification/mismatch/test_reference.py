@@ -7,35 +7,16 @@ import pytest
 
 from identification.limits import LIMITS
 from identification.mismatch.plain_loop import inputs_of, prepared
-from identification.mismatch.recording import Recording
 from identification.mismatch.reference import Foretold, foretold, switched
-from proofs.concealed.plant import Drive, Pi, Plant, close_loop, idle
+from proofs.concealed.plant import Plant
+from tests.proofs.concealed.sealed_loop import PLANT, N, recording
 
-N = 4500
-PLANT = Plant(K=1.1, T=25.0, L=4.0, v0=48.0, y0=52.0)
 CLOCK = np.arange(N)
 
 
-def left_of(
-    plant: Plant, seed: int, act: np.ndarray | None = None, pre: np.ndarray | None = None
-) -> Foretold:
-    """What the plain loop leaves of a plant whose set point moves every 150 s or so under load and noise."""
-    rng = np.random.default_rng(seed)
-    load = np.empty(N)
-    load[0] = 0.0
-    for k, shock in enumerate(rng.normal(0.0, 0.05, N - 1)):
-        load[k + 1] = 0.995 * load[k] + shock
-    still = idle(N, plant)
-    drive = Drive(
-        **{f: getattr(still, f) for f in ("late", "force", "op_hi", "helper", "supply")},
-        sp=plant.y0 + np.repeat(rng.uniform(-6.0, 6.0, N // 150 + 1), 150)[:N],
-        load=load,
-        pre=still.pre if pre is None else pre,
-        post=rng.normal(0.0, 0.03, N),
-        act=still.act if act is None else act,
-    )
-    pv, op = close_loop(plant, Pi(kp=1.2, ti=30.0), drive, 1.0)
-    s = Recording(drive.sp, pv, op, np.ones(N, dtype=bool), 1.0, CLOCK.astype(float))
+def left_of(plant: Plant, seed: int, **acting: np.ndarray) -> Foretold:
+    """What the plain loop leaves of a loop of the sealed generator."""
+    s = recording(plant, seed, **acting)
     p, fit = prepared(inputs_of(s), s.pv - s.pv.mean(), s.usable)
     return foretold(p, fit)
 

@@ -5,33 +5,14 @@ import pytest
 
 from identification.mismatch.answer import Answer, answer
 from identification.mismatch.diagnosis import explain
-from identification.mismatch.recording import Recording
 from identification.mismatch.words import check, unexplained_reason
-from proofs.concealed.plant import Drive, Pi, Plant, close_loop, idle
-
-N, SCAN = 4500, 1.0
-PLANT = Plant(K=1.1, T=25.0, L=4.0, v0=48.0, y0=52.0)
-PI = Pi(kp=1.2, ti=30.0)
+from proofs.concealed.plant import Plant
+from tests.proofs.concealed.sealed_loop import PLANT, N, recording
 
 
-def asked(plant: Plant, seed: int, supply: np.ndarray | None = None) -> Answer:
-    """The answer for a loop whose set point moves every 150 s or so under a load and noise."""
-    rng = np.random.default_rng(seed)
-    moves = np.repeat(rng.uniform(-6.0, 6.0, N // 150 + 1), 150)[:N]
-    load = np.empty(N)
-    load[0] = 0.0
-    for k, shock in enumerate(rng.normal(0.0, 0.05, N - 1)):
-        load[k + 1] = 0.995 * load[k] + shock
-    still = idle(N, plant)
-    drive = Drive(
-        **{f: getattr(still, f) for f in ("pre", "late", "force", "op_hi", "helper", "act")},
-        sp=plant.y0 + moves,
-        load=load,
-        supply=np.ones(N) if supply is None else supply,
-        post=rng.normal(0.0, 0.03, N),
-    )
-    pv, op = close_loop(plant, PI, drive, SCAN)
-    s = Recording(drive.sp, pv, op, np.ones(N, dtype=bool), SCAN, SCAN * np.arange(N))
+def asked(plant: Plant, seed: int, **acting: np.ndarray) -> Answer:
+    """The answer for a loop of the sealed generator."""
+    s = recording(plant, seed, **acting)
     return answer(explain(s), s)
 
 
@@ -89,5 +70,5 @@ def test_plain_loop_is_not_given_physics_of_no_name() -> None:
 def test_supply_that_wanders_keeps_its_name() -> None:
     """A supply that sways twice in the record by itself is a supply, though a gain that remembers sways as well."""
     sway = 1.0 + 0.15 * np.sin(4.0 * np.pi * np.arange(N) / N)
-    said = asked(PLANT, 5, sway)
+    said = asked(PLANT, 5, supply=sway)
     assert (said.verdict, said.outside) == ("supply-variation", None)
