@@ -49,7 +49,7 @@ def witness(verdict: Verdict, oscillates: bool, prepared: Prepared, limits: Caus
         "profile": [round(float(x), 1) for x in _profile(m, 0.0 if convicted else limits.noise_widths)],
         "needed": round(needed(m, limits, oscillates), 1),
         "op_range": float(f"{m.play.valve.stickband / m.size:.4g}") if m.size > 0 else 0.0,
-        "jump": [round(x, 1) for x in (_jump(m, limits) if whole else (0.0, 0.0))],
+        "jump": [round(x, 1) for x in (_jump(_by_slips(verdict, m) or m, limits) if whole else (0.0, 0.0))],
         **{
             k: [float(f"{x:.4g}") for x in known]
             for k, known in _told(verdict, m, limits, oscillates).items()
@@ -70,6 +70,13 @@ def _profile(m: Measured, noise_widths: float) -> Floats:
     return np.where(found > 0.0, found * max(m.evidence, 0.0) / most, found)
 
 
+def _by_slips(verdict: Verdict, m: Measured) -> Measured | None:
+    """What was measured slip by slip, where the verdict tells the valve so: one friction for all slips hides their
+    jumps. None where it does not."""
+    told = verdict.measured
+    return told if told is not None and told is not m and told.stick_slip is not None else None
+
+
 def _jump(m: Measured, limits: CauseLimits) -> Known:
     """Evidence for a slip jump and what it takes [nat], none where it was not looked for."""
     if m.stick_slip is None:
@@ -81,8 +88,8 @@ def _jump(m: Measured, limits: CauseLimits) -> Known:
 
 def _told(verdict: Verdict, m: Measured, limits: CauseLimits, oscillates: bool) -> Mapping[str, Known]:
     """Constants of the better fit, the valve's as they are told where that is slip by slip."""
-    found, told = dict(_constants(m, limits, oscillates)), verdict.measured
-    if told is not m and told is not None and told.stick_slip is not None:
+    found, told = dict(_constants(m, limits, oscillates)), _by_slips(verdict, m)
+    if told is not None and told.stick_slip is not None:
         valve = told.stick_slip.valve
         found |= {"width": (valve.stickband, DECODED), "slip_jump": (valve.slip_jump, math.log(LEAST_JUMP))}
     return found
