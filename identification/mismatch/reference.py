@@ -48,8 +48,8 @@ WIDEST = 5.0
 
 @dataclass(frozen=True, slots=True)
 class Loop:
-    """What a way may act by: flow behind the valve and PV one sample late, shape (n,) each, about their means, the
-    time constant [s], and the response of PV to a load."""
+    """What a way may act by: flow behind the valve [% OP] and PV as known before [% PV], shape (n,) each, about
+    their means, the time constant [s], and the response of PV to a load."""
 
     flow: Floats
     pv: Floats
@@ -71,9 +71,13 @@ class Foretold:
 
 
 def loop_of(p: Problem, c: Floats) -> Loop:
-    """A loop as a model, shape (SIZE,), has it."""
+    """A loop as a model, shape (SIZE,), has it.
+
+    An experiment's errors are those of its simulation and go on from sample to sample, so that recorded PV tells them
+    whatever makes them: there PV is the simulation's.
+    """
     flow, dt_s = through_valve(p.inputs, c), p.inputs.dt_s
-    pv = np.concatenate((p.y[:1], p.y[:-1]))
+    pv = simulate(p.inputs, c) if p.by_simulation else np.concatenate((p.y[:1], p.y[:-1]))
     lag_s = min(max(float(c[Slot.T]), dt_s), 0.1 * flow.size * dt_s)
     unit, still = c.copy(), np.zeros(flow.size)
     unit[[Slot.K, Slot.BIAS, Slot.START]] = 1.0, 0.0, 0.0
@@ -156,7 +160,8 @@ def ways(p: Problem, fit: Fitted) -> Mapping[str, Callable[[], list[Floats]]]:
     def white(signals: Callable[[], list[Floats]]) -> list[Floats]:
         return [whitened(x, fit.ar, p.edges) for x in signals()]
 
-    return {k: partial(white, v) for k, v in in_pv.items()} | {"sensor": partial(by_sensor, p, fit)}
+    asked = {k: partial(white, v) for k, v in in_pv.items()}
+    return asked if p.by_simulation else {**asked, "sensor": partial(by_sensor, p, fit)}
 
 
 def foretold(p: Problem, fit: Fitted, clock: bool = True) -> Foretold:

@@ -9,6 +9,7 @@ from identification.limits import LIMITS
 from identification.mismatch.plain_loop import inputs_of, prepared
 from identification.mismatch.reference import Foretold, foretold, switched
 from proofs.concealed.plant import Plant
+from proofs.experiments import drawn
 from tests.proofs.concealed.sealed_loop import PLANT, N, recording
 
 CLOCK = np.arange(N)
@@ -62,6 +63,15 @@ def test_a_pump_by_the_clock_is_left_to_the_clock(seed: int) -> None:
         assert told.way == "clock"
         assert told.gain > LIMITS.search.left_over
     assert left_of(PLANT, seed, act=0.4 * (CLOCK % 600 < 200)).gain < LIMITS.search.left_over
+
+
+def test_the_errors_of_an_experiment_s_simulation_are_not_foretold() -> None:
+    """Under a load that lasts, of plain plants moved by a script (proofs/experiments.py), nothing is left: errors that
+    go on from sample to sample are told by recorded PV whatever makes them, and that is not asked."""
+    for seed in range(6):
+        s, _ = drawn("plain", seed)
+        p, fit = prepared(inputs_of(s), s.pv - s.pv.mean(), s.usable, experiment=True)
+        assert foretold(p, fit).gain < LIMITS.search.left_over
 
 
 def test_a_switch_remembers_where_it_was_last() -> None:
