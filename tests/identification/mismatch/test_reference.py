@@ -56,8 +56,8 @@ def test_what_acts_in_one_way_is_left_to_it(changes: dict[str, float], way: str)
 
 @pytest.mark.parametrize("seed", [22, 23, 24])
 def test_a_pump_by_the_clock_is_left_to_the_clock(seed: int) -> None:
-    """A load that is on for a third of every ten minutes is foretold by a clock past what is told of, by nothing else
-    as well; the half of it, which noise hides, is not told of."""
+    """A load that is on for a third of every ten minutes is foretold best by a clock, past what is told of; the half
+    of it, which noise hides, is not told of."""
     for size in (0.7, 1.5):
         told = left_of(PLANT, seed, act=size * (CLOCK % 600 < 200))
         assert told.way == "clock"
@@ -66,8 +66,8 @@ def test_a_pump_by_the_clock_is_left_to_the_clock(seed: int) -> None:
 
 
 def test_the_errors_of_an_experiment_s_simulation_are_not_foretold() -> None:
-    """Under a load that lasts, of plain plants moved by a script (proofs/experiments.py), nothing is left: errors that
-    go on from sample to sample are told by recorded PV whatever makes them, and that is not asked."""
+    """Of plain plants moved by a script under a load that lasts nothing is left: recorded PV, which tells errors that
+    go on from sample to sample whatever makes them, is not asked."""
     for seed in range(6):
         s, _ = drawn("plain", seed)
         p, fit = prepared(inputs_of(s), s.pv - s.pv.mean(), s.usable, experiment=True)
