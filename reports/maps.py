@@ -16,7 +16,7 @@ from reports.svg import (
     box,
     digits,
     log_ticks,
-    named_place,
+    named_places,
     tick_x,
     tick_y,
     upright,
@@ -97,9 +97,9 @@ def field(f: Field, alone: bool = False) -> Drawing:
         body += tick_y(down, across, "" if alone and down < TITLED and len(text) > 3 else text)
     body.append(written(left + width / 2, height + 32, f.x_label, "middle", "axis"))
     body.append(written(4, 12, f.y_label, "start", "axis"))
-    for place in f.places:
-        at = min(max(x.at(place.x), left), left + width), min(max(y.at(place.y), 0.0), height)
-        body += named_place(place, *at, across)
+    held = [(min(max(x.at(p.x), left), left + width), min(max(y.at(p.y), 0.0), height)) for p in f.places]
+    named = [(place, *at) for place, at in zip(f.places, held, strict=True)]
+    body += named_places(named, (left, 0.0, left + width, height))
     return Drawing(left + width + 10, height + foot, "".join(body), f.title, "graph", natural=True)
 
 

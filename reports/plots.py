@@ -16,7 +16,7 @@ from reports.svg import (
     between,
     box,
     digits,
-    named_place,
+    named_places,
     points,
     tick_x,
     tick_y,
@@ -120,8 +120,8 @@ def plot(p: Plot) -> Drawing:
         few = slice(None, None, max(math.ceil(line.x.size / MOST_POINTS), 1))
         body.append(_line(line, x.places(line.x[few]), y.places(line.y[few])))
     body += [part for mark in p.marks for part in _mark(mark, x, along)]
-    for place in p.places:
-        body += named_place(place, x.at(place.x), y.at(place.y), across)
+    named = [(place, x.at(place.x), y.at(place.y)) for place in p.places]
+    body += named_places(named, (across[0], along[0], across[1], along[1]))
     body.append(written((x.first + x.last) / 2, PLOT[1] - 6, p.x_label, "middle", "axis"))
     body.append(_turned(13, (y.first + y.last) / 2, p.y_label))
     return Drawing(*PLOT, "".join(body), f"{p.title}: {p.y_label} over {p.x_label}", "plot")

@@ -6,7 +6,7 @@ Colours come from the style sheet by class, so that light, dark and print need o
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +17,17 @@ from reports.pages import Bars, Floats, Place, Sparkline
 SPARK = (120.0, 26.0)
 LETTER = 6.6
 """Width of a letter at the size of a tick's figure, about."""
+POINT = 4.5
+"""Radius of a named point."""
+BESIDE = tuple(
+    (down, across, side)
+    for down in (4.0, -9.0, 17.0, -22.0, 30.0)
+    for across, side in ((8.0, "start"), (-8.0, "end"), (0.0, "middle"))
+    if (down, side) != (4.0, "middle")
+)
+"""Where the name of a point may stand from it: down, across, and how it is anchored; the first that is free."""
+Corners = tuple[float, float, float, float]
+"""Left, top, right and foot of a rectangle."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,12 +136,37 @@ def between(x: Floats, low: Floats, high: Floats) -> str:
     return f"M{'L'.join(there)}L{'L'.join(reversed(back))}Z" if there else ""
 
 
-def named_place(place: Place, x: float, y: float, room: tuple[float, float]) -> list[str]:
-    """A point with its name, on the side where there is room between two horizontal places."""
-    end = x > room[0] + 0.75 * (room[1] - room[0])
-    aside, anchor = (-8, "end") if end else (8, "start")
-    point = f'<circle class="place {place.kind}" cx="{digits(x)}" cy="{digits(y)}" r="4.5"/>'
-    return [point, written(x + aside, y + 4, place.label, anchor, "placed")]
+def named_places(points: Sequence[tuple[Place, float, float]], room: Corners) -> list[str]:
+    """Points with their names beside them, each where it covers no other name or point and leaves no room it has."""
+    taken = [(x - POINT, y - POINT, x + POINT, y + POINT) for _, x, y in points]
+    out = []
+    for place, x, y in points:
+        wide = LETTER * len(place.label)
+        spots = [(x + dx, y + dy, side) for dy, dx, side in BESIDE]
+        boxes = [_letters(across, down, side, wide) for across, down, side in spots]
+        best = min(range(len(spots)), key=lambda k: (_covered(boxes[k], taken) + _outside(boxes[k], room), k))
+        taken.append(boxes[best])
+        across, down, side = spots[best]
+        out.append(f'<circle class="place {place.kind}" cx="{digits(x)}" cy="{digits(y)}" r="{POINT}"/>')
+        out.append(written(across, down, place.label, side, "placed"))
+    return out
+
+
+def _letters(x: float, y: float, anchor: str, wide: float) -> Corners:
+    """Where a text's letters stand."""
+    left = x - wide * {"start": 0.0, "middle": 0.5, "end": 1.0}[anchor]
+    return left, y - 10.0, left + wide, y + 3.0
+
+
+def _covered(own: Corners, others: Iterable[Corners]) -> float:
+    """Area that a rectangle shares with others."""
+    sides = ((min(own[2], o[2]) - max(own[0], o[0]), min(own[3], o[3]) - max(own[1], o[1])) for o in others)
+    return sum(max(w, 0.0) * max(h, 0.0) for w, h in sides)
+
+
+def _outside(own: Corners, room: Corners) -> float:
+    """Area of a rectangle that lies outside another one."""
+    return (own[2] - own[0]) * (own[3] - own[1]) - _covered(own, [room])
 
 
 def nice_ticks(low: float, high: float, most: int = 6) -> list[float]:

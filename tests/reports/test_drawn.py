@@ -115,3 +115,28 @@ def test_places_are_named_on_the_side_with_room() -> None:
     ((_, drawn),) = drawings(replace(PLOT, places=places))
     assert re.search(r'text-anchor="start" class="placed">left<', drawn.body)
     assert re.search(r'text-anchor="end" class="placed">right<', drawn.body)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_names_of_points_near_each_other_cover_none(seed: int) -> None:
+    """Five settings within a twentieth of the map have names that overlap neither each other nor leave it."""
+    rng = np.random.default_rng(seed)
+    centre = rng.uniform(0.2, 1.8, 2)
+    at = 10.0 ** (centre + rng.uniform(-0.05, 0.05, (5, 2)))
+    names = ("now", "recommended", "Skogestad", "Cohen-Coon", "lambda")
+    places = tuple(Place(x, y, name, "now") for (x, y), name in zip(at, names, strict=True))
+    ((_, drawn),) = drawings(Field("f", "Map", "Kp", "Ti", X, X, np.ones((20, 20)), NONE, NONE, places))
+    boxes = []
+    for x, y, anchor, name in re.findall(
+        r'<text x="([\d.]+)" y="([\d.]+)" text-anchor="(\w+)" class="placed">([^<]*)<', drawn.body
+    ):
+        left = float(x) - 6.0 * len(name) * {"start": 0.0, "middle": 0.5, "end": 1.0}[anchor]
+        boxes.append((left, left + 6.0 * len(name), float(y) - 9.0, float(y)))
+    assert len(boxes) == len(names)
+    apart = [
+        a[1] <= b[0] or b[1] <= a[0] or a[3] <= b[2] or b[3] <= a[2]
+        for i, a in enumerate(boxes)
+        for b in boxes[:i]
+    ]
+    assert all(apart)
+    assert all(left >= 62.0 and right <= 482.0 for left, right, _, _ in boxes)
