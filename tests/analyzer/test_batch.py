@@ -203,6 +203,7 @@ def test_progress_counts_all_loops(night, tmp_path):
     assert said == [(k, 20) for k in range(0, 21, 4)]
 
 
+@pytest.mark.slow
 def test_two_weeks_are_fourteen_nights(tmp_path):
     """An export of two weeks is cut at midnights into 14 nights, each with all loops and 24 hours."""
     n = 14 * 1440
@@ -266,6 +267,7 @@ print(json.dumps(peak))
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="no resource module")
 def test_memory_does_not_grow_with_the_number_of_loops(tmp_path):
     """Sixty loops of 24 h, 140 MB of samples, take no more than 1.3 times the memory of the first fifteen."""

@@ -72,6 +72,7 @@ def test_a_worker_killed_in_mid_run_costs_no_loop(export, whole, cluster, tmp_pa
     assert tables(store) == whole
 
 
+@pytest.mark.slow
 def test_a_scheduler_that_dies_is_one_line(export, whole, tmp_path):
     """With kill -9 of the scheduler in mid-run the run ends with exit 2 and a last line that names it and --resume,
     and so gone on with on this machine it makes the store of an undisturbed run."""

@@ -128,6 +128,7 @@ def test_commands_that_read_an_export_take_the_same_options(name):
     assert {"--loops", "--changes", "--since", "--until", "--timezone", "--config"} <= options
 
 
+@pytest.mark.slow
 def test_the_limits_reach_every_part_of_a_run(tmp_path: Path, export: Path):
     """Limits of each part change what that part says of one export: quality, figures, oscillation, cause, advice."""
     plain = night(tmp_path, export, "")

@@ -12,6 +12,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 
 import pyarrow as pa
@@ -29,6 +30,7 @@ from identification.errors import InputError
 from proofs.plant import START_S, write_export
 
 LOOPS = 24
+slow = partial(pytest.param, marks=pytest.mark.slow)
 linux = pytest.mark.skipif(sys.platform != "linux", reason="processes are looked for in /proc")
 
 
@@ -150,7 +152,7 @@ def test_a_run_killed_with_signal_9_goes_on_with_resume(export, whole, killed, b
 
 
 @linux
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
+@pytest.mark.parametrize("number", [signal.SIGTERM, slow(signal.SIGINT), slow(signal.SIGHUP)])
 def test_a_stopped_run_ends_at_once_and_says_how_to_go_on(export, tmp_path, number):
     """SIGTERM, SIGINT and SIGHUP end run and workers, with one line that names --resume and no traceback."""
     store = tmp_path / "store"
@@ -166,6 +168,7 @@ def test_a_stopped_run_ends_at_once_and_says_how_to_go_on(export, tmp_path, numb
     assert not set(workers) & {int(p.name) for p in Path("/proc").glob("[0-9]*")}
 
 
+@pytest.mark.slow
 @linux
 def test_a_run_under_nohup_outlives_its_terminal(export, whole, tmp_path):
     """Where SIGHUP is ignored, as under nohup, it ends nothing."""
@@ -239,6 +242,7 @@ def test_a_second_export_of_a_night_adds_its_loops(export, whole, tmp_path):
     assert tables(store) == whole
 
 
+@pytest.mark.slow
 def test_the_fuller_record_of_a_loop_is_kept(export, whole, tmp_path):
     """An hour of a loop is not replaced by twenty minutes of it, and the other way round it is; both are said."""
     short = part(export, tmp_path / "short.parquet", range(2), 1200)
@@ -288,7 +292,7 @@ def test_a_run_goes_on_with_its_own_limits_alone(export, begun, tmp_path):
     assert ran(export, begun, "--resume", "--config", str(limits)).exit_code == 0
 
 
-@pytest.mark.parametrize("year", [1601, 1970, 2106])
+@pytest.mark.parametrize("year", [slow(1601), 1970, slow(2106)])
 def test_a_stray_stamp_makes_no_nights(export, whole, tmp_path, year):
     """One stamp far from the rest is set aside and told; the night is what it is without it."""
     table = pq.read_table(export)
@@ -319,6 +323,7 @@ def test_a_gap_of_days_makes_no_empty_nights(tmp_path):
     assert "2 nights without a good sample of any loop are left out" in told.stderr
 
 
+@pytest.mark.slow
 def test_explanations_of_other_loops_stay(export, tmp_path):
     """What was explained of loops that a second export does not hold is kept; that of replaced records is not."""
     store = Store(tmp_path / "store")
@@ -366,7 +371,7 @@ def small_files(most: int) -> None:
 
 
 @linux
-@pytest.mark.parametrize("most", [512, 20_000])
+@pytest.mark.parametrize("most", [512, slow(20_000)])
 def test_a_full_disk_names_the_file_and_resume(export, whole, tmp_path, most):
     """Where there is no room to write, one line names the file and --resume, and with room the run goes on."""
     store = tmp_path / "store"

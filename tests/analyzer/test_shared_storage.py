@@ -225,6 +225,7 @@ def test_a_worker_elsewhere_copies_what_it_has_not(bucket: str, export: Path, tm
     assert (opened.read(["L00.PV"])["L00.PV"].value == before).all()
 
 
+@pytest.mark.slow
 def test_a_cluster_reads_and_writes_shared_storage(
     bucket: str,
     export: Path,

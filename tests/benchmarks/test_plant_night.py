@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import pytest
+
 from benchmarks.plant_night import line, make, night, tenth
 
 
+@pytest.mark.slow
 def test_a_plants_night_is_run_and_measured_end_to_end(tmp_path):
     """Exports of areas are written and run by the command; floor, time and memory are told, and who was flagged."""
     plant = make(tmp_path, 12, 2.0, 1, tenth, area_of=8)

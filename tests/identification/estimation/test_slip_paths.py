@@ -60,7 +60,7 @@ def responded(stem: Floats) -> Floats:
 
 
 def test_the_path_is_the_best_of_all_there_are():
-    """On a short record the path told is the most probable of every choice of slips, its log probability too."""
+    """On a short record the path told is the most probable of all with up to four slips, its probability too."""
     rng = np.random.default_rng(3)
     op = 1.25 * np.sin(np.arange(26) * 0.5)
     start = op[0] - BREAKAWAY
@@ -76,7 +76,7 @@ def test_the_path_is_the_best_of_all_there_are():
         e = pv - responded(stem) - (pv[0] - responded(stem)[0]) * POLE ** np.arange(op.size)
         return chance - 0.5 * float((e[1:] ** 2).sum()) / NOISE**2, stem
 
-    every = [worth(s) for n in range(6) for s in itertools.combinations(possible, n)]
+    every = [worth(s) for n in range(5) for s in itertools.combinations(possible, n)]
     best, stem = max(every, key=lambda found: found[0])
     r = Response(Lag(POLE, 1 - POLE, 0.0, DELAY), GAIN, np.zeros(op.size))
     counts = np.arange(op.size) > 0
