@@ -40,7 +40,7 @@ def _at_limit(found: Finding) -> str:
     side = "" if not isinstance(mean, float) else " lower" if mean < 50 else " upper"
     text = f"OP rests at its{side} limit for {found.number('at_limits_pct'):.0f} % of the time"
     from_end_to_end = found.cause is Cause.TUNING  # then nothing is wrong with the valve's size
-    return text if from_end_to_end else f"{text}: look at the valve's size and at what feeds it"
+    return text if from_end_to_end else f"{text}; look at the valve's size and at what feeds it"
 
 
 def _side(found: Finding) -> str:
@@ -56,7 +56,7 @@ def _lasting(found: Finding) -> str:
     if Lane.AT_LIMIT in found.lanes:
         return text
     return (
-        f"{text} though the loop is in automatic and OP off its limits: do tags and ranges belong together?"
+        f"{text} though the loop is in automatic and OP off its limits; do tags and ranges belong together?"
     )
 
 
@@ -70,7 +70,7 @@ def _slow(found: Finding, limits: LaneLimits) -> bool:
 def _sluggish(found: Finding) -> str:
     text = f"sluggish: errors last {found.number('error_memory_ti'):.2g} integral times, the gain is small"
     room = found.number("gain_room")
-    return text if room < 2.0 else f"{text} (the process bears about {room:.1g} times as much)"
+    return text if room < 2.0 else f"{text}; the process bears about {room:.1g} times as much"
 
 
 RULES = (

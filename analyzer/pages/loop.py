@@ -29,6 +29,7 @@ from analyzer.pages.words import (
     with_noun,
 )
 from analyzer.words.belief import wear_text
+from analyzer.words.reason import in_short
 from analyzer.words.units import row_settings
 from identification.mismatch.words import check
 from reports.pages import Block, Cell, Facts, Line, Listing, Page, Panels, Plot, Section, Table, Text
@@ -110,7 +111,7 @@ def _notes(notes: Sequence[str]) -> tuple[Section, ...]:
 
 def _first(row: Row, thin: Thinned | None) -> Section:
     """What is wrong, what to do in three lines, and ten periods of it."""
-    reason = row["reason"] or "nothing was found"
+    reason = cell(row, "reason").text or "nothing was found"
     blocks: list[Block] = [Text((reason[:1].upper() + reason[1:] + ".",), "lead")]
     order = work_order(row)
     if order:
@@ -146,6 +147,9 @@ def _evidence(row: Row) -> Section:
     blocks: list[Block] = (
         [Table("evidence", "", page_columns("evidence"), rows)] if rows else [Text(("No sign of a fault.",))]
     )
+    more = in_short(row["reason"] or "")[1]
+    if more:
+        blocks.insert(0, Text((more[:1].upper() + more[1:] + ".",)))
     known = [titled(k, number(row[k])) for k in (*MODEL, *LIKELIHOOD) if row[k] is not None]
     if known:
         blocks.append(Facts(tuple(known)))

@@ -12,7 +12,7 @@ from analyzer.columns import BY_NAME
 from analyzer.loop.cost import LOSS, SIGNIFICANCE, cost, cost_column
 from analyzer.loop.decisions import CAUSES, Cause, Status, counts
 from analyzer.pages.reading import ShownNight, linked, needs_a_look, read_nights
-from analyzer.pages.words import Row, number, page_columns, plain_cell
+from analyzer.pages.words import Row, cell, number, page_columns, plain_cell
 from analyzer.store.store import Store
 from reports.pages import Block, Cell, Floats, Line, Panels, Plot, Table, Tile, TileGroup, TreeMap
 
@@ -71,7 +71,7 @@ def area_table(rows: Sequence[Row]) -> Table:
 
 def _tile(night: ShownNight, row: Row, by: str) -> Tile:
     kind = "calm" if not needs_a_look(row) else row["cause"] if row["cause"] in CAUSES else "unclear"
-    text = f"{row['loop']}: {number(cost(row, by))}. {row['reason'] or ''}"
+    text = f"{row['loop']}: {number(cost(row, by))}. {cell(row, 'reason').text}"
     return Tile(row["loop"], cost(row, by), kind, text, linked(night, row["loop"]).href)
 
 

@@ -10,7 +10,7 @@ from analyzer.loop.decisions import CAUSES, Action, Cause, Due, Fault, GroupRole
 from analyzer.pages.maintenance import work_order
 from analyzer.pages.news import news_lines
 from analyzer.pages.reading import ShownNight, needs_a_look, oscillates, read_night
-from analyzer.pages.words import Row, duration, enumerated, page_columns, texts, with_noun
+from analyzer.pages.words import Row, cell, duration, enumerated, page_columns, texts, with_noun
 from analyzer.plantwide.view import GroupView, read_groups
 from analyzer.store.store import Store
 from analyzer.words.units import changed_settings
@@ -121,7 +121,7 @@ def page(store: Store, name: str | None = None) -> Page:
         [r for r in night.rows if r["loop"] not in night.hidden], read_groups(store, night.name)
     )
     rows: tuple[tuple[Cell, ...], ...] = tuple(
-        (Cell(r["loop"], kind="strong"), Cell(r["reason"] or ""), Cell(_do(r)), Cell(night.note(r["loop"])))
+        (Cell(r["loop"], kind="strong"), cell(r, "reason"), Cell(_do(r)), Cell(night.note(r["loop"])))
         for r in night.worst
     )
     shown = page_columns("summary")[: 4 if any(row[3].text for row in rows) else 3]

@@ -14,6 +14,7 @@ from analyzer.comparison.before_after import Change, ChangeVerdict
 from analyzer.history.plant_clock import stamp
 from analyzer.loop.cost import mark
 from analyzer.loop.decisions import CAUSES
+from analyzer.words.reason import in_short
 from analyzer.words.units import duration
 from reports.pages import Cell, Column, Floats
 
@@ -113,6 +114,8 @@ def plain_cell(value: float | None) -> Cell:
 def cell(row: Row, name: str) -> Cell:
     """What a row holds in a column of the store: three digits, a period in the unit that reads best, or a text."""
     value = row[name]
+    if name == "reason":
+        return Cell(in_short(value or "")[0])
     if not BY_NAME[name].is_number:
         return Cell(value or "")
     return Cell(duration(value) if name == "period_s" else number(value), value)

@@ -48,14 +48,7 @@ def width_text(now: Belief) -> str:
         return "the valve is worn"
     if width is None:
         return f"the valve {verb} about {now.valve.width:.2g} % of OP"
-    return f"the valve {verb} {width.value:.2g} % of OP ({width.low:.2g} to {width.high:.2g})"
-
-
-def _pooled(now: Belief) -> str:
-    """The pooled width with its interval, '' where there is none."""
-    pool = now.constants.get("width")
-    width = None if pool is None else pool.pooled
-    return "" if width is None else f"{width.value:.2g} % ({width.low:.2g} to {width.high:.2g}), "
+    return f"the valve {verb} {width.value:.2g} % of OP ({width.low:.3g} to {width.high:.3g})"
 
 
 def wear_text(row: Row) -> str:
@@ -127,18 +120,14 @@ def _of_valve(now: Belief, row: Row) -> dict[str, Any]:
 def reason(now: Belief, row: Row) -> str:
     """The sentence of a loop: the night's own where the nights agree, else what they say together; with the valve's
     width over the nights where it is worn."""
-    t, several = now.told, now.valve.nights > 1
-    worn = several and t.fault in IS and now.valve.certain
-    over = (
-        f"{now.valve.nights} nights say {width_text(now)}, certain since {now.valve.certain}"
-        if worn
-        else None
-    )
-    if now.told.calmed:
-        return joined(_calmed(now), over)
-    if t.own:
-        return joined(row["reason"], over)
-    return joined(_together(now, row), over, f"this night alone: {WAS[Cause(row['cause'])]}")
+    t, nights = now.told, now.valve.nights
+    worn = nights > 1 and t.fault in IS and now.valve.certain
+    sure = f"certain by {nights} nights" if worn else None
+    over = f"{nights} nights say {width_text(now)}, certain since {now.valve.certain}" if worn else None
+    alone = None if t.own or t.calmed else f"this night alone: {WAS[Cause(row['cause'])]}"
+    text = _calmed(now) if t.calmed else row["reason"] if t.own else _together(now, row)
+    first, *others = (text or "").split("; ")
+    return joined(first, sure, *others, over, alone)
 
 
 CALMED = (
@@ -156,8 +145,8 @@ def _calmed(now: Belief) -> str:
     slower = "slower and " if (left.period_s or 0.0) > (then.period_s or 0.0) else ""
     before = f"every {duration(then.period_s)} until {then.night}"
     return (
-        f"cycles every {duration(left.period_s)}, {slower}{share:.0f} % as much as before its settings were changed "
-        f"({before}): {width_text(now)}; at the next shutdown stroke it"
+        f"cycles every {duration(left.period_s)}, {slower}{share:.0f} % as much as before its settings were changed; "
+        f"at the next shutdown stroke it; {width_text(now)}; it cycled {before}"
     )
 
 

@@ -8,6 +8,7 @@ from typing import Any
 from analyzer.columns import BY_NAME
 from analyzer.loop.cost import LOSS, cost_column, mark
 from analyzer.loop.decisions import Cause
+from analyzer.words.reason import in_short
 from analyzer.words.units import duration, gain_unit
 from reports.texts import visible
 
@@ -55,8 +56,9 @@ def brief(row: Mapping[str, Any], columns: Sequence[str] = SHOWN) -> dict[str, s
         "kp": _settings(row["kp"], row["kp_new"], gain),
         "ti": _settings(row["ti"], row["ti_new"], row.get("ti_unit") or "s", "none"),
     }
+    special["reason"] = in_short(row["reason"] or "")[0]
     if row.get("note"):
-        special["reason"] = f"{row['reason'] or ''} [note: {row['note']}]"
+        special["reason"] += f" [note: {row['note']}]"
     return {
         name: visible(special.get(name, "") or figure(row[name], name) + mark(row, name)) for name in columns
     }

@@ -1,4 +1,7 @@
-"""The reason of a loop's row: what was found and why, in one plain sentence; most figures stay in their columns."""
+"""The reason of a loop's row: what was found and why, clause by clause, what matters most first.
+
+Lists and pages show the clauses that make a sentence (`in_short`); the others are evidence and stand folded.
+"""
 
 from __future__ import annotations
 
@@ -7,9 +10,11 @@ from analyzer.loop.decisions import AMPLIFICATION, OF_LOAD, Action, Cause, Due, 
 from analyzer.loop.finding import Finding, Root
 from analyzer.words.units import duration
 
+MOST_WORDS = 20
+"""Words of a reason that is read at a glance."""
 PLAIN = {
-    Fault.BACKLASH: "the valve has {width:.2g} % play ({share:.0f} % of OP's range)",
-    Fault.STICTION: "the valve sticks by {width:.2g} % ({share:.0f} % of OP's range)",
+    Fault.BACKLASH: "the valve has {width:.2g} % play",
+    Fault.STICTION: "the valve sticks by {width:.2g} %",
 }
 WITHOUT_WIDTH = {
     Fault.BACKLASH: "the valve has play over {share:.0f} % of OP's range",
@@ -17,8 +22,8 @@ WITHOUT_WIDTH = {
 }
 """The same where OP is not in percent."""
 BY_HAND = {
-    Due.NOW: "; stroke it in steps of {step:.2g} %",
-    Due.SHUTDOWN: "; at the next shutdown stroke it in steps of {step:.2g} %",
+    Due.NOW: "stroke it in steps of {step:.2g} %",
+    Due.SHUTDOWN: "at the next shutdown stroke it in steps of {step:.2g} %",
 }
 """How a valve's fault is confirmed, and when."""
 STEPS = 4.0
@@ -29,6 +34,14 @@ SAID_AT_ONCE = (Action.CHECK_SETTINGS, Action.NEEDS_DATA)
 """Actions whose words belong into the list."""
 
 
+def in_short(text: str, most: int = MOST_WORDS) -> tuple[str, str]:
+    """The first clauses of a reason, as many as make a short sentence (one at least), and the others."""
+    clauses = text.split("; ")
+    words = [len(clause.split()) for clause in clauses]
+    kept = max([n for n in range(1, len(clauses) + 1) if sum(words[:n]) <= most], default=1)
+    return "; ".join(clauses[:kept]), "; ".join(clauses[kept:])
+
+
 def reason(found: Finding) -> str:
     """What was found and why, what the lanes add, and since when it is told."""
     known = {Lane.MANUAL} if found.lack is Lack.AUTOMATIC else set()  # what it lacks has said so already
@@ -37,8 +50,9 @@ def reason(found: Finding) -> str:
     changed = found.text("settings_changed")
     if not changed:
         return text
-    late = found.known.get("judged_since_s") is None
-    return f"before {changed}, too late in the night to judge: {text}" if late else f"since {changed}: {text}"
+    clock = changed.split()[-1]
+    late = "too late in the night to judge" if found.known.get("judged_since_s") is None else None
+    return joined(f"{'before' if late else 'since'} {clock} (new settings): {text}", changed, late)
 
 
 def _whole(found: Finding) -> str:
@@ -47,24 +61,18 @@ def _whole(found: Finding) -> str:
         return found.lacking
     if found.follows is not None:
         return f"{cycle_text(found)}: {_follows(found.follows)}"
-    text = _alone(found)
-    names = ", ".join(found.moves[:MOST_NAMES]) + (" ..." if len(found.moves) > MOST_NAMES else "")
-    return joined(text, f"it also moves {names}: fix this one first" if names else None)
-
-
-def _alone(found: Finding) -> str:
-    """What was found of the loop by itself, with the test that it asks for."""
     if found.swing is None:
         return f"not assessed: {found.remedy.text or found.lacking}"
-    text, more = _cause(found), found.remedy.text
+    names = ", ".join(found.moves[:MOST_NAMES]) + (" ..." if len(found.moves) > MOST_NAMES else "")
+    moves = f"it also moves {names}: fix this one first" if names else None
     at_once = found.remedy.action in SAID_AT_ONCE or found.lack is Lack.OP_RANGE
-    if at_once and more not in (found.lacking, ""):
-        text = joined(text, more)
-    return text + to_stroke(found)
+    more = found.remedy.text if at_once and found.remedy.text != found.lacking else None
+    first, *others = _cause(found).split("; ")
+    return joined(first, moves, more, to_stroke(found), *others)
 
 
 def _cause(found: Finding) -> str:
-    """Whether the loop cycles, and why."""
+    """Whether the loop cycles, and why, with the figures that say so at the end."""
     cycle = cycle_text(found)
     if found.cause is Cause.VALVE:
         return f"{cycle}: {valve_text(found)}"
@@ -101,7 +109,7 @@ def valve_text(found: Finding) -> str:
         return f"the valve is at fault; {_strongest(found, 2)}"
     if width is None:
         return WITHOUT_WIDTH[fault].format(share=100 * size)
-    return PLAIN[fault].format(width=width, share=100 * size)
+    return f"{PLAIN[fault].format(width=width)}; that is {100 * size:.0f} % of OP's range"
 
 
 def _strongest(found: Finding, most: int, *first: str) -> str:

@@ -71,8 +71,8 @@ def too_short(hours: float, least: float) -> str:
 def too_coarse(dt_s: float, period_s: float, samples: float) -> str:
     """Why a record cannot show the cycles that the loop would have."""
     return (
-        f"oscillation needs a sample every {period_s / samples:.2g} s or faster, has one every {dt_s:g} s (a cycle "
-        f"of this loop would take about {period_s:.3g} s)"
+        f"oscillation needs a sample every {period_s / samples:.2g} s or faster, has one every {dt_s:g} s; a cycle "
+        f"of this loop would take about {period_s:.3g} s"
     )
 
 

@@ -14,6 +14,8 @@ from analyzer.loops.changes import read_changes
 from analyzer.loops.tags import match, read_loops
 from analyzer.night import batch
 from analyzer.store.store import Store
+from analyzer.words.present import brief
+from analyzer.words.reason import in_short
 from identification.models import Pid
 from identification.record import LoopRecord
 from proofs.plant import CONFIG, SAMPLE_DATA, START_S, Trends, prepared, run, spec, wander
@@ -109,7 +111,16 @@ def test_no_false_alarm_of_settings_on_the_day_of_a_change(retuned):
     named = {loop for loop, r in rows.items() if r["settings_changed"]}
     assert named == changed
     assert rows["TIC2106"]["judged_since_s"] == START_S + 7 * DAY_S + 9 * HOUR + 600.0
-    assert rows["TIC2106"]["reason"].startswith("since Ti 70 \u2192 520 s at 09:10: ")
+    assert rows["TIC2106"]["reason"].startswith("since 09:10 (new settings): ")
+    assert "; Ti 70 \u2192 520 s at 09:10" in rows["TIC2106"]["reason"]
+
+
+def test_a_list_tells_every_loop_in_twenty_words(retuned):
+    """Of the mill's loops on the day of seven changes none takes over 20 words in a list, and loses nothing."""
+    for row in retuned[0].values():
+        head, rest = in_short(row["reason"])
+        assert len(brief(row)["reason"].split()) <= 20
+        assert "; ".join(filter(None, (head, rest))) == row["reason"]
 
 
 def test_a_follower_is_told_as_one_on_the_day_of_its_change(retuned):

@@ -6,7 +6,7 @@ import pytest
 
 from analyzer.loop.decisions import Cause, Status
 from analyzer.loop.finding import Finding, Sign, Swing
-from analyzer.words.reason import reason
+from analyzer.words.reason import in_short, reason
 
 
 @pytest.mark.parametrize(
@@ -24,3 +24,20 @@ def test_a_loop_that_cycles_for_a_part_of_the_night_is_not_said_to_be_calm(share
     swing = Swing(1.0, share, 1086.0 if share else None, 1.0)
     cause = Cause.LOAD if share >= 50 else Cause.NONE
     assert reason(Finding("L", "2026-03-02", Status.OK, swing=swing, cause=cause, signs=signs)) == said
+
+
+@pytest.mark.parametrize(
+    ("text", "head"),
+    [
+        ("does not oscillate", "does not oscillate"),
+        ("one two; three", "one two; three"),
+        (f"{'a ' * 18}b; c; d", f"{'a ' * 18}b; c"),
+        (f"{'a ' * 24}b; c", f"{'a ' * 24}b"),
+        ("", ""),
+    ],
+)
+def test_a_reason_in_short_is_its_first_clauses(text: str, head: str) -> None:
+    """Whole clauses stand in front as far as twenty words go, one at least; the others follow, and none is lost."""
+    first, rest = in_short(text)
+    assert first == head
+    assert "; ".join(filter(None, (first, rest))) == text
