@@ -26,7 +26,8 @@ DRAWS = 200
 """Bootstrap draws over all loops together."""
 SEED = 0
 NOW, RECOMMENDED, SIMC, LAMBDA, LONGER = "now", "recommended", "SIMC", "lambda", "Ti not below T"
-"""Names of the settings compared."""
+CALMER, SMALLER, REPAIRED = "calmer valve", "smaller error", "now, valve repaired"
+"""Names of the settings compared; the last is what a repair would bring."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -189,11 +190,11 @@ class Tried:
     integral_s: float
 
 
-def alternatives(loop: Loop, new: Pid | None) -> dict[str, Pid]:
-    """Settings to compare: the present ones, the recommended if any, and the rules'; those that equal earlier ones
-    are left out."""
+def alternatives(loop: Loop, new: Pid | None, chosen: Mapping[str, Pid] | None = None) -> dict[str, Pid]:
+    """Settings to compare: the present ones, the recommended if any, those chosen between, and the rules'; those that
+    equal earlier ones are left out."""
     now, h = loop.controller, scan_step(loop)
-    found = {NOW: now} | ({} if new is None else {RECOMMENDED: new})
+    found = {NOW: now} | ({} if new is None else {RECOMMENDED: new}) | dict(chosen or {})
     rules = {SIMC: simc(loop.process, scan_s=h), LAMBDA: lambda_settings(loop.process, h)}
     found |= {name: replace(now, kp=pid.kp, ti_s=pid.ti_s, td_s=0.0) for name, pid in rules.items()}
     if not isinstance(loop.process, Integrator):

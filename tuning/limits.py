@@ -45,6 +45,8 @@ class TuningLimits:
     cycle_growth_stick: float = TOML
     band_beyond: float = TOML
     stick_ratio: float = TOML
+    trade_error: float = TOML
+    trade_reach: float = TOML
     spread_slope: float = TOML
     spread_delay: float = TOML
     spread_band: float = TOML

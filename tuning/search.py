@@ -233,7 +233,8 @@ def rounded(x: float) -> float:
     return float(f"{x:.3g}")
 
 
-def _pairs(loop: Loop, gains: Floats, times: Floats) -> list[Pid]:
+def pairs(loop: Loop, gains: Floats, times: Floats) -> list[Pid]:
+    """Settings of every gain [% OP / % PV] with every integral time [s], with the sign that the loop has now."""
     now, sign = loop.controller, math.copysign(1.0, loop.controller.kp)
     return [
         replace(now, kp=rounded(sign * float(k)), ti_s=rounded(float(t))) for k, t in product(gains, times)
@@ -251,7 +252,7 @@ def robust(loops: Sequence[Loop], controller: Pid, most: Sequence[float]) -> flo
     return first
 
 
-def _bounds_now(loops: Sequence[Loop], limits: TuningLimits) -> list[float]:
+def bounds_now(loops: Sequence[Loop], limits: TuningLimits) -> list[float]:
     """The limits of Ms, or the present tuning's own where that is larger, the first loop's up to the samples' limit.
 
     A loop that has run for years at its present Ms is not made less robust by settings with no more; a valve model
@@ -263,11 +264,11 @@ def _bounds_now(loops: Sequence[Loop], limits: TuningLimits) -> list[float]:
     return [own, *(max(most, ms if math.isfinite(ms) else most) for ms in now[1:])]
 
 
-def _kept(table: Bench, most: Rejection, pairs: list[Pid]) -> list[Candidate]:
-    """Those of the pairs that keep robustness, load rejection and error, tried on every loop."""
-    process, bounds = table.loops[0].process, _bounds_now(table.loops, table.limits)
+def _kept(table: Bench, most: Rejection, settings: list[Pid]) -> list[Candidate]:
+    """Those of some settings that keep robustness, load rejection and error, tried on every loop."""
+    process, bounds = table.loops[0].process, bounds_now(table.loops, table.limits)
     found = []
-    for pid in pairs:
+    for pid in settings:
         if pid.ti_s / abs(pid.kp) > most.integral:
             continue
         ms = robust(table.loops, pid, bounds)
@@ -281,15 +282,17 @@ def _kept(table: Bench, most: Rejection, pairs: list[Pid]) -> list[Candidate]:
 def _grid(loop: Loop, most: Rejection, limits: TuningLimits) -> tuple[Floats, Floats]:
     """Gains [% OP / % PV] and integral times [s] of the coarse grid.
 
-    With play before a lag no integral time is shorter than the time constant (the source study's Eq. 6).
+    With play before a lag no integral time is shorter than the time constant (the source study's Eq. 6), where load
+    rejection lets it be as long: else the lag is as good as an integrator.
     """
     nominal, now = simc(loop.process, scan_s=scan_step(loop)), loop.controller
     high = min(limits.gain_up * abs(now.kp), 2.0 * abs(nominal.kp))
     down = limits.gain_down_play if is_play(loop.valve) else limits.gain_down_stick
     low = min(limits.gain_down * abs(now.kp), down * abs(nominal.kp))
     shortest = 0.5 * min(integral_s(now), nominal.ti_s)
-    if is_play(loop.valve) and isinstance(loop.process, Fopdt):
-        shortest = loop.process.time_constant_s
+    lag = loop.process.time_constant_s if isinstance(loop.process, Fopdt) else math.inf
+    if is_play(loop.valve) and lag <= most.integral * high:
+        shortest = lag
     longest = max(most.integral * high, 2.0 * shortest)
     return np.geomspace(low, high, GAINS), np.geomspace(shortest, longest, TIMES)
 
@@ -302,11 +305,11 @@ def search(table: Bench) -> tuple[Candidate, ...]:
     loop = table.loops[0]
     most = allowed(loop, table.limits)
     gains, times = _grid(loop, most, table.limits)
-    coarse = _kept(table, most, _pairs(loop, gains, times))
+    coarse = _kept(table, most, pairs(loop, gains, times))
     if not coarse:
         return ()
     best = min(coarse, key=lambda c: c.score).controller
     step = np.linspace(-1.0, 1.0, FINE)
     longer = np.maximum(best.ti_s * (times[1] / times[0]) ** step, times[0])
-    fine = _pairs(loop, abs(best.kp) * (gains[1] / gains[0]) ** step, np.unique(longer))
+    fine = pairs(loop, abs(best.kp) * (gains[1] / gains[0]) ** step, np.unique(longer))
     return tuple(sorted(coarse + _kept(table, most, fine), key=lambda c: c.score))

@@ -52,11 +52,13 @@ class Advice:
 
 @dataclass(frozen=True, slots=True)
 class Proposed:
-    """A proposal, and the loop and load [% PV] that it was sought on, None where none was sought."""
+    """A proposal, the loop and load [% PV] that it was sought on, None where none was sought, and what else the loop
+    may be."""
 
     proposal: Proposal
     loop: Loop | None = None
     load: Floats | None = None
+    others: tuple[Loop, ...] = ()
 
 
 def chosen_fit(verdict: Verdict) -> Fit:
@@ -170,7 +172,8 @@ def _sought(
     beside = None
     if proposed.loop is not None and proposed.load is not None:
         new = held or proposal.controller or proposal.meanwhile
-        beside = compared(proposed.loop, proposed.load, new, period_s, spec, pv_span, config.tuning)
+        known = proposed.loop, proposed.load, new, period_s, spec, pv_span, config.tuning
+        beside = compared(*known, proposed.others)
     return replace(_stated(proposal, spec, pv_span), compared=beside)
 
 
@@ -310,7 +313,7 @@ def _for_tuning(verdict: Verdict, loop: Loop, period_s: float | None, config: Co
     slow = replace(loop, process=cautious(fit.process, period_s))
     others = (loop, *uncertain(fit, loop)[:2])
     load = load_of(fit, loop.controller)
-    return Proposed(recommend(slow, verdict.cause, others, load, config.tuning), loop, load)
+    return Proposed(recommend(slow, verdict.cause, others, load, config.tuning), loop, load, others)
 
 
 def _for_valve(verdict: Verdict, loop: Loop, period_s: float | None, config: Config) -> Proposed:
@@ -321,7 +324,7 @@ def _for_valve(verdict: Verdict, loop: Loop, period_s: float | None, config: Con
     if rests and math.isinf(integral_s(loop.controller)):
         return Proposed(Proposal(Action.CHECK_SETTINGS, words.NO_INTEGRAL))
     load = load_of(fit, loop.controller)
-    return Proposed(recommend(sought, verdict.cause, others, load, config.tuning), sought, load)
+    return Proposed(recommend(sought, verdict.cause, others, load, config.tuning), sought, load, others)
 
 
 def _stated(proposal: Proposal, spec: LoopSpec, pv_span: float) -> Advice:

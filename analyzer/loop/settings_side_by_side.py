@@ -1,4 +1,5 @@
-"""Present, recommended and textbook settings of one flagged loop on the load that its night leaves."""
+"""Present, recommended and textbook settings of one flagged loop on the load that its night leaves, and those between
+which an engineer may choose."""
 
 from __future__ import annotations
 
@@ -13,11 +14,13 @@ from analyzer.loops.tags import as_stated
 from identification.models import Loop, Pid
 from identification.record import Floats
 from reports.pages import as_held
-from tuning.forecast import Tried, alternatives, run, settled, tried
+from tuning.forecast import REPAIRED, Tried, alternatives, run, settled, tried
 from tuning.frequency_response import integral_s
 from tuning.harmonic_balance import TravelMap, travel_map
 from tuning.limits import TuningLimits
 from tuning.rules import simc
+from tuning.search import Candidate, bench
+from tuning.trade import trade, worst
 
 MAP_POINTS, SPREAD = 24, 12.0
 """Points of the travel map along each axis, and how far it reaches about the present settings; ours."""
@@ -42,7 +45,9 @@ class Comparison:
 
     loop, the identified one with its present controller; load [% PV] on the controller's clock, shape (n,); tried, in
     the order in which they are told; shown, a piece of each simulation by name; travel, the map of the limit cycle's
-    travel, None where the valve is free; stated, Kp and Ti by name in the plant's units.
+    travel, None where the valve is free; stated, Kp and Ti by name in the plant's units; everywhere, each on all
+    loops that the data allow, by name; curve, what no other settings beat in travel and in error, the calmest first;
+    repaired, the present settings behind a free valve, None where it is free.
     """
 
     loop: Loop
@@ -52,6 +57,9 @@ class Comparison:
     travel: TravelMap | None
     stated: Mapping[str, tuple[float, float]]
     pv_span: float
+    everywhere: Mapping[str, Candidate]
+    curve: tuple[Candidate, ...]
+    repaired: Tried | None
 
 
 def _piece(loop: Loop, controller: Pid, load: Floats, period_s: float) -> Shown:
@@ -90,15 +98,20 @@ def compared(
     spec: LoopSpec,
     pv_span: float,
     limits: TuningLimits,
+    others: Sequence[Loop] = (),
 ) -> Comparison | None:
     """Present, recommended and textbook settings of an identified loop; None where its load is too short for that.
 
     load is load and noise on the controller's clock [% PV], shape (n,); period_s, of the recorded cycle [s]; pv_span,
-    the span of PV in its own unit.
+    the span of PV in its own unit; others, what else the loop may be, on which each is tried too.
     """
     if load.size < limits.least_steps or loop.process.slope * loop.controller.kp <= 0.0:
         return None
-    settings, load = alternatives(loop, new), as_held(load)
+    load = as_held(load)
+    table = bench(loop, others, load, limits)
+    found = trade(table)
+    settings = alternatives(loop, new, {name: c.controller for name, c in found.chosen.items()})
+    free = None if loop.valve is None else replace(loop, valve=None)
     return Comparison(
         loop,
         load,
@@ -107,4 +120,7 @@ def compared(
         _map(loop, tuple(settings.values())),
         {name: as_stated(pid, spec, pv_span) for name, pid in settings.items()},
         pv_span,
+        worst(table, settings),
+        found.curve,
+        None if free is None else tried(free, load, {REPAIRED: loop.controller})[0],
     )

@@ -68,7 +68,8 @@ class Tuning:
 
     estimates by name with 90 % intervals; model, the identified loop with its present controller; period_s and
     amplitude_pct of the recorded cycle [s], [% of span], None where there is none; cycle, the one simulation
-    finds; proposal; forecast, None where nothing is proposed; load [% PV] on the scan's clock.
+    finds; proposal; forecast, None where nothing is proposed; load [% PV] on the scan's clock; others, what else the
+    loop may be.
     """
 
     estimates: dict[str, Estimate]
@@ -79,6 +80,7 @@ class Tuning:
     proposal: Proposal
     forecast: Forecast | None
     load: Floats
+    others: tuple[Loop, ...] = ()
 
     @property
     def new(self) -> Pid | None:
@@ -150,6 +152,7 @@ def tune(found: Assessment, controller: Pid, config: Config, kept: Advice | None
         proposal,
         forecast,
         load,
+        others,
     )
 
 
@@ -292,19 +295,24 @@ def proposal(asked: Asked, loop: str, drawn: bool) -> tuple[list[str], dict[str,
         return [*text, f"action: {Action.REPAIR_VALVE}", f"no settings: {needs or NO_MOVES}"], {}
     tuning = tune(found, stated, config, withheld(found, spec, stated, prepared.scale.span, config))
     text += proposal_lines(tuning, spec, prepared.scale.span)
-    return text, _drawn(tuning, spec, prepared.scale.span, config, night.name) if drawn else {}
+    return _beside(tuning, spec, prepared.scale.span, config, night.name, text, drawn)
 
 
-def _drawn(t: Tuning, spec: LoopSpec, pv_span: float, config: Config, night: str) -> dict[str, bytes]:
-    """Pictures by file name, and the page on which settings are compared and tried."""
+def _beside(
+    t: Tuning, spec: LoopSpec, pv_span: float, config: Config, night: str, text: list[str], drawn: bool
+) -> tuple[list[str], dict[str, bytes]]:
+    """Text with the settings to choose between; pictures by file name and, among them, the page of settings."""
     from analyzer.loop.settings_side_by_side import compared
-    from analyzer.pages.compared import page
+    from analyzer.pages.compared import choices, page
     from reports.html import render
     from reports.pictures import as_file
 
-    files = {f"{p.name}.svg": as_file(p).encode() for p in pictures(t, spec.loop)}
     period_s = t.period_s or 10.0 * slowest_s(t.model)
-    found = compared(t.model, t.load, t.new, period_s, spec, pv_span, config.tuning)
+    found = compared(t.model, t.load, t.new, period_s, spec, pv_span, config.tuning, t.others)
+    text = text if found is None else [*text, *choices(found, spec)]
+    if not drawn:
+        return text, {}
+    files = {f"{p.name}.svg": as_file(p).encode() for p in pictures(t, spec.loop)}
     if found is not None:
         files["settings.html"] = render(page(spec.loop, night, found, spec), True).encode()
-    return files
+    return text, files

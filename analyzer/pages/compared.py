@@ -12,7 +12,7 @@ import numpy as np
 from analyzer.loop.settings_side_by_side import SPREAD, Comparison, Shown
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import unit_ratio
-from analyzer.pages.words import number, page_columns
+from analyzer.pages.words import number, page_columns, signed
 from analyzer.words.units import duration, gain_unit
 from identification.models import Integrator
 from identification.simulation.closed_loop import scan_step
@@ -23,6 +23,7 @@ from reports.pages import (
     Cell,
     Field,
     Line,
+    Listing,
     Page,
     Panels,
     Place,
@@ -34,7 +35,19 @@ from reports.pages import (
 )
 from reports.texts import slug
 from tuning.describing import band, is_play
-from tuning.forecast import LAMBDA, LEAST_PRELUDE, LONGER, NOW, PRELUDE, RECOMMENDED, SIMC, Tried
+from tuning.forecast import (
+    CALMER,
+    LAMBDA,
+    LEAST_PRELUDE,
+    LONGER,
+    NOW,
+    PRELUDE,
+    RECOMMENDED,
+    REPAIRED,
+    SIMC,
+    SMALLER,
+    Tried,
+)
 from tuning.frequency_response import slowest_s
 from tuning.harmonic_balance import TravelMap
 from tuning.limit_cycle import KICK
@@ -49,6 +62,9 @@ INTEGRATOR = {
 MEANING = {
     NOW: "as stated",
     RECOMMENDED: "the least travel and error within the limits, on the load and on what else the loop may be",
+    CALMER: "the least travel for at most a quarter more error, on all that the loop may be",
+    SMALLER: "the least error for no more travel, on all that the loop may be",
+    REPAIRED: "the present settings behind a valve without fault",
     SIMC: "Kp = T/(K (tau + L)), Ti = min(T, 4 (tau + L)), tau = 1.5 L; knows no valve",
     LAMBDA: "Kp = T/(K (lambda + L)), Ti = T, lambda = T, 3 L at least; knows no valve",
     LONGER: "the present gain, Ti raised to the time constant: the source study's rule for play",
@@ -58,6 +74,8 @@ CAUTION = (
     "allow, with little more gain: a valve that jumps looks like one with play behind a process of less gain."
 )
 HINT = "Move a slider, or begin from one of the settings; drag over a trend to zoom, double click for all."
+SHOWN = 3.0
+"""Times the present travel or error beyond which settings are left out of the picture of prices; ours."""
 BETTER, WORSE = 0.97, 1.03
 """Ratios to the present settings from which a figure is coloured [-]; ours."""
 
@@ -78,11 +96,10 @@ def opening(c: Comparison, spec: LoopSpec, unit: str) -> str:
     """What the recommended settings win and cost, in a sentence; of a loop without them what is compared."""
     now, new = c.tried[0], next((t for t in c.tried if t.name == RECOMMENDED), None)
     if new is None:
-        return "No settings are recommended; what the rules know would do this on the night's load."
-    scale, (kp, ti) = c.pv_span / 100.0, c.stated[RECOMMENDED]
-    typed = (
-        f"Kp {kp:.3g} {gain_unit(spec.gain_unit, spec.pv_unit, spec.op_unit)} and Ti {ti:.3g} {spec.ti_unit}"
-    )
+        return (
+            f"No settings are recommended: none wins on all that the loop may be without a price. {_offer(c)}"
+        )
+    scale, typed = c.pv_span / 100.0, _typed(c, RECOMMENDED, spec)
     errors = f"{number(scale * now.error)} to {number(scale * new.error)} {unit}"
     text = (
         f"On the night's load {typed} take the stem's travel from {number(now.stem_travel)} to "
@@ -96,6 +113,47 @@ def opening(c: Comparison, spec: LoopSpec, unit: str) -> str:
     return f"{text}; the price is that {cost}." if longer else f"{text}, and {cost}."
 
 
+def _typed(c: Comparison, name: str, spec: LoopSpec) -> str:
+    """Settings as they are typed in."""
+    kp, ti = c.stated[name]
+    gain = gain_unit(spec.gain_unit, spec.pv_unit, spec.op_unit)
+    return f"Kp {kp:.3g} {gain} and Ti {ti:.3g} {spec.ti_unit}"
+
+
+def _offer(c: Comparison) -> str:
+    """What may be chosen all the same, and what a repair would bring."""
+    offers = [f"{name}: {at_worst(c, name)} at worst" for name in (CALMER, SMALLER) if name in c.everywhere]
+    if c.repaired is not None:
+        offers.append(f"a repaired valve: {_against_now(c, c.repaired)}")
+    return f"To choose between: {'; '.join(offers)}." if offers else ""
+
+
+def choices(c: Comparison, spec: LoopSpec) -> list[str]:
+    """The settings between which an engineer may choose, a line each, and what a repair would bring."""
+    named = [t for t in c.tried if t.name in (RECOMMENDED, CALMER, SMALLER)]
+    lines = [f"  {t.name}: {_typed(c, t.name, spec)}: {at_worst(c, t.name)} at worst" for t in named]
+    if c.repaired is not None:
+        lines.append(f"  {REPAIRED}: {_against_now(c, c.repaired)}")
+    return ["to choose between, on all that the loop may be:", *lines] if lines else []
+
+
+def at_worst(c: Comparison, name: str) -> str:
+    """Change of travel and error on that of all loops that the data allow where each is worst."""
+    found = c.everywhere[name]
+    return f"travel {_change(found.worst_travel)}, error {_change(found.worst_error)}"
+
+
+def _against_now(c: Comparison, t: Tried) -> str:
+    """Change of travel and error against the present settings, on the identified loop."""
+    now = c.tried[0]
+    travel, error = t.stem_travel / max(now.stem_travel, 1e-9), t.error / max(now.error, 1e-9)
+    return f"travel {_change(travel)}, error {_change(error)}"
+
+
+def _change(ratio: float) -> str:
+    return f"{signed(100.0 * (ratio - 1.0))} %"
+
+
 def _times(t: Tried, now: Tried) -> float | None:
     """Sum of the error that a step of load leaves, over that of the present settings; None where one never ends."""
     known = math.isfinite(t.integral_s) and math.isfinite(now.integral_s)
@@ -104,7 +162,8 @@ def _times(t: Tried, now: Tried) -> float | None:
 
 def table(c: Comparison, spec: LoopSpec, unit: str) -> Table:
     """The settings with what they do on the load."""
-    rows = tuple(_row(t, c, spec, unit) for t in c.tried)
+    shown = (*c.tried, *((c.repaired,) if c.repaired is not None else ()))
+    rows = tuple(_row(t, c, spec, unit) for t in shown)
     lasts = duration(c.load.size * scan_step(c.loop))
     note = (
         f"Each simulated on the {lasts} of load that the night leaves behind the identified loop. {CAUTION}"
@@ -113,8 +172,9 @@ def table(c: Comparison, spec: LoopSpec, unit: str) -> Table:
 
 
 def _row(t: Tried, c: Comparison, spec: LoopSpec, unit: str) -> tuple[Cell, ...]:
-    scale, now, (kp, ti) = c.pv_span / 100.0, c.tried[0], c.stated[t.name]
-    meaning = MEANING | (INTEGRATOR if isinstance(c.loop.process, Integrator) else {})
+    scale, now, (kp, ti) = c.pv_span / 100.0, c.tried[0], c.stated.get(t.name, c.stated[NOW])
+    found = c.everywhere.get(t.name) if t is not now else None
+    worst = "" if found is None else f"{_change(found.worst_travel)}, {_change(found.worst_error)}"
     ms = "unstable" if math.isinf(t.ms) else f"{t.ms:.2f}"
     return (
         Cell(t.name, kind="strong" if t.name == RECOMMENDED else ""),
@@ -123,10 +183,17 @@ def _row(t: Tried, c: Comparison, spec: LoopSpec, unit: str) -> tuple[Cell, ...]
         Cell(number(t.stem_travel), t.stem_travel, _against(t.stem_travel, now.stem_travel)),
         Cell(f"{number(scale * t.error)} {unit}", t.error, _against(t.error, now.error)),
         Cell(f"{number(scale * t.peak)} {unit}", t.peak, _against(t.peak, now.peak)),
+        Cell(worst),
         _rejection(t, now),
         Cell(ms, None if math.isinf(t.ms) else t.ms),
-        Cell(meaning[t.name]),
     )
+
+
+def meanings(c: Comparison) -> Listing:
+    """What the names of the settings mean."""
+    known = MEANING | (INTEGRATOR if isinstance(c.loop.process, Integrator) else {})
+    named = [t.name for t in c.tried] + ([] if c.repaired is None else [REPAIRED])
+    return Listing(tuple((f"{name}:", known[name]) for name in named))
 
 
 def _plot(t: Tried, shown: Shown, scale: float, unit: str, reach: float) -> Plot:
@@ -163,6 +230,26 @@ def travel_field(found: TravelMap, places: Sequence[Place], title: str, moves: s
         tuple(places),
         (*keys, ("unstable", "unstable")),
     )
+
+
+def price(c: Comparison, unit: str) -> Plot | None:
+    """Travel over error of the settings that no others beat in both, and of those compared; None without such."""
+    if len(c.curve) < 2:
+        return None
+    now, scale = c.tried[0], c.pv_span / 100.0
+    kinds = {NOW: "now", RECOMMENDED: "recommended"}
+    shown = [t for t in c.tried if t.stem_travel < SHOWN * now.stem_travel and t.error < SHOWN * now.error]
+    places = tuple(Place(scale * t.error, t.stem_travel, t.name, kinds.get(t.name, "rule")) for t in shown)
+    found = [(x.error, x.travel) for x in c.curve if x.travel < SHOWN and x.error < SHOWN]
+    error, travel = np.array(found, float).reshape(-1, 2).T
+    at = np.array([(p.x, p.y) for p in places], float)
+    lines = (
+        Line("none of the robust ones beats these", scale * now.error * error, now.stem_travel * travel),
+        Line("compared", at[:, 0], at[:, 1], joined=False),
+    )
+    title = "What each costs: the lower and the further left, the better"
+    axes = f"average absolute error [{unit}]", "stem travel [%/h]"
+    return Plot("price", title, *axes, lines, reach=(0.0,), places=places)
 
 
 def field(c: Comparison) -> Field | None:
@@ -240,10 +327,14 @@ def page(loop: str, night: str, c: Comparison, spec: LoopSpec) -> Page:
     unit = (spec.pv_unit or "own unit") if known else "%"
     drawn = field(c)
     first: list[Block] = [Text((opening(c, spec, unit),), "lead"), panels(c, unit), table(c, spec, unit)]
-    first += [] if drawn is None else [drawn]
+    first += [block for block in (price(c, unit), drawn) if block is not None]
     said = "The load adds to PV as it did in the night; what the model lacks, and a load that changes, are not in it."
     tried = WhatIf("try", "Kp and Ti moved, the night simulated again", model(c, spec, unit), c.load, said)
     hint = Text((HINT,))
-    sections = Section("Settings compared", tuple(first)), Section("Try settings", (hint, tried))
+    sections = (
+        Section("Settings compared", tuple(first)),
+        Section("Try settings", (hint, tried)),
+        Section("What the settings are, for experts", (meanings(c),), closed=True),
+    )
     subtitle = f"settings compared and tried on night {night}"
     return Page(f"{slug(loop)}-settings", f"{loop}: settings", subtitle, sections)

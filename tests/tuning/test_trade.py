@@ -1,0 +1,85 @@
+"""Settings between which an engineer may choose: none is shown that another beats, and the price holds everywhere."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identification.models import Backlash, Fopdt, Loop, Pid
+from identification.simulation.closed_loop import closed_loop
+from proofs.valve_loops import backlash_case, level_case, stick_case
+from tuning.forecast import CALMER, SMALLER, assess, run, settled, tried
+from tuning.frequency_response import maximum_sensitivity
+from tuning.limits import LIMITS
+from tuning.recommend import recommend
+from tuning.search import assumed_uncertainty, bench
+from tuning.trade import trade
+
+
+@pytest.fixture(scope="module")
+def found():
+    """Benches and trades of three loops each with play, stick-slip and play on an integrator."""
+    out = []
+    for make in (backlash_case, stick_case, level_case):
+        for seed in range(3):
+            case = make(seed)
+            table = bench(case.loop, assumed_uncertainty(case.loop, LIMITS)[:3], case.load, LIMITS)
+            out.append((table, trade(table)))
+    return out
+
+
+def test_of_two_settings_on_the_curve_neither_beats_the_other(found):
+    """Along the curve travel rises and error falls, and each point is robust."""
+    for table, t in found:
+        travel, error = (np.array([getattr(c, name) for c in t.curve]) for name in ("travel", "error"))
+        assert np.all(np.diff(travel) >= 0)
+        assert np.all(np.diff(error) < 0)
+        for c in t.curve:
+            ms = maximum_sensitivity(replace(table.loops[0], controller=c.controller))
+            assert ms <= LIMITS.ms_most_sample
+    assert np.median([len(t.curve) for _, t in found]) >= 3
+
+
+def test_what_is_chosen_keeps_its_price_on_every_loop(found):
+    """Simulated one by one, the calmer valve costs at most a quarter more error, the smaller error no more travel."""
+    chosen = 0
+    for table, t in found:
+        for name, c in t.chosen.items():
+            chosen += 1
+            for one, load in zip(table.loops, table.loads, strict=True):
+                old, new = (
+                    assess(settled(run(replace(one, controller=pid), load)))
+                    for pid in (one.controller, c.controller)
+                )
+                travel = new.stem_travel / old.stem_travel
+                error = new.average_absolute_error / old.average_absolute_error
+                assert error <= (LIMITS.trade_error if name == CALMER else 1.0) + 0.01
+                assert travel <= (1.0 if name == CALMER else LIMITS.travel_growth_sample) + 0.01
+    assert chosen >= len(found)
+    assert any(SMALLER in t.chosen for _, t in found)
+
+
+def test_a_repaired_valve_is_the_process_alone():
+    """What a repair would bring is a simulation in which the stem is OP."""
+    loop = Loop(Fopdt(1.2, 30.0, 3.0), Pid(0.4, 60.0), Backlash(3.0))
+    load = 0.3 * np.sin(np.arange(4000) / 300.0)
+    (free,) = tried(replace(loop, valve=None), load, {"free": loop.controller})
+    r = closed_loop(replace(loop, valve=Backlash(0.0)), np.zeros(load.size), load, op_start=50.0)
+    whole = assess(settled(r))
+    assert free.stem_travel == pytest.approx(whole.op_travel, rel=1e-6)
+    assert free.error == pytest.approx(whole.average_absolute_error, rel=1e-6)
+
+
+def test_a_slow_lag_behind_a_play_is_tuned_as_an_integrator():
+    """Where load rejection forbids an integral time as long as the lag, shorter ones calm the valve."""
+    loop = Loop(Fopdt(44.2, 861.0, 3.5), Pid(0.6, 40.0), Backlash(3.0))
+    rng = np.random.default_rng(2)
+    load = 2.0 * np.sin(np.arange(9000) / 900.0) + 0.02 * rng.standard_normal(9000)
+    p = recommend(loop, "valve", load=load)
+    assert p.controller is not None
+    assert p.controller.ti_s < loop.process.time_constant_s
+    old, new = (
+        assess(settled(run(replace(loop, controller=pid), load))) for pid in (loop.controller, p.controller)
+    )
+    assert new.stem_travel < 0.8 * old.stem_travel
+    assert new.average_absolute_error < old.average_absolute_error

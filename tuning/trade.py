@@ -1,0 +1,87 @@
+"""Settings on one curve: where nothing is won for nothing, what an engineer may choose between, each at its price."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from identification.models import Fopdt, Pid
+from identification.record import Floats
+from identification.simulation.closed_loop import scan_step
+from tuning.forecast import CALMER, SMALLER
+from tuning.frequency_response import integral_s, maximum_sensitivity
+from tuning.rules import simc
+from tuning.search import Bench, Candidate, bounds_now, pairs, robust, try_out
+
+POINTS = 11
+"""Gains and integral times of the curve's grid."""
+TRIED = 5
+"""Settings of the curve that are tried on all loops, from its end inwards, before none is told."""
+
+
+@dataclass(frozen=True, slots=True)
+class Trade:
+    """What settings win and cost.
+
+    curve, robust settings that no others beat in travel and in error, the calmest first, figures on the first loop;
+    chosen, the two ends that hold on every loop of the bench, by name, figures over all loops.
+    """
+
+    curve: tuple[Candidate, ...]
+    chosen: Mapping[str, Candidate]
+
+
+def trade(table: Bench) -> Trade:
+    """The curve of a bench and the settings chosen on it, which hold on every loop that the data allow: the calmest
+    valve for a stated price in error, and the least error for no more travel."""
+    curve, limits = _front(table), table.limits
+    calm = (c for c in curve if c.error <= limits.trade_error)
+    exact = (c for c in reversed(curve) if c.travel <= 1.0)
+    ends = {CALMER: (calm, limits.trade_error, 1.0), SMALLER: (exact, 1.0, limits.travel_growth_sample)}
+    chosen = {}
+    for name, (candidates, error, travel) in ends.items():
+        whole = (try_out(table, c.controller, c.ms) for c, _ in zip(candidates, range(TRIED), strict=False))
+        held = next((c for c in whole if c.worst_error <= error and c.worst_travel <= travel), None)
+        if held is not None:
+            chosen[name] = held
+    return Trade(curve, chosen)
+
+
+def worst(table: Bench, settings: Mapping[str, Pid]) -> dict[str, Candidate]:
+    """What settings do on every loop of the bench, by name."""
+    first = table.loops[0]
+    return {
+        name: try_out(table, pid, maximum_sensitivity(replace(first, controller=pid)))
+        for name, pid in settings.items()
+    }
+
+
+def _front(table: Bench) -> tuple[Candidate, ...]:
+    """Robust settings of a wide grid that no others beat in travel and in error, the calmest first."""
+    bounds = bounds_now(table.loops, table.limits)
+    found = []
+    for pid in pairs(table.loops[0], *_grid(table)):
+        ms = robust(table.loops, pid, bounds)
+        if ms is not None:
+            found.append(try_out(table, pid, ms, 1))
+    front: list[Candidate] = []
+    for c in sorted(found, key=lambda c: (c.travel, c.error)):
+        if not front or c.error < front[-1].error:
+            front.append(c)
+    return tuple(front)
+
+
+def _grid(table: Bench) -> tuple[Floats, Floats]:
+    """Gains [% OP / % PV] and integral times [s] about the present and SIMC's, up to the time constant."""
+    loop, limits = table.loops[0], table.limits
+    nominal = simc(loop.process, scan_s=scan_step(loop))
+    gains = sorted((abs(loop.controller.kp), abs(nominal.kp)))
+    now_s = integral_s(loop.controller)
+    times = sorted((now_s, nominal.ti_s)) if np.isfinite(now_s) else [nominal.ti_s] * 2
+    reach, lag = limits.trade_reach, loop.process.time_constant_s if isinstance(loop.process, Fopdt) else 0.0
+    return (
+        np.geomspace(gains[0] / reach, gains[1] * limits.gain_up, POINTS),
+        np.geomspace(times[0] / 2.0, max(times[1] * reach, lag), POINTS),
+    )
