@@ -16,7 +16,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from reports import svg
-from reports.pages import MOST_LEVEL, Band, Bars, Cell, Floats, Page, Sparkline, Trend, WhatIf, level_step
+from reports.pages import MOST_LEVEL, Band, Bars, Cell, Floats, Page, Sparkline, Trend, WhatIf, levels
 from reports.pictures import asset, drawings, keys
 from reports.texts import visible_parts
 
@@ -29,11 +29,11 @@ MISSING = MOST_LEVEL + 1
 
 
 def _coded(values: Floats, gap: np.ndarray) -> dict[str, object]:
-    """A signal as 16-bit levels between its ends, base64: 2.7 bytes a value, exact to 1/65534 of its
-    range."""
+    """A signal as 16-bit levels between its ends, base64: 2.7 bytes a value, exact to 1/32500 of its
+    range or better."""
     known = np.isfinite(values) & ~gap
     low, high = (float(values[known].min()), float(values[known].max())) if known.any() else (0.0, 1.0)
-    step = level_step(low, high)
+    low, step = levels(low, high)
     level = np.where(known, np.round((np.where(known, values, low) - low) / step), MISSING)
     return {"low": low, "step": step, "data": base64.b64encode(level.astype("<u2").tobytes()).decode()}
 

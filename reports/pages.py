@@ -6,6 +6,7 @@ Every text may hold anything that a plant writes; the renderers escape it. Array
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -348,19 +349,28 @@ class WhatIf:
 
 MOST_LEVEL = 65534
 """Levels of a signal that a page holds, in 16 bits, one of which says that nothing is known."""
+LEVELS = 65000.0
+"""Levels that a signal covers at most: some are left so that one which is held is held again without loss."""
 
 
-def level_step(low: float, high: float) -> float:
-    """The step between the levels in which a page holds a signal, in its own unit, 1 where it stands still."""
-    return (high - low) / MOST_LEVEL or 1.0
+def levels(low: float, high: float) -> tuple[float, float]:
+    """The lowest level and the step in which a page holds a signal between two values, in its own unit.
+
+    The step is a power of two and the lowest level a multiple of it: then each level is exact in binary, and a signal
+    that has been held once is the same to the last digit when it is held again. A stem at the edge of its play makes
+    travel of a last digit.
+    """
+    if not high > low:
+        return low, 1.0
+    step = 2.0 ** math.ceil(math.log2((high - low) / LEVELS) - 1e-3)
+    return math.floor(low / step) * step, step
 
 
 def as_held(x: Floats) -> Floats:
     """A signal, shape (n,), as a page holds it, so that what is told of it is what the page computes."""
     if x.size == 0:
         return x
-    low = float(x.min())
-    step = level_step(low, float(x.max()))
+    low, step = levels(float(x.min()), float(x.max()))
     return low + step * np.round((x - low) / step)  # type: ignore[no-any-return]
 
 

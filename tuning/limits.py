@@ -21,6 +21,7 @@ class TuningLimits:
     ms_most: float = TOML
     ms_most_sample: float = TOML
     peak_factor: float = TOML
+    peak_growth: float = TOML
     integral_factor: float = TOML
     integral_factor_ramp: float = TOML
     gain_up: float = TOML

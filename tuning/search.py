@@ -225,7 +225,9 @@ def allowed(loop: Loop, limits: TuningLimits) -> Rejection:
     rule = longest / min(abs(nominal.kp), abs(loop.controller.kp))
     integral = ramp if isinstance(loop.process, Integrator) else max(min(most, ramp), min(1.5 * rule, most))
     present = now.integral if math.isfinite(now.integral) else 0.0
-    return Rejection(max(limits.peak_factor * best.peak, now.peak), max(integral, present))
+    return Rejection(
+        max(limits.peak_factor * best.peak, limits.peak_growth * now.peak), max(integral, present)
+    )
 
 
 def rounded(x: float) -> float:

@@ -19,7 +19,7 @@ from tuning.frequency_response import integral_s
 from tuning.harmonic_balance import TravelMap, travel_map
 from tuning.limits import TuningLimits
 from tuning.rules import simc
-from tuning.search import Candidate, bench
+from tuning.search import Candidate, bench, rejection
 from tuning.trade import trade, worst
 
 MAP_POINTS, SPREAD = 24, 12.0
@@ -45,7 +45,8 @@ class Comparison:
 
     loop, the identified one with its present controller; load [% PV] on the controller's clock, shape (n,); tried, in
     the order in which they are told; shown, a piece of each simulation by name; travel, the map of the limit cycle's
-    travel, None where the valve is free; stated, Kp and Ti by name in the plant's units; everywhere, each on all
+    travel, None where the valve is free; stated, Kp and Ti by name in the plant's units; peaks, largest error after a
+    unit step of load at the valve, over the present one, by name [-]; everywhere, each on all
     loops that the data allow, by name; curve, what no other settings beat in travel and in error, the calmest first;
     repaired, the present settings behind a free valve, None where it is free.
     """
@@ -57,6 +58,7 @@ class Comparison:
     travel: TravelMap | None
     stated: Mapping[str, tuple[float, float]]
     pv_span: float
+    peaks: Mapping[str, float]
     everywhere: Mapping[str, Candidate]
     curve: tuple[Candidate, ...]
     repaired: Tried | None
@@ -111,6 +113,7 @@ def compared(
     table = bench(loop, others, load, limits)
     found = trade(table)
     settings = alternatives(loop, new, {name: c.controller for name, c in found.chosen.items()})
+    now = rejection(loop.process, loop.controller)
     free = None if loop.valve is None else replace(loop, valve=None)
     return Comparison(
         loop,
@@ -120,6 +123,7 @@ def compared(
         _map(loop, tuple(settings.values())),
         {name: as_stated(pid, spec, pv_span) for name, pid in settings.items()},
         pv_span,
+        {name: rejection(loop.process, pid).peak / now.peak for name, pid in settings.items()},
         worst(table, settings),
         found.curve,
         None if free is None else tried(free, load, {REPAIRED: loop.controller})[0],

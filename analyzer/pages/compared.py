@@ -84,9 +84,8 @@ def _against(value: float, now: float) -> str:
     return "better" if value < BETTER * now else "worse" if value > WORSE * now else ""
 
 
-def _rejection(t: Tried, now: Tried) -> Cell:
-    """How much of the error a load step leaves, against now."""
-    ratio = _times(t, now)
+def _rejection(ratio: float | None) -> Cell:
+    """What a load step does, against now."""
     if ratio is None:
         return Cell("–")
     return Cell(number(ratio), ratio, _against(ratio, 1.0))
@@ -122,7 +121,7 @@ def _typed(c: Comparison, name: str, spec: LoopSpec) -> str:
 
 def _offer(c: Comparison) -> str:
     """What may be chosen all the same, and what a repair would bring."""
-    offers = [f"{name}: {at_worst(c, name)} at worst" for name in (CALMER, SMALLER) if name in c.everywhere]
+    offers = [f"{name}: {_priced(c, name)}" for name in (CALMER, SMALLER) if name in c.everywhere]
     if c.repaired is not None:
         offers.append(f"a repaired valve: {_against_now(c, c.repaired)}")
     return f"To choose between: {'; '.join(offers)}." if offers else ""
@@ -131,16 +130,17 @@ def _offer(c: Comparison) -> str:
 def choices(c: Comparison, spec: LoopSpec) -> list[str]:
     """The settings between which an engineer may choose, a line each, and what a repair would bring."""
     named = [t for t in c.tried if t.name in (RECOMMENDED, CALMER, SMALLER)]
-    lines = [f"  {t.name}: {_typed(c, t.name, spec)}: {at_worst(c, t.name)} at worst" for t in named]
+    lines = [f"  {t.name}: {_typed(c, t.name, spec)}: {_priced(c, t.name)}" for t in named]
     if c.repaired is not None:
         lines.append(f"  {REPAIRED}: {_against_now(c, c.repaired)}")
     return ["to choose between, on all that the loop may be:", *lines] if lines else []
 
 
-def at_worst(c: Comparison, name: str) -> str:
-    """Change of travel and error on that of all loops that the data allow where each is worst."""
+def _priced(c: Comparison, name: str) -> str:
+    """What settings win and cost on that of all loops that the data allow where each is worst, and on a load step."""
     found = c.everywhere[name]
-    return f"travel {_change(found.worst_travel)}, error {_change(found.worst_error)}"
+    worst = f"travel {_change(found.worst_travel)}, error {_change(found.worst_error)} at worst"
+    return f"{worst}, a load step goes {number(c.peaks[name])} times as far"
 
 
 def _against_now(c: Comparison, t: Tried) -> str:
@@ -184,7 +184,8 @@ def _row(t: Tried, c: Comparison, spec: LoopSpec, unit: str) -> tuple[Cell, ...]
         Cell(f"{number(scale * t.error)} {unit}", t.error, _against(t.error, now.error)),
         Cell(f"{number(scale * t.peak)} {unit}", t.peak, _against(t.peak, now.peak)),
         Cell(worst),
-        _rejection(t, now),
+        _rejection(c.peaks.get(t.name, 1.0)),
+        _rejection(_times(t, now)),
         Cell(ms, None if math.isinf(t.ms) else t.ms),
     )
 

@@ -290,7 +290,7 @@ def page(
     notes : sequence of str
         What people wrote about it, oldest first.
     settings : Page or None
-        The page on which settings are compared and tried, which is linked; its first section stands here too.
+        The page on which settings are compared and tried, which is linked; what it opens with stands here too.
     """
     row = rows[-1]
     sections = [
@@ -302,13 +302,19 @@ def page(
         _evidence(row),
         *_trends(thin, row),
         *_limit_cycle(row),
-        *(() if settings is None else settings.sections[:1]),
+        *(() if settings is None else (_of_settings(settings),)),
         nights_section(rows),
     ]
     sections.insert(-1, _figures(row))
     group = row["group"] if shared is not None else None
     links = (("All loops", "index.html"), *_links(more, settings, group))
     return Page(slug(row["loop"]), row["loop"], _subtitle(row), tuple(sections), links)
+
+
+def _of_settings(found: Page) -> Section:
+    """What the page of settings opens with: what is won and what it costs, in a sentence and a picture."""
+    first = found.sections[0]
+    return Section(first.title, tuple(b for b in first.blocks if isinstance(b, Text | Plot)))
 
 
 def _figures(row: Row) -> Section:

@@ -109,7 +109,7 @@ def valve_text(found: Finding) -> str:
         return f"the valve is at fault; {_strongest(found, 2)}"
     if width is None:
         return WITHOUT_WIDTH[fault].format(share=100 * size)
-    return f"{PLAIN[fault].format(width=width)}; that is {100 * size:.0f} % of OP's range"
+    return f"{PLAIN[fault].format(width=width)}; its width is {100 * size:.0f} % of OP's range"
 
 
 def _strongest(found: Finding, most: int, *first: str) -> str:

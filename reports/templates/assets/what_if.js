@@ -61,7 +61,7 @@
     let y = 0, u = model.op_start, e1 = -d[0], y1 = d[0], y2 = d[0];
     for (let k = 0; k < n; k += 1) {
       const pv = y + d[k], e = -pv;
-      u = Math.min(Math.max(u + kp * (e - e1) + ki * e - kd * (pv - 2 * y1 + y2), model.op_lo), model.op_hi);
+      u = Math.min(Math.max(u + (kp * (e - e1) + ki * e - kd * (pv - 2 * y1 + y2)), model.op_lo), model.op_hi);
       e1 = e; y2 = y1; y1 = pv;
       error[k] = e; op[k] = u; stem[k] = stemAt(u);
       const late = k >= p.delay ? stem[k - p.delay] - model.op_start : 0;
