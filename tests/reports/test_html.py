@@ -121,8 +121,7 @@ def test_a_long_table_shows_its_first_rows_and_says_so() -> None:
 
 
 def test_a_signal_that_is_held_is_held_again_without_loss() -> None:
-    """Of signals of any size about any place the levels are within a 32,500th of their range and exact when held again, in
-    single precision too where the place is no farther than a hundred ranges."""
+    """Levels of any signal are within a 32,500th of its range, and exact when held again, in single precision too."""
     rng = np.random.default_rng(1)
     for _ in range(200):
         size, place = 10.0 ** rng.uniform(-6, 6), rng.uniform(-100, 100)
