@@ -229,6 +229,9 @@ class FigureLimits:
     travel_deadband_pct: float = TOML
     small_error_pct: float = TOML
     least_share: float = TOML
+    move_noise: float = TOML
+    move_spread: float = TOML
+    move_stands: int = TOML
 
 
 @dataclass(frozen=True, slots=True)

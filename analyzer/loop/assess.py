@@ -15,7 +15,6 @@ from analyzer.loop.assessments import (
     Hour,
     assess_span,
     hourly,
-    settling_time,
 )
 from analyzer.loop.cause import (
     NO_CAUSE,
@@ -35,6 +34,7 @@ from analyzer.loop.measure import Measured, measure, time_scale
 from analyzer.loop.oscillation import Oscillation, Oscillations, barely_seen, counting, detect
 from analyzer.loop.page_trends import BUCKETS, FINE_BUCKETS, close_view, thinned
 from analyzer.loop.quality import Prepared
+from analyzer.loop.setpoint_moves import Move, moves
 from analyzer.loop.settings_check import SettingsDiffer, differing
 from analyzer.loop.slip_by_slip import told_slip_by_slip
 from analyzer.plantwide.wave import Wave, waves_of
@@ -56,7 +56,7 @@ class Assessment:
 
     loop; start_s, duration_s of the record [s]; night, the figures of the whole span; hours, of each clock
     hour; oscillations; verdict; settings, where the controller's are not the stated ones; harris index (1: minimum
-    variance) and settling time [s] where known; waves, its part in the plant-wide pass; trend, thinned;
+    variance) where known; moves of the set point; waves, its part in the plant-wide pass; trend, thinned;
     notes, plain sentences about the data; needs, what the record lacks to tell whether the loop oscillates, None
     where that is told; close_s, first and last time [s] of the last ten periods; for_settings, what
     the record lacks for new settings whatever its cause, None where it lacks nothing; judged_h, good hours in
@@ -73,7 +73,7 @@ class Assessment:
     verdict: Verdict
     settings: SettingsDiffer | None = None
     harris: float | None = None
-    settling_s: float | None = None
+    moves: tuple[Move, ...] = ()
     waves: tuple[Wave, ...] = ()
     trend: Mapping[str, np.ndarray] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
@@ -303,7 +303,7 @@ def _assessment(prepared: Prepared, stretch: Stretch, judged: _Judged, config: C
         verdict=judged.verdict,
         settings=judged.settings,
         harris=harris_index(record.error, record.usable, record.dt_s, dead_time) if dead_time else None,
-        settling_s=settling_time(record, night.noise_band_pct or 0.0),
+        moves=moves(record, night.noise_band_pct or 0.0, config.figures),
         waves=waves_of(record.tag, judged.of_all, end_s, config.plant),
         trend=thinned(record, FINE_BUCKETS if counting(found) else BUCKETS, close),
         notes=prepared.notes,

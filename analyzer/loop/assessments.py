@@ -246,23 +246,3 @@ def hourly(
         significance, share = _hourly_oscillation(found, record, start, a, b)
         rows.append(Hour(start, assess_span(record.span(a, b), limits, band), significance, share))
     return rows
-
-
-def settling_time(record: LoopRecord, noise: float) -> float | None:
-    """Median time [s] from a set point step until e stays within the larger of 2 noise bands and 5 % of the step.
-
-    None where no step larger than 10 noise bands stood for long enough.
-    """
-    if record.sp_estimated:
-        return None
-    steps = np.flatnonzero(np.abs(np.diff(record.sp)) > max(10 * noise, 1e-6)) + 1
-    if steps.size == 0:
-        return None
-    ends = np.append(steps[1:], len(record))
-    times = []
-    for at, end in zip(steps, ends, strict=True):
-        size = abs(record.sp[at] - record.sp[at - 1])
-        outside = np.flatnonzero(np.abs(record.error[at:end]) > max(3 * noise, 0.05 * size))
-        if outside.size and outside[-1] < 0.8 * (end - at):
-            times.append((outside[-1] + 1) * record.dt_s)
-    return float(np.median(times)) if times else None

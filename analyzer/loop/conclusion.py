@@ -18,6 +18,7 @@ from analyzer.loop.decisions import Action, Cause, Fault, Lack, Status
 from analyzer.loop.finding import Cell, Finding, Remedy, Swing
 from analyzer.loop.identified import gain_room
 from analyzer.loop.oscillation import Oscillations
+from analyzer.loop.setpoint_moves import as_row
 from analyzer.loops.spec import LoopSpec
 from identification.estimation.hammerstein import Fit
 
@@ -148,7 +149,7 @@ def _measured(a: Assessment, limits: AdviceLimits) -> Known:
         "start_s": a.start_s,
         "duration_s": a.duration_s,
         "harris_index": a.harris,
-        "settling_time_s": a.settling_s,
+        **as_row(a.moves),
         "notes": "; ".join((*a.notes, f"cause not assessed: {v.needs}") if v.needs else a.notes),
     }
     if m is not None:

@@ -11,7 +11,14 @@ from analyzer.columns import BY_NAME
 from analyzer.explain.words import agreement, title
 from analyzer.loop.cost import mark
 from analyzer.loop.decisions import CAUSES, Fault, Status
-from analyzer.pages.loop_pictures import close_span, pv_over_op, rhythm_plots, trend_block, turn_panels
+from analyzer.pages.loop_pictures import (
+    answered_moves,
+    close_span,
+    pv_over_op,
+    rhythm_plots,
+    trend_block,
+    turn_panels,
+)
 from analyzer.pages.maintenance import work_order
 from analyzer.pages.reading import Thinned
 from analyzer.pages.words import (
@@ -43,7 +50,7 @@ MOST_SURE = 99.0
 FIGURES = (
     *("oscillation_significance", "oscillating_pct", "average_absolute_error_pct", "variability_pct"),
     *("valve_travel_pct_per_h", "reversals_per_h", "crossings_per_h", "noise_band_pct", "harris_index"),
-    *("settling_time_s", "regularity", "normal_pct", "at_limits_pct", "service_pct", "usable_h"),
+    *("regularity", "normal_pct", "at_limits_pct", "service_pct", "usable_h"),
     *("sp_mean_pct", "pv_mean_pct", "op_mean_pct", "manual_pct", "frozen_pct", "lasting_error_pct"),
     *("error_memory_ti", "loss"),
 )
@@ -79,6 +86,7 @@ COLUMNS = (
     *("witness", "believed_nights", "believed_since", "worn_pct", "worn_nights", "certain_since"),
     *("width_pct", "width_low_pct", "width_high_pct", "wear_pct_per_month", "wear_low_pct", "wear_high_pct"),
     *("wear_since", "reaches_pct", "reaches_from", "reaches_by"),
+    *("sp_moves", "rise_time_s", "overshoot_pct", "settling_time_s", "moves"),
     *(name for _, period, amplitude in CYCLES for name in (period, amplitude)),
 )
 """What a loop's page reads of the table of nights."""
@@ -165,6 +173,16 @@ def _figure(name: str, row: Row, scale: PvScale) -> tuple[str, str]:
     term, text = titled(name, number(row[name]) + mark(row, name))
     own = "" if name in LEVELS else beside(BY_NAME[name].unit, row[name], scale)
     return term, text + own
+
+
+def _moves(row: Row) -> list[Section]:
+    """How PV answers moves of the set point, where there were some."""
+    drawn = answered_moves(row)
+    if drawn is None:
+        return []
+    names = ("sp_moves", "rise_time_s", "overshoot_pct", "settling_time_s")
+    facts = Facts(tuple(titled(k, number(row[k])) for k in names if row[k] is not None))
+    return [Section("Moves of the set point", (facts, drawn))]
 
 
 def _limit_cycle(row: Row) -> list[Section]:
@@ -301,6 +319,7 @@ def page(
         *_explained(explained, row),
         _evidence(row),
         *_trends(thin, row),
+        *_moves(row),
         *_limit_cycle(row),
         *(() if settings is None else (_of_settings(settings),)),
         nights_section(rows),

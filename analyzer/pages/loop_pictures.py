@@ -195,3 +195,16 @@ def _laid_over(paths: Sequence[tuple[Floats, Floats, slice]]) -> tuple[Line, ...
     lines = [Line("since the turn", x, y) for x, y, _ in paths]
     stuck = [Line(STANDS, x[part], y[part], kind="stuck") for x, y, part in paths if x[part].size > 1]
     return (*lines, *stuck)
+
+
+def answered_moves(row: Row) -> Plot | None:
+    """PV's answers to moves of the set point over one another, each from 0 to 1; None where there were none."""
+    found = json.loads(row["moves"] or "[]")
+    if not found:
+        return None
+    lines = tuple(
+        Line("PV", np.linspace(0.0, m["lasts_s"], len(m["course"])), np.array(m["course"]), kind="pv")
+        for m in found
+    )
+    title = "PV after moves of the set point, which go from 0 to 1"
+    return Plot("moves", title, "s", "share of the move", lines, reach=(0.0, 1.0))

@@ -18,7 +18,6 @@ from analyzer.loop.assessments import (
     hour_edges,
     hourly,
     noise_band,
-    settling_time,
     travel_of,
 )
 from analyzer.loop.decisions import Lack
@@ -252,15 +251,6 @@ def test_usable_is_good_and_automatic():
     """A sample is usable where it is neither bad nor in manual."""
     r = night(41)
     assert np.array_equal(r.usable, [not b and not m for b, m in zip(r.bad, r.mask("manual"), strict=True)])
-
-
-def test_settling_time_of_a_lag():
-    """A step that a first-order lag follows settles to 5 % in three time constants."""
-    sp = 50 + 10.0 * (T >= 1000)
-    pv = sp - 10 * np.exp(-(T - 1000) / 100.0) * (T >= 1000)
-    found = settling_time(record(pv, sp), 0.0)
-    assert found == pytest.approx(-100 * math.log(0.05), abs=2)
-    assert settling_time(record(pv, 50.0), 0.0) is None
 
 
 def test_what_cannot_be_assessed_says_what_it_needs_and_has():
