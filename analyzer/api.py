@@ -4,7 +4,7 @@ Heavy parts are imported when they are used. From the project's folder:
 >>> import analyzer as triage
 >>> plant = triage.read("sample_data/mill.parquet", loops="sample_data/loops.csv", changes="sample_data/changes.csv")
 >>> len(plant.loops), plant.nights[0]
-(18, '2026-03-02')
+(22, '2026-03-02')
 >>> loop = plant.loop("TIC2106", night="2026-03-03")
 >>> loop.record.dt_s, loop.controller.kp
 (10.0, 4.0)

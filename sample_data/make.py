@@ -22,7 +22,7 @@ INTERVAL_S = 10
 OP_STEP = 0.05  # historian's resolution of OP [%]
 DOOR_PCT = 0.6  # half-width of the swinging door of the compressed loop [% of span]
 DAY_LOOPS = ("LIC2102", "TIC2104", "LIC2107", "FIC2110", "TIC2115", "PIC2116")
-CYCLING = ("backlash", "stiction", "tuning", "load", "neighbour")
+CYCLING = ("backlash", "stiction", "tuning", "load", "neighbour", "slave")
 DAY, DAY_EVERY = 2, 3  # the third day, every third sample: 30 s
 
 
@@ -117,12 +117,15 @@ def period(trend: Trend) -> float:
 def truth(trends: dict[str, Trend]) -> dict[str, dict]:
     """What was simulated, by tag, in seconds and percent of span."""
     names = ("gain", "time_constant_s", "dead_time_s")
+    slaves = {loop.master: loop.tag for loop in MILL if loop.master}
     out = {}
     for loop in MILL:
         out[loop.tag] = {
             "cause": loop.cause,
             "period_s": period(trends[loop.tag]) if loop.cause in CYCLING else None,
-            "source_loop": loop.load.source or None,
+            "source_loop": loop.load.source or slaves.get(loop.tag),
+            "master": loop.master or None,
+            "ratio_of": loop.ratio_of or None,
             "process": dict(zip(names, loop.process, strict=True)),
             "valve": {"backlash": loop.backlash, "stickband": loop.stickband, "slip_jump": loop.slip_jump},
             "before": {"kp": loop.tuning[0], "ti_s": loop.tuning[1]},

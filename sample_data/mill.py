@@ -10,7 +10,7 @@ from dataclasses import dataclass, fields
 from datetime import UTC, datetime
 
 import numpy as np
-from physics import Floats, run, swing, wander
+from physics import Floats, run, run_cascade, swing, wander
 
 SEED = 2101
 START = datetime(2026, 3, 2, tzinfo=UTC)
@@ -73,6 +73,10 @@ class Loop:
     compressed: bool = False
     only_last_h: float = 0.0
     importance: int = 3
+    master: str = ""  # the loop whose output is the set point
+    ratio_of: str = ""  # the loop whose PV, times `ratio`, is the set point
+    ratio: float = 0.0
+    batch: float = 0.0  # how far the set point of a batch rises [% PV]
 
 
 @dataclass(frozen=True)
@@ -147,7 +151,21 @@ MILL: tuple[Loop, ...] = (
     Loop("FIC2120", "Spill liquor flow", "flow", "Evaporation", "short",
          (1.0, 18.0, 4.0), (0.6, 20.0), noise=0.12, only_last_h=2.5,
          unit=Unit("t/h", 0.0, 80.0, 0.02), importance=1),
+    Loop("TIC2121", "Bleach tower temperature", "temperature", "Bleaching", "slave",
+         (1.2, 300.0, 30.0), (1.6, 300.0), noise=0.03, load=Load(0.6, 0.1, 0.6),
+         unit=_degrees(120.0), sp=62.0, op=45.0, sp_move=1.0, importance=4),
+    Loop("FIC2122", "Steam flow to bleach tower", "flow", "Bleaching", "stiction",
+         (1.1, 8.0, 2.0), (0.35, 14.0), stickband=5.0, slip_jump=4.0, noise=0.12, load=Load(0.3, 0.15, 0.2),
+         unit=Unit("t/h", 0.0, 60.0, 0.02), sp=45.0, sp_move=0.0, master="TIC2121", importance=4),
+    Loop("FIC2123", "Chlorine dioxide to pulp", "flow", "Bleaching", "none",
+         (0.9, 12.0, 3.0), (0.6, 14.0), noise=0.12, load=Load(0.4, 0.2, 0.3),
+         unit=Unit("m3/h", 0.0, 200.0, 0.05), sp=45.0, sp_move=0.0, ratio_of="FIC2113", ratio=0.9),
+    Loop("TIC2124", "Batch digester temperature", "temperature", "Cooking", "none",
+         (1.5, 500.0, 25.0), (3.0, 400.0), noise=0.03, load=Load(0.4, 0.1, 0.4),
+         unit=_degrees(200.0), sp=40.0, op=30.0, sp_move=0.0, batch=30.0),
 )  # fmt: skip
+BATCH_S, RAMP_S, HELD_S = 5 * 3600, 3000, 7000
+"""A batch, its ramp and how long it is held; the rest it stands at the start, up to a third of an hour longer."""
 
 
 def _rng(tag: str, what: int) -> np.random.Generator:
@@ -162,6 +180,15 @@ def _set_point(loop: Loop, n: int) -> Floats:
         at = int((day + rng.uniform(0.3, 0.8)) * DAY_S)
         sp[at:] = loop.sp + loop.sp_move * ((day + 1) % 2) * rng.choice([-1.0, 1.0])
     return sp
+
+
+def _batches(loop: Loop, n: int) -> Floats:
+    """What a batch adds to the set point [% PV], shape (n,): a ramp, a time at its end, and back at once."""
+    rng, out = _rng(loop.tag, 8), np.zeros(n)
+    for begin in np.cumsum(BATCH_S + rng.integers(0, 1200, n // BATCH_S + 1)):
+        course = np.concatenate((np.linspace(0.0, 1.0, RAMP_S), np.ones(HELD_S)))[: max(n - int(begin), 0)]
+        out[begin : begin + course.size] = loop.batch * course
+    return out
 
 
 def _load(loop: Loop, n: int, trends: dict[str, Trend]) -> Floats:
@@ -194,7 +221,13 @@ def _manual(loop: Loop, n: int) -> tuple[np.ndarray, Floats]:
 
 def simulate_loop(loop: Loop, n: int, trends: dict[str, Trend]) -> Trend:
     """Two weeks, or the first n seconds of them, of one loop; `trends` holds the loops that disturb it."""
+    if loop.master:
+        raise ValueError(f"{loop.tag} is simulated with its master, {loop.master}")
     sp, (manual, push) = _set_point(loop, n), _manual(loop, n)
+    if loop.ratio_of:
+        sp = loop.ratio * trends[loop.ratio_of].pv
+    if loop.batch:
+        sp = sp + _batches(loop, n)
     kp, ti = (np.full(n, setting) for setting in loop.tuning)
     if loop.retuned:
         at = RETUNED_S + 60 * loop.minute
@@ -204,6 +237,19 @@ def simulate_loop(loop: Loop, n: int, trends: dict[str, Trend]) -> Trend:
     valve = (loop.backlash, static, kinetic)
     pv, op, stem = run(sp, _load(loop, n, trends), noise, kp, ti, push, manual, loop.op, valve, loop.process)
     return Trend(sp, pv, op, stem, manual)
+
+
+def simulate_cascade(master: Loop, slave: Loop, n: int) -> dict[str, Trend]:
+    """A master and its slave, by tag, from second to second."""
+    pair, never = (master, slave), np.zeros(n, dtype=bool)
+    sp, load = _set_point(master, n), np.stack([_load(loop, n, {}) for loop in pair])
+    noise = np.stack([loop.noise * _rng(loop.tag, 7).standard_normal(n) for loop in pair])
+    static, kinetic = 0.5 * (slave.stickband + slave.slip_jump), 0.5 * (slave.stickband - slave.slip_jump)
+    settings, ends = np.array([loop.tuning for loop in pair]), (master.op, slave.op)
+    valve = (slave.backlash, static, kinetic)
+    pv, op, stem = run_cascade(sp, load, noise, settings, ends, valve, slave.process, master.process)
+    of_master = Trend(sp, pv[0], op[0], pv[1], never)
+    return {master.tag: of_master, slave.tag: Trend(op[0], pv[1], op[1], stem, never)}
 
 
 def thin(trend: Trend, every: int) -> Trend:
@@ -224,9 +270,12 @@ def simulate(days: float = DAYS, tags: tuple[str, ...] = (), every: int = 10) ->
         Interval of the samples returned [s]; inside, the mill runs second by second.
     """
     chosen = [loop for loop in MILL if not tags or loop.tag in tags]
-    sources = {loop.load.source for loop in chosen} - {""}
-    n = int(days * DAY_S)
+    sources = {tag for loop in chosen for tag in (loop.load.source, loop.ratio_of)} - {""}
+    n, by_tag = int(days * DAY_S), {loop.tag: loop for loop in MILL}
     full = {loop.tag: simulate_loop(loop, n, {}) for loop in MILL if loop.tag in sources}
+    for slave in MILL:
+        if slave.master and {slave, by_tag[slave.master]} & set(chosen):
+            full |= simulate_cascade(by_tag[slave.master], slave, n)
     trends = {}
     for loop in chosen:
         trend = full[loop.tag] if loop.tag in full else simulate_loop(loop, n, full)

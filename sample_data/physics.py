@@ -133,6 +133,62 @@ def run(
     return pv, op, stem
 
 
+@njit(cache=True)
+def run_cascade(
+    sp: Floats, load: Floats, noise: Floats, settings: Floats, op0: tuple[float, float], valve: Three,
+    inner: Three, outer: Three,
+) -> tuple[Floats, Floats, Floats]:  # fmt: skip
+    """A master whose output is the set point of a slave, whose PV feeds the master's process; both PI, 1 s scan.
+
+    Parameters
+    ----------
+    sp : ndarray of shape (n,)
+        The master's set point [% PV].
+    load, noise : ndarray of shape (2, n)
+        Of master and slave: load at the process input [% of its input], measurement noise [% PV].
+    settings : ndarray of shape (2, 2)
+        Gain and integral time [s] of master and slave.
+    op0 : tuple of (float, float)
+        Outputs of master and slave that hold the first set point [%].
+    valve : tuple of (float, float, float)
+        The slave's: backlash, static and kinetic friction [% OP].
+    inner, outer : tuple of (float, float, float)
+        The slave's and the master's process: gain, time constant [s], dead time [s].
+
+    Returns
+    -------
+    PV and OP, shape (2, n) each, and stem position, shape (n,), in percent.
+    """
+    dt, n = 1.0 / SUBSTEPS, sp.size
+    steps2, old2, new2 = shares(inner[1], inner[2], dt)
+    steps1, old1, new1 = shares(outer[1], outer[2], dt)
+    late2, late1 = np.full(steps2 + 2, op0[1]), np.full(steps1 + 2, op0[0])
+    follow, share = 1.0 - math.exp(-dt / ACTUATOR_S), 1.0 - math.exp(-dt / SLIP_S)
+    pv, op, stem = np.empty((2, n)), np.empty((2, n)), np.empty(n)
+    x1, x2, e1, e2, way, at2, at1 = 0.0, 0.0, 0.0, 0.0, 0.0, 0, 0
+    u1, (u2, force, rest) = op0[0], (op0[1], op0[1], op0[1])
+    for k in range(n):
+        pv[0, k] = min(max(sp[0] + x1 + noise[0, k], 0.0), 100.0)
+        pv[1, k] = min(max(op0[0] + x2 + noise[1, k], 0.0), 100.0)
+        e = sp[k] - pv[0, k]
+        u1, e1 = min(max(u1 + settings[0, 0] * (e - e1 + e / settings[0, 1]), 0.0), 100.0), e
+        e = u1 - pv[1, k]
+        u2, e2 = min(max(u2 + settings[1, 0] * (e - e2 + e / settings[1, 1]), 0.0), 100.0), e
+        for _ in range(SUBSTEPS):
+            force += follow * (u2 - force)
+            rest, way = moved(rest, way, force, valve, share)
+            late2[at2] = rest
+            at2 = (at2 + 1) % late2.size
+            inflow = old2 * late2[at2] + new2 * late2[(at2 + 1) % late2.size]
+            x2 += (old2 + new2) * (inner[0] * (load[1, k] - op0[1]) - x2) + inner[0] * inflow
+            late1[at1] = op0[0] + x2
+            at1 = (at1 + 1) % late1.size
+            inflow = old1 * late1[at1] + new1 * late1[(at1 + 1) % late1.size]
+            x1 += (old1 + new1) * (outer[0] * (load[0, k] - op0[0]) - x1) + outer[0] * inflow
+        op[0, k], op[1, k], stem[k] = u1, u2, rest
+    return pv, op, stem
+
+
 def wander(rng: np.random.Generator, n: int, std: float, corner_s: float) -> Floats:
     """Ornstein-Uhlenbeck noise, standard deviation `std`, correlation time `corner_s` [s]; shape (n,)."""
     keep = math.exp(-1.0 / corner_s)

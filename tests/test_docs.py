@@ -14,6 +14,7 @@ from click.testing import CliRunner
 from analyzer.cli import main
 from analyzer.loop.decisions import Action, Lane
 from analyzer.loops import changes, spec
+from analyzer.store.store import Store
 
 ROOT = Path(__file__).resolve().parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -68,7 +69,8 @@ def test_each_command_has_help_and_an_example(name):
 
 
 def test_main_job_of_the_readme_on_one_day(tmp_path):
-    """The README's main job, on one day of the sample mill, ranks the loops that are hidden as faulty first."""
+    """The README's main job, on one day of the sample mill, ranks the loops that are hidden as faulty first, tells a
+    cascade's sticking valve at its slave, and takes the phases of a batch for no cycle."""
     triage = [sys.executable, "-m", "analyzer.cli"]
     sample = ROOT / "sample_data"
     run = [*triage, "run", str(sample / "mill.parquet"), "--loops", str(sample / "loops.csv")]
@@ -80,7 +82,14 @@ def test_main_job_of_the_readme_on_one_day(tmp_path):
         [*triage, "rank", str(tmp_path)], capture_output=True, text=True, check=True
     ).stdout
     loops = re.findall(r"^ ([A-Z]{3}\d{4})", ranked, flags=re.MULTILINE)
-    assert set(loops[:11]) >= {"LIC2102", "LIC2105", "LIC2107", "TIC2104", "TIC2106", "FIC2110", "PIC2112"}
+    assert set(loops[:12]) >= {"LIC2102", "LIC2105", "LIC2107", "TIC2104", "TIC2106", "FIC2110", "FIC2122"}
+    held = Store(tmp_path)
+    columns = ["loop", "cause", "source_loop", "master", "ratio_of", "oscillating_pct"]
+    found = {r["loop"]: r for r in held.rows("nights", held.require(), columns)}
+    assert (found["FIC2122"]["cause"], found["FIC2122"]["master"]) == ("valve", "TIC2121")
+    assert found["TIC2121"]["source_loop"] == "FIC2122"
+    assert found["FIC2123"]["ratio_of"] == "FIC2113"
+    assert found["TIC2124"]["oscillating_pct"] == 0.0
 
 
 def cells(path: str) -> list[list[str]]:

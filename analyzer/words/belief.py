@@ -124,7 +124,8 @@ def reason(now: Belief, row: Row) -> str:
     worn = nights > 1 and t.fault in IS and now.valve.certain
     sure = f"certain by {nights} nights" if worn else None
     over = f"{nights} nights say {width_text(now)}, certain since {now.valve.certain}" if worn else None
-    alone = None if t.own or t.calmed else f"this night alone: {WAS[Cause(row['cause'])]}"
+    differs = not (t.own or t.calmed) and row["cause"] != t.cause
+    alone = f"this night alone: {WAS[Cause(row['cause'])]}" if differs else None
     text = _calmed(now) if t.calmed else row["reason"] if t.own else _together(now, row)
     first, *others = (text or "").split("; ")
     return joined(first, sure, *others, over, alone)

@@ -274,3 +274,24 @@ def test_historian_reports_by_exception_within_its_bound() -> None:
     x = np.cumsum(np.random.default_rng(1).standard_normal(2000)) * 0.1
     assert np.max(np.abs(reported(x, 0.05) - x)) <= 0.075 + 1e-9
     assert np.max(np.abs(compressed(x, 0.4, 0.001) - x)) <= 0.4 + 0.001
+
+
+def test_a_cascade_and_a_ratio_hang_together(mill: pd.DataFrame) -> None:
+    """A slave's set point is its master's output over its own range, a ratio loop's a multiple of its leader's PV."""
+    for tag, loop in LOOPS.items():
+        sp, _, _ = percent(mill, tag)
+        if loop.master:
+            assert np.abs(sp - mill[f"{loop.master}.OP"].to_numpy()).max() < 0.2
+        if loop.ratio_of:
+            _, leader, _ = percent(mill, loop.ratio_of)
+            assert np.abs(sp - loop.ratio * leader).max() < 0.3
+
+
+def test_a_batch_rises_and_comes_back(mill: pd.DataFrame) -> None:
+    """Some four times a day the batch's set point ramps up by its height, stays and steps back."""
+    (loop,) = (x for x in MILL if x.batch)
+    sp, pv, _ = percent(mill, loop.tag)
+    steps = np.flatnonzero(np.diff(sp) < -0.9 * loop.batch)
+    assert 14 * 3 <= steps.size <= 14 * 5
+    assert np.ptp(sp) == pytest.approx(loop.batch, abs=0.1)
+    assert np.corrcoef(sp, pv)[0, 1] > 0.9
