@@ -192,11 +192,11 @@ class Tried:
 
 def alternatives(loop: Loop, new: Pid | None, chosen: Mapping[str, Pid] | None = None) -> dict[str, Pid]:
     """Settings to compare: the present ones, the recommended if any, those chosen between, and the rules'; those that
-    equal earlier ones are left out."""
+    equal earlier ones are left out. A derivative is the present one in all of them."""
     now, h = loop.controller, scan_step(loop)
     found = {NOW: now} | ({} if new is None else {RECOMMENDED: new}) | dict(chosen or {})
     rules = {SIMC: simc(loop.process, scan_s=h), LAMBDA: lambda_settings(loop.process, h)}
-    found |= {name: replace(now, kp=pid.kp, ti_s=pid.ti_s, td_s=0.0) for name, pid in rules.items()}
+    found |= {name: replace(now, kp=pid.kp, ti_s=pid.ti_s) for name, pid in rules.items()}
     if not isinstance(loop.process, Integrator):
         found[LONGER] = backlash_rule(loop.process, now)
     seen: dict[tuple[float, float], str] = {}

@@ -133,7 +133,8 @@ def _simc_settings(
 ) -> list[tuple[Pid, float]]:
     """SIMC settings with their Ms from the `first` step of the closed-loop time constant on, all samples robust.
 
-    The loop's own time constant and the shortest of its samples' give the integral times.
+    The loop's own time constant and the shortest of its samples' give the integral times. A derivative stays as it
+    is, for nobody is told to switch it off.
     """
     h = scan_step(loop)
     tau_c = TAU_C_PER_DELAY * effective_delay(loop.process, h)
@@ -143,7 +144,7 @@ def _simc_settings(
     for k in range(first, STEPS):
         nominal = simc(loop.process, tau_c * SLOWER**k, h)
         for ti in dict.fromkeys((nominal.ti_s, min([nominal.ti_s, *lags]))):
-            new = replace(loop.controller, kp=rounded(nominal.kp), ti_s=rounded(ti), td_s=0.0)
+            new = replace(loop.controller, kp=rounded(nominal.kp), ti_s=rounded(ti))
             ms = robust((loop, *others), new, most)
             found += [] if ms is None else [(new, ms)]
         if len(found) >= ENOUGH:

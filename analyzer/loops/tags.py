@@ -176,6 +176,16 @@ def as_stated(pid: Pid, spec: LoopSpec, pv_span: float | None) -> tuple[float, f
     return kp, _stated_time(ti_s, spec.ti_unit)
 
 
+def derivative_as_stated(pid: Pid, spec: LoopSpec, pv_span: float | None) -> float:
+    """Derivative time of `pid` in the unit of time and the form of `spec`; 0 for none."""
+    td_s = pid.td_s
+    if spec.form is Form.PARALLEL:
+        td_s *= abs(pid.kp / unit_ratio(spec, pv_span))
+    elif spec.form is Form.SERIES and td_s > 0.0 and math.isfinite(pid.ti_s):
+        td_s /= _from_ideal(spec.form, 1.0, pid.ti_s, td_s)[0]
+    return td_s / (1.0 if spec.ti_unit == "s" else 60.0)
+
+
 def unit_ratio(spec: LoopSpec, pv_span: float | None) -> float:
     """Percent of OP per percent of PV, for one unit of the stated gain."""
     if spec.gain_unit != "engineering":

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from analyzer.loop.settings_check import SettingsDiffer
 from analyzer.loops.spec import LoopSpec
-from analyzer.loops.tags import as_stated
+from analyzer.loops.tags import as_stated, derivative_as_stated
 from analyzer.words.units import arrow, gain_unit, settings
 from identification.models import Pid
 
@@ -31,7 +31,9 @@ CALM = "At the settings in force the valve's fault makes no cycle: its repair ca
 def of_controller(pid: Pid, spec: LoopSpec, pv_span: float) -> str:
     """A controller's settings as they are typed into it."""
     kp, ti = as_stated(pid, spec, pv_span)
-    return settings(kp, ti, gain_unit(spec.gain_unit, spec.pv_unit, spec.op_unit), spec.ti_unit)
+    known = settings(kp, ti, gain_unit(spec.gain_unit, spec.pv_unit, spec.op_unit), spec.ti_unit)
+    td = derivative_as_stated(pid, spec, pv_span)
+    return f"{known}, Td {td:.3g} {'s' if spec.ti_unit == 's' else 'min'}" if td else known
 
 
 def settings_changed(old: LoopSpec, new: LoopSpec, clock: str) -> str:

@@ -11,7 +11,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from analyzer.history.export import open_export
-from analyzer.loops.tags import LoopSpec, as_stated, controller, find_loops, match, read_loops
+from analyzer.loops.tags import (
+    LoopSpec,
+    as_stated,
+    controller,
+    derivative_as_stated,
+    find_loops,
+    match,
+    read_loops,
+)
 from identification.errors import InputError
 from identification.models import Form
 
@@ -192,6 +200,7 @@ def test_stated_settings_survive_the_round_trip(spec: LoopSpec, pv_span: float, 
     pid = controller(spec, pv_span)
     assert pid is not None
     assert as_stated(pid, spec, pv_span) == pytest.approx((spec.kp, spec.ti), rel=1e-6)
+    assert derivative_as_stated(pid, spec, pv_span) == pytest.approx(spec.td or 0.0, rel=1e-5, abs=1e-9)
 
 
 def test_no_settings_no_controller() -> None:

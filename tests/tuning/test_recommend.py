@@ -170,6 +170,17 @@ def test_tight_tuning_gets_simc():
         assert p.ms < LIMITS.ms_most < p.ms_before
 
 
+def test_a_derivative_stays_as_it_is_and_robust():
+    """A tight loop with a derivative gets a gain and an integral time that are robust with that derivative."""
+    process = Fopdt(1.0, 60.0, 10.0)
+    nominal = simc(process, scan_s=1.0)
+    loop = Loop(process, replace(nominal, kp=3 * nominal.kp, td_s=6.0))
+    p = recommend(loop, "tuning")
+    assert p.controller is not None
+    assert p.controller.td_s == loop.controller.td_s
+    assert maximum_sensitivity(replace(loop, controller=p.controller)) <= LIMITS.ms_most
+
+
 def test_tight_loop_gets_the_robust_settings_of_least_error_on_its_load():
     """Where the load is known, tight tuning gets robust SIMC settings with no more error than nominal."""
     process = Fopdt(1.5, 100, 8)
