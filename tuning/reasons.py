@@ -154,5 +154,5 @@ def nothing_better(loop: Loop, before: Confirmed, considered: bool) -> str:
     kind = "play" if isinstance(loop.valve, Backlash) else "stick-slip"
     return (
         f"The valve has {_fault(loop)} and gives {_cycle(before.cycle)}; no pair of Kp and Ti {what}. "
-        f"Only less {kind} helps: repair the valve."
+        f"Only less {kind} helps without a price: repair the valve."
     )
