@@ -62,9 +62,10 @@ def written(store: Path, weeks: Path, out: Path) -> dict[str, Path]:
     changes = Path("sample_data/changes.csv")
     run(["pages", str(store), "--out", str(out)])
     run(["report", str(weeks), "--changes", str(changes), "--out", str(out)])
-    loop = next(p for p in sorted(out.glob("LIC2102-*.html")))
+    settings = next(out.glob("LIC2107-*-settings.html"))
+    loop = out / settings.name.replace("-settings", "")
     kinds = {"morning": out / "index.html", "maintenance": out / "maintenance.html", "loop": loop}
-    kinds |= {"group": out / "group-1.html", "before-after": out / "before-after.html"}
+    kinds |= {"settings": settings, "group": out / "group-1.html", "before-after": out / "before-after.html"}
     return {name: path for name, path in kinds.items() if path.exists()}
 
 
