@@ -257,7 +257,8 @@ def _of_calm(now: Belief, own: Told, limits: BeliefLimits) -> Told:
         confidence = {**own.confidence, Cause.VALVE: now.valve.worn_pct(limits)}
         if own.action in FIRST:
             return Told(Cause.VALVE, confidence, fault, None, own.action)
-        return Told(Cause.VALVE, confidence, fault, None, Action.REPAIR_VALVE, Due.SHUTDOWN)
+        due = own.due or Due.SHUTDOWN  # a slave that moves its master cannot wait
+        return Told(Cause.VALVE, confidence, fault, None, Action.REPAIR_VALVE, due)
     if own.cause is not Cause.VALVE:
         return own
     action = Action.NONE if own.action is Action.REPAIR_VALVE else own.action

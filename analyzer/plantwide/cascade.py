@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import Any
 
 from analyzer.config import PlantLimits
-from analyzer.loop.decisions import Action, Cause, GroupRole, Status
+from analyzer.loop.decisions import Action, Cause, Due, GroupRole, Status
 from analyzer.loop.finding import Finding, Remedy, Root, Sign, following
 from analyzer.plantwide.structure import Link, Tie
 from analyzer.plantwide.verdict import follower_confidence
@@ -99,7 +99,8 @@ def _judged(
         root = Root(below.loop, level, None, max(f.confidence.get(cause, 0.0) for f in (above, below)))
         if above.cause is Cause.VALVE or _alike(above, below, limits) or not below.oscillates:
             sign = Sign(Cause.LOAD, limits.follower_sign, below_text(below))
-            return _follows(above, root, sign, limits), replace(below, moves=_with(below, above.loop))
+            moved = replace(below, moves=_with(below, above.loop), remedy=_now(below.remedy))
+            return _follows(above, root, sign, limits), moved
         if above.remedy.action in ACTING:
             return replace(above, remedy=Remedy(Action.UNDECIDED, below_first(below))), below
         return above, below
@@ -108,6 +109,11 @@ def _judged(
         sign = Sign(Cause.LOAD, limits.follower_sign, above_text(above, tie))
         return replace(above, moves=_with(above, below.loop)), _follows(below, root, sign, limits)
     return above, below
+
+
+def _now(remedy: Remedy) -> Remedy:
+    """A repair that could wait if the loop were alone: its master cycles for it."""
+    return Remedy(remedy.action, due=Due.NOW) if remedy.due is Due.SHUTDOWN else remedy
 
 
 def _follows(own: Finding, root: Root, sign: Sign, limits: PlantLimits) -> Finding:

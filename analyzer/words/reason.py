@@ -89,7 +89,7 @@ def cycle_text(found: Finding) -> str:
     """Whether the loop cycles, and for how much of the time where it is too little to count."""
     swing = found.swing
     if swing is None or not swing.oscillating_pct or not swing.period_s:
-        return "does not oscillate"
+        return f"moves with {found.moves[0]}" if found.moves else "does not oscillate"
     cycle = f"cycles every {duration(swing.period_s)}"
     return cycle if found.oscillates else f"{cycle}, for {swing.oscillating_pct:.0f} % of the time"
 

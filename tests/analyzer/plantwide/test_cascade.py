@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 from analyzer.config import Config
-from analyzer.loop.decisions import CAUSES, Action, Cause, Fault, GroupRole, Status
+from analyzer.loop.decisions import CAUSES, Action, Cause, Due, Fault, GroupRole, Status
 from analyzer.loop.finding import Finding, Remedy, Root, Sign, Swing, following
 from analyzer.plantwide.cascade import led_anew, linked
 from analyzer.plantwide.structure import Link, Tie
@@ -63,6 +63,18 @@ def test_a_slave_that_its_tight_master_swings_follows_it() -> None:
     assert (master.cause, master.action, master.moves) == (Cause.TUNING, Action.RETUNE, ("FIC1",))
     _, apart = night(tight, found("FIC1", Cause.UNDECIDED, 17.0, Action.UNDECIDED))
     assert apart.follows is None
+
+
+def test_a_slaves_repair_does_not_wait_while_its_master_cycles() -> None:
+    """A slave whose own error does not count as a cycle is stroked at once where its master cycles for its valve."""
+    waits = replace(
+        found("FIC1", Cause.VALVE, None, Action.REPAIR_VALVE),
+        remedy=Remedy(Action.REPAIR_VALVE, "its repair can wait", due=Due.SHUTDOWN),
+    )
+    master, slave = night(found("TIC1", Cause.VALVE, 240.0, Action.RETUNE), waits)
+    assert master.action is Action.SEE_SOURCE_LOOP
+    assert (slave.remedy.action, slave.remedy.due, slave.moves) == (Action.REPAIR_VALVE, Due.NOW, ("TIC1",))
+    assert reason(slave).startswith("moves with TIC1")
 
 
 def test_a_master_gets_no_settings_while_its_slave_has_a_fault() -> None:
