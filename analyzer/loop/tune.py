@@ -38,7 +38,7 @@ from identification.models import Estimate, Loop, Pid, Process, Valve
 from identification.record import Floats
 from tuning.describing import describe
 from tuning.forecast import Forecast, predict, run
-from tuning.frequency_response import slowest_s
+from tuning.frequency_response import is_stable, slowest_s
 from tuning.harmonic_balance import curves, travel_map
 from tuning.limit_cycle import Confirmed, confirm
 from tuning.recommend import Proposal
@@ -308,8 +308,12 @@ def _beside(
     from reports.pictures import as_file
 
     period_s = t.period_s or 10.0 * slowest_s(t.model)
-    found = compared(t.model, t.load, t.new, period_s, spec, pv_span, config.tuning, t.others)
-    text = text if found is None else [*text, *choices(found, spec)]
+    bounded = t.new is not None or is_stable(t.model)  # else what is identified is no loop to try settings on
+    known = t.model, t.load, t.new, period_s, spec, pv_span, config.tuning, t.others
+    found = compared(*known) if bounded else None
+    sought = t.new is not None or t.proposal.before is not None
+    if found is not None and sought:
+        text = [*text, *choices(found, spec)]
     if not drawn:
         return text, {}
     files = {f"{p.name}.svg": as_file(p).encode() for p in pictures(t, spec.loop)}
