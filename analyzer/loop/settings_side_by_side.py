@@ -14,7 +14,7 @@ from analyzer.loops.tags import as_stated
 from identification.models import Loop, Pid
 from identification.record import Floats
 from reports.pages import as_held
-from tuning.forecast import REPAIRED, Tried, alternatives, run, settled, tried
+from tuning.forecast import RECOMMENDED, REPAIRED, Tried, alternatives, run, settled, tried
 from tuning.frequency_response import integral_s
 from tuning.harmonic_balance import TravelMap, travel_map
 from tuning.limits import TuningLimits
@@ -26,6 +26,8 @@ MAP_POINTS, SPREAD = 24, 12.0
 """Points of the travel map along each axis, and how far it reaches about the present settings; ours."""
 BEYOND = 1.5
 """How far the map reaches beyond the outermost settings [-]; ours."""
+ALIKE = 0.01
+"""Difference of travel over the present one [-] that is none to an engineer; ours."""
 SHOWN_PERIODS, SHOWN_POINTS = 8.0, 240
 """Periods of each simulation that a picture shows, and its points at most; ours."""
 
@@ -92,6 +94,14 @@ def _map(loop: Loop, settings: Sequence[Pid]) -> TravelMap | None:
     return travel_map(loop, kp, np.geomspace(first, last, MAP_POINTS))
 
 
+def _beaten(name: str, everywhere: Mapping[str, Candidate]) -> bool:
+    """Whether the recommended settings win as much for less, on all loops that the data allow."""
+    best, own = everywhere.get(RECOMMENDED), everywhere[name]
+    if best is None:
+        return False
+    return best.worst_travel <= own.worst_travel + ALIKE and best.worst_error <= own.worst_error
+
+
 def compared(
     loop: Loop,
     load: Floats,
@@ -113,6 +123,8 @@ def compared(
     table = bench(loop, others, load, limits)
     found = trade(table)
     settings = alternatives(loop, new, {name: c.controller for name, c in found.chosen.items()})
+    everywhere = worst(table, settings)
+    settings = {k: pid for k, pid in settings.items() if k not in found.chosen or not _beaten(k, everywhere)}
     now = rejection(loop.process, loop.controller)
     free = None if loop.valve is None else replace(loop, valve=None)
     return Comparison(
@@ -124,7 +136,7 @@ def compared(
         {name: as_stated(pid, spec, pv_span) for name, pid in settings.items()},
         pv_span,
         {name: rejection(loop.process, pid).peak / now.peak for name, pid in settings.items()},
-        worst(table, settings),
+        everywhere,
         found.curve,
         None if free is None else tried(free, load, {REPAIRED: loop.controller})[0],
     )

@@ -121,7 +121,7 @@ def _typed(c: Comparison, name: str, spec: LoopSpec) -> str:
 
 def _offer(c: Comparison) -> str:
     """What may be chosen all the same, and what a repair would bring."""
-    offers = [f"{name}: {_priced(c, name)}" for name in (CALMER, SMALLER) if name in c.everywhere]
+    offers = [f"{name}: {_priced(c, name)}" for name in (CALMER, SMALLER) if name in c.shown]
     if c.repaired is not None:
         offers.append(f"a repaired valve: {_against_now(c, c.repaired)}")
     return f"To choose between: {'; '.join(offers)}." if offers else ""
