@@ -46,6 +46,7 @@ READ = (
         "cause",
         "valve_fault",
         "source_loop",
+        "master",
         "lack",
     ),
     *(f"osc_{c}_pct" for c in CAUSES),

@@ -73,6 +73,13 @@ def test_a_loop_that_cycles_for_a_part_of_the_night_has_not_stopped() -> None:
     assert headlines(few) == ["stopped oscillating"]
 
 
+def test_whether_a_slaves_error_is_a_cycle_tonight_is_no_news() -> None:
+    """Behind a set point that its master moves a slave cycles on every second night: its master tells, not it."""
+    rows = [row(k, LOAD if k % 2 else CALM) for k in range(6)]
+    assert any("oscillat" in h for h in headlines(rows))
+    assert headlines([r | {"master": "TIC1"} for r in rows]) == [""] * 5
+
+
 def test_a_valve_that_becomes_certain_is_news_once() -> None:
     """The night from which a valve is believed worn says so, with its width; no night after it does."""
     rows = [row(k, CALM, witness=witness(0.8, 6.0)) for k in range(6)]
