@@ -182,8 +182,8 @@ def news(before: Belief | None, now: Belief, row: Row) -> tuple[str, str]:
 
 
 def _swing_news(before: Belief, now: Belief, row: Row) -> tuple[str, str] | None:
-    """That a loop began or ceased to oscillate, or does so more or less than it used to; nothing of a slave, whose error
-    behind a set point that moves is a cycle on one night and none on the next: its master tells."""
+    """That a loop began or ceased to oscillate, or does so more or less than it used to; nothing of a slave, whose
+    error behind a set point that moves is a cycle on one night and none on the next: its master tells."""
     if row["master"]:
         return None
     changed = now.cycle.since != before.cycle.since and now.cycle.nights == 1
