@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Sequence
+from urllib.parse import quote
 
 import numpy as np
 
@@ -20,7 +21,7 @@ from analyzer.pages.loop_pictures import (
     turn_panels,
 )
 from analyzer.pages.maintenance import work_order
-from analyzer.pages.reading import Thinned
+from analyzer.pages.reading import BESIDE, Thinned
 from analyzer.pages.words import (
     PvScale,
     Row,
@@ -326,7 +327,7 @@ def page(
     ]
     sections.insert(-1, _figures(row))
     group = row["group"] if shared is not None else None
-    links = (("All loops", "index.html"), *_links(more, settings, group))
+    links = (("All loops", "index.html"), *_links(more, settings, group), *_beside_source(row))
     return Page(slug(row["loop"]), row["loop"], _subtitle(row), tuple(sections), links)
 
 
@@ -347,6 +348,14 @@ def _subtitle(row: Row) -> str:
     """What loop it is, and which night."""
     known = [row["description"], row["type"], row["area"], f"night {row['night']}"]
     return ", ".join(k for k in known if k)
+
+
+def _beside_source(row: Row) -> Iterator[tuple[str, str]]:
+    """To its trends and those of the loop that it follows, on one time axis."""
+    source = row["source_loop"]
+    if source:
+        pair = ",".join(quote(name, safe="") for name in (source, row["loop"]))
+        yield f"Beside {source}", f"{BESIDE}.html#{pair}"
 
 
 def _links(more: Page | None, settings: Page | None, group: str | None) -> Iterator[tuple[str, str]]:

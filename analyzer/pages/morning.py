@@ -13,7 +13,7 @@ from analyzer.pages.groups import morning_table
 from analyzer.pages.loop_pictures import close_span, sparkline
 from analyzer.pages.news import since
 from analyzer.pages.plant import NightSum, area_table, plant_history, plant_map
-from analyzer.pages.reading import ShownNight, linked, needs_a_look, oscillates
+from analyzer.pages.reading import BESIDE, ShownNight, linked, needs_a_look, oscillates
 from analyzer.pages.summary import first_things
 from analyzer.pages.words import Row, cause_cell, cell, heading, marked_cell, page_columns, with_noun
 from analyzer.plantwide.view import GroupView
@@ -26,11 +26,10 @@ FACETS = ("area", "cause", "action")
 """Columns by which lists are filtered."""
 ALL_SHARES = ("oscillating_pct", "osc_valve_pct", "osc_tuning_pct", "osc_load_pct")
 ALL_COSTS = ("average_absolute_error_pct", "valve_travel_pct_per_h", "variability_pct")
-BESIDE = "side-by-side.html"
 LINKS = (
     ("Hand-over to maintenance", f"{maintenance.NAME}.html"),
     ("Work list", "work.html"),
-    ("Loops side by side", BESIDE),
+    ("Loops side by side", f"{BESIDE}.html"),
     ("All loops as CSV", "csv/index-ranking.csv"),
 )
 
@@ -70,7 +69,7 @@ def worst_table(night: ShownNight) -> Table:
     declared = page_columns("worst") if noted else page_columns("worst")[:-1]
     shown = (*declared[:4], heading(by), *declared[4:])
     rows = tuple(row[: len(shown)] for row in rows)
-    return Table("worst", "", shown, rows, said, True, FACETS, True, BESIDE)
+    return Table("worst", "", shown, rows, said, True, FACETS, True, f"{BESIDE}.html")
 
 
 def _all_row(night: ShownNight, row: Row) -> tuple[Cell, ...]:
@@ -90,7 +89,7 @@ def ranking(night: ShownNight) -> Table:
     marked = any(mark(row, name) for row in night.rows for name in (SIGNIFICANCE, *ALL_COSTS))
     note = f"{MARK} {OF_RECORDED}." if marked else ""
     rows = tuple(_all_row(night, r) for r in night.rows)
-    return Table("ranking", "", page_columns("ranking"), rows, note, True, FACETS, beside=BESIDE)
+    return Table("ranking", "", page_columns("ranking"), rows, note, True, FACETS, beside=f"{BESIDE}.html")
 
 
 def waiting(night: ShownNight) -> list[tuple[str, str]]:

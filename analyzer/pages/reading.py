@@ -25,6 +25,8 @@ from reports.texts import slug
 
 Row = Mapping[str, Any]
 SIGNALS = ("sp", "pv", "op")
+BESIDE = "side-by-side"
+"""Name of the page on which loops are laid beside each other; the address after # names them."""
 AROUND_D = 2
 """Nights are named by the date of their middle and are up to 36 h long: read this many days more [d]."""
 

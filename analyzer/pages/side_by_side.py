@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from analyzer.pages.loop_pictures import trend_block
-from analyzer.pages.reading import ShownNight, read_trends
+from analyzer.pages.reading import BESIDE, ShownNight, read_trends
 from analyzer.pages.words import pv_scale_of
 from analyzer.store.store import Store
 from reports.pages import Beside, Page, Section
 from reports.texts import slug
 
-NAME = "side-by-side"
 BUCKETS = 720
 """Buckets of a trend at most; ours: two minutes of a day, and some kilobytes a loop."""
 CAPTION = "Each loop in its own unit. Zoom or move one, and all go with it; the address keeps the choice."
@@ -26,7 +25,7 @@ def page(store: Store, night: ShownNight) -> Page:
     )
     beside = Beside("beside", "Loops, up to six", blocks, CAPTION)
     return Page(
-        NAME,
+        BESIDE,
         "Loops side by side",
         f"the night of {night.name}",
         (Section("Side by side", (beside,)),),

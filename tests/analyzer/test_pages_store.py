@@ -10,9 +10,10 @@ import pyarrow.parquet as pq
 import pytest
 
 from analyzer.belief.nights import settle_anew
+from analyzer.columns import row_of
 from analyzer.config import Config
 from analyzer.loops.changes import TuningChange
-from analyzer.pages import before_after, morning, night
+from analyzer.pages import before_after, loop, morning, night
 from analyzer.pages.changes import Spans, change_cases, detected, wear_texts
 from analyzer.pages.loop_pictures import autocorrelation, rhythm_plots, turn_panels
 from analyzer.pages.plant import score
@@ -234,3 +235,11 @@ def test_half_cycles_are_drawn_in_the_loops_unit() -> None:
     ]
     assert "m3/h" in plane.y_label
     assert turn_panels({"turns": None, "cause": "valve"}, PvScale(0.0, 1.0, "")) is None
+
+
+def test_a_follower_is_laid_beside_its_source() -> None:
+    """The page of a loop that follows another one links to both on one time axis, whatever their names hold."""
+    known = {"loop": "A 1", "night": "2026-03-02", "status": "ok", "source_loop": "B,2"}
+    row = row_of(known)
+    links = loop.page([row | dict.fromkeys(set(loop.COLUMNS) - set(row))], None).links
+    assert ("Beside B,2", "side-by-side.html#B%2C2,A%201") in links
