@@ -168,6 +168,8 @@ def table(c: Comparison, spec: LoopSpec, unit: str) -> Table:
     note = (
         f"Each simulated on the {lasts} of load that the night leaves behind the identified loop. {CAUTION}"
     )
+    if c.loop.controller.td_s > 0.0:
+        note += " The derivative time is the present one in all of them."
     return Table("settings", "", page_columns("settings"), rows, note, cards=True)
 
 

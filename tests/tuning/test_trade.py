@@ -5,6 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from analyzer.loop.settings_side_by_side import compared
+from analyzer.loops.spec import LoopSpec
+from analyzer.pages import compared as page
 from identification.models import Backlash, Fopdt, Loop, Pid
 from identification.simulation.closed_loop import closed_loop
 from proofs.valve_loops import backlash_case, level_case, stick_case
@@ -83,3 +86,14 @@ def test_a_slow_lag_behind_a_play_is_tuned_as_an_integrator():
     )
     assert new.stem_travel < 0.8 * old.stem_travel
     assert new.average_absolute_error < old.average_absolute_error
+
+
+@pytest.mark.parametrize("td_s", [0.0, 5.0])
+def test_a_derivative_that_stays_is_said_to(td_s):
+    """The table of settings of a loop with a derivative says that it stays, and all its settings have it."""
+    spec = LoopSpec("L", kp=0.4, ti=60.0, td=td_s, pv_lo=0.0, pv_hi=100.0)
+    loop = Loop(Fopdt(1.2, 30.0, 3.0), Pid(0.4, 60.0, td_s), Backlash(3.0))
+    load = 0.3 * np.sin(np.arange(4000) / 300.0)
+    found = compared(loop, load, Pid(0.3, 90.0, td_s), 120.0, spec, 100.0, LIMITS)
+    assert {t.controller.td_s for t in found.tried} == {td_s}
+    assert ("derivative" in page.table(found, spec, "%").note) == (td_s > 0.0)
