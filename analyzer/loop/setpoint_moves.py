@@ -48,22 +48,32 @@ def moves(record: LoopRecord, noise: float, limits: FigureLimits) -> tuple[Move,
     """
     if record.sp_estimated:
         return ()
-    usable, n = record.usable, len(record)
     steps = np.flatnonzero(np.abs(np.diff(record.sp)) > 1e-6) + 1
-    edges = np.concatenate(([0], steps, [n]))
-    found = []
-    for first, at, last in zip(edges[:-2], steps, edges[2:], strict=True):
-        size = float(record.sp[at] - record.sp[at - 1])
-        stood = min(at - first, last - at) >= limits.move_stands
-        if stood and abs(size) > limits.move_noise * max(noise, 1e-6) and usable[first:last].all():
-            spread = robust_deviation(record.error[first:at] - np.median(record.error[first:at]))
-            if abs(size) > limits.move_spread * spread:
-                found.append(
-                    _answered(
-                        record, slice(int(at) - 1, int(last)), size, max(noise, spread), limits.move_stands
-                    )
-                )
-    return tuple(found)
+    edges = np.concatenate(([0], steps, [len(record)]))
+    held, size = np.diff(edges), record.sp[steps] - record.sp[steps - 1]
+    stood = np.minimum(held[:-1], held[1:]) >= limits.move_stands
+    large = np.abs(size) > limits.move_noise * max(noise, 1e-6)
+    found = (_move(record, edges[k : k + 3], noise, limits) for k in np.flatnonzero(stood & large))
+    return tuple(m for m in found if m is not None)
+
+
+def _move(record: LoopRecord, edges: np.ndarray, noise: float, limits: FigureLimits) -> Move | None:
+    """One move; None where the error did as much before it, or samples are lacking before PV has settled.
+
+    edges : first sample before which SP stood, that of the move, and that of the next, shape (3,).
+    """
+    first, at, last = (int(x) for x in edges)
+    before = record.error[first:at][record.usable[first:at]]
+    bad = np.flatnonzero(~record.usable[at - 1 : last])
+    until = at - 1 + int(bad[0]) if bad.size else last
+    if min(before.size, until - at) < limits.move_stands:
+        return None
+    size = float(record.sp[at] - record.sp[at - 1])
+    spread = robust_deviation(before - np.median(before))
+    if abs(size) <= limits.move_spread * spread:
+        return None
+    found = _answered(record, slice(at - 1, until), size, max(noise, spread), limits.move_stands)
+    return found if until == last or found.settled_s is not None else None
 
 
 def _answered(record: LoopRecord, part: slice, size: float, spread: float, stands: int) -> Move:

@@ -76,3 +76,11 @@ def test_a_gap_in_the_answer_tells_nothing() -> None:
     whole = stepped(1.0 - np.exp(-T / 100.0))
     whole.bad[AT + 50] = True
     assert moves(whole, 0.0, FigureLimits()) == ()
+
+
+def test_a_gap_after_pv_has_settled_costs_no_move() -> None:
+    """Samples that are bad hours after the answer, or before the move, leave the move as it was."""
+    whole = stepped(1.0 - np.exp(-T / 100.0))
+    (found,) = moves(whole, 0.0, FigureLimits())
+    whole.bad[[AT - 500, AT + 2500]] = True
+    assert moves(whole, 0.0, FigureLimits()) == (found,)
