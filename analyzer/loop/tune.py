@@ -310,8 +310,8 @@ def _beside(
     period_s = t.period_s or 10.0 * slowest_s(t.model)
     bounded = t.new is not None or is_stable(t.model)  # else what is identified is no loop to try settings on
     known = t.model, t.load, t.new, period_s, spec, pv_span, config.tuning, t.others
-    found = compared(*known) if bounded else None
     sought = t.new is not None or t.proposal.before is not None
+    found = compared(*known) if bounded and (sought or drawn) else None
     if found is not None and sought:
         text = [*text, *choices(found, spec)]
     if not drawn:
