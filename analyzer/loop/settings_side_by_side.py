@@ -20,7 +20,7 @@ from tuning.harmonic_balance import TravelMap, travel_map
 from tuning.limits import TuningLimits
 from tuning.rules import simc
 from tuning.search import Candidate, bench, rejection
-from tuning.trade import trade, worst
+from tuning.trade import Trade, trade, worst
 
 MAP_POINTS, SPREAD = 24, 12.0
 """Points of the travel map along each axis, and how far it reaches about the present settings; ours."""
@@ -50,7 +50,7 @@ class Comparison:
     travel, None where the valve is free; stated, Kp and Ti by name in the plant's units; peaks, largest error after a
     unit step of load at the valve, over the present one, by name [-]; everywhere, each on all
     loops that the data allow, by name; curve, what no other settings beat in travel and in error, the calmest first;
-    repaired, the present settings behind a free valve, None where it is free.
+    repaired, the present settings behind a free valve, None where it is free or rests.
     """
 
     loop: Loop
@@ -121,12 +121,13 @@ def compared(
         return None
     load = as_held(load)
     table = bench(loop, others, load, limits)
-    found = trade(table)
+    moves = table.travel[0] > 0.0  # of a stem that rests no settings are calmer, and a ratio says nothing
+    found = trade(table) if moves else Trade((), {})
     settings = alternatives(loop, new, {name: c.controller for name, c in found.chosen.items()})
-    everywhere = worst(table, settings)
+    everywhere = worst(table, settings) if moves else {}
     settings = {k: pid for k, pid in settings.items() if k not in found.chosen or not _beaten(k, everywhere)}
     now = rejection(loop.process, loop.controller)
-    free = None if loop.valve is None else replace(loop, valve=None)
+    free = None if loop.valve is None or not moves else replace(loop, valve=None)
     return Comparison(
         loop,
         load,

@@ -76,6 +76,8 @@ CAUTION = (
 HINT = "Move a slider, or begin from one of the settings; drag over a trend to zoom, double click for all."
 SHOWN = 3.0
 """Times the present travel or error beyond which settings are left out of the picture of prices; ours."""
+MANY = 100.0
+"""Times the present figure beyond which it is not told how many [-]; ours."""
 BETTER, WORSE = 0.97, 1.03
 """Ratios to the present settings from which a figure is coloured [-]; ours."""
 
@@ -129,7 +131,7 @@ def _offer(c: Comparison) -> str:
 
 def choices(c: Comparison, spec: LoopSpec) -> list[str]:
     """The settings between which an engineer may choose, a line each, and what a repair would bring."""
-    named = [t for t in c.tried if t.name in (RECOMMENDED, CALMER, SMALLER)]
+    named = [t for t in c.tried if t.name in (RECOMMENDED, CALMER, SMALLER) and t.name in c.everywhere]
     lines = [f"  {t.name}: {_typed(c, t.name, spec)}: {_priced(c, t.name)}" for t in named]
     if c.repaired is not None:
         lines.append(f"  {REPAIRED}: {_against_now(c, c.repaired)}")
@@ -151,6 +153,9 @@ def _against_now(c: Comparison, t: Tried) -> str:
 
 
 def _change(ratio: float) -> str:
+    """A change against now; of what hardly is now no percentage."""
+    if ratio > MANY:
+        return f"over {MANY:g} times"
     return f"{signed(100.0 * (ratio - 1.0))} %"
 
 
@@ -245,7 +250,7 @@ def price(c: Comparison, unit: str) -> Plot | None:
     places = tuple(Place(scale * t.error, t.stem_travel, t.name, kinds.get(t.name, "rule")) for t in shown)
     found = [(x.error, x.travel) for x in c.curve if x.travel < SHOWN and x.error < SHOWN]
     error, travel = np.array(found, float).reshape(-1, 2).T
-    at = np.array([(p.x, p.y) for p in places], float)
+    at = np.array([(p.x, p.y) for p in places], float).reshape(-1, 2)
     lines = (
         Line("none of the robust ones beats these", scale * now.error * error, now.stem_travel * travel),
         Line("compared", at[:, 0], at[:, 1], joined=False),
