@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -11,6 +10,7 @@ import pytest
 from analyzer.history.stamps import parse_time
 from analyzer.loops.changes import read_changes
 from identification.errors import InputError
+from tests.steps import steps
 
 
 def at(text: str) -> float:
@@ -96,7 +96,7 @@ def test_what_no_clock_shows_is_refused(tmp_path: Path, time: str) -> None:
 
 
 def test_many_changes_are_one_table(tmp_path: Path) -> None:
-    """Each of 20,000 rows is what it is alone, in one second of processor time for them all."""
+    """Each of 20,000 rows is what it is alone, in at most 60 calls a row."""
     shown = (
         "2026-03-{d:02d} 0{h}:00",
         "{d:02d}.03.2026 0{h}:00",
@@ -106,9 +106,9 @@ def test_many_changes_are_one_table(tmp_path: Path) -> None:
     texts = [shown[k % 4].format(d=1 + k % 28, h=k % 10) for k in range(20_000)]
     path = tmp_path / "changes.csv"
     path.write_text("loop,time\n" + "".join(f"A,{text}\n" for text in texts))
-    begun = time.process_time()
-    found = [change.time_s for change in read_changes(path, "Europe/Helsinki")]
-    assert time.process_time() - begun < 1.0
+    found: list[float] = []
+    taken = steps(lambda: found.extend(change.time_s for change in read_changes(path, "Europe/Helsinki")))
+    assert taken < 60 * len(texts)
     some = range(0, 20_000, 997)
     assert [found[k] for k in some] == [parse_time(texts[k], "here", "Europe/Helsinki") for k in some]
     assert found[0] == at("2026-02-28T22:00:00")
