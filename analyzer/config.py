@@ -192,6 +192,7 @@ class PlantLimits:
     linked: float = TOML
     in_ratio: float = TOML
     cascade_period: float = TOML
+    halves_apart: float = TOML
 
 
 @dataclass(frozen=True, slots=True)
@@ -251,6 +252,7 @@ class LaneLimits:
     noise: float = TOML
     straight_share: float = TOML
     travel_pct_per_h: float = TOML
+    winds_up_pct: float = TOML
 
 
 @dataclass(frozen=True, slots=True)

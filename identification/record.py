@@ -39,8 +39,10 @@ class LoopRecord:
         Stem position [% of OP span] where recorded.
     sp_estimated : bool
         True where no SP was recorded and one was estimated from PV.
+    feed : ndarray of shape (n,) or None
+        What acts on OP beside the error, in its own unit, where stated and recorded.
     masks : mapping of str to ndarray of bool, shape (n,)
-        True where the named thing happens: gap, stale, compressed, quantized, saturated, manual.
+        True where the named thing happens: gap, stale, compressed, quantized, saturated, manual, idle.
     """
 
     tag: str
@@ -53,6 +55,7 @@ class LoopRecord:
     position: Floats | None = None
     sp_estimated: bool = False
     masks: Mapping[str, Mask] = field(default_factory=_no_masks)
+    feed: Floats | None = None
 
     def __len__(self) -> int:
         return self.pv.size
@@ -68,9 +71,14 @@ class LoopRecord:
         return self.op if self.position is None else self.position
 
     @property
+    def at_work(self) -> Mask:
+        """True where a sample is good and no other one has the loop's valve, in manual too, shape (n,)."""
+        return ~(self.bad | self.mask("idle"))
+
+    @property
     def usable(self) -> Mask:
-        """True where a sample is good and the loop in automatic, shape (n,)."""
-        return ~(self.bad | self.mask("manual"))
+        """True where a sample is good and the loop at work in automatic, shape (n,)."""
+        return self.at_work & ~self.mask("manual")
 
     @property
     def time_s(self) -> Floats:
@@ -105,6 +113,7 @@ class LoopRecord:
             op=self.op[:n].reshape(-1, factor).mean(axis=1),
             bad=within(self.bad),
             position=None if self.position is None else self.position[:n:factor],
+            feed=None if self.feed is None else self.feed[:n:factor],
             masks=MappingProxyType({k: within(v) for k, v in self.masks.items()}),
         )
 
@@ -119,5 +128,6 @@ class LoopRecord:
             op=self.op[cut],
             bad=self.bad[cut],
             position=None if self.position is None else self.position[cut],
+            feed=None if self.feed is None else self.feed[cut],
             masks=MappingProxyType({k: v[cut] for k, v in self.masks.items()}),
         )

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from analyzer.loop.decisions import Action, Cause, Lane, Status
+from analyzer.words.units import duration
 
 if TYPE_CHECKING:
     from analyzer.config import LaneLimits
@@ -73,6 +74,13 @@ def _sluggish(found: Finding) -> str:
     return text if room < 2.0 else f"{text}; the process bears about {room:.1g} times as much"
 
 
+def _winds_up(found: Finding) -> str:
+    late = found.number("takeover_s")
+    text = f"winds up while {found.text('override_with')} has the valve"
+    text += f", and takes it back {duration(late)} late" if late else ""
+    return f"{text}: let its output follow the valve's (external reset)"
+
+
 RULES = (
     Rule(Lane.OSCILLATION, "oscillation_significance", lambda f, limits: f.oscillates),
     Rule(
@@ -115,6 +123,12 @@ RULES = (
         lambda f: f"OP travels {f.number('valve_travel_pct_per_h'):.0f} %/h",
     ),
     Rule(Lane.WEAR, "wear_pct_per_month", lambda f, limits: f.number("wear_pct_per_month") > 0.0),
+    Rule(
+        Lane.WINDUP,
+        "winds_up_pct",
+        lambda f, limits: f.number("winds_up_pct") > limits.winds_up_pct,
+        _winds_up,
+    ),
 )
 """All lanes in the order in which they are told."""
 FIGURE: Mapping[Lane, str] = {r.lane: r.figure for r in RULES}
@@ -140,6 +154,8 @@ def action_of(status: Status, action: Action | None, lanes: tuple[Lane, ...]) ->
         asks = [r.lane for r in RULES if r.of_measurement and r.lane in lanes]
         if asks and not (asks == [Lane.LASTING_ERROR] and Lane.AT_LIMIT in lanes):
             return Action.CHECK_MEASUREMENT
+    if action is Action.NONE and Lane.WINDUP in lanes:
+        return Action.CHECK_SETTINGS
     return Action.UNDECIDED if action is Action.NONE and Lane.AT_LIMIT in lanes else action
 
 

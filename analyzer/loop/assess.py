@@ -36,6 +36,7 @@ from analyzer.loop.page_trends import BUCKETS, FINE_BUCKETS, close_view, thinned
 from analyzer.loop.quality import Prepared
 from analyzer.loop.setpoint_moves import Move, moves
 from analyzer.loop.settings_check import SettingsDiffer, differing
+from analyzer.loop.shared_valve import Shared
 from analyzer.loop.slip_by_slip import told_slip_by_slip
 from analyzer.plantwide.wave import Wave, waves_of
 from analyzer.words import settings as words
@@ -61,7 +62,7 @@ class Assessment:
     where that is told; close_s, first and last time [s] of the last ten periods; for_settings, what
     the record lacks for new settings whatever its cause, None where it lacks nothing; judged_h, good hours in
     automatic that oscillations and verdict rest on: of the stretch that is judged (judged_stretch.py), whose settings
-    are `outdated` where they were changed since; op_scaled as in Prepared.
+    are `outdated` where they were changed since; op_scaled and shared as in Prepared.
     """
 
     loop: str
@@ -83,14 +84,17 @@ class Assessment:
     judged_h: float = 0.0
     outdated: bool = False
     op_scaled: bool = True
+    shared: Shared | None = None
 
 
 def unassessable(record: LoopRecord, config: Config) -> Needs | None:
     """What the record lacks for an assessment; None where it can support one."""
     q = config.quality
-    share = float(record.usable.mean())
-    if len(record) < q.samples:
-        return Needs(Lack.SAMPLES, f"needs {q.samples} samples, has {len(record)}")
+    own = ~record.mask("idle")
+    if int(own.sum()) < q.samples:
+        idle = "" if own.all() else f" while it has the valve, {100 * own.mean():.1f} % of the time"
+        return Needs(Lack.SAMPLES, f"needs {q.samples} samples, has {own.sum()}{idle}")
+    share = float(record.usable[own].mean())
     if share >= q.usable_share:
         return None
     manual, bad = float(record.mask("manual").mean()), float(record.bad.mean())
@@ -313,6 +317,7 @@ def _assessment(prepared: Prepared, stretch: Stretch, judged: _Judged, config: C
         judged_h=_hours_in(judged.part.record),
         outdated=stretch.outdated,
         op_scaled=prepared.op_scaled,
+        shared=prepared.shared,
     )
 
 

@@ -188,7 +188,8 @@ def assess_span(record: LoopRecord, limits: FigureLimits, noise: float | None = 
     trends = Trends(record.sp, record.pv, record.op, record.mask("saturated"))
     sums = sums_of(trends, use, limits.small_error_pct, 2 * band)
     spread = 2 * sums.pv_deviation
-    automatic = 100 * count / max(float((~record.bad).sum()), 1.0)
+    good = ~record.bad
+    automatic = 100 * float((good & ~record.mask("manual")).sum()) / max(float(good.sum()), 1.0)
     return Assessments(
         usable_h=hours,
         average_absolute_error_pct=sums.absolute_error,

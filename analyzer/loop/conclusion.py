@@ -34,6 +34,8 @@ def stated(spec: LoopSpec) -> Known:
         "area": spec.area,
         "master": spec.master,
         "ratio_of": spec.ratio_of,
+        "split_of": spec.split_of,
+        "override_with": spec.override_with,
         "description": spec.description,
         "pv_unit": spec.pv_unit,
         "op_unit": spec.op_unit,
@@ -99,6 +101,8 @@ def concluded(
             **(_cycle(a) if shown else {}),
             **_measured(a, limits),
             **_cycles_of(advice),
+            **(a.shared.as_row() if a.shared is not None else {}),
+            **(_of_half(v, limits) if spec.split_of else {}),
             **known,
         },
     )
@@ -174,6 +178,14 @@ def _model(verdict: Verdict, limits: AdviceLimits) -> Mapping[str, float | None]
         columns = {"stickband_pct": valve.stickband, "slip_jump_pct": valve.slip_jump}
         return {**_process(m.stick_slip, limits), **columns}
     return {**_process(m.play, limits), "backlash_pct": m.play.valve.stickband}
+
+
+def _of_half(verdict: Verdict, limits: AdviceLimits) -> Known:
+    """How the process answers a half of a split range, whatever its verdict."""
+    m = verdict.measured
+    found = {} if m is None else _process(m.play if verdict.cause is Cause.VALVE else m.linear, limits)
+    columns = {"half_gain": "gain", "half_lag_s": "time_constant_s", "half_slope": "slope_pct_per_s"}
+    return {name: found.get(of) for name, of in columns.items()}
 
 
 def _process(fit: Fit, limits: AdviceLimits) -> dict[str, float | None]:

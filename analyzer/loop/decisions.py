@@ -75,6 +75,7 @@ class Lane(StrEnum):
     SLUGGISH = "sluggish"
     TRAVEL = "valve travel"
     WEAR = "wear"
+    WINDUP = "windup"
 
 
 class Due(StrEnum):

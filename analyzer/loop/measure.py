@@ -23,6 +23,7 @@ from identification.estimation.backlash_stiction import (
 from identification.estimation.evidence import (
     Trials,
     evidence,
+    evidence_without_best,
     expected_evidence,
     stem_moves,
     trials,
@@ -182,7 +183,8 @@ def measure(
         excited=bool(due.any()),
     )
     if oscillation is None:
-        return seen_alone
+        alone = window.position is not None or best is linear
+        return seen_alone if alone else replace(seen_alone, evidence=evidence_without_best(best, linear))
     return _of_a_cycle(seen_alone, best, linear, scale, op_range, error)
 
 

@@ -17,6 +17,7 @@ import numpy as np
 
 from analyzer.config import OscillationLimits
 from analyzer.loop.decisions import counts
+from identification.controller.check import runs
 from identification.record import Floats, LoopRecord, Mask
 from identification.signals.correlation import Rhythm, rhythm
 from identification.signals.half_cycles import half_cycles, levelled_correlation, shape, usual_prominence
@@ -100,7 +101,7 @@ def begun_up(error: Floats) -> int:
 
 def error_spectrum(record: LoopRecord) -> Spectrum:
     """Spectrum of the error, once it has come to the set point, without what the set point explains."""
-    error, good = record.error, np.flatnonzero(~record.bad)
+    error, good = record.error, np.flatnonzero(record.at_work)
     if good.size < error.size:
         error = np.interp(np.arange(error.size), good, error[good])
     first = 0 if record.sp_estimated else begun_up(error)
@@ -238,6 +239,15 @@ def _lasts(record: LoopRecord, o: Oscillation, limits: OscillationLimits) -> boo
     return begun * o.period_s < limits.moved_cycles * record.duration_s
 
 
+def _longest_seen(record: LoopRecord) -> float:
+    """Period [s] of which two fit between times at which another one has the loop's valve: a longer one is of the
+    hand-overs; inf of a loop that has its valve alone."""
+    idle = record.mask("idle")
+    if not idle.any():
+        return math.inf
+    return max(b - a for a, b in runs(~idle)) * record.dt_s / 2.0
+
+
 def _is_harmonic(o: Oscillation, other: Oscillation) -> bool:
     """Whether one oscillation is a whole multiple (2 to 7) of a stronger one's frequency."""
     ratio = other.period_s / o.period_s
@@ -258,14 +268,15 @@ def detect(record: LoopRecord, limits: OscillationLimits) -> Oscillations:
     if s.n < 16 or s.variance <= resolution**2:
         return Oscillations(spectrum=s)
     b = bands(tapered_power(s), limits.periods)
-    usable = ~record.bad[record.bad.size - s.n :]
+    usable = record.at_work[len(record) - s.n :]
     kept: list[Oscillation] = []
+    longest = _longest_seen(record)
     strong = peaks(b, limits.prominence)
     for k in strong + [k for k in peaks(b, limits.shape_prominence) if k not in strong]:
         o = _candidate(s, b, k, limits)
         if o is None or any(abs(math.log(o.period_s / p.period_s)) < math.log(1.3) for p in kept):
             continue
-        if not any(_is_harmonic(o, p) for p in kept):
+        if o.period_s <= longest and not any(_is_harmonic(o, p) for p in kept):
             kept.append(o)
     if not kept:
         return Oscillations(spectrum=s, bands=b)

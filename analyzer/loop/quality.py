@@ -25,6 +25,7 @@ from analyzer.loop.sample_clock import (
     straight,
     without_stray_ends,
 )
+from analyzer.loop.shared_valve import Shared, half, selected
 from analyzer.loops.spec import LoopSpec
 from identification.record import Floats, LoopRecord, Mask
 
@@ -79,7 +80,8 @@ class Prepared:
     pv_step, op_step : resolution of PV and OP [% of span], 0 where none was seen; compressed_share : share of
     samples on straight segments [-]; op_known : False where no OP was recorded; op_scaled : False where what was
     recorded cannot be percent of the range that is stated, or assumed, of OP; archived_share : share of samples, of
-    PV or OP the fewer, that were kept where trends are compressed [-].
+    PV or OP the fewer, that were kept where trends are compressed [-]; shared : what the loop has of a valve that it
+    shares, None where it has it alone.
     """
 
     record: LoopRecord
@@ -91,6 +93,7 @@ class Prepared:
     op_known: bool = True
     op_scaled: bool = True
     archived_share: float = 1.0
+    shared: Shared | None = None
 
 
 def scale_of(spec: LoopSpec, pv: Floats) -> Scale:
@@ -140,6 +143,7 @@ def prepare(spec: LoopSpec, series: Mapping[str, Series], limits: QualityLimits)
     op_known = bool(spec.op) and not op_gap.all() and bool(np.isfinite(scale.op_pct(op)).all())
     position, _ = _signal(series, spec.position, clock, dt, limits)
     has_position = bool(spec.position and spec.position in series)
+    feed, no_feed = _signal(series, spec.feed, clock, dt, limits)
     record = LoopRecord(
         spec.loop,
         float(clock[0]),
@@ -150,10 +154,26 @@ def prepare(spec: LoopSpec, series: Mapping[str, Series], limits: QualityLimits)
         gap | op_gap if spec.op else gap,
         scale.op_pct(position) if has_position else None,
         not sp_known,
+        feed=None if no_feed.all() else feed,
     )
     step = resolution(pv)
     masked = _masked(record, clock, series.get(spec.mode or ""), op_known, step, limits)
-    return _described(masked, scale, op_known, step, limits)
+    other = spec.beside.tag if spec.beside is not None else None
+    shared = _shared(masked, spec, _signal(series, other, clock, dt, limits), limits)
+    if shared is not None:
+        masked = replace(masked, masks=MappingProxyType({**masked.masks, "idle": shared.idle}))
+    return replace(_described(masked, scale, op_known, step, limits), shared=shared)
+
+
+def _shared(
+    record: LoopRecord, spec: LoopSpec, other: tuple[Floats, Mask], limits: QualityLimits
+) -> Shared | None:
+    """What a loop has of a valve that it shares, beside the other controller's output in that one's own unit."""
+    if spec.beside is None or spec.op is None or other[1].all():
+        return None
+    output = 100.0 * (other[0] - spec.beside.low) / (spec.beside.high - spec.beside.low)
+    found = selected if spec.override_with else half
+    return found(record, output, other[1], limits)
 
 
 def _numeric(spec: LoopSpec, series: Mapping[str, Series], limits: QualityLimits) -> dict[str, Series]:

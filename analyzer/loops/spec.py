@@ -22,7 +22,18 @@ from identification.models import Form
 STATED: dict[str, Any] = tomllib.loads(Path(__file__).with_name("loops.toml").read_text(encoding="utf-8"))
 """What tags end in, what other systems call the columns, and what is assumed where a row is silent."""
 ROLES = ("sp", "pv", "op", "mode", "position")
-TEXTS = ("loop", "description", "type", "area", "master", "ratio_of", "pv_unit")
+TEXTS = (
+    "loop",
+    "description",
+    "type",
+    "area",
+    "master",
+    "ratio_of",
+    "split_of",
+    "override_with",
+    "feedforward",
+    "pv_unit",
+)
 NUMBERS = ("pv_lo", "pv_hi", "op_lo", "op_hi", "kp", "ti", "td", "scan_s", "importance")
 MEANT: Mapping[str, tuple[float, float, bool]] = {
     **dict.fromkeys(("pv_lo", "pv_hi", "op_lo", "op_hi"), (1e-9, 1e12, True)),
@@ -50,16 +61,27 @@ OTHER_NAMES = {other: ours for ours, others in STATED["other_names"].items() for
 
 
 @dataclass(frozen=True, slots=True)
+class Output:
+    """Another controller's output: its tag, and its values at 0 and at 100 %."""
+
+    tag: str
+    low: float
+    high: float
+
+
+@dataclass(frozen=True, slots=True)
 class LoopSpec:
     """One row of loops.csv, or one loop found by its tags.
 
     Tags are None where the row is silent, and after `tags.match` where the export lacks them; `wanted_pv` is then
     the tag that was looked for. `master` is the loop whose output is this loop's set point, `ratio_of` the one to
-    whose PV it keeps a ratio. `kp`, `ti`, `td` are as stated, in `gain_unit`, `ti_unit` and `form`; `pv_lo` and
-    `pv_hi` in the PV's own unit, `op_lo` and `op_hi` in the OP's. `extra` holds columns of the plant's own,
-    `stated` the names of the columns that the row fills. `valid_from_s` is when the row's settings came into force
-    [s since 1970-01-01 UTC], None where it does not say; `earlier` holds the loop's rows before it, the oldest
-    first.
+    whose PV it keeps a ratio, `split_of` the controller of whose split range it is a half, `override_with` the one
+    with which it shares a valve by a select; `beside` is the output of one of the latter two. `feedforward` is a loop
+    or tag that acts on OP beside the error, `feed` its tag where the export has it. `kp`, `ti`, `td` are as stated,
+    in `gain_unit`, `ti_unit` and `form`; `pv_lo` and `pv_hi` in the PV's own unit, `op_lo` and `op_hi` in the OP's.
+    `extra` holds columns of the plant's own, `stated` the names of the columns that the row fills. `valid_from_s` is
+    when the row's settings came into force [s since 1970-01-01 UTC], None where it does not say; `earlier` holds the
+    loop's rows before it, the oldest first.
     """
 
     loop: str
@@ -68,6 +90,9 @@ class LoopSpec:
     area: str = ""
     master: str = ""
     ratio_of: str = ""
+    split_of: str = ""
+    override_with: str = ""
+    feedforward: str = ""
     sp: str | None = None
     pv: str | None = None
     op: str | None = None
@@ -91,11 +116,14 @@ class LoopSpec:
     wanted_pv: str = ""
     valid_from_s: float | None = None
     earlier: tuple[LoopSpec, ...] = ()
+    beside: Output | None = None
+    feed: str | None = None
 
     @property
     def tags(self) -> tuple[str, ...]:
-        """The tags of the loop that are known."""
-        return tuple(tag for tag in (getattr(self, role) for role in ROLES) if tag is not None)
+        """The tags of the loop that are known, with those of what it is judged beside."""
+        own = (*(getattr(self, role) for role in ROLES), self.beside.tag if self.beside else None, self.feed)
+        return tuple(dict.fromkeys(tag for tag in own if tag is not None))
 
     @property
     def op_unit(self) -> str:

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from analyzer.loops.spec import ROLES, STATED, LoopSpec, read_loops
+from analyzer.loops.spec import ROLES, STATED, LoopSpec, Output, read_loops
 from identification.errors import InputError
 from identification.models import Form, Pid
 
@@ -88,7 +88,9 @@ def match(specs: Sequence[LoopSpec], tags: Iterable[str]) -> tuple[tuple[LoopSpe
     known = dict.fromkeys(tags)
     specs, by_place = in_order(specs, tuple(known))
     by_ending = loops_of(known)
-    matched = tuple(_matched(spec, known, by_ending.get(spec.loop, {})) for spec in specs)
+    alone = tuple(_matched(spec, known, by_ending.get(spec.loop, {})) for spec in specs)
+    by_loop = {spec.loop: spec for spec in alone}
+    matched = tuple(_beside(spec, by_loop, known) for spec in alone)
     notes = list(by_place)
     notes += [note for before, after in zip(specs, matched, strict=True) for note in _missing(before, after)]
     taken = {tag for spec in matched for tag in spec.tags}
@@ -123,10 +125,26 @@ def _matched(spec: LoopSpec, known: Mapping[str, None], found: Mapping[str, str]
     return replace(spec, **present, wanted_pv=wanted["pv"])
 
 
+def _beside(spec: LoopSpec, by_loop: Mapping[str, LoopSpec], known: Mapping[str, None]) -> LoopSpec:
+    """A loop with the tags of those that it is judged beside, where the export has them."""
+    other, fed = by_loop.get(spec.override_with or spec.split_of), by_loop.get(spec.feedforward)
+    feed = fed.pv if fed is not None else spec.feedforward if spec.feedforward in known else None
+    beside = Output(other.op, other.op_lo, other.op_hi) if other is not None and other.op else None
+    return spec if (beside, feed) == (None, None) else replace(spec, beside=beside, feed=feed)
+
+
 def _missing(before: LoopSpec, after: LoopSpec) -> list[str]:
     notes = [] if after.pv else [f"{after.loop}: not assessed, no PV tag {after.wanted_pv} in the export"]
     stated = [(role, getattr(before, role)) for role in ROLES if role != "pv" and getattr(before, role)]
     lost = [(role, tag) for role, tag in stated if getattr(after, role) is None]
+    if (after.override_with or after.split_of) and after.beside is None:
+        notes.append(
+            f"{after.loop}: no OP of {after.override_with or after.split_of} in the export, judged alone"
+        )
+    if after.feedforward and after.feed is None:
+        notes.append(
+            f"{after.loop}: feedforward {after.feedforward} is neither a loop nor a tag of the export"
+        )
     return notes + [f"{after.loop}: {role.upper()} tag {tag} is not in the export" for role, tag in lost]
 
 

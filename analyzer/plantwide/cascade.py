@@ -12,8 +12,10 @@ from analyzer.loop.decisions import Action, Cause, Due, GroupRole, Status
 from analyzer.loop.finding import Finding, Remedy, Root, Sign, following
 from analyzer.plantwide.structure import Link, Tie
 from analyzer.plantwide.verdict import follower_confidence
-from analyzer.words.reason import above_text, below_first, below_text
+from analyzer.words.reason import above_text, below_first, below_text, halves_apart
 
+COLUMN = {Tie.MASTER: "master", Tie.SPLIT: "split_of", Tie.RATIO: "ratio_of"}
+"""The column that names the loop that another one hangs on."""
 OWN = (Cause.VALVE, Cause.TUNING)
 """Causes that are a loop's own."""
 HARMONICS = (1, 2, 3)
@@ -31,15 +33,40 @@ def linked(
     done = {k: _built(f, links.get(k)) for k, f in loops.items()}
     for loop in loops:
         own = done[loop]
-        above = own.text("master") or own.text("ratio_of")
-        if above in done and above != loop:
-            tie = Tie.MASTER if own.text("master") else Tie.RATIO
+        tie = next((t for t, column in COLUMN.items() if own.text(column)), None)
+        above = own.text(COLUMN[tie]) if tie is not None else ""
+        if tie is not None and above in done and above != loop:
             led = done[above].moves
             done[above], done[loop] = _judged(done[above], own, tie, links.get(loop), limits)
             root = done[above].follows
             if root is not None and root.loop == loop:
                 _send_on(done, [k for k in led if k != loop], above, root)
-    return done
+    halves: dict[str, list[Finding]] = {}
+    for found in done.values():
+        halves.setdefault(found.text("split_of"), []).append(found)
+    return {k: _with_halves(f, halves.get(k, ()), limits) for k, f in done.items()}
+
+
+def _with_halves(own: Finding, halves: Sequence[Finding], limits: PlantLimits) -> Finding:
+    """A controller of a split range, without new settings where its halves need two: one gain cannot suit both."""
+    if len(halves) != 2 or own.remedy.action is not Action.RETUNE:
+        return own
+    size = _sizes(halves)
+    if size is None or max(size) < limits.halves_apart * min(size):
+        return own
+    stronger, weaker = (halves[k] for k in sorted((0, 1), key=lambda k: -size[k]))
+    text = halves_apart(stronger.loop, weaker.loop, max(size) / min(size))
+    return replace(own, remedy=Remedy(Action.CHECK_SETTINGS, text))
+
+
+def _sizes(halves: Sequence[Finding]) -> list[float] | None:
+    """How much PV answers each half for a percent of the controller's output: by gains where all are known, else by
+    slopes; None where these are not known."""
+    for column in ("half_gain", "half_slope"):
+        size = [abs(h.number(column) * h.number("split_slope")) for h in halves]
+        if all(size):
+            return size
+    return None
 
 
 def _send_on(done: dict[str, Finding], led: Sequence[str], above: str, root: Root) -> None:
@@ -76,10 +103,9 @@ def led_anew(rows: Sequence[Mapping[str, Any]], loops: Mapping[str, Finding]) ->
 
 def _built(own: Finding, link: Link | None) -> Finding:
     """A loop with what it hangs on."""
-    if link is None or own.text("master") or own.text("ratio_of"):
+    if link is None or any(own.text(column) for column in COLUMN.values()):
         return own
-    column = "master" if link.tie is Tie.MASTER else "ratio_of"
-    return replace(own, known={**own.known, column: link.loop, "link_agreement": link.agreement})
+    return replace(own, known={**own.known, COLUMN[link.tie]: link.loop, "link_agreement": link.agreement})
 
 
 def _judged(
@@ -89,20 +115,17 @@ def _judged(
     if {above.status, below.status} != {Status.OK} or above.follows is not None or below.follows is not None:
         return above, below
     level = 1.0 if link is None else min(link.agreement, 1.0)
-    faulty = below.cause in OWN
-    if (
-        tie is Tie.MASTER
-        and (faulty or above.cause is Cause.VALVE)
-        and (above.oscillates or above.cause in OWN)
-    ):
+    faulty = below.cause is Cause.VALVE if tie is Tie.SPLIT else below.cause in OWN
+    blamed = {Tie.MASTER: faulty or above.cause is Cause.VALVE, Tie.SPLIT: faulty, Tie.RATIO: False}[tie]
+    if blamed and (above.oscillates or above.cause in OWN):
         cause = Cause.TUNING if below.cause is Cause.TUNING else Cause.VALVE
         root = Root(below.loop, level, None, max(f.confidence.get(cause, 0.0) for f in (above, below)))
         if above.cause is Cause.VALVE or _alike(above, below, limits) or not below.oscillates:
-            sign = Sign(Cause.LOAD, limits.follower_sign, below_text(below))
+            sign = Sign(Cause.LOAD, limits.follower_sign, below_text(below, tie))
             moved = replace(below, moves=_with(below, above.loop), remedy=_now(below.remedy))
             return _follows(above, root, sign, limits), moved
         if above.remedy.action in ACTING:
-            return replace(above, remedy=Remedy(Action.UNDECIDED, below_first(below))), below
+            return replace(above, remedy=Remedy(Action.UNDECIDED, below_first(below, tie))), below
         return above, below
     if not faulty and below.oscillates and above.oscillates and _alike(above, below, limits):
         root = Root(above.loop, level, None, max(above.confidence.values(), default=0.0))

@@ -32,10 +32,12 @@ Small = np.ndarray[tuple[int], np.dtype[np.int8]]
 
 
 class Tie(StrEnum):
-    """How a loop hangs on another: its set point is the other's output, or keeps a ratio to its PV."""
+    """How a loop hangs on another: its set point is the other's output, or keeps a ratio to its PV, or its output is
+    a half of the other's."""
 
     MASTER = "master"
     RATIO = "ratio"
+    SPLIT = "split"
 
 
 @dataclass(frozen=True, slots=True)

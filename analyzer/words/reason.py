@@ -135,24 +135,36 @@ def following_text(root: Root) -> str:
     return f"moves with {root.loop}{later(root)}, {start}"
 
 
-def below_text(below: Finding) -> str:
+def below_text(below: Finding, tie: str = "master") -> str:
     """The sign of a master whose slave has a fault, or answers as a faulty valve would."""
     what = {Cause.VALVE: "valve is at fault", Cause.TUNING: "tuning is too tight"}.get(
         below.cause or Cause.NONE
     )
     told = f"whose {what}" if what else "which answers as a faulty valve would"
-    return f"its output is the set point of {below.loop}, {told}"
+    moves = "moves" if tie == "split" else "is the set point of"
+    return f"its output {moves} {below.loop}, {told}"
 
 
-def below_first(below: Finding) -> str:
+def below_first(below: Finding, tie: str = "master") -> str:
     """Why a master gets no advice of its own."""
-    return f"{below_text(below)}: mend that first, then look again."
+    return f"{below_text(below, tie)}: mend that first, then look again."
+
+
+def halves_apart(stronger: str, weaker: str, times: float) -> str:
+    """Why a split range gets no settings: one gain cannot suit halves that differ so much."""
+    share = 100.0 * times / (1.0 + times)
+    return (
+        f"PV answers {stronger} {times:.1f} times as much as {weaker}: give {stronger} {share:.0f} % of the output's "
+        "range, then look again."
+    )
 
 
 def above_text(above: Finding, tie: str) -> str:
     """The sign of a loop whose set point brings the cycle."""
-    brings = "the output" if tie == "master" else "in a ratio to the PV"
-    return f"its set point is {brings} of {above.loop}, which cycles"
+    brings = {"master": "its set point is the output", "split": "it is moved by the output"}.get(
+        tie, "its set point is in a ratio to the PV"
+    )
+    return f"{brings} of {above.loop}, which cycles"
 
 
 def joined(*clauses: str | None) -> str:

@@ -113,7 +113,8 @@ def moves(
     columns: Floats, out_of_law: Mask, samples: int, step: int = 1, level: bool = False
 ) -> Moves | None:
     """Increments over so many samples, begun every `step`, of the columns, shape (n, 5), that span none that is out
-    of the law; `level`: less their means, for a constant error of PV's makes the integral run away."""
+    of the law, less what goes with those of a sixth column, where there is one; `level`: less their means, for a
+    constant error of PV's makes the integral run away."""
     since = np.cumsum(out_of_law)
     inside = since[samples::step] == since[:-samples:step]
     inside &= ~out_of_law[:-samples:step]
@@ -121,18 +122,28 @@ def moves(
     if len(rows) < FEWEST:
         return None
     rows = rows - rows.mean(axis=0) if level else rows
+    rows = rows if rows.shape[1] == 5 else _without(rows[:, :5], rows[:, 5])
     products = rows.T @ rows / len(rows)
     if not (products[3, 3] > 0 and products[0, 0] > 0):
         return None
     return Moves(products[:4, :4], samples, float(products[4, 4]))
 
 
+def _without(rows: Floats, feed: Floats) -> Floats:
+    """Increments without their part along those of what is fed forward (Frisch and Waugh 1933): its gain, whatever it
+    is, then changes nothing."""
+    size = float(feed @ feed)
+    return rows - np.outer(feed, feed @ rows) / size if size > 0 else rows
+
+
 def _columns(record: LoopRecord, error: Floats, slope: Floats | None = None) -> Floats:
-    """Error, integral [% s], slope [% / s], OP, and what the integral of every second sample lacks, shape (n, 5)."""
+    """Error, integral [% s], slope [% / s], OP, and what the integral of every second sample lacks, shape (n, 5);
+    what is fed forward as a sixth column, where there is some."""
     none = np.zeros(error.size) if slope is None else slope
     coarser = np.repeat(error[::2], 2)[: error.size]
     whole, lacking = np.cumsum(error) * record.dt_s, np.cumsum(error - coarser) * record.dt_s
-    return np.column_stack((error, whole, none, record.op, lacking))
+    feed = () if record.feed is None else (record.feed,)
+    return np.column_stack((error, whole, none, record.op, lacking, *feed))
 
 
 def clamped(op: Floats) -> Mask:
@@ -148,7 +159,7 @@ def clamped(op: Floats) -> Mask:
 
 
 def _out_of_law(record: LoopRecord) -> Mask:
-    return record.bad | record.mask("manual") | record.mask("saturated")
+    return ~record.usable | record.mask("saturated")
 
 
 def fit_pi(record: LoopRecord, period_s: float) -> ControllerFit | None:
