@@ -116,6 +116,9 @@ class CauseLimits:
     evidence_per_sample: float = TOML
     quiet_factor: float = TOML
     hopeless: float = TOML
+    steady: float = TOML
+    steady_alone: float = TOML
+    plain_width: float = TOML
     evidence_jump: float = TOML
     moves: int = TOML
     few_moves: int = TOML
@@ -253,6 +256,7 @@ class LaneLimits:
     straight_share: float = TOML
     travel_pct_per_h: float = TOML
     winds_up_pct: float = TOML
+    programme: float = TOML
 
 
 @dataclass(frozen=True, slots=True)

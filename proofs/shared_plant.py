@@ -102,6 +102,12 @@ def split(
     return pv, op, out
 
 
+def spread(error: Floats, where: NDArray[np.bool_] | None = None) -> float:
+    """Spread of an error after the warm-up, where it counts."""
+    late = error[WARM:]
+    return float(np.std(late if where is None else late[where[WARM:]]))
+
+
 def override_pair(out: Plant, rng: np.random.Generator, number: int, n: int) -> None:
     """A flow whose valve a low pressure takes now and then."""
     fault = str(rng.choice(["healthy", "healthy", "stick", "play"]))
@@ -110,7 +116,9 @@ def override_pair(out: Plant, rng: np.random.Generator, number: int, n: int) -> 
     gain = np.array([rng.uniform(0.8, 1.5), -rng.uniform(0.8, 1.5)])
     kp, ti = 0.4 / gain, lag * rng.uniform(1.0, 2.0)
     setting = np.column_stack((gain, lag, dead, kp, ti))
-    low = np.array([0.0, -rng.uniform(12.0, 18.0)])  # the pressure's set point lies well under where it usually is
+    low = np.array(
+        [0.0, -rng.uniform(12.0, 18.0)]
+    )  # the pressure's set point lies well under where it usually is
     loads = np.stack((wander(rng, n, 1.0, 1200.0), np.zeros(n)))
     starved = np.zeros(n)
     for begin in range(int(rng.integers(3600, 7200)), n, int(rng.integers(9000, 16000))):
@@ -120,6 +128,7 @@ def override_pair(out: Plant, rng: np.random.Generator, number: int, n: int) -> 
     width = rng.uniform(2.0, 4.5)
     valve = width * np.array(FAULT.get(fault, (0.0, 0.0, 0.0)))
     pv, op, has = override(setting, 50.0 + low, loads, noises, valve, follows)
+    sound = override(setting, 50.0 + low, loads, noises, np.zeros(3), follows)
     for i, name in enumerate((f"FIC{number}", f"PIC{number}")):
         stated = {
             "type": ("flow", "pressure")[i],
@@ -129,8 +138,9 @@ def override_pair(out: Plant, rng: np.random.Generator, number: int, n: int) -> 
         }
         share = 100.0 * float(np.mean(has[WARM:] == i))
         trends = {"SP": np.full(n, 50.0 + low[i]), "PV": pv[i], "OP": op[i]}
+        swell = spread(50.0 + low[i] - pv[i], has == i) / spread(50.0 + low[i] - sound[0][i], sound[2] == i)
         out.keep(
-            name, trends, stated, kind="override", cause=fault, part=i, share=share, winds_up=not follows
+            name, trends, stated, kind="override", cause=fault, share=share, winds_up=not follows, swell=swell
         )
 
 
@@ -150,7 +160,11 @@ def duty(rng: np.random.Generator, n: int, size: float) -> Floats:
 def split_range(out: Plant, rng: np.random.Generator, number: int, n: int) -> None:
     """A temperature with a cooling and a heating valve, one of which may be faulty, or far stronger."""
     fault = str(rng.choice(["healthy", "stick", "play", "unequal"]))
-    lag, dead, at = float(rng.uniform(40.0, 120.0)), float(rng.integers(4, 12)), float(rng.uniform(35.0, 65.0))
+    lag, dead, at = (
+        float(rng.uniform(40.0, 120.0)),
+        float(rng.integers(4, 12)),
+        float(rng.uniform(35.0, 65.0)),
+    )
     times = float(rng.uniform(2.0, 3.0)) if fault == "unequal" else float(rng.uniform(0.9, 1.1))
     per_output = float(rng.uniform(0.8, 1.5))  # PV for a percent of OP on the weaker side
     which = int(rng.integers(0, 2))
@@ -167,15 +181,17 @@ def split_range(out: Plant, rng: np.random.Generator, number: int, n: int) -> No
         sp[begin:] = 50.0 + rng.uniform(-4.0, 4.0)
     noise = rng.uniform(0.03, 0.08) * rng.standard_normal(n)
     pv, op, halves = split(np.array([lag, dead, kp, ti]), at, gains, sp, load, noise, valves)
+    sound = split(np.array([lag, dead, kp, ti]), at, gains, sp, load, noise, np.zeros((2, 3)))
     whole = f"TIC{number}"
     stated = {"type": "temperature", "kp": round(kp, 4), "ti": round(ti, 2)}
-    out.keep(whole, {"SP": sp, "PV": pv, "OP": op}, stated, kind="split", cause=fault, part=-1)
+    out.keep(whole, {"SP": sp, "PV": pv, "OP": op}, stated, kind="split", cause=fault)
     for i, name in enumerate((f"{whole}A", f"{whole}B")):
         worn = fault if i == which and fault in FAULT else "healthy"
         trends = {"SP": sp, "PV": pv, "OP": halves[i]}
         out.keep(
-            name, trends, {"type": "temperature", "split_of": whole}, kind="half", cause=worn, part=i, at=at,
-            times=times if fault == "unequal" else 1.0, stronger=i == which,
+            name, trends, {"type": "temperature", "split_of": whole}, kind="half", cause=worn, at=at,
+            gain=float(gains[i]), lag=lag,
+            swell=spread(sp - pv, halves[i] > 0.0) / spread(sp - sound[0], sound[2][i] > 0.0),
         )  # fmt: skip
 
 
@@ -203,7 +219,11 @@ def loop(setting: Floats, sp: Floats, load: Floats, noise: Floats, valve: Floats
 def batch_loop(out: Plant, rng: np.random.Generator, number: int, n: int) -> None:
     """A temperature of a programme that is repeated: fill, a step, a ramp, a hold, and back."""
     fault = str(rng.choice(["healthy", "healthy", "stick", "growing"]))
-    lag, dead, gain = float(rng.uniform(50.0, 150.0)), float(rng.integers(4, 15)), float(rng.uniform(0.7, 1.3))
+    lag, dead, gain = (
+        float(rng.uniform(50.0, 150.0)),
+        float(rng.integers(4, 15)),
+        float(rng.uniform(0.7, 1.3)),
+    )
     kp = np.full(n, 0.5 * lag / (dead + 10.0) / gain)
     if fault == "growing":
         kp *= np.linspace(1.0, 3.2, n)
@@ -218,11 +238,16 @@ def batch_loop(out: Plant, rng: np.random.Generator, number: int, n: int) -> Non
     sp = np.where(t > 0.85 * long, low, sp)
     valve = rng.uniform(3.0, 5.0) * np.array(FAULT.get(fault, (0.0, 0.0, 0.0)))
     load, noise = wander(rng, n, 0.5, 1800.0), rng.uniform(0.03, 0.1) * rng.standard_normal(n)
-    pv, op = loop(np.concatenate(([gain, lag, dead, ti], kp)), sp, load, noise, valve)
+    setting = np.concatenate(([gain, lag, dead, ti], kp))
+    pv, op = loop(setting, sp, load, noise, valve)
+    held = np.concatenate(
+        (np.zeros(600, dtype=bool), np.abs(sp[600:] - sp[:-600]) < 1e-9)
+    )  # ten minutes at least
+    swell = spread(sp - pv, held) / spread(sp - loop(setting, sp, load, noise, np.zeros(3))[0], held)
     stated = {"type": "temperature", "kp": round(float(kp[-1]), 4), "ti": round(ti, 2)}
     trends = {"SP": sp, "PV": pv, "OP": op}
     out.keep(
-        f"BIC{number}", trends, stated, kind="batch", cause=fault, part=0,
+        f"BIC{number}", trends, stated, kind="batch", cause=fault, swell=swell,
         batches=(n - WARM) // long, rise=middle - low,
     )  # fmt: skip
 

@@ -26,7 +26,12 @@ DRAWS = 200
 """Bootstrap draws over all loops together."""
 SEED = 0
 NOW, RECOMMENDED, SIMC, LAMBDA, LONGER = "now", "recommended", "SIMC", "lambda", "Ti not below T"
-CALMER, SMALLER, REPAIRED = "calmer valve", "smaller error", "now, valve repaired"
+CALMER, SMALLER, DERIVATIVE, REPAIRED = (
+    "calmer valve",
+    "smaller error",
+    "with derivative",
+    "now, valve repaired",
+)
 """Names of the settings compared; the last is what a repair would bring."""
 
 
@@ -192,16 +197,16 @@ class Tried:
 
 def alternatives(loop: Loop, new: Pid | None, chosen: Mapping[str, Pid] | None = None) -> dict[str, Pid]:
     """Settings to compare: the present ones, the recommended if any, those chosen between, and the rules'; those that
-    equal earlier ones are left out. A derivative is the present one in all of them."""
+    equal earlier ones are left out. A derivative is the present one in all but those that are chosen for theirs."""
     now, h = loop.controller, scan_step(loop)
     found = {NOW: now} | ({} if new is None else {RECOMMENDED: new}) | dict(chosen or {})
     rules = {SIMC: simc(loop.process, scan_s=h), LAMBDA: lambda_settings(loop.process, h)}
     found |= {name: replace(now, kp=pid.kp, ti_s=pid.ti_s) for name, pid in rules.items()}
     if not isinstance(loop.process, Integrator):
         found[LONGER] = backlash_rule(loop.process, now)
-    seen: dict[tuple[float, float], str] = {}
+    seen: dict[tuple[str, ...], str] = {}
     for name, pid in found.items():
-        seen.setdefault((float(f"{pid.kp:.3g}"), float(f"{pid.ti_s:.3g}")), name)
+        seen.setdefault(tuple(f"{x:.3g}" for x in (pid.kp, pid.ti_s, pid.td_s)), name)
     return {name: found[name] for name in seen.values()}
 
 

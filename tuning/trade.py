@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 
 from identification.models import Fopdt, Pid
 from identification.record import Floats
 from identification.simulation.closed_loop import scan_step
-from tuning.forecast import CALMER, SMALLER
+from tuning.forecast import CALMER, DERIVATIVE, SMALLER
 from tuning.frequency_response import integral_s, maximum_sensitivity
-from tuning.rules import simc
-from tuning.search import Bench, Candidate, bounds_now, pairs, robust, try_out
+from tuning.rules import effective_delay, simc
+from tuning.search import Bench, Candidate, bounds_now, pairs, robust, rounded, try_out
 
 POINTS = 11
 """Gains and integral times of the curve's grid."""
+SHARES, MORE = (0.25, 0.5), (1.0, 1.3)
+"""Derivative times that are tried, over the delay, and gains over those of the curve; ours: half the delay is what
+Ziegler and Nichols (1942) set."""
 TRIED = 5
 """Settings of the curve that are tried on all loops, from its end inwards, before none is told."""
 
@@ -26,7 +30,8 @@ class Trade:
     """What settings win and cost.
 
     curve, robust settings that no others beat in travel and in error, the calmest first, figures on the first loop;
-    chosen, the two ends that hold on every loop of the bench, by name, figures over all loops.
+    chosen, the two ends that hold on every loop of the bench, and one with a derivative where that pays, by name,
+    figures over all loops.
     """
 
     curve: tuple[Candidate, ...]
@@ -46,7 +51,29 @@ def trade(table: Bench) -> Trade:
         held = next((c for c in whole if c.worst_error <= error and c.worst_travel <= travel), None)
         if held is not None:
             chosen[name] = held
-    return Trade(curve, chosen)
+    derived = _with_derivative(table, curve, chosen.get(SMALLER))
+    return Trade(curve, chosen if derived is None else {**chosen, DERIVATIVE: derived})
+
+
+def _with_derivative(table: Bench, curve: Sequence[Candidate], without: Candidate | None) -> Candidate | None:
+    """Settings of the curve with a derivative, and some more gain, that on every loop take off far more error than
+    the best without one, for no more travel than now; None where none does, or the loop has a derivative."""
+    loop, limits = table.loops[0], table.limits
+    if loop.controller.td_s > 0.0:
+        return None
+    most = (1.0 - limits.worth_error) * (1.0 if without is None else min(without.worst_error, 1.0))
+    delay_s, bounds = effective_delay(loop.process, scan_step(loop)), bounds_now(table.loops, limits)
+    found = []
+    for c, share, gain in product(curve, SHARES, MORE):
+        pid = replace(c.controller, kp=rounded(gain * c.controller.kp), td_s=rounded(share * delay_s))
+        ms = robust(table.loops, pid, bounds)
+        first = None if ms is None else try_out(table, pid, ms, 1)
+        if first is not None and first.error <= most and first.travel <= 1.0:
+            found.append(first)
+    best = sorted(found, key=lambda c: c.error)[:TRIED]
+    whole = (try_out(table, c.controller, c.ms) for c in best)
+    fit = (c for c in whole if c.worst_error <= most and c.worst_travel <= limits.travel_growth_sample)
+    return next(fit, None)
 
 
 def worst(table: Bench, settings: Mapping[str, Pid]) -> dict[str, Candidate]:

@@ -14,8 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from analyzer.belief import cycle, remedy, valve
+from analyzer.belief import cycle, phases, remedy, valve
 from analyzer.belief.cycle import CycleBelief
+from analyzer.belief.phases import Phase
 from analyzer.belief.pool import Pool
 from analyzer.belief.remedy import Pair, RemedyBelief
 from analyzer.belief.valve import ValveBelief, Witness
@@ -68,7 +69,7 @@ class Belief:
 
     night, the last that counted; end_s, when its record ended; kp, ti, the settings in force; before, what the
     loop did under those before; straight_pct, how much of its PV was on straight segments [%], and recorder, the
-    first night that was recorded so, '' where all were."""
+    first night that was recorded so, '' where all were; phases of its programme."""
 
     loop: str
     night: str
@@ -85,6 +86,7 @@ class Belief:
     told: Told = field(default_factory=Told)
     straight_pct: float | None = None
     recorder: str = ""
+    phases: tuple[Phase, ...] = ()
 
     def is_calmed(self, limits: BeliefLimits) -> bool:
         """Whether the last change of settings took most of a cycle away."""
@@ -128,7 +130,8 @@ def step(before: Belief | None, row: Row, repaired_s: Sequence[float], limits: B
         row["period_s"],
     )
     end_s = (row["start_s"] or 0.0) + (row["duration_s"] or 0.0)
-    now = replace(now, night=row["night"], end_s=end_s, remedy=done, last=seen)
+    seen_phases = phases.with_night(now.phases, row)
+    now = replace(now, night=row["night"], end_s=end_s, remedy=done, last=seen, phases=seen_phases)
     return replace(now, kp=row["kp"], ti=row["ti"], told=tell(now, row, limits))
 
 
@@ -148,14 +151,15 @@ def _after_changes(now: Belief, row: Row, repaired_s: Sequence[float]) -> Belief
     """The belief with what a change of settings, stated or seen in OP, or a repair since the night before has ended
     begun anew."""
     settings, fresh = (row["kp"], row["ti"]), CycleBelief(top=now.cycle.top, loud=now.cycle.loud)
+    anew = replace(now, cycle=fresh, remedy=RemedyBelief(), before=now.last)
+    anew = replace(anew, phases=phases.forgotten(now.phases))
     listed = now.remedy.action is Action.CHECK_SETTINGS
     if now.night and None not in (now.kp, *settings) and (now.kp, now.ti) != settings:
-        if listed:  # a list that is put right changes no loop
-            now = replace(now, remedy=RemedyBelief())
-        else:
-            now = replace(now, cycle=fresh, remedy=RemedyBelief(), before=now.last)
+        now = (
+            replace(now, remedy=RemedyBelief()) if listed else anew
+        )  # a list that is put right changes no loop
     elif now.night and not listed and row["action"] == Action.CHECK_SETTINGS:
-        now = replace(now, cycle=fresh, remedy=RemedyBelief(), before=now.last)
+        now = anew
     end_s = (row["start_s"] or 0.0) + (row["duration_s"] or 0.0)
     if any(now.end_s < at <= end_s for at in repaired_s) and now.night:
         kept = {k: v for k, v in now.constants.items() if k not in OF_VALVE}

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from analyzer.belief.belief import Belief, step
+from analyzer.belief.phases import growth
 from analyzer.belief.pool import Pool
 from analyzer.belief.remedy import HeldPair
 from analyzer.belief.state import belief_of, kept_as
@@ -62,6 +63,7 @@ READ = (
         "stickband_pct",
         "slip_jump_pct",
     ),
+    *("phases", "pv_lo", "pv_hi", "pv_unit", "timezone"),
 )
 """What beliefs follow from."""
 
@@ -216,7 +218,11 @@ def _row(before: Belief | None, now: Belief, row: Row | None, night: str, config
         known |= _worn_by(found)
     if row is None or now.night != night:
         return known
+    grown = [(p, g) for p in now.phases if (g := growth(p, config.wear)) is not None]
+    known["growing"] = "; ".join(words.growing(p, g, row) for p, g in grown) or None
     text, tone = words.news(before, now, row)
+    if not text and grown and not any(growth(p, config.wear) for p in (before.phases if before else ())):
+        text, tone = words.growing(*grown[0], row), "worse"
     lanes = ", ".join(filter(None, (row["lanes"], Lane.WEAR if found is not None else None)))
     told = words.told(now, row) | {"lanes": lanes or None}
     return known | told | {"news": text or None, "news_tone": tone or None}

@@ -54,15 +54,22 @@ def wear(widths: Sequence[Width], limits: WearLimits) -> Wear | None:
     days = np.array([date.fromisoformat(night).toordinal() for night, _, _ in widths], dtype=np.float64)
     width = np.array([w for _, w, _ in widths])
     deviation = width * np.array([max(s, limits.least_deviation) for _, _, s in widths])
-    bend = _bend(days, width, deviation, limits)
-    if bend is None:
+    at = bend(days, width, deviation, limits)
+    if at is None:
         return None
-    return _forecast(days[days >= bend], width[days >= bend], limits)
+    return _forecast(days[days >= at], width[days >= at], limits)
 
 
-def _bend(days: Floats, width: Floats, deviation: Floats, limits: WearLimits) -> float | None:
-    """The day from which on the width grows: the best of all bends, where it is a better story than that nothing
-    does; None where it is not."""
+def bend(days: Floats, width: Floats, deviation: Floats, limits: WearLimits) -> float | None:
+    """The day from which on a width, or another figure, grows: the best of all bends, where it is a better story than
+    that it stays; None where it is not.
+
+    Parameters
+    ----------
+    days, width, deviation : ndarray of shape (n,)
+        When, what, and its standard deviation.
+    limits : WearLimits
+    """
     weight = 1.0 / deviation
     flat = _left(np.ones((days.size, 1)), width, weight)[0]
     best, least, slope = None, math.inf, 0.0

@@ -15,6 +15,7 @@ from analyzer.loop.quality import Prepared
 from identification.models import Pid
 from identification.record import LoopRecord
 from identification.signals.correlation import SMOOTHING, correlation_time
+from identification.signals.setpoint_response import moves
 
 AVERAGING = "level"
 """Type of loops that are slow on purpose: a level buffers flow."""
@@ -45,10 +46,15 @@ def _percent(part: np.ndarray, whole: np.ndarray) -> float | None:
 
 
 def _lasting_error(record: LoopRecord, limits: LaneLimits) -> float | None:
-    """The typical hour's mean error; None without a recorded set point or without an hour that is half usable."""
+    """The typical hour's mean error, ramps of a programme left out; None without a recorded set point or without an
+    hour that is half usable."""
     if record.sp_estimated:
         return None
-    use, error = record.usable, record.error
+    moving = moves(record.sp)
+    ramps = (
+        moving.mean() <= limits.programme
+    )  # of a set point that is always under way, a slave's, it is all there is
+    use, error = record.usable & ~(moving & ramps), record.error
     hours = [
         abs(float(error[a:b][use[a:b]].mean()))
         for a, b, _ in hour_edges(record)

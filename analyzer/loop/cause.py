@@ -66,6 +66,8 @@ class Verdict:
         return self if self.steady is None or self.cause is not Cause.VALVE else self.steady
 
 
+AGAIN = "every stretch between moves of the stem says so again"
+"""What the stretches of a calm loop say of a fault that is narrow beside OP's range, as in a loop of a programme."""
 NO_CAUSE = Verdict(Cause.NONE, dict.fromkeys(CAUSES, 0.0), Fault.NONE)
 
 
@@ -93,14 +95,20 @@ def speaks(m: Measured, limits: CauseLimits, oscillating: bool) -> bool:
 def quiet_signs(m: Measured, limits: CauseLimits) -> tuple[Sign, ...]:
     """Signs of a valve at fault in a loop that does not oscillate.
 
-    A few moves of a stem are told from steps of the load, unless the set point called for them, by more evidence.
+    The stretches between moves of the stem must agree. A few moves are told from steps of the load, unless the set
+    point called for them, by more evidence.
     """
+    if m.steady < limits.steady:
+        return ()
     few = m.moves < limits.few_moves and not m.excited
     least = needed(m, limits, False) * (limits.quiet_factor if few else 1.0)
     if not speaks(m, limits, False) or m.evidence < least or (m.moves < limits.moves and not m.excited):
         return ()
     text, figures = likelihood_told(m.evidence)
     signs = [Sign("valve", 0.5 + 0.5 * _ramp(m.evidence, least, 4 * least), text, figures=figures)]
+    width = m.play.valve.stickband
+    if m.size < limits.size and m.steady >= limits.steady_alone and width >= limits.plain_width:
+        signs.append(Sign("valve", 0.6 + 0.4 * _ramp(m.steady, limits.steady_alone, 10.0), AGAIN))
     if m.size >= limits.size:
         signs.append(Sign("valve", 0.6 + 0.4 * _ramp(m.size, limits.size, 0.7), width_text(m.size)))
     return tuple(signs)

@@ -17,12 +17,15 @@ from analyzer.loop.cost import RECORDED, STATED, loss
 from analyzer.loop.decisions import Action, Cause, Fault, Lack, Status
 from analyzer.loop.finding import Cell, Finding, Remedy, Swing
 from analyzer.loop.identified import gain_room
+from analyzer.loop.intervals import intervals
 from analyzer.loop.oscillation import Oscillations
 from analyzer.loop.setpoint_moves import as_row
 from analyzer.loops.spec import LoopSpec
 from identification.estimation.hammerstein import Fit
 
 Known = dict[str, Cell]
+KNOWN_WITHIN = 2.5
+"""Ends of a 90 % interval, one over the other, within which a constant of a half of a split range is told; ours."""
 PER_OP = ("gain", "slope_pct_per_s", "backlash_pct", "stickband_pct", "slip_jump_pct")
 """Constants in percent of OP, or per percent of it."""
 
@@ -181,11 +184,13 @@ def _model(verdict: Verdict, limits: AdviceLimits) -> Mapping[str, float | None]
 
 
 def _of_half(verdict: Verdict, limits: AdviceLimits) -> Known:
-    """How the process answers a half of a split range, whatever its verdict."""
+    """How fast the process answers a half of a split range whose valve is sound, where moves of the set point tell it
+    well."""
     m = verdict.measured
-    found = {} if m is None else _process(m.play if verdict.cause is Cause.VALVE else m.linear, limits)
-    columns = {"half_gain": "gain", "half_lag_s": "time_constant_s", "half_slope": "slope_pct_per_s"}
-    return {name: found.get(of) for name, of in columns.items()}
+    if m is None or not m.excited or verdict.cause is not Cause.NONE:
+        return {}
+    slope = intervals(m.linear, False, limits)["slope_pct_per_s"]
+    return {"half_slope": slope.value} if 0.0 < slope.high / slope.low < KNOWN_WITHIN else {}
 
 
 def _process(fit: Fit, limits: AdviceLimits) -> dict[str, float | None]:

@@ -23,10 +23,10 @@ from identification.estimation.backlash_stiction import (
 from identification.estimation.evidence import (
     Trials,
     evidence,
-    evidence_without_best,
     expected_evidence,
     stem_moves,
     trials,
+    trials_between_moves,
     with_load_step,
 )
 from identification.estimation.gauss_newton import descend
@@ -56,6 +56,10 @@ FEWEST_CYCLES = 2.5
 """Cycles from which harmonics are told apart from drift; ours."""
 
 
+FEW_MORE = 0.1
+"""Share of a stretch that may be out of use beyond the least for the set point's moves in it; ours."""
+
+
 @dataclass(frozen=True, slots=True)
 class Measured:
     """What the signs are read from.
@@ -68,7 +72,8 @@ class Measured:
     better valve sets out; excited, whether set point moves drove the loop; trials, how the stretches between OP's
     turns agree on the better valve, None with too few; kurtosis [-] of the band at the period, 3 for noise, 1.5 where
     the size is kept; wave_left [-], harmonics of PV's cycle that the better valve leaves, over its fundamental;
-    expected [nat], the evidence that a play would bring in such a recording.
+    expected [nat], the evidence that a play would bring in such a recording; steady [-], of a calm loop, how the
+    stretches between moves of the stem agree on the better valve: their mean gain over its standard error.
     """
 
     linear: Fit
@@ -91,6 +96,7 @@ class Measured:
     kurtosis: float = 3.0
     wave_left: float = 0.0
     expected: float = 0.0
+    steady: float = 0.0
 
     @property
     def window(self) -> Window:
@@ -183,8 +189,11 @@ def measure(
         excited=bool(due.any()),
     )
     if oscillation is None:
-        alone = window.position is not None or best is linear
-        return seen_alone if alone else replace(seen_alone, evidence=evidence_without_best(best, linear))
+        shown = trials_between_moves(best, linear)
+        seen_stem = window.position is not None
+        return replace(
+            seen_alone, steady=math.inf if seen_stem else 0.0 if shown is None else shown.steadiness
+        )
     return _of_a_cycle(seen_alone, best, linear, scale, op_range, error)
 
 
@@ -321,11 +330,20 @@ def time_scale(record: LoopRecord, oscillation: Oscillation | None, controller: 
 
 
 def latest_fit_stretch(record: LoopRecord, n: int) -> int:
-    """First sample of the latest stretch of n samples with the fewest out of use."""
-    out = ~record.usable
-    seen = np.concatenate(([0], np.cumsum(out)))
+    """First sample of the latest stretch of n samples with the fewest out of use, or with few more where the set
+    point moves farther in it: its moves tell the process apart from load and valve."""
     firsts = np.arange(len(record) - n, -1, -max(n // 4, 1))
-    return int(firsts[int(np.argmin(seen[firsts + n] - seen[firsts]))])
+
+    def within(x: Floats) -> Floats:
+        total = np.concatenate(([0.0], np.cumsum(x)))
+        return np.asarray(total[firsts + n] - total[firsts])
+
+    out = within((~record.usable).astype(np.float64))
+    moved = np.abs(np.diff(record.sp, prepend=record.sp[:1]))
+    far, least = within(np.where(record.usable, moved, 0.0)), out <= out.min()
+    farther = (out <= out.min() + FEW_MORE * n) & (far > far[least].max())
+    among = np.flatnonzero(farther if farther.any() else least)
+    return int(firsts[among[far[among] >= far[among].max() - 1e-9][0]])
 
 
 def window_of(record: LoopRecord, scale_s: float, limits: CauseLimits, kind: str = "") -> Window:

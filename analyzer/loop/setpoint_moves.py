@@ -16,23 +16,30 @@ POINTS, FOLLOWED = 48, 2
 """Points of a course that are kept, and times its settling time that it is followed; ours."""
 SMALL = 0.05
 """Share of a move within which an error is small [-]: the 5 % of step responses."""
+FEWEST_ALIKE = 3
+"""Moves that are alike from which they are a phase of a programme; ours."""
+LEVEL = 0.1
+"""What the levels of moves that are alike may differ by, over the size [-]; ours: recipes trim set points by less."""
 MOST = 12
 """Moves of a night that are kept one by one, the latest; ours: a picture holds no more."""
 
 
 @dataclass(frozen=True, slots=True)
 class Move:
-    """One move of the set point that then stood.
+    """One move of the set point, a step or a ramp, between times at which it stood.
 
-    start_s [s since 1970-01-01 UTC]; size [% of span]; rise_s, from a tenth to nine tenths of the way [s], None where
-    PV never got there; overshoot, how far it goes beyond the new set point at first, noise left out, over the size
-    [-]; settled_s, until the error stays small for as long again [s], None where it does not before the next move;
-    lasts_s, how long the course was followed [s]; course, PV at even times until then, 0 at the old set point and 1
-    at the new.
+    start_s [s since 1970-01-01 UTC]; begin, the set point before it, size, how far it went [% of span]; ramp_s, how
+    long it took, 0 for a step [s]; rise_s, from a tenth to nine tenths of the way [s], None where PV never got there
+    and for a ramp, which sets it; overshoot, how far PV goes beyond the new set point at first, noise left out, over
+    the size [-]; settled_s, from the move's end until the error stays small for as long again [s], None where it
+    does not before the next move; lasts_s, how long the course was followed [s]; course, PV at even times until then,
+    0 at the old set point and 1 at the new.
     """
 
     start_s: float
+    begin: float
     size: float
+    ramp_s: float
     rise_s: float | None
     overshoot: float
     settled_s: float | None
@@ -44,54 +51,66 @@ def moves(record: LoopRecord, noise: float, limits: FigureLimits) -> tuple[Move,
     """The moves of a record that are larger than noise [% of span] and than what the error does anyway, between spans
     in which the set point stood.
 
-    A set point that is always under way, as a slave's, has none; neither has one that was estimated from PV.
+    Steps that follow closely, all up or all down, are one ramp. A set point that is always under way, as a slave's,
+    has none; neither has one that was estimated from PV.
     """
     if record.sp_estimated:
         return ()
     steps = np.flatnonzero(np.abs(np.diff(record.sp)) > 1e-6) + 1
-    edges = np.concatenate(([0], steps, [len(record)]))
-    held, size = np.diff(edges), record.sp[steps] - record.sp[steps - 1]
-    stood = np.minimum(held[:-1], held[1:]) >= limits.move_stands
-    large = np.abs(size) > limits.move_noise * max(noise, 1e-6)
-    found = (_move(record, edges[k : k + 3], noise, limits) for k in np.flatnonzero(stood & large))
+    if not steps.size:
+        return ()
+    apart = np.flatnonzero(np.diff(steps) >= limits.move_stands) + 1
+    runs = np.split(steps, apart)
+    firsts, lasts = (np.array([run[k] for run in runs]) for k in (0, -1))
+    before, after = np.append(0, lasts[:-1]), np.append(firsts[1:], len(record))
+    size = record.sp[lasts] - record.sp[firsts - 1]
+    one_way = np.array([np.ptp(np.sign(np.diff(record.sp[run[0] - 1 : run[-1] + 1]))) <= 1.0 for run in runs])
+    large = one_way & (np.abs(size) > limits.move_noise * max(noise, 1e-6))
+    edges = np.column_stack((before, firsts, lasts, after))
+    found = (_move(record, edges[k], noise, limits) for k in np.flatnonzero(large))
     return tuple(m for m in found if m is not None)
 
 
 def _move(record: LoopRecord, edges: np.ndarray, noise: float, limits: FigureLimits) -> Move | None:
-    """One move; None where the error did as much before it, or samples are lacking before PV has settled.
+    """One move; None where the set point did not stand about it, the error did as much before it, or samples are
+    lacking before PV has settled.
 
-    edges : first sample before which SP stood, that of the move, and that of the next, shape (3,).
+    edges : first sample since which SP stood, first and last of the move, and that of the next, shape (4,).
     """
-    first, at, last = (int(x) for x in edges)
+    first, at, end, last = (int(x) for x in edges)
     before = record.error[first:at][record.usable[first:at]]
     bad = np.flatnonzero(~record.usable[at - 1 : last])
     until = at - 1 + int(bad[0]) if bad.size else last
-    if min(before.size, until - at) < limits.move_stands:
+    if min(at - first, before.size, until - end) < limits.move_stands:
         return None
-    size = float(record.sp[at] - record.sp[at - 1])
+    size = float(record.sp[end] - record.sp[at - 1])
     spread = robust_deviation(before - np.median(before))
     if abs(size) <= limits.move_spread * spread:
         return None
-    found = _answered(record, slice(at - 1, until), size, max(noise, spread), limits.move_stands)
+    part = slice(at - 1, until)
+    found = _answered(record, part, end - at, size, max(noise, spread), limits.move_stands)
     return found if until == last or found.settled_s is not None else None
 
 
-def _answered(record: LoopRecord, part: slice, size: float, spread: float, stands: int) -> Move:
-    """How PV answers a move; part, from the sample before it to the next move; spread of the error before [% of
-    span]."""
-    way = (record.pv[part] - record.sp[part.start]) / size
+def _answered(record: LoopRecord, part: slice, ramp: int, size: float, spread: float, stands: int) -> Move:
+    """How PV answers a move of so many samples; part, from the sample before it to the next move; spread of the error
+    before [% of span]."""
+    begin = float(record.sp[part.start])
+    way = (record.pv[part] - begin) / size
     still = spread / abs(size)
-    settled = _settled(np.abs(way - 1.0) > max(2.0 * still, SMALL), stands)
-    shown = way.size if settled is None else min(way.size, FOLLOWED * settled + 2)
+    settled = _settled(np.abs(way[ramp:] - 1.0) > max(2.0 * still, SMALL), stands)
+    shown = way.size if settled is None else min(way.size, FOLLOWED * (settled + ramp) + 2)
     course = np.interp(np.linspace(0, shown - 1, POINTS), np.arange(shown), way[:shown])
     return Move(
         record.start_s + (part.start + 1) * record.dt_s,
+        begin,
         size,
-        _rise(way, record.dt_s),
+        ramp * record.dt_s,
+        None if ramp else _rise(way, record.dt_s),
         max(_excursion(way) - 2.0 * still, 0.0),
         None if settled is None else settled * record.dt_s,
         (shown - 1) * record.dt_s,
-        tuple(float(f"{x:.3f}") for x in course),
+        tuple(float(f"{x:.3g}") for x in course),
     )
 
 
@@ -127,14 +146,56 @@ def _rise(way: Floats, dt_s: float) -> float | None:
     return float(last - first) * dt_s
 
 
+@dataclass(frozen=True, slots=True)
+class Phase:
+    """Moves of a programme that are alike: set point before and after [% of span], and of each repetition its start
+    [s since 1970-01-01 UTC], overshoot [% of the size] and settling [s], None where it did not settle."""
+
+    begin: float
+    end: float
+    start_s: tuple[float, ...]
+    overshoot_pct: tuple[float, ...]
+    settled_s: tuple[float | None, ...]
+
+
+def phases(found: Sequence[Move]) -> tuple[Phase, ...]:
+    """Moves that come back between the same levels, in the order in which they first came."""
+    kinds: list[list[Move]] = []
+    for m in found:
+        same = [k for k in kinds if alike((k[0].begin, k[0].begin + k[0].size), (m.begin, m.begin + m.size))]
+        if not same:
+            kinds.append([])
+        (same[0] if same else kinds[-1]).append(m)
+    return tuple(_phase(k) for k in kinds if len(k) >= FEWEST_ALIKE)
+
+
+def alike(one: tuple[float, float], other: tuple[float, float]) -> bool:
+    """Whether moves from one level to another are of one kind [% of span]."""
+    most = LEVEL * abs(one[1] - one[0])
+    return all(abs(a - b) <= most for a, b in zip(one, other, strict=True))
+
+
+def _phase(of: Sequence[Move]) -> Phase:
+    return Phase(
+        float(np.median([m.begin for m in of])),
+        float(np.median([m.begin + m.size for m in of])),
+        tuple(m.start_s for m in of),
+        tuple(round(100.0 * m.overshoot, 2) for m in of),
+        tuple(m.settled_s for m in of),
+    )
+
+
 def as_row(found: Sequence[Move]) -> dict[str, float | str | None]:
-    """Columns of the night: how many moves, the medians of what is known of them, and the latest of them as JSON."""
+    """Columns of the night: how many moves, the medians of what is known of them, the latest of them and the phases
+    that come back as JSON."""
+    alike = phases(found)
     return {
         "sp_moves": float(len(found)),
         "rise_time_s": _median([m.rise_s for m in found]),
         "overshoot_pct": _median([100.0 * m.overshoot for m in found]),
         "settling_time_s": _median([m.settled_s for m in found]),
         "moves": json.dumps([asdict(m) for m in found[-MOST:]], separators=(",", ":")) if found else None,
+        "phases": json.dumps([asdict(p) for p in alike], separators=(",", ":")) if alike else None,
     }
 
 

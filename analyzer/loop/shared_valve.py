@@ -88,8 +88,8 @@ def _changes_per_h(idle: Mask, good: Mask, dt_s: float) -> float:
 
 
 def _takeover_s(record: LoopRecord, idle: Mask, good: Mask) -> float | None:
-    """Median time for which the error has had the other side than while the loop is idle, before a take-over [s]; None
-    where there is none."""
+    """Median time before a take-over for which the error has had the other side than while the loop is idle [s]; None
+    without a take-over."""
     side, waits = np.sign(record.error) * np.sign(np.median(record.error[idle])), []
     for first, last in runs(idle):
         if last < idle.size and good[last]:

@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -43,6 +44,8 @@ def witness(verdict: Verdict, oscillates: bool, prepared: Prepared, limits: Caus
     m = verdict.for_settings.measured
     if m is None or hidden_by_grid(m, prepared.pv_step, oscillates, limits):
         return None
+    if not oscillates and m.steady < limits.steady:
+        m = replace(m, evidence=min(m.evidence, 0.0))
     convicted = oscillates and verdict.cause is Cause.VALVE
     whole = prepared.compressed_share <= COMPRESSED
     said = {

@@ -11,7 +11,7 @@ import numpy as np
 
 from analyzer.loop.settings_side_by_side import SPREAD, Comparison, Shown
 from analyzer.loops.spec import LoopSpec
-from analyzer.loops.tags import unit_ratio
+from analyzer.loops.tags import derivative_as_stated, unit_ratio
 from analyzer.pages.words import number, page_columns, signed
 from analyzer.words.units import duration, gain_unit
 from identification.models import Integrator
@@ -37,6 +37,7 @@ from reports.texts import slug
 from tuning.describing import band, is_play
 from tuning.forecast import (
     CALMER,
+    DERIVATIVE,
     LAMBDA,
     LEAST_PRELUDE,
     LONGER,
@@ -64,11 +65,14 @@ MEANING = {
     RECOMMENDED: "the least travel and error within the limits, on the load and on what else the loop may be",
     CALMER: "the least travel for at most a quarter more error, on all that the loop may be",
     SMALLER: "the least error for no more travel, on all that the loop may be",
+    DERIVATIVE: "what a derivative takes off the error for no more travel, on all that the loop may be",
     REPAIRED: "the present settings behind a valve without fault",
     SIMC: "Kp = T/(K (tau + L)), Ti = min(T, 4 (tau + L)), tau = 1.5 L; knows no valve",
     LAMBDA: "Kp = T/(K (lambda + L)), Ti = T, lambda = T, 3 L at least; knows no valve",
     LONGER: "the present gain, Ti raised to the time constant: the source study's rule for play",
 }
+OFFERED = (CALMER, SMALLER, DERIVATIVE)
+"""Settings between which may be chosen beside the recommended ones."""
 CAUTION = (
     "Recommended are only settings that keep robustness, load rejection and error on all that the night's data "
     "allow, with little more gain: a valve that jumps looks like one with play behind a process of less gain."
@@ -118,12 +122,20 @@ def _typed(c: Comparison, name: str, spec: LoopSpec) -> str:
     """Settings as they are typed in."""
     kp, ti = c.stated[name]
     gain = gain_unit(spec.gain_unit, spec.pv_unit, spec.op_unit)
-    return f"Kp {kp:.3g} {gain} and Ti {ti:.3g} {spec.ti_unit}"
+    derivative = "" if name != DERIVATIVE else f" and {_td(c, name, spec)}"
+    return f"Kp {kp:.3g} {gain} and Ti {ti:.3g} {spec.ti_unit}{derivative}"
+
+
+def _td(c: Comparison, name: str, spec: LoopSpec) -> str:
+    """A derivative time as it is typed in."""
+    pid = next(t.controller for t in c.tried if t.name == name)
+    td = derivative_as_stated(pid, spec, c.pv_span)
+    return f"Td {td:.3g} {'s' if spec.ti_unit == 's' else 'min'}"
 
 
 def _offer(c: Comparison) -> str:
     """What may be chosen all the same, and what a repair would bring."""
-    offers = [f"{name}: {_priced(c, name)}" for name in (CALMER, SMALLER) if name in c.shown]
+    offers = [f"{name}: {_priced(c, name)}" for name in OFFERED if name in c.shown]
     if c.repaired is not None:
         offers.append(f"a repaired valve: {_against_now(c, c.repaired)}")
     return f"To choose between: {'; '.join(offers)}." if offers else ""
@@ -131,7 +143,7 @@ def _offer(c: Comparison) -> str:
 
 def choices(c: Comparison, spec: LoopSpec) -> list[str]:
     """The settings between which an engineer may choose, a line each, and what a repair would bring."""
-    named = [t for t in c.tried if t.name in (RECOMMENDED, CALMER, SMALLER) and t.name in c.everywhere]
+    named = [t for t in c.tried if t.name in (RECOMMENDED, *OFFERED) and t.name in c.everywhere]
     lines = [f"  {t.name}: {_typed(c, t.name, spec)}: {_priced(c, t.name)}" for t in named]
     if c.repaired is not None:
         lines.append(f"  {REPAIRED}: {_against_now(c, c.repaired)}")
@@ -183,10 +195,11 @@ def _row(t: Tried, c: Comparison, spec: LoopSpec, unit: str) -> tuple[Cell, ...]
     found = c.everywhere.get(t.name) if t is not now else None
     worst = "" if found is None else f"{_change(found.worst_travel)}, {_change(found.worst_error)}"
     ms = "unstable" if math.isinf(t.ms) else f"{t.ms:.2f}"
+    derivative = f", {_td(c, t.name, spec)}" if t.name == DERIVATIVE else ""
     return (
         Cell(t.name, kind="strong" if t.name == RECOMMENDED else ""),
         Cell(f"{kp:.3g} {gain_unit(spec.gain_unit, spec.pv_unit, spec.op_unit)}", kp),
-        Cell("none" if ti == 0 else f"{ti:.3g} {spec.ti_unit}", ti),
+        Cell("none" if ti == 0 else f"{ti:.3g} {spec.ti_unit}{derivative}", ti),
         Cell(number(t.stem_travel), t.stem_travel, _against(t.stem_travel, now.stem_travel)),
         Cell(f"{number(scale * t.error)} {unit}", t.error, _against(t.error, now.error)),
         Cell(f"{number(scale * t.peak)} {unit}", t.peak, _against(t.peak, now.peak)),
@@ -300,7 +313,8 @@ def model(c: Comparison, spec: LoopSpec, unit: str) -> str:
     loop, h = c.loop, scan_step(c.loop)
     d, pid = discretize(loop.process, h), c.loop.controller
     breakaway, sliding, tolerance = law_of(loop.valve)
-    settings = [{"name": t.name, "kp": t.controller.kp, "ti_s": _finite(t.controller.ti_s)} for t in c.tried]
+    alike = [t for t in c.tried if t.controller.td_s == pid.td_s]  # the sliders move Kp and Ti alone
+    settings = [{"name": t.name, "kp": t.controller.kp, "ti_s": _finite(t.controller.ti_s)} for t in alike]
     return json.dumps(
         {
             "process": {"pole": d.pole, "now": d.now, "before": d.before, "delay": d.delay},

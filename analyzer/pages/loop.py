@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Sequence
+from statistics import median
 from urllib.parse import quote
 
 import numpy as np
@@ -59,6 +60,11 @@ MODEL = (
     *("gain", "time_constant_s", "slope_pct_per_s", "dead_time_s", "backlash_pct", "stickband_pct"),
     "slip_jump_pct",
 )
+SHARED = (
+    *("valve_pct", "changeovers_per_h", "winds_up_pct", "takeover_s"),
+    *("split_at_pct", "split_slope", "half_slope"),
+)
+"""Figures of a loop that shares a valve, or works half of a split range."""
 LEVELS = frozenset({"sp_mean_pct", "pv_mean_pct"})
 """Figures that are places and no sizes: their own unit has another zero."""
 LIKELIHOOD = ("evidence", "valve_size")
@@ -78,6 +84,8 @@ COLUMNS = (
         "group",
         "master",
         "ratio_of",
+        "split_of",
+        "override_with",
         "osc_valve_pct",
         "osc_tuning_pct",
         "osc_load_pct",
@@ -88,6 +96,7 @@ COLUMNS = (
     *("width_pct", "width_low_pct", "width_high_pct", "wear_pct_per_month", "wear_low_pct", "wear_high_pct"),
     *("wear_since", "reaches_pct", "reaches_from", "reaches_by"),
     *("sp_moves", "rise_time_s", "overshoot_pct", "settling_time_s", "moves"),
+    *("phases", "growing", *SHARED),
     *(name for _, period, amplitude in CYCLES for name in (period, amplitude)),
 )
 """What a loop's page reads of the table of nights."""
@@ -99,9 +108,10 @@ def _facts(row: Row) -> Facts:
     facts += [titled(f"osc_{c}_pct", f"{share:.0f}") for c, share in shares if share is not None]
     if row["valve_fault"] not in (None, "", Fault.NONE):
         facts.append(titled("valve_fault", row["valve_fault"]))
-    for built in ("source_loop", "master", "ratio_of"):
+    for built in ("source_loop", "master", "ratio_of", "split_of", "override_with"):
         if row[built]:
             facts.append(titled(built, row[built]))
+    facts += [titled(k, number(row[k])) for k in SHARED if row[k] is not None]
     if row["period_s"] is not None:
         facts.append(("Period", duration(row["period_s"])))
         facts.append(titled("pv_amplitude_pct", number(row["pv_amplitude_pct"])))
@@ -183,7 +193,31 @@ def _moves(row: Row) -> list[Section]:
         return []
     names = ("sp_moves", "rise_time_s", "overshoot_pct", "settling_time_s")
     facts = Facts(tuple(titled(k, number(row[k])) for k in names if row[k] is not None))
-    return [Section("Moves of the set point", (facts, drawn))]
+    growing = [Text((row["growing"] + ".",), "lead")] if row["growing"] else []
+    return [Section("Moves of the set point", (*growing, facts, drawn, *_phases(row)))]
+
+
+def _phases(row: Row) -> list[Table]:
+    """Moves of a programme that come back, a row a kind: how often, and the medians of their answers."""
+    told = json.loads(row["phases"] or "[]")
+    if not told:
+        return []
+    low, span = row["pv_lo"] or 0.0, (row["pv_hi"] or 100.0) - (row["pv_lo"] or 0.0)
+    rows = []
+    for phase in told:
+        settled = [s for s in phase["settled_s"] if s is not None]
+        ends = (plain_cell(low + span * phase[k] / 100.0) for k in ("begin", "end"))
+        count, overshoot = len(phase["start_s"]), median(phase["overshoot_pct"])
+        rows.append(
+            (
+                *ends,
+                plain_cell(count),
+                plain_cell(overshoot),
+                plain_cell(median(settled) if settled else None),
+            )
+        )
+    unit = f"Levels in {row['pv_unit']}." if row["pv_unit"] else ""
+    return [Table("phases", "Phases that come back", page_columns("phases"), tuple(rows), unit)]
 
 
 def _limit_cycle(row: Row) -> list[Section]:

@@ -51,22 +51,12 @@ def _with_halves(own: Finding, halves: Sequence[Finding], limits: PlantLimits) -
     """A controller of a split range, without new settings where its halves need two: one gain cannot suit both."""
     if len(halves) != 2 or own.remedy.action is not Action.RETUNE:
         return own
-    size = _sizes(halves)
-    if size is None or max(size) < limits.halves_apart * min(size):
+    size = [abs(h.number("half_slope") * h.number("split_slope")) for h in halves]
+    if not all(size) or max(size) < limits.halves_apart * min(size):
         return own
     stronger, weaker = (halves[k] for k in sorted((0, 1), key=lambda k: -size[k]))
     text = halves_apart(stronger.loop, weaker.loop, max(size) / min(size))
     return replace(own, remedy=Remedy(Action.CHECK_SETTINGS, text))
-
-
-def _sizes(halves: Sequence[Finding]) -> list[float] | None:
-    """How much PV answers each half for a percent of the controller's output: by gains where all are known, else by
-    slopes; None where these are not known."""
-    for column in ("half_gain", "half_slope"):
-        size = [abs(h.number(column) * h.number("split_slope")) for h in halves]
-        if all(size):
-            return size
-    return None
 
 
 def _send_on(done: dict[str, Finding], led: Sequence[str], above: str, root: Root) -> None:

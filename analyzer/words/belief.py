@@ -6,12 +6,14 @@ import re
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
+from analyzer.history.plant_clock import local
 from analyzer.loop.decisions import CAUSES, Action, Cause, Fault, counts
 from analyzer.words.reason import joined
 from analyzer.words.units import duration
 
 if TYPE_CHECKING:
     from analyzer.belief.belief import Belief
+    from analyzer.belief.phases import Growth, Phase
 
 Row = Mapping[str, Any]
 REPAIRED = re.compile(
@@ -179,6 +181,17 @@ def news(before: Belief | None, now: Belief, row: Row) -> tuple[str, str]:
     if before is None or now.recorder == now.night:  # another recorder shows other sizes of the same
         return "", ""
     return _swing_news(before, now, row) or _valve_news(before, now) or _cause_news(before, now) or ("", "")
+
+
+def growing(phase: Phase, found: Growth, row: Row) -> str:
+    """That the overshoot of a phase grows, and since which repetition."""
+    low, span = row["pv_lo"] or 0.0, (row["pv_hi"] or 100.0) - (row["pv_lo"] or 0.0)
+    begin, end = (low + span * x / 100.0 for x in (phase.begin, phase.end))
+    when = local(found.start_s, row["timezone"]).strftime("%Y-%m-%d %H:%M")
+    return (
+        f"overshoot of {begin:.4g} → {end:.4g} {row['pv_unit'] or ''} grows since batch {found.number} ({when}): "
+        f"{found.before:.0f} → {found.now:.0f} % of the move"
+    ).replace("  ", " ")
 
 
 def _swing_news(before: Belief, now: Belief, row: Row) -> tuple[str, str] | None:

@@ -169,20 +169,9 @@ def _agreement(gained: Floats) -> Trials:
     return Trials(gained.size, float((gained > 0).mean()), float(gained.mean()) / max(spread, 1e-9))
 
 
-def gains_between_moves(ours: Fit, theirs: Fit) -> Floats:
-    """Gains in log likelihood [nat] of the stretches that the moves of our valve's stem part, shape (t,), t > 0."""
-    at = moves_begun(ours)
-    return np.add.reduceat(gains(ours, theirs), np.append(0, at[at > 0]))
-
-
 def trials_between_moves(ours: Fit, theirs: Fit) -> Trials | None:
     """The same of the stretches that the moves of our valve's stem part, for a loop without cycles; None without a
-    move."""
-    gained = gains_between_moves(ours, theirs)
-    return _agreement(gained) if gained.size > 1 else None
-
-
-def evidence_without_best(ours: Fit, theirs: Fit) -> float:
-    """Evidence [nat] that is left without the stretch between moves that gives most: a ramp of the load while OP runs
-    against it looks once like a stem that rests, and not again."""
-    return float(np.sort(gains_between_moves(ours, theirs))[:-1].sum())
+    move. A ramp of the load while OP runs against it looks once like a stem that rests, and not again."""
+    at = moves_begun(ours)
+    at = at[at > 0]
+    return _agreement(np.add.reduceat(gains(ours, theirs), np.append(0, at))) if at.size else None

@@ -11,7 +11,7 @@ from analyzer.pages import compared as page
 from identification.models import Backlash, Fopdt, Loop, Pid, Stiction
 from identification.simulation.closed_loop import closed_loop
 from proofs.valve_loops import backlash_case, level_case, stick_case
-from tuning.forecast import CALMER, SMALLER, assess, run, settled, tried
+from tuning.forecast import CALMER, DERIVATIVE, SMALLER, assess, run, settled, tried
 from tuning.frequency_response import maximum_sensitivity
 from tuning.limits import LIMITS
 from tuning.recommend import recommend
@@ -109,3 +109,24 @@ def test_a_stem_that_rests_has_nothing_to_trade():
     assert page.price(found, "%") is None
     assert page.choices(found, spec) == []
     assert page.page("L", "2026-03-02", found, spec).sections
+
+
+def test_a_derivative_is_offered_where_it_pays_alone():
+    """Behind play it takes a tenth off the error for no more travel, simulated anew; under noise, and to a loop that
+    has one, none is offered."""
+    rng = np.random.default_rng(2)
+    walk = np.cumsum(rng.normal(0.0, 0.02, 20_000))
+    load = walk - np.convolve(walk, np.ones(2000) / 2000, "same")
+    loop = Loop(Fopdt(1.0, 60.0, 20.0), Pid(1.5, 60.0, scan_s=1.0), Backlash(2.0))
+    calm = trade(bench(loop, (loop,), load, LIMITS)).chosen
+    offered = calm[DERIVATIVE].controller
+    assert offered.td_s > 0.0
+    old, new = (
+        assess(settled(run(replace(loop, controller=pid), load))) for pid in (loop.controller, offered)
+    )
+    assert new.average_absolute_error < 0.9 * old.average_absolute_error
+    assert new.stem_travel <= LIMITS.travel_growth_sample * old.stem_travel
+    noisy = load + rng.normal(0.0, 0.3, load.size)
+    assert DERIVATIVE not in trade(bench(loop, (loop,), noisy, LIMITS)).chosen
+    has = replace(loop, controller=replace(loop.controller, td_s=4.0))
+    assert DERIVATIVE not in trade(bench(has, (has,), load, LIMITS)).chosen

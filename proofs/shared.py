@@ -1,0 +1,151 @@
+"""Overrides, split ranges and batches: python -m proofs.shared [--seed 301 302 303 304] [--jobs 2]
+
+Plants of six overrides, six split ranges and six batch loops (proofs/shared_plant.py), twelve hours every two
+seconds. Counted are: who has a valve (within two percent of the time), windup told where an output winds up and not
+where it follows; the change-over of a split range (within two percent of the output), the answer to a half (within a
+factor of 1.35 where it is told); faults told at the valve that has them, of those that swell the loop's error by .3;
+phases of a programme with their repetitions; and what is blamed that is sound. Writes shared.md here.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+import tempfile
+from collections import Counter
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from analyzer.config import Config
+from analyzer.history.export import open_export
+from analyzer.loop.decisions import Action, Cause, Fault
+from analyzer.loops.spec import LoopSpec
+from analyzer.loops.tags import match
+from analyzer.night import batch
+from analyzer.store.store import Store
+from proofs.common import command, command_line, publish, table
+from proofs.plant import START_S
+from proofs.shared_plant import EVERY, FAULT, Plant, plant
+
+COLUMNS = (
+    *(
+        "loop",
+        "cause",
+        "valve_fault",
+        "action",
+        "source_loop",
+        "lanes",
+        "phases",
+        "valve_pct",
+        "split_at_pct",
+    ),
+    *("split_slope", "half_slope", "oscillating_pct"),
+)
+Row = Mapping[str, Any]
+SHOWS = 1.3
+"""Spread of the error over that without the fault from which a fault shows."""
+
+
+def told(built: Plant, jobs: int) -> dict[str, Row]:
+    """What a night tells of a plant's loops."""
+    n = next(iter(built.tags.values())).size
+    stamp = np.round((START_S + EVERY * np.arange(n)) * 1e6).astype("datetime64[us]")
+    specs, _ = match([LoopSpec(**s) for s in built.stated], built.tags)  # type: ignore[arg-type]
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "export.parquet"
+        pq.write_table(pa.table({"timestamp": stamp, **built.tags}), path)
+        store = Store(Path(folder) / "store")
+        batch.run(batch.Batch(open_export([path]), specs, store, Config()), jobs)
+        return {r["loop"]: r for r in store.own_rows("nights", store.nights()[-1], COLUMNS)}
+
+
+def of_override(row: Row, true: Row) -> dict[str, bool]:
+    """What of a loop that shares a valve is told right."""
+    out = {"share of the valve": abs((row["valve_pct"] or 0.0) - true["share"]) <= 2.0}
+    winds = "windup" in (row["lanes"] or "")
+    out["windup" if true["winds_up"] else "none where the output follows"] = winds == true["winds_up"]
+    return out
+
+
+def of_half(row: Row, true: Row) -> dict[str, bool]:
+    """What of a half of a split range is told right."""
+    out = {"change-over": abs((row["split_at_pct"] or math.inf) - true["at"]) <= 2.0}
+    if row["half_slope"] is not None:
+        off = abs(math.log(max(row["half_slope"] * true["lag"] / true["gain"], 1e-3)))
+        out["answer to a half, where told"] = off <= math.log(1.35)
+    return out
+
+
+def of_batch(row: Row, true: Row) -> dict[str, bool]:
+    """What of a loop of a programme is told right: a phase that is up by the first step, in every batch but one."""
+    found = json.loads(row["phases"] or "[]")
+    rise = [p for p in found if abs(p["end"] - p["begin"] - true["rise"]) < 1.0]
+    return {"phases": bool(rise) and len(rise[0]["start_s"]) >= true["batches"] - 1}
+
+
+OF = {"override": of_override, "half": of_half, "batch": of_batch}
+
+
+def counted(built: Plant, rows: Mapping[str, Row]) -> tuple[Counter[str], list[tuple[str, ...]]]:
+    """What is asked and right in one plant, what is wrong, and the loops of which something is."""
+    out: Counter[str] = Counter()
+    missed = []
+    for loop, true in built.truth.items():
+        row, kind = rows[loop], str(true["kind"])
+        answers = OF[kind](row, true) if kind in OF else {}
+        worn = true["cause"] in FAULT and kind != "split"
+        blamed = row["cause"] == Cause.VALVE or row["valve_fault"] in (Fault.BACKLASH, Fault.STICTION)
+        if worn and true["swell"] >= SHOWS:
+            answers[f"worn valve of a {kind} loop"] = blamed
+        for name, right in answers.items():
+            out[f"asked {kind}: {name}"] += 1
+            out[f"right {kind}: {name}"] += right
+        wrong = {
+            "sound valves blamed": blamed and not worn and true["cause"] not in FAULT,
+            "controllers of a split range blamed for a half's valve": kind == "split" and blamed,
+            "hand-overs told as cycles": kind in ("override", "half")
+            and true["cause"] == "healthy"
+            and (row["oscillating_pct"] or 0.0) >= 50.0,
+            "sound loops retuned": true["cause"] == "healthy" and row["action"] == Action.RETUNE,
+        }
+        out.update({f"wrong {name}": int(is_so) for name, is_so in wrong.items()})
+        bad = [name for name, right in answers.items() if not right] + [k for k, v in wrong.items() if v]
+        if bad:
+            said = (row["cause"], row["action"], row["source_loop"])
+            missed.append((loop, f"{kind}: {true['cause']}", "; ".join(bad), *(str(x or "") for x in said)))
+    return out, missed
+
+
+def main() -> None:
+    """Run the plants and write the page."""
+    given = command_line(__doc__, seed=[301, 302, 303, 304], jobs=2)
+    total: Counter[str] = Counter()
+    missed = []
+    for seed in given.seed:
+        built = plant(seed)
+        found, more = counted(built, told(built, given.jobs))
+        total.update(found)
+        missed += [(str(seed), *m) for m in more]
+        print(f"plant {seed} done", file=sys.stderr)
+    asked = sorted(k.removeprefix("asked ") for k in total if k.startswith("asked "))
+    wrong = sorted(k.removeprefix("wrong ") for k in total if k.startswith("wrong "))
+    publish(
+        __file__,
+        "Overrides, split ranges and batches",
+        command(__file__, seed=given.seed),
+        (__doc__ or "").split("\n\n")[1].replace("\n", " ").split(" Writes shared.md")[0],
+        table("told | asked | right", [(k, total[f"asked {k}"], total[f"right {k}"]) for k in asked]),
+        table("wrong | loops", [(k, total[f"wrong {k}"]) for k in wrong]),
+        "Loops of which something is missed or wrong:",
+        table("plant | loop | truth | what | cause | action | source", missed),
+    )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,68 @@
+"""Phases over nights: an overshoot that grows is told with its batch, and one that only scatters is not."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+import pytest
+
+from analyzer.belief.phases import Phase, forgotten, growth, with_night
+from analyzer.config import WearLimits
+
+LIMITS, HOUR = WearLimits(), 3600.0
+
+
+def row(first: int, overshoot: np.ndarray, begin: float = 20.0, end: float = 50.0) -> dict[str, Any]:
+    """A night whose batches follow each other every hour."""
+    start = [HOUR * (first + k) for k in range(overshoot.size)]
+    told = {
+        "begin": begin,
+        "end": end,
+        "start_s": start,
+        "overshoot_pct": overshoot.tolist(),
+        "settled_s": [],
+    }
+    return {"phases": json.dumps([told])}
+
+
+def of_nights(overshoot: np.ndarray, a_night: int = 8) -> tuple[Phase, ...]:
+    """What is known of a phase after nights of so many batches."""
+    known: tuple[Phase, ...] = ()
+    for k in range(0, overshoot.size, a_night):
+        known = with_night(known, row(k, overshoot[k : k + a_night]))
+    return known
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_growth_is_told_with_the_batch_from_which_on(seed: int) -> None:
+    """An overshoot of 4 % that grows by one in a hundred from batch 24 on is told so within a few batches."""
+    x = np.arange(48)
+    seen = 4.0 + np.maximum(x - 23, 0) * 1.0 + np.random.default_rng(seed).normal(0.0, 1.0, 48)
+    (phase,) = of_nights(seen)
+    found = growth(phase, LIMITS)
+    assert phase.count == 48
+    assert found is not None
+    assert abs(found.number - 24) <= 5
+    assert found.before == pytest.approx(4.0, abs=2.0)
+    assert found.now == pytest.approx(26.0, abs=2.0)
+    assert found.start_s == HOUR * (found.number - 1)
+
+
+def test_what_scatters_falls_or_jumps_once_is_no_growth() -> None:
+    """Of a hundred phases that stay, scatter by 3 %, or fall, none is told to grow."""
+    for seed in range(100):
+        rng = np.random.default_rng(seed)
+        seen = 6.0 + rng.normal(0.0, 3.0, 48) - (seed % 2) * np.linspace(0.0, 4.0, 48)
+        (phase,) = of_nights(np.maximum(seen, 0.0))
+        assert growth(phase, LIMITS) is None
+
+
+def test_a_night_twice_and_other_levels_are_kept_apart() -> None:
+    """A night read again counts no batch twice; another move is another phase; new settings begin anew."""
+    once = with_night((), row(0, np.full(8, 3.0)))
+    assert with_night(once, row(0, np.full(8, 3.0))) == once
+    both = with_night(once, row(8, np.full(4, 3.0), begin=50.0, end=80.0))
+    assert [p.count for p in both] == [8, 4]
+    assert [(p.count, p.shown) for p in forgotten(both)] == [(8, ()), (4, ())]
