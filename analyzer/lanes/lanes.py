@@ -77,8 +77,11 @@ def _sluggish(found: Finding) -> str:
 def _winds_up(found: Finding) -> str:
     late = found.number("takeover_s")
     text = f"winds up while {found.text('override_with')} has the valve"
-    text += f", and takes it back {duration(late)} late" if late else ""
-    return f"{text}: let its output follow the valve's (external reset)"
+    return (
+        f"{text}, takes it back {duration(late)} late: use external reset"
+        if late
+        else f"{text}: use external reset"
+    )
 
 
 RULES = (
@@ -147,16 +150,14 @@ def lanes_of(found: Finding, limits: LaneLimits) -> tuple[Lane, ...]:
 
 def action_of(status: Status, action: Action | None, lanes: tuple[Lane, ...]) -> Action | None:
     """The action, or the one that a lane asks for where nothing else is to be done; what holds OP at its limit has to
-    be found out first."""
+    be found out first, and an output that winds up is no matter of gain and integral time."""
     if status is Status.NOT_ASSESSED and action is None:
         action = Action.NEEDS_DATA
     if action in NOTHING_SURER and status is not Status.FAILED:
         asks = [r.lane for r in RULES if r.of_measurement and r.lane in lanes]
         if asks and not (asks == [Lane.LASTING_ERROR] and Lane.AT_LIMIT in lanes):
             return Action.CHECK_MEASUREMENT
-    if action is Action.NONE and Lane.WINDUP in lanes:
-        return Action.CHECK_SETTINGS
-    return Action.UNDECIDED if action is Action.NONE and Lane.AT_LIMIT in lanes else action
+    return Action.UNDECIDED if action is Action.NONE and {Lane.AT_LIMIT, Lane.WINDUP} & set(lanes) else action
 
 
 def lanes_in(row: Mapping[str, Any]) -> tuple[str, ...]:

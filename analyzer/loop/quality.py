@@ -161,7 +161,9 @@ def prepare(spec: LoopSpec, series: Mapping[str, Series], limits: QualityLimits)
     other = spec.beside.tag if spec.beside is not None else None
     shared = _shared(masked, spec, _signal(series, other, clock, dt, limits), limits)
     if shared is not None:
-        masked = replace(masked, masks=MappingProxyType({**masked.masks, "idle": shared.idle}))
+        saturated = masked.mask("saturated") & ~shared.idle  # at rest a limit limits nothing
+        masks = {**masked.masks, "saturated": saturated, "idle": shared.idle}
+        masked = replace(masked, masks=MappingProxyType(masks))
     return replace(_described(masked, scale, op_known, step, limits), shared=shared)
 
 
@@ -290,7 +292,7 @@ def _described(
     op_scaled = not op_known or op_in_range(record.op, limits)
     if not op_scaled:
         notes.append(op_range(scale, record.op))
-    for name in ("gap", "stale", "saturated", "manual"):
+    for name in ("gap", "stale", "saturated", "manual", "idle"):
         share = float(record.mask(name).mean())
         if share > 0.005:
             notes.append(f"{name} {100 * share:.0f} % of the time")

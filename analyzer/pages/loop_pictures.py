@@ -199,7 +199,10 @@ def _laid_over(paths: Sequence[tuple[Floats, Floats, slice]]) -> tuple[Line, ...
 
 def answered_moves(row: Row) -> Plot | None:
     """PV's answers to moves of the set point over one another, each from 0 to 1; None where there were none."""
-    found = json.loads(row["moves"] or "[]")
+    every = json.loads(row["moves"] or "[]")
+    found = [
+        m for m in every if not m.get("ramp_s")
+    ] or every  # ramps are long, and set the course themselves
     if not found:
         return None
     lines = tuple(

@@ -46,8 +46,8 @@ def _case(row: Row) -> str:
         return "dead valve"
     if action is Action.NONE and row["cause"] == Cause.LOAD:
         return "moved from outside"
-    if action is Action.UNDECIDED and row["cause"] == Cause.NONE and Lane.AT_LIMIT in lanes_in(row):
-        return "at limit"
+    if action is Action.UNDECIDED and row["cause"] == Cause.NONE:
+        return next((str(x) for x in (Lane.AT_LIMIT, Lane.WINDUP) if x in lanes_in(row)), action)
     return action
 
 

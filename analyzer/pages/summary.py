@@ -67,7 +67,8 @@ def _work(row: Row) -> set[str]:
         Action.NEEDS_DATA: "halve" if tuning else "",
     }
     at_limit = Lane.AT_LIMIT in lanes_in(row) and not tuning
-    return {kinds.get(row["action"], ""), "limit" if at_limit else ""}
+    winds_up = Lane.WINDUP in lanes_in(row)
+    return {kinds.get(row["action"], ""), "limit" if at_limit else "", "windup" if winds_up else ""}
 
 
 def _asked(work: str, rows: Sequence[Row]) -> str:

@@ -56,7 +56,7 @@ def _with_halves(own: Finding, halves: Sequence[Finding], limits: PlantLimits) -
         return own
     stronger, weaker = (halves[k] for k in sorted((0, 1), key=lambda k: -size[k]))
     text = halves_apart(stronger.loop, weaker.loop, max(size) / min(size))
-    return replace(own, remedy=Remedy(Action.CHECK_SETTINGS, text))
+    return replace(own, remedy=Remedy(Action.UNDECIDED, text))
 
 
 def _send_on(done: dict[str, Finding], led: Sequence[str], above: str, root: Root) -> None:
