@@ -16,7 +16,7 @@ import numpy as np
 
 from analyzer.belief import cycle, phases, remedy, valve
 from analyzer.belief.cycle import CycleBelief
-from analyzer.belief.phases import Phase
+from analyzer.belief.phases import PhaseKnown
 from analyzer.belief.pool import Pool
 from analyzer.belief.remedy import Pair, RemedyBelief
 from analyzer.belief.valve import ValveBelief, Witness
@@ -86,7 +86,7 @@ class Belief:
     told: Told = field(default_factory=Told)
     straight_pct: float | None = None
     recorder: str = ""
-    phases: tuple[Phase, ...] = ()
+    phases: tuple[PhaseKnown, ...] = ()
 
     def is_calmed(self, limits: BeliefLimits) -> bool:
         """Whether the last change of settings took most of a cycle away."""

@@ -22,7 +22,7 @@ LEAST = 5.0
 
 
 @dataclass(frozen=True, slots=True)
-class Phase:
+class PhaseKnown:
     """One kind of move over the nights: set point before and after [% of span], how often it has come, and of the
     latest repetitions their numbers, starts [s since 1970-01-01 UTC] and overshoots [% of the move]."""
 
@@ -43,7 +43,7 @@ class Growth:
     now: float
 
 
-def with_night(known: Sequence[Phase], row: Mapping[str, Any]) -> tuple[Phase, ...]:
+def with_night(known: Sequence[PhaseKnown], row: Mapping[str, Any]) -> tuple[PhaseKnown, ...]:
     """The phases with what a night's row says of them; a repetition that is known already is not counted again."""
     out = list(known)
     for told in json.loads(row.get("phases") or "[]"):
@@ -51,24 +51,24 @@ def with_night(known: Sequence[Phase], row: Mapping[str, Any]) -> tuple[Phase, .
         at = next((k for k, p in enumerate(out) if alike((p.begin, p.end), ends)), None)
         if at is None:
             at = len(out)
-            out.append(Phase(*ends))
+            out.append(PhaseKnown(*ends))
         out[at] = _with(out[at], list(zip(told["start_s"], told["overshoot_pct"], strict=True)))
     return tuple(out)
 
 
-def _with(phase: Phase, found: Sequence[tuple[float, float]]) -> Phase:
+def _with(phase: PhaseKnown, found: Sequence[tuple[float, float]]) -> PhaseKnown:
     last = phase.shown[-1][1] if phase.shown else float("-inf")
     new = [(start, size) for start, size in found if start > last]
     numbered = tuple((phase.count + k, start, size) for k, (start, size) in enumerate(new, 1))
     return replace(phase, count=phase.count + len(new), shown=(*phase.shown, *numbered)[-REMEMBERED:])
 
 
-def forgotten(known: Sequence[Phase]) -> tuple[Phase, ...]:
+def forgotten(known: Sequence[PhaseKnown]) -> tuple[PhaseKnown, ...]:
     """The phases of a loop whose settings were changed: counted on, their overshoots begun anew."""
     return tuple(replace(p, shown=()) for p in known)
 
 
-def growth(phase: Phase, limits: WearLimits) -> Growth | None:
+def growth(phase: PhaseKnown, limits: WearLimits) -> Growth | None:
     """Whether the overshoot of a phase grows from some repetition on; None where it stays or too few show it."""
     if len(phase.shown) < limits.nights:
         return None

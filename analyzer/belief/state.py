@@ -8,7 +8,7 @@ from typing import Any
 
 from analyzer.belief.belief import Belief, Calm, Told
 from analyzer.belief.cycle import CycleBelief
-from analyzer.belief.phases import Phase
+from analyzer.belief.phases import PhaseKnown
 from analyzer.belief.pool import Pool
 from analyzer.belief.remedy import Pair, RemedyBelief
 from analyzer.belief.valve import ValveBelief
@@ -62,7 +62,7 @@ def belief_of(text: str) -> Belief:
         ),
         kept["straight_pct"],
         kept["recorder"],
-        tuple(Phase(**{**p, "shown": tuple(tuple(x) for x in p["shown"])}) for p in kept["phases"]),
+        tuple(PhaseKnown(**{**p, "shown": tuple(tuple(x) for x in p["shown"])}) for p in kept["phases"]),
     )
 
 

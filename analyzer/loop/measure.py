@@ -164,11 +164,11 @@ def measure(
     NotAssessedError
         Good samples are too scattered for a model of how one follows from those before it.
     """
-    scale = time_scale(record, oscillation, controller)
-    window = window_of(record, scale, limits, kind)
+    scale, calm = time_scale(record, oscillation, controller), oscillation is None
+    window = window_of(record, scale, limits, kind, calm)
     _check_judged(window, limits)
     controller = controller or recovered(record, scale)
-    due = due_to_answer(record, window, scale)
+    due = due_to_answer(record, window, scale, calm)
     linear, play, stick, best, gained, jump = _fits(window, scale, due, limits, oscillation)
     hopeless = oscillation is None and gained < _hopeful(window, due, limits)
     op_range = _op_range(window, scale, oscillation is not None)
@@ -329,9 +329,10 @@ def time_scale(record: LoopRecord, oscillation: Oscillation | None, controller: 
     return min(60 * record.dt_s, top)
 
 
-def latest_fit_stretch(record: LoopRecord, n: int) -> int:
-    """First sample of the latest stretch of n samples with the fewest out of use, or with few more where the set
-    point moves farther in it: its moves tell the process apart from load and valve."""
+def latest_fit_stretch(record: LoopRecord, n: int, calm: bool = False) -> int:
+    """First sample of the latest stretch of n samples with the fewest out of use, or, of a calm loop, with few more
+    where the set point moves farther in it: its moves tell the process apart from load and valve. In a cycle they do
+    not: of a tight loop of the sample mill they left the time constant unsure by three times."""
     firsts = np.arange(len(record) - n, -1, -max(n // 4, 1))
 
     def within(x: Floats) -> Floats:
@@ -339,6 +340,8 @@ def latest_fit_stretch(record: LoopRecord, n: int) -> int:
         return np.asarray(total[firsts + n] - total[firsts])
 
     out = within((~record.usable).astype(np.float64))
+    if not calm:
+        return int(firsts[int(np.argmin(out))])
     moved = np.abs(np.diff(record.sp, prepend=record.sp[:1]))
     far, least = within(np.where(record.usable, moved, 0.0)), out <= out.min()
     farther = (out <= out.min() + FEW_MORE * n) & (far > far[least].max())
@@ -346,11 +349,13 @@ def latest_fit_stretch(record: LoopRecord, n: int) -> int:
     return int(firsts[among[far[among] >= far[among].max() - 1e-9][0]])
 
 
-def window_of(record: LoopRecord, scale_s: float, limits: CauseLimits, kind: str = "") -> Window:
+def window_of(
+    record: LoopRecord, scale_s: float, limits: CauseLimits, kind: str = "", calm: bool = False
+) -> Window:
     """The latest stretch with the fewest samples out of use, in blocks of a fraction of the period."""
     factor = max(round(scale_s / limits.blocks_per_period / record.dt_s), 1)
     n = min(len(record) // factor, limits.window) * factor
-    first = latest_fit_stretch(record, n)
+    first = latest_fit_stretch(record, n, calm)
     part = record.span(first, first + n)
     usable = block_means(part.usable.astype(np.float64), factor) > 0.99
     known = {name: (t, dead) for name, t, dead in limits.fast_process}
@@ -362,12 +367,12 @@ def window_of(record: LoopRecord, scale_s: float, limits: CauseLimits, kind: str
     )
 
 
-def due_to_answer(record: LoopRecord, window: Window, scale_s: float) -> Mask:
+def due_to_answer(record: LoopRecord, window: Window, scale_s: float, calm: bool = False) -> Mask:
     """True where PV is due to answer a set point move, shape of the window.
 
     From a move for scale_s [s], and on until PV has come to the set point, however long the valve takes.
     """
-    first = latest_fit_stretch(record, window.y.size * window.factor)
+    first = latest_fit_stretch(record, window.y.size * window.factor, calm)
     sp = record.sp[first :: window.factor][: window.y.size]
     moves = np.flatnonzero(np.abs(np.diff(sp)) > 1e-6) + 1
     out = np.zeros(window.y.size, dtype=bool)

@@ -13,7 +13,7 @@ from analyzer.words.units import duration
 
 if TYPE_CHECKING:
     from analyzer.belief.belief import Belief
-    from analyzer.belief.phases import Growth, Phase
+    from analyzer.belief.phases import Growth, PhaseKnown
 
 Row = Mapping[str, Any]
 REPAIRED = re.compile(
@@ -183,7 +183,7 @@ def news(before: Belief | None, now: Belief, row: Row) -> tuple[str, str]:
     return _swing_news(before, now, row) or _valve_news(before, now) or _cause_news(before, now) or ("", "")
 
 
-def growing(phase: Phase, found: Growth, row: Row) -> str:
+def growing(phase: PhaseKnown, found: Growth, row: Row) -> str:
     """That the overshoot of a phase grows, and since which repetition."""
     low, span = row["pv_lo"] or 0.0, (row["pv_hi"] or 100.0) - (row["pv_lo"] or 0.0)
     begin, end = (low + span * x / 100.0 for x in (phase.begin, phase.end))

@@ -10,13 +10,15 @@ estimated from the window itself; constants are not touched.
 from __future__ import annotations
 
 import math
+from itertools import product
 
 import numpy as np
 from numba import njit
 
 from identification.estimation.backlash_stiction import generic_noise, pits
+from identification.estimation.descent import compass
 from identification.estimation.hammerstein import Fit
-from identification.estimation.prediction_error import Fitted, Model, Problem, descended
+from identification.estimation.prediction_error import Fitted, Model, Problem, descended, residual_fit
 from identification.estimation.window import Window
 from identification.mismatch.effect import Friction
 from identification.mismatch.outside import about
@@ -27,7 +29,7 @@ from identification.signals.filters import stretch_ends
 from identification.simulation.effect import Signal, Variant, acted
 from identification.simulation.open_loop import as_parameters, from_flow, simulate
 from identification.simulation.parameters import Slot, neutral
-from identification.simulation.valve import StemLaw, stem_step, sticking
+from identification.simulation.valve import StemLaw, moved_stem, sticking
 from identification.simulation.valve_chain import before_stem, behind_stem, friction_of
 
 WEARS = (Friction.PLAY, Friction.STICKS)
@@ -36,6 +38,23 @@ OF_CYCLES = (Slot.T, Slot.L, Slot.K, Slot.STICKBAND, Slot.JUMP, Slot.COAST)
 """Parameters that the cycles tell."""
 PLACES = 9
 """Places of the stem that are tried within its friction band; ours: an eighth of the band apart."""
+WIDTHS = tuple(float(w) for w in np.geomspace(0.9, 1.8, 10))
+"""Stickbands that are tried of a stem with mass, in widths of the best play; ours: of 18 simulated stems of dry
+friction they were 1.1 to 1.8."""
+SHARES, TIMES = (0.4, 0.6, 0.8), (0.12, 0.25, 0.5)
+"""Jumps that are tried, in stickbands, and natural times, in samples; ours: faster stems move within a sample, slower
+ones are a lag."""
+FOLLOWED, ENDED = 20, 3
+"""Starts of a stem with mass that are moved by small steps, and that are followed to the end; ours."""
+STEPS, MOST_MOVES = (0.08, 0.04, 0.02, 0.01), 40
+"""Relative steps, and how many are taken at most; ours: a pit is a tenth of the stickband wide."""
+MOVES = (
+    *((1, 0, 0, 0), (-1, 0, 0, 0), (0, 1, 0, 0), (0, -1, 0, 0)),
+    *((0, 0, 1, 0), (0, 0, -1, 0), (0, 0, 0, 1), (0, 0, 0, -1), (1, 1, 0, 0), (-1, -1, 0, 0)),
+)
+"""Moves of stickband, jump, natural time and dead time that are tried."""
+DEAD_STEPS = 4.0
+"""Samples of dead time that a step of one takes; ours."""
 CARRIED_ON = 0.9
 """Squares left by another place, in those left by the stem carried on, from which it is placed anew; ours."""
 
@@ -47,10 +66,20 @@ def is_friction(name: str) -> bool:
 
 def fit_sticking(p: Problem, play: Fitted, row: Variant, rows: tuple[Variant, ...]) -> Fitted:
     """The best valve that sticks as `row` says, beside `rows`, about a fit whose last row is a play: its stem is
-    sought as a night seeks it, and followed to the end beside all that the fit holds."""
-    window, c = _window_behind(p, play.model.c), play.model.c.copy()
+    sought as a night seeks it, or with its mass, and followed to the end beside all that the fit holds."""
+    c = play.model.c.copy()
     for slot, value in (row.fixed or {}).items():
         c[slot] = value
+    has_mass = any(q.slot == Slot.STEM_T for q in row.params)
+    begun = (
+        _with_mass(p, Model((*rows, row), c)) if has_mass else _as_a_night(p, play, Model((*rows, row), c))
+    )
+    return min((descended(p, m, 2 * p.limits.search.screen_steps) for m in begun), key=lambda fit: fit.loss)
+
+
+def _as_a_night(p: Problem, play: Fitted, model: Model) -> list[Model]:
+    """Starts in the pits that the stickbands and jumps of a night's scan find."""
+    window, c = _window_behind(p, play.model.c), model.c
     near = Fit(
         float(c[Slot.K]),
         min(float(c[Slot.T]), window.bounds[0]),
@@ -62,13 +91,42 @@ def fit_sticking(p: Problem, play: Fitted, row: Variant, rows: tuple[Variant, ..
         np.zeros(4),
         window,
     )
-    fits = []
+    out = []
     for found in pits(near, (friction_of(c).tolerance,)):
         c = c.copy()
         c[Slot.STICKBAND], c[Slot.JUMP] = found.valve.stickband, found.valve.slip_jump
         c[Slot.L] = found.dead_time_s
-        fits.append(descended(p, Model((*rows, row), c), 2 * p.limits.search.screen_steps))
-    return min(fits, key=lambda fit: fit.loss)
+        out.append(Model(model.added, c))
+    return out
+
+
+def _with_mass(p: Problem, model: Model) -> list[Model]:
+    """The best starts of stems with mass: stickbands about the play's width, jumps and natural times scanned, the
+    best moved by ever smaller steps, for slips make pits that a descent does not see from afar."""
+    scanned = []
+    for width, share, samples in product(WIDTHS, SHARES, TIMES):
+        c = model.c.copy()
+        c[Slot.STICKBAND] *= width
+        c[Slot.JUMP] = share * c[Slot.STICKBAND]
+        c[Slot.STEM_T] = samples * p.inputs.dt_s
+        c[Slot.L] = max(c[Slot.L] - c[Slot.STEM_T], 0.0)
+        trial = Model(model.added, c)
+        scanned.append((residual_fit(p, trial).loss, trial))
+    best = sorted(scanned, key=lambda pair: pair[0])[:FOLLOWED]
+    moved = (compass(p, trial, loss, _heavier, MOVES, STEPS, most=MOST_MOVES) for loss, trial in best)
+    return [trial for trial, _ in sorted(moved, key=lambda pair: pair[1])[:ENDED]]
+
+
+def _heavier(p: Problem, model: Model, move: tuple[int, ...], step: float) -> tuple[Model, float]:
+    """A stem with mass with another stickband, jump, natural time and dead time, and its loss."""
+    c = model.c.copy()
+    for slot, way in zip((Slot.STICKBAND, Slot.JUMP, Slot.STEM_T), move, strict=False):
+        c[slot] *= math.exp(step * way)
+    c[Slot.L] = max(c[Slot.L] + move[3] * step * DEAD_STEPS * p.inputs.dt_s, 0.0)
+    if c[Slot.JUMP] > c[Slot.STICKBAND]:
+        return model, math.inf
+    trial = Model(model.added, c)
+    return trial, residual_fit(p, trial).loss
 
 
 def _window_behind(p: Problem, c: Floats) -> Window:
@@ -118,7 +176,8 @@ def simulated_anew(p: Problem, c: Floats, window: int) -> Floats:
     op = before_stem(np.ascontiguousarray(acted(Signal.OP, inputs.op, c, inputs.dt_s)), c, inputs.dt_s)
     dead = round(float(c[Slot.L]) / inputs.dt_s)
     pole = math.exp(-inputs.dt_s / max(float(c[Slot.T]), 1e-9))
-    stem = stem_placed(op, p.y, stretch_ends(op.size, window), dead, pole, float(c[Slot.K]), friction)
+    mass = float(c[Slot.STEM_T]), inputs.dt_s
+    stem = stem_placed(op, p.y, stretch_ends(op.size, window), dead, pole, float(c[Slot.K]), friction, mass)
     flow = behind_stem(stem, c, inputs.dt_s, inputs.middle)
     return from_flow(inputs, c, acted(Signal.FLOW, flow, c, inputs.dt_s))
 
@@ -133,26 +192,29 @@ def _left(
     pole: float,
     gain: float,
     friction: StemLaw,
+    mass: tuple[float, float],
     stem: float,
     x: float,
     out: Floats,
 ) -> tuple[float, float, float]:
-    """Squares about a line that a stem begun at a place leaves of PV; where stem and lag end; `out` is its path."""
+    """Squares about a line that a stem begun at a place leaves of PV; where stem and lag end; `out` is its path.
+
+    mass : natural time of the stem, 0 without mass, and of a sample [s]."""
     state = (stem, 0.0, op[first])
     n = t1 = t2 = r0 = r1 = r2 = 0.0
     for k in range(first, last):
-        state = stem_step(state, op[k], friction)
-        out[k] = stem = state[0]
+        out[k], state = moved_stem(state, op[k], friction, mass[0], mass[1])
+        stem = out[k]
         x = pole * x + (1.0 - pole) * stem
         if k + dead < y.size:
             r, t = y[k + dead] - gain * x, float(k - first)
             n, t1, t2 = n + 1.0, t1 + t, t2 + t * t
             r0, r1, r2 = r0 + r, r1 + r * t, r2 + r * r
     if n < 3.0:
-        return 0.0, stem, x
+        return 0.0, state[0], x
     spread = t2 - t1 * t1 / n
     slope = (r1 - t1 * r0 / n) / spread if spread > 0.0 else 0.0
-    return r2 - r0 * r0 / n - slope * (r1 - t1 * r0 / n), stem, x
+    return r2 - r0 * r0 / n - slope * (r1 - t1 * r0 / n), state[0], x
 
 
 @njit(cache=True)
@@ -164,17 +226,18 @@ def stem_placed(
     pole: float,
     gain: float,
     friction: StemLaw,
+    mass: tuple[float, float],
 ) -> Floats:
     """Stem [% OP], shape (n,), placed in each window where it leaves least of PV, or carried on from the last one."""
     out, trial = np.empty_like(op), np.empty_like(op)
     stem, x = op[0], op[0]
     for i in range(ends.size - 1):
         first, last = ends[i], ends[i + 1]
-        least, stem_on, x_on = _left(op, y, first, last, dead, pole, gain, friction, stem, x, out)
+        least, stem_on, x_on = _left(op, y, first, last, dead, pole, gain, friction, mass, stem, x, out)
         least *= CARRIED_ON
         for j in range(PLACES):
             place = op[first] + friction.breakaway * (2.0 * j / (PLACES - 1) - 1.0)
-            left, stem_j, x_j = _left(op, y, first, last, dead, pole, gain, friction, place, x, trial)
+            left, stem_j, x_j = _left(op, y, first, last, dead, pole, gain, friction, mass, place, x, trial)
             if left < least:
                 least, stem_on, x_on = left, stem_j, x_j
                 out[first:last] = trial[first:last]

@@ -33,7 +33,7 @@ PV_LENGTH = 5.0
 """Length of PV's response, in dead time and all time constants together."""
 EARLY = 0.25
 """It is drawn to ten of its shortest lags where that is less than this part of the whole."""
-FRICTION = (Slot.STICKBAND, Slot.JUMP, Slot.COAST)
+FRICTION = (Slot.STICKBAND, Slot.JUMP, Slot.COAST, Slot.STEM_T)
 AT_REST = (Slot.STOP_LO, Slot.STOP_HI, Slot.SPLIT, Slot.RATIO, Slot.SPLIT_DEAD, Slot.BEND)
 DYNAMICS = (Slot.T, Slot.L, Slot.K, Slot.T2, Slot.T3, Slot.SHARE, Slot.MODE_T, Slot.ASYMMETRY, Slot.LEAK)
 """Parameters of the valve's friction, of its flow once all has come to rest, and of the process's own dynamics."""

@@ -90,16 +90,14 @@ def with_cycles(p: Problem, near: Fitted, seen: SeenInCycles, candidates: list[C
 def shown_by_cycles(s: Recording, candidates: list[Candidate]) -> Candidate | None:
     """The best play or stick-slip, where the loop's cycles show a faulty valve; None where they do not.
 
-    Cycles that show a jump are believed: a slip now and then late hides it from one constant friction. Where there is
-    no cycle, a slip or two say no more than run read from them.
+    What shows a jump is believed: a slip now and then late hides it from one constant friction. A play is not, where
+    a stem that sticks leaves less.
     """
     if s.cycles is None:
         return None
     rubs = [c for c in candidates if is_friction(c.name)]
-    sticks = isinstance(s.cycles.valve, Stiction)
-    if sticks or not s.cycles.cycling:
-        wanted = Friction.STICKS if sticks else Friction.PLAY
-        rubs = [*(c for c in rubs if about(c.name).friction is wanted), *rubs]
+    if isinstance(s.cycles.valve, Stiction):
+        rubs = [*(c for c in rubs if about(c.name).friction is Friction.STICKS), *rubs]
     return rubs[0] if rubs else None
 
 

@@ -61,6 +61,7 @@ def returned(pv: Floats, way_s: float, dt_s: float) -> Floats:
 
 OUTSIDE = (
     *(Slot.T, Slot.L, Slot.K, Slot.BIAS, Slot.START, Slot.STICKBAND, Slot.JUMP, Slot.COAST, Slot.RATE),
+    Slot.STEM_T,
     *(Slot.STOP_HI, Slot.STOP_LO, Slot.BEND, Slot.SERVO, Slot.DAMPING, Slot.DEADBAND),
     *(Slot.SPLIT, Slot.RATIO, Slot.SPLIT_DEAD, Slot.SPLIT_LAG, Slot.CLIP_HI, Slot.CLIP_LO),
     *(Slot.SINE, Slot.COSINE, Slot.OMEGA, Slot.NEIGHBOUR, Slot.NEIGHBOUR_T),

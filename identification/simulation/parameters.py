@@ -72,7 +72,8 @@ class Slot(IntEnum):
     SWITCH_BAND = 53
     RETURNED = 54
     RETURNS_S = 55
-    HEAD = 56
+    STEM_T = 56
+    HEAD = 57
 
 
 SIZE = int(Slot.HEAD) + KNOTS

@@ -115,6 +115,59 @@ def walk(op: Floats, law: StemLaw, first: float) -> Floats:
     return out
 
 
+STILL = 0.01
+"""Speed of a stem with mass, in breakaway over its natural time, under which static friction holds it again; ours."""
+MOST_PIECES = 4
+"""Pieces of motion within one sample at most: a stem that turns at once is held; ours."""
+
+
+@njit(cache=True)
+def heavy_step(stem: Stem, op: float, law: StemLaw, time_s: float, dt_s: float) -> tuple[float, Stem]:
+    """Mean position over a sample, and the stem after it, of a stem with mass on a spring, critically damped, under
+    dry friction (Karnopp 1985), for an OP that stands over the sample; solved piece by piece.
+
+    stem : position [% OP], speed [%/s], and nothing; time_s : natural time of mass and spring [s].
+    """
+    at, speed, left, total = stem[0], stem[1], dt_s, 0.0
+    for _ in range(MOST_PIECES):
+        gap = op - at
+        if speed == 0.0 and abs(gap) <= law.breakaway:
+            break
+        way = math.copysign(1.0, speed if speed != 0.0 else gap)
+        rest = op - way * law.sliding  # where spring and friction balance
+        x, a = at - rest, speed + (at - rest) / time_s
+        stops = speed * time_s / a if a * way > 0.0 else math.inf
+        t = min(stops, left)
+        fade = math.exp(-t / time_s)
+        moved = time_s * (x + a * time_s) - fade * time_s * (x + a * time_s + a * t)
+        total += rest * t + moved
+        at, speed, left = rest + (x + a * t) * fade, (speed - a * t / time_s) * fade, left - t
+        if stops <= t or abs(speed) * time_s < STILL * law.breakaway:
+            speed = 0.0
+        if left <= 0.0:
+            break
+    return (total + at * left) / dt_s, (at, speed, op)
+
+
+@njit(cache=True)
+def moved_stem(stem: Stem, op: float, law: StemLaw, time_s: float, dt_s: float) -> tuple[float, Stem]:
+    """Mean position over a sample, and the stem after it, with mass (time_s > 0) or without."""
+    if time_s > 0.0:
+        return heavy_step(stem, op, law, time_s, dt_s)
+    after = stem_step(stem, op, law)
+    return after[0], after
+
+
+@njit(cache=True)
+def heavy_walk(op: Floats, law: StemLaw, first: float, time_s: float, dt_s: float) -> Floats:
+    """Mean positions over the samples [% OP], shape (n,), of a stem with mass that rests at `first` before them."""
+    out = np.empty_like(op)
+    stem = (first, 0.0, op[0])
+    for k in range(op.size):
+        out[k], stem = heavy_step(stem, op[k], law, time_s, dt_s)
+    return out
+
+
 @njit(cache=True)
 def first_slip(op: Floats, law: StemLaw) -> float:
     """Stem position before the first sample [% OP] of a valve of which only OP, shape (n,), is known.

@@ -20,7 +20,8 @@ from identification.simulation.valve import (
     TOLERANCES,
     StemLaw,
     first_slip,
-    stem_step,
+    heavy_walk,
+    moved_stem,
     thresholds,
     walk,
 )
@@ -33,6 +34,7 @@ SERVO_STEPS = 5
 RATE, SERVO, DAMPING, DEADBAND = (int(s) for s in (Slot.RATE, Slot.SERVO, Slot.DAMPING, Slot.DEADBAND))
 STOP_HI, STOP_LO, BEND, SPLIT = (int(s) for s in (Slot.STOP_HI, Slot.STOP_LO, Slot.BEND, Slot.SPLIT))
 RATIO, SPLIT_DEAD, SPLIT_LAG = (int(s) for s in (Slot.RATIO, Slot.SPLIT_DEAD, Slot.SPLIT_LAG))
+STEM_T = int(Slot.STEM_T)
 STRAIGHT = 1e-9
 """A bend under this is none."""
 SLEWED, SERVED, SPEED, STEM, MOVING, TURNED, SECOND = range(7)
@@ -89,8 +91,8 @@ def flow_step(op: float, m: Floats, c: Floats, friction: StemLaw, dt_s: float, m
     if c[SERVO] > 0.0:
         x, m[SERVED], m[SPEED] = servo_step(m[SERVED], m[SPEED], x, c[SERVO], c[DAMPING], c[DEADBAND], dt_s)
     if friction.breakaway > 0.0:
-        m[STEM], m[MOVING], m[TURNED] = stem_step((m[STEM], m[MOVING], m[TURNED]), x, friction)
-        x = m[STEM]
+        stem = (m[STEM], m[MOVING], m[TURNED])
+        x, (m[STEM], m[MOVING], m[TURNED]) = moved_stem(stem, x, friction, c[STEM_T], dt_s)
     x = min(max(x, c[STOP_LO]), c[STOP_HI])
     if not math.isinf(c[SPLIT]):
         extra = second_valve(x, c)
@@ -159,5 +161,7 @@ def flow(op: Floats, c: Floats, dt_s: float, middle: float) -> Floats:
     if law.breakaway > 0:
         moves = float(np.abs(x - x[0]).max()) > law.breakaway
         start = float(x[0]) if moves else first_slip(x, law)
-        x = walk(x, law, start + float(c[Slot.PLACE]) * law.breakaway)
+        start += float(c[Slot.PLACE]) * law.breakaway
+        stem_s = float(c[Slot.STEM_T])
+        x = heavy_walk(x, law, start, stem_s, dt_s) if stem_s > 0.0 else walk(x, law, start)
     return np.asarray(behind_stem(x, c, dt_s, middle))

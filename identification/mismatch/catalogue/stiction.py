@@ -1,12 +1,14 @@
-"""Stiction: the stem holds through the stickband and then jumps; behind the jump it rests, halts or slides."""
+"""Stiction: the stem holds through the stickband and then jumps; behind the jump it rests, halts, slides or swings."""
 
 from identification.estimation.covariance import LEAST_BAND, LEAST_JUMP, reaching
 from identification.mismatch.effect import Block, Effect, Estimate, Friction, Param, Parameters, Slot, Variant
 from identification.mismatch.pictures import stem_over_op
+from identification.models import Motion
 from identification.simulation.valve_chain import COASTS
 
 BAND = Param(Slot.STICKBAND, "stickband_pct", "% OP", 1e-4, 2.0, "op", True, title="Stickband")
 JUMP = Param(Slot.JUMP, "slip_jump_pct", "% OP", 1e-5, 2.0, "op", True, title="Slip jump")
+TIME = Param(Slot.STEM_T, "stem_time_s", "s", 0.02, 2.0, "dt", True, title="Stem's natural time")
 BANDS = (0.01, 0.03, 0.08, 0.2, 0.5)
 """Stickbands that the search begins with, in OP's range."""
 
@@ -32,13 +34,22 @@ EFFECT = Effect(
     derived=as_friction_leaves_it,
     friction=Friction.STICKS,
     curve=stem_over_op,
-    variants=tuple(
+    variants=(
+        *(
+            Variant(
+                (BAND, JUMP),
+                tuple({Slot.STICKBAND: s, Slot.JUMP: j * s} for s in BANDS for j in (0.4, 0.8)),
+                {Slot.COAST: coast},
+                label=motion,
+            )
+            for motion, coast in COASTS.items()
+        ),
         Variant(
-            (BAND, JUMP),
-            tuple({Slot.STICKBAND: s, Slot.JUMP: j * s} for s in BANDS for j in (0.4, 0.8)),
-            {Slot.COAST: coast},
-            label=motion,
-        )
-        for motion, coast in COASTS.items()
+            (BAND, JUMP, TIME),
+            tuple({Slot.STICKBAND: s, Slot.JUMP: 0.6 * s, Slot.STEM_T: 0.25} for s in BANDS),
+            {Slot.COAST: COASTS[Motion.SLIDES]},
+            label="has mass",
+            delays=(Slot.STEM_T,),
+        ),
     ),
 )

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from analyzer.belief.phases import Phase, forgotten, growth, with_night
+from analyzer.belief.phases import PhaseKnown, forgotten, growth, with_night
 from analyzer.config import WearLimits
 
 LIMITS, HOUR = WearLimits(), 3600.0
@@ -27,9 +27,9 @@ def row(first: int, overshoot: np.ndarray, begin: float = 20.0, end: float = 50.
     return {"phases": json.dumps([told])}
 
 
-def of_nights(overshoot: np.ndarray, a_night: int = 8) -> tuple[Phase, ...]:
+def of_nights(overshoot: np.ndarray, a_night: int = 8) -> tuple[PhaseKnown, ...]:
     """What is known of a phase after nights of so many batches."""
-    known: tuple[Phase, ...] = ()
+    known: tuple[PhaseKnown, ...] = ()
     for k in range(0, overshoot.size, a_night):
         known = with_night(known, row(k, overshoot[k : k + a_night]))
     return known
