@@ -137,6 +137,7 @@ class SearchLimits:
     left_share: float = TOML
     rival_share: float = TOML
     outside_share: float = TOML
+    outside_near: float = TOML
     experiment_samples: int = TOML
     samples_a_lag: float = TOML
 

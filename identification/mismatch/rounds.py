@@ -59,14 +59,17 @@ def one_by_one(found: Explanation, tell: Progress, s: Recording) -> tuple[Explan
 
 
 def chosen(p: Problem, found: Explanation, s: Recording, candidates: list[Candidate]) -> Candidate | None:
-    """What is taken of a round's candidates; physics of no name only where it does far better than what is taken so
-    far."""
+    """What is taken of a round's candidates; physics of no name, which is handed PV as recorded, only where it does
+    far better than what is taken so far, and than what has a name."""
     winner = None if found.accepted else shown_by_cycles(s, candidates)
     winner = winner or proven(p, found.best, candidates)
-    least = p.limits.search.outside_share * gain(found.best, found.plain)
-    if winner is not None and winner.name in OUTSIDE and winner.penalised <= least:
-        return proven(p, found.best, [c for c in candidates if c.name in EFFECTS])
-    return winner
+    if winner is None or winner.name not in OUTSIDE:
+        return winner
+    named = proven(p, found.best, [c for c in candidates if c.name in EFFECTS])
+    limits = p.limits.search
+    little = winner.penalised <= limits.outside_share * gain(found.best, found.plain)
+    near = named is not None and named.penalised >= limits.outside_near * winner.penalised
+    return named if little or near else winner
 
 
 def has_rivals(s: Recording) -> bool:
