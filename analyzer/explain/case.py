@@ -131,6 +131,16 @@ MOST_SAMPLES, STRETCH_SAMPLES = 40_000, 15_000
 20 s of processor time either way, for a long recording holds more that asks for an effect."""
 
 
+def as_given(prepared: Prepared) -> Prepared:
+    """A loop that shares a valve with what a select gave it, whoever that was; half a split range without the time in
+    which the other half moves PV."""
+    r, shared = prepared.record, prepared.shared
+    if shared is None:
+        return prepared
+    moved = replace(r, bad=r.bad | shared.idle) if shared.valve is None else replace(r, op=shared.valve)
+    return replace(prepared, record=moved)
+
+
 def telling_stretch(prepared: Prepared, most: int | None) -> tuple[Prepared, str]:
     """The stretch in which OP travels most of a recording of more than so many samples, and a sentence on it."""
     r = prepared.record
@@ -161,7 +171,7 @@ def case(
     raw = series[spec.pv or ""]
     series = snapped(series, spec.pv or "")
     whole = prepare(spec, series, config.quality)
-    prepared, shortened = telling_stretch(whole, most)
+    prepared, shortened = telling_stretch(as_given(whole), most)
     r = prepared.record
     if not prepared.op_known:
         raise NotAssessedError(f"{spec.loop}: needs OP, has none")
@@ -205,7 +215,7 @@ def subject_of(
         ~(r.bad | r.mask("gap")),
         r.dt_s,
         stamps,
-        stated_law(spec, prepared),
+        stated_law(spec, prepared) if prepared.shared is None else None,
         not prepared.scale.recorded,
         others,
         spec.type.strip().lower(),

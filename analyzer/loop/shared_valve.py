@@ -7,7 +7,7 @@ valve tells which. A half of a split range rests at an end of its valve while th
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -32,7 +32,8 @@ class Shared:
     changeovers_per_h, how often it passes from one to the other; winds_up_pct, share of the idle time in which OP
     stands at the far end, None for a half of a split range; takeover_s, median time from the error's asking for the
     valve to having it [s], None where that never happens; split_at_pct, split_slope, output of the split range's
-    controller from which on the half works [%], and how much it moves for it [-].
+    controller from which on the half works [%], and how much it moves for it [-]; valve, what a select gives the
+    valve, shape (n,) [%], None for a half.
     """
 
     idle: Mask
@@ -42,10 +43,11 @@ class Shared:
     takeover_s: float | None = None
     split_at_pct: float | None = None
     split_slope: float | None = None
+    valve: Floats | None = None
 
     def as_row(self) -> Mapping[str, float | None]:
         """The figures by column."""
-        return {k: v for k, v in asdict(self).items() if k != "idle"}
+        return {f.name: getattr(self, f.name) for f in fields(self) if f.name not in ("idle", "valve")}
 
 
 def selected(record: LoopRecord, other: Floats, other_bad: Mask, limits: QualityLimits) -> Shared | None:
@@ -78,6 +80,7 @@ def selected(record: LoopRecord, other: Floats, other_bad: Mask, limits: Quality
         _changes_per_h(idle, good, record.dt_s),
         100.0 * float(far[idle].mean()),
         _takeover_s(record, idle, good),
+        valve=np.where(idle, other, record.op),
     )
 
 

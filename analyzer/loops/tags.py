@@ -127,10 +127,11 @@ def _matched(spec: LoopSpec, known: Mapping[str, None], found: Mapping[str, str]
 
 def _beside(spec: LoopSpec, by_loop: Mapping[str, LoopSpec], known: Mapping[str, None]) -> LoopSpec:
     """A loop with the tags of those that it is judged beside, where the export has them."""
-    other, fed = by_loop.get(spec.override_with or spec.split_of), by_loop.get(spec.feedforward)
+    beside = spec.override_with or spec.split_of
+    other, fed = by_loop.get(beside) if beside != spec.loop else None, by_loop.get(spec.feedforward)
     feed = fed.pv if fed is not None else spec.feedforward if spec.feedforward in known else None
-    beside = Output(other.op, other.op_lo, other.op_hi) if other is not None and other.op else None
-    return spec if (beside, feed) == (None, None) else replace(spec, beside=beside, feed=feed)
+    output = Output(other.op, other.op_lo, other.op_hi) if other is not None and other.op else None
+    return spec if (output, feed) == (None, None) else replace(spec, beside=output, feed=feed)
 
 
 def _missing(before: LoopSpec, after: LoopSpec) -> list[str]:

@@ -9,10 +9,12 @@ import numpy as np
 import pytest
 
 from analyzer.config import Config, QualityLimits
+from analyzer.explain.case import as_given
 from analyzer.lanes.lanes import lanes_of
 from analyzer.loop.decisions import CAUSES, Action, Cause, Lane, Status
 from analyzer.loop.finding import Finding
 from analyzer.loop.oscillation import counting, detect
+from analyzer.loop.quality import Prepared, Scale
 from analyzer.loop.shared_valve import half, selected
 from analyzer.loops.spec import LoopSpec, Output
 from analyzer.loops.tags import match
@@ -97,6 +99,20 @@ def test_hand_overs_are_no_cycle() -> None:
         loop, pv=np.where(found.idle, loop.pv, 50.0), masks=MappingProxyType({"idle": found.idle})
     )
     assert counting(detect(quiet, Config().oscillation)) is None
+
+
+def test_what_moves_pv_is_explained_by_what_the_valve_was_given() -> None:
+    """An explanation is asked with the output that had the valve; of half a split range only while it works."""
+    loop, other, idle = pair(True, False)
+    shared = selected(loop, other, GOOD, LIMITS)
+    assert shared is not None
+    whole = Prepared(loop, Scale(0.0, 100.0, 0.0, 100.0, False), 0.0, 0.0, 0.0, (), shared=shared)
+    given = as_given(whole).record
+    assert (given.op == np.minimum(loop.op, other)).all()
+    assert not given.bad.any()
+    part = as_given(replace(whole, shared=replace(shared, valve=None))).record
+    assert (part.bad == idle).all()
+    assert (part.op == loop.op).all()
 
 
 def test_a_loop_that_winds_up_is_to_be_set_right() -> None:

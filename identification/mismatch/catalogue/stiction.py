@@ -1,4 +1,4 @@
-"""Stiction: the stem holds through the stickband and then jumps; behind it the stem rests, halts, slides, has mass."""
+"""Stiction: the stem holds through the stickband, then jumps; behind the jump it rests, halts, slides or swings."""
 
 from identification.estimation.covariance import LEAST_BAND, LEAST_JUMP, reaching
 from identification.mismatch.effect import Block, Effect, Estimate, Friction, Param, Parameters, Slot, Variant
