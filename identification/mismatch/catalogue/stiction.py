@@ -7,21 +7,24 @@ from identification.models import Motion
 from identification.simulation.valve_chain import COASTS
 
 BAND = Param(Slot.STICKBAND, "stickband_pct", "% OP", 1e-4, 2.0, "op", True, title="Stickband")
-JUMP = Param(Slot.JUMP, "slip_jump_pct", "% OP", 1e-5, 2.0, "op", True, title="Slip jump")
 TIME = Param(Slot.STEM_T, "stem_time_s", "s", 0.02, 2.0, "dt", True, title="Stem's natural time")
+JUMP = Param(Slot.JUMP, "slip_jump_pct", "% OP", 1e-5, 2.0, "op", True, title="Slip jump")
 BANDS = (0.01, 0.03, 0.08, 0.2, 0.5)
 """Stickbands that the search begins with, in OP's range."""
 
 
 def as_friction_leaves_it(own: Parameters) -> dict[str, Estimate]:
-    """Both within what true friction does to them: it differs from slip to slip, and a slip more or less moves all
+    """All within what true friction does to them: it differs from slip to slip, and a slip more or less moves all
     that follow, so the likelihood's own pit is much narrower than what is known."""
-    band, jump = own[BAND.name], own[JUMP.name]
+    band, jump, time = own[BAND.name], own[JUMP.name], own.get(TIME.name)
     most = band.value * LEAST_BAND
-    return {
+    told = {
         BAND.name: reaching(band, band.value / LEAST_BAND, most),
         JUMP.name: reaching(jump, jump.value / LEAST_JUMP, most),
     }
+    if time is not None:
+        told[TIME.name] = reaching(time, time.value / LEAST_JUMP, time.value * LEAST_JUMP)
+    return told
 
 
 EFFECT = Effect(
