@@ -62,7 +62,9 @@ def belief_of(text: str) -> Belief:
         ),
         kept["straight_pct"],
         kept["recorder"],
-        tuple(PhaseKnown(**{**p, "shown": tuple(tuple(x) for x in p["shown"])}) for p in kept["phases"]),
+        tuple(
+            PhaseKnown(**{**p, "shown": tuple(tuple(x) for x in p["shown"])}) for p in kept.get("phases", ())
+        ),
     )
 
 

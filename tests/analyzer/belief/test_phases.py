@@ -8,7 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from analyzer.belief.belief import Belief
 from analyzer.belief.phases import PhaseKnown, forgotten, growth, with_night
+from analyzer.belief.state import belief_of, kept_as
 from analyzer.config import WearLimits
 
 LIMITS, HOUR = WearLimits(), 3600.0
@@ -66,3 +68,10 @@ def test_a_night_twice_and_other_levels_are_kept_apart() -> None:
     both = with_night(once, row(8, np.full(4, 3.0), begin=50.0, end=80.0))
     assert [p.count for p in both] == [8, 4]
     assert [(p.count, p.shown) for p in forgotten(both)] == [(8, ()), (4, ())]
+
+
+def test_beliefs_of_a_version_without_phases_are_read() -> None:
+    """What nights before this version believed goes on, its phases begun with the next night."""
+    old = json.loads(kept_as(Belief("BIC1", "2026-03-02")))
+    del old["phases"]
+    assert belief_of(json.dumps(old)).phases == ()
