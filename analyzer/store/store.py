@@ -140,7 +140,7 @@ class Store:
         if not resting or not self.file("beliefs", night).exists():
             return rows
         wanted = ["loop", "cause", *(c for c in resting if c != "cause")]
-        told = read_stored(self.file("beliefs", night), wanted).to_pylist()
+        told = self.own_rows("beliefs", night, wanted)
         by_loop = {r["loop"]: {c: r[c] for c in resting} for r in told if r["cause"] is not None}
         return [{**row, **by_loop.get(row["loop"], {})} for row in rows]
 

@@ -243,3 +243,16 @@ def test_a_follower_is_laid_beside_its_source() -> None:
     row = row_of(known)
     links = loop.page([row | dict.fromkeys(set(loop.COLUMNS) - set(row))], None).links
     assert ("Beside B,2", "side-by-side.html#B%2C2,A%201") in links
+
+
+def test_beliefs_without_a_column_of_this_version_are_read(tmp_path: Path) -> None:
+    """A table of beliefs that an earlier version wrote lacks a column: it is unknown, the others are as they were."""
+    old = small_store(tmp_path / "store")
+    settle_anew(old, Config())
+    night = old.require()
+    whole = old.rows("nights", night, ["loop", "growing", "worn_pct"])
+    file = old.file("beliefs", night)
+    pq.write_table(pq.read_table(file).drop_columns(["growing"]), file)
+    assert old.rows("nights", night, ["loop", "growing", "worn_pct"]) == [
+        {**r, "growing": None} for r in whole
+    ]
