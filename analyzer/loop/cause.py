@@ -92,13 +92,19 @@ def speaks(m: Measured, limits: CauseLimits, oscillating: bool) -> bool:
     return m.evidence >= needed(m, limits, oscillating) and not wrong_way
 
 
+def agrees(m: Measured, limits: CauseLimits) -> bool:
+    """Whether no single load gives the evidence of a calm loop: its stretches agree, or moves of the set point, for
+    which no load waits, suffice."""
+    return m.steady >= limits.steady or m.asked >= needed(m, limits, False)
+
+
 def quiet_signs(m: Measured, limits: CauseLimits) -> tuple[Sign, ...]:
     """Signs of a valve at fault in a loop that does not oscillate.
 
     The stretches between moves of the stem must agree. A few moves are told from steps of the load, unless the set
     point called for them, by more evidence.
     """
-    if m.steady < limits.steady:
+    if not agrees(m, limits):
         return ()
     few = m.moves < limits.few_moves and not m.excited
     least = needed(m, limits, False) * (limits.quiet_factor if few else 1.0)

@@ -24,6 +24,7 @@ from identification.estimation.evidence import (
     Trials,
     evidence,
     expected_evidence,
+    gains,
     stem_moves,
     trials,
     trials_between_moves,
@@ -73,7 +74,8 @@ class Measured:
     turns agree on the better valve, None with too few; kurtosis [-] of the band at the period, 3 for noise, 1.5 where
     the size is kept; wave_left [-], harmonics of PV's cycle that the better valve leaves, over its fundamental;
     expected [nat], the evidence that a play would bring in such a recording; steady [-], of a calm loop, how the
-    stretches between moves of the stem agree on the better valve: their mean gain over its standard error.
+    stretches between moves of the stem agree on the better valve: their mean gain over its standard error, and asked,
+    what it gains while PV is due to answer moves of the set point [nat].
     """
 
     linear: Fit
@@ -97,6 +99,7 @@ class Measured:
     wave_left: float = 0.0
     expected: float = 0.0
     steady: float = 0.0
+    asked: float = 0.0
 
     @property
     def window(self) -> Window:
@@ -190,10 +193,11 @@ def measure(
     )
     if oscillation is None:
         shown = trials_between_moves(best, linear)
-        seen_stem = window.position is not None
-        return replace(
-            seen_alone, steady=math.inf if seen_stem else 0.0 if shown is None else shown.steadiness
-        )
+        if window.position is not None:
+            return replace(seen_alone, steady=math.inf)
+        alone = not record.mask("idle").any()  # else another one moves PV too
+        asked = float(gains(best, linear)[due].sum()) if alone else 0.0
+        return replace(seen_alone, steady=0.0 if shown is None else shown.steadiness, asked=asked)
     return _of_a_cycle(seen_alone, best, linear, scale, op_range, error)
 
 

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from analyzer.config import CauseLimits
-from analyzer.loop.cause import Verdict, fault_of, hidden_by_grid, needed
+from analyzer.loop.cause import Verdict, agrees, fault_of, hidden_by_grid, needed
 from analyzer.loop.decisions import Cause, Fault
 from analyzer.loop.measure import Measured
 from analyzer.loop.quality import Prepared
@@ -44,7 +44,7 @@ def witness(verdict: Verdict, oscillates: bool, prepared: Prepared, limits: Caus
     m = verdict.for_settings.measured
     if m is None or hidden_by_grid(m, prepared.pv_step, oscillates, limits):
         return None
-    if not oscillates and m.steady < limits.steady:
+    if not oscillates and not agrees(m, limits):
         m = replace(m, evidence=min(m.evidence, 0.0))
     convicted = oscillates and verdict.cause is Cause.VALVE
     whole = prepared.compressed_share <= COMPRESSED
