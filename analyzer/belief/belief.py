@@ -155,9 +155,8 @@ def _after_changes(now: Belief, row: Row, repaired_s: Sequence[float]) -> Belief
     anew = replace(anew, phases=phases.forgotten(now.phases))
     listed = now.remedy.action is Action.CHECK_SETTINGS
     if now.night and None not in (now.kp, *settings) and (now.kp, now.ti) != settings:
-        now = (
-            replace(now, remedy=RemedyBelief()) if listed else anew
-        )  # a list that is put right changes no loop
+        # a list that is put right changes no loop
+        now = replace(now, remedy=RemedyBelief()) if listed else anew
     elif now.night and not listed and row["action"] == Action.CHECK_SETTINGS:
         now = anew
     end_s = (row["start_s"] or 0.0) + (row["duration_s"] or 0.0)

@@ -110,7 +110,7 @@ def _answered(record: LoopRecord, part: slice, ramp: int, size: float, spread: f
         max(_excursion(way) - 2.0 * still, 0.0),
         None if settled is None else settled * record.dt_s,
         (shown - 1) * record.dt_s,
-        tuple(float(f"{x:.3g}") for x in course),
+        tuple(float(f"{x:.3f}") for x in course),
     )
 
 
@@ -188,14 +188,14 @@ def _phase(of: Sequence[Move]) -> Phase:
 def as_row(found: Sequence[Move]) -> dict[str, float | str | None]:
     """Columns of the night: how many moves, the medians of what is known of them, the latest of them and the phases
     that come back as JSON."""
-    alike = phases(found)
+    back = phases(found)
     return {
         "sp_moves": float(len(found)),
         "rise_time_s": _median([m.rise_s for m in found]),
         "overshoot_pct": _median([100.0 * m.overshoot for m in found]),
         "settling_time_s": _median([m.settled_s for m in found]),
         "moves": json.dumps([asdict(m) for m in found[-MOST:]], separators=(",", ":")) if found else None,
-        "phases": json.dumps([asdict(p) for p in alike], separators=(",", ":")) if alike else None,
+        "phases": json.dumps([asdict(p) for p in back], separators=(",", ":")) if back else None,
     }
 
 
