@@ -51,10 +51,8 @@ def _lasting_error(record: LoopRecord, limits: LaneLimits) -> float | None:
     if record.sp_estimated:
         return None
     moving = moves(record.sp)
-    ramps = (
-        moving.mean() <= limits.programme
-    )  # of a set point that is always under way, a slave's, it is all there is
-    use, error = record.usable & ~(moving & ramps), record.error
+    holds = moving.mean() <= limits.programme  # a slave's set point never does
+    use, error = record.usable & ~(moving & holds), record.error
     hours = [
         abs(float(error[a:b][use[a:b]].mean()))
         for a, b, _ in hour_edges(record)

@@ -66,7 +66,7 @@ class Verdict:
         return self if self.steady is None or self.cause is not Cause.VALVE else self.steady
 
 
-AGAIN = "every stretch between moves of the stem says so again"
+AGAIN = "stretch after stretch between moves of the stem says so"
 """What the stretches of a calm loop say of a fault that is narrow beside OP's range, as in a loop of a programme."""
 NO_CAUSE = Verdict(Cause.NONE, dict.fromkeys(CAUSES, 0.0), Fault.NONE)
 

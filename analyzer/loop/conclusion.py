@@ -190,7 +190,9 @@ def _of_half(verdict: Verdict, limits: AdviceLimits) -> Known:
     if m is None or not m.excited or verdict.cause is not Cause.NONE:
         return {}
     slope = intervals(m.linear, False, limits)["slope_pct_per_s"]
-    return {"half_slope": slope.value} if 0.0 < slope.high / slope.low < KNOWN_WITHIN else {}
+    least, most = sorted((abs(slope.low), abs(slope.high)))
+    one_way = slope.low * slope.high > 0.0
+    return {"half_slope": slope.value} if one_way and most < KNOWN_WITHIN * least else {}
 
 
 def _process(fit: Fit, limits: AdviceLimits) -> dict[str, float | None]:

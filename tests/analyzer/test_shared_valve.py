@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from types import MappingProxyType
+from types import MappingProxyType, SimpleNamespace
 
 import numpy as np
 import pytest
 
-from analyzer.config import Config, QualityLimits
+from analyzer.config import AdviceLimits, Config, QualityLimits
 from analyzer.explain.case import as_given
 from analyzer.lanes.lanes import lanes_of
+from analyzer.loop import conclusion
 from analyzer.loop.decisions import CAUSES, Action, Cause, Lane, Status
 from analyzer.loop.finding import Finding
 from analyzer.loop.oscillation import counting, detect
@@ -18,6 +19,7 @@ from analyzer.loop.quality import Prepared, Scale
 from analyzer.loop.shared_valve import half, selected
 from analyzer.loops.spec import LoopSpec, Output
 from analyzer.loops.tags import match
+from identification.models import Estimate
 from identification.record import LoopRecord
 
 N = 21_600
@@ -145,3 +147,27 @@ def test_partners_are_found_among_loops_and_tags() -> None:
     assert set(flow.tags) == {"FIC1.PV", "FIC1.OP", "PIC1.OP"}
     assert "TIC1: no OP of nobody in the export, judged alone" in notes
     assert "FIC1: feedforward FIC9 is neither a loop nor a tag of the export" in notes
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "told"),
+    [
+        (0.8, 1.2, True),
+        (-1.2, -0.8, True),
+        (0.1, 2.0, False),
+        (-2.0, -0.1, False),
+        (-0.1, 1.0, False),
+        (0.0, 1.0, False),
+    ],
+)
+def test_an_answer_to_a_half_is_told_where_it_is_known(
+    low: float, high: float, told: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of either sign it is told within a narrow interval, and not in a wide one or one that reaches to nothing."""
+    value = 0.5 * (low + high)
+    monkeypatch.setattr(
+        conclusion, "intervals", lambda *_: {"slope_pct_per_s": Estimate(value, low, high, "%/(% s)")}
+    )
+    seen = SimpleNamespace(excited=True, linear=None)
+    verdict = SimpleNamespace(measured=seen, cause=Cause.NONE)
+    assert bool(conclusion._of_half(verdict, AdviceLimits())) is told
