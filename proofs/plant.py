@@ -3,17 +3,23 @@
 from __future__ import annotations
 
 import sys
+import tempfile
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
 from analyzer.config import Config, QualityLimits
+from analyzer.history.export import open_export
 from analyzer.history.series import Series
 from analyzer.loop.quality import Prepared, prepare
 from analyzer.loops.spec import LoopSpec
+from analyzer.night import batch
+from analyzer.store.store import Store
 from identification.models import Pid
 from identification.record import Floats, LoopRecord
 
@@ -123,3 +129,17 @@ def write_export(path: Path, loops: dict[str, Trends], start_s: float = START_S,
 
 
 CONFIG = Config()
+
+
+def night_of(
+    tags: Mapping[str, Floats], specs: Sequence[LoopSpec], every_s: float, columns: Sequence[str], jobs: int
+) -> dict[str, Mapping[str, Any]]:
+    """What a night tells of loops whose trends, shape (n,) by tag, are kept every so many seconds: rows by loop."""
+    n = next(iter(tags.values())).size
+    stamp = np.round((START_S + every_s * np.arange(n)) * 1e6).astype("datetime64[us]")
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "export.parquet"
+        pq.write_table(pa.table({"timestamp": stamp, **tags}), path)
+        store = Store(Path(folder) / "store")
+        batch.run(batch.Batch(open_export([path]), specs, store, Config()), jobs)
+        return {r["loop"]: r for r in store.own_rows("nights", store.nights()[-1], columns)}

@@ -12,25 +12,15 @@ from __future__ import annotations
 import json
 import math
 import sys
-import tempfile
 from collections import Counter
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
-import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
-
-from analyzer.config import Config
-from analyzer.history.export import open_export
 from analyzer.loop.decisions import Action, Cause, Fault
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import match
-from analyzer.night import batch
-from analyzer.store.store import Store
 from proofs.common import command, command_line, publish, table
-from proofs.plant import START_S
+from proofs.plant import night_of
 from proofs.shared_plant import EVERY, FAULT, Plant, plant
 
 COLUMNS = (
@@ -54,15 +44,8 @@ SHOWS = 1.3
 
 def told(built: Plant, jobs: int) -> dict[str, Row]:
     """What a night tells of a plant's loops."""
-    n = next(iter(built.tags.values())).size
-    stamp = np.round((START_S + EVERY * np.arange(n)) * 1e6).astype("datetime64[us]")
     specs, _ = match([LoopSpec(**s) for s in built.stated], built.tags)  # type: ignore[arg-type]
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "export.parquet"
-        pq.write_table(pa.table({"timestamp": stamp, **built.tags}), path)
-        store = Store(Path(folder) / "store")
-        batch.run(batch.Batch(open_export([path]), specs, store, Config()), jobs)
-        return {r["loop"]: r for r in store.own_rows("nights", store.nights()[-1], COLUMNS)}
+    return night_of(built.tags, specs, EVERY, COLUMNS, jobs)
 
 
 def of_override(row: Row, true: Row) -> dict[str, bool]:

@@ -10,23 +10,13 @@ retuned. Writes structure.md here.
 from __future__ import annotations
 
 import sys
-import tempfile
 from collections import Counter
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
-import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
-
-from analyzer.config import Config
-from analyzer.history.export import open_export
 from analyzer.loop.decisions import Action, Cause, Fault
-from analyzer.night import batch
-from analyzer.store.store import Store
 from proofs.common import command, command_line, publish, table
-from proofs.plant import START_S, spec
+from proofs.plant import night_of, spec
 from proofs.structure_plant import Plant, plant
 
 COLUMNS = ("loop", "cause", "valve_fault", "action", "source_loop", "master", "ratio_of", "kp_new")
@@ -50,14 +40,7 @@ def told(built: Plant, jobs: int) -> dict[str, Mapping[str, Any]]:
         spec(str(s["loop"]), str(s["type"]), **{k: s[k] for k in ("pv_lo", "pv_hi", "kp", "ti")})
         for s in built.stated
     ]
-    n = next(iter(built.tags.values())).size
-    stamp = np.round((START_S + built.every_s * np.arange(n)) * 1e6).astype("datetime64[us]")
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "export.parquet"
-        pq.write_table(pa.table({"timestamp": stamp, **built.tags}), path)
-        store = Store(Path(folder) / "store")
-        batch.run(batch.Batch(open_export([path]), stated, store, Config()), jobs)
-        return {r["loop"]: r for r in store.own_rows("nights", store.nights()[-1], COLUMNS)}
+    return night_of(built.tags, stated, built.every_s, COLUMNS, jobs)
 
 
 def counted(

@@ -57,7 +57,7 @@ class CycleBelief:
         return max(self.sources, key=lambda loop: (self.sources[loop], loop))
 
 
-def oscillates(before: CycleBelief, row: Row, limits: BeliefLimits) -> tuple[bool, float]:
+def loud_and_top(before: CycleBelief, row: Row, limits: BeliefLimits) -> tuple[bool, float]:
     """Whether a loop oscillates, with a memory, and the largest significance [% h]: what is small beside what
     there was neither ends nor begins an oscillation."""
     now = float(row["oscillation_significance"] or 0.0)
@@ -69,7 +69,7 @@ def oscillates(before: CycleBelief, row: Row, limits: BeliefLimits) -> tuple[boo
 
 def with_night(before: CycleBelief, share: float, row: Row, limits: BeliefLimits) -> CycleBelief:
     """The belief with one night more, of which what came before counts for a share."""
-    loud, top = oscillates(before, row, limits)
+    loud, top = loud_and_top(before, row, limits)
     begun = _sized(before, float(row["oscillation_significance"] or 0.0) if loud else 0.0, limits)
     told = replace(begun, since=before.since or row["night"], nights=before.nights + 1, loud=loud, top=top)
     if not counts(row["oscillating_pct"]):

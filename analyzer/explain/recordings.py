@@ -74,7 +74,7 @@ def parts(
     return [out[0], *(p for p in out[1:] if p.samples >= FEWEST)]
 
 
-def said_of(judged: Sequence[Part]) -> str:
+def parts_said(judged: Sequence[Part]) -> str:
     """On which part an explanation rests and which are held out, as a sentence; empty where there is one."""
     if len(judged) < 2:
         return ""
@@ -123,7 +123,7 @@ def asked_cases(asked: Asked, tag: str, held_out: Sequence[Path]) -> tuple[Case,
     if not kept:
         raise NotAssessedError(f"{tag}: needs OP and PV that move in one part of its settings, has none")
     first = kept[0][1]
-    first = replace(first, shortened=f"{said_of([part for part, _ in kept])} {first.shortened}".strip())
+    first = replace(first, shortened=f"{parts_said([part for part, _ in kept])} {first.shortened}".strip())
     others = {part.name: c for part, c in kept[1:]}
     for path in held_out:
         elsewhere = replace(asked, export=(path,), since_s=-math.inf, until_s=math.inf)

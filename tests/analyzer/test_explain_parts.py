@@ -12,7 +12,7 @@ import pandas as pd
 import pytest
 
 from analyzer.config import Config
-from analyzer.explain.recordings import FEWEST, asked_cases, parts, said_of
+from analyzer.explain.recordings import FEWEST, asked_cases, parts, parts_said
 from analyzer.history.series import Series
 from analyzer.loops.changes import TuningChange
 from analyzer.loops.spec import LoopSpec
@@ -42,7 +42,7 @@ def test_each_part_has_the_settings_of_its_time() -> None:
     assert [(p.samples, p.spec.kp) for p in found] == [(3000, 1.0), (1000, 1.5), (1000, 2.0)]
     stamps = np.concatenate([p.series["A.OP"].stamp_s for p in found])
     np.testing.assert_array_equal(np.sort(stamps), np.arange(N))
-    assert "1970-01-01 00:00 to 1970-01-01 00:49" in said_of(found)
+    assert "1970-01-01 00:00 to 1970-01-01 00:49" in parts_said(found)
 
 
 def test_changes_elsewhere_leave_one_part() -> None:
@@ -50,7 +50,7 @@ def test_changes_elsewhere_leave_one_part() -> None:
     outside = (changed(2000, 1.0, 1.5, "B"), changed(-5.0, 1.0, 2.0), changed(N + 10, 2.0, 3.0))
     found = parts(SPEC, trends(), outside, "UTC")
     assert [(p.samples, p.spec.kp) for p in found] == [(N, 2.0)]
-    assert said_of(found) == ""
+    assert parts_said(found) == ""
 
 
 def test_scrap_is_left_out() -> None:
