@@ -45,6 +45,8 @@ LANES = (
     "wear",
     "windup",
 )
+OF_THE_HOUR = re.compile(rb"\d{4}-\d\d-\d\d \d\d:\d\d(?=; times|, ordered)|\n?explain: .* s, trying [^\n]*")
+"""When it was asked, and how long it took."""
 NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 
 
@@ -180,7 +182,7 @@ def kept(out: Path) -> dict[str, bytes]:
         for p in sorted(out.rglob("*"))
         if p.is_file() and p.suffix != ".parquet" and "store" not in p.relative_to(out).parts[:-1]
     )
-    return {str(p.relative_to(out)): p.read_bytes() for p in files}
+    return {str(p.relative_to(out)): OF_THE_HOUR.sub(b"", p.read_bytes()) for p in files}
 
 
 def difference(a: bytes, b: bytes) -> str:
