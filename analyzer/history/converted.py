@@ -38,7 +38,7 @@ from analyzer.history.sheet import (
     reading,
     unreadable,
 )
-from analyzer.history.table import trimmed
+from analyzer.history.table import Table, trimmed
 from identification.errors import InputError
 
 BUCKETS = 64
@@ -52,24 +52,15 @@ DONE = "done.json"
 NAMED = "converted-"
 
 
-@dataclass(frozen=True, slots=True)
-class Converted:
-    """A table as it was streamed; see `table.Table`.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Converted(Table):
+    """A table as it was streamed.
 
-    `folder` holds `count` files; `tag` is the column whose text says in which of them a row is, -1 for one file;
-    `tags` are the texts of it, in the order in which they were met; with `unquoted` quotes are no quotes.
+    `folder` holds `count` files, in which a row is by its tag; with `unquoted` quotes are no quotes.
     """
 
-    path: Path
     folder: Path
     count: int
-    names: tuple[str, ...]
-    types: tuple[pa.DataType, ...]
-    notes: tuple[str, ...]
-    decimal: str
-    first_row: int | None
-    tag: int = -1
-    tags: tuple[str, ...] = ()
     unquoted: bool = False
 
     def head(self, columns: Sequence[int]) -> list[pa.Array]:
@@ -133,24 +124,32 @@ def converted(sheet: Sheet, tag: int, scratch: Path | None) -> Converted:
     InputError
         The disk has no room, or the text cannot be read.
     """
-    written = sheet.encoding, sheet.delimiter, sheet.decimal, sheet.skip_rows, sheet.names
-    how = (*written, sheet.as_written, sheet.unquoted, tag)
+    written = sheet.encoding, sheet.delimiter, sheet.decimal, sheet.first_row, sheet.names
+    how = (*written, sheet.as_written, tag)
     folder, done = _laid(scratch, sheet.path, sheet.bytes, how, partial(_streamed, sheet, tag))
     first = next(folder.glob("*.parquet"), None)
     if first is None:
         expected = "rows of as many columns as the header"
         raise InputError(f"{sheet.path}: no row", expected, "export it again")
-    count, types = 1 if tag < 0 else BUCKETS, tuple(pq.read_schema(first).types)
-    start = sheet.path, folder, count, sheet.names, types, (*sheet.found, *done.notes)
-    return Converted(*start, sheet.decimal, sheet.first_row, tag, done.tags, done.unquoted)
+    return Converted(
+        sheet.path,
+        sheet.names,
+        tuple(pq.read_schema(first).types),
+        (*sheet.found, *done.notes),
+        sheet.decimal,
+        sheet.first_row,
+        done.tags,
+        folder=folder,
+        count=1 if tag < 0 else BUCKETS,
+        unquoted=done.unquoted,
+    )
 
 
 def converted_parquet(table: ParquetTable, tag: int, scratch: Path | None) -> Converted:
     """The same of a long Parquet file, of which each loop's read would decode all."""
     room = 4 * table.path.stat().st_size
     folder, done = _laid(scratch, table.path, room, (table.names, tag), partial(_parted, table, tag))
-    start = table.path, folder, BUCKETS, table.names, table.types, table.notes
-    return Converted(*start, ".", None, tag, done.tags)
+    return Converted(table.path, table.names, table.types, tags=done.tags, folder=folder, count=BUCKETS)
 
 
 def holds_copies(place: Path) -> bool:
@@ -212,25 +211,24 @@ def _said(folder: Path) -> Laid | None:
 
 def _streamed(sheet: Sheet, tag: int, folder: Path) -> Laid:
     """A sheet's rows laid into a folder."""
-    width = len(sheet.names)
+    once = partial(_pass, tag, folder)
     try:
-        done = as_far_as_numbers_go(sheet.encoding, width, partial(_pass, sheet, tag, folder))
+        done = as_far_as_numbers_go(sheet, once)
         if is_swallowed(sheet, done.rows + done.left_out):
             sheet = replace(sheet, unquoted=True)
-            done = as_far_as_numbers_go(sheet.encoding, width, partial(_pass, sheet, tag, folder))
+            done = as_far_as_numbers_go(sheet, once)
     except (UnicodeError, pa.ArrowInvalid) as error:
         raise unreadable(sheet.path, error) from error
     return Laid(tuple(quotes_told(sheet.unquoted, done.left_out)), tuple(done.tags), sheet.unquoted)
 
 
-def _pass(sheet: Sheet, tag: int, folder: Path, encoding: str, texts: Collection[int]) -> _Stream:
+def _pass(tag: int, folder: Path, sheet: Sheet, texts: Collection[int]) -> _Stream:
     for left in folder.glob("*.parquet"):  # of a pass that was begun anew
         left.unlink()
     left_out: list[int] = []
     stream = _Stream(folder, tag)
-    columns = tuple(range(len(sheet.names)))
     as_text = {*texts, tag} - {-1}
-    with csv.open_csv(sheet.path, **reading(sheet, columns, encoding, left_out, as_text)) as reader:
+    with csv.open_csv(sheet.path, **reading(sheet, left_out, as_text)) as reader:
         for batch in reader:
             stream.take(batch)
     stream.close()

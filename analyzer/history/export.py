@@ -21,13 +21,13 @@ import pyarrow as pa
 
 from analyzer.history.converted import converted, converted_parquet
 from analyzer.history.files import export_files, is_parquet, own_scratch, packed_beside, unpacked
-from analyzer.history.layouts import source_of, tag_column
+from analyzer.history.layouts import Source, source_of, tag_column
 from analyzer.history.parquet import open_parquet
 from analyzer.history.plant_clock import zone_of
 from analyzer.history.series import MainSpan, NoStampError, Raw, Series, settle
 from analyzer.history.sheet import WHOLE_FILE_BYTES
 from analyzer.history.sniff import open_sheet
-from analyzer.history.table import ReadOptions, Source
+from analyzer.history.table import ReadOptions
 from analyzer.places import at_hand, bring, is_remote
 from identification.errors import InputError
 

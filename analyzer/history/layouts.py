@@ -4,8 +4,9 @@ each sample, with the tag in a column of its own)."""
 from __future__ import annotations
 
 import re
+from abc import ABC, abstractmethod
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Self
@@ -16,7 +17,6 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from analyzer.history.clock import Clock
-from analyzer.history.converted import Converted
 from analyzer.history.names import (
     COLUMNS,
     LONGEST,
@@ -32,7 +32,7 @@ from analyzer.history.names import (
 )
 from analyzer.history.quality import Scheme, mostly_one, not_good, quality_columns, scheme_of
 from analyzer.history.series import MainSpan, NoStampError, Raw, main_span
-from analyzer.history.table import ReadOptions, Source, SourceTable, as_text, is_number, is_text
+from analyzer.history.table import ReadOptions, Table, as_text, is_number, is_text
 from analyzer.history.time_columns import check_seconds, find_clock, holds_stamps, stamps_clock
 from analyzer.history.values import values
 from identification.errors import InputError
@@ -49,7 +49,7 @@ Stamps = tuple[NDArray[np.float64], Counter[str]]
 """Stamps of rows [s since 1970-01-01 UTC], and what was met in them."""
 
 
-def source_of(table: SourceTable, options: ReadOptions) -> Source:
+def source_of(table: Table, options: ReadOptions) -> Source:
     """The table by the first layout that knows it; a further one is a function that answers None for a table that is
     not its own. The last takes every table and says what is missing.
 
@@ -62,10 +62,10 @@ def source_of(table: SourceTable, options: ReadOptions) -> Source:
 
 
 @dataclass(frozen=True, slots=True)
-class _Laid:
-    """What layouts have in common; see `table.Source`."""
+class Source(ABC):
+    """One file whose layout is understood; small, picklable, holds no samples."""
 
-    table: SourceTable
+    table: Table
     clock: Clock
     tags: tuple[str, ...]
     good_quality: tuple[str, ...] | None
@@ -75,9 +75,22 @@ class _Laid:
         """The file."""
         return self.table.path
 
+    @property
+    @abstractmethod
+    def notes(self) -> tuple[str, ...]:
+        """Format and layout of the file."""
+
     def with_clock(self, clock: Clock) -> Self:
-        """The same file, its stamps read by another clock."""
+        """The same file, its stamps read in the order of day and month, and the winter time, of another clock."""
         return replace(self, clock=clock)
+
+    @abstractmethod
+    def read(self, tags: Sequence[str]) -> dict[str, Raw]:
+        """Samples of those of `tags` that the file holds."""
+
+    @abstractmethod
+    def span(self) -> MainSpan:
+        """Where the samples lie in time, stray ones apart [s since 1970-01-01 UTC]."""
 
     def _raw(self, stamps: Stamps, value: pa.Array, codes: pa.Array | None, scheme: Scheme | None) -> Raw:
         """One tag's samples from its columns of values and of quality codes."""
@@ -100,7 +113,7 @@ class TagColumn:
 
 
 @dataclass(frozen=True, slots=True)
-class WideSource(_Laid):
+class WideSource(Source):
     """A table with a column for each tag; `layout` says of what kind, `ones` whether most codes of quality are 1 and
     not 0 (None: found out of each column), `paired` whether rows without a stamp lie below a tag's last one."""
 
@@ -163,7 +176,7 @@ class WideSource(_Laid):
         return self._raw(stamps, value, codes, scheme)
 
 
-def open_wide(table: SourceTable, options: ReadOptions) -> WideSource:
+def open_wide(table: Table, options: ReadOptions) -> WideSource:
     """Take a table as wide: one time column, and a column for each tag."""
     clock = find_clock(table, options)
     check_seconds(table, clock)
@@ -186,9 +199,7 @@ def open_wide(table: SourceTable, options: ReadOptions) -> WideSource:
     return WideSource(table, clock, tags, options.good_quality, columns, layout, ones)
 
 
-def _quality_notes(
-    table: SourceTable, columns: Sequence[TagColumn], ones: bool, said: Sequence[str]
-) -> list[str]:
+def _quality_notes(table: Table, columns: Sequence[TagColumn], ones: bool, said: Sequence[str]) -> list[str]:
     """Which columns of codes a wide table has, and codes of which another reading is possible."""
     coded = {table.names[c.quality]: c.quality for c in columns if c.quality >= 0}
     used = sorted(coded)
@@ -200,7 +211,7 @@ def _quality_notes(
     return [*notes, *said, *read_as]
 
 
-def _any_number(table: SourceTable, columns: Sequence[int]) -> bool:
+def _any_number(table: Table, columns: Sequence[int]) -> bool:
     """Whether the first rows of any column hold a number, or nothing yet; a list of alarms holds none.
 
     Columns of a controller's modes are texts too: they are named for their loop.
@@ -212,7 +223,7 @@ def _any_number(table: SourceTable, columns: Sequence[int]) -> bool:
     return len(texts) < len(heads) or any(np.isfinite(values(h, table.decimal).value).any() for h in texts)
 
 
-def _holds_values(table: SourceTable, i: int) -> bool:
+def _holds_values(table: Table, i: int) -> bool:
     name, kind = table.names[i], table.types[i]
     if not name or name.startswith(("Unnamed:", "__index_level_")) or plain(name) in COLUMNS["remark"]:
         return False
@@ -220,7 +231,7 @@ def _holds_values(table: SourceTable, i: int) -> bool:
     return bool(is_number(kind) or is_text(kind) or others)
 
 
-def open_pairs(table: SourceTable, options: ReadOptions) -> WideSource | None:
+def open_pairs(table: Table, options: ReadOptions) -> WideSource | None:
     """Take a table as pairs where two or more columns hold stamps, each with values behind it; else None."""
     if options.time_column is not None or options.date_format is not None:
         return None
@@ -238,7 +249,7 @@ def open_pairs(table: SourceTable, options: ReadOptions) -> WideSource | None:
     return WideSource(table, columns[0].clock, tags, options.good_quality, columns, (layout,), paired=True)
 
 
-def _groups(table: SourceTable) -> list[tuple[int, list[int]]]:
+def _groups(table: Table) -> list[tuple[int, list[int]]]:
     """Each column of stamps with the columns behind it up to the next; none where a column has nothing behind it."""
     likely = [
         i
@@ -264,14 +275,14 @@ def _is_time(name: str) -> bool:
     return plain(bare) in STAMP_NAMES or any((TIME_WORDS.search(bare), TIME_FIRST.match(bare)))
 
 
-def _time_name(table: SourceTable, i: int) -> str:
+def _time_name(table: Table, i: int) -> str:
     """A name under which numbers of a column may count as stamps: its own, or 'time' before a column without one."""
     name = NUMBERED.sub("", table.names[i][:LONGEST])
     unnamed = i + 1 < len(table.names) and table.names[i + 1] == "" and name != ""
     return "time" if unnamed or _is_time(table.names[i]) else ""
 
 
-def _paired(table: SourceTable, time: int, beside: Sequence[int], options: ReadOptions) -> list[TagColumn]:
+def _paired(table: Table, time: int, beside: Sequence[int], options: ReadOptions) -> list[TagColumn]:
     """The tags that share one clock: those behind it that hold values, with their quality."""
     quality = [i for i in beside if plain(NUMBERED.sub("", table.names[i])) in QUALITY_NAMES]
     held = [i for i in beside if i not in quality]
@@ -280,7 +291,7 @@ def _paired(table: SourceTable, time: int, beside: Sequence[int], options: ReadO
     return [TagColumn(clock, i, single) for i in held]
 
 
-def _tag(table: SourceTable, column: TagColumn) -> str:
+def _tag(table: Table, column: TagColumn) -> str:
     """The tag's name: above its values, or where that says nothing above its stamps."""
     own, other = table.names[column.value], table.names[column.clock.columns[0]]
     if plain(NUMBERED.sub("", own)) in VALUE_NAMES or own == "":
@@ -289,7 +300,7 @@ def _tag(table: SourceTable, column: TagColumn) -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class LongSource(_Laid):
+class LongSource(Source):
     """A long table; `tag`, `value` and `quality` are positions of columns (-1: none)."""
 
     tag: int
@@ -323,7 +334,7 @@ class LongSource(_Laid):
         """Where the samples lie in time, stray ones apart [s since 1970-01-01 UTC]."""
         spans = [
             main_span(stamp_s)
-            for arrays in _pieces(self.table, self.clock.columns)
+            for arrays in self.table.each(self.clock.columns)
             if np.isfinite(stamp_s := self.clock.utc(*self.clock.seconds(arrays))[0]).any()
         ]
         if not spans:
@@ -338,20 +349,20 @@ class LongSource(_Laid):
         return self._raw(self.clock.utc(second[rows], local), value, codes, self.scheme)
 
 
-def tag_column(table: SourceTable) -> int:
+def tag_column(table: Table) -> int:
     """The column of tags of a long table, -1 of any other."""
     tag = first_named(table.names, TAG_NAMES)
     return -1 if tag is None or _value_column(table) is None else tag
 
 
-def open_long(table: SourceTable, options: ReadOptions) -> LongSource | None:
+def open_long(table: Table, options: ReadOptions) -> LongSource | None:
     """Take a table as long where it has columns for tag and value; else None."""
     tag, value = tag_column(table), _value_column(table)
     if tag < 0 or value is None:
         return None
     clock = find_clock(table, options)
     check_seconds(table, clock, tag)
-    met = table.tags if isinstance(table, Converted) else _kinds(table, tag).to_pylist()
+    met = table.tags or _kinds(table, tag).to_pylist()
     tags = tuple(str(name) for name in met if name not in (None, ""))
     stated = options.quality_column
     quality = (
@@ -365,20 +376,12 @@ def open_long(table: SourceTable, options: ReadOptions) -> LongSource | None:
     return LongSource(table, clock, tags, options.good_quality, tag, value, quality, scheme)
 
 
-def _pieces(table: SourceTable, columns: Sequence[int]) -> Iterator[list[pa.Array]]:
-    """Whole columns, in one piece or, of a table that lies in several files, file by file."""
-    if isinstance(table, Converted):
-        yield from table.each(columns)
-    else:
-        yield table.read(columns)
-
-
-def _kinds(table: SourceTable, column: int) -> pa.Array:
+def _kinds(table: Table, column: int) -> pa.Array:
     """The distinct cells of a column."""
-    return pc.unique(pa.concat_arrays([pc.unique(arrays[0]) for arrays in _pieces(table, [column])]))
+    return pc.unique(pa.concat_arrays([pc.unique(arrays[0]) for arrays in table.each([column])]))
 
 
-def _value_column(table: SourceTable) -> int | None:
+def _value_column(table: Table) -> int | None:
     """The column that is named so, else the only one of numbers that is neither time nor quality."""
     named = first_named(table.names, VALUE_NAMES)
     if named is not None:

@@ -15,6 +15,7 @@ import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
 from analyzer.history.names import check_once
+from analyzer.history.table import Table, one_array
 from identification.errors import InputError
 
 HEAD_ROWS = 1000
@@ -32,15 +33,9 @@ thousand tags, which stands whole before a group of few rows, has a twentieth of
 
 
 @dataclass(frozen=True, slots=True)
-class ParquetTable:
-    """A Parquet file, known by its footer; see `table.Table`."""
+class ParquetTable(Table):
+    """A Parquet file, known by its footer."""
 
-    path: Path
-    names: tuple[str, ...]
-    types: tuple[pa.DataType, ...]
-    notes: tuple[str, ...] = ()
-    decimal: str = "."
-    first_row: int | None = None
     rows: int = 0
 
     def head(self, columns: Sequence[int]) -> list[pa.Array]:
@@ -61,7 +56,7 @@ class ParquetTable:
             table = _file(self).read(columns=names)
         else:
             table = _filtered(self, names, self.names[where[0]], where[1])
-        return [_one_chunk(table.column(name)) for name in names]
+        return [one_array(table.column(name)) for name in names]
 
 
 def open_parquet(path: Path) -> ParquetTable:
@@ -152,8 +147,3 @@ def _filtered(table: ParquetTable, names: list[str], key: str, wanted: Sequence[
     field = pc.field(key) if text else pc.field(key).cast(pa.string())
     keep = field.isin(list(wanted))
     return pq.read_table(table.path, columns=names, filters=keep, partitioning=None)
-
-
-def _one_chunk(column: pa.ChunkedArray) -> pa.Array:
-    chunks = column.combine_chunks()
-    return chunks.chunk(0) if isinstance(chunks, pa.ChunkedArray) else chunks

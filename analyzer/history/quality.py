@@ -19,7 +19,7 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from analyzer.history.names import COLUMNS, LONGEST, QUALITY_NAMES, QUALITY_OF, WORDS, plain
-from analyzer.history.table import SourceTable
+from analyzer.history.table import Table
 
 GOOD, BAD, NOT_BAD, IS_BAD = (
     frozenset(WORDS["quality"][kind]) for kind in ("good", "bad", "not_bad", "is_bad")
@@ -122,7 +122,7 @@ def not_good(
     return bad[place], +found
 
 
-def quality_columns(table: SourceTable, free: Sequence[int]) -> tuple[dict[int, int], list[str]]:
+def quality_columns(table: Table, free: Sequence[int]) -> tuple[dict[int, int], list[str]]:
     """Value column to quality column of a wide table, by position, and sentences on such as are not understood.
 
     `free` are the columns that are not the time's.
@@ -155,7 +155,7 @@ def _tag_of(name: str, others: Mapping[str, int]) -> str | None:
     return next((tag for tag in tags if tag in others and tag != name), None)
 
 
-def _is_coded(table: SourceTable, i: int) -> bool:
+def _is_coded(table: Table, i: int) -> bool:
     """Whether a column named as quality holds codes: few kinds, whole numbers or known texts.
 
     A loop's flow may be called Q.

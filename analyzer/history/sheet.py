@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache, partial
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -13,7 +13,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from pyarrow import csv
 
-from analyzer.history.table import trimmed
+from analyzer.history.table import Table, as_text, trimmed
 from identification.errors import InputError
 
 WHOLE_FILE_BYTES = 64_000_000  # files below are read at once and kept for the next loop's read
@@ -28,37 +28,27 @@ MOST_LATE = 3
 """Columns whose texts come late that a pass is begun anew for, one by one; then all columns are read as texts."""
 
 
-@dataclass(frozen=True, slots=True)
-class Sheet:
-    """A file of delimited text and how it is written; see `table.Table`.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sheet(Table):
+    """A file of delimited text and how it is written.
 
-    `skip_rows` is the number of lines up to and with the header, `bytes` the size of the file. With
-    `as_written` all columns stay text, for dates of a stated format that may look like ISO dates and be none; with
-    `unquoted` quotes are no quotes.
+    `first_row` is the number of the first row below the header, `bytes` the size of the file. With `as_written` all
+    columns stay text, for dates of a stated format that may look like ISO dates and be none; with `unquoted` quotes
+    are no quotes.
     """
 
-    path: Path
+    first_row: int
     changed_ns: int
     bytes: int
     encoding: str
     delimiter: str
-    decimal: str
-    skip_rows: int
-    names: tuple[str, ...]
     as_written: bool = False
     unquoted: bool = False
-    types: tuple[pa.DataType, ...] = ()
-    found: tuple[str, ...] = ()
-
-    @property
-    def first_row(self) -> int:
-        """Number of the first row of data, counted from 1."""
-        return self.skip_rows + 1
 
     @property
     def notes(self) -> tuple[str, ...]:
         """How the file is written, and the lines of it that do not fit its header."""
-        loaded = _loaded(self, self._wanted([0]))
+        loaded = _loaded(self)
         return (*self.found, *quotes_told(loaded.unquoted, loaded.left_out))
 
     def head(self, columns: Sequence[int]) -> list[pa.Array]:
@@ -69,63 +59,57 @@ class Sheet:
 
     def read(self, columns: Sequence[int], where: tuple[int, Sequence[str]] | None = None) -> list[pa.Array]:
         """Whole columns, or the rows where a column holds one of some texts."""
-        wanted = [*columns] if where is None else [*columns, where[0]]
-        loaded = _loaded(self, self._wanted(wanted)).columns
-        arrays = [loaded[i] for i in wanted]
+        columns_read = _loaded(self).columns
+        arrays = [columns_read[i] for i in columns]
         if where is None:
             return arrays
-        keep = pc.is_in(pc.cast(arrays[-1], pa.string()), value_set=pa.array(where[1], pa.string()))
-        return [array.filter(keep) for array in arrays[:-1]]
-
-    def _wanted(self, columns: Sequence[int]) -> tuple[int, ...]:
-        return tuple(range(len(self.names))) if self.bytes < WHOLE_FILE_BYTES else tuple(sorted(set(columns)))
+        keep = pc.is_in(as_text(columns_read[where[0]]), value_set=pa.array(where[1], pa.string()))
+        return [array.filter(keep) for array in arrays]
 
 
 @dataclass(frozen=True, slots=True)
 class Loaded:
     """Columns by position, the number of lines left out, and whether quotes were taken as they stand."""
 
-    columns: dict[int, pa.Array]
+    columns: list[pa.Array]
     left_out: int
-    unquoted: bool = False
+    unquoted: bool
 
 
 @lru_cache(maxsize=KEPT_READS)
-def _loaded(sheet: Sheet, columns: tuple[int, ...]) -> Loaded:
-    """Some columns of the whole file."""
+def _loaded(sheet: Sheet) -> Loaded:
+    """The whole file."""
     try:
-        loaded = as_far_as_numbers_go(sheet.encoding, len(sheet.names), partial(_parsed, sheet, columns))
-        rows = len(loaded.columns[columns[0]]) + loaded.left_out
+        loaded = as_far_as_numbers_go(sheet, _parsed)
+        rows = len(loaded.columns[0]) + loaded.left_out
         if not is_swallowed(sheet, rows):
             return loaded
-        plain = replace(sheet, unquoted=True)
-        again = as_far_as_numbers_go(sheet.encoding, len(sheet.names), partial(_parsed, plain, columns))
-        more = len(again.columns[columns[0]]) > rows
-        return replace(again, unquoted=True) if more else loaded
+        again = as_far_as_numbers_go(replace(sheet, unquoted=True), _parsed)
+        return again if len(again.columns[0]) > rows else loaded
     except (UnicodeError, OSError, pa.ArrowInvalid) as error:
         raise unreadable(sheet.path, error) from error
 
 
-def as_far_as_numbers_go(encoding: str, width: int, read: Callable[[str, Collection[int]], Read]) -> Read:
-    """What `read` gives of a file of `width` columns, begun anew with a column as text where only its first block is
-    all numbers, or in another encoding where a letter late in the file shows it."""
+def as_far_as_numbers_go(sheet: Sheet, read: Callable[[Sheet, Collection[int]], Read]) -> Read:
+    """What `read` gives of a sheet, begun anew with a column as text where only its first block is all numbers, or in
+    another encoding where a letter late in the file shows it."""
     texts = set[int]()
     while True:
         try:
-            return read(encoding, texts)
+            return read(sheet, texts)
         except pa.ArrowInvalid as error:
             late = LATE_TEXT.search(str(error))
-            if "UTF8" in str(error) and encoding != "cp1252":
-                encoding = "cp1252"
+            if "UTF8" in str(error) and sheet.encoding != "cp1252":
+                sheet = replace(sheet, encoding="cp1252")
             elif late is not None and int(late["column"]) not in texts:
-                texts.update([int(late["column"])] if len(texts) < MOST_LATE else range(width))
+                texts.update([int(late["column"])] if len(texts) < MOST_LATE else range(len(sheet.names)))
             else:
                 raise
 
 
 def is_swallowed(sheet: Sheet, rows: int) -> bool:
     """Whether so few of a sheet's lines came back as rows that an open quote has swallowed the rest."""
-    lines = _lines(sheet.path, sheet.changed_ns) - sheet.skip_rows
+    lines = _lines(sheet.path, sheet.changed_ns) - sheet.first_row + 1
     return rows < WHOLE_SHARE * lines - 1 and not sheet.unquoted
 
 
@@ -153,24 +137,21 @@ def unreadable(path: Path, error: Exception) -> InputError:
     return InputError(f"{path}: {str(error)[:120]}", "delimited text in one encoding", remedy)
 
 
-def _parsed(sheet: Sheet, columns: tuple[int, ...], encoding: str, texts: Collection[int]) -> Loaded:
+def _parsed(sheet: Sheet, texts: Collection[int]) -> Loaded:
     left_out: list[int] = []
-    table = csv.read_csv(sheet.path, **reading(sheet, columns, encoding, left_out, texts))
-    return Loaded({i: trimmed(table.column(str(i)), sheet.unquoted) for i in columns}, len(left_out))
+    table = csv.read_csv(sheet.path, **reading(sheet, left_out, texts))
+    return Loaded([trimmed(a, sheet.unquoted) for a in table.columns], len(left_out), sheet.unquoted)
 
 
 @lru_cache(maxsize=KEPT_READS)
-def _first_block(sheet: Sheet) -> dict[int, pa.Array]:
+def _first_block(sheet: Sheet) -> list[pa.Array]:
     """First rows of all columns, without reading further."""
-    columns = tuple(range(len(sheet.names)))
-    with csv.open_csv(sheet.path, **reading(sheet, columns, sheet.encoding, [], ())) as reader:
+    with csv.open_csv(sheet.path, **reading(sheet, [], ())) as reader:
         batch = reader.read_next_batch().slice(0, HEAD_ROWS)
-    return {i: trimmed(batch.column(i), sheet.unquoted) for i in columns}
+    return [trimmed(a, sheet.unquoted) for a in batch.columns]
 
 
-def reading(
-    sheet: Sheet, columns: tuple[int, ...], encoding: str, left_out: list[int], texts: Collection[int]
-) -> dict[str, Any]:
+def reading(sheet: Sheet, left_out: list[int], texts: Collection[int]) -> dict[str, Any]:
     """Options of the parser; it adds to `left_out` for each line that does not fit.
 
     One thread: the parser calls back for such lines, and from threads of its own that ended processes now and then.
@@ -184,9 +165,9 @@ def reading(
     as_text = names if sheet.as_written else [names[i] for i in texts]
     return {
         "read_options": csv.ReadOptions(
-            skip_rows=sheet.skip_rows,
+            skip_rows=sheet.first_row - 1,
             column_names=names,
-            encoding=encoding.replace("utf-8-sig", "utf-8"),
+            encoding=sheet.encoding.replace("utf-8-sig", "utf-8"),
             use_threads=False,
         ),
         "parse_options": csv.ParseOptions(
@@ -196,7 +177,6 @@ def reading(
         ),
         "convert_options": csv.ConvertOptions(
             column_types=dict.fromkeys(as_text, pa.string()) if as_text else None,
-            include_columns=[names[i] for i in columns],
             null_values=[""],
             true_values=[],
             false_values=[],

@@ -70,16 +70,22 @@ def open_sheet(path: Path, options: ReadOptions) -> Sheet:
     width = Counter(len(row) for row in rows).most_common(1)[0][0]  # rows may end with a delimiter
     names = (*(name.strip() for name in header), *[""] * (width - len(header)))
     decimal, doubt = (options.decimal, "") if options.decimal else detect_decimal(rows, delimiter)
-    stat = path.stat()
-    skipped = place + 1 + above
-    sheet = Sheet(path, stat.st_mtime_ns, stat.st_size, encoding, delimiter, decimal, skipped, names)
-    said = [] if guessed is None else [f"no header: columns are taken as {', '.join(guessed)}"]
-    said += [doubt] if doubt else []
-    sheet = replace(sheet, as_written=options.date_format is not None)
-    types = tuple(array.type for array in sheet.head(range(len(names))))
     between, mark = DELIMITERS.get(delimiter, repr(delimiter)), "comma" if decimal == "," else "point"
-    note = f"delimited text: {between} between columns, decimal {mark}, encoding {encoding}"
-    return replace(sheet, types=types, found=(note, *said))
+    said = [f"delimited text: {between} between columns, decimal {mark}, encoding {encoding}"]
+    said += [] if guessed is None else [f"no header: columns are taken as {', '.join(guessed)}"]
+    sheet = Sheet(
+        path,
+        names,
+        found=(*said, doubt) if doubt else tuple(said),
+        decimal=decimal,
+        first_row=place + above + 2,
+        changed_ns=path.stat().st_mtime_ns,
+        bytes=path.stat().st_size,
+        encoding=encoding,
+        delimiter=delimiter,
+        as_written=options.date_format is not None,
+    )
+    return replace(sheet, types=tuple(array.type for array in sheet.head(range(len(names)))))
 
 
 def detect_decimal(rows: Sequence[Sequence[str]], delimiter: str) -> tuple[str, str]:

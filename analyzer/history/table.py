@@ -1,18 +1,14 @@
-"""A file of named columns, whatever its format; what layouts make of it; and what a user may state about it."""
+"""A file of named columns, whatever its format, and what a user may state about it."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol
 
 import pyarrow as pa
 import pyarrow.compute as pc
-
-if TYPE_CHECKING:
-    from analyzer.history.clock import Clock
-    from analyzer.history.series import MainSpan, Raw
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,54 +45,40 @@ class ReadOptions:
     scratch: Path | None = None
 
 
-class SourceTable(Protocol):
-    """Columns by position; `read` touches no other column.
+@dataclass(frozen=True, slots=True)
+class Table(ABC):
+    """Columns of a file by position; `read` touches no other column.
 
-    `path` is the file, `names` and `types` are of its columns, `notes` what was found out about its format,
+    `path` is the file, `names` and `types` are of its columns, `found` what was found out about its format,
     `decimal` the mark in numbers that stand among texts, `first_row` the number of the first row of data as
-    an editor counts them (None for binary files).
+    an editor counts them (None for binary files), `tags` the tags of a long table in the order in which they were
+    met, where these are known.
     """
 
-    @property
-    def path(self) -> Path: ...
-    @property
-    def names(self) -> tuple[str, ...]: ...
-    @property
-    def types(self) -> tuple[pa.DataType, ...]: ...
-    @property
-    def notes(self) -> tuple[str, ...]: ...
-    @property
-    def decimal(self) -> str: ...
-    @property
-    def first_row(self) -> int | None: ...
+    path: Path
+    names: tuple[str, ...]
+    types: tuple[pa.DataType, ...] = ()
+    found: tuple[str, ...] = ()
+    decimal: str = "."
+    first_row: int | None = None
+    tags: tuple[str, ...] = ()
 
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What is to be told of the format."""
+        return self.found
+
+    @abstractmethod
     def head(self, columns: Sequence[int]) -> list[pa.Array]:
         """First rows of some columns, for detection."""
 
+    @abstractmethod
     def read(self, columns: Sequence[int], where: tuple[int, Sequence[str]] | None = None) -> list[pa.Array]:
         """Whole columns, or only the rows where column `where[0]` holds one of `where[1]`."""
 
-
-class Source(Protocol):
-    """One file whose layout is understood; small, picklable, holds no samples."""
-
-    @property
-    def path(self) -> Path: ...
-    @property
-    def tags(self) -> tuple[str, ...]: ...
-    @property
-    def notes(self) -> tuple[str, ...]: ...
-    @property
-    def clock(self) -> Clock: ...
-
-    def with_clock(self, clock: Clock) -> Source:
-        """The same file, its stamps read in the order of day and month, and the winter time, of another clock."""
-
-    def read(self, tags: Sequence[str]) -> dict[str, Raw]:
-        """Samples of those of `tags` that the file holds."""
-
-    def span(self) -> MainSpan:
-        """Where the samples lie in time, stray ones apart [s since 1970-01-01 UTC]."""
+    def each(self, columns: Sequence[int]) -> Iterator[list[pa.Array]]:
+        """Whole columns, piece by piece where the table lies in several files."""
+        yield self.read(columns)
 
 
 def is_text(kind: pa.DataType) -> bool:

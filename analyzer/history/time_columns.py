@@ -31,7 +31,7 @@ from analyzer.history.names import (
     time_unit,
     without_unit,
 )
-from analyzer.history.table import ReadOptions, SourceTable, as_text, is_number, is_text
+from analyzer.history.table import ReadOptions, Table, as_text, is_number, is_text
 from identification.errors import InputError
 
 TIME_OF_DAY = r"^\s*\d{1,2}(:\d\d(:\d\d([.,;]\d+)?)?|\.\d\d\.\d\d([.,]\d+)?)\s*([AaPp]\.?[Mm]\.?)?\s*$"
@@ -52,7 +52,7 @@ FINER = "timems"
 RANK = {name: i for i, name in enumerate((*STAMP_NAMES, *COLUMNS["time_of_day"]))}
 
 
-def find_clock(table: SourceTable, options: ReadOptions) -> Clock:
+def find_clock(table: Table, options: ReadOptions) -> Clock:
     """The time columns of a table, and how they are written.
 
     Raises
@@ -73,7 +73,7 @@ def find_clock(table: SourceTable, options: ReadOptions) -> Clock:
     return _with_winter_time(table, _with_zone(table, replace(clock, local=local)))
 
 
-def stamps_clock(table: SourceTable, column: int, options: ReadOptions) -> Clock:
+def stamps_clock(table: Table, column: int, options: ReadOptions) -> Clock:
     """The clock of one column that is known to hold stamps."""
     head = table.head([column])[0]
     scale = time_scale_of(head, time_unit(table.names[column])) if is_number(head.type) else None
@@ -81,7 +81,7 @@ def stamps_clock(table: SourceTable, column: int, options: ReadOptions) -> Clock
     return _with_winter_time(table, replace(clock, local=clock.seconds([head])[1]))
 
 
-def check_seconds(table: SourceTable, clock: Clock, tag: int = -1) -> None:
+def check_seconds(table: Table, clock: Clock, tag: int = -1) -> None:
     """Raise InputError where stamps have lost their seconds, so that the samples of a minute share one; `tag` is the
     column of the tags of a long table, -1 of a wide one."""
     second = clock.seconds(table.head(clock.columns))[0]
@@ -112,7 +112,7 @@ def holds_stamps(name: str, head: pa.Array, since_start: bool = True) -> bool:
     return _kind(name, filled) == "full"
 
 
-def _with_order(table: SourceTable, clock: Clock, options: ReadOptions) -> Clock:
+def _with_order(table: Table, clock: Clock, options: ReadOptions) -> Clock:
     """The clock with what stands first in its dates, decided from as much of the column as it takes."""
     if options.day_first is not None:
         return replace(clock, order=DateOrder("day" if options.day_first else "month", "as stated"))
@@ -132,7 +132,7 @@ def _texts(arrays: Sequence[pa.Array]) -> pa.Array | None:
     return as_text(column) if is_text(column.type) else None
 
 
-def _with_fraction(table: SourceTable, clock: Clock) -> Clock:
+def _with_fraction(table: Table, clock: Clock) -> Clock:
     """The clock with a column beside it that holds what is below the second, where one is named so."""
     for i, name in enumerate(table.names):
         unit = BELOW_SECOND.get(plain(name), 0.0)
@@ -144,7 +144,7 @@ def _with_fraction(table: SourceTable, clock: Clock) -> Clock:
     return clock
 
 
-def _with_zone(table: SourceTable, clock: Clock) -> Clock:
+def _with_zone(table: Table, clock: Clock) -> Clock:
     """The clock with the zone that the column's name or its stamps state, where these are local."""
     name, head = table.names[clock.columns[0]], table.head(clock.columns[:1])[0].drop_null()
     text = str(head[0].as_py()) if clock.local and is_text(head.type) and len(head) else ""
@@ -154,7 +154,7 @@ def _with_zone(table: SourceTable, clock: Clock) -> Clock:
     return replace(clock, offset_s=zones.header_offset_s(name, zone), timezone=zone, doubt=doubt)
 
 
-def _with_winter_time(table: SourceTable, clock: Clock) -> Clock:
+def _with_winter_time(table: Table, clock: Clock) -> Clock:
     """The clock, marked where its stamps show that it keeps the stated zone's winter time all the year."""
     zone = clock.timezone
     if not clock.local or clock.offset_s is not None or zone is None or zones.is_fixed(zone):
@@ -163,7 +163,7 @@ def _with_winter_time(table: SourceTable, clock: Clock) -> Clock:
     return replace(clock, winter_s=zones.winter_offset_s(second, zone))
 
 
-def _is_doubtful(table: SourceTable, clock: Clock, kinds: dict[int, str], heads: dict[int, pa.Array]) -> bool:
+def _is_doubtful(table: Table, clock: Clock, kinds: dict[int, str], heads: dict[int, pa.Array]) -> bool:
     """Whether what was chosen stands in for a time column that cannot be read, or merely counts the rows."""
     chosen = clock.columns[0]
     if is_stamp(table.names[chosen]):
@@ -174,7 +174,7 @@ def _is_doubtful(table: SourceTable, clock: Clock, kinds: dict[int, str], heads:
     )
 
 
-def _candidates(table: SourceTable, options: ReadOptions) -> list[int]:
+def _candidates(table: Table, options: ReadOptions) -> list[int]:
     """Columns that may hold a time: the stated one, else by type, by name, and columns of text."""
     if options.time_column is not None:
         return [stated_column(table.path, table.names, options.time_column, "time")]
@@ -220,7 +220,7 @@ def _text_kind(texts: pa.Array, timezone: str | None = None) -> str:
     return "full" if (parts.clock_s != 0).any() or len(texts) == 1 else "date"
 
 
-def _chosen(table: SourceTable, kinds: dict[int, str], options: ReadOptions) -> Clock | None:
+def _chosen(table: Table, kinds: dict[int, str], options: ReadOptions) -> Clock | None:
     """The clock of the column, or of the columns of date and time of day, that say most."""
     by_kind = {kind: _by_name(table, [i for i in kinds if kinds[i] == kind]) for kind in set(kinds.values())}
     clock = Clock((0,), date_format=options.date_format, timezone=options.timezone)
@@ -242,7 +242,7 @@ def _chosen(table: SourceTable, kinds: dict[int, str], options: ReadOptions) -> 
     return _elapsed(table, clock, by_kind.get("time of day", ()))
 
 
-def _elapsed(table: SourceTable, clock: Clock, columns: Sequence[int]) -> Clock | None:
+def _elapsed(table: Table, clock: Clock, columns: Sequence[int]) -> Clock | None:
     """The clock of times without a date, where they begin with zero or pass a day: they count from the start."""
     for i in columns:
         second = counted_s(as_text(table.head([i])[0]))
@@ -252,12 +252,12 @@ def _elapsed(table: SourceTable, clock: Clock, columns: Sequence[int]) -> Clock 
     return None
 
 
-def _by_name(table: SourceTable, columns: Sequence[int]) -> list[int]:
+def _by_name(table: Table, columns: Sequence[int]) -> list[int]:
     """Columns whose names mean a time first, in the order of the dictionary of names."""
     return sorted(columns, key=lambda i: (RANK.get(plain(without_unit(table.names[i])), len(RANK)), i))
 
 
-def _no_time(table: SourceTable, columns: Sequence[int]) -> InputError:
+def _no_time(table: Table, columns: Sequence[int]) -> InputError:
     named = [i for i in columns if is_stamp(table.names[i])]
     if named:
         return _unreadable(table, named[0])
@@ -268,7 +268,7 @@ def _no_time(table: SourceTable, columns: Sequence[int]) -> InputError:
     )
 
 
-def _unreadable(table: SourceTable, column: int) -> InputError:
+def _unreadable(table: Table, column: int) -> InputError:
     text = next(iter(as_text(table.head([column])[0].drop_null()).to_pylist()), "")
     row = "" if table.first_row is None else f", row {table.first_row}"
     place = f"{table.path}: column '{table.names[column]}'{row}"

@@ -214,7 +214,7 @@ def test_lines_that_do_not_fit_are_told(tmp_path: Path) -> None:
 
 
 def test_a_file_too_big_to_keep(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A file above the limit is opened by its first rows and read by column, with the same result."""
+    """A file above the limit is opened by its first rows, with the same result."""
     monkeypatch.setattr("analyzer.history.sheet.WHOLE_FILE_BYTES", 100)
     table = day(n=70_000)
     (tmp_path / "x.csv").write_text(as_text(table, "%d.%m.%Y %H:%M:%S", ";", ",", ""))
