@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from analyzer.history import stamps, zones
 from analyzer.history.date_order import DateOrder, by_gaps, days_seen
-from analyzer.history.table import as_text, is_text
+from analyzer.history.table import as_text, is_text, numbers
 
 TICKS_PER_S = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
 EARLIEST_S, LATEST_S = -11_676_096_000.0, 10_413_792_000.0
@@ -211,11 +211,6 @@ def counted_s(texts: pa.Array) -> NDArray[np.float64]:
         numbers(pc.replace_substring(pc.struct_field(parts, name), ",", ".")) for name in "hms"
     )
     return np.asarray(3600.0 * hour + 60.0 * minute + second)
-
-
-def numbers(column: pa.Array) -> NDArray[np.float64]:
-    """A column as numbers, shape (n,), NaN where it is empty."""
-    return np.asarray(pc.cast(column, pa.float64(), safe=False).to_numpy(zero_copy_only=False))
 
 
 def is_count(column: pa.Array) -> bool:

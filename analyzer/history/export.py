@@ -24,7 +24,7 @@ from analyzer.history.files import export_files, is_parquet, own_scratch, packed
 from analyzer.history.layouts import Source, source_of, tag_column
 from analyzer.history.parquet import open_parquet
 from analyzer.history.plant_clock import zone_of
-from analyzer.history.series import MainSpan, NoStampError, Raw, Series, settle
+from analyzer.history.series import MainSpan, NoStampError, Series, settle
 from analyzer.history.sheet import WHOLE_FILE_BYTES
 from analyzer.history.sniff import open_sheet
 from analyzer.history.table import ReadOptions
@@ -76,12 +76,15 @@ class Export:
         homes = sorted({home for tag in tags for home in self._homes[tag]})
         for home in homes:
             bring(self.sources[home].path, self.origins)
-        pieces = [_read(self.sources[home], tags) for home in homes]
+        pieces = []
+        for home in homes:
+            with _told(self.sources[home].path):
+                pieces.append(self.sources[home].read(tags))
         series = {}
         for tag in tags:
-            series[tag], found = settle([piece[tag] for piece in pieces if tag in piece])
-            if found:
-                self._met[tag] = found
+            series[tag] = settle([piece[tag] for piece in pieces if tag in piece])
+            if series[tag].found:
+                self._met[tag] = series[tag].found
         return series
 
     def span(self, tag: str | None = None) -> tuple[float, float]:
@@ -271,11 +274,6 @@ def _table(plain: Path, options: ReadOptions) -> Source:
     sheet = open_sheet(plain, options)
     big = sheet.bytes >= CONVERTED_BYTES
     return source_of(converted(sheet, tag_column(sheet), options.scratch) if big else sheet, options)
-
-
-def _read(source: Source, tags: Sequence[str]) -> dict[str, Raw]:
-    with _told(source.path):
-        return source.read(tags)
 
 
 @contextmanager

@@ -31,10 +31,10 @@ from analyzer.history.names import (
     with_loop,
 )
 from analyzer.history.quality import Scheme, mostly_one, not_good, quality_columns, scheme_of
-from analyzer.history.series import MainSpan, NoStampError, Raw, main_span
+from analyzer.history.series import MainSpan, NoStampError, Series, main_span
 from analyzer.history.table import ReadOptions, Table, as_text, is_number, is_text
 from analyzer.history.time_columns import check_seconds, find_clock, holds_stamps, stamps_clock
-from analyzer.history.values import values
+from analyzer.history.values import parsed, values
 from identification.errors import InputError
 
 TIME_WORDS = re.compile(
@@ -85,21 +85,24 @@ class Source(ABC):
         return replace(self, clock=clock)
 
     @abstractmethod
-    def read(self, tags: Sequence[str]) -> dict[str, Raw]:
+    def read(self, tags: Sequence[str]) -> dict[str, Series]:
         """Samples of those of `tags` that the file holds."""
 
     @abstractmethod
     def span(self) -> MainSpan:
         """Where the samples lie in time, stray ones apart [s since 1970-01-01 UTC]."""
 
-    def _raw(self, stamps: Stamps, value: pa.Array, codes: pa.Array | None, scheme: Scheme | None) -> Raw:
+    def _series(
+        self, stamps: Stamps, value: pa.Array, codes: pa.Array | None, scheme: Scheme | None
+    ) -> Series:
         """One tag's samples from its columns of values and of quality codes."""
-        (stamp_s, met), read = stamps, values(value, self.table.decimal)
+        stamp_s, met = stamps
+        read = values(stamp_s, value, self.table.decimal)
         bad, found = read.bad, read.found + met
         if codes is not None and scheme is not None:
             rejected, counts = not_good(codes, scheme, self.good_quality)
             bad, found = bad | rejected, found + counts
-        return Raw(stamp_s, read.value, bad, read.text, read.unread, read.example, found)
+        return replace(read, bad=bad, found=found)
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,7 +139,7 @@ class WideSource(Source):
         columns = tuple(replace(c, clock=known[c.clock]) for c in self.columns)
         return replace(self, clock=columns[0].clock, columns=columns)
 
-    def read(self, tags: Sequence[str]) -> dict[str, Raw]:
+    def read(self, tags: Sequence[str]) -> dict[str, Series]:
         """Samples of those of `tags` that the file holds."""
         asked = set(tags)
         wanted = {tag: c for tag, c in zip(self.tags, self.columns, strict=True) if tag in asked}
@@ -168,12 +171,12 @@ class WideSource(Source):
 
     def _samples(
         self, column: TagColumn, arrays: dict[int, pa.Array], stamps: Stamps, rows: pa.Array | None
-    ) -> Raw:
+    ) -> Series:
         value, codes = (None if i < 0 else arrays[i] for i in (column.value, column.quality))
         if rows is not None:
             value, codes = (None if a is None else a.filter(rows) for a in (value, codes))
         scheme = None if codes is None else scheme_of(self.table.names[column.quality], codes, self.ones)
-        return self._raw(stamps, value, codes, scheme)
+        return self._series(stamps, value, codes, scheme)
 
 
 def open_wide(table: Table, options: ReadOptions) -> WideSource:
@@ -220,7 +223,8 @@ def _any_number(table: Table, columns: Sequence[int]) -> bool:
         return True
     heads = table.head(columns)
     texts = [h for h in heads if is_text(h.type) and h.null_count < len(h)]
-    return len(texts) < len(heads) or any(np.isfinite(values(h, table.decimal).value).any() for h in texts)
+    read = (parsed([str(text).strip() for text in h.unique().to_pylist()], table.decimal)[0] for h in texts)
+    return len(texts) < len(heads) or any(np.isfinite(number).any() for number in read)
 
 
 def _holds_values(table: Table, i: int) -> bool:
@@ -317,7 +321,7 @@ class LongSource(Source):
         quality = f"column '{self.table.names[self.quality]}' read as {self.scheme.value}"
         return (*self.table.notes, layout, quality, *self.clock.notes)
 
-    def read(self, tags: Sequence[str]) -> dict[str, Raw]:
+    def read(self, tags: Sequence[str]) -> dict[str, Series]:
         """Samples of those of `tags` that the file holds."""
         present = set(self.tags)
         wanted = [tag for tag in tags if tag in present]
@@ -344,9 +348,9 @@ class LongSource(Source):
 
     def _samples(
         self, second: NDArray[np.float64], local: bool, data: list[pa.Array], rows: NDArray[np.int64]
-    ) -> Raw:
+    ) -> Series:
         value, codes = (*(a.take(pa.array(rows)) for a in data), None)[:2]
-        return self._raw(self.clock.utc(second[rows], local), value, codes, self.scheme)
+        return self._series(self.clock.utc(second[rows], local), value, codes, self.scheme)
 
 
 def tag_column(table: Table) -> int:

@@ -1,4 +1,4 @@
-"""Samples of one tag: as they stand in one file (`Raw`), as a reader returns them (`Series`), and their span of time.
+"""Samples of one tag: as they stand in one file, settled into one series, and their span of time.
 
 Stamps far from the rest (a clock that was wrong once, a last value from weeks before, a stamp of 1601) would stretch
 a record over years of nothing, so they are set aside and told.
@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import datetime, timedelta
 
 import numpy as np
@@ -29,12 +29,12 @@ hour beside a day, or four hours beside two weeks."""
 
 @dataclass(frozen=True, slots=True)
 class Series:
-    """Raw samples of one tag, oldest first, one per stamp.
+    """Samples of one tag: in the order of a file, or, as a reader returns them, oldest first and one per stamp.
 
     Parameters
     ----------
     stamp_s : ndarray of float, shape (n,)
-        Time of each sample [s since 1970-01-01 UTC], strictly rising.
+        Time of each sample [s since 1970-01-01 UTC]; in the order of a file NaN where unreadable.
     value : ndarray of float, shape (n,)
         Values in the tag's own unit; NaN where the export holds no number.
     bad : ndarray of bool, shape (n,)
@@ -46,6 +46,8 @@ class Series:
         Values in the export that look like numbers and could not be understood; bad here.
     example : str
         One of them.
+    found : Counter
+        What is worth telling: each key completes the sentence "12 ...".
     """
 
     stamp_s: NDArray[np.float64]
@@ -54,74 +56,57 @@ class Series:
     text: NDArray[np.object_] | None = None
     unread: int = 0
     example: str = ""
+    found: Counter[str] = field(default_factory=Counter, repr=False)
 
-
-@dataclass(frozen=True, slots=True)
-class Raw(Series):
-    """One tag's samples in the order of the file; stamps may be NaN where unreadable.
-
-    `found` counts what is worth telling: each key completes the sentence "12 ...".
-    """
-
-    found: Counter[str] = field(default_factory=Counter)
-
-    def taken(self, index: NDArray[np.generic] | slice) -> Raw:
+    def taken(self, index: NDArray[np.generic] | slice) -> Series:
         """Some of the samples, and nothing of what was found."""
         text = None if self.text is None else self.text[index]
-        return Raw(self.stamp_s[index], self.value[index], self.bad[index], text, self.unread, self.example)
+        return Series(
+            self.stamp_s[index], self.value[index], self.bad[index], text, self.unread, self.example
+        )
 
 
-def settle(pieces: Sequence[Raw]) -> tuple[Series, Counter[str]]:
+def settle(pieces: Sequence[Series]) -> Series:
     """Join the pieces of one tag (one a file) into one series of strictly rising stamps.
 
     Parameters
     ----------
-    pieces : sequence of Raw
+    pieces : sequence of Series
         In the order of the files; of equal stamps the last sample counts.
     """
-    if len(pieces) == 1 and _rises(pieces[0].stamp_s):
-        return _series(pieces[0]), pieces[0].found
     found: Counter[str] = Counter()
     ready = [_oldest_first(_with_stamps(piece, found), found) for piece in pieces]
     for piece in pieces:
         found.update(piece.found)
     joined = ready[0] if len(ready) == 1 else _joined(ready)
-    if _rises(joined.stamp_s):
-        return _series(joined), found
-    return _series(_sorted(joined, _origins(ready), found)), found
+    if not (np.diff(joined.stamp_s) > 0).all():
+        origin = np.repeat(np.arange(len(ready)), [len(piece.value) for piece in ready])
+        joined = _sorted(joined, origin, found)
+    return replace(joined, found=found)
 
 
-def _rises(stamp_s: NDArray[np.float64]) -> bool:
-    return bool(
-        (np.diff(stamp_s) > 0).all() and np.isfinite(stamp_s[:1]).all() and np.isfinite(stamp_s[-1:]).all()
-    )
-
-
-def _series(raw: Raw) -> Series:
-    return Series(raw.stamp_s, raw.value, raw.bad, raw.text, raw.unread, raw.example)
-
-
-def _with_stamps(raw: Raw, found: Counter[str]) -> Raw:
-    readable = np.isfinite(raw.stamp_s)
+def _with_stamps(piece: Series, found: Counter[str]) -> Series:
+    readable = np.isfinite(piece.stamp_s)
     if readable.all():
-        return raw
+        return piece
     found[NO_STAMP] += int((~readable).sum())
-    return raw.taken(readable)
+    return piece.taken(readable)
 
 
-def _oldest_first(raw: Raw, found: Counter[str]) -> Raw:
-    step = np.diff(raw.stamp_s)
+def _oldest_first(piece: Series, found: Counter[str]) -> Series:
+    step = np.diff(piece.stamp_s)
     if not (step < 0).any() or (step < 0).sum() <= (step > 0).sum():
-        return raw
+        return piece
     found[NEWEST_FIRST] += 1
-    return raw.taken(slice(None, None, -1))
+    return piece.taken(slice(None, None, -1))
 
 
-def _joined(pieces: Sequence[Raw]) -> Raw:
+def _joined(pieces: Sequence[Series]) -> Series:
     texts = None
     if any(piece.text is not None for piece in pieces):
-        texts = np.concatenate([_texts(piece) for piece in pieces])
-    return Raw(
+        blank = [np.full(len(piece.value), "", dtype=object) for piece in pieces]
+        texts = np.concatenate([b if p.text is None else p.text for p, b in zip(pieces, blank, strict=True)])
+    return Series(
         np.concatenate([piece.stamp_s for piece in pieces]),
         np.concatenate([piece.value for piece in pieces]),
         np.concatenate([piece.bad for piece in pieces]),
@@ -131,26 +116,19 @@ def _joined(pieces: Sequence[Raw]) -> Raw:
     )
 
 
-def _texts(raw: Raw) -> NDArray[np.object_]:
-    return np.full(len(raw.value), "", dtype=object) if raw.text is None else raw.text
-
-
-def _origins(pieces: Sequence[Raw]) -> NDArray[np.int64]:
-    return np.repeat(np.arange(len(pieces)), [len(piece.value) for piece in pieces])
-
-
-def _sorted(raw: Raw, origin: NDArray[np.int64], found: Counter[str]) -> Raw:
+def _sorted(joined: Series, origin: NDArray[np.int64], found: Counter[str]) -> Series:
     """Stable sort by stamp, then the last of each stamp; counts what was met on the way."""
-    order = np.argsort(raw.stamp_s, kind="stable")
+    order = np.argsort(joined.stamp_s, kind="stable")
     within_file = np.diff(origin) == 0
-    found[UNORDERED] += int(((np.diff(raw.stamp_s) < 0) & within_file).sum())
-    raw, origin = raw.taken(order), origin[order]
-    same = np.diff(raw.stamp_s) == 0
-    differ = (np.diff(raw.value) != 0) & np.isfinite(raw.value[1:]) & np.isfinite(raw.value[:-1])
+    found[UNORDERED] += int(((np.diff(joined.stamp_s) < 0) & within_file).sum())
+    joined, origin = joined.taken(order), origin[order]
+    same = np.diff(joined.stamp_s) == 0
+    value = joined.value
+    differ = (np.diff(value) != 0) & np.isfinite(value[1:]) & np.isfinite(value[:-1])
     contradicted = same & (np.diff(origin) != 0) & differ
     found[REPEATED] += int((same & ~contradicted).sum())
     found[CONTRADICTED] += int(contradicted.sum())
-    return raw.taken(np.append(~same, True))
+    return joined.taken(np.append(~same, True))
 
 
 class NoStampError(ValueError):

@@ -7,8 +7,10 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
+from numpy.typing import NDArray
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,6 +98,11 @@ def is_number(kind: pa.DataType) -> bool:
 def as_text(column: pa.Array) -> pa.Array:
     """The column as plain strings."""
     return pc.cast(column, pa.string())
+
+
+def numbers(column: pa.Array) -> NDArray[np.float64]:
+    """A column as numbers, shape (n,), NaN where it is empty."""
+    return np.asarray(pc.cast(column, pa.float64(), safe=False).to_numpy(zero_copy_only=False))
 
 
 def one_array(column: pa.Array | pa.ChunkedArray) -> pa.Array:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import re
 from collections import Counter
-from dataclasses import dataclass
 
 import numpy as np
 import pyarrow as pa
@@ -13,7 +12,8 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from analyzer.history.names import WORDS
-from analyzer.history.table import is_text
+from analyzer.history.series import Series
+from analyzer.history.table import is_text, numbers
 
 BLANK = "cells are blank: no value (a historian that reports by exception leaves unchanged values blank)"
 ERROR_TEXTS = frozenset(WORDS["values"]["none"])
@@ -44,56 +44,35 @@ LIKE_NUMBER = re.compile(r"^[^\w]*\d")
 """A text that begins as a number does, and so was meant as one."""
 
 
-@dataclass(frozen=True, slots=True)
-class Values:
-    """Arrays of shape (n,): `value` NaN where no number, `bad` where neither number nor mode text.
-
-    `unread`: how many texts look like numbers and are not understood, with one of them as `example`.
-    """
-
-    value: NDArray[np.float64]
-    bad: NDArray[np.bool_]
-    text: NDArray[np.object_] | None
-    found: Counter[str]
-    unread: int = 0
-    example: str = ""
-
-
 def is_error_text(text: str) -> bool:
     """True where a historian writes this text in place of a value that it does not have."""
     return text.lower() in ERROR_TEXTS or ERROR_SHAPES.match(text) is not None
 
 
-def values(column: pa.Array, decimal: str = ".") -> Values:
-    """Numbers, bad samples and texts of one column of values.
+def values(stamp_s: NDArray[np.float64], column: pa.Array, decimal: str) -> Series:
+    """The samples of one column of values: bad where neither number nor mode text.
 
     Parameters
     ----------
+    stamp_s : ndarray, shape (n,)
+        Their stamps [s since 1970-01-01 UTC].
     column : pyarrow.Array, shape (n,)
         Numbers, or texts that may hold numbers.
     decimal : str
         Decimal mark of numbers that stand as text.
     """
     if is_text(column.type):
-        return _from_texts(column, decimal)
+        return _from_texts(stamp_s, column, decimal)
     if pa.types.is_dictionary(column.type):
         column = column.dictionary_decode()
-    value = _numbers(column)
+    value = numbers(column)
     bad = ~np.isfinite(value)
     if bad.any():
         value = np.where(bad, np.nan, value)
-    return Values(value, bad, None, +Counter({BLANK: column.null_count}))
+    return Series(stamp_s, value, bad, found=+Counter({BLANK: column.null_count}))
 
 
-def _numbers(column: pa.Array) -> NDArray[np.float64]:
-    if pa.types.is_null(column.type):
-        return np.full(len(column), np.nan)
-    if not pa.types.is_floating(column.type):
-        column = pc.cast(column, pa.float64(), safe=False)
-    return column.to_numpy(zero_copy_only=False).astype(np.float64, copy=False)
-
-
-def _from_texts(column: pa.Array, decimal: str) -> Values:
+def _from_texts(stamp_s: NDArray[np.float64], column: pa.Array, decimal: str) -> Series:
     """Every distinct text is read once; the samples refer to it by number."""
     encoded = column if pa.types.is_dictionary(column.type) else pc.dictionary_encode(column)
     place = pc.fill_null(encoded.indices, len(encoded.dictionary)).to_numpy(zero_copy_only=False)
@@ -109,9 +88,9 @@ def _from_texts(column: pa.Array, decimal: str) -> Values:
     lost, example = int(count[unread].sum()), next((kinds[i] for i in np.flatnonzero(unread)), "")
     if count[word].sum() * 2 > count[~blank & ~error].sum() and not lost:
         text = np.array(kinds, dtype=object)
-        return Values(number[place], (blank | error)[place], text[place], found)
+        return Series(stamp_s, number[place], (blank | error)[place], text[place], found=found)
     found.update(_found(kinds, count, np.zeros_like(blank), word))
-    return Values(number[place], ~np.isfinite(number[place]), None, found, lost, example)
+    return Series(stamp_s, number[place], ~np.isfinite(number[place]), None, lost, example, found)
 
 
 def parsed(texts: list[str], decimal: str) -> tuple[NDArray[np.float64], list[str]]:
