@@ -13,7 +13,7 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from analyzer.history import stamps, zones
-from analyzer.history.date_order import DateOrder, by_gaps, days_seen
+from analyzer.history.stamps import DateOrder, by_gaps, days_seen
 from analyzer.history.table import as_text, is_text, numbers
 
 TICKS_PER_S = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}

@@ -1,28 +1,36 @@
 """Which files an export consists of, and packed ones laid beside as plain ones, bounded: gzip, bzip2, xz, a zip
-archive of one file, and workbooks."""
+archive of one file, and workbooks, each sheet as text, cell by cell as it is stored and not as it is shown.
+
+Workbooks are read by python-calamine (extra `excel`): xlsx, xlsm, xlsb, xls and ods.
+"""
 
 from __future__ import annotations
 
 import atexit
 import bz2
+import codecs
+import csv
+import datetime as dt
 import gzip
+import importlib.util
 import lzma
+import re
 import shutil
 import tempfile
 import zipfile
 import zlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import lru_cache
 from pathlib import Path
 from typing import IO, Any
 
-from analyzer.history import workbook
 from identification.errors import InputError
 
 TEXT_ENDINGS = frozenset({".csv", ".txt", ".tsv"})
 PARQUET_ENDINGS = frozenset({".parquet", ".pq"})
 PACKED_ENDINGS = frozenset({".gz", ".bz2", ".xz", ".zip"})
-READ_ENDINGS = TEXT_ENDINGS | PARQUET_ENDINGS | PACKED_ENDINGS | workbook.ENDINGS
+WORKBOOK_ENDINGS = frozenset({".xlsx", ".xlsm", ".xlsb", ".xls", ".ods"})
+READ_ENDINGS = TEXT_ENDINGS | PARQUET_ENDINGS | PACKED_ENDINGS | WORKBOOK_ENDINGS
 NOT_READ_ENDING = ".7z"
 NO_EXPORTS = frozenset({"loops.csv", "labels.csv", "changes.csv"})
 PARQUET, ZIP, SEVEN_ZIP = b"PAR1", b"PK\x03\x04", b"7z\xbc\xaf"
@@ -32,6 +40,12 @@ STREAMS: dict[bytes, Callable[..., Any]] = {
     b"\xfd7zX": lzma.open,
 }
 """How files that begin so are opened."""
+OLD = b"\xd0\xcf\x11\xe0"
+"""First bytes of a workbook of the old kind."""
+FEWEST = 2
+"""Rows and columns of a table at least: a header and a sample, stamps and values."""
+PLAIN = re.compile(r"[^\w.-]+")
+"""What stands for nothing in the name of a file."""
 ENDS_BYTES = 65_536
 """Bytes at both ends of a file that stand for it beside its size; ours: headers, footers and the newest samples are
 there, and a folder of thousands of files is known in a second."""
@@ -43,6 +57,30 @@ ALWAYS_BYTES = 100e6
 """Size up to which anything is unpacked [bytes]."""
 MOST_OF_DISK = 0.8
 """Share of the disk's room that an unpacked file may take [-]; ours: the night needs the rest."""
+
+
+ENCODINGS = (
+    (codecs.BOM_UTF8, "utf-8-sig"),
+    (codecs.BOM_UTF32_LE, "utf-32"),
+    (codecs.BOM_UTF16_LE, "utf-16"),
+    (codecs.BOM_UTF16_BE, "utf-16"),
+)
+
+
+def detect_encoding(head: bytes) -> str:
+    """Encoding by byte-order mark, by the zeros of UTF-16, by valid UTF-8; else Windows Latin."""
+    for mark, name in ENCODINGS:
+        if head.startswith(mark):
+            return name
+    if head[1:400:2].count(0) > 100 or (len(head) < 400 and head[1::2].count(0) * 3 > len(head)):
+        return "utf-16-le"
+    if head[0:400:2].count(0) > 100:
+        return "utf-16-be"
+    try:
+        codecs.getincrementaldecoder("utf-8")().decode(head)
+    except UnicodeDecodeError:
+        return "cp1252"
+    return "utf-8"
 
 
 def export_files(paths: Sequence[Path]) -> list[Path]:
@@ -155,9 +193,9 @@ def unpacked(path: Path, scratch: Path | None) -> list[Path]:
     place = scratch or own_scratch()
     with path.open("rb") as file:
         start = file.read(5)
-    if workbook.is_workbook(path, start):
+    if is_workbook(path, start):
         _check_parts(path, place)
-        return workbook.sheets_as_text(path, Path(tempfile.mkdtemp(prefix="workbook-", dir=place)))
+        return sheets_as_text(path, Path(tempfile.mkdtemp(prefix="workbook-", dir=place)))
     stream = next((STREAMS[magic] for magic in STREAMS if start.startswith(magic)), None)
     if stream is None and not start.startswith(ZIP):
         return [path]
@@ -225,3 +263,106 @@ def _check_size(path: Path, size: int, written: int, folder: Path) -> None:
     if size > ALWAYS_BYTES and size > MOST_OF_DISK * (shutil.disk_usage(folder).free + written):
         remedy = "unpack it elsewhere and name what comes out"
         raise InputError(f"{path}: no room to unpack it", "free disk", remedy)
+
+
+def is_workbook(path: Path, start: bytes) -> bool:
+    """Whether a file that begins so is a workbook; text that is only called one is none."""
+    if start.startswith(OLD):
+        return True
+    if not start.startswith(b"PK\x03\x04"):
+        return False
+    if path.suffix.lower() in WORKBOOK_ENDINGS:
+        return True
+    try:
+        with zipfile.ZipFile(path) as archive:
+            return any(name.startswith("xl/") for name in archive.namelist())
+    except (zipfile.BadZipFile, OSError):
+        return False
+
+
+def can_be_read() -> bool:
+    """Whether the package that reads workbooks is there."""
+    return importlib.util.find_spec("python_calamine") is not None
+
+
+def sheets_as_text(path: Path, folder: Path) -> list[Path]:
+    """Each sheet of a workbook that holds a table as a text file of its own under `folder`, in their order.
+
+    Raises
+    ------
+    InputError
+        The package is missing, the file is damaged or has a password, or no sheet holds a table.
+    """
+    if not can_be_read():
+        raise InputError(
+            f"{path}: a workbook",
+            "delimited text or Parquet, or the extra 'excel'",
+            "pip install 'loop-triage[excel]', or save the sheet as CSV and name that file",
+        )
+    try:
+        found = _sheets(path, folder)
+    except (OSError, ValueError, RuntimeError) as error:
+        raise _damaged(path, error) from error
+    except BaseException as error:  # a panic of the reader is no Exception
+        if type(error).__name__ != "PanicException":
+            raise
+        raise _damaged(path, error) from error
+    if not found:
+        raise InputError(
+            f"{path}: no sheet with a table", "stamps, tags and samples in a sheet", "name another file"
+        )
+    return found
+
+
+def _damaged(path: Path, error: BaseException) -> InputError:
+    why = " ".join(str(error).split())[:80] or type(error).__name__
+    remedy = "open it and save it anew, without a password, or as CSV"
+    return InputError(f"{path}: cannot be read as a workbook ({why})", "a whole workbook", remedy)
+
+
+def _sheets(path: Path, folder: Path) -> list[Path]:
+    from python_calamine import CalamineError, CalamineWorkbook
+
+    try:
+        book = CalamineWorkbook.from_path(str(path))
+        names = list(book.sheet_names)
+    except CalamineError as error:
+        raise ValueError(str(error)) from error
+    out = []
+    for at, name in enumerate(names):
+        try:
+            sheet = book.get_sheet_by_index(at)
+        except CalamineError:  # a chart, or a macro
+            continue
+        if sheet.height < FEWEST or sheet.width < FEWEST:
+            continue
+        written = folder / f"{path.name}, sheet {at + 1} {PLAIN.sub('_', name)[:40]}".rstrip()
+        _write(sheet.iter_rows(), written)
+        out.append(written)
+    return out
+
+
+def _write(rows: Iterable[list[Any]], path: Path) -> None:
+    """Rows as tab-delimited text; rows without a cell are left out, and titles above a table stand alone."""
+    above = True
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, delimiter="\t", lineterminator="\n")
+        for row in rows:
+            cells = [_text(cell) for cell in row]
+            filled = [cell for cell in cells if cell]
+            above = above and len(filled) < FEWEST
+            if filled:
+                writer.writerow(filled if above else cells)
+
+
+def _text(cell: Any) -> str:
+    """A cell as text: stamps in ISO form, numbers with all their digits."""
+    if isinstance(cell, bool):
+        return str(int(cell))
+    if isinstance(cell, float):
+        return f"{cell:.15g}"
+    if isinstance(cell, dt.datetime):
+        return cell.isoformat(sep=" ")
+    if isinstance(cell, dt.date | dt.time):
+        return cell.isoformat()
+    return str(cell)

@@ -16,7 +16,7 @@ import pyarrow as pa
 
 from analyzer.history import stamps
 from analyzer.history.clock import SINCE_START, time_scale_of
-from analyzer.history.encoding import detect_encoding
+from analyzer.history.files import detect_encoding
 from analyzer.history.names import WORDS, is_stamp, without_unit
 from analyzer.history.rewritten import rewritten
 from analyzer.history.sheet import Sheet

@@ -20,7 +20,6 @@ from analyzer.history.clock import (
     is_count,
     time_scale_of,
 )
-from analyzer.history.date_order import DateOrder, date_order
 from analyzer.history.names import (
     BELOW_SECOND,
     COLUMNS,
@@ -31,6 +30,7 @@ from analyzer.history.names import (
     time_unit,
     without_unit,
 )
+from analyzer.history.stamps import DateOrder, date_order
 from analyzer.history.table import ReadOptions, Table, as_text, is_number, is_text
 from identification.errors import InputError
 

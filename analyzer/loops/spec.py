@@ -13,7 +13,7 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
-from analyzer.history.encoding import detect_encoding
+from analyzer.history.files import detect_encoding
 from analyzer.history.plant_clock import UTC_NAME
 from analyzer.history.stamps import parse_time
 from identification.errors import InputError
