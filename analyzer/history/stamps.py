@@ -1,7 +1,7 @@
 """Written dates to seconds: one pattern for ISO, either order of day and month, month names, offsets.
 
-Dates of exports, whose file tells what stands first where their writing leaves it open; and a time that a person wrote
-in changes.csv, in loops.csv or on the command line.
+Dates of exports, of which a whole file tells what stands first where the writing leaves it open; and a time that a
+person wrote in changes.csv, in loops.csv or on the command line.
 """
 
 from __future__ import annotations

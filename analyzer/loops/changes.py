@@ -3,8 +3,6 @@ settings were in force at a time, by them and by the dates of loops.csv."""
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -18,7 +16,7 @@ from analyzer.comparison.block_bootstrap import Floats
 from analyzer.config import ChangeLimits
 from analyzer.history.plant_clock import UTC_NAME, date_of
 from analyzer.history.stamps import parse_times
-from analyzer.loops.spec import LoopSpec, csv_text
+from analyzer.loops.spec import LoopSpec, csv_table
 from identification.errors import InputError
 
 COLUMNS = ("loop", "time", "kp_old", "ti_old", "kp_new", "ti_new", "who")
@@ -45,10 +43,10 @@ class TuningChange:
 
 
 def _number(text: str, where: str, column: str) -> float | None:
-    if not text.strip():
+    if not text:
         return None
     try:
-        value = float(text.strip().replace(",", "."))
+        value = float(text.replace(",", "."))
     except ValueError:
         value = math.nan
     if not math.isfinite(value) or (column in ("ti_old", "ti_new") and value < 0):
@@ -68,25 +66,21 @@ def read_changes(path: Path, zone: str = UTC_NAME, day_first: bool | None = None
         Where the file cannot be opened, holds no change, lacks a column, or a cell is neither time nor
         number.
     """
-    text, delimiter = csv_text(path, "change")
-    reader = csv.DictReader(io.StringIO(text, newline=""), delimiter=delimiter)
-    names = {(n or "").strip().lower(): n for n in reader.fieldnames or ()}
+    header, rows = csv_table(path, "change")
     for required in ("loop", "time"):
-        if required not in names:
+        if required not in header:
             raise InputError(f"{path}: no column {required!r}", "columns " + ", ".join(COLUMNS), "add it")
-    rows = [{k: (row[n] or "") for k, n in names.items() if k in COLUMNS} for row in reader]
-    places = [f"{path}, row {i}" for i, row in enumerate(rows, 2) if row["loop"].strip()]
-    rows = [row for row in rows if row["loop"].strip()]
+    rows = [(row, cells) for row, cells in rows if cells.get("loop")]
     if not rows:
         raise InputError(f"{path}: no changes", "one row a change below the header", "add the changes")
-    times = parse_times([row["time"] for row in rows], places, zone, day_first).tolist()
-    return tuple(_change(*stated) for stated in zip(rows, places, times, strict=True))
+    places = [f"{path}, row {row}" for row, _ in rows]
+    times = parse_times([cells.get("time", "") for _, cells in rows], places, zone, day_first).tolist()
+    return tuple(_change(cells, *at) for (_, cells), *at in zip(rows, places, times, strict=True))
 
 
 def _change(row: Mapping[str, str], where: str, time_s: float) -> TuningChange:
     kp_old, ti_old, kp_new, ti_new = (_number(row.get(c, ""), where, c) for c in COLUMNS[2:6])
-    who = row.get("who", "").strip()
-    return TuningChange(row["loop"].strip(), time_s, kp_old, ti_old, kp_new, ti_new, who)
+    return TuningChange(row["loop"], time_s, kp_old, ti_old, kp_new, ti_new, row.get("who", ""))
 
 
 def stated_changes(rows: Sequence[Mapping[str, Any]]) -> list[TuningChange]:

@@ -34,16 +34,15 @@ TEXTS = (
     "feedforward",
     "pv_unit",
 )
-NUMBERS = ("pv_lo", "pv_hi", "op_lo", "op_hi", "kp", "ti", "td", "scan_s", "importance")
-MEANT: Mapping[str, tuple[float, float, bool]] = {
-    **dict.fromkeys(("pv_lo", "pv_hi", "op_lo", "op_hi"), (1e-9, 1e12, True)),
-    "kp": (1e-6, 1e6, True),
-    "ti": (1e-3, 1e12, True),  # no integral is written as 0 or as many nines
-    "td": (1e-6, 1e6, True),
-    "scan_s": (1e-3, 1e5, True),
-    "importance": (1e-6, 1e6, True),
+NUMBERS: Mapping[str, tuple[float, float]] = {
+    **dict.fromkeys(("pv_lo", "pv_hi", "op_lo", "op_hi"), (1e-9, 1e12)),
+    "kp": (1e-6, 1e6),
+    "ti": (1e-3, 1e12),  # no integral is written as 0 or as many nines
+    "td": (1e-6, 1e6),
+    "scan_s": (1e-3, 1e5),
+    "importance": (1e-6, 1e6),
 }
-"""Least and largest size of a number that is meant, and whether it may be 0; ours: beyond them a cell is a slip."""
+"""Least and largest size of a number that is meant, beside 0; ours: beyond them a cell is a slip."""
 OFF_IS_EMPTY = ("kp", "scan_s")
 """Numbers that control systems export as 0 where there is none: a cell that says nothing."""
 SIGNED = ("pv_lo", "pv_hi", "op_lo", "op_hi", "kp")
@@ -153,14 +152,13 @@ def read_loops(path: Path, zone: str = UTC_NAME, day_first: bool | None = None) 
         The file is missing or empty, lacks the column `loop`, misspells a column, names a loop twice at one
         time, or holds what is no number, no known form or unit, or a range that does not rise.
     """
-    header, rows = _table(Path(path))
+    header, rows = csv_table(path, "loop")
     _check_header(path, header)
-    cells = [(row, dict(zip(header, filled, strict=False))) for row, filled in rows]
-    specs = tuple(_spec(path, row, own, zone, day_first) for row, own in cells)
+    specs = [(row, _spec(path, row, cells, zone, day_first)) for row, cells in rows]
     if not specs:
         raise InputError(f"{path}: no loops", "one row a loop below the header", "add the loops")
-    _check_unique(path, [(row, spec) for (row, _), spec in zip(rows, specs, strict=True)])
-    return _dated(specs)
+    _check_unique(path, specs)
+    return _dated([spec for _, spec in specs])
 
 
 def _dated(specs: Sequence[LoopSpec]) -> tuple[LoopSpec, ...]:
@@ -178,13 +176,13 @@ def unknown_columns(specs: Sequence[LoopSpec]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(name for spec in specs for name in spec.extra if name not in OWN_COLUMNS))
 
 
-def csv_text(path: Path, of: str) -> tuple[str, str]:
-    """What a CSV of loops or of changes holds, and its delimiter.
+def csv_table(path: Path, of: str) -> tuple[list[str], list[tuple[int, dict[str, str]]]]:
+    """Header in lower case of a CSV of loops or of changes, and its filled rows with their numbers in an editor.
 
     Raises
     ------
     InputError
-        It cannot be opened, or has a line beyond all measure.
+        It cannot be opened, is empty, or has a line beyond all measure.
     """
     try:
         data = Path(path).read_bytes()
@@ -195,18 +193,14 @@ def csv_text(path: Path, of: str) -> tuple[str, str]:
     if max(map(len, text.split("\n"))) > csv.field_size_limit():
         raise InputError(f"{path}: a line of more than 128 kB", f"one row a {of}", "correct the file")
     first = next((line for line in text.splitlines() if line.strip()), "")
-    return text, max(",;\t", key=first.count)
-
-
-def _table(path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
-    """Header in lower case, and the filled rows with their numbers as an editor counts them."""
-    text, delimiter = csv_text(path, "loop")
-    reader = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter)
+    reader = csv.reader(io.StringIO(text, newline=""), delimiter=max(",;\t", key=first.count))
     rows = [(reader.line_num, [cell.strip() for cell in cells]) for cells in reader]
     rows = [(row, cells) for row, cells in rows if any(cells) and not cells[0].startswith("#")]
     if not rows:
-        raise InputError(f"{path}: empty file", "a header with the column 'loop' and a row a loop", "fill it")
-    return [cell.lower() for cell in rows[0][1]], rows[1:]
+        expected = f"a header with the column 'loop' and a row a {of}"
+        raise InputError(f"{path}: empty file", expected, "fill it")
+    header = [cell.lower() for cell in rows[0][1]]
+    return header, [(row, dict(zip(header, cells, strict=False))) for row, cells in rows[1:]]
 
 
 def _check_header(path: Path, header: Sequence[str]) -> None:
@@ -251,8 +245,8 @@ def _number(path: Path, row: int, name: str, cell: str) -> float:
         number = float(cell if "." in cell else cell.replace(",", "."))
     except ValueError:
         number = math.nan
-    least, most, zero = MEANT[name]
-    sized = least <= abs(number) <= most or (zero and number == 0.0)  # false of NaN and inf
+    least, most = NUMBERS[name]
+    sized = least <= abs(number) <= most or number == 0.0  # false of NaN and inf
     if sized and (number >= 0.0 or name in SIGNED):
         return number
     expected = f"a number{'' if name in SIGNED else ', not below 0'}, of {least:g} to {most:g} in size"

@@ -103,7 +103,7 @@ def match(specs: Sequence[LoopSpec], tags: Iterable[str]) -> tuple[tuple[LoopSpe
 def in_order(specs: Sequence[LoopSpec], tags: Sequence[str]) -> tuple[Sequence[LoopSpec], tuple[str, ...]]:
     """Loops with the columns of a table without a header for their tags, in the order in which loops.csv states them,
     and a sentence on it; the loops as they are where the columns have names or are not as many."""
-    stated = [(k, role) for k, spec in enumerate(specs) for role in (_stated_roles(spec) or ROLES[:3])]
+    stated = [(k, role) for k, spec in enumerate(specs) for role in _stated_roles(spec)]
     if not tags or not all(UNNAMED.fullmatch(tag) for tag in tags) or len(stated) != len(tags):
         return specs, ()
     taken: list[dict[str, str]] = [{} for _ in specs]
@@ -116,7 +116,7 @@ def in_order(specs: Sequence[LoopSpec], tags: Sequence[str]) -> tuple[Sequence[L
 
 
 def _stated_roles(spec: LoopSpec) -> tuple[str, ...]:
-    return tuple(role for role in ROLES if getattr(spec, role))
+    return tuple(role for role in ROLES if getattr(spec, role)) or ROLES[:3]
 
 
 def _matched(spec: LoopSpec, known: Mapping[str, None], found: Mapping[str, str]) -> LoopSpec:
@@ -177,7 +177,7 @@ def controller(spec: LoopSpec, pv_span: float | None) -> Pid | None:
     if spec.kp is None or spec.ti is None or spec.kp == 0:
         return None
     gain = 100 / spec.kp if spec.gain_unit == "band" else spec.kp
-    ti_s, td_s = _seconds(spec.ti, spec.ti_unit), _derivative_s(spec)
+    ti_s, td_s = _seconds(spec.ti, spec.ti_unit), (spec.td or 0.0) * (1 if spec.ti_unit == "s" else 60)
     kp, ti_s, td_s = _to_ideal(spec.form, gain, ti_s, td_s)
     scan = {} if spec.scan_s is None else {"scan_s": spec.scan_s}
     return Pid(kp * unit_ratio(spec, pv_span), ti_s, td_s, **scan)
@@ -192,7 +192,9 @@ def as_stated(pid: Pid, spec: LoopSpec, pv_span: float | None) -> tuple[float, f
     gain = pid.kp / unit_ratio(spec, pv_span)
     gain, ti_s = _from_ideal(spec.form, gain, pid.ti_s, pid.td_s)
     kp = 100 / gain if spec.gain_unit == "band" else gain
-    return kp, _stated_time(ti_s, spec.ti_unit)
+    return kp, 0.0 if math.isinf(ti_s) else {"s": ti_s, "min": ti_s / 60, "repeats/min": 60 / ti_s}[
+        spec.ti_unit
+    ]
 
 
 def derivative_as_stated(pid: Pid, spec: LoopSpec, pv_span: float | None) -> float:
@@ -218,14 +220,6 @@ def unit_ratio(spec: LoopSpec, pv_span: float | None) -> float:
 def _seconds(ti: float, unit: str) -> float:
     """Integral time [s]; infinite where 0 switches the integral action off."""
     return math.inf if ti == 0 else {"s": ti, "min": 60 * ti, "repeats/min": 60 / ti}[unit]
-
-
-def _stated_time(ti_s: float, unit: str) -> float:
-    return 0.0 if math.isinf(ti_s) else {"s": ti_s, "min": ti_s / 60, "repeats/min": 60 / ti_s}[unit]
-
-
-def _derivative_s(spec: LoopSpec) -> float:
-    return (spec.td or 0.0) * (1 if spec.ti_unit == "s" else 60)
 
 
 def _to_ideal(form: Form, gain: float, ti_s: float, td_s: float) -> tuple[float, float, float]:

@@ -86,6 +86,14 @@ def test_changes_are_read_in_one_order(tmp_path: Path) -> None:
     assert [c.time_s for c in read_changes(path, day_first=True)] == [at("2026-05-12")]
 
 
+def test_rows_of_changes_are_counted_as_an_editor_does(tmp_path: Path) -> None:
+    """Blank lines and comments are no changes, and count among the rows that an error names."""
+    path = tmp_path / "changes.csv"
+    path.write_text("loop,time\n\n# tuned in May\nA,2026-05-12\n\nB,soon\n")
+    with pytest.raises(InputError, match="row 6: time 'soon'"):
+        read_changes(path)
+
+
 @pytest.mark.parametrize("time", ["25:00", "24:01", "12:61", "12:00:61", "12:00+99:00", "13:00 AM"])
 def test_what_no_clock_shows_is_refused(tmp_path: Path, time: str) -> None:
     """A time that no clock shows is one line with file and row, and not carried over into another hour or day."""
