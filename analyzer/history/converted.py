@@ -56,11 +56,11 @@ NAMED = "converted-"
 class Converted(Table):
     """A table as it was streamed.
 
-    `folder` holds `count` files, in which a row is by its tag; with `unquoted` quotes are no quotes.
+    `folder` holds one file, or of a long table those in which a row is by its tag; with `unquoted` quotes are no
+    quotes.
     """
 
     folder: Path
-    count: int
     unquoted: bool = False
 
     def head(self, columns: Sequence[int]) -> list[pa.Array]:
@@ -76,8 +76,8 @@ class Converted(Table):
         """
         if where is None:
             return self._columns(self._largest(), columns)
-        files = sorted({_bucket(tag, self.count) for tag in where[1]})
-        parts = [self._columns(self._file(k), [*columns, where[0]]) for k in files if self._file(k).exists()]
+        files = [_file(self.folder, k) for k in sorted({_bucket(tag) for tag in where[1]})]
+        parts = [self._columns(path, [*columns, where[0]]) for path in files if path.exists()]
         wanted = pa.array(where[1], pa.string())
         kept = [[a.filter(pc.is_in(part[-1], value_set=wanted)) for a in part[:-1]] for part in parts]
         empty = [pa.array([], self.types[i]) for i in columns]
@@ -85,27 +85,26 @@ class Converted(Table):
 
     def each(self, columns: Sequence[int]) -> Iterator[list[pa.Array]]:
         """Whole columns, file by file."""
-        for k in range(self.count):
-            if self._file(k).exists():
-                yield self._columns(self._file(k), columns)
+        return (self._columns(path, columns) for path in sorted(self.folder.glob("*.parquet")))
 
     def _columns(self, path: Path, columns: Sequence[int]) -> list[pa.Array]:
         with pq.ParquetFile(path) as file:
             table = file.read(columns=sorted({str(i) for i in columns}))
         return [trimmed(table.column(str(i)), self.unquoted) for i in columns]
 
-    def _file(self, k: int) -> Path:
-        return self.folder / f"{k:03d}.parquet"
-
     def _largest(self) -> Path:
         return max(self.folder.glob("*.parquet"), key=lambda p: (p.stat().st_size, p.name))
 
 
+def _file(folder: Path, k: int) -> Path:
+    return folder / f"{k:03d}.parquet"
+
+
 @lru_cache(maxsize=100_000)
-def _bucket(tag: str, count: int) -> int:
+def _bucket(tag: str) -> int:
     """The file of a tag: that of its loop, which is what stands before its last point, stroke or colon."""
     loop = tag[: max(tag.rfind(mark) for mark in "./:|")] or tag
-    return zlib.crc32(loop.encode("utf-8")) % count
+    return zlib.crc32(loop.encode("utf-8")) % BUCKETS
 
 
 def converted(sheet: Sheet, tag: int, scratch: Path | None) -> Converted:
@@ -140,7 +139,6 @@ def converted(sheet: Sheet, tag: int, scratch: Path | None) -> Converted:
         sheet.first_row,
         done.tags,
         folder=folder,
-        count=1 if tag < 0 else BUCKETS,
         unquoted=done.unquoted,
     )
 
@@ -149,7 +147,7 @@ def converted_parquet(table: ParquetTable, tag: int, scratch: Path | None) -> Co
     """The same of a long Parquet file, of which each loop's read would decode all."""
     room = 4 * table.path.stat().st_size
     folder, done = _laid(scratch, table.path, room, (table.names, tag), partial(_parted, table, tag))
-    return Converted(table.path, table.names, table.types, tags=done.tags, folder=folder, count=BUCKETS)
+    return Converted(table.path, table.names, table.types, tags=done.tags, folder=folder)
 
 
 def holds_copies(place: Path) -> bool:
@@ -213,16 +211,16 @@ def _streamed(sheet: Sheet, tag: int, folder: Path) -> Laid:
     """A sheet's rows laid into a folder."""
     once = partial(_pass, tag, folder)
     try:
-        done = as_far_as_numbers_go(sheet, once)
-        if is_swallowed(sheet, done.rows + done.left_out):
-            sheet = replace(sheet, unquoted=True)
-            done = as_far_as_numbers_go(sheet, once)
+        rows, done = as_far_as_numbers_go(sheet, once)
+        if is_swallowed(sheet, rows):
+            rows, done = as_far_as_numbers_go(replace(sheet, unquoted=True), once)
     except (UnicodeError, pa.ArrowInvalid) as error:
         raise unreadable(sheet.path, error) from error
-    return Laid(tuple(quotes_told(sheet.unquoted, done.left_out)), tuple(done.tags), sheet.unquoted)
+    return done
 
 
-def _pass(tag: int, folder: Path, sheet: Sheet, texts: Collection[int]) -> _Stream:
+def _pass(tag: int, folder: Path, sheet: Sheet, texts: Collection[int]) -> tuple[int, Laid]:
+    """How many lines of a sheet were rows or were left out, and what else was found out."""
     for left in folder.glob("*.parquet"):  # of a pass that was begun anew
         left.unlink()
     left_out: list[int] = []
@@ -232,8 +230,8 @@ def _pass(tag: int, folder: Path, sheet: Sheet, texts: Collection[int]) -> _Stre
         for batch in reader:
             stream.take(batch)
     stream.close()
-    stream.left_out = len(left_out)
-    return stream
+    told = tuple(quotes_told(sheet.unquoted, len(left_out)))
+    return stream.rows + len(left_out), Laid(told, tuple(stream.tags), sheet.unquoted)
 
 
 def _parted(table: ParquetTable, tag: int, folder: Path) -> Laid:
@@ -249,14 +247,12 @@ def _parted(table: ParquetTable, tag: int, folder: Path) -> Laid:
 
 
 class _Stream:
-    """One pass over an export: files, rows, lines left out, the tags met and the file of each."""
+    """One pass over an export: files, rows, and the tags in the order in which they are met."""
 
     def __init__(self, folder: Path, tag: int) -> None:
-        self.folder, self.tag = folder, tag
-        self.rows = self.left_out = 0
-        self.tags: dict[str, int] = {}
+        self.folder, self.tag, self.rows = folder, tag, 0
+        self.tags: dict[str, None] = {}
         self._held: dict[int, list[pa.RecordBatch]] = {}
-        self._waiting: dict[int, int] = {}
         self._writers: dict[int, pq.ParquetWriter] = {}
 
     def take(self, batch: pa.RecordBatch) -> None:
@@ -269,30 +265,25 @@ class _Stream:
             return
         coded = pc.dictionary_encode(batch.column(self.tag), null_encoding="encode")
         names = [str(name or "").strip(' \t"') for name in coded.dictionary.to_pylist()]
-        self.tags.update({name: _bucket(name, BUCKETS) for name in names if name and name not in self.tags})
-        of_kind = np.array([_bucket(name, BUCKETS) for name in names], dtype=np.uint8)  # small: sorted fast
+        self.tags.update(dict.fromkeys(filter(None, names)))
+        of_kind = np.array([_bucket(name) for name in names], dtype=np.uint8)  # small: sorted fast
         bucket = of_kind[coded.indices.to_numpy(zero_copy_only=False)]
         order = np.argsort(bucket, kind="stable")
-        ordered, cuts = (
-            batch.take(pa.array(order)),
-            np.searchsorted(bucket[order], np.arange(BUCKETS + 1)),
-        )
+        ordered, cuts = batch.take(pa.array(order)), np.searchsorted(bucket[order], np.arange(BUCKETS + 1))
         for k in np.unique(bucket):
             self._put(int(k), ordered.slice(cuts[k], cuts[k + 1] - cuts[k]))
 
     def _put(self, k: int, batch: pa.RecordBatch) -> None:
-        self._held.setdefault(k, []).append(batch)
-        self._waiting[k] = self._waiting.get(k, 0) + batch.num_rows
-        if self._waiting[k] >= HELD_ROWS:
+        held = self._held.setdefault(k, [])
+        held.append(batch)
+        if sum(part.num_rows for part in held) >= HELD_ROWS:
             self._write(k)
 
     def _write(self, k: int) -> None:
         table = pa.Table.from_batches(self._held.pop(k))
         if k not in self._writers:
-            path = self.folder / f"{k:03d}.parquet"
-            self._writers[k] = pq.ParquetWriter(path, table.schema, compression="snappy")
+            self._writers[k] = pq.ParquetWriter(_file(self.folder, k), table.schema, compression="snappy")
         self._writers[k].write_table(table.combine_chunks())
-        self._waiting[k] = 0
 
     def close(self) -> None:
         """Write what is held and close all files."""

@@ -106,31 +106,23 @@ class Export:
     @property
     def notes(self) -> tuple[str, ...]:
         """What was detected, a sentence each: on every file, and on the samples of all tags read so far."""
-        return (*self.file_notes, *self._sample_notes())
+        return (*self.file_notes, *met_told(self.met(self._met)))
 
     @property
     def file_notes(self) -> tuple[str, ...]:
         """What was detected of every file, and stamps that were set aside; first what could be read otherwise."""
-        notes = (*self.skipped, *self._file_notes(), *self._stray_notes())
+        files: dict[str, list[str]] = {}
+        for source in self.sources:
+            for note in source.notes:
+                files.setdefault(note, []).append(source.path.name)
+        notes = [*self.skipped, *(f"{_some(names)}: {note}" for note, names in files.items())]
+        if stray := sum(s.stray for s in self._spans.values()):
+            notes.append(f"{stray} stamps lie far from the rest of their file and are set aside")
         return tuple(sorted(notes, key=lambda note: DOUBT not in note))
 
     def met(self, tags: Iterable[str]) -> Counter[str]:
         """How often something worth telling was met in the samples of some tags that were read."""
         return sum((self._met[tag] for tag in tags if tag in self._met), Counter())
-
-    def _stray_notes(self) -> list[str]:
-        stray = sum(s.stray for s in self._spans.values())
-        return [f"{stray} stamps lie far from the rest of their file and are set aside"] if stray else []
-
-    def _file_notes(self) -> list[str]:
-        files: dict[str, list[str]] = {}
-        for source in self.sources:
-            for note in source.notes:
-                files.setdefault(note, []).append(source.path.name)
-        return [f"{_some(names)}: {note}" for note, names in files.items()]
-
-    def _sample_notes(self) -> list[str]:
-        return met_told(self.met(self._met))
 
     def _check_known(self, tags: Sequence[str]) -> None:
         missing = [tag for tag in tags if tag not in self._homes]

@@ -208,8 +208,7 @@ def unpacked(path: Path, scratch: Path | None) -> list[Path]:
             return [out]
         return [_member(path, folder)]
     except (OSError, EOFError, zipfile.BadZipFile, lzma.LZMAError, RuntimeError, zlib.error) as error:
-        why = " ".join(str(error).split())[:80] or type(error).__name__
-        seen = f"{path}: cannot be unpacked ({why})"
+        seen = f"{path}: cannot be unpacked ({_why(error)})"
         raise InputError(seen, "a whole archive", "export it again") from error
 
 
@@ -314,10 +313,13 @@ def sheets_as_text(path: Path, folder: Path) -> list[Path]:
     return found
 
 
+def _why(error: BaseException) -> str:
+    return " ".join(str(error).split())[:80] or type(error).__name__
+
+
 def _damaged(path: Path, error: BaseException) -> InputError:
-    why = " ".join(str(error).split())[:80] or type(error).__name__
     remedy = "open it and save it anew, without a password, or as CSV"
-    return InputError(f"{path}: cannot be read as a workbook ({why})", "a whole workbook", remedy)
+    return InputError(f"{path}: cannot be read as a workbook ({_why(error)})", "a whole workbook", remedy)
 
 
 def _sheets(path: Path, folder: Path) -> list[Path]:
