@@ -6,7 +6,7 @@ from __future__ import annotations
 import re
 from abc import ABC, abstractmethod
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Self
@@ -132,11 +132,10 @@ class WideSource(Source):
 
     def with_clock(self, clock: Clock) -> Self:
         """The same file, all its stamps read in the order of day and month, and the winter time, of another clock."""
-        known = {
-            own: replace(own, order=clock.order, winter_s=clock.winter_s)
-            for own in {c.clock for c in self.columns}
-        }
-        columns = tuple(replace(c, clock=known[c.clock]) for c in self.columns)
+        columns = tuple(
+            replace(c, clock=replace(c.clock, order=clock.order, winter_s=clock.winter_s))
+            for c in self.columns
+        )
         return replace(self, clock=columns[0].clock, columns=columns)
 
     def read(self, tags: Sequence[str]) -> dict[str, Series]:
@@ -146,18 +145,20 @@ class WideSource(Source):
         if not wanted:
             return {}
         needed = {i for c in wanted.values() for i in (*c.clock.columns, c.value, c.quality) if i >= 0}
-        columns = sorted(needed)
-        arrays = dict(zip(columns, self.table.read(columns), strict=True))
+        arrays = self._arrays(needed)
         timed = {clock: self._timed(clock, arrays) for clock in {c.clock for c in wanted.values()}}
         return {tag: self._samples(c, arrays, *timed[c.clock]) for tag, c in wanted.items()}
 
     def span(self) -> MainSpan:
         """Where the samples lie in time, stray ones apart [s since 1970-01-01 UTC]."""
-        clocks = {c.clock: None for c in self.columns}
-        columns = sorted({i for clock in clocks for i in clock.columns})
-        arrays = dict(zip(columns, self.table.read(columns), strict=True))
+        clocks = dict.fromkeys(c.clock for c in self.columns)
+        arrays = self._arrays({i for clock in clocks for i in clock.columns})
         stamps = [c.utc(*c.seconds([arrays[i] for i in c.columns]))[0] for c in clocks]
-        return main_span(np.concatenate(stamps) if len(stamps) > 1 else stamps[0])
+        return main_span(np.concatenate(stamps))
+
+    def _arrays(self, columns: Collection[int]) -> dict[int, pa.Array]:
+        """Whole columns by their positions."""
+        return dict(zip(sorted(columns), self.table.read(sorted(columns)), strict=True))
 
     def _timed(self, clock: Clock, arrays: dict[int, pa.Array]) -> tuple[Stamps, pa.Array | None]:
         """Stamps of one clock's rows, and which rows of the table these are; None where all are."""
@@ -374,10 +375,11 @@ def open_long(table: Table, options: ReadOptions) -> LongSource | None:
         if stated is None
         else stated_column(table.path, table.names, stated, "quality")
     )
+    source = LongSource(table, clock, tags, options.good_quality, tag, value)
     if quality is None:
-        return LongSource(table, clock, tags, options.good_quality, tag, value)
+        return source
     scheme = scheme_of(table.names[quality], _kinds(table, quality), mostly_one(table.head([quality])))
-    return LongSource(table, clock, tags, options.good_quality, tag, value, quality, scheme)
+    return replace(source, quality=quality, scheme=scheme)
 
 
 def _kinds(table: Table, column: int) -> pa.Array:

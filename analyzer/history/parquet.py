@@ -55,7 +55,10 @@ class ParquetTable(Table):
         if where is None:
             table = _file(self).read(columns=names)
         else:
-            table = _filtered(self, names, self.names[where[0]], where[1])
+            key, kind = pc.field(self.names[where[0]]), self.types[where[0]]
+            text = pa.types.is_string(kind) or pa.types.is_large_string(kind)
+            kept = (key if text else key.cast(pa.string())).isin([*where[1]])
+            table = pq.read_table(self.path, columns=names, filters=kept, partitioning=None)
         return [one_array(table.column(name)) for name in names]
 
 
@@ -139,11 +142,3 @@ def _opened(path: Path, changed_ns: int, process: int) -> pq.ParquetFile:
 def _file(table: ParquetTable) -> pq.ParquetFile:
     """The file, opened once by each process: of a footer with thousands of columns that takes as long as a loop."""
     return _opened(table.path, table.path.stat().st_mtime_ns, os.getpid())
-
-
-def _filtered(table: ParquetTable, names: list[str], key: str, wanted: Sequence[str]) -> pa.Table:
-    kind = table.types[table.names.index(key)]
-    text = pa.types.is_string(kind) or pa.types.is_large_string(kind)
-    field = pc.field(key) if text else pc.field(key).cast(pa.string())
-    keep = field.isin(list(wanted))
-    return pq.read_table(table.path, columns=names, filters=keep, partitioning=None)

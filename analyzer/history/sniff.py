@@ -243,7 +243,7 @@ def _taken_as(lines: Sequence[str], delimiter: str) -> tuple[str, ...] | None:
     Only where each of the first rows has the same shape: a stamp, a text that is none of the rest, and a number; or a
     stamp first and behind it numbers alone, which are named by their places (loops.csv may tell what they are).
     """
-    rows = [row for row in csv.reader(io.StringIO("\n".join(lines[:HEAD_LINES])), delimiter=delimiter) if row]
+    rows = [row for row in _split(lines[:HEAD_LINES], delimiter) if row]
     if len(rows) < 3 or len({len(row) for row in rows}) != 1 or len(rows[0]) < 3:
         return None
     columns = [[cell.strip() for cell in column] for column in zip(*rows, strict=True)]
@@ -252,8 +252,10 @@ def _taken_as(lines: Sequence[str], delimiter: str) -> tuple[str, ...] | None:
         return ("timestamp", *(UNNAMED.format(i + 1) for i in range(1, len(columns))))
     if len(columns) > 8 or kinds.count("stamp") != 1 or "text" not in kinds or "number" not in kinds:
         return None
-    tag = max(_places(kinds, "text"), key=lambda i: (len(set(columns[i])), -i))
-    value = max(_places(kinds, "number"), key=lambda i: (len(set(columns[i])), -i))
+    tag, value = (
+        max((i for i in range(len(columns)) if kinds[i] == kind), key=lambda i: (len(set(columns[i])), -i))
+        for kind in ("text", "number")
+    )
     names = [UNNAMED.format(i + 1) for i in range(len(columns))]
     names[tag], names[kinds.index("stamp")], names[value] = "tag", "timestamp", "value"
     free = [i for i in range(len(columns)) if names[i].startswith("column")]
@@ -261,10 +263,6 @@ def _taken_as(lines: Sequence[str], delimiter: str) -> tuple[str, ...] | None:
     if coded:
         names[max(coded, key=lambda i: (kinds[i] == "quality", i))] = "quality"
     return tuple(names)
-
-
-def _places(kinds: Sequence[str], kind: str) -> list[int]:
-    return [i for i, found in enumerate(kinds) if found == kind]
 
 
 def _kind(cells: Sequence[str]) -> str:

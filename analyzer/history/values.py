@@ -20,8 +20,7 @@ ERROR_TEXTS = frozenset(WORDS["values"]["none"])
 ERROR_SHAPES = re.compile(
     r"^(?:\?+|\[-?\d+\].*|#.*|[+-]?1?\.?#(?:qnan|snan|ind|inf).*|[+-]?1\.#.*|<.*>)$", re.IGNORECASE
 )
-
-
+"""What a historian writes in place of a value that it does not have."""
 MINUS = str.maketrans({"\u2212": "-", "\u2013": "-", "\u2012": "-", "\ufe63": "-", "\uff0d": "-"})
 """Signs that stand for a minus."""
 MINUS_BEHIND = re.compile(r"^([\d.,' \u00a0\u2007\u2009\u202f]*\d[.,]?)\s?-$")
@@ -42,11 +41,6 @@ LONGEST, SHOWN = 100, 60
 """Characters of a number at most, and of a text that notes show."""
 LIKE_NUMBER = re.compile(r"^[^\w]*\d")
 """A text that begins as a number does, and so was meant as one."""
-
-
-def is_error_text(text: str) -> bool:
-    """True where a historian writes this text in place of a value that it does not have."""
-    return text.lower() in ERROR_TEXTS or ERROR_SHAPES.match(text) is not None
 
 
 def values(stamp_s: NDArray[np.float64], column: pa.Array, decimal: str) -> Series:
@@ -80,7 +74,8 @@ def _from_texts(stamp_s: NDArray[np.float64], column: pa.Array, decimal: str) ->
     count = np.bincount(place, minlength=len(kinds))
     number, notes = parsed(kinds, decimal)
     blank = np.array([text == "" for text in kinds])
-    error = np.array([is_error_text(text) for text in kinds]) & ~np.isfinite(number)
+    error = np.array([text.lower() in ERROR_TEXTS or ERROR_SHAPES.match(text) is not None for text in kinds])
+    error &= ~np.isfinite(number)
     word = ~np.isfinite(number) & ~blank & ~error
     found = _found(kinds, count, blank, error)
     found.update({note: int(count[np.isfinite(number)].sum()) for note in notes})
