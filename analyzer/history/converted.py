@@ -30,7 +30,6 @@ from pyarrow import csv
 from analyzer.history.files import ends_of, own_scratch
 from analyzer.history.parquet import ParquetTable
 from analyzer.history.sheet import (
-    HEAD_ROWS,
     Sheet,
     as_far_as_numbers_go,
     is_swallowed,
@@ -38,7 +37,7 @@ from analyzer.history.sheet import (
     reading,
     unreadable,
 )
-from analyzer.history.table import Table, trimmed
+from analyzer.history.table import HEAD_ROWS, Table, trimmed
 from identification.errors import InputError
 
 BUCKETS = 64
@@ -64,7 +63,6 @@ class Converted(Table):
     unquoted: bool = False
 
     def head(self, columns: Sequence[int]) -> list[pa.Array]:
-        """First rows of some columns."""
         with pq.ParquetFile(self._largest()) as file:
             batch = next(file.iter_batches(batch_size=HEAD_ROWS, columns=[str(i) for i in columns]))
         return [trimmed(batch.column(str(i)), self.unquoted) for i in columns]
@@ -84,7 +82,6 @@ class Converted(Table):
         return [pa.concat_arrays(list(same)) for same in zip(*kept, strict=True)] if kept else empty
 
     def each(self, columns: Sequence[int]) -> Iterator[list[pa.Array]]:
-        """Whole columns, file by file."""
         return (self._columns(path, columns) for path in sorted(self.folder.glob("*.parquet")))
 
     def _columns(self, path: Path, columns: Sequence[int]) -> list[pa.Array]:

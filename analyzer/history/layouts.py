@@ -127,7 +127,6 @@ class WideSource(Source):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Format and layout of the file."""
         return (*self.table.notes, *self.layout, *self.clock.notes)
 
     def with_clock(self, clock: Clock) -> Self:
@@ -139,7 +138,6 @@ class WideSource(Source):
         return replace(self, clock=columns[0].clock, columns=columns)
 
     def read(self, tags: Sequence[str]) -> dict[str, Series]:
-        """Samples of those of `tags` that the file holds."""
         asked = set(tags)
         wanted = {tag: c for tag, c in zip(self.tags, self.columns, strict=True) if tag in asked}
         if not wanted:
@@ -150,7 +148,6 @@ class WideSource(Source):
         return {tag: self._samples(c, arrays, *timed[c.clock]) for tag, c in wanted.items()}
 
     def span(self) -> MainSpan:
-        """Where the samples lie in time, stray ones apart [s since 1970-01-01 UTC]."""
         clocks = dict.fromkeys(c.clock for c in self.columns)
         arrays = self._arrays({i for clock in clocks for i in clock.columns})
         stamps = [c.utc(*c.seconds([arrays[i] for i in c.columns]))[0] for c in clocks]
@@ -315,7 +312,6 @@ class LongSource(Source):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Format and layout of the file."""
         layout = f"long table, {len(self.tags)} tags in column '{self.table.names[self.tag]}'"
         if self.scheme is None:
             return (*self.table.notes, layout, *self.clock.notes)
@@ -323,7 +319,6 @@ class LongSource(Source):
         return (*self.table.notes, layout, quality, *self.clock.notes)
 
     def read(self, tags: Sequence[str]) -> dict[str, Series]:
-        """Samples of those of `tags` that the file holds."""
         present = set(self.tags)
         wanted = [tag for tag in tags if tag in present]
         if not wanted:
@@ -336,7 +331,6 @@ class LongSource(Source):
         return {name: self._samples(second, local, data, rows[name]) for name in wanted}
 
     def span(self) -> MainSpan:
-        """Where the samples lie in time, stray ones apart [s since 1970-01-01 UTC]."""
         spans = [
             main_span(stamp_s)
             for arrays in self.table.each(self.clock.columns)

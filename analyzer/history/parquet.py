@@ -15,10 +15,9 @@ import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
 from analyzer.history.names import check_once
-from analyzer.history.table import Table, one_array
+from analyzer.history.table import HEAD_ROWS, Table, one_array
 from identification.errors import InputError
 
-HEAD_ROWS = 1000
 OPEN_FILES = 4
 MANY_ROWS, ROWS_A_BYTE = 5e6, 20.0
 """Files of more rows than both are not read; ours: where any value moves there are 3 rows a byte at most, in whatever
@@ -39,7 +38,6 @@ class ParquetTable(Table):
     rows: int = 0
 
     def head(self, columns: Sequence[int]) -> list[pa.Array]:
-        """First rows of some columns."""
         names = [self.names[i] for i in columns]
         batches = _file(self).iter_batches(batch_size=HEAD_ROWS, columns=names)
         batch = next((b for b in batches if b.num_rows), None)
@@ -50,7 +48,6 @@ class ParquetTable(Table):
         return [batch.column(name) for name in names]
 
     def read(self, columns: Sequence[int], where: tuple[int, Sequence[str]] | None = None) -> list[pa.Array]:
-        """Whole columns, or the rows where a column holds one of some texts."""
         names = [self.names[i] for i in columns]
         if where is None:
             table = _file(self).read(columns=names)

@@ -13,12 +13,11 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from pyarrow import csv
 
-from analyzer.history.table import Table, as_text, trimmed
+from analyzer.history.table import HEAD_ROWS, Table, as_text, trimmed
 from identification.errors import InputError
 
 WHOLE_FILE_BYTES = 64_000_000  # files below are read at once and kept for the next loop's read
 KEPT_READS = 2
-HEAD_ROWS = 1000
 BLOCK_BYTES = 1 << 24
 WHOLE_SHARE = 0.95
 """Share of a file's lines that must come back as rows [-]; where fewer do, an open quote has swallowed the rest."""
@@ -52,13 +51,11 @@ class Sheet(Table):
         return (*self.found, *quotes_told(loaded.unquoted, loaded.left_out))
 
     def head(self, columns: Sequence[int]) -> list[pa.Array]:
-        """First rows of some columns."""
         if self.bytes >= WHOLE_FILE_BYTES:
             return [_first_block(self)[i] for i in columns]
         return [array.slice(0, HEAD_ROWS) for array in self.read(columns)]
 
     def read(self, columns: Sequence[int], where: tuple[int, Sequence[str]] | None = None) -> list[pa.Array]:
-        """Whole columns, or the rows where a column holds one of some texts."""
         columns_read = _loaded(self).columns
         arrays = [columns_read[i] for i in columns]
         if where is None:

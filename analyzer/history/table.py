@@ -12,6 +12,9 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
+HEAD_ROWS = 1000
+"""Rows by which a table is known before it is read."""
+
 
 @dataclass(frozen=True, slots=True)
 class ReadOptions:

@@ -199,17 +199,12 @@ def settings_from(spec: LoopSpec, changes: Sequence[TuningChange], at_s: float, 
     if now.kp is None and now.ti is None:
         return ""
     dated = _dated(spec, at_s)
-    own = sorted(c.time_s for c in changes if c.loop == spec.loop)
-    before = [t for t in own if t <= at_s]
-    if (now.kp, now.ti) != (dated.kp, dated.ti) and not before:
-        return f"changes.csv, before {date_of(own[0], zone)}"
-    if before and _tells(changes, spec.loop, before[-1]):
-        return f"changes.csv, from {date_of(before[-1], zone)}"
+    own = sorted((c for c in changes if c.loop == spec.loop), key=lambda c: c.time_s)
+    last_s = max((c.time_s for c in own if c.time_s <= at_s), default=None)
+    if (now.kp, now.ti) != (dated.kp, dated.ti) and last_s is None:
+        return f"changes.csv, before {date_of(own[0].time_s, zone)}"
+    typed_in = [c for c in own if c.time_s == last_s and (c.kp_new is not None or c.ti_new is not None)]
+    if typed_in:
+        return f"changes.csv, from {date_of(typed_in[0].time_s, zone)}"
     since = dated.valid_from_s if spec.earlier else None
     return "loops.csv" if since is None else f"loops.csv, from {date_of(since, zone)}"
-
-
-def _tells(changes: Sequence[TuningChange], loop: str, time_s: float) -> bool:
-    """Whether a change says what was typed in."""
-    last = [c for c in changes if c.loop == loop and c.time_s == time_s]
-    return any(c.kp_new is not None or c.ti_new is not None for c in last)
