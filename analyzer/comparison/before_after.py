@@ -67,7 +67,7 @@ class Measure:
 
     name : its column in the table of hours; least : differences below this, in the figure's unit, are none; scale :
     factor from the hourly mean to the unit shown, which is that of the column where scaled_unit is ''; primary : one
-    of the study's four; lower_is_better, largest : which way is better, and its upper end.
+    of the study's four; lower_is_better : which way is better.
     """
 
     name: str
@@ -75,7 +75,6 @@ class Measure:
     primary: bool = False
     scale: float = 1.0
     lower_is_better: bool = True
-    largest: float = np.inf
     scaled_unit: str = ""
 
     @property
@@ -101,10 +100,10 @@ MEASURES = (
     Measure("variability_pct", 0.01, primary=True),
     Measure("reversals_per_h", 0.5),
     Measure("crossings_per_h", 0.5),
-    Measure("oscillating_pct", 2.0, largest=100.0),
+    Measure("oscillating_pct", 2.0),
     Measure("pv_variability_pct", 0.01),
-    Measure("at_limits_pct", 1.0, largest=100.0),
-    Measure("service_pct", 1.0, lower_is_better=False, largest=100.0),
+    Measure("at_limits_pct", 1.0),
+    Measure("service_pct", 1.0, lower_is_better=False),
 )
 """The study's four first (its section 7), then the others of the store. Least differences are ours: about the
 resolution of what a historian keeps."""

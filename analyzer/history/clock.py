@@ -213,12 +213,6 @@ def counted_s(texts: pa.Array) -> NDArray[np.float64]:
     return np.asarray(3600.0 * hour + 60.0 * minute + second)
 
 
-def is_count(column: pa.Array) -> bool:
-    """Whether numbers merely count the rows: whole, and each one more than the one before."""
-    number = numbers(column)
-    return number.size > 1 and bool((np.diff(number) == 1).all()) and number[0] in (0.0, 1.0)
-
-
 def date_and_time(arrays: Sequence[pa.Array]) -> pa.Array:
     """A column of dates and a column of times of day as one column of text."""
     return pc.binary_join_element_wise(*(_trimmed_midnight(as_text(array)) for array in arrays), " ")

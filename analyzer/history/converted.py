@@ -29,14 +29,7 @@ from pyarrow import csv
 
 from analyzer.history.files import ends_of, own_scratch
 from analyzer.history.parquet import ParquetTable
-from analyzer.history.sheet import (
-    Sheet,
-    as_far_as_numbers_go,
-    is_swallowed,
-    quotes_told,
-    reading,
-    unreadable,
-)
+from analyzer.history.sheet import Sheet, as_far_as_numbers_go, is_swallowed, quotes_told, reading, unreadable
 from analyzer.history.table import HEAD_ROWS, Table, trimmed
 from identification.errors import InputError
 

@@ -17,19 +17,7 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from analyzer.history.clock import Clock
-from analyzer.history.names import (
-    COLUMNS,
-    LONGEST,
-    QUALITY_NAMES,
-    STAMP_NAMES,
-    TAG_NAMES,
-    VALUE_NAMES,
-    check_once,
-    first_named,
-    plain,
-    stated_column,
-    with_loop,
-)
+from analyzer.history.names import COLUMNS, LONGEST, check_once, first_named, plain, stated_column, with_loop
 from analyzer.history.quality import Scheme, mostly_one, not_good, quality_columns, scheme_of
 from analyzer.history.series import MainSpan, NoStampError, Series, main_span
 from analyzer.history.table import ReadOptions, Table, as_text, is_number, is_text
@@ -274,7 +262,7 @@ def _groups(table: Table) -> list[tuple[int, list[int]]]:
 def _is_time(name: str) -> bool:
     """Whether a column's own name is that of stamps."""
     bare = NUMBERED.sub("", name[:LONGEST])
-    return plain(bare) in STAMP_NAMES or any((TIME_WORDS.search(bare), TIME_FIRST.match(bare)))
+    return plain(bare) in COLUMNS["stamp"] or any((TIME_WORDS.search(bare), TIME_FIRST.match(bare)))
 
 
 def _time_name(table: Table, i: int) -> str:
@@ -286,7 +274,7 @@ def _time_name(table: Table, i: int) -> str:
 
 def _paired(table: Table, time: int, beside: Sequence[int], options: ReadOptions) -> list[TagColumn]:
     """The tags that share one clock: those behind it that hold values, with their quality."""
-    quality = [i for i in beside if plain(NUMBERED.sub("", table.names[i])) in QUALITY_NAMES]
+    quality = [i for i in beside if plain(NUMBERED.sub("", table.names[i])) in COLUMNS["quality"]]
     held = [i for i in beside if i not in quality]
     clock = stamps_clock(table, time, options)
     single = quality[0] if len(quality) == 1 and len(held) == 1 else -1
@@ -296,7 +284,7 @@ def _paired(table: Table, time: int, beside: Sequence[int], options: ReadOptions
 def _tag(table: Table, column: TagColumn) -> str:
     """The tag's name: above its values, or where that says nothing above its stamps."""
     own, other = table.names[column.value], table.names[column.clock.columns[0]]
-    if plain(NUMBERED.sub("", own)) in VALUE_NAMES or own == "":
+    if plain(NUMBERED.sub("", own)) in COLUMNS["value"] or own == "":
         return TIME_WORDS.sub("", other[:LONGEST]) or other
     return VALUE_WORDS.sub("", own[:LONGEST]) or own
 
@@ -350,7 +338,7 @@ class LongSource(Source):
 
 def tag_column(table: Table) -> int:
     """The column of tags of a long table, -1 of any other."""
-    tag = first_named(table.names, TAG_NAMES)
+    tag = first_named(table.names, COLUMNS["tag"])
     return -1 if tag is None or _value_column(table) is None else tag
 
 
@@ -365,7 +353,7 @@ def open_long(table: Table, options: ReadOptions) -> LongSource | None:
     tags = tuple(str(name) for name in met if name not in (None, ""))
     stated = options.quality_column
     quality = (
-        first_named(table.names, QUALITY_NAMES)
+        first_named(table.names, COLUMNS["quality"])
         if stated is None
         else stated_column(table.path, table.names, stated, "quality")
     )
@@ -383,11 +371,11 @@ def _kinds(table: Table, column: int) -> pa.Array:
 
 def _value_column(table: Table) -> int | None:
     """The column that is named so, else the only one of numbers that is neither time nor quality."""
-    named = first_named(table.names, VALUE_NAMES)
+    named = first_named(table.names, COLUMNS["value"])
     if named is not None:
         return named
     floating = [i for i, kind in enumerate(table.types) if pa.types.is_floating(kind)]
-    taken = {*STAMP_NAMES, *QUALITY_NAMES} - {
+    taken = {*COLUMNS["stamp"], *COLUMNS["quality"]} - {
         "data"
     }  # a date in Italian, but numbers of that name are values
     free = [i for i in floating if plain(table.names[i]) not in taken]

@@ -13,9 +13,6 @@ from identification.errors import InputError
 
 WORDS: dict[str, Any] = tomllib.loads(Path(__file__).with_name("words.toml").read_text(encoding="utf-8"))
 COLUMNS: dict[str, tuple[str, ...]] = {kind: tuple(names) for kind, names in WORDS["columns"].items()}
-STAMP_NAMES, TAG_NAMES, VALUE_NAMES, QUALITY_NAMES = (
-    COLUMNS[kind] for kind in ("stamp", "tag", "value", "quality")
-)
 BELOW_SECOND = {
     name: unit_s
     for kind, unit_s in (("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9))
@@ -62,7 +59,7 @@ def is_stamp(name: str) -> bool:
     if not plain(name):
         return False
     bare = plain(without_unit(name))
-    return plain(name) in STAMP_NAMES or bare in STAMP_NAMES or bare in COLUMNS["elapsed"]
+    return plain(name) in COLUMNS["stamp"] or bare in COLUMNS["stamp"] or bare in COLUMNS["elapsed"]
 
 
 def first_named(names: Sequence[str], wanted: Iterable[str]) -> int | None:
@@ -98,7 +95,7 @@ def check_once(path: Path, names: Sequence[str]) -> None:
 def with_loop(names: Sequence[str], stem: str) -> tuple[str, ...]:
     """Full tags: bare columns such as 'PV' and 'OP' belong to the loop that the file is named for, and a lone column
     of values to the tag that it is named for."""
-    if len(names) == 1 and plain(names[0]) in VALUE_NAMES:
+    if len(names) == 1 and plain(names[0]) in COLUMNS["value"]:
         return (stem,)
     if not names or not all(plain(name) in COLUMNS["bare_ending"] for name in names):
         return tuple(names)

@@ -18,7 +18,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
-from analyzer.history.names import COLUMNS, LONGEST, QUALITY_NAMES, QUALITY_OF, WORDS, plain
+from analyzer.history.names import COLUMNS, LONGEST, QUALITY_OF, WORDS, plain
 from analyzer.history.table import Table
 
 GOOD, BAD, NOT_BAD, IS_BAD = (
@@ -134,7 +134,7 @@ def quality_columns(table: Table, free: Sequence[int]) -> tuple[dict[int, int], 
     by_name = {names[i]: i for i in reversed(free)}
     named = {i: by_name[tag] for i in free if (tag := _tag_of(names[i], by_name)) is not None}
     found = {tag: i for i, tag in named.items() if _is_coded(table, i)}
-    bare = [i for i in free if plain(names[i]) in QUALITY_NAMES and i not in found.values()]
+    bare = [i for i in free if plain(names[i]) in COLUMNS["quality"] and i not in found.values()]
     values = [i for i in free if i not in bare and i not in found.values()]
     if len(bare) > 1:
         return {**{i - 1: i for i in bare if i - 1 in values}, **found}, []

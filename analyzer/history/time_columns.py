@@ -11,19 +11,10 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from analyzer.history import stamps, zones
-from analyzer.history.clock import (
-    ELAPSED,
-    SINCE_START,
-    Clock,
-    counted_s,
-    date_and_time,
-    is_count,
-    time_scale_of,
-)
+from analyzer.history.clock import ELAPSED, SINCE_START, Clock, counted_s, date_and_time, time_scale_of
 from analyzer.history.names import (
     BELOW_SECOND,
     COLUMNS,
-    STAMP_NAMES,
     is_stamp,
     plain,
     stated_column,
@@ -31,7 +22,7 @@ from analyzer.history.names import (
     without_unit,
 )
 from analyzer.history.stamps import DateOrder, date_order
-from analyzer.history.table import ReadOptions, Table, as_text, is_number, is_text
+from analyzer.history.table import ReadOptions, Table, as_text, is_number, is_text, numbers
 from identification.errors import InputError
 
 TIME_OF_DAY = r"^\s*\d{1,2}(:\d\d(:\d\d([.,;]\d+)?)?|\.\d\d\.\d\d([.,]\d+)?)\s*([AaPp]\.?[Mm]\.?)?\s*$"
@@ -49,7 +40,7 @@ SHOWN = 60
 """Characters of a cell that an error shows."""
 FINER = "timems"
 """Column of WinCC that holds its text's stamp to the microsecond, in millions of Excel days."""
-RANK = {name: i for i, name in enumerate((*STAMP_NAMES, *COLUMNS["time_of_day"]))}
+RANK = {name: i for i, name in enumerate((*COLUMNS["stamp"], *COLUMNS["time_of_day"]))}
 
 
 def find_clock(table: Table, options: ReadOptions) -> Clock:
@@ -170,8 +161,14 @@ def _is_doubtful(table: Table, clock: Clock, kinds: dict[int, str], heads: dict[
         return False
     unread = [i for i, head in heads.items() if kinds[i] == "" and head.null_count < len(head)]
     return any(is_stamp(table.names[i]) for i in unread) or (
-        clock.scale is not None and is_count(heads[chosen])
+        clock.scale is not None and _is_count(heads[chosen])
     )
+
+
+def _is_count(column: pa.Array) -> bool:
+    """Whether numbers merely count the rows: whole, and each one more than the one before."""
+    number = numbers(column)
+    return number.size > 1 and bool((np.diff(number) == 1).all()) and number[0] in (0.0, 1.0)
 
 
 def _candidates(table: Table, options: ReadOptions) -> list[int]:
@@ -229,13 +226,13 @@ def _chosen(table: Table, kinds: dict[int, str], options: ReadOptions) -> Clock 
         return replace(clock, columns=(named[0],)) if named else None
     if "date" in by_kind and "time of day" in by_kind:
         return replace(clock, columns=(by_kind["date"][0], by_kind["time of day"][0]))
-    numbers = by_kind.get("number", [])
-    finer = next((i for i in numbers if plain(table.names[i]) == FINER), None)
+    of_numbers = by_kind.get("number", [])
+    finer = next((i for i in of_numbers if plain(table.names[i]) == FINER), None)
     if finer is not None and (scale := time_scale_of(table.head([finer])[0])) is not None:
         return replace(clock, columns=(finer,), scale=scale)
-    if "full" not in by_kind and numbers:
-        scale = time_scale_of(table.head(numbers[:1])[0], time_unit(table.names[numbers[0]]))
-        return replace(clock, columns=(numbers[0],), scale=scale)
+    if "full" not in by_kind and of_numbers:
+        scale = time_scale_of(table.head(of_numbers[:1])[0], time_unit(table.names[of_numbers[0]]))
+        return replace(clock, columns=(of_numbers[0],), scale=scale)
     of_text = by_kind.get("full") or by_kind.get("date")
     if of_text:
         return replace(clock, columns=(of_text[0],))

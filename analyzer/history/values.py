@@ -57,8 +57,6 @@ def values(stamp_s: NDArray[np.float64], column: pa.Array, decimal: str) -> Seri
     """
     if is_text(column.type):
         return _from_texts(stamp_s, column, decimal)
-    if pa.types.is_dictionary(column.type):
-        column = column.dictionary_decode()
     value = numbers(column)
     bad = ~np.isfinite(value)
     if bad.any():
