@@ -228,11 +228,7 @@ def _verdict(found: Difference, measure: Measure, limits: ComparisonLimits) -> C
 
 
 def change_of(
-    hours: Hours,
-    spans: tuple[Span, Span],
-    measure: Measure,
-    comparable: bool,
-    limits: ComparisonLimits = LIMITS,
+    hours: Hours, spans: tuple[Span, Span], measure: Measure, comparable: bool, limits: ComparisonLimits
 ) -> Change | None:
     """The change of one figure; None where it is not known on both sides."""
     before, after = (gridded(hours, s, measure.name) for s in spans)

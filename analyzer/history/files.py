@@ -91,12 +91,10 @@ def export_files(paths: Sequence[Path]) -> list[Path]:
     InputError
         A path is missing, cannot be opened, or is a folder without exports.
     """
-    found: dict[Path, None] = {}
-    for path in paths:
-        found.update(dict.fromkeys(_within(Path(path))))
+    found = list(dict.fromkeys(file for path in paths for file in _within(Path(path))))
     if not found:
         raise InputError("no path to an export", "a file or a folder", "name the export to read")
-    return list(found)
+    return found
 
 
 def ends_of(path: Path) -> bytes:

@@ -375,9 +375,7 @@ def _value_column(table: Table) -> int | None:
     if named is not None:
         return named
     floating = [i for i, kind in enumerate(table.types) if pa.types.is_floating(kind)]
-    taken = {*COLUMNS["stamp"], *COLUMNS["quality"]} - {
-        "data"
-    }  # a date in Italian, but numbers of that name are values
+    taken = {*COLUMNS["stamp"], *COLUMNS["quality"]} - {"data"}  # a date in Italian, but of numbers a value
     free = [i for i in floating if plain(table.names[i]) not in taken]
     return free[0] if len(free) == 1 else None
 

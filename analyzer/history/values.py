@@ -75,14 +75,14 @@ def _from_texts(stamp_s: NDArray[np.float64], column: pa.Array, decimal: str) ->
     error = np.array([text.lower() in ERROR_TEXTS or ERROR_SHAPES.match(text) is not None for text in kinds])
     error &= ~np.isfinite(number)
     word = ~np.isfinite(number) & ~blank & ~error
-    found = _found(kinds, count, blank, error)
+    found = _as_bad(kinds, count, error) + Counter({BLANK: int(count[blank].sum())})
     found.update({note: int(count[np.isfinite(number)].sum()) for note in notes})
     unread = word & np.array([LIKE_NUMBER.match(text) is not None for text in kinds])
     lost, example = int(count[unread].sum()), next((kinds[i] for i in np.flatnonzero(unread)), "")
     if count[word].sum() * 2 > count[~blank & ~error].sum() and not lost:
         text = np.array(kinds, dtype=object)
         return Series(stamp_s, number[place], (blank | error)[place], text[place], found=found)
-    found.update(_found(kinds, count, np.zeros_like(blank), word))
+    found.update(_as_bad(kinds, count, word))
     return Series(stamp_s, number[place], ~np.isfinite(number[place]), None, lost, example, found)
 
 
@@ -129,11 +129,9 @@ def _without_unit(texts: list[str]) -> tuple[list[str], str]:
     return [text if m is None else m["number"] for text, m in zip(texts, found, strict=True)], units.pop()
 
 
-def _found(
-    kinds: list[str], count: NDArray[np.int64], blank: NDArray[np.bool_], error: NDArray[np.bool_]
-) -> Counter[str]:
+def _as_bad(kinds: list[str], count: NDArray[np.int64], which: NDArray[np.bool_]) -> Counter[str]:
+    """How often each of some texts was met, in words."""
     found: Counter[str] = Counter()
-    for i in np.flatnonzero(error & (count > 0)):
+    for i in np.flatnonzero(which & (count > 0)):
         found[f"values are the text '{kinds[i][:SHOWN]}', taken as bad"] += int(count[i])
-    found[BLANK] += int(count[blank].sum())
-    return +found
+    return found
