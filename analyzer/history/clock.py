@@ -62,6 +62,7 @@ SINCE_START = {
 """Clocks that count from the start, by the unit that the column's name states; seconds where it states none."""
 ELAPSED = TimeScale("hours, minutes and seconds since the start", 0, 0, 1.0)
 """A clock in text that counts from the start, such as 25:10:03."""
+MIDNIGHT = r"[ T]0?0:00:00(?:\.0+)?$"
 COUNTED = r"^\s*(?P<h>\d{1,5}):(?P<m>[0-5]\d):(?P<s>[0-5]\d(?:[.,]\d+)?)\s*$"
 SECONDS = TimeScale("seconds since 1970", 1e8, 3e9, 1.0)
 SCALES = (
@@ -126,7 +127,7 @@ class Clock:
         if self.below_s > 0:
             second, local = replace(self, below_s=0.0).seconds(arrays[:-1])
             return second + numbers(pc.fill_null(arrays[-1], 0)) * self.below_s, local
-        column = arrays[0] if len(arrays) == 1 else date_and_time(arrays)
+        column = date_and_time(arrays)
         if self.scale is ELAPSED:
             return counted_s(as_text(column)), False
         if pa.types.is_date(column.type):
@@ -214,12 +215,12 @@ def counted_s(texts: pa.Array) -> NDArray[np.float64]:
 
 
 def date_and_time(arrays: Sequence[pa.Array]) -> pa.Array:
-    """A column of dates and a column of times of day as one column of text."""
-    return pc.binary_join_element_wise(*(_trimmed_midnight(as_text(array)) for array in arrays), " ")
-
-
-def _trimmed_midnight(texts: pa.Array) -> pa.Array:
-    return pc.replace_substring_regex(texts, r"[ T]0?0:00:00(?:\.0+)?$", "")
+    """A column of dates and a column of times of day as one column of text; one column alone as it is."""
+    if len(arrays) == 1:
+        return arrays[0]
+    return pc.binary_join_element_wise(
+        *(pc.replace_substring_regex(as_text(array), MIDNIGHT, "") for array in arrays), " "
+    )
 
 
 def _from_timestamps(column: pa.Array) -> NDArray[np.float64]:

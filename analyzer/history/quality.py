@@ -19,7 +19,7 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from analyzer.history.names import COLUMNS, LONGEST, QUALITY_OF, WORDS, plain
-from analyzer.history.table import Table
+from analyzer.history.table import Table, distinct
 
 GOOD, BAD, NOT_BAD, IS_BAD = (
     frozenset(WORDS["quality"][kind]) for kind in ("good", "bad", "not_bad", "is_bad")
@@ -103,21 +103,14 @@ def not_good(
     `good` are codes or texts that count as good whatever the scheme says, None where the scheme counts; a blank is
     bad, but where codes stand only where something is wrong.
     """
-    encoded = codes if pa.types.is_dictionary(codes.type) else pc.dictionary_encode(codes)
-    place = pc.fill_null(encoded.indices, len(encoded.dictionary)).to_numpy(zero_copy_only=False)
-    kinds = pa.concat_arrays([encoded.dictionary, pa.nulls(1, encoded.dictionary.type)])
+    kinds, place, count = distinct(codes)
     bad = ~_good(kinds, scheme) if good is None else ~_listed(kinds, good)
-    count = np.bincount(place, minlength=len(kinds))
     names = kinds.to_pylist()
     blank = np.array([name is None or str(name).strip() == "" for name in names])
     if good is None and bad[~blank].all() and 2 * count[blank].sum() > count.sum():
         bad = bad & ~blank
-    found = Counter(
-        {
-            f"samples have quality '{str(names[i])[:60]}', taken as bad": int(count[i])
-            for i in np.flatnonzero(bad)
-        }
-    )
+    told = "samples have quality '{:.60}', taken as bad"
+    found = Counter({told.format(str(names[i])): int(count[i]) for i in np.flatnonzero(bad)})
     found[FLAGGED_INTERPOLATED] = int(count[_interpolated(kinds, scheme)].sum())
     return bad[place], +found
 

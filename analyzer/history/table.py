@@ -108,6 +108,14 @@ def numbers(column: pa.Array) -> NDArray[np.float64]:
     return np.asarray(pc.cast(column, pa.float64(), safe=False).to_numpy(zero_copy_only=False))
 
 
+def distinct(column: pa.Array) -> tuple[pa.Array, NDArray[np.int64], NDArray[np.int64]]:
+    """The distinct cells of a column, an empty one last; where each cell is among them; and how often each comes."""
+    encoded = column if pa.types.is_dictionary(column.type) else pc.dictionary_encode(column)
+    kinds = pa.concat_arrays([encoded.dictionary, pa.nulls(1, encoded.dictionary.type)])
+    place = pc.fill_null(encoded.indices, len(kinds) - 1).to_numpy(zero_copy_only=False)
+    return kinds, place, np.bincount(place, minlength=len(kinds))
+
+
 def one_array(column: pa.Array | pa.ChunkedArray) -> pa.Array:
     """A column in one piece."""
     array = column.combine_chunks() if isinstance(column, pa.ChunkedArray) else column

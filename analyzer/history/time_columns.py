@@ -119,7 +119,7 @@ def _with_order(table: Table, clock: Clock, options: ReadOptions) -> Clock:
 
 
 def _texts(arrays: Sequence[pa.Array]) -> pa.Array | None:
-    column = arrays[0] if len(arrays) == 1 else date_and_time(arrays)
+    column = date_and_time(arrays)
     return as_text(column) if is_text(column.type) else None
 
 

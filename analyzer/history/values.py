@@ -8,12 +8,11 @@ from collections import Counter
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from analyzer.history.names import WORDS
 from analyzer.history.series import Series
-from analyzer.history.table import is_text, numbers
+from analyzer.history.table import distinct, is_text, numbers
 
 BLANK = "cells are blank: no value (a historian that reports by exception leaves unchanged values blank)"
 ERROR_TEXTS = frozenset(WORDS["values"]["none"])
@@ -66,10 +65,8 @@ def values(stamp_s: NDArray[np.float64], column: pa.Array, decimal: str) -> Seri
 
 def _from_texts(stamp_s: NDArray[np.float64], column: pa.Array, decimal: str) -> Series:
     """Every distinct text is read once; the samples refer to it by number."""
-    encoded = column if pa.types.is_dictionary(column.type) else pc.dictionary_encode(column)
-    place = pc.fill_null(encoded.indices, len(encoded.dictionary)).to_numpy(zero_copy_only=False)
-    kinds = [str(text).strip() for text in encoded.dictionary.to_pylist()] + [""]
-    count = np.bincount(place, minlength=len(kinds))
+    cells, place, count = distinct(column)
+    kinds = [str(text or "").strip() for text in cells.to_pylist()]
     number, notes = parsed(kinds, decimal)
     blank = np.array([text == "" for text in kinds])
     error = np.array([text.lower() in ERROR_TEXTS or ERROR_SHAPES.match(text) is not None for text in kinds])
