@@ -218,9 +218,8 @@ def date_and_time(arrays: Sequence[pa.Array]) -> pa.Array:
     """A column of dates and a column of times of day as one column of text; one column alone as it is."""
     if len(arrays) == 1:
         return arrays[0]
-    return pc.binary_join_element_wise(
-        *(pc.replace_substring_regex(as_text(array), MIDNIGHT, "") for array in arrays), " "
-    )
+    texts = (pc.replace_substring_regex(as_text(array), MIDNIGHT, "") for array in arrays)
+    return pc.binary_join_element_wise(*texts, " ")
 
 
 def _from_timestamps(column: pa.Array) -> NDArray[np.float64]:
