@@ -104,8 +104,10 @@ def _oldest_first(piece: Series, found: Counter[str]) -> Series:
 def _joined(pieces: Sequence[Series]) -> Series:
     texts = None
     if any(piece.text is not None for piece in pieces):
-        blank = [np.full(len(piece.value), "", dtype=object) for piece in pieces]
-        texts = np.concatenate([b if p.text is None else p.text for p, b in zip(pieces, blank, strict=True)])
+        blank = np.array("", dtype=object)
+        texts = np.concatenate(
+            [np.broadcast_to(blank if p.text is None else p.text, p.value.shape) for p in pieces]
+        )
     return Series(
         np.concatenate([piece.stamp_s for piece in pieces]),
         np.concatenate([piece.value for piece in pieces]),

@@ -22,18 +22,9 @@ from identification.models import Form
 STATED: dict[str, Any] = tomllib.loads(Path(__file__).with_name("loops.toml").read_text(encoding="utf-8"))
 """What tags end in, what other systems call the columns, and what is assumed where a row is silent."""
 ROLES = ("sp", "pv", "op", "mode", "position")
-TEXTS = (
-    "loop",
-    "description",
-    "type",
-    "area",
-    "master",
-    "ratio_of",
-    "split_of",
-    "override_with",
-    "feedforward",
-    "pv_unit",
-)
+RELATIONS = ("master", "ratio_of", "split_of", "override_with", "feedforward")
+"""What names another loop."""
+TEXTS = ("loop", "description", "type", "area", *RELATIONS, "pv_unit")
 NUMBERS: Mapping[str, tuple[float, float]] = {
     **dict.fromkeys(("pv_lo", "pv_hi", "op_lo", "op_hi"), (1e-9, 1e12)),
     "kp": (1e-6, 1e6),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -63,7 +64,8 @@ def _roles(endings: Mapping[str, str]) -> dict[str, str]:
 
 def _without_blocks(loops: dict[str, dict[str, str]]) -> dict[str, dict[str, str]]:
     modules = {loop: match["module"] for loop in loops if (match := _BLOCK.match(loop))}
-    single = {loop: module for loop, module in modules.items() if list(modules.values()).count(module) == 1}
+    blocks = Counter(modules.values())
+    single = {loop: module for loop, module in modules.items() if blocks[module] == 1}
     return {single.get(loop, loop) if single.get(loop) not in loops else loop: loops[loop] for loop in loops}
 
 
