@@ -51,12 +51,13 @@ def source_of(table: Table, options: ReadOptions) -> Source:
 
 @dataclass(frozen=True, slots=True)
 class Source(ABC):
-    """One file whose layout is understood; small, picklable, holds no samples."""
+    """One file whose layout is understood; small, picklable, holds no samples. `layout` says of what kind it is."""
 
     table: Table
     clock: Clock
     tags: tuple[str, ...]
     good_quality: tuple[str, ...] | None
+    layout: tuple[str, ...]
 
     @property
     def path(self) -> Path:
@@ -64,9 +65,9 @@ class Source(ABC):
         return self.table.path
 
     @property
-    @abstractmethod
     def notes(self) -> tuple[str, ...]:
         """Format and layout of the file."""
+        return (*self.table.notes, *self.layout, *self.clock.notes)
 
     def with_clock(self, clock: Clock) -> Self:
         """The same file, its stamps read in the order of day and month, and the winter time, of another clock."""
@@ -105,17 +106,12 @@ class TagColumn:
 
 @dataclass(frozen=True, slots=True)
 class WideSource(Source):
-    """A table with a column for each tag; `layout` says of what kind, `ones` whether most codes of quality are 1 and
-    not 0 (None: found out of each column), `paired` whether rows without a stamp lie below a tag's last one."""
+    """A table with a column for each tag; `ones` says whether most codes of quality are 1 and not 0 (None: found out
+    of each column), `paired` whether rows without a stamp lie below a tag's last one."""
 
     columns: tuple[TagColumn, ...]
-    layout: tuple[str, ...]
     ones: bool | None = None
     paired: bool = False
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        return (*self.table.notes, *self.layout, *self.clock.notes)
 
     def with_clock(self, clock: Clock) -> Self:
         """The same file, all its stamps read in the order of day and month, and the winter time, of another clock."""
@@ -185,7 +181,7 @@ def open_wide(table: Table, options: ReadOptions) -> WideSource:
     ones = mostly_one(table.head(coded))
     columns = tuple(TagColumn(clock, i, partner.get(i, -1)) for i in values_in)
     layout = (f"wide table, {len(tags)} tags", *_quality_notes(table, columns, ones, said))
-    return WideSource(table, clock, tags, options.good_quality, columns, layout, ones)
+    return WideSource(table, clock, tags, options.good_quality, layout, columns, ones)
 
 
 def _quality_notes(table: Table, columns: Sequence[TagColumn], ones: bool, said: Sequence[str]) -> list[str]:
@@ -236,7 +232,7 @@ def open_pairs(table: Table, options: ReadOptions) -> WideSource | None:
     columns = tuple(column for _, column in found)
     clocks = len({c.clock.columns for c in columns})
     layout = f"pairs of columns, {len(tags)} tags with {clocks} clocks of their own"
-    return WideSource(table, columns[0].clock, tags, options.good_quality, columns, (layout,), paired=True)
+    return WideSource(table, columns[0].clock, tags, options.good_quality, (layout,), columns, paired=True)
 
 
 def _groups(table: Table) -> list[tuple[int, list[int]]]:
@@ -298,14 +294,6 @@ class LongSource(Source):
     quality: int = -1
     scheme: Scheme | None = None
 
-    @property
-    def notes(self) -> tuple[str, ...]:
-        layout = f"long table, {len(self.tags)} tags in column '{self.table.names[self.tag]}'"
-        if self.scheme is None:
-            return (*self.table.notes, layout, *self.clock.notes)
-        quality = f"column '{self.table.names[self.quality]}' read as {self.scheme.value}"
-        return (*self.table.notes, layout, quality, *self.clock.notes)
-
     def read(self, tags: Sequence[str]) -> dict[str, Series]:
         present = set(self.tags)
         wanted = [tag for tag in tags if tag in present]
@@ -357,11 +345,13 @@ def open_long(table: Table, options: ReadOptions) -> LongSource | None:
         if stated is None
         else stated_column(table.path, table.names, stated, "quality")
     )
-    source = LongSource(table, clock, tags, options.good_quality, tag, value)
+    said = f"long table, {len(tags)} tags in column '{table.names[tag]}'"
+    source = LongSource(table, clock, tags, options.good_quality, (said,), tag, value)
     if quality is None:
         return source
     scheme = scheme_of(table.names[quality], _kinds(table, quality), mostly_one(table.head([quality])))
-    return replace(source, quality=quality, scheme=scheme)
+    codes = f"column '{table.names[quality]}' read as {scheme.value}"
+    return replace(source, layout=(said, codes), quality=quality, scheme=scheme)
 
 
 def _kinds(table: Table, column: int) -> pa.Array:
