@@ -27,7 +27,7 @@ import pyarrow.compute as pc
 import pyarrow.parquet as pq
 from pyarrow import csv
 
-from analyzer.history.files import ends_of, own_scratch
+from analyzer.history.files import ends_of
 from analyzer.history.parquet import ParquetTable
 from analyzer.history.sheet import Sheet, as_far_as_numbers_go, is_swallowed, quotes_told, reading, unreadable
 from analyzer.history.table import HEAD_ROWS, Table, trimmed
@@ -97,7 +97,7 @@ def _bucket(tag: str) -> int:
     return zlib.crc32(loop.encode("utf-8")) % BUCKETS
 
 
-def converted(sheet: Sheet, tag: int, scratch: Path | None) -> Converted:
+def converted(sheet: Sheet, tag: int, place: Path) -> Converted:
     """Stream a sheet into Parquet, or take up what an earlier process has streamed of the same.
 
     Parameters
@@ -105,8 +105,8 @@ def converted(sheet: Sheet, tag: int, scratch: Path | None) -> Converted:
     sheet : Sheet
     tag : int
         Column of the tags of a long table, -1 for a wide one.
-    scratch : Path or None
-        Where the files are laid; None: this process's own directory.
+    place : Path
+        Where the files are laid.
 
     Raises
     ------
@@ -115,7 +115,7 @@ def converted(sheet: Sheet, tag: int, scratch: Path | None) -> Converted:
     """
     written = sheet.encoding, sheet.delimiter, sheet.decimal, sheet.first_row, sheet.names
     how = (*written, sheet.as_written, tag)
-    folder, done = _laid(scratch, sheet.path, sheet.bytes, how, partial(_streamed, sheet, tag))
+    folder, done = _laid(place, sheet.path, sheet.bytes, how, partial(_streamed, sheet, tag))
     first = next(folder.glob("*.parquet"), None)
     if first is None:
         expected = "rows of as many columns as the header"
@@ -133,10 +133,10 @@ def converted(sheet: Sheet, tag: int, scratch: Path | None) -> Converted:
     )
 
 
-def converted_parquet(table: ParquetTable, tag: int, scratch: Path | None) -> Converted:
+def converted_parquet(table: ParquetTable, tag: int, place: Path) -> Converted:
     """The same of a long Parquet file, of which each loop's read would decode all."""
     room = 4 * table.path.stat().st_size
-    folder, done = _laid(scratch, table.path, room, (table.names, tag), partial(_parted, table, tag))
+    folder, done = _laid(place, table.path, room, (table.names, tag), partial(_parted, table, tag))
     return Converted(table.path, table.names, table.types, tags=done.tags, folder=folder)
 
 
@@ -162,13 +162,12 @@ class Laid:
 
 
 def _laid(
-    scratch: Path | None, path: Path, room: int, how: tuple[object, ...], lay: Callable[[Path], Laid]
+    place: Path, path: Path, room: int, how: tuple[object, ...], lay: Callable[[Path], Laid]
 ) -> tuple[Path, Laid]:
     """The folder of a copy of a file that is read so, and what it says of itself.
 
     Where there is none yet it is laid by `lay`, in `room` bytes.
     """
-    place = scratch or own_scratch()
     mark = hashlib.blake2b(ends_of(path), digest_size=16)
     mark.update(repr((path.name, how, version("loop-triage"))).encode())
     folder = place / f"{NAMED}{mark.hexdigest()}"

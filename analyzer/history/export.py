@@ -20,7 +20,7 @@ from pathlib import Path
 import pyarrow as pa
 
 from analyzer.history.converted import converted, converted_parquet
-from analyzer.history.files import export_files, is_parquet, own_scratch, packed_beside, unpacked
+from analyzer.history.files import export_files, is_parquet, packed_beside, unpacked
 from analyzer.history.layouts import Source, source_of, tag_column
 from analyzer.history.parquet import open_parquet
 from analyzer.history.plant_clock import zone_of
@@ -153,9 +153,7 @@ def open_export(paths: Sequence[Path], options: ReadOptions | None = None) -> Ex
     """
     options = options or ReadOptions()
     _check_stated(options)
-    paths, origins = (
-        at_hand(paths, options.scratch or own_scratch()) if any(map(is_remote, paths)) else (paths, {})
-    )
+    paths, origins = at_hand(paths, options.place) if any(map(is_remote, paths)) else (paths, {})
     opened, skipped = _readable(paths, options)
     sources = _agreed(opened)
     homes: dict[str, tuple[int, ...]] = {}
@@ -243,7 +241,7 @@ def _some(names: Sequence[str]) -> str:
 def _opened(path: Path, options: ReadOptions) -> tuple[list[Source], list[InputError]]:
     """The tables of a file, one but for workbooks, and why other sheets of a workbook are none."""
     with _told(path):
-        parts = unpacked(path, options.scratch)
+        parts = unpacked(path, options.place)
     found: list[Source] = []
     failed: list[InputError] = []
     for part in parts:
@@ -262,10 +260,10 @@ def _table(plain: Path, options: ReadOptions) -> Source:
     if is_parquet(plain):
         table = open_parquet(plain)
         tag = tag_column(table) if table.rows >= CONVERTED_ROWS else -1
-        return source_of(table if tag < 0 else converted_parquet(table, tag, options.scratch), options)
+        return source_of(table if tag < 0 else converted_parquet(table, tag, options.place), options)
     sheet = open_sheet(plain, options)
     big = sheet.bytes >= CONVERTED_BYTES
-    return source_of(converted(sheet, tag_column(sheet), options.scratch) if big else sheet, options)
+    return source_of(converted(sheet, tag_column(sheet), options.place) if big else sheet, options)
 
 
 @contextmanager

@@ -179,16 +179,14 @@ def own_scratch() -> Path:
     return made
 
 
-def unpacked(path: Path, scratch: Path | None) -> list[Path]:
-    """The file itself, or, where it is packed, a plain copy of it under `scratch` (None: this process's own), or the
-    tables of a workbook.
+def unpacked(path: Path, place: Path) -> list[Path]:
+    """The file itself, or, where it is packed, a plain copy of it under `place`, or the tables of a workbook.
 
     Raises
     ------
     InputError
         It is damaged, would fill the disk, or is an archive of several files or with a password.
     """
-    place = scratch or own_scratch()
     with path.open("rb") as file:
         start = file.read(5)
     if is_workbook(path, start):

@@ -8,7 +8,6 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
-from analyzer.history.files import own_scratch
 from analyzer.history.names import LONGEST
 
 DELIMITERS = (";", "\t", "|", ",")
@@ -30,22 +29,15 @@ FIRST = 12
 Rewrite = Callable[[Iterator[str]], Iterator[Sequence[str]]]
 
 
-def rewritten(path: Path, encoding: str, lines: Sequence[str], scratch: Path | None) -> Path | None:
+def rewritten(path: Path, encoding: str, lines: Sequence[str], place: Path) -> Path | None:
     """A plain table of a file in one of these layouts, separated by tabs, in UTF-8; None for any other file.
 
-    Parameters
-    ----------
-    path, encoding
-        The file.
-    lines : sequence of str
-        Its first lines.
-    scratch : Path or None
-        Where the copy is laid; None: this process's own directory.
+    `lines` are the file's first ones, the copy is laid under `place`.
     """
     rewrite = _blocks(lines) or _columns(lines) or _words(lines)
     if rewrite is None:
         return None
-    out = Path(tempfile.mkdtemp(prefix="rewritten-", dir=scratch or own_scratch())) / path.name
+    out = Path(tempfile.mkdtemp(prefix="rewritten-", dir=place)) / path.name
     with (
         path.open(encoding=encoding, errors="replace", newline=None) as source,
         out.open("w", encoding="utf-8") as file,

@@ -55,9 +55,8 @@ def open_sheet(path: Path, options: ReadOptions) -> Sheet:
     head = _head(path)
     encoding = options.encoding or detect_encoding(head)
     first = _lines(path, head, encoding)
-    plain = (
-        rewritten(path, encoding, first[:HEAD_LINES], options.scratch) if options.delimiter is None else None
-    )
+    stated = options.delimiter is not None
+    plain = None if stated else rewritten(path, encoding, first[:HEAD_LINES], options.place)
     if plain is not None:
         return open_sheet(plain, replace(options, delimiter="\t", encoding="utf-8"))
     lines, above = _after_data_mark(first)

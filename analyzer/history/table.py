@@ -12,6 +12,8 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
+from analyzer.history.files import own_scratch
+
 HEAD_ROWS = 1000
 """Rows by which a table is known before it is read."""
 
@@ -48,6 +50,11 @@ class ReadOptions:
     time_column: str | None = None
     quality_column: str | None = None
     scratch: Path | None = None
+
+    @property
+    def place(self) -> Path:
+        """Where copies are laid."""
+        return self.scratch or own_scratch()
 
 
 @dataclass(frozen=True, slots=True)
