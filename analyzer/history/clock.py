@@ -44,8 +44,7 @@ class TimeScale:
         return said
 
 
-IN_DAYS = frozenset({"Excel days", "days since year 0", "Julian days"})
-"""Scales whose numbers hardly change over an export."""
+DAY_S = 86400.0
 SINCE_START_MOST = 1e8
 """Largest number of a clock that counts from the start of the export; above it are the seconds since 1970."""
 EXCEL_MOST_SPAN = 4000.0
@@ -57,7 +56,7 @@ SINCE_START = {
     "s": TimeScale("seconds since the start", 0, SINCE_START_MOST, 1.0),
     "min": TimeScale("minutes since the start", 0, SINCE_START_MOST, 60.0),
     "h": TimeScale("hours since the start", 0, SINCE_START_MOST, 3600.0),
-    "d": TimeScale("days since the start", 0, 2e4, 86400.0),
+    "d": TimeScale("days since the start", 0, 2e4, DAY_S),
 }
 """Clocks that count from the start, by the unit that the column's name states; seconds where it states none."""
 ELAPSED = TimeScale("hours, minutes and seconds since the start", 0, 0, 1.0)
@@ -66,9 +65,9 @@ MIDNIGHT = r"[ T]0?0:00:00(?:\.0+)?$"
 COUNTED = r"^\s*(?P<h>\d{1,5}):(?P<m>[0-5]\d):(?P<s>[0-5]\d(?:[.,]\d+)?)\s*$"
 SECONDS = TimeScale("seconds since 1970", 1e8, 3e9, 1.0)
 SCALES = (
-    TimeScale("Excel days", 2e4, 8e4, 86400.0, EXCEL_ORIGIN_S, local=True),
-    TimeScale("days since year 0", 7.1e5, 7.7e5, 86400.0, -719529 * 86400.0, local=True),
-    TimeScale("Julian days", 2.43e6, 2.49e6, 86400.0, -2440587.5 * 86400.0),
+    TimeScale("Excel days", 2e4, 8e4, DAY_S, EXCEL_ORIGIN_S, local=True),
+    TimeScale("days since year 0", 7.1e5, 7.7e5, DAY_S, -719529 * DAY_S, local=True),
+    TimeScale("Julian days", 2.43e6, 2.49e6, DAY_S, -2440587.5 * DAY_S),
     SECONDS,
     TimeScale("seconds since 1904", 3e9, 4.1e9, 1.0, -2082844800.0),
     TimeScale("millions of Excel days", 2e10, 8e10, 0.0864, EXCEL_ORIGIN_S, local=True),
@@ -188,7 +187,7 @@ def time_scale_of(column: pa.Array, unit: str = "") -> TimeScale | None:
         return None
     middle, reach = float(np.median(number)), float(np.ptp(number))
     found = next((scale for scale in SCALES if scale.low <= middle < scale.high), None)
-    in_days = found is not None and found.name in IN_DAYS
+    in_days = found is not None and found.unit_s == DAY_S  # such numbers hardly change over an export
     other = unit in ("ms", "s", "min", "h") if in_days else unit not in ("", "s") and found is SECONDS
     if found is not None and not (other or (in_days and reach > EXCEL_MOST_SPAN)):
         return found
