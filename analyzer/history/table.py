@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -64,13 +64,14 @@ class Table(ABC):
     `path` is the file, `names` and `types` are of its columns, `found` what was found out about its format,
     `decimal` the mark in numbers that stand among texts, `first_row` the number of the first row of data as
     an editor counts them (None for binary files), `tags` the tags of a long table in the order in which they were
-    met, where these are known.
+    met, where these are known. What was found out does not tell two tables of one file apart, so that a read that is
+    kept serves both.
     """
 
     path: Path
     names: tuple[str, ...]
-    types: tuple[pa.DataType, ...] = ()
-    found: tuple[str, ...] = ()
+    types: tuple[pa.DataType, ...] = field(default=(), compare=False)
+    found: tuple[str, ...] = field(default=(), compare=False)
     decimal: str = "."
     first_row: int | None = None
     tags: tuple[str, ...] = ()

@@ -11,6 +11,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from analyzer.history import sheet
 from analyzer.history.export import ReadOptions, open_export
 
 STAMP_FORMATS = (
@@ -219,6 +220,16 @@ def test_a_file_too_big_to_keep(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     table = day(n=70_000)
     (tmp_path / "x.csv").write_text(as_text(table, "%d.%m.%Y %H:%M:%S", ";", ",", ""))
     assert_read(tmp_path / "x.csv", table)
+
+
+def test_a_text_is_parsed_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What was parsed to find out how a text is written serves the samples too."""
+    parsed, whole = [], sheet._parsed
+    monkeypatch.setattr(sheet, "_parsed", lambda *how: parsed.append(how) or whole(*how))
+    table = day()
+    (tmp_path / "x.csv").write_text(as_text(table, "%d.%m.%Y %H:%M:%S", ";", ",", ""))
+    assert_read(tmp_path / "x.csv", table)
+    assert len(parsed) == 1
 
 
 def test_a_latin_letter_late_in_the_file(tmp_path: Path) -> None:
