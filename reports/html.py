@@ -16,7 +16,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from reports import svg
-from reports.pages import MOST_LEVEL, Band, Bars, Cell, Floats, Page, Sparkline, Trend, WhatIf, levels
+from reports.pages import MOST_LEVEL, Band, Cell, Floats, Page, Trend, WhatIf, levels
 from reports.pictures import asset, drawings, keys
 from reports.texts import visible_parts
 
@@ -74,13 +74,6 @@ def _for_script(data: dict[str, object]) -> Markup:
     return Markup(json.dumps(data).replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e"))
 
 
-def cell_figure(cell: Cell) -> svg.Drawing | Markup:
-    """The picture in a cell, if there is one."""
-    if isinstance(cell.figure, Sparkline):
-        return svg.sparkline(cell.figure)
-    return svg.bars(cell.figure) if isinstance(cell.figure, Bars) else Markup("")
-
-
 def sort_key(cell: Cell) -> str:
     """What a column is sorted by: the full number; '' where the text itself is."""
     return "" if cell.number is None else f"{cell.number:.10g}"
@@ -90,7 +83,7 @@ def sort_key(cell: Cell) -> str:
 def _environment() -> Environment:
     env = Environment(loader=PackageLoader("reports"), autoescape=True, undefined=StrictUndefined)
     env.trim_blocks = env.lstrip_blocks = True
-    env.filters.update(picture=cell_figure, sort_key=sort_key, keys=keys, trend_data=trend_data)
+    env.filters.update(sparkline=svg.sparkline, sort_key=sort_key, keys=keys, trend_data=trend_data)
     env.filters.update(what_if_data=what_if_data, block=lambda block: type(block).__name__)
     env.filters["drawn"] = lambda block: Markup("").join(drawn for _, drawn in drawings(block))
     return env

@@ -6,7 +6,6 @@ import re
 from collections.abc import Sequence
 
 from reports.pages import (
-    Bars,
     Beside,
     Block,
     Cell,
@@ -42,8 +41,6 @@ def _link(href: str) -> str:
 
 def _cell(cell: Cell) -> str:
     text = escaped(cell.text)
-    if isinstance(cell.figure, Bars) and not cell.text:
-        text = " / ".join(f"{name} {share:.0f}" for name, share in cell.figure.shares)
     return f"[{text}]({_link(cell.href)})" if cell.href and text else text
 
 

@@ -26,13 +26,6 @@ class Sparkline:
 
 
 @dataclass(frozen=True, slots=True)
-class Bars:
-    """Shares of 100 side by side, each with the name of its colour: (("valve", 92.0), ...)."""
-
-    shares: tuple[tuple[str, float], ...]
-
-
-@dataclass(frozen=True, slots=True)
 class Cell:
     """A cell: its text and, where it is a number, the number itself, for sorting and for CSV.
 
@@ -44,7 +37,7 @@ class Cell:
     number: float | None = None
     kind: str = ""
     href: str = ""
-    figure: Sparkline | Bars | None = None
+    figure: Sparkline | None = None
 
 
 @dataclass(frozen=True, slots=True)

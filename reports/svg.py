@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from markupsafe import Markup, escape
 
-from reports.pages import Bars, Floats, Place, Sparkline
+from reports.pages import Floats, Place, Sparkline
 
 SPARK = (120.0, 26.0)
 LETTER = 6.6
@@ -202,13 +202,3 @@ def sparkline(s: Sparkline) -> Drawing | Markup:
     x = np.linspace(0, width, s.low.size)
     foot, top = (height - 2 - (y - low) * scale for y in (s.low, s.high))
     return Drawing(width, height, f'<path d="{between(x, foot, top)}"/>', "PV of the night", "spark")
-
-
-def bars(b: Bars) -> Drawing:
-    """Shares of 100, one thin bar each, under one another."""
-    body = ""
-    for i, (name, share) in enumerate(b.shares):
-        body += f'<rect class="rail" {box(0, 6 * i + 1, 60, 4)}/>'
-        body += f'<rect class="{escape(name)}" {box(0, 6 * i + 1, 0.6 * min(share, 100), 4)}/>'
-    label = ", ".join(f"{name} {share:.0f} %" for name, share in b.shares)
-    return Drawing(60, 6.0 * len(b.shares), body, label, "bars")

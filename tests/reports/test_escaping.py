@@ -19,7 +19,6 @@ from reports.markdown import escaped
 from reports.markdown import render as render_markdown
 from reports.pages import (
     Band,
-    Bars,
     Cell,
     Column,
     Facts,
@@ -164,10 +163,3 @@ def test_file_names_of_different_tags_differ() -> None:
     """Tags that differ only in signs that file names lack keep different files."""
     tags = ["FIC-1", "FIC.1", "FIC/1", "FIC 1", "fic-1", "ФИК", "流量", ""]
     assert len({slug(t).lower() for t in tags}) == len(tags)
-
-
-def test_bars_say_their_shares() -> None:
-    """Cause bars are read out by a screen reader as figures."""
-    table = Table("t", "", (Column("c", "c"),), ((Cell("", figure=Bars((("valve", 92.0), ("load", 3.0)))),),))
-    html = render(Page("p", "p", "", (Section("s", (table,)),)))
-    assert 'aria-label="valve 92 %, load 3 %"' in html
