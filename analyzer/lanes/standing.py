@@ -4,8 +4,6 @@ example, has its lane all the same."""
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass
 
 import numpy as np
 
@@ -19,26 +17,6 @@ from identification.signals.setpoint_response import moves
 
 AVERAGING = "level"
 """Type of loops that are slow on purpose: a level buffers flow."""
-
-
-@dataclass(frozen=True, slots=True)
-class Standing:
-    """Figures of the lanes; None where they cannot be told.
-
-    manual_pct, at_limits_pct : shares of the good time [%], the latter of that in automatic where there is any;
-    frozen_pct : share of the time in which PV stands while OP moves [%]; lasting_error_pct : median over the hours of
-    the size of the hour's mean error [% of span]; error_memory_ti : correlation time of the error in Ti [-]
-    """
-
-    manual_pct: float | None = None
-    at_limits_pct: float | None = None
-    frozen_pct: float | None = None
-    lasting_error_pct: float | None = None
-    error_memory_ti: float | None = None
-
-    def as_row(self) -> Mapping[str, float | None]:
-        """The figures by column."""
-        return asdict(self)
 
 
 def _percent(part: np.ndarray, whole: np.ndarray) -> float | None:
@@ -78,8 +56,12 @@ def _memory(prepared: Prepared, controller: Pid | None, kind: str, config: Confi
     return None if found is None else found / controller.ti_s
 
 
-def standing(prepared: Prepared, controller: Pid | None, kind: str, config: Config) -> Standing:
-    """The figures of one prepared record.
+def standing(prepared: Prepared, controller: Pid | None, kind: str, config: Config) -> dict[str, float | None]:
+    """The figures of one prepared record by column; None where they cannot be told.
+
+    manual_pct, at_limits_pct : shares of the good time [%], the latter of that in automatic where there is any;
+    frozen_pct : share of the time in which PV stands while OP moves [%]; lasting_error_pct : median over the hours of
+    the size of the hour's mean error [% of span]; error_memory_ti : correlation time of the error in Ti [-]
 
     Parameters
     ----------
@@ -93,10 +75,10 @@ def standing(prepared: Prepared, controller: Pid | None, kind: str, config: Conf
     record, op = prepared.record, prepared.op_known
     scaled = op and prepared.op_scaled
     good, use = ~record.bad, record.usable
-    return Standing(
-        _percent(record.mask("manual"), good) if op else None,
-        _percent(record.mask("saturated"), use if use.any() else good) if scaled else None,
-        100.0 * float(record.mask("stale").mean()) if op else None,
-        _lasting_error(record, config.lanes),
-        _memory(prepared, controller, kind, config),
-    )
+    return {
+        "manual_pct": _percent(record.mask("manual"), good) if op else None,
+        "at_limits_pct": _percent(record.mask("saturated"), use if use.any() else good) if scaled else None,
+        "frozen_pct": 100.0 * float(record.mask("stale").mean()) if op else None,
+        "lasting_error_pct": _lasting_error(record, config.lanes),
+        "error_memory_ti": _memory(prepared, controller, kind, config),
+    }

@@ -130,7 +130,7 @@ def _loop_row(
         prepared = prepare(spec, part, config.quality)
         known |= {"pv_lo": prepared.scale.low, "pv_hi": prepared.scale.low + prepared.scale.span}
         known["straight_pct"] = 100.0 * prepared.compressed_share
-        known |= standing(prepared, controller_of(spec, prepared), spec.type, config).as_row()
+        known |= standing(prepared, controller_of(spec, prepared), spec.type, config)
         earlier = earlier_settings(stated, changes, prepared)
         found, advice = _assessed(spec, prepared, config, advising, earlier, held)
         known |= _typed_in(earlier, spec, found, night.zone)
