@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from reports.pages import (
     Beside,
@@ -44,14 +44,20 @@ def _cell(cell: Cell) -> str:
     return f"[{text}]({_link(cell.href)})" if cell.href and text else text
 
 
+def rows_of_table(head: Sequence[str], rows: Iterable[Iterable[str]], rules: Sequence[str] = ()) -> list[str]:
+    """The lines of a table whose cells are escaped; rules : how each column is aligned, at the left by default."""
+    drawn = f"|{'|'.join(rules or ['---'] * len(head))}|"
+    return [f"| {' | '.join(head)} |", drawn, *(f"| {' | '.join(row)} |" for row in rows)]
+
+
 def _table(table: Table) -> list[str]:
     shown = [i for i, c in enumerate(table.columns) if c.key != "trend" and not c.csv_only]
-    head = "| " + " | ".join(escaped(table.columns[i].title) for i in shown) + " |"
-    rule = "|" + "|".join("--:" if table.columns[i].numeric else "---" for i in shown) + "|"
-    body = ["| " + " | ".join(_cell(row[i]) for i in shown) + " |" for row in table.rows]
+    head = [escaped(table.columns[i].title) for i in shown]
+    body = ([_cell(row[i]) for i in shown] for row in table.rows)
+    lines = rows_of_table(head, body, ["--:" if table.columns[i].numeric else "---" for i in shown])
     title = [f"**{escaped(table.title)}**", ""] if table.title else []
     note = ["", escaped(table.note)] if table.note else []
-    return [*title, head, rule, *body, *note]
+    return [*title, *lines, *note]
 
 
 def _block(block: Block, folder: str) -> list[str]:

@@ -56,7 +56,9 @@ def _memory(prepared: Prepared, controller: Pid | None, kind: str, config: Confi
     return None if found is None else found / controller.ti_s
 
 
-def standing(prepared: Prepared, controller: Pid | None, kind: str, config: Config) -> dict[str, float | None]:
+def standing(
+    prepared: Prepared, controller: Pid | None, kind: str, config: Config
+) -> dict[str, float | None]:
     """The figures of one prepared record by column; None where they cannot be told.
 
     manual_pct, at_limits_pct : shares of the good time [%], the latter of that in automatic where there is any;

@@ -14,7 +14,6 @@ from analyzer.pages.reading import Thinned, action_text
 from analyzer.pages.words import Row, cause_cell, duration, number, page_columns, plain_cell, texts, with_noun
 from analyzer.plantwide.view import GroupView, read_groups
 from analyzer.store.store import Store
-from analyzer.words.present import figure
 from identification.signals.spectrum import PER_OCTAVE
 from reports.pages import (
     Arrow,
@@ -97,7 +96,7 @@ def sentence(g: GroupView) -> str:
         tail = f"it starts at {loop} ({pct:.0f} %)"
     else:
         tail = f"it starts at one of {_candidates(g)}, or outside what is recorded ({g.unseen_pct:.0f} %)"
-    return f"{head}; {tail}; without it the others' average errors fall by {figure(g.gain_pct)} % of span together"
+    return f"{head}; {tail}; without it the others' average errors fall by {number(g.gain_pct)} % of span together"
 
 
 def page_name(number: str) -> str:

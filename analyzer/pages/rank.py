@@ -13,6 +13,7 @@ from analyzer.loop.decisions import Cause, Due, Lane
 from analyzer.store import notes
 from analyzer.store.notes import Note
 from analyzer.store.store import Store
+from analyzer.words.units import Row
 from identification.errors import InputError
 
 BELIEFS_TOLD = tuple(c for c in BELIEVED if c.name not in ("constants", "state", "news_tone"))
@@ -25,7 +26,6 @@ LIST_COLUMNS = (*KEPT, *names(NOTED))
 """Columns of CSV and JSON: the contract's, then what says in which units settings stand, and the advice in full."""
 MOST_NAMES = 10
 """Areas that are named in an error."""
-Row = Mapping[str, Any]
 
 
 def ranked(

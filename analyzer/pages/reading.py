@@ -19,11 +19,10 @@ from analyzer.store import notes
 from analyzer.store.notes import Note, is_hidden, last
 from analyzer.store.store import Store
 from analyzer.store.table import TREND, read_stored
-from analyzer.words.units import row_settings
+from analyzer.words.units import Row, row_settings
 from reports.pages import Cell
 from reports.texts import slug
 
-Row = Mapping[str, Any]
 SIGNALS = ("sp", "pv", "op")
 BESIDE = "side-by-side"
 """Name of the page on which loops are laid beside each other; the address after # names them."""

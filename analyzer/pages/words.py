@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
@@ -15,12 +14,11 @@ from analyzer.history.plant_clock import stamp
 from analyzer.loop.cost import mark
 from analyzer.loop.decisions import CAUSES
 from analyzer.words.reason import in_short
-from analyzer.words.units import duration
+from analyzer.words.units import Row, duration, number
 from reports.pages import Cell, Column, Floats
 
-__all__ = ["duration", "stamp"]  # of the words that are not chosen here
+__all__ = ["Row", "duration", "number", "stamp"]  # of the words that are not chosen here
 
-Row = Mapping[str, Any]
 KINDS = {
     ChangeVerdict.BETTER: "better",
     ChangeVerdict.WORSE: "worse",
@@ -28,15 +26,6 @@ KINDS = {
     ChangeVerdict.INCOMPARABLE: "incomparable",
 }
 """Colour of each verdict."""
-
-
-def number(value: float | None) -> str:
-    """Three digits, empty where not known."""
-    if value is None:
-        return ""
-    if value == 0:
-        return "0"
-    return f"{value:.0f}" if abs(value) >= 100 else f"{value:.3g}"
 
 
 def signed(value: float | None) -> str:

@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from analyzer.history.plant_clock import local
 from analyzer.loop.decisions import CAUSES, Action, Cause, Fault, counts
 from analyzer.words.reason import joined
-from analyzer.words.units import duration
+from analyzer.words.units import Row, duration
 
 if TYPE_CHECKING:
     from analyzer.belief.belief import Belief
     from analyzer.belief.phases import Growth, PhaseKnown
 
-Row = Mapping[str, Any]
 REPAIRED = re.compile(
     r"\b(repaired|replaced|overhauled|exchanged|renewed|repacked|new (valve|actuator|positioner|packing|stem))\b",
     re.I,

@@ -1,4 +1,4 @@
-"""Sentences on settings and on what a recording lacks, with units; `present` makes rows of them."""
+"""Sentences on settings and on what a recording lacks, with units."""
 
 from __future__ import annotations
 

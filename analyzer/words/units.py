@@ -5,6 +5,18 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+Row = Mapping[str, Any]
+"""A loop's night, by column."""
+
+
+def number(value: float | None) -> str:
+    """Three digits, all before the point of larger numbers; empty where not known."""
+    if value is None:
+        return ""
+    if value == 0:
+        return "0"
+    return f"{value:.0f}" if abs(value) >= 100 else f"{value:.3g}"
+
 
 def duration(seconds: float | None) -> str:
     """A length of time in the unit that reads best."""
@@ -30,7 +42,7 @@ def settings(kp: float | None, ti: float | None, gain: str, time: str) -> str:
     return ", ".join(parts)
 
 
-def row_settings(row: Mapping[str, Any], kp: str = "kp", ti: str = "ti") -> str:
+def row_settings(row: Row, kp: str = "kp", ti: str = "ti") -> str:
     """The settings in two columns of a row of the night, with the units that the row states."""
     gain = gain_unit(row["gain_unit"], row["pv_unit"], row.get("op_unit"))
     return settings(row[kp], row[ti], gain, row["ti_unit"] or "s")
@@ -47,7 +59,7 @@ def seconds_of(ti: float, unit: str) -> float | None:
     return 60.0 / ti if unit == "repeats/min" else ti * SECONDS[unit or "s"]
 
 
-def changed_settings(row: Mapping[str, Any]) -> str:
+def changed_settings(row: Row) -> str:
     """Old and new settings of a row with their units; a band in gain and other times in seconds too."""
     gain, time = gain_unit(row["gain_unit"], row["pv_unit"], row.get("op_unit")), row["ti_unit"] or "s"
     old, new = (row["kp"], row["ti"]), (row["kp_new"], row["ti_new"])
@@ -62,6 +74,5 @@ def changed_settings(row: Mapping[str, Any]) -> str:
 
 
 def arrow(old: float | None, new: float | None) -> str:
-    """An old and a new number in three digits."""
-    texts = ["none" if x is None else f"{x:.3g}" if abs(x) < 1000 else f"{x:.0f}" for x in (old, new)]
-    return f"{texts[0]} \u2192 {texts[1]}"
+    """An old and a new number, 'none' for one that is not known."""
+    return f"{number(old) or 'none'} \u2192 {number(new) or 'none'}"

@@ -13,8 +13,8 @@ from analyzer.loop.judged_stretch import Earlier, judged_stretch
 from analyzer.loops.changes import read_changes
 from analyzer.loops.tags import match, read_loops
 from analyzer.night import batch
+from analyzer.pages.lists import brief
 from analyzer.store.store import Store
-from analyzer.words.present import brief
 from analyzer.words.reason import in_short
 from identification.models import Pid
 from identification.record import LoopRecord
@@ -119,7 +119,7 @@ def test_a_list_tells_every_loop_in_twenty_words(retuned):
     """Of the mill's loops on the day of seven changes none takes over 20 words in a list, and loses nothing."""
     for row in retuned[0].values():
         head, rest = in_short(row["reason"])
-        assert len(brief(row)["reason"].split()) <= 20
+        assert len(brief(row, ("reason",))["reason"].split()) <= 20
         assert "; ".join(filter(None, (head, rest))) == row["reason"]
 
 

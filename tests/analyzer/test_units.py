@@ -9,8 +9,8 @@ import numpy as np
 from analyzer.columns import row_of
 from analyzer.loop.conclusion import stated
 from analyzer.loops.spec import LoopSpec
-from analyzer.words.present import brief
-from analyzer.words.units import gain_unit
+from analyzer.pages.lists import brief
+from analyzer.words.units import arrow, gain_unit, number
 from identification.controller.pid_regression import fit_pi
 from identification.models import Fopdt, Loop, Pid
 from identification.simulation.closed_loop import closed_loop
@@ -37,3 +37,9 @@ def test_a_controller_without_integral_action_has_no_integral_time() -> None:
     assert math.isinf(found.ti_s)
     row = row_of({"loop": "A", **stated(LoopSpec("A", kp=2.0, ti=0.0))})
     assert brief(row, ("ti",)) == {"ti": "none"}
+
+
+def test_a_number_just_under_a_thousand_has_no_exponent() -> None:
+    """999.7 rounds to 1000, in a cell and between two settings; -0 is 0, and what is not known is said so."""
+    assert [number(x) for x in (999.7, 99.96, 0.01234, -0.0, None)] == ["1000", "100", "0.0123", "0", ""]
+    assert arrow(999.7, None) == "1000 \u2192 none"
