@@ -26,9 +26,9 @@ from analyzer.loops.changes import TuningChange, read_changes
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import controller, match, read_loops
 from analyzer.night import batch
-from analyzer.pages.news import news_lines
 from analyzer.pages.rank import ranked
 from analyzer.pages.reading import read_night
+from analyzer.pages.summary import news_lines
 from analyzer.store.store import Store
 from proofs.common import command_line
 

@@ -11,10 +11,9 @@ from analyzer.loop.decisions import CAUSES, Cause, Status
 from analyzer.pages import maintenance
 from analyzer.pages.groups import morning_table
 from analyzer.pages.loop_pictures import close_span, sparkline
-from analyzer.pages.news import since
 from analyzer.pages.plant import NightSum, area_table, plant_history, plant_map
 from analyzer.pages.reading import BESIDE, ShownNight, linked, needs_a_look, oscillates
-from analyzer.pages.summary import first_things
+from analyzer.pages.summary import first_things, since
 from analyzer.pages.words import Row, cause_cell, cell, heading, marked_cell, page_columns, with_noun
 from analyzer.plantwide.view import GroupView
 from analyzer.words.units import changed_settings, row_settings

@@ -141,28 +141,27 @@ NIGHT_COLUMNS = (
     "reaches_by",
 )
 """What the pages of a night read of its rows."""
-REMEMBERED = ("loop", "status", "oscillation_significance", "oscillating_pct", "cause", "lanes")
-"""What is read of nights before the last one."""
-MEMORY = 14
-"""Nights before the last one that tell what is usual for a loop; ours: two weeks."""
+REMEMBERED = ("loop", "lanes", *FIGURE.values())
+"""What is read of the nights before."""
+MEMORY = 15
+"""Nights before that tell what is usual for a loop; ours: two weeks, and the night before."""
 
 
 @dataclass(frozen=True, slots=True)
 class ShownNight:
-    """The rows of a night, the worst first, those of the night before by loop, and trends of the worst.
+    """The rows of a night, the worst first, and trends of the worst.
 
-    earlier : rows of the nights before that one by loop, oldest first, with what is remembered of them; paged : loops
-    that have a page of their own, the worst first.
+    earlier : of loops that the night before has, rows of it and of others before it, oldest first, with what is
+    remembered of them; paged : loops that have a page of their own, the worst first.
     """
 
     name: str
     rows: tuple[Row, ...]
-    before: Mapping[str, Row]
+    earlier: Mapping[str, Sequence[Row]]
     before_name: str
     worst: tuple[Row, ...]
     trends: Mapping[str, Thinned] = field(default_factory=dict)
     notes: Mapping[str, tuple[Note, ...]] = field(default_factory=dict)
-    earlier: Mapping[str, Sequence[Row]] = field(default_factory=dict)
     paged: tuple[str, ...] = ()
 
     @property
@@ -214,17 +213,17 @@ def read_night(store: Store, name: str | None, top: int, drawn: bool = True) -> 
     store.read("nights", night, ["loop"])
     earlier = [n for n in nights if n < night]
     rows = worst_first(read_nights(store, [night], NIGHT_COLUMNS))
-    before = {r["loop"]: r for r in read_nights(store, earlier[-1:], NIGHT_COLUMNS)}
     remembered: dict[str, list[Row]] = {}
-    for row in read_nights(store, earlier[-1 - MEMORY : -1], REMEMBERED):
+    for row in read_nights(store, earlier[-MEMORY:], REMEMBERED):
         remembered.setdefault(row["loop"], []).append(row)
+    remembered = {loop: told for loop, told in remembered.items() if told[-1]["night"] == earlier[-1]}
     known = notes.read_notes(store.path)
     looked = [r for r in rows if needs_a_look(r) and not is_hidden(last(known, r["loop"]), night)]
     worst = tuple(followers_under(looked)[:top])
     paged = tuple(dict.fromkeys(r["loop"] for r in (*worst, *rows)))[:top]
     trends = read_trends(store, {r["loop"] for r in worst}, [night]) if drawn else {}
     return ShownNight(
-        night, tuple(rows), before, earlier[-1] if earlier else "", worst, trends, known, remembered, paged
+        night, tuple(rows), remembered, earlier[-1] if earlier else "", worst, trends, known, paged
     )
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from analyzer.lanes.lanes import FIGURE
-from analyzer.pages.news import news_lines, news_table
 from analyzer.pages.reading import ShownNight
+from analyzer.pages.summary import news_lines, news_table
 
 NO_LANES: dict[str, object] = {"lanes": None, **dict.fromkeys(FIGURE.values(), 0.0)}
 CALM = {"loop": "L", "status": "ok", "oscillating_pct": 0.0, "oscillation_significance": 0.0, "cause": "none"}
@@ -16,7 +16,7 @@ LOST = {"status": "not assessed", "oscillating_pct": None, "oscillation_signific
 
 def told(before: dict[str, object], now: dict[str, object]) -> tuple[list[str], list[str]]:
     """News of one loop under New and under Better."""
-    night = ShownNight("2026-03-03", (ROW | now,), {"L": ROW | before}, "2026-03-02", ())
+    night = ShownNight("2026-03-03", (ROW | now,), {"L": [ROW | before]}, "2026-03-02", ())
     tables = [news_table(night, tones, "t", "T") for tones in (("worse", "unclear"), ("better",))]
     return tuple([row[1].text for row in t.rows] for t in tables)  # type: ignore[return-value]
 
@@ -45,7 +45,7 @@ def night_by_night(nights: list[dict[str, object]]) -> list[str]:
     rows = [ROW | n for n in nights]
     found = []
     for k in range(1, len(rows)):
-        night = ShownNight("x", (rows[k],), {"L": rows[k - 1]}, "y", (), earlier={"L": rows[: k - 1]})
+        night = ShownNight("x", (rows[k],), {"L": rows[:k]}, "y", ())
         found.append("; ".join(news_lines(night)).removeprefix("L "))
     return found
 
