@@ -22,7 +22,7 @@ from analyzer.comparison.before_after import (
 from analyzer.config import ChangeLimits, ComparisonLimits
 from analyzer.loop.decisions import counts
 from analyzer.loops.changes import TuningChange, behaviour_change, stated_changes
-from analyzer.pages.reading import Thinned, nights_within, read_hours, read_nights, read_trends
+from analyzer.pages.reading import Thinned, by_loop, nights_within, read_hours, read_nights, read_trends
 from analyzer.pages.words import PLAIN, PvScale, Row, enumerated, number, pv_scale_of
 from analyzer.store.store import Store
 from analyzer.words.units import gain_unit
@@ -76,12 +76,11 @@ def detected(
     """Changes that nobody stated: settings that differ between nights, and steps of a controller's
     behaviour."""
     nights = store.nights()
-    rows = read_nights(store, nights, COLUMNS, loops)
-    tags = list(dict.fromkeys(r["loop"] for r in rows))
-    hours = read_hours(store, tags, nights)
+    rows = by_loop(read_nights(store, nights, COLUMNS, loops))
+    hours = read_hours(store, rows, nights)
     found = []
-    for tag in tags:
-        stated = stated_changes([r for r in rows if r["loop"] == tag])
+    for tag, own in rows.items():
+        stated = stated_changes(own)
         seen = behaviour_change(tag, hours[tag], limits) if tag in hours else None
         found += stated or ([seen] if seen else [])
     return found
@@ -120,12 +119,12 @@ def change_cases(
     of = [spans.of(c, [o.time_s for o in changes if o.loop == c.loop and o != c]) for c in changes]
     nights = nights_within(store, _around(of))
     loops = {c.loop for c in changes}
-    rows = read_nights(store, nights, COLUMNS, loops)
+    rows = by_loop(read_nights(store, nights, COLUMNS, loops))
     hours, trends = read_hours(store, loops, nights), read_trends(store, loops, nights)
     found: list[ChangeCase] = []
     missing: list[tuple[str, str]] = []
     for change, (before, after) in zip(changes, of, strict=True):
-        own = [r for r in rows if r["loop"] == change.loop]
+        own = rows.get(change.loop)
         if change.loop not in hours or not own:
             missing.append((change.loop, "the store holds no hours of it around the change"))
             continue

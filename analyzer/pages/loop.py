@@ -29,6 +29,7 @@ from analyzer.pages.words import (
     beside,
     cause_cell,
     cell,
+    cells,
     duration,
     number,
     page_columns,
@@ -239,8 +240,8 @@ def _trends(thin: Thinned | None, row: Row) -> list[Section]:
 
 def _night(row: Row) -> tuple[Cell, ...]:
     """One night's cells; the last says why where the loop was not assessed."""
-    cells = tuple(cell(row, column.key) for column in page_columns("history"))
-    return cells if row["status"] == Status.OK else (*cells[:-1], Cell(f"{row['status']}: {row['reason']}"))
+    lost = {} if row["status"] == Status.OK else {"action": Cell(f"{row['status']}: {row['reason']}")}
+    return cells(row, page_columns("history"), **lost)
 
 
 def nights_section(rows: Sequence[Row]) -> Section:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from analyzer.lanes.lanes import lanes_in
 from analyzer.loop.decisions import Action, Cause, Fault, Lane, Status
 from analyzer.pages.reading import ShownNight, linked
-from analyzer.pages.words import Row, cell, duration, page_columns, plain_cell, texts, with_noun
+from analyzer.pages.words import Row, cells, duration, page_columns, plain_cell, texts, with_noun
 from analyzer.words.belief import wear_text
 from analyzer.words.reason import STEPS
 from analyzer.words.units import changed_settings
@@ -80,18 +80,6 @@ def work_order(row: Row) -> tuple[tuple[str, str], ...]:
     return ("Do", order["do"]), ("Look for", look), ("Then", order["after"])
 
 
-def _cells(night: ShownNight, row: Row) -> tuple[Cell, ...]:
-    return (
-        linked(night, row["loop"]),
-        *(cell(row, name) for name in ("description", "area")),
-        Cell("" if row["valve_fault"] in (None, Fault.NONE) else row["valve_fault"], kind="valve"),
-        plain_cell(row["stickband_pct"] or row["backlash_pct"]),
-        cell(row, "valve_travel_pct_per_h"),
-        Cell(valve_test(row)),
-        Cell(""),
-    )
-
-
 def is_at_fault(row: Row) -> bool:
     """Whether a valve is at fault, by making a cycle or for all that nights say of it."""
     return row["cause"] == Cause.VALVE or row["valve_fault"] in (Fault.BACKLASH, Fault.STICTION)
@@ -101,19 +89,10 @@ def wearing(night: ShownNight) -> Table:
     """Valves whose width grows, the fastest first: for the next shutdown."""
     rows = [r for r in night.rows if r["wear_pct_per_month"] is not None]
     rows.sort(key=lambda r: -r["wear_pct_per_month"])
-    cells = tuple(
-        (
-            linked(night, r["loop"]),
-            *(cell(r, name) for name in ("description", "area")),
-            plain_cell(r["width_pct"]),
-            plain_cell(r["wear_pct_per_month"]),
-            Cell(r["wear_since"]),
-            Cell(wear_text(r)),
-        )
-        for r in rows
-    )
+    shown = page_columns("wear")
+    told = tuple(cells(r, shown, loop=linked(night, r["loop"]), forecast=Cell(wear_text(r))) for r in rows)
     note = "Play or stickband by all nights; growth, its night of beginning and the forecast with 90 % ends."
-    return Table("wear", "", page_columns("wear"), cells, note, cards=True)
+    return Table("wear", "", shown, told, note, cards=True)
 
 
 def faulty(night: ShownNight) -> Table:
@@ -125,21 +104,31 @@ def faulty(night: ShownNight) -> Table:
         "then look at positioner feedback, linkage, packing and actuator. "
         "With new settings a loop can wait for the shutdown."
     )
-    return Table(
-        "valves", "", page_columns("valves"), tuple(_cells(night, r) for r in rows), note, cards=True
-    )
+    shown = page_columns("valves")
+    told = tuple(cells(r, shown, **_of_valve(night, r)) for r in rows)
+    return Table("valves", "", shown, told, note, cards=True)
+
+
+def _of_valve(night: ShownNight, row: Row) -> dict[str, Cell]:
+    """What the store does not hold as a valve's row shows it."""
+    fault = row["valve_fault"]
+    return {
+        "loop": linked(night, row["loop"]),
+        "valve_fault": Cell("" if fault in (None, Fault.NONE) else fault, kind="valve"),
+        "width": plain_cell(row["stickband_pct"] or row["backlash_pct"]),
+        "test": Cell(valve_test(row)),
+        "found": Cell(""),
+    }
 
 
 def worn(night: ShownNight) -> Table:
     """The valves that travel most."""
     rows = [r for r in night.rows if r["valve_travel_pct_per_h"] is not None]
     rows.sort(key=lambda r: -r["valve_travel_pct_per_h"])
-    shown = rows[:TRAVELLED]
-    cells = tuple(
-        (linked(night, r["loop"]), *(cell(r, c.key) for c in page_columns("travel")[1:])) for r in shown
-    )
+    shown = page_columns("travel")
+    told = tuple(cells(r, shown, loop=linked(night, r["loop"])) for r in rows[:TRAVELLED])
     note = "Travel of OP, or of the stem where it is recorded; where the loop is tight, its settings wear the valve."
-    return Table("travel", "", page_columns("travel"), cells, note, cards=True)
+    return Table("travel", "", shown, told, note, cards=True)
 
 
 def page(night: ShownNight) -> Page:

@@ -14,7 +14,7 @@ from analyzer.pages.loop_pictures import close_span, sparkline
 from analyzer.pages.plant import NightSum, area_table, plant_history, plant_map
 from analyzer.pages.reading import BESIDE, ShownNight, linked, needs_a_look, oscillates
 from analyzer.pages.summary import first_things, since
-from analyzer.pages.words import Row, cause_cell, cell, heading, marked_cell, page_columns, with_noun
+from analyzer.pages.words import Row, cause_cell, cells, heading, marked_cell, page_columns, with_noun
 from analyzer.plantwide.view import GroupView
 from analyzer.words.units import changed_settings, row_settings
 from reports.pages import Cell, Listing, Page, Section, Sparkline, Table, Tiles
@@ -43,52 +43,44 @@ def _settings(row: Row) -> str:
     return changed_settings(row) if known else row_settings(row)
 
 
-def _worst_row(night: ShownNight, row: Row, follows: bool, by: str) -> tuple[Cell, ...]:
+def _of_worst(night: ShownNight, row: Row, follows: bool, by: str) -> dict[str, Cell]:
+    """What a loop to touch is shown with and the store does not hold."""
     name = linked(night, row["loop"])
-    return (
-        replace(name, text=FOLLOWER + name.text) if follows else name,
-        *(cell(row, c) for c in ("description", "area")),
-        Cell("", figure=_spark(night, row)),
-        marked_cell(row, by),
-        cell(row, "period_s"),
-        cause_cell(row["cause"]),
-        cell(row, "reason"),
-        cell(row, "action"),
-        Cell(_settings(row)),
-        Cell(night.note(row["loop"])),
-    )
+    return {
+        "loop": replace(name, text=FOLLOWER + name.text) if follows else name,
+        "trend": Cell("", figure=_spark(night, row)),
+        by: marked_cell(row, by),
+        "cause": cause_cell(row["cause"]),
+        "settings": Cell(_settings(row)),
+        "note": Cell(night.note(row["loop"])),
+    }
 
 
 def worst_table(night: ShownNight) -> Table:
     """The loops to touch, the worst first, followers under the loop that moves them."""
     here, by = {r["loop"] for r in night.worst}, cost_column(night.rows)
-    rows = tuple(_worst_row(night, r, r["source_loop"] in here, by) for r in night.worst)
     said = f"{MARK} {OF_RECORDED}." if any(mark(r, by) for r in night.worst) else ""
-    noted = any(row[-1].text for row in rows)
+    noted = any(night.note(r["loop"]) for r in night.worst)
     declared = page_columns("worst") if noted else page_columns("worst")[:-1]
     shown = (*declared[:4], heading(by), *declared[4:])
-    rows = tuple(row[: len(shown)] for row in rows)
+    rows = tuple(cells(r, shown, **_of_worst(night, r, r["source_loop"] in here, by)) for r in night.worst)
     return Table("worst", "", shown, rows, said, True, FACETS, True, f"{BESIDE}.html")
 
 
-def _all_row(night: ShownNight, row: Row) -> tuple[Cell, ...]:
-    return (
-        linked(night, row["loop"]),
-        *(cell(row, c) for c in ("description", "type", "area")),
-        marked_cell(row, SIGNIFICANCE),
-        *(marked_cell(row, c, ".0f") for c in ALL_SHARES),
-        cause_cell(row["cause"]),
-        *(marked_cell(row, c) for c in ALL_COSTS),
-        *(cell(row, c) for c in ("action", "percent_of")),
-    )
+def _of_all(night: ShownNight, row: Row) -> dict[str, Cell]:
+    """What a loop is listed with and the store does not hold."""
+    own = {name: marked_cell(row, name) for name in (SIGNIFICANCE, *ALL_COSTS)}
+    own |= {name: marked_cell(row, name, ".0f") for name in ALL_SHARES}
+    return own | {"loop": linked(night, row["loop"]), "cause": cause_cell(row["cause"])}
 
 
 def ranking(night: ShownNight) -> Table:
     """All loops of the night."""
     marked = any(mark(row, name) for row in night.rows for name in (SIGNIFICANCE, *ALL_COSTS))
     note = f"{MARK} {OF_RECORDED}." if marked else ""
-    rows = tuple(_all_row(night, r) for r in night.rows)
-    return Table("ranking", "", page_columns("ranking"), rows, note, True, FACETS, beside=f"{BESIDE}.html")
+    shown = page_columns("ranking")
+    rows = tuple(cells(r, shown, **_of_all(night, r)) for r in night.rows)
+    return Table("ranking", "", shown, rows, note, True, FACETS, beside=f"{BESIDE}.html")
 
 
 def waiting(night: ShownNight) -> list[tuple[str, str]]:
@@ -111,7 +103,7 @@ def lost_table(night: ShownNight) -> Table:
     """Loops that were not assessed, and why."""
     lost = sorted((r for r in night.rows if r["status"] != Status.OK), key=lambda r: r["loop"])
     shown = page_columns("not-assessed")
-    rows = tuple(tuple(cell(r, column.key) for column in shown) for r in lost)
+    rows = tuple(cells(r, shown) for r in lost)
     return Table("not-assessed", "", shown, rows, searchable=len(rows) > 12)
 
 

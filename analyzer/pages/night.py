@@ -9,7 +9,7 @@ from typing import Any
 from analyzer.explain.night import known
 from analyzer.pages import groups, loop, maintenance, morning, side_by_side, work
 from analyzer.pages.plant import NightSum, read_sums
-from analyzer.pages.reading import ShownNight, Thinned, read_night, read_nights, read_trends
+from analyzer.pages.reading import ShownNight, Thinned, by_loop, read_night, read_nights, read_trends
 from analyzer.plantwide.view import GroupView, read_groups
 from analyzer.store.store import Store
 from reports.page_file import PageFileError, loads
@@ -56,13 +56,13 @@ def _loop_pages(
     around: Mapping[str, Thinned],
 ) -> Iterator[Page]:
     """The loops one by one, each with its settings compared and its explanation, if the night kept any."""
-    rows = read_nights(store, nights, loop.COLUMNS, night.paged)
+    rows = by_loop(read_nights(store, nights, loop.COLUMNS, night.paged))
     trends = read_trends(store, night.paged, nights[-loop.WEEK :])
     by_number = {g.number: g for g in shared}
     explained = {r["loop"]: r for r in known(store, night.name)}
     compared = _compared(store, night.name)
     for tag in night.paged:
-        own = [r for r in rows if r["loop"] == tag]
+        own = rows[tag]
         drawn, settings = explanation(explained.get(tag)), kept_page(compared.get(tag))
         group = by_number.get(own[-1]["group"] or "")
         said = [n.said(night.zone) for n in night.notes.get(tag, ())]

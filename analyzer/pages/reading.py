@@ -87,6 +87,14 @@ def read_nights(
     return rows
 
 
+def by_loop(rows: Sequence[Row]) -> dict[str, list[Row]]:
+    """Rows of nights by their loop, in their order."""
+    out: dict[str, list[Row]] = {}
+    for row in rows:
+        out.setdefault(row["loop"], []).append(row)
+    return out
+
+
 def read_hours(store: Store, loops: Collection[str], nights: Sequence[str]) -> dict[str, dict[str, Floats]]:
     """Hourly figures by loop, in order of time, NaN where not known; of an hour that stands twice the fuller
     one."""
@@ -213,9 +221,7 @@ def read_night(store: Store, name: str | None, top: int, drawn: bool = True) -> 
     store.read("nights", night, ["loop"])
     earlier = [n for n in nights if n < night]
     rows = worst_first(read_nights(store, [night], NIGHT_COLUMNS))
-    remembered: dict[str, list[Row]] = {}
-    for row in read_nights(store, earlier[-MEMORY:], REMEMBERED):
-        remembered.setdefault(row["loop"], []).append(row)
+    remembered = by_loop(read_nights(store, earlier[-MEMORY:], REMEMBERED))
     remembered = {loop: told for loop, told in remembered.items() if told[-1]["night"] == earlier[-1]}
     known = notes.read_notes(store.path)
     looked = [r for r in rows if needs_a_look(r) and not is_hidden(last(known, r["loop"]), night)]

@@ -9,7 +9,7 @@ from analyzer.loop.cost import cost, cost_column
 from analyzer.loop.decisions import CAUSES, Action, Cause, Due, Fault, GroupRole, Lane, Status
 from analyzer.pages.maintenance import work_order
 from analyzer.pages.reading import ShownNight, action_text, linked, needs_a_look, oscillates, read_night
-from analyzer.pages.words import Row, cell, duration, enumerated, page_columns, texts, with_noun
+from analyzer.pages.words import Row, cell, cells, duration, enumerated, page_columns, texts, with_noun
 from analyzer.plantwide.view import GroupView, read_groups
 from analyzer.store.store import Store
 from analyzer.words.units import changed_settings
@@ -137,7 +137,7 @@ def news_lines(night: ShownNight) -> list[str]:
 
 def news_table(night: ShownNight, tones: Sequence[str], name: str, title: str) -> Table:
     """Loops of which there is something new, of the colours asked for."""
-    found = [(row, *_news(night, row)) for row in night.rows]
+    told = ((row, *_news(night, row)) for row in night.rows)
     rows = tuple(
         (
             linked(night, row["loop"]),
@@ -145,7 +145,7 @@ def news_table(night: ShownNight, tones: Sequence[str], name: str, title: str) -
             *(cell(r, "oscillation_significance") for r in (night.earlier[row["loop"]][-1], row)),
             Cell(action_text(row)),
         )
-        for row, text, tone in found
+        for row, text, tone in told
         if text and tone in tones
     )
     return Table(name, f"{title} ({len(rows)})", page_columns("news"), rows)
@@ -195,12 +195,13 @@ def page(store: Store, name: str | None = None) -> Page:
     first = first_things(
         [r for r in night.rows if r["loop"] not in night.hidden], read_groups(store, night.name)
     )
-    rows: tuple[tuple[Cell, ...], ...] = tuple(
-        (Cell(r["loop"], kind="strong"), cell(r, "reason"), Cell(_do(r)), Cell(night.note(r["loop"])))
+    shown = page_columns("summary")[: 4 if any(night.note(r["loop"]) for r in night.worst) else 3]
+    rows = tuple(
+        cells(
+            r, shown, loop=Cell(r["loop"], kind="strong"), do=Cell(_do(r)), note=Cell(night.note(r["loop"]))
+        )
         for r in night.worst
     )
-    shown = page_columns("summary")[: 4 if any(row[3].text for row in rows) else 3]
-    rows = tuple(row[: len(shown)] for row in rows)
     left = sum(needs_a_look(r) and r["loop"] not in night.hidden for r in night.rows) - len(rows)
     note = f"{left} more in the list." if left > 0 else ""
     lines = news_lines(night)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
@@ -108,6 +109,11 @@ def cell(row: Row, name: str) -> Cell:
     if not BY_NAME[name].is_number:
         return Cell(value or "")
     return Cell(duration(value) if name == "period_s" else number(value), value)
+
+
+def cells(row: Row, columns: Iterable[Column], **own: Cell) -> tuple[Cell, ...]:
+    """A row of a table by the keys of its columns: cells of its own, else what the store holds."""
+    return tuple(own[c.key] if c.key in own else cell(row, c.key) for c in columns)
 
 
 def marked_cell(row: Row, name: str, digits: str = "") -> Cell:

@@ -9,8 +9,8 @@ import numpy as np
 
 from analyzer.history.plant_clock import stamp
 from analyzer.loop.decisions import Status
-from analyzer.pages.reading import ShownNight, linked, oscillates, read_nights
-from analyzer.pages.words import Row, cause_cell, cell, page_columns, with_noun
+from analyzer.pages.reading import ShownNight, by_loop, linked, oscillates, read_nights
+from analyzer.pages.words import Row, cause_cell, cells, page_columns, with_noun
 from analyzer.store.notes import FINISHED, Work, work_on
 from analyzer.store.store import Store
 from reports.pages import Cell, Page, Section, Table, Text, Tiles
@@ -68,19 +68,18 @@ def _change(before: float, since: float) -> str:
     return f"{100.0 * (since / before - 1.0):+.0f} %".replace("-", "\u2212")
 
 
-def _row(night: ShownNight, row: Row, work: Work, both: Sides) -> tuple[Cell, ...]:
+def _of_work(night: ShownNight, row: Row, work: Work, both: Sides) -> dict[str, Cell]:
+    """What is told of a piece of work, and what the nights since say of it."""
     late = bool(work.due) and work.due < night.name and work.state not in FINISHED
-    return (
-        linked(night, row["loop"]),
-        *(cell(row, c) for c in ("description", "area")),
-        Cell(work.state, kind="better" if work.state in FINISHED else ""),
-        Cell(work.owner),
-        Cell(work.due, kind="worse" if late else ""),
-        Cell(f"{work.note.text} ({stamp(work.note.time_s, night.zone)[:10]})"),
-        cause_cell(row["cause"]),
-        cell(row, "action"),
-        Cell(said_since(work, both)),
-    )
+    return {
+        "loop": linked(night, row["loop"]),
+        "state": Cell(work.state, kind="better" if work.state in FINISHED else ""),
+        "owner": Cell(work.owner),
+        "due": Cell(work.due, kind="worse" if late else ""),
+        "note": Cell(f"{work.note.text} ({stamp(work.note.time_s, night.zone)[:10]})"),
+        "cause": cause_cell(row["cause"]),
+        "since": Cell(said_since(work, both)),
+    }
 
 
 def _order(work: Work) -> tuple[bool, str, float]:
@@ -110,22 +109,20 @@ def page(store: Store, night: ShownNight) -> Page:
     """The work list as it stands after a night."""
     works = {loop: work_on(notes) for loop, notes in night.notes.items() if notes}
     names = [n for n in store.nights() if n <= night.name][-NIGHTS:]
-    history: dict[str, list[Row]] = {}
-    for r in read_nights(store, names, READ, works):
-        history.setdefault(r["loop"], []).append(r)
+    history = by_loop(read_nights(store, names, READ, works))
     rows = {r["loop"]: r for r in night.rows if r["loop"] in works}
     listed = sorted(rows, key=lambda loop: (_order(works[loop]), loop))
-    cells = tuple(
-        _row(night, rows[k], works[k], sides(history.get(k, ()), stamp(works[k].since_s, night.zone)[:10]))
-        for k in listed
-    )
+    shown, told = page_columns("work"), []
+    for k in listed:
+        both = sides(history.get(k, ()), stamp(works[k].since_s, night.zone)[:10])
+        told.append(cells(rows[k], shown, **_of_work(night, rows[k], works[k], both)))
     note = f"Since: nights after the day of the note, beside the {COMPARED} before it."
-    table = Table("work-list", "", page_columns("work"), cells, note, True, ("state", "owner", "area"), True)
+    table = Table("work-list", "", shown, tuple(told), note, True, ("state", "owner", "area"), True)
     brought = won(night, works, history)
     empty = Text(('Nothing is noted: triage note STORE LOOP "..." --state open --due DATE.',))
     sections = (
         *(() if brought is None else (Section(f"Won since {night.name[:7]}-01", (brought,)),)),
-        Section("Work", (table if cells else empty,)),
+        Section("Work", (table if told else empty,)),
     )
     links = (("All loops", "index.html"), ("As CSV", f"csv/{NAME}-work-list.csv"))
     open_ones = sum(works[k].state not in FINISHED for k in rows)
