@@ -11,7 +11,6 @@ from analyzer.comparison.before_after import (
     MEASURES,
     Change,
     ChangeVerdict,
-    Grade,
     LoopComparison,
     Measure,
     grade,
@@ -22,11 +21,9 @@ from analyzer.loops.changes import TuningChange
 from analyzer.pages.changes import ChangeCase, outcome
 from analyzer.pages.loop_pictures import trend_block
 from analyzer.pages.words import (
-    KINDS,
-    change_interval,
+    number,
     page_columns,
     plain_cell,
-    setting,
     signed,
     stamp,
     texts,
@@ -50,32 +47,31 @@ from reports.pages import (
 
 PRIMARY = tuple(m for m in MEASURES if m.primary)
 """The study's four figures."""
-TONES = {
-    Grade.CLEAR: "better",
-    Grade.MODEST: "better",
-    Grade.PARTIAL: "unclear",
-    Grade.NONE: "unclear",
-    Grade.MIXED: "worse",
-    Grade.WORSE: "worse",
-    Grade.INCOMPARABLE: "incomparable",
+KINDS = {
+    ChangeVerdict.BETTER: "better",
+    ChangeVerdict.WORSE: "worse",
+    ChangeVerdict.UNCLEAR: "unclear",
+    ChangeVerdict.INCOMPARABLE: "incomparable",
 }
-"""Colours of outcomes."""
+"""Colour of each verdict."""
 TREND_BUCKETS = 4000
 """Buckets of a trend on this page: two weeks at two pixels a bucket, 64 kB a loop; ours."""
 
 
 def _tiles(cases: Sequence[ChangeCase]) -> Tiles:
-    kinds = [grade(c.found) for c in cases]
-    counts = (
-        (kinds.count(Grade.CLEAR), "improved clearly in all four", "better"),
-        (kinds.count(Grade.MODEST), "improved modestly", "better"),
-        (kinds.count(Grade.PARTIAL), "improved only in part", "unclear"),
-        (kinds.count(Grade.NONE), "without clear change", "unclear"),
-        (kinds.count(Grade.MIXED) + kinds.count(Grade.WORSE), "worse in something", "worse"),
-        (kinds.count(Grade.INCOMPARABLE), "not comparable", "incomparable"),
-    )
-    shown = tuple((str(n), what, tone) for n, what, tone in counts if n)
+    known = texts("outcomes")
+    found = [known[grade(c.found)] for c in cases]
+    counts = {o["tile"]: (sum(x["tile"] == o["tile"] for x in found), o["tone"]) for o in known.values()}
+    shown = ((str(n), tile, tone) for tile, (n, tone) in counts.items() if n)
     return Tiles(((str(len(cases)), "changes looked at", ""), *shown))
+
+
+def _interval(change: Change) -> str:
+    """The interval of a change in percent of before, or in the figure's unit where before is zero."""
+    ends = change.interval_pct
+    if ends is None:
+        return f"{number(change.found.low)} … {number(change.found.high)} {change.measure.unit}"
+    return f"{signed(ends[0])} … {signed(ends[1])} %"
 
 
 def _row(change: Change, found: LoopComparison) -> tuple[Cell, ...]:
@@ -88,7 +84,7 @@ def _row(change: Change, found: LoopComparison) -> tuple[Cell, ...]:
         plain_cell(d.before),
         plain_cell(d.after),
         Cell(signed(change.value_pct), change.value_pct),
-        Cell(change_interval(change)),
+        Cell(_interval(change)),
         plain_cell(d.low),
         plain_cell(d.high),
         Cell(change.verdict.value, kind=KINDS[change.verdict]),
@@ -104,18 +100,22 @@ def figures(cases: Sequence[ChangeCase], primary: bool, name: str) -> Table:
     )
 
 
+def _setting(value: float | None) -> str:
+    return "–" if value is None else f"{value:g}"
+
+
 def _settings(change: TuningChange, units: str) -> str:
     if change.kp_new is None and change.ti_new is None:
         return change.seen or "not stated"
     pairs = (("Kp", change.kp_old, change.kp_new), ("Ti", change.ti_old, change.ti_new))
-    said = ", ".join(f"{name} {setting(old)} → {setting(new)}" for name, old, new in pairs)
+    said = ", ".join(f"{name} {_setting(old)} → {_setting(new)}" for name, old, new in pairs)
     return f"{said} ({units})"
 
 
 def _in_short(case: ChangeCase) -> tuple[Cell, ...]:
     """A loop in one row: what was typed in, the four changes, and what to make of them."""
     by_name = {c.measure.name: c for c in case.found.primary}
-    kind = TONES[grade(case.found)]
+    kind = texts("outcomes")[grade(case.found)]["tone"]
     return (
         Cell(case.found.loop, kind="strong"),
         Cell(case.description),
@@ -195,15 +195,8 @@ def _average(cases: Sequence[ChangeCase], measure: Measure) -> IntervalBar:
     down, up = (float(np.sqrt(((ends[:, k] - values) ** 2).sum()) / len(known)) for k in (0, 1))
     mean = float(values.mean())
     low, high = max(mean - down, -100.0), mean + up
-    verdict = (
-        ChangeVerdict.UNCLEAR
-        if low <= 0 <= high
-        else ChangeVerdict.BETTER
-        if mean < 0
-        else ChangeVerdict.WORSE
-    )
-    text = f"{signed(mean)} %"
-    return IntervalBar(group, measure.short_title, mean, low, high, KINDS[verdict], text)
+    kind = "unclear" if low <= 0 <= high else "better" if mean < 0 else "worse"
+    return IntervalBar(group, measure.short_title, mean, low, high, kind, f"{signed(mean)} %")
 
 
 def average_chart(cases: Sequence[ChangeCase]) -> IntervalChart:

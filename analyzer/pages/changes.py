@@ -11,7 +11,6 @@ from analyzer.comparison.before_after import (
     LIMITS,
     Change,
     ChangeVerdict,
-    Grade,
     LoopComparison,
     Span,
     compare,
@@ -23,7 +22,7 @@ from analyzer.config import ChangeLimits, ComparisonLimits
 from analyzer.loop.decisions import counts
 from analyzer.loops.changes import TuningChange, behaviour_change, stated_changes
 from analyzer.pages.reading import Thinned, by_loop, nights_within, read_hours, read_nights, read_trends
-from analyzer.pages.words import PLAIN, PvScale, Row, enumerated, number, pv_scale_of
+from analyzer.pages.words import PLAIN, PvScale, Row, enumerated, number, pv_scale_of, texts
 from analyzer.store.store import Store
 from analyzer.words.units import gain_unit
 
@@ -33,13 +32,6 @@ COLUMNS = (
 )
 CHANGES = ChangeLimits()
 """The limits in force where none are given."""
-GRADES = {
-    Grade.CLEAR: "improved clearly in all four",
-    Grade.MODEST: "improved modestly",
-    Grade.MIXED: "in part better, in part worse",
-    Grade.WORSE: "worse",
-    Grade.NONE: "no clear change",
-}
 HOURS_A_YEAR = 8760.0
 
 
@@ -140,14 +132,9 @@ def _case(change: TuningChange, result: LoopComparison, row: Row, trend: Thinned
 
 def outcome(found: LoopComparison) -> str:
     """A loop's outcome in one phrase."""
-    kind = grade(found)
-    if kind is Grade.PARTIAL:
-        better = [c.measure.short_title.lower() for c in found.primary if c.verdict is ChangeVerdict.BETTER]
-        text = f"improved only in {enumerated(better)}"
-    elif kind is Grade.INCOMPARABLE:
-        text = "not comparable: " + ("; ".join(found.reasons) or "no hourly figures on both sides")
-    else:
-        text = GRADES[kind]
+    better = [c.measure.short_title.lower() for c in found.primary if c.verdict is ChangeVerdict.BETTER]
+    reasons = "; ".join(found.reasons) or "no hourly figures on both sides"
+    text: str = texts("outcomes")[grade(found)]["said"].format(better=enumerated(better), reasons=reasons)
     if found.source_loop:
         text += f"; the cause lies in the neighbour {found.source_loop}, whose oscillation it follows"
     return text

@@ -11,9 +11,10 @@ import numpy as np
 from analyzer.columns import GROUP_LIST, GROUPS, row_of
 from analyzer.loop.decisions import GroupRole
 from analyzer.pages.reading import Thinned, action_text
-from analyzer.pages.words import Row, cause_cell, duration, number, page_columns, plain_cell, texts, with_noun
+from analyzer.pages.words import ALL_LOOPS, cause_cell, page_columns, plain_cell, texts, with_noun
 from analyzer.plantwide.view import GroupView, read_groups
 from analyzer.store.store import Store
+from analyzer.words.units import Row, duration, number
 from identification.signals.spectrum import PER_OCTAVE
 from reports.pages import (
     Arrow,
@@ -110,15 +111,17 @@ def _heading(name: str) -> Column:
     return Column(name, declared.heading + unit, declared.is_number, declared.hint)
 
 
-def morning_table(groups: Sequence[GroupView]) -> Table:
-    """One cause, several loops: the groups of a night, those that cost most first."""
+def morning_table(groups: Sequence[GroupView], linked: bool) -> Table:
+    """One cause, several loops: the groups of a night, those that cost most first; `linked` to their pages."""
     note = "Repair or retune the first loop, then look at the others again."
-    return Table("groups", "", page_columns("groups"), tuple(map(_morning_row, groups)), note, cards=True)
+    return Table(
+        "groups", "", page_columns("groups"), tuple(_morning_row(g, linked) for g in groups), note, cards=True
+    )
 
 
-def _morning_row(g: GroupView) -> tuple[Cell, ...]:
+def _morning_row(g: GroupView, linked: bool) -> tuple[Cell, ...]:
     return (
-        Cell(f"group {g.number}", kind="strong", href=f"{page_name(g.number)}.html"),
+        Cell(f"group {g.number}", kind="strong", href=f"{page_name(g.number)}.html" if linked else ""),
         Cell(str(len(g.rows)), len(g.rows)),
         Cell(duration(g.period_s), g.period_s),
         Cell(_candidates(g) or "not clear"),
@@ -184,8 +187,7 @@ def page(g: GroupView, trends: Mapping[str, Thinned], night: str, paged: frozens
         *((Section("Trends and spectra", tuple(pictures)),) if pictures else ()),
     )
     subtitle = f"{with_noun(len(g.rows), 'loop')}, night {night}."
-    links = (("All loops", "index.html"),)
-    return Page(page_name(g.number), f"Group {g.number}: one oscillation", subtitle, sections, links)
+    return Page(page_name(g.number), f"Group {g.number}: one oscillation", subtitle, sections, (ALL_LOOPS,))
 
 
 def member_section(g: GroupView, loop: str, trends: Mapping[str, Thinned]) -> Section:

@@ -24,6 +24,7 @@ from analyzer.pages.loop_pictures import (
 from analyzer.pages.maintenance import work_order
 from analyzer.pages.reading import BESIDE, Thinned
 from analyzer.pages.words import (
+    ALL_LOOPS,
     PvScale,
     Row,
     beside,
@@ -362,7 +363,7 @@ def page(
     ]
     sections.insert(-1, _figures(row))
     group = row["group"] if shared is not None else None
-    links = (("All loops", "index.html"), *_links(more, settings, group), *_beside_source(row))
+    links = (ALL_LOOPS, *_links(more, settings, group), *_beside_source(row))
     return Page(slug(row["loop"]), row["loop"], _subtitle(row), tuple(sections), links)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from analyzer.lanes.lanes import lanes_in
 from analyzer.loop.decisions import Action, Cause, Fault, Lane, Status
 from analyzer.pages.reading import ShownNight, linked
-from analyzer.pages.words import Row, cells, duration, page_columns, plain_cell, texts, with_noun
+from analyzer.pages.words import ALL_LOOPS, Row, cells, duration, page_columns, plain_cell, texts, with_noun
 from analyzer.words.belief import wear_text
 from analyzer.words.reason import STEPS
 from analyzer.words.units import changed_settings
@@ -142,4 +142,4 @@ def page(night: ShownNight) -> Page:
     subtitle = (
         f"{with_noun(len(first.rows), 'valve')} at fault in the night of {night.name}, for the valve shop."
     )
-    return Page(NAME, "Hand-over to maintenance", subtitle, sections, (("All loops", "index.html"),))
+    return Page(NAME, "Hand-over to maintenance", subtitle, sections, (ALL_LOOPS,))

@@ -119,12 +119,12 @@ def page(
     """
     seen = [r for r in night.rows if r["loop"] not in night.hidden]
     first = Listing((*(("", text) for text in first_things(seen, groups)), *waiting(night)))
-    drawn, lost = plant_map(night), lost_table(night)
+    drawn, lost, together = plant_map(night), lost_table(night), morning_table(groups, bool(night.paged))
     sections = (
         Section("First", (first, _tiles(night))),
         since(night),
         Section("Loops worth a look", (worst_table(night),)),
-        *((Section("One cause, several loops", (morning_table(groups),)),) if groups else ()),
+        *([Section("One cause, several loops", (together,))] if groups else ()),
         *((Section("The plant", (drawn, *plant_history(sums))),) if drawn is not None else ()),
         Section("Areas", (area_table(night.rows),)),
         Section("All loops", (ranking(night),)),

@@ -4,22 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
 
 from analyzer.explain.night import known
-from analyzer.pages import groups, loop, maintenance, morning, side_by_side, work
+from analyzer.pages import groups, loop, maintenance, morning, work
+from analyzer.pages.loop_pictures import trend_block
 from analyzer.pages.plant import NightSum, read_sums
-from analyzer.pages.reading import ShownNight, Thinned, by_loop, read_night, read_nights, read_trends
+from analyzer.pages.reading import BESIDE, ShownNight, Thinned, by_loop, read_night, read_nights, read_trends
+from analyzer.pages.words import ALL_LOOPS, pv_scale_of
 from analyzer.plantwide.view import GroupView, read_groups
 from analyzer.store.store import Store
 from reports.page_file import PageFileError, loads
-from reports.pages import Block, Page, Section, Table, TreeMap
+from reports.pages import Beside, Page, Section
+from reports.texts import slug
 
 MOST_DATED = 31
 """Nights that have a page; the store has the others."""
 SHOWN = 50
 """Loops worth a look that a dated page lists at most."""
 LATEST = ("Latest night", "index.html")
+BUCKETS = 720
+"""Buckets of a trend beside others at most; ours: two minutes of a day, and some kilobytes a loop."""
 HISTORY = 60
 """Nights of history on a loop's page; ours: two months, as a maintenance round takes."""
 
@@ -39,13 +43,27 @@ def pages(store: Store, name: str | None = None, top: int = 200) -> Iterator[Pag
     about = morning.page(night, shared, read_sums(store, night.name), links)
     yield replace(about, choices=choices(nights[-MOST_DATED:], night.name))
     yield maintenance.page(night)
-    yield side_by_side.page(store, night)
+    yield side_by_side(store, night)
     yield work.page(store, night)
     members = {r["loop"] for g in shared for r in g.rows[: groups.MOST]}
     trends = read_trends(store, members, [night.name])
     for g in shared:
         yield groups.page(g, trends, night.name, frozenset(night.paged))
     yield from _loop_pages(store, night, nights[-HISTORY:], shared, {**trends, **night.trends})
+
+
+def side_by_side(store: Store, night: ShownNight) -> Page:
+    """The page on which the loops that have a page of their own are laid beside each other on one time axis."""
+    trends = read_trends(store, night.paged, [night.name])
+    scales = {r["loop"]: pv_scale_of(r) for r in night.rows}
+    blocks = tuple(
+        trend_block(f"beside-{slug(loop)}", loop, trends[loop].coarser(BUCKETS), (), scales[loop])
+        for loop in night.paged
+        if loop in trends and trends[loop].time_s.size > 1
+    )
+    caption = "Each loop in its own unit. Zoom or move one, and all go with it; the address keeps the choice."
+    section = Section("Side by side", (Beside("beside", "Loops, up to six", blocks, caption),))
+    return Page(BESIDE, "Loops side by side", f"the night of {night.name}", (section,), (ALL_LOOPS,))
 
 
 def _loop_pages(
@@ -60,14 +78,16 @@ def _loop_pages(
     trends = read_trends(store, night.paged, nights[-loop.WEEK :])
     by_number = {g.number: g for g in shared}
     explained = {r["loop"]: r for r in known(store, night.name)}
-    compared = _compared(store, night.name)
+    table = store.read_if_there("compared", night.name)
+    compared = {} if table is None else {r["loop"]: r["settings_page"] for r in table.to_pylist()}
     for tag in night.paged:
         own = rows[tag]
-        drawn, settings = explanation(explained.get(tag)), kept_page(compared.get(tag))
+        found = explained.get(tag)
+        drawn, settings = kept_page(found.get("page") if found else None), kept_page(compared.get(tag))
         group = by_number.get(own[-1]["group"] or "")
         said = [n.said(night.zone) for n in night.notes.get(tag, ())]
         part = None if group is None else groups.member_section(group, tag, around)
-        about = loop.page(own, trends.get(tag), explained.get(tag), drawn, part, said, settings)
+        about = loop.page(own, trends.get(tag), found, drawn, part, said, settings)
         yield about
         for more in (settings, drawn):
             if more is not None:
@@ -123,41 +143,10 @@ def dated_page(store: Store, night: str, nights: Sequence[str], sums: Sequence[N
         The plant's figures of these nights and others.
     """
     own = [s for s in sums if s.name <= night]
-    found = morning.page(read_night(store, night, SHOWN), read_groups(store, night), own)
+    without_pages = replace(read_night(store, night, SHOWN), paged=())
+    found = morning.page(without_pages, read_groups(store, night), own)
     links = (*nights_around(nights, night), LATEST)
-    return replace(
-        found,
-        name=name_of(night),
-        sections=tuple(map(_unlinked, found.sections)),
-        links=links,
-        choices=choices(nights, night),
-    )
-
-
-def _unlinked(section: Section) -> Section:
-    return replace(section, blocks=tuple(map(_without_links, section.blocks)))
-
-
-def _without_links(block: Block) -> Block:
-    if isinstance(block, Table):
-        rows = tuple(tuple(replace(c, href="") for c in row) for row in block.rows)
-        return replace(block, rows=rows)
-    if isinstance(block, TreeMap):
-        groups = tuple(replace(g, tiles=tuple(replace(t, href="") for t in g.tiles)) for g in block.groups)
-        return replace(block, groups=groups)
-    return block
-
-
-def _compared(store: Store, night: str) -> dict[str, str]:
-    """Pages of settings that a night kept, by loop."""
-    table = store.read_if_there("compared", night)
-    rows = [] if table is None else table.select(["loop", "settings_page"]).to_pylist()
-    return {r["loop"]: r["settings_page"] for r in rows}
-
-
-def explanation(kept: Mapping[str, Any] | None) -> Page | None:
-    """The page of an explanation as the night kept it; None where it kept none, or one of another version."""
-    return None if kept is None else kept_page(kept.get("page"))
+    return replace(found, name=name_of(night), links=links, choices=choices(nights, night))
 
 
 def kept_page(text: str | None) -> Page | None:

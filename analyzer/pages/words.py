@@ -10,7 +10,6 @@ from importlib.resources import files
 from typing import Any
 
 from analyzer.columns import BY_NAME
-from analyzer.comparison.before_after import Change, ChangeVerdict
 from analyzer.history.plant_clock import stamp
 from analyzer.loop.cost import mark
 from analyzer.loop.decisions import CAUSES
@@ -20,13 +19,8 @@ from reports.pages import Cell, Column, Floats
 
 __all__ = ["Row", "duration", "number", "stamp"]  # of the words that are not chosen here
 
-KINDS = {
-    ChangeVerdict.BETTER: "better",
-    ChangeVerdict.WORSE: "worse",
-    ChangeVerdict.UNCLEAR: "unclear",
-    ChangeVerdict.INCOMPARABLE: "incomparable",
-}
-"""Colour of each verdict."""
+ALL_LOOPS = ("All loops", "index.html")
+"""The link from a page to the morning page."""
 
 
 def signed(value: float | None) -> str:
@@ -37,19 +31,6 @@ def signed(value: float | None) -> str:
     return text.replace("-", "−")
 
 
-def change_interval(change: Change) -> str:
-    """The interval of a change in percent of before, or in the figure's unit where before is zero."""
-    ends = change.interval_pct
-    if ends is None:
-        return f"{number(change.found.low)} … {number(change.found.high)} {change.measure.unit}"
-    return f"{signed(ends[0])} … {signed(ends[1])} %"
-
-
-def setting(value: Any) -> str:
-    """A controller setting as it was stated."""
-    return "–" if value is None else f"{value:g}"
-
-
 def with_noun(n: int, what: str) -> str:
     """A number with its noun."""
     return f"{n} {what}" if n == 1 else f"{n} {what}s"
@@ -57,7 +38,7 @@ def with_noun(n: int, what: str) -> str:
 
 def enumerated(names: list[str]) -> str:
     """Names in a sentence."""
-    return names[0] if len(names) == 1 else ", ".join(names[:-1]) + " and " + names[-1]
+    return " and ".join(filter(None, (", ".join(names[:-1]), *names[-1:])))
 
 
 @cache

@@ -10,7 +10,7 @@ import numpy as np
 from analyzer.history.plant_clock import stamp
 from analyzer.loop.decisions import Status
 from analyzer.pages.reading import ShownNight, by_loop, linked, oscillates, read_nights
-from analyzer.pages.words import Row, cause_cell, cells, page_columns, with_noun
+from analyzer.pages.words import ALL_LOOPS, Row, cause_cell, cells, page_columns, with_noun
 from analyzer.store.notes import FINISHED, Work, work_on
 from analyzer.store.store import Store
 from reports.pages import Cell, Page, Section, Table, Text, Tiles
@@ -124,7 +124,7 @@ def page(store: Store, night: ShownNight) -> Page:
         *(() if brought is None else (Section(f"Won since {night.name[:7]}-01", (brought,)),)),
         Section("Work", (table if told else empty,)),
     )
-    links = (("All loops", "index.html"), ("As CSV", f"csv/{NAME}-work-list.csv"))
+    links = (ALL_LOOPS, ("As CSV", f"csv/{NAME}-work-list.csv"))
     open_ones = sum(works[k].state not in FINISHED for k in rows)
     return Page(
         NAME,
