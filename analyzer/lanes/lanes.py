@@ -23,17 +23,25 @@ if TYPE_CHECKING:
 class Rule:
     """One lane.
 
-    figure : the column that it is ranked by, the largest first; stands : whether a loop stands in it; said : its
-    clause of the reason, None where the reason says it anyway; hidden_by : lanes beside which it says nothing new;
+    figure : the column that it is ranked by, the largest first; said : its clause of the reason, None where the
+    reason says it anyway; limit : the limit over which the figure puts a loop in, of the same name where ''; judged :
+    whether a loop stands in it where that takes more; hidden_by : lanes beside which it says nothing new;
     of_measurement : whether it asks for a look at the measurement.
     """
 
     lane: Lane
     figure: str
-    stands: Callable[[Finding, LaneLimits], bool]
     said: Callable[[Finding], str] | None = None
+    limit: str = ""
+    judged: Callable[[Finding, LaneLimits], bool] | None = None
     hidden_by: frozenset[Lane] = frozenset()
     of_measurement: bool = False
+
+    def stands(self, found: Finding, limits: LaneLimits) -> bool:
+        """Whether a loop stands in the lane, whatever hides it."""
+        if self.judged is not None:
+            return self.judged(found, limits)
+        return found.number(self.figure) > float(getattr(limits, self.limit or self.figure))
 
 
 def _at_limit(found: Finding) -> str:
@@ -76,62 +84,29 @@ def _sluggish(found: Finding) -> str:
 
 def _winds_up(found: Finding) -> str:
     late = found.number("takeover_s")
-    text = f"winds up while {found.text('override_with')} has the valve"
-    return (
-        f"{text}, takes it back {duration(late)} late: use external reset"
-        if late
-        else f"{text}: use external reset"
-    )
+    back = f", takes it back {duration(late)} late" if late else ""
+    return f"winds up while {found.text('override_with')} has the valve{back}: use external reset"
 
 
+def _frozen(found: Finding) -> str:
+    return f"PV stands still for {found.number('frozen_pct'):.0f} % of the time while OP moves: frozen"
+
+
+def _travels(found: Finding) -> str:
+    return f"OP travels {found.number('valve_travel_pct_per_h'):.0f} %/h"
+
+
+HIDE_SLOW = frozenset({Lane.OSCILLATION, Lane.AT_LIMIT, Lane.FROZEN})
 RULES = (
-    Rule(Lane.OSCILLATION, "oscillation_significance", lambda f, limits: f.oscillates),
-    Rule(
-        Lane.MANUAL,
-        "manual_pct",
-        lambda f, limits: f.number("manual_pct") > limits.manual_pct,
-        lambda f: f"in manual for {f.number('manual_pct'):.0f} % of the time",
-    ),
-    Rule(
-        Lane.AT_LIMIT,
-        "at_limits_pct",
-        lambda f, limits: f.number("at_limits_pct") > limits.at_limits_pct,
-        _at_limit,
-    ),
-    Rule(
-        Lane.LASTING_ERROR,
-        "lasting_error_pct",
-        lambda f, limits: f.number("lasting_error_pct") > limits.lasting_error_pct,
-        _lasting,
-        of_measurement=True,
-    ),
-    Rule(
-        Lane.FROZEN,
-        "frozen_pct",
-        lambda f, limits: f.number("frozen_pct") > limits.frozen_pct,
-        lambda f: f"PV stands still for {f.number('frozen_pct'):.0f} % of the time while OP moves: frozen",
-        of_measurement=True,
-    ),
-    Rule(
-        Lane.SLUGGISH,
-        "error_memory_ti",
-        _slow,
-        _sluggish,
-        hidden_by=frozenset({Lane.OSCILLATION, Lane.AT_LIMIT, Lane.FROZEN}),
-    ),
-    Rule(
-        Lane.TRAVEL,
-        "valve_travel_pct_per_h",
-        lambda f, limits: f.number("valve_travel_pct_per_h") > limits.travel_pct_per_h,
-        lambda f: f"OP travels {f.number('valve_travel_pct_per_h'):.0f} %/h",
-    ),
-    Rule(Lane.WEAR, "wear_pct_per_month", lambda f, limits: f.number("wear_pct_per_month") > 0.0),
-    Rule(
-        Lane.WINDUP,
-        "winds_up_pct",
-        lambda f, limits: f.number("winds_up_pct") > limits.winds_up_pct,
-        _winds_up,
-    ),
+    Rule(Lane.OSCILLATION, "oscillation_significance", judged=lambda f, limits: f.oscillates),
+    Rule(Lane.MANUAL, "manual_pct", lambda f: f"in manual for {f.number('manual_pct'):.0f} % of the time"),
+    Rule(Lane.AT_LIMIT, "at_limits_pct", _at_limit),
+    Rule(Lane.LASTING_ERROR, "lasting_error_pct", _lasting, of_measurement=True),
+    Rule(Lane.FROZEN, "frozen_pct", _frozen, of_measurement=True),
+    Rule(Lane.SLUGGISH, "error_memory_ti", _sluggish, judged=_slow, hidden_by=HIDE_SLOW),
+    Rule(Lane.TRAVEL, "valve_travel_pct_per_h", _travels, "travel_pct_per_h"),
+    Rule(Lane.WEAR, "wear_pct_per_month", judged=lambda f, limits: f.number("wear_pct_per_month") > 0.0),
+    Rule(Lane.WINDUP, "winds_up_pct", _winds_up),
 )
 """All lanes in the order in which they are told."""
 FIGURE: Mapping[Lane, str] = {r.lane: r.figure for r in RULES}
