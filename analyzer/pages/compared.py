@@ -12,7 +12,7 @@ import numpy as np
 from analyzer.loop.settings_side_by_side import SPREAD, Comparison, Shown
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import derivative_as_stated, unit_ratio
-from analyzer.pages.words import number, page_columns, signed
+from analyzer.pages.words import number, page_columns, signed, texts
 from analyzer.words.units import duration, gain_unit
 from identification.models import Integrator
 from identification.simulation.closed_loop import scan_step
@@ -38,14 +38,11 @@ from tuning.describing import band, is_play
 from tuning.forecast import (
     CALMER,
     DERIVATIVE,
-    LAMBDA,
     LEAST_PRELUDE,
-    LONGER,
     NOW,
     PRELUDE,
     RECOMMENDED,
     REPAIRED,
-    SIMC,
     SMALLER,
     Tried,
 )
@@ -55,24 +52,10 @@ from tuning.limit_cycle import KICK
 from tuning.limits import WARM_UP
 from tuning.rules import simc
 
-INTEGRATOR = {
-    SIMC: "Kp = 1/(slope (tau + L)), Ti = 4 (tau + L), tau = 1.5 L; knows no valve",
-    LAMBDA: "Kp = Ti/(slope (lambda + L)^2), Ti = 2 lambda + L, lambda = 3 L; knows no valve",
-}
-"""What the rules are for a process whose time constant is not known."""
-MEANING = {
-    NOW: "as stated",
-    RECOMMENDED: "the least travel and error within the limits, on the load and on what else the loop may be",
-    CALMER: "the least travel for at most a quarter more error, on all that the loop may be",
-    SMALLER: "the least error for no more travel, on all that the loop may be",
-    DERIVATIVE: "what a derivative takes off the error for no more travel, on all that the loop may be",
-    REPAIRED: "the present settings behind a valve without fault",
-    SIMC: "Kp = T/(K (tau + L)), Ti = min(T, 4 (tau + L)), tau = 1.5 L; knows no valve",
-    LAMBDA: "Kp = T/(K (lambda + L)), Ti = T, lambda = T, 3 L at least; knows no valve",
-    LONGER: "the present gain, Ti raised to the time constant: the source study's rule for play",
-}
 OFFERED = (CALMER, SMALLER, DERIVATIVE)
 """Settings between which may be chosen beside the recommended ones."""
+PLACED = {NOW: "now", RECOMMENDED: "recommended"}
+"""Colours of settings in a picture; others are those of a rule."""
 CAUTION = (
     "Recommended are only settings that keep robustness, load rejection and error on all that the night's data "
     "allow, with little more gain: a valve that jumps looks like one with play behind a process of less gain."
@@ -212,7 +195,9 @@ def _row(t: Tried, c: Comparison, spec: LoopSpec, unit: str) -> tuple[Cell, ...]
 
 def meanings(c: Comparison) -> Listing:
     """What the names of the settings mean."""
-    known = MEANING | (INTEGRATOR if isinstance(c.loop.process, Integrator) else {})
+    known = texts("settings") | (
+        texts("settings_of_integrators") if isinstance(c.loop.process, Integrator) else {}
+    )
     named = [t.name for t in c.tried] + ([] if c.repaired is None else [REPAIRED])
     return Listing(tuple((f"{name}:", known[name]) for name in named))
 
@@ -237,20 +222,14 @@ def travel_field(found: TravelMap, places: Sequence[Place], title: str, moves: s
 
     moves, rest : what travels, and what is said of settings at rest.
     """
-    keys = (("swings", f"limit cycle, the darker the more {moves} travels"), ("calm", f"comes to rest{rest}"))
-    return Field(
-        "travel-map",
-        title,
-        "Kp [%/%]",
-        "Ti [s]",
-        np.abs(found.kp),
-        found.ti_s,
-        3600.0 * found.travel,
-        found.rests,
-        found.unstable,
-        tuple(places),
-        (*keys, ("unstable", "unstable")),
-    )
+    swings = f"limit cycle, the darker the more {moves} travels"
+    keys = (("swings", swings), ("calm", f"comes to rest{rest}"), ("unstable", "unstable"))
+    cells = np.abs(found.kp), found.ti_s, 3600.0 * found.travel, found.rests, found.unstable
+    return Field("travel-map", title, "Kp [%/%]", "Ti [s]", *cells, tuple(places), keys)
+
+
+def _place(x: float, y: float, t: Tried) -> Place:
+    return Place(x, y, t.name, PLACED.get(t.name, "rule"))
 
 
 def price(c: Comparison, unit: str) -> Plot | None:
@@ -258,9 +237,8 @@ def price(c: Comparison, unit: str) -> Plot | None:
     if len(c.curve) < 2:
         return None
     now, scale = c.tried[0], c.pv_span / 100.0
-    kinds = {NOW: "now", RECOMMENDED: "recommended"}
     shown = [t for t in c.tried if t.stem_travel < SHOWN * now.stem_travel and t.error < SHOWN * now.error]
-    places = tuple(Place(scale * t.error, t.stem_travel, t.name, kinds.get(t.name, "rule")) for t in shown)
+    places = tuple(_place(scale * t.error, t.stem_travel, t) for t in shown)
     found = [(x.error, x.travel) for x in c.curve if x.travel < SHOWN and x.error < SHOWN]
     error, travel = np.array(found, float).reshape(-1, 2).T
     at = np.array([(p.x, p.y) for p in places], float).reshape(-1, 2)
@@ -277,12 +255,8 @@ def field(c: Comparison) -> Field | None:
     """The travel map with all settings that are compared; None where the valve is free."""
     if c.travel is None:
         return None
-    kinds = {NOW: "now", RECOMMENDED: "recommended"}
-    places = [
-        Place(abs(t.controller.kp), t.controller.ti_s, t.name, kinds.get(t.name, "rule"))
-        for t in c.tried
-        if math.isfinite(t.controller.ti_s)
-    ]
+    known = ((t, t.controller) for t in c.tried if math.isfinite(t.controller.ti_s))
+    places = [_place(abs(pid.kp), pid.ti_s, t) for t, pid in known]
     rest = "" if is_play(c.loop.valve) else " (seldom with stick-slip)"
     title = "Travel by describing function, without load"
     caption = "Kp in percent of OP over percent of PV, whatever unit the controller has."

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Sequence
 from statistics import median
+from typing import Any
 from urllib.parse import quote
 
 import numpy as np
@@ -67,6 +68,8 @@ SHARED = (
     *("split_at_pct", "split_slope", "half_slope"),
 )
 """Figures of a loop that shares a valve, or works half of a split range."""
+BUILT = ("source_loop", "master", "ratio_of", "split_of", "override_with")
+"""Other loops to which it is tied."""
 LEVELS = frozenset({"sp_mean_pct", "pv_mean_pct"})
 """Figures that are places and no sizes: their own unit has another zero."""
 LIKELIHOOD = ("evidence", "valve_size")
@@ -78,20 +81,8 @@ CYCLES = (
 COLUMNS = (
     *("loop", "type", "area", "description", "pv_unit", "op_unit", "status", "reason", "action", "cause"),
     *("valve_fault", "pv_lo", "pv_hi", "close_first_s", "close_last_s", "lanes", "evidence", "valve_size"),
-    *(
-        "timezone",
-        "lack",
-        "turns",
-        "source_loop",
-        "group",
-        "master",
-        "ratio_of",
-        "split_of",
-        "override_with",
-        "osc_valve_pct",
-        "osc_tuning_pct",
-        "osc_load_pct",
-    ),
+    *("timezone", "lack", "turns", "group", *BUILT),
+    *(f"osc_{cause}_pct" for cause in CAUSES),
     *("kp", "ti", "kp_new", "ti_new", "settings_from", "form", "gain_unit", "ti_unit", "signs", "notes"),
     *("advice", "start_s", "percent_of", *FIGURES, *MODEL),
     *("witness", "believed_nights", "believed_since", "worn_pct", "worn_nights", "certain_since"),
@@ -104,16 +95,18 @@ COLUMNS = (
 """What a loop's page reads of the table of nights."""
 
 
+def _known(row: Row, names: Sequence[str]) -> tuple[tuple[str, str], ...]:
+    """Figures that the night knows, with their titles and units."""
+    return tuple(titled(name, number(row[name])) for name in names if row[name] is not None)
+
+
 def _facts(row: Row) -> Facts:
     facts = [titled("action", row["action"] or "–"), titled("cause", row["cause"] or "not assessed")]
     shares = [(c, row[f"osc_{c}_pct"]) for c in CAUSES]
     facts += [titled(f"osc_{c}_pct", f"{share:.0f}") for c, share in shares if share is not None]
-    if row["valve_fault"] not in (None, "", Fault.NONE):
-        facts.append(titled("valve_fault", row["valve_fault"]))
-    for built in ("source_loop", "master", "ratio_of", "split_of", "override_with"):
-        if row[built]:
-            facts.append(titled(built, row[built]))
-    facts += [titled(k, number(row[k])) for k in SHARED if row[k] is not None]
+    fault = () if row["valve_fault"] == Fault.NONE else ("valve_fault",)
+    facts += [titled(name, row[name]) for name in (*fault, *BUILT) if row[name]]
+    facts += _known(row, SHARED)
     if row["period_s"] is not None:
         facts.append(("Period", duration(row["period_s"])))
         facts.append(titled("pv_amplitude_pct", number(row["pv_amplitude_pct"])))
@@ -149,10 +142,8 @@ def _first(row: Row, thin: Thinned | None) -> Section:
 
 def _verdict(row: Row) -> Section:
     """What was found, and on how many nights it rests."""
-    blocks: list[Block] = [_facts(row)]
-    if row["believed_nights"]:
-        blocks.append(Facts(_believed(row)))
-    return Section("What and why", tuple(blocks))
+    believed = (Facts(_believed(row)),) if row["believed_nights"] else ()
+    return Section("What and why", (_facts(row), *believed))
 
 
 def _evidence(row: Row) -> Section:
@@ -171,9 +162,9 @@ def _evidence(row: Row) -> Section:
     more = in_short(row["reason"] or "")[1]
     if more:
         blocks.insert(0, Text((more[:1].upper() + more[1:] + ".",)))
-    known = [titled(k, number(row[k])) for k in (*MODEL, *LIKELIHOOD) if row[k] is not None]
+    known = _known(row, (*MODEL, *LIKELIHOOD))
     if known:
-        blocks.append(Facts(tuple(known)))
+        blocks.append(Facts(known))
     if row["advice"]:
         blocks.append(Text((f"The advice rests on this: {row['advice']}",)))
     if row["notes"]:
@@ -194,7 +185,7 @@ def _moves(row: Row) -> list[Section]:
     if drawn is None:
         return []
     names = ("sp_moves", "rise_time_s", "overshoot_pct", "settling_time_s")
-    facts = Facts(tuple(titled(k, number(row[k])) for k in names if row[k] is not None))
+    facts = Facts(_known(row, names))
     growing = [Text((row["growing"] + ".",), "lead")] if row["growing"] else []
     return [Section("Moves of the set point", (*growing, facts, drawn, *_phases(row)))]
 
@@ -207,17 +198,11 @@ def _phases(row: Row) -> list[Table]:
     low, span = row["pv_lo"] or 0.0, (row["pv_hi"] or 100.0) - (row["pv_lo"] or 0.0)
     rows = []
     for phase in told:
-        settled = [s for s in phase["settled_s"] if s is not None]
-        ends = (plain_cell(low + span * phase[k] / 100.0) for k in ("begin", "end"))
+        ends = (low + span * phase[k] / 100.0 for k in ("begin", "end"))
         count, overshoot = len(phase["start_s"]), median(phase["overshoot_pct"])
-        rows.append(
-            (
-                *ends,
-                plain_cell(count),
-                plain_cell(overshoot),
-                plain_cell(median(settled) if settled else None),
-            )
-        )
+        settled = [s for s in phase["settled_s"] if s is not None]
+        figures = (*ends, count, overshoot, median(settled) if settled else None)
+        rows.append(tuple(map(plain_cell, figures)))
     unit = f"Levels in {row['pv_unit']}." if row["pv_unit"] else ""
     return [Table("phases", "Phases that come back", page_columns("phases"), tuple(rows), unit)]
 
@@ -257,12 +242,8 @@ def nights_section(rows: Sequence[Row]) -> Section:
 
 def _believed(row: Row) -> tuple[tuple[str, str], ...]:
     """What the nights together say, and how many they are."""
-    out = [
-        (
-            "The verdict rests on",
-            f"{with_noun(int(row['believed_nights']), 'night')} since {row['believed_since']}",
-        )
-    ]
+    nights = with_noun(int(row["believed_nights"]), "night")
+    out = [("The verdict rests on", f"{nights} since {row['believed_since']}")]
     if row["worn_nights"]:
         certain = f", certain since {row['certain_since']}" if row["certain_since"] else ""
         sure = "> 99" if row["worn_pct"] > MOST_SURE else f"{row['worn_pct']:.0f}"
@@ -277,30 +258,29 @@ def _believed(row: Row) -> tuple[tuple[str, str], ...]:
 
 def _over_nights(rows: Sequence[Row], column: str) -> Plot | None:
     """A figure over the nights; None where fewer than three know it."""
-    known = [(i - len(rows) + 1.0, r[column]) for i, r in enumerate(rows)]
-    points = np.array([(x, y) for x, y in known if y is not None], float)
-    if len(points) < 3:
+    line = _by_night("each night", [r[column] for r in rows])
+    if line.x.size < 3:
         return None
-    shown = BY_NAME[column]
-    line = Line("each night", points[:, 0], points[:, 1])
-    return Plot(
-        f"nights-{slug(column)}", shown.title, "nights before this one", shown.unit, (line,), reach=(0.0, 0.0)
-    )
+    name, shown = f"nights-{slug(column)}", BY_NAME[column]
+    return Plot(name, shown.title, "nights before this one", shown.unit, (line,), reach=(0.0, 0.0))
+
+
+def _by_night(label: str, figures: Sequence[float | None], **drawn: Any) -> Line:
+    """A figure of the nights up to this one, where it is known."""
+    known = [(i - len(figures) + 1.0, y) for i, y in enumerate(figures) if y is not None]
+    x, y = np.array(known, float).reshape(-1, 2).T
+    return Line(label, x, y, **drawn)
 
 
 def _widths(rows: Sequence[Row]) -> Plot | None:
     """Width of the valve's fault as each night tells it, and as they do together; None where fewer than three do."""
-    own = [(i - len(rows) + 1.0, _own_width(r)) for i, r in enumerate(rows)]
-    pooled = [(i - len(rows) + 1.0, r["width_pct"]) for i, r in enumerate(rows) if r["certain_since"]]
-    each, together = (np.array([p for p in part if p[1] is not None], float) for part in (own, pooled))
-    if not rows[-1]["certain_since"] or min(len(each), len(together)) < 3:
+    own = _by_night("each night", [_own_width(r) for r in rows], joined=False)
+    certain = [r["width_pct"] if r["certain_since"] else None for r in rows]
+    pooled = _by_night("nights together", certain, kind="op")
+    if not rows[-1]["certain_since"] or min(own.x.size, pooled.x.size) < 3:
         return None
-    lines = (
-        Line("each night", each[:, 0], each[:, 1], joined=False),
-        Line("nights together", together[:, 0], together[:, 1], kind="op"),
-    )
     title = "Width of the valve's fault"
-    return Plot("widths", title, "nights before this one", "% of OP", lines, reach=(0.0, 1.0))
+    return Plot("widths", title, "nights before this one", "% of OP", (own, pooled), reach=(0.0, 1.0))
 
 
 def _own_width(row: Row) -> float | None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -31,6 +30,8 @@ LEAST_BUCKETS = 2.5
 SHOWN_PERIODS = 8.0
 """Length of the autocorrelation shown [periods]."""
 STANDS = "OP moves, the stem stands"
+Course = tuple[Floats, Floats, slice]
+"""A line's places across and along, shape (n,) each, and the part of it in which the stem stands."""
 
 
 def close_span(row: Row, thin: Thinned) -> tuple[float, float] | None:
@@ -147,50 +148,34 @@ def turn_panels(row: Row, scale: PvScale) -> Panels | None:
     kept = json.loads(row.get("turns") or "null")
     if not kept:
         return None
-    halves = [_HalfCycle.of(h, scale, kept["step_s"]) for h in kept["halves"]]
     delay = f", PV {kept['dead_s']:.3g} s later" if kept["dead_s"] > 0 else ""
     pv, minutes = f"PV [{scale.label}]", "min since OP's turn"
-    op_lines = _laid_over([(h.minutes, h.turned(h.op), h.stuck) for h in halves])
-    pv_lines = _laid_over([(h.minutes, h.turned(h.pv), h.stuck) for h in halves])
-    plane = _laid_over([(h.op, h.late, h.stuck) for h in halves])
-    reach = _held(float(np.median(halves[0].late)), scale)
+    paths = zip(*(_half_cycle(h, scale, kept["step_s"]) for h in kept["halves"]), strict=True)
+    op_lines, pv_lines, plane = map(_laid_over, paths)
+    reach = _held(float(np.median(plane[0].y)), scale)
     plots = (
         Plot("turns-op", "OP since its turn", minutes, "OP [%]", op_lines, reach=(0.0, 0.0)),
         Plot("turns-pv", "PV since OP's turn", minutes, pv, pv_lines, reach=(0.0, 0.0)),
         Plot("turns-plane", f"PV over OP{delay}", "OP [%]", pv, plane, reach=reach),
     )
     said = texts("half_cycles").get(row["cause"], "Half-cycles laid over one another.")
-    title = f"The last {len(halves)} half-cycles, from each turn of OP (falling ones turned over)"
+    title = f"The last {len(kept['halves'])} half-cycles, from each turn of OP (falling ones turned over)"
     return Panels("turns", title, plots, said)
 
 
-@dataclass(frozen=True)
-class _HalfCycle:
-    """A half-cycle in the units of its axes; `late` is PV the dead time later, so that no delay looks like play."""
-
-    minutes: Floats
-    op: Floats
-    pv: Floats
-    late: Floats
-    stuck: slice
-
-    @classmethod
-    def of(cls, kept: Row, scale: PvScale, step_s: float) -> _HalfCycle:
-        """As the store kept it."""
-        op, pv, late = (np.array(kept[name], dtype=np.float64) for name in ("op", "pv", "late"))
-        first, last = kept["stuck"]
-        stuck = slice(first, last + 1 if last > first else last)
-        return cls(
-            np.arange(op.size, dtype=np.float64) * (step_s / 60.0), op, scale.of(pv), scale.of(late), stuck
-        )
-
-    def turned(self, y: Floats) -> Floats:
-        """A signal since the turn, that of a falling half turned over so that all lie on one another."""
-        way = 1.0 if self.op[-1] >= self.op[0] else -1.0
-        return way * (y - y[0])
+def _half_cycle(kept: Row, scale: PvScale, step_s: float) -> tuple[Course, Course, Course]:
+    """OP and PV since the turn, of a falling half turned over so that all lie on one another, and over OP the PV of
+    the dead time later, so that no delay looks like play."""
+    op, pv, late = (np.array(kept[name], dtype=np.float64) for name in ("op", "pv", "late"))
+    pv, late = scale.of(pv), scale.of(late)
+    first, last = kept["stuck"]
+    stuck = slice(first, last + 1 if last > first else last)
+    minutes = np.arange(op.size, dtype=np.float64) * (step_s / 60.0)
+    way = 1.0 if op[-1] >= op[0] else -1.0
+    return (minutes, way * (op - op[0]), stuck), (minutes, way * (pv - pv[0]), stuck), (op, late, stuck)
 
 
-def _laid_over(paths: Sequence[tuple[Floats, Floats, slice]]) -> tuple[Line, ...]:
+def _laid_over(paths: Sequence[Course]) -> tuple[Line, ...]:
     """Paths over one another, where the stem stands marked on top."""
     lines = [Line("since the turn", x, y) for x, y, _ in paths]
     stuck = [Line(STANDS, x[part], y[part], kind="stuck") for x, y, part in paths if x[part].size > 1]
