@@ -38,24 +38,10 @@ TREND, FIRST, OTHER = 1040.0, 200.0, 130.0
 """Width of a trend, and heights of its first panel and of the others."""
 BUCKETS = 1040
 """Buckets of a trend that are drawn at most: one a pixel."""
+DAY_S = 86400
 STEPS_S = (
-    1,
-    2,
-    5,
-    10,
-    30,
-    60,
-    300,
-    900,
-    1800,
-    3600,
-    7200,
-    21600,
-    43200,
-    86400,
-    2 * 86400,
-    7 * 86400,
-    28 * 86400,
+    *(1, 2, 5, 10, 30, 60, 300, 900, 1800, 3600, 7200, 21600, 43200),
+    *(days * DAY_S for days in (1, 2, 7, 28)),
 )
 """Distances of a time axis's ticks [s]."""
 MOST_TIMES = 9
@@ -86,6 +72,11 @@ def _axes(p: Plot) -> tuple[Axis, Axis]:
     return across, Axis(*_extent(y, 0.04), height - bottom, top, logs["y"])
 
 
+def _few(values: Floats) -> Floats:
+    """At most MOST_POINTS of the values of a line, evenly."""
+    return values[:: max(math.ceil(values.size / MOST_POINTS), 1)]
+
+
 def _line(line: Line, x: Floats, y: Floats) -> str:
     there = points(x, y)
     if line.joined:
@@ -113,12 +104,9 @@ def plot(p: Plot) -> Drawing:
     body = [part for v in x.ticks(6) for part in tick_x(x.at(v), along, f"{v:.6g}", 16)]
     body += [part for v in y.ticks(5) for part in tick_y(y.at(v), across, f"{v:.6g}")]
     for a in p.areas:
-        few = slice(None, None, max(math.ceil(a.x.size / MOST_POINTS), 1))
-        outline = between(x.places(a.x[few]), y.places(a.low[few]), y.places(a.high[few]))
+        outline = between(x.places(_few(a.x)), y.places(_few(a.low)), y.places(_few(a.high)))
         body += [f'<path class="area {a.kind}" d="{outline}"/>'] if outline else []
-    for line in p.lines:
-        few = slice(None, None, max(math.ceil(line.x.size / MOST_POINTS), 1))
-        body.append(_line(line, x.places(line.x[few]), y.places(line.y[few])))
+    body += [_line(line, x.places(_few(line.x)), y.places(_few(line.y))) for line in p.lines]
     body += [part for mark in p.marks for part in _mark(mark, x, along)]
     named = [(place, x.at(place.x), y.at(place.y)) for place in p.places]
     body += named_places(named, (across[0], along[0], across[1], along[1]))
@@ -228,5 +216,5 @@ def _times(start: float, end: float, zone: str) -> list[tuple[float, str]]:
     for at in (k * step - offset for k in whole):
         told = datetime.fromtimestamp(at, UTC).astimezone(clock)
         midnight = step >= 60 and told.hour == told.minute == 0
-        out.append((at, f"{told.day} {told:%b}" if step >= 86400 or midnight else f"{told:{form}}"))
+        out.append((at, f"{told.day} {told:%b}" if step >= DAY_S or midnight else f"{told:{form}}"))
     return out

@@ -52,9 +52,6 @@ class Drawing:
         head = f'<svg class="{self.kind}"{size} {box} role="{self.role}" aria-label="{escape(self.label)}">'
         return f"{head}{self.body}</svg>"
 
-    def __str__(self) -> str:
-        return self.__html__()
-
 
 @dataclass(frozen=True, slots=True)
 class Axis:

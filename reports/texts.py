@@ -36,21 +36,17 @@ def visible_lines(text: str) -> str:
 
 def visible_parts(part: T) -> T:
     """A page, or a part of one, with all its texts visible; the same object where they are."""
-    shown: T = _shown(part)
-    return shown
-
-
-def _shown(part: Any) -> Any:
+    shown: Any = part
     if type(part) is str:
-        return visible_lines(part)
-    if isinstance(part, tuple):
-        shown = tuple(map(_shown, part))
-        return part if all(a is b for a, b in zip(part, shown, strict=True)) else shown
-    if not is_dataclass(part) or isinstance(part, type):
-        return part
-    held = {f.name: getattr(part, f.name) for f in fields(part)}
-    changed = {name: new for name, old in held.items() if (new := _shown(old)) is not old}
-    return replace(part, **changed) if changed else part
+        shown = visible_lines(shown)
+    elif isinstance(part, tuple):
+        shown = tuple(map(visible_parts, part))
+        shown = part if all(a is b for a, b in zip(part, shown, strict=True)) else shown
+    elif is_dataclass(part) and not isinstance(part, type):
+        held = {f.name: getattr(part, f.name) for f in fields(part)}
+        changed = {name: new for name, old in held.items() if (new := visible_parts(old)) is not old}
+        shown = replace(part, **changed) if changed else part
+    return shown  # type: ignore[no-any-return]
 
 
 def harmless(text: str) -> str:
