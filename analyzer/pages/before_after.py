@@ -17,18 +17,20 @@ from analyzer.comparison.before_after import (
 )
 from analyzer.config import ComparisonLimits
 from analyzer.history.plant_clock import UTC_NAME
-from analyzer.loops.changes import TuningChange
-from analyzer.pages.changes import ChangeCase, outcome
+from analyzer.pages.changes import ChangeCase, outcome, wear_texts
 from analyzer.pages.loop_pictures import trend_block
 from analyzer.pages.words import (
+    cell,
     number,
     page_columns,
     plain_cell,
+    pv_scale_of,
     signed,
     stamp,
     texts,
     with_noun,
 )
+from analyzer.words.units import gain_unit
 from reports.pages import (
     Block,
     Cell,
@@ -104,12 +106,14 @@ def _setting(value: float | None) -> str:
     return "–" if value is None else f"{value:g}"
 
 
-def _settings(change: TuningChange, units: str) -> str:
+def _settings(case: ChangeCase) -> str:
+    change, row = case.change, case.row
     if change.kp_new is None and change.ti_new is None:
         return change.seen or "not stated"
     pairs = (("Kp", change.kp_old, change.kp_new), ("Ti", change.ti_old, change.ti_new))
     said = ", ".join(f"{name} {_setting(old)} → {_setting(new)}" for name, old, new in pairs)
-    return f"{said} ({units})"
+    gain = gain_unit(row["gain_unit"], row["pv_unit"], row["op_unit"])
+    return f"{said} ({row['form'] or 'ideal'} form, Kp in {gain}, Ti in {row['ti_unit'] or 's'})"
 
 
 def _in_short(case: ChangeCase) -> tuple[Cell, ...]:
@@ -118,8 +122,8 @@ def _in_short(case: ChangeCase) -> tuple[Cell, ...]:
     kind = texts("outcomes")[grade(case.found)]["tone"]
     return (
         Cell(case.found.loop, kind="strong"),
-        Cell(case.description),
-        Cell(_settings(case.change, case.units)),
+        cell(case.row, "description"),
+        Cell(_settings(case)),
         *(_change_cell(by_name.get(m.name)) for m in PRIMARY),
         Cell(outcome(case.found), kind=kind),
     )
@@ -149,22 +153,23 @@ def loop_section(case: ChangeCase, number_: int, zone: str = UTC_NAME) -> Sectio
     """What became of one loop: settings, spans, remarks, trends (the study's Figure 10)."""
     found, change = case.found, case.change
     facts = (
-        ("Settings", _settings(change, case.units)),
+        ("Settings", _settings(case)),
         ("Changed", f"{stamp(change.time_s, zone)} {zone}" + (f" by {change.who}" if change.who else "")),
         ("Before", _span(found.before.first_s, found.before.last_s, found.hours[0], zone)),
         ("After", _span(found.after.first_s, found.after.last_s, found.hours[1], zone)),
     )
     text = outcome(found)
     blocks: list[Block] = [Text((text[:1].upper() + text[1:] + ".",), "lead"), Facts(facts)]
-    if case.wear:
-        blocks.append(Listing(tuple(("", w) for w in case.wear)))
+    wear = wear_texts(found, case.row)
+    if wear:
+        blocks.append(Listing(tuple(("", text) for text in wear)))
     if case.trend is not None and case.trend.time_s.size > 1:
         thin = case.trend.between(found.before.first_s, found.after.last_s).coarser(TREND_BUCKETS)
         marks = (Mark(change.time_s, "changed"),)
         title = f"{found.loop}: before and after on one scale"
         if thin.time_s.size > 1:  # trends may have been pruned where hours were kept
-            blocks.append(trend_block(f"trend-{number_}", title, thin, marks, case.scale))
-    title = f"{found.loop} {case.description}".strip()
+            blocks.append(trend_block(f"trend-{number_}", title, thin, marks, pv_scale_of(case.row)))
+    title = f"{found.loop} {case.row['description'] or ''}".strip()
     return Section(title, tuple(blocks))
 
 

@@ -22,9 +22,8 @@ from analyzer.config import ChangeLimits, ComparisonLimits
 from analyzer.loop.decisions import counts
 from analyzer.loops.changes import TuningChange, behaviour_change, stated_changes
 from analyzer.pages.reading import Thinned, by_loop, nights_within, read_hours, read_nights, read_trends
-from analyzer.pages.words import PLAIN, PvScale, Row, enumerated, number, pv_scale_of, texts
+from analyzer.pages.words import Row, enumerated, number, texts
 from analyzer.store.store import Store
-from analyzer.words.units import gain_unit
 
 COLUMNS = (
     *("loop", "night", "description", "type", "gain_unit", "ti_unit", "pv_unit", "op_unit", "form", "kp"),
@@ -37,15 +36,12 @@ HOURS_A_YEAR = 8760.0
 
 @dataclass(frozen=True, slots=True)
 class ChangeCase:
-    """A change with what came of it."""
+    """A change with what came of it, the loop's row of the last night around it, and its trend."""
 
     change: TuningChange
     found: LoopComparison
-    description: str
-    units: str
+    row: Row
     trend: Thinned | None
-    wear: tuple[str, ...] = ()
-    scale: PvScale = PLAIN
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,21 +74,6 @@ def detected(
     return found
 
 
-def _around(spans: Sequence[tuple[Span, Span]]) -> Span:
-    ends = [s for pair in spans for s in pair]
-    return Span(min(s.first_s for s in ends), max(s.last_s for s in ends))
-
-
-def _source(rows: Sequence[Row], limits: ComparisonLimits) -> str:
-    oscillating = [counts(r["oscillating_pct"]) for r in rows]
-    return follows([r["source_loop"] for r in rows], oscillating, limits)
-
-
-def _units(row: Row) -> str:
-    gain = gain_unit(row["gain_unit"], row["pv_unit"], row["op_unit"])
-    return f"{row['form'] or 'ideal'} form, Kp in {gain}, Ti in {row['ti_unit'] or 's'}"
-
-
 def change_cases(
     store: Store, changes: Sequence[TuningChange], spans: Spans, limits: ComparisonLimits = LIMITS
 ) -> tuple[list[ChangeCase], list[tuple[str, str]]]:
@@ -109,7 +90,8 @@ def change_cases(
     if not changes:
         return [], []
     of = [spans.of(c, [o.time_s for o in changes if o.loop == c.loop and o != c]) for c in changes]
-    nights = nights_within(store, _around(of))
+    ends = [span for pair in of for span in pair]
+    nights = nights_within(store, Span(min(s.first_s for s in ends), max(s.last_s for s in ends)))
     loops = {c.loop for c in changes}
     rows = by_loop(read_nights(store, nights, COLUMNS, loops))
     hours, trends = read_hours(store, loops, nights), read_trends(store, loops, nights)
@@ -120,14 +102,11 @@ def change_cases(
         if change.loop not in hours or not own:
             missing.append((change.loop, "the store holds no hours of it around the change"))
             continue
-        result = compare(change.loop, hours[change.loop], before, after, _source(own, limits), limits)
-        found.append(_case(change, result, own[-1], trends.get(change.loop)))
+        oscillating = [counts(r["oscillating_pct"]) for r in own]
+        source = follows([r["source_loop"] for r in own], oscillating, limits)
+        result = compare(change.loop, hours[change.loop], before, after, source, limits)
+        found.append(ChangeCase(change, result, own[-1], trends.get(change.loop)))
     return found, missing
-
-
-def _case(change: TuningChange, result: LoopComparison, row: Row, trend: Thinned | None) -> ChangeCase:
-    told = (row["description"] or "", _units(row), trend)
-    return ChangeCase(change, result, *told, wear_texts(result, row), pv_scale_of(row))
 
 
 def outcome(found: LoopComparison) -> str:

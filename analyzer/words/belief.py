@@ -13,6 +13,7 @@ from analyzer.words.units import Row, duration
 if TYPE_CHECKING:
     from analyzer.belief.belief import Belief
     from analyzer.belief.phases import Growth, PhaseKnown
+    from analyzer.belief.remedy import Pair
 
 REPAIRED = re.compile(
     r"\b(repaired|replaced|overhauled|exchanged|renewed|repacked|new (valve|actuator|positioner|packing|stem))\b",
@@ -88,19 +89,18 @@ def _advice(now: Belief, row: Row) -> str | None:
     if now.told.calmed:
         return CALMED
     if now.told.action is Action.RETUNE and now.told.pair is not None:
-        return " ".join(filter(None, (now.told.pair.advice, _spread(now, row))))
+        return " ".join(filter(None, (now.told.pair.advice, _spread(now, now.told.pair, row))))
     return row["advice"] if row["action"] == now.told.action else ""
 
 
-def _spread(now: Belief, row: Row) -> str:
+def _spread(now: Belief, held: Pair, row: Row) -> str:
     """What else nights have advised; '' where one night alone has."""
     pairs = now.remedy.pairs
     if len(pairs) < 2:
         return ""
     ends = ((min(x), max(x)) for x in (tuple(p.kp for p in pairs), tuple(p.ti for p in pairs)))
     kp, ti = (f"{low:.3g} to {high:.3g}" for low, high in ends)
-    told = f"that of {now.told.pair.night} is held" if now.told.pair is not None else ""
-    return f"{len(pairs)} nights advise Kp {kp} and Ti {ti} {row['ti_unit'] or 's'}; {told}."
+    return f"{len(pairs)} nights advise Kp {kp} and Ti {ti} {row['ti_unit'] or 's'}; that of {held.night} is held."
 
 
 def _of_valve(now: Belief, row: Row) -> dict[str, Any]:
@@ -153,25 +153,19 @@ def _calmed(now: Belief) -> str:
 
 def _together(now: Belief, row: Row) -> str:
     """What the nights say of the cycle, and of the valve beside it."""
-    t = now.told
-    cycle = (
-        f"cycles every {duration(row['period_s'])}"
-        if counts(row["oscillating_pct"])
-        else "does not oscillate"
-    )
+    t, cycles = now.told, counts(row["oscillating_pct"])
+    cycle = f"cycles every {duration(row['period_s'])}" if cycles else "does not oscillate"
     nights = f"{now.cycle.nights} nights since {now.cycle.since}"
     if t.source is not None:
         return f"{cycle}: follows {t.source} in most of {nights}; fix that loop first"
-    if t.cause is Cause.VALVE:
-        return f"{cycle}: the valve makes it, by {nights}" if counts(row["oscillating_pct"]) else cycle
-    if t.cause is Cause.TUNING:
-        return f"{cycle}: too tight for its process, by {nights}"
-    if t.cause is Cause.LOAD:
-        beside = "; the valve is worn all the same" if t.fault in IS else ""
-        return f"{cycle}: driven from outside, by {nights}{beside}"
-    if t.cause is Cause.UNDECIDED:
-        return f"{cycle}; cause undecided: {nights} do not agree"
-    return cycle
+    beside = "; the valve is worn all the same" if t.fault in IS else ""
+    said = {
+        Cause.VALVE: f": the valve makes it, by {nights}" if cycles else "",
+        Cause.TUNING: f": too tight for its process, by {nights}",
+        Cause.LOAD: f": driven from outside, by {nights}{beside}",
+        Cause.UNDECIDED: f"; cause undecided: {nights} do not agree",
+    }
+    return cycle + said.get(t.cause, "")
 
 
 def news(before: Belief | None, now: Belief, row: Row) -> tuple[str, str]:
@@ -204,9 +198,8 @@ def _swing_news(before: Belief, now: Belief, row: Row) -> tuple[str, str] | None
     if before.cycle.loud and not now.cycle.loud:
         cycles = counts(row["oscillating_pct"])
         share = 100.0 * (row["oscillation_significance"] or 0.0) / max(now.cycle.top, 1e-9)
-        return (
-            f"oscillates {share:.0f} % as much as before" if cycles else "stopped oscillating"
-        ) + after, "better"
+        what = f"oscillates {share:.0f} % as much as before" if cycles else "stopped oscillating"
+        return what + after, "better"
     if now.cycle.shift > 0.0:
         tone = "worse" if now.cycle.shift > 1.0 else "better"
         return f"oscillates {100 * now.cycle.shift:.0f} % as much as it used to", tone
