@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from markupsafe import escape
@@ -146,8 +146,7 @@ def graph(g: Graph) -> Drawing:
     return Drawing(width, height, "".join(body), g.title, "graph", natural=True)
 
 
-@dataclass(frozen=True, slots=True)
-class Room:
+class Room(NamedTuple):
     """A rectangle: left, top, width, height."""
 
     x: float
@@ -201,8 +200,8 @@ def _mirrored(room: Room) -> Room:
 
 def laid_out(m: TreeMap, width: float, height: float) -> list[tuple[str, Room, list[tuple[Tile, Room]]]]:
     """Each group's name and room, and its tiles with theirs, the largest first; tiles without size are left out."""
-    groups = [(g.name, [t for t in g.tiles if t.size > 0]) for g in m.groups]
-    groups = sorted(((n, t) for n, t in groups if t), key=lambda g: -sum(t.size for t in g[1]))
+    sized = [(name, [t for t in tiles if t.size > 0]) for name, tiles in m.groups]
+    groups = sorted(((n, t) for n, t in sized if t), key=lambda g: -sum(t.size for t in g[1]))
     rooms = squarified([sum(t.size for t in tiles) for _, tiles in groups], Room(0.0, 0.0, width, height))
     out = []
     for (name, tiles), room in zip(groups, rooms, strict=True):
@@ -229,7 +228,7 @@ def tree_map(m: TreeMap) -> Drawing:
 
 def _tile(t: Tile, p: Room) -> str:
     title = f"<title>{escape(t.text)}</title>"
-    drawn = f'<rect class="tile {escape(t.kind)}" {box(p.x, p.y, p.w, p.h)}>{title}</rect>'
+    drawn = f'<rect class="tile {escape(t.kind)}" {box(*p)}>{title}</rect>'
     if p.h >= 16:
         drawn += written(p.x + 4, p.y + 13, fitting(t.name, p.w), kind="on")
     return f'<a href="{escape(t.href)}">{drawn}</a>' if t.href else drawn

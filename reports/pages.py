@@ -307,20 +307,13 @@ class Tile:
 
 
 @dataclass(frozen=True, slots=True)
-class TileGroup:
-    """Rectangles that lie together, under a name."""
-
-    name: str
-    tiles: tuple[Tile, ...]
-
-
-@dataclass(frozen=True, slots=True)
 class TreeMap:
-    """Groups of rectangles as large as what they stand for; `keys` names the colours: (kind, what it is)."""
+    """Rectangles as large as what they stand for, those of a group together under its name; `keys` names the colours:
+    (kind, what it is)."""
 
     name: str
     title: str
-    groups: tuple[TileGroup, ...]
+    groups: tuple[tuple[str, tuple[Tile, ...]], ...]
     keys: tuple[tuple[str, str], ...] = ()
     caption: str = ""
 

@@ -17,7 +17,7 @@ from analyzer.pages.summary import first_things, since
 from analyzer.pages.words import Row, cause_cell, cells, heading, marked_cell, page_columns, with_noun
 from analyzer.plantwide.view import GroupView
 from analyzer.words.units import changed_settings, row_settings
-from reports.pages import Cell, Listing, Page, Section, Sparkline, Table, Tiles
+from reports.pages import Cell, Listing, Page, Section, Table, Tiles
 
 FOLLOWER = "\u2514 "
 """Before the name of a loop that stands under the one it follows."""
@@ -33,11 +33,6 @@ LINKS = (
 )
 
 
-def _spark(night: ShownNight, row: Row) -> Sparkline | None:
-    trend = night.trends.get(row["loop"])
-    return None if trend is None else sparkline(trend, close_span(row, trend))
-
-
 def _settings(row: Row) -> str:
     known = row["kp_new"] is not None or row["ti_new"] is not None
     return changed_settings(row) if known else row_settings(row)
@@ -45,10 +40,11 @@ def _settings(row: Row) -> str:
 
 def _of_worst(night: ShownNight, row: Row, follows: bool, by: str) -> dict[str, Cell]:
     """What a loop to touch is shown with and the store does not hold."""
-    name = linked(night, row["loop"])
+    name, trend = linked(night, row["loop"]), night.trends.get(row["loop"])
+    drawn = None if trend is None else sparkline(trend, close_span(row, trend))
     return {
         "loop": replace(name, text=FOLLOWER + name.text) if follows else name,
-        "trend": Cell("", figure=_spark(night, row)),
+        "trend": Cell("", figure=drawn),
         by: marked_cell(row, by),
         "cause": cause_cell(row["cause"]),
         "settings": Cell(_settings(row)),

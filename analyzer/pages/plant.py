@@ -14,8 +14,9 @@ from analyzer.loop.decisions import CAUSES, Cause, Status, counts
 from analyzer.pages.reading import ShownNight, linked, needs_a_look, read_nights
 from analyzer.pages.words import Row, cell, number, page_columns, plain_cell
 from analyzer.store.store import Store
-from reports.pages import Block, Cell, Floats, Line, Panels, Plot, Table, Tile, TileGroup, TreeMap
+from reports.pages import Block, Cell, Floats, Line, Panels, Plot, Table, Tile, TreeMap
 
+NO_AREA = "no area stated"
 WORST = 5
 MOST_TILES = 15
 """Loops of an area that are drawn by themselves; the rest is one rectangle."""
@@ -53,7 +54,7 @@ def _area(name: str, rows: Sequence[Row]) -> tuple[Cell, ...]:
     numbers = [len(rows), len(assessed)]
     numbers += [sum(r["cause"] == c for r in assessed) for c in (*CAUSES, Cause.UNDECIDED)]
     return (
-        Cell(name or "no area stated"),
+        Cell(name or NO_AREA),
         plain_cell(score(rows)),
         *(Cell(str(n), float(n)) for n in numbers),
         plain_cell(sum(r[SIGNIFICANCE] or 0.0 for r in assessed)),
@@ -75,14 +76,14 @@ def _tile(night: ShownNight, row: Row, by: str) -> Tile:
     return Tile(row["loop"], cost(row, by), kind, text, linked(night, row["loop"]).href)
 
 
-def _tiles(night: ShownNight, name: str, rows: Sequence[Row], by: str) -> TileGroup:
+def _tiles(night: ShownNight, rows: Sequence[Row], by: str) -> tuple[Tile, ...]:
     ordered = sorted(rows, key=lambda r: (-cost(r, by), r["loop"]))
     tiles = [_tile(night, r, by) for r in ordered[:MOST_TILES]]
     rest = ordered[MOST_TILES:]
     if rest:
         total = sum(cost(r, by) for r in rest)
         tiles.append(Tile(f"{len(rest)} more", total, "calm", f"{len(rest)} more loops: {number(total)}"))
-    return TileGroup(name or "no area stated", tuple(tiles))
+    return tuple(tiles)
 
 
 def plant_map(night: ShownNight) -> TreeMap | None:
@@ -93,7 +94,7 @@ def plant_map(night: ShownNight) -> TreeMap | None:
     if not any(cost(r, by) > 0 for r in rows):
         return None
     what = "average absolute error times importance" if by == LOSS else "oscillation significance"
-    groups = tuple(_tiles(night, area, own, by) for area, own in by_area(rows).items())
+    groups = tuple((area or NO_AREA, _tiles(night, own, by)) for area, own in by_area(rows).items())
     return TreeMap("plant", f"The plant by area: size is {what}", groups, KEYS)
 
 

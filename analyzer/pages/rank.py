@@ -69,9 +69,8 @@ def _noted(row: dict[str, Any], known: Mapping[str, tuple[Note, ...]]) -> dict[s
     """A row with the newest note of its loop; numbers that are none are not known."""
     row = {k: None if isinstance(v, float) and not math.isfinite(v) else v for k, v in row.items()}
     found = notes.last(known, row["loop"])
-    if found is None:
-        return {**row, "note": None, "hidden_until": None}
-    return {**row, "note": found.said(row["timezone"]), "hidden_until": found.hidden_until or None}
+    said, until = (None, None) if found is None else (found.said(row["timezone"]), found.hidden_until or None)
+    return {**row, "note": said, "hidden_until": until}
 
 
 def hidden_loops(rows: Sequence[Row], night: str) -> tuple[str, ...]:
@@ -81,27 +80,23 @@ def hidden_loops(rows: Sequence[Row], night: str) -> tuple[str, ...]:
 
 def _sorted(rows: Sequence[dict[str, Any]], column: str, ascending: bool) -> list[dict[str, Any]]:
     """Rows by a column, ties and loops without a figure by name."""
-    known = [r for r in rows if r[column] not in (None, "")]
-    others = sorted((r for r in rows if r[column] in (None, "")), key=lambda r: r["loop"])
-    if BY_NAME[column].is_number:
-        known.sort(key=lambda r: (r[column] if ascending else -r[column], r["loop"]))
-    else:
-        known.sort(key=lambda r: (r[column], r["loop"]))
-    return known + others
+    by_name = sorted(rows, key=lambda r: r["loop"])
+    known = [r for r in by_name if r[column] not in (None, "")]
+    falls = BY_NAME[column].is_number and not ascending
+    known.sort(key=lambda r: -r[column] if falls else r[column])
+    return known + [r for r in by_name if r[column] in (None, "")]
 
 
 def worst_first(rows: Sequence[dict[str, Any]], column: str | None = None) -> list[dict[str, Any]]:
-    """Rows as the morning reads them: what oscillates, then what stands in another lane, then the rest."""
+    """Rows as the morning reads them: what oscillates, then what stands in another lane, then the rest.
+
+    Each by a column; behind them, by the significance within their own recorded range, those whose figure is not
+    known or compares with no other's.
+    """
     by = cost_column(rows)
-    return sorted(_comparable_first(rows, column or by), key=lambda row: _worth(row, by == LOSS))
-
-
-def _comparable_first(rows: Sequence[dict[str, Any]], column: str) -> list[dict[str, Any]]:
-    """Rows by a column; behind them, by the significance within their own recorded range, those whose figure is not
-    known or compares with no other's."""
-    alike = [r for r in rows if compares(r, column)]
-    others = [r for r in rows if not compares(r, column)]
-    return _sorted(alike, column, False) + _sorted(others, SIGNIFICANCE, False)
+    alike = _sorted([r for r in rows if compares(r, column or by)], column or by, False)
+    others = _sorted([r for r in rows if not compares(r, column or by)], SIGNIFICANCE, False)
+    return sorted((*alike, *others), key=lambda row: _worth(row, by == LOSS))
 
 
 def _worth(row: Row, lossy: bool) -> int:

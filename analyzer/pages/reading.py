@@ -143,10 +143,8 @@ NIGHT_COLUMNS = (
     *("period_s", "source_loop", "average_absolute_error_pct", "valve_travel_pct_per_h", "kp", "ti"),
     *("variability_pct", "kp_new", "ti_new", "action", "reason", "form", "gain_unit", "ti_unit", "pv_unit"),
     *("op_unit", "group", "close_first_s", "close_last_s", "timezone", "backlash_pct", "stickband_pct"),
-    *("advice", "due", "settings_changed", "judged_since_s", "percent_of", *FIGURE.values()),
-    *("news", "news_tone", "worn_pct", "worn_nights", "certain_since", "width_pct", "width_low_pct"),
-    *("width_high_pct", "wear_low_pct", "wear_high_pct", "wear_since", "reaches_pct", "reaches_from"),
-    "reaches_by",
+    *("advice", "due", "percent_of", *FIGURE.values(), "news", "news_tone", "width_pct"),
+    *("wear_low_pct", "wear_high_pct", "wear_since", "reaches_pct", "reaches_from", "reaches_by"),
 )
 """What the pages of a night read of its rows."""
 REMEMBERED = ("loop", "lanes", *FIGURE.values())

@@ -26,7 +26,6 @@ from reports.pages import (
     Place,
     Plot,
     Tile,
-    TileGroup,
     TreeMap,
     Trend,
 )
@@ -49,9 +48,7 @@ PICTURES: tuple[Picture, ...] = (
     Graph(
         "g", "Way", (Node("A", "x", "source", 0), Node("B", "y", "follower", 1)), (Arrow("A", "B", "3 s"),)
     ),
-    TreeMap(
-        "m", "Plant", (TileGroup("area", (Tile("L", 1.0, "valve", "L: 1", "l.html"),)),), (("valve", "v"),)
-    ),
+    TreeMap("m", "Plant", (("area", (Tile("L", 1.0, "valve", "L: 1", "l.html"),)),), (("valve", "v"),)),
 )
 
 

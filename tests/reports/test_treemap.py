@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from reports.maps import HEAD, Room, fitting, laid_out, squarified, tree_map
-from reports.pages import Tile, TileGroup, TreeMap
+from reports.pages import Tile, TreeMap
 
 SIZES = st.lists(st.floats(0.01, 1e4), min_size=1, max_size=40).map(lambda x: sorted(x, reverse=True))
 
@@ -38,7 +38,7 @@ def test_the_papers_example() -> None:
 
 def test_nothing_is_drawn_of_nothing() -> None:
     """Loops that lose nothing and areas without loss have no rectangle."""
-    empty = TreeMap("m", "M", (TileGroup("a", (Tile("x", 0.0, "calm", "x"),)),))
+    empty = TreeMap("m", "M", (("a", (Tile("x", 0.0, "calm", "x"),)),))
     assert laid_out(empty, 100, 100) == []
     assert "<rect" not in str(tree_map(empty))
 
@@ -46,7 +46,7 @@ def test_nothing_is_drawn_of_nothing() -> None:
 def test_groups_lie_apart_and_names_are_escaped() -> None:
     """Tiles lie within their group's room below its name; plant texts are escaped."""
     tiles = tuple(Tile(f"<b>{i}", 5.0 - i, "valve", "a & b", "x.html") for i in range(3))
-    m = TreeMap("m", "M", (TileGroup("<A>", tiles), TileGroup("B", (Tile("y", 3.0, "calm", "y"),))))
+    m = TreeMap("m", "M", (("<A>", tiles), ("B", (Tile("y", 3.0, "calm", "y"),))))
     for _, room, placed in laid_out(m, 500, 300):
         assert all(p.y >= room.y + HEAD - 1e-9 and p.x + p.w <= room.x + room.w + 1e-9 for _, p in placed)
     drawn = str(tree_map(m))
