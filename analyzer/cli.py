@@ -94,8 +94,7 @@ def rank(
 
     Example: triage rank store --top 20 --format markdown
     """
-    from analyzer.pages.lists import rendered, rendered_groups
-    from analyzer.pages.rank import hidden_loops, ranked
+    from analyzer.pages.rank import hidden_loops, ranked, rendered, rendered_groups
     from analyzer.store.store import Store
 
     if groups:

@@ -1,20 +1,28 @@
-"""The loops of a night in the order of the morning; reads what is shown and no more."""
+"""`triage rank`: the loops of a night in the order of the morning, or its groups, as text; reads what is shown."""
 
 from __future__ import annotations
 
+import json
 import math
+import os
+import sys
 from collections.abc import Mapping, Sequence
+from shutil import get_terminal_size
 from typing import Any
 
-from analyzer.columns import BELIEVED, BY_NAME, LISTED, NOTED, RANKING, names
+from analyzer.columns import BELIEVED, BY_NAME, GROUP_LIST, LISTED, NOTED, RANKING, names
 from analyzer.lanes.lanes import FIGURE, lanes_in
-from analyzer.loop.cost import LOSS, SIGNIFICANCE, compares, cost_column
-from analyzer.loop.decisions import Cause, Due, Lane
+from analyzer.loop.cost import LOSS, MARK, OF_RECORDED, SIGNIFICANCE, compares, cost_column, mark
+from analyzer.loop.decisions import CAUSES, Cause, Due, Lane
 from analyzer.store import notes
 from analyzer.store.notes import Note
 from analyzer.store.store import Store
-from analyzer.words.units import Row
+from analyzer.words.reason import in_short
+from analyzer.words.units import Row, duration, gain_unit, number
 from identification.errors import InputError
+from reports.markdown import escaped, rows_of_table
+from reports.plain import Heading, csv_text, table
+from reports.texts import visible
 
 BELIEFS_TOLD = tuple(c for c in BELIEVED if c.name not in ("constants", "state", "news_tone"))
 """What beliefs add to a list."""
@@ -26,6 +34,33 @@ LIST_COLUMNS = (*KEPT, *names(NOTED))
 """Columns of CSV and JSON: the contract's, then what says in which units settings stand, and the advice in full."""
 MOST_NAMES = 10
 """Areas that are named in an error."""
+WIDEST, PIPED = 240, 180
+"""Characters of a line of a wide table, and of one that no terminal shows."""
+OF_GROUPS = ("group", "loops", "period", "starts at", "action there", "others gain %", "members")
+CAUSE_STYLES: Mapping[str, str] = {
+    Cause.VALVE: "red",
+    Cause.TUNING: "yellow",
+    Cause.LOAD: "cyan",
+    Cause.UNDECIDED: "magenta",
+}
+"""Colours of causes on the terminal."""
+SHARES = tuple(f"osc_{cause}_pct" for cause in CAUSES)
+SHOWN = (
+    *("loop", "oscillation_significance", "oscillating_pct", *SHARES),
+    *("average_absolute_error_pct", "valve_travel_pct_per_h", "period_s", "kp", "ti", "action", "reason"),
+)
+"""Columns for people, in their order; new settings stand in the cells of the old ones."""
+WHOLE = frozenset({"oscillating_pct", *SHARES})
+"""Shares that are shown without decimals."""
+WITH_UNITS = frozenset({"period_s", "kp", "ti"})
+"""Numbers that are shown with their units, and so as texts."""
+WORTH_LEAST = (
+    *("osc_load_pct", "osc_tuning_pct", "osc_valve_pct", "valve_travel_pct_per_h", "oscillating_pct"),
+    *("average_absolute_error_pct", "ti", "kp", "period_s", "loss", "oscillation_significance"),
+)
+"""Columns that a narrow table leaves out, the first of them first; loop, action and reason stay."""
+LEAST_REASON = 44
+"""Characters of a line of the reason at least."""
 
 
 def ranked(
@@ -119,3 +154,154 @@ def _within(rows: list[dict[str, Any]], area: str | None) -> list[dict[str, Any]
         named = ", ".join(known[:MOST_NAMES]) or "none: loops.csv states no areas"
         raise InputError(f"area {area!r}", f"one of {named}", "correct --area")
     return found
+
+
+def rendered(rows: Sequence[Row], form: str, night: str, wide: bool = False, lane: Lane | None = None) -> str:
+    """Loops as text in one of the formats; a `wide` table keeps all its columns, one of a lane shows its figure."""
+    if form == "csv":
+        return _csv(rows, LIST_COLUMNS)
+    if form == "json":
+        return json.dumps([{c: r[c] for c in LIST_COLUMNS} for r in rows], indent=1)
+    if not rows:
+        return f"Night {night}: no loop is in the lane {lane}" if lane else f"Night {night}: no loops"
+    shown = _shown_of(rows, None if lane is None else FIGURE[lane])
+    if form == "table":
+        text, sign = as_table(rows, night, WIDEST if wide else None, shown), MARK
+    else:
+        cells = [map(escaped, brief(row, shown).values()) for row in rows]
+        text = "\n".join(rows_of_table([BY_NAME[name].heading for name in shown], cells))
+        sign = escaped(MARK)
+    marked = any(mark(row, column) for row in rows for column in shown)
+    return f"{text}\n\n{sign} {OF_RECORDED}" if marked else text
+
+
+def _csv(rows: Sequence[Row], columns: Sequence[str]) -> str:
+    return csv_text(columns, ([row[c] for c in columns] for row in rows)).rstrip("\n")
+
+
+def as_table(
+    rows: Sequence[Row], night: str, width: int | None = None, columns: Sequence[str] | None = None
+) -> str:
+    """The columns for people as a table; those worth least go where `width` (the terminal's by default) is short."""
+    width = width or (get_terminal_size().columns if interactive() else PIPED)
+    shown = [brief(row, columns or SHOWN) for row in rows]
+    kept = _fitting(shown, width)
+    headings = [
+        Heading(c.heading, c.is_number and c.name not in WITH_UNITS, c.name == "reason")
+        for c in map(BY_NAME.__getitem__, kept)
+    ]
+    head, body = table(headings, [[cells[name] for name in kept] for cells in shown], width)
+    rule = " " + "\u2500" * (max(map(len, (head, *(line for lines in body for line in lines)))) - 1)
+    coloured = interactive() and not os.environ.get("NO_COLOR")
+    lines = [
+        _coloured(line, row["loop"], row["cause"]) if coloured and not k else line
+        for row, lines in zip(rows, body, strict=True)
+        for k, line in enumerate(lines)
+    ]
+    return "\n".join([f"Night {night}", "", head, rule, *lines])
+
+
+def _coloured(line: str, loop: str, cause: str | None) -> str:
+    """A row's first line with its loop in the colour of its cause."""
+    import click
+
+    colour, shown = CAUSE_STYLES.get(cause or ""), visible(loop)
+    return line if colour is None else line.replace(shown, click.style(shown, fg=colour), 1)
+
+
+def _shown_of(rows: Sequence[Row], figure: str | None) -> tuple[str, ...]:
+    """The columns for people: a lane's figure in the place of the significance, the loss where there is one."""
+    lead = [] if figure is None or figure in SHOWN else [figure]
+    lead += [LOSS] if cost_column(rows) == LOSS else []
+    rest = [name for name in SHOWN[1:] if figure in (None, *SHOWN) or name not in SHARES]
+    return (SHOWN[0], *lead, *rest)
+
+
+def brief(row: Row, columns: Sequence[str]) -> dict[str, str]:
+    """A row for people, by column: figures in few characters, settings as old and new in one cell."""
+    gain = gain_unit(row.get("gain_unit"), row.get("pv_unit"), row.get("op_unit"))
+    special = {
+        "period_s": duration(row["period_s"]),
+        "kp": _settings(row["kp"], row["kp_new"], gain),
+        "ti": _settings(row["ti"], row["ti_new"], row.get("ti_unit") or "s", "none"),
+    }
+    noted = f" [note: {row['note']}]" if row.get("note") else ""
+    special["reason"] = in_short(row["reason"] or "")[0] + noted
+    return {
+        name: visible(special.get(name, "") or _figure(row[name], name) + mark(row, name)) for name in columns
+    }
+
+
+def _fitting(shown: Sequence[Mapping[str, str]], width: int) -> tuple[str, ...]:
+    """The columns that fit into so many characters with all tags whole; none without rows."""
+    kept = list(shown[0]) if shown else []
+    size = {name: max(map(len, (BY_NAME[name].heading, *(row[name] for row in shown)))) + 1 for name in kept}
+    size |= {"reason": LEAST_REASON + 1} if shown else {}
+    for name in WORTH_LEAST:
+        if name in kept and sum(size[n] for n in kept) + 1 > width:
+            kept.remove(name)
+    return tuple(kept)
+
+
+def _settings(now: float | None, new: float | None, unit: str, off: str = "0") -> str:
+    """A setting and what to make of it, with its unit; empty where it is not known, `off` where it is 0."""
+    if now is None:
+        return ""
+    present = number(now) if now else off
+    if new is not None:
+        return f"{present} -> {number(new)} {unit}"
+    return f"{present} {unit}" if now else off
+
+
+def _figure(value: Any, column: str) -> str:
+    """A cell for people: three digits, empty where not known."""
+    if isinstance(value, str):
+        return value
+    return f"{value:.0f}" if column in WHOLE and value is not None else number(value)
+
+
+def rendered_groups(rows: Sequence[Row], form: str, night: str) -> str:
+    """Groups (analyzer.pages.groups.group_row) as text in one of the formats."""
+    if form == "csv":
+        return _csv(rows, names(GROUP_LIST))
+    if form == "json":
+        lists = ("candidates", "members")
+        held = [{k: json.loads(v) if k in lists else v for k, v in r.items()} for r in rows]
+        return json.dumps(held, indent=1)
+    if form == "table":
+        return _group_table(rows, night)
+    return "\n".join(rows_of_table(OF_GROUPS, [map(escaped, _group_cells(r)) for r in rows]))
+
+
+def _group_cells(row: Row) -> tuple[str, ...]:
+    start = ", ".join(f"{loop} {pct:.0f} %" for loop, pct in json.loads(row["candidates"]).items())
+    members = [m for m in json.loads(row["members"]) if m != row["fix_first"]]
+    cells = (
+        *(row["group"], f"{row['loops']:.0f}", duration(row["group_period_s"]), start or "unseen"),
+        *(row["source_action"] or "undecided", number(row["others_gain_pct"]), ", ".join(members)),
+    )
+    return tuple(map(visible, cells))
+
+
+def _group_table(rows: Sequence[Row], night: str) -> str:
+    from rich.box import SIMPLE_HEAD
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    if not rows:
+        return f"Night {night}: no loops share an oscillation"
+    drawn = Table(box=SIMPLE_HEAD, title=f"Night {night}: one cause, several loops", title_justify="left")
+    for name in OF_GROUPS:
+        drawn.add_column(name, justify="right" if name in ("loops", "others gain %") else "left")
+    for row in rows:
+        drawn.add_row(*(Text(cell) for cell in _group_cells(row)))
+    console = Console(width=None if interactive() else PIPED)
+    with console.capture() as capture:
+        console.print(drawn)
+    return "\n".join(line.rstrip() for line in capture.get().rstrip().splitlines())
+
+
+def interactive() -> bool:
+    """Whether the output is read on a terminal."""
+    return sys.stdout.isatty()

@@ -13,7 +13,7 @@ from analyzer.loop.judged_stretch import Earlier, judged_stretch
 from analyzer.loops.changes import read_changes
 from analyzer.loops.tags import match, read_loops
 from analyzer.night import batch
-from analyzer.pages.lists import brief
+from analyzer.pages.rank import brief
 from analyzer.store.store import Store
 from analyzer.words.reason import in_short
 from identification.models import Pid

@@ -16,8 +16,8 @@ from click.testing import CliRunner, Result
 
 from analyzer.cli import main
 from analyzer.columns import NIGHTS, row_of
-from analyzer.pages import lists
-from analyzer.pages.lists import as_table
+from analyzer.pages import rank
+from analyzer.pages.rank import as_table
 from analyzer.store.store import Store
 from analyzer.store.table import rows_table, write_table
 from tests.steps import steps
@@ -216,7 +216,7 @@ def test_a_terminal_has_colours_and_the_same_words(small, monkeypatch):
     """On a terminal a loop has the colour of its cause, the words are those of a pipe, and NO_COLOR is heeded."""
     held = [row_of(row) for row in rows(10)]
     plain = as_table(held, NIGHT, 180)
-    monkeypatch.setattr(lists, "interactive", lambda: True)
+    monkeypatch.setattr(rank, "interactive", lambda: True)
     monkeypatch.delenv("NO_COLOR", raising=False)
     coloured = as_table(held, NIGHT, 180)
     assert "\x1b[31mFIC00000\x1b[0m" in coloured

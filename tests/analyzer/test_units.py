@@ -9,7 +9,7 @@ import numpy as np
 from analyzer.columns import row_of
 from analyzer.loop.conclusion import stated
 from analyzer.loops.spec import LoopSpec
-from analyzer.pages.lists import brief
+from analyzer.pages.rank import brief
 from analyzer.words.units import arrow, gain_unit, number
 from identification.controller.pid_regression import fit_pi
 from identification.models import Fopdt, Loop, Pid
