@@ -7,12 +7,11 @@ import io
 import math
 import textwrap
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 from rich.cells import cell_len, chop_cells, set_cell_size
 
-from reports.pages import Block, Cell, Facts, Listing, Page, Table, Text, Tiles
+from reports.pages import Block, Cell, Column, Facts, Listing, Page, Table, Text, Tiles
 from reports.texts import harmless, visible, visible_parts
 
 WIDTH = 100
@@ -87,42 +86,34 @@ def _held(cell: Cell, numeric: bool) -> str | float | None:
     return None if cell.number is None or not math.isfinite(cell.number) else float(cell.number)
 
 
-@dataclass(frozen=True, slots=True)
-class Heading:
-    """A column: its title, whether its cells stand at the right, and whether they are wrapped (one at most)."""
-
-    title: str
-    right: bool = False
-    wrapped: bool = False
-
-
 def table(
-    headings: Sequence[Heading], rows: Sequence[Sequence[str]], width: int
+    columns: Sequence[Column], rows: Sequence[Sequence[str]], width: int
 ) -> tuple[str, list[list[str]]]:
     """The line of headings, and of each row its lines.
 
     Parameters
     ----------
-    headings : sequence of Heading
+    columns : sequence of Column
+        Numbers stand at the right, and the cells of a wide one (one at most) are wrapped.
     rows : sequence of rows
-        A cell for each heading.
+        A cell for each column.
     width : int
-        Characters of a line; columns that are not wrapped are never cut, and may make it longer.
+        Characters of a line; columns that are not wide are never cut, and may make it longer.
     """
     sizes = [
-        max(map(cell_len, (h.title, *(row[k] for row in rows))), default=0) for k, h in enumerate(headings)
+        max(map(cell_len, (h.title, *(row[k] for row in rows))), default=0) for k, h in enumerate(columns)
     ]
-    others = sum(size for size, h in zip(sizes, headings, strict=True) if not h.wrapped)
-    room = max(width - others - len(GAP) * (len(headings) - 1) - 2, LEAST)
-    sizes = [min(size, room) if h.wrapped else size for size, h in zip(sizes, headings, strict=True)]
-    head = _line([h.title for h in headings], headings, sizes)
-    return head, [_lines(row, headings, sizes, room) for row in rows]
+    others = sum(size for size, h in zip(sizes, columns, strict=True) if not h.wide)
+    room = max(width - others - len(GAP) * (len(columns) - 1) - 2, LEAST)
+    sizes = [min(size, room) if h.wide else size for size, h in zip(sizes, columns, strict=True)]
+    head = _line([h.title for h in columns], columns, sizes)
+    return head, [_lines(row, columns, sizes, room) for row in rows]
 
 
-def _lines(row: Sequence[str], headings: Sequence[Heading], sizes: Sequence[int], room: int) -> list[str]:
-    folded = [_folded(cell, room) if h.wrapped else [cell] for cell, h in zip(row, headings, strict=True)]
+def _lines(row: Sequence[str], columns: Sequence[Column], sizes: Sequence[int], room: int) -> list[str]:
+    folded = [_folded(cell, room) if h.wide else [cell] for cell, h in zip(row, columns, strict=True)]
     return [
-        _line([cell[k] if k < len(cell) else "" for cell in folded], headings, sizes)
+        _line([cell[k] if k < len(cell) else "" for cell in folded], columns, sizes)
         for k in range(max(map(len, folded)))
     ]
 
@@ -141,8 +132,8 @@ def _folded(text: str, width: int) -> list[str]:
     return lines
 
 
-def _line(cells: Sequence[str], headings: Sequence[Heading], sizes: Sequence[int]) -> str:
-    padded = (_padded(cell, h.right, size) for cell, h, size in zip(cells, headings, sizes, strict=True))
+def _line(cells: Sequence[str], columns: Sequence[Column], sizes: Sequence[int]) -> str:
+    padded = (_padded(cell, h.numeric, size) for cell, h, size in zip(cells, columns, sizes, strict=True))
     return f" {GAP.join(padded)}".rstrip()
 
 

@@ -55,9 +55,7 @@ def _area(name: str, rows: Sequence[Row]) -> tuple[Cell, ...]:
     numbers += [sum(r["cause"] == c for r in assessed) for c in (*CAUSES, Cause.UNDECIDED)]
     return (
         Cell(name or NO_AREA),
-        plain_cell(score(rows)),
-        *(Cell(str(n), float(n)) for n in numbers),
-        plain_cell(sum(r[SIGNIFICANCE] or 0.0 for r in assessed)),
+        *map(plain_cell, (score(rows), *numbers, sum(r[SIGNIFICANCE] or 0.0 for r in assessed))),
         Cell(", ".join(f"{r['loop']} ({number(r[SIGNIFICANCE])})" for r in worst[:WORST])),
     )
 

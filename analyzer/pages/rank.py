@@ -21,7 +21,8 @@ from analyzer.words.reason import in_short
 from analyzer.words.units import Row, duration, gain_unit, number
 from identification.errors import InputError
 from reports.markdown import escaped, rows_of_table
-from reports.plain import Heading, csv_text, table
+from reports.pages import Column
+from reports.plain import csv_text, table
 from reports.texts import visible
 
 BELIEFS_TOLD = tuple(c for c in BELIEVED if c.name not in ("constants", "state", "news_tone"))
@@ -187,8 +188,8 @@ def as_table(
     shown = [brief(row, columns or SHOWN) for row in rows]
     kept = _fitting(shown, width)
     headings = [
-        Heading(c.heading, c.is_number and c.name not in WITH_UNITS, c.name == "reason")
-        for c in map(BY_NAME.__getitem__, kept)
+        Column(n, BY_NAME[n].heading, BY_NAME[n].is_number and n not in WITH_UNITS, wide=n == "reason")
+        for n in kept
     ]
     head, body = table(headings, [[cells[name] for name in kept] for cells in shown], width)
     rule = " " + "\u2500" * (max(map(len, (head, *(line for lines in body for line in lines)))) - 1)

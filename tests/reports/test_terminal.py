@@ -10,9 +10,15 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from reports.plain import Heading, table
+from reports.pages import Column
+from reports.plain import table
 
-HEADINGS = (Heading("Loop"), Heading("Error %", right=True), Heading("Kp"), Heading("Reason", wrapped=True))
+HEADINGS = (
+    Column("loop", "Loop"),
+    Column("error", "Error %", numeric=True),
+    Column("kp", "Kp"),
+    Column("reason", "Reason", wide=True),
+)
 WORDS = ("cycles", "every", "10.2", "min:", "the", "valve", "sticks", "by", "5", "%", "\u03a4\u0399\u039a-1")
 
 
@@ -20,7 +26,7 @@ def drawn(rows: list[list[str]], width: int) -> list[str]:
     """The lines of headings and rows as rich draws them."""
     slow = Table(box=SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 0))
     for h in HEADINGS:
-        slow.add_column(h.title, justify="right" if h.right else "left", no_wrap=not h.wrapped)
+        slow.add_column(h.title, justify="right" if h.numeric else "left", no_wrap=not h.wide)
     for row in rows:
         slow.add_row(*map(Text, row))
     console = Console(width=width)
