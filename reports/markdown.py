@@ -35,13 +35,9 @@ def escaped(text: str) -> str:
     return ADDRESSES.sub(r"\g<0>&#8203;", text).replace("@", "&#64;")
 
 
-def _link(href: str) -> str:
-    return href.removesuffix(".html") + ".md" if href.endswith(".html") else href
-
-
 def _cell(cell: Cell) -> str:
-    text = escaped(cell.text)
-    return f"[{text}]({_link(cell.href)})" if cell.href and text else text
+    text, href = escaped(cell.text), re.sub(r"\.html\Z", ".md", cell.href)
+    return f"[{text}]({href})" if href and text else text
 
 
 def rows_of_table(head: Sequence[str], rows: Iterable[Iterable[str]], rules: Sequence[str] = ()) -> list[str]:

@@ -29,10 +29,8 @@ def _answer(row: Row) -> str:
 
 def valve_test(row: Row) -> str:
     """The stroke test of a valve at fault in a few words; its order says how it is done."""
-    answer = _answer(row)
-    return (
-        f"steps of {_step(row)} %: {answer}" if answer else "steps of 5 %: PV, or the stem, does not answer"
-    )
+    answer = _answer(row) or "PV, or the stem, does not answer"
+    return f"steps of {_step(row) if _answer(row) else 5} %: {answer}"
 
 
 def _step(row: Row) -> str:

@@ -109,7 +109,7 @@ def dated_pages(store: Store, name: str | None, written: Callable[[str], bool]) 
     sums = read_sums(store, last)
     for night in nights:
         if night in nights[-2:] or not written(night):
-            yield dated_page(store, night, nights, sums)
+            yield _dated_page(store, night, nights, sums)
 
 
 def name_of(night: str) -> str:
@@ -130,18 +130,8 @@ def choices(nights: Sequence[str], night: str) -> tuple[tuple[str, str], ...]:
     return tuple((n, pages[n]) for n in reversed(nights)) if len(nights) > 1 else ()
 
 
-def dated_page(store: Store, night: str, nights: Sequence[str], sums: Sequence[NightSum]) -> Page:
-    """A night's morning page without links to loops' pages, which are those of the latest night alone.
-
-    Parameters
-    ----------
-    store : Store
-    night : str
-    nights : sequence of str
-        All nights that have a page, oldest first.
-    sums : sequence of NightSum
-        The plant's figures of these nights and others.
-    """
+def _dated_page(store: Store, night: str, nights: Sequence[str], sums: Sequence[NightSum]) -> Page:
+    """A night's morning page without links to loops' pages, which are those of the latest night alone."""
     own = [s for s in sums if s.name <= night]
     without_pages = replace(read_night(store, night, SHOWN), paged=())
     found = morning.page(without_pages, read_groups(store, night), own)

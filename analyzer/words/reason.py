@@ -34,11 +34,11 @@ SAID_AT_ONCE = (Action.CHECK_SETTINGS, Action.NEEDS_DATA)
 """Actions whose words belong into the list."""
 
 
-def in_short(text: str, most: int = MOST_WORDS) -> tuple[str, str]:
+def in_short(text: str) -> tuple[str, str]:
     """The first clauses of a reason, as many as make a short sentence (one at least), and the others."""
     clauses = text.split("; ")
     words = [len(clause.split()) for clause in clauses]
-    kept = max([n for n in range(1, len(clauses) + 1) if sum(words[:n]) <= most], default=1)
+    kept = max([n for n in range(1, len(clauses) + 1) if sum(words[:n]) <= MOST_WORDS], default=1)
     return "; ".join(clauses[:kept]), "; ".join(clauses[kept:])
 
 
