@@ -21,7 +21,7 @@ import numpy as np
 
 from analyzer.pages import night
 from proofs.common import command, publish, table
-from proofs.valve_loops import backlash_case, stick_case
+from proofs.valve_loops import backlash_case, corners, stick_case
 from reports.folder import write_html
 from tests.reports.small_store import small_store
 from tuning.recommend import recommend
@@ -79,7 +79,7 @@ def rows() -> list[tuple[str, float, str, float]]:
             ("morning page of 1,500 loops and 50 loop pages", pages, "one rfft of 86,400", transform)
         )
     for name, case in (("stick-slip", stick_case(2, 30_000)), ("play", backlash_case(2, 30_000))):
-        spent = call_s(lambda case=case: recommend(case.loop, "valve", load=case.load))
+        spent = call_s(lambda case=case: recommend(case.loop, "valve", corners(case.loop), case.load))
         found.append(
             (f"recommendation, {name}, 30,000 scans of load", spent, "one rfft of 86,400", transform)
         )

@@ -49,6 +49,7 @@ from proofs.limits_samples import (
 )
 from proofs.limits_sealed import of_controller, of_effects, of_recorder
 from proofs.plant import prepared, series, simulate, spec
+from proofs.valve_loops import corners
 from tuning.recommend import recommend
 
 
@@ -124,7 +125,7 @@ def of_advice(c: Config) -> list[Any]:
     for s in ADVISED:
         valve = Stiction(s.stickband, s.slip_jump) if s.stickband else Backlash(s.backlash)
         loop = Loop(Fopdt(s.process[0], s.process[1], s.process[2]), s.controller, valve)
-        found = recommend(loop, s.cause, limits=c.tuning)
+        found = recommend(loop, s.cause, corners(loop), limits=c.tuning)
         out.append((found.action, found.controller))
     out += [_is_hidden(dt_s, c) for dt_s in range(8, 40, 2)]
     return out

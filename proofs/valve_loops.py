@@ -1,14 +1,25 @@
-"""Random loops with a faulty valve, a load and noise, for the tests of the advice."""
+"""Random loops with a faulty valve, a load and noise, for the tests of the advice; and what the source study asks of
+one with play."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 from scipy.signal import lfilter
 
-from identification.models import Backlash, Fopdt, Integrator, Loop, Pid, Stiction
+from identification.models import Backlash, Fopdt, Integrator, Loop, Pid, Process, Stiction
 from identification.record import Floats
+from tuning.harmonic_balance import travel_map
+from tuning.rules import simc
+from tuning.search import scaled_valve
+
+SLOPE, DELAY, BAND = 0.15, 0.25, 0.15
+"""Half widths of what slope, dead time and play of a loop may be by, over their values [-]."""
+BISECTIONS = 24
+"""Halvings of Ti/T in the search for the largest that cycles: far below the two digits of the study's table."""
 
 
 @dataclass(frozen=True)
@@ -53,3 +64,45 @@ def level_case(seed: int, steps: int = 12_000) -> Case:
     case = backlash_case(seed, steps)
     process = Integrator(case.loop.process.slope, case.loop.process.dead_time_s)
     return replace(case, loop=replace(case.loop, process=process))
+
+
+def corners(loop: Loop) -> tuple[Loop, ...]:
+    """Eight corners of slope, dead time and play around a loop: what else it may be."""
+    return tuple(
+        replace(
+            loop,
+            process=_scaled(loop.process, 1.0 + up * SLOPE, 1.0 + late * DELAY),
+            valve=scaled_valve(loop.valve, 1.0 + wide * BAND),
+        )
+        for up, late, wide in product((-1.0, 1.0), repeat=3)
+    )
+
+
+def _scaled(process: Process, slope: float, delay: float) -> Process:
+    late = process.dead_time_s * delay
+    if isinstance(process, Integrator):
+        return Integrator(process.slope * slope, late)
+    return Fopdt(process.gain * slope, process.time_constant_s, late)
+
+
+def largest_cycling_ratio(process: Fopdt, gain_share: float = 1.0) -> float:
+    """Largest Ti/T at which play still cycles by harmonic balance under a continuous controller (Figure 6).
+
+    gain_share is Kp over that of the nominal tuning (SIMC with tau_c = 1.5 L). 0 where the loop cycles nowhere
+    between 0.02 and 5, inf where it still cycles at 5.
+    """
+    loop = Loop(process, replace(simc(process), scan_s=0.0), Backlash(1.0))
+    kp = np.array([loop.controller.kp * gain_share])
+
+    def cycles(ratio: float) -> bool:
+        return bool(travel_map(loop, kp, np.array([ratio * process.time_constant_s])).travel[0, 0] > 0.0)
+
+    tried = np.geomspace(0.02, 5.0, 40)
+    at = [r for r in tried if cycles(float(r))]
+    if not at or at[-1] == tried[-1]:
+        return math.inf if at else 0.0
+    low, high = float(at[-1]), float(at[-1] * (tried[1] / tried[0]))
+    for _ in range(BISECTIONS):
+        middle = math.sqrt(low * high)
+        low, high = (middle, high) if cycles(middle) else (low, middle)
+    return low

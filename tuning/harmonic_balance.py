@@ -1,24 +1,22 @@
 """Harmonic balance: the limit cycles that describing functions predict for a loop with play or stick-slip.
 
 G(iw) C(iw) N(A) = -1 (the source study's Eq. 3) has its phase in w alone once A is chosen to fit, so all
-solutions are the zeros of one function of w. Its Figures 3 to 7 as arrays stand here too: curves, travel over Kp and
-Ti, longest Ti that cycles.
+solutions are the zeros of one function of w. Its Figures 3, 4, 5 and 7 as arrays stand here too: curves, and travel
+over Kp and Ti.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
 
-from identification.models import Backlash, Fopdt, Loop
+from identification.models import Loop
 from identification.record import Floats, Mask
 from tuning.describing import Branch, Complexes, band, branches, curve, is_play
 from tuning.frequency_response import controller_response, frequencies, loop_response, spaced, stable_gains
-from tuning.rules import simc
 
 POLISH_STEPS = 6
 """Eightfold bracketings that polish a root found on the grid."""
@@ -27,8 +25,6 @@ END_STEPS, FINER = 2, 40
 REACH_POINTS, MAP_POINTS = 600, 300
 """Frequencies at which a branch is looked at: no pair of solutions further apart than 2 % is missed; and those of a
 map's row, whose periods are then within 0.1 %."""
-BISECTIONS = 24
-"""Halvings of Ti/T in the search for the largest that cycles: far below the two digits of the table."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -175,17 +171,15 @@ class TravelMap:
     """Figures 4, 5 and 7: the limit cycle over the Kp-Ti plane by harmonic balance.
 
     kp [% OP / % PV] of shape (n,), ti_s [s] of shape (m,). Of shape (m, n), 0 where there is no cycle: travel
-    [% OP / s], OP amplitude over period as the study defines it, period_s [s], op_amplitude [% OP] and
-    pv_amplitude [% PV]. Masks of shape (m, n): `rests` True where no limit cycle is predicted and the linear
-    loop is stable (the study's green), `unstable` True where the linear loop itself is not stable.
+    [% OP / s], OP amplitude over period as the study defines it, and period_s [s]. Masks of shape (m, n): `rests`
+    True where no limit cycle is predicted and the linear loop is stable (the study's green), `unstable` True where
+    the linear loop itself is not stable.
     """
 
     kp: Floats
     ti_s: Floats
     travel: Floats
     period_s: Floats
-    op_amplitude: Floats
-    pv_amplitude: Floats
     rests: Mask
     unstable: Mask
 
@@ -242,44 +236,11 @@ def travel_map(loop: Loop, kp: Floats, ti_s: Floats) -> TravelMap:
     stable = np.array([stable_gains(r, kp) for r in rows])
     cycles = np.isfinite(omega)
     period = np.where(cycles, 2.0 * math.pi / np.where(cycles, omega, 1.0), 0.0)
-    size = np.where(cycles, amplitude, 0.0)
     return TravelMap(
         kp,
         ti_s,
-        travel=size / np.where(cycles, period, 1.0),
+        travel=np.where(cycles, amplitude, 0.0) / np.where(cycles, period, 1.0),
         period_s=period,
-        op_amplitude=size,
-        pv_amplitude=size / _controller_gains(rows, kp, np.where(cycles, omega, 1.0)),
         rests=~cycles & stable & (band(loop.valve) <= 0.0 or is_play(loop.valve)),
         unstable=~stable,
     )
-
-
-def _controller_gains(rows: Sequence[Loop], kp: Floats, omega: Floats) -> Floats:
-    unit = [np.abs(controller_response(r.controller, w)) for r, w in zip(rows, omega, strict=True)]
-    return np.array(unit) * np.abs(kp / kp[0])
-
-
-def largest_cycling_ratio(process: Fopdt, gain_share: float = 1.0, scan_s: float = 0.0) -> float:
-    """Largest Ti/T at which play still cycles by harmonic balance (Figure 6).
-
-    gain_share is Kp over that of the nominal tuning (SIMC with tau_c = 1.5 L); scan_s = 0 a continuous controller, as
-    in the study. 0 where the loop cycles nowhere between 0.02 and 5, inf where it still cycles at 5.
-    """
-    loop = Loop(process, replace(simc(process), scan_s=scan_s), Backlash(1.0))
-    kp = np.array([loop.controller.kp * gain_share])
-
-    def cycles(ratio: float) -> bool:
-        return bool(
-            np.isfinite(_largest(_with(loop, float(kp[0]), ratio * process.time_constant_s), kp)[0][0])
-        )
-
-    tried = np.geomspace(0.02, 5.0, 40)
-    at = [r for r in tried if cycles(float(r))]
-    if not at or at[-1] == tried[-1]:
-        return math.inf if at else 0.0
-    low, high = float(at[-1]), float(at[-1] * (tried[1] / tried[0]))
-    for _ in range(BISECTIONS):
-        middle = math.sqrt(low * high)
-        low, high = (middle, high) if cycles(middle) else (low, middle)
-    return low

@@ -48,9 +48,6 @@ class TuningLimits:
     stick_ratio: float = TOML
     trade_error: float = TOML
     trade_reach: float = TOML
-    spread_slope: float = TOML
-    spread_delay: float = TOML
-    spread_band: float = TOML
     most_steps: int = TOML
     least_steps: int = TOML
 

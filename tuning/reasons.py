@@ -12,12 +12,8 @@ from tuning.limit_cycle import Confirmed, Cycle
 from tuning.limits import TuningLimits
 from tuning.search import Bench, Candidate, rejection
 
-
-def load(source: str) -> str:
-    """Why a loop under load is left alone."""
-    if source:
-        return f"The oscillation comes from loop {source}; new settings here would not end it."
-    return "The load oscillates, not this loop; new settings here would not end it. Look upstream."
+LOAD = "The load oscillates, not this loop; new settings here would not end it. Look upstream."
+"""Why a loop under load is left alone."""
 
 
 def no_cause(cause: str) -> str:

@@ -21,7 +21,6 @@ from tuning.rules import TAU_C_PER_DELAY, effective_delay, simc
 from tuning.search import (
     Bench,
     Candidate,
-    assumed_uncertainty,
     bench,
     mean_error,
     robust,
@@ -80,7 +79,6 @@ def recommend(
     uncertainty: Sequence[Loop] = (),
     load: Floats | None = None,
     limits: TuningLimits = LIMITS,
-    source: str = "",
 ) -> Proposal:
     """The proposal for one loop: identified process and valve with the present controller.
 
@@ -89,23 +87,20 @@ def recommend(
     cause : str
         Why the loop is in trouble, one of tuning.decisions.Cause; ValueError for any other.
     uncertainty : sequence of Loop
-        Other loops that the data allow; empty: corners around the loop (tuning.limits).
+        Other loops that the data allow.
     load : ndarray of shape (n,) or None
         Load and noise as they add to PV, on the controller's clock [% PV]; ValueError where it is not finite.
         None, or one too short to tell (tuning.limits): steps at the valve.
-    source : str
-        Name of the loop from which the load comes, if known.
     """
     _check(cause, load)
     if cause == Cause.LOAD:
-        return Proposal(Action.SEE_SOURCE_LOOP if source else Action.NONE, reasons.load(source))
+        return Proposal(Action.NONE, reasons.LOAD)
     if cause in (Cause.NONE, Cause.UNDECIDED):
         return Proposal(Action.NONE if cause == Cause.NONE else Action.UNDECIDED, reasons.no_cause(cause))
     if loop.controller.kp * loop.process.slope <= 0.0:
         return Proposal(Action.CHECK_SETTINGS, reasons.wrong_sign(loop))
-    others = tuple(uncertainty) or assumed_uncertainty(loop, limits)
     load = None if load is None or load.size < limits.least_steps else load
-    return (_tight if cause == Cause.TUNING else _valve)(loop, others, load, limits)
+    return (_tight if cause == Cause.TUNING else _valve)(loop, uncertainty, load, limits)
 
 
 def _tight(loop: Loop, others: Sequence[Loop], load: Floats | None, limits: TuningLimits) -> Proposal:

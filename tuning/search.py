@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass, replace
 from itertools import product
 
 import numpy as np
@@ -77,26 +77,6 @@ def standard_load(loop: Loop, steps: int) -> Floats:
     return load
 
 
-def assumed_uncertainty(loop: Loop, limits: TuningLimits) -> tuple[Loop, ...]:
-    """Eight corners of slope, dead time and play around the loop, for want of samples from identification."""
-    corners = product((-1.0, 1.0), repeat=3)
-    return tuple(
-        replace(
-            loop,
-            process=_scaled(loop.process, 1.0 + up * limits.spread_slope, 1.0 + late * limits.spread_delay),
-            valve=scaled_valve(loop.valve, 1.0 + wide * limits.spread_band),
-        )
-        for up, late, wide in corners
-    )
-
-
-def _scaled(process: Process, slope: float, delay: float) -> Process:
-    late = process.dead_time_s * delay
-    if isinstance(process, Integrator):
-        return Integrator(process.slope * slope, late)
-    return Fopdt(process.gain * slope, process.time_constant_s, late)
-
-
 def scaled_valve(valve: Valve, factor: float) -> Valve:
     """The valve with play, or stickband and slip jump, times a factor [-]."""
     if valve is None:
@@ -106,34 +86,25 @@ def scaled_valve(valve: Valve, factor: float) -> Valve:
     return replace(valve, stickband=valve.stickband * factor, slip_jump=valve.slip_jump * factor)
 
 
-def _upright(loop: Loop) -> Loop:
-    """The loop with its controller's gain above 0: mirrored about OP's middle, it travels and errs alike."""
-    if loop.controller.kp >= 0.0:
-        return loop
-    controller = replace(loop.controller, kp=-loop.controller.kp)
-    return replace(loop, process=_scaled(loop.process, -1.0, 1.0), controller=controller)
-
-
 def _to_digits(x: float) -> float:
     return float(f"{x:.{DIGITS}g}")
 
 
-def _resolved(loop: Loop) -> Loop:
-    """The loop with its constants to so many digits as they are ever known."""
-    p, valve = loop.process, loop.valve
-    first = _to_digits(p.slope) if isinstance(p, Integrator) else _to_digits(p.gain)
-    process: Process = Integrator(first, _to_digits(p.dead_time_s))
-    if isinstance(p, Fopdt):
-        process = Fopdt(first, _to_digits(p.time_constant_s), _to_digits(p.dead_time_s))
-    width = band(valve)
-    return replace(
-        loop, process=process, valve=scaled_valve(valve, _to_digits(width) / width) if width > 0.0 else valve
+def _as_simulated(loop: Loop) -> Loop:
+    """The loop with its constants to so many digits as they are ever known, and its controller's gain above 0:
+    mirrored about OP's middle, it travels and errs alike."""
+    p, c, width = loop.process, loop.controller, band(loop.valve)
+    gain, *times = (_to_digits(x) for x in astuple(p))
+    return Loop(
+        type(p)(math.copysign(1.0, c.kp) * gain, *times),
+        replace(c, kp=abs(c.kp)),
+        scaled_valve(loop.valve, _to_digits(width) / width) if width > 0.0 else loop.valve,
     )
 
 
 def _figures(loop: Loop, load: Floats) -> tuple[float, float]:
     """Stem travel [%/h] and average absolute error [% PV] on the load."""
-    r = settled(run(_upright(_resolved(loop)), np.round(load, DIGITS)))
+    r = settled(run(_as_simulated(loop), np.round(load, DIGITS)))
     return float(np.abs(np.diff(r.stem)).sum()) / r.duration_s * 3600.0, float(np.mean(np.abs(r.pv)))
 
 

@@ -25,7 +25,8 @@ from PIL import Image
 
 from identification.models import Backlash, Fopdt, Loop, Pid, Stiction
 from identification.simulation.closed_loop import closed_loop
-from tuning.harmonic_balance import TravelMap, curves, largest_cycling_ratio, travel_map
+from proofs.valve_loops import largest_cycling_ratio
+from tuning.harmonic_balance import TravelMap, curves, travel_map
 from tuning.limit_cycle import confirm
 
 LEVEL = Loop(Fopdt(80, 200, 1), Pid(1.0, 10.0), Backlash(1.0))

@@ -7,11 +7,9 @@ import pytest
 
 from identification.models import Backlash, Fopdt, Loop, Pid
 from identification.record import LoopRecord
-from proofs.valve_loops import backlash_case
+from proofs.valve_loops import backlash_case, corners
 from tuning.forecast import NAMES, assess, autocorrelation_peak, predict
-from tuning.limits import LIMITS
 from tuning.rules import backlash_rule
-from tuning.search import assumed_uncertainty
 
 
 def record(error, stem):
@@ -51,7 +49,7 @@ def test_forecast_of_the_rule_is_a_cut_in_travel():
     """With the rule for play travel and error fall beyond their intervals, on the uncertainty samples too."""
     case = backlash_case(1)
     new = backlash_rule(case.loop.process, case.loop.controller)
-    f = predict(case.loop, new, case.load, assumed_uncertainty(case.loop, LIMITS))
+    f = predict(case.loop, new, case.load, corners(case.loop))
     assert f.change["stem_travel"].high < -0.2
     assert f.change["oscillation"].value < 0
     for name in NAMES:

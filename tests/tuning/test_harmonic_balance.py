@@ -9,12 +9,12 @@ from hypothesis import strategies as st
 from scipy.optimize import fsolve
 
 from identification.models import Backlash, Fopdt, Integrator, Loop, Pid, Stiction
+from proofs.valve_loops import largest_cycling_ratio
 from tuning.describing import backlash
 from tuning.frequency_response import is_stable
 from tuning.harmonic_balance import (
     curves,
     harmonic_balance,
-    largest_cycling_ratio,
     predicted_cycle,
     travel_map,
 )
@@ -67,7 +67,7 @@ def test_nominal_tuning_begins_to_cycle_between_ten_and_twenty():
 @pytest.mark.parametrize("valve", [Backlash(1.0), Stiction(1.0, 1.0), Stiction(1.0, 0.4)])
 @pytest.mark.parametrize("scan", [0.0, 1.0])
 def test_map_agrees_with_the_balance_point_by_point(valve, scan):
-    """Every cell has the period, the amplitudes and the rest that the balance gives for that cell alone."""
+    """Every cell has the period, the travel and the rest that the balance gives for that cell alone."""
     kp, ti = np.array([0.3, 0.7, 1.4]), np.array([5.0, 20.0, 120.0, 250.0])
     loop = replace(LEVEL, valve=valve, controller=Pid(1, 10, scan_s=scan))
     m = travel_map(loop, kp, ti)
@@ -80,7 +80,6 @@ def test_map_agrees_with_the_balance_point_by_point(valve, scan):
                 assert m.travel[i, j] == 0
             else:
                 assert m.period_s[i, j] == pytest.approx(b.period_s, rel=2e-3)
-                assert m.pv_amplitude[i, j] == pytest.approx(b.pv_amplitude, rel=5e-3)
                 assert m.travel[i, j] == pytest.approx(b.op_amplitude / b.period_s, rel=5e-3)
 
 

@@ -10,12 +10,12 @@ from analyzer.loops.spec import LoopSpec
 from analyzer.pages import compared as page
 from identification.models import Backlash, Fopdt, Loop, Pid, Stiction
 from identification.simulation.closed_loop import closed_loop
-from proofs.valve_loops import backlash_case, level_case, stick_case
+from proofs.valve_loops import backlash_case, corners, level_case, stick_case
 from tuning.forecast import CALMER, DERIVATIVE, SMALLER, assess, run, settled, tried
 from tuning.frequency_response import maximum_sensitivity
 from tuning.limits import LIMITS
 from tuning.recommend import recommend
-from tuning.search import assumed_uncertainty, bench
+from tuning.search import bench
 from tuning.trade import trade
 
 
@@ -26,7 +26,7 @@ def found():
     for make in (backlash_case, stick_case, level_case):
         for seed in range(3):
             case = make(seed)
-            table = bench(case.loop, assumed_uncertainty(case.loop, LIMITS)[:3], case.load, LIMITS)
+            table = bench(case.loop, corners(case.loop)[:3], case.load, LIMITS)
             out.append((table, trade(table)))
     return out
 
@@ -78,7 +78,7 @@ def test_a_slow_lag_behind_a_play_is_tuned_as_an_integrator():
     loop = Loop(Fopdt(44.2, 861.0, 3.5), Pid(0.6, 40.0), Backlash(3.0))
     rng = np.random.default_rng(2)
     load = 2.0 * np.sin(np.arange(9000) / 900.0) + 0.02 * rng.standard_normal(9000)
-    p = recommend(loop, "valve", load=load)
+    p = recommend(loop, "valve", corners(loop), load)
     assert p.controller is not None
     assert p.controller.ti_s < loop.process.time_constant_s
     old, new = (
