@@ -16,9 +16,8 @@ from multiprocessing import get_context
 import numpy as np
 
 from analyzer.config import AdviceLimits, QualityLimits
-from analyzer.loop.advice import chosen_fit
 from analyzer.loop.assess import Assessment, assess
-from analyzer.loop.intervals import intervals
+from analyzer.loop.identified import intervals
 from analyzer.loop.quality import prepare
 from identification.errors import NotAssessedError
 from identification.models import Estimate, Pid
@@ -149,7 +148,7 @@ def held(case: tuple[str, int]) -> list[Held] | str:
     ]
     if told != wanted or verdict.measured is None:
         return told
-    found = intervals(chosen_fit(verdict), family != FAMILIES[2], AdviceLimits())
+    found = intervals(verdict.fit, family != FAMILIES[2], AdviceLimits())
     return [compared(family, name, found[name], true) for name, true in m.truth.items() if name in found]
 
 

@@ -13,7 +13,7 @@ from analyzer.history.series import Series
 from analyzer.loop.assess import convicted
 from analyzer.loop.cause import NO_CAUSE, Verdict
 from analyzer.loop.decisions import Cause, Fault
-from analyzer.loop.intervals import intervals
+from analyzer.loop.identified import intervals
 from analyzer.loop.oscillation import counting, detect
 from analyzer.loop.quality import Prepared, prepare
 from analyzer.loop.sample_clock import onto_clock

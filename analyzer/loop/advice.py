@@ -8,19 +8,16 @@ from dataclasses import dataclass, field, replace
 from analyzer.config import AdviceLimits, Config
 from analyzer.loop.assess import Assessment
 from analyzer.loop.cause import Verdict
-from analyzer.loop.decisions import Action, Cause, Due, Fault, Lack, Needs
+from analyzer.loop.decisions import Action, Cause, Due, Lack, Needs
 from analyzer.loop.fitness import too_thin
-from analyzer.loop.identified import cautious, load_of, uncertain
-from analyzer.loop.measure import Measured
+from analyzer.loop.identified import cautious, load_of, tuned, uncertain
 from analyzer.loop.oscillation import counting
 from analyzer.loop.settings_side_by_side import Comparison, compared
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import as_stated
 from analyzer.words import settings as words
-from identification.estimation.covariance import NINETY
-from identification.estimation.gauss_newton import covariance
 from identification.estimation.hammerstein import Fit
-from identification.models import Integrator, Loop, Pid, Process, Valve
+from identification.models import Loop, Pid
 from identification.record import Floats
 from tuning.frequency_response import integral_s, is_stable
 from tuning.limit_cycle import Cycle, confirm
@@ -61,58 +58,10 @@ class Proposed:
     others: tuple[Loop, ...] = ()
 
 
-def chosen_fit(verdict: Verdict) -> Fit:
-    """The fit that a verdict rests on."""
-    m = measured_of(verdict)
-    if verdict.cause is not Cause.VALVE:
-        return m.linear
-    return m.stick_slip if verdict.fault is Fault.STICTION and m.stick_slip is not None else m.play
-
-
-def measured_of(verdict: Verdict) -> Measured:
-    """What a verdict rests on.
-
-    Raises
-    ------
-    ValueError
-        Where it has no model.
-    """
-    if verdict.measured is None:
-        raise ValueError("a verdict without a model has no fit")
-    return verdict.measured
-
-
-def valve_of(verdict: Verdict, fit: Fit) -> Valve:
-    """The valve of a verdict's model, None where it is not at fault."""
-    return fit.valve.valve if verdict.cause is Cause.VALVE else None
-
-
 def model_of(verdict: Verdict, controller: Pid) -> Loop:
     """The closed loop that a verdict's model and the settings make."""
-    fit = chosen_fit(verdict)
-    process = fit.process
-    return Loop(process, controller, valve_of(verdict, fit))
-
-
-def lag_factor(fit: Fit, valve: bool, limits: AdviceLimits) -> float | None:
-    """Factor from the time constant to its 90 % limits [-]; None where the record tells gain over it alone."""
-    spread = math.sqrt(max(float(covariance(fit, free_width=valve)[0, 0]), 0.0))
-    factor = math.exp(min(NINETY * spread, 20.0))
-    known = is_known(fit, limits) and factor < limits.most_factor
-    return factor if known else None
-
-
-def is_known(fit: Fit, limits: AdviceLimits) -> bool:
-    """Whether the time constant is well inside the window, so that it can be told from an integrator's."""
-    return fit.time_constant_s < limits.longest_share * fit.window.duration_s
-
-
-def tuned(fit: Fit, valve: bool, limits: AdviceLimits) -> Process:
-    """The process that settings are sought for: an integrator where the time constant is not known."""
-    process = fit.process
-    if lag_factor(fit, valve, limits) is None:
-        return Integrator(process.slope, process.dead_time_s)
-    return process
+    fit = verdict.fit
+    return Loop(fit.process, controller, fit.valve.valve if verdict.cause is Cause.VALVE else None)
 
 
 def advise(
@@ -206,33 +155,24 @@ def withheld(
         return _lacking(found.needs)
     if verdict.cause in (Cause.NONE, Cause.LOAD):
         return Advice(Action.NONE)
-    if counting(found.oscillations) is None and verdict.cause is Cause.VALVE:
-        return Advice(Action.REPAIR_VALVE, words.CALM, due=Due.SHUTDOWN)
     if counting(found.oscillations) is None:
-        return Advice(Action.NONE)
+        at_fault = verdict.cause is Cause.VALVE
+        return Advice(Action.REPAIR_VALVE, words.CALM, due=Due.SHUTDOWN) if at_fault else Advice(Action.NONE)
+    if verdict.needs is not None:
+        return _lacking(verdict.needs)
     if verdict.cause is Cause.UNDECIDED:
-        return _for_a_cause(found, controller, config)
+        return _too_thin(found, controller, config) or Advice(Action.UNDECIDED)
     return _unsupported(found, controller, config)
-
-
-def _for_a_cause(found: Assessment, controller: Pid | None, config: Config) -> Advice:
-    """What a loop whose cause is not told lacks, if anything that is known."""
-    if found.verdict.needs is not None:
-        return _lacking(found.verdict.needs)
-    return _too_thin(found, controller, config) or Advice(Action.UNDECIDED)
 
 
 def _unsupported(found: Assessment, controller: Pid | None, config: Config) -> Advice | None:
     """What a loop that oscillates for its valve or its tuning lacks for new settings; None where nothing."""
-    verdict, m = found.verdict, found.verdict.measured
-    if m is None or (verdict.fault is Fault.UNDECIDED and m.play.gain == 0):
-        return Advice(Action.REPAIR_VALVE) if verdict.cause is Cause.VALVE else Advice(Action.UNDECIDED)
+    if found.for_settings is not None and found.verdict.cause is Cause.VALVE:
+        return Advice(Action.REPAIR_VALVE, f"no new settings: {found.for_settings}")
     if found.for_settings is not None:
-        lacking = _lacking(found.for_settings)
-        unset = f"no new settings: {found.for_settings}"
-        return Advice(Action.REPAIR_VALVE, unset) if verdict.cause is Cause.VALVE else lacking
+        return _lacking(found.for_settings)
     if controller is None:
-        return _without_settings(verdict)
+        return _without_settings(found.verdict)
     if found.judged_h < config.advice.least_h:
         return _lacking(Needs(Lack.LONGER, words.too_short(found.judged_h, config.advice.least_h)))
     return _too_thin(found, controller, config)
@@ -247,19 +187,6 @@ def _too_thin(found: Assessment, controller: Pid | None, config: Config) -> Advi
     return None if thin is None else _lacking(thin)
 
 
-def _sticks(m: Measured, controller: Pid, limits: AdviceLimits) -> Loop | None:
-    """The loop with the stick-slip that was tried beside a play, None where none was."""
-    fit = m.stick_slip
-    if fit is None or fit.valve.slip_jump <= 0:
-        return None
-    return Loop(tuned(fit, True, limits), controller, fit.valve.valve)
-
-
-def _cycles_alone(one: Loop, other: Loop) -> bool:
-    """Whether the first loop, simulated without load, cycles and the second does not."""
-    return confirm(other).cycle is None and confirm(one).cycle is not None
-
-
 def sought_for(verdict: Verdict, controller: Pid, limits: AdviceLimits) -> tuple[Loop, Fit, tuple[Loop, ...]]:
     """The loop that settings are sought for, its fit, and what else it may be, for a valve at fault.
 
@@ -267,13 +194,17 @@ def sought_for(verdict: Verdict, controller: Pid, limits: AdviceLimits) -> tuple
     sticks: something must move it.
     """
     verdict = verdict.for_settings
-    m, fit = measured_of(verdict), chosen_fit(verdict)
-    loop = replace(model_of(verdict, controller), process=tuned(fit, True, limits))
-    other = _sticks(m, controller, limits) if fit is m.play else None
-    if other is None or m.stick_slip is None or not _cycles_alone(other, loop):
+    fit, sticks = verdict.fit, verdict.rests_on.stick_slip
+
+    def of(fit: Fit) -> Loop:
+        return Loop(tuned(fit, True, limits), controller, fit.valve.valve)
+
+    loop = of(fit)
+    tried = sticks is not None and sticks is not fit and sticks.valve.slip_jump > 0
+    if sticks is None or not tried or confirm(loop).cycle is not None or confirm(of(sticks)).cycle is None:
         return loop, fit, uncertain(fit, loop)
-    samples = uncertain(m.stick_slip, other, 3), uncertain(fit, loop, 2)
-    return other, m.stick_slip, (loop, *samples[0], *samples[1])
+    other = of(sticks)
+    return other, sticks, (loop, *uncertain(sticks, other, 3), *uncertain(fit, loop, 2))
 
 
 def propose(verdict: Verdict, controller: Pid, period_s: float | None, config: Config) -> Proposed:
@@ -302,14 +233,14 @@ def _proposed(verdict: Verdict, controller: Pid, period_s: float | None, config:
 
 def _not_known_well(loop: Loop, verdict: Verdict, config: Config) -> str | None:
     """Why a model gives no settings, in words; None where it does."""
-    duration_s, dead_time_s = measured_of(verdict).window.duration_s, loop.process.dead_time_s
+    duration_s, dead_time_s = verdict.fit.window.duration_s, loop.process.dead_time_s
     if dead_time_s > config.advice.beyond_record * duration_s:
         return words.beyond_record(dead_time_s, duration_s)
     return words.UNSTABLE if verdict.cause is Cause.VALVE and not is_stable(loop) else None
 
 
 def _for_tuning(verdict: Verdict, loop: Loop, period_s: float | None, config: Config) -> Proposed:
-    fit = chosen_fit(verdict)
+    fit = verdict.fit
     slow = replace(loop, process=cautious(fit.process, period_s))
     others = (loop, *uncertain(fit, loop)[:2])
     load = load_of(fit, loop.controller)

@@ -39,6 +39,7 @@ from analyzer.loop.measure import PLAYS, Measured
 from analyzer.loop.oscillation import Oscillation
 from analyzer.loop.quality import Prepared
 from analyzer.words import settings as words
+from identification.estimation.hammerstein import Fit
 from identification.record import LoopRecord
 
 
@@ -59,6 +60,21 @@ class Verdict:
     measured: Measured | None = None
     dead: bool = False
     steady: Verdict | None = None
+
+    @property
+    def rests_on(self) -> Measured:
+        """What was measured; ValueError where nothing was."""
+        if self.measured is None:
+            raise ValueError("a verdict without a model has no fit")
+        return self.measured
+
+    @property
+    def fit(self) -> Fit:
+        """The fit that it rests on, the valve's where that is at fault; ValueError where it has no model."""
+        m = self.rests_on
+        if self.cause is not Cause.VALVE:
+            return m.linear
+        return m.stick_slip if self.fault is Fault.STICTION and m.stick_slip is not None else m.play
 
     @property
     def for_settings(self) -> Verdict:

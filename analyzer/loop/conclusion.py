@@ -10,14 +10,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analyzer.config import AdviceLimits
-from analyzer.loop.advice import Advice, is_known
+from analyzer.loop.advice import Advice
 from analyzer.loop.assess import Assessment
 from analyzer.loop.cause import Verdict
 from analyzer.loop.cost import RECORDED, STATED, loss
 from analyzer.loop.decisions import Action, Cause, Fault, Lack, Status
 from analyzer.loop.finding import Cell, Finding, Remedy, Swing
-from analyzer.loop.identified import gain_room
-from analyzer.loop.intervals import intervals
+from analyzer.loop.identified import gain_room, intervals, is_known
 from analyzer.loop.oscillation import Oscillations
 from analyzer.loop.setpoint_moves import as_row
 from analyzer.loops.spec import LoopSpec
@@ -174,13 +173,12 @@ def _model(verdict: Verdict, limits: AdviceLimits) -> Mapping[str, float | None]
     m = verdict.measured
     if m is None or verdict.cause not in (Cause.VALVE, Cause.TUNING):
         return {}
+    process, valve = _process(verdict.fit, limits), verdict.fit.valve
     if verdict.cause is Cause.TUNING:
-        return _process(m.linear, limits)
-    if verdict.fault is Fault.STICTION and m.stick_slip is not None:
-        valve = m.stick_slip.valve
-        columns = {"stickband_pct": valve.stickband, "slip_jump_pct": valve.slip_jump}
-        return {**_process(m.stick_slip, limits), **columns}
-    return {**_process(m.play, limits), "backlash_pct": m.play.valve.stickband}
+        return process
+    if verdict.fit is m.stick_slip:
+        return {**process, "stickband_pct": valve.stickband, "slip_jump_pct": valve.slip_jump}
+    return {**process, "backlash_pct": valve.stickband}
 
 
 def _of_half(verdict: Verdict, limits: AdviceLimits) -> Known:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from analyzer.loop.decisions import Cause, Fault
+from analyzer.loop.decisions import Cause
 from analyzer.loop.oscillation import Oscillations, counting
 from analyzer.loop.quality import Prepared
 from identification.estimation.evidence import turns_of
@@ -79,16 +79,6 @@ def thinned(
     return out
 
 
-def _fit(found: Assessment) -> Fit | None:
-    """The fit that the page's marks rest on: that of the valve at fault, else of the plain loop."""
-    v, m = found.verdict, found.verdict.measured
-    if m is None:
-        return None
-    if v.cause is not Cause.VALVE:
-        return m.linear
-    return m.stick_slip if v.fault is Fault.STICTION and m.stick_slip is not None else m.play
-
-
 def _marks(faulty: Fit | None, fit: Fit | None, period_s: float) -> StemMarks:
     """What the marks need: of a slow process PV does not come to rest, and the mark begins at the turn."""
     if fit is None:
@@ -106,7 +96,7 @@ def turn_events(prepared: Prepared, found: Assessment) -> str | None:
     end = round((found.close_s[1] - record.start_s) / record.dt_s)
     begin = max(end - round(SEARCHED_PERIODS * first.period_s / record.dt_s), 0)
     part = slice(begin, end)
-    fit = _fit(found)
+    fit = None if found.verdict.measured is None else found.verdict.fit
     marks = _marks(fit if found.verdict.cause is Cause.VALVE else None, fit, first.period_s)
     turns = turns_of(record.op[part], first.period_s / record.dt_s)
     good = record.usable[part]

@@ -8,23 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from analyzer.config import AdviceLimits, Config
-from analyzer.loop.advice import (
-    Advice,
-    chosen_fit,
-    model_of,
-    propose,
-    sought_for,
-    tuned,
-    uncertain,
-    valve_of,
-    withheld,
-)
+from analyzer.loop.advice import Advice, model_of, propose, sought_for, withheld
 from analyzer.loop.assess import Assessment, assess
 from analyzer.loop.cause import Verdict
 from analyzer.loop.decisions import Action, Cause, Needs
 from analyzer.loop.fitness import at_limits, unfit_for_cause
-from analyzer.loop.identified import load_of
-from analyzer.loop.intervals import intervals
+from analyzer.loop.identified import intervals, load_of, tuned, uncertain
 from analyzer.loop.judged_stretch import controller_of, earlier_settings
 from analyzer.loop.quality import Prepared, prepare
 from analyzer.loop.settings_side_by_side import middle_ti
@@ -92,8 +81,8 @@ def _model(verdict: Verdict, controller: Pid, limits: AdviceLimits) -> tuple[Loo
     """The loop that the forecast runs on, its fit, and what else it may be."""
     if verdict.cause is Cause.VALVE:
         return sought_for(verdict, controller, limits)
-    fit, model = chosen_fit(verdict), model_of(verdict, controller)
-    return model, fit, uncertain(fit, model) if verdict.measured else ()
+    model = model_of(verdict, controller)
+    return model, verdict.fit, uncertain(verdict.fit, model)
 
 
 def identified(found: Assessment, limits: AdviceLimits) -> tuple[Process, Valve, dict[str, Estimate]]:
@@ -107,9 +96,9 @@ def identified(found: Assessment, limits: AdviceLimits) -> tuple[Process, Valve,
     verdict = found.verdict
     if verdict.measured is None:
         raise NotAssessedError(str(verdict.needs or NO_MODEL))
-    fit, at_fault = chosen_fit(verdict), verdict.cause is Cause.VALVE
-    process = tuned(fit, at_fault, limits)
-    return process, valve_of(verdict, fit), intervals(fit, at_fault, limits)
+    fit, at_fault = verdict.fit, verdict.cause is Cause.VALVE
+    valve = fit.valve.valve if at_fault else None
+    return tuned(fit, at_fault, limits), valve, intervals(fit, at_fault, limits)
 
 
 def tune(found: Assessment, controller: Pid, config: Config, kept: Advice | None = None) -> Tuning:

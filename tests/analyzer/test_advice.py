@@ -9,20 +9,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analyzer.loop.advice import (
-    advise,
-    chosen_fit,
-    lag_factor,
-    propose,
-    sought_for,
-    tuned,
-    uncertain,
-)
+from analyzer.loop.advice import advise, propose, sought_for
 from analyzer.loop.assess import Assessment, assess
 from analyzer.loop.cause import NO_CAUSE, not_assessed
 from analyzer.loop.conclusion import concluded
 from analyzer.loop.decisions import Lack, Needs
-from analyzer.loop.identified import load_of, scan_noise
+from analyzer.loop.identified import lag_factor, load_of, scan_noise, tuned, uncertain
 from analyzer.loop.oscillation import Oscillations
 from analyzer.loop.quality import prepare
 from analyzer.store.rows import night_row
@@ -70,7 +62,7 @@ def test_play_before_a_known_lag_gets_ti_of_at_least_the_lag(pipe):
 
 def test_unknown_lag_is_sought_as_an_integrator(tank):
     """Where the record tells gain over time constant alone, settings are sought for an integrator of that slope."""
-    fit = chosen_fit(tank.verdict)
+    fit = tank.verdict.fit
     assert lag_factor(fit, True, CONFIG.advice) is None
     process = tuned(fit, True, CONFIG.advice)
     assert isinstance(process, Integrator)
@@ -79,7 +71,7 @@ def test_unknown_lag_is_sought_as_an_integrator(tank):
 
 def test_known_lag_is_sought_as_a_lag(pipe):
     """Where the record tells the time constant, settings are sought for that lag, within a quarter."""
-    process = tuned(chosen_fit(pipe.verdict), True, CONFIG.advice)
+    process = tuned(pipe.verdict.fit, True, CONFIG.advice)
     assert isinstance(process, Fopdt)
     assert process.time_constant_s == pytest.approx(PIPE.process[1], rel=0.25)
 
@@ -114,7 +106,7 @@ def test_same_seed_same_samples(tank):
 def test_load_keeps_the_noise_of_a_scan(tank):
     """The reconstructed load moves from scan to scan by the noise that was put in, though blocks have lost it."""
     m = tank.verdict.measured
-    fit = chosen_fit(tank.verdict)
+    fit = tank.verdict.fit
     assert scan_noise(m.window, TANK.controller) == pytest.approx(TANK.noise, rel=0.15)
     load = load_of(fit, TANK.controller)
     assert np.isfinite(load).all()
