@@ -1,1 +1,28 @@
-"""What to change: describing functions, limit cycles, rules, recommendations."""
+"""What to change: describing functions, limit cycles, rules, recommendations; the words of question and answer."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+
+
+class Cause(StrEnum):
+    """Why a loop oscillates, or is in trouble without."""
+
+    VALVE = "valve"
+    TUNING = "tuning"
+    LOAD = "load"
+    NONE = "none"
+    UNDECIDED = "undecided"
+
+
+class Action(StrEnum):
+    """What to do about a loop."""
+
+    RETUNE = "retune"
+    REPAIR_VALVE = "repair valve"
+    SEE_SOURCE_LOOP = "see source loop"
+    CHECK_SETTINGS = "check settings"
+    CHECK_MEASUREMENT = "check measurement"
+    NEEDS_DATA = "needs data"
+    NONE = "none"
+    UNDECIDED = "undecided"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from identification.models import Backlash, Integrator, Loop, Pid
-from tuning.decisions import Cause
+from tuning import Cause
 from tuning.describing import band, is_play
 from tuning.frequency_response import integral_s
 from tuning.limit_cycle import Confirmed, Cycle

@@ -11,8 +11,7 @@ import numpy as np
 from identification.models import Fopdt, Loop, Pid
 from identification.record import Floats
 from identification.simulation.closed_loop import scan_step
-from tuning import reasons
-from tuning.decisions import Action, Cause
+from tuning import Action, Cause, reasons
 from tuning.describing import band, is_play
 from tuning.frequency_response import integral_s, maximum_sensitivity
 from tuning.limit_cycle import Confirmed, confirm
@@ -85,7 +84,7 @@ def recommend(
     Parameters
     ----------
     cause : str
-        Why the loop is in trouble, one of tuning.decisions.Cause; ValueError for any other.
+        Why the loop is in trouble, one of tuning.Cause; ValueError for any other.
     uncertainty : sequence of Loop
         Other loops that the data allow.
     load : ndarray of shape (n,) or None

@@ -149,8 +149,9 @@ def withheld(
         return Advice(Action.REPAIR_VALVE)
     if found.outdated:
         return Advice(Action.NONE, words.JUST_CHANGED)
-    if found.settings is not None:
-        return Advice(Action.CHECK_SETTINGS, words.settings_differ(found.settings, spec, pv_span))
+    if found.settings is not None and controller is not None:
+        differ = words.settings_differ(controller, found.settings, spec, pv_span)
+        return Advice(Action.CHECK_SETTINGS, differ)
     if found.needs is not None:
         return _lacking(found.needs)
     if verdict.cause in (Cause.NONE, Cause.LOAD):

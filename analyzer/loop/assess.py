@@ -25,6 +25,7 @@ from analyzer.loop.cause import (
     judge,
     not_assessed,
     told_apart,
+    told_slip_by_slip,
     with_dead_valve,
 )
 from analyzer.loop.decisions import Cause, Lack, LacksError, Needs
@@ -35,9 +36,8 @@ from analyzer.loop.oscillation import Oscillation, Oscillations, barely_seen, co
 from analyzer.loop.page_trends import BUCKETS, FINE_BUCKETS, close_view, thinned
 from analyzer.loop.quality import Prepared
 from analyzer.loop.setpoint_moves import Move, moves
-from analyzer.loop.settings_check import SettingsDiffer, differing
+from analyzer.loop.settings_check import differing
 from analyzer.loop.shared_valve import Shared
-from analyzer.loop.slip_by_slip import told_slip_by_slip
 from analyzer.plantwide.wave import Wave, waves_of
 from analyzer.words import settings as words
 from identification.errors import NotAssessedError
@@ -56,8 +56,8 @@ class Assessment:
     """What is known about one loop after one night.
 
     loop; start_s, duration_s of the record [s]; night, the figures of the whole span; hours, of each clock
-    hour; oscillations; verdict; settings, where the controller's are not the stated ones; harris index (1: minimum
-    variance) where known; moves of the set point; waves, its part in the plant-wide pass; trend, thinned;
+    hour; oscillations; verdict; settings, the controller's where they are not the stated ones; harris index (1:
+    minimum variance) where known; moves of the set point; waves, its part in the plant-wide pass; trend, thinned;
     notes, plain sentences about the data; needs, what the record lacks to tell whether the loop oscillates, None
     where that is told; close_s, first and last time [s] of the last ten periods; for_settings, what
     the record lacks for new settings whatever its cause, None where it lacks nothing; judged_h, good hours in
@@ -72,7 +72,7 @@ class Assessment:
     hours: tuple[Hour, ...]
     oscillations: Oscillations
     verdict: Verdict
-    settings: SettingsDiffer | None = None
+    settings: Pid | None = None
     harris: float | None = None
     moves: tuple[Move, ...] = ()
     waves: tuple[Wave, ...] = ()
@@ -198,9 +198,7 @@ def hidden(record: LoopRecord, found: Oscillations, controller: Pid | None, conf
     return None if period is None else Needs(Lack.FASTER, words.too_coarse(record.dt_s, period, samples))
 
 
-def _settings(
-    prepared: Prepared, found: Oscillations, stated: Pid | None, config: Config
-) -> SettingsDiffer | None:
+def _settings(prepared: Prepared, found: Oscillations, stated: Pid | None, config: Config) -> Pid | None:
     """Where the controller works with other settings than the stated ones."""
     if stated is None or not prepared.op_known:
         return None
@@ -230,7 +228,7 @@ class _Judged:
     of_all: Oscillations
     found: Oscillations
     verdict: Verdict
-    settings: SettingsDiffer | None
+    settings: Pid | None
 
 
 def _judged(prepared: Prepared, stretch: Stretch, config: Config, kind: str) -> _Judged:
@@ -241,7 +239,7 @@ def _judged(prepared: Prepared, stretch: Stretch, config: Config, kind: str) -> 
     whole = len(part.record) == len(record)
     found = of_all if whole else detect(part.record, config.oscillation)
     settings = None if stretch.outdated else _settings(part, found, stretch.controller, config)
-    stated = settings.recorded if settings else stretch.controller
+    stated = settings or stretch.controller
     found, verdict = convicted(part, found, stated, config, kind)
     if _hours_in(part.record) < config.advice.least_h or too_thin(record.dt_s, stretch.controller, config):
         verdict = as_hint(verdict, config.advice.hint_pct)

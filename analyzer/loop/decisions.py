@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from identification.errors import NotAssessedError
-from tuning.decisions import Action, Cause
+from tuning import Action, Cause
 
 __all__ = [
     "CAUSES",

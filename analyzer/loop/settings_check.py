@@ -8,7 +8,6 @@ and is another, the two are told and nothing is advised.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 from analyzer.config import SettingsLimits
 from identification.controller.pid_regression import LawsCompared, compare_laws
@@ -21,20 +20,6 @@ FILTERED = 2.0
 """Factor by which the derivative's filter, which no list states, can hide its gain [-]; ours."""
 
 
-@dataclass(frozen=True, slots=True)
-class SettingsDiffer:
-    """Stated settings that are not those of the controller.
-
-    stated, recorded : in percent and seconds; explained_stated, explained_recorded : share of the variance of OP's
-    increments that each explains [-].
-    """
-
-    stated: Pid
-    recorded: Pid
-    explained_stated: float
-    explained_recorded: float
-
-
 def _factor(a: float, b: float) -> float:
     """How many times one setting is the other, at least 1; inf where one is nothing or the signs differ."""
     if a == b:
@@ -44,10 +29,9 @@ def _factor(a: float, b: float) -> float:
     return max(a / b, b / a)
 
 
-def differing(
-    record: LoopRecord, stated: Pid, scale_s: float, limits: SettingsLimits
-) -> SettingsDiffer | None:
-    """The recorded settings where they are plainly not the stated ones, in the whole record or in its later half.
+def differing(record: LoopRecord, stated: Pid, scale_s: float, limits: SettingsLimits) -> Pid | None:
+    """The recorded settings, in percent and seconds, where they are plainly not the stated ones, in the whole record
+    or in its later half.
 
     Settings that were changed within the record show in its later half, and those are the ones in force. scale_s is
     the period, or another time scale on which the loop moves [s]. None where they agree or the record cannot tell.
@@ -61,7 +45,7 @@ def differing(
         if seen is not None and seen.found == stated:
             return None
         if seen is not None and _plainly(seen, stated, record.dt_s, limits):
-            return SettingsDiffer(stated, seen.found, seen.explained_stated, seen.explained)
+            return seen.found
     return None
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from analyzer.loop.settings_check import SettingsDiffer
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import as_stated, derivative_as_stated
 from analyzer.words.units import arrow, gain_unit, settings
@@ -48,11 +47,11 @@ def settings_changed(old: LoopSpec, new: LoopSpec, clock: str) -> str:
     return f"{what} at {clock}"
 
 
-def settings_differ(found: SettingsDiffer, spec: LoopSpec, pv_span: float) -> str:
+def settings_differ(stated: Pid, recorded: Pid, spec: LoopSpec, pv_span: float) -> str:
     """What loops.csv states beside what OP follows."""
-    stated, recorded = (of_controller(pid, spec, pv_span) for pid in (found.stated, found.recorded))
+    listed, followed = (of_controller(pid, spec, pv_span) for pid in (stated, recorded))
     return (
-        f"settings in loops.csv are not those of the controller: stated {stated}; recorded about {recorded}. Correct "
+        f"settings in loops.csv are not those of the controller: stated {listed}; recorded about {followed}. Correct "
         "loops.csv (or find out who changed them) before anything is typed in"
     )
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from analyzer.config import Config
-from analyzer.loop.settings_check import SettingsDiffer, differing
+from analyzer.loop.settings_check import differing
 from identification.models import Pid
 from identification.record import LoopRecord
 
@@ -39,7 +39,7 @@ def recorded(pid: Pid, scans: int = 1, top: float = 100.0, seed: int = 3) -> Loo
     return LoopRecord("L", 0.0, 1.0, np.full(N, 50.0), 50.0 + pv[at], ops[at], out)
 
 
-def told(record: LoopRecord, stated: Pid) -> SettingsDiffer | None:
+def told(record: LoopRecord, stated: Pid) -> Pid | None:
     """What the check says, on the time scale of the true loop."""
     return differing(record, stated, 320.0, Config().settings)
 
@@ -57,8 +57,8 @@ def test_wrong_settings_are_told_with_the_true_ones(pid, top):
     """Gain and integral time stated wrong are told, with those that OP follows."""
     found = told(recorded(pid, top=top), replace(pid, kp=2.5 * pid.kp, ti_s=3.0 * pid.ti_s))
     assert found is not None
-    assert found.recorded.kp == pytest.approx(pid.kp, rel=0.25)
-    assert found.recorded.ti_s == pytest.approx(pid.ti_s, rel=0.25)
+    assert found.kp == pytest.approx(pid.kp, rel=0.25)
+    assert found.ti_s == pytest.approx(pid.ti_s, rel=0.25)
 
 
 def test_a_scan_faster_than_the_log_hides_nothing():
@@ -67,15 +67,15 @@ def test_a_scan_faster_than_the_log_hides_nothing():
     assert told(record, replace(PI, scan_s=0.1)) is None
     found = told(record, replace(PI, kp=5.0, ti_s=240.0, scan_s=0.1))
     assert found is not None
-    assert found.recorded.kp == pytest.approx(2.0, rel=0.1)
-    assert found.recorded.ti_s == pytest.approx(80.0, rel=0.1)
+    assert found.kp == pytest.approx(2.0, rel=0.1)
+    assert found.ti_s == pytest.approx(80.0, rel=0.1)
 
 
 def test_integral_action_that_is_not_there_is_told():
     """A controller of gain alone, stated with an integral time, is told to have none."""
     found = told(recorded(P), replace(P, ti_s=80.0))
     assert found is not None
-    assert math.isinf(found.recorded.ti_s)
+    assert math.isinf(found.ti_s)
 
 
 def test_a_constant_error_of_pv_is_no_other_integral_time():
