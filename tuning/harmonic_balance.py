@@ -33,13 +33,12 @@ class Balance:
 
     period_s [s], op_amplitude [% OP] and pv_amplitude [% PV] (half of peak to peak), stable: whether the loop
     returns to it (a limit cycle) or leaves it (the border between two fates); jumps of the stem per half
-    cycle (0: play); stem_amplitude [% OP] of the stem's fundamental.
+    cycle (0: play).
     """
 
     period_s: float
     op_amplitude: float
     pv_amplitude: float
-    stem_amplitude: float
     stable: bool
     jumps: int
 
@@ -124,14 +123,13 @@ def _is_stable(loop: Loop, branch: Branch, omega: float, phase: float) -> bool:
 def _solution(loop: Loop, branch: Branch, omega: float) -> Balance:
     at = np.array([omega])
     phase = np.angle(-1.0 / loop_response(loop, at))
-    log_a, log_n = branch.at_phase(phase)
+    log_a, _ = branch.at_phase(phase)
     amplitude = float(np.exp(log_a[0]))
     gain = float(np.abs(controller_response(loop.controller, at))[0])
     return Balance(
         period_s=2.0 * math.pi / omega,
         op_amplitude=amplitude,
         pv_amplitude=amplitude / gain,
-        stem_amplitude=amplitude * float(np.exp(log_n[0])),
         stable=_is_stable(loop, branch, omega, float(phase[0])),
         jumps=branch.jumps,
     )

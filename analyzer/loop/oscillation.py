@@ -20,7 +20,7 @@ from analyzer.loop.decisions import counts
 from identification.controller.check import runs
 from identification.record import Floats, LoopRecord, Mask
 from identification.signals.correlation import Rhythm, rhythm
-from identification.signals.half_cycles import half_cycles, levelled_correlation, shape, usual_prominence
+from identification.signals.half_cycles import levelled_correlation, shape, usual_prominence
 from identification.signals.setpoint_response import amplitude_at_rest, moves, without_setpoint
 from identification.signals.spectrum import (
     WIDE_BAND,
@@ -47,9 +47,8 @@ class Oscillation:
 
     period_s [s]; amplitude_pct, half of peak to peak of the fundamental [% of PV span] while it oscillates;
     oscillating_pct, share of time [%]; significance [% h], amplitude times correlation summed over the hours
-    of oscillation; rhythm, what the autocorrelation says; prominence and share as in OscillationLimits;
-    cycles, periods that the record holds; line, its frequency in lines of the spectrum; scatter, spread of the
-    cycles' lengths about the period [-].
+    of oscillation; rhythm, what the autocorrelation says; prominence as in OscillationLimits; cycles, periods that
+    the record holds, and so its frequency in lines of the spectrum.
     """
 
     period_s: float
@@ -58,10 +57,7 @@ class Oscillation:
     significance: float
     rhythm: Rhythm
     prominence: float
-    share: float
     cycles: float
-    line: float
-    scatter: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +66,7 @@ class Oscillations:
 
     found : the oscillations, the most significant first; active : True where the first one is on, shape (m,), at
     interval active_dt_s [s]; level : its amplitude over time [% of PV span], shape (m,); spectrum and bands of
-    the error without the set point's part; needs : why it could not be assessed, empty where it could.
+    the error without the set point's part.
     """
 
     found: tuple[Oscillation, ...] = ()
@@ -79,7 +75,6 @@ class Oscillations:
     active_dt_s: float = 1.0
     spectrum: Spectrum | None = None
     bands: Bands | None = None
-    needs: str = ""
 
     @property
     def first(self) -> Oscillation | None:
@@ -173,8 +168,7 @@ def _candidate(s: Spectrum, b: Bands, k: int, limits: OscillationLimits) -> Osci
     if not tonal and not _in_shape(s, line, x, dt, (cycles, prominence, correlation), limits):
         return None
     amplitude = math.sqrt(2 * float(x @ x) / x.size)
-    scatter = half_cycles(x, dt).scatter
-    return Oscillation(found.period_s, amplitude, 0, 0, found, prominence, share, cycles, cycles, scatter)
+    return Oscillation(found.period_s, amplitude, 0, 0, found, prominence, cycles)
 
 
 def peaks(b: Bands, least: float) -> list[int]:
@@ -205,7 +199,7 @@ def _sized(
     s: Spectrum, o: Oscillation, usable: Mask, limits: OscillationLimits
 ) -> tuple[Oscillation, Mask, Floats, float]:
     """Amplitude, share of time and significance from the envelope of the band."""
-    level, dt = envelope(s, o.line)
+    level, dt = envelope(s, o.cycles)
     width = max(round(2 * o.period_s / dt), 1)
     kernel = np.ones(width) / width
     smooth = np.sqrt(np.convolve(np.pad(level**2, width, mode="reflect"), kernel, mode="same")[width:-width])
@@ -278,8 +272,6 @@ def detect(record: LoopRecord, limits: OscillationLimits) -> Oscillations:
             continue
         if o.period_s <= longest and not any(_is_harmonic(o, p) for p in kept):
             kept.append(o)
-    if not kept:
-        return Oscillations(spectrum=s, bands=b)
     each = (_sized(s, o, usable, limits) for o in kept[:MOST])
     sized = sorted((r for r in each if _lasts(record, r[0], limits)), key=lambda r: -r[0].significance)
     if not sized:

@@ -77,7 +77,7 @@ class Scale:
 class Prepared:
     """A record with its scale, the resolution of its trends and plain sentences about its quality.
 
-    pv_step, op_step : resolution of PV and OP [% of span], 0 where none was seen; compressed_share : share of
+    pv_step : resolution of PV [% of span], 0 where none was seen; compressed_share : share of
     samples on straight segments [-]; op_known : False where no OP was recorded; op_scaled : False where what was
     recorded cannot be percent of the range that is stated, or assumed, of OP; archived_share : share of samples, of
     PV or OP the fewer, that were kept where trends are compressed [-]; shared : what the loop has of a valve that it
@@ -87,7 +87,6 @@ class Prepared:
     record: LoopRecord
     scale: Scale
     pv_step: float
-    op_step: float
     compressed_share: float
     notes: tuple[str, ...]
     op_known: bool = True
@@ -298,8 +297,7 @@ def _described(
             notes.append(f"{name} {100 * share:.0f} % of the time")
     if compressed > 0.3:
         notes.append(f"compressed: {100 * compressed:.0f} % of the samples lie on straight segments")
-    op_step = resolution(record.op) if op_known else 0.0
     if pv_step > 0:
         notes.append(f"PV on a grid of {pv_step:.3g} % of span")
     archived = min(archived_share(x) for x in ((record.pv, record.op) if op_known else (record.pv,)))
-    return Prepared(record, scale, pv_step, op_step, compressed, tuple(notes), op_known, op_scaled, archived)
+    return Prepared(record, scale, pv_step, compressed, tuple(notes), op_known, op_scaled, archived)

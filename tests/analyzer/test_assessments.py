@@ -265,7 +265,7 @@ def test_what_cannot_be_assessed_says_what_it_needs_and_has():
 def test_a_constant_loop_is_assessed_without_cause():
     """A loop that stands still is assessed: no oscillation, no cause, and no number that is none."""
     r = record(np.full(N, 47.0), op=50 + 0.1 * np.sin(T / 900))
-    found = assess(Prepared(r, Scale(0, 100, 0, 100, False), 0, 0, 0, ()), None, CONFIG)
+    found = assess(Prepared(r, Scale(0, 100, 0, 100, False), 0, 0, ()), None, CONFIG)
     assert found.verdict.cause == "none"
     assert found.oscillations.first is None
     assert all(h.oscillation_significance == 0.0 for h in found.hours)

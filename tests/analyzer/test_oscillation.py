@@ -170,7 +170,7 @@ def test_scaling_pv_scales_amplitude_and_significance_alone(factor, shift_s, lev
     other = first_of(moved)
     assert other.amplitude_pct == pytest.approx(factor * one.amplitude_pct, rel=1e-6)
     assert other.significance == pytest.approx(factor * one.significance, rel=1e-6)
-    for name in ("period_s", "oscillating_pct", "prominence", "share", "cycles"):
+    for name in ("period_s", "oscillating_pct", "prominence", "cycles"):
         assert getattr(other, name) == pytest.approx(getattr(one, name), rel=1e-6)
     assert other.rhythm.regularity == pytest.approx(one.rhythm.regularity, rel=1e-4)
 
@@ -248,13 +248,7 @@ def test_a_cycle_whose_halves_last_from_half_to_twice_is_found(seed):
     x = slips(seed, 60, 25)
     found = first_of(record(50 + x + 0.5 * noise(seed, x.size)))
     assert found.period_s == pytest.approx(2 * x.size / 60, rel=0.5)
-    assert found.scatter > 0.15
     assert found.oscillating_pct > 50
-
-
-def test_the_scatter_of_the_period_is_told():
-    """A sine in little noise has a period that scatters by less than 3 %."""
-    assert first_of(record(50 + np.sin(2 * np.pi * T / 130) + 0.05 * noise(20))).scatter < 0.03
 
 
 def test_three_samples_a_cycle_are_enough_where_the_cycle_is_plain():

@@ -108,7 +108,7 @@ def test_what_moves_pv_is_explained_by_what_the_valve_was_given() -> None:
     loop, other, idle = pair(True, False)
     shared = selected(loop, other, GOOD, LIMITS)
     assert shared is not None
-    whole = Prepared(loop, Scale(0.0, 100.0, 0.0, 100.0, False), 0.0, 0.0, 0.0, (), shared=shared)
+    whole = Prepared(loop, Scale(0.0, 100.0, 0.0, 100.0, False), 0.0, 0.0, (), shared=shared)
     given = as_given(whole).record
     assert (given.op == np.minimum(loop.op, other)).all()
     assert not given.bad.any()
