@@ -18,9 +18,9 @@ from analyzer.loop.cause import dead_valve
 from analyzer.loop.decisions import Status
 from analyzer.loop.finding import Finding, Swing
 from analyzer.loop.fitness import at_limits
+from analyzer.loop.judged_stretch import differing
 from analyzer.loop.oscillation import barely_seen, counting, detect
 from analyzer.loop.quality import prepare
-from analyzer.loop.settings_check import differing
 from analyzer.loops.changes import behaviour_change
 from analyzer.plantwide.night import likely, swing_of
 from analyzer.plantwide.verdict import follower_confidence, followers_of, trace

@@ -12,15 +12,12 @@ from tuning.limit_cycle import Confirmed, Cycle
 from tuning.limits import TuningLimits
 from tuning.search import Bench, Candidate, rejection
 
-LOAD = "The load oscillates, not this loop; new settings here would not end it. Look upstream."
-"""Why a loop under load is left alone."""
-
-
-def no_cause(cause: str) -> str:
-    """Why a loop without a known cause is left alone."""
-    if cause == Cause.NONE:
-        return "The loop is not in trouble; nothing to change."
-    return "The cause is not decided; no settings are proposed on a guess."
+LEFT_ALONE = {
+    Cause.LOAD: "The load oscillates, not this loop; new settings here would not end it. Look upstream.",
+    Cause.NONE: "The loop is not in trouble; nothing to change.",
+    Cause.UNDECIDED: "The cause is not decided; no settings are proposed on a guess.",
+}
+"""Why a loop in no trouble of its own, or of an unknown one, is left alone."""
 
 
 def wrong_sign(loop: Loop) -> str:
@@ -63,9 +60,8 @@ def little_less_error(left: float, now: float) -> str:
     )
 
 
-def no_size() -> str:
-    """Why a valve without a size gets no settings."""
-    return "The valve is at fault, but neither play nor stickband is known; a size is needed for settings."
+NO_SIZE = "The valve is at fault, but neither play nor stickband is known; a size is needed for settings."
+"""Why a valve without a size gets no settings."""
 
 
 def no_travel(loop: Loop) -> str:

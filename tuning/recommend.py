@@ -92,10 +92,9 @@ def recommend(
         None, or one too short to tell (tuning.limits): steps at the valve.
     """
     _check(cause, load)
-    if cause == Cause.LOAD:
-        return Proposal(Action.NONE, reasons.LOAD)
-    if cause in (Cause.NONE, Cause.UNDECIDED):
-        return Proposal(Action.NONE if cause == Cause.NONE else Action.UNDECIDED, reasons.no_cause(cause))
+    if cause in reasons.LEFT_ALONE:
+        action = Action.UNDECIDED if cause == Cause.UNDECIDED else Action.NONE
+        return Proposal(action, reasons.LEFT_ALONE[Cause(cause)])
     if loop.controller.kp * loop.process.slope <= 0.0:
         return Proposal(Action.CHECK_SETTINGS, reasons.wrong_sign(loop))
     load = None if load is None or load.size < limits.least_steps else load
@@ -149,7 +148,7 @@ def _simc_settings(
 def _valve(loop: Loop, others: Sequence[Loop], load: Floats | None, limits: TuningLimits) -> Proposal:
     """The least travel and error that the limits allow, for a loop with play or stick-slip."""
     if band(loop.valve) <= 0.0:
-        return Proposal(Action.UNDECIDED, reasons.no_size())
+        return Proposal(Action.UNDECIDED, reasons.NO_SIZE)
     before = confirm(loop)
     if _is_short_and_sticks(loop, limits):
         return Proposal(Action.REPAIR_VALVE, reasons.sticks_on_short_lag(loop, before, limits), before=before)

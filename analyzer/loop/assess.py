@@ -30,13 +30,12 @@ from analyzer.loop.cause import (
 )
 from analyzer.loop.decisions import Cause, Lack, LacksError, Needs
 from analyzer.loop.fitness import too_thin, unfit_for_cause, unfit_for_settings
-from analyzer.loop.judged_stretch import Earlier, Stretch, judged_stretch
+from analyzer.loop.judged_stretch import Earlier, Stretch, differing, judged_stretch
 from analyzer.loop.measure import Measured, measure, time_scale
 from analyzer.loop.oscillation import Oscillation, Oscillations, barely_seen, counting, detect
 from analyzer.loop.page_trends import BUCKETS, FINE_BUCKETS, close_view, thinned
 from analyzer.loop.quality import Prepared
 from analyzer.loop.setpoint_moves import Move, moves
-from analyzer.loop.settings_check import differing
 from analyzer.loop.shared_valve import Shared
 from analyzer.plantwide.wave import Wave, waves_of
 from analyzer.words import settings as words

@@ -30,8 +30,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analyzer.config import CauseLimits, Config
-from analyzer.loop.cause_signs import likelihood_told, signs_of, width_text
-from analyzer.loop.cause_weights import PLAIN, chances, measures
+from analyzer.loop.cause_weights import PLAIN, chances, likelihood_told, measures, signs_of, width_text
 from analyzer.loop.decisions import CAUSES, OF_LOAD, Cause, Fault, Lack, Needs
 from analyzer.loop.finding import Sign
 from analyzer.loop.fitness import compressed
@@ -150,13 +149,19 @@ def combined(signs: Iterable[Sign]) -> float:
 
 def fault_of(m: Measured, limits: CauseLimits) -> Fault:
     """Backlash or stiction, by what a slip jump adds to a play."""
-    if m.stick_slip is None:
-        return Fault.BACKLASH
-    share = m.stick_slip.valve.slip_jump / max(m.stick_slip.valve.stickband, 1e-9)
-    clear = max(limits.evidence_jump, limits.jump_share * m.evidence)
-    if m.jump > clear and share >= limits.least_jump:
+    found, clear = jump_evidence(m, limits)
+    if found > clear:
         return Fault.STICTION
-    return Fault.BACKLASH if m.jump < 0.5 * clear or share < limits.least_jump else Fault.UNDECIDED
+    return Fault.BACKLASH if m.stick_slip is None or found < 0.5 * clear else Fault.UNDECIDED
+
+
+def jump_evidence(m: Measured, limits: CauseLimits) -> tuple[float, float]:
+    """Evidence for a slip jump and what it takes [nat], none where it was not looked for."""
+    if m.stick_slip is None:
+        return 0.0, 0.0
+    clear = max(limits.evidence_jump, limits.jump_share * m.evidence)
+    share = m.stick_slip.valve.slip_jump / max(m.stick_slip.valve.stickband, 1e-9)
+    return min(m.jump, 10.0 * clear) if share >= limits.least_jump else 0.0, clear
 
 
 def judge(m: Measured, oscillation: Oscillation | None, limits: CauseLimits) -> Verdict:

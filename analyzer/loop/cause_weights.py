@@ -1,4 +1,4 @@
-"""The signs of a cause as numbers, and what each weighs: a multinomial logit, fitted to simulated loops.
+"""The signs of a cause as numbers, what each weighs in a multinomial logit fitted to simulated loops, and its words.
 
 Each sign counts along a broken line, and the odds of the causes are products over the signs, as in a scorecard (Good
 1950, weight of evidence). Which way a sign may point is fixed by physics; how much it weighs is fitted. Weights and
@@ -10,14 +10,15 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
 
 import numpy as np
 
-from analyzer.loop.decisions import CAUSES, Cause
+from analyzer.loop.decisions import AMPLIFICATION, CAUSES, Cause
+from analyzer.loop.finding import Sign
 from analyzer.loop.measure import Measured
 from analyzer.loop.oscillation import Oscillation
 from identification.record import Floats
@@ -107,18 +108,6 @@ def _log(x: float, low: float, high: float) -> float:
     return math.log(min(max(x, low), high))
 
 
-def _amplification(m: Measured) -> float:
-    """|S| at the period [-], 1 where no settings are known."""
-    if not m.stable:
-        return UNSTABLE
-    return m.amplification or 1.0
-
-
-def _loop_gain(m: Measured) -> float:
-    """Gain of process and controller together [-], 1 where no settings are known."""
-    return 1.0 if m.controller is None else abs(m.linear.gain * m.controller.kp)
-
-
 NAMES = (
     *("evidence", "evidence_per_cycle", "agreeing", "steadiness", "jump", "size"),
     *("line_linear", "line_valve", "amplification", "loop_gain", "dead_time_share", "consistency"),
@@ -131,9 +120,9 @@ def measures(m: Measured, o: Oscillation) -> Floats:
     """The signs of one oscillating loop as numbers, shape (len(NAMES),), within fixed bounds; NaN where not known.
 
     Gains in log likelihood in logarithms; agreeing and steadiness of the trials, 0 without; stickband over range of
-    OP; prominences, amplification at the period and K Kp in logarithms; dead time over period; gain outside the
-    period's band over gain with it; third harmonic over fundamental; kurtosis of the cycle's size; the
-    autocorrelation's third returning peak; share of time at a limit; harmonics that a faulty valve leaves.
+    OP; prominences, amplification at the period and K Kp, 1 without settings, in logarithms; dead time over period;
+    gain outside the period's band over gain with it; third harmonic over fundamental; kurtosis of the cycle's size;
+    the autocorrelation's third returning peak; share of time at a limit; harmonics that a faulty valve leaves.
     """
     t, cycles = m.trials, max(o.cycles, 1.0)
     found = (
@@ -145,8 +134,8 @@ def measures(m: Measured, o: Oscillation) -> Floats:
         min(max(m.size, 0.0), 1.5),
         _log(m.line_linear, 0.05, 1e4),
         _log(m.line_valve, 0.05, 1e4),
-        _log(_amplification(m), 0.1, 50.0),
-        _log(_loop_gain(m), 1e-3, 1e2),
+        _log(m.amplification or 1.0 if m.stable else UNSTABLE, 0.1, 50.0),
+        _log(1.0 if m.controller is None else abs(m.linear.gain * m.controller.kp), 1e-3, 1e2),
         min(m.linear.dead_time_s / o.period_s, 1.5),
         min(max(m.consistency, 0.0), 1.5),
         min(m.harmonic, 0.4),
@@ -156,3 +145,131 @@ def measures(m: Measured, o: Oscillation) -> Floats:
         min(max(m.wave_left, PLAIN), 0.4),
     )
     return np.array(found, dtype=np.float64)
+
+
+AMPLIFIES = 1.7
+"""|S| at the period from which that is told [-]: SIMC settings have 1.6 to 1.7 at their peak (Grimholt, Skogestad
+2012)."""
+LEAST_NAT = 0.1
+"""Push [nat] below which a sign is not worth a line: it moves the odds by a tenth."""
+
+
+Told = tuple[str, str]
+"""Words for everybody, and figures for an expert, '' where the words hold them."""
+
+
+def likelihood_told(evidence: float) -> Told:
+    """How a faulty valve explains PV against an ideal one."""
+    if evidence <= 0:
+        return "play or stick-slip explains PV no better than an ideal valve", ""
+    return "play or stick-slip explains PV better than an ideal valve", f"log likelihood +{evidence:.0f}"
+
+
+def width_text(size: float) -> str:
+    """The width of the valve's fault."""
+    return f"its width is {100 * size:.0f} % of OP's range"
+
+
+def _likelihood(m: Measured, o: Oscillation) -> Told:
+    t = m.trials
+    text, figures = likelihood_told(m.evidence)
+    if t is None or m.evidence <= 0:
+        return text, figures
+    return f"{text}, in {100 * t.agreeing:.0f} % of {t.count} stretches between turns of OP", figures
+
+
+def _width(m: Measured, o: Oscillation) -> Told:
+    if m.evidence <= 0:
+        return "no play or stick-slip is seen in PV", ""
+    return f"the fault that fits best is {100 * m.size:.0f} % of OP's range wide", ""
+
+
+def _left(m: Measured, o: Oscillation) -> Told:
+    plain = f"the load that is left has {'a' if m.line_linear >= 1.0 else 'no'} peak at the period"
+    return plain, f"prominence {m.line_linear:.1f}, behind a faulty valve {m.line_valve:.1f}"
+
+
+def _amplification(m: Measured, o: Oscillation) -> Told:
+    if not m.stable:
+        return "the identified loop is unstable", ""
+    if m.amplification is None:
+        return "how the loop amplifies at the period is not known, for want of its settings", ""
+    verb = "amplifies" if m.amplification > 1.0 else "weakens"
+    times = m.amplification if m.amplification > 1.0 else 1.0 / max(m.amplification, 1e-3)
+    return f"at the period the loop {verb} load {times:.1f} times", ""
+
+
+def _loop_gain(m: Measured, o: Oscillation) -> Told:
+    if m.controller is None:
+        return "the gain of process and controller together is not known, for want of settings", ""
+    return f"process and controller together have a gain of {abs(m.linear.gain * m.controller.kp):.2g}", ""
+
+
+def _process(m: Measured, o: Oscillation) -> Told:
+    figures = f"{m.consistency:.1f} times its gain"
+    if m.consistency >= 0.5:
+        return "outside the period's band the same process is seen", figures
+    return "away from the period another process is seen", figures
+
+
+def _wave(m: Measured, o: Oscillation) -> Told:
+    return f"the wave has a phase-locked third harmonic of {100 * m.harmonic:.0f} %", ""
+
+
+def _wave_left(m: Measured, o: Oscillation) -> Told:
+    if m.wave_left < PLAIN:
+        return "a faulty valve leaves few harmonics of the cycle unexplained", ""
+    return f"a faulty valve leaves harmonics of {100 * m.wave_left:.0f} % of the cycle unexplained", ""
+
+
+def _size(m: Measured, o: Oscillation) -> Told:
+    size, rhythm = m.kurtosis < 2.0, o.rhythm.third >= 0.5
+    figures = f"kurtosis {m.kurtosis:.1f}, noise has 3; rhythm {o.rhythm.third:.1f}"
+    if size == rhythm:
+        return f"the cycle {'keeps' if size else 'changes'} its size and its rhythm", figures
+    kept, changed = ("size", "rhythm") if size else ("rhythm", "size")
+    return f"the cycle keeps its {kept} and changes its {changed}", figures
+
+
+def _limits(m: Measured, o: Oscillation) -> Told:
+    share = 100 * m.saturated
+    return f"OP is at a limit {share:.0f} % of the time" if share >= 1 else "OP stays off its limits", ""
+
+
+def _dead_time(m: Measured, o: Oscillation) -> Told:
+    if o.period_s > 50 * m.linear.dead_time_s:
+        return "the period is long against the dead time", ""
+    return f"the period is {o.period_s / m.linear.dead_time_s:.0f} dead times", ""
+
+
+GROUPS: tuple[tuple[tuple[str, ...], Callable[[Measured, Oscillation], Told]], ...] = (
+    (("evidence", "evidence_per_cycle", "agreeing", "steadiness", "jump"), _likelihood),
+    (("size",), _width),
+    (("line_linear", "line_valve"), _left),
+    ((AMPLIFICATION,), _amplification),
+    (("loop_gain",), _loop_gain),
+    (("consistency",), _process),
+    (("harmonic",), _wave),
+    (("wave_left",), _wave_left),
+    (("kurtosis", "rhythm"), _size),
+    (("saturated",), _limits),
+    (("dead_time_share",), _dead_time),
+)
+"""Measures that are one sign together, with its words."""
+
+
+def signs_of(m: Measured, o: Oscillation) -> tuple[Sign, ...]:
+    """The signs of one oscillating loop; strength is one less the share to which a sign brings the odds against its
+    cause."""
+    moved = pushes(measures(m, o))
+    out = []
+    for names, text in GROUPS:
+        push = np.sum([moved[n] for n in names], axis=0)
+        k = int(np.argmax(push))
+        if push[k] >= LEAST_NAT:
+            words, figures = text(m, o)
+            out.append(Sign(CAUSES[k], 1.0 - math.exp(-float(push[k])), words, names[0], figures))
+    if not m.stable or (m.amplification or 0.0) >= AMPLIFIES:
+        told = [s for s in out if s.name != AMPLIFICATION]
+        return (*told, Sign(Cause.TUNING, 0.05, _amplification(m, o)[0], AMPLIFICATION))
+    return tuple(out)

@@ -25,6 +25,11 @@ from identification.estimation.hammerstein import Fit
 Known = dict[str, Cell]
 KNOWN_WITHIN = 2.5
 """Ends of a 90 % interval, one over the other, within which a constant of a half of a split range is told; ours."""
+AS_STATED = (
+    *("type", "area", "master", "ratio_of", "split_of", "override_with", "description", "pv_unit", "op_unit"),
+    *("importance", "kp", "ti", "gain_unit", "ti_unit"),
+)
+"""Columns of loops.csv that are columns of a finding."""
 PER_OP = ("gain", "slope_pct_per_s", "backlash_pct", "stickband_pct", "slip_jump_pct")
 """Constants in percent of OP, or per percent of it."""
 
@@ -32,22 +37,9 @@ PER_OP = ("gain", "slope_pct_per_s", "backlash_pct", "stickband_pct", "slip_jump
 def stated(spec: LoopSpec) -> Known:
     """What loops.csv states of a loop, by column."""
     return {
-        "type": spec.type,
-        "area": spec.area,
-        "master": spec.master,
-        "ratio_of": spec.ratio_of,
-        "split_of": spec.split_of,
-        "override_with": spec.override_with,
-        "description": spec.description,
-        "pv_unit": spec.pv_unit,
-        "op_unit": spec.op_unit,
-        "importance": spec.importance,
+        **{name: getattr(spec, name) for name in AS_STATED},
         "percent_of": STATED if spec.has_pv_range else RECORDED,
-        "kp": spec.kp,
-        "ti": spec.ti,
         "form": str(spec.form),
-        "gain_unit": spec.gain_unit,
-        "ti_unit": spec.ti_unit,
         "extra": json.dumps(dict(spec.extra)),
     }
 

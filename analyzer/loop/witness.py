@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from analyzer.config import CauseLimits
-from analyzer.loop.cause import Verdict, agrees, fault_of, hidden_by_grid, needed
+from analyzer.loop.cause import Verdict, agrees, fault_of, hidden_by_grid, jump_evidence, needed
 from analyzer.loop.decisions import Cause, Fault
 from analyzer.loop.measure import Measured
 from analyzer.loop.quality import Prepared
@@ -52,7 +52,9 @@ def witness(verdict: Verdict, oscillates: bool, prepared: Prepared, limits: Caus
         "profile": [round(float(x), 1) for x in _profile(m, 0.0 if convicted else limits.noise_widths)],
         "needed": round(needed(m, limits, oscillates), 1),
         "op_range": float(f"{m.play.valve.stickband / m.size:.4g}") if m.size > 0 else 0.0,
-        "jump": [round(x, 1) for x in (_jump(_by_slips(verdict, m) or m, limits) if whole else (0.0, 0.0))],
+        "jump": [
+            round(x, 1) for x in (jump_evidence(_by_slips(verdict, m) or m, limits) if whole else (0.0, 0.0))
+        ],
         **{
             k: [float(f"{x:.4g}") for x in known]
             for k, known in _told(verdict, m, limits, oscillates).items()
@@ -78,15 +80,6 @@ def _by_slips(verdict: Verdict, m: Measured) -> Measured | None:
     jumps. None where it does not."""
     told = verdict.measured
     return told if told is not None and told is not m and told.stick_slip is not None else None
-
-
-def _jump(m: Measured, limits: CauseLimits) -> Known:
-    """Evidence for a slip jump and what it takes [nat], none where it was not looked for."""
-    if m.stick_slip is None:
-        return 0.0, 0.0
-    clear = max(limits.evidence_jump, limits.jump_share * m.evidence)
-    share = m.stick_slip.valve.slip_jump / max(m.stick_slip.valve.stickband, 1e-9)
-    return min(m.jump, 10.0 * clear) if share >= limits.least_jump else 0.0, clear
 
 
 def _told(verdict: Verdict, m: Measured, limits: CauseLimits, oscillates: bool) -> Mapping[str, Known]:

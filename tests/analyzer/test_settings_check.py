@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from analyzer.config import Config
-from analyzer.loop.settings_check import differing
+from analyzer.loop.judged_stretch import differing
 from identification.models import Pid
 from identification.record import LoopRecord
 
