@@ -9,22 +9,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from identification.errors import NotAssessedError
-from tuning import Action, Cause
-
-__all__ = [
-    "CAUSES",
-    "Action",
-    "Cause",
-    "Due",
-    "Fault",
-    "GroupRole",
-    "Lack",
-    "LacksError",
-    "Lane",
-    "Needs",
-    "Status",
-    "counts",
-]
+from tuning import Action as Action
+from tuning import Cause as Cause
 
 CAUSES = (Cause.VALVE, Cause.TUNING, Cause.LOAD)
 """Causes that have a confidence of their own."""
