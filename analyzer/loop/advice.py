@@ -126,11 +126,14 @@ def _sought(
     return replace(_stated(proposal, spec, pv_span), compared=beside)
 
 
+def _or_repair(verdict: Verdict, other: Advice) -> Advice:
+    """What is left to do where new settings lack something: a valve at fault is one all the same."""
+    return Advice(Action.REPAIR_VALVE, other.reason) if verdict.cause is Cause.VALVE else other
+
+
 def _without_settings(verdict: Verdict) -> Advice:
-    """What is left to do where none are stated: a valve at fault is one all the same."""
-    if verdict.cause is Cause.VALVE:
-        return Advice(Action.REPAIR_VALVE, words.NOT_STATED)
-    return Advice(Action.CHECK_SETTINGS, words.NOT_STATED)
+    """What is left to do where none are stated."""
+    return _or_repair(verdict, Advice(Action.CHECK_SETTINGS, words.NOT_STATED))
 
 
 def _lacking(needs: Needs) -> Advice:
@@ -183,9 +186,7 @@ def _too_thin(found: Assessment, controller: Pid | None, config: Config) -> Advi
     """What sampling it takes, where the controller acts several times between two samples, unseen."""
     m = found.verdict.measured
     thin = None if m is None else too_thin(m.window.dt_s / m.window.factor, controller, config)
-    if thin is not None and found.verdict.cause is Cause.VALVE:  # a stroke test needs no settings
-        return Advice(Action.REPAIR_VALVE, thin.text)
-    return None if thin is None else _lacking(thin)
+    return None if thin is None else _or_repair(found.verdict, _lacking(thin))
 
 
 def sought_for(verdict: Verdict, controller: Pid, limits: AdviceLimits) -> tuple[Loop, Fit, tuple[Loop, ...]]:
@@ -225,19 +226,14 @@ def _proposed(verdict: Verdict, controller: Pid, period_s: float | None, config:
     right_way = loop.controller.kp * loop.process.slope > 0.0
     if not right_way or verdict.cause not in (Cause.VALVE, Cause.TUNING):
         return Proposed(recommend(loop, verdict.cause, limits=config.tuning))
-    unknown = _not_known_well(loop, verdict, config)
-    if unknown is not None:
-        return Proposed(Proposal(Action.UNDECIDED, unknown))
-    of_cause = _for_tuning if verdict.cause is Cause.TUNING else _for_valve
-    return of_cause(verdict, loop, period_s, config)
-
-
-def _not_known_well(loop: Loop, verdict: Verdict, config: Config) -> str | None:
-    """Why a model gives no settings, in words; None where it does."""
     duration_s, dead_time_s = verdict.fit.window.duration_s, loop.process.dead_time_s
     if dead_time_s > config.advice.beyond_record * duration_s:
-        return words.beyond_record(dead_time_s, duration_s)
-    return words.UNSTABLE if verdict.cause is Cause.VALVE and not is_stable(loop) else None
+        return Proposed(Proposal(Action.UNDECIDED, words.beyond_record(dead_time_s, duration_s)))
+    if verdict.cause is Cause.TUNING:
+        return _for_tuning(verdict, loop, period_s, config)
+    if not is_stable(loop):
+        return Proposed(Proposal(Action.UNDECIDED, words.UNSTABLE))
+    return _for_valve(verdict, loop, period_s, config)
 
 
 def _for_tuning(verdict: Verdict, loop: Loop, period_s: float | None, config: Config) -> Proposed:

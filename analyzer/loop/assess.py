@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -46,8 +47,10 @@ from identification.signals.correlation import harris_index
 
 NYQUIST = 2.0
 """Samples a period below which a cycle is seen as a slower one."""
-OF_OP = ("valve_travel_pct_per_h", "reversals_per_h", "at_limits_pct", "service_pct", "op_mean_pct")
-"""Figures that rest on OP."""
+OF_OP: Mapping[str, Any] = dict.fromkeys(
+    ("valve_travel_pct_per_h", "reversals_per_h", "at_limits_pct", "service_pct", "op_mean_pct")
+)
+"""Figures that rest on OP, as they are where none is in percent."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,16 +173,9 @@ def verdict_by_measures(
     return told_apart(judge(measured, oscillation, config.cause), prepared, oscillation, config)
 
 
-def _in_percent(prepared: Prepared) -> bool:
-    """Whether OP is known in percent of its range."""
-    return prepared.op_known and prepared.op_scaled
-
-
 def _known(figures: Assessments, op: bool) -> Assessments:
     """The figures without those that rest on OP where none is in percent: unknown is empty, never zero."""
-    if op:
-        return figures
-    return Assessments(**{k: None if k in OF_OP else v for k, v in figures.as_row().items()})  # type: ignore[arg-type]
+    return figures if op else replace(figures, **OF_OP)
 
 
 def hidden(record: LoopRecord, found: Oscillations, controller: Pid | None, config: Config) -> Needs | None:
@@ -197,25 +193,9 @@ def hidden(record: LoopRecord, found: Oscillations, controller: Pid | None, conf
     return None if period is None else Needs(Lack.FASTER, words.too_coarse(record.dt_s, period, samples))
 
 
-def _settings(prepared: Prepared, found: Oscillations, stated: Pid | None, config: Config) -> Pid | None:
-    """Where the controller works with other settings than the stated ones."""
-    if stated is None or not prepared.op_known:
-        return None
-    scale = time_scale(prepared.record, counting(found), stated)
-    return differing(prepared.record, stated, scale, config.settings)
-
-
 def _dead_time(verdict: Verdict) -> float | None:
     m = verdict.measured
     return None if m is None else (m.play if verdict.cause is Cause.VALVE else m.linear).dead_time_s
-
-
-def _hours(
-    prepared: Prepared, found: Oscillations, band_pct: float | None, config: Config
-) -> tuple[Hour, ...]:
-    """The figures of each hour, as far as what they rest on is known."""
-    hours = hourly(prepared.record, found, config.figures, band_pct)
-    return tuple(replace(h, figures=_known(h.figures, _in_percent(prepared))) for h in hours)
 
 
 @dataclass(frozen=True, slots=True)
@@ -237,10 +217,12 @@ def _judged(prepared: Prepared, stretch: Stretch, config: Config, kind: str) -> 
     of_all = detect(record, config.oscillation)
     whole = len(part.record) == len(record)
     found = of_all if whole else detect(part.record, config.oscillation)
-    settings = None if stretch.outdated else _settings(part, found, stretch.controller, config)
-    stated = settings or stretch.controller
-    found, verdict = convicted(part, found, stated, config, kind)
-    if _hours_in(part.record) < config.advice.least_h or too_thin(record.dt_s, stretch.controller, config):
+    stated, settings = stretch.controller, None
+    if stated is not None and part.op_known and not stretch.outdated:
+        scale = time_scale(part.record, counting(found), stated)
+        settings = differing(part.record, stated, scale, config.settings)
+    found, verdict = convicted(part, found, settings or stated, config, kind)
+    if _hours_in(part.record) < config.advice.least_h or too_thin(record.dt_s, stated, config):
         verdict = as_hint(verdict, config.advice.hint_pct)
     return _Judged(part, found if whole else of_all, found, verdict, settings)
 
@@ -290,7 +272,9 @@ def assess(
 def _assessment(prepared: Prepared, stretch: Stretch, judged: _Judged, config: Config) -> Assessment:
     """The figures of the whole record beside what was judged."""
     record, found = prepared.record, judged.found
-    night = _known(assess_span(record, config.figures), _in_percent(prepared))
+    in_percent = prepared.op_known and prepared.op_scaled
+    night = _known(assess_span(record, config.figures), in_percent)
+    hours = hourly(record, judged.of_all, config.figures, night.noise_band_pct)
     dead_time = _dead_time(judged.verdict)
     close = _close(judged.part.record, found, stretch.first)
     end_s = record.start_s + record.duration_s
@@ -299,7 +283,7 @@ def _assessment(prepared: Prepared, stretch: Stretch, judged: _Judged, config: C
         start_s=record.start_s,
         duration_s=record.duration_s,
         night=night,
-        hours=_hours(prepared, judged.of_all, night.noise_band_pct, config),
+        hours=tuple(replace(h, figures=_known(h.figures, in_percent)) for h in hours),
         oscillations=found,
         verdict=judged.verdict,
         settings=judged.settings,

@@ -39,11 +39,14 @@ from analyzer.loop.measure import PLAYS, Measured
 from analyzer.loop.oscillation import Oscillation
 from analyzer.loop.quality import Prepared
 from analyzer.words import settings as words
+from identification.errors import NotAssessedError
 from identification.estimation.backlash_stiction import SHORT, generic_noise
 from identification.estimation.gauss_newton import descend
 from identification.estimation.hammerstein import Fit
 from identification.estimation.irregular_slips import SlipPath, fit_irregular, path_evidence
 from identification.record import LoopRecord
+
+NO_MODEL = "needs trends from which a model can be identified"
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,14 +69,14 @@ class Verdict:
 
     @property
     def rests_on(self) -> Measured:
-        """What was measured; ValueError where nothing was."""
+        """What was measured; NotAssessedError, with what the record lacks, where nothing was."""
         if self.measured is None:
-            raise ValueError("a verdict without a model has no fit")
+            raise NotAssessedError(str(self.needs or NO_MODEL))
         return self.measured
 
     @property
     def fit(self) -> Fit:
-        """The fit that it rests on, the valve's where that is at fault; ValueError where it has no model."""
+        """The fit that it rests on, the valve's where that is at fault; NotAssessedError where there is none."""
         m = self.rests_on
         if self.cause is not Cause.VALVE:
             return m.linear

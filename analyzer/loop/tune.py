@@ -38,7 +38,6 @@ if TYPE_CHECKING:
 
 MAP_POINTS = 36
 """Points of the map along each axis."""
-NO_MODEL = "needs trends from which a model can be identified"
 NO_MOVES = "needs PV that moves with OP, so that a model can be identified"
 SPREAD = 20.0
 """The map reaches this factor below and above the present settings."""
@@ -94,8 +93,6 @@ def identified(found: Assessment, limits: AdviceLimits) -> tuple[Process, Valve,
         Where the loop's trends give no model.
     """
     verdict = found.verdict
-    if verdict.measured is None:
-        raise NotAssessedError(str(verdict.needs or NO_MODEL))
     fit, at_fault = verdict.fit, verdict.cause is Cause.VALVE
     valve = fit.valve.valve if at_fault else None
     return tuned(fit, at_fault, limits), valve, intervals(fit, at_fault, limits)
@@ -119,8 +116,6 @@ def tune(found: Assessment, controller: Pid, config: Config, kept: Advice | None
         Where the loop's trends give no model.
     """
     verdict = found.verdict
-    if verdict.measured is None:
-        raise NotAssessedError(str(verdict.needs or NO_MODEL))
     first = found.oscillations.first
     period = first.period_s if first else None
     model, fit, others = _model(verdict, controller, config.advice)
@@ -133,7 +128,7 @@ def tune(found: Assessment, controller: Pid, config: Config, kept: Advice | None
     is_long = load.size >= config.tuning.least_steps
     forecast = predict(model, new, load, others) if new and is_long else None
     return Tuning(
-        identified(found, config.advice)[2],
+        intervals(verdict.fit, verdict.cause is Cause.VALVE, config.advice),
         model,
         period,
         first.amplitude_pct if first else None,
