@@ -155,12 +155,13 @@ def intervals(fit: Fit, valve: bool, limits: AdviceLimits) -> dict[str, Estimate
     valve that jumps PV tells jump times slope; only slips beyond the first of a half cycle part the two, so both
     are told within wide limits. proofs/coverage.md says how often the intervals hold the truth.
     """
-    spread = np.sqrt(np.maximum(np.diag(covariance(fit, free_width=valve)), 0.0))
+    whole = covariance(fit, free_width=valve)
     t, window = fit.time_constant_s, fit.window
     factor = lag_factor(fit, valve, limits)
-    if valve and factor is None:
-        spread = spread * SLOPE_ALONE
-    out = {"slope_pct_per_s": _slope(fit, valve, SLOPE_ALONE if valve and factor is None else 1.0)}
+    wider = SLOPE_ALONE if valve and factor is None else 1.0
+    spread = wider * np.sqrt(np.maximum(np.diag(whole), 0.0))
+    slope = abs(fit.slope) * half_width(wider * slope_deviation(fit, whole), LEAST_SHARE)
+    out = {"slope_pct_per_s": _around(fit.slope, slope, "%/(% s)")}
     if factor is not None:
         wide = max(factor ** _lag_wider(fit, valve), 1.0 + LEAST_SHARE)
         out["gain"] = _around(fit.gain, half_width(spread[3], LEAST_SHARE * abs(fit.gain)), "%/%")
@@ -204,12 +205,11 @@ def _jumping(window: Window, valve: StemLaw, found: dict[str, Estimate]) -> dict
     return out
 
 
-def _slope(fit: Fit, valve: bool, wider: float) -> Estimate:
-    """Gain over time constant with its interval; the errors of the two are strongly correlated."""
-    c = covariance(fit, free_width=valve)
-    relative = c[3, 3] / fit.gain**2 + c[0, 0] - 2 * c[0, 3] / fit.gain
-    deviation = wider * math.sqrt(max(relative, 0.0))
-    return _around(fit.slope, abs(fit.slope) * half_width(deviation, LEAST_SHARE), "%/(% s)")
+def slope_deviation(fit: Fit, spread: Floats) -> float:
+    """Relative deviation of gain over time constant [-], whose errors go together; spread, covariance of (log T, L,
+    stickband, gain), shape (4, 4)."""
+    relative = spread[3, 3] / fit.gain**2 + spread[0, 0] - 2.0 * spread[0, 3] / fit.gain
+    return math.sqrt(max(relative, 0.0))
 
 
 def _around(value: float, half: float, unit: str, least: float = -math.inf) -> Estimate:

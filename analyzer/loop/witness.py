@@ -13,6 +13,7 @@ import numpy as np
 from analyzer.config import CauseLimits
 from analyzer.loop.cause import Verdict, agrees, fault_of, hidden_by_grid, jump_evidence, needed
 from analyzer.loop.decisions import Cause, Fault
+from analyzer.loop.identified import slope_deviation
 from analyzer.loop.measure import Measured
 from analyzer.loop.quality import Prepared
 from identification.estimation.covariance import DECODED, LEAST_JUMP
@@ -47,17 +48,17 @@ def witness(verdict: Verdict, oscillates: bool, prepared: Prepared, limits: Caus
     if not oscillates and not agrees(m, limits):
         m = replace(m, evidence=min(m.evidence, 0.0))
     convicted = oscillates and verdict.cause is Cause.VALVE
+    slips = _by_slips(verdict, m)
     whole = prepared.compressed_share <= COMPRESSED
+    jump = jump_evidence(slips or m, limits) if whole else (0.0, 0.0)
     said = {
         "profile": [round(float(x), 1) for x in _profile(m, 0.0 if convicted else limits.noise_widths)],
         "needed": round(needed(m, limits, oscillates), 1),
         "op_range": float(f"{m.play.valve.stickband / m.size:.4g}") if m.size > 0 else 0.0,
-        "jump": [
-            round(x, 1) for x in (jump_evidence(_by_slips(verdict, m) or m, limits) if whole else (0.0, 0.0))
-        ],
+        "jump": [round(x, 1) for x in jump],
         **{
             k: [float(f"{x:.4g}") for x in known]
-            for k, known in _told(verdict, m, limits, oscillates).items()
+            for k, known in _constants(m, slips, limits, oscillates).items()
         },
     }
     return json.dumps(said, separators=(",", ":"))
@@ -82,37 +83,32 @@ def _by_slips(verdict: Verdict, m: Measured) -> Measured | None:
     return told if told is not None and told is not m and told.stick_slip is not None else None
 
 
-def _told(verdict: Verdict, m: Measured, limits: CauseLimits, oscillates: bool) -> Mapping[str, Known]:
-    """Constants of the better fit, the valve's as they are told where that is slip by slip."""
-    found, told = dict(_constants(m, limits, oscillates)), _by_slips(verdict, m)
-    if told is not None and told.stick_slip is not None:
-        valve = told.stick_slip.valve
-        found |= {"width": (valve.stickband, DECODED), "slip_jump": (valve.slip_jump, math.log(LEAST_JUMP))}
-    return found
-
-
-def _constants(m: Measured, limits: CauseLimits, oscillates: bool) -> Mapping[str, Known]:
-    """Constants of the better fit: of the valve's where PV speaks for its fault, else of the process alone."""
+def _constants(
+    m: Measured, slips: Measured | None, limits: CauseLimits, oscillates: bool
+) -> Mapping[str, Known]:
+    """Constants of the better fit: of the valve's where PV speaks for its fault, else of the process alone; a valve's
+    that is told slip by slip are those told."""
     worn = m.evidence >= needed(m, limits, oscillates)
     sticks = worn and fault_of(m, limits) is Fault.STICTION and m.stick_slip is not None
     fit = (m.stick_slip if sticks else m.play) if worn else m.linear
     assert fit is not None
-    spread = covariance(fit, free_width=worn)
-    if not np.isfinite(spread).all() or fit.gain == 0.0:
-        return {}
-    found = _process(fit, spread)
-    if worn:
-        found["width"] = fit.valve.stickband, math.sqrt(spread[2, 2]) / max(fit.valve.stickband, 1e-9)
-        found["slip_jump"] = fit.valve.slip_jump, found["width"][1]
+    spread, found = covariance(fit, free_width=worn), {}
+    if np.isfinite(spread).all() and fit.gain != 0.0:
+        found = _process(fit, spread)
+        if worn:
+            relative = math.sqrt(spread[2, 2]) / max(fit.valve.stickband, 1e-9)
+            found |= {"width": (fit.valve.stickband, relative), "slip_jump": (fit.valve.slip_jump, relative)}
+    if slips is not None and slips.stick_slip is not None:
+        valve = slips.stick_slip.valve
+        found |= {"width": (valve.stickband, DECODED), "slip_jump": (valve.slip_jump, math.log(LEAST_JUMP))}
     return found
 
 
 def _process(fit: Fit, spread: Floats) -> dict[str, Known]:
     """Slope, time constant, gain and dead time of a fit, by its covariance of (log T, L, stickband, gain)."""
     dead_s = fit.process.dead_time_s
-    of_slope = spread[0, 0] + spread[3, 3] / fit.gain**2 - 2.0 * spread[0, 3] / fit.gain
     return {
-        "slope": (fit.slope, math.sqrt(max(of_slope, 0.0))),
+        "slope": (fit.slope, slope_deviation(fit, spread)),
         "time_constant_s": (fit.time_constant_s, math.sqrt(spread[0, 0])),
         "gain": (fit.gain, math.sqrt(spread[3, 3]) / abs(fit.gain)),
         "dead_time_s": (dead_s, math.sqrt(spread[1, 1]) / max(dead_s, 1e-9)),
