@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from itertools import pairwise
 
 import numpy as np
@@ -183,7 +183,7 @@ class Tried:
 
     controller; ms, maximum sensitivity [-], inf where the linear loop is unstable; stem_travel [%/h]; error, average
     of its absolute value [% PV]; peak, largest of it [% PV]; integral_s, Ti/|Kp| [s], integral of the error that a
-    step of the load at OP leaves, inf without integral action.
+    step of the load at OP leaves, inf without integral action; record, what was simulated, without its warm-up.
     """
 
     name: str
@@ -193,6 +193,7 @@ class Tried:
     error: float
     peak: float
     integral_s: float
+    record: LoopRecord = field(repr=False, compare=False)
 
 
 def alternatives(loop: Loop, new: Pid | None, chosen: Mapping[str, Pid] | None = None) -> dict[str, Pid]:
@@ -226,4 +227,5 @@ def _tried(name: str, loop: Loop, load: Floats) -> Tried:
         figures.average_absolute_error,
         peak=float(np.max(np.abs(record.error), initial=0.0)),
         integral_s=integral_s(c) / abs(c.kp),
+        record=record,
     )

@@ -12,9 +12,9 @@ import numpy as np
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import as_stated
 from identification.models import Loop, Pid
-from identification.record import Floats
+from identification.record import Floats, LoopRecord
 from reports.pages import as_held
-from tuning.forecast import RECOMMENDED, REPAIRED, Tried, alternatives, run, settled, tried
+from tuning.forecast import RECOMMENDED, REPAIRED, Tried, alternatives, tried
 from tuning.frequency_response import integral_s
 from tuning.harmonic_balance import TravelMap, travel_map
 from tuning.limits import TuningLimits
@@ -34,11 +34,10 @@ SHOWN_PERIODS, SHOWN_POINTS = 8.0, 240
 
 @dataclass(frozen=True, slots=True)
 class Shown:
-    """A piece of one simulation: seconds, error and OP, shape (n,) each [s, % PV, % OP]."""
+    """A piece of one simulation: seconds and error, shape (n,) each [s, % PV]."""
 
     time_s: Floats
     error: Floats
-    op: Floats
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,13 +65,12 @@ class Comparison:
     repaired: Tried | None
 
 
-def _piece(loop: Loop, controller: Pid, load: Floats, period_s: float) -> Shown:
+def _piece(record: LoopRecord, period_s: float) -> Shown:
     """The end of a simulation, thinned."""
-    record = settled(run(replace(loop, controller=controller), load))
     count = min(len(record), max(round(SHOWN_PERIODS * period_s / record.dt_s), 20))
     every = max(count // SHOWN_POINTS, 1)
     part = record.span(len(record) - count, len(record))
-    return Shown(part.time_s[::every] - part.time_s[0], part.error[::every], part.op[::every])
+    return Shown(part.time_s[::every] - part.time_s[0], part.error[::every])
 
 
 def middle_ti(loop: Loop) -> float:
@@ -126,13 +124,13 @@ def compared(
     settings = alternatives(loop, new, {name: c.controller for name, c in found.chosen.items()})
     everywhere = worst(table, settings) if moves else {}
     settings = {k: pid for k, pid in settings.items() if k not in found.chosen or not _beaten(k, everywhere)}
-    now = rejection(loop.process, loop.controller)
+    now, each = rejection(loop.process, loop.controller), tried(loop, load, settings)
     free = None if loop.valve is None or not moves else replace(loop, valve=None)
     return Comparison(
         loop,
         load,
-        tried(loop, load, settings),
-        {name: _piece(loop, pid, load, period_s) for name, pid in settings.items()},
+        each,
+        {t.name: _piece(t.record, period_s) for t in each},
         _map(loop, tuple(settings.values())),
         {name: as_stated(pid, spec, pv_span) for name, pid in settings.items()},
         pv_span,
