@@ -48,7 +48,9 @@ def witness(verdict: Verdict, oscillates: bool, prepared: Prepared, limits: Caus
     if not oscillates and not agrees(m, limits):
         m = replace(m, evidence=min(m.evidence, 0.0))
     convicted = oscillates and verdict.cause is Cause.VALVE
-    slips = _by_slips(verdict, m)
+    slips = (
+        None if verdict.for_settings is verdict else verdict.measured
+    )  # one friction for all hides their jumps
     whole = prepared.compressed_share <= COMPRESSED
     jump = jump_evidence(slips or m, limits) if whole else (0.0, 0.0)
     said = {
@@ -74,13 +76,6 @@ def _profile(m: Measured, noise_widths: float) -> Floats:
     if most <= 0.0 or most <= m.evidence:
         return found
     return np.where(found > 0.0, found * max(m.evidence, 0.0) / most, found)
-
-
-def _by_slips(verdict: Verdict, m: Measured) -> Measured | None:
-    """What was measured slip by slip, where the verdict tells the valve so: one friction for all slips hides their
-    jumps. None where it does not."""
-    told = verdict.measured
-    return told if told is not None and told is not m and told.stick_slip is not None else None
 
 
 def _constants(

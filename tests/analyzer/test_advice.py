@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import re
 from dataclasses import replace
@@ -17,6 +18,7 @@ from analyzer.loop.decisions import Lack, Needs
 from analyzer.loop.identified import lag_factor, load_of, scan_noise, tuned, uncertain
 from analyzer.loop.oscillation import Oscillations
 from analyzer.loop.quality import prepare
+from analyzer.loop.witness import witness
 from analyzer.store.rows import night_row
 from identification.models import Backlash, Fopdt, Integrator, Pid
 from proofs.plant import CONFIG, START_S, Sketch, prepared, series, simulate, spec
@@ -258,3 +260,16 @@ def test_play_is_the_model_where_it_cycles_by_itself(tank):
     loop, fit, others = sought_for(tank.verdict, TANK.controller, CONFIG.advice)
     assert loop.valve == Backlash(fit.valve.stickband)
     assert all(isinstance(one.valve, Backlash) for one in others)
+
+
+def test_a_calm_loop_witnesses_no_width_that_its_stretches_do_not_bear_out(pipe):
+    """Stick-slip that was tried on a calm loop is not told slip by slip: its width is none where single stretches
+    alone speak for it."""
+    m = pipe.verdict.rests_on
+    tried = replace(m.play, valve=m.play.valve._replace(sliding=0.25 * m.play.valve.stickband))
+    single = replace(m, stick_slip=tried, steady=0.0, asked=0.0)
+    calm = replace(pipe.verdict, measured=single, steady=None)
+    said = json.loads(witness(calm, False, prepared(simulate(PIPE, 6.0)), CONFIG.cause) or "")
+    assert "slope" in said
+    assert "width" not in said
+    assert max(said["profile"]) == 0.0
