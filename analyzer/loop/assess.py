@@ -276,7 +276,7 @@ def _assessment(prepared: Prepared, stretch: Stretch, judged: _Judged, config: C
     night = _known(assess_span(record, config.figures), in_percent)
     hours = hourly(record, judged.of_all, config.figures, night.noise_band_pct)
     dead_time = _dead_time(judged.verdict)
-    close = _close(judged.part.record, found, stretch.first)
+    close = close_view(judged.part.record, found, stretch.first)
     end_s = record.start_s + record.duration_s
     return Assessment(
         loop=record.tag,
@@ -305,9 +305,3 @@ def _assessment(prepared: Prepared, stretch: Stretch, judged: _Judged, config: C
 def _at(record: LoopRecord, sample: int) -> float:
     """The time of a sample [s]."""
     return record.start_s + sample * record.dt_s
-
-
-def _close(part: LoopRecord, found: Oscillations, first: int) -> tuple[int, int] | None:
-    """First and last sample (excluded) of the last ten periods, in a record of which `part` begins at `first`."""
-    close = close_view(part, found)
-    return None if close is None else (close[0] + first, close[1] + first)

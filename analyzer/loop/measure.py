@@ -146,8 +146,6 @@ def _consistency(fit: Fit, period_s: float) -> float:
     return gain / fit.gain if fit.gain else 0.0
 
 
-Candidates = tuple[Fit, Fit, Fit | None]
-"""Plain fit, play and stick-slip."""
 Fits = tuple[Fit, Fit, Fit | None, Fit, float, float]
 """Plain fit, play, stick-slip if it was tried, the better valve, its evidence and that of the jump [nat]."""
 
@@ -243,7 +241,7 @@ def _check_judged(window: Window, limits: CauseLimits) -> None:
         )
 
 
-def _refined(fits: Candidates, best: Fit, hopeless: bool) -> Candidates:
+def _refined(fits: tuple[Fit, Fit, Fit | None], best: Fit, hopeless: bool) -> tuple[Fit, Fit, Fit | None]:
     """Fits at the record's own interval, where the dead time is no shorter than a block; the valve's are left as they
     are where it is `hopeless` to look for its fault."""
     window = best.window

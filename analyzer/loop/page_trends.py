@@ -35,15 +35,16 @@ QUICK = 0.2
 """Time constant over a half-cycle up to which PV comes to rest within it and can be seen to stand [-]; ours."""
 
 
-def close_view(record: LoopRecord, found: Oscillations) -> tuple[int, int] | None:
-    """First and last sample (excluded) of the last ten periods of the oscillation; None where there is none."""
+def close_view(part: LoopRecord, found: Oscillations, before: int) -> tuple[int, int] | None:
+    """First and last sample (excluded) of the last ten periods of the oscillation in a part of a record, of which so
+    many samples are before it; None where there is none."""
     if found.first is None or found.active is None or not found.active.any():
         return None
-    skipped = len(record) * record.dt_s - found.active.size * found.active_dt_s
+    skipped = len(part) * part.dt_s - found.active.size * found.active_dt_s
     end_s = skipped + (int(np.flatnonzero(found.active)[-1]) + 1) * found.active_dt_s
-    last = min(round(end_s / record.dt_s), len(record))
-    first = max(last - round(PERIODS * found.first.period_s / record.dt_s), 0)
-    return (first, last) if last - first > 2 else None
+    last = min(round(end_s / part.dt_s), len(part))
+    first = max(last - round(PERIODS * found.first.period_s / part.dt_s), 0)
+    return (before + first, before + last) if last - first > 2 else None
 
 
 def _edges(n: int, buckets: int, close: tuple[int, int] | None) -> np.ndarray:
