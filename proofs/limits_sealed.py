@@ -14,10 +14,10 @@ from analyzer.config import Config
 from analyzer.explain.case import case
 from analyzer.loops.spec import spec_of
 from analyzer.night.asked import opened
-from identification.controller.check import StatedSettings
+from identification.controller.check import Finding, StatedSettings
 from identification.mismatch.answer import answer
 from identification.mismatch.diagnosis import controller_finding_of, explain, recorder_finding_of
-from identification.mismatch.recording import STEP, Finding, Recording, unlogged
+from identification.mismatch.recording import STEP, Recording, unlogged
 from proofs.concealed.make import seal
 from proofs.concealed.plan import Case, plan
 from proofs.limits_samples import DEFAULT, tried

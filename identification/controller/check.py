@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from enum import StrEnum
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -41,22 +41,13 @@ LATE_SAMPLES = "late_samples"
 """Name of the number by which a finding says how late PV's clock is [samples]."""
 
 
-class ControllerFault(StrEnum):
-    """What may be wrong with clock or controller."""
-
-    CLOCK = "clock"
-    SETTINGS = "settings"
-    GAP = "gap"
-    LOGIC = "logic"
-
-
 @dataclass(frozen=True, slots=True)
-class ControllerFinding:
-    """One finding about clock or controller: which, its numbers, where it is (bool, shape (n,))."""
+class Finding:
+    """What was found about recorder or controller: its numbers, where it is (bool, shape (n,)), the effect's name."""
 
-    fault: ControllerFault
-    values: dict[str, float]
-    where: Mask
+    values: Mapping[str, float]
+    where: Mask = field(repr=False)
+    name: str = ""
 
 
 def op_step(op: Floats) -> float:
@@ -86,7 +77,7 @@ def frozen_width(
 
 def gap(
     e: Floats, op: Floats, said: StatedSettings, usable: Mask, limits: ControllerLimits
-) -> ControllerFinding | None:
+) -> Finding | None:
     """OP standing still while the error is small: a law with a gap gives OP where the one without does not."""
     length = span_length(op.size, said.ti, limits)
     n = (op.size // length) * length
@@ -105,7 +96,7 @@ def gap(
     inside = still & (np.abs(e) < width)
     if inside.mean() < 0.02:
         return None
-    return ControllerFinding(ControllerFault.GAP, {"gap_pct": width}, inside)
+    return Finding({"gap_pct": width}, inside, "controller-gap")
 
 
 def runs(still: Mask) -> list[tuple[int, int]]:
@@ -137,17 +128,17 @@ def ruled(
     usable: Mask,
     found: ControlLaw,
     limits: ControllerLimits,
-) -> ControllerFinding | None:
+) -> Finding | None:
     """Spans in which something other than the law moves OP, or keeps it."""
     off = lawless(found, usable, op_step(op), limits)
     if float(off.mean()) > limits.lawless_share and found.explained > 0.0:
-        return ControllerFinding(ControllerFault.LOGIC, {"share": float(off.mean())}, off)
+        return Finding({"share": float(off.mean())}, off, "controller-logic")
     return logic(e, op, said, usable, limits)
 
 
 def logic(
     e: Floats, op: Floats, said: StatedSettings, usable: Mask, limits: ControllerLimits
-) -> ControllerFinding | None:
+) -> Finding | None:
     """Stretches in which OP stands although the law asks it to go, whatever the error."""
     path = np.cumsum(due_moves(e, said.kp, said.ti))
     least = limits.stuck_move * max(op_step(op), 0.02)
@@ -156,11 +147,7 @@ def logic(
         if last - first >= limits.stuck_run and float(np.ptp(path[first:last])) > least:
             where[first:last] = True
     share = float(where.mean())
-    return (
-        ControllerFinding(ControllerFault.LOGIC, {"share": share}, where)
-        if share > limits.stuck_share
-        else None
-    )
+    return Finding({"share": share}, where, "controller-logic") if share > limits.stuck_share else None
 
 
 def typical(residual: Floats, length: int) -> float:
@@ -186,7 +173,7 @@ def obeys(
     return whole and typical(left, length) < limits.same_law * typical(found.residual, length)
 
 
-def settings(found: ControlLaw, said: StatedSettings, limits: ControllerLimits) -> ControllerFinding | None:
+def settings(found: ControlLaw, said: StatedSettings, limits: ControllerLimits) -> Finding | None:
     """Settings that reproduce OP where the stated ones do not."""
     if found.explained < limits.law_explains or found.ki == 0 or found.kp / found.ki <= 0:
         return None
@@ -196,7 +183,7 @@ def settings(found: ControlLaw, said: StatedSettings, limits: ControllerLimits) 
     if max(off_kp, off_ti) < (limits.setting_thinned if said.thinned(limits) else limits.setting):
         return None
     values = {"kp": found.kp, "ti_samples": ti} if off_kp >= off_ti else {"ti_samples": ti, "kp": found.kp}
-    return ControllerFinding(ControllerFault.SETTINGS, values, np.ones(found.residual.size, dtype=bool))
+    return Finding(values, np.ones(found.residual.size, dtype=bool), "controller-settings")
 
 
 def judge(
@@ -206,7 +193,7 @@ def judge(
     usable: Mask,
     said: StatedSettings,
     limits: ControllerLimits = LIMITS.controller,
-) -> tuple[ControllerFinding | None, ControlLaw | None]:
+) -> tuple[Finding | None, ControlLaw | None]:
     """The first thing that is wrong with clock or controller, and the law as found.
 
     sp, pv, op : shape (n,), trends [% of span]; usable : bool, shape (n,), False in gaps, in manual and at OP's
@@ -222,9 +209,7 @@ def judge(
     if thinned:
         return wrong, found
     if found.late >= limits.late and found.explained > limits.law_explains:
-        return ControllerFinding(
-            ControllerFault.CLOCK, {LATE_SAMPLES: found.late}, np.ones(op.size, dtype=bool)
-        ), found
+        return Finding({LATE_SAMPLES: found.late}, np.ones(op.size, dtype=bool), "clock-offset"), found
     law_now = StatedSettings(found.kp, found.kp / found.ki) if wrong is not None else said
     frozen = gap(e, op, law_now, usable, limits)
     other = ruled(e, op, law_now, usable & ~asked(sp, op, limits), found, limits)

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from identification.controller.check import Finding
 from identification.estimation.covariance import half_width
 from identification.estimation.descent import nats
 from identification.estimation.prediction_error import Fitted, Problem, deviations, residual_fit
@@ -17,7 +18,7 @@ from identification.mismatch.effect import Block, exact
 from identification.mismatch.explanation import Explanation, by_cycles, is_stack
 from identification.mismatch.outside import about
 from identification.mismatch.proof import HeldOut, Misfit
-from identification.mismatch.recording import Finding, Recording
+from identification.mismatch.recording import Recording
 from identification.mismatch.where import Located, located_in, where_of
 from identification.models import Estimate
 from identification.record import Floats

@@ -11,14 +11,14 @@ from functools import partial
 
 import numpy as np
 
-from identification.controller.check import LATE_SAMPLES, judge
+from identification.controller.check import LATE_SAMPLES, Finding, judge
 from identification.controller.pi_regression import ControlLaw, shifted, unstated_law
-from identification.mismatch.catalogue import CONTROLLER_FAULTS, RECORDER_FAULTS, fault
+from identification.mismatch.catalogue import RECORDER_FAULTS, fault
 from identification.mismatch.effect import Ends
 from identification.mismatch.experiment import agreed, is_experiment
 from identification.mismatch.explanation import Explanation, beyond_the_grid, carried_over
 from identification.mismatch.plain_loop import Clip, inputs_of, prepared, without_spikes
-from identification.mismatch.recording import Finding, Recording, straightened, unlogged
+from identification.mismatch.recording import Recording, straightened, unlogged
 from identification.mismatch.rounds import physics
 from identification.mismatch.selection import Progress, silent
 from identification.record import Floats
@@ -85,10 +85,7 @@ def controller_finding_of(s: Recording, recorder: Finding | None) -> tuple[Findi
     free = s.usable & (s.op > 0.05) & (s.op < 99.95)
     if s.stated is None:
         return None, unstated_law(s.sp, s.pv, s.op, free, s.limits.controller)
-    found, law = judge(s.sp, s.pv, s.op, free, s.stated, s.limits.controller)
-    if found is None:
-        return None, law
-    return Finding(found.values, found.where, CONTROLLER_FAULTS[found.fault].name), law
+    return judge(s.sp, s.pv, s.op, free, s.stated, s.limits.controller)
 
 
 def ends(finding: Finding | None) -> Ends:

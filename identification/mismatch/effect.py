@@ -9,8 +9,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
+from identification.controller.check import Finding
 from identification.mismatch.pictures import Drawing, Picture
-from identification.mismatch.recording import Finding, Recording
+from identification.mismatch.recording import Recording
 from identification.models import Estimate
 from identification.record import Floats
 from identification.simulation.effect import Act, Param, Signal, Start, Variant, each
@@ -136,15 +137,14 @@ class Number:
 class Fault(Effect):
     """An effect of recorder or controller: it is found in the trends themselves, before any physics is fitted.
 
-    order : place among the questions; find : the finding in a recording, None of what the controller's check finds;
-    finds : what the controller's check calls it; ends : what is asked after it; censors : whether samples where it
-    is tell no more than that PV is beyond; numbers : what is answered of it;
-    drawn : its picture, from the finding, the recording and the plain model's PV.
+    order : place among the questions; find : the finding in a recording, None of what the controller's check finds
+    (check.py); ends : what is asked after it; censors : whether samples where it is tell no more than that PV is
+    beyond; numbers : what is answered of it; drawn : its picture, from the finding, the recording and the plain
+    model's PV.
     """
 
     order: int = 0
     find: Callable[[Recording], Finding | None] | None = None
-    finds: str = ""
     ends: Ends = Ends.NOTHING
     censors: bool = False
     numbers: tuple[Number, ...] = ()

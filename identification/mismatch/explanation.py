@@ -7,13 +7,14 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from identification.controller.check import Finding
 from identification.controller.pi_regression import ControlLaw
 from identification.estimation.prediction_error import Fitted, Problem, descended
 from identification.mismatch.catalogue import EFFECTS, fault
 from identification.mismatch.effect import Ends
 from identification.mismatch.friction import is_friction
 from identification.mismatch.proof import HeldOut, OnOther, held_out, is_one_move
-from identification.mismatch.recording import STEP, Finding, SeenInCycles
+from identification.mismatch.recording import STEP, SeenInCycles
 from identification.mismatch.selection import Candidate, without
 from identification.simulation.open_loop import simulate
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from identification.controller.check import StatedSettings, runs
+from identification.controller.check import Finding, StatedSettings, runs
 from identification.controller.pi_regression import shifted
 from identification.mismatch.pictures import OP, TIME, Axis, Drawn, Picture
-from identification.mismatch.recording import Finding, Recording
+from identification.mismatch.recording import Recording
 from identification.record import Floats, Mask
 from identification.simulation.pi import free_path
 

@@ -85,15 +85,6 @@ STEP = "step_pct"
 """Name of the number that says in which steps a finding leaves PV [% PV]."""
 
 
-@dataclass(frozen=True, slots=True)
-class Finding:
-    """What was found about recorder or controller: its numbers, where it is (bool, shape (n,)), the effect's name."""
-
-    values: Mapping[str, float]
-    where: Mask = field(repr=False)
-    name: str = ""
-
-
 def straight(pv: Floats) -> Mask:
     """True where a moving trend is straight through three samples, shape (n,)."""
     out = np.zeros(pv.size, dtype=bool)

@@ -23,11 +23,10 @@ EFFECTS: Mapping[str, Effect] = _read()
 bring(tuple(act for e in EFFECTS.values() for act in e.acts))
 CANDIDATES: tuple[Variant, ...] = tuple(v for e in EFFECTS.values() for v in e.candidates)
 """Everything that may be added to the plain loop."""
-_FAULTS = [e for e in EFFECTS.values() if isinstance(e, Fault)]
-RECORDER_FAULTS: tuple[Fault, ...] = tuple(sorted((e for e in _FAULTS if e.find), key=lambda e: e.order))
+RECORDER_FAULTS: tuple[Fault, ...] = tuple(
+    sorted((e for e in EFFECTS.values() if isinstance(e, Fault) and e.find), key=lambda e: e.order)
+)
 """What is looked for in the trends, in this order."""
-CONTROLLER_FAULTS: Mapping[str, Fault] = {e.finds: e for e in _FAULTS if e.finds}
-"""What the controller's check may find, by what it calls it."""
 
 
 def fault(name: str) -> Fault:

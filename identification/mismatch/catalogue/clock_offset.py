@@ -1,6 +1,6 @@
 """PV stamped by another clock than OP."""
 
-from identification.controller.check import LATE_SAMPLES, ControllerFault
+from identification.controller.check import LATE_SAMPLES
 from identification.mismatch.effect import Block, Fault, Number
 from identification.mismatch.fault_pictures import other_clock
 
@@ -13,7 +13,6 @@ EFFECT = Fault(
     sentence="PV is stamped {shift_s} later than OP: the two clocks differ.",
     check="Record PV and OP from one source or synchronize the clocks.",
     caption="OP recorded, and rebuilt with PV's clock set right (found) and as stamped.",
-    finds=ControllerFault.CLOCK,
     numbers=(Number("shift_s", "s", "PV late by", LATE_SAMPLES, in_time=True, half=lambda s: SURE * s.dt_s),),
     drawn=other_clock,
 )

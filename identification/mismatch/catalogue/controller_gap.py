@@ -1,6 +1,5 @@
 """A controller that stands still while the error is small."""
 
-from identification.controller.check import ControllerFault
 from identification.mismatch.effect import Block, Fault, Number
 from identification.mismatch.fault_pictures import gap_profile
 
@@ -13,7 +12,6 @@ EFFECT = Fault(
     sentence="The controller stands still while the error is under {gap_pct}.",
     check="Look for a dead band or gap action in the controller's configuration.",
     caption="A plain controller moves OP at every error; under the gap it stands still.",
-    finds=ControllerFault.GAP,
     numbers=(Number("gap_pct", "% PV", "Gap", share=SURE),),
     drawn=gap_profile,
 )

@@ -1,6 +1,5 @@
 """Something beside the control law moves OP or holds it: tracking, overrides, a hand."""
 
-from identification.controller.check import ControllerFault
 from identification.mismatch.effect import Block, Fault, Number
 from identification.mismatch.fault_pictures import outside_law
 
@@ -13,7 +12,6 @@ EFFECT = Fault(
     sentence="For {share_pct} of the time something other than the controller's law moved or held OP.",
     check="Look for tracking, overrides, limits or an operator's hand in those spans.",
     caption="OP recorded, and OP as the stated settings would have moved it from there.",
-    finds=ControllerFault.LOGIC,
     numbers=(Number("share_pct", "%", "Time outside the law", "share", 100.0, share=SURE),),
     drawn=outside_law,
 )

@@ -1,6 +1,5 @@
 """A controller that runs with other settings than stated."""
 
-from identification.controller.check import ControllerFault
 from identification.mismatch.effect import Block, Fault, Number
 from identification.mismatch.fault_pictures import other_settings
 
@@ -13,7 +12,6 @@ EFFECT = Fault(
     sentence="The controller runs with other settings than stated: Kp {kp} and Ti {ti_s}.",
     check="Read Kp, Ti and form in the controller and correct loops.csv or the controller.",
     caption="OP recorded, and OP rebuilt from SP and PV by the settings found and by those stated.",
-    finds=ControllerFault.SETTINGS,
     numbers=(
         Number("kp", "% OP/% PV", "Kp", share=SURE),
         Number("ti_s", "s", "Ti", "ti_samples", in_time=True, share=SURE),

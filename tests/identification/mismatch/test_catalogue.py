@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from identification.estimation.prediction_error import scales
-from identification.mismatch.catalogue import CANDIDATES, CONTROLLER_FAULTS, EFFECTS, RECORDER_FAULTS
+from identification.mismatch.catalogue import CANDIDATES, EFFECTS, RECORDER_FAULTS
 from identification.mismatch.effect import Fault
 from identification.mismatch.outside import OUTSIDE, RIVALS
 from identification.record import Floats
@@ -17,6 +17,8 @@ from identification.simulation.parameters import Slot, neutral
 N = 1500
 NAMED_IN_CONTRACT, NEVER_FOUND = 30, 1
 """Names of the contract's catalogue, and those of them that are answered as alternatives alone (sensor-lag)."""
+FOUND_BY_CHECK = ("clock-offset", "controller-gap", "controller-logic", "controller-settings")
+"""Names of what the controller's check finds."""
 
 
 def inputs() -> ModelInputs:
@@ -61,8 +63,9 @@ def test_every_parameter_acts(variant: Variant) -> None:
 def test_every_effect_is_either_added_or_found() -> None:
     """An effect has variants that are fitted, or is found in the trends or by the controller's check; never both."""
     for effect in EFFECTS.values():
-        faults = (effect in RECORDER_FAULTS) + (effect in CONTROLLER_FAULTS.values())
-        assert bool(effect.variants) + faults == 1, effect.name
+        found = effect in RECORDER_FAULTS or effect.name in FOUND_BY_CHECK
+        assert bool(effect.variants) + found == 1, effect.name
+        assert isinstance(effect, Fault) == found, effect.name
 
 
 def test_every_effect_is_said_and_drawn() -> None:

@@ -7,10 +7,11 @@ import math
 import numpy as np
 import pytest
 
+from identification.controller.check import Finding
 from identification.mismatch.catalogue import CANDIDATES, EFFECTS
 from identification.mismatch.fault_pictures import around, biggest_move, busiest, gap_profile, grid, rebuilt
 from identification.mismatch.pictures import Drawing, Picture, banded
-from identification.mismatch.recording import Finding, Recording
+from identification.mismatch.recording import Recording
 from identification.models import Estimate
 from identification.simulation.effect import Param, Variant
 from identification.simulation.open_loop import ModelInputs

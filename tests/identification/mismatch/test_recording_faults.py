@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from identification.controller.check import Finding
 from identification.mismatch.catalogue import fault
-from identification.mismatch.recording import Finding, Recording, least_jump, unlogged
+from identification.mismatch.recording import Recording, least_jump, unlogged
 from tests.identification.scenes import recording
 
 PV = recording(1).pv
