@@ -115,7 +115,7 @@ class Number:
 
     name, unit, title : as answered and as pages call it; of : its name in the finding, where another; times : factor
     to the finding's; in_time : whether it is a time, which the finding has in samples; share : half width of its
-    interval, in itself; half : the same of its own kind.
+    interval, in itself, ours; half : the same of its own kind.
     """
 
     name: str

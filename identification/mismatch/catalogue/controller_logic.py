@@ -3,15 +3,12 @@
 from identification.mismatch.effect import Block, Fault, Number
 from identification.mismatch.fault_pictures import outside_law
 
-SURE = 0.1
-"""Half width of the interval, in the share found; ours."""
-
 EFFECT = Fault(
     name="controller-logic",
     block=Block.CONTROLLER,
     sentence="For {share_pct} of the time something other than the controller's law moved or held OP.",
     check="Look for tracking, overrides, limits or an operator's hand in those spans.",
     caption="OP recorded, and OP as the stated settings would have moved it from there.",
-    numbers=(Number("share_pct", "%", "Time outside the law", "share", 100.0, share=SURE),),
+    numbers=(Number("share_pct", "%", "Time outside the law", "share", 100.0, share=0.1),),
     drawn=outside_law,
 )

@@ -3,9 +3,6 @@
 from identification.mismatch.effect import Block, Fault, Number
 from identification.mismatch.fault_pictures import other_settings
 
-SURE = 0.02
-"""Half width of both intervals, as a share; ours."""
-
 EFFECT = Fault(
     name="controller-settings",
     block=Block.CONTROLLER,
@@ -13,8 +10,8 @@ EFFECT = Fault(
     check="Read Kp, Ti and form in the controller and correct loops.csv or the controller.",
     caption="OP recorded, and OP rebuilt from SP and PV by the settings found and by those stated.",
     numbers=(
-        Number("kp", "% OP/% PV", "Kp", share=SURE),
-        Number("ti_s", "s", "Ti", "ti_samples", in_time=True, share=SURE),
+        Number("kp", "% OP/% PV", "Kp", share=0.02),
+        Number("ti_s", "s", "Ti", "ti_samples", in_time=True, share=0.02),
     ),
     drawn=other_settings,
 )

@@ -1,20 +1,15 @@
 """A process gain that changes over the recording: fouling, wear."""
 
-from identification.mismatch.effect import Block, Effect, Floats, Param, Slot, Variant, each
+from identification.mismatch.effect import Block, Effect, Param, Slot, Variant, each
 from identification.mismatch.pictures import GAIN, Drawing, Picture, course_picture
-from identification.simulation.open_loop import ModelInputs
 
 DRIFT = Param(Slot.DRIFT, "gain_drift", "per record", -1.9, 1.9, title="Gain drift")
 
 
-def drifting_gain(inputs: ModelInputs, c: Floats) -> Floats:
-    """The gain as it drifts, shape (n,)."""
-    return c[Slot.K] * (1.0 + c[Slot.DRIFT] * inputs.clock)  # type: ignore[no-any-return]
-
-
 def gain_over_time(d: Drawing) -> Picture:
     """The gain as it drifts."""
-    return course_picture(d, GAIN, drifting_gain, rest=float(d.plain[Slot.K]))
+    rest = float(d.plain[Slot.K])
+    return course_picture(d, GAIN, lambda x, c: c[Slot.K] * (1.0 + c[Slot.DRIFT] * x.clock), rest)
 
 
 EFFECT = Effect(

@@ -1,7 +1,7 @@
 """A position loop of second order that rests within a dead band of its aim."""
 
 from identification.mismatch.effect import Block, Effect, Friction, Param, Slot, Variant
-from identification.mismatch.pictures import Drawing, Picture, stem_response
+from identification.mismatch.pictures import stem_response
 
 LENGTH = 8.0
 """Length of the drawn response, in lags."""
@@ -11,12 +11,6 @@ FREE = (
     Param(Slot.DEADBAND, "deadband_pct", "% OP", 0.0, 0.5, "op", title="Dead band"),
 )
 
-
-def stem_after_step(d: Drawing) -> Picture:
-    """Stem after a step of OP."""
-    return stem_response(d, LENGTH * float(d.best[Slot.SERVO]), (Slot.SERVO, Slot.DAMPING, Slot.DEADBAND))
-
-
 EFFECT = Effect(
     name="positioner",
     block=Block.VALVE,
@@ -24,7 +18,7 @@ EFFECT = Effect(
     check="Look at the positioner's gain and dead band; a recorded stem position would settle it.",
     indistinguishable=("stiction",),
     friction=Friction.HINT,
-    curve=stem_after_step,
+    curve=lambda d: stem_response(d, LENGTH * float(d.best[Slot.SERVO]), tuple(p.slot for p in FREE)),
     variants=(
         Variant(
             FREE,

@@ -8,8 +8,6 @@ from identification.mismatch.recording import STEP, level_gaps
 
 OFTEN, FEWEST = 0.2, 4
 """Share of the mean count from which a value is one at which PV dwells, and samples there at least; ours."""
-SURE = 0.01
-"""Half width of the interval, in the step found; ours."""
 
 
 def coarse_grid(s: Recording) -> Finding | None:
@@ -45,6 +43,6 @@ EFFECT = Fault(
     order=2,
     find=coarse_grid,
     ends=Ends.SMALLER,
-    numbers=(Number("step_pct", "% PV", "Step of values", share=SURE),),
+    numbers=(Number("step_pct", "% PV", "Step of values", share=0.01),),
     drawn=grid,
 )

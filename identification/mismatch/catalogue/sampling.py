@@ -5,9 +5,6 @@ import numpy as np
 from identification.mismatch.effect import Block, Ends, Fault, Finding, Number, Recording
 from identification.mismatch.fault_pictures import spacings
 
-SURE = 0.1
-"""Half width of the interval, in the scatter found; ours."""
-
 
 def scattered_stamps(s: Recording) -> Finding | None:
     """Stamps that scatter about a uniform clock by more than logging does, gaps left out."""
@@ -28,6 +25,6 @@ EFFECT = Fault(
     order=1,
     find=scattered_stamps,
     ends=Ends.ALL,
-    numbers=(Number("jitter_samples", "samples", "Scatter of stamps", share=SURE),),
+    numbers=(Number("jitter_samples", "samples", "Scatter of stamps", share=0.1),),
     drawn=spacings,
 )

@@ -1,20 +1,15 @@
 """A supply to the valve that wanders slowly and changes gain and bias together."""
 
 from identification.mismatch.effect import Block, Effect, Param, Slot, Variant
-from identification.mismatch.pictures import Axis, Drawing, Picture, course_picture
+from identification.mismatch.pictures import Axis, course_picture
 from identification.simulation.open_loop import head
 from identification.simulation.parameters import KNOTS
 
 AT_REST = Param(Slot.HEAD_BIAS, "flow_at_rest_pct", "% OP", -60.0, 60.0, title="Flow at rest")
 KNOT = tuple(Param(int(Slot.HEAD) + i, f"head_{i + 1}", "", -2.0, 2.0, hidden=True) for i in range(KNOTS))
+SUPPLY = Axis("supply", "% of its mean")
 ADDED = 1e4
 """Flow at rest [% OP] beside which a course that is added has no part in the gain; ours."""
-
-
-def supply_over_time(d: Drawing) -> Picture:
-    """The supply as it wanders."""
-    return course_picture(d, Axis("supply", "% of its mean"), lambda inputs, c: 100.0 * head(inputs, c))
-
 
 EFFECT = Effect(
     name="supply-variation",
@@ -28,7 +23,7 @@ EFFECT = Effect(
     },
     timed=True,
     needs="moves",
-    curve=supply_over_time,
+    curve=lambda d: course_picture(d, SUPPLY, lambda inputs, c: 100.0 * head(inputs, c)),
     variants=(
         Variant(
             (AT_REST, *KNOT),
