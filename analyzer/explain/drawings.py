@@ -9,10 +9,9 @@ from analyzer.explain.words import AXES, BROUGHT, CURVES, FEATURES, KINDS, ROWS,
 from analyzer.pages.words import number
 from identification.estimation.prediction_error import Fitted
 from identification.mismatch.catalogue import fault
-from identification.mismatch.fault_pictures import busiest, by_stated_law
 from identification.mismatch.location import Feature, Group, Located, groups, profile
 from identification.mismatch.outside import about
-from identification.mismatch.pictures import Drawing, Picture
+from identification.mismatch.pictures import Drawing, Picture, busiest, by_stated_law
 from identification.mismatch.proof import course
 from identification.mismatch.where import located_in, won_over
 from identification.record import Floats

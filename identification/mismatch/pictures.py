@@ -1,7 +1,8 @@
-"""What an effect does, as arrays to draw beside the plain loop: of valve and process, and over the recording.
+"""What an effect does, as arrays to draw: of valve and process and over the recording, beside the plain loop, and of
+recorder and controller as they are in the recording.
 
-Each picture is a function of the model's parameters; its band is that function at the ends of their intervals, one
-parameter at a time, the deviations added as squares.
+A picture of the physics is a function of the model's parameters; its band is that function at the ends of their
+intervals, one parameter at a time, the deviations added as squares.
 """
 
 from __future__ import annotations
@@ -11,11 +12,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from identification.controller.check import StatedSettings, runs
+from identification.mismatch.recording import Recording
 from identification.models import Estimate
-from identification.record import Floats
+from identification.record import Floats, Mask
 from identification.simulation.effect import Variant
 from identification.simulation.open_loop import ModelInputs, load, simulate
 from identification.simulation.parameters import Slot, neutral
+from identification.simulation.pi import free_path
 from identification.simulation.valve_chain import flow
 
 POINTS = 241
@@ -31,6 +35,10 @@ STEM_LENGTH, FEWEST_SAMPLES = 1.6, 4
 """Length of a stem's response, in the time that the stem takes; at least so many samples."""
 PV_LENGTH = 5.0
 """Length of PV's response, in dead time and all time constants together."""
+WINDOW, MOST_WINDOW = 240, 1500
+"""Samples of a stretch that is drawn, and at most; ours: single samples can still be seen."""
+LAW_WINDOW = 8.0
+"""Length of a stretch with a law, in integral times; ours: a law that is off has drifted away by then."""
 EARLY = 0.25
 """It is drawn to ten of its shortest lags where that is less than this part of the whole."""
 FRICTION = (Slot.STICKBAND, Slot.JUMP, Slot.COAST, Slot.STEM_T)
@@ -61,7 +69,7 @@ class Axis:
 
 
 TIME, OP, FLOW, STEM = Axis("time", "s"), Axis("OP", "%"), Axis("flow", "% OP"), Axis("stem", "% OP")
-GAIN, LOAD = Axis("gain", "% PV/% OP"), Axis("load at the inlet", "% OP")
+GAIN, LOAD, PV = Axis("gain", "% PV/% OP"), Axis("load at the inlet", "% OP"), Axis("PV", "%")
 
 
 @dataclass(frozen=True, slots=True)
@@ -236,7 +244,7 @@ def gain_over_pv(d: Drawing) -> Picture:
         scheduled = np.maximum(1.0 + k[Slot.GAIN_SLOPE] * x / 50.0, 0.05)
         return np.asarray(k[Slot.K] * root * bent * scheduled)
 
-    return beside_plain(d, "curve", (Axis("PV", "%"), GAIN), pv, read, float(d.plain[Slot.K]))
+    return beside_plain(d, "curve", (PV, GAIN), pv, read, float(d.plain[Slot.K]))
 
 
 def course_picture(
@@ -257,3 +265,73 @@ def course_picture(
 def load_over_time(d: Drawing) -> Picture:
     """The load at the inlet over the recording."""
     return course_picture(d, LOAD, load)
+
+
+def busiest(x: Floats, length: int, usable: Mask | None = None) -> slice:
+    """The stretch of that many samples in which a signal travels most, samples not usable left out of account."""
+    length = min(length, x.size)
+    travel = np.abs(np.diff(x, prepend=x[0]))
+    if usable is not None:
+        travel = np.where(usable, travel, 0.0)
+    total = np.concatenate(([0.0], np.cumsum(travel)))
+    first = int(np.argmax(total[length:] - total[:-length]))
+    return slice(first, first + length)
+
+
+def biggest_move(x: Floats, length: int, usable: Mask) -> slice:
+    """A stretch of that many samples about a signal's biggest move, a third of it before."""
+    size = np.where(usable, np.abs(np.diff(x, prepend=x[0])), 0.0)
+    length = min(length, x.size)
+    first = min(max(int(np.argmax(size)) - length // 3, 0), x.size - length)
+    return slice(first, first + length)
+
+
+def around(where: Mask, length: int) -> slice:
+    """A stretch about the longest run of a mask."""
+    found = runs(where)
+    if not found:
+        return slice(0, min(length, where.size))
+    first, last = max(found, key=lambda r: r[1] - r[0])
+    length = min(max(length, 2 * (last - first)), MOST_WINDOW, where.size)
+    start = min(max((first + last - length) // 2, 0), where.size - length)
+    return slice(start, start + length)
+
+
+def comb(name: str, axis: Axis, at: Floats, count: np.ndarray) -> Picture:
+    """How often each of some values occurs."""
+    x, none = np.repeat(at, 3), np.zeros(at.size)
+    y = np.stack([none, count, none], axis=1).ravel().astype(float)
+    return Picture(name, "comb", axis, Axis("samples", ""), (Drawn("recorded", x, y),))
+
+
+def rebuilt(e: Floats, op: Floats, kp: float, ti: float) -> Floats:
+    """OP that a PI of gain [% OP/% PV] and integral time [samples] gives for an error, shape (n,), with the mean of
+    the recorded OP."""
+    free = free_path(e, kp, ti)
+    return np.asarray(free - free.mean() + op.mean())
+
+
+def rebuilt_course(
+    name: str, s: Recording, part: slice, laws: dict[str, tuple[Floats, StatedSettings]]
+) -> Picture:
+    """A stretch of recorded OP, and OP rebuilt from errors, shape (n,), by some laws."""
+    time, own = np.arange(part.start, part.stop) * s.dt_s, s.op[part]
+    curves = [Drawn(k, time, rebuilt(e[part], own, law.kp, law.ti)) for k, (e, law) in laws.items()]
+    return Picture(name, "course", TIME, OP, (*curves, Drawn("recorded", time, own)))
+
+
+def law_window(s: Recording, ti: float) -> int:
+    """Samples of a stretch in which a law is drawn."""
+    return int(np.clip(LAW_WINDOW * ti, WINDOW, min(MOST_WINDOW, s.pv.size)))
+
+
+def by_stated_law(name: str, s: Recording, where: Mask | None = None) -> Picture | None:
+    """OP about a mask's longest stretch (the busiest where None) and as the stated settings would have moved it.
+
+    None without SP or settings.
+    """
+    if s.sp is None or s.stated is None:
+        return None
+    length = law_window(s, s.stated.ti)
+    part = busiest(s.op, length, s.usable) if where is None else around(where[: s.op.size], length)
+    return rebuilt_course(name, s, part, {"stated": (s.sp - s.pv, s.stated)})

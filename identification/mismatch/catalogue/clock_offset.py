@@ -1,9 +1,22 @@
 """PV stamped by another clock than OP."""
 
+import numpy as np
+
 from identification.controller.check import LATE_SAMPLES
-from identification.controller.pi_regression import LATE_STEP
-from identification.mismatch.effect import Block, Fault, Number
-from identification.mismatch.fault_pictures import other_clock
+from identification.controller.pi_regression import LATE_STEP, shifted
+from identification.mismatch.effect import Block, Fault, Finding, Floats, Number, Recording
+from identification.mismatch.pictures import WINDOW, Picture, biggest_move, rebuilt_course
+
+
+def other_clock(found: Finding, s: Recording, _: Floats) -> Picture | None:
+    """OP about its biggest move, rebuilt with PV as stamped and with its clock set right; None without settings."""
+    if s.sp is None or s.stated is None:
+        return None
+    part = biggest_move(s.sp if float(np.ptp(s.sp)) > 0 else s.op, WINDOW // 4, s.usable)
+    right = s.sp - shifted(s.pv, found.values[LATE_SAMPLES])
+    laws = {"found": (right, s.stated), "stated": (s.sp - s.pv, s.stated)}
+    return rebuilt_course(found.name, s, part, laws)
+
 
 EFFECT = Fault(
     name="clock-offset",

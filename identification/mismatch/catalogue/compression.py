@@ -1,7 +1,9 @@
 """A historian that keeps few points and draws straight lines between them."""
 
-from identification.mismatch.effect import Block, Ends, Fault, Finding, Number, Recording
-from identification.mismatch.fault_pictures import straight_lines
+import numpy as np
+
+from identification.mismatch.effect import Block, Ends, Fault, Finding, Floats, Number, Recording
+from identification.mismatch.pictures import PV, TIME, WINDOW, Drawn, Picture, busiest
 from identification.mismatch.recording import straight, straightened
 
 
@@ -11,6 +13,14 @@ def straight_segments(s: Recording) -> Finding | None:
         return None
     found = straight(s.pv)
     return Finding({"straight_share": float(found.mean())}, found)
+
+
+def straight_lines(found: Finding, s: Recording, _: Floats) -> Picture:
+    """The busiest stretch of a compressed trend, with the samples that lie on straight lines."""
+    part = busiest(s.pv, WINDOW)
+    time, x, marked = np.arange(part.start, part.stop) * s.dt_s, s.pv[part], found.where[part]
+    curves = (Drawn("points", time[marked], x[marked]), Drawn("recorded", time, x))
+    return Picture(found.name, "course", TIME, PV, curves)
 
 
 EFFECT = Fault(

@@ -1,7 +1,30 @@
 """A controller that stands still while the error is small."""
 
-from identification.mismatch.effect import Block, Fault, Number
-from identification.mismatch.fault_pictures import gap_profile
+import numpy as np
+
+from identification.mismatch.effect import Block, Fault, Finding, Floats, Number, Recording
+from identification.mismatch.pictures import Axis, Drawn, Picture
+
+GAPS_SHOWN, GAP_CLASSES, FEWEST_IN_CLASS = 4.0, 32, 5
+"""Errors up to so many gaps are drawn, in so many classes of size, each of at least so many samples."""
+
+
+def gap_profile(found: Finding, s: Recording, _: Floats) -> Picture | None:
+    """How often OP stands still, over the size of the error, with the gap's end; None without SP."""
+    if s.sp is None:
+        return None
+    width = found.values["gap_pct"]
+    still = np.diff(s.op, prepend=s.op[0]) == 0
+    edges = np.linspace(0.0, GAPS_SHOWN * width, GAP_CLASSES + 1)
+    at = np.digitize(np.abs(s.sp - s.pv)[s.usable], edges) - 1
+    count = np.bincount(at, minlength=GAP_CLASSES + 1)[:GAP_CLASSES]
+    stood = np.bincount(at, still[s.usable], minlength=GAP_CLASSES + 1)[:GAP_CLASSES]
+    held = count >= FEWEST_IN_CLASS
+    middle = 0.5 * (edges[1:] + edges[:-1])
+    curve = Drawn("recorded", middle[held], 100.0 * stood[held] / count[held])
+    x, y = Axis("size of SP − PV", "%"), Axis("OP stands still", "% of samples")
+    return Picture(found.name, "curve", x, y, (curve,), (width,))
+
 
 EFFECT = Fault(
     name="controller-gap",

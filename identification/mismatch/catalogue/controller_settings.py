@@ -1,7 +1,18 @@
 """A controller that runs with other settings than stated."""
 
-from identification.mismatch.effect import Block, Fault, Number
-from identification.mismatch.fault_pictures import other_settings
+from identification.controller.check import StatedSettings
+from identification.mismatch.effect import Block, Fault, Finding, Floats, Number, Recording
+from identification.mismatch.pictures import Picture, busiest, law_window, rebuilt_course
+
+
+def other_settings(found: Finding, s: Recording, _: Floats) -> Picture | None:
+    """OP over its busiest stretch, rebuilt by the settings found and by those stated; None without SP or settings."""
+    if s.sp is None or s.stated is None:
+        return None
+    part, e = busiest(s.op, law_window(s, s.stated.ti), s.usable), s.sp - s.pv
+    own = StatedSettings(found.values["kp"], found.values["ti_samples"])
+    return rebuilt_course(found.name, s, part, {"found": (e, own), "stated": (e, s.stated)})
+
 
 EFFECT = Fault(
     name="controller-settings",

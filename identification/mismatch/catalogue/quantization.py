@@ -3,11 +3,13 @@
 import numpy as np
 
 from identification.mismatch.effect import Block, Ends, Fault, Finding, Floats, Number, Recording
-from identification.mismatch.fault_pictures import grid
+from identification.mismatch.pictures import PV, Picture, comb
 from identification.mismatch.recording import STEP, level_gaps
 
 OFTEN, FEWEST = 0.2, 4
 """Share of the mean count from which a value is one at which PV dwells, and samples there at least; ours."""
+STEPS_SHOWN = 24
+"""Steps of a coarse sensor that are drawn."""
 
 
 def coarse_grid(s: Recording) -> Finding | None:
@@ -31,6 +33,13 @@ def grid_unit(pv: Floats) -> float:
     gaps = np.diff(levels)
     dwelt = gaps[often[1:] & often[:-1]]
     return float(dwelt.mean() if dwelt.size >= FEWEST - 1 else np.median(gaps))
+
+
+def grid(found: Finding, s: Recording, _: Floats) -> Picture:
+    """How often each value of PV occurs within some steps of a coarse sensor."""
+    middle = float(np.median(s.pv))
+    near = s.pv[np.abs(s.pv - middle) <= 0.5 * STEPS_SHOWN * found.values["step_pct"]]
+    return comb(found.name, PV, *np.unique(near, return_counts=True))
 
 
 EFFECT = Fault(

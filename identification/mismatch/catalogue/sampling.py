@@ -2,8 +2,11 @@
 
 import numpy as np
 
-from identification.mismatch.effect import Block, Ends, Fault, Finding, Number, Recording
-from identification.mismatch.fault_pictures import spacings
+from identification.mismatch.effect import Block, Ends, Fault, Finding, Floats, Number, Recording
+from identification.mismatch.pictures import Axis, Picture, comb
+
+HISTOGRAM = 160
+"""Classes of a histogram."""
 
 
 def scattered_stamps(s: Recording) -> Finding | None:
@@ -14,6 +17,13 @@ def scattered_stamps(s: Recording) -> Finding | None:
     if jitter < s.limits.recorder.jitter:
         return None
     return Finding({"jitter_samples": jitter}, np.ones(s.stamp_s.size, dtype=bool))
+
+
+def spacings(found: Finding, s: Recording, _: Floats) -> Picture:
+    """How often each spacing of two stamps occurs."""
+    spacing = np.diff(s.stamp_s)
+    count, edge = np.histogram(spacing[(spacing > 0) & (spacing < 2 * s.dt_s)], HISTOGRAM)
+    return comb(found.name, Axis("time between samples", "s"), 0.5 * (edge[1:] + edge[:-1]), count)
 
 
 EFFECT = Fault(

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from identification.mismatch.effect import Block, Fault, Finding, Number, Recording
-from identification.mismatch.fault_pictures import range_end
+from identification.mismatch.effect import Block, Fault, Finding, Floats, Number, Recording
+from identification.mismatch.pictures import PV, TIME, WINDOW, Drawn, Picture, around
 
 
 def clipped(s: Recording) -> Finding | None:
@@ -23,6 +23,19 @@ def clipped(s: Recording) -> Finding | None:
 def step(s: Recording) -> float:
     """A step of the recording [% PV], to which the end is known."""
     return float(np.median(np.diff(np.unique(s.pv))))
+
+
+def range_end(found: Finding, s: Recording, free: Floats) -> Picture:
+    """The stretch in which PV stands at its end longest, with the model that goes on."""
+    part = around(found.where, WINDOW)
+    time = np.arange(part.start, part.stop) * s.dt_s
+    end = np.full(time.size, found.values["clip_pct"])
+    curves = (
+        Drawn("found", time, free[part]),
+        Drawn("recorded", time, s.pv[part]),
+        Drawn("limit", time, end),
+    )
+    return Picture(found.name, "course", TIME, PV, curves)
 
 
 EFFECT = Fault(

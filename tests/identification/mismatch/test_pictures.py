@@ -9,8 +9,9 @@ import pytest
 
 from identification.controller.check import Finding
 from identification.mismatch.catalogue import CANDIDATES, EFFECTS
-from identification.mismatch.fault_pictures import around, biggest_move, busiest, gap_profile, grid, rebuilt
-from identification.mismatch.pictures import Drawing, Picture, banded
+from identification.mismatch.catalogue.controller_gap import gap_profile
+from identification.mismatch.catalogue.quantization import grid
+from identification.mismatch.pictures import Drawing, Picture, around, banded, biggest_move, busiest, rebuilt
 from identification.mismatch.recording import Recording
 from identification.models import Estimate
 from identification.simulation.effect import Param, Variant
