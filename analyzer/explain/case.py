@@ -23,8 +23,7 @@ from analyzer.words.settings import stands_and_jumps
 from identification.controller.check import StatedSettings
 from identification.errors import NotAssessedError
 from identification.estimation.evidence import trials_between_moves
-from identification.mismatch.experiment import coarser_by, is_experiment
-from identification.mismatch.recording import Recording, SeenInCycles, least_jump
+from identification.mismatch.recording import Recording, SeenInCycles, coarser_by, is_experiment, least_jump
 from identification.record import Floats
 
 

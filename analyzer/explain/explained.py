@@ -18,8 +18,7 @@ from identification.controller.pi_regression import ControlLaw
 from identification.controller.pid_regression import integral_time
 from identification.mismatch.answer import Answer, answer
 from identification.mismatch.diagnosis import explain
-from identification.mismatch.explanation import Explanation
-from identification.mismatch.other_recordings import proven_on
+from identification.mismatch.explanation import Explanation, proven_on
 from identification.mismatch.recording import Recording
 from identification.mismatch.words import sentence, unexplained_reason
 

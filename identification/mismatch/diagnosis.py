@@ -1,7 +1,7 @@
 """From one recording to its explanation: recorder, controller, plain loop, then effects until nothing passes.
 
 Read on in the order of the walk: recording, the faults of catalogue/, plain_loop, rounds, selection (with starts and
-friction), proof, explanation, experiment and other_recordings; then answer, with where and location, and words.
+friction), proof, explanation; then answer, with where and location, and words.
 """
 
 from __future__ import annotations
@@ -15,10 +15,9 @@ from identification.controller.check import LATE_SAMPLES, Finding, judge
 from identification.controller.pi_regression import ControlLaw, shifted, unstated_law
 from identification.mismatch.catalogue import RECORDER_FAULTS, fault
 from identification.mismatch.effect import Ends
-from identification.mismatch.experiment import agreed, is_experiment
-from identification.mismatch.explanation import Explanation, beyond_the_grid, carried_over
+from identification.mismatch.explanation import Explanation, agreed, beyond_the_grid, carried_over
 from identification.mismatch.plain_loop import Clip, inputs_of, prepared, without_spikes
-from identification.mismatch.recording import Recording, straightened, unlogged
+from identification.mismatch.recording import Recording, is_experiment, straightened, unlogged
 from identification.mismatch.rounds import physics
 from identification.mismatch.selection import Progress, silent
 from identification.record import Floats

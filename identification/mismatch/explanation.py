@@ -1,22 +1,43 @@
 """What was found in one recording: fits without and with effects, in which order, and which of them stand: those
-larger than the recorder's grid that carry over to held-out data."""
+larger than the recorder's grid that carry over to held-out data, and to other recordings of the loop on which nothing
+was fitted but a bias.
+
+Of an experiment in open loop there are two explanations. Where a controller answers PV, a load moves OP too, and only
+innovations tell effect and load apart (noise.py). Where OP is moved by hand or by a script, no load hides in OP, and
+what a simulation misses is the model's lack; the innovations then see little of what is slow, for a noise model takes
+it up.
+"""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from identification.controller.check import Finding
 from identification.controller.pi_regression import ControlLaw
-from identification.estimation.prediction_error import Fitted, Problem, descended
+from identification.estimation.prediction_error import Fitted, Problem, descended, gain, problem
 from identification.mismatch.catalogue import EFFECTS, fault
 from identification.mismatch.effect import Ends
 from identification.mismatch.friction import is_friction
-from identification.mismatch.proof import HeldOut, OnOther, held_out, is_one_move
-from identification.mismatch.recording import STEP, SeenInCycles
+from identification.mismatch.model_file import carried, constants, inputs_for, to_data
+from identification.mismatch.proof import (
+    HeldOut,
+    Misfit,
+    OnOther,
+    anchored,
+    course,
+    held_out,
+    is_one_move,
+    misfit,
+)
+from identification.mismatch.recording import STEP, Recording, SeenInCycles
 from identification.mismatch.selection import Candidate, without
+from identification.record import Floats
 from identification.simulation.open_loop import simulate
+from identification.simulation.parameters import Slot
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,3 +151,134 @@ def first_effects(found: Explanation, count: int) -> Explanation:
     model = without(found.best.model, (c.row for c in found.accepted[count:]))
     best = descended(found.p, model, found.p.limits.search.full_steps)
     return replace(found, best=best, accepted=found.accepted[:count], outside=None)
+
+
+def agreed(told: Explanation, by_misfit: Explanation) -> Explanation:
+    """Of an experiment's explanations by innovations and by the simulation's misfit the nearer one.
+
+    What the misfit tells, innovations have to second. What is left is what both miss: a load that wanders is no lack
+    of the model, and innovations see none in it.
+    """
+    by_misfit = replace(by_misfit, left=min(told.left, by_misfit.left), by_innovations=told)
+    other = judged_by_simulation(told, by_misfit)
+    return nearer(other, by_misfit) if is_seconded(by_misfit, told) else other
+
+
+def most_telling_first(found: Explanation) -> Explanation:
+    """The explanation with its effects in the order of what the simulation would miss without each."""
+    full = found.p.limits.search.full_steps
+    model = found.best.model
+    if len(model.added) < 2:
+        return found
+    missed = {row.name: descended(found.p, without(model, [row]), full).loss for row in model.added}
+    ordered = tuple(sorted(model.added, key=lambda row: -missed[row.name]))
+    accepted = tuple(sorted(found.accepted, key=lambda c: -missed[c.name]))
+    return replace(found, best=replace(found.best, model=replace(model, added=ordered)), accepted=accepted)
+
+
+def nearer(one: Explanation, other: Explanation) -> Explanation:
+    """Of two explanations the one whose simulation is nearer to PV: on held-out data, or over all where none could be
+    held out, for OP moved once or an effect is bound to a time."""
+    timed = any(EFFECTS[c.name].timed for c in (*one.accepted, *other.accepted))
+    over_all = timed or is_one_move(one.p)
+
+    def missed(found: Explanation) -> float:
+        if found.proof is None:
+            return math.inf
+        return (found.proof.overall if over_all else found.proof.held)[1].rmse
+
+    return min(one, other, key=missed)
+
+
+def is_seconded(found: Explanation, told: Explanation) -> bool:
+    """Whether innovations gain what one constant costs by the effects that a simulation's misfit tells: two signs."""
+    limits = told.p.limits.search
+    seen = descended(told.p, found.best.model, limits.full_steps)
+    return gain(seen, told.plain) > limits.search_penalty + limits.parameter_penalty
+
+
+def judged_by_simulation(found: Explanation, other: Explanation) -> Explanation:
+    """An experiment's explanation by innovations, fitted anew to what its simulation misses, as the other one is."""
+    best = descended(other.p, found.best.model, other.p.limits.search.full_steps)
+    anew = replace(found, p=other.p, plain=other.plain, best=best, left=other.left, by_innovations=found)
+    return carried_over(most_telling_first(anew))
+
+
+def simulated_there(found: Explanation, c: Floats, s: Recording, window: int) -> Floats:
+    """PV [% PV], shape (n,), that constants give for another recording's OP, anchored in windows."""
+    data = to_data("", found.p.inputs, c, found.best.names, found.late_s, None)
+    if window and found.proven.placed:
+        c, here = constants(data), inputs_for(data, s.op, s.pv, s.dt_s)
+        c[Slot.START] = float(s.pv[0]) - here.level
+        return here.level + course(problem(here, s.pv - here.level, s.usable), c, window, True)
+    return anchored(s.pv, carried(data, s.op, s.pv, s.dt_s), window)
+
+
+def on_other(found: Explanation, s: Recording, window: int) -> OnOther:
+    """Both models on another recording, the plain one by either criterion, and the better without its effects."""
+    best = found.best.model
+    models = (found.plain.model.c, found.proven.drawn[0], best.c, without(best, best.added).c)
+    own, drawn, better, cleared = (misfit(s.pv, simulated_there(found, c, s, window), window) for c in models)
+    return OnOther(min(own, drawn, key=lambda x: x.rmse), better, cleared, s.pv.size)
+
+
+def together(parts: Sequence[Misfit], samples: Sequence[int]) -> Misfit:
+    """Misfits of several recordings as one, each sample counting alike."""
+    n = np.array(samples, dtype=np.float64)
+    rmse = np.array([m.rmse for m in parts])
+    moves = np.array([m.rmse / max(1.0 - m.fit_pct / 100.0, 1e-9) for m in parts])
+    left, own = (float(np.sqrt(np.sum(n * x**2) / n.sum())) for x in (rmse, moves))
+    return Misfit(left, 100.0 * (1.0 - left / max(own, 1e-12)))
+
+
+def window_of(found: Explanation, s: Recording) -> int:
+    """Samples there over which models are compared where the whole shows the load alone, as own proof or loop ask."""
+    if found.proven.window:
+        return max(round(found.proven.window * found.p.inputs.dt_s / s.dt_s), 1)
+    c, limits = found.plain.model.c, found.p.limits.proof
+    memory = limits.window_times * float(c[Slot.T] + c[Slot.L]) / s.dt_s
+    return max(math.ceil(min(memory, 1e9)), limits.window_samples)
+
+
+def compared(found: Explanation, others: Sequence[Recording]) -> tuple[HeldOut, tuple[OnOther, ...]]:
+    """The proof on other recordings: over the whole of each, or over windows where the whole shows the load alone."""
+    whole = _compared(found, others, [0] * len(others), False)
+    if whole[0].carries:
+        return whole
+    return _compared(found, others, [window_of(found, s) for s in others], found.proven.placed)
+
+
+def _compared(
+    found: Explanation, others: Sequence[Recording], windows: Sequence[int], placed: bool
+) -> tuple[HeldOut, tuple[OnOther, ...]]:
+    """The same over windows of each recording, 0 for the whole."""
+    p, drawn = found.p, found.proven.drawn
+    each = tuple(on_other(found, s, window) for s, window in zip(others, windows, strict=True))
+    samples = [x.samples for x in each]
+    held = together([x.baseline for x in each], samples), together([x.explained for x in each], samples)
+    window = round(windows[0] * others[0].dt_s / p.inputs.dt_s)
+    plain, better = (misfit(p.y, course(p, c, window, placed), window) for c in drawn)
+    seen = plain, better
+    return HeldOut(0.0, seen, held, seen, drawn, window, placed, limits=p.limits.proof), each
+
+
+def proven_on(found: Explanation, others: Sequence[Recording]) -> Explanation:
+    """The explanation, kept where it carries over to other recordings, given up where it does not.
+
+    An effect bound to a time says nothing of another recording; a valve that the cycles there show too keeps its
+    name. The others are of the same loop, in the percent of the recording that was fitted.
+    """
+    if not others or not found.accepted:
+        return found
+    proof, each = compared(found, others)
+    names = tuple(c.name for c in found.accepted)
+    cycling = by_cycles(found) and any(s.cycles is not None for s in others)
+    samples = [x.samples for x in each]
+    there, bare = (together([getattr(x, k) for x in each], samples).rmse for k in ("explained", "without"))
+    if (proof.share > 0.0 and proof.follows and there < bare) or cycling:
+        return replace(found, proof=proof, others=each, unproven=False)
+    if all(EFFECTS[name].timed for name in names):
+        return replace(found, others=each)
+    plain = replace(found, best=found.plain, accepted=(), refuted=names, unproven=False)
+    proof, _ = compared(plain, others)
+    return replace(plain, proof=proof, others=each)

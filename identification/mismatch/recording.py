@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from identification.controller.check import StatedSettings
+from identification.controller.pi_regression import fed_back
+from identification.estimation.start_values import plain_processes
 from identification.limits import LIMITS, ExplainLimits, RecorderLimits
 from identification.models import Backlash, Estimate, Fopdt, Stiction
 from identification.record import Floats, Mask
@@ -142,3 +144,24 @@ def unlogged(stamp_s: Floats, n: int, dt_s: float, limits: RecorderLimits = LIMI
     for k in np.flatnonzero(np.diff(at) > limits.missed):
         out[int(np.ceil(at[k] + 0.5)) : int(np.floor(at[k + 1] + 0.5))] = True
     return out
+
+
+def is_experiment(s: Recording) -> bool:
+    """Whether OP was moved by hand or by a script: nothing is known of a controller, and OP does not answer PV.
+
+    In a loop that cycles, so that PV tells OP's moves and is told by them, OP must stand still nearly always.
+    """
+    if s.sp is not None or s.stated is not None or fed_back(s.op, s.pv) >= s.limits.controller.feedback:
+        return False
+    cycles = s.cycles is not None or s.free_valve
+    return not cycles or float(np.mean(np.diff(s.op) != 0.0)) < s.limits.controller.by_hand
+
+
+def coarser_by(s: Recording) -> int:
+    """Of how many samples of an experiment one tells all there is to tell of its process; 1 where each is needed."""
+    limits = s.limits.search
+    most = s.pv.size // limits.experiment_samples
+    if most < 2:
+        return 1
+    fast = min(x.time_constant_s + x.dead_time_s for x in plain_processes(s.pv, s.op, s.usable, s.dt_s))
+    return max(min(most, int(fast / (limits.samples_a_lag * s.dt_s))), 1)

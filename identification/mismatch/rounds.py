@@ -7,12 +7,11 @@ from dataclasses import replace
 from identification.estimation.prediction_error import Fitted, Problem, descended, gain
 from identification.mismatch.catalogue import CANDIDATES, EFFECTS
 from identification.mismatch.effect import Friction
-from identification.mismatch.experiment import is_experiment
 from identification.mismatch.explanation import Explanation
 from identification.mismatch.friction import from_cycles, is_friction
 from identification.mismatch.outside import OUTSIDE, RIVALS, about
 from identification.mismatch.proof import passes
-from identification.mismatch.recording import Recording, SeenInCycles
+from identification.mismatch.recording import Recording, SeenInCycles, is_experiment
 from identification.mismatch.reference import Foretold, foretold
 from identification.mismatch.selection import (
     Candidate,

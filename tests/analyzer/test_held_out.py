@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from identification.mismatch.other_recordings import together
+from identification.mismatch.explanation import together
 from identification.mismatch.proof import Misfit
 from tests.analyzer.test_explain import asked, export
 

@@ -10,7 +10,7 @@ import pytest
 from identification.controller.check import StatedSettings
 from identification.mismatch.answer import AT_REST, answer, untold_gain
 from identification.mismatch.diagnosis import explain
-from identification.mismatch.experiment import coarser_by, is_experiment
+from identification.mismatch.recording import coarser_by, is_experiment
 from identification.mismatch.words import WANDERS
 from identification.models import Estimate
 from proofs.experiments import Plant, asked, carried_misfit, drawn, slow_mode
