@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from identification.controller.check import Finding
 from identification.estimation.covariance import half_width
 from identification.estimation.descent import nats
 from identification.estimation.prediction_error import Fitted, Problem, deviations, residual_fit
@@ -17,7 +16,7 @@ from identification.mismatch.catalogue import EFFECTS, fault
 from identification.mismatch.effect import Block, exact
 from identification.mismatch.explanation import Explanation, by_cycles, is_stack
 from identification.mismatch.outside import about
-from identification.mismatch.proof import HeldOut, Misfit
+from identification.mismatch.proof import HeldOut
 from identification.mismatch.recording import Recording
 from identification.mismatch.where import Located, located_in, where_of
 from identification.models import Estimate
@@ -65,9 +64,9 @@ class Answer:
     fit: dict[str, Any]
     moved: dict[str, tuple[float, float]]
     remaining: float | None
-    note: str = field(default="")
-    caution: str = field(default="")
-    shown: str = field(default="")
+    note: str = ""
+    caution: str = ""
+    shown: str = ""
     outside: EffectFound | None = None
 
 
@@ -155,7 +154,11 @@ def untold_gain(found: Explanation, effects: tuple[EffectFound, ...]) -> str:
 
 def effects_of(found: Explanation, s: Recording, proof: HeldOut | None) -> tuple[EffectFound, ...]:
     """Every effect found, the likeliest first: what is larger than a grid before the grid."""
-    gates = [finding_effect(f, s) for f in (found.recorder, found.controller) if f is not None]
+    gates = [
+        EffectFound(f.name, own.block, {n.name: n.estimate(f, s) for n in own.numbers}, None)
+        for f in (found.recorder, found.controller)
+        if f is not None and (own := fault(f.name))
+    ]
     rows = found.best.model.added
     physics = [
         EffectFound(
@@ -168,12 +171,6 @@ def effects_of(found: Explanation, s: Recording, proof: HeldOut | None) -> tuple
         for i, row in enumerate(rows)
     ]
     return (*physics, *gates) if found.finding is None else (*gates, *physics)
-
-
-def finding_effect(finding: Finding, s: Recording) -> EffectFound:
-    """A finding about recorder or controller as an effect."""
-    own = fault(finding.name)
-    return EffectFound(own.name, own.block, {n.name: n.estimate(finding, s) for n in own.numbers}, None)
 
 
 def parameters_of(p: Problem, fit: Fitted, row: Variant) -> dict[str, Estimate]:
@@ -234,12 +231,8 @@ def ahead(found: Explanation) -> float | None:
 
 def fit_of(proof: HeldOut, dt_s: float) -> dict[str, Any]:
     """Misfit before and after, fitted and held out, and the horizon that simulations run over [s]; None: all."""
-
-    def said(m: Misfit) -> dict[str, float]:
-        return {"rmse": m.rmse, "fit_pct": m.fit_pct}
-
     both: dict[str, Any] = {
-        name: {"fitted": said(proof.fitted[i]), "held_out": said(proof.held[i])}
+        name: {"fitted": asdict(proof.fitted[i]), "held_out": asdict(proof.held[i])}
         for i, name in enumerate(("baseline", "explained"))
     }
     return both | {"horizon_s": proof.window * dt_s if proof.window else None}

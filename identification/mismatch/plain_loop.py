@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -108,19 +109,22 @@ def with_memory(p: Problem, fit: Fitted) -> tuple[Problem, Fitted]:
     return known, replace(fit, count=known.independent(fit.e))
 
 
+def unfollowed(p: Problem, fit: Fitted) -> Callable[[Floats], Floats]:
+    """Takes from signals, shape (n,) or (n, m), weighted as innovations are, what a fit's own constants and its noise
+    model can follow linearly."""
+    r = p.y - simulate(p.inputs, fit.model.c)
+    own = np.concatenate((sensitivities(p, fit.model, fit.ar), lag_means(r, p.edges))) * np.sqrt(p.weight)
+    span = np.linalg.qr(np.nan_to_num(own).T)[0]
+    return lambda x: x - span @ (span.T @ x)
+
+
 def left_freely(p: Problem, fit: Fitted) -> Floats:
-    """What the flexible model leaves of a fit's weighted innovations, shape (n,); the fit's own constants and its
-    noise model follow linearly."""
-    c, root = fit.model.c, np.sqrt(p.weight)
+    """What the flexible model leaves of a fit's weighted innovations, shape (n,)."""
+    c, root, rest = fit.model.c, np.sqrt(p.weight), unfollowed(p, fit)
     through = through_valve(p.inputs, c)
     free = past_moves(p, c, through) + bent_moves(p, c, through)
-    r = p.y - simulate(p.inputs, c)
-    own = np.concatenate((sensitivities(p, fit.model, fit.ar), lag_means(r, p.edges))) * root
-    more = np.stack([whitened(x, fit.ar, p.edges) for x in free]) * root
-    span = np.linalg.qr(own.T)[0]
-    e = fit.e * root
-    e = e - span @ (span.T @ e)
-    more = more.T - span @ (span.T @ more.T)
+    e = rest(fit.e * root)
+    more = rest((np.stack([whitened(x, fit.ar, p.edges) for x in free]) * root).T)
     q, scale = np.linalg.qr(more)
     kept = np.abs(np.diag(scale)) > 1e-8 * np.abs(np.diag(scale)).max()
     return e - q[:, kept] @ (q[:, kept].T @ e)  # type: ignore[no-any-return]

@@ -15,9 +15,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from identification.estimation.noise import lag_means, whitened
-from identification.estimation.prediction_error import Fitted, Problem, sensitivities
-from identification.mismatch.plain_loop import bent_moves, past_moves
+from identification.estimation.noise import whitened
+from identification.estimation.prediction_error import Fitted, Problem
+from identification.mismatch.plain_loop import bent_moves, past_moves, unfollowed
 from identification.record import Floats
 from identification.simulation.lag import lagged
 from identification.simulation.open_loop import simulate, through_valve
@@ -167,17 +167,11 @@ def ways(p: Problem, fit: Fitted) -> Mapping[str, Callable[[], list[Floats]]]:
 def foretold(p: Problem, fit: Fitted, clock: bool = True) -> Foretold:
     """The way that foretells most of a fit's innovations on data held out, a clock among them or not; what the fit's
     constants and its noise model could take up is no way's."""
-    root = np.sqrt(p.weight)
-    own = np.concatenate(
-        (sensitivities(p, fit.model, fit.ar), lag_means(p.y - simulate(p.inputs, fit.model.c), p.edges))
-    )
-    span = np.linalg.qr(np.nan_to_num(own * root).T)[0]
-    e = fit.e * root
-    e = e - span @ (span.T @ e)
+    root, rest = np.sqrt(p.weight), unfollowed(p, fit)
+    e = rest(fit.e * root)
     best = Foretold("clock", _gained(fit, e, _by_clock(e, root))) if clock else Foretold()
     for way, signals in ways(p, fit).items():
-        x = np.nan_to_num(np.stack(signals()) * root).T
-        x = x - span @ (span.T @ x)
+        x = rest(np.nan_to_num(np.stack(signals()) * root).T)
         size = x.std(axis=0)
         kept = size > 1e-9 * size.max(initial=1e-30)
         won = max(_gained(fit, e, _by_ridge(e, x[:, kept] / size[kept], prior)) for prior in PRIORS)
