@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from identification.controller.pi_regression import (
     ControlLaw,
+    Trends,
     centred,
     recovered_law,
     span_length,
     trusted,
 )
 from identification.controller.pid_regression import integral_time
-from identification.limits import LIMITS, ControllerLimits
+from identification.limits import ControllerLimits
 from identification.record import Floats, Mask
 from identification.simulation.lag import first_order
 from identification.simulation.pi import due_moves, gapped
@@ -56,14 +57,12 @@ def op_step(op: Floats) -> float:
     return float(np.quantile(gaps, 0.1)) if gaps.size else 0.0
 
 
-def frozen_width(
-    e: Floats, op: Floats, said: StatedSettings, usable: Mask, limits: ControllerLimits
-) -> float:
+def frozen_width(x: Trends, e: Floats, said: StatedSettings) -> float:
     """Largest error [% PV] under which due moves of OP do not happen while those beyond do; 0 without one."""
-    due = np.abs(due_moves(e, said.kp, said.ti)) > max(op_step(op), 1e-6)
-    still = np.diff(op, prepend=op[0]) == 0
+    due = np.abs(due_moves(e, said.kp, said.ti)) > max(op_step(x.op), 1e-6)
+    still = np.diff(x.op, prepend=x.op[0]) == 0
     size = np.maximum(np.abs(e), np.abs(np.concatenate((e[:1], e[:-1]))))
-    use = due & usable
+    use, limits = due & x.usable, x.limits
     order = np.argsort(size[use])
     frozen, size = still[use][order], size[use][order]
     if frozen.size < 4 * limits.frozen_moves:
@@ -75,24 +74,22 @@ def frozen_width(
     return float(size[good[-1]]) if good.size else 0.0
 
 
-def gap(
-    e: Floats, op: Floats, said: StatedSettings, usable: Mask, limits: ControllerLimits
-) -> Finding | None:
+def gap(x: Trends, e: Floats, said: StatedSettings) -> Finding | None:
     """OP standing still while the error is small: a law with a gap gives OP where the one without does not."""
-    length = span_length(op.size, said.ti, limits)
-    n = (op.size // length) * length
-    y = centred(op[:n], length)
+    length = span_length(x.op.size, said.ti, x.limits)
+    n = (x.op.size // length) * length
+    y = centred(x.op[:n], length)
 
     def left(width: float, catches_up: bool) -> float:
         path = gapped(e, said.kp, said.kp / said.ti, width, catches_up)
         return typical(y - centred(path[:n], length), length)
 
-    size = float(np.median(np.abs(e[usable]))) if usable.any() else 0.0
+    size = float(np.median(np.abs(e[x.usable]))) if x.usable.any() else 0.0
     trials = [(left(size * w, c), size * w) for w in GAPS for c in (True, False)]
     best, width = min(trials)
-    still = np.diff(op, prepend=op[0]) == 0
-    if best > limits.gap_leaves * left(0.0, True):
-        width = frozen_width(e, op, said, usable, limits)
+    still = np.diff(x.op, prepend=x.op[0]) == 0
+    if best > x.limits.gap_leaves * left(0.0, True):
+        width = frozen_width(x, e, said)
     inside = still & (np.abs(e) < width)
     if inside.mean() < 0.02:
         return None
@@ -105,45 +102,36 @@ def runs(still: Mask) -> list[tuple[int, int]]:
     return list(zip(np.flatnonzero(edge == 1), np.flatnonzero(edge == -1), strict=True))
 
 
-def asked(sp: Floats, op: Floats, limits: ControllerLimits) -> Mask:
+def asked(x: Trends) -> Mask:
     """True where a move of SP or a limit of OP stands in for the law, and a sample about it, shape (n,)."""
-    here = (np.abs(np.diff(sp, prepend=sp[0])) > limits.asked) | (op <= 0.05) | (op >= 99.95)
+    here = (np.abs(np.diff(x.sp, prepend=x.sp[0])) > x.limits.asked) | (x.op <= 0.05) | (x.op >= 99.95)
     return np.convolve(here, np.ones(3), mode="same") > 0
 
 
-def lawless(found: ControlLaw, usable: Mask, step: float, limits: ControllerLimits) -> Mask:
+def lawless(x: Trends, found: ControlLaw) -> Mask:
     """True in spans of good samples where OP is far from the law that the others obey, shape (n,)."""
     n, length = found.residual.size, found.length
     size = np.sqrt((found.residual.reshape(-1, length) ** 2).mean(axis=1))
-    whole = usable[:n].reshape(-1, length).all(axis=1)
-    out = np.zeros(usable.size, dtype=bool)
-    out[:n] = np.repeat(whole & (size > limits.lawless * np.median(size) + step), length)
+    whole = x.usable[:n].reshape(-1, length).all(axis=1)
+    out = np.zeros(x.op.size, dtype=bool)
+    out[:n] = np.repeat(whole & (size > x.limits.lawless * np.median(size) + op_step(x.op)), length)
     return out
 
 
-def ruled(
-    e: Floats,
-    op: Floats,
-    said: StatedSettings,
-    usable: Mask,
-    found: ControlLaw,
-    limits: ControllerLimits,
-) -> Finding | None:
+def ruled(x: Trends, e: Floats, said: StatedSettings, found: ControlLaw) -> Finding | None:
     """Spans in which something other than the law moves OP, or keeps it."""
-    off = lawless(found, usable, op_step(op), limits)
-    if float(off.mean()) > limits.lawless_share and found.explained > 0.0:
+    off = lawless(x, found)
+    if float(off.mean()) > x.limits.lawless_share and found.explained > 0.0:
         return Finding({"share": float(off.mean())}, off, "controller-logic")
-    return logic(e, op, said, usable, limits)
+    return logic(x, e, said)
 
 
-def logic(
-    e: Floats, op: Floats, said: StatedSettings, usable: Mask, limits: ControllerLimits
-) -> Finding | None:
+def logic(x: Trends, e: Floats, said: StatedSettings) -> Finding | None:
     """Stretches in which OP stands although the law asks it to go, whatever the error."""
-    path = np.cumsum(due_moves(e, said.kp, said.ti))
-    least = limits.stuck_move * max(op_step(op), 0.02)
-    where = np.zeros(op.size, dtype=bool)
-    for first, last in runs((np.diff(op, prepend=op[0] + 1.0) == 0) & usable):
+    path, limits = np.cumsum(due_moves(e, said.kp, said.ti)), x.limits
+    least = limits.stuck_move * max(op_step(x.op), 0.02)
+    where = np.zeros(x.op.size, dtype=bool)
+    for first, last in runs((np.diff(x.op, prepend=x.op[0] + 1.0) == 0) & x.usable):
         if last - first >= limits.stuck_run and float(np.ptp(path[first:last])) > least:
             where[first:last] = True
     share = float(where.mean())
@@ -155,16 +143,14 @@ def typical(residual: Floats, length: int) -> float:
     return float(np.median(np.sqrt((residual.reshape(-1, length) ** 2).mean(axis=1))))
 
 
-def obeys(
-    sp: Floats, pv: Floats, op: Floats, said: StatedSettings, found: ControlLaw, limits: ControllerLimits
-) -> bool:
+def obeys(x: Trends, said: StatedSettings, found: ControlLaw) -> bool:
     """Whether the stated law gives OP nearly as well as the one found, in most spans and in those that move it; on a
     thinned recording, whether it gives most of OP."""
-    n, length = found.residual.size, found.length
-    e = found.error(sp, pv)[:n]
-    left = centred(op[:n], length) - said.kp * (centred(e, length) + centred(np.cumsum(e), length) / said.ti)
+    n, length, limits = found.residual.size, found.length, x.limits
+    e, y = found.error(x.sp, x.pv)[:n], centred(x.op[:n], length)
+    left = y - said.kp * (centred(e, length) + centred(np.cumsum(e), length) / said.ti)
     lawful = trusted(found.residual, length)
-    moved = float(np.mean(centred(op[:n], length)[lawful] ** 2))
+    moved = float(np.mean(y[lawful] ** 2))
     if said.thinned(limits) and float(np.mean(left[lawful] ** 2)) < limits.thinned_leaves * moved:
         return True
     whole = float(np.mean(left[lawful] ** 2)) < limits.same_law**2 * float(
@@ -186,33 +172,25 @@ def settings(found: ControlLaw, said: StatedSettings, limits: ControllerLimits) 
     return Finding(values, np.ones(found.residual.size, dtype=bool), "controller-settings")
 
 
-def judge(
-    sp: Floats,
-    pv: Floats,
-    op: Floats,
-    usable: Mask,
-    said: StatedSettings,
-    limits: ControllerLimits = LIMITS.controller,
-) -> tuple[Finding | None, ControlLaw | None]:
+def judge(x: Trends, said: StatedSettings) -> tuple[Finding | None, ControlLaw | None]:
     """The first thing that is wrong with clock or controller, and the law as found.
 
-    sp, pv, op : shape (n,), trends [% of span]; usable : bool, shape (n,), False in gaps, in manual and at OP's
-    limits; said : of a thinned recording nothing but settings plainly wrong is said: the law is not seen at work;
+    said : of a thinned recording nothing but settings plainly wrong is said: the law is not seen at work;
     nothing at all where its integral acts between the samples.
     """
-    thinned = said.thinned(limits)
+    limits, thinned = x.limits, said.thinned(x.limits)
     if thinned and said.ti < limits.thinned_ti:
         return None, None
-    found = recovered_law(sp, pv, op, usable, said.ti, said.kp, late=not thinned, limits=limits)
-    e = sp - first_order(pv, found.smoothed)
-    wrong = None if obeys(sp, pv, op, said, found, limits) else settings(found, said, limits)
+    found = recovered_law(x, said.ti, said.kp, late=not thinned)
+    e = x.sp - first_order(x.pv, found.smoothed)
+    wrong = None if obeys(x, said, found) else settings(found, said, limits)
     if thinned:
         return wrong, found
     if found.late >= limits.late and found.explained > limits.law_explains:
-        return Finding({LATE_SAMPLES: found.late}, np.ones(op.size, dtype=bool), "clock-offset"), found
+        return Finding({LATE_SAMPLES: found.late}, np.ones(x.op.size, dtype=bool), "clock-offset"), found
     law_now = StatedSettings(found.kp, found.kp / found.ki) if wrong is not None else said
-    frozen = gap(e, op, law_now, usable, limits)
-    other = ruled(e, op, law_now, usable & ~asked(sp, op, limits), found, limits)
+    frozen = gap(x, e, law_now)
     if frozen is not None:
         return frozen, found
+    other = ruled(replace(x, usable=x.usable & ~asked(x)), e, law_now, found)
     return (other if other is not None else wrong), found

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
@@ -49,15 +50,24 @@ class ControlLaw:
         return sp - first_order(shifted(pv, self.late), self.smoothed)
 
 
+@dataclass(frozen=True, slots=True)
+class Trends:
+    """What a control law is sought in.
+
+    sp, pv, op : shape (n,) [% of span]; usable : bool, shape (n,), False in gaps, in manual and at OP's limits.
+    """
+
+    sp: Floats
+    pv: Floats
+    op: Floats
+    usable: Mask
+    limits: ControllerLimits = LIMITS.controller
+
+
 def shifted(x: Floats, late: float) -> Floats:
     """The signal `late` samples earlier, shape (n,), by straight lines between samples."""
     k = np.arange(x.size)
     return np.interp(k + late, k, x)
-
-
-def spans(n: int, length: int) -> list[slice]:
-    """Consecutive spans of that many samples."""
-    return [slice(a, a + length) for a in range(0, n - length + 1, length)]
 
 
 def centred(x: Floats, length: int) -> Floats:
@@ -93,26 +103,17 @@ def unbroken(usable: Mask, length: int, limits: ControllerLimits) -> Mask:
     return whole if whole.sum() >= limits.spans * length else usable.copy()
 
 
-def law(
-    sp: Floats,
-    pv: Floats,
-    op: Floats,
-    usable: Mask,
-    length: int,
-    late: float,
-    smoothed: float = 0.0,
-    limits: ControllerLimits = LIMITS.controller,
-) -> ControlLaw:
+def law(x: Trends, length: int, late: float, smoothed: float = 0.0) -> ControlLaw:
     """The PI law at a given lateness of PV and a filter's time constant [samples], spans that do not obey it left
     out twice."""
-    e = sp - first_order(shifted(pv, late), smoothed)
+    e = x.sp - first_order(shifted(x.pv, late), smoothed)
     n = (e.size // length) * length
-    fit = unbroken(usable[:n], length, limits)
+    fit = unbroken(x.usable[:n], length, x.limits)
     keep = fit
     for _ in range(3):
-        kp, ki, residual = regress(e[:n], op[:n], length, keep)
+        kp, ki, residual = regress(e[:n], x.op[:n], length, keep)
         keep = fit & trusted(residual, length)
-    moved = centred(op[:n], length)
+    moved = centred(x.op[:n], length)
     left = float((residual[keep] ** 2).mean()) if keep.any() else math.inf
     power = float((moved[keep] ** 2).mean()) if keep.any() else 1.0
     return ControlLaw(
@@ -120,39 +121,27 @@ def law(
     )
 
 
-def span_length(n: int, ti_samples: float, limits: ControllerLimits = LIMITS.controller) -> int:
+def span_length(n: int, ti_samples: float, limits: ControllerLimits) -> int:
     """Samples in a span of the regression: an integral time, but at least so many spans in the record."""
     return int(np.clip(ti_samples, limits.span_samples, max(n // limits.spans, limits.span_samples)))
 
 
-def recovered_law(
-    sp: Floats,
-    pv: Floats,
-    op: Floats,
-    usable: Mask,
-    ti_samples: float,
-    stated_kp: float = 1.0,
-    late: bool = True,
-    limits: ControllerLimits = LIMITS.controller,
-) -> ControlLaw:
+def recovered_law(x: Trends, ti_samples: float, stated_kp: float = 1.0, late: bool = True) -> ControlLaw:
     """The PI law, with PV's lateness searched in whole samples and then between them.
 
     Under an oscillation a law of the wrong sign, half a period late, gives OP as well; only laws whose gain has the
     stated one's sign are looked for. late : whether PV's clock may be late at all. A filter before the controller
     makes OP late too, so lateness is searched beside filters as well, up to what it is without one.
     """
-    length = span_length(op.size, ti_samples, limits)
+    at = partial(law, x, span_length(x.op.size, ti_samples, x.limits))
 
-    def at(shift: float, smoothed: float = 0.0) -> ControlLaw:
-        return law(sp, pv, op, usable, length, shift, smoothed, limits)
-
-    def scatter(x: ControlLaw) -> float:
-        return x.scatter if x.kp * stated_kp > 0 and x.kp * x.ki > 0 else math.inf
+    def scatter(found: ControlLaw) -> float:
+        return found.scatter if found.kp * stated_kp > 0 and found.kp * found.ki > 0 else math.inf
 
     shifts = SHIFTS if late else (0.0,)
     plain = min((at(s) for s in shifts), key=scatter)
     filtered = min((at(s, f) for f in FILTERS for s in shifts if s <= max(plain.late, 0.0)), key=scatter)
-    best = filtered if scatter(filtered) < limits.filter_leaves * scatter(plain) else plain
+    best = filtered if scatter(filtered) < x.limits.filter_leaves * scatter(plain) else plain
     if math.isinf(scatter(best)):
         return at(0.0)
     for step in (0.5, 0.25, 0.125, 0.06) if best.smoothed else (0.5, 0.25):
@@ -162,24 +151,22 @@ def recovered_law(
     return best
 
 
-def unstated_law(
-    sp: Floats, pv: Floats, op: Floats, usable: Mask, limits: ControllerLimits = LIMITS.controller
-) -> ControlLaw | None:
+def unstated_law(x: Trends) -> ControlLaw | None:
     """The PI law of a controller of which nothing is stated; None where none gives OP.
 
     The spans of the regression are as long as the integral time, so that is found in two steps.
     """
     best = None
     for guess in GUESSES:
-        first = law(sp, pv, op, usable, span_length(op.size, guess, limits), 0.0, limits=limits)
+        first = law(x, span_length(x.op.size, guess, x.limits), 0.0)
         if first.kp * first.ki > 0.0 and (best is None or first.explained > best.explained):
             best = first
     if best is None:
         return None
-    found = recovered_law(sp, pv, op, usable, best.kp / best.ki, best.kp, limits=limits)
-    moved = centred(op, found.length)
+    found = recovered_law(x, best.kp / best.ki, best.kp)
+    moved = centred(x.op, found.length)
     over_all = 1.0 - float(found.residual @ found.residual) / max(float(moved @ moved), 1e-12)
-    believed = found.explained >= limits.law_explains and over_all >= limits.law_gives
+    believed = found.explained >= x.limits.law_explains and over_all >= x.limits.law_gives
     return found if found.kp * found.ki > 0.0 and believed else None
 
 

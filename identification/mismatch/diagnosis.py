@@ -12,7 +12,7 @@ from functools import partial
 import numpy as np
 
 from identification.controller.check import LATE_SAMPLES, Finding, judge
-from identification.controller.pi_regression import ControlLaw, shifted, unstated_law
+from identification.controller.pi_regression import ControlLaw, Trends, shifted, unstated_law
 from identification.mismatch.catalogue import RECORDER_FAULTS, fault
 from identification.mismatch.effect import Ends
 from identification.mismatch.explanation import Explanation, agreed, beyond_the_grid, carried_over
@@ -82,9 +82,10 @@ def controller_finding_of(s: Recording, recorder: Finding | None) -> tuple[Findi
     if any(straightened(x, s.limits.recorder.straight_law) for x in (s.pv, s.op)):
         return None, None
     free = s.usable & (s.op > 0.05) & (s.op < 99.95)
+    x = Trends(s.sp, s.pv, s.op, free, s.limits.controller)
     if s.stated is None:
-        return None, unstated_law(s.sp, s.pv, s.op, free, s.limits.controller)
-    return judge(s.sp, s.pv, s.op, free, s.stated, s.limits.controller)
+        return None, unstated_law(x)
+    return judge(x, s.stated)
 
 
 def ends(finding: Finding | None) -> Ends:

@@ -26,7 +26,7 @@ from analyzer.config import Config
 from analyzer.explain.case import Case, case
 from analyzer.loops.spec import spec_of
 from analyzer.night.asked import opened
-from identification.controller.pi_regression import recovered_law
+from identification.controller.pi_regression import Trends, recovered_law
 from identification.mismatch.catalogue import CANDIDATES, EFFECTS
 from identification.mismatch.model_file import carried, to_data
 from identification.mismatch.plain_loop import inputs_of, prepared, without_spikes
@@ -84,7 +84,7 @@ def compared(cases: pathlib.Path, truths: dict, tag: str) -> dict:
         for r in candidates
         if not kin(r.name, truth["effect"], KIN) and truth["effect"] not in EFFECTS[r.name].indistinguishable
     ]
-    law = recovered_law(s.sp, s.pv, s.op, s.usable & (s.op > 0.05) & (s.op < 99.95), s.stated.ti)
+    law = recovered_law(Trends(s.sp, s.pv, s.op, s.usable & (s.op > 0.05) & (s.op < 99.95)), s.stated.ti)
     base = truth["base"]
     return {
         "loop": tag,

@@ -14,6 +14,7 @@ from analyzer.explain.models import judged
 from analyzer.history.series import Series
 from analyzer.loops.spec import LoopSpec
 from identification.controller.check import judge
+from identification.controller.pi_regression import Trends
 from identification.estimation.prediction_error import Model, descended, gain
 from identification.mismatch.answer import answer
 from identification.mismatch.catalogue import CANDIDATES
@@ -77,7 +78,7 @@ def explanation(kind: str) -> Explained:
     inputs = inputs_of(s)
     p, plain = prepared(inputs, s.pv - inputs.level, s.usable)
     recorder = recorder_finding_of(s) if kind == "quantization" else None
-    law = judge(s.sp, s.pv, s.op, s.usable, s.stated)[1]
+    law = judge(Trends(s.sp, s.pv, s.op, s.usable), s.stated)[1]
     found = Explanation(
         p,
         plain,

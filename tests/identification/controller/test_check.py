@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from identification.controller.check import StatedSettings, judge
+from identification.controller.pi_regression import Trends
 from tests.identification.scenes import PLAY, N, recording
 
 pytestmark = pytest.mark.slow
@@ -28,14 +29,14 @@ def test_true_settings_are_not_blamed() -> None:
     """A controller that does what is stated is not named."""
     s = recording(1)
     assert s.stated is not None
-    assert judge(s.sp, s.pv, s.op, GOOD, s.stated)[0] is None
+    assert judge(Trends(s.sp, s.pv, s.op, GOOD), s.stated)[0] is None
 
 
 @pytest.mark.parametrize(("kp", "ti"), [(2.1, 20.0), (1.8, 23.0)])
 def test_wrong_settings_are_found(kp: float, ti: float) -> None:
     """Settings stated 15 % wrong are named and the true ones given within 3 %."""
     s = recording(2)
-    found, _ = judge(s.sp, s.pv, s.op, GOOD, StatedSettings(kp, ti))
+    found, _ = judge(Trends(s.sp, s.pv, s.op, GOOD), StatedSettings(kp, ti))
     assert found is not None
     assert found.name == "controller-settings"
     assert found.values["kp"] == pytest.approx(1.8, rel=0.03)
@@ -48,7 +49,7 @@ def test_wrong_integral_time_is_found_where_the_loop_seldom_moves() -> None:
     e = rng.normal(0, 0.02, N)
     e[2500:2700] += 6 * np.exp(-np.arange(200) / 50.0)
     op = law(e, 1.8, 20.0) + np.round(rng.normal(0, 0.05, N), 2)
-    found, _ = judge(np.full(N, 50.0), 50.0 - e, op, GOOD, StatedSettings(1.8, 32.0))
+    found, _ = judge(Trends(np.full(N, 50.0), 50.0 - e, op, GOOD), StatedSettings(1.8, 32.0))
     assert found is not None
     assert found.name == "controller-settings"
     assert found.values["ti_samples"] == pytest.approx(20.0, rel=0.05)
@@ -70,13 +71,13 @@ def filtered_loop(seed: int, lag: float, step: float) -> tuple[np.ndarray, np.nd
 def test_filter_of_pv_is_no_fault(lag: float, step: float) -> None:
     """A controller that acts on a filtered PV has neither other settings nor a gap nor a late clock."""
     pv, op = filtered_loop(7, lag, step)
-    assert judge(np.full(N, 50.0), pv, op, GOOD, StatedSettings(1.8, 20.0))[0] is None
+    assert judge(Trends(np.full(N, 50.0), pv, op, GOOD), StatedSettings(1.8, 20.0))[0] is None
 
 
 def test_wrong_settings_show_behind_a_filter() -> None:
     """With the filter recovered beside them the true settings are given within 5 %."""
     pv, op = filtered_loop(8, 3.0, 0.01)
-    found, _ = judge(np.full(N, 50.0), pv, op, GOOD, StatedSettings(1.8, 30.0))
+    found, _ = judge(Trends(np.full(N, 50.0), pv, op, GOOD), StatedSettings(1.8, 30.0))
     assert found is not None
     assert found.name == "controller-settings"
     assert found.values["ti_samples"] == pytest.approx(20.0, rel=0.05)
@@ -87,7 +88,7 @@ def test_integral_within_a_sample_is_not_judged() -> None:
     """Of a thinned recording with an integral time of two samples nothing is said."""
     s = recording(2, PLAY)
     pv, op, sp = s.pv[::10], s.op[::10], s.sp[::10]
-    assert judge(sp, pv, op, GOOD[::10], StatedSettings(0.9, 2.0, 10.0)) == (None, None)
+    assert judge(Trends(sp, pv, op, GOOD[::10]), StatedSettings(0.9, 2.0, 10.0)) == (None, None)
 
 
 def test_thinned_recordings_blame_no_sound_controller() -> None:
@@ -95,8 +96,8 @@ def test_thinned_recordings_blame_no_sound_controller() -> None:
     s = recording(2, PLAY)
     pv, op, sp = s.pv[::5], s.op[::5], s.sp[::5]
     good = np.ones(pv.size, dtype=bool)
-    assert judge(sp, pv, op, good, StatedSettings(1.8, 4.0, 5.0))[0] is None
-    wrong, _ = judge(sp, pv, op, good, StatedSettings(0.9, 4.0, 5.0))
+    assert judge(Trends(sp, pv, op, good), StatedSettings(1.8, 4.0, 5.0))[0] is None
+    wrong, _ = judge(Trends(sp, pv, op, good), StatedSettings(0.9, 4.0, 5.0))
     assert wrong is not None
     assert wrong.name == "controller-settings"
 
@@ -105,7 +106,7 @@ def test_late_clock_is_found() -> None:
     """PV stamped three samples late is named with its shift."""
     s = recording(3)
     late = np.concatenate((np.full(3, s.pv[0]), s.pv[:-3]))
-    found, _ = judge(s.sp, late, s.op, GOOD, StatedSettings(1.8, 20.0))
+    found, _ = judge(Trends(s.sp, late, s.op, GOOD), StatedSettings(1.8, 20.0))
     assert found is not None
     assert (found.name, found.values["late_samples"]) == ("clock-offset", 3.0)
 
@@ -114,7 +115,7 @@ def test_gap_is_found() -> None:
     """An OP that stands while the error is under 0.4 % is a gap of that size."""
     s = recording(4)
     op = law(s.sp - s.pv, 1.8, 20.0, 0.4)
-    found, _ = judge(s.sp, s.pv, op, GOOD, StatedSettings(1.8, 20.0))
+    found, _ = judge(Trends(s.sp, s.pv, op, GOOD), StatedSettings(1.8, 20.0))
     assert found is not None
     assert found.name == "controller-gap"
     assert found.values["gap_pct"] == pytest.approx(0.4, rel=0.3)
@@ -126,6 +127,6 @@ def test_held_output_is_logic() -> None:
     op = s.op.copy()
     for first in (700, 2200, 3900):
         op[first : first + 90] = op[first]
-    found, _ = judge(s.sp, s.pv, op, GOOD, StatedSettings(1.8, 20.0))
+    found, _ = judge(Trends(s.sp, s.pv, op, GOOD), StatedSettings(1.8, 20.0))
     assert found is not None
     assert found.name == "controller-logic"

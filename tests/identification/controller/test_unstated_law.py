@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from identification.controller.pi_regression import unstated_law
+from identification.controller.pi_regression import Trends, unstated_law
 
 
 def day(kp: float, ti: float, seed: int, n: int = 6000) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -33,7 +33,7 @@ def day(kp: float, ti: float, seed: int, n: int = 6000) -> tuple[np.ndarray, np.
 def test_settings_come_back_within_a_twentieth(kp: float, ti: float) -> None:
     """Kp and Ti are found within 5 %, of either sign, from an integral time of nine samples to two hundred."""
     sp, pv, op = day(kp, ti, 7)
-    found = unstated_law(sp, pv, op, (op > 0.05) & (op < 99.95))
+    found = unstated_law(Trends(sp, pv, op, (op > 0.05) & (op < 99.95)))
     assert found is not None
     assert found.kp == pytest.approx(kp, rel=0.05)
     assert found.kp / found.ki == pytest.approx(ti, rel=0.05)
@@ -50,5 +50,5 @@ def test_a_script_obeys_no_law(seed: int) -> None:
         answered[k] = 50.0 + x
         x += (op[k] - 50.0 - x) / 25.0
     usable = np.ones(pv.size, bool)
-    assert unstated_law(sp, pv, op, usable) is None
-    assert unstated_law(sp, answered, op, usable) is None
+    assert unstated_law(Trends(sp, pv, op, usable)) is None
+    assert unstated_law(Trends(sp, answered, op, usable)) is None
