@@ -15,7 +15,7 @@ from identification.controller.check import LATE_SAMPLES, Finding, judge
 from identification.controller.pi_regression import ControlLaw, Trends, shifted, unstated_law
 from identification.mismatch.catalogue import RECORDER_FAULTS, fault
 from identification.mismatch.effect import Ends
-from identification.mismatch.explanation import Explanation, agreed, beyond_the_grid, carried_over
+from identification.mismatch.explanation import Explanation, agreed, beyond_the_grid, carried_over, ends
 from identification.mismatch.plain_loop import Clip, inputs_of, prepared, without_spikes
 from identification.mismatch.recording import Recording, is_experiment, straightened, unlogged
 from identification.mismatch.rounds import physics
@@ -86,12 +86,6 @@ def controller_finding_of(s: Recording, recorder: Finding | None) -> tuple[Findi
     if s.stated is None:
         return None, unstated_law(x)
     return judge(x, s.stated)
-
-
-def ends(finding: Finding | None) -> Ends:
-    """What a finding leaves to be asked. After one about the controller the physics is still asked, for whatever made
-    OP, PV answers it."""
-    return Ends.NOTHING if finding is None else fault(finding.name).ends
 
 
 def transmitter_end(recorder: Finding | None, pv: Floats) -> Clip | None:

@@ -85,11 +85,16 @@ class Explanation:
     def finding(self) -> Finding | None:
         """The finding about recorder or controller that is named first; None where an effect stands before it, as one
         of valve or process does that is larger than the steps of PV's grid. A load says nothing against the grid."""
-        ends = Ends.NOTHING if self.recorder is None else fault(self.recorder.name).ends
         lasting = bool(self.accepted) and not EFFECTS[self.accepted[0].name].timed
-        if lasting and self.controller is None and ends is Ends.SMALLER:
+        if lasting and self.controller is None and ends(self.recorder) is Ends.SMALLER:
             return None
         return self.recorder or self.controller
+
+
+def ends(finding: Finding | None) -> Ends:
+    """What a finding leaves to be asked. After one about the controller the physics is still asked, for whatever made
+    OP, PV answers it."""
+    return Ends.NOTHING if finding is None else fault(finding.name).ends
 
 
 def beyond_the_grid(found: Explanation) -> Explanation:
