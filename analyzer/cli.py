@@ -139,8 +139,7 @@ def config() -> None:
 
     Example: triage config > limits.toml; edit it; triage run export.parquet --config limits.toml --store store
     """
-    from analyzer.config import Config
-    from analyzer.config_file import limits_document
+    from analyzer.config import Config, limits_document
 
     click.echo(limits_document(Config()))
 

@@ -1,59 +1,36 @@
-"""The limits of a run together, section by section as `triage config` prints them; limits.toml states the values."""
+"""The limits of a run: limits.toml states them by section, a file changes them, `triage config` prints them."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+import textwrap
+import tomllib
+from collections.abc import Mapping
+from dataclasses import Field, dataclass, field, fields, replace
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any
 
+from identification.errors import InputError
 from identification.limits import (
-    TOML,
+    KEY,
     ControllerLimits,
     ExplainLimits,
+    Limit,
+    Limits,
     ProofLimits,
     RecorderLimits,
     SearchLimits,
-    stated_in,
 )
 from tuning.limits import TuningLimits
 
+REMEDY = "correct it; 'triage config' prints all limits with their ranges"
+WIDTH = 100
+"""Characters of a comment's line."""
 
-@dataclass(frozen=True, slots=True)
-@stated_in("analyzer", "oscillation")
-class OscillationLimits:
+
+class OscillationLimits(Limits, section="oscillation"):
     """When a peak of the spectrum is an oscillation."""
-
-    periods: float = TOML
-    prominence: float = TOML
-    prominence_few: float = TOML
-    correlation: float = TOML
-    correlation_few: float = TOML
-    correlation_most: float = TOML
-    trade: float = TOML
-    least: float = TOML
-    share: float = TOML
-    samples: float = TOML
-    envelope: float = TOML
-    samples_few: float = TOML
-    shape: float = TOML
-    shape_few: float = TOML
-    shape_least: float = TOML
-    shape_trade: float = TOML
-    shape_correlation: float = TOML
-    shape_correlation_few: float = TOML
-    shape_prominence: float = TOML
-    swing: float = TOML
-    swing_trade: float = TOML
-    swing_least: float = TOML
-    swing_cycles: float = TOML
-    swing_spread: float = TOML
-    swing_share: float = TOML
-    near: float = TOML
-    near_share: float = TOML
-    near_prominence: float = TOML
-    programme_moves: float = TOML
-    rest_stretches: int = TOML
-    moved_cycles: float = TOML
-    rest_share: float = TOML
 
     def nearly(self) -> OscillationLimits:
         """The limits of a cycle that another sign must confirm: half-cycles need not be like one another, for a valve
@@ -71,78 +48,12 @@ class OscillationLimits:
         )
 
 
-@dataclass(frozen=True, slots=True)
-@stated_in("analyzer", "quality")
-class QualityLimits:
+class QualityLimits(Limits, section="quality"):
     """When samples or trends are unfit."""
 
-    gap_factor: float = TOML
-    usable_share: float = TOML
-    samples: int = TOML
-    run_samples: int = TOML
-    run_share: float = TOML
-    unread_share: float = TOML
-    ticks_per_sample: float = TOML
-    stale_s: float = TOML
-    stale_samples: int = TOML
-    straight_share: float = TOML
-    archived_points: float = TOML
-    limit_pct: float = TOML
-    on_limit_pct: float = TOML
-    resting_share: float = TOML
-    outside_pct: float = TOML
-    saturated_share: float = TOML
-    manual_s: float = TOML
-    manual_samples: int = TOML
-    automatic_share: float = TOML
 
-
-@dataclass(frozen=True, slots=True)
-@stated_in("analyzer", "cause")
-class CauseLimits:
+class CauseLimits(Limits, section="cause"):
     """When a cause is named."""
-
-    near_evidence: float = TOML
-    near_size: float = TOML
-    near_pct: float = TOML
-    size: float = TOML
-    grid_covered: float = TOML
-    judged: int = TOML
-    window: int = TOML
-    blocks_per_period: float = TOML
-    fast_process: tuple[tuple[str, float, float], ...] = TOML
-    evidence: float = TOML
-    evidence_unexcited: float = TOML
-    evidence_per_sample: float = TOML
-    quiet_factor: float = TOML
-    hopeless: float = TOML
-    steady: float = TOML
-    steady_alone: float = TOML
-    plain_width: float = TOML
-    evidence_jump: float = TOML
-    moves: int = TOML
-    few_moves: int = TOML
-    jump_share: float = TOML
-    least_jump: float = TOML
-    beside_pct: float = TOML
-    beside_share: float = TOML
-    beside_agreeing: float = TOML
-    samples_told: float = TOML
-    steps_told: float = TOML
-    steps_tuning: float = TOML
-    wound_pct: float = TOML
-    least_size: float = TOML
-    small_size: float = TOML
-    small_pct: float = TOML
-    changing_pct: float = TOML
-    changing: float = TOML
-    square: float = TOML
-    valve_pct: float = TOML
-    compressed_pct: float = TOML
-    named_pct: float = TOML
-    signs: int = TOML
-    grid_steps: float = TOML
-    noise_widths: float = TOML
 
     def needed(self, count: int, excited: bool, oscillating: bool) -> float:
         """Evidence that a valve's fault needs [nat]: a floor, and a share of the samples judged, for no model is
@@ -152,216 +63,48 @@ class CauseLimits:
         return max(least, per_sample * count)
 
 
-@dataclass(frozen=True, slots=True)
-@stated_in("analyzer", "plant")
-class PlantLimits:
+class PlantLimits(Limits, section="plant"):
     """When loops share an oscillation, and where it starts."""
 
-    waves: int = TOML
-    weak_prominence: float = TOML
-    locked_harmonic: float = TOML
-    over_chance: float = TOML
-    chance: float = TOML
-    chance_in_step: float = TOML
-    over_chance_in_step: float = TOML
-    drift_in_step: float = TOML
-    lost: float = TOML
-    lost_to_noise: float = TOML
-    hints: int = TOML
-    hint_prominence: float = TOML
-    coherent: float = TOML
-    follow_cycles: float = TOML
-    same_period: float = TOML
-    foresight: float = TOML
-    near_period: float = TOML
-    drift: float = TOML
-    follower_most_pct: float = TOML
-    follower_sign: float = TOML
-    sign_valve: float = TOML
-    sign_best_valve: float = TOML
-    sign_tuning: float = TOML
-    sign_oscillates: float = TOML
-    sign_first: float = TOML
-    sign_foresees: float = TOML
-    sign_central: float = TOML
-    sign_clear: float = TOML
-    sign_share: float = TOML
-    sign_nonlinear: float = TOML
-    unseen_pct: float = TOML
-    unseen_beside_valve_pct: float = TOML
-    source_pct: float = TOML
-    weak_share: float = TOML
-    sure_pct: float = TOML
-    linked: float = TOML
-    in_ratio: float = TOML
-    cascade_period: float = TOML
-    halves_apart: float = TOML
 
-
-@dataclass(frozen=True, slots=True)
-@stated_in("analyzer", "settings")
-class SettingsLimits:
+class SettingsLimits(Limits, section="settings"):
     """When the settings that OP follows are not the stated ones."""
 
-    explained: float = TOML
-    gain: float = TOML
-    left: float = TOML
-    factor: float = TOML
-    straight_share: float = TOML
-    ti_samples: float = TOML
 
-
-@dataclass(frozen=True, slots=True)
-@stated_in("analyzer", "advice")
-class AdviceLimits:
+class AdviceLimits(Limits, section="advice"):
     """What new settings and firm verdicts rest on at least."""
 
-    least_h: float = TOML
-    hint_pct: float = TOML
-    cycle_per_ti: float = TOML
-    longest_share: float = TOML
-    most_factor: float = TOML
-    beyond_record: float = TOML
 
-
-@dataclass(frozen=True, slots=True)
-@stated_in("analyzer", "figures")
-class FigureLimits:
+class FigureLimits(Limits, section="figures"):
     """What the assessments of a span leave out."""
 
-    travel_grid_s: float = TOML
-    travel_deadband_pct: float = TOML
-    small_error_pct: float = TOML
-    least_share: float = TOML
-    move_noise: float = TOML
-    move_spread: float = TOML
-    move_stands: int = TOML
 
-
-@dataclass(frozen=True, slots=True)
-@stated_in("analyzer", "lanes")
-class LaneLimits:
+class LaneLimits(Limits, section="lanes"):
     """From where on a loop stands in a lane."""
 
-    manual_pct: float = TOML
-    at_limits_pct: float = TOML
-    lasting_error_pct: float = TOML
-    hour_share: float = TOML
-    frozen_pct: float = TOML
-    error_memory_ti: float = TOML
-    small_gain_memory_ti: float = TOML
-    small_gain_room: float = TOML
-    at_set_point: float = TOML
-    noise: float = TOML
-    straight_share: float = TOML
-    travel_pct_per_h: float = TOML
-    winds_up_pct: float = TOML
-    programme: float = TOML
 
-
-@dataclass(frozen=True, slots=True)
-@stated_in("analyzer", "nights")
-class NightLimits:
+class NightLimits(Limits, section="nights"):
     """How an export becomes nights, and which of two records of a loop is kept."""
 
-    whole_h: float = TOML
-    least_piece_h: float = TOML
-    most: int = TOML
-    fuller_share: float = TOML
-    fuller_h: float = TOML
 
-
-@dataclass(frozen=True, slots=True)
-@stated_in("analyzer", "belief")
-class BeliefLimits:
+class BeliefLimits(Limits, section="belief"):
     """What nights together say of a loop, and from when on it is told."""
 
-    half_life: float = TOML
-    doubt: float = TOML
-    doubt_alone: float = TOML
-    doubt_small: float = TOML
-    doubt_beside: float = TOML
-    doubt_against: float = TOML
-    small: float = TOML
-    conviction: float = TOML
-    most: float = TOML
-    worn_before: float = TOML
-    worn_pct: float = TOML
-    still_worn_pct: float = TOML
-    beside_pct: float = TOML
-    change: float = TOML
-    recent: int = TOML
-    least_deviation: float = TOML
-    between: float = TOML
-    named_pct: float = TOML
-    held_pct: float = TOML
-    comes_back: float = TOML
-    dies_away: float = TOML
-    seldom_pct: float = TOML
-    calmed: float = TOML
-    another_size: float = TOML
-    confirmed: int = TOML
-    vote_lead: float = TOML
-    recorder: float = TOML
-    advised_share: float = TOML
-    pairs: int = TOML
-    settle_nights: int = TOML
-    settle_ratio: float = TOML
-    remembered: int = TOML
 
-
-@dataclass(frozen=True, slots=True)
-@stated_in("analyzer", "wear")
-class WearLimits:
+class WearLimits(Limits, section="wear"):
     """When a valve wears, and how far that is carried on."""
 
-    nights: int = TOML
-    growing_nights: int = TOML
-    least_deviation: float = TOML
-    scale: float = TOML
-    sure: float = TOML
-    least_growth: float = TOML
-    ahead_d: float = TOML
-    size: float = TOML
 
-
-@dataclass(frozen=True, slots=True)
-@stated_in("analyzer", "before_after")
-class ComparisonLimits:
+class ComparisonLimits(Limits, section="before_after"):
     """When the spans before and after a change can be compared, and how sure a verdict is."""
 
-    confidence: float = TOML
-    least_days: float = TOML
-    usable_share: float = TOML
-    least_pct: float = TOML
-    modest_pct: float = TOML
-    set_point_pct: float = TOML
-    load_pct: float = TOML
-    sp_travel_ratio: float = TOML
-    sp_travel_floor: float = TOML
-    mode_points: float = TOML
-    limit_points: float = TOML
-    source_share: float = TOML
 
-
-@dataclass(frozen=True, slots=True)
-@stated_in("analyzer", "changes")
-class ChangeLimits:
+class ChangeLimits(Limits, section="changes"):
     """When a change of a controller that nobody stated is offered."""
 
-    least_days: float = TOML
-    least_step: float = TOML
-    least_ratio: float = TOML
 
-
-@dataclass(frozen=True, slots=True)
-@stated_in("analyzer", "workers")
-class WorkerLimits:
+class WorkerLimits(Limits, section="workers"):
     """What one loop may cost before it is given up, so that the night goes on."""
-
-    memory_mb: float = TOML
-    processor_s: float = TOML
-    wall_s: float = TOML
 
 
 @dataclass(frozen=True, slots=True)
@@ -391,7 +134,9 @@ class Config:
     explain_search: SearchLimits = field(default_factory=SearchLimits)
     explain_proof: ProofLimits = field(default_factory=ProofLimits)
     workers: WorkerLimits = field(default_factory=WorkerLimits)
-    opening: WorkerLimits = field(default_factory=lambda: WorkerLimits(65_536.0, 60.0, 360.0))
+    opening: WorkerLimits = field(
+        default_factory=lambda: WorkerLimits(memory_mb=65_536.0, processor_s=60.0, wall_s=360.0)
+    )
 
     @property
     def explain(self) -> ExplainLimits:
@@ -399,3 +144,125 @@ class Config:
         return ExplainLimits(
             self.explain_recorder, self.explain_controller, self.explain_search, self.explain_proof
         )
+
+
+def read_config(path: Path | None) -> Config:
+    """The limits of a file, defaults where it is silent; the defaults alone without one.
+
+    Raises
+    ------
+    InputError
+        Where the file is not TOML, or has an unknown name, a wrong type or a value out of range.
+    """
+    if path is None:
+        return Config()
+    try:
+        stated = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+    except (ValueError, RecursionError) as error:  # of the decoder, of the encoding, of numbers without end
+        raise InputError(
+            f"{path}: {error}", "TOML in UTF-8", "begin with what 'triage config' prints"
+        ) from error
+    return configured(stated, str(path))
+
+
+def configured(stated: Mapping[str, Any], where: str) -> Config:
+    """The limits with those that are stated, by section and name, in place of the defaults.
+
+    Raises
+    ------
+    InputError
+        For an unknown name, a wrong type or a value out of range.
+    """
+    config = Config()
+    changed = {}
+    for name, section in stated.items():
+        _require_known(name, [f.name for f in fields(config)], f"{where}: section [{name}]")
+        if not isinstance(section, Mapping):
+            raise InputError(f"{where}: {name} is {section!r}", f"a section [{name}]", REMEDY)
+        changed[name] = _section(getattr(config, name), section, f"{where}: [{name}]")
+    return replace(config, **changed)
+
+
+def _require_known(name: str, known: list[str], seen: str) -> None:
+    if name not in known:
+        near = get_close_matches(name, known, n=1)
+        raise InputError(seen, f"{near[0]}" if near else "one of " + ", ".join(known), REMEDY)
+
+
+def _section(limits: Any, stated: Mapping[str, Any], where: str) -> Any:
+    """A section's limits with those that are stated."""
+    known = {f.name: f for f in fields(limits)}
+    values = {}
+    for name, value in stated.items():
+        _require_known(name, list(known), f"{where} {name}")
+        values[name] = _checked(known[name], getattr(limits, name), value, f"{where} {name}")
+    return replace(limits, **values)
+
+
+def _checked(field: Field[Any], default: Any, value: Any, where: str) -> Any:
+    """A value of the field's type, within its range."""
+    said = limit_of(field)
+    if isinstance(default, tuple):
+        return _table(said, value, where)
+    whole = isinstance(default, int)
+    if not _is_number(value, said, whole):
+        kind = "a whole number" if whole else "a number"
+        raise InputError(f"{where} is {value!r}", f"{kind} {_range(said)}", REMEDY)
+    return value if whole else float(value)
+
+
+def _is_number(value: Any, said: Limit, whole: bool = False) -> bool:
+    """Whether a value is a number of the kind that is wanted, within its range."""
+    if isinstance(value, bool) or not isinstance(value, int if whole else (int, float)):
+        return False
+    return bool(said.least <= value <= said.most)  # false of NaN
+
+
+def _table(said: Limit, value: Any, where: str) -> tuple[tuple[str, float, float], ...]:
+    """Rows of a loop's type and two numbers."""
+    rows = value if isinstance(value, list) else [value]
+    for row in rows:
+        shaped = isinstance(row, list) and len(row) == 3 and isinstance(row[0], str)
+        if not shaped or not all(_is_number(cell, said) for cell in row[1:]):
+            raise InputError(
+                f"{where} has {row!r}", f'rows such as ["flow", 60.0, 30.0], {_range(said)}', REMEDY
+            )
+    return tuple((row[0].lower(), float(row[1]), float(row[2])) for row in rows)
+
+
+def limit_of(field: Field[Any]) -> Limit:
+    """What is declared of a field."""
+    said: Limit = field.metadata[KEY]
+    return said
+
+
+def _range(said: Limit) -> str:
+    unit = "" if said.unit == "-" else f" [{said.unit}]"
+    return f"from {said.least:g} to {said.most:g}{unit}"
+
+
+def limits_document(config: Config) -> str:
+    """Limits as TOML, each with unit, range, meaning and source as a comment."""
+    parts = [_part(f.name, getattr(config, f.name)) for f in fields(config)]
+    return "\n".join(
+        ["# Limits of triage; a file given with --config needs only those that it changes.", *parts]
+    )
+
+
+def _part(name: str, limits: Any) -> str:
+    first = (type(limits).__doc__ or "").splitlines()[0]
+    lines = ["", f"# {first}", f"[{name}]"]
+    for each in fields(limits):
+        said = limit_of(each)
+        text = f"{said.meaning}. {_range(said).capitalize()}; {said.source}."
+        lines += [f"# {line}" for line in textwrap.wrap(text, WIDTH)]
+        lines.append(f"{each.name} = {_value(getattr(limits, each.name))}")
+    return "\n".join(lines)
+
+
+def _value(value: Any) -> str:
+    if isinstance(value, tuple):
+        return "[" + ", ".join(_value(item) for item in value) + "]"
+    if isinstance(value, str):
+        return '"' + value.replace("\\", "\\\\").replace('"', '\\"') + '"'
+    return repr(value)

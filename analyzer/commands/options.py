@@ -157,7 +157,7 @@ def export_options(command: Command) -> Command:
     def collected(
         export: tuple[Path, ...], loops: Path | None, changes: Path | None, config: Path | None, **given: Any
     ) -> Any:
-        from analyzer.config_file import read_config
+        from analyzer.config import read_config
         from analyzer.loops.changes import read_changes
         from analyzer.night.asked import Asked
 

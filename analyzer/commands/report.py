@@ -97,7 +97,7 @@ def report(
 
     Example: triage report store --changes changes.csv --out report
     """
-    from analyzer.config_file import read_config
+    from analyzer.config import read_config
     from analyzer.pages.before_after import page
     from analyzer.pages.changes import Spans, change_cases
     from analyzer.store.store import Store

@@ -55,7 +55,7 @@ def check(path: Path, config: Path | None) -> None:
     Example: triage store check store
     """
     from analyzer.belief.nights import unfounded
-    from analyzer.config_file import read_config
+    from analyzer.config import read_config
     from analyzer.store import care as store_care
     from analyzer.store.store import Store
 
@@ -110,7 +110,7 @@ def beliefs(path: Path, config: Path | None) -> None:
     Example: triage store beliefs store
     """
     from analyzer.belief.nights import settle_anew
-    from analyzer.config_file import read_config
+    from analyzer.config import read_config
     from analyzer.store.lock import locked
     from analyzer.store.store import Store
 

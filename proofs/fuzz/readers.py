@@ -51,7 +51,7 @@ def _model(path: Path) -> None:
 
 
 def _config(path: Path) -> None:
-    from analyzer.config_file import read_config
+    from analyzer.config import read_config
 
     read_config(path)
 
@@ -114,7 +114,7 @@ def main() -> None:
 
     fill(Path(sys.argv[1]))
     with atheris.instrument_imports(include=["analyzer"]):
-        import analyzer.config_file
+        import analyzer.config
         import analyzer.explain.models
         import analyzer.history.export
         import analyzer.loops.changes

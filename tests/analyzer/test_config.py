@@ -11,8 +11,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from analyzer.cli import main
-from analyzer.config import Config
-from analyzer.config_file import configured, limit_of, limits_document, read_config
+from analyzer.config import Config, configured, limit_of, limits_document, read_config
 from analyzer.explain.recordings import asked_cases, whole
 from analyzer.loops.changes import TuningChange
 from analyzer.night.asked import Asked
