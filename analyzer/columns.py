@@ -1,6 +1,6 @@
 """The columns of the results: declared once in columns.toml; rows, the store's types, lists and pages come from here.
 
-`python -m analyzer.columns > docs/columns.md` prints them as a page of the documentation.
+`python docs/columns.py > docs/columns.md` prints them as a page of the documentation.
 """
 
 from __future__ import annotations
@@ -67,29 +67,30 @@ def _declared() -> dict[str, Table]:
     }
 
 
-_TABLES = _declared()
-RANKING = _TABLES["ranking"]
+TABLES = _declared()
+"""All that are declared, by the name of what they are of."""
+RANKING = TABLES["ranking"]
 """The contract's columns in its order."""
-LISTED = _TABLES["listed"]
+LISTED = TABLES["listed"]
 """Columns that follow in CSV and JSON: facts of the plant, the units that settings stand in, the advice in full."""
-NOTED = _TABLES["noted"]
+NOTED = TABLES["noted"]
 """What `triage note` keeps, joined when a night is listed."""
-GROUP_LIST = _TABLES["group_list"]
+GROUP_LIST = TABLES["group_list"]
 """Of a group, as `triage rank --groups` lists it."""
-NIGHTS = (*RANKING, *LISTED, *_TABLES["stored"])
+NIGHTS = (*RANKING, *LISTED, *TABLES["stored"])
 """Of the table of nights: a row a loop."""
-BELIEVED = _TABLES["believed"]
+BELIEVED = TABLES["believed"]
 """Of a belief alone."""
 BY_NAME: Mapping[str, Column] = {c.name: c for c in (*NIGHTS, *BELIEVED)}
 """What a loop's row may hold, with what beliefs add to it."""
 _KEYS = (BY_NAME["loop"], BY_NAME["night"])
-HOURS = (*_KEYS, *_TABLES["hour"], *(c for c in NIGHTS if c.hourly))
+HOURS = (*_KEYS, *TABLES["hour"], *(c for c in NIGHTS if c.hourly))
 """Of the table of hours: a row a loop and hour."""
-EXPLAINED = (*_KEYS, *_TABLES["explanation"])
+EXPLAINED = (*_KEYS, *TABLES["explanation"])
 """Of the table of explanations: a row a loop that was explained."""
-SETTINGS = (*_KEYS, *_TABLES["compared"])
+SETTINGS = (*_KEYS, *TABLES["compared"])
 """Of the table of settings compared: a row a loop."""
-GROUPS = (*_KEYS, *_TABLES["group"])
+GROUPS = (*_KEYS, *TABLES["group"])
 """Of the table of groups: a row a loop and group."""
 RESTING = tuple(
     BY_NAME[name]
@@ -126,48 +127,3 @@ def row_of(values: Mapping[str, Any], columns: Sequence[Column] = NIGHTS) -> dic
     """
     require_declared(values, columns)
     return {c.name: values.get(c.name) for c in columns}
-
-
-HEAD = """# Columns of the results
-
-Every column is declared once, in `analyzer/columns.toml`; rows, the store's types, lists and pages come from
-there, and so does this page (`python -m analyzer.columns > docs/columns.md`).
-
-Numbers are 64-bit floats; an empty cell is what is not known. Percent of span is of PV's range, percent of OP of
-OP's. Columns marked h stand in the table of hours too.
-"""
-PARTS = {
-    "ranking": "The ranking: `triage rank`, names and order a contract",
-    "listed": "Further columns of `triage rank --format csv` and `json`",
-    "noted": "Notes, last in `triage rank --format csv` and `json`",
-    "stored": "Further columns of the store: `nights/*.parquet`, a row a loop",
-    "hour": "Of the hours alone: `hours/*.parquet`, a row a loop and hour",
-    "group": "Groups that share an oscillation: `groups/*.parquet`, a row a loop and group",
-    "group_list": "Groups as listed: `triage rank --groups --format csv` and `json`, a row a group",
-    "compared": "Settings compared: `compared/*.parquet`, a row a loop for which they were sought, newest night",
-    "believed": "Beliefs: `beliefs/*.parquet`, a row a loop and night, beside what of the ranking rests on nights",
-    "explanation": "Explanations: `explained/*.parquet`, a row a loop that was explained",
-}
-TITLES = ("column", "holds", "title", "unit", "from", "h", "meaning")
-
-
-def _line(cells: Sequence[str]) -> str:
-    return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
-
-
-def _part(title: str, columns: Sequence[Column]) -> str:
-    holds = {kind: "JSON as text" if kind is Kind.JSON else kind for kind in Kind}
-    lines = [
-        _line((f"`{c.name}`", holds[c.kind], c.title, c.unit, c.source, "h" if c.hourly else "", c.meaning))
-        for c in columns
-    ]
-    return "\n".join([f"## {title}", "", _line(TITLES), _line(["---"] * len(TITLES)), *lines])
-
-
-def columns_document() -> str:
-    """All columns as a page in Markdown."""
-    return "\n".join([HEAD, *(_part(title, _TABLES[table]) + "\n" for table, title in PARTS.items())])
-
-
-if __name__ == "__main__":
-    print(columns_document(), end="")
