@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-
-
-def _no_masks() -> Mapping[str, Mask]:
-    return MappingProxyType({})
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +49,7 @@ class LoopRecord:
     bad: Mask
     position: Floats | None = None
     sp_estimated: bool = False
-    masks: Mapping[str, Mask] = field(default_factory=_no_masks)
+    masks: Mapping[str, Mask] = field(default_factory=dict)
     feed: Floats | None = None
 
     def __len__(self) -> int:
@@ -105,29 +100,24 @@ class LoopRecord:
         def within(x: Mask) -> Mask:
             return np.asarray(x[:n].reshape(-1, factor).any(axis=1))
 
-        return replace(
-            self,
-            dt_s=self.dt_s * factor,
-            sp=self.sp[:n:factor],
-            pv=self.pv[:n:factor],
-            op=self.op[:n].reshape(-1, factor).mean(axis=1),
-            bad=within(self.bad),
-            position=None if self.position is None else self.position[:n:factor],
-            feed=None if self.feed is None else self.feed[:n:factor],
-            masks=MappingProxyType({k: within(v) for k, v in self.masks.items()}),
-        )
+        kept = self._each(lambda x: x[:n:factor], within)
+        return replace(kept, dt_s=self.dt_s * factor, op=self.op[:n].reshape(-1, factor).mean(axis=1))
 
     def span(self, first: int, last: int) -> LoopRecord:
         """The record of samples first (included) to last (excluded)."""
         cut = slice(max(first, 0), last)
+        kept = self._each(lambda x: x[cut], lambda x: x[cut])
+        return replace(kept, start_s=self.start_s + max(first, 0) * self.dt_s)
+
+    def _each(self, trend: Callable[[Floats], Floats], mask: Callable[[Mask], Mask]) -> LoopRecord:
+        """The record with each trend, and each mask, as a function leaves it."""
         return replace(
             self,
-            start_s=self.start_s + max(first, 0) * self.dt_s,
-            sp=self.sp[cut],
-            pv=self.pv[cut],
-            op=self.op[cut],
-            bad=self.bad[cut],
-            position=None if self.position is None else self.position[cut],
-            feed=None if self.feed is None else self.feed[cut],
-            masks=MappingProxyType({k: v[cut] for k, v in self.masks.items()}),
+            sp=trend(self.sp),
+            pv=trend(self.pv),
+            op=trend(self.op),
+            bad=mask(self.bad),
+            position=None if self.position is None else trend(self.position),
+            feed=None if self.feed is None else trend(self.feed),
+            masks={name: mask(x) for name, x in self.masks.items()},
         )
