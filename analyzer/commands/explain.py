@@ -45,10 +45,10 @@ def explain(
     Example: triage explain export.parquet --loops loops.csv --loop FIC101
     """
     from analyzer.commands.options import trying
+    from analyzer.explain.case import asked_cases
     from analyzer.explain.explained import abstained, explained
     from analyzer.explain.models import read_model, write_model
     from analyzer.explain.page import abstention, page
-    from analyzer.explain.recordings import asked_cases
 
     try:
         with trying() as tell:
@@ -100,8 +100,8 @@ def simulate(model: Path, asked: Asked, tag: str, out: Path, closed_loop: bool) 
     """
     import pandas as pd
 
+    from analyzer.explain.case import whole
     from analyzer.explain.models import read_model, simulated
-    from analyzer.explain.recordings import whole
 
     case, raw = whole(asked, tag)
     pv, op = simulated(case, read_model(model, tag), raw.stamp_s, closed_loop)

@@ -12,7 +12,7 @@ from click.testing import CliRunner, Result
 
 from analyzer.cli import main
 from analyzer.config import Config, configured, limit_of, limits_document, read_config
-from analyzer.explain.recordings import asked_cases, whole
+from analyzer.explain.case import asked_cases, whole
 from analyzer.loops.changes import TuningChange
 from analyzer.night.asked import Asked
 from analyzer.store.store import Store

@@ -12,7 +12,7 @@ import pandas as pd
 import pytest
 
 from analyzer.config import Config
-from analyzer.explain.recordings import FEWEST, asked_cases, parts, parts_said
+from analyzer.explain.case import FEWEST, asked_cases, parts, parts_said
 from analyzer.history.series import Series
 from analyzer.loops.changes import TuningChange
 from analyzer.loops.spec import LoopSpec
