@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from analyzer.explain.explained import Explained
-from analyzer.explain.words import AXES, BROUGHT, CURVES, FEATURES, KINDS, ROWS, caption
+from analyzer.explain.words import BROUGHT, CURVES, FEATURES, ROWS, caption
 from analyzer.pages.words import number
 from identification.estimation.prediction_error import Fitted
 from identification.mismatch.catalogue import fault
@@ -35,16 +35,10 @@ LONGEST_SEGMENT, SHORTEST_SEGMENT = 4096, 64
 """Samples of such a part at most and at least; ours."""
 SPECTRUM_POINTS = 120
 """Points of a spectrum."""
-POWERS = ("op_rate", "after_reversals")
-"""Features drawn over powers of ten: most of a record is near zero of them."""
-UNDRAWN = ("op_direction", "at_limits")
-"""Features of two or three values, which a table says better."""
 ERRORS = 2.0
 """Half width of a profile's band in standard errors."""
 LABELS = {"baseline": ROWS["baseline"], "model": "improved", "brought": BROUGHT}
 SHORT = {"baseline": ROWS["baseline"], "model": ROWS["explained"]}
-ORDER = {"recorded": 0, "plain": 1, "stated": 1, "limit": 1, "least": 2, "most": 2, "points": 3, "found": 4}
-"""What is drawn above what."""
 
 
 def recorded_pv(e: Explained) -> Floats:
@@ -134,7 +128,7 @@ def misfit_panels(e: Explained) -> Panels:
     known, c = {f.name: f for f in at.features}, found.plain.model.c
     late, memory = float(c[Slot.L]) / s.dt_s, float(c[Slot.L] + c[Slot.T]) / s.dt_s
     along = groups(s.pv, s.op, s.dt_s, min(round(late), s.pv.size // 4), max(round(memory), 2))
-    plots = [feature_plot(e, g, known.get(g.name)) for g in along if g.name not in UNDRAWN]
+    plots = [feature_plot(e, g, known.get(g.name)) for g in along if "axis" in FEATURES[g.name]]
     said = (
         "One-step errors: simulation plus noise model against PV, sample by sample; bands are two standard errors. "
         "A sound model lies flat."
@@ -147,7 +141,8 @@ def feature_plot(e: Explained, g: Group, f: Feature | None) -> Plot:
     """Mean (or size) of the one-step errors along one feature, before and after, with two standard errors."""
     judged, by = e.found.p.weight > 0, "sign" if f is None else f.of
     fits = {"baseline": e.found.plain} | ({"model": e.found.best} if e.found.accepted else {})
-    log = g.name in POWERS and float(g.signal[judged].max(initial=0.0)) > 0
+    known = FEATURES[g.name]
+    log = "powers" in known and float(g.signal[judged].max(initial=0.0)) > 0
     lines, areas = [], []
     for kind, fit in fits.items():
         x, y, half = errors_along(g, fit, judged, by)
@@ -159,7 +154,7 @@ def feature_plot(e: Explained, g: Group, f: Feature | None) -> Plot:
     label = "size of errors [% PV]" if by == "power" else f"mean error{along} [% PV]"
     size = float(np.sqrt(np.mean(fit.e[judged] ** 2)))
     reach = (1 - SEEN, 1 + SEEN) if by == "power" else (-SEEN, SEEN)
-    ends, words = (reach[0] * size, reach[1] * size), (FEATURES[g.name], AXES[g.name], label)
+    ends, words = (reach[0] * size, reach[1] * size), (known["title"], known["axis"], label)
     return Plot(
         f"misfit-{g.name}", *words, tuple(lines), (), note_of(f), tuple(areas), "x" if log else "", ends
     )
@@ -243,9 +238,9 @@ def law_plot(e: Explained) -> Plot | None:
 def shape_plot(shape: Picture, name: str, title: str) -> Plot:
     """A shape as a plot: what was recorded below, what was found above."""
     lines, areas = [], []
-    for d in sorted(shape.curves, key=lambda d: ORDER[d.name]):
-        kind = KINDS.get(d.name, "recorded" if d.name == "recorded" else "model")
-        lines.append(Line(CURVES[d.name], d.x, d.y, d.name != "points", kind))
+    for d in sorted(shape.curves, key=lambda d: CURVES[d.name]["above"]):
+        kind = CURVES[d.name]["kind"]
+        lines.append(Line(CURVES[d.name]["label"], d.x, d.y, d.name != "points", kind))
         if d.low is not None and d.high is not None:
             areas.append(Area(d.x, d.low, d.high, kind))
     marks = tuple(Mark(x, number(x)) for x in shape.places)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from analyzer.explain import drawings, tables
+from analyzer.explain import drawings, words
 from analyzer.explain.explained import Explained
 from analyzer.explain.words import number_text, places, rms, share, title
 from analyzer.history.plant_clock import UTC_NAME
@@ -30,9 +30,9 @@ def page(e: Explained, zone: str = UTC_NAME) -> Page:
             Section("What was found", _found(e)),
             Section("Where the misfit lives", (*_where(e.data), drawings.misfit_panels(e))),
             Section(
-                "How well it fits", (tables.misfits(e.data, _fit_note(e)), *_filled(tables.others(e.data)))
+                "How well it fits", (words.misfits(e.data, _fit_note(e)), *_filled(words.others(e.data)))
             ),
-            Section("What it could also be", _filled(tables.alternatives(e.data))),
+            Section("What it could also be", _filled(words.alternatives(e.data))),
             Section("All that was tried", _tried(e), closed=bool(e.found.accepted)),
             Section("Does the controller do what is stated?", _controller(e), closed=True),
         )
@@ -104,7 +104,7 @@ def _tiles(e: Explained) -> list[tuple[str, str, str]]:
 
 def _found(e: Explained) -> tuple[Block, ...]:
     drawn = drawings.found_plot(e)
-    told = (*_filled(tables.parameters(e.data)), *_filled(tables.moved(e.data)))
+    told = (*_filled(words.parameters(e.data)), *_filled(words.moved(e.data)))
     return told if drawn is None else (drawn, *told)
 
 
@@ -115,7 +115,7 @@ def _where(data: Data) -> tuple[Block, ...]:
     told = (Facts(facts),) if facts else ()
     if not where.get("features"):
         return (*told, Text((UNTESTED,), "note"))
-    return (Text((located_sentence(where),)), *told, tables.features(data))
+    return (Text((located_sentence(where),)), *told, words.features(data))
 
 
 def _fit_note(e: Explained) -> str:
@@ -134,7 +134,7 @@ def _fit_note(e: Explained) -> str:
 
 
 def _tried(e: Explained) -> tuple[Block, ...]:
-    return _filled(tables.tried(e.found.first, e.found.accepted))
+    return _filled(words.tried(e.found.first, e.found.accepted))
 
 
 def _controller(e: Explained) -> tuple[Block, ...]:

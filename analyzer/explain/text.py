@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from textwrap import wrap
 from typing import Any
 
-from analyzer.explain import tables
+from analyzer.explain import words
 from analyzer.explain.words import places, share, title
 from analyzer.pages.words import number
 from identification.mismatch.words import check, seen_ahead, two_plain_loops
@@ -28,7 +28,7 @@ def answer_lines(data: Mapping[str, Any]) -> list[str]:
     head = f"{data['loop']}: {title(data['verdict']) if data['fit'] else 'not told'}"
     block = f" ({data['block']})" if data["block"] != "none" else ""
     out = [head + block, *wrap(data["reason"], WIDTH), *wrap(check(data), WIDTH)]
-    out += _part("Parameters (90 % intervals)", _texts(tables.parameters(data)), (2,))
+    out += _part("Parameters (90 % intervals)", _texts(words.parameters(data)), (2,))
     out += _part("Controller, as SP, PV and OP show it", _controller(data), (1,))
     out += _part("Misfit, rms in % of span", _fit(data), (1, 2, 3, 4))
     out += _part("On the recordings held out", _others(data), (1, 3, 4))
@@ -40,7 +40,7 @@ def answer_lines(data: Mapping[str, Any]) -> list[str]:
             out += _told(f"{first['name']} removes {removed} of the held-out misfit's mean square.")
     out += _part("Where", _where(data))
     out += _part("The plain loop's constants moved", _moved(data), (1, 3))
-    return out + _part("Could also be, and what would tell", _texts(tables.alternatives(data)))
+    return out + _part("Could also be, and what would tell", _texts(words.alternatives(data)))
 
 
 def _told(sentence: str) -> list[str]:
@@ -82,19 +82,19 @@ def _controller(data: Mapping[str, Any]) -> Rows:
 
 
 def _fit(data: Mapping[str, Any]) -> Rows:
-    rows = [(*row, "") for row in _texts(tables.misfits(data))]
+    rows = [(*row, "") for row in _texts(words.misfits(data))]
     return [("", "fitted", "fit %", "held out", "fit %", ""), *rows] if rows else []
 
 
 def _others(data: Mapping[str, Any]) -> Rows:
     rows = [
-        (name, plain, "→", better, removed) for name, plain, better, removed in _texts(tables.others(data))
+        (name, plain, "→", better, removed) for name, plain, better, removed in _texts(words.others(data))
     ]
     return [("", "plain", "", "improved", "removed"), *rows] if rows else []
 
 
 def _moved(data: Mapping[str, Any]) -> Rows:
-    return [(name, before, "→", after, unit) for name, before, after, _, unit in _texts(tables.moved(data))]
+    return [(name, before, "→", after, unit) for name, before, after, _, unit in _texts(words.moved(data))]
 
 
 def _where(data: Mapping[str, Any]) -> Rows:
@@ -102,7 +102,7 @@ def _where(data: Mapping[str, Any]) -> Rows:
         (name if name.isupper() else name[:1].lower() + name[1:], text)
         for name, text in places(data["where"])
     ]
-    features = _texts(tables.features(data))
+    features = _texts(words.features(data))
     rows += [
         (name, f"{how} (chance {chance})") for name, chance, carries, how in features if carries == "yes"
     ]

@@ -1,5 +1,5 @@
-"""The words of an explanation's text and page: names of parameters and features, figures with their units, and how
-it goes together with the night's verdict."""
+"""The words, figures and tables of an explanation, whose text and page show the same cells, and how it goes together
+with the night's verdict."""
 
 from __future__ import annotations
 
@@ -8,12 +8,16 @@ from collections.abc import Mapping
 from typing import Any
 
 from analyzer.loop.decisions import Cause, Fault
-from analyzer.pages.words import duration, number
+from analyzer.pages.words import duration, number, page_columns, plain_cell, texts
 from identification.mismatch import effect
 from identification.mismatch.catalogue import EFFECTS, fault
 from identification.mismatch.effect import Block, Ends
 from identification.mismatch.outside import OUTSIDE
-from identification.mismatch.words import ALONG, place
+from identification.mismatch.selection import Candidate
+from identification.mismatch.words import ALONG, discriminating_test, place
+from reports.pages import Cell, Table
+
+Data = Mapping[str, Any]
 
 KNOWN = {**EFFECTS, **OUTSIDE}
 """Every effect, named or not."""
@@ -21,67 +25,28 @@ PARAMETERS = {name: text for e in KNOWN.values() for name, text in e.called.item
 """Parameters as they are called on a page; others by their own name."""
 HIDDEN = frozenset(name for e in KNOWN.values() for name in e.hidden)
 """Parameters whose meaning another one carries."""
-MOVED = {
-    "gain": ("Gain", "% PV/% OP"),
-    "time_constant_s": ("Time constant", "s"),
-    "dead_time_s": ("Dead time", "s"),
-}
-FEATURES = {
-    "pv_level": "PV level",
-    "op_level": "OP level",
-    "op_direction": "Direction of OP",
-    "op_rate": "Rate of OP",
-    "after_reversals": "Time since OP turned",
-    "time_in_record": "Time in the recording",
-    "at_limits": "OP at a limit",
-}
-AXES = {
-    "pv_level": "PV [%]",
-    "op_level": "OP [%]",
-    "op_rate": "size of OP's rate [%/s]",
-    "after_reversals": "time since OP turned [s]",
-    "time_in_record": "time [s]",
-}
-"""Axes of the features that are drawn."""
-TITLES = {"none": "the plain loop explains it", "unexplained": "no name for what is left"}
+TOLD = texts("explanation")
+FEATURES, CURVES = TOLD["features"], TOLD["curves"]
 BROUGHT = "your model"
 ROWS = {"baseline": "plain loop", "explained": "improved loop", "brought": BROUGHT}
-CURVES = {
-    "found": "found",
-    "plain": "plain loop",
-    "least": "interval",
-    "most": "interval",
-    "stated": "by the stated settings",
-    "recorded": "recorded",
-    "points": "samples on straight lines",
-    "limit": "end of the range",
-}
-KINDS = {
-    "found": "model",
-    "plain": "baseline",
-    "least": "edge",
-    "most": "edge",
-    "stated": "baseline",
-    "limit": "sp",
-}
-SHAPES = {
-    "loop": "Stem over OP for a slow sweep up and down; dotted: the ends of the interval.",
-    "curve": "The curve found, with its interval, against the plain loop's.",
-    "response": "After a step of OP; the band is the interval of what was added.",
-    "course": "Over the recording, or the stretch where it shows most.",
-}
 OBEYED = "OP rebuilt from SP and PV by the stated settings lies on OP as recorded."
 """What the picture of a controller without fault shows."""
+HARDLY = 0.05
+"""Relative change of the plain loop's constants under which they count as kept."""
+BENT = "What was left out had to be made up for by these; with it they move back."
+KEPT = "They hardly move: what was left out had not bent them."
+SHOWN = 12
+"""Names shown of those that were tried."""
 
 
 def caption(effect: str, kind: str) -> str:
     """What a picture shows: by its effect where that says more than its kind."""
-    return (KNOWN[effect].caption if effect in KNOWN else OBEYED) or SHAPES.get(kind, "")
+    return (KNOWN[effect].caption if effect in KNOWN else OBEYED) or TOLD["shapes"].get(kind, "")
 
 
 def title(verdict: str) -> str:
     """The verdict as a heading."""
-    return TITLES.get(verdict, verdict.replace("-", " "))
+    return TOLD["titles"].get(verdict, verdict.replace("-", " "))
 
 
 def called(name: str) -> str:
@@ -154,24 +119,103 @@ def places(where: Mapping[str, Any]) -> list[tuple[str, str]]:
     return out
 
 
-STROKE = "stroke the valve both ways in steps of a quarter of its band and watch the stem"
-"""What settles a question about a valve."""
-AGREE = "Verdict and explanation agree on the valve."
-OTHER_KIND = (
-    "Both find the valve; the night's verdict calls it {kind}, the explanation {verdict}, which a sampling like this "
-    f"hardly tells apart: {STROKE}."
-)
-STOPPED = (
-    "The explanation stops at what the recorder did, so it neither bears out nor contradicts the verdict."
-)
-NOT_BORNE_OUT = (
-    "The night's verdict is a valve fault; the explanation does not bear it out on the part of the recording "
-    f"that it had not seen: {STROKE} before it is repaired."
-)
-VALVE_ALONE = (
-    "The explanation finds something at the valve; the night's verdict does not hold it to be what makes the "
-    "loop oscillate."
-)
+def parameters(data: Data) -> Table:
+    """Parameters with intervals of all effects, and of physics that has no name."""
+    rows = tuple(
+        (Cell(x["name"]), Cell(called(k)), plain_cell(v["value"]), Cell(interval_text(v)), Cell(v["unit"]))
+        for x in [*data["effects"], *([data["outside"]] if "outside" in data else [])]
+        for k, v in x["parameters"].items()
+        if k not in HIDDEN
+    )
+    return Table("parameters", "Parameters", page_columns("effects_found"), rows)
+
+
+def moved(data: Data) -> Table:
+    """The plain loop's constants before and after."""
+    named = TOLD["constants"]
+    rows = tuple(
+        (Cell(named[k]["title"]), plain_cell(a), plain_cell(b), Cell(change(a, b)), Cell(named[k]["unit"]))
+        for k, (a, b) in data["moved"].items()
+    )
+    most = max((abs(b / a - 1) if a else 0.0 for a, b in data["moved"].values()), default=0.0)
+    note = KEPT if most < HARDLY else BENT
+    return Table("moved", "How the plain loop's constants moved", page_columns("constants_moved"), rows, note)
+
+
+def misfits(data: Data, note: str = "") -> Table:
+    """Misfit of the simulations, fitted and held out."""
+    shown = [k for k in ROWS if k in data["fit"] and (k != "explained" or data["moved"])]
+    rows = []
+    for key in shown:
+        cells = [Cell(ROWS[key])]
+        for part in ("fitted", "held_out"):
+            m = data["fit"][key][part]
+            cells += [_rms(m), Cell(f"{m['fit_pct']:.1f}", m["fit_pct"])]
+        rows.append(tuple(cells))
+    return Table("fit", "", page_columns("simulations"), tuple(rows), note)
+
+
+def others(data: Data) -> Table:
+    """Misfit of both simulations on each other recording that was held out."""
+    rows = tuple(
+        (Cell(x["recording"]), _rms(x["baseline"]), _rms(x["explained"]), Cell(share(x["share"]), x["share"]))
+        for x in data.get("held_out_on", [])
+    )
+    return Table("others", "On the recordings held out", page_columns("held_out"), rows)
+
+
+def _rms(misfit: Mapping[str, float]) -> Cell:
+    return Cell(rms(misfit["rmse"]), misfit["rmse"])
+
+
+def features(data: Data) -> Table:
+    """What the misfit is tied to."""
+    rows = tuple(
+        (
+            Cell(FEATURES[f["name"]]["title"], kind="strong" if f["carries"] else ""),
+            Cell(chance(f["p"]), f["p"]),
+            Cell("yes" if f["carries"] else "no"),
+            Cell(carried_by(f)),
+        )
+        for f in data["where"].get("features", [])
+    )
+    note = (
+        "The plain loop's one-step errors in one joint regression: each row is what it adds to the others; chances "
+        "from blocks in other orders."
+    )
+    return Table("where", "", page_columns("misfit_tied_to"), rows, note)
+
+
+def alternatives(data: Data) -> Table:
+    """Names that fit as well or look alike, and what would tell them from the one that is told."""
+    rows = tuple(
+        (Cell(other, kind="strong"), Cell(discriminating_test(first["name"], other)))
+        for first in data["effects"][:1]
+        for other in first["alternatives"]
+    )
+    return Table("alternatives", "", page_columns("alternatives"), rows)
+
+
+def tried(first: tuple[Candidate, ...], taken: tuple[Candidate, ...]) -> Table:
+    """What was tried in the first round, the best of each name, the likeliest first."""
+    names = {c.name for c in taken}
+    best = {c.name: c for c in sorted(first, key=lambda c: c.penalised)}
+    rows = tuple(
+        (Cell(c.name), _nats(c.gain), _nats(c.penalised), Cell(_standing(c, names)))
+        for c in sorted(best.values(), key=lambda c: -c.penalised)[:SHOWN]
+    )
+    note = "Each name was fitted with all constants free; the best of so many gains about five nat by chance."
+    return Table("candidates", "", page_columns("effects_tried"), rows, note)
+
+
+def _nats(value: float) -> Cell:
+    return Cell(str(round(value)), value)
+
+
+def _standing(c: Candidate, taken: set[str]) -> str:
+    if c.name in taken:
+        return "taken"
+    return "does not pay" if c.penalised <= 0 else "less, or not proven"
 
 
 def agreement(row: Mapping[str, Any], verdict: str, block: str) -> str:
@@ -190,13 +234,14 @@ def agreement(row: Mapping[str, Any], verdict: str, block: str) -> str:
     verdict, block : str
         The explanation's name and block.
     """
-    known = EFFECTS.get(verdict)
+    known, told = EFFECTS.get(verdict), TOLD["beside_verdict"]
     friction = known is not None and known.friction is not None
     if row["cause"] != Cause.VALVE:
-        return VALVE_ALONE if friction or block == Block.VALVE else ""
+        return told["valve_alone"] if friction or block == Block.VALVE else ""
     if friction:
         kind = row.get("valve_fault") or Fault.UNDECIDED
         same = kind in (verdict, Fault.UNDECIDED, Fault.NONE)
-        return AGREE if same else OTHER_KIND.format(kind=kind, verdict=verdict)
+        said = told["agree"] if same else told["other_kind"]
+        return said.format(kind=kind, verdict=verdict, stroke=told["stroke"])
     unasked = isinstance(known, effect.Fault) and fault(verdict).ends is not Ends.NOTHING
-    return STOPPED if unasked else NOT_BORNE_OUT
+    return told["stopped"] if unasked else told["not_borne_out"].format(stroke=told["stroke"])

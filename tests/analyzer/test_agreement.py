@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from analyzer.explain.words import STROKE, agreement
+from analyzer.explain.words import TOLD, agreement
 
 
 @pytest.mark.parametrize(
@@ -12,7 +12,7 @@ from analyzer.explain.words import STROKE, agreement
     [
         ("valve", "backlash", "backlash", "valve", "agree"),
         ("valve", "undecided", "stiction", "valve", "agree"),
-        ("valve", "backlash", "positioner", "valve", STROKE),
+        ("valve", "backlash", "positioner", "valve", TOLD["beside_verdict"]["stroke"]),
         ("valve", "stiction", "none", "none", "does not bear it out"),
         ("valve", "stiction", "second-lag", "process", "does not bear it out"),
         ("valve", "backlash", "quantization", "sensor", "neither bears out nor contradicts"),
