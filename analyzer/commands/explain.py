@@ -47,7 +47,7 @@ def explain(
     from analyzer.commands.options import trying
     from analyzer.explain.case import asked_cases
     from analyzer.explain.explained import abstained, explained
-    from analyzer.explain.models import read_model, write_model
+    from analyzer.explain.models import read_model
     from analyzer.explain.page import abstention, page
 
     try:
@@ -61,7 +61,7 @@ def explain(
         click.echo(f"triage: {error}", err=True)
         sys.exit(NOTHING_DONE)
     if save_model is not None:
-        write_model(found.model(), save_model)
+        save_model.write_text(json.dumps(found.model(), indent=1))
     _show(found.data, lambda: page(found, asked.zone), form, out)
 
 

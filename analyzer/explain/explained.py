@@ -13,12 +13,13 @@ from typing import Any
 import numpy as np
 
 from analyzer.explain.case import Case
-from analyzer.explain.models import Brought, judged, plain_start, saved_model, span_note
+from analyzer.explain.models import SCALE, Brought, judged, plain_start, span_note
 from identification.controller.pi_regression import ControlLaw
 from identification.controller.pid_regression import integral_time
 from identification.mismatch.answer import Answer, answer
-from identification.mismatch.diagnosis import explain
+from identification.mismatch.diagnosis import explain, transmitter_end
 from identification.mismatch.explanation import Explanation, proven_on
+from identification.mismatch.model_file import to_data
 from identification.mismatch.recording import Recording
 from identification.mismatch.words import sentence, unexplained_reason
 
@@ -38,7 +39,14 @@ class Explained:
 
     def model(self) -> dict[str, Any]:
         """The model found, the plain loop where nothing was, as data to be written."""
-        return saved_model(self.case, self.found, self.said)
+        c, found, s = self.case, self.found, self.case.prepared.scale
+        scale = dict(zip(SCALE, (s.low, s.span, s.op_low, s.op_span), strict=True))
+        names = tuple(e.name for e in self.said.effects)
+        data = to_data(c.spec.loop, found.p.inputs, found.best.model.c, names, found.late_s, scale)
+        end = transmitter_end(found.recorder, c.subject.pv)
+        if end is not None:
+            data["constants"]["CLIP_HI" if end.upper else "CLIP_LO"] = end.value
+        return data
 
 
 def explained(
@@ -92,7 +100,8 @@ def as_data(c: Case, said: Answer, brought: Brought | None = None) -> dict[str, 
         del data[part]
     outside = data.pop("outside")
     if brought is not None:
-        data["fit"]["brought"] = brought.as_data()
+        judgement = {"fitted": asdict(brought.fitted), "held_out": asdict(brought.held_out)}
+        data["fit"]["brought"] = judgement | {"note": brought.note}
     if outside is not None:
         data["outside"] = {k: outside[k] for k in ("name", "block", "parameters")}
     return json_ready(data)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +13,9 @@ import numpy as np
 from analyzer.explain.case import Case
 from analyzer.loop.quality import Scale
 from identification.errors import InputError
-from identification.mismatch.answer import Answer, restored, unanswered
-from identification.mismatch.diagnosis import transmitter_end
+from identification.mismatch.answer import restored, unanswered
 from identification.mismatch.explanation import Explanation
-from identification.mismatch.model_file import VERSION, carried, carried_closed, constants, to_data
+from identification.mismatch.model_file import VERSION, carried, carried_closed, constants
 from identification.mismatch.proof import Misfit, misfit
 from identification.mismatch.recording import Recording
 from identification.record import Floats
@@ -35,23 +34,6 @@ TIMES = (((40.0, 90.0), "minutes"), ((2400.0, 5400.0), "hours"))
 SAVED, ANEW = "a model saved by `triage explain`", "save it anew"
 RUNS = "a model that can be run on this recording"
 SCALE = ("pv_low", "pv_span", "op_low", "op_span")
-
-
-def saved_model(c: Case, found: Explanation, said: Answer) -> dict[str, Any]:
-    """The model found, the plain loop where nothing was, as data to be written."""
-    s = c.prepared.scale
-    scale = dict(zip(SCALE, (s.low, s.span, s.op_low, s.op_span), strict=True))
-    names = tuple(e.name for e in said.effects)
-    data = to_data(c.spec.loop, found.p.inputs, found.best.model.c, names, found.late_s, scale)
-    end = transmitter_end(found.recorder, c.subject.pv)
-    if end is not None:
-        data["constants"]["CLIP_HI" if end.upper else "CLIP_LO"] = end.value
-    return data
-
-
-def write_model(data: Mapping[str, Any], path: Path) -> None:
-    """Write a model."""
-    path.write_text(json.dumps(data, indent=1))
 
 
 def read_model(path: Path, loop: str) -> dict[str, Any]:
@@ -112,10 +94,6 @@ class Brought:
     fitted: Misfit
     held_out: Misfit
     note: str
-
-    def as_data(self) -> dict[str, Any]:
-        """The entry `brought` of the answer's `fit`."""
-        return {"fitted": asdict(self.fitted), "held_out": asdict(self.held_out), "note": self.note}
 
 
 def judged(data: Mapping[str, Any], found: Explanation, s: Recording, more: str = "") -> Brought:

@@ -33,7 +33,11 @@ def page(e: Explained, zone: str = UTC_NAME) -> Page:
                 "How well it fits", (words.misfits(e.data, _fit_note(e)), *_filled(words.others(e.data)))
             ),
             Section("What it could also be", _filled(words.alternatives(e.data))),
-            Section("All that was tried", _tried(e), closed=bool(e.found.accepted)),
+            Section(
+                "All that was tried",
+                _filled(words.tried(e.found.first, e.found.accepted)),
+                closed=bool(e.found.accepted),
+            ),
             Section("Does the controller do what is stated?", _controller(e), closed=True),
         )
     spec = e.case.spec
@@ -131,10 +135,6 @@ def _fit_note(e: Explained) -> str:
     )
     parts = (f"Held out: {held}.", FIT, anew, seen_ahead(fit), two_plain_loops(fit))
     return " ".join(part for part in parts if part)
-
-
-def _tried(e: Explained) -> tuple[Block, ...]:
-    return _filled(words.tried(e.found.first, e.found.accepted))
 
 
 def _controller(e: Explained) -> tuple[Block, ...]:

@@ -21,7 +21,7 @@ import numpy as np
 from analyzer.config import Config
 from analyzer.explain.case import Case, case
 from analyzer.explain.explained import Explained, explained
-from analyzer.explain.models import saved_model, simulated
+from analyzer.explain.models import simulated
 from analyzer.loops.spec import spec_of
 from analyzer.night.asked import opened
 from identification.mismatch.model_file import to_data
@@ -56,7 +56,7 @@ def misfit(c: Case, model: dict) -> float:
 
 def carried_over(step: Explained, loop: Case) -> str:
     """The duct's plain and improved model, of the step, on the PI loop."""
-    best = saved_model(step.case, step.found, step.said)
+    best = step.model()
     plain = best | to_data("DUCT", step.found.p.inputs, step.found.plain.model.c, (), 0.0, best["scale"])
     return f"{misfit(loop, plain):.3f} → {misfit(loop, best):.3f}"
 
