@@ -15,11 +15,11 @@ from analyzer.commands.options import (
     NIGHT,
     SOME_LOST,
     STORE,
+    Told,
     export_options,
     formats,
     of_loop,
     say,
-    told,
 )
 from analyzer.loop.decisions import Lane
 
@@ -32,7 +32,7 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 way. Set before numpy is imported."""
 
 
-@click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
+@click.group(cls=Told, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
 @click.version_option(package_name="loop-triage", prog_name="triage")
 def main() -> None:
     """Nightly triage of PID loops: which oscillate, why, what to type in, and whether it helped.
@@ -86,7 +86,6 @@ def check(asked: Asked) -> None:
 @click.option("--all", "everything", is_flag=True, help="Loops that notes hide from the table, too.")
 @click.option("--wide", is_flag=True, help="All columns of the table, however narrow the terminal.")
 @formats("table", "csv", "json", "markdown", text="Output format.")
-@told
 def rank(
     store: Path, top: int | None, groups: bool, everything: bool, wide: bool, form: str, **by: Any
 ) -> None:
@@ -133,7 +132,6 @@ def tune(asked: Asked, tag: str, out: Path | None) -> None:
 
 
 @main.command()
-@told
 def config() -> None:
     """All limits with their defaults as TOML: what each decides, its unit and range, and what set it.
 

@@ -8,7 +8,7 @@ import time
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from functools import wraps
+from functools import reduce, wraps
 from pathlib import Path
 from typing import Any
 
@@ -27,16 +27,16 @@ MOST_SAID = 600
 """Characters of a line that says what is wrong."""
 
 
-def told(command: Command) -> Command:
-    """Errors that are ours, or the system's, as one line on stderr and exit status 2."""
+class Told(click.Group):
+    """Commands whose errors that are ours, or the system's, are one line on stderr and exit status 2."""
 
-    @wraps(command)
-    def wrapped(*args: Any, **kwargs: Any) -> Any:
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run a command."""
         try:
             with warnings.catch_warnings():
                 if not sys.warnoptions:
                     warnings.simplefilter("ignore")  # a library's warning says nothing to an engineer
-                return command(*args, **kwargs)
+                return super().invoke(ctx)
         except BrokenPipeError:
             sys.stderr.close()
         except Exception as error:
@@ -45,8 +45,6 @@ def told(command: Command) -> Command:
                 raise
             click.echo(f"triage: {line}", err=True)
         sys.exit(NOTHING_DONE)
-
-    return wrapped
 
 
 def what_went_wrong(error: Exception) -> str | None:
@@ -150,7 +148,7 @@ KINDS: dict[str, dict[str, Any]] = {
 
 
 def export_options(command: Command) -> Command:
-    """EXPORT... and what every command that reads one takes, handed over as one `asked`; errors told as by `told`."""
+    """EXPORT... and what every command that reads one takes, handed over as one `asked`."""
     names = [name.split("/")[0].lstrip("-").replace("-", "_") for name in READING]
 
     @wraps(command)
@@ -172,12 +170,9 @@ def export_options(command: Command) -> Command:
         asked = Asked(export, loops, dated, first, last, read_config(config), zone, reading)
         return command(asked=asked, **given)
 
-    found = told(collected)
     reads = [click.option(name, help=text, **KINDS.get(name, {})) for name, text in READING.items()]
     options: list[Any] = [*SPAN, *reads]
-    for option in reversed(options):
-        found = option(found)
-    return found
+    return reduce(lambda found, option: option(found), reversed(options), collected)
 
 
 Report = Callable[[int, int], None]

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from analyzer.commands.options import CONFIG, FILE, NIGHT, SOME_LOST, STORE, Command, formats, say, told
+from analyzer.commands.options import CONFIG, FILE, NIGHT, SOME_LOST, STORE, Command, formats, say
 from identification.errors import InputError
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ class Folder:
 
 
 def into_folder(single_text: str) -> Callable[[Command], Command]:
-    """--format, --single-file and --out, handed over as one `folder`; errors told as by `told`."""
+    """--format, --single-file and --out, handed over as one `folder`."""
     single = click.option("--single-file", is_flag=True, help=single_text)
     where = click.option("--out", required=True, type=FILE, help="Folder to write into.")
 
@@ -55,7 +55,7 @@ def into_folder(single_text: str) -> Callable[[Command], Command]:
         def collected(form: str, single_file: bool, out: Path, **given: Any) -> Any:
             return command(folder=Folder(form, single_file, out), **given)
 
-        return formats("html", "markdown")(single(where(told(collected))))
+        return formats("html", "markdown")(single(where(collected)))
 
     return collecting
 

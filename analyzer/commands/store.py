@@ -9,7 +9,7 @@ from pathlib import Path
 
 import click
 
-from analyzer.commands.options import CONFIG, NIGHT, PLACE, SOME_LOST, STORE, formats, say, told
+from analyzer.commands.options import CONFIG, NIGHT, PLACE, SOME_LOST, STORE, formats, say
 from analyzer.store.notes import STATES
 from identification.errors import InputError
 
@@ -45,7 +45,6 @@ def store() -> None:
 @store.command()
 @click.argument("path", metavar="STORE", type=PLACE)
 @CONFIG
-@told
 def check(path: Path, config: Path | None) -> None:
     """Read every table of a store and say what is damaged, left over or not finished, or does not follow from its
     nights.
@@ -75,7 +74,6 @@ def check(path: Path, config: Path | None) -> None:
 @click.option("--keep", required=True, help="How long nights are kept, before the latest: 400d, 60w, 2y.")
 @click.option("--keep-trends", help="How long trends and hours are kept. Default: as long as nights.")
 @click.option("--dry-run", is_flag=True, help="Only say what would be deleted.")
-@told
 def prune(path: Path, keep: str, keep_trends: str | None, dry_run: bool) -> None:
     """Delete nights older than some time before the latest, and what dead processes left. Notes stay.
 
@@ -101,7 +99,6 @@ def prune(path: Path, keep: str, keep_trends: str | None, dry_run: bool) -> None
 @store.command()
 @click.argument("path", metavar="STORE", type=PLACE)
 @CONFIG
-@told
 def beliefs(path: Path, config: Path | None) -> None:
     """Make the beliefs of a store anew from its nights: what they say together of each loop.
 
@@ -137,7 +134,6 @@ def beliefs(path: Path, config: Path | None) -> None:
 )
 @click.option("--state", type=click.Choice(STATES), help="How far the work has come.")
 @click.option("--due", type=click.DateTime(("%Y-%m-%d",)), metavar="DATE", help="When it is to be done.")
-@told
 def note(
     store: Path,
     loop: str,
@@ -181,7 +177,6 @@ def note(
 @STORE
 @NIGHT
 @formats("text", "html", "markdown", text="html is one mail without scripts.")
-@told
 def summary(store: Path, night: str | None, form: str) -> None:
     """The morning on one screen, to be mailed: what to do first, what changed, the worst loops.
 

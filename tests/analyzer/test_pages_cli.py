@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner, Result
 
+from analyzer.cli import main
 from analyzer.columns import NIGHTS, row_of
-from analyzer.commands.report import pages, report
 from analyzer.store.store import Store
 from analyzer.store.table import rows_table, write_table
 from reports.texts import slug
@@ -25,7 +25,7 @@ def store(tmp_path_factory: pytest.TempPathFactory) -> Store:
 
 def run(*arguments: object) -> Result:
     """Run the command report."""
-    return CliRunner().invoke(report, [str(a) for a in arguments])
+    return CliRunner().invoke(main, ["report", *map(str, arguments)])
 
 
 def test_one_loop_by_its_tag(store: Store, tmp_path: Path) -> None:
@@ -81,7 +81,7 @@ def test_what_cannot_be_done_is_said(
 
 def test_pages_of_a_night(store: Store, tmp_path: Path) -> None:
     """The command writes the morning page, the hand-over sheet, a page a night and as many loops' as asked for."""
-    found = CliRunner().invoke(pages, [str(store.path), "--top", "3", "--out", str(tmp_path)])
+    found = CliRunner().invoke(main, ["pages", str(store.path), "--top", "3", "--out", str(tmp_path)])
     assert found.exit_code == 0
     names = [p.name for p in tmp_path.glob("*.html")]
     dated = [n for n in names if n.startswith("morning-")]
@@ -93,10 +93,10 @@ def test_nights_are_linked_and_stale_pages_go(tmp_path: Path) -> None:
     """Each dated page leads to the one before and after; pages of loops that are calm by now are deleted, no more."""
     kept = small_store(tmp_path / "store", loops=8, nights=3)
     out = tmp_path / "out"
-    assert CliRunner().invoke(pages, [str(kept.path), "--out", str(out)]).exit_code == 0
+    assert CliRunner().invoke(main, ["pages", str(kept.path), "--out", str(out)]).exit_code == 0
     before = {p.name for p in out.glob("*.html")}
     (out / "mine.html").write_text("my own", encoding="utf-8")
-    assert CliRunner().invoke(pages, [str(kept.path), "--top", "1", "--out", str(out)]).exit_code == 0
+    assert CliRunner().invoke(main, ["pages", str(kept.path), "--top", "1", "--out", str(out)]).exit_code == 0
     after = {p.name for p in out.glob("*.html")}
     assert "mine.html" in after
     assert len([n for n in before if n not in after]) == len(before) - 4 - 3 - 1
@@ -122,7 +122,7 @@ def test_a_calm_night_has_its_page(tmp_path: Path) -> None:
     """Where no loop is worth a look the morning page is written all the same, and the calm loop's page beside it."""
     rows = [row_of({"loop": "FIC1", "night": "2026-03-02", "status": "ok", "cause": "none"})]
     write_table(rows_table(rows, NIGHTS), tmp_path / "store" / "nights" / "2026-03-02.parquet")
-    found = CliRunner().invoke(pages, [str(tmp_path / "store"), "--out", str(tmp_path / "out")])
+    found = CliRunner().invoke(main, ["pages", str(tmp_path / "store"), "--out", str(tmp_path / "out")])
     assert found.exit_code == 0, found.output
     assert {p.name for p in (tmp_path / "out").glob("*.html")} == {
         *("index.html", "maintenance.html", "morning-2026-03-02.html", "side-by-side.html", "work.html"),
