@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from analyzer.commands.options import FILE, NOTHING_DONE, PLACE, export_options, formats, of_loop, say
+from analyzer.commands.options import FILE, NOTHING_DONE, PLACE, export_options, formats, of_loop, say, trying
 from identification.errors import NotAssessedError
 
 if TYPE_CHECKING:
@@ -44,7 +44,6 @@ def explain(
 
     Example: triage explain export.parquet --loops loops.csv --loop FIC101
     """
-    from analyzer.commands.options import trying
     from analyzer.explain.case import asked_cases
     from analyzer.explain.explained import abstained, explained
     from analyzer.explain.models import read_model

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from analyzer.commands.options import NOTHING_DONE, PLACE, SOME_LOST, export_options, say, what_failed
+from analyzer.commands.options import NOTHING_DONE, PLACE, SOME_LOST, bar, export_options, say, what_failed
 from identification.errors import InputError, TriageError
 from reports.whole_file import is_full
 
@@ -161,7 +161,6 @@ def _say(notes: Sequence[str], log: RunLog) -> None:
 
 def _assessed(batch: Batch, how: How, log: RunLog) -> Outcome:
     """Run the batch with progress and say what came of it: what was lost, how many were assessed, of which night."""
-    from analyzer.commands.options import bar
     from analyzer.night import batch as nightly
 
     with bar("loops") as progress:
@@ -185,7 +184,6 @@ def _assessed(batch: Batch, how: How, log: RunLog) -> Outcome:
 
 def _explained(batch: Batch, how: How, night: Night) -> None:
     """Explain the flagged loops of a night, with progress, and say how many."""
-    from analyzer.commands.options import bar
     from analyzer.explain import night as explain_night
 
     with bar("explained") as progress:
