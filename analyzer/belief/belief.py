@@ -9,8 +9,11 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from typing import Any
+from dataclasses import asdict, dataclass, field, replace
+from functools import cache
+from itertools import repeat
+from types import UnionType
+from typing import Any, get_args, get_origin, get_type_hints
 
 import numpy as np
 
@@ -94,6 +97,35 @@ class Belief:
         if then is None or now is None or not counts(then.oscillating_pct):
             return False
         return now.significance <= limits.calmed * then.significance
+
+
+def kept_as(belief: Belief) -> str:
+    """A belief as the store keeps it (JSON): what the belief of the next night goes on from."""
+    return json.dumps(asdict(belief), separators=(",", ":"))
+
+
+def belief_of(text: str) -> Belief:
+    """A belief as the store kept it; KeyError, TypeError or ValueError where another version wrote it."""
+    return _read_as(Belief, {"phases": []} | json.loads(text))  # type: ignore[no-any-return]
+
+
+_types = cache(get_type_hints)
+
+
+def _read_as(kind: Any, kept: Any) -> Any:
+    """What JSON kept of a value, as a value of its declared type again."""
+    if kind in (float, int, str, bool):
+        return kept
+    if hasattr(kind, "__dataclass_fields__"):
+        return kind(**{name: _read_as(of, kept[name]) for name, of in _types(kind).items()})
+    origin, of = get_origin(kind), get_args(kind)
+    if origin is UnionType:
+        return None if kept is None else _read_as(of[0], kept)
+    if origin is tuple:
+        return tuple(map(_read_as, repeat(of[0]) if of[-1] is ... else of, kept))
+    if origin is None:
+        return kind(kept)
+    return {_read_as(of[0], k): _read_as(of[1], v) for k, v in kept.items()}
 
 
 def step(before: Belief | None, row: Row, repaired_s: Sequence[float], limits: BeliefLimits) -> Belief | None:

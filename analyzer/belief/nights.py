@@ -8,11 +8,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from analyzer.belief.belief import Belief, step
+from analyzer.belief.belief import Belief, belief_of, kept_as, step
 from analyzer.belief.phases import growth
 from analyzer.belief.pool import Pool
 from analyzer.belief.remedy import HeldPair
-from analyzer.belief.state import belief_of, kept_as
 from analyzer.belief.wear import Wear, wear
 from analyzer.columns import BELIEFS, row_of
 from analyzer.config import Config

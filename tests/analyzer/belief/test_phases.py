@@ -8,9 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from analyzer.belief.belief import Belief
+from analyzer.belief.belief import Belief, belief_of, kept_as
 from analyzer.belief.phases import PhaseKnown, forgotten, growth, with_night
-from analyzer.belief.state import belief_of, kept_as
 from analyzer.config import WearLimits
 
 LIMITS, HOUR = WearLimits(), 3600.0
