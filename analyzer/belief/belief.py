@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import cache
 from itertools import repeat
+from operator import attrgetter
 from types import UnionType
 from typing import Any, get_args, get_origin, get_type_hints
 
@@ -37,6 +38,9 @@ OF_VALVE = ("width", "slip_jump")
 """Those of them that a repair changes."""
 FIRST = (Action.CHECK_MEASUREMENT, Action.CHECK_SETTINGS)
 """What is told in the night that finds it: no settings of other nights hold where these are not known."""
+
+GIST = attrgetter("cause", "fault", "action", "source")
+"""What makes a difference between what two tell."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -251,13 +255,7 @@ def tell(now: Belief, row: Row, limits: BeliefLimits) -> Told:
         told = _of_cycle(now, own, limits) if cycles else _of_calm(now, own, limits)
     if cycles and told.cause is Cause.VALVE and now.is_calmed(limits):
         told = _left_alone(told)
-    same = (told.cause, told.fault, told.action, told.source) == (
-        own.cause,
-        own.fault,
-        own.action,
-        own.source,
-    )
-    return replace(told, own=same)
+    return replace(told, own=GIST(told) == GIST(own))
 
 
 def _left_alone(told: Told) -> Told:

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 from analyzer.belief.belief import Belief, belief_of, kept_as, step
@@ -25,43 +24,16 @@ from analyzer.words import belief as words
 from identification.errors import InputError
 
 Row = Mapping[str, Any]
+Followed = tuple[str, Sequence[Row], Sequence[str]]
+"""A night, the rows of its beliefs, and sentences on loops of which they failed."""
 READ = (
-    *(
-        "loop",
-        "night",
-        "status",
-        "start_s",
-        "duration_s",
-        "kp",
-        "ti",
-        "form",
-        "gain_unit",
-        "ti_unit",
-        "op_unit",
-    ),
-    *(
-        "oscillation_significance",
-        "oscillating_pct",
-        "period_s",
-        "cause",
-        "valve_fault",
-        "source_loop",
-        "master",
-        "lack",
-    ),
-    *(f"osc_{c}_pct" for c in CAUSES),
+    *("loop", "night", "status", "start_s", "duration_s"),
+    *("kp", "ti", "form", "gain_unit", "ti_unit", "op_unit"),
+    *("oscillation_significance", "oscillating_pct", "period_s", "cause", "valve_fault", "source_loop"),
+    *("master", "lack", *(f"osc_{c}_pct" for c in CAUSES)),
     *("action", "due", "kp_new", "ti_new", "advice", "expected_period_s", "expected_pv_amplitude_pct"),
-    *(
-        "lanes",
-        "reason",
-        "straight_pct",
-        "witness",
-        "evidence",
-        "settings_changed",
-        "backlash_pct",
-        "stickband_pct",
-        "slip_jump_pct",
-    ),
+    *("lanes", "reason", "straight_pct", "witness", "evidence", "settings_changed"),
+    *("backlash_pct", "stickband_pct", "slip_jump_pct"),
     *("phases", "pv_lo", "pv_hi", "pv_unit", "timezone"),
 )
 """What beliefs follow from."""
@@ -74,9 +46,8 @@ def settle(store: Store, night: str, config: Config) -> list[str]:
     lacking = [n for n in names if not store.file("beliefs", n).exists()]
     first = min([night, *lacking])
     earlier = [n for n in names if n < first]
-    try:
-        known = read(store, earlier[-1]) if earlier else {}
-    except (InputError, KeyError, TypeError, ValueError):  # damaged, or of another version
+    known = read(store, earlier[-1]) if earlier else {}
+    if known is None:
         return settle_anew(store, config)
     return _written(store, _followed(store, [n for n in names if n >= first], known, config))
 
@@ -84,12 +55,7 @@ def settle(store: Store, night: str, config: Config) -> list[str]:
 def held_pairs(store: Store, night: str) -> dict[str, HeldPair]:
     """Settings that are told of loops before a night; none where the store has no beliefs before it."""
     earlier = [n for n in store.nights() if n < night]
-    if not earlier or not store.file("beliefs", earlier[-1]).exists():
-        return {}
-    try:
-        known = read(store, earlier[-1])
-    except (InputError, KeyError, TypeError, ValueError):
-        return {}
+    known = (read(store, earlier[-1]) if earlier else None) or {}
     held = {loop: (b.told.pair, b) for loop, b in known.items()}
     return {k: HeldPair(pair.kp, pair.ti, (b.kp, b.ti)) for k, (pair, b) in held.items() if pair is not None}
 
@@ -111,50 +77,39 @@ def unfounded(store: Store, config: Config) -> list[Problem]:
     except InputError:
         return []
     remedy = "'triage store beliefs' makes them anew"
-    paths = [store.file("beliefs", f.night) for f in followed if not _same(store, f)]
+    paths = [store.file("beliefs", night) for night, rows, _ in followed if not _same(store, night, rows)]
     return [Problem(f"{path}: not what the nights say", remedy) for path in paths]
-
-
-@dataclass(frozen=True, slots=True)
-class Followed:
-    """A night, the rows of its beliefs, and sentences on loops of which they failed."""
-
-    night: str
-    rows: Sequence[Row]
-    lost: Sequence[str]
 
 
 def _written(store: Store, followed: Iterator[Followed]) -> list[str]:
     lost: list[str] = []
-    for f in followed:
-        store.write("beliefs", f.night, rows_table(f.rows, BELIEFS))
-        lost += f.lost
+    for night, rows, more in followed:
+        store.write("beliefs", night, rows_table(rows, BELIEFS))
+        lost += more
     return lost
 
 
-def _same(store: Store, followed: Followed) -> bool:
+def _same(store: Store, night: str, rows: Sequence[Row]) -> bool:
     try:
-        held = store.read_if_there("beliefs", followed.night)
+        held = store.read_if_there("beliefs", night)
     except InputError:
         return False
     kept = [] if held is None else held.to_pylist()
-    return {r["loop"]: r for r in kept} == {r["loop"]: row_of(r, BELIEFS) for r in followed.rows}
+    return {r["loop"]: r for r in kept} == {r["loop"]: row_of(r, BELIEFS) for r in rows}
 
 
-def read(store: Store, night: str) -> dict[str, Belief]:
-    """The beliefs of a night by loop; errors as of `belief_of` and `Store.read`."""
-    table = store.read("beliefs", night, ["loop", "state"])
-    return {r["loop"]: belief_of(r["state"]) for r in table.to_pylist()}
+def read(store: Store, night: str) -> dict[str, Belief] | None:
+    """The beliefs of a night by loop; None where there are none that this version can read."""
+    try:
+        rows = store.read("beliefs", night, ["loop", "state"]).to_pylist()
+        return {r["loop"]: belief_of(r["state"]) for r in rows}
+    except (InputError, KeyError, TypeError, ValueError):  # damaged, or of another version
+        return None
 
 
 def _of_pruned(store: Store, names: Sequence[str]) -> dict[str, Belief]:
     """What the oldest night of a store knew of nights before it, which have been deleted."""
-    if not names or not store.file("beliefs", names[0]).exists():
-        return {}
-    try:
-        known = read(store, names[0])
-    except (InputError, KeyError, TypeError, ValueError):
-        return {}
+    known = (read(store, names[0]) if names else None) or {}
     return {k: b for k, b in known.items() if min(b.valve.since or names[0], b.cycle.since) < names[0]}
 
 
@@ -169,24 +124,20 @@ def _followed(
         out, lost = [], []
         for loop in (*rows, *(k for k in beliefs if k not in rows)):
             before, row = beliefs.get(loop), rows.get(loop)
+            known_already = (
+                before is not None and before.night >= name
+            )  # to a store whose first nights are pruned
             try:
-                now = _after(before, row, name, repaired.get(loop, ()), config)
+                if row is None or known_already:
+                    now = before
+                else:
+                    now = step(before, row, repaired.get(loop, ()), config.belief)
                 if now is not None:
                     out.append(_row(before, now, row, name, config))
                     beliefs[loop] = now
             except Exception as error:  # a belief that fails is that loop's alone, and never the night's end
                 lost.append(f"{loop}: no belief of night {name} ({type(error).__name__}: {error})")
-        yield Followed(name, out, lost)
-
-
-def _after(
-    before: Belief | None, row: Row | None, night: str, repaired: Sequence[float], config: Config
-) -> Belief | None:
-    """The belief after a night; as it was where the night has no row, or where it is what a pruned store knew of its
-    oldest night."""
-    if row is None or (before is not None and before.night >= night):
-        return before
-    return step(before, row, repaired, config.belief)
+        yield name, out, lost
 
 
 def repairs(own: Sequence[Note]) -> list[float]:

@@ -7,7 +7,7 @@ and the pooled value is known no better than it allows. Sums are kept, not night
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 from identification.estimation.covariance import NINETY, WIDER
 
@@ -42,15 +42,7 @@ class Pool:
 
     def faded(self, share: float) -> Pool:
         """The same as it counts some nights later."""
-        return Pool(
-            share * self.count,
-            share * self.total,
-            share * self.weight,
-            share * self.first,
-            share * self.second,
-            share * self.squares,
-            self.sign,
-        )
+        return Pool(**{name: share * x for name, x in asdict(self).items()} | {"sign": self.sign})
 
     def plus(self, value: float, deviation: float, least: float) -> Pool:
         """With one night more: its value and the standard deviation of its logarithm, no less than `least`."""
