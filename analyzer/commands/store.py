@@ -63,9 +63,7 @@ def check(path: Path, config: Path | None) -> None:
     for problem in (*store_care.problems(kept), *unfounded(kept, limits)):
         found += 1
         click.echo(f"{problem.seen}: {problem.remedy}")
-    held = store_care.sizes(kept)
-    size = f"{held.nights} nights, {held.tables} tables, {held.bytes / 1e6:.1f} MB"
-    click.echo(f"{path}: {size}; " + (f"{found} to look at" if found else "all whole"))
+    click.echo(f"{path}: {store_care.size_text(kept)}; " + (f"{found} to look at" if found else "all whole"))
     sys.exit(SOME_LOST if found else 0)
 
 

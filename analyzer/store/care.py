@@ -28,20 +28,11 @@ class Problem:
     remedy: str
 
 
-@dataclass(frozen=True, slots=True)
-class Sizes:
-    """What a store holds: nights, tables, and bytes in all."""
-
-    nights: int
-    tables: int
-    bytes: int
-
-
-def sizes(store: Store) -> Sizes:
-    """What a store holds."""
+def size_text(store: Store) -> str:
+    """What a store holds: nights, tables, and megabytes in all."""
     tables = sum(len(list((store.path / t.name).glob("*.parquet"))) for t in KEPT)
     total = sum(p.stat().st_size for p in store.path.rglob("*") if p.is_file())
-    return Sizes(len(store.nights()), tables, total)
+    return f"{len(store.nights())} nights, {tables} tables, {total / 1e6:.1f} MB"
 
 
 def problems(store: Store) -> Iterator[Problem]:

@@ -16,7 +16,7 @@ from __future__ import annotations
 import contextlib
 import json
 import secrets
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Sequence
 from contextlib import nullcontext
 from datetime import date
 from pathlib import Path
@@ -88,11 +88,10 @@ class Store:
             raise InputError(f"{self.path}: {seen}", "a store", MAKE_ONE)
         return nights[-1]
 
-    def read(self, table: str, night: str, columns: Sequence[str] | None = None, **where: str) -> pa.Table:
-        """One night of one table; `where` filters on equality (loop="...")."""
-        filters = [(k, "=", v) for k, v in where.items()] or None
+    def read(self, table: str, night: str, columns: Sequence[str] | None = None) -> pa.Table:
+        """One night of one table, or some of its columns."""
         try:
-            return read_stored(self.file(table, night), columns, filters)
+            return read_stored(self.file(table, night), columns)
         except FileNotFoundError as error:
             known = ", ".join(self.nights()[-3:]) or "none"
             raise InputError(
@@ -116,11 +115,17 @@ class Store:
         self, table: str, night: str, columns: Sequence[str], loops: Collection[str] | None = None
     ) -> list[dict[str, Any]]:
         """Rows of one night, of some loops or of all, as they are told: in the table of nights with what rests on all
-        nights as beliefs have it. Columns that are not known are None."""
-        if table != "nights":
+        nights as beliefs have it, where there are any that tell something of the loop. Columns that are not known are
+        None."""
+        resting = [c.name for c in (*RESTING, *BELIEVED) if c.name in columns]
+        if table != "nights" or not resting or not self.file("beliefs", night).exists():
             return self.own_rows(table, night, columns, loops)
-        found = self._believed(night, self.own_rows(table, night, [*columns, "loop"], loops), columns)
-        return [{c: row[c] for c in columns} for row in found]
+        wanted = ["loop", "cause", *(c for c in resting if c != "cause")]
+        told = self.own_rows("beliefs", night, wanted)
+        by_loop = {r["loop"]: {c: r[c] for c in resting} for r in told if r["cause"] is not None}
+        alone = self.own_rows(table, night, [*columns, "loop"], loops)
+        rows = [row | by_loop.get(row["loop"], {}) for row in alone]
+        return [{c: row[c] for c in columns} for row in rows]
 
     def own_rows(
         self, table: str, night: str, columns: Sequence[str], loops: Collection[str] | None = None
@@ -131,22 +136,12 @@ class Store:
         found = read_stored(self.file(table, night), [c for c in columns if c in names], where)
         return [{**dict.fromkeys(columns), **row} for row in found.to_pylist()]
 
-    def _believed(
-        self, night: str, rows: list[dict[str, Any]], columns: Sequence[str]
-    ) -> list[dict[str, Any]]:
-        """Rows of a night with what rests on all nights; as they are where the store has no beliefs of the
-        night, or the night has told nothing of a loop."""
-        resting = [c.name for c in (*RESTING, *BELIEVED) if c.name in columns]
-        if not resting or not self.file("beliefs", night).exists():
-            return rows
-        wanted = ["loop", "cause", *(c for c in resting if c != "cause")]
-        told = self.own_rows("beliefs", night, wanted)
-        by_loop = {r["loop"]: {c: r[c] for c in resting} for r in told if r["cause"] is not None}
-        return [{**row, **by_loop.get(row["loop"], {})} for row in rows]
-
     def read_if_there(self, table: str, night: str) -> pa.Table | None:
         """One night of one table, None where the store has none."""
-        return _if_there(self.file(table, night))
+        try:
+            return read_stored(self.file(table, night))
+        except FileNotFoundError:
+            return None
 
     def write(self, table: str, night: str, rows: pa.Table | None) -> None:
         """Keep one night of one table; where there are no rows, keep none."""
@@ -202,8 +197,10 @@ class Store:
 
     def read_parts(self, night: str, table: str, keys: Sequence[str]) -> pa.Table | None:
         """The pieces of one table of a night that some chunks have written, None where there are none."""
-        pieces = (_if_there(self.part(night, table, key)) for key in keys)
-        found = [piece for piece in pieces if piece is not None]
+        found = []
+        for key in keys:
+            with contextlib.suppress(FileNotFoundError):
+                found.append(read_stored(self.part(night, table, key)))
         return pa.concat_tables(found) if found else None
 
     def drop_parts(self) -> None:
@@ -257,29 +254,18 @@ class Store:
             The store is of a newer version.
         """
         self.require_known()
-        changed = sum(self._filled()) if self.version() < SCHEMA else 0
-        path = self.path / VERSION_FILE
-        if self.version() < SCHEMA or not path.exists():
+        path, old, changed = self.path / VERSION_FILE, self.version() < SCHEMA, 0
+        for table in sorted((self.path / "nights").glob("*.parquet")) if old else ():
+            with contextlib.suppress(InputError):  # a damaged table stays for `store check` to name
+                held = set(stored_names(table))
+                lacking = [c for c in NIGHTS if c.name not in held]
+                if lacking:
+                    write_table(with_empty(read_stored(table), lacking), table)
+                    changed += 1
+        if old or not path.exists():
             with whole_file(path, kept=True) as temporary:
                 temporary.write_text(json.dumps({"schema": SCHEMA}) + "\n", encoding="utf-8")
         return changed
-
-    def _filled(self) -> Iterator[bool]:
-        """Add what tables of nights lack; whether each lacked something."""
-        for path in sorted((self.path / "nights").glob("*.parquet")):
-            with contextlib.suppress(InputError):  # a damaged table stays for `store check` to name
-                held = set(stored_names(path))
-                lacking = [c for c in NIGHTS if c.name not in held]
-                if lacking:
-                    write_table(with_empty(read_stored(path), lacking), path)
-                yield bool(lacking)
-
-
-def _if_there(path: Path) -> pa.Table | None:
-    try:
-        return read_stored(path)
-    except FileNotFoundError:
-        return None
 
 
 def _stated(path: Path) -> int:

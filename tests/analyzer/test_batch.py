@@ -215,7 +215,7 @@ def test_two_weeks_are_fourteen_nights(tmp_path):
     assert store.nights() == [f"2026-03-{day:02d}" for day in range(2, 16)]
     for night in store.nights():
         assert store.read("nights", night).num_rows == 2
-        hours = store.read("hours", night, ["hour_s"], loop="L0").column("hour_s").to_pylist()
+        hours = [r["hour_s"] for r in store.rows("hours", night, ["hour_s"], ["L0"])]
         assert len(hours) == 24
         assert len({h // DAY for h in hours}) == 1
 
