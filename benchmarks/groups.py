@@ -20,8 +20,8 @@ import pyarrow.parquet as pq
 
 from analyzer.config import PlantLimits
 from analyzer.loop.decisions import Cause
+from analyzer.plantwide.night import trace
 from analyzer.plantwide.source import Peer
-from analyzer.plantwide.verdict import trace
 from analyzer.plantwide.wave import BESIDE, REACH, Wave, waves_in, waves_table
 from proofs.common import command, parser_of, publish, table
 

@@ -22,8 +22,7 @@ from analyzer.loop.judged_stretch import differing
 from analyzer.loop.oscillation import barely_seen, counting, detect
 from analyzer.loop.quality import prepare
 from analyzer.loops.changes import behaviour_change
-from analyzer.plantwide.night import likely, swing_of
-from analyzer.plantwide.verdict import follower_confidence, followers_of, trace
+from analyzer.plantwide.night import follower_confidence, followers_of, likely, swing_of, trace
 from analyzer.plantwide.wave import waves_of
 from identification.models import Backlash, Fopdt, Loop, Pid, Stiction
 from identification.record import LoopRecord

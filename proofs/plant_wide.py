@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from multiprocessing import Pool
 from pathlib import Path
 from typing import Any
@@ -24,7 +24,7 @@ from analyzer.loop.decisions import Action, Cause, counts
 from analyzer.loop.finding import Finding
 from analyzer.loops.spec import LoopSpec
 from analyzer.night.chunk import assess_loop
-from analyzer.plantwide.night import TracedNight, traced_night
+from analyzer.plantwide.night import traced_night
 from analyzer.store.rows import night_row
 from identification.errors import TriageError
 from proofs.common import parser_of
@@ -75,12 +75,17 @@ def reached(truth: Mapping[str, Truth]) -> dict[str, set[str]]:
     return out
 
 
-def scored(drawn: Drawn, known: Mapping[str, Finding], found: TracedNight) -> Counter[str]:
+def scored(
+    drawn: Drawn,
+    known: Mapping[str, Finding],
+    traced: Mapping[str, Finding],
+    shared: Sequence[Mapping[str, Any]],
+) -> Counter[str]:
     """Counts of what was right on one plant."""
     truth, k = drawn.truth, Counter[str]()
-    rows, after = ({n: night_row(f) for n, f in loops.items()} for loops in (known, found.loops))
+    rows, after = ({n: night_row(f) for n, f in loops.items()} for loops in (known, traced))
     groups: dict[str, list[Mapping[str, Any]]] = {}
-    for row in found.groups:
+    for row in shared:
         groups.setdefault(row["group"], []).append(row)
     members = [{r["loop"] for r in g} for g in groups.values()]
     ranks = [[r["loop"] for r in sorted(g, key=lambda r: -r["source_pct"])] for g in groups.values()]
@@ -129,8 +134,7 @@ def plant(job: tuple[int, int | None, float | None]) -> Counter[str]:
     alone = {name: finding for name, (finding, _) in known.items()}
     waves = [w for _, own in known.values() for w in own]
     begun = time.perf_counter()
-    found = traced_night(alone, waves, config.plant)
-    k = scored(drawn, alone, found)
+    k = scored(drawn, alone, *traced_night(alone, waves, config.plant))
     k["loops"], k["plants"] = len(drawn.loops), 1
     k["milliseconds"] = round(1000 * (time.perf_counter() - begun))
     return k

@@ -10,8 +10,8 @@ from typing import Any
 from analyzer.config import PlantLimits
 from analyzer.loop.decisions import Action, Cause, Due, GroupRole, Status
 from analyzer.loop.finding import Finding, Remedy, Root, Sign, following
+from analyzer.plantwide.night import follower_confidence
 from analyzer.plantwide.structure import Link, Tie
-from analyzer.plantwide.verdict import follower_confidence
 from analyzer.words.reason import above_text, below_first, below_text, halves_apart
 
 COLUMN = {Tie.MASTER: "master", Tie.SPLIT: "split_of", Tie.RATIO: "ratio_of"}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -72,20 +72,19 @@ def _on_span(wave: Wave, span: Span) -> Wave | None:
 class Lags:
     """How much later each of some loops is than each other one; a pair is compared once."""
 
-    def __init__(self, waves: Iterable[Wave]) -> None:
-        self.waves = {w.loop: w for w in waves}
+    def __init__(self, waves: Mapping[str, Wave]) -> None:
+        self.waves = waves
         self._known: dict[tuple[str, str], Delay] = {}
 
     def between(self, one: str, other: str) -> Delay:
         """How much later the second loop's wave is than the first one's."""
         pair = one, other
         if pair not in self._known:
-            self._known[pair] = lag_between(self.waves[one], self.waves[other])
+            self._known[pair] = _lag(self.waves[one], self.waves[other])
         return self._known[pair]
 
 
-def lag_between(one: Wave, other: Wave) -> Delay:
-    """How much later a second wave is than a first one of the same clock."""
+def _lag(one: Wave, other: Wave) -> Delay:
     low, high, _ = band(one.line)
     low = max(low, one.first + 1, other.first + 1)
     high = min(high, one.first + one.lines.size - 1, other.first + other.lines.size - 1)

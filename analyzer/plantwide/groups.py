@@ -8,7 +8,7 @@ groups.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,41 +30,34 @@ SHIFTS = 12
 
 
 @dataclass(frozen=True, slots=True)
-class Member:
-    """A loop in a group: its wave and the coherence with the wave that leads [-]."""
-
-    wave: Wave
-    coherence: float
-
-
-@dataclass(frozen=True, slots=True)
 class Group:
-    """Loops that share an oscillation; the first member's wave leads, the others follow by their coherence."""
+    """Loops that share an oscillation, each with its wave and its coherence with the wave that leads [-]; the first
+    one's leads, the others follow by their coherence."""
 
-    members: tuple[Member, ...]
+    waves: Mapping[str, Wave]
+    coherence: Mapping[str, float]
 
     @property
     def period_s(self) -> float:
         """Its period [s]."""
-        return self.members[0].wave.period_s
+        return next(iter(self.waves.values())).period_s
 
     @property
     def loops(self) -> tuple[str, ...]:
         """Names of its loops."""
-        return tuple(m.wave.loop for m in self.members)
-
-    @property
-    def waves(self) -> dict[str, Wave]:
-        """The waves of its loops by name."""
-        return {m.wave.loop: m.wave for m in self.members}
+        return tuple(self.waves)
 
     def shared(self, other: Group) -> int:
         """How many loops it has in common with another."""
-        return len(set(self.loops) & set(other.loops))
+        return len(self.waves.keys() & other.waves.keys())
 
-    def with_lacking(self, more: Iterable[Member]) -> Group:
-        """The group with those of some members whose loops it lacks."""
-        return Group((*self.members, *(m for m in more if m.wave.loop not in self.loops)))
+    def with_lacking(self, waves: Mapping[str, Wave], coherence: Mapping[str, float]) -> Group:
+        """The group with those of some loops that it lacks."""
+        lacking = [loop for loop in waves if loop not in self.waves]
+        return Group(
+            {**self.waves, **{loop: waves[loop] for loop in lacking}},
+            {**self.coherence, **{loop: coherence[loop] for loop in lacking}},
+        )
 
 
 class _Neighbours:
@@ -171,7 +164,7 @@ def groups_of(waves: Sequence[Wave], limits: PlantLimits) -> list[Group]:
         return []
     beside = _Neighbours(known, limits)
     merged = (_with_foresight(g, beside, limits) for g in _merged(_led(beside, limits), limits))
-    return sorted(merged, key=lambda g: (-len(g.members), g.loops))
+    return sorted(merged, key=lambda g: (-len(g.waves), g.loops))
 
 
 def _shows(wave: Wave, limits: PlantLimits) -> bool:
@@ -189,27 +182,30 @@ def _led(beside: _Neighbours, limits: PlantLimits) -> list[Group]:
         if i in taken:
             continue
         levels = {i: 1.0} | beside.moving_with(i) | beside.second_ring(i)
-        members = tuple(Member(beside.waves[j], level) for j, level in levels.items())
-        if len(members) > 1 and _is_wave(members, limits):
+        waves = [beside.waves[j] for j in levels]
+        if len(waves) > 1 and _is_wave(waves, limits):
             taken.update(levels)
-            found.append(Group(members))
+            names = [w.loop for w in waves]
+            found.append(
+                Group(dict(zip(names, waves, strict=True)), dict(zip(names, levels.values(), strict=True)))
+            )
     return found
 
 
-def _is_wave(members: Sequence[Member], limits: PlantLimits) -> bool:
+def _is_wave(waves: Sequence[Wave], limits: PlantLimits) -> bool:
     """Whether it is an oscillation at all that loops share, and not the load of neighbours: one of them shows it by
     itself, or several hint at it."""
-    hints = sum(m.wave.prominence >= limits.hint_prominence for m in members)
-    return hints >= limits.hints or any(m.wave.own for m in members)
+    hints = sum(w.prominence >= limits.hint_prominence for w in waves)
+    return hints >= limits.hints or any(w.own for w in waves)
 
 
 def _merged(groups: Sequence[Group], limits: PlantLimits) -> list[Group]:
     """Groups of one period that share most of their loops as one, and groups at harmonics of others within those."""
     kept: list[Group] = []
-    for group in sorted(groups, key=lambda g: (-g.period_s, -len(g.members))):
+    for group in sorted(groups, key=lambda g: (-g.period_s, -len(g.waves))):
         for k, other in enumerate(kept):
             if _is_same(group, other, limits) or _is_harmonic(group, other, limits):
-                kept[k] = other.with_lacking(group.members)
+                kept[k] = other.with_lacking(group.waves, group.coherence)
                 break
         else:
             kept.append(group)
@@ -220,7 +216,7 @@ def _is_same(one: Group, other: Group, limits: PlantLimits) -> bool:
     """Whether two groups have one period and most of the smaller one's loops in common."""
     if abs(math.log(one.period_s / other.period_s)) > limits.same_period:
         return False
-    return 2 * one.shared(other) > min(len(one.loops), len(other.loops))
+    return 2 * one.shared(other) > min(len(one.waves), len(other.waves))
 
 
 def _is_harmonic(one: Group, other: Group, limits: PlantLimits) -> bool:
@@ -228,21 +224,19 @@ def _is_harmonic(one: Group, other: Group, limits: PlantLimits) -> bool:
     ratio = other.period_s / one.period_s
     if round(ratio) < 2 or abs(math.log(ratio / round(ratio))) > HARMONIC:
         return False
-    tied = {m.wave.loop for m in one.members if m.wave.harmonic == round(ratio)}
-    return bool(tied & set(other.loops))
+    return any(w.harmonic == round(ratio) and loop in other.waves for loop, w in one.waves.items())
 
 
 def _with_foresight(group: Group, beside: _Neighbours, limits: PlantLimits) -> Group:
     """A group with loops that move with it too loosely to be coherent, and yet foresee it: a source that sticks and
     slips without a rhythm moves others by what of it their filters let through."""
-    inside = group.waves
-    clearest = sorted(inside.values(), key=lambda w: -w.prominence)[:HEARD]
+    clearest = sorted(group.waves.values(), key=lambda w: -w.prominence)[:HEARD]
     best: dict[str, tuple[float, Wave]] = {}
-    for k in beside.near(group.members[0].wave.line, limits.near_period):
+    for k in beside.near(next(iter(group.waves.values())).line, limits.near_period):
         wave = beside.waves[k]
-        if wave.loop in inside or wave.harmonic != 1 or not _shows(wave, limits):
+        if wave.loop in group.waves or wave.harmonic != 1 or not _shows(wave, limits):
             continue
         level = foresight(wave, clearest)
         if level >= limits.foresight and level > best.get(wave.loop, (0.0, wave))[0]:
             best[wave.loop] = level, wave
-    return group.with_lacking(Member(wave, 0.0) for _, wave in best.values())
+    return group.with_lacking({loop: wave for loop, (_, wave) in best.items()}, dict.fromkeys(best, 0.0))

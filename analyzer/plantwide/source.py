@@ -33,14 +33,12 @@ SURE = 3.0
 class Peer:
     """What a loop's own verdict says when sources are looked for.
 
-    cause; evidence [nat] of its valve fault; tuning_pct, confidence of its tuning [%]; master, the loop whose OP is
-    its set point, empty where none is stated.
+    cause; evidence [nat] of its valve fault; tuning_pct, confidence of its tuning [%].
     """
 
     cause: Cause
     evidence: float = 0.0
     tuning_pct: float = 0.0
-    master: str = ""
 
 
 @dataclass(frozen=True, slots=True)

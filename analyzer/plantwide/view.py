@@ -13,21 +13,9 @@ from analyzer.store.table import no_column
 
 Row = Mapping[str, Any]
 OF_LOOPS = (
-    *(
-        "loop",
-        "cause",
-        "valve_fault",
-        "action",
-        "kp_new",
-        "ti_new",
-        "kp",
-        "ti",
-        "form",
-        "gain_unit",
-        "ti_unit",
-    ),
-    *("pv_unit", "op_unit", "description", "area", "master", "spectrum", "average_absolute_error_pct"),
-    "start_s",
+    *("loop", "cause", "valve_fault", "action", "kp_new", "ti_new", "kp", "ti", "form", "gain_unit"),
+    *("ti_unit", "pv_unit", "op_unit", "description", "area", "master", "spectrum", "start_s"),
+    "average_absolute_error_pct",
 )
 """What is read of the rows of the night."""
 ALWAYS = ("loop", "group", "role", "source_pct", "coherence", "group_period_s")

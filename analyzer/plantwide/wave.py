@@ -105,40 +105,31 @@ def _thinned(error: Floats, dt_s: float, start_s: float, period_s: float) -> tup
     return few * dt_s, (begin + skip) // few + count - means.size, means.astype(np.float32)
 
 
-@dataclass(frozen=True, slots=True)
-class _Source:
-    """What the waves of one loop are cut from: its spectrum, the power of each line, its error over time."""
-
-    loop: str
-    spectrum: Spectrum
-    start_s: float
-    power: Floats
-    error: Floats
-
-
-def _cut(of: _Source, period_s: float, harmonic: int, own: bool) -> Wave | None:
-    """The wave about one period, None where the spectrum does not hold enough of it."""
-    s = of.spectrum
+def _cut(
+    s: Spectrum, loop: str, start_s: float, error: Floats, period_s: float, harmonic: int, own: bool
+) -> Wave | None:
+    """The wave about one period of a loop's error, None where the spectrum does not hold enough of it."""
+    power = s.lines.real**2 + s.lines.imag**2
     line = s.duration_s / period_s
     low = max(math.floor(line / REACH) - BESIDE, 0)
     high = min(math.ceil(line * REACH) + BESIDE, s.lines.size - 1)
     if line * 1.1 > s.lines.size - 1 or high - low < 2 * BESIDE:
         return None
     near = slice(math.floor(line / APART), math.ceil(line * APART) + 1)
-    above = float(of.power[max(math.ceil(line / (2 * APART)), 1) :].sum())
+    above = float(power[max(math.ceil(line / (2 * APART)), 1) :].sum())
     return Wave(
-        of.loop,
+        loop,
         period_s,
         harmonic,
         own,
-        of.start_s,
+        start_s,
         s.duration_s,
         low,
-        peak_prominence(of.power, line),
-        float(of.power[near].sum()) / above if above > 0 else 0.0,
+        peak_prominence(power, line),
+        float(power[near].sum()) / above if above > 0 else 0.0,
         math.hypot(*(locked_harmonic(s, period_s, m) for m in HARMONICS)),
         (s.lines[low : high + 1] * (2.0 / s.n)).astype(np.complex64),
-        *_thinned(of.error, s.dt_s, of.start_s, period_s),
+        *_thinned(error, s.dt_s, start_s, period_s),
     )
 
 
@@ -169,9 +160,8 @@ def waves_of(loop: str, found: Oscillations, end_s: float, limits: PlantLimits) 
             wanted.append((period, 1, False))
         if len(wanted) >= limits.waves:
             break
-    power = s.lines.real**2 + s.lines.imag**2
-    source = _Source(loop, s, end_s - s.duration_s, power, irfft(s.lines, s.n))
-    cut = (_cut(source, *asked) for asked in wanted)
+    error = irfft(s.lines, s.n)
+    cut = (_cut(s, loop, end_s - s.duration_s, error, *asked) for asked in wanted)
     return tuple(w for w in cut if w is not None)
 
 

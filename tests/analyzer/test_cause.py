@@ -12,8 +12,8 @@ from analyzer.loop.assess import Assessment, assess
 from analyzer.loop.cause import dead_valve, judge
 from analyzer.loop.decisions import Lack
 from analyzer.loop.quality import prepare
+from analyzer.plantwide.night import followers_of, trace
 from analyzer.plantwide.source import Peer
-from analyzer.plantwide.verdict import followers_of, trace
 from identification.errors import NotAssessedError
 from proofs.plant import CONFIG, START_S, Sketch, Trends, prepared, record, series, simulate, spec
 from proofs.untidy.recorder import swinging_door

@@ -14,7 +14,7 @@ from analyzer.loop.decisions import CAUSES, Action, Cause, Fault, Lack, LacksErr
 from analyzer.loop.finding import Finding, Remedy, Root, Sign, following
 from analyzer.night import chunk
 from analyzer.night.nights import Night
-from analyzer.plantwide.verdict import follower_confidence
+from analyzer.plantwide.night import follower_confidence
 from analyzer.store.rows import night_row
 from proofs.plant import CONFIG, START_S, series, spec
 

@@ -12,8 +12,8 @@ from scipy.signal import lfilter
 from analyzer.loop.decisions import Cause
 from analyzer.loop.oscillation import detect
 from analyzer.plantwide.groups import Group, groups_of
+from analyzer.plantwide.night import Traced, followers_of, may_follow, trace
 from analyzer.plantwide.source import Peer
-from analyzer.plantwide.verdict import Traced, followers_of, may_follow, trace
 from analyzer.plantwide.wave import Wave, waves_in, waves_of, waves_table
 from proofs.plant import CONFIG, START_S, record
 
