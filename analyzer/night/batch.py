@@ -26,7 +26,7 @@ from analyzer.night.cluster import Cluster
 from analyzer.night.finish import finish_night, is_empty
 from analyzer.night.nights import Night, nights_of
 from analyzer.night.run_files import RunIdentity, identity, require_same, write_identity
-from analyzer.night.workers import Died, Executor, executor
+from analyzer.night.workers import Died, Here, Workers, executor
 from analyzer.store.lock import locked
 from analyzer.store.store import Store
 from analyzer.store.table import OF_A_NIGHT
@@ -106,9 +106,12 @@ def _tasks(batch: Batch, nights: Sequence[Night], known: set[str]) -> list[Task]
     ]
 
 
+_Workers = Cluster[Task, Done] | Here[Task, Done] | Workers[Task, Done]
+
+
 def _results(tasks: Sequence[Task], jobs: int, config: Config, scheduler: str | None) -> Iterator[Done]:
     """What the chunks give, on a cluster, on worker processes or, with no jobs, in this process, unprotected."""
-    workers: Executor[Task, Done]
+    workers: _Workers
     if scheduler is not None:
         workers = Cluster(scheduler, chunk.work)
     else:
@@ -123,7 +126,7 @@ def _results(tasks: Sequence[Task], jobs: int, config: Config, scheduler: str | 
                 yield result
 
 
-def _mourned(workers: Executor[Task, Done], died: Died[Task]) -> Iterator[Done]:
+def _mourned(workers: _Workers, died: Died[Task]) -> Iterator[Done]:
     """The loop that was in hand is tried once alone, then given up with the reason; others go to other workers. Where
     it is not known which it was, each is tried by itself."""
     task, at = died.task, died.at

@@ -78,7 +78,7 @@ def finish_night(
     other = [] if replace else _other_groups(store, night, fresh)
     first = 1 + max((int(r["group"]) for r in other), default=0)
     waves = waves_in(store.read_parts(night, "waves", keys))
-    traced, groups = traced_night(fresh, waves, config.plant, first)
+    traced, found = traced_night(fresh, waves, config.plant, first)
     links = links_of(moves_in(store.read_parts(night, "moves", keys)), config.plant)
     loops = linked(traced, links, config.plant)
     rows = {loop: night_row(in_lanes(found, config.lanes)) for loop, found in loops.items()}
@@ -88,7 +88,7 @@ def finish_night(
     joined = [old[k] if k in kept else rows[k] for k in order if k in rows] + [old[k] for k in beside]
     mine = [loop for loop in rows if loop not in kept]
     _join_others(store, night, keys, mine, replace)
-    groups = [*other, *led_anew(groups, loops)]
+    groups = [*other, *led_anew(found, loops)]
     store.write("groups", night, rows_table(groups, GROUPS) if groups else None)
     store.write("nights", night, rows_table(joined, NIGHTS))
     store.forget_explained(night, None if replace else mine)

@@ -1,4 +1,4 @@
-"""Who carries out tasks: this process, worker processes that may die, or a cluster (cluster.py), by one interface.
+"""Who carries out tasks, by one interface: this process, worker processes that may die, or a cluster (cluster.py).
 
 Each worker process has a pipe of its own, so that what kills one harms no other.
 
@@ -21,7 +21,7 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection, wait
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any, Generic, TypeVar
 
 from analyzer.config import WorkerLimits
 
@@ -53,29 +53,9 @@ class Died(Generic[T]):
     again: bool
 
 
-class Executor(Protocol[T, R]):
-    """Carries out one function on many tasks, for as long as it is entered."""
-
-    def __enter__(self) -> Executor[T, R]: ...
-
-    def __exit__(self, *_: object) -> None: ...
-
-    def submit(self, task: T, alone: bool = False) -> None:
-        """Add a task; those that are to run alone wait until nothing else does."""
-
-    def results(self) -> Iterator[R | Died[T]]:
-        """What comes back, as it comes, until no task is left; tasks may be added meanwhile.
-
-        Raises
-        ------
-        Exception
-            Whatever the function raised: an error of an item is the function's business.
-        """
-
-
 @dataclass(slots=True)
 class Here(Generic[T, R]):
-    """This process carries out the tasks, one after the other, unprotected."""
+    """This process carries out the tasks, one after the other, unprotected; used as `Workers` are."""
 
     function: Callable[[T], R]
     _waiting: deque[T] = field(default_factory=deque)
@@ -111,7 +91,7 @@ class _Worker:
 
 @dataclass(slots=True)
 class Workers(Generic[T, R]):
-    """Some processes that carry out one function on many tasks.
+    """Some processes that carry out one function on many tasks, for as long as they are entered.
 
     Parameters
     ----------
@@ -133,19 +113,6 @@ class Workers(Generic[T, R]):
         return self
 
     def __exit__(self, *_: object) -> None:
-        self.stop()
-
-    def submit(self, task: T, alone: bool = False) -> None:
-        """Add a task."""
-        (self._alone if alone else self._waiting).append(task)
-
-    def results(self) -> Iterator[R | Died[T]]:
-        """What comes back, as it comes."""
-        while self._waiting or self._alone or any(w.busy for w in self._workers):
-            self._feed()
-            yield from self._gathered()
-
-    def stop(self) -> None:
         """End all processes at once, whatever they are at."""
         for worker in self._workers:
             worker.process.kill()
@@ -153,6 +120,22 @@ class Workers(Generic[T, R]):
             worker.process.join()
             worker.pipe.close()
         self._workers.clear()
+
+    def submit(self, task: T, alone: bool = False) -> None:
+        """Add a task; those that are to run alone wait until nothing else does."""
+        (self._alone if alone else self._waiting).append(task)
+
+    def results(self) -> Iterator[R | Died[T]]:
+        """What comes back, as it comes, until no task is left; tasks may be added meanwhile.
+
+        Raises
+        ------
+        Exception
+            Whatever the function raised: an error of an item is the function's business.
+        """
+        while self._waiting or self._alone or any(w.busy for w in self._workers):
+            self._feed()
+            yield from self._gathered()
 
     def _feed(self) -> None:
         """Give each idle worker a task, and start workers where there are more tasks than idle ones."""
