@@ -26,7 +26,7 @@ import pyarrow as pa
 
 from analyzer.columns import BELIEVED, NIGHTS, RESTING
 from analyzer.places import answering, content, is_remote, remove_tree
-from analyzer.store.table import KEPT, read_stored, rows_of_loops, stored_names, with_empty, write_table
+from analyzer.store.table import KEPT, read_stored, rows_of_loops, rows_table, stored_names, write_table
 from identification.errors import InputError
 from reports.whole_file import whole_file
 
@@ -260,7 +260,8 @@ class Store:
                 held = set(stored_names(table))
                 lacking = [c for c in NIGHTS if c.name not in held]
                 if lacking:
-                    write_table(with_empty(read_stored(table), lacking), table)
+                    whole = [read_stored(table), rows_table((), lacking)]
+                    write_table(pa.concat_tables(whole, promote_options="default"), table)
                     changed += 1
         if old or not path.exists():
             with whole_file(path, kept=True) as temporary:

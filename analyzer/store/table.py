@@ -83,20 +83,8 @@ def rows_table(rows: Sequence[Mapping[str, Any]], columns: Sequence[Column]) -> 
     """
     for row in rows:
         require_declared(row, columns)
-    fields = [pa.field(c.name, _kind_of(c)) for c in columns]
-    arrays = [pa.array([row.get(f.name) for row in rows], type=f.type) for f in fields]
-    return pa.Table.from_arrays(arrays, schema=pa.schema(fields))
-
-
-def with_empty(table: pa.Table, columns: Sequence[Column]) -> pa.Table:
-    """A table with some columns more in which nothing is known."""
-    for c in columns:
-        table = table.append_column(c.name, pa.nulls(table.num_rows, _kind_of(c)))
-    return table
-
-
-def _kind_of(column: Column) -> pa.DataType:
-    return pa.float64() if column.is_number else pa.string()
+    schema = pa.schema([(c.name, pa.float64() if c.is_number else pa.string()) for c in columns])
+    return pa.Table.from_pylist(list(rows), schema=schema)
 
 
 def rows_of_loops(table: pa.Table, loops: Sequence[str], others: bool = False) -> pa.Table:
