@@ -50,15 +50,10 @@ def check(asked: Asked) -> None:
 
     Example: triage check export.csv --loops loops.csv
     """
-    from analyzer.loops.tags import no_loops
     from analyzer.night.check import check_lines
 
-    source, specs, notes = asked.opened()
     lost = 0
-    if not specs:
-        say("\n".join(line for line, _ in check_lines(source, specs, notes, asked.config, asked.within)))
-        raise no_loops(source.tags)
-    for line, bad in check_lines(source, specs, notes, asked.config, asked.within, asked.changes, asked.zone):
+    for line, bad in check_lines(asked):
         lost += bad
         say(line)
     sys.exit(SOME_LOST if lost else 0)

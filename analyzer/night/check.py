@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 
 from analyzer.config import Config
 from analyzer.history.export import Export
-from analyzer.history.plant_clock import UTC_NAME, stamp
-from analyzer.history.series import Series
+from analyzer.history.plant_clock import stamp
 from analyzer.loop.assess import hidden, unassessable
 from analyzer.loop.decisions import Needs
 from analyzer.loop.fitness import too_thin, unfit_for_cause, unfit_for_settings
@@ -16,10 +15,10 @@ from analyzer.loop.oscillation import detect
 from analyzer.loop.quality import Prepared, prepare
 from analyzer.loops.changes import TuningChange, in_force
 from analyzer.loops.spec import LoopSpec
+from analyzer.loops.tags import no_loops
+from analyzer.night.asked import Asked
 from identification.errors import TriageError
 
-Within = Callable[[Mapping[str, Series]], dict[str, Series]]
-"""Cuts samples to a span of time."""
 MOST_NAMES = 5
 """Loops that are named in a line."""
 
@@ -44,17 +43,17 @@ def _fit(lacking: Needs | None, spec: LoopSpec, prepared: Prepared, config: Conf
     return "fit for all questions" if unset is None else f"fit for all but new settings: {unset}"
 
 
-def loop_line(export: Export, spec: LoopSpec, config: Config, within: Within) -> tuple[str, bool]:
+def loop_line(export: Export, spec: LoopSpec, asked: Asked) -> tuple[str, bool]:
     """One loop's line, and whether it cannot be assessed."""
     if spec.pv is None:
         return f"{spec.loop}: no PV tag {spec.wanted_pv or spec.loop + '.PV'} in the export", True
     try:
-        prepared = prepare(spec, within(export.read(spec.tags)), config.quality)
+        prepared = prepare(spec, asked.within(export.read(spec.tags)), asked.config.quality)
     except TriageError as error:
         return f"{spec.loop}: {_tags(spec)}; fit for nothing: {error}", True
     record = prepared.record
-    lacking = unassessable(record, config)
-    fit = _fit(lacking, spec, prepared, config)
+    lacking = unassessable(record, asked.config)
+    fit = _fit(lacking, spec, prepared, asked.config)
     parts = [_tags(spec), f"{len(record)} samples every {record.dt_s:g} s", *prepared.notes, fit]
     return f"{spec.loop}: " + "; ".join(parts), lacking is not None
 
@@ -67,26 +66,27 @@ def _dated(changes: Sequence[TuningChange], specs: Sequence[LoopSpec]) -> str:
     return text + (f"; not of {', '.join(others[:MOST_NAMES])}" if others else "")
 
 
-def check_lines(
-    export: Export,
-    specs: Sequence[LoopSpec],
-    notes: Sequence[str],
-    config: Config,
-    within: Within,
-    changes: Sequence[TuningChange] = (),
-    zone: str = UTC_NAME,
-) -> Iterator[tuple[str, bool]]:
-    """All lines, each with whether a loop of it cannot be assessed."""
+def check_lines(asked: Asked) -> Iterator[tuple[str, bool]]:
+    """All lines on an export, each with whether a loop of it cannot be assessed.
+
+    Raises
+    ------
+    InputError
+        It cannot be used; once the lines on it are told, where it has no loops.
+    """
+    export, specs, notes = asked.opened()
     first, last = export.span()
-    span = f"{stamp(first, zone)} to {stamp(last, zone)} {zone}"
+    span = f"{stamp(first, asked.zone)} to {stamp(last, asked.zone)} {asked.zone}"
     yield f"{len(export.tags)} tags, {len(specs)} loops, {span}", False
     for note in notes:
         yield note, False
     if specs and specs[0].defaults:
         yield "assumed where loops.csv is silent: " + ", ".join(specs[0].defaults), False
-    if changes:
-        yield _dated(changes, specs), False
+    if specs and asked.changes:
+        yield _dated(asked.changes, specs), False
     for spec in specs:
-        yield loop_line(export, in_force(spec, changes, last), config, within)
+        yield loop_line(export, in_force(spec, asked.changes, last), asked)
     for note in export.notes:
         yield note, False
+    if not specs:
+        raise no_loops(export.tags)
