@@ -11,7 +11,7 @@ from analyzer.belief.belief import Belief, belief_of, kept_as, step
 from analyzer.belief.phases import growth
 from analyzer.belief.pool import Pool
 from analyzer.belief.remedy import HeldPair
-from analyzer.belief.wear import Wear, wear
+from analyzer.belief.wear import wear
 from analyzer.columns import BELIEFS, row_of
 from analyzer.config import Config
 from analyzer.loop.decisions import CAUSES, Lane
@@ -165,7 +165,7 @@ def _row(before: Belief | None, now: Belief, row: Row | None, night: str, config
         known |= {"width_pct": width.value, "width_low_pct": width.low, "width_high_pct": width.high}
     found = wear(now.widths, config.wear) if now.valve.certain else None
     if found is not None:
-        known |= _worn_by(found)
+        known |= found
     if row is None or now.night != night:
         return known
     grown = [(p, g) for p in now.phases if (g := growth(p, config.wear)) is not None]
@@ -176,18 +176,6 @@ def _row(before: Belief | None, now: Belief, row: Row | None, night: str, config
     lanes = ", ".join(filter(None, (row["lanes"], Lane.WEAR if found is not None else None)))
     told = words.told(now, row) | {"lanes": lanes or None}
     return known | told | {"news": text or None, "news_tone": tone or None}
-
-
-def _worn_by(found: Wear) -> dict[str, Any]:
-    return {
-        "wear_pct_per_month": found.per_month,
-        "wear_low_pct": found.low,
-        "wear_high_pct": found.high,
-        "wear_since": found.since,
-        "reaches_pct": found.reaches,
-        "reaches_from": found.earliest or None,
-        "reaches_by": found.latest or None,
-    }
 
 
 def _constants(pools: Mapping[str, Pool]) -> str:

@@ -10,8 +10,8 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass
 from datetime import date, timedelta
+from typing import Any
 
 import numpy as np
 
@@ -25,22 +25,7 @@ MONTH_D = 30.0
 """Days of a month, as speeds are told."""
 
 
-@dataclass(frozen=True, slots=True)
-class Wear:
-    """A valve that wears: the night from which its width grows, growth in thirty days with its 90 % interval [%
-    OP], the size that it will reach [% OP], and the days between which it does with 90 %; `latest` is '' where
-    that is not within sight."""
-
-    since: str
-    per_month: float
-    low: float
-    high: float
-    reaches: float
-    earliest: str = ""
-    latest: str = ""
-
-
-def wear(widths: Sequence[Width], limits: WearLimits) -> Wear | None:
+def wear(widths: Sequence[Width], limits: WearLimits) -> dict[str, Any] | None:
     """Whether a width grows, by the nights that tell it; None where it stays or too few do.
 
     Parameters
@@ -48,6 +33,12 @@ def wear(widths: Sequence[Width], limits: WearLimits) -> Wear | None:
     widths : sequence of Width
         Oldest first.
     limits : WearLimits
+
+    Returns
+    -------
+    dict or None
+        Columns of a belief: the night since which it grows, growth in thirty days with its 90 % interval [% OP], the
+        size that it will reach [% OP], and the days between which it does with 90 %, None where not within sight.
     """
     if len(widths) < limits.nights:
         return None
@@ -93,7 +84,7 @@ def _left(design: Floats, width: Floats, weight: Floats) -> tuple[float, Floats]
     return float((((width - design @ found) * weight) ** 2).sum()), found
 
 
-def _forecast(days: Floats, width: Floats, limits: WearLimits) -> Wear | None:
+def _forecast(days: Floats, width: Floats, limits: WearLimits) -> dict[str, Any] | None:
     """The trend of what grows, carried on until it reaches the next size."""
     from statsmodels.tsa.statespace.structural import UnobservedComponents
 
@@ -114,15 +105,19 @@ def _forecast(days: Floats, width: Floats, limits: WearLimits) -> Wear | None:
     now = float(fit.filtered_state[0, -1])
     size = limits.size if limits.size > now else 2.0 * now
     last = date.fromordinal(int(days[-1]))
-    since = date.fromordinal(int(days[0])).isoformat()
     half, around = NINETY * deviation, NINETY * error
-    earliest, latest = _first(mean + around, size, last), _first(mean - around, size, last)
-    return Wear(
-        since, MONTH_D * slope, MONTH_D * (slope - half), MONTH_D * (slope + half), size, earliest, latest
-    )
+    return {
+        "wear_pct_per_month": MONTH_D * slope,
+        "wear_low_pct": MONTH_D * (slope - half),
+        "wear_high_pct": MONTH_D * (slope + half),
+        "wear_since": date.fromordinal(int(days[0])).isoformat(),
+        "reaches_pct": size,
+        "reaches_from": _first(mean + around, size, last),
+        "reaches_by": _first(mean - around, size, last),
+    }
 
 
-def _first(path: Floats, size: float, last: date) -> str:
-    """The day on which a path reaches a size, '' where it does not."""
+def _first(path: Floats, size: float, last: date) -> str | None:
+    """The day on which a path reaches a size, None where it does not."""
     there = np.flatnonzero(path >= size)
-    return (last + timedelta(days=int(there[0]) + 1)).isoformat() if there.size else ""
+    return (last + timedelta(days=int(there[0]) + 1)).isoformat() if there.size else None
