@@ -22,6 +22,7 @@ from analyzer.loop.advice import Advice
 from analyzer.loop.conclusion import concluded
 from analyzer.loop.decisions import Action, Cause, counts
 from analyzer.loop.finding import Finding
+from analyzer.loop.quality import prepare
 from analyzer.loops.spec import LoopSpec
 from analyzer.night.chunk import assess_loop
 from analyzer.plantwide.night import traced_night
@@ -52,7 +53,7 @@ def assessed(x: Recorded, config: Config) -> tuple[Finding, tuple[Any, ...]] | N
     """Finding and waves of one loop; None where it cannot be assessed."""
     spec, series = recorded(x)
     try:
-        found, _ = assess_loop(spec, series, config, advising=False)
+        found, _ = assess_loop(spec, prepare(spec, series, config.quality), config, advising=False)
     except TriageError:
         return None
     return concluded(found, Advice(Action.NONE), spec, "2026-03-02", config.advice), found.waves

@@ -74,20 +74,14 @@ class Done:
 
 
 def assess_loop(
-    spec: LoopSpec, series: dict[str, Series], config: Config, advising: bool = True
-) -> tuple[Assessment, Advice]:
-    """Prepare and assess one loop from its raw samples, and advise on it if wanted."""
-    return _assessed(spec, prepare(spec, series, config.quality), config, advising)
-
-
-def _assessed(
     spec: LoopSpec,
     prepared: Prepared,
     config: Config,
-    advising: bool,
+    advising: bool = True,
     earlier: Sequence[Earlier] = (),
     held: HeldPair | None = None,
 ) -> tuple[Assessment, Advice]:
+    """Assess one loop, and advise on it if wanted, in view of settings before its last and of those told before."""
     stated = controller_of(spec, prepared)
     found = assess(prepared, stated, config, spec.type, earlier)
     if not advising:
@@ -132,7 +126,7 @@ def _loop_row(
         known["straight_pct"] = 100.0 * prepared.compressed_share
         known |= standing(prepared, controller_of(spec, prepared), spec.type, config)
         earlier = earlier_settings(stated, changes, prepared)
-        found, advice = _assessed(spec, prepared, config, advising, earlier, held)
+        found, advice = assess_loop(spec, prepared, config, advising, earlier, held)
         known |= _typed_in(earlier, spec, found, night.zone)
         known["turns"] = turn_events(prepared, found) if advising else None
         known["witness"] = witness(

@@ -71,22 +71,6 @@ def nights(spans: Sequence[tuple[float, float]], limits: NightLimits, zone: str 
     return [replace(_named(*latest, zone), first_s=first, last_s=last + 1.0)]
 
 
-def clipped(
-    spans: Sequence[tuple[float, float]], since_s: float, until_s: float
-) -> list[tuple[float, float]]:
-    """Spans within a span of time; those outside are left out.
-
-    Raises
-    ------
-    InputError
-        Where nothing is left.
-    """
-    inside = [(max(a, since_s), min(b, until_s - 1.0)) for a, b in spans if a < until_s and b >= since_s]
-    if not inside:
-        raise InputError("no samples between --since and --until", "a span of the export", "widen it")
-    return inside
-
-
 def cut(series: Series, night: Night) -> Series:
     """The samples of one night."""
     a, b = np.searchsorted(series.stamp_s, [night.first_s, night.last_s])
@@ -115,4 +99,8 @@ def nights_of(
     if not present:
         wanted = specs[0].wanted_pv or f"{specs[0].loop}.PV"
         raise InputError("no PV tag of any loop is in the export", f"tags such as {wanted}", "check --loops")
-    return nights(clipped([export.span(tag) for tag in present], since_s, until_s), limits, zone)
+    spans = [export.span(tag) for tag in present]
+    inside = [(max(a, since_s), min(b, until_s - 1.0)) for a, b in spans if a < until_s and b >= since_s]
+    if not inside:
+        raise InputError("no samples between --since and --until", "a span of the export", "widen it")
+    return nights(inside, limits, zone)

@@ -13,6 +13,7 @@ import numpy as np
 
 from analyzer.config import Config
 from analyzer.history.series import Series
+from analyzer.loop.quality import prepare
 from analyzer.loops.spec import LoopSpec
 from analyzer.night.chunk import assess_loop
 from identification.models import Backlash, Fopdt, Loop, Pid, Stiction
@@ -40,13 +41,14 @@ def simulated_series(loop: Loop, seed: int) -> dict[str, Series]:
 
 def main() -> None:
     """Assess a loop of each kind, with advice."""
-    begun = time.monotonic()
+    begun, config = time.monotonic(), Config()
     for seed, loop in enumerate(LOOPS):
         pid = loop.controller
         stated = LoopSpec(
             "L", sp="L.SP", pv="L.PV", op="L.OP", pv_lo=0.0, pv_hi=100.0, kp=pid.kp, ti=pid.ti_s
         )
-        assess_loop(stated, simulated_series(loop, seed), Config())
+        prepared = prepare(stated, simulated_series(loop, seed), config.quality)
+        assess_loop(stated, prepared, config)
     print(f"kernels are ready after {time.monotonic() - begun:.0f} s", file=sys.stderr)
 
 

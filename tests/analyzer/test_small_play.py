@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from analyzer.loop.assess import Assessment
+from analyzer.loop.quality import prepare
 from analyzer.night.chunk import assess_loop
 from proofs.plant import CONFIG, START_S, series, spec
 
@@ -32,9 +33,8 @@ def tank(rate: float, kp: float, ti: float, half: float, load: np.ndarray, seed:
         y += rate * (late[(k + 1) % 6] - 50.0 + load[k])
     stamp = START_S + np.arange(n, dtype=float)
     values = {"L.SP": np.full(n, 50.0), "L.PV": pv.round(3), "L.OP": op.round(3)}
-    found, _ = assess_loop(
-        spec(kp=kp, ti=ti), {k: series(stamp, v) for k, v in values.items()}, CONFIG, advising=False
-    )
+    stated, trends = spec(kp=kp, ti=ti), {k: series(stamp, v) for k, v in values.items()}
+    found, _ = assess_loop(stated, prepare(stated, trends, CONFIG.quality), CONFIG, advising=False)
     return found
 
 
