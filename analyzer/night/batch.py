@@ -6,6 +6,7 @@ joining happen once all pieces are there.
 
 from __future__ import annotations
 
+import json
 import math
 import uuid
 from collections import Counter
@@ -25,7 +26,7 @@ from analyzer.night.chunk import Done, Task
 from analyzer.night.cluster import Cluster
 from analyzer.night.finish import finish_night, is_empty
 from analyzer.night.nights import Night, nights_of
-from analyzer.night.run_files import RunIdentity, identity, require_same, write_identity
+from analyzer.night.run_files import identity, require_same
 from analyzer.night.workers import Died, Here, Workers, executor
 from analyzer.store.lock import locked
 from analyzer.store.store import Store
@@ -54,12 +55,6 @@ class Batch:
     until_s: float = math.inf
     changes: Sequence[TuningChange] = ()
     zone: str = UTC_NAME
-
-    @property
-    def identity(self) -> RunIdentity:
-        """What a run that goes on with its pieces must have in common with it."""
-        own = (*self.specs, *self.changes, self.zone)
-        return identity(self.export, own, self.since_s, self.until_s, self.config)
 
     def nights(self) -> list[Night]:
         """The nights that the span holds, oldest first."""
@@ -144,15 +139,17 @@ def _mourned(workers: _Workers, died: Died[Task]) -> Iterator[Done]:
         yield chunk.lose(replace(task, specs=hand, key=f"{task.key}-lost"), died.why)
 
 
-def _begun(store: Store, nights: Sequence[Night], mine: RunIdentity, resume: bool) -> list[str]:
+def _begun(batch: Batch, nights: Sequence[Night], resume: bool) -> list[str]:
     """Keys of the chunks that a stopped run left whole; all else of it is forgotten."""
+    store, mine = batch.store, identity(batch)
     if resume:
         require_same(store.run_file, mine)
         keys = [key for key in store.whole_chunks(nights[-1].name) if _is_readable(store, nights, key)]
     else:
         store.drop_parts()
         keys = []
-    write_identity(store.run_file, mine)
+    store.run_file.parent.mkdir(parents=True, exist_ok=True)
+    store.run_file.write_text(json.dumps(mine), encoding="utf-8")
     return keys
 
 
@@ -206,7 +203,7 @@ def run(
         batch.store.upgrade()
         nights = batch.nights()
         said = [line for night in nights for line in batch.store.set_aside_damaged(night.name)]
-        keys, met = _begun(batch.store, nights, batch.identity, resume), Counter[str]()
+        keys, met = _begun(batch, nights, resume), Counter[str]()
         known = _loops_in(batch.store, nights[-1].name, keys)
         done, of = len(known), len(batch.specs)
         progress(done, of)

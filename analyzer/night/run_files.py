@@ -12,48 +12,45 @@ import hashlib
 import json
 import os
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from collections.abc import Set as AbstractSet
-from dataclasses import asdict, dataclass, fields, is_dataclass
+from dataclasses import fields, is_dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from analyzer.config import Config
-from analyzer.history.export import Export
 from analyzer.history.files import ends_of
-from analyzer.loops.spec import LoopSpec
 from identification.errors import InputError
 from reports.texts import visible
+
+if TYPE_CHECKING:
+    from analyzer.night.batch import Batch
 
 PLAIN = frozenset("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789._:/+-%")
 """Characters of values that need no quotes."""
 
 
-@dataclass(frozen=True, slots=True)
-class RunIdentity:
-    """A run as it is written down beside its pieces: fingerprint, and words for people."""
-
-    fingerprint: str
-    export: str
-    loops: int
-    begun: str
+Identity = Mapping[str, Any]
+"""A run as it is written down beside its pieces: fingerprint, and words for people (export, loops, begun)."""
 
 
-def identity(
-    export: Export, stated: Sequence[object], since_s: float, until_s: float, config: Config
-) -> RunIdentity:
-    """The identity of a run over an export, with what is stated of its loops, within a span of time [s, UTC]."""
+def identity(batch: Batch) -> Identity:
+    """What a run that goes on with the pieces of a batch must have in common with it."""
     mark = hashlib.blake2b(digest_size=16)
-    for source in export.sources:
+    for source in batch.export.sources:
         mark.update(ends_of(source.path))
         mark.update(in_one_order(source.clock))
-    mark.update(in_one_order((tuple(stated), since_s, until_s, config)))
-    names = [source.path.name for source in export.sources]
-    loops = sum(isinstance(row, LoopSpec) for row in stated)
+    stated = (*batch.specs, *batch.changes, batch.zone)
+    mark.update(in_one_order((stated, batch.since_s, batch.until_s, batch.config)))
+    names = [source.path.name for source in batch.export.sources]
     more = f" and {len(names) - 1} more files" if len(names) > 1 else ""
     now = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
-    return RunIdentity(mark.hexdigest(), names[0] + more, loops, now)
+    return {
+        "fingerprint": mark.hexdigest(),
+        "export": names[0] + more,
+        "loops": len(batch.specs),
+        "begun": now,
+    }
 
 
 def in_one_order(value: object) -> bytes:
@@ -77,22 +74,17 @@ def _plain(value: Any) -> object:
     raise TypeError(f"{type(value).__name__} has no stated order")
 
 
-def write_identity(path: Path, run: RunIdentity) -> None:
-    """Write a run down beside its pieces."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(json.dumps(asdict(run)), encoding="utf-8")
-
-
-def require_same(path: Path, run: RunIdentity) -> None:
+def require_same(path: Path, run: Identity) -> None:
     """Raise InputError where the pieces at `path` are of another run; nothing where there are none."""
     try:
-        stopped = RunIdentity(**json.loads(path.read_text(encoding="utf-8")))
-    except (OSError, ValueError, TypeError, RecursionError):
+        stopped = json.loads(path.read_text(encoding="utf-8"))
+        begun = f"{stopped['export']} ({stopped['loops']} loops, begun {stopped['begun']})"
+        same = stopped["fingerprint"] == run["fingerprint"]
+    except (OSError, ValueError, TypeError, KeyError, RecursionError):
         return
-    if stopped.fingerprint != run.fingerprint:
+    if not same:
         raise InputError(
-            f"the run that was stopped read {stopped.export} ({stopped.loops} loops, begun {stopped.begun}), "
-            f"this one reads {run.export} ({run.loops} loops)",
+            f"the run that was stopped read {begun}, this one reads {run['export']} ({run['loops']} loops)",
             "--resume with the same EXPORT, --loops, --changes, --since, --until, --config and version",
             "give them again, or leave out --resume to give up what the stopped run had done",
         )
