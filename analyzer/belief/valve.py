@@ -101,27 +101,20 @@ def faded_over(before: str, night: str, limits: BeliefLimits) -> float:
     return float(0.5 ** (max(gap, 0) / limits.half_life))
 
 
-@dataclass(frozen=True, slots=True)
-class Doubt:
+def doubt(said: Witness, cause: Cause, oscillates: bool, limits: BeliefLimits) -> tuple[float, float, float]:
     """What a night's likelihood may be wrong by, in the evidence that a verdict of one night needs [-]: as one of
-    several nights, by itself, and in what it says against a width."""
+    several nights, by itself, and in what it says against a width.
 
-    each: float
-    alone: float
-    against: float
-
-
-def doubt(said: Witness, cause: Cause, oscillates: bool, limits: BeliefLimits) -> Doubt:
-    """What a night may be wrong by, in a loop whose cycles have a cause by all nights: no model is exact, and
-    what it lacks it lacks every night. In a cycle which another cause makes a play is mimicked every night; one
-    that is narrow beside OP's range, in a night now and then."""
+    No model is exact, and what it lacks it lacks every night. In a cycle which another cause makes, by all nights, a
+    play is mimicked every night; one that is narrow beside OP's range, in a night now and then.
+    """
     if oscillates and cause is not Cause.VALVE:
         beside = limits.doubt_beside if cause is Cause.LOAD else limits.doubt_small
-        return Doubt(beside, beside, beside)
+        return beside, beside, beside
     width = float(WIDTHS[int(np.argmax(said["profile"]))])
     narrow = oscillates or width < limits.small * said["op_range"]
     alone = limits.doubt_small if narrow else limits.doubt_alone
-    return Doubt(limits.doubt, alone, limits.doubt_alone if oscillates else limits.doubt_against)
+    return limits.doubt, alone, limits.doubt_alone if oscillates else limits.doubt_against
 
 
 def weighed(said: Witness, wrong_by: float, against: float, limits: BeliefLimits) -> Floats:
@@ -141,7 +134,7 @@ def with_night(
     share: float,
     night: str,
     said: Witness,
-    wrong: Doubt,
+    wrong: tuple[float, float, float],
     limits: BeliefLimits,
 ) -> ValveBelief:
     """The belief with one night more.
@@ -154,11 +147,12 @@ def with_night(
     night : str
     said : dict
         The night's witness.
-    wrong : Doubt
-        What it may be wrong by.
+    wrong : tuple of float
+        What it may be wrong by, as `doubt` gives it.
     limits : BeliefLimits
     """
-    own, alone = (weighed(said, x, wrong.against, limits) for x in (wrong.each, wrong.alone))
+    *each, against = wrong
+    own, alone = (weighed(said, x, against, limits) for x in each)
     faded = [(n, share * np.asarray(p)) for n, p in before.recent]
     recent = [*faded, (night, own)][-limits.recent :]
     summed = share * np.asarray(before.summed) + own if before.summed else own
