@@ -15,7 +15,6 @@ import numpy as np
 import pyarrow as pa
 
 from analyzer.config import PlantLimits
-from analyzer.plantwide.wave import stretches
 from identification.record import Floats, LoopRecord
 
 BLOCK_S = 120.0
@@ -130,9 +129,6 @@ def _rows(moves: Sequence[Moves], role: str, begin: int, size: int) -> np.ndarra
     return out
 
 
-SIGNALS = ("sp", "pv", "op")
-
-
 def moves_table(moves: Sequence[Moves]) -> pa.Table:
     """A row a loop."""
     return pa.table({f.name: [getattr(m, f.name) for m in moves] for f in fields(Moves)})
@@ -142,8 +138,6 @@ def moves_in(table: pa.Table | None) -> list[Moves]:
     """The moves of a table, none without one."""
     if table is None or not table.num_rows:
         return []
-    known = table.select(["loop", "first"]).to_pylist()
     return [
-        Moves(**k, sp=s, pv=p, op=o)
-        for k, s, p, o in zip(known, *(stretches(table.column(x)) for x in SIGNALS), strict=True)
+        Moves(*row) for row in zip(*(table.column(f.name).to_numpy() for f in fields(Moves)), strict=True)
     ]

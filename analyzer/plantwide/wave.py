@@ -182,15 +182,5 @@ def waves_in(table: pa.Table | None) -> list[Wave]:
     if table is None or not table.num_rows:
         return []
     known = table.select(SCALARS).to_pylist()
-    real, imag, trend = (stretches(table.column(name)) for name in ("real", "imag", "trend"))
+    real, imag, trend = (table.column(name).to_numpy() for name in ("real", "imag", "trend"))
     return [Wave(**s, lines=x + 1j * y, trend=t) for s, x, y, t in zip(known, real, imag, trend, strict=True)]
-
-
-def stretches(column: pa.ChunkedArray) -> list[np.ndarray]:
-    """The lists of a column as arrays, without a Python object for each number."""
-    out = []
-    for chunk in column.chunks:
-        flat = chunk.flatten().to_numpy(zero_copy_only=False)
-        ends = np.cumsum(chunk.value_lengths().to_numpy(zero_copy_only=False))
-        out += np.split(flat, ends[:-1]) if ends.size else []
-    return out
