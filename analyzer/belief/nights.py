@@ -10,7 +10,6 @@ from typing import Any
 from analyzer.belief.belief import Belief, belief_of, kept_as, step
 from analyzer.belief.phases import growth
 from analyzer.belief.pool import Pool
-from analyzer.belief.remedy import HeldPair
 from analyzer.belief.wear import wear
 from analyzer.columns import BELIEFS, row_of
 from analyzer.config import Config
@@ -24,6 +23,8 @@ from analyzer.words import belief as words
 from identification.errors import InputError
 
 Row = Mapping[str, Any]
+Held = tuple[tuple[float | None, float | None], tuple[float, float]]
+"""Settings in force, as loops.csv states them, and those that nights have told to type in instead."""
 Followed = tuple[str, Sequence[Row], Sequence[str]]
 """A night, the rows of its beliefs, and sentences on loops of which they failed."""
 READ = (
@@ -52,12 +53,12 @@ def settle(store: Store, night: str, config: Config) -> list[str]:
     return _written(store, _followed(store, [n for n in names if n >= first], known, config))
 
 
-def held_pairs(store: Store, night: str) -> dict[str, HeldPair]:
+def held_pairs(store: Store, night: str) -> dict[str, Held]:
     """Settings that are told of loops before a night; none where the store has no beliefs before it."""
     earlier = [n for n in store.nights() if n < night]
     known = (read(store, earlier[-1]) if earlier else None) or {}
-    held = {loop: (b.told.pair, b) for loop, b in known.items()}
-    return {k: HeldPair(pair.kp, pair.ti, (b.kp, b.ti)) for k, (pair, b) in held.items() if pair is not None}
+    told = [(loop, b.told.pair, b) for loop, b in known.items()]
+    return {loop: ((b.kp, b.ti), (pair.kp, pair.ti)) for loop, pair, b in told if pair is not None}
 
 
 def settle_anew(store: Store, config: Config) -> list[str]:

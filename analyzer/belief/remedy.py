@@ -46,16 +46,6 @@ class Pair:
 
 
 @dataclass(frozen=True, slots=True)
-class HeldPair:
-    """Settings that nights have told of a loop, and those in force that they are to replace, as loops.csv
-    states them."""
-
-    kp: float
-    ti: float
-    of: tuple[float | None, float | None]
-
-
-@dataclass(frozen=True, slots=True)
 class RemedyBelief:
     """Votes by action, older nights counting less; the pairs advised of late; the action and the pair that are
     held."""

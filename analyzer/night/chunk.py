@@ -12,7 +12,7 @@ from typing import Any
 
 import pyarrow as pa
 
-from analyzer.belief.remedy import HeldPair
+from analyzer.belief.nights import Held
 from analyzer.columns import HOURS, NIGHTS, SETTINGS
 from analyzer.config import Config
 from analyzer.history.export import Export
@@ -61,7 +61,7 @@ class Task:
     key: str
     changes: tuple[TuningChange, ...] = ()
     alone: bool = False
-    held: Mapping[str, HeldPair] = field(default_factory=dict)
+    held: Mapping[str, Held] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,7 +79,7 @@ def assess_loop(
     config: Config,
     advising: bool = True,
     earlier: Sequence[Earlier] = (),
-    held: HeldPair | None = None,
+    held: Held | None = None,
 ) -> tuple[Assessment, Advice]:
     """Assess one loop, and advise on it if wanted, in view of settings before its last and of those told before."""
     stated = controller_of(spec, prepared)
@@ -87,8 +87,9 @@ def assess_loop(
     if not advising:
         return found, Advice(HISTORY.get(found.verdict.cause))
     pair = None
-    if held is not None and held.of == (spec.kp, spec.ti):
-        pair = controller_of(replace(spec, kp=held.kp, ti=held.ti), prepared)
+    if held is not None and held[0] == (spec.kp, spec.ti):
+        kp, ti = held[1]
+        pair = controller_of(replace(spec, kp=kp, ti=ti), prepared)
     return found, advise(found, spec, stated, prepared.scale.span, config, pair)
 
 
@@ -110,7 +111,7 @@ def _loop_row(
     advising: bool,
     kept: Rows,
     changes: Sequence[TuningChange] = (),
-    held: HeldPair | None = None,
+    held: Held | None = None,
 ) -> None:
     """Keep the row of one loop and night, whatever happens, and its assessment where there is one."""
     spec = in_force(stated, changes, night.last_s)

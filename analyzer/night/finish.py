@@ -12,7 +12,7 @@ from typing import Any
 import pyarrow as pa
 
 from analyzer.belief.nights import settle
-from analyzer.columns import BY_NAME, GROUPS, NIGHTS, names
+from analyzer.columns import GROUPS, NIGHTS, Column, names
 from analyzer.config import Config, NightLimits
 from analyzer.loop.decisions import Status
 from analyzer.loop.finding import in_lanes
@@ -82,7 +82,7 @@ def finish_night(
     links = links_of(moves_in(store.read_parts(night, "moves", keys)), config.plant)
     loops = linked(traced, links, config.plant)
     rows = {loop: night_row(in_lanes(found, config.lanes)) for loop, found in loops.items()}
-    old = {} if replace else _known(store, night)
+    old = {} if replace else {r["loop"]: r for r in _held(store, "nights", night, NIGHTS)}
     kept = {loop for loop, row in rows.items() if loop in old and fuller(old[loop], row, config.nights)}
     beside = [loop for loop in old if loop not in rows]
     joined = [old[k] if k in kept else rows[k] for k in order if k in rows] + [old[k] for k in beside]
@@ -104,21 +104,16 @@ def _join_others(store: Store, night: str, keys: Sequence[str], mine: Sequence[s
         store.write(name, night, _joined(before, store.read_parts(night, name, keys), mine))
 
 
-def _other_groups(store: Store, night: str, mine: Container[str]) -> list[Row]:
+def _held(store: Store, table: str, night: str, columns: Sequence[Column]) -> list[dict[str, Any]]:
+    """The rows that the store has of a night, none where it has no such table."""
+    return store.own_rows(table, night, names(columns)) if store.file(table, night).exists() else []
+
+
+def _other_groups(store: Store, night: str, mine: Container[str]) -> list[dict[str, Any]]:
     """The groups that the store has of a night and that hold none of these loops."""
-    table = store.read_if_there("groups", night)
-    rows = [] if table is None else table.select(names(GROUPS)).to_pylist()
+    rows = _held(store, "groups", night, GROUPS)
     gone = {r["group"] for r in rows if r["loop"] in mine}
     return [r for r in rows if r["group"] not in gone]
-
-
-def _known(store: Store, night: str) -> dict[str, Row]:
-    """The rows that the store has of a night, without columns that another version wrote."""
-    table = store.read_if_there("nights", night)
-    if table is None:
-        return {}
-    declared = table.select([c for c in table.column_names if c in BY_NAME])
-    return {r["loop"]: r for r in declared.to_pylist()}
 
 
 def _joined(before: pa.Table | None, piece: pa.Table | None, mine: Sequence[str]) -> pa.Table | None:
