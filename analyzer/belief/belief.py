@@ -18,13 +18,12 @@ from typing import Any, get_args, get_origin, get_type_hints
 
 import numpy as np
 
-from analyzer.belief import cycle, phases, remedy, valve
+from analyzer.belief import cycle, remedy, valve
 from analyzer.belief.cycle import CycleBelief
-from analyzer.belief.phases import PhaseKnown
 from analyzer.belief.pool import Pool
 from analyzer.belief.remedy import Pair, RemedyBelief
 from analyzer.belief.valve import ValveBelief, Witness
-from analyzer.belief.wear import Width
+from analyzer.belief.wear import PhaseKnown, Width, forgotten, with_repetitions
 from analyzer.config import BeliefLimits
 from analyzer.loop.decisions import CAUSES, Action, Cause, Due, Fault, Status, counts
 from identification.estimation.width_profile import WIDTHS
@@ -166,7 +165,7 @@ def step(before: Belief | None, row: Row, repaired_s: Sequence[float], limits: B
         row["period_s"],
     )
     end_s = (row["start_s"] or 0.0) + (row["duration_s"] or 0.0)
-    seen_phases = phases.with_night(now.phases, row)
+    seen_phases = with_repetitions(now.phases, row)
     now = replace(now, night=row["night"], end_s=end_s, remedy=done, last=seen, phases=seen_phases)
     return replace(now, kp=row["kp"], ti=row["ti"], told=tell(now, row, limits))
 
@@ -188,7 +187,7 @@ def _after_changes(now: Belief, row: Row, repaired_s: Sequence[float]) -> Belief
     begun anew."""
     settings, fresh = (row["kp"], row["ti"]), CycleBelief(top=now.cycle.top, loud=now.cycle.loud)
     anew = replace(now, cycle=fresh, remedy=RemedyBelief(), before=now.last)
-    anew = replace(anew, phases=phases.forgotten(now.phases))
+    anew = replace(anew, phases=forgotten(now.phases))
     listed = now.remedy.action is Action.CHECK_SETTINGS
     if now.night and None not in (now.kp, *settings) and (now.kp, now.ti) != settings:
         # a list that is put right changes no loop

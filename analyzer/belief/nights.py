@@ -8,9 +8,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from analyzer.belief.belief import Belief, belief_of, kept_as, step
-from analyzer.belief.phases import growth
 from analyzer.belief.pool import Pool
-from analyzer.belief.wear import wear
+from analyzer.belief.wear import growth, wear
 from analyzer.columns import BELIEFS, row_of
 from analyzer.config import Config
 from analyzer.loop.decisions import CAUSES, Lane

@@ -12,8 +12,8 @@ from analyzer.words.units import Row, duration
 
 if TYPE_CHECKING:
     from analyzer.belief.belief import Belief
-    from analyzer.belief.phases import Growth, PhaseKnown
     from analyzer.belief.remedy import Pair
+    from analyzer.belief.wear import Growth, PhaseKnown
 
 REPAIRED = re.compile(
     r"\b(repaired|replaced|overhauled|exchanged|renewed|repacked|new (valve|actuator|positioner|packing|stem))\b",
