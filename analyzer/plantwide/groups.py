@@ -182,13 +182,10 @@ def _led(beside: _Neighbours, limits: PlantLimits) -> list[Group]:
         if i in taken:
             continue
         levels = {i: 1.0} | beside.moving_with(i) | beside.second_ring(i)
-        waves = [beside.waves[j] for j in levels]
-        if len(waves) > 1 and _is_wave(waves, limits):
+        waves = {beside.waves[j].loop: beside.waves[j] for j in levels}
+        if len(waves) > 1 and _is_wave(list(waves.values()), limits):
             taken.update(levels)
-            names = [w.loop for w in waves]
-            found.append(
-                Group(dict(zip(names, waves, strict=True)), dict(zip(names, levels.values(), strict=True)))
-            )
+            found.append(Group(waves, {beside.waves[j].loop: level for j, level in levels.items()}))
     return found
 
 
