@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from analyzer.config import Config
+from analyzer.lanes.lanes import RULES
 from identification.limits import LIMITS, ExplainLimits
 from identification.mismatch.answer import answer
 from identification.mismatch.diagnosis import explain
@@ -28,8 +29,9 @@ def read_names() -> set[str]:
 
 
 def test_every_limit_is_read():
-    """A limit that no line reads decides nothing; the weights of a source's signs are read by the signs' names."""
-    read = read_names()
+    """A limit that no line reads decides nothing; the weights of a source's signs are read by the signs' names, and
+    those of lanes by their figures' names."""
+    read = read_names() | {rule.limit or rule.figure for rule in RULES}
     declared = {f.name for s in fields(Config()) for f in fields(getattr(Config(), s.name))}
     assert {name for name in declared - read if not name.startswith("sign_")} == set()
 
