@@ -66,10 +66,12 @@ def triage(out: Path, name: str, *words: object) -> None:
 
 
 def tables_of(store: Path, out: Path) -> None:
-    """Every table of a store as CSV, in the order of its own cells."""
+    """Every table of a store as CSV, in the order of loops and times: workers end as they can."""
     for folder in sorted({p.parent for p in store.rglob("*.parquet")}):
         whole = pd.concat([pd.read_parquet(p) for p in sorted(folder.glob("*.parquet"))])
         whole = whole.drop(columns=[c for c in whole.columns if c in ("version", "written", "took_s")])
+        order = [c for c in ("loop", "night", "hour_s", "time_s") if c in whole.columns]
+        whole = whole.sort_values(order, kind="stable") if order else whole
         target = out / "tables" / f"{'-'.join(folder.relative_to(store).parts) or 'store'}.csv"
         target.parent.mkdir(parents=True, exist_ok=True)
         whole.to_csv(target, index=False)
