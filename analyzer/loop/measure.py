@@ -190,13 +190,18 @@ def measure(
         excited=bool(due.any()),
     )
     if oscillation is None:
-        shown = trials_between_moves(best, linear)
         if window.position is not None:
             return replace(seen_alone, steady=math.inf)
         alone = not record.mask("idle").any()  # else another one moves PV too
-        asked = float(gains(best, linear)[due].sum()) if alone else 0.0
-        return replace(seen_alone, steady=0.0 if shown is None else shown.steadiness, asked=asked)
+        return _without_a_cycle(seen_alone, best, linear, due if alone else None)
     return _of_a_cycle(seen_alone, best, linear, scale, op_range, error)
+
+
+def _without_a_cycle(m: Measured, best: Fit, linear: Fit, due: Mask | None) -> Measured:
+    """What the stretches between moves of the stem show beside, and PV where it is due to answer a set point."""
+    shown = trials_between_moves(best, linear)
+    asked = 0.0 if due is None else float(gains(best, linear)[due].sum())
+    return replace(m, steady=0.0 if shown is None else shown.steadiness, asked=asked)
 
 
 def _of_a_cycle(

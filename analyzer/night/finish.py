@@ -93,8 +93,7 @@ def finish_night(
     store.write("nights", night, rows_table(joined, NIGHTS))
     store.forget_explained(night, None if replace else mine)
     store.forget_compared()
-    lost = settle(store, night, config)
-    return (*lost, *_told(night, rows, old, kept, beside))
+    return (*settle(store, night, config), *_told(night, rows, old, kept, beside))
 
 
 def _join_others(store: Store, night: str, keys: Sequence[str], mine: Sequence[str], replace: bool) -> None:

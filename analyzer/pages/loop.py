@@ -319,13 +319,13 @@ def page(
     explained : mapping or None
         The night's explanation of the loop (analyzer.columns.EXPLAINED).
     more : Page or None
-        The page of that explanation, which is linked.
+        The page of that explanation.
     shared : Section or None
         What it shares with other loops.
     notes : sequence of str
         What people wrote about it, oldest first.
     settings : Page or None
-        The page on which settings are compared and tried, which is linked; what it opens with stands here too.
+        The page on which settings are tried; what it opens with stands here too.
     """
     row = rows[-1]
     sections = [
@@ -339,10 +339,10 @@ def page(
         *_moves(row),
         *_limit_cycle(row),
         *(() if settings is None else (_of_settings(settings),)),
+        _figures(row),
         nights_section(rows),
     ]
-    sections.insert(-1, _figures(row))
-    group = row["group"] if shared is not None else None
+    group = None if shared is None else row["group"]
     links = (ALL_LOOPS, *_links(more, settings, group), *_beside_source(row))
     return Page(slug(row["loop"]), row["loop"], _subtitle(row), tuple(sections), links)
 

@@ -188,6 +188,16 @@ def poured(
     return after, out
 
 
+@njit(cache=True, error_model="numpy")
+def parted(c: Floats, dt_s: float) -> tuple[int, tuple[float, float]]:
+    """The dead time's whole samples, and the two parts of a sample that its fraction makes [s]."""
+    if c[PIPE] != 0.0:
+        return 0, (0.0, dt_s)
+    delay = int(c[L] / dt_s)
+    part = c[L] - delay * dt_s
+    return delay, (part, dt_s - part)
+
+
 # A sample has two parts, before and after the dead time's fraction; what is the same in each is worked out once, into
 # locals: for all that a compiler knows the loop might write entries of c.
 @njit(cache=True, error_model="numpy")
@@ -203,9 +213,7 @@ def vessel_span(
     """
     flow, act, gain = drive
     x, mode, basin, z2, z3 = m
-    delay = 0 if c[PIPE] != 0.0 else int(c[L] / dt_s)
-    part = 0.0 if c[PIPE] != 0.0 else c[L] - delay * dt_s
-    parts = (part, dt_s - part)
+    delay, parts = parted(c, dt_s)
     linear = c[SLOPE] == 0.0 and c[ROOT] == 0.0 and c[GAIN_SLOPE] == 0.0
     times, o = (parts[0] / c[T], parts[1] / c[T]), outflow_of(c, head)
     rises = shares_filled(o, times)
