@@ -276,10 +276,10 @@ def _candidates(
     """Plain fit, play, stick-slip if it was tried, the better valve, its evidence and that of the jump [nat]."""
     linear = fit_linear(window, scale_s)
     short = oscillation is None and window.y.size < SHORT
-    hopeful = SCREENED if oscillation is not None or short else _hopeful(window, due, limits)
+    hopeful = None if oscillation is not None or short else _hopeful(window, due, limits)
     play = fit_play(linear, scale_s, hopeful)
     gained = play.log_likelihood - linear.log_likelihood
-    if gained < hopeful and not short:
+    if gained < (SCREENED if hopeful is None else hopeful) and not short:
         return linear, play, None, play, gained, 0.0
     linear = better_linear(linear, play)
     best, stick, jump = play, None, 0.0
