@@ -48,7 +48,7 @@ MOVES = (
     *((1, 0, -1), (-1, 0, 1), (1, -1, -1), (-1, 1, 1)),
 )
 """Steps that are tried of stickband, jump and dead time: a wider band that jumps less answers sooner; ours: with the
-last two one more of 16 simulated stems (tests/identification/estimation/test_slip_paths.py) is found."""
+last two one more of 16 simulated stems (tests/identification/estimation/test_slip_paths.py) was found."""
 WORTH = 1.0
 """Gain [nat] of a step from which it is taken."""
 MOST_MOVES = 40
@@ -146,8 +146,8 @@ def _screened(play: Fit, noise: Floats, rest: int, gains: Gains) -> list[_Trial]
 def _chosen(tried: list[_Trial]) -> list[_Trial]:
     """The best trial of each width, best first.
 
-    Ours: 14 of 16 simulated stems are found so (see MOVES), by two of each jump share at two dead times, which come
-    to one path, 11; of 48 of other bands, jumps and processes 32 and 22.
+    Ours: 16 of 16 simulated stems are found so (see MOVES), by two of each jump share at two dead times, which come
+    to one path, 11; of 48 of other bands, jumps and processes 30 and 22.
     """
     best: dict[float, _Trial] = {}
     for t in sorted(tried, key=lambda t: -t.score):

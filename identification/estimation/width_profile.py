@@ -7,10 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from identification.estimation.backlash_stiction import generic_noise, plays, tried
+from identification.estimation.backlash_stiction import generic_noise
 from identification.estimation.hammerstein import Fit
+from identification.estimation.search import Dynamics, WhitePv, behind, score, search, white_pv
+from identification.estimation.window import Window
 from identification.record import Floats
-from identification.simulation.valve import IDEAL, StemLaw
+from identification.simulation.valve import IDEAL, StemLaw, sticking
 
 WIDTHS = np.geomspace(0.1, 60.0, 29)
 """Widths of a play that records are asked of [% OP], a quarter apart: from the least dead band of a positioner
@@ -19,6 +21,8 @@ SEEN = 0.03
 """Width over OP's range below which a play moves PV as an ideal valve does [-]; ours."""
 WHOLE = 1.25
 """Width over OP's range from which on the stem never moves [-]."""
+HALVINGS = 1
+"""How often the steps of the search of dynamics are halved, which begins where the width beside has ended."""
 
 
 def width_profile(linear: Fit, play: Fit) -> Floats:
@@ -35,14 +39,37 @@ def width_profile(linear: Fit, play: Fit) -> Floats:
     asked = np.flatnonzero((SEEN * reach < WIDTHS) & (WHOLE * reach > WIDTHS))
     if asked.size == 0:
         return out
-    begins = [(fit.time_constant_s, fit.dead_time_s) for fit in (play, linear)]
-    valves = [*plays(WIDTHS[asked][::-1]), IDEAL]
-
-    def left(ar: Floats, valves: list[StemLaw]) -> Floats:
-        return np.array([fit.sigma2 for fit in tried(blocks, ar, valves, begins, 1)])
-
-    least = np.minimum(*(left(ar, valves) for ar in (play.ar, generic_noise())))
-    ideal = min(least[-1], *left(linear.ar, [IDEAL]))
-    out[asked] = 0.5 * play.count * np.log(ideal / least[-2::-1])
+    ideal, least = _ideal(blocks, linear, play, linear.ar), np.full(asked.size, np.inf)
+    for ar in (play.ar, generic_noise()):
+        ideal = min(ideal, _ideal(blocks, linear, play, ar))
+        least = np.minimum(least, _swept(white_pv(blocks, ar), WIDTHS[asked], play))
+    out[asked] = 0.5 * play.count * np.log(ideal / least)
     out[asked[-1] + 1 :] = out[asked[-1]]
     return out
+
+
+def _ideal(window: Window, linear: Fit, play: Fit, ar: Floats) -> float:
+    """Innovations variance behind an ideal valve under one noise model."""
+    return _left(white_pv(window, ar), IDEAL, [_dynamics(linear), _dynamics(play)])[0]
+
+
+def _dynamics(fit: Fit) -> Dynamics:
+    return fit.time_constant_s, fit.dead_time_s
+
+
+def _swept(pv: WhitePv, widths: Floats, play: Fit) -> Floats:
+    """Innovations variance behind plays of rising widths, from that of the best one outwards either way."""
+    out = np.empty(widths.size)
+    first = int(np.argmin(np.abs(np.log(widths / max(play.valve.stickband, 1e-3)))))
+    for way in (range(first, widths.size), range(first - 1, -1, -1)):
+        near = _dynamics(play)
+        for k in way:
+            out[k], near = _left(pv, sticking(widths[k], 0.0), [near, _dynamics(play)])
+    return out
+
+
+def _left(pv: WhitePv, valve: StemLaw, begins: list[Dynamics]) -> tuple[float, Dynamics]:
+    """Least innovations variance behind a valve, and the dynamics that leave it."""
+    prepared = behind(pv, valve)
+    found = search(prepared, begins, HALVINGS)
+    return float(score(prepared, *found)[0]), found
