@@ -15,7 +15,7 @@ from analyzer.commands.options import (
     NIGHT,
     SOME_LOST,
     STORE,
-    Told,
+    OneLineErrors,
     export_options,
     formats,
     of_loop,
@@ -32,7 +32,9 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 way. Set before numpy is imported."""
 
 
-@click.group(cls=Told, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
+@click.group(
+    cls=OneLineErrors, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110}
+)
 @click.version_option(package_name="loop-triage", prog_name="triage")
 def main() -> None:
     """Nightly triage of PID loops: which oscillate, why, what to type in, and whether it helped.

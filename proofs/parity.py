@@ -114,18 +114,8 @@ def sample(out: Path) -> None:
     triage(out, "check-day.txt", "check", SAMPLE / "mill-day.csv", "--loops", loops)
     store = night(out, [mill], loops, "--changes", changes)
     for format_ in ("html", "markdown"):
-        triage(
-            out,
-            f"report-{format_}.txt",
-            "report",
-            store,
-            "--changes",
-            changes,
-            "--format",
-            format_,
-            "--out",
-            out / f"report-{format_}",
-        )
+        how = ("--changes", changes, "--format", format_, "--out", out / f"report-{format_}")
+        triage(out, f"report-{format_}.txt", "report", store, *how)
     triage(out, "found.txt", "report", store, "--find", "--out", out / "found")
     triage(
         out,
@@ -144,37 +134,22 @@ def sample(out: Path) -> None:
     for loop in TUNED:
         triage(out, f"tune-{loop}.txt", "tune", *day, "--loop", loop, "--out", out / f"tune-{loop}")
     for loop in EXPLAINED:
-        for format_ in ("text", "json", "html", "markdown"):
-            where = ("--out", out / f"explain-{loop}-{format_}") if format_ in ("html", "markdown") else ()
-            saved = ("--save-model", out / f"{loop}.json") if format_ == "json" else ()
-            triage(
-                out,
-                f"explain-{loop}.{format_}.txt",
-                "explain",
-                *day,
-                "--loop",
-                loop,
-                "--format",
-                format_,
-                *where,
-                *saved,
-            )
-        for closed in ((), ("--closed-loop",)):
-            target = out / f"simulated-{loop}{'-closed' * len(closed)}.parquet"
-            triage(
-                out,
-                f"{target.stem}.txt",
-                "simulate",
-                out / f"{loop}.json",
-                *day,
-                "--loop",
-                loop,
-                "--out",
-                target,
-                *closed,
-            )
-            if target.exists():
-                pd.read_parquet(target).to_csv(target.with_suffix(".csv"))
+        explained(out, loop, day)
+
+
+def explained(out: Path, loop: str, day: tuple[object, ...]) -> None:
+    """A loop of a day explained in every format, and its model run open and closed."""
+    model = out / f"{loop}.json"
+    for format_ in ("text", "json", "html", "markdown"):
+        where = ("--out", out / f"explain-{loop}-{format_}") if format_ in ("html", "markdown") else ()
+        saved = ("--save-model", model) if format_ == "json" else ()
+        how = ("--loop", loop, "--format", format_, *where, *saved)
+        triage(out, f"explain-{loop}.{format_}.txt", "explain", *day, *how)
+    for closed in ((), ("--closed-loop",)):
+        target = out / f"simulated-{loop}{'-closed' * len(closed)}.parquet"
+        triage(out, f"{target.stem}.txt", "simulate", model, *day, "--loop", loop, "--out", target, *closed)
+        if target.exists():
+            pd.read_parquet(target).to_csv(target.with_suffix(".csv"))
 
 
 def kept(out: Path) -> dict[str, bytes]:

@@ -124,9 +124,8 @@ def _followed(
         out, lost = [], []
         for loop in (*rows, *(k for k in beliefs if k not in rows)):
             before, row = beliefs.get(loop), rows.get(loop)
-            known_already = (
-                before is not None and before.night >= name
-            )  # to a store whose first nights are pruned
+            # what a pruned store knew of its oldest night is not counted again
+            known_already = before is not None and before.night >= name
             try:
                 if row is None or known_already:
                     now = before

@@ -27,7 +27,7 @@ MOST_SAID = 600
 """Characters of a line that says what is wrong."""
 
 
-class Told(click.Group):
+class OneLineErrors(click.Group):
     """Commands whose errors that are ours, or the system's, are one line on stderr and exit status 2."""
 
     def invoke(self, ctx: click.Context) -> Any:

@@ -24,7 +24,7 @@ from analyzer.history.files import export_files, is_parquet, packed_beside, unpa
 from analyzer.history.layouts import Source, source_of, tag_column
 from analyzer.history.parquet import open_parquet
 from analyzer.history.plant_clock import zone_of
-from analyzer.history.series import MainSpan, NoStampError, Series, settle
+from analyzer.history.series import MainSpan, NoStampError, Series, joined_pieces
 from analyzer.history.sheet import WHOLE_FILE_BYTES
 from analyzer.history.sniff import open_sheet
 from analyzer.history.table import ReadOptions
@@ -82,7 +82,7 @@ class Export:
                 pieces.append(self.sources[home].read(tags))
         series = {}
         for tag in tags:
-            series[tag] = settle([piece[tag] for piece in pieces if tag in piece])
+            series[tag] = joined_pieces([piece[tag] for piece in pieces if tag in piece])
             if series[tag].found:
                 self._met[tag] = series[tag].found
         return series

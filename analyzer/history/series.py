@@ -1,4 +1,4 @@
-"""Samples of one tag: as they stand in one file, settled into one series, and their span of time.
+"""Samples of one tag: as they stand in one file, joined into one series, and their span of time.
 
 Stamps far from the rest (a clock that was wrong once, a last value from weeks before, a stamp of 1601) would stretch
 a record over years of nothing, so they are set aside and told.
@@ -66,7 +66,7 @@ class Series:
         )
 
 
-def settle(pieces: Sequence[Series]) -> Series:
+def joined_pieces(pieces: Sequence[Series]) -> Series:
     """Join the pieces of one tag (one a file) into one series of strictly rising stamps.
 
     Parameters

@@ -48,9 +48,8 @@ def witness(verdict: Verdict, oscillates: bool, prepared: Prepared, limits: Caus
     if not oscillates and not agrees(m, limits):
         m = replace(m, evidence=min(m.evidence, 0.0))
     convicted = oscillates and verdict.cause is Cause.VALVE
-    slips = (
-        None if verdict.for_settings is verdict else verdict.measured
-    )  # one friction for all hides their jumps
+    # one friction for all slips hides their jumps
+    slips = None if verdict.for_settings is verdict else verdict.measured
     whole = prepared.compressed_share <= COMPRESSED
     jump = jump_evidence(slips or m, limits) if whole else (0.0, 0.0)
     said = {

@@ -6,16 +6,19 @@ joining happen once all pieces are there.
 
 from __future__ import annotations
 
+import hashlib
 import json
 import math
 import uuid
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from datetime import UTC, datetime
 
 from analyzer.belief.nights import held_pairs
 from analyzer.config import Config
 from analyzer.history.export import Export, met_told
+from analyzer.history.files import ends_of
 from analyzer.history.plant_clock import UTC_NAME
 from analyzer.loop.decisions import Status
 from analyzer.loops.changes import TuningChange
@@ -26,7 +29,7 @@ from analyzer.night.chunk import Done, Task
 from analyzer.night.cluster import Cluster
 from analyzer.night.finish import finish_night, is_empty
 from analyzer.night.nights import Night, nights_of
-from analyzer.night.run_files import identity, require_same
+from analyzer.night.run_files import Identity, in_one_order, require_same
 from analyzer.night.workers import Died, Here, Workers, executor
 from analyzer.store.lock import locked
 from analyzer.store.store import Store
@@ -137,6 +140,25 @@ def _mourned(workers: _Workers, died: Died[Task]) -> Iterator[Done]:
         workers.submit(replace(task, specs=hand, key=f"{task.key}-alone", alone=True), alone=True)
     else:
         yield chunk.lose(replace(task, specs=hand, key=f"{task.key}-lost"), died.why)
+
+
+def identity(batch: Batch) -> Identity:
+    """What a run that goes on with the pieces of a batch must have in common with it."""
+    mark = hashlib.blake2b(digest_size=16)
+    for source in batch.export.sources:
+        mark.update(ends_of(source.path))
+        mark.update(in_one_order(source.clock))
+    stated = (*batch.specs, *batch.changes, batch.zone)
+    mark.update(in_one_order((stated, batch.since_s, batch.until_s, batch.config)))
+    names = [source.path.name for source in batch.export.sources]
+    more = f" and {len(names) - 1} more files" if len(names) > 1 else ""
+    now = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
+    return {
+        "fingerprint": mark.hexdigest(),
+        "export": names[0] + more,
+        "loops": len(batch.specs),
+        "begun": now,
+    }
 
 
 def _begun(batch: Batch, nights: Sequence[Night], resume: bool) -> list[str]:

@@ -8,7 +8,6 @@ person can grep and a program can split: one line an event, appended, logfmt.
 
 from __future__ import annotations
 
-import hashlib
 import json
 import os
 import sys
@@ -17,14 +16,10 @@ from collections.abc import Set as AbstractSet
 from dataclasses import fields, is_dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from analyzer.history.files import ends_of
 from identification.errors import InputError
 from reports.texts import visible
-
-if TYPE_CHECKING:
-    from analyzer.night.batch import Batch
 
 PLAIN = frozenset("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789._:/+-%")
 """Characters of values that need no quotes."""
@@ -32,25 +27,6 @@ PLAIN = frozenset("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ012345678
 
 Identity = Mapping[str, Any]
 """A run as it is written down beside its pieces: fingerprint, and words for people (export, loops, begun)."""
-
-
-def identity(batch: Batch) -> Identity:
-    """What a run that goes on with the pieces of a batch must have in common with it."""
-    mark = hashlib.blake2b(digest_size=16)
-    for source in batch.export.sources:
-        mark.update(ends_of(source.path))
-        mark.update(in_one_order(source.clock))
-    stated = (*batch.specs, *batch.changes, batch.zone)
-    mark.update(in_one_order((stated, batch.since_s, batch.until_s, batch.config)))
-    names = [source.path.name for source in batch.export.sources]
-    more = f" and {len(names) - 1} more files" if len(names) > 1 else ""
-    now = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
-    return {
-        "fingerprint": mark.hexdigest(),
-        "export": names[0] + more,
-        "loops": len(batch.specs),
-        "begun": now,
-    }
 
 
 def in_one_order(value: object) -> bytes:
