@@ -99,8 +99,9 @@ Scanned = tuple[float, float, float, int]
 
 
 @njit(cache=True)
-def _phase(process: Scanned, kp: float, law: tuple[float, float], low: float, points: int) -> float:
-    """Phase [rad] that the characteristic polynomial in 1/z goes through along the upper unit circle.
+def _half_turns(process: Scanned, kp: float, law: tuple[float, float], low: float, points: int) -> int:
+    """Half turns about 0 that the characteristic polynomial in 1/z makes along the upper unit circle, from one real
+    value to another: how often it crosses the imaginary axis to the left, less how often to the right.
 
     Its points are `points` even ones and as many in even ratios from `low` [rad] on. The law is the scan over the
     integral time, and the derivative time over the scan. A controller without integral leaves a factor 1 - 1/z on the
@@ -108,27 +109,32 @@ def _phase(process: Scanned, kp: float, law: tuple[float, float], low: float, po
     """
     pole, now, before, delay = process
     rate, td = law
-    total, last, i, j = 0.0, 0.0, 0, 0
-    ratio = math.log(math.pi / low) / (points - 1)
+    turns, i, j, last = 0, 0, 0, complex(0.0, 0.0)
+    apart, ratio = math.pi / (points - 1), math.exp(math.log(math.pi / low) / (points - 1))
+    turn, turn_late = _backwards(apart), _backwards(apart * (delay + 1))
+    even, even_late, spread = complex(1.0, 0.0), complex(1.0, 0.0), low
     while i < points or j < points:
-        even = math.pi * i / (points - 1) if i < points else math.inf
-        spread = low * math.exp(ratio * j) if j < points else math.inf
-        angle = min(even, spread)
-        i, j = (i + 1, j) if even <= spread else (i, j + 1)
-        w = complex(math.cos(angle), -math.sin(angle))
-        step = 1.0 - w
-        turned = angle * (delay + 1)
-        late = (now + before * w) * complex(math.cos(turned), -math.sin(turned))
+        if i < points and (j == points or apart * i <= spread):
+            w, late = even, even_late
+            even, even_late, i = even * turn, even_late * turn_late, i + 1
+        else:
+            w, late = _backwards(spread), _backwards(spread * (delay + 1))
+            spread, j = spread * ratio, j + 1
+        step, late = 1.0 - w, (now + before * w) * late
         if rate == 0.0:
             value = 1.0 - pole * w + kp * (1.0 + td * step) * late
         else:
             value = step * (1.0 - pole * w) + kp * (step + rate + td * step * step) * late
-        here = math.atan2(value.imag, value.real)
-        if i + j > 1:
-            moved = here - last
-            total += moved - 2.0 * math.pi * np.round(moved / (2.0 * math.pi))
-        last = here
-    return total
+        if i + j > 1 and (value.real < 0.0) != (last.real < 0.0):
+            turns += 1 if last.real * value.imag > last.imag * value.real else -1
+        last = value
+    return turns
+
+
+@njit(cache=True)
+def _backwards(angle: float) -> complex:
+    """1/z at an angle [rad] of z on the unit circle."""
+    return complex(math.cos(angle), -math.sin(angle))
 
 
 def stable_gains(loop: Loop, kp: Floats) -> Mask:
@@ -141,8 +147,7 @@ def stable_gains(loop: Loop, kp: Floats) -> Mask:
     d, c = discretize(loop.process, h), loop.controller
     process, law = (d.pole, d.now, d.before, d.delay), (_rate(c) * h, c.td_s / h)
     low, points = 1e-3 * h / max(slowest_s(loop), h), CIRCLE + 8 * d.delay
-    turned = np.array([_phase(process, float(k), law, low, points) for k in np.asarray(kp)])
-    return np.abs(turned) < 0.5 * np.pi
+    return np.array([_half_turns(process, float(k), law, low, points) == 0 for k in np.asarray(kp)])
 
 
 def is_stable(loop: Loop) -> bool:
@@ -170,8 +175,7 @@ def _least_distance(process: Scanned, kp: float, law: tuple[float, float], angle
     rate, td = law
     least = math.inf
     for k in range(angles.size):
-        w = complex(math.cos(angles[k]), -math.sin(angles[k]))
-        step, turned = 1.0 - w, angles[k] * (delay + 1)
-        g = (now + before * w) * complex(math.cos(turned), -math.sin(turned)) / (1.0 - pole * w)
+        w, late = _backwards(angles[k]), _backwards(angles[k] * (delay + 1))
+        step, g = 1.0 - w, (now + before * w) * late / (1.0 - pole * w)
         least = min(least, abs(1.0 + g * kp * (1.0 + rate / step + td * step)))
     return least
