@@ -121,9 +121,14 @@ def assess(record: LoopRecord) -> Assessed:
     )
 
 
+def warm(record: LoopRecord) -> int:
+    """First sample of a simulated record behind its warm-up."""
+    return int(WARM_UP * len(record))
+
+
 def settled(record: LoopRecord) -> LoopRecord:
     """The record without its warm-up."""
-    return record.span(int(WARM_UP * len(record)), len(record))
+    return record.span(warm(record), len(record))
 
 
 def _blocks(record: LoopRecord) -> Floats:

@@ -21,6 +21,7 @@ from tuning.search import (
     Bench,
     Candidate,
     bench,
+    in_digits,
     mean_error,
     robust,
     rounded,
@@ -111,6 +112,7 @@ def _tight(loop: Loop, others: Sequence[Loop], load: Floats | None, limits: Tuni
         return Proposal(Action.UNDECIDED, reasons.too_uncertain(limits), ms_before=now)
     new, ms = found[0]
     if load is not None:
+        load = in_digits(load)
         new, ms = min(found, key=lambda pair: mean_error((loop, *others), pair[0], load))
         left = max(
             mean_error((one,), new, load) / max(mean_error((one,), one.controller, load), 1e-9)

@@ -17,7 +17,7 @@ from identification.record import Floats
 from identification.simulation.closed_loop import closed_loop, scan_step
 from identification.simulation.lag import discretize, respond
 from tuning.describing import band, is_play
-from tuning.forecast import run, settled
+from tuning.forecast import run, warm
 from tuning.frequency_response import integral_s, maximum_sensitivity, slowest_s
 from tuning.limits import TuningLimits
 from tuning.rules import effective_delay, simc
@@ -103,19 +103,26 @@ def _as_simulated(loop: Loop) -> Loop:
 
 
 def _figures(loop: Loop, load: Floats) -> tuple[float, float]:
-    """Stem travel [%/h] and average absolute error [% PV] on the load."""
-    r = settled(run(_as_simulated(loop), np.round(load, DIGITS)))
-    return float(np.abs(np.diff(r.stem)).sum()) / r.duration_s * 3600.0, float(np.mean(np.abs(r.pv)))
+    """Stem travel [%/h] and average absolute error [% PV] on a load in DIGITS, without the warm-up."""
+    r = run(_as_simulated(loop), load)
+    first = warm(r)
+    travel = float(np.abs(np.diff(r.stem[first:])).sum())
+    return travel / ((len(r) - first) * r.dt_s) * 3600.0, float(np.mean(np.abs(r.pv[first:])))
+
+
+def in_digits(load: Floats) -> Floats:
+    """A load as it is simulated, shape (n,) [% PV]."""
+    return np.ascontiguousarray(np.round(load, DIGITS))
 
 
 def mean_error(loops: Sequence[Loop], controller: Pid, load: Floats) -> float:
-    """Average absolute error [% PV] on a load, shape (n,), mean over the loops with one controller."""
+    """Average absolute error [% PV] on a load in DIGITS, shape (n,), mean over the loops with one controller."""
     return float(np.mean([_figures(replace(one, controller=controller), load)[1] for one in loops]))
 
 
 def bench(loop: Loop, others: Sequence[Loop], load: Floats, limits: TuningLimits) -> Bench:
     """The present tuning on every loop, so that candidates can be compared with it."""
-    cut = np.ascontiguousarray(load[-limits.most_steps :])
+    cut = in_digits(load[-limits.most_steps :])
     loops = tuple(replace(one, controller=loop.controller) for one in (loop, *others))
     loads = tuple(cut if k % 2 == 0 else np.ascontiguousarray(cut[::-1]) for k in range(len(loops)))
     figures = np.array([_figures(*case) for case in zip(loops, loads, strict=True)])
