@@ -50,6 +50,22 @@ def _value(stated: Any) -> Any:
     return tuple(_value(item) for item in stated) if isinstance(stated, list) else stated
 
 
+class FitLimits(Limits, section="fit"):
+    """Where fits of a process behind a valve begin, how far they are followed, and what one must gain on another."""
+
+
+class SlipLimits(Limits, section="slips"):
+    """The search for a stem whose slips scatter."""
+
+
+class StemLimits(Limits, section="stem"):
+    """What a recorded stem shows of its valve."""
+
+
+class IntervalLimits(Limits, section="intervals"):
+    """How wide the intervals of identified constants are told."""
+
+
 class RecorderLimits(Limits, section="recorder"):
     """What a recorder did to the trends before anyone saw them: lines, steps, ends, stamps."""
 
@@ -78,3 +94,5 @@ class ExplainLimits:
 
 LIMITS = ExplainLimits()
 """The limits where none are given."""
+FIT, SLIPS, STEM, INTERVALS = FitLimits(), SlipLimits(), StemLimits(), IntervalLimits()
+"""What fits go by: no plant has reasons of its own to change it."""

@@ -9,7 +9,8 @@ from __future__ import annotations
 import math
 from dataclasses import asdict, dataclass
 
-from identification.estimation.covariance import NINETY, WIDER
+from identification.estimation.covariance import NINETY
+from identification.limits import INTERVALS
 
 UNKNOWN = 2.0
 """Standard deviation of a logarithm beyond which a night does not know a constant [-]: a factor of seven."""
@@ -48,7 +49,7 @@ class Pool:
         """With one night more: its value and the standard deviation of its logarithm, no less than `least`."""
         if value == 0.0 or not math.isfinite(value) or not deviation <= UNKNOWN:
             return self
-        x, w = math.log(abs(value)), 1.0 / max(WIDER * deviation, least) ** 2
+        x, w = math.log(abs(value)), 1.0 / max(INTERVALS.wider * deviation, least) ** 2
         return Pool(
             self.count + 1.0,
             self.total + x,

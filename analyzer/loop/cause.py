@@ -40,10 +40,11 @@ from analyzer.loop.oscillation import Oscillation
 from analyzer.loop.quality import Prepared
 from analyzer.words import settings as words
 from identification.errors import NotAssessedError
-from identification.estimation.backlash_stiction import SHORT, generic_noise
+from identification.estimation.backlash_stiction import generic_noise
 from identification.estimation.gauss_newton import descend
 from identification.estimation.hammerstein import Fit
 from identification.estimation.irregular_slips import SlipPath, fit_irregular, path_evidence
+from identification.limits import FIT
 from identification.record import LoopRecord
 
 NO_MODEL = "needs trends from which a model can be identified"
@@ -350,7 +351,7 @@ def told_slip_by_slip(verdict: Verdict, period_s: float, limits: CauseLimits) ->
         verdict.cause is not Cause.VALVE
         or m is None
         or m.window.position is not None
-        or m.window.y.size < SHORT
+        or m.window.y.size < FIT.short
     ):
         return verdict
     blocks = replace(m.play, window=replace(m.window, fine=False))

@@ -8,24 +8,11 @@ import numpy as np
 
 from analyzer.config import AdviceLimits
 from analyzer.loop.measure import Measured
-from identification.estimation.covariance import (
-    DECODED,
-    JUMPING,
-    LATER,
-    LEAST_BAND,
-    LEAST_BLOCK,
-    LEAST_JUMP,
-    LEAST_SHARE,
-    NINETY,
-    SLOPE_ALONE,
-    SOONER,
-    WIDER,
-    half_width,
-    reaching,
-)
+from identification.estimation.covariance import NINETY, half_width, reaching
 from identification.estimation.gauss_newton import covariance
 from identification.estimation.hammerstein import Fit, disturbance
 from identification.estimation.window import Window
+from identification.limits import INTERVALS
 from identification.models import Estimate, Fopdt, Integrator, Loop, Pid, Process
 from identification.record import Floats
 from identification.signals.robust import robust_deviation
@@ -158,18 +145,19 @@ def intervals(fit: Fit, valve: bool, limits: AdviceLimits) -> dict[str, Estimate
     whole = covariance(fit, free_width=valve)
     t, window = fit.time_constant_s, fit.window
     factor = lag_factor(fit, valve, limits)
-    wider = SLOPE_ALONE if valve and factor is None else 1.0
+    wider = INTERVALS.slope_alone if valve and factor is None else 1.0
     spread = wider * np.sqrt(np.maximum(np.diag(whole), 0.0))
-    slope = abs(fit.slope) * half_width(wider * slope_deviation(fit, whole), LEAST_SHARE)
+    slope = abs(fit.slope) * half_width(wider * slope_deviation(fit, whole), INTERVALS.least_share)
     out = {"slope_pct_per_s": _around(fit.slope, slope, "%/(% s)")}
     if factor is not None:
-        wide = max(factor ** _lag_wider(fit, valve), 1.0 + LEAST_SHARE)
-        out["gain"] = _around(fit.gain, half_width(spread[3], LEAST_SHARE * abs(fit.gain)), "%/%")
+        wide = max(factor ** _lag_wider(fit, valve), 1.0 + INTERVALS.least_share)
+        out["gain"] = _around(fit.gain, half_width(spread[3], INTERVALS.least_share * abs(fit.gain)), "%/%")
         out["time_constant_s"] = Estimate(t, t / wide, t * wide, "s")
     dead_s = fit.process.dead_time_s
-    out["dead_time_s"] = _around(dead_s, half_width(spread[1], LEAST_BLOCK * window.dt_s), "s", least=0.0)
+    late = half_width(spread[1], INTERVALS.least_block * window.dt_s)
+    out["dead_time_s"] = _around(dead_s, late, "s", least=0.0)
     if valve and window.decoded:
-        spread[2] = DECODED * fit.valve.stickband
+        spread[2] = INTERVALS.decoded * fit.valve.stickband
     if valve:
         name = "backlash_pct" if fit.valve.slip_jump == 0 else "stickband_pct"
         out[name] = _around(fit.valve.stickband, half_width(spread[2]), "% of OP", least=0.0)
@@ -181,8 +169,8 @@ def intervals(fit: Fit, valve: bool, limits: AdviceLimits) -> dict[str, Estimate
 def _lag_wider(fit: Fit, valve: bool) -> float:
     """Times wider that a time constant is told; behind play the deviations are those of its errors."""
     if not valve:
-        return WIDER
-    return WIDER * JUMPING if fit.valve.slip_jump > 0 else 1.0
+        return INTERVALS.wider
+    return INTERVALS.wider * INTERVALS.jumping if fit.valve.slip_jump > 0 else 1.0
 
 
 def _jumping(window: Window, valve: StemLaw, found: dict[str, Estimate]) -> dict[str, Estimate]:
@@ -192,16 +180,18 @@ def _jumping(window: Window, valve: StemLaw, found: dict[str, Estimate]) -> dict
     leaves; a stem that lets go later is as good as a process that answers later by the time OP takes for that.
     """
     jump, band = valve.slip_jump, valve.stickband
-    out = {"slip_jump_pct": Estimate(jump, jump / LEAST_JUMP, band, "% of OP")}
+    out = {"slip_jump_pct": Estimate(jump, jump / INTERVALS.least_jump, band, "% of OP")}
     for name in ("slope_pct_per_s", "gain"):
         if name in found:
-            out[name] = reaching(found[name], found[name].value * jump / band, found[name].value * LEAST_JUMP)
-    out["stickband_pct"] = reaching(found["stickband_pct"], band / LEAST_BAND)
+            value = found[name].value
+            out[name] = reaching(found[name], value * jump / band, value * INTERVALS.least_jump)
+    out["stickband_pct"] = reaching(found["stickband_pct"], band / INTERVALS.least_band)
     travel = float(np.abs(np.diff(window.op_blocks)).sum())
-    later_s = 0.5 * band * (1.0 - 1.0 / LEAST_BAND) * window.duration_s / max(travel, 1e-9)
+    later_s = 0.5 * band * (1.0 - 1.0 / INTERVALS.least_band) * window.duration_s / max(travel, 1e-9)
     dead = found["dead_time_s"]
-    sooner_s = SOONER * (dead.value - dead.low)
-    out["dead_time_s"] = reaching(dead, max(dead.value - sooner_s, 0.0), dead.value + LATER * later_s)
+    sooner_s = INTERVALS.sooner * (dead.value - dead.low)
+    low, high = max(dead.value - sooner_s, 0.0), dead.value + INTERVALS.later * later_s
+    out["dead_time_s"] = reaching(dead, low, high)
     return out
 
 

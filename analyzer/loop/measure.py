@@ -13,8 +13,6 @@ from analyzer.loop.oscillation import Oscillation
 from identification.controller.pid_regression import fit_pi
 from identification.errors import NotAssessedError
 from identification.estimation.backlash_stiction import (
-    SCREENED,
-    SHORT,
     better_linear,
     fit_linear,
     fit_play,
@@ -33,9 +31,13 @@ from identification.estimation.evidence import (
 from identification.estimation.gauss_newton import descend
 from identification.estimation.hammerstein import Fit, residual
 from identification.estimation.noise import judged
-from identification.estimation.search import AR_ORDER, prepare, score
+from identification.estimation.search import (
+    prepare,
+    score,
+)
 from identification.estimation.stem_position import Seen, seen
 from identification.estimation.window import Window, block_means
+from identification.limits import FIT
 from identification.models import Fopdt, Loop, Pid
 from identification.record import Floats, LoopRecord, Mask
 from identification.signals.half_cycles import size_kurtosis
@@ -239,10 +241,10 @@ def _fits(
 
 def _check_judged(window: Window, limits: CauseLimits) -> None:
     """Raise NotAssessedError where too few blocks follow on as many good ones as the noise model looks back."""
-    count = int(judged(window.usable, AR_ORDER).sum())
+    count = int(judged(window.usable, FIT.ar_order).sum())
     if count < limits.judged:
         raise NotAssessedError(
-            f"needs {limits.judged} stretches of {AR_ORDER + 1} good samples in a row, has {count}"
+            f"needs {limits.judged} stretches of {FIT.ar_order + 1} good samples in a row, has {count}"
         )
 
 
@@ -266,7 +268,7 @@ def _refined(fits: tuple[Fit, Fit, Fit | None], best: Fit, hopeless: bool) -> tu
 
 def _hopeful(window: Window, due: Mask, limits: CauseLimits) -> float:
     """Evidence [nat] from which it is worth looking for the fault of a valve whose loop does not oscillate."""
-    count = int(judged(window.usable, AR_ORDER).sum())
+    count = int(judged(window.usable, FIT.ar_order).sum())
     return limits.hopeless * limits.needed(count, bool(due.any()), False)
 
 
@@ -275,11 +277,11 @@ def _candidates(
 ) -> Fits:
     """Plain fit, play, stick-slip if it was tried, the better valve, its evidence and that of the jump [nat]."""
     linear = fit_linear(window, scale_s)
-    short = oscillation is None and window.y.size < SHORT
+    short = oscillation is None and window.y.size < FIT.short
     hopeful = None if oscillation is not None or short else _hopeful(window, due, limits)
     play = fit_play(linear, scale_s, hopeful)
     gained = play.log_likelihood - linear.log_likelihood
-    if gained < (SCREENED if hopeful is None else hopeful) and not short:
+    if gained < (FIT.screened if hopeful is None else hopeful) and not short:
         return linear, play, None, play, gained, 0.0
     linear = better_linear(linear, play)
     best, stick, jump = play, None, 0.0

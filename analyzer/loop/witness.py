@@ -16,10 +16,10 @@ from analyzer.loop.decisions import Cause, Fault
 from analyzer.loop.identified import slope_deviation
 from analyzer.loop.measure import Measured
 from analyzer.loop.quality import Prepared
-from identification.estimation.covariance import DECODED, LEAST_JUMP
 from identification.estimation.gauss_newton import covariance
 from identification.estimation.hammerstein import Fit
 from identification.estimation.width_profile import WIDTHS, width_profile
+from identification.limits import INTERVALS
 from identification.record import Floats
 from identification.signals.robust import robust_deviation
 
@@ -94,7 +94,8 @@ def _constants(
             found |= {"width": (fit.valve.stickband, relative), "slip_jump": (fit.valve.slip_jump, relative)}
     if slips is not None and slips.stick_slip is not None:
         valve = slips.stick_slip.valve
-        found |= {"width": (valve.stickband, DECODED), "slip_jump": (valve.slip_jump, math.log(LEAST_JUMP))}
+        found["width"] = valve.stickband, INTERVALS.decoded
+        found["slip_jump"] = valve.slip_jump, math.log(INTERVALS.least_jump)
     return found
 
 

@@ -11,8 +11,6 @@ from identification.estimation.gauss_newton import descend
 from identification.estimation.hammerstein import Fit, stem_blocks
 from identification.estimation.noise import arx_noise
 from identification.estimation.search import (
-    AR_ORDER,
-    INPUT_LAGS,
     Dynamics,
     Prepared,
     Products,
@@ -30,48 +28,16 @@ from identification.estimation.search import (
     whitened_stem,
 )
 from identification.estimation.window import Window
+from identification.limits import FIT
 from identification.record import Floats
 from identification.simulation.lag import Lag, respond, unit_lag
 from identification.simulation.valve import HALTS, IDEAL, RESTS, SLIDES, StemLaw, sticking
 
-SCREEN_SHARES = (0.1, 0.3, 0.55, 0.8)
-"""Stickbands that a loop without an evident fault is screened with, as shares of OP's range; ours: a play of any
-width between is seen by the nearest of them."""
-SCREENED = 3.0
-"""Gain in log likelihood [nat] from which the screening is followed by the whole search; ours: a third of what a
-verdict needs."""
-SMALL, MIDDLE, LARGE = (0.06, 0.12, 0.2, 0.3), (0.42, 0.55), (0.7, 0.85, 1.0)
-"""Stickbands tried first, as shares of OP's range; a valve much wider than OP's range would not move at all. The
-best of each part is followed: at the period a small play with a long dead time answers as a large one with a short
-one does, and the scan ranks the first before; ours: where the best of the scan alone were followed, 3 of 20 loops
-that oscillate lost 10 nat and more, and two plain plays all they had; now 3 of 209 lose as much."""
-JUMP_SHARES = (0.2, 0.4, 0.7, 1.0)
-"""Slip jumps tried, as shares of the stickband."""
-COAST = 0.15
-"""Turning of OP that a sliding stem ignores, as share of the stickband: OP's noise; ours."""
 FINE_WIDTHS = tuple(float(w) for w in np.arange(0.88, 1.34, 0.012))
 """Stickbands tried about a play, in its width; ours: on simulated stick-slip from 0.94 to 1.3 times the play that
 fits best, in pits about 1 % wide where OP is recorded finely."""
 FINE_JUMPS = tuple(float(j) for j in np.arange(0.1, 1.01, 0.06))
 """Slip jumps tried about a play, as shares of the stickband."""
-LATER = (0.0, 0.4, 0.8, 1.2, 1.6, 2.0, 2.5, 3.0)
-"""Dead times tried about a play, in blocks beyond the play's: a play in place of a jump answers too soon; ours."""
-FINALISTS = 8
-"""Candidates of the fine scan, per behaviour, that are brought to the bottom of their pits; ours: of 165 loops two
-lost more than 1 nat where the likeliest two of all these alone were brought there a second time."""
-SHORT = 1000
-"""Blocks of a record that is so short that every candidate can be tried on it; ours."""
-FOLLOWED_SHORT = 5
-"""Candidates that are followed on a short record: with few events there are more valleys."""
-FOLLOWED = 2
-"""Candidates of a scan of stick-slip that are followed to the end."""
-
-
-CLEAR = 1.0
-"""Gain in log likelihood [nat] from which one fit of the same model is preferred to another; ours."""
-GENERIC = 0.95
-"""First coefficient of a noise model that knows nothing: nearly a difference. A noise model that was fitted with
-another valve takes that valve's side, so candidates are ranked by both."""
 
 
 def begin(window: Window, prepared: Prepared, dynamics: Dynamics) -> Fit:
@@ -90,7 +56,7 @@ def fit_linear(window: Window, period_s: float) -> Fit:
     period_s : period of the oscillation, or other scale of the loop [s], about which the search begins.
     """
     stem = window.stems_in_blocks.ideal
-    learnt = arx_noise(window.centred, stem, window.usable, AR_ORDER, INPUT_LAGS)
+    learnt = arx_noise(window.centred, stem, window.usable, FIT.ar_order, FIT.input_lags)
     fits = []
     for ar in (learnt, generic_noise()):
         prepared = prepare(window, IDEAL, ar)
@@ -99,9 +65,9 @@ def fit_linear(window: Window, period_s: float) -> Fit:
 
 
 def generic_noise() -> Floats:
-    """The noise model that knows nothing, shape (AR_ORDER,)."""
-    out = np.zeros(AR_ORDER)
-    out[0] = GENERIC
+    """The noise model that knows nothing, shape (FIT.ar_order,)."""
+    out = np.zeros(FIT.ar_order)
+    out[0] = FIT.generic
     return out
 
 
@@ -131,19 +97,19 @@ def fit_play(linear: Fit, period_s: float, hopeful: float | None = None) -> Fit:
     """The best play followed by a lag: a screening, and the whole search where it finds anything.
 
     linear : the best fit behind an ideal valve; period_s : scale of the search [s]; hopeful : gain in log likelihood
-    [nat] of a quick screening from which the whole search follows; None: the screening is thorough, and SCREENED is
+    [nat] of a quick screening from which the whole search follows; None: the screening is thorough, FIT.screened
     enough.
     """
     window = linear.window
     reach = max(window.op_range, 1e-9)
-    screened = [sticking(share * reach, 0.0) for share in SCREEN_SHARES]
+    screened = [sticking(share * reach, 0.0) for share in FIT.screen_shares]
     followed = len(screened) if hopeful is None else 1
     best = _likeliest(_chosen(linear, screened, period_s, followed))
-    if best.log_likelihood - linear.log_likelihood < (SCREENED if hopeful is None else hopeful):
+    if best.log_likelihood - linear.log_likelihood < (FIT.screened if hopeful is None else hopeful):
         return best
-    followed = FOLLOWED_SHORT if window.y.size < SHORT else 1
+    followed = FIT.followed_short if window.y.size < FIT.short else 1
     begun = []
-    for part in (SMALL, MIDDLE, LARGE, (best.valve.stickband / reach,)):
+    for part in (FIT.small, FIT.middle, FIT.large, (best.valve.stickband / reach,)):
         valves = [sticking(share * reach, 0.0) for share in part]
         begun += _chosen(best, valves, period_s, followed)
     return max(best, _likeliest(begun), key=lambda fit: fit.log_likelihood)
@@ -156,7 +122,7 @@ def better_linear(linear: Fit, play: Fit) -> Fit:
     likely, the one that was searched on its own stays.
     """
     trial = descend(replace(play, valve=IDEAL))
-    return trial if trial.log_likelihood > linear.log_likelihood + CLEAR else linear
+    return trial if trial.log_likelihood > linear.log_likelihood + FIT.clear else linear
 
 
 def fit_stick_slip(play: Fit, period_s: float) -> Fit:
@@ -165,8 +131,8 @@ def fit_stick_slip(play: Fit, period_s: float) -> Fit:
     play : the best play: its width is near the stickband, for OP tells both by its travel between slips; period_s :
     scale of the search [s].
     """
-    short = play.window.y.size < SHORT
-    begun = _chosen(play, _coarse(play), period_s, FOLLOWED_SHORT if short else FOLLOWED)
+    short = play.window.y.size < FIT.short
+    begun = _chosen(play, _coarse(play), period_s, FIT.followed_short if short else FIT.followed)
     fits = [_likeliest(begun), *pits(play, (RESTS, HALTS, SLIDES))]
     return max(fits, key=lambda fit: fit.log_likelihood)
 
@@ -175,12 +141,12 @@ def _coarse(play: Fit) -> list[StemLaw]:
     """Stickbands up to OP's range, with stems that rest and stems that slide."""
     reach = max(play.window.op_range, 1e-9)
     near = play.valve.stickband / reach
-    widths = {round(s, 4) for s in MIDDLE + LARGE} | {near, 1.1 * near}
+    widths = {round(s, 4) for s in FIT.middle + FIT.large} | {near, 1.1 * near}
     return [
         sticking(width * reach, jump, tolerance)
         for width in sorted(widths)
-        for jump in JUMP_SHARES
-        for tolerance in (RESTS, COAST * width * reach)
+        for jump in FIT.jump_shares
+        for tolerance in (RESTS, FIT.coast * width * reach)
     ]
 
 
@@ -191,14 +157,14 @@ def pits(play: Fit, tolerances: tuple[float, ...]) -> list[Fit]:
     """
     window = play.window
     pairs = np.array([(w * play.valve.stickband, j) for w in FINE_WIDTHS for j in FINE_JUMPS])
-    begins = [(play.time_constant_s, play.dead_time_s + blocks * window.dt_s) for blocks in LATER]
+    begins = [(play.time_constant_s, play.dead_time_s + blocks * window.dt_s) for blocks in FIT.later]
     out = []
     for tolerance in tolerances:
         left = scan(window, pairs, tolerance, generic_noise(), begins)
-        best = [sticking(pairs[i, 0], pairs[i, 1], tolerance) for i in np.argsort(left)[:FINALISTS]]
+        best = [sticking(pairs[i, 0], pairs[i, 1], tolerance) for i in np.argsort(left)[: FIT.finalists]]
         fits = _ranked(window, generic_noise(), best, begins)
         out += [_bottom(descend(fit)) for fit in fits]
-    likeliest = sorted(out, key=lambda fit: -fit.log_likelihood)[:FOLLOWED]
+    likeliest = sorted(out, key=lambda fit: -fit.log_likelihood)[: FIT.followed]
     return [_bottom(fit) for fit in likeliest]
 
 

@@ -13,6 +13,7 @@ from identification.estimation.gauss_newton import descend
 from identification.estimation.hammerstein import Fit, disturbance, residual, stem_of
 from identification.estimation.noise import every_lag, judged, whitened
 from identification.estimation.search import prepare, search, starts
+from identification.limits import FIT
 from identification.record import Floats, Mask
 from identification.signals.robust import clipped_gain
 from identification.simulation.valve import IDEAL, sticking
@@ -28,10 +29,6 @@ def innovations(fit: Fit) -> Floats:
 def evidence(ours: Fit, theirs: Fit) -> float:
     """Gain in log likelihood [nat] of one fit over another, no innovation counting for more than outliers do."""
     return float(clipped_gain(innovations(ours), innovations(theirs)).sum())
-
-
-STEP_PENALTY = 6.0
-"""Gain in log likelihood [nat] that one step of the load at any time costs: log of the blocks, nearly."""
 
 
 def moves_begun(fit: Fit) -> np.ndarray:
@@ -62,7 +59,7 @@ def with_load_step(fit: Fit, answering: Mask, noise: Floats) -> Fit:
     stepped = replace(fit, window=replace(fit.window, step_at=at))
     tried = descend(stepped), descend(replace(stepped, ar=noise))
     trial = max(tried, key=lambda f: f.log_likelihood)
-    return trial if trial.log_likelihood - fit.log_likelihood > STEP_PENALTY else fit
+    return trial if trial.log_likelihood - fit.log_likelihood > FIT.step_penalty else fit
 
 
 def expected_evidence(linear: Fit, width: float, period_s: float) -> float:
@@ -92,12 +89,6 @@ def expected_evidence(linear: Fit, width: float, period_s: float) -> float:
 def _pv(fit: Fit) -> Floats:
     """PV of a process behind a valve, free of load and noise [% PV], shape (n,)."""
     return fit.window.centred - residual(fit)
-
-
-TURN = 0.4
-"""A turn of OP is one by this share of its usual range within a period [-]; ours: noise on OP turns by less."""
-SMOOTHED = 12
-"""Parts of a period over which OP is smoothed for its turns; ours."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,10 +132,10 @@ def _usual_range(x: Floats, length: int) -> float:
 
 def turns_of(op: Floats, period: float) -> np.ndarray:
     """Samples at which OP, shape (n,), turns in a cycle of that period [samples], shape (t,)."""
-    half = max(int(period / (2 * SMOOTHED)), 1)
+    half = max(int(period / (2 * FIT.smoothed)), 1)
     kernel = np.full(2 * half + 1, 1.0 / (2 * half + 1))
     smooth = np.convolve(np.pad(op, half, mode="edge"), kernel, mode="valid")
-    return turning_points(smooth, max(TURN * _usual_range(smooth, max(round(period), 2)), 1e-12))
+    return turning_points(smooth, max(FIT.turn * _usual_range(smooth, max(round(period), 2)), 1e-12))
 
 
 def gains(ours: Fit, theirs: Fit) -> Floats:

@@ -20,14 +20,11 @@ from identification.estimation.descent import Descent, down
 from identification.estimation.hammerstein import Fit, stem_of
 from identification.estimation.noise import every_lag, judged, whitened
 from identification.estimation.window import Stems, Window
+from identification.limits import FIT
 from identification.record import Floats
 from identification.simulation.lag import respond, respond_together, unit_lag
 from identification.simulation.valve import StemLaw
 
-ITERATIONS = 25
-"""Gauss-Newton steps at most; ours: nine in ten fits stop before the fifteenth."""
-SETTLED = 0.01
-"""Gain in log likelihood [nat] below which the steps stop."""
 NARROWEST = 0.2
 """Stickband after a step, in terms of that before, that is tried no more."""
 BASE = 8
@@ -201,15 +198,9 @@ def _stepped(b: _Bench, p: _Point, step: Floats) -> _Point:
 
 
 @njit(cache=True)
-def _descend(b: _Bench, theta: Floats, valve: StemLaw) -> _Point:
+def _descend(b: _Bench, theta: Floats, valve: StemLaw, rule: Descent) -> _Point:
     """Damped Gauss-Newton steps to the least mean square of the innovations judged."""
-    return down(
-        b,
-        _point(b, theta, valve),
-        _curved,
-        _stepped,
-        Descent(ITERATIONS, ITERATIONS, b.at.size, SETTLED, 10.0, 5.0, ITERATIONS),
-    )  # type: ignore[no-any-return]
+    return down(b, _point(b, theta, valve), _curved, _stepped, rule)  # type: ignore[no-any-return]
 
 
 def _theta(fit: Fit) -> Floats:
@@ -243,7 +234,9 @@ def descend(fit: Fit, free_width: bool = False) -> Fit:
     Time constant, dead time, gain, slow terms and the noise model, and with `free_width` the stickband, move at
     once, because they trade against each other along narrow valleys.
     """
-    best = _descend(_bench(fit.window, fit.ar.size, free_width), _theta(fit), _law(fit.valve))
+    b, steps = _bench(fit.window, fit.ar.size, free_width), FIT.iterations
+    rule = Descent(steps, steps, b.at.size, FIT.settled, 10.0, 5.0, steps)
+    best = _descend(b, _theta(fit), _law(fit.valve), rule)
     theta = best.theta
     return Fit(
         float(theta[3]),

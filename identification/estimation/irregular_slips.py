@@ -15,43 +15,17 @@ from identification.estimation.hammerstein import Fit, disturbance, residual, sl
 from identification.estimation.noise import every_lag, judged, whitened
 from identification.estimation.slip_beam import Noise, Response, SlipDistances, decoded, log_chance
 from identification.estimation.window import Window
+from identification.limits import SLIPS
 from identification.record import Floats
 from identification.simulation.lag import unit_lag
 from identification.simulation.valve import StemLaw, sticking
 from identification.simulation.valve import play as play_stem
 
-WIDTHS = (0.78, 0.88, 0.98, 1.12)
-"""Stickbands tried, in widths of the play that fits best; ours: on 32 simulated stems of dry friction 0.7 to 1.3."""
-JUMPS = (0.35, 0.6, 0.9)
-"""Slip jumps tried, in stickbands."""
-ABSURD = 2.0
-"""Times that the play's gain exceeds what a friction's slips need from which theirs is taken: a play may answer a
-square PV by a stem that barely moves and a gain that no process has; ours."""
-LATER = (0.0, 0.8, 1.6, 2.8)
-"""Dead times tried, in blocks beyond the play's: a play in place of a jump answers too soon."""
-SCREENED, CARRIED = 8, 16
-"""Paths side by side while these are tried, and later; ours, for time."""
-ROUNDS = 5
-"""Turns of decoding and fitting; ours: of six followed by hand the last turns gained a few nat."""
-HOT = (8.0, 4.0, 2.0, 1.0)
-"""Times the innovations' variance in the first rounds, in which the process is not known yet."""
-FEWEST = 6
-"""Slips of a path at least; ours: three cycles."""
-RESTS = 0.9
-"""Longest rest of a stem, in periods, while the process is not known: one that parks explains nothing."""
-STEPS = (0.15, 0.08, 0.04)
-"""Relative steps of the search for the friction in the end."""
-DEAD_STEPS = 8.0
-"""Blocks of dead time that a step of one takes; ours: a stem that lets go later is like one behind a longer pipe."""
 MOVES = (
     *((1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1)),
     *((1, 0, -1), (-1, 0, 1), (1, -1, -1), (-1, 1, 1)),
 )
 """Steps that are tried of stickband, jump and dead time: a wider band that jumps less answers sooner."""
-WORTH = 1.0
-"""Gain [nat] of a step from which it is taken."""
-MOST_MOVES = 40
-"""Steps that are taken at most, for time; ours: on 9 simulated stems some five were."""
 
 
 Gains = dict[tuple[float, float], float]
@@ -120,7 +94,7 @@ def _gain(play: Fit, band: float, share: float, half: int) -> float:
     moved = (float(np.std(x[half:] - x[:-half])) if 0 < half < x.size else 0.0 for x in (centred, stem))
     pv, swing = moved
     found = math.copysign(pv / swing, play.gain) if swing > 0.0 else 0.0
-    return found if abs(found) < abs(play.gain) / ABSURD else 0.0
+    return found if abs(found) < abs(play.gain) / SLIPS.absurd else 0.0
 
 
 def _screened(play: Fit, noise: Floats, rest: int, gains: Gains) -> list[_Trial]:
@@ -130,14 +104,14 @@ def _screened(play: Fit, noise: Floats, rest: int, gains: Gains) -> list[_Trial]
     e = whitened(disturbance(play), noise, every_lag(noise.size))[noise.size :]
     sigma2 = float(np.mean(e[window.usable[noise.size :]] ** 2))
     mean, out = float(play_stem(window.op, play.valve.stickband).mean()), list[_Trial]()
-    for later in LATER:
+    for later in SLIPS.later:
         for (width, share), gain in gains.items():
             if gain:
                 band = width * play.valve.stickband
                 fit = replace(play, dead_time_s=play.dead_time_s + later * window.dt_s, gain=gain)
                 r, f = _response(fit, mean), _friction(band, share, rest)
                 least = _bound(out, band, share)
-                path, score = _decoded(window, r, Noise(noise, sigma2), f, SCREENED, least)
+                path, score = _decoded(window, r, Noise(noise, sigma2), f, SLIPS.screened, least)
                 out = _chosen([*out, _Trial(score, _slips(path), band, share, later, gain, path)])
     return out
 
@@ -157,7 +131,7 @@ def _chosen(tried: list[_Trial]) -> list[_Trial]:
     """
     best: dict[tuple[str, float], _Trial] = {}
     for t in sorted(tried, key=lambda t: -t.score):
-        if t.slips >= FEWEST:
+        if t.slips >= SLIPS.fewest:
             best.setdefault(("width", t.band), t)
             best.setdefault(("share", t.share), t)
     return list(dict.fromkeys(best.values()))
@@ -172,7 +146,7 @@ def _path(fit: Fit, valve: StemLaw, stem: Floats) -> SlipPath:
 
 
 def _decoded_by(fit: Fit, mean: float, f: SlipDistances, hot: float) -> Floats:
-    return _decoded(fit.window, _response(fit, mean), Noise(fit.ar, hot * fit.sigma2), f, CARRIED)[0]
+    return _decoded(fit.window, _response(fit, mean), Noise(fit.ar, hot * fit.sigma2), f, SLIPS.carried)[0]
 
 
 def _followed(play: Fit, begun: _Trial, rest: int) -> SlipPath:
@@ -182,10 +156,10 @@ def _followed(play: Fit, begun: _Trial, rest: int) -> SlipPath:
     later_s = begun.later * window.dt_s
     fit = replace(play, dead_time_s=play.dead_time_s + later_s, gain=begun.gain)
     best = path = _path(fit, valve, stem)
-    for k in range(1, ROUNDS):
+    for k in range(1, SLIPS.rounds):
         f = _friction(begun.band, begun.share, rest if k == 1 else window.op.size)
-        stem = _decoded_by(path.fit, path.mean, f, HOT[min(k - 1, len(HOT) - 1)])
-        if _slips(stem) < FEWEST:
+        stem = _decoded_by(path.fit, path.mean, f, SLIPS.hot[min(k - 1, len(SLIPS.hot) - 1)])
+        if _slips(stem) < SLIPS.fewest:
             break
         path = _path(path.fit, valve, stem)
         best = max(best, path, key=lambda p: p.worth)
@@ -194,7 +168,9 @@ def _followed(play: Fit, begun: _Trial, rest: int) -> SlipPath:
 
 def _settled(best: SlipPath) -> SlipPath:
     """Stickband, jump and dead time moved by ever smaller steps to the most probable path."""
-    return compass(None, best, -best.worth, _moved, MOVES, STEPS, worth=WORTH, most=MOST_MOVES)[0]
+    return compass(
+        None, best, -best.worth, _moved, MOVES, SLIPS.steps, worth=SLIPS.worth, most=SLIPS.most_moves
+    )[0]
 
 
 def _moved(_: None, best: SlipPath, move: tuple[int, int, int], step: float) -> tuple[SlipPath, float]:
@@ -202,13 +178,13 @@ def _moved(_: None, best: SlipPath, move: tuple[int, int, int], step: float) -> 
     window = best.fit.window
     v, (wider, jumpier, later) = best.fit.valve, (step * m for m in move)
     band, share = v.stickband * (1.0 + wider), v.slip_jump / v.stickband + 2.0 * jumpier
-    dead_s = best.fit.dead_time_s + later * DEAD_STEPS * window.dt_s
+    dead_s = best.fit.dead_time_s + later * SLIPS.dead_steps * window.dt_s
     if not 0.0 < share <= 1.0 or dead_s < 0.0:
         return best, math.inf
     gain = best.fit.gain * v.slip_jump / (band * share)  # a slip moves PV by gain times jump
     fit, f = replace(best.fit, dead_time_s=dead_s, gain=gain), _friction(band, share, window.op.size)
     stem = _decoded_by(fit, best.mean, f, 1.0)
-    if _slips(stem) < FEWEST:
+    if _slips(stem) < SLIPS.fewest:
         return best, math.inf
     path = _path(fit, sticking(band, share), stem)
     return path, -path.worth
@@ -224,9 +200,9 @@ def fit_irregular(play: Fit, noise: Floats, period_s: float, any_gain: bool = Tr
     if play.gain == 0.0:
         return None
     window = play.window
-    rest = max(int(RESTS * period_s * window.factor / window.dt_s), 1)
+    rest = max(int(SLIPS.rests * period_s * window.factor / window.dt_s), 1)
     bands, half = play.valve.stickband, rest // window.factor // 2
-    usual: Gains = {(w, s): play.gain for w in WIDTHS for s in JUMPS}
+    usual: Gains = {(w, s): play.gain for w in SLIPS.widths for s in SLIPS.jumps}
     best = _likeliest(play, noise, rest, usual)
     if best is None and any_gain:
         smaller = {(w, s): _gain(play, w * bands, s, half) for w, s in usual}

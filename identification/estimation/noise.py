@@ -12,6 +12,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from identification.limits import FIT
 from identification.record import Floats, Mask
 
 Edges = NDArray[np.int64]
@@ -20,14 +21,8 @@ EDGES = np.array([0, 1, 2, 3, 4, 5, 6, 8, 10, 13, 17, 22, 29, 38, 50, 66, 88, 11
 octave where load is, reaching as far as a loop of 100 samples' time constant needs."""
 NO_NOISE = np.zeros(1, dtype=np.int64)
 """Edges of no lags at all: innovations are the errors of the simulation themselves."""
-FEWEST = 4
-"""Fewest edges."""
-JUDGED = 0.5
-"""Share of the good samples that have to be judged; ours."""
 TILE = 1024
 """Samples that are whitened at a time."""
-SHORTEST = 12
-"""Records hold at least this many times the longest lag; ours."""
 
 
 def edges_for(usable: Mask) -> Edges:
@@ -35,8 +30,10 @@ def edges_for(usable: Mask) -> Edges:
 
     Where single samples are missing all over a record, a noise model that looked back far would judge none.
     """
-    count = max(int(np.searchsorted(EDGES, usable.size / SHORTEST, side="right")), FEWEST)
-    while count > FEWEST and judged(usable, int(EDGES[count - 1])).sum() < JUDGED * usable.sum():
+    count = max(int(np.searchsorted(EDGES, usable.size / FIT.longest_lag, side="right")), FIT.fewest_edges)
+    while (
+        count > FIT.fewest_edges and judged(usable, int(EDGES[count - 1])).sum() < FIT.judged * usable.sum()
+    ):
         count -= 1
     return EDGES[:count]
 

@@ -10,7 +10,7 @@ import numpy as np
 from identification.estimation.covariance import inverse, scattered
 from identification.estimation.descent import Descent, damped_step, down, nats
 from identification.estimation.noise import Edges, edges_for, fitted, judged, lag_means, whitened
-from identification.limits import LIMITS, ExplainLimits
+from identification.limits import FIT, LIMITS, ExplainLimits
 from identification.record import Floats, Mask
 from identification.signals.correlation import correlated
 from identification.signals.filters import without_lines
@@ -149,14 +149,6 @@ def bounds(inputs: ModelInputs, c: Floats, param: Param) -> tuple[float, float]:
 
 PRIOR = (Slot.START, Slot.BIAS)
 """Constants that short time constants, or a load like a random walk, leave open; they are held near the recording."""
-PLACES = (-1.0, -0.5, 0.0, 0.5, 1.0)
-"""Where a stem may stand first, from OP on, in distances at which it lets go; ours."""
-WORTH = 3.0
-"""Gain [nat] of another place from which it is taken: what a parameter costs; ours."""
-TRIALS = 5
-"""Dampings tried for a step."""
-FAR = 3e3
-"""A model whose residual reaches this [% PV] has run away and is the worst there is."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -182,9 +174,9 @@ def residual_fit(p: Problem, model: Model) -> Residual:
     simulated = simulate(p.inputs, model.c)
     r = without_lines(p.y - simulated, p.window)
     groups, root, total = p.edges.size - 1, np.sqrt(p.weight), float(p.weight.sum())
-    if not float(np.abs(r).max()) < FAR:
+    if not float(np.abs(r).max()) < FIT.far:
         none = np.zeros((groups, r.size)), np.zeros((groups, groups)), np.zeros(groups)
-        return Residual(model, simulated, *none, FAR * root, FAR**2)
+        return Residual(model, simulated, *none, FIT.far * root, FIT.far**2)
     columns, weighted = lag_means(r, p.edges), r * root
     columns *= root
     ar, gram = fitted(columns, weighted)
@@ -277,9 +269,9 @@ def placed(p: Problem, model: Model) -> Model:
     if not model.c[Slot.STICKBAND] > 0.0:
         return model
     first = float(model.c[Slot.PLACE])
-    losses = {place: residual_fit(p, _with_place(model, place)).loss for place in (first, *PLACES)}
+    losses = {place: residual_fit(p, _with_place(model, place)).loss for place in (first, *FIT.places)}
     best = min(losses, key=lambda place: losses[place])
-    return _with_place(model, best) if nats(p.count, losses[first], losses[best]) > WORTH else model
+    return _with_place(model, best) if nats(p.count, losses[first], losses[best]) > FIT.place_worth else model
 
 
 def descended(p: Problem, model: Model, steps: int, aim: float = math.inf) -> Fitted:
@@ -303,7 +295,9 @@ def _descend(p: Problem, model: Model, steps: int, aim: float) -> Fitted:
     def stepped(p: Problem, found: Residual, step: Floats) -> Residual:
         return residual_fit(p, moved(p, found.model, step))
 
-    ends = Descent(steps, TRIALS * steps, p.count, p.limits.search.settled, 20.0, 10.0, TRIALS - 1)
+    ends = Descent(
+        steps, FIT.dampings * steps, p.count, p.limits.search.settled, 20.0, 10.0, FIT.dampings - 1
+    )
     best = down(p, residual_fit(p, model), curved, stepped, ends)
     e = innovations_of(p, best)
     return Fitted(best.model, best.loss, p.independent(e), best.ar, e)
@@ -311,8 +305,8 @@ def _descend(p: Problem, model: Model, steps: int, aim: float) -> Fitted:
 
 def innovations_of(p: Problem, found: Residual) -> Floats:
     """Innovations [% PV], shape (n,), also where they count nothing."""
-    if not found.loss < FAR**2:
-        return np.full(p.y.size, FAR)
+    if not found.loss < FIT.far**2:
+        return np.full(p.y.size, FIT.far)
     left = without_lines(p.y - found.simulated, p.window)
     return whitened(left, found.ar, p.edges)  # type: ignore[no-any-return]
 

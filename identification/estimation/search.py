@@ -16,15 +16,11 @@ from identification.estimation.descent import compass
 from identification.estimation.hammerstein import stem_of
 from identification.estimation.noise import every_lag, judged, whitened
 from identification.estimation.window import Stems, Window
+from identification.limits import FIT
 from identification.record import Floats, Mask
 from identification.signals.filters import notch
 from identification.simulation.lag import Lag, stepped, unit_lag
 from identification.simulation.valve import StemLaw
-
-AR_ORDER = 8
-"""Order of the noise model; ours: on the simulated plants 12 gives innovations less than 1 % smaller."""
-INPUT_LAGS = 10
-"""Lags of OP in the unstructured model that gives the first noise model; ours, as AR_ORDER."""
 
 FADED = 1e-17
 """A decay under this share of its start is over; numbers have sixteen digits."""
@@ -34,8 +30,6 @@ COMPASS = (0.02, 0.007, 0.0025)
 """Relative steps of the search within a pit of stickband and jump."""
 PIT_MOVES = ((1, 0), (-1, 0), (0, 1), (0, -1))
 """Steps of stickband and jump that are tried in a pit."""
-NOTCH_WIDTH = 0.15
-"""Width of the band that is left out when the process is wanted in spite of a load with a line; ours."""
 
 
 @njit(cache=True)
@@ -198,7 +192,7 @@ def prepare(window: Window, valve: StemLaw, ar: Floats, notch_period: float = 0.
 
 
 def _notched(x: Floats, period: float) -> Floats:
-    return x if period <= 0 else notch(x, period, NOTCH_WIDTH)
+    return x if period <= 0 else notch(x, period, FIT.notch_width)
 
 
 @register_jitable  # type: ignore[untyped-decorator]

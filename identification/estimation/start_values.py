@@ -8,29 +8,26 @@ import numpy as np
 
 from identification.estimation.backlash_stiction import begin, generic_noise
 from identification.estimation.noise import arx_noise
-from identification.estimation.search import AR_ORDER, INPUT_LAGS, Dynamics, prepare, search
+from identification.estimation.search import (
+    Dynamics,
+    prepare,
+    search,
+)
 from identification.estimation.window import Window
+from identification.limits import FIT
 from identification.models import Fopdt
 from identification.record import Floats, Mask
 from identification.simulation.valve import IDEAL
 
-SHORTEST = 1.5
-"""Shortest time constant tried [samples]."""
-APART = 2.5
-"""Ratio of neighbouring time constants; ours: the descent covers a factor of three either way."""
-DELAYS = (0.0, 0.1, 0.3, 0.8)
-"""Dead times tried, as shares of the time constant."""
-LONGEST_DELAY = 0.1
-"""Longest dead time tried at first, as a share of the record; the descent may go on from there."""
 NO_WHITENING = np.zeros(1)
 """The noise model of a simulation judged by its own errors: none."""
 
 
 def record_starts(samples: int, dt_s: float) -> list[Dynamics]:
     """Time constants and dead times [s] from which the search begins, over all time scales of the record."""
-    count = 1 + math.ceil(math.log(max(samples / SHORTEST, APART)) / math.log(APART))
-    times = SHORTEST * APART ** np.arange(count)
-    pairs = {(t, min(round(t * d, 1), LONGEST_DELAY * samples)) for t in times for d in DELAYS}
+    count = 1 + math.ceil(math.log(max(samples / FIT.shortest, FIT.apart)) / math.log(FIT.apart))
+    times = FIT.shortest * FIT.apart ** np.arange(count)
+    pairs = {(t, min(round(t * d, 1), FIT.longest_delay * samples)) for t in times for d in FIT.delays}
     return [(t * dt_s, d * dt_s) for t, d in sorted(pairs)]
 
 
@@ -53,5 +50,5 @@ def plain_processes(y: Floats, op: Floats, usable: Mask, dt_s: float) -> list[Fo
     """
     window = Window(y, op, usable, dt_s)
     stem = window.stems_in_blocks.ideal
-    learnt = arx_noise(window.centred, stem, usable, AR_ORDER, INPUT_LAGS)
+    learnt = arx_noise(window.centred, stem, usable, FIT.ar_order, FIT.input_lags)
     return [_searched(window, ar) for ar in (learnt, generic_noise(), NO_WHITENING)]

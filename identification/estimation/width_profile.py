@@ -11,18 +11,13 @@ from identification.estimation.backlash_stiction import generic_noise
 from identification.estimation.hammerstein import Fit
 from identification.estimation.search import Dynamics, WhitePv, behind, score, search, white_pv
 from identification.estimation.window import Window
+from identification.limits import FIT
 from identification.record import Floats
 from identification.simulation.valve import IDEAL, StemLaw, sticking
 
 WIDTHS = np.geomspace(0.1, 60.0, 29)
 """Widths of a play that records are asked of [% OP], a quarter apart: from the least dead band of a positioner
 to that of a valve which has come loose."""
-SEEN = 0.03
-"""Width over OP's range below which a play moves PV as an ideal valve does [-]; ours."""
-WHOLE = 1.25
-"""Width over OP's range from which on the stem never moves [-]."""
-HALVINGS = 1
-"""How often the steps of the search of dynamics are halved, which begins where the width beside has ended."""
 
 
 def width_profile(linear: Fit, play: Fit) -> Floats:
@@ -36,7 +31,7 @@ def width_profile(linear: Fit, play: Fit) -> Floats:
     window = linear.window
     blocks = replace(window, position=None)
     out, reach = np.zeros(WIDTHS.size), float(np.ptp(window.op))
-    asked = np.flatnonzero((SEEN * reach < WIDTHS) & (WHOLE * reach > WIDTHS))
+    asked = np.flatnonzero((FIT.width_seen * reach < WIDTHS) & (FIT.width_whole * reach > WIDTHS))
     if asked.size == 0:
         return out
     ideal, least = _ideal(blocks, linear, play, linear.ar), np.full(asked.size, np.inf)
@@ -71,5 +66,5 @@ def _swept(pv: WhitePv, widths: Floats, play: Fit) -> Floats:
 def _left(pv: WhitePv, valve: StemLaw, begins: list[Dynamics]) -> tuple[float, Dynamics]:
     """Least innovations variance behind a valve, and the dynamics that leave it."""
     prepared = behind(pv, valve)
-    found = search(prepared, begins, HALVINGS)
+    found = search(prepared, begins, FIT.profile_halvings)
     return float(score(prepared, *found)[0]), found

@@ -9,12 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from identification.limits import FIT
 from identification.record import Floats, Mask
-
-LONGEST_DEAD_TIME = 0.25
-"""Largest dead time searched, as a share of the window; ours: beyond it the window holds under four of them."""
-LONGEST_TIME_CONSTANT = 3.0
-"""Largest time constant searched, in windows; beyond it a lag and an integrator are one (PHYSICS: integrator)."""
 
 
 class Stems(NamedTuple):
@@ -98,7 +94,7 @@ class Window:
     @cached_property
     def bounds(self) -> tuple[float, float]:
         """Largest time constant and dead time that are searched [s]."""
-        longest = LONGEST_TIME_CONSTANT * self.duration_s, LONGEST_DEAD_TIME * self.duration_s
+        longest = FIT.longest_time_constant * self.duration_s, FIT.longest_dead_time * self.duration_s
         known = self.most_time_constant_s, self.most_dead_time_s
         return max(min(longest[0], known[0]), self.dt_s), max(min(longest[1], known[1]), 2 * self.dt_s)
 

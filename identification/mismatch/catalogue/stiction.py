@@ -1,6 +1,7 @@
 """Stiction: the stem holds through the stickband, then jumps; behind the jump it rests, halts, slides or swings."""
 
-from identification.estimation.covariance import LEAST_BAND, LEAST_JUMP, reaching
+from identification.estimation.covariance import reaching
+from identification.limits import INTERVALS
 from identification.mismatch.effect import Block, Effect, Estimate, Friction, Param, Parameters, Slot, Variant
 from identification.mismatch.pictures import stem_over_op
 from identification.models import Motion
@@ -17,13 +18,13 @@ def as_friction_leaves_it(own: Parameters) -> dict[str, Estimate]:
     """All within what true friction does to them: it differs from slip to slip, and a slip more or less moves all
     that follow, so the likelihood's own pit is much narrower than what is known."""
     band, jump, time = own[BAND.name], own[JUMP.name], own.get(TIME.name)
-    most = band.value * LEAST_BAND
+    most = band.value * INTERVALS.least_band
     told = {
-        BAND.name: reaching(band, band.value / LEAST_BAND, most),
-        JUMP.name: reaching(jump, jump.value / LEAST_JUMP, most),
+        BAND.name: reaching(band, band.value / INTERVALS.least_band, most),
+        JUMP.name: reaching(jump, jump.value / INTERVALS.least_jump, most),
     }
     if time is not None:
-        told[TIME.name] = reaching(time, time.value / LEAST_JUMP, time.value * LEAST_JUMP)
+        told[TIME.name] = reaching(time, time.value / INTERVALS.least_jump, time.value * INTERVALS.least_jump)
     return told
 
 
