@@ -107,13 +107,13 @@ class WorkerLimits(Limits, section="workers"):
     """What one loop may cost before it is given up, so that the night goes on."""
 
 
+class OpeningLimits(Limits, section="opening"):
+    """What finding out about an export may cost before it is given up."""
+
+
 @dataclass(frozen=True, slots=True)
 class Config:
-    """All limits of a run.
-
-    opening : what finding out about an export may cost, which reads its clocks and tags once; ours: ten times what
-    3 GB of text take. Memory ends where the machine's does, and that ends this process alone.
-    """
+    """All limits of a run."""
 
     oscillation: OscillationLimits = field(default_factory=OscillationLimits)
     quality: QualityLimits = field(default_factory=QualityLimits)
@@ -134,9 +134,7 @@ class Config:
     explain_search: SearchLimits = field(default_factory=SearchLimits)
     explain_proof: ProofLimits = field(default_factory=ProofLimits)
     workers: WorkerLimits = field(default_factory=WorkerLimits)
-    opening: WorkerLimits = field(
-        default_factory=lambda: WorkerLimits(memory_mb=65_536.0, processor_s=60.0, wall_s=360.0)
-    )
+    opening: OpeningLimits = field(default_factory=OpeningLimits)
 
     @property
     def explain(self) -> ExplainLimits:

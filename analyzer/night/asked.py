@@ -21,9 +21,6 @@ from identification.errors import InputError
 
 MOST_NAMES = 10
 """Loops that are named in a note; the rest is counted."""
-OPENED_BYTES_S, FETCHED_S = 1e6, 3600.0
-"""Speed that an export's opening has at least beyond its limit [bytes/s], and the time more that one of shared
-storage may take [s]; ours: text is laid beside as Parquet at fifty times the first."""
 Opened = tuple[Export, tuple[LoopSpec, ...], tuple[str, ...]]
 """An export, its loops with their tags, and what there is to say about them."""
 
@@ -105,10 +102,15 @@ def _allowed(asked: Asked) -> WorkerLimits:
     """What opening the export may cost, by its size; of shared storage the copying is not known beforehand."""
     near = [path for path in asked.export if not is_remote(path)]
     files = [file for path in near for file in (path.rglob("*") if path.is_dir() else [path])]
-    more_s = sum(file.stat().st_size for file in files if file.is_file()) / OPENED_BYTES_S
-    more_s += FETCHED_S * (len(near) < len(asked.export))
     limits = asked.config.opening
-    return replace(limits, processor_s=limits.processor_s + more_s, wall_s=limits.wall_s + 6.0 * more_s)
+    more_s = sum(file.stat().st_size for file in files if file.is_file()) / limits.bytes_per_s
+    more_s += limits.fetched_s * (len(near) < len(asked.export))
+    return replace(
+        asked.config.workers,
+        memory_mb=limits.memory_mb,
+        processor_s=limits.processor_s + more_s,
+        wall_s=limits.wall_s + 6.0 * more_s,
+    )
 
 
 def find_out(asked: Asked, began: Callable[[int], None]) -> Opened:

@@ -32,9 +32,6 @@ Began = Callable[[int], None]
 POLL_S = 0.5
 """How often the clocks of the items in hand are looked at [s]."""
 MEGABYTE = 2**20
-MOST_OF_MACHINE = 0.8
-"""Share of the machine's memory that one process may take, whatever the limits say [-]; ours: the system needs the
-rest, and ends whom it likes where there is none."""
 OUT_OF_TIME = -int(getattr(signal, "SIGXCPU", 24))
 """Exit status of a worker that used up its processor time."""
 
@@ -215,7 +212,7 @@ def _serve(pipe: Connection, function: Callable[[Any, Began], Any], limits: Work
     if not sys.warnoptions:
         warnings.simplefilter("ignore")  # a library's warning says nothing to an engineer
     _end_with_parent()
-    _limit_memory(limits.memory_mb)
+    _limit_memory(limits.memory_mb, limits.machine_share)
 
     def began(at: int) -> None:
         _limit_processor(limits.processor_s)
@@ -257,14 +254,15 @@ def _end_with_parent() -> None:
             ctypes.CDLL(None).prctl(set_death_signal, int(signal.SIGKILL))
 
 
-def _limit_memory(megabytes: float) -> None:
-    """Let allocations fail beyond what is held now and so many megabytes more; nothing where the system cannot."""
+def _limit_memory(megabytes: float, machine_share: float) -> None:
+    """Let allocations fail beyond what is held now and so many megabytes more, or a share of the machine's memory;
+    nothing where the system cannot."""
     if sys.platform != "linux":
         return
     import resource
 
     with contextlib.suppress(OSError, ValueError):
-        most = min(_held_bytes() + int(megabytes * MEGABYTE), int(MOST_OF_MACHINE * _machine_bytes()))
+        most = min(_held_bytes() + int(megabytes * MEGABYTE), int(machine_share * _machine_bytes()))
         _, hard = resource.getrlimit(resource.RLIMIT_DATA)
         limit = most if hard == resource.RLIM_INFINITY else min(most, hard)
         resource.setrlimit(resource.RLIMIT_DATA, (limit, hard))
