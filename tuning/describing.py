@@ -14,13 +14,10 @@ from numpy.typing import ArrayLike, NDArray
 from identification.models import Backlash, Motion, Stiction, Valve
 from identification.record import Floats
 from identification.simulation.valve import thresholds
+from tuning.limits import METHOD
 
 Complexes = NDArray[np.complex128]
 
-PLAY_JUMP_SHARE = 0.02
-"""Slip jump below this share of the stickband counts as play; ours: fifty jumps a stickband look like it."""
-MAX_JUMPS = 60
-"""Jumps per half cycle up to which stick-slip has branches of its own; ours, far beyond what is met."""
 TABLE_SIZE = 4000
 """Points of each part of a branch's table; interpolation is then better than 1e-5 in amplitude and gain."""
 
@@ -91,7 +88,7 @@ def sliding(amplitude: ArrayLike, stickband: float, slip_jump: float) -> Complex
 def is_play(valve: Valve) -> bool:
     """Whether the valve is play, or stick-slip with a jump too small to tell from it."""
     return isinstance(valve, Backlash) or (
-        isinstance(valve, Stiction) and valve.slip_jump <= PLAY_JUMP_SHARE * valve.stickband
+        isinstance(valve, Stiction) and valve.slip_jump <= METHOD.play_jump_share * valve.stickband
     )
 
 
@@ -188,5 +185,5 @@ def branches(valve: Valve) -> tuple[Branch, ...]:
     if valve.motion is not Motion.RESTS:
         amplitude = width / (1.0 + np.cos(np.linspace(0.0, np.pi, TABLE_SIZE + 1)[:-1]))
         return (_branch(1, amplitude, sliding(amplitude * (1 + 1e-12), width, valve.slip_jump)),)
-    most = min(MAX_JUMPS, int(np.ceil(6 * valve.stickband / valve.slip_jump)))
+    most = min(METHOD.jumps_most, int(np.ceil(6 * valve.stickband / valve.slip_jump)))
     return tuple(_jump_branch(valve, jumps) for jumps in range(1, most + 1))

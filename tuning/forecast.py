@@ -15,15 +15,9 @@ from identification.simulation.closed_loop import closed_loop, scan_step
 from tuning.describing import band, is_play
 from tuning.frequency_response import integral_s, maximum_sensitivity, slowest_s
 from tuning.limit_cycle import KICK
-from tuning.limits import WARM_UP
+from tuning.limits import METHOD
 from tuning.rules import backlash_rule, lambda_settings, simc
 
-BLOCKS = 12
-"""Blocks that a record is cut into for the bootstrap; ours: a block holds cycles enough to be counted."""
-PRELUDE, LEAST_PRELUDE = 6.0, 300
-"""Length of the time between kick and record over the loop's slowest time, and scans at least; ours."""
-DRAWS = 200
-"""Bootstrap draws over all loops together."""
 SEED = 0
 NOW, RECOMMENDED, SIMC, LAMBDA, LONGER = "now", "recommended", "SIMC", "lambda", "Ti not below T"
 CALMER, SMALLER, DERIVATIVE, REPAIRED = (
@@ -86,7 +80,7 @@ def _prelude(loop: Loop, load: Floats) -> Floats:
     width = band(loop.valve)
     if not is_play(loop.valve) or width <= 0.0 or load.size == 0:
         return np.empty(0)
-    hold = int(min(max(PRELUDE * slowest_s(loop) / scan_step(loop), LEAST_PRELUDE), load.size))
+    hold = int(min(max(METHOD.prelude * slowest_s(loop) / scan_step(loop), METHOD.least_prelude), load.size))
     kick = KICK * width / abs(loop.controller.kp)
     return load[0] + kick * np.repeat([0.0, 1.0, 0.0], [1, hold // 2, hold])
 
@@ -123,7 +117,7 @@ def assess(record: LoopRecord) -> Assessed:
 
 def warm(record: LoopRecord) -> int:
     """First sample of a simulated record behind its warm-up."""
-    return int(WARM_UP * len(record))
+    return int(METHOD.warm_up * len(record))
 
 
 def settled(record: LoopRecord) -> LoopRecord:
@@ -132,8 +126,8 @@ def settled(record: LoopRecord) -> LoopRecord:
 
 
 def _blocks(record: LoopRecord) -> Floats:
-    """Assessments of each block, shape (BLOCKS, number of assessments)."""
-    edges = np.linspace(0, len(record), BLOCKS + 1).astype(int)
+    """Assessments of each block, shape (blocks, number of assessments)."""
+    edges = np.linspace(0, len(record), METHOD.blocks + 1).astype(int)
     found = [assess(record.span(int(a), int(b))) for a, b in pairwise(edges)]
     return np.array([[getattr(a, n) for n in NAMES] for a in found])
 
@@ -158,13 +152,15 @@ def predict(loop: Loop, controller: Pid, load: Floats, uncertainty: Sequence[Loo
     block. Of `uncertainty`, other loops that the data allow, the controllers are not used. Blocks do not overlap
     (Kunsch 1989).
     """
-    if load.size < 10 * BLOCKS:
-        raise ValueError(f"a forecast needs {10 * BLOCKS} scans of load, has {load.size}")
+    if load.size < 10 * METHOD.blocks:
+        raise ValueError(f"a forecast needs {10 * METHOD.blocks} scans of load, has {load.size}")
     rng = np.random.default_rng(SEED)
     cases = [replace(one, controller=loop.controller) for one in (loop, *uncertainty)]
     old = [_blocks(settled(run(one, load))) for one in cases]
     new = [_blocks(settled(run(replace(one, controller=controller), load))) for one in cases]
-    draws = [rng.integers(0, BLOCKS, BLOCKS) for _ in range(max(DRAWS // len(cases), 20))]
+    draws = [
+        rng.integers(0, METHOD.blocks, METHOD.blocks) for _ in range(max(METHOD.draws // len(cases), 20))
+    ]
     before = np.array([b[d].mean(axis=0) for b in old for d in draws])
     after = np.array([b[d].mean(axis=0) for b in new for d in draws])
     first, second = old[0].mean(axis=0), new[0].mean(axis=0)

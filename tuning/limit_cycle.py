@@ -16,15 +16,8 @@ from identification.simulation.closed_loop import closed_loop, scan_step
 from tuning.describing import band
 from tuning.frequency_response import integral_s, slowest_s
 from tuning.harmonic_balance import Balance, predicted_cycle
+from tuning.limits import METHOD
 
-PERIODS = 30
-"""Predicted periods that a confirmation simulates at first; ours: the study's loops settle within ten."""
-MOST_STEPS = 600_000
-"""Steps that a confirmation may take in all; some 20 ms."""
-REST_SHARE = 0.45
-"""Amplitude of OP over the width of the play below which a loop rests: no cycle has less than half of it."""
-STEADY = 0.02
-"""Relative change of amplitude from one quarter of the record to the next below which a cycle is steady."""
 KICK = 1.0 + math.sqrt(5.0)
 """Kick in widths of the play, seen at OP; irrational, lest the stem's travel meet it exactly."""
 OTHER_KICKS = (1.37, 1.83)
@@ -102,11 +95,11 @@ def _verdict(op: Floats, width: float) -> str:
     """decays, steady, grows or moves: the amplitude of OP in the last two quarters."""
     n = op.size // 4
     before, now = 0.5 * np.ptp(op[-2 * n : -n]), 0.5 * np.ptp(op[-n:])
-    if now < REST_SHARE * width:
+    if now < METHOD.rest_share * width:
         return "decays"
     if now > 1e4 * width:
         return "grows"
-    return "steady" if abs(now / before - 1.0) < STEADY else "moves"
+    return "steady" if abs(now / before - 1.0) < METHOD.steady else "moves"
 
 
 def confirm(loop: Loop) -> Confirmed:
@@ -120,7 +113,7 @@ def confirm(loop: Loop) -> Confirmed:
     scale = max(4.0 * slowest_s(loop), _ramp_s(loop))
     if predicted is not None:
         kick, scale = max(kick, 3.0 * predicted.pv_amplitude), predicted.period_s
-    steps = int(min(max(PERIODS * scale / h, 2000), MOST_STEPS))
+    steps = int(min(max(METHOD.cycle_periods * scale / h, 2000), METHOD.cycle_steps))
     found = _settle(loop, steps, kick, width, predicted)
     for factor in OTHER_KICKS if _jumps(loop) else ():
         if found.cycle is not None:
@@ -155,6 +148,6 @@ def _settle(loop: Loop, steps: int, kick: float, width: float, predicted: Balanc
         cycle = _measured(last)
         if verdict == "steady" and cycle is not None and cycle.period_s * 4 < last.duration_s:
             return Confirmed(cycle, True, predicted)
-        if verdict == "grows" or 3 * steps > MOST_STEPS:
+        if verdict == "grows" or 3 * steps > METHOD.cycle_steps:
             return Confirmed(cycle, False, predicted)
         steps *= 3

@@ -15,7 +15,11 @@ class TuningLimits(Limits, section="tuning"):
     """
 
 
+class MethodLimits(Limits, section="method"):
+    """What rules, describing functions, limit cycles and forecasts are computed with; no plant changes it."""
+
+
 LIMITS = TuningLimits()
 """The limits in force where none are given."""
-WARM_UP = 0.1
-"""Share of a simulated record that is left out at its start [-]; ours."""
+METHOD = MethodLimits()
+"""The same of the method."""

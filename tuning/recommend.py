@@ -15,8 +15,8 @@ from tuning import Action, Cause, reasons
 from tuning.describing import band, is_play
 from tuning.frequency_response import integral_s, maximum_sensitivity
 from tuning.limit_cycle import Confirmed, confirm
-from tuning.limits import LIMITS, TuningLimits
-from tuning.rules import TAU_C_PER_DELAY, effective_delay, simc
+from tuning.limits import LIMITS, METHOD, TuningLimits
+from tuning.rules import effective_delay, simc
 from tuning.search import (
     Bench,
     Candidate,
@@ -28,18 +28,6 @@ from tuning.search import (
     search,
     standard_load,
 )
-
-CONFIRMED = 15
-"""Candidates whose limit cycle is simulated, from the best down, before the search gives up."""
-SAMPLES_CONFIRMED = 3
-"""Uncertainty samples on which the chosen candidate's limit cycle is simulated too."""
-APART = 0.15
-"""Difference of ln Kp or ln Ti from which two candidates are confirmed apart."""
-SLOWER = 1.25
-"""Factor by which SIMC's closed-loop time constant grows until every sample keeps its Ms."""
-STEPS, FASTER, ENOUGH = 12, 5, 6
-"""Growths tried at most, shrinkings tried first where the load is known, and settings that are enough to choose from;
-ours: two shrinkings make the closed loop as slow as the dead time, SIMC's tightest, and from five on Ms passes 2."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,7 +95,7 @@ def _tight(loop: Loop, others: Sequence[Loop], load: Floats | None, limits: Tuni
     now = maximum_sensitivity(loop)
     if now <= limits.ms_most:
         return Proposal(Action.UNDECIDED, reasons.not_tight(now), ms_before=now)
-    found = _simc_settings(loop, others, -FASTER if load is not None else 0, limits)
+    found = _simc_settings(loop, others, -limits.faster_most if load is not None else 0, limits)
     if not found:
         return Proposal(Action.UNDECIDED, reasons.too_uncertain(limits), ms_before=now)
     new, ms = found[0]
@@ -132,17 +120,17 @@ def _simc_settings(
     is, for nobody is told to switch it off.
     """
     h = scan_step(loop)
-    tau_c = TAU_C_PER_DELAY * effective_delay(loop.process, h)
+    tau_c = METHOD.tau_c_per_delay * effective_delay(loop.process, h)
     most = (limits.ms_most, *(limits.ms_most_sample for _ in others))
     lags = [one.process.time_constant_s for one in others if isinstance(one.process, Fopdt)]
     found = []
-    for k in range(first, STEPS):
-        nominal = simc(loop.process, tau_c * SLOWER**k, h)
+    for k in range(first, limits.slower_most):
+        nominal = simc(loop.process, tau_c * limits.slower**k, h)
         for ti in dict.fromkeys((nominal.ti_s, min([nominal.ti_s, *lags]))):
             new = replace(loop.controller, kp=rounded(nominal.kp), ti_s=rounded(ti))
             ms = robust((loop, *others), new, most)
             found += [] if ms is None else [(new, ms)]
-        if len(found) >= ENOUGH:
+        if len(found) >= limits.enough:
             break
     return found
 
@@ -210,13 +198,13 @@ def _smaller(after: Confirmed, before: Confirmed, most_growth: float) -> bool:
     return not grown and after.cycle.stem_travel <= before.cycle.stem_travel
 
 
-def _apart(candidates: list[Candidate]) -> list[Candidate]:
-    """Those that differ from every better one by more than `APART`: the rest would share its fate."""
+def _apart(candidates: list[Candidate], apart: float) -> list[Candidate]:
+    """Those that differ from every better one by more than `apart`: the rest would share its fate."""
     kept: list[Candidate] = []
     for c in candidates:
         here = np.log([abs(c.controller.kp), c.controller.ti_s])
         others = [np.log([abs(k.controller.kp), k.controller.ti_s]) for k in kept]
-        if all(np.abs(here - other).max() > APART for other in others):
+        if all(np.abs(here - other).max() > apart for other in others):
             kept.append(c)
     return kept
 
@@ -225,10 +213,11 @@ def _confirmed(
     table: Bench, candidates: tuple[Candidate, ...], before: Confirmed
 ) -> tuple[Candidate, Confirmed] | None:
     """The best candidate worth a change whose simulated limit cycle is none or smaller, on samples too."""
-    worthy = _apart([c for c in candidates if _worth(c, table.loops[0].controller, table.limits)])[:CONFIRMED]
-    samples = [(one, confirm(one)) for one in table.loops[1 : 1 + SAMPLES_CONFIRMED]] if worthy else []
-    limits = table.limits
-    growth = limits.cycle_growth if is_play(table.loops[0].valve) else limits.cycle_growth_stick
+    first, limits = table.loops[0], table.limits
+    worth = [c for c in candidates if _worth(c, first.controller, limits)]
+    worthy = _apart(worth, limits.apart)[: limits.confirmed]
+    samples = [(one, confirm(one)) for one in table.loops[1 : 1 + limits.samples_confirmed]] if worthy else []
+    growth = limits.cycle_growth if is_play(first.valve) else limits.cycle_growth_stick
     for candidate in worthy:
         after = confirm(replace(table.loops[0], controller=candidate.controller))
         if _smaller(after, before, growth) and all(

@@ -7,19 +7,14 @@ from dataclasses import replace
 
 from identification.models import Fopdt, Integrator, Pid, Process
 from tuning.frequency_response import integral_s
-
-TAU_C_PER_DELAY = 1.5
-"""Closed-loop time constant over dead time of the nominal tuning (the source study, section 5)."""
-LEAST_DELAY_SHARE = 5e-4
-"""Least effective dead time over the time constant; ours, a quarter of the study's least (T/L = 500): without
-it a process without dead time asks for infinite gain."""
+from tuning.limits import METHOD
 
 
 def effective_delay(process: Process, scan_s: float = 0.0) -> float:
     """Dead time plus half a scan [s], the hold's share of it (Grimholt, Skogestad 2012, rule of the half)."""
     delay = process.dead_time_s + 0.5 * scan_s
     if isinstance(process, Fopdt):
-        return max(delay, LEAST_DELAY_SHARE * process.time_constant_s)
+        return max(delay, METHOD.least_delay_share * process.time_constant_s)
     return delay
 
 
@@ -32,7 +27,7 @@ def simc(process: Process, tau_c: float | None = None, scan_s: float = 0.0) -> P
     dead time, scan and tau_c.
     """
     delay = effective_delay(process, scan_s)
-    sum_s = delay + (TAU_C_PER_DELAY * delay if tau_c is None else tau_c)
+    sum_s = delay + (METHOD.tau_c_per_delay * delay if tau_c is None else tau_c)
     slope = process.slope
     if slope == 0.0 or sum_s <= 0.0:
         raise ValueError(
@@ -40,11 +35,6 @@ def simc(process: Process, tau_c: float | None = None, scan_s: float = 0.0) -> P
         )
     slowest = math.inf if isinstance(process, Integrator) else process.time_constant_s
     return Pid(1.0 / (slope * sum_s), min(slowest, 4.0 * sum_s), scan_s=scan_s)
-
-
-LAMBDA_PER_LAG, LAMBDA_PER_DELAY = 1.0, 3.0
-"""Closed-loop time constant of the lambda rule over the time constant, and over the dead time at least (Dahlin 1968;
-three dead times keep the loop robust, as mills use it: Olsen, Bialkowski 2002)."""
 
 
 def lambda_settings(process: Process, scan_s: float = 0.0) -> Pid:
@@ -58,11 +48,11 @@ def lambda_settings(process: Process, scan_s: float = 0.0) -> Pid:
     if slope == 0.0 or delay <= 0.0:
         raise ValueError(f"the lambda rule needs gain and delay, has slope {slope:g} and L {delay:g} s")
     if isinstance(process, Integrator):
-        aim = LAMBDA_PER_DELAY * delay
+        aim = METHOD.lambda_per_delay * delay
         ti = 2.0 * aim + delay
         return Pid(ti / (slope * (aim + delay) ** 2), ti, scan_s=scan_s)
     lag = process.time_constant_s
-    aim = max(LAMBDA_PER_LAG * lag, LAMBDA_PER_DELAY * delay)
+    aim = max(lag, METHOD.lambda_per_delay * delay)
     return Pid(1.0 / (slope * (aim + delay)), lag, scan_s=scan_s)
 
 

@@ -21,8 +21,6 @@ POINTS = 11
 SHARES, MORE = (0.25, 0.5), (1.0, 1.3)
 """Derivative times that are tried, over the delay, and gains over those of the curve; ours: half the delay is what
 Ziegler and Nichols (1942) set."""
-TRIED = 5
-"""Settings of the curve that are tried on all loops, from its end inwards, before none is told."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +45,9 @@ def trade(table: Bench) -> Trade:
     ends = {CALMER: (calm, limits.trade_error, 1.0), SMALLER: (exact, 1.0, limits.travel_growth_sample)}
     chosen = {}
     for name, (candidates, error, travel) in ends.items():
-        whole = (try_out(table, c.controller, c.ms) for c, _ in zip(candidates, range(TRIED), strict=False))
+        whole = (
+            try_out(table, c.controller, c.ms) for c, _ in zip(candidates, range(limits.tried), strict=False)
+        )
         held = next((c for c in whole if c.worst_error <= error and c.worst_travel <= travel), None)
         if held is not None:
             chosen[name] = held
@@ -70,7 +70,7 @@ def _with_derivative(table: Bench, curve: Sequence[Candidate], without: Candidat
         first = None if ms is None else try_out(table, pid, ms, 1)
         if first is not None and first.error <= most and first.travel <= 1.0:
             found.append(first)
-    best = sorted(found, key=lambda c: c.error)[:TRIED]
+    best = sorted(found, key=lambda c: c.error)[: limits.tried]
     whole = (try_out(table, c.controller, c.ms) for c in best)
     fit = (c for c in whole if c.worst_error <= most and c.worst_travel <= limits.travel_growth_sample)
     return next(fit, None)

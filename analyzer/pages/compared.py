@@ -38,9 +38,7 @@ from tuning.describing import band, is_play
 from tuning.forecast import (
     CALMER,
     DERIVATIVE,
-    LEAST_PRELUDE,
     NOW,
-    PRELUDE,
     RECOMMENDED,
     REPAIRED,
     SMALLER,
@@ -49,7 +47,7 @@ from tuning.forecast import (
 from tuning.frequency_response import slowest_s
 from tuning.harmonic_balance import TravelMap
 from tuning.limit_cycle import KICK
-from tuning.limits import WARM_UP
+from tuning.limits import METHOD
 from tuning.rules import simc
 
 OFFERED = (CALMER, SMALLER, DERIVATIVE)
@@ -273,8 +271,8 @@ def _kick(c: Comparison) -> dict[str, float]:
     return {
         "kick": KICK * width if is_play(c.loop.valve) and width > 0.0 else 0.0,
         "slowest_s": slowest_s(free),
-        "times": PRELUDE,
-        "least": LEAST_PRELUDE,
+        "times": METHOD.prelude,
+        "least": METHOD.least_prelude,
     }
 
 
@@ -298,7 +296,7 @@ def model(c: Comparison, spec: LoopSpec, unit: str) -> str:
             "op_lo": pid.op_lo,
             "op_hi": pid.op_hi,
             "op_start": 0.5 * (pid.op_lo + pid.op_hi),
-            "warm_up": WARM_UP,
+            "warm_up": METHOD.warm_up,
             "prelude": _kick(c),
             "settings": settings,
             "ti_middle_s": simc(loop.process, scan_s=h).ti_s,
