@@ -10,24 +10,13 @@ from dataclasses import replace
 import numpy as np
 from scipy.fft import fft, ifft, next_fast_len
 
+from analyzer.limits import WAVES
 from analyzer.plantwide.wave import Wave
 from identification.record import Floats
 from identification.signals.cross_spectrum import Delay, band, granger_f, lag, tapered
 
-SAME = 0.02
-"""Difference of spans [periods] that is none; ours."""
 FINE = 8
 """Samples of the envelope for each line."""
-COVERED = 0.8
-"""Share of the common span that a record has to cover to be compared at all; ours."""
-LAG_PERIODS, LAG_LEAST_S = 4.0, 900.0
-"""Lags looked for reach so many periods, and so far at least [s]: clocks of two historians differ by minutes."""
-FORESEEN = 12
-"""Steps of the past by which others are foreseen: half of a period to a whole one."""
-LEAST_STEPS = 300
-"""Steps that trends have in common at least where foresight is asked for; ours: 12 for each constant."""
-LEAST_F, PLAIN = 3.0, 10.0
-"""F from which foresight is more than chance (one in a thousand by chance), and ratio of both ways that is plain."""
 Span = tuple[float, float]
 """Start [s since 1970-01-01 UTC] and duration [s]."""
 
@@ -45,10 +34,10 @@ def on_one_clock(waves: Sequence[Wave]) -> list[Wave]:
 def _on_span(wave: Wave, span: Span) -> Wave | None:
     """The wave with the lines that it has over another span; None where its record covers too little of that."""
     start, length = span
-    if abs(wave.start_s - start) + abs(wave.duration_s - length) <= SAME * wave.period_s:
+    if abs(wave.start_s - start) + abs(wave.duration_s - length) <= WAVES.same * wave.period_s:
         return wave
     begin, end = max(start, wave.start_s), min(start + length, wave.start_s + wave.duration_s)
-    if end - begin < COVERED * length:
+    if end - begin < WAVES.covered * length:
         return None
     count = wave.lines.size
     size = next_fast_len(FINE * count)
@@ -91,7 +80,7 @@ def _lag(one: Wave, other: Wave) -> Delay:
     if high - low < 4:
         return Delay(0.0, math.inf, 0.0)
     x, y = (tapered(w.lines[low - w.first - 1 : high - w.first + 1]) for w in (one, other))
-    return lag(x, y, one.duration_s, max(LAG_PERIODS * one.period_s, LAG_LEAST_S))
+    return lag(x, y, one.duration_s, max(WAVES.lag_periods * one.period_s, WAVES.lag_least_s))
 
 
 def _on_common_steps(waves: Sequence[Wave]) -> tuple[list[int], Floats]:
@@ -108,7 +97,7 @@ def _on_common_steps(waves: Sequence[Wave]) -> tuple[list[int], Floats]:
         found.append((i, (w.trend_first + skip) // few, means))
     begin = max((first for _, first, _ in found), default=0)
     end = min((first + x.size for _, first, x in found), default=0)
-    if end - begin < LEAST_STEPS:
+    if end - begin < WAVES.least_steps:
         return [], np.zeros((0, 0))
     return [i for i, *_ in found], np.array([x[begin - first : end - first] for _, first, x in found], float)
 
@@ -119,9 +108,9 @@ def foresees(waves: Sequence[Wave]) -> Floats:
     known, trends = _on_common_steps(waves)
     if len(known) < 2:
         return out
-    f = granger_f(trends, FORESEEN)
-    clear = np.maximum(f, f.T) >= LEAST_F
-    ratio = np.log(np.maximum(f, 0.1) / np.maximum(f.T, 0.1)) / math.log(PLAIN)
+    f = granger_f(trends, WAVES.foreseen)
+    clear = np.maximum(f, f.T) >= WAVES.least_f
+    ratio = np.log(np.maximum(f, 0.1) / np.maximum(f.T, 0.1)) / math.log(WAVES.plain_ratio)
     out[known] = np.where(clear, np.clip(ratio, -1.0, 1.0), 0.0).sum(axis=1) / (len(known) - 1)
     return out
 
@@ -131,6 +120,6 @@ def foresight(one: Wave, others: Sequence[Wave]) -> float:
     known, trends = _on_common_steps([one, *others])
     if len(known) < 2 or known[0] != 0:
         return 0.0
-    f = granger_f(trends, FORESEEN)
+    f = granger_f(trends, WAVES.foreseen)
     forth, back = float(np.median(f[0, 1:])), float(np.median(f[1:, 0]))
     return forth if forth > back else 0.0

@@ -19,15 +19,6 @@ from analyzer.plantwide.wave import Wave
 from identification.record import Floats
 from identification.signals.cross_spectrum import Whole, band, chance_coherence, coherences, drift, tapered
 
-HARMONIC = 0.03
-"""Difference of a period from a whole part of another up to which it is a harmonic; ours."""
-ASKED = 12
-"""Loops of a group that are asked whom they move with, the most coherent first; ours: more add nothing."""
-HEARD = 6
-"""Loops of a group that a loop beside it has to foresee, the clearest; ours."""
-SHIFTS = 12
-"""Shifts of the lines by which chance coherence is told, at most."""
-
 
 @dataclass(frozen=True, slots=True)
 class Group:
@@ -92,7 +83,7 @@ class _Neighbours:
         joined = self.moving_with(one)
         inside = {self._loop[j] for j in (one, *joined)}
         seen: dict[int, list[float]] = {}
-        for j in list(joined)[:ASKED]:
+        for j in list(joined)[: self._limits.asked]:
             for k, level in self.moving_with(j).items():
                 if self._loop[k] not in inside:
                     seen.setdefault(k, []).append(level)
@@ -134,7 +125,7 @@ class _Neighbours:
             return np.zeros(0)
         low, high, _ = band(self.waves[one].line)
         far = max((high - low) // 2, 4)
-        shifts = np.unique(np.linspace(3, far, SHIFTS // 2).astype(int))
+        shifts = np.unique(np.linspace(3, far, self._limits.shifts // 2).astype(int))
         found = [self._coherences(one, others, int(sign * s)) for s in shifts for sign in (-1, 1)]
         return np.asarray(np.max(found, axis=0))
 
@@ -219,7 +210,7 @@ def _is_same(one: Group, other: Group, limits: PlantLimits) -> bool:
 def _is_harmonic(one: Group, other: Group, limits: PlantLimits) -> bool:
     """Whether the waves of a group are harmonics of a loop of another one."""
     ratio = other.period_s / one.period_s
-    if round(ratio) < 2 or abs(math.log(ratio / round(ratio))) > HARMONIC:
+    if round(ratio) < 2 or abs(math.log(ratio / round(ratio))) > limits.harmonic:
         return False
     return any(w.harmonic == round(ratio) and loop in other.waves for loop, w in one.waves.items())
 
@@ -227,7 +218,7 @@ def _is_harmonic(one: Group, other: Group, limits: PlantLimits) -> bool:
 def _with_foresight(group: Group, beside: _Neighbours, limits: PlantLimits) -> Group:
     """A group with loops that move with it too loosely to be coherent, and yet foresee it: a source that sticks and
     slips without a rhythm moves others by what of it their filters let through."""
-    clearest = sorted(group.waves.values(), key=lambda w: -w.prominence)[:HEARD]
+    clearest = sorted(group.waves.values(), key=lambda w: -w.prominence)[: limits.heard]
     best: dict[str, tuple[float, Wave]] = {}
     for k in beside.near(next(iter(group.waves.values())).line, limits.near_period):
         wave = beside.waves[k]

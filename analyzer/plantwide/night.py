@@ -20,12 +20,6 @@ from analyzer.plantwide.wave import Wave
 from analyzer.words.reason import following_text
 
 Row = Mapping[str, Any]
-LAG_KNOWN = 0.5
-"""Standard deviation of a lag over the lag up to which it is told; ours: two deviations from nothing."""
-MOST_IN_TREE = 40
-"""Loops of a group up to which the way from loop to loop is told."""
-BY_WAY = 0.02
-"""Coherence by which a loop has to go better with another follower than with the source; ours: less is chance."""
 
 
 def traced_night(
@@ -208,7 +202,7 @@ def _traced(group: Group, peers: Mapping[str, Peer], limits: PlantLimits) -> Tra
     if not candidates:
         return None
     best = candidates[0]
-    links = _links(group, best, lags)
+    links = _links(group, best, lags, limits)
     followers = [
         loop
         for loop, link in links.items()
@@ -216,27 +210,27 @@ def _traced(group: Group, peers: Mapping[str, Peer], limits: PlantLimits) -> Tra
         and loop in peers
         and may_follow(peers[loop], peers[best.loop], link.coherence, limits)
     ]
-    return Traced(group, candidates, links, _parents(best.loop, lags), frozenset(followers))
+    return Traced(group, candidates, links, _parents(best.loop, lags, limits), frozenset(followers))
 
 
-def _links(group: Group, best: Candidate, lags: Lags) -> dict[str, Root]:
+def _links(group: Group, best: Candidate, lags: Lags, limits: PlantLimits) -> dict[str, Root]:
     """How the other loops of a group go with its likeliest source."""
     out = {}
     for loop, coherence in group.coherence.items():
         if loop != best.loop:
             lag = lags.between(best.loop, loop)
-            known = lag.lag_s if lag.deviation_s < LAG_KNOWN * abs(lag.lag_s) else None
+            known = lag.lag_s if lag.deviation_s < limits.lag_known * abs(lag.lag_s) else None
             out[loop] = Root(best.loop, max(lag.coherence, coherence), known, best.confidence_pct)
     return out
 
 
-def _parents(source: str, lags: Lags) -> dict[str, str]:
+def _parents(source: str, lags: Lags, limits: PlantLimits) -> dict[str, str]:
     """The loop from which each other one seems to have the wave: the tree of greatest coherence from the source on.
 
     Coherence falls along the way, for each loop adds something of its own; of large groups all hang on the source.
     """
     others = [loop for loop in lags.waves if loop != source]
-    if len(lags.waves) > MOST_IN_TREE:
+    if len(lags.waves) > limits.most_in_tree:
         return dict.fromkeys(others, source)
     best = {loop: (lags.between(source, loop).coherence, source) for loop in others}
     out: dict[str, str] = {}
@@ -245,7 +239,7 @@ def _parents(source: str, lags: Lags) -> dict[str, str]:
         out[loop] = best.pop(loop)[1]
         for other, (level, _) in best.items():
             found = lags.between(loop, other).coherence
-            if found > level + BY_WAY:
+            if found > level + limits.by_way:
                 best[other] = found, loop
     return out
 

@@ -21,13 +21,6 @@ from analyzer.plantwide.compare import Lags, foresees
 from analyzer.plantwide.wave import Wave
 from identification.record import Floats
 
-MOST = 12
-"""Candidates of a group that are weighed, the likeliest by their verdicts and the clearness of their waves."""
-MUCH_EVIDENCE = 1000.0
-"""Evidence of a valve's fault [nat] that is as much as there can be."""
-SURE = 3.0
-"""Deviations from which a lead is certain."""
-
 
 @dataclass(frozen=True, slots=True)
 class Peer:
@@ -50,8 +43,8 @@ class Candidate:
     confidence_pct: float
 
 
-def _first_guess(waves: Sequence[Wave], peers: Mapping[str, Peer]) -> list[Wave]:
-    """The waves of the likeliest candidates."""
+def _first_guess(waves: Sequence[Wave], peers: Mapping[str, Peer], most: int) -> list[Wave]:
+    """The waves of the likeliest candidates, so many at most."""
 
     def rank(w: Wave) -> tuple[float, float]:
         peer = peers[w.loop]
@@ -59,17 +52,17 @@ def _first_guess(waves: Sequence[Wave], peers: Mapping[str, Peer]) -> list[Wave]
 
     known = [w for w in waves if w.loop in peers]
     by_verdict, by_clearness = sorted(known, key=rank), sorted(known, key=lambda w: -w.prominence)
-    chosen = {w.loop: w for w in (*by_verdict[: MOST // 2], *by_clearness)}
-    return list(chosen.values())[:MOST]
+    chosen = {w.loop: w for w in (*by_verdict[: most // 2], *by_clearness)}
+    return list(chosen.values())[:most]
 
 
-def _leads(loops: Sequence[str], lags: Lags) -> tuple[Floats, Floats]:
+def _leads(loops: Sequence[str], lags: Lags, limits: PlantLimits) -> tuple[Floats, Floats]:
     """Mean certainty with which each loop is ahead of the others (-1 to 1), and its mean coherence with them."""
     n = len(loops)
     ahead, shared = np.zeros((n, n)), np.zeros((n, n))
     for i, j in combinations(range(n), 2):
         found = lags.between(loops[i], loops[j])
-        sure = max(min(found.lag_s / (SURE * max(found.deviation_s, 1e-9)), 1.0), -1.0)
+        sure = max(min(found.lag_s / (limits.sure_lead * max(found.deviation_s, 1e-9)), 1.0), -1.0)
         ahead[i, j], ahead[j, i] = sure * found.coherence, -sure * found.coherence
         shared[i, j] = shared[j, i] = found.coherence
     count = max(n - 1, 1)
@@ -94,10 +87,10 @@ def candidates_of(lags: Lags, peers: Mapping[str, Peer], limits: PlantLimits) ->
         Verdicts by loop; a loop that is not in it is no candidate.
     limits : PlantLimits
     """
-    waves = _first_guess(list(lags.waves.values()), peers)
+    waves = _first_guess(list(lags.waves.values()), peers, limits.candidates)
     if not waves:
         return ()
-    signs = _signs(waves, [peers[w.loop] for w in waves], lags)
+    signs = _signs(waves, [peers[w.loop] for w in waves], lags, limits)
     valves = any(s["valve"] > 0 for s in signs)
     seen = 1.0 - (limits.unseen_beside_valve_pct if valves else limits.unseen_pct) / 100.0
     odds = np.array([sum(getattr(limits, f"sign_{k}") * v for k, v in s.items()) for s in signs])
@@ -107,11 +100,13 @@ def candidates_of(lags: Lags, peers: Mapping[str, Peer], limits: PlantLimits) ->
     return tuple(sorted(found, key=lambda c: (-c.confidence_pct, c.loop)))
 
 
-def _signs(waves: Sequence[Wave], peers: Sequence[Peer], lags: Lags) -> list[dict[str, float]]:
+def _signs(
+    waves: Sequence[Wave], peers: Sequence[Peer], lags: Lags, limits: PlantLimits
+) -> list[dict[str, float]]:
     """The signs of each candidate by name."""
-    first, shared = _leads([w.loop for w in waves], lags)
+    first, shared = _leads([w.loop for w in waves], lags, limits)
     own = [p.evidence if p.cause is Cause.VALVE else 0.0 for p in peers]
-    most = math.log1p(MUCH_EVIDENCE)
+    most = math.log1p(limits.much_evidence)
     columns: dict[str, Sequence[float] | Floats] = {
         "valve": [min(math.log1p(max(x, 0.0)) / most, 1.0) for x in own],
         "best_valve": _relative(np.array(own)),

@@ -15,14 +15,9 @@ import numpy as np
 import pyarrow as pa
 
 from analyzer.config import PlantLimits
+from analyzer.limits import WAVES
 from identification.record import Floats, LoopRecord
 
-BLOCK_S = 120.0
-"""Length of a block [s]; ours: longer than what recorders and scans delay, short beside a shift."""
-FEWEST = 30
-"""Blocks from which moves are compared; ours."""
-USUAL, MOST = 0.6, 3.0
-"""Quantile of moves that is a usual one, and the largest that counts, in usual ones; ours."""
 STEPS = 40
 """Steps of a usual move that are kept; ours: a fortieth is far under what recorders add."""
 ROWS = 256
@@ -62,10 +57,10 @@ class Moves:
 
 def moves_of(record: LoopRecord) -> Moves | None:
     """What is kept of a record; None where it is too short."""
-    at = np.floor((record.start_s + record.time_s) / BLOCK_S).astype(np.int64)
+    at = np.floor((record.start_s + record.time_s) / WAVES.block_s).astype(np.int64)
     block = at - at[0]
     count = int(block[-1]) + 1
-    if count < FEWEST:
+    if count < WAVES.least_blocks:
         return None
     good = ~record.bad
     kept = np.bincount(block, good.astype(np.float64), count).astype(np.float64)
@@ -82,10 +77,10 @@ def _in_steps(total: Floats, kept: Floats) -> Small:
     there = kept > 0
     move = np.diff(total / np.maximum(kept, 1.0))
     move[~(there[1:] & there[:-1])] = 0.0
-    usual = float(np.quantile(np.abs(move), USUAL))
+    usual = float(np.quantile(np.abs(move), WAVES.usual_move))
     if not usual > 1e-9 * max(float(np.abs(total).max()), 1.0):
         return np.empty(0, np.int8)
-    return np.round(STEPS * np.clip(move / usual, -MOST, MOST)).astype(np.int8)
+    return np.round(STEPS * np.clip(move / usual, -WAVES.most_move, WAVES.most_move)).astype(np.int8)
 
 
 def links_of(moves: Sequence[Moves], limits: PlantLimits) -> dict[str, Link]:

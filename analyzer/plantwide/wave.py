@@ -11,22 +11,15 @@ import pyarrow as pa
 from scipy.fft import ifft, irfft, next_fast_len
 
 from analyzer.config import PlantLimits
+from analyzer.limits import WAVES
 from analyzer.loop.oscillation import Oscillations, peaks
 from identification.record import Floats
 from identification.signals.spectrum import Complex, Spectrum, locked_harmonic, peak_prominence
 
-REACH = 1.35
-"""Lines kept about a period reach from f / REACH to f * REACH, for neighbours whose period differs."""
 BESIDE = 6
 """Lines kept beyond that on either side."""
-STEPS, TREND = 12, 2400
-"""Steps of a period at least, and steps of a trend at most; ours: a hundred periods tell who foresees whom."""
 HARMONICS = (2, 3)
 """Harmonics that are looked at; ours: higher ones drown in noise."""
-APART = 1.2
-"""Ratio from which two peaks of one loop are two waves."""
-ENVELOPE = 0.5
-"""A wave is on where its envelope is over half of what it exceeds a tenth of the time, as an oscillation's is."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,27 +74,29 @@ class Wave:
         padded = np.pad(power, width, mode="reflect")
         level = np.sqrt(np.convolve(padded, np.ones(width) / width, mode="same"))[width:-width]
         top = float(np.quantile(level, 0.9))
-        return 100.0 * float(np.mean(level >= ENVELOPE * top)) if top > 0 and math.isfinite(top) else 0.0
+        return (
+            100.0 * float(np.mean(level >= WAVES.envelope * top)) if top > 0 and math.isfinite(top) else 0.0
+        )
 
 
 def _centred(s: Spectrum, line: float) -> float:
     """Period [s] at the centre of the power about a frequency [lines]."""
-    at = np.arange(math.floor(line / APART), min(math.ceil(line * APART), s.lines.size - 1) + 1)
+    at = np.arange(math.floor(line / WAVES.apart), min(math.ceil(line * WAVES.apart), s.lines.size - 1) + 1)
     power = np.abs(s.lines[at]) ** 2
     return s.duration_s / float(power @ at / power.sum())
 
 
 def _thinned(error: Floats, dt_s: float, start_s: float, period_s: float) -> tuple[float, int, Floats]:
-    """Step [s], number of the first step and means of an error at 12 to 24 steps a period, the last TREND of them.
+    """Step [s], number of the first step and means of an error at 12 to 24 steps a period, the last ones.
 
     Steps are the sample interval times a power of two and begin at whole multiples of themselves, so that those of
     other loops with the same interval lie on them or join in pairs.
     """
-    few = 2 ** max(math.floor(math.log2(max(period_s / (STEPS * dt_s), 1.0))), 0)
+    few = 2 ** max(math.floor(math.log2(max(period_s / (WAVES.steps * dt_s), 1.0))), 0)
     begin = round(start_s / dt_s)
     skip = -begin % few
     count = (error.size - skip) // few
-    means = error[skip : skip + count * few].reshape(count, few).mean(axis=1)[-TREND:]
+    means = error[skip : skip + count * few].reshape(count, few).mean(axis=1)[-WAVES.trend_steps :]
     return few * dt_s, (begin + skip) // few + count - means.size, means.astype(np.float32)
 
 
@@ -111,12 +106,12 @@ def _cut(
     """The wave about one period of a loop's error, None where the spectrum does not hold enough of it."""
     power = s.lines.real**2 + s.lines.imag**2
     line = s.duration_s / period_s
-    low = max(math.floor(line / REACH) - BESIDE, 0)
-    high = min(math.ceil(line * REACH) + BESIDE, s.lines.size - 1)
+    low = max(math.floor(line / WAVES.reach) - BESIDE, 0)
+    high = min(math.ceil(line * WAVES.reach) + BESIDE, s.lines.size - 1)
     if line * 1.1 > s.lines.size - 1 or high - low < 2 * BESIDE:
         return None
-    near = slice(math.floor(line / APART), math.ceil(line * APART) + 1)
-    above = float(power[max(math.ceil(line / (2 * APART)), 1) :].sum())
+    near = slice(math.floor(line / WAVES.apart), math.ceil(line * WAVES.apart) + 1)
+    above = float(power[max(math.ceil(line / (2 * WAVES.apart)), 1) :].sum())
     return Wave(
         loop,
         period_s,
@@ -156,7 +151,7 @@ def waves_of(loop: str, found: Oscillations, end_s: float, limits: PlantLimits) 
             wanted += [(o.period_s / m, m, False) for m, size in sizes if size > limits.locked_harmonic]
     for k in peaks(b, limits.weak_prominence):
         period = _centred(s, float(b.line[k]))
-        if all(abs(math.log(period / p)) > math.log(APART) for p, *_ in wanted):
+        if all(abs(math.log(period / p)) > math.log(WAVES.apart) for p, *_ in wanted):
             wanted.append((period, 1, False))
         if len(wanted) >= limits.waves:
             break
