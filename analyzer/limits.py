@@ -9,4 +9,8 @@ class WaveLimits(Limits, section="waves"):
     """What is kept of a loop's waves and moves, and when those of two loops can be compared: alike in all nights."""
 
 
-WAVES = WaveLimits()
+class LoopLimits(Limits, section="loop"):
+    """How the record of one loop is read, and which of its signs are told."""
+
+
+WAVES, LOOP = WaveLimits(), LoopLimits()

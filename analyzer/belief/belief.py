@@ -165,7 +165,7 @@ def step(before: Belief | None, row: Row, repaired_s: Sequence[float], limits: B
         row["period_s"],
     )
     end_s = (row["start_s"] or 0.0) + (row["duration_s"] or 0.0)
-    seen_phases = with_repetitions(now.phases, row)
+    seen_phases = with_repetitions(now.phases, row, limits.repetitions)
     now = replace(now, night=row["night"], end_s=end_s, remedy=done, last=seen, phases=seen_phases)
     return replace(now, kp=row["kp"], ti=row["ti"], told=tell(now, row, limits))
 
@@ -222,9 +222,8 @@ def _with_witness(
         widths = (*widths, (row["night"], *said["width"]))[-limits.remembered :]
     for name in CONSTANTS:
         if name in said:
-            constants[name] = constants.get(name, Pool()).plus(
-                said[name][0], said[name][1], limits.least_deviation
-            )
+            pool, (value, deviation) = constants.get(name, Pool()), said[name]
+            constants[name] = pool.plus(value, deviation, limits.least_deviation, limits.most_deviation)
     worn = found.is_worn(limits)
     certain = (now.valve.certain if found.since == now.valve.since else "") or row["night"] if worn else ""
     return replace(now, valve=replace(found, certain=certain), constants=constants, widths=widths)

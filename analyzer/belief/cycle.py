@@ -15,8 +15,6 @@ from analyzer.config import BeliefLimits
 from analyzer.loop.decisions import CAUSES, Cause, counts
 
 Row = Mapping[str, Any]
-LEAST_PCT = 0.5
-"""Confidence below which a cause is as good as excluded [%]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,7 +72,7 @@ def with_night(before: CycleBelief, share: float, row: Row, limits: BeliefLimits
     told = replace(begun, since=before.since or row["night"], nights=before.nights + 1, loud=loud, top=top)
     if not counts(row["oscillating_pct"]):
         return told
-    weight, odds = share * before.weight + 1.0, _log_confidence(row)
+    weight, odds = share * before.weight + 1.0, _log_confidence(row, limits)
     sources = {k: share * v for k, v in before.sources.items()}
     if row["source_loop"]:
         sources[row["source_loop"]] = sources.get(row["source_loop"], 0.0) + 1.0
@@ -101,10 +99,10 @@ def _sized(before: CycleBelief, significance: float, limits: BeliefLimits) -> Cy
     return replace(before, usual=usual, off=off, shift=0.0)
 
 
-def _log_confidence(row: Row) -> tuple[float, ...]:
+def _log_confidence(row: Row, limits: BeliefLimits) -> tuple[float, ...]:
     """Log confidence of the causes by one night; of one whose record lacks something, none stands out: the next
     record lacks the same."""
-    found = [max(row[f"osc_{c}_pct"] or 0.0, LEAST_PCT) for c in CAUSES]
+    found = [max(row[f"osc_{c}_pct"] or 0.0, limits.least_pct) for c in CAUSES]
     if row["lack"] and row["cause"] not in CAUSES:
         second = sorted(found)[-2]
         found = [min(x, second) for x in found]

@@ -12,9 +12,6 @@ from dataclasses import asdict, dataclass
 from identification.estimation.covariance import NINETY
 from identification.limits import INTERVALS
 
-UNKNOWN = 2.0
-"""Standard deviation of a logarithm beyond which a night does not know a constant [-]: a factor of seven."""
-
 
 @dataclass(frozen=True, slots=True)
 class Pooled:
@@ -45,9 +42,10 @@ class Pool:
         """The same as it counts some nights later."""
         return Pool(**{name: share * x for name, x in asdict(self).items()} | {"sign": self.sign})
 
-    def plus(self, value: float, deviation: float, least: float) -> Pool:
-        """With one night more: its value and the standard deviation of its logarithm, no less than `least`."""
-        if value == 0.0 or not math.isfinite(value) or not deviation <= UNKNOWN:
+    def plus(self, value: float, deviation: float, least: float, most: float) -> Pool:
+        """With one night more: its value and the standard deviation of its logarithm, no less than `least`; beyond
+        `most` the night does not know it."""
+        if value == 0.0 or not math.isfinite(value) or not deviation <= most:
             return self
         x, w = math.log(abs(value)), 1.0 / max(INTERVALS.wider * deviation, least) ** 2
         return Pool(

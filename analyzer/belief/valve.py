@@ -22,8 +22,6 @@ from analyzer.loop.decisions import Cause, Fault
 from identification.estimation.width_profile import WIDTHS
 from identification.record import Floats
 
-FEWEST = 2
-"""Nights that another valve takes to be told: one can be odd."""
 Witness = Mapping[str, Any]
 """What a night says, as analyzer/loop/witness.py puts it."""
 Recent = tuple[str, tuple[float, ...]]
@@ -156,7 +154,7 @@ def with_night(
     faded = [(n, share * np.asarray(p)) for n, p in before.recent]
     recent = [*faded, (night, own)][-limits.recent :]
     summed = share * np.asarray(before.summed) + own if before.summed else own
-    at = changed_at(summed, [p for _, p in recent], limits.change)
+    at = changed_at(summed, [p for _, p in recent], limits.change, limits.confirmed)
     if at is not None:
         return _begun_anew(recent[at:], said)
     jump, clear = said["jump"]
@@ -194,7 +192,7 @@ def _kept(x: Floats) -> tuple[float, ...]:
     return tuple(round(float(v), 3) for v in x)
 
 
-def changed_at(summed: Floats, recent: Sequence[Floats], least: float) -> int | None:
+def changed_at(summed: Floats, recent: Sequence[Floats], least: float, nights: int) -> int | None:
     """The first of the recent nights from which on the valve is another one; None where all nights agree.
 
     Parameters
@@ -205,12 +203,14 @@ def changed_at(summed: Floats, recent: Sequence[Floats], least: float) -> int | 
         Of the last of them, as they count in it.
     least : float
         Gain in log likelihood [nat] of two valves over one from which it is told.
+    nights : int
+        How many of them that takes at least: one can be odd.
     """
     together = max(float(summed.max()), 0.0)
     after, best, gain = np.zeros(summed.size), None, least
     for k in range(len(recent) - 1, -1, -1):
         after = after + recent[k]
         apart = max(float((summed - after).max()), 0.0) + max(float(after.max()), 0.0)
-        if apart - together > gain and len(recent) - k >= FEWEST:
+        if apart - together > gain and len(recent) - k >= nights:
             best, gain = k, apart - together
     return best

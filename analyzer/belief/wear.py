@@ -27,12 +27,6 @@ Width = tuple[str, float, float]
 """A night, the width that it tells [% OP], and the standard deviation of its logarithm."""
 MONTH_D = 30.0
 """Days of a month, as speeds are told."""
-REMEMBERED = 60
-"""Repetitions of a phase that are remembered; ours: some weeks of daily batches, a few days of hourly ones."""
-DEVIATION = 2.0
-"""Standard deviation that an overshoot has at least [% of the move]; ours: noise and samples make it one or two."""
-LEAST = 5.0
-"""Growth of an overshoot from which it is told [% of the move]; ours: the 5 % within which an answer has settled."""
 
 
 def wear(widths: Sequence[Width], limits: WearLimits) -> dict[str, Any] | None:
@@ -155,8 +149,11 @@ class Growth:
     now: float
 
 
-def with_repetitions(known: Sequence[PhaseKnown], row: Mapping[str, Any]) -> tuple[PhaseKnown, ...]:
-    """The phases with what a night's row says of them; a repetition that is known already is not counted again."""
+def with_repetitions(
+    known: Sequence[PhaseKnown], row: Mapping[str, Any], most: int
+) -> tuple[PhaseKnown, ...]:
+    """The phases with what a night's row says of them; a repetition that is known already is not counted again, and
+    no more than `most` are remembered."""
     out = list(known)
     for told in json.loads(row.get("phases") or "[]"):
         ends = told["begin"], told["end"]
@@ -164,15 +161,15 @@ def with_repetitions(known: Sequence[PhaseKnown], row: Mapping[str, Any]) -> tup
         if at is None:
             at = len(out)
             out.append(PhaseKnown(*ends))
-        out[at] = _with(out[at], list(zip(told["start_s"], told["overshoot_pct"], strict=True)))
+        out[at] = _with(out[at], list(zip(told["start_s"], told["overshoot_pct"], strict=True)), most)
     return tuple(out)
 
 
-def _with(phase: PhaseKnown, found: Sequence[tuple[float, float]]) -> PhaseKnown:
+def _with(phase: PhaseKnown, found: Sequence[tuple[float, float]], most: int) -> PhaseKnown:
     last = phase.shown[-1][1] if phase.shown else float("-inf")
     new = [(start, size) for start, size in found if start > last]
     numbered = tuple((phase.count + k, start, size) for k, (start, size) in enumerate(new, 1))
-    return replace(phase, count=phase.count + len(new), shown=(*phase.shown, *numbered)[-REMEMBERED:])
+    return replace(phase, count=phase.count + len(new), shown=(*phase.shown, *numbered)[-most:])
 
 
 def forgotten(known: Sequence[PhaseKnown]) -> tuple[PhaseKnown, ...]:
@@ -185,11 +182,11 @@ def growth(phase: PhaseKnown, limits: WearLimits) -> Growth | None:
     if len(phase.shown) < limits.nights:
         return None
     number, start, size = (np.array(x, dtype=np.float64) for x in zip(*phase.shown, strict=True))
-    at = bend(number, size, np.full(size.size, DEVIATION), limits)
+    at = bend(number, size, np.full(size.size, limits.overshoot_deviation), limits)
     if at is None:
         return None
     some = int(limits.growing_nights)
     before, now = float(np.median(size[number <= at][-some:])), float(np.median(size[-some:]))
-    if now - before < LEAST:
+    if now - before < limits.overshoot_growth:
         return None
     return Growth(int(at), float(start[number == at][0]), before, now)

@@ -30,12 +30,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analyzer.config import CauseLimits, Config
-from analyzer.loop.cause_weights import PLAIN, chances, likelihood_told, measures, signs_of, width_text
+from analyzer.limits import LOOP
+from analyzer.loop.cause_weights import chances, likelihood_told, measures, signs_of, width_text
 from analyzer.loop.decisions import CAUSES, OF_LOAD, Cause, Fault, Lack, Needs
 from analyzer.loop.finding import Sign
 from analyzer.loop.fitness import compressed
 from analyzer.loop.identified import sensitivity
-from analyzer.loop.measure import PLAYS, Measured
+from analyzer.loop.measure import Measured
 from analyzer.loop.oscillation import Oscillation
 from analyzer.loop.quality import Prepared
 from analyzer.words import settings as words
@@ -324,8 +325,9 @@ def _beside(verdict: Verdict, limits: CauseLimits) -> Needs | None:
     if m is None or m.trials is None or verdict.confidence[Cause.LOAD] >= limits.beside_pct:
         return None
     plain = m.evidence > limits.beside_share * (m.expected + limits.evidence)
-    crossed = PLAYS[0] <= m.size <= limits.near_size
-    if not plain or not crossed or m.trials.agreeing < limits.beside_agreeing or m.wave_left > PLAIN:
+    crossed = LOOP.least_play <= m.size <= limits.near_size
+    agree = m.trials.agreeing >= limits.beside_agreeing
+    if not plain or not crossed or not agree or m.wave_left > LOOP.plain_wave:
         return None
     return Needs(Lack.STROKE, words.valve_beside(m.size, m.trials.agreeing))
 

@@ -17,6 +17,7 @@ from importlib.resources import files
 
 import numpy as np
 
+from analyzer.limits import LOOP
 from analyzer.loop.decisions import AMPLIFICATION, CAUSES, Cause
 from analyzer.loop.finding import Sign
 from analyzer.loop.measure import Measured
@@ -92,11 +93,6 @@ KEPT = 0.9
 """Height of the autocorrelation's third returning peak [-] from which a rhythm is kept as by a clock; ours: a load
 from a machine and a loop at its limit of stability are both above it, and not told apart by how far."""
 
-PLAIN = 0.08
-"""Harmonics left over the fundamental [-] below which they say nothing, for a cycle near a sine leaves none whatever
-makes it; ours: without it a loop that a tank with play feeds is blamed for a valve of its own, at 85 %, and of .01 to
-.08 the last tells most of the loops kept apart from the fit (proofs/cause_weights.py)."""
-
 
 def _signed_log(x: float) -> float:
     """Straight near zero, logarithmic far from it."""
@@ -142,16 +138,9 @@ def measures(m: Measured, o: Oscillation) -> Floats:
         min(max(m.kurtosis, 1.4), 4.0),
         min(max(o.rhythm.third, -0.2), KEPT),
         m.saturated,
-        min(max(m.wave_left, PLAIN), 0.4),
+        min(max(m.wave_left, LOOP.plain_wave), 0.4),
     )
     return np.array(found, dtype=np.float64)
-
-
-AMPLIFIES = 1.7
-"""|S| at the period from which that is told [-]: SIMC settings have 1.6 to 1.7 at their peak (Grimholt, Skogestad
-2012)."""
-LEAST_NAT = 0.1
-"""Push [nat] below which a sign is not worth a line: it moves the odds by a tenth."""
 
 
 Told = tuple[str, str]
@@ -217,7 +206,7 @@ def _wave(m: Measured, o: Oscillation) -> Told:
 
 
 def _wave_left(m: Measured, o: Oscillation) -> Told:
-    if m.wave_left < PLAIN:
+    if m.wave_left < LOOP.plain_wave:
         return "a faulty valve leaves few harmonics of the cycle unexplained", ""
     return f"a faulty valve leaves harmonics of {100 * m.wave_left:.0f} % of the cycle unexplained", ""
 
@@ -266,10 +255,10 @@ def signs_of(m: Measured, o: Oscillation) -> tuple[Sign, ...]:
     for names, text in GROUPS:
         push = np.sum([moved[n] for n in names], axis=0)
         k = int(np.argmax(push))
-        if push[k] >= LEAST_NAT:
+        if push[k] >= LOOP.least_push:
             words, figures = text(m, o)
             out.append(Sign(CAUSES[k], 1.0 - math.exp(-float(push[k])), words, names[0], figures))
-    if not m.stable or (m.amplification or 0.0) >= AMPLIFIES:
+    if not m.stable or (m.amplification or 0.0) >= LOOP.amplifies:
         told = [s for s in out if s.name != AMPLIFICATION]
         return (*told, Sign(Cause.TUNING, 0.05, _amplification(m, o)[0], AMPLIFICATION))
     return tuple(out)

@@ -23,8 +23,6 @@ from analyzer.loops.spec import LoopSpec
 from identification.estimation.hammerstein import Fit
 
 Known = dict[str, Cell]
-KNOWN_WITHIN = 2.5
-"""Ends of a 90 % interval, one over the other, within which a constant of a half of a split range is told; ours."""
 AS_STATED = (
     *("type", "area", "master", "ratio_of", "split_of", "override_with", "description", "pv_unit", "op_unit"),
     *("importance", "kp", "ti", "gain_unit", "ti_unit"),
@@ -182,7 +180,7 @@ def _of_half(verdict: Verdict, limits: AdviceLimits) -> Known:
     slope = intervals(m.linear, False, limits)["slope_pct_per_s"]
     least, most = sorted((abs(slope.low), abs(slope.high)))
     one_way = slope.low * slope.high > 0.0
-    return {"half_slope": slope.value} if one_way and most < KNOWN_WITHIN * least else {}
+    return {"half_slope": slope.value} if one_way and most < limits.half_within * least else {}
 
 
 def _process(fit: Fit, limits: AdviceLimits) -> dict[str, float | None]:

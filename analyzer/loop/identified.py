@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from analyzer.config import AdviceLimits
+from analyzer.limits import LOOP
 from analyzer.loop.measure import Measured
 from identification.estimation.covariance import NINETY, half_width, reaching
 from identification.estimation.gauss_newton import covariance
@@ -20,9 +21,6 @@ from identification.simulation.valve import StemLaw
 from tuning.frequency_response import maximum_sensitivity
 from tuning.rules import simc
 from tuning.search import scaled_valve
-
-MOST_SCANS = 20_000
-"""Scans of reconstructed load that settings are tried on at most."""
 
 
 def is_known(fit: Fit, limits: AdviceLimits) -> bool:
@@ -78,7 +76,7 @@ def gain_room(m: Measured) -> float | None:
 
 
 def load_of(fit: Fit, controller: Pid, seed: int = 0) -> Floats:
-    """Load and noise [% PV] that the model leaves, on the scan's clock, the latest `MOST_SCANS`, shape (m,).
+    """Load and noise [% PV] that the model leaves, on the scan's clock, the latest scans, shape (m,).
 
     The window's blocks have lost the noise from scan to scan. OP still has it, times the gain, and it dithers the
     stem; white noise of that size is added.
@@ -87,7 +85,7 @@ def load_of(fit: Fit, controller: Pid, seed: int = 0) -> Floats:
     scan_s = controller.scan_s or window.dt_s
     left = disturbance(fit)
     clock = np.arange(int(window.duration_s / scan_s)) * scan_s
-    load = np.interp(clock, np.arange(left.size) * window.dt_s, left)[-MOST_SCANS:]
+    load = np.interp(clock, np.arange(left.size) * window.dt_s, left)[-LOOP.load_scans :]
     if window.factor > 1:
         load += scan_noise(window, controller) * np.random.default_rng(seed).normal(size=load.size)
     return np.asarray(load, dtype=np.float64)

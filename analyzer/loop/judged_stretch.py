@@ -28,11 +28,6 @@ from identification.controller.pid_regression import LawsCompared, compare_laws
 from identification.models import Pid
 from identification.record import LoopRecord, Mask
 
-FEWEST = 2.0
-"""Samples of a stated integral time from which it can be judged; ours: within fewer the integral is not seen."""
-FILTERED = 2.0
-"""Factor by which the derivative's filter, which no list states, can hide its gain [-]; ours."""
-
 
 @dataclass(frozen=True, slots=True)
 class Earlier:
@@ -125,7 +120,7 @@ def differing(record: LoopRecord, stated: Pid, scale_s: float, limits: SettingsL
     """
     if record.mask("compressed").mean() > limits.straight_share:
         return None
-    if stated.ti_s < FEWEST * record.dt_s:
+    if stated.ti_s < limits.judged_ti_samples * record.dt_s:
         return None
     for part in (record.span(len(record) // 2, len(record)), record):
         seen = compare_laws(part, scale_s, stated)
@@ -141,10 +136,11 @@ def _plainly(seen: LawsCompared, stated: Pid, dt_s: float, limits: SettingsLimit
     to PV leaves the true law 1/explained times what it leaves the best."""
     if seen.explained < limits.explained or seen.explained - seen.explained_stated < limits.gain:
         return False
-    return seen.left * seen.explained >= limits.left and _apart(seen.found, stated, dt_s) >= limits.factor
+    apart = _apart(seen.found, stated, dt_s, limits.filtered)
+    return seen.left * seen.explained >= limits.left and apart >= limits.factor
 
 
-def _apart(found: Pid, stated: Pid, dt_s: float) -> float:
+def _apart(found: Pid, stated: Pid, dt_s: float, filtered: float) -> float:
     """The largest factor between settings, less what a derivative's filter may make of it; of a slope that is taken
     between the samples nothing is known."""
     apart = max(_factor(found.kp, stated.kp), _factor(found.ti_s, stated.ti_s))
@@ -152,4 +148,4 @@ def _apart(found: Pid, stated: Pid, dt_s: float) -> float:
         return apart
     slopes = (pid.kp * max(pid.td_s, dt_s) for pid in (found, stated))
     slope = 1.0 if stated.scan_s < dt_s else _factor(*slopes)
-    return max(apart / math.sqrt(FILTERED), slope / FILTERED)
+    return max(apart / math.sqrt(filtered), slope / filtered)

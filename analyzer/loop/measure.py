@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analyzer.config import CauseLimits
+from analyzer.limits import LOOP
 from analyzer.loop.assessments import at_limits_share, noise_band
 from analyzer.loop.oscillation import Oscillation
 from identification.controller.pid_regression import fit_pi
@@ -53,14 +54,6 @@ from tuning.frequency_response import is_stable, loop_response
 
 HARMONICS = (2, 3)
 """Harmonics of a cycle that a valve's model must explain: beyond the third few samples a cycle are left."""
-PLAYS = (0.25, 0.6)
-"""Least and greatest play, over OP's range, whose evidence is foretold; ours: plays of loops that cycle."""
-FEWEST_CYCLES = 2.5
-"""Cycles from which harmonics are told apart from drift; ours."""
-
-
-FEW_MORE = 0.1
-"""Share of a stretch that may be out of use beyond the least for the set point's moves in it; ours."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,7 +123,7 @@ def _prominence(x: Floats, dt_s: float, period_s: float) -> float:
 def _wave_left(fit: Fit, period_s: float) -> float:
     """Second and third harmonic locked to PV's cycle in what a fit leaves of PV, over PV's fundamental."""
     window = fit.window
-    if window.duration_s < FEWEST_CYCLES * period_s:
+    if window.duration_s < LOOP.harmonic_cycles * period_s:
         return 0.0
     left, cycle = spectrum(residual(fit), window.dt_s), spectrum(window.centred, window.dt_s)
     return math.hypot(*(locked_harmonic(left, period_s, order, cycle) for order in HARMONICS))
@@ -138,7 +131,7 @@ def _wave_left(fit: Fit, period_s: float) -> float:
 
 def _play(size: float) -> float:
     """Width of the play that is looked for, over OP's range: that which fits best, where it could make a cycle."""
-    return min(max(size, PLAYS[0]), PLAYS[1])
+    return min(max(size, LOOP.least_play), LOOP.most_play)
 
 
 def _consistency(fit: Fit, period_s: float) -> float:
@@ -353,7 +346,7 @@ def latest_fit_stretch(record: LoopRecord, n: int, calm: bool = False) -> int:
         return int(firsts[int(np.argmin(out))])
     moved = np.abs(np.diff(record.sp, prepend=record.sp[:1]))
     far, least = within(np.where(record.usable, moved, 0.0)), out <= out.min()
-    farther = (out <= out.min() + FEW_MORE * n) & (far > far[least].max())
+    farther = (out <= out.min() + LOOP.few_more * n) & (far > far[least].max())
     among = np.flatnonzero(farther if farther.any() else least)
     return int(firsts[among[far[among] >= far[among].max() - 1e-9][0]])
 

@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analyzer.config import OscillationLimits
+from analyzer.limits import LOOP
 from analyzer.loop.decisions import counts
 from identification.controller.check import runs
 from identification.record import Floats, LoopRecord, Mask
@@ -32,13 +33,6 @@ from identification.signals.spectrum import (
     spectrum,
     tapered_power,
 )
-
-MOST = 3
-"""Periods reported per loop."""
-FAR = 3.0
-"""First error, over the usual one after it has come to nothing, from which a record begins on its way; ours."""
-LONGEST_WAY = 0.5
-"""Share of a record that the way to the set point may take [-]; ours."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,10 +82,10 @@ def begun_up(error: Floats) -> int:
     A vessel heated up, or a loop just switched on, is on its way there; what it swings by then hides every cycle.
     """
     arrived = int(np.argmax(error * error[0] <= 0.0))
-    if arrived == 0 or arrived > LONGEST_WAY * error.size:
+    if arrived == 0 or arrived > LOOP.longest_way * error.size:
         return 0
     usual = math.sqrt(float(np.mean(error[arrived:] ** 2)))
-    return arrived if abs(error[0]) > FAR * usual else 0
+    return arrived if abs(error[0]) > LOOP.far * usual else 0
 
 
 def error_spectrum(record: LoopRecord) -> Spectrum:
@@ -175,11 +169,7 @@ def peaks(b: Bands, least: float) -> list[int]:
     """Trial frequencies whose prominence is the highest within half an octave, the most power first."""
     p = b.prominence
     ks = [k for k in range(p.size) if p[k] >= least and p[k] >= p[max(k - 3, 0) : k + 4].max()]
-    return sorted(ks, key=lambda k: -float(b.power[k] * b.line[k]))[: 2 * MOST]
-
-
-FEWEST = 2.2
-"""Samples per period from which a peak of the spectrum is a cycle at all [-]: below it every tone folds back."""
+    return sorted(ks, key=lambda k: -float(b.power[k] * b.line[k]))[: 2 * LOOP.reported]
 
 
 def barely_seen(found: Oscillations, limits: OscillationLimits) -> float | None:
@@ -187,7 +177,7 @@ def barely_seen(found: Oscillations, limits: OscillationLimits) -> float | None:
     s, b = found.spectrum, found.bands
     if s is None or b is None:
         return None
-    few = replace(limits, samples=FEWEST, samples_few=FEWEST)
+    few = replace(limits, samples=limits.samples_least, samples_few=limits.samples_least)
     fast = [
         k for k in peaks(b, limits.prominence) if s.duration_s / float(b.line[k]) < limits.samples * s.dt_s
     ]
@@ -272,7 +262,7 @@ def detect(record: LoopRecord, limits: OscillationLimits) -> Oscillations:
             continue
         if o.period_s <= longest and not any(_is_harmonic(o, p) for p in kept):
             kept.append(o)
-    each = (_sized(s, o, usable, limits) for o in kept[:MOST])
+    each = (_sized(s, o, usable, limits) for o in kept[: LOOP.reported])
     sized = sorted((r for r in each if _lasts(record, r[0], limits)), key=lambda r: -r[0].significance)
     if not sized:
         return Oscillations(spectrum=s, bands=b)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from analyzer.limits import LOOP
 from analyzer.loop.decisions import Cause
 from analyzer.loop.oscillation import Oscillations, counting
 from analyzer.loop.quality import Prepared
@@ -31,8 +32,6 @@ HALVES = 10
 """Half-cycles that are kept."""
 SEARCHED_PERIODS = 30.0
 """Periods from the close view's end back in which they are looked for; ours: those with gaps are passed over."""
-QUICK = 0.2
-"""Time constant over a half-cycle up to which PV comes to rest within it and can be seen to stand [-]; ours."""
 
 
 def close_view(part: LoopRecord, found: Oscillations, before: int) -> tuple[int, int] | None:
@@ -84,7 +83,7 @@ def _marks(faulty: Fit | None, fit: Fit | None, period_s: float) -> StemMarks:
     """What the marks need: of a slow process PV does not come to rest, and the mark begins at the turn."""
     if fit is None:
         return StemMarks(0.0, 0.0, 0.0)
-    quick = fit.time_constant_s <= QUICK * 0.5 * period_s
+    quick = fit.time_constant_s <= LOOP.quick * 0.5 * period_s
     answered = fit.dead_time_s + 2.0 * fit.time_constant_s if quick else 0.0
     return StemMarks(0.0 if faulty is None else float(faulty.valve.stickband), fit.dead_time_s, answered)
 

@@ -9,13 +9,9 @@ from numba import njit
 
 from analyzer.config import QualityLimits
 from analyzer.history.series import Series, main_span
+from analyzer.limits import LOOP
 from analyzer.loop.decisions import Lack, LacksError, Needs
 from identification.record import Floats, Mask
-
-LOOKED_AT = 20_000
-"""Samples that are searched for a grid; ours."""
-PER_LEVEL = 10
-"""Samples a level that tell a grid from values that happen to repeat; ours."""
 
 
 def interval(stamp_s: Floats) -> float:
@@ -106,10 +102,10 @@ def resolution(value: Floats) -> float:
 
     The usual difference between values that occur; a grid is told by so many samples a level.
     """
-    most = min(value.size, LOOKED_AT) / PER_LEVEL
-    if np.unique(value[: int(most) + 2 * PER_LEVEL]).size > most:
+    most = min(value.size, LOOP.grid_samples) / LOOP.grid_per_level
+    if np.unique(value[: int(most) + 2 * LOOP.grid_per_level]).size > most:
         return 0.0
-    levels = np.unique(value[:LOOKED_AT])
+    levels = np.unique(value[: LOOP.grid_samples])
     if levels.size < 2 or levels.size > most:
         return 0.0
     return float(np.median(np.diff(levels)))

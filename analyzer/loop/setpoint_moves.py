@@ -9,17 +9,12 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from analyzer.config import FigureLimits
+from analyzer.limits import LOOP
 from identification.record import Floats, LoopRecord, Mask
 from identification.signals.robust import robust_deviation
 
 POINTS, FOLLOWED = 48, 2
 """Points of a course that are kept, and times its settling time that it is followed; ours."""
-SMALL = 0.05
-"""Share of a move within which an error is small [-]: the 5 % of step responses."""
-FEWEST_ALIKE = 3
-"""Moves that are alike from which they are a phase of a programme; ours."""
-LEVEL = 0.1
-"""What the levels of moves that are alike may differ by, over the size [-]; ours: recipes trim set points by less."""
 MOST = 12
 """Moves of a night that are kept one by one, the latest; ours: a picture holds no more."""
 
@@ -88,17 +83,19 @@ def _move(record: LoopRecord, edges: np.ndarray, noise: float, limits: FigureLim
     if abs(size) <= limits.move_spread * spread:
         return None
     part = slice(at - 1, until)
-    found = _answered(record, part, end - at, size, max(noise, spread), limits.move_stands)
+    found = _answered(record, part, end - at, size, max(noise, spread), limits)
     return found if until == last or found.settled_s is not None else None
 
 
-def _answered(record: LoopRecord, part: slice, ramp: int, size: float, spread: float, stands: int) -> Move:
+def _answered(
+    record: LoopRecord, part: slice, ramp: int, size: float, spread: float, limits: FigureLimits
+) -> Move:
     """How PV answers a move of so many samples; part, from the sample before it to the next move; spread of the error
     before [% of span]."""
     begin = float(record.sp[part.start])
     way = (record.pv[part] - begin) / size
     still = spread / abs(size)
-    settled = _settled(np.abs(way[ramp:] - 1.0) > max(2.0 * still, SMALL), stands)
+    settled = _settled(np.abs(way[ramp:] - 1.0) > max(2.0 * still, limits.move_settled), limits.move_stands)
     shown = way.size if settled is None else min(way.size, FOLLOWED * (settled + ramp) + 2)
     course = np.interp(np.linspace(0, shown - 1, POINTS), np.arange(shown), way[:shown])
     return Move(
@@ -166,12 +163,12 @@ def phases(found: Sequence[Move]) -> tuple[Phase, ...]:
         if not same:
             kinds.append([])
         (same[0] if same else kinds[-1]).append(m)
-    return tuple(_phase(k) for k in kinds if len(k) >= FEWEST_ALIKE)
+    return tuple(_phase(k) for k in kinds if len(k) >= LOOP.alike_least)
 
 
 def alike(one: tuple[float, float], other: tuple[float, float]) -> bool:
     """Whether moves from one level to another are of one kind [% of span]."""
-    most = LEVEL * abs(one[1] - one[0])
+    most = LOOP.alike_level * abs(one[1] - one[0])
     return all(abs(a - b) <= most for a, b in zip(one, other, strict=True))
 
 

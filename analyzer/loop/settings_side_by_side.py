@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from analyzer.limits import LOOP
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import as_stated
 from identification.models import Loop, Pid
@@ -26,8 +27,6 @@ MAP_POINTS, SPREAD = 24, 12.0
 """Points of the travel map along each axis, and how far it reaches about the present settings; ours."""
 BEYOND = 1.5
 """How far the map reaches beyond the outermost settings [-]; ours."""
-ALIKE = 0.01
-"""Difference of travel over the present one [-] that is none to an engineer; ours."""
 SHOWN_PERIODS, SHOWN_POINTS = 8.0, 240
 """Periods of each simulation that a picture shows, and its points at most; ours."""
 
@@ -97,7 +96,7 @@ def _beaten(name: str, everywhere: Mapping[str, Candidate]) -> bool:
     best, own = everywhere.get(RECOMMENDED), everywhere[name]
     if best is None:
         return False
-    return best.worst_travel <= own.worst_travel + ALIKE and best.worst_error <= own.worst_error
+    return best.worst_travel <= own.worst_travel + LOOP.same_travel and best.worst_error <= own.worst_error
 
 
 def compared(

@@ -15,14 +15,6 @@ from analyzer.config import QualityLimits
 from identification.controller.check import runs
 from identification.record import Floats, LoopRecord, Mask
 
-LEAST_SHARE = 0.01
-"""Share of the time that each of two must have the valve for a select to be seen at work; ours: less is a touch."""
-HOLDS = 0.5
-"""Mean square of the error while a loop has the valve, over that while it has not, under which a select is seen [-];
-ours: a loop without the valve is moved by another one's needs."""
-AT_WORK = 50
-"""Samples at work from which a half's part of the output is told; ours, as of a regression of two constants."""
-
 
 @dataclass(frozen=True, slots=True)
 class Shared:
@@ -63,14 +55,12 @@ def selected(record: LoopRecord, other: Floats, other_bad: Mask, limits: Quality
     """
     good = record.usable & ~other_bad
     lower = record.op < other
-    if (
-        record.sp_estimated
-        or not LEAST_SHARE <= float(lower[good].mean() if good.any() else 0.0) <= 1 - LEAST_SHARE
-    ):
+    share, least = float(lower[good].mean() if good.any() else 0.0), limits.shared_share
+    if record.sp_estimated or not least <= share <= 1 - least:
         return None
     size = [float(np.mean(record.error[good & has] ** 2)) for has in (lower, ~lower)]
     low = size[0] < size[1]
-    if min(size) > HOLDS * max(size):
+    if min(size) > limits.shared_error * max(size):
         return None
     idle = good & (lower != low)
     far = record.op >= 100.0 - limits.limit_pct if low else record.op <= limits.limit_pct
@@ -117,17 +107,21 @@ def half(record: LoopRecord, whole: Floats, whole_bad: Mask, limits: QualityLimi
     ends = record.op <= limits.limit_pct, record.op >= 100.0 - limits.limit_pct
     rest = max(ends, key=lambda end: int((end & good).sum()))
     idle = rest & good
-    if not good.any() or not LEAST_SHARE <= float(idle[good].mean()) <= 1 - LEAST_SHARE:
+    if not good.any() or not limits.shared_share <= float(idle[good].mean()) <= 1 - limits.shared_share:
         return None
-    slope, begin = _part_of(record.op, whole, good & ~ends[0] & ~ends[1], 0.0 if rest is ends[0] else 100.0)
+    working, end = good & ~ends[0] & ~ends[1], 0.0 if rest is ends[0] else 100.0
+    slope, begin = _part_of(record.op, whole, working, end, limits.half_samples)
     valve_pct = 100.0 * float(1.0 - idle[good].mean())
     changes = _changes_per_h(idle, good, record.dt_s)
     return Shared(idle, valve_pct, changes, split_at_pct=begin, split_slope=slope)
 
 
-def _part_of(op: Floats, whole: Floats, working: Mask, end: float) -> tuple[float | None, float | None]:
-    """How much a half moves for its controller's output [-], and the output at which it leaves its end [%]."""
-    if int(working.sum()) < AT_WORK:
+def _part_of(
+    op: Floats, whole: Floats, working: Mask, end: float, least: int
+) -> tuple[float | None, float | None]:
+    """How much a half moves for its controller's output [-], and the output at which it leaves its end [%]; None
+    where so few samples are at work."""
+    if int(working.sum()) < least:
         return None, None
     x, y = whole[working], op[working]
     spread = float(np.var(x))

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from analyzer.config import CauseLimits
+from analyzer.config import CauseLimits, Config
 from analyzer.loop.cause import Verdict, agrees, fault_of, hidden_by_grid, jump_evidence, needed
 from analyzer.loop.decisions import Cause, Fault
 from analyzer.loop.identified import slope_deviation
@@ -23,13 +23,11 @@ from identification.limits import INTERVALS
 from identification.record import Floats
 from identification.signals.robust import robust_deviation
 
-COMPRESSED = 0.1
-"""Share of PV on straight segments from which slips are not told from what compression cuts [-]; ours, as lanes."""
 Known = tuple[float, float]
 """A constant and the standard deviation of its logarithm."""
 
 
-def witness(verdict: Verdict, oscillates: bool, prepared: Prepared, limits: CauseLimits) -> str | None:
+def witness(verdict: Verdict, oscillates: bool, prepared: Prepared, config: Config) -> str | None:
     """What a record says, as the store keeps it (JSON): the profile of widths and the evidence that it takes to
     tell a fault [nat], the evidence for a slip jump and what it takes [nat], and constants with the deviation
     of their logarithms; None where nothing was fitted.
@@ -40,9 +38,9 @@ def witness(verdict: Verdict, oscillates: bool, prepared: Prepared, limits: Caus
     oscillates : bool
     prepared : Prepared
         PV's grid may hold PV still as a valve would, and compression cuts turns so that they look like slips.
-    limits : CauseLimits
+    config : Config
     """
-    m = verdict.for_settings.measured
+    m, limits = verdict.for_settings.measured, config.cause
     if m is None or hidden_by_grid(m, prepared.pv_step, oscillates, limits):
         return None
     if not oscillates and not agrees(m, limits):
@@ -50,7 +48,7 @@ def witness(verdict: Verdict, oscillates: bool, prepared: Prepared, limits: Caus
     convicted = oscillates and verdict.cause is Cause.VALVE
     # one friction for all slips hides their jumps
     slips = None if verdict.for_settings is verdict else verdict.measured
-    whole = prepared.compressed_share <= COMPRESSED
+    whole = prepared.compressed_share <= config.lanes.straight_share
     jump = jump_evidence(slips or m, limits) if whole else (0.0, 0.0)
     said = {
         "profile": [round(float(x), 1) for x in _profile(m, 0.0 if convicted else limits.noise_widths)],

@@ -130,9 +130,7 @@ def _loop_row(
         found, advice = assess_loop(spec, prepared, config, advising, earlier, held)
         known |= _typed_in(earlier, spec, found, night.zone)
         known["turns"] = turn_events(prepared, found) if advising else None
-        known["witness"] = witness(
-            found.verdict, counting(found.oscillations) is not None, prepared, config.cause
-        )
+        known["witness"] = witness(found.verdict, counting(found.oscillations) is not None, prepared, config)
         told = concluded(found, advice, spec, night.name, config.advice, **known)
         drawn = _settings_row(spec, night.name, advice)
     except Exception as error:  # an error of one loop is that loop's result, never the night's end

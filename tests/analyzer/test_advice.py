@@ -269,7 +269,7 @@ def test_a_calm_loop_witnesses_no_width_that_its_stretches_do_not_bear_out(pipe)
     tried = replace(m.play, valve=m.play.valve._replace(sliding=0.25 * m.play.valve.stickband))
     single = replace(m, stick_slip=tried, steady=0.0, asked=0.0)
     calm = replace(pipe.verdict, measured=single, steady=None)
-    said = json.loads(witness(calm, False, prepared(simulate(PIPE, 6.0)), CONFIG.cause) or "")
+    said = json.loads(witness(calm, False, prepared(simulate(PIPE, 6.0)), CONFIG) or "")
     assert "slope" in said
     assert "width" not in said
     assert max(said["profile"]) == 0.0

@@ -12,7 +12,7 @@ from analyzer.belief.belief import Belief, belief_of, kept_as
 from analyzer.belief.wear import PhaseKnown, forgotten, growth, with_repetitions
 from analyzer.config import WearLimits
 
-LIMITS, HOUR = WearLimits(), 3600.0
+LIMITS, HOUR, MOST = WearLimits(), 3600.0, 60
 
 
 def row(first: int, overshoot: np.ndarray, begin: float = 20.0, end: float = 50.0) -> dict[str, Any]:
@@ -32,7 +32,7 @@ def of_nights(overshoot: np.ndarray, a_night: int = 8) -> tuple[PhaseKnown, ...]
     """What is known of a phase after nights of so many batches."""
     known: tuple[PhaseKnown, ...] = ()
     for k in range(0, overshoot.size, a_night):
-        known = with_repetitions(known, row(k, overshoot[k : k + a_night]))
+        known = with_repetitions(known, row(k, overshoot[k : k + a_night]), MOST)
     return known
 
 
@@ -62,9 +62,9 @@ def test_what_scatters_falls_or_jumps_once_is_no_growth() -> None:
 
 def test_a_night_twice_and_other_levels_are_kept_apart() -> None:
     """A night read again counts no batch twice; another move is another phase; new settings begin anew."""
-    once = with_repetitions((), row(0, np.full(8, 3.0)))
-    assert with_repetitions(once, row(0, np.full(8, 3.0))) == once
-    both = with_repetitions(once, row(8, np.full(4, 3.0), begin=50.0, end=80.0))
+    once = with_repetitions((), row(0, np.full(8, 3.0)), MOST)
+    assert with_repetitions(once, row(0, np.full(8, 3.0)), MOST) == once
+    both = with_repetitions(once, row(8, np.full(4, 3.0), begin=50.0, end=80.0), MOST)
     assert [p.count for p in both] == [8, 4]
     assert [(p.count, p.shown) for p in forgotten(both)] == [(8, ()), (4, ())]
 

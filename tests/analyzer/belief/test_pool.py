@@ -17,7 +17,7 @@ def pooled(values: np.ndarray, deviations: np.ndarray) -> Pool:
     """The pool of some nights."""
     out = Pool()
     for value, deviation in zip(values, deviations, strict=True):
-        out = out.plus(float(value), float(deviation), LEAST)
+        out = out.plus(float(value), float(deviation), LEAST, 2.0)
     return out
 
 
