@@ -5,6 +5,10 @@ from __future__ import annotations
 from identification.limits import Limits
 
 
+class HistoryLimits(Limits, section="history"):
+    """How exports are read: what their columns, clocks and names are known by, and what is too much to read."""
+
+
 class WaveLimits(Limits, section="waves"):
     """What is kept of a loop's waves and moves, and when those of two loops can be compared: alike in all nights."""
 
@@ -13,4 +17,17 @@ class LoopLimits(Limits, section="loop"):
     """How the record of one loop is read, and which of its signs are told."""
 
 
-WAVES, LOOP = WaveLimits(), LoopLimits()
+class ExplainingLimits(Limits, section="explain"):
+    """Which part of a recording is explained, and which models are tried on it."""
+
+
+class StoreLimits(Limits, section="store"):
+    """When another run is at work on a store, and when what it left is dead."""
+
+
+class PageLimits(Limits, section="pages"):
+    """How much pages tell."""
+
+
+HISTORY, WAVES, LOOP = HistoryLimits(), WaveLimits(), LoopLimits()
+EXPLAIN, STORE, PAGES = ExplainingLimits(), StoreLimits(), PageLimits()

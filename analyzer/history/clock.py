@@ -15,10 +15,9 @@ from numpy.typing import NDArray
 from analyzer.history import stamps, zones
 from analyzer.history.stamps import DateOrder, by_gaps, days_seen
 from analyzer.history.table import as_text, is_text, numbers
+from analyzer.limits import HISTORY
 
 TICKS_PER_S = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
-EARLIEST_S, LATEST_S = -11_676_096_000.0, 10_413_792_000.0
-"""Stamps before 1600 and from 2300 on are none [s since 1970-01-01]; those between that stray are told."""
 EXCEL_ORIGIN_S = -25569 * 86400.0
 
 
@@ -47,10 +46,6 @@ class TimeScale:
 DAY_S = 86400.0
 SINCE_START_MOST = 1e8
 """Largest number of a clock that counts from the start of the export; above it are the seconds since 1970."""
-EXCEL_MOST_SPAN = 4000.0
-"""Days that stamps in Excel days may span [d]; ours: numbers that rise further count seconds."""
-LEAST_MS_STEP = 100.0
-"""Steps of a clock without a unit from which it counts milliseconds where they are no whole minutes; ours."""
 SINCE_START = {
     "ms": TimeScale("milliseconds since the start", 0, 1e11, 1e-3),
     "s": TimeScale("seconds since the start", 0, SINCE_START_MOST, 1.0),
@@ -120,7 +115,8 @@ class Clock:
         """Seconds since 1970-01-01 on the file's clock, NaN where unreadable; True where that is local."""
         second, local = self._seconds(arrays)
         with np.errstate(invalid="ignore"):
-            return np.where((second >= EARLIEST_S) & (second < LATEST_S), second, np.nan), local
+            known = (second >= HISTORY.earliest_s) & (second < HISTORY.latest_s)
+            return np.where(known, second, np.nan), local
 
     def _seconds(self, arrays: Sequence[pa.Array]) -> tuple[NDArray[np.float64], bool]:
         if self.below_s > 0:
@@ -189,7 +185,7 @@ def time_scale_of(column: pa.Array, unit: str = "") -> TimeScale | None:
     found = next((scale for scale in SCALES if scale.low <= middle < scale.high), None)
     in_days = found is not None and found.unit_s == DAY_S  # such numbers hardly change over an export
     other = unit in ("ms", "s", "min", "h") if in_days else unit not in ("", "s") and found is SECONDS
-    if found is not None and not (other or (in_days and reach > EXCEL_MOST_SPAN)):
+    if found is not None and not (other or (in_days and reach > HISTORY.excel_days)):
         return found
     since = SINCE_START[unit or _unit_by_step(number)]
     return since if since.low <= middle < since.high else None
@@ -201,7 +197,7 @@ def _unit_by_step(number: NDArray[np.float64]) -> str:
     steps = np.abs(np.diff(number))
     step = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
     whole = bool((number % 1 == 0).all())
-    return "ms" if whole and step >= LEAST_MS_STEP and (step % 60 != 0 or step % 1000 == 0) else "s"
+    return "ms" if whole and step >= HISTORY.least_ms_step and (step % 60 != 0 or step % 1000 == 0) else "s"
 
 
 def counted_s(texts: pa.Array) -> NDArray[np.float64]:

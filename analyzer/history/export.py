@@ -25,16 +25,12 @@ from analyzer.history.layouts import Source, source_of, tag_column
 from analyzer.history.parquet import open_parquet
 from analyzer.history.plant_clock import zone_of
 from analyzer.history.series import MainSpan, NoStampError, Series, joined_pieces
-from analyzer.history.sheet import WHOLE_FILE_BYTES
 from analyzer.history.sniff import open_sheet
 from analyzer.history.table import ReadOptions
+from analyzer.limits import HISTORY
 from analyzer.places import at_hand, bring, is_remote
 from identification.errors import InputError
 
-CONVERTED_BYTES = WHOLE_FILE_BYTES
-"""Size from which delimited text is streamed into Parquet once, instead of read for each loop anew [bytes]."""
-CONVERTED_ROWS = 2_000_000
-"""Rows from which a long Parquet file is parted by loop once, instead of being searched for each loop anew."""
 DOUBT = "; state "
 """What stands in notes on readings of which another is possible, before how the other is stated."""
 __all__ = ["Export", "ReadOptions", "open_export"]
@@ -259,10 +255,10 @@ def _opened(path: Path, options: ReadOptions) -> tuple[list[Source], list[InputE
 def _table(plain: Path, options: ReadOptions) -> Source:
     if is_parquet(plain):
         table = open_parquet(plain)
-        tag = tag_column(table) if table.rows >= CONVERTED_ROWS else -1
+        tag = tag_column(table) if table.rows >= HISTORY.whole_rows else -1
         return source_of(table if tag < 0 else converted_parquet(table, tag, options.place), options)
     sheet = open_sheet(plain, options)
-    big = sheet.bytes >= CONVERTED_BYTES
+    big = sheet.bytes >= HISTORY.whole_bytes
     return source_of(converted(sheet, tag_column(sheet), options.place) if big else sheet, options)
 
 

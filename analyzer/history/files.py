@@ -24,6 +24,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import IO, Any
 
+from analyzer.limits import HISTORY
 from identification.errors import InputError
 
 TEXT_ENDINGS = frozenset({".csv", ".txt", ".tsv"})
@@ -46,17 +47,7 @@ FEWEST = 2
 """Rows and columns of a table at least: a header and a sample, stamps and values."""
 PLAIN = re.compile(r"[^\w.-]+")
 """What stands for nothing in the name of a file."""
-ENDS_BYTES = 65_536
-"""Bytes at both ends of a file that stand for it beside its size; ours: headers, footers and the newest samples are
-there, and a folder of thousands of files is known in a second."""
 BLOCK_BYTES = 1 << 20
-MOST_TIMES = 200.0
-"""Times that a file may be larger unpacked than packed, beyond `ALWAYS_BYTES`; ours: exports of a plant at rest
-shrink to a hundredth, and what shrinks further is made to fill a disk."""
-ALWAYS_BYTES = 100e6
-"""Size up to which anything is unpacked [bytes]."""
-MOST_OF_DISK = 0.8
-"""Share of the disk's room that an unpacked file may take [-]; ours: the night needs the rest."""
 
 
 ENCODINGS = (
@@ -102,8 +93,8 @@ def ends_of(path: Path) -> bytes:
     with path.open("rb") as file:
         size = file.seek(0, 2)
         file.seek(0)
-        head = file.read(ENDS_BYTES)
-        file.seek(max(size - ENDS_BYTES, 0))
+        head = file.read(HISTORY.ends_bytes)
+        file.seek(max(size - HISTORY.ends_bytes, 0))
         return str(size).encode() + head + file.read()
 
 
@@ -249,13 +240,14 @@ def _check_size(path: Path, size: int, written: int, folder: Path) -> None:
     """Raise InputError where a file of `size` bytes, some of them `written` to a folder, is beyond all measure or the
     disk's room."""
     packed = path.stat().st_size
-    if size > max(MOST_TIMES * packed, ALWAYS_BYTES):
+    if size > max(HISTORY.unpacked_times * packed, HISTORY.unpacked_bytes):
         raise InputError(
             f"{path}: {packed} bytes that unpack to more than {size / 1e6:.0f} MB",
-            f"at most {MOST_TIMES:g} times as much",
+            f"at most {HISTORY.unpacked_times:g} times as much",
             "unpack it where there is room, and name what comes out",
         )
-    if size > ALWAYS_BYTES and size > MOST_OF_DISK * (shutil.disk_usage(folder).free + written):
+    room = shutil.disk_usage(folder).free + written
+    if size > HISTORY.unpacked_bytes and size > HISTORY.disk_share * room:
         remedy = "unpack it elsewhere and name what comes out"
         raise InputError(f"{path}: no room to unpack it", "free disk", remedy)
 

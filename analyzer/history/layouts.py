@@ -17,12 +17,13 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from analyzer.history.clock import Clock
-from analyzer.history.names import COLUMNS, LONGEST, check_once, first_named, plain, stated_column, with_loop
+from analyzer.history.names import COLUMNS, check_once, first_named, plain, stated_column, with_loop
 from analyzer.history.quality import Scheme, mostly_one, not_good, quality_columns, scheme_of
 from analyzer.history.series import MainSpan, NoStampError, Series, main_span
 from analyzer.history.table import ReadOptions, Table, as_text, is_number, is_text
 from analyzer.history.time_columns import check_seconds, find_clock, holds_stamps, stamps_clock
 from analyzer.history.values import parsed, values
+from analyzer.limits import HISTORY
 from identification.errors import InputError
 
 TIME_WORDS = re.compile(
@@ -257,13 +258,13 @@ def _groups(table: Table) -> list[tuple[int, list[int]]]:
 
 def _is_time(name: str) -> bool:
     """Whether a column's own name is that of stamps."""
-    bare = NUMBERED.sub("", name[:LONGEST])
+    bare = NUMBERED.sub("", name[: HISTORY.name_length])
     return plain(bare) in COLUMNS["stamp"] or any((TIME_WORDS.search(bare), TIME_FIRST.match(bare)))
 
 
 def _time_name(table: Table, i: int) -> str:
     """A name under which numbers of a column may count as stamps: its own, or 'time' before a column without one."""
-    name = NUMBERED.sub("", table.names[i][:LONGEST])
+    name = NUMBERED.sub("", table.names[i][: HISTORY.name_length])
     unnamed = i + 1 < len(table.names) and table.names[i + 1] == "" and name != ""
     return "time" if unnamed or _is_time(table.names[i]) else ""
 
@@ -281,8 +282,8 @@ def _tag(table: Table, column: TagColumn) -> str:
     """The tag's name: above its values, or where that says nothing above its stamps."""
     own, other = table.names[column.value], table.names[column.clock.columns[0]]
     if plain(NUMBERED.sub("", own)) in COLUMNS["value"] or own == "":
-        return TIME_WORDS.sub("", other[:LONGEST]) or other
-    return VALUE_WORDS.sub("", own[:LONGEST]) or own
+        return TIME_WORDS.sub("", other[: HISTORY.name_length]) or other
+    return VALUE_WORDS.sub("", own[: HISTORY.name_length]) or own
 
 
 @dataclass(frozen=True, slots=True)

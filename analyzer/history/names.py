@@ -9,6 +9,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
+from analyzer.limits import HISTORY
 from identification.errors import InputError
 
 WORDS: dict[str, Any] = tomllib.loads(Path(__file__).with_name("words.toml").read_text(encoding="utf-8"))
@@ -29,8 +30,6 @@ QUALITY_OF = (
     re.compile(rf"^(?:{_QUALITIES})(?: of)?[ ._:/|#-]*[(\[]?(?P<tag>.+?)[)\]]?$", re.IGNORECASE),
 )
 """Names of quality columns that hold the tag's, in front or behind."""
-LONGEST = 200
-"""Characters of a name that are looked at: no tag has more, and patterns take the square of a name's length."""
 UNIT_IN_NAME = re.compile(
     r"(?:^|[\s_(\[.,-]+)(?:(?P<ms>ms|msec)|(?P<s>s|secs?|seconds?|sek|sekunden)|(?P<min>mins?|minutes?|minuten)"
     r"|(?P<h>h|hrs?|hours?|std|stunden)|(?P<d>d|days?|tage))[)\].]*$",
@@ -40,18 +39,18 @@ UNIT_IN_NAME = re.compile(
 
 def plain(name: str) -> str:
     """Name without case, units in brackets, blanks and underscores: ' Time_Stamp (UTC)' is 'timestamp'."""
-    return re.sub(r"\([^()]*\)|\[[^\[\]]*\]|[\s_\-\"']", "", name[:LONGEST]).lower()
+    return re.sub(r"\([^()]*\)|\[[^\[\]]*\]|[\s_\-\"']", "", name[: HISTORY.name_length]).lower()
 
 
 def time_unit(name: str) -> str:
     """The unit that a time column's name states, as in 'Time (min)' or 't_h': ms, s, min, h or d; '' where none."""
-    found = UNIT_IN_NAME.search(name[:LONGEST])
+    found = UNIT_IN_NAME.search(name[: HISTORY.name_length])
     return "" if found is None else str(found.lastgroup)
 
 
 def without_unit(name: str) -> str:
     """A time column's name without the unit that stands behind it."""
-    return UNIT_IN_NAME.sub("", name[:LONGEST])
+    return UNIT_IN_NAME.sub("", name[: HISTORY.name_length])
 
 
 def is_stamp(name: str) -> bool:

@@ -16,19 +16,10 @@ import pyarrow.parquet as pq
 
 from analyzer.history.names import check_once
 from analyzer.history.table import HEAD_ROWS, Table, one_array
+from analyzer.limits import HISTORY
 from identification.errors import InputError
 
 OPEN_FILES = 4
-MANY_ROWS, ROWS_A_BYTE = 5e6, 20.0
-"""Files of more rows than both are not read; ours: where any value moves there are 3 rows a byte at most, in whatever
-encoding; a file of nothing but constants may have 90."""
-PROBED_BYTES, PROBE_S = 4_000_000, 10.0
-"""Size below which a file is read through when it is opened, and the time that this may take by the clock; ours: it
-takes 50 ms, and of larger files the limits of a run's workers hold."""
-LONGEST_TEXT, MUCH_TEXT = 1000.0, 10_000_000
-"""Mean length of the texts of a column in a row group, and their bytes, beyond which together a file is not read;
-ours: names, stamps and states are short, and a few texts of megabytes unpack from nothing to gigabytes. A list of ten
-thousand tags, which stands whole before a group of few rows, has a twentieth of the second."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,19 +68,19 @@ def open_parquet(path: Path) -> ParquetTable:
             "export it again, or give it the ending .csv if it is text",
         ) from error
     check_once(path, schema.names)
-    if rows > MANY_ROWS and rows > ROWS_A_BYTE * path.stat().st_size:
+    if rows > HISTORY.many_rows and rows > HISTORY.rows_a_byte * path.stat().st_size:
         raise InputError(
             f"{path}: {rows} rows in {path.stat().st_size} bytes",
-            f"at most {ROWS_A_BYTE:g} rows a byte",
+            f"at most {HISTORY.rows_a_byte:g} rows a byte",
             "export it again; a file that unpacks to so much more is not read",
         )
-    if long_text > LONGEST_TEXT:
+    if long_text > HISTORY.longest_text:
         raise InputError(
             f"{path}: texts of {long_text:.0f} bytes on average",
-            f"at most {LONGEST_TEXT:g} bytes for a tag, a stamp or a state",
+            f"at most {HISTORY.longest_text:g} bytes for a tag, a stamp or a state",
             "export numbers, tags and stamps alone",
         )
-    if path.stat().st_size < PROBED_BYTES:
+    if path.stat().st_size < HISTORY.probed_bytes:
         _check_pages(path)
     if rows == 0:
         raise InputError(f"{path}: Parquet without rows", "at least one sample", "export a period with data")
@@ -103,10 +94,10 @@ def _check_pages(path: Path) -> None:
     """
     reading = threading.Thread(target=_read_through, args=(path,), daemon=True)
     reading.start()
-    reading.join(PROBE_S)
+    reading.join(HISTORY.probe_s)
     if reading.is_alive():
         raise InputError(
-            f"{path}: its pages take longer than {PROBE_S:g} s to read",
+            f"{path}: its pages take longer than {HISTORY.probe_s:g} s to read",
             "a whole Parquet file",
             "export it again",
         )
@@ -124,7 +115,7 @@ def _longest_text(footer: pq.FileMetaData) -> float:
     texts = [j for j in range(footer.num_columns) if footer.schema.column(j).physical_type == "BYTE_ARRAY"]
     groups = [footer.row_group(k) for k in range(footer.num_row_groups)]
     sizes = [(g.column(j).total_uncompressed_size, g.num_rows) for g in groups for j in texts]
-    return max((size / max(rows, 1) for size, rows in sizes if size > MUCH_TEXT), default=0.0)
+    return max((size / max(rows, 1) for size, rows in sizes if size > HISTORY.much_text), default=0.0)
 
 
 def _first_line(error: Exception) -> str:

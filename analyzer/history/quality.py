@@ -18,16 +18,15 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
-from analyzer.history.names import COLUMNS, LONGEST, QUALITY_OF, WORDS, plain
+from analyzer.history.names import COLUMNS, QUALITY_OF, WORDS, plain
 from analyzer.history.table import Table, distinct
+from analyzer.limits import HISTORY
 
 GOOD, BAD, NOT_BAD, IS_BAD = (
     frozenset(WORDS["quality"][kind]) for kind in ("good", "bad", "not_bad", "is_bad")
 )
 DA_GOOD, UA_UNCERTAIN, CONFIDENCE_GOOD, CONFIDENCE_FULL = 192, 0x40000000, 50, 100
 PCS7_GOOD = 0x80
-MOST_FLAG = 10
-"""Codes below this number are a plant's own, of which 0 or 1 is good."""
 INTERPOLATED = 0x00020000
 """Flag of OPC historical access beside the DA code in the low byte."""
 FLAGGED_INTERPOLATED = "samples are flagged as interpolated, not recorded"
@@ -90,7 +89,7 @@ def scheme_of(name: str, codes: pa.Array, ones: bool | None = None) -> Scheme:
         return Scheme.DA
     if (known == PCS7_GOOD).any() and known.max() < 0x100:
         return Scheme.PCS7
-    if len(known) and known.max() < MOST_FLAG and (mostly_one([codes]) if ones is None else ones):
+    if len(known) and known.max() < HISTORY.flags and (mostly_one([codes]) if ones is None else ones):
         return Scheme.ONE_GOOD
     return Scheme.CONFIDENCE if len(known) and known.max() == CONFIDENCE_FULL else Scheme.UA
 
@@ -142,7 +141,7 @@ def quality_columns(table: Table, free: Sequence[int]) -> tuple[dict[int, int], 
 
 def _tag_of(name: str, others: Mapping[str, int]) -> str | None:
     """The other column that a quality column is named for."""
-    if len(name) > LONGEST:
+    if len(name) > HISTORY.name_length:
         return None
     tags = (match["tag"] for pattern in QUALITY_OF if (match := pattern.match(name)) is not None)
     return next((tag for tag in tags if tag in others and tag != name), None)

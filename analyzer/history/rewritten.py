@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
-from analyzer.history.names import LONGEST
+from analyzer.limits import HISTORY
 
 DELIMITERS = (";", "\t", "|", ",")
 TITLE = re.compile(
@@ -23,8 +23,6 @@ NUMBERED = re.compile(r"^[+-]?\d[\d.:/T+-]*Z?$")
 """What a row of data begins with: a stamp or a number."""
 GAP = re.compile(r"\s{2,}")
 RULE = re.compile(r"^\s*-{3,}(?:\s+-{3,})+\s*$")
-FIRST = 12
-"""Lines within which a layout shows itself."""
 
 Rewrite = Callable[[Iterator[str]], Iterator[Sequence[str]]]
 
@@ -49,7 +47,7 @@ def rewritten(path: Path, encoding: str, lines: Sequence[str], place: Path) -> P
 
 def _title(line: str) -> str:
     """The tag that a line stands for as a title over its samples; '' for any other line."""
-    if len(line) > LONGEST:
+    if len(line) > HISTORY.name_length:
         return ""
     found = TITLE.match(line) or BARE_TITLE.match(line.strip())
     if found is None or STAMPED.match(line):
@@ -61,7 +59,7 @@ def _title(line: str) -> str:
 def _blocks(lines: Sequence[str]) -> Rewrite | None:
     """How blocks of one tag after another are read, where the first lines are such a block's."""
     filled = [line for line in lines if line.strip()]
-    at = next((k for k, line in enumerate(filled[:FIRST]) if _title(line)), None)
+    at = next((k for k, line in enumerate(filled[: HISTORY.layout_lines]) if _title(line)), None)
     if at is None:
         return None
     below = filled[at + 1 : at + 4]
@@ -92,10 +90,10 @@ def _blocks(lines: Sequence[str]) -> Rewrite | None:
 
 def _columns(lines: Sequence[str]) -> Rewrite | None:
     """How columns that blanks part are read, where the first lines are such columns and hold no delimiter."""
-    filled = [line for line in lines if line.strip()][: 4 * FIRST]
+    filled = [line for line in lines if line.strip()][: 4 * HISTORY.layout_lines]
     if len(filled) < 4 or any(d in line for d in DELIMITERS for line in filled[:4]):
         return None
-    rule = next((line for line in filled[:FIRST] if RULE.match(line)), None)
+    rule = next((line for line in filled[: HISTORY.layout_lines] if RULE.match(line)), None)
     edges = [m.start() for m in re.finditer(r"(?<!\S)-", rule)] if rule is not None else []
 
     def cells(line: str) -> list[str]:
@@ -119,7 +117,7 @@ def _columns(lines: Sequence[str]) -> Rewrite | None:
 def _words(lines: Sequence[str]) -> Rewrite | None:
     """How a table is read whose columns are parted by one blank, below a header as wide or, where a stamp is a date
     and a time of day under one name, a word narrower."""
-    head, *rest = [line.split() for line in lines if line.strip()][: 4 * FIRST] or [[]]
+    head, *rest = [line.split() for line in lines if line.strip()][: 4 * HISTORY.layout_lines] or [[]]
     more = (Counter(map(len, rest)).most_common(1) or [(0, 0)])[0][0] - len(head)
     fitting = sum(len(row) == len(head) + more and NUMBERED.match(row[0]) is not None for row in rest)
     if len(head) < 2 or more not in (0, 1) or fitting < max(3, 0.9 * len(rest)) or NUMBERED.match(head[0]):

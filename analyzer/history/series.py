@@ -14,17 +14,14 @@ from datetime import datetime, timedelta
 import numpy as np
 from numpy.typing import NDArray
 
+from analyzer.limits import HISTORY
+
 NEWEST_FIRST = "series run newest first and are turned round"
 REPEATED = "samples repeat a stamp; the last one counts"
 CONTRADICTED = "samples contradict another file at the same stamp; the later file counts"
 UNORDERED = "samples were out of order"
 NO_STAMP = "samples have no readable time stamp and are left out"
 EPOCH = datetime(1970, 1, 1)
-APART_S = 86400.0
-"""Samples further apart than this [s] are separate clusters; ours: a day without a sample is no night's gap."""
-LEAST_SHARE = 0.01
-"""A first or last cluster with less than this share of the largest one's samples is stray [-]; ours: a quarter of an
-hour beside a day, or four hours beside two weeks."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,12 +160,12 @@ def main_span(stamp_s: NDArray[np.float64]) -> MainSpan:
     if known.size == 0:
         raise NoStampError
     first, last = float(known.min()), float(known.max())
-    if last - first <= APART_S:
+    if last - first <= HISTORY.apart_s:
         return MainSpan(first, last, 0)
     ordered = known if bool((np.diff(known) >= 0).all()) else np.sort(known)
-    cuts = np.flatnonzero(np.diff(ordered) > APART_S) + 1
+    cuts = np.flatnonzero(np.diff(ordered) > HISTORY.apart_s) + 1
     starts, ends = np.r_[0, cuts], np.r_[cuts, ordered.size]
-    whole = np.flatnonzero((ends - starts) >= LEAST_SHARE * (ends - starts).max())
+    whole = np.flatnonzero((ends - starts) >= HISTORY.stray_share * (ends - starts).max())
     a, b = int(starts[whole[0]]), int(ends[whole[-1]])
     return MainSpan(float(ordered[a]), float(ordered[b - 1]), int(ordered.size - (b - a)))
 

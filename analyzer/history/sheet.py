@@ -14,17 +14,13 @@ import pyarrow.compute as pc
 from pyarrow import csv
 
 from analyzer.history.table import HEAD_ROWS, Table, as_text, trimmed
+from analyzer.limits import HISTORY
 from identification.errors import InputError
 
-WHOLE_FILE_BYTES = 64_000_000  # files below are read at once and kept for the next loop's read
 KEPT_READS = 2
 BLOCK_BYTES = 1 << 24
-WHOLE_SHARE = 0.95
-"""Share of a file's lines that must come back as rows [-]; where fewer do, an open quote has swallowed the rest."""
 Read = TypeVar("Read")
 LATE_TEXT = re.compile(r"In CSV column #(?P<column>\d+): (?:Row #\d+: )?CSV conversion error")
-MOST_LATE = 3
-"""Columns whose texts come late that a pass is begun anew for, one by one; then all columns are read as texts."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -51,7 +47,7 @@ class Sheet(Table):
         return (*self.found, *quotes_told(loaded.unquoted, loaded.left_out))
 
     def head(self, columns: Sequence[int]) -> list[pa.Array]:
-        if self.bytes >= WHOLE_FILE_BYTES:
+        if self.bytes >= HISTORY.whole_bytes:
             return [_first_block(self)[i] for i in columns]
         return [array.slice(0, HEAD_ROWS) for array in self.read(columns)]
 
@@ -99,7 +95,8 @@ def as_far_as_numbers_go(sheet: Sheet, read: Callable[[Sheet, Collection[int]], 
             if "UTF8" in str(error) and sheet.encoding != "cp1252":
                 sheet = replace(sheet, encoding="cp1252")
             elif late is not None and int(late["column"]) not in texts:
-                texts.update([int(late["column"])] if len(texts) < MOST_LATE else range(len(sheet.names)))
+                few = len(texts) < HISTORY.late_columns
+                texts.update([int(late["column"])] if few else range(len(sheet.names)))
             else:
                 raise
 
@@ -107,7 +104,7 @@ def as_far_as_numbers_go(sheet: Sheet, read: Callable[[Sheet, Collection[int]], 
 def is_swallowed(sheet: Sheet, rows: int) -> bool:
     """Whether so few of a sheet's lines came back as rows that an open quote has swallowed the rest."""
     lines = _lines(sheet.path, sheet.changed_ns) - sheet.first_row + 1
-    return rows < WHOLE_SHARE * lines - 1 and not sheet.unquoted
+    return rows < HISTORY.whole_share * lines - 1 and not sheet.unquoted
 
 
 def quotes_told(unquoted: bool, left_out: int) -> list[str]:

@@ -21,10 +21,9 @@ from analyzer.history.names import WORDS, is_stamp, without_unit
 from analyzer.history.rewritten import rewritten
 from analyzer.history.sheet import Sheet
 from analyzer.history.table import ReadOptions
+from analyzer.limits import HISTORY
 from identification.errors import InputError
 
-HEAD_BYTES = 1_000_000
-HEAD_LINES = 200
 DELIMITERS = {",": "comma", ";": "semicolon", "\t": "tab", "|": "bar"}
 NO_DATA_LINE = re.compile(r"^(?:#.*|\[\w+\]|sep=.?|)$", re.IGNORECASE)
 COMMA_NUMBER = re.compile(r"^[+-]?\d+,\d+(?:[eE][+-]?\d+)?$")
@@ -34,13 +33,9 @@ GROUP = re.compile(r"^[+-]?[1-9]\d{0,2}[.,]\d{3}$")
 """A number whose mark may be decimal or may group thousands."""
 DATA_MARK = re.compile(r"^\s*\[data\]\s*$", re.IGNORECASE)
 JSON = re.compile(r"^(?:\{\s*[\"}]|\[\s*[\[{\"])")
-PREAMBLE = 30
-"""Lines of a preamble at most under which a header is looked for; ours."""
 STAMP = re.compile(r"^\d{1,4}[-/.]\w{1,9}[-/.]\d{1,4}\b|^\d{1,2}:\d\d\b")
 UNNAMED = "column {}"
 """Name of a column that has none, by its place, from 1."""
-MOSTLY = 0.8
-"""Share of a column's cells that are numbers where it holds numbers; the rest is a historian's words; ours."""
 QUALITIES = frozenset(WORDS["quality"]["unnamed"])
 
 
@@ -56,7 +51,7 @@ def open_sheet(path: Path, options: ReadOptions) -> Sheet:
     encoding = options.encoding or detect_encoding(head)
     first = _lines(path, head, encoding)
     stated = options.delimiter is not None
-    plain = None if stated else rewritten(path, encoding, first[:HEAD_LINES], options.place)
+    plain = None if stated else rewritten(path, encoding, first[: HISTORY.head_lines], options.place)
     if plain is not None:
         return open_sheet(plain, replace(options, delimiter="\t", encoding="utf-8"))
     lines, above = _after_data_mark(first)
@@ -111,7 +106,7 @@ def detect_decimal(rows: Sequence[Sequence[str]], delimiter: str) -> tuple[str, 
 
 def _head(path: Path) -> bytes:
     with path.open("rb") as file:
-        head = file.read(HEAD_BYTES)
+        head = file.read(HISTORY.head_bytes)
     if not head.strip(b"\r\n\t \x00\xef\xbb\xbf\xff\xfe"):
         raise InputError(f"{path}: empty file", "a table with a header and samples", "export it again")
     return head
@@ -127,14 +122,14 @@ def _lines(path: Path, head: bytes, encoding: str) -> list[str]:
     if other:
         raise InputError(f"{path}: {other}", "delimited text or Parquet", "export as CSV or Parquet")
     lines = re.split(r"\r\n|\n|\r", text)
-    return lines if len(head) < HEAD_BYTES else lines[:-1]
+    return lines if len(head) < HISTORY.head_bytes else lines[:-1]
 
 
 def _after_data_mark(lines: list[str]) -> tuple[list[str], int]:
     """The first lines behind a mark such as [Data], where there is one, and how many lines stand above them."""
     marks = [k for k, line in enumerate(lines) if DATA_MARK.match(line)]
     above = marks[-1] + 1 if marks else 0
-    return lines[above : above + HEAD_LINES], above
+    return lines[above : above + HISTORY.head_lines], above
 
 
 def _split(lines: Sequence[str], delimiter: str) -> list[list[str]]:
@@ -209,7 +204,7 @@ def _header_below(
 
     Within a few lines, with a name of a time column among its cells; a table without a header has none.
     """
-    rows = [(k, _cells(lines[k], delimiter)) for k in range(start + 1, len(lines))][:PREAMBLE]
+    rows = [(k, _cells(lines[k], delimiter)) for k in range(start + 1, len(lines))][: HISTORY.preamble_lines]
     for (place, cells), (_, after) in pairwise(rows):
         if len(cells) >= width - 1 and _names_time(cells) and not _is_data(cells) and _is_data(after):
             return place, cells
@@ -242,7 +237,7 @@ def _taken_as(lines: Sequence[str], delimiter: str) -> tuple[str, ...] | None:
     Only where each of the first rows has the same shape: a stamp, a text that is none of the rest, and a number; or a
     stamp first and behind it numbers alone, which are named by their places (loops.csv may tell what they are).
     """
-    rows = [row for row in _split(lines[:HEAD_LINES], delimiter) if row]
+    rows = [row for row in _split(lines[: HISTORY.head_lines], delimiter) if row]
     if len(rows) < 3 or len({len(row) for row in rows}) != 1 or len(rows[0]) < 3:
         return None
     columns = [[cell.strip() for cell in column] for column in zip(*rows, strict=True)]
@@ -267,7 +262,7 @@ def _taken_as(lines: Sequence[str], delimiter: str) -> tuple[str, ...] | None:
 def _kind(cells: Sequence[str]) -> str:
     """'stamp', 'number', 'quality' or 'text' for what all cells of a column are; '' where they are not alike."""
     numbers = [float(cell.replace(",", ".")) for cell in cells if NUMBER.match(cell)]
-    if NUMBER.match(cells[0]) and len(numbers) >= MOSTLY * len(cells):
+    if NUMBER.match(cells[0]) and len(numbers) >= HISTORY.numbers_share * len(cells):
         scale = time_scale_of(pa.array(numbers))
         return "number" if scale is None or scale in SINCE_START.values() else "stamp"
     if {cell.lower() for cell in cells} <= QUALITIES:

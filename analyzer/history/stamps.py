@@ -21,6 +21,7 @@ from analyzer.history.names import WORDS
 from analyzer.history.plant_clock import UTC_NAME
 from analyzer.history.plant_clock import utc_seconds as utc_s
 from analyzer.history.zones import offsets_h
+from analyzer.limits import HISTORY
 from identification.errors import InputError
 
 LETTER = r"[^\x00-@\[-`{-\x7f]"
@@ -53,22 +54,15 @@ REARRANGED = (
 """Writings that are brought into the form of the pattern, and what they become."""
 MONTHS = {begins: int(month) for month, words in WORDS["months"].items() for begins in words}
 LONGEST_MONTH = max(map(len, MONTHS))
-CENTURY_TURN = 70
-MOST_OFFSET_S = 14 * 3600.0
-"""No zone is further from UTC [s]."""
 FIRST = {"year": 0, "day": 1, "month": 2}
 """Orders in which a date can be written, by the part that stands first."""
 YEAR, DAY, MONTH = FIRST.values()
 OPEN = 3
 """The order of a date whose writing leaves it open, for two numbers stand in front."""
-STATED_FROM_S, STATED_TO_S = 0.0, 4102444800.0
-"""Times before 1970 and from 2100 on are nobody's changes [s since 1970-01-01 UTC]."""
 SHOWN = 40
 """Characters of a time that an error shows."""
 DAY_FIRST_ZONES = ("Europe/", "Africa/", "Australia/", "Asia/")
 """Zones in which dates have the day first where figures alone would read either way."""
-AHEAD_S = 2 * 86400.0
-"""Stamps later than now by more than this are taken as read in a wrong order [s]."""
 WITHOUT_LEAP = "so read, the stamps run without a leap"
 EXAMPLE = "a time such as 2026-03-09 08:00 or 2026-03-09T08:00:00Z"
 
@@ -120,7 +114,7 @@ def fields(texts: pa.Array, timezone: str | None = None) -> Fields | None:
         _number(part["c"]),
         clock_s,
         offset_s,
-        _readable(parts, part, known) & shown & (np.abs(offset_s) <= MOST_OFFSET_S),
+        _readable(parts, part, known) & shown & (np.abs(offset_s) <= HISTORY.offset_s),
         _numpy(pc.not_equal(part["z"], "")),
         _written_order(part),
         _numpy(pc.less_equal(pc.utf8_length(part["c"]), 2)),
@@ -152,7 +146,7 @@ def stamp_seconds(parts: Fields, first: str = "month") -> NDArray[np.float64]:
     month = np.where(order == MONTH, parts.a, parts.b)
     day = np.select([order == YEAR, order == DAY], [parts.c, parts.a], parts.b)
     short = np.where(order == YEAR, parts.order == OPEN, parts.short)
-    century = np.where(year < CENTURY_TURN, 2000, 1900)
+    century = np.where(year < HISTORY.century_turn, 2000, 1900)
     year = np.where(short & (year < 100), year + century, year)
     valid = parts.readable & (month >= 1) & (month <= 12) & (day >= 1)
     begins = ((year - 1970) * 12 + np.clip(month, 1, 12) - 1).astype("datetime64[M]")
@@ -275,7 +269,7 @@ def _largest_gap(parts: Fields, first: str) -> float:
 def _day_is_usual(parts: Fields, timezone: str | None) -> bool:
     """Whether dates that read either way have the day first: where the month first would lie ahead of us, or as
     is usual in the stated zone."""
-    limit = time.time() + AHEAD_S
+    limit = time.time() + HISTORY.ahead_s
     day, month = (bool((stamp_seconds(parts, first) > limit).any()) for first in ("day", "month"))
     if day != month:
         return month
@@ -290,7 +284,7 @@ def _with_short_year(parts: Fields, pointed: bool) -> DateOrder | None:
     """
     if not _may_begin_with_year(parts):
         return None
-    limit = time.time() + AHEAD_S
+    limit = time.time() + HISTORY.ahead_s
     readings = {first: stamp_seconds(parts, first) for first in ("year", "day", "month")}
     possible = {
         first: found for first, found in readings.items() if np.isfinite(found).all() and found.max() <= limit
@@ -360,7 +354,7 @@ def parse_times(
     day, sure = _stated_order(parts, trimmed, day_first)
     local_s = np.where(day, stamp_seconds(parts, "day"), stamp_seconds(parts, "month"))
     with np.errstate(invalid="ignore"):
-        of_our_time = (local_s >= STATED_FROM_S) & (local_s < STATED_TO_S)
+        of_our_time = (local_s >= HISTORY.stated_from_s) & (local_s < HISTORY.stated_to_s)
     for at in np.flatnonzero(~sure | ~of_our_time)[:1]:
         seen = f"{where[at]}: time {trimmed[at][:SHOWN]!r}"
         if not sure[at]:

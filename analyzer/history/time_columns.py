@@ -23,19 +23,14 @@ from analyzer.history.names import (
 )
 from analyzer.history.stamps import DateOrder, date_order
 from analyzer.history.table import ReadOptions, Table, as_text, is_number, is_text, numbers
+from analyzer.limits import HISTORY
 from identification.errors import InputError
 
 TIME_OF_DAY = r"^\s*\d{1,2}(:\d\d(:\d\d([.,;]\d+)?)?|\.\d\d\.\d\d([.,]\d+)?)\s*([AaPp]\.?[Mm]\.?)?\s*$"
-UNREADABLE_SHARE = 0.5
-GLANCE = 50
-"""Texts of a column that are glanced at before they are taken apart."""
 LIKE_STAMP = re.compile(
     r"\d[-/. ]\.?\s*\w{1,12}[-/. ,]|\d:\d\d|[^\W\d]{3}\.? \d{1,2}\b|^\s*\d{8}|\d\.\d\d\.\d\d|\d[年년]"
 )
 LETTERS_BEHIND = re.compile(r"\b([A-Z]{3,5})\W*$")
-FEW_ROWS, SHARED_MINUTES = 10, 0.7
-"""Rows from which stamps of whole minutes are looked at, and the share of them that must differ [-]; ours: samples 42
-s apart and more are read, a few of them on one stamp."""
 SHOWN = 60
 """Characters of a cell that an error shows."""
 FINER = "timems"
@@ -77,11 +72,11 @@ def check_seconds(table: Table, clock: Clock, tag: int = -1) -> None:
     column of the tags of a long table, -1 of a wide one."""
     second = clock.seconds(table.head(clock.columns))[0]
     known = np.isfinite(second)
-    if known.sum() < FEW_ROWS or (second[known] % 60.0 != 0).any():
+    if known.sum() < HISTORY.minutes_rows or (second[known] % 60.0 != 0).any():
         return
     tags = as_text(table.head([tag])[0]).to_pylist() if tag >= 0 else [""] * len(second)
     kept = {(tags[k], second[k]) for k in np.flatnonzero(known)}
-    if len(kept) <= SHARED_MINUTES * known.sum():
+    if len(kept) <= HISTORY.minutes_share * known.sum():
         raise InputError(
             f"{table.path}: stamps without their seconds, {known.sum()} samples on {len(kept)} whole minutes",
             "a stamp of its own for each sample",
@@ -206,13 +201,13 @@ def _kind(name: str, head: pa.Array, timezone: str | None = None) -> str:
 
 
 def _text_kind(texts: pa.Array, timezone: str | None = None) -> str:
-    if not any(LIKE_STAMP.search(text) for text in texts.slice(0, GLANCE).to_pylist()):
+    if not any(LIKE_STAMP.search(text) for text in texts.slice(0, HISTORY.glance).to_pylist()):
         return ""  # most columns of text are modes: the patterns below cost more than the rest of opening
     of_day = pc.cast(pc.match_substring_regex(texts, TIME_OF_DAY), pa.float64())
-    if pc.mean(of_day).as_py() > UNREADABLE_SHARE:
+    if pc.mean(of_day).as_py() > HISTORY.unreadable_share:
         return "time of day"
     parts = stamps.fields(texts, timezone)
-    if parts is None or parts.readable.mean() <= UNREADABLE_SHARE:
+    if parts is None or parts.readable.mean() <= HISTORY.unreadable_share:
         return ""
     return "full" if (parts.clock_s != 0).any() or len(texts) == 1 else "date"
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from analyzer.history.names import WORDS
 from analyzer.history.series import Series
 from analyzer.history.table import distinct, is_text, numbers
+from analyzer.limits import HISTORY
 
 BLANK = "cells are blank: no value (a historian that reports by exception leaves unchanged values blank)"
 ERROR_TEXTS = frozenset(WORDS["values"]["none"])
@@ -36,8 +37,8 @@ SPACED = re.compile(r"^[+-]?\d{1,3}(?: \d{3})+(?:[.,]\d+)?$")
 COMMA_FRACTION = re.compile(r"^[+-]?\d+,(?:\d{1,2}|\d{4,})(?:[eE][+-]?\d+)?$|^[+-]?0,\d+$")
 """A decimal comma that can be nothing else."""
 WITH_UNIT = re.compile(r"^(?P<number>[+-]?[\d.,]*\d(?:[eE][+-]?\d+)?)\s*(?P<unit>[^\d\s.,+-][^\d]{0,11})$")
-LONGEST, SHOWN = 100, 60
-"""Characters of a number at most, and of a text that notes show."""
+SHOWN = 60
+"""Characters of a text that notes show."""
 LIKE_NUMBER = re.compile(r"^[^\w]*\d")
 """A text that begins as a number does, and so was meant as one."""
 
@@ -105,7 +106,7 @@ def parsed(texts: list[str], decimal: str) -> tuple[NDArray[np.float64], list[st
 
 def _number(text: str, decimal: str) -> tuple[float, bool]:
     """A text as a number, NaN where it is none, and whether its thousands are grouped."""
-    if len(text) > LONGEST:
+    if len(text) > HISTORY.number_length:
         return math.nan, False
     spaced = SPACES.sub(" ", text)
     grouped = bool(SPACED.match(spaced)) or bool(GROUPED[decimal].match(text))

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analyzer.history.names import WORDS, plain
+from analyzer.limits import HISTORY
 
 HEADER_ZONE = re.compile(
     r"(?:^|[\s(\[_])(?P<name>(?i:UTC|GMT|Z|CEST|CET|EEST|EET)|[A-Z]{3,5})?"
@@ -29,14 +30,6 @@ SEVERAL = frozenset(WORDS["zone_letters"]["several"])
 MISSING_HOUR = "samples stand in the hour that the time zone leaves out in spring and are left out"
 REPEATED_HOUR = "samples stand in the hour that the time zone repeats in autumn; told apart by their order"
 HOUR_S, DAY_S = 3600.0, 86400.0
-ENOUGH = 12
-"""Samples in the hours about an autumn change from which their number tells whether an hour came twice; ours: one in
-five minutes."""
-IN_SPRING, IN_AUTUMN = 0.25, 1.5
-"""Samples in the hour that spring leaves out, and in that which autumn repeats, over those of their neighbours:
-beyond the first, or below the second, a clock keeps winter time [-]; where it is changed they are 0 and 2."""
-TYPICAL_STEPS = 3.0
-"""Typical steps that a step over the change may take where the clock does not run backwards [-]; ours."""
 
 
 @lru_cache
@@ -115,8 +108,8 @@ def winter_offset_s(local_s: NDArray[np.float64], zone: str) -> float | None:
     summer, winter = _offset_readings(around * HOUR_S + HOUR_S / 2, zone)
     held = dict(zip(hour.tolist(), count.tolist(), strict=True))
     spring = _shares(around[np.isnan(summer)], held, 1)
-    autumn = _shares(around[np.isfinite(summer) & (summer != winter)], held, ENOUGH)
-    keeps = max(spring) > IN_SPRING if spring else bool(autumn) and max(autumn) < IN_AUTUMN
+    autumn = _shares(around[np.isfinite(summer) & (summer != winter)], held, HISTORY.autumn_samples)
+    keeps = max(spring) > HISTORY.in_spring if spring else bool(autumn) and max(autumn) < HISTORY.in_autumn
     if not keeps:
         return None
     year = datetime(1970, 1, 1).year + int(np.median(hour) * HOUR_S / (365.2425 * DAY_S))
@@ -185,6 +178,6 @@ def _set_back(local_s: NDArray[np.float64], rows: NDArray[np.intp], typical_s: f
     at_end = local_s[rows[-1] + 1] - local_s[rows[-1]] if rows[-1] + 1 < len(local_s) else -np.inf
     inner = int(np.argmin(before[1:])) + 1 if rows.size > 1 else 0
     step = before[inner] if inner else np.inf
-    if step < 0 or (step + HOUR_S <= TYPICAL_STEPS * typical_s and step < min(at_start, at_end)):
+    if step < 0 or (step + HOUR_S <= HISTORY.typical_steps * typical_s and step < min(at_start, at_end)):
         return inner
     return 0 if at_start < at_end else len(rows)

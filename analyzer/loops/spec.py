@@ -16,6 +16,7 @@ from typing import Any
 from analyzer.history.files import detect_encoding
 from analyzer.history.plant_clock import UTC_NAME
 from analyzer.history.stamps import parse_time
+from analyzer.limits import HISTORY
 from identification.errors import InputError
 from identification.models import Form
 
@@ -46,7 +47,6 @@ CHOICES: Mapping[str, tuple[str, ...]] = {
 VALID_FROM = "valid_from"
 COLUMNS = (*TEXTS, *ROLES, *NUMBERS, *CHOICES, VALID_FROM)
 OWN_COLUMNS = ("op_unit", "sp_unit")  # near to a known name, and yet none misspelt
-MISSPELT = 0.75
 OTHER_NAMES = {other: ours for ours, others in STATED["other_names"].items() for other in others}
 
 
@@ -196,7 +196,8 @@ def csv_table(path: Path, of: str) -> tuple[list[str], list[tuple[int, dict[str,
 
 def _check_header(path: Path, header: Sequence[str]) -> None:
     for name in header:
-        near = [] if name in (*COLUMNS, *OWN_COLUMNS) else get_close_matches(name, COLUMNS, 1, MISSPELT)
+        known = name in (*COLUMNS, *OWN_COLUMNS)
+        near = [] if known else get_close_matches(name, COLUMNS, 1, HISTORY.misspelt)
         if near and near[0] not in header:
             remedy = f"did you mean '{near[0]}'? Rename it"
             raise InputError(f"{path}: column '{name}'", f"'{near[0]}'", remedy)
