@@ -19,6 +19,7 @@ import numpy as np
 from analyzer.config import AdviceLimits, Config
 from analyzer.history.plant_clock import stamp
 from analyzer.history.series import Series
+from analyzer.limits import EXPLAIN
 from analyzer.loop.assess import convicted
 from analyzer.loop.cause import NO_CAUSE, Verdict
 from analyzer.loop.decisions import Cause, Fault
@@ -49,15 +50,10 @@ class Case:
     shortened: str = ""
 
 
-MOST_NEIGHBOURS = 8
-"""Other loops whose OP is read beside a loop's own trends, in the order of loops.csv; ours: each is one more trend in
-memory, and the first that moves is the one that is tried."""
-
-
 def tags_of(spec: LoopSpec, specs: Sequence[LoopSpec]) -> list[str]:
     """Tags that explaining a loop reads: its own, and the OPs of some other loops."""
     others = [s.op for s in specs if s.loop != spec.loop and s.op]
-    return list(dict.fromkeys([*spec.tags, *others[:MOST_NEIGHBOURS]]))
+    return list(dict.fromkeys([*spec.tags, *others[: EXPLAIN.neighbours]]))
 
 
 def stated_law(spec: LoopSpec, prepared: Prepared) -> StatedSettings | None:
@@ -137,11 +133,6 @@ def verdict_on(spec: LoopSpec, prepared: Prepared, config: Config) -> Verdict:
     return said if counting(found) is not None or said.cause is Cause.VALVE else NO_CAUSE
 
 
-MOST_SAMPLES, STRETCH_SAMPLES = 40_000, 15_000
-"""Samples up to which a recording is explained whole, and length of the most telling stretch of a longer one; ours:
-20 s of processor time either way, for a long recording holds more that asks for an effect."""
-
-
 def as_given(prepared: Prepared) -> Prepared:
     """A loop that shares a valve with what a select gave it, whoever that was; half a split range without the time in
     which the other half moves PV."""
@@ -157,7 +148,7 @@ def telling_stretch(prepared: Prepared, most: int | None) -> tuple[Prepared, str
     r = prepared.record
     if most is None or len(r) <= most:
         return prepared, ""
-    most = min(most, STRETCH_SAMPLES)
+    most = min(most, EXPLAIN.stretch_samples)
     travel = np.concatenate(([0.0], np.cumsum(np.abs(np.diff(r.op)))))
     first = int(np.argmax(travel[most - 1 :] - travel[: len(r) - most + 1]))
     days = f"{most * r.dt_s / 86400:.1f} of {len(r) * r.dt_s / 86400:.1f} days"
@@ -170,7 +161,7 @@ def case(
     specs: tuple[LoopSpec, ...],
     series: dict[str, Series],
     config: Config,
-    most: int | None = MOST_SAMPLES,
+    most: int | None = EXPLAIN.whole_samples,
 ) -> Case:
     """Prepare one loop; of a recording of more than `most` samples the most telling stretch, None for all.
 
@@ -236,10 +227,6 @@ def subject_of(
     )
 
 
-FEWEST = 300
-"""Samples of PV from which a part is judged; ours: a noise model that looks 25 back needs twelve times that."""
-
-
 @dataclass(frozen=True, slots=True)
 class Part:
     """One part: the loop with the settings in force there, its trends, and when it was."""
@@ -279,7 +266,7 @@ def parts(
             name = f"{stamp(float(pv[0]), zone)} to {stamp(float(pv[-1]), zone)}"
             out.append(Part(in_force(spec, changes, float(pv[-1])), held, name, pv.size))
     out.sort(key=lambda p: -p.samples)
-    return [out[0], *(p for p in out[1:] if p.samples >= FEWEST)]
+    return [out[0], *(p for p in out[1:] if p.samples >= EXPLAIN.part_samples)]
 
 
 def parts_said(judged: Sequence[Part]) -> str:
@@ -326,7 +313,7 @@ def asked_cases(asked: Asked, tag: str, held_out: Sequence[Path]) -> tuple[Case,
     kept: list[tuple[Part, Case]] = []
     for part in judged:
         with nullcontext() if len(judged) == 1 else suppress(NotAssessedError):  # OP stands still in it
-            most = None if kept else MOST_SAMPLES
+            most = None if kept else EXPLAIN.whole_samples
             kept.append((part, case(part.spec, specs, part.series, asked.config, most)))
     if not kept:
         raise NotAssessedError(f"{tag}: needs OP and PV that move in one part of its settings, has none")

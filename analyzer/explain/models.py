@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from analyzer.explain.case import Case
+from analyzer.limits import EXPLAIN
 from analyzer.loop.quality import Scale
 from identification.errors import InputError
 from identification.mismatch.answer import restored, unanswered
@@ -21,12 +22,6 @@ from identification.mismatch.recording import Recording
 from identification.record import Floats
 from identification.simulation.parameters import Slot, neutral
 
-LARGEST = 1e9
-"""Size of a model's numbers at most, in percent and seconds; ours."""
-RUNAWAY_PCT = 1e5
-"""Size of simulated PV and OP at most [%]; ours: a thousand ranges are no plant."""
-SPAN_DIFFERS = 0.01
-"""Relative difference of two PV spans from which a model's percent are not the record's; ours."""
 HUNDRED = (60.0, 160.0)
 """Ratios of two gains that look like percent against fractions; ours: a refit moves a gain by less."""
 TIMES = (((40.0, 90.0), "minutes"), ((2400.0, 5400.0), "hours"))
@@ -60,16 +55,16 @@ def checked(data: Mapping[str, Any], path: Path) -> None:
     """Raise InputError where a number of a model is none."""
     held = data["constants"] if isinstance(data["constants"], dict) else {}
     placed = {k: data.get(k, 0.0) for k in ("middle_op_pct", "level_pv_pct", "late_s")}
-    scale = data["scale"] if isinstance(data.get("scale"), dict) else {}
+    scale, most = data["scale"] if isinstance(data.get("scale"), dict) else {}, EXPLAIN.largest
     for name, value in {**held, **placed, **scale}.items():
         number = not isinstance(value, bool) and isinstance(value, int | float)
-        if not number or not abs(value) <= LARGEST:  # false of NaN
-            seen, most = f"{path}: {name} is {str(value)[:40]}", f"a number of at most {LARGEST:g} in size"
-            raise InputError(seen, most, "correct it or save the model anew")
+        if not number or not abs(value) <= most:  # false of NaN
+            seen, wanted = f"{path}: {name} is {str(value)[:40]}", f"a number of at most {most:g} in size"
+            raise InputError(seen, wanted, "correct it or save the model anew")
     for name in ("pv_span", "op_span"):
         if name in scale and not scale[name] > 0:
             raise InputError(f"{path}: {name} is {scale[name]:g}", "a span above 0", "save the model anew")
-    if not held.get("CLIP_LO", -LARGEST) < held.get("CLIP_HI", LARGEST) or held.get("RATE", 1.0) <= 0:
+    if not held.get("CLIP_LO", -most) < held.get("CLIP_HI", most) or held.get("RATE", 1.0) <= 0:
         seen = f"{path}: limits that nothing fits between"
         raise InputError(seen, "CLIP_LO below CLIP_HI, RATE above 0", "save the model anew")
     if data.get("version", VERSION) != VERSION:
@@ -158,7 +153,7 @@ def span_note(now: Scale, brought: Mapping[str, Any]) -> str:
     """What to say where a model was made with another PV span than the record now has; empty where not."""
     scale = brought.get("scale")
     then = scale.get("pv_span") if isinstance(scale, dict) else None
-    if not isinstance(then, int | float) or abs(then / now.span - 1.0) < SPAN_DIFFERS:
+    if not isinstance(then, int | float) or abs(then / now.span - 1.0) < EXPLAIN.span_differs:
         return ""
     spans = f"it was made with a PV span of {then:.4g}, this record has {now.span:.4g}"
     return f"{spans}: its gain is off by their ratio"
@@ -198,7 +193,8 @@ def simulated(c: Case, data: dict[str, Any], stamps: Floats, closed: bool) -> tu
             pv = carried(data, op, pv, r.dt_s)
     except (ZeroDivisionError, OverflowError, FloatingPointError) as error:
         raise InputError(f"{c.spec.loop}: {error}", RUNS, "save the model anew") from error
-    if not (np.abs(pv).max() <= RUNAWAY_PCT and np.abs(op).max() <= RUNAWAY_PCT):  # false of NaN
+    most = EXPLAIN.runaway_pct
+    if not (np.abs(pv).max() <= most and np.abs(op).max() <= most):  # false of NaN
         raise InputError(f"{c.spec.loop}: PV or OP runs away", RUNS, "save the model anew")
     at = r.start_s + r.time_s
     pv_at = np.interp(stamps, at, scale.low + pv * scale.span / 100.0)

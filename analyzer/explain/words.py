@@ -7,6 +7,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+from analyzer.limits import EXPLAIN
 from analyzer.loop.decisions import Cause, Fault
 from analyzer.pages.words import duration, number, page_columns, plain_cell, texts
 from identification.mismatch import effect
@@ -31,8 +32,6 @@ BROUGHT = "your model"
 ROWS = {"baseline": "plain loop", "explained": "improved loop", "brought": BROUGHT}
 OBEYED = "OP rebuilt from SP and PV by the stated settings lies on OP as recorded."
 """What the picture of a controller without fault shows."""
-HARDLY = 0.05
-"""Relative change of the plain loop's constants under which they count as kept."""
 BENT = "What was left out had to be made up for by these; with it they move back."
 KEPT = "They hardly move: what was left out had not bent them."
 SHOWN = 12
@@ -138,7 +137,7 @@ def moved(data: Data) -> Table:
         for k, (a, b) in data["moved"].items()
     )
     most = max((abs(b / a - 1) if a else 0.0 for a, b in data["moved"].values()), default=0.0)
-    note = KEPT if most < HARDLY else BENT
+    note = KEPT if most < EXPLAIN.hardly else BENT
     return Table("moved", "How the plain loop's constants moved", page_columns("constants_moved"), rows, note)
 
 

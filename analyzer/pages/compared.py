@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from analyzer.limits import PAGES
 from analyzer.loop.settings_side_by_side import SPREAD, Comparison, Shown
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import derivative_as_stated, unit_ratio
@@ -59,16 +60,10 @@ CAUTION = (
     "allow, with little more gain: a valve that jumps looks like one with play behind a process of less gain."
 )
 HINT = "Move a slider, or begin from one of the settings; drag over a trend to zoom, double click for all."
-SHOWN = 3.0
-"""Times the present travel or error beyond which settings are left out of the picture of prices; ours."""
-MANY = 100.0
-"""Times the present figure beyond which it is not told how many [-]; ours."""
-BETTER, WORSE = 0.97, 1.03
-"""Ratios to the present settings from which a figure is coloured [-]; ours."""
 
 
 def _against(value: float, now: float) -> str:
-    return "better" if value < BETTER * now else "worse" if value > WORSE * now else ""
+    return "better" if value < PAGES.better * now else "worse" if value > PAGES.worse * now else ""
 
 
 def _rejection(ratio: float | None) -> Cell:
@@ -94,7 +89,7 @@ def opening(c: Comparison, spec: LoopSpec, unit: str) -> str:
     ratio = _times(new, now)
     if ratio is None:
         return f"{text}."
-    longer = ratio > WORSE
+    longer = ratio > PAGES.worse
     cost = f"the error that a lasting load leaves sums up to {number(ratio)} times as much"
     return f"{text}; the price is that {cost}." if longer else f"{text}, and {cost}."
 
@@ -147,8 +142,8 @@ def _against_now(c: Comparison, t: Tried) -> str:
 
 def _change(ratio: float) -> str:
     """A change against now; of what hardly is now no percentage."""
-    if ratio > MANY:
-        return f"over {MANY:g} times"
+    if ratio > PAGES.many_times:
+        return f"over {PAGES.many_times:g} times"
     return f"{signed(100.0 * (ratio - 1.0))} %"
 
 
@@ -235,9 +230,10 @@ def price(c: Comparison, unit: str) -> Plot | None:
     if len(c.curve) < 2:
         return None
     now, scale = c.tried[0], c.pv_span / 100.0
-    shown = [t for t in c.tried if t.stem_travel < SHOWN * now.stem_travel and t.error < SHOWN * now.error]
+    most = PAGES.shown_ratio
+    shown = [t for t in c.tried if t.stem_travel < most * now.stem_travel and t.error < most * now.error]
     places = tuple(_place(scale * t.error, t.stem_travel, t) for t in shown)
-    found = [(x.error, x.travel) for x in c.curve if x.travel < SHOWN and x.error < SHOWN]
+    found = [(x.error, x.travel) for x in c.curve if x.travel < most and x.error < most]
     error, travel = np.array(found, float).reshape(-1, 2).T
     at = np.array([(p.x, p.y) for p in places], float).reshape(-1, 2)
     lines = (

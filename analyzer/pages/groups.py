@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from analyzer.columns import GROUP_LIST, GROUPS, row_of
+from analyzer.limits import PAGES
 from analyzer.loop.decisions import GroupRole
 from analyzer.pages.reading import Thinned, action_text
 from analyzer.pages.words import ALL_LOOPS, cause_cell, page_columns, plain_cell, texts, with_noun
@@ -35,8 +36,6 @@ from reports.pages import (
 from reports.texts import slug
 
 DECLARED = {c.name: c for c in GROUPS}
-MOST = 12
-"""Loops that are drawn beneath each other; ours: more do not fit on a screen."""
 PERIODS = 12.0
 """Periods that the aligned trends show."""
 FLOOR_DB = 30.0
@@ -205,7 +204,7 @@ def member_section(g: GroupView, loop: str, trends: Mapping[str, Thinned]) -> Se
 
 def graph(g: GroupView) -> Graph:
     """The way of the oscillation from loop to loop."""
-    shown = [r for r in g.rows if r["role"] != GroupRole.SHARES or r is g.rows[0]][:MOST]
+    shown = [r for r in g.rows if r["role"] != GroupRole.SHARES or r is g.rows[0]][: PAGES.group_loops]
     by_name = {r["loop"]: r for r in shown}
     first = shown[0]["loop"]
     depth = {first: 0}
@@ -241,7 +240,8 @@ def _arrow_text(r: Row) -> str:
 
 def heat_map(g: GroupView) -> HeatMap | None:
     """Spectra of the members beneath each other; None where the night kept none."""
-    kept = [(r["loop"], json.loads(s)) for r in g.rows[:MOST] if (s := g.loops[r["loop"]]["spectrum"])]
+    rows = g.rows[: PAGES.group_loops]
+    kept = [(r["loop"], json.loads(s)) for r in rows if (s := g.loops[r["loop"]]["spectrum"])]
     if not kept:
         return None
     count = max(len(s["db"]) for _, s in kept)
@@ -265,7 +265,7 @@ def heat_map(g: GroupView) -> HeatMap | None:
 def aligned(g: GroupView, trends: Mapping[str, Thinned], only: Sequence[str] = ()) -> Trend | None:
     """PV of the members beneath each other over some periods; None where the trends are too coarse to show any."""
     names = [r["loop"] for r in g.rows if r["loop"] in trends and (not only or r["loop"] in only)]
-    names = sorted(names, key=only.index)[:MOST] if only else names[:MOST]
+    names = (sorted(names, key=only.index) if only else names)[: PAGES.group_loops]
     if not names:
         return None
     first = trends[names[0]]

@@ -12,6 +12,7 @@ import numpy as np
 
 from analyzer.columns import BY_NAME
 from analyzer.explain.words import agreement, title
+from analyzer.limits import PAGES
 from analyzer.loop.cost import mark
 from analyzer.loop.decisions import CAUSES, Fault, Status
 from analyzer.pages.loop_pictures import (
@@ -50,8 +51,6 @@ from reports.texts import slug
 WEEK = 7
 OVER_NIGHTS = ("oscillation_significance", "average_absolute_error_pct", "valve_travel_pct_per_h", "period_s")
 """Figures of a loop that are drawn night by night."""
-MOST_SURE = 99.0
-"""Percent that are told at most: nothing is certain."""
 FIGURES = (
     *("oscillation_significance", "oscillating_pct", "average_absolute_error_pct", "variability_pct"),
     *("valve_travel_pct_per_h", "reversals_per_h", "crossings_per_h", "noise_band_pct", "harris_index"),
@@ -246,7 +245,7 @@ def _believed(row: Row) -> tuple[tuple[str, str], ...]:
     out = [("The verdict rests on", f"{nights} since {row['believed_since']}")]
     if row["worn_nights"]:
         certain = f", certain since {row['certain_since']}" if row["certain_since"] else ""
-        sure = "> 99" if row["worn_pct"] > MOST_SURE else f"{row['worn_pct']:.0f}"
+        sure = "> 99" if row["worn_pct"] > PAGES.most_sure_pct else f"{row['worn_pct']:.0f}"
         out.append(("Worn valve", f"{sure} %{certain}"))
     if row["certain_since"] and row["width_pct"] is not None:
         ends = f"{number(row['width_low_pct'])} … {number(row['width_high_pct'])}"

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from analyzer.lanes.lanes import lanes_in
+from analyzer.limits import PAGES
 from analyzer.loop.decisions import Action, Cause, Fault, Lane, Status
 from analyzer.pages.reading import ShownNight, linked
 from analyzer.pages.words import ALL_LOOPS, Row, cells, duration, page_columns, plain_cell, texts, with_noun
 from analyzer.words.belief import wear_text
-from analyzer.words.reason import STEPS
 from analyzer.words.units import changed_settings
 from reports.pages import Cell, Page, Section, Table
 
 NAME = "maintenance"
-TRAVELLED = 20
-"""Valves that are listed for their travel alone."""
 
 
 def _width(row: Row) -> float | None:
@@ -34,7 +32,7 @@ def valve_test(row: Row) -> str:
 
 
 def _step(row: Row) -> str:
-    return f"{(_width(row) or 0.0) / STEPS:.2g}"
+    return f"{(_width(row) or 0.0) / PAGES.stroke_steps:.2g}"
 
 
 def _case(row: Row) -> str:
@@ -124,7 +122,7 @@ def worn(night: ShownNight) -> Table:
     rows = [r for r in night.rows if r["valve_travel_pct_per_h"] is not None]
     rows.sort(key=lambda r: -r["valve_travel_pct_per_h"])
     shown = page_columns("travel")
-    told = tuple(cells(r, shown, loop=linked(night, r["loop"])) for r in rows[:TRAVELLED])
+    told = tuple(cells(r, shown, loop=linked(night, r["loop"])) for r in rows[: PAGES.travelled])
     note = "Travel of OP, or of the stem where it is recorded; where the loop is tight, its settings wear the valve."
     return Table("travel", "", shown, told, note, cards=True)
 

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from analyzer.explain.night import known
+from analyzer.limits import PAGES
 from analyzer.pages import groups, loop, maintenance, morning, work
 from analyzer.pages.loop_pictures import trend_block
 from analyzer.pages.plant import NightSum, read_sums
@@ -17,15 +18,9 @@ from reports.page_file import PageFileError, loads
 from reports.pages import Beside, Page, Section
 from reports.texts import slug
 
-MOST_DATED = 31
-"""Nights that have a page; the store has the others."""
-SHOWN = 50
-"""Loops worth a look that a dated page lists at most."""
 LATEST = ("Latest night", "index.html")
 BUCKETS = 720
 """Buckets of a trend beside others at most; ours: two minutes of a day, and some kilobytes a loop."""
-HISTORY = 60
-"""Nights of history on a loop's page; ours: two months, as a maintenance round takes."""
 
 
 def pages(store: Store, name: str | None = None, top: int = 200) -> Iterator[Page]:
@@ -39,17 +34,17 @@ def pages(store: Store, name: str | None = None, top: int = 200) -> Iterator[Pag
     night = read_night(store, name, top)
     shared = read_groups(store, night.name)
     nights = [n for n in store.nights() if n <= night.name]
-    links = nights_around(nights[-MOST_DATED:], night.name)
+    links = nights_around(nights[-PAGES.dated :], night.name)
     about = morning.page(night, shared, read_sums(store, night.name), links)
-    yield replace(about, choices=choices(nights[-MOST_DATED:], night.name))
+    yield replace(about, choices=choices(nights[-PAGES.dated :], night.name))
     yield maintenance.page(night)
     yield side_by_side(store, night)
     yield work.page(store, night)
-    members = {r["loop"] for g in shared for r in g.rows[: groups.MOST]}
+    members = {r["loop"] for g in shared for r in g.rows[: PAGES.group_loops]}
     trends = read_trends(store, members, [night.name])
     for g in shared:
         yield groups.page(g, trends, night.name, frozenset(night.paged))
-    yield from _loop_pages(store, night, nights[-HISTORY:], shared, {**trends, **night.trends})
+    yield from _loop_pages(store, night, nights[-PAGES.history :], shared, {**trends, **night.trends})
 
 
 def side_by_side(store: Store, night: ShownNight) -> Page:
@@ -105,7 +100,7 @@ def dated_pages(store: Store, name: str | None, written: Callable[[str], bool]) 
         Told a night; True where its page was written after its results.
     """
     last = name or store.require()
-    nights = [n for n in store.nights() if n <= last][-MOST_DATED:]
+    nights = [n for n in store.nights() if n <= last][-PAGES.dated :]
     sums = read_sums(store, last)
     for night in nights:
         if night in nights[-2:] or not written(night):
@@ -133,7 +128,7 @@ def choices(nights: Sequence[str], night: str) -> tuple[tuple[str, str], ...]:
 def _dated_page(store: Store, night: str, nights: Sequence[str], sums: Sequence[NightSum]) -> Page:
     """A night's morning page without links to loops' pages, which are those of the latest night alone."""
     own = [s for s in sums if s.name <= night]
-    without_pages = replace(read_night(store, night, SHOWN), paged=())
+    without_pages = replace(read_night(store, night, PAGES.dated_loops), paged=())
     found = morning.page(without_pages, read_groups(store, night), own)
     links = (*nights_around(nights, night), LATEST)
     return replace(found, name=name_of(night), links=links, choices=choices(nights, night))

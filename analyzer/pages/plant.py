@@ -9,6 +9,7 @@ from datetime import date
 import numpy as np
 
 from analyzer.columns import BY_NAME
+from analyzer.limits import PAGES
 from analyzer.loop.cost import LOSS, SIGNIFICANCE, cost, cost_column
 from analyzer.loop.decisions import CAUSES, Cause, Status, counts
 from analyzer.pages.reading import ShownNight, linked, needs_a_look, read_nights
@@ -17,19 +18,12 @@ from analyzer.store.store import Store
 from reports.pages import Block, Cell, Floats, Line, Panels, Plot, Table, Tile, TreeMap
 
 NO_AREA = "no area stated"
-WORST = 5
-MOST_TILES = 15
-"""Loops of an area that are drawn by themselves; the rest is one rectangle."""
 KEYS = (
     *((cause, cause) for cause in CAUSES),
     ("unclear", "another reason to look"),
     ("calm", "nothing to do"),
 )
 SUMMED = ("loop", "status", "oscillating_pct", "cause", "importance", LOSS, SIGNIFICANCE)
-MOST_NIGHTS = 60
-"""Nights that are shown."""
-LEAST_NIGHTS = 3
-"""Nights from which a curve says something."""
 
 
 def by_area(rows: Sequence[Row]) -> dict[str, list[Row]]:
@@ -56,7 +50,7 @@ def _area(name: str, rows: Sequence[Row]) -> tuple[Cell, ...]:
     return (
         Cell(name or NO_AREA),
         *map(plain_cell, (score(rows), *numbers, sum(r[SIGNIFICANCE] or 0.0 for r in assessed))),
-        Cell(", ".join(f"{r['loop']} ({number(r[SIGNIFICANCE])})" for r in worst[:WORST])),
+        Cell(", ".join(f"{r['loop']} ({number(r[SIGNIFICANCE])})" for r in worst[: PAGES.area_loops])),
     )
 
 
@@ -76,8 +70,8 @@ def _tile(night: ShownNight, row: Row, by: str) -> Tile:
 
 def _tiles(night: ShownNight, rows: Sequence[Row], by: str) -> tuple[Tile, ...]:
     ordered = sorted(rows, key=lambda r: (-cost(r, by), r["loop"]))
-    tiles = [_tile(night, r, by) for r in ordered[:MOST_TILES]]
-    rest = ordered[MOST_TILES:]
+    tiles = [_tile(night, r, by) for r in ordered[: PAGES.area_tiles]]
+    rest = ordered[PAGES.area_tiles :]
     if rest:
         total = sum(cost(r, by) for r in rest)
         tiles.append(Tile(f"{len(rest)} more", total, "calm", f"{len(rest)} more loops: {number(total)}"))
@@ -117,13 +111,13 @@ def summed(name: str, rows: Sequence[Row]) -> NightSum:
 
 def read_sums(store: Store, night: str) -> list[NightSum]:
     """The sums of a night and of those before it, oldest first."""
-    names = [n for n in store.nights() if n <= night][-MOST_NIGHTS:]
+    names = [n for n in store.nights() if n <= night][-PAGES.history :]
     return [summed(n, read_nights(store, [n], SUMMED)) for n in names]
 
 
 def plant_history(sums: Sequence[NightSum]) -> tuple[Block, ...]:
     """Curves over the nights; none where there are too few."""
-    if len(sums) < LEAST_NIGHTS:
+    if len(sums) < PAGES.curve_nights:
         return ()
     day = np.array([date.fromisoformat(s.name[:10]).toordinal() for s in sums], float)
     day -= day[-1]

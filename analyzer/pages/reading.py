@@ -13,6 +13,7 @@ import pyarrow as pa
 from analyzer.comparison.before_after import Span
 from analyzer.comparison.block_bootstrap import Floats
 from analyzer.lanes.lanes import FIGURE
+from analyzer.limits import PAGES
 from analyzer.loop.decisions import Cause, Status, counts
 from analyzer.pages.rank import worst_first
 from analyzer.store import notes
@@ -149,8 +150,6 @@ NIGHT_COLUMNS = (
 """What the pages of a night read of its rows."""
 REMEMBERED = ("loop", "lanes", *FIGURE.values())
 """What is read of the nights before."""
-MEMORY = 15
-"""Nights before that tell what is usual for a loop; ours: two weeks, and the night before."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -219,7 +218,7 @@ def read_night(store: Store, name: str | None, top: int, drawn: bool = True) -> 
     store.read("nights", night, ["loop"])
     earlier = [n for n in nights if n < night]
     rows = worst_first(read_nights(store, [night], NIGHT_COLUMNS))
-    remembered = by_loop(read_nights(store, earlier[-MEMORY:], REMEMBERED))
+    remembered = by_loop(read_nights(store, earlier[-PAGES.usual_nights :], REMEMBERED))
     remembered = {loop: told for loop, told in remembered.items() if told[-1]["night"] == earlier[-1]}
     known = notes.read_notes(store.path)
     looked = [r for r in rows if needs_a_look(r) and not is_hidden(last(known, r["loop"]), night)]

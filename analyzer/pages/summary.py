@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from analyzer.lanes.lanes import FIGURE, lanes_in
+from analyzer.limits import PAGES
 from analyzer.loop.cost import cost, cost_column
 from analyzer.loop.decisions import CAUSES, Action, Cause, Due, Fault, GroupRole, Lane, Status
 from analyzer.pages.maintenance import work_order
@@ -15,25 +16,15 @@ from analyzer.store.store import Store
 from analyzer.words.units import changed_settings
 from reports.pages import Block, Cell, Listing, Page, Section, Table, Text
 
-FIRST = 3
-"""Sentences at most."""
-NAMED = 3
-"""Loops that a sentence names; the rest is counted."""
 CALM = "No loop needs a touch this morning."
-WORST = 10
-"""Loops that are listed."""
-NEWS = 8
-"""Changes that are listed."""
-CONFIRMED = 2
-"""Nights in a row in or out of a lane that is inferred after which that is told; ours: one night can miss it."""
 NOTHING = ("", "")
 """No news, in no colour."""
 
 
 def listed(names: Sequence[str]) -> str:
     """Names in a sentence, the first few of them."""
-    more = len(names) - NAMED
-    return ", ".join(names[:NAMED]) + f" and {more} more" if more > 0 else enumerated(list(names))
+    more = len(names) - PAGES.named
+    return ", ".join(names[: PAGES.named]) + f" and {more} more" if more > 0 else enumerated(list(names))
 
 
 def first_things(rows: Sequence[Row], groups: Sequence[GroupView] = ()) -> tuple[str, ...]:
@@ -56,7 +47,7 @@ def first_things(rows: Sequence[Row], groups: Sequence[GroupView] = ()) -> tuple
             worth = 0.0 if work == "shutdown" else sum(cost(r, by) for r in mine)
             found.append((worth, _asked(work, mine)))
     ordered = sorted(found, key=lambda pair: -pair[0])
-    return tuple(text for _, text in ordered[:FIRST]) or (CALM,)
+    return tuple(text for _, text in ordered[: PAGES.sentences]) or (CALM,)
 
 
 def _work(row: Row) -> set[str]:
@@ -116,13 +107,13 @@ def _lane_news(nights: Sequence[Row]) -> tuple[str, str]:
 
 
 def _inside(nights: Sequence[Row], lane: Lane) -> list[bool]:
-    """Whether a loop was in a lane in each night; one that is inferred has to be told CONFIRMED nights in a row."""
+    """Whether a loop was in a lane in each night; one that is inferred has to be told some nights in a row."""
     told = [lane in lanes_in(row) for row in nights]
     if lane is not Lane.SLUGGISH:
         return told
     states = told[:1]
     for k in range(1, len(told)):
-        last = told[max(k + 1 - CONFIRMED, 0) : k + 1]
+        last = told[max(k + 1 - PAGES.lane_nights, 0) : k + 1]
         states.append(told[k] if len(set(last)) == 1 else states[-1])
     return states
 
@@ -191,7 +182,7 @@ def page(store: Store, name: str | None = None) -> Page:
     InputError
         Where the store holds no such night.
     """
-    night = read_night(store, name, WORST, drawn=False)
+    night = read_night(store, name, PAGES.summary_loops, drawn=False)
     first = first_things(
         [r for r in night.rows if r["loop"] not in night.hidden], read_groups(store, night.name)
     )
@@ -204,10 +195,10 @@ def page(store: Store, name: str | None = None) -> Page:
     )
     left = sum(needs_a_look(r) and r["loop"] not in night.hidden for r in night.rows) - len(rows)
     note = f"{left} more in the list." if left > 0 else ""
-    lines = news_lines(night)
-    more = [("", f"{len(lines) - NEWS} more")] if len(lines) > NEWS else []
+    lines, most = news_lines(night), PAGES.news
+    more = [("", f"{len(lines) - most} more")] if len(lines) > most else []
     news = (
-        (Listing((*(("", text) for text in lines[:NEWS]), *more)),) if lines else (Text(("Nothing new.",)),)
+        (Listing((*(("", text) for text in lines[:most]), *more)),) if lines else (Text(("Nothing new.",)),)
     )
     sections = (
         Section("First", (Listing(tuple(("", text) for text in first)), Text((_counts(night),)))),

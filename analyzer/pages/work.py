@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from analyzer.history.plant_clock import stamp
+from analyzer.limits import PAGES
 from analyzer.loop.decisions import Status
 from analyzer.pages.reading import ShownNight, by_loop, linked, oscillates, read_nights
 from analyzer.pages.words import ALL_LOOPS, Row, cause_cell, cells, page_columns, with_noun
@@ -16,10 +17,6 @@ from analyzer.store.store import Store
 from reports.pages import Cell, Page, Section, Table, Text, Tiles
 
 NAME = "work"
-NIGHTS = 62
-"""Nights that are looked at: a month, and the month before it."""
-COMPARED = 7
-"""Nights before a piece of work that are compared with those since; ours: a week."""
 FIGURES = {
     "average_absolute_error_pct": "average absolute error",
     "valve_travel_pct_per_h": "valve travel",
@@ -45,7 +42,8 @@ class Sides:
 def sides(rows: Sequence[Row], day: str) -> Sides:
     """A loop's assessed nights, oldest first, parted by the day of the work, which is neither."""
     told = [r for r in rows if r["status"] == Status.OK]
-    return Sides([r for r in told if r["night"] < day][-COMPARED:], [r for r in told if r["night"] > day])
+    before = [r for r in told if r["night"] < day][-PAGES.before_work :]
+    return Sides(before, [r for r in told if r["night"] > day])
 
 
 def said_since(work: Work, both: Sides) -> str:
@@ -108,7 +106,7 @@ def won(night: ShownNight, works: Mapping[str, Work], history: Mapping[str, Sequ
 def page(store: Store, night: ShownNight) -> Page:
     """The work list as it stands after a night."""
     works = {loop: work_on(notes) for loop, notes in night.notes.items() if notes}
-    names = [n for n in store.nights() if n <= night.name][-NIGHTS:]
+    names = [n for n in store.nights() if n <= night.name][-PAGES.work_nights :]
     history = by_loop(read_nights(store, names, READ, works))
     rows = {r["loop"]: r for r in night.rows if r["loop"] in works}
     listed = sorted(rows, key=lambda loop: (_order(works[loop]), loop))
@@ -116,7 +114,7 @@ def page(store: Store, night: ShownNight) -> Page:
     for k in listed:
         both = sides(history.get(k, ()), stamp(works[k].since_s, night.zone)[:10])
         told.append(cells(rows[k], shown, **_of_work(night, rows[k], works[k], both)))
-    note = f"Since: nights after the day of the note, beside the {COMPARED} before it."
+    note = f"Since: nights after the day of the note, beside the {PAGES.before_work} before it."
     table = Table("work-list", "", shown, tuple(told), note, True, ("state", "owner", "area"), True)
     brought = won(night, works, history)
     empty = Text(('Nothing is noted: triage note STORE LOOP "..." --state open --due DATE.',))

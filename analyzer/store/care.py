@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from datetime import date, timedelta
 from pathlib import Path
 
+from analyzer.limits import STORE
 from analyzer.store import notes
-from analyzer.store.lock import LEFT_OVER_S
 from analyzer.store.store import MAKE_ONE, SCHEMA, Store, is_night
 from analyzer.store.table import KEPT, read_stored
 from identification.errors import InputError
@@ -120,7 +120,7 @@ def pruned(store: Store, keep_d: int, detail_d: int | None, dry: bool = False) -
         gone += [path for path in store.files(table.name) if path.stem < oldest]
     now = time.time()
     half_written = sorted(store.path.rglob(f".*{SUFFIX}"))
-    gone += [path for path in half_written if now - path.stat().st_mtime > LEFT_OVER_S]
+    gone += [path for path in half_written if now - path.stat().st_mtime > STORE.left_over_s]
     if not dry:
         for path in gone:
             path.unlink(missing_ok=True)

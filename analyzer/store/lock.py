@@ -24,6 +24,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from analyzer.history.converted import forget_halves, holds_copies
+from analyzer.limits import STORE
 from analyzer.places import answering, content, is_remote
 from analyzer.store.notes import user
 from identification.errors import InputError
@@ -37,10 +38,6 @@ SCRATCH, MAKING = ".copies-", ".making"
 """Beginning of the names of directories of copies, and what stands before it until they are locked."""
 TRIED = ".written"
 """Name of an object that shows whether shared storage can be written."""
-ALIVE_S, DEAD_S = 60.0, 600.0
-"""How often a holder of shared storage signs anew, and the age from which its signature is a dead run's [s]; ours."""
-LEFT_OVER_S = 86_400.0
-"""Age from which something half done is left over from a process that died [s]; ours."""
 Signature = dict[str, Any]
 """User, host, process, since when, a mark of its own, and when it last signed (alive_s [s])."""
 
@@ -96,7 +93,7 @@ def _held_scratch(store: Path, resume: bool) -> tuple[Path, BaseFileLock]:
     """A directory of copies and the lock that says that it is in use: the newest that nobody uses where a run goes
     on, else a new one. Others that nobody uses are removed."""
     for left in store.glob(f"{MAKING}{SCRATCH}*"):
-        if time.time() - _changed_s(left) > LEFT_OVER_S:
+        if time.time() - _changed_s(left) > STORE.left_over_s:
             shutil.rmtree(left, ignore_errors=True)
     taken: tuple[Path, BaseFileLock] | None = None
     for left in sorted(store.glob(f"{SCRATCH}*"), key=_changed_s, reverse=True):
@@ -156,8 +153,8 @@ def _require_unsigned(store: Path) -> None:
     """Raise InputError where a signature of shared storage is not that of a dead run."""
     with answering(store):
         alive_s = _signature(store).get("alive_s")
-    if isinstance(alive_s, int | float) and time.time() - alive_s < DEAD_S:
-        left = max(math.ceil((DEAD_S + alive_s - time.time()) / 60.0), 1)
+    if isinstance(alive_s, int | float) and time.time() - alive_s < STORE.dead_s:
+        left = max(math.ceil((STORE.dead_s + alive_s - time.time()) / 60.0), 1)
         raise _in_use(store, f"; if it died, its hold ends in {left} min, then --resume goes on with it")
 
 
@@ -167,7 +164,7 @@ def _renewed(store: Path, mine: Signature) -> Iterator[None]:
     ended = threading.Event()
 
     def live() -> None:
-        while not ended.wait(ALIVE_S):
+        while not ended.wait(STORE.alive_s):
             with contextlib.suppress(Exception):  # the next one may succeed
                 _sign(store, mine)
 

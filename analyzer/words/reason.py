@@ -6,12 +6,11 @@ Lists and pages show the clauses that make a sentence (`in_short`); the others a
 from __future__ import annotations
 
 from analyzer.lanes.lanes import SAID
+from analyzer.limits import PAGES
 from analyzer.loop.decisions import AMPLIFICATION, OF_LOAD, Action, Cause, Due, Fault, Lack, Lane, Status
 from analyzer.loop.finding import Finding, Root
 from analyzer.words.units import duration
 
-MOST_WORDS = 20
-"""Words of a reason that is read at a glance."""
 PLAIN = {
     Fault.BACKLASH: "the valve has {width:.2g} % play",
     Fault.STICTION: "the valve sticks by {width:.2g} %",
@@ -26,8 +25,6 @@ BY_HAND = {
     Due.SHUTDOWN: "at the next shutdown stroke it in steps of {step:.2g} %",
 }
 """How a valve's fault is confirmed, and when."""
-STEPS = 4.0
-"""Steps of a stroke test to the width of what is looked for; ours: the first three must then move nothing."""
 MOST_NAMES = 5
 """Followers that are named in a row."""
 SAID_AT_ONCE = (Action.CHECK_SETTINGS, Action.NEEDS_DATA)
@@ -38,7 +35,7 @@ def in_short(text: str) -> tuple[str, str]:
     """The first clauses of a reason, as many as make a short sentence (one at least), and the others."""
     clauses = text.split("; ")
     words = [len(clause.split()) for clause in clauses]
-    kept = max([n for n in range(1, len(clauses) + 1) if sum(words[:n]) <= MOST_WORDS], default=1)
+    kept = max([n for n in range(1, len(clauses) + 1) if sum(words[:n]) <= PAGES.reason_words], default=1)
     return "; ".join(clauses[:kept]), "; ".join(clauses[kept:])
 
 
@@ -99,7 +96,7 @@ def to_stroke(found: Finding) -> str:
     width = found.width_pct
     if found.remedy.action is not Action.REPAIR_VALVE or width is None:
         return ""
-    return BY_HAND[found.remedy.due or Due.NOW].format(step=width / STEPS)
+    return BY_HAND[found.remedy.due or Due.NOW].format(step=width / PAGES.stroke_steps)
 
 
 def valve_text(found: Finding) -> str:
