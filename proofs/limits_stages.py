@@ -185,7 +185,7 @@ def of_changes(c: Config) -> list[Any]:
         travel = hours["valve_travel_pct_per_h"]
         later = np.arange(travel.size) >= 24 * rng.uniform(1.0, 13.0)
         hours = {**hours, "valve_travel_pct_per_h": travel * np.exp(later * rng.uniform(-1.0, 1.0))}
-        out.append(tried(lambda h=hours: behaviour_change("L", h, c.changes)) is not None)
+        out.append(tried(lambda h=hours: behaviour_change("L", h, c)) is not None)
     return out
 
 

@@ -24,7 +24,7 @@ from analyzer.belief.pool import Pool
 from analyzer.belief.remedy import Pair, RemedyBelief
 from analyzer.belief.valve import ValveBelief, Witness
 from analyzer.belief.wear import PhaseKnown, Width, forgotten, with_repetitions
-from analyzer.config import BeliefLimits
+from analyzer.config import BeliefLimits, Config
 from analyzer.loop.decisions import CAUSES, Action, Cause, Due, Fault, Status, counts
 from identification.estimation.width_profile import WIDTHS
 
@@ -131,7 +131,7 @@ def _read_as(kind: Any, kept: Any) -> Any:
     return {_read_as(of[0], k): _read_as(of[1], v) for k, v in kept.items()}
 
 
-def step(before: Belief | None, row: Row, repaired_s: Sequence[float], limits: BeliefLimits) -> Belief | None:
+def step(before: Belief | None, row: Row, repaired_s: Sequence[float], config: Config) -> Belief | None:
     """The belief after a night.
 
     Parameters
@@ -142,7 +142,7 @@ def step(before: Belief | None, row: Row, repaired_s: Sequence[float], limits: B
         The loop's row of the night.
     repaired_s : sequence of float
         When notes say that its valve was repaired [s since 1970-01-01 UTC].
-    limits : BeliefLimits
+    config : Config
 
     Returns
     -------
@@ -151,11 +151,11 @@ def step(before: Belief | None, row: Row, repaired_s: Sequence[float], limits: B
     """
     if row["status"] != Status.OK or row["oscillating_pct"] is None:
         return before
-    now = before or Belief(row["loop"], "")
+    now, limits = before or Belief(row["loop"], ""), config.belief
     share = valve.faded_over(now.night, row["night"], limits) if now.night else 1.0
     now = _recorded(_after_changes(now, row, repaired_s), row, limits)
     found = cycle.with_night(now.cycle, share, row, limits)
-    now = _with_witness(replace(now, cycle=found), share, row, repaired_s, limits)
+    now = _with_witness(replace(now, cycle=found), share, row, repaired_s, config)
     ended = before is not None and before.cycle.loud and not found.loud
     done = remedy.with_night(RemedyBelief() if ended else now.remedy, share, row, limits)
     seen = Calm(
@@ -201,18 +201,16 @@ def _after_changes(now: Belief, row: Row, repaired_s: Sequence[float]) -> Belief
     return now
 
 
-def _with_witness(
-    now: Belief, share: float, row: Row, repaired_s: Sequence[float], limits: BeliefLimits
-) -> Belief:
+def _with_witness(now: Belief, share: float, row: Row, repaired_s: Sequence[float], config: Config) -> Belief:
     """The belief in valve and process with what a night says of them; nothing where it says nothing, or where the
     valve was repaired within it."""
     start_s = row["start_s"] or 0.0
     mixed = any(start_s < at < start_s + (row["duration_s"] or 0.0) for at in repaired_s)
     constants = {k: pool.faded(share) for k, pool in now.constants.items()}
-    said = None if mixed else said_of(row)
+    said, limits = None if mixed else said_of(row), config.belief
     if said is None:
         return replace(now, constants=constants)
-    wrong = valve.doubt(said, now.cycle.cause, counts(row["oscillating_pct"]), limits)
+    wrong = valve.doubt(said, now.cycle.cause, counts(row["oscillating_pct"]), config)
     found = valve.with_night(now.valve, share, row["night"], said, wrong, limits)
     if found.since != now.valve.since:  # another valve
         constants = {k: pool for k, pool in constants.items() if k not in OF_VALVE}

@@ -127,10 +127,8 @@ def _followed(
             # what a pruned store knew of its oldest night is not counted again
             known_already = before is not None and before.night >= name
             try:
-                if row is None or known_already:
-                    now = before
-                else:
-                    now = step(before, row, repaired.get(loop, ()), config.belief)
+                own = repaired.get(loop, ())
+                now = before if row is None or known_already else step(before, row, own, config)
                 if now is not None:
                     out.append(_row(before, now, row, name, config))
                     beliefs[loop] = now

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from analyzer.config import BeliefLimits
+from analyzer.config import BeliefLimits, Config
 from analyzer.loop.decisions import Cause, Fault
 from identification.estimation.width_profile import WIDTHS
 from identification.record import Floats
@@ -99,18 +99,19 @@ def faded_over(before: str, night: str, limits: BeliefLimits) -> float:
     return float(0.5 ** (max(gap, 0) / limits.half_life))
 
 
-def doubt(said: Witness, cause: Cause, oscillates: bool, limits: BeliefLimits) -> tuple[float, float, float]:
+def doubt(said: Witness, cause: Cause, oscillates: bool, config: Config) -> tuple[float, float, float]:
     """What a night's likelihood may be wrong by, in the evidence that a verdict of one night needs [-]: as one of
     several nights, by itself, and in what it says against a width.
 
     No model is exact, and what it lacks it lacks every night. In a cycle which another cause makes, by all nights, a
     play is mimicked every night; one that is narrow beside OP's range, in a night now and then.
     """
+    limits = config.belief
     if oscillates and cause is not Cause.VALVE:
         beside = limits.doubt_beside if cause is Cause.LOAD else limits.doubt_small
         return beside, beside, beside
     width = float(WIDTHS[int(np.argmax(said["profile"]))])
-    narrow = oscillates or width < limits.small * said["op_range"]
+    narrow = oscillates or width < config.cause.size * said["op_range"]
     alone = limits.doubt_small if narrow else limits.doubt_alone
     return limits.doubt, alone, limits.doubt_alone if oscillates else limits.doubt_against
 

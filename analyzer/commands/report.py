@@ -16,7 +16,7 @@ from identification.errors import InputError
 
 if TYPE_CHECKING:
     from analyzer.comparison.before_after import Span
-    from analyzer.config import ChangeLimits
+    from analyzer.config import Config
     from analyzer.loops.changes import TuningChange
     from analyzer.store.store import Store
     from reports.pages import Page
@@ -108,7 +108,7 @@ def report(
     if not days <= MOST_DAYS:  # NaN passes the range that the option states
         raise InputError(f"--days {days}", f"1 to {MOST_DAYS}", "correct it")
     spans = Spans(days, _span(before, "--before", zone), _span(after, "--after", zone))
-    found, missing = change_cases(kept, _changes(kept, limits.changes, **named), spans, limits.before_after)
+    found, missing = change_cases(kept, _changes(kept, limits, **named), spans, limits.before_after)
     if not found:
         why = "; ".join(f"{tag}: {reason}" for tag, reason in missing) or "no change found"
         raise InputError(why, "loops and times that the store holds", "check the tags and times")
@@ -137,7 +137,7 @@ def _span(texts: Sequence[str] | None, option: str, zone: str) -> Span | None:
 
 def _changes(
     store: Store,
-    limits: ChangeLimits,
+    config: Config,
     changes: Path | None,
     loop: str | None,
     changed: str | None,
@@ -149,7 +149,7 @@ def _changes(
     from analyzer.pages.changes import detected
 
     if find:
-        return detected(store, [loop] if loop else None, limits)
+        return detected(store, [loop] if loop else None, config)
     if changes is not None:
         return [c for c in read_changes(changes, store.zone()) if loop in (None, c.loop)]
     if loop is not None and changed is not None:

@@ -17,9 +17,8 @@ from analyzer.comparison.block_bootstrap import Difference, Floats, Side, differ
 from analyzer.config import ComparisonLimits
 
 HOUR_S = 3600.0
-TRANSITION_S = 3600.0
-"""Left out after a change [s], beside the hour it falls into; ours: a bump of new settings is not their
-behaviour."""
+LIMITS = ComparisonLimits()
+"""The limits in force where none are given."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,12 +33,14 @@ Hours = Mapping[str, Floats]
 """Columns of the store's hourly table of one loop, shape (h,) each, NaN where not known."""
 
 
-def spans_around(changed_s: float, days: float, others: Sequence[float] = ()) -> tuple[Span, Span]:
+def spans_around(
+    changed_s: float, days: float, others: Sequence[float] = (), limits: ComparisonLimits = LIMITS
+) -> tuple[Span, Span]:
     """Spans before and after a change, ended by other changes of the same loop [s]."""
     first, last = changed_s - days * 24 * HOUR_S, changed_s + days * 24 * HOUR_S
-    earlier = [o + TRANSITION_S for o in others if o < changed_s]
+    earlier = [o + limits.transition_s for o in others if o < changed_s]
     later = [o for o in others if o > changed_s]
-    after = Span(changed_s + TRANSITION_S, min([last, *later]))
+    after = Span(changed_s + limits.transition_s, min([last, *later]))
     return Span(max([first, *earlier]), changed_s), after
 
 
@@ -107,10 +108,6 @@ MEASURES = (
 )
 """The study's four first (its section 7), then the others of the store. Least differences are ours: about the
 resolution of what a historian keeps."""
-
-
-LIMITS = ComparisonLimits()
-"""The limits in force where none are given."""
 
 
 class ChangeVerdict(StrEnum):

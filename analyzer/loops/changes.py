@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from analyzer.comparison.block_bootstrap import Floats
-from analyzer.config import ChangeLimits
+from analyzer.config import Config
 from analyzer.history.plant_clock import UTC_NAME, date_of
 from analyzer.history.stamps import parse_times
 from analyzer.loops.spec import LoopSpec, csv_table
@@ -108,16 +108,17 @@ def _ratio(hours: Mapping[str, Floats]) -> tuple[Floats, Floats]:
     return np.log(travel[known] / spread[known]), hours["hour_s"][known]
 
 
-def behaviour_change(loop: str, hours: Mapping[str, Floats], limits: ChangeLimits) -> TuningChange | None:
+def behaviour_change(loop: str, hours: Mapping[str, Floats], config: Config) -> TuningChange | None:
     """The hour at which a loop's controller began to answer differently, or None.
 
     What a controller does to OP for a given error is its tuning's doing: valve travel over variability is
     steady under changing load and steps when somebody types in new settings. The split that explains most is
     offered where the step is large and clear against how days differ by themselves.
     """
+    limits, least_s = config.changes, config.before_after.least_days * DAY_S
     y, at = _ratio(hours)
-    first = np.searchsorted(at, at[0] + limits.least_days * DAY_S) if y.size else 0
-    last = np.searchsorted(at, at[-1] - limits.least_days * DAY_S) if y.size else 0
+    first = np.searchsorted(at, at[0] + least_s) if y.size else 0
+    last = np.searchsorted(at, at[-1] - least_s) if y.size else 0
     if last - first < 1:
         return None
     total, n = np.cumsum(y), np.arange(1, y.size + 1)

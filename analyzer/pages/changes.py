@@ -18,7 +18,7 @@ from analyzer.comparison.before_after import (
     grade,
     spans_around,
 )
-from analyzer.config import ChangeLimits, ComparisonLimits
+from analyzer.config import ComparisonLimits, Config
 from analyzer.loop.decisions import counts
 from analyzer.loops.changes import TuningChange, behaviour_change, stated_changes
 from analyzer.pages.reading import Thinned, by_loop, nights_within, read_hours, read_nights, read_trends
@@ -29,8 +29,6 @@ COLUMNS = (
     *("loop", "night", "description", "type", "gain_unit", "ti_unit", "pv_unit", "op_unit", "form", "kp"),
     *("ti", "start_s", "status", "source_loop", "oscillating_pct", "extra", "pv_lo", "pv_hi"),
 )
-CHANGES = ChangeLimits()
-"""The limits in force where none are given."""
 HOURS_A_YEAR = 8760.0
 
 
@@ -52,15 +50,15 @@ class Spans:
     before: Span | None = None
     after: Span | None = None
 
-    def of(self, change: TuningChange, others: Sequence[float]) -> tuple[Span, Span]:
+    def of(
+        self, change: TuningChange, others: Sequence[float], limits: ComparisonLimits
+    ) -> tuple[Span, Span]:
         """Spans before and after a change."""
-        before, after = spans_around(change.time_s, self.days, others)
+        before, after = spans_around(change.time_s, self.days, others, limits)
         return self.before or before, self.after or after
 
 
-def detected(
-    store: Store, loops: Sequence[str] | None = None, limits: ChangeLimits = CHANGES
-) -> list[TuningChange]:
+def detected(store: Store, loops: Sequence[str] | None, config: Config) -> list[TuningChange]:
     """Changes that nobody stated: settings that differ between nights, and steps of a controller's
     behaviour."""
     nights = store.nights()
@@ -69,7 +67,7 @@ def detected(
     found = []
     for tag, own in rows.items():
         stated = stated_changes(own)
-        seen = behaviour_change(tag, hours[tag], limits) if tag in hours else None
+        seen = behaviour_change(tag, hours[tag], config) if tag in hours else None
         found += stated or ([seen] if seen else [])
     return found
 
@@ -89,7 +87,7 @@ def change_cases(
     """
     if not changes:
         return [], []
-    of = [spans.of(c, [o.time_s for o in changes if o.loop == c.loop and o != c]) for c in changes]
+    of = [spans.of(c, [o.time_s for o in changes if o.loop == c.loop and o != c], limits) for c in changes]
     ends = [span for pair in of for span in pair]
     nights = nights_within(store, Span(min(s.first_s for s in ends), max(s.last_s for s in ends)))
     loops = {c.loop for c in changes}

@@ -16,7 +16,6 @@ from io import FileIO
 from pathlib import Path
 
 from analyzer.history.plant_clock import stamp
-from analyzer.limits import STORE
 from analyzer.places import is_remote
 from identification.errors import InputError
 from reports.texts import visible
@@ -27,6 +26,8 @@ STATES = ("open", "ordered", "done", "checked")
 """How far the work on a loop has come."""
 FINISHED = STATES[2:]
 """Those in which it is done: the nights since are held against those before."""
+LATEST_S = 32503680000.0
+"""Times of notes beyond the year 3000 are none [s since 1970-01-01 UTC]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,7 +133,7 @@ def _parsed(line: str) -> Note | None:
         at_s = float(kept["time_s"])
     except (ValueError, TypeError, KeyError, AttributeError, OverflowError, RecursionError):
         return None
-    if not all(isinstance(x, str) for x in parts) or not 0.0 <= at_s <= STORE.notes_latest_s:
+    if not all(isinstance(x, str) for x in parts) or not 0.0 <= at_s <= LATEST_S:
         return None
     loop, *told = parts
     return Note(loop, at_s, *map(visible, told))

@@ -10,17 +10,22 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner, Result
 
+from analyzer import limits
 from analyzer.cli import main
 from analyzer.config import Config, configured, limit_of, limits_document, read_config
 from analyzer.explain.case import asked_cases, whole
 from analyzer.loops.changes import TuningChange
 from analyzer.night.asked import Asked
 from analyzer.store.store import Store
+from identification.limits import Limits
 from proofs.plant import START_S, Sketch, simulate, write_export
 from tests.reports.small_store import small_store
+from tuning.limits import METHOD
 
 TANK = Sketch("valve", (60.0, 1800.0, 9.0), 0.9, 40.0, backlash=2.5)
 """A tank on a valve with play."""
+FIXED = [x for x in (*vars(limits).values(), METHOD) if isinstance(x, Limits)]
+"""Limits that no plant changes."""
 READERS = ("run", "check", "tune", "explain", "simulate")
 """Commands that read an EXPORT (contract)."""
 CASES = [
@@ -66,13 +71,20 @@ def test_the_printed_defaults_are_the_defaults():
 
 def test_every_limit_has_unit_range_meaning_and_source():
     """No limit is without unit, meaning and source, and every default lies in its range."""
-    for section in fields(Config()):
-        limits = getattr(Config(), section.name)
-        for field in fields(limits):
-            said, value = limit_of(field), getattr(limits, field.name)
+    for table in (*(getattr(Config(), section.name) for section in fields(Config)), *FIXED):
+        for field in fields(table):
+            said, value = limit_of(field), getattr(table, field.name)
             assert all((said.unit, said.meaning, said.source)), field.name
             numbers = [value] if isinstance(value, int | float) else [x for row in value for x in row[1:]]
             assert all(said.least <= x <= said.most for x in numbers), field.name
+
+
+def test_sections_are_printed_in_their_own_words():
+    """What stands over a section's heading is what its own class says."""
+    printed = limits_document(Config())
+    said = re.findall(r"^# (.*)\n\[(\w+)\]$", printed, re.MULTILINE)
+    assert len({words for words, _ in said}) == len(said) == len(fields(Config))
+    assert ("What finding out about an export may cost before it is given up.", "opening") in said
 
 
 def test_a_file_changes_what_it_states_and_nothing_else(tmp_path: Path):

@@ -78,7 +78,7 @@ def test_untouched_loops_do_not_change(store: Store) -> None:
 def test_changes_are_offered_where_there_were_some(store: Store) -> None:
     """Changes of behaviour are offered for retuned loops only, within six hours of the truth; most are seen."""
     truth = {c.loop: c.time_s for c in read_changes(MILL / "changes.csv")}
-    offered = {c.loop: c.time_s for c in detected(store)}
+    offered = {c.loop: c.time_s for c in detected(store, None, Config())}
     assert set(offered) <= set(truth)
     assert len(offered) >= 5
     assert all(abs(t - truth[loop]) < 6 * 3600 for loop, t in offered.items())

@@ -196,7 +196,7 @@ def test_behaviour_changes_are_offered(tmp_path: Path) -> None:
         more = np.where(np.array(rows["loop"]) == NASTY[4], 4.0, 1.0)
         moved = more * rows["valve_travel_pct_per_h"].to_numpy()
         pq.write_table(rows.set_column(at, "valve_travel_pct_per_h", [moved]), path)
-    offered = detected(found)
+    offered = detected(found, None, Config())
     assert [c.loop for c in offered] == [NASTY[4]]
     assert offered[0].time_s == pytest.approx(CHANGED_S, abs=3600)
     assert "4 times" in offered[0].seen

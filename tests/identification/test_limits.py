@@ -10,13 +10,15 @@ from typing import Any
 import numpy as np
 import pytest
 
+from analyzer import limits
 from analyzer.config import Config
 from analyzer.lanes.lanes import RULES
-from identification.limits import LIMITS, ExplainLimits
+from identification.limits import LIMITS, ExplainLimits, Limits
 from identification.mismatch.answer import answer
 from identification.mismatch.diagnosis import explain
 from identification.mismatch.recording import Recording
 from tests.identification.hand_made import Plant, recording
+from tuning.limits import METHOD
 
 ROOT = Path(__file__).parents[2]
 
@@ -32,7 +34,9 @@ def test_every_limit_is_read():
     """A limit that no line reads decides nothing; the weights of a source's signs are read by the signs' names, and
     those of lanes by their figures' names."""
     read = read_names() | {rule.limit or rule.figure for rule in RULES}
-    declared = {f.name for s in fields(Config()) for f in fields(getattr(Config(), s.name))}
+    fixed = (x for x in (*vars(limits).values(), METHOD) if isinstance(x, Limits))
+    tables = [*(getattr(Config(), s.name) for s in fields(Config)), *fixed]
+    declared = {f.name for table in tables for f in fields(table)}
     assert {name for name in declared - read if not name.startswith("sign_")} == set()
 
 

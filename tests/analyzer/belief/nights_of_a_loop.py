@@ -13,7 +13,8 @@ from analyzer.belief.nights import READ
 from analyzer.config import Config
 from identification.estimation.width_profile import WIDTHS
 
-LIMITS = Config().belief
+CONFIG = Config()
+LIMITS = CONFIG.belief
 FIRST, DAY_S = date(2026, 3, 2), 86400.0
 CALM: dict[str, Any] = {"cause": "none", "valve_fault": "none", "action": "none", "oscillating_pct": 0.0}
 WORN: dict[str, Any] = {
@@ -68,7 +69,7 @@ def followed(rows: list[dict[str, Any]], repaired_s: tuple[float, ...] = ()) -> 
     """The beliefs after each night."""
     now, out = None, []
     for r in rows:
-        now = step(now, r, repaired_s, LIMITS)
+        now = step(now, r, repaired_s, CONFIG)
         assert now is not None
         out.append(now)
     return out
