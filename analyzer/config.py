@@ -252,7 +252,7 @@ def _part(name: str, limits: Any) -> str:
     lines = ["", f"# {first}", f"[{name}]"]
     for each in fields(limits):
         said = limit_of(each)
-        text = f"{said.meaning}. {_range(said).capitalize()}; {said.source}."
+        text = f"{said.meaning}. {_range(said).replace('from', 'From', 1)}; {said.source}."
         lines += [f"# {line}" for line in textwrap.wrap(text, WIDTH)]
         lines.append(f"{each.name} = {_value(getattr(limits, each.name))}")
     return "\n".join(lines)
