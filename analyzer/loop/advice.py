@@ -17,6 +17,7 @@ from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import as_stated
 from analyzer.words import settings as words
 from identification.estimation.hammerstein import Fit
+from identification.limits import FIT
 from identification.models import Loop, Pid
 from identification.record import Floats
 from tuning.frequency_response import integral_s, is_stable
@@ -227,7 +228,7 @@ def _proposed(verdict: Verdict, controller: Pid, period_s: float | None, config:
     if not right_way or verdict.cause not in (Cause.VALVE, Cause.TUNING):
         return Proposed(recommend(loop, verdict.cause, limits=config.tuning))
     duration_s, dead_time_s = verdict.fit.window.duration_s, loop.process.dead_time_s
-    if dead_time_s > config.advice.beyond_record * duration_s:
+    if dead_time_s > FIT.longest_dead_time * duration_s:
         return Proposed(Proposal(Action.UNDECIDED, words.beyond_record(dead_time_s, duration_s)))
     if verdict.cause is Cause.TUNING:
         return _for_tuning(verdict, loop, period_s, config)
