@@ -82,6 +82,22 @@ class ProofLimits(Limits, section="proof"):
     """When a candidate's gain is real: on data that were not fitted, and spread over the record."""
 
 
+class LawLimits(Limits, section="law"):
+    """What a record tells of a controller's law, by OP's increments."""
+
+
+class LocationLimits(Limits, section="location"):
+    """Where a misfit is said to live: features, chance and spans."""
+
+
+class ReferenceLimits(Limits, section="reference"):
+    """What the most flexible model may go with, that has no name for it."""
+
+
+class SignalLimits(Limits, section="signals"):
+    """How spectra, cycles and correlations are read, and what of noise is an outlier."""
+
+
 @dataclass(frozen=True, slots=True)
 class ExplainLimits:
     """What decides about recorder, controller, effects and their proof."""
@@ -95,4 +111,5 @@ class ExplainLimits:
 LIMITS = ExplainLimits()
 """The limits where none are given."""
 FIT, SLIPS, STEM, INTERVALS = FitLimits(), SlipLimits(), StemLimits(), IntervalLimits()
-"""What fits go by: no plant has reasons of its own to change it."""
+LAW, LOCATION, REFERENCE, SIGNALS = LawLimits(), LocationLimits(), ReferenceLimits(), SignalLimits()
+"""Numbers of a method, the same for every plant: no plant has reasons of its own to change them."""

@@ -19,12 +19,12 @@ from analyzer.config import OscillationLimits
 from analyzer.limits import LOOP
 from analyzer.loop.decisions import counts
 from identification.controller.check import runs
+from identification.limits import SIGNALS
 from identification.record import Floats, LoopRecord, Mask
 from identification.signals.correlation import Rhythm, rhythm
 from identification.signals.half_cycles import levelled_correlation, shape, usual_prominence
 from identification.signals.setpoint_response import amplitude_at_rest, moves, without_setpoint
 from identification.signals.spectrum import (
-    WIDE_BAND,
     Bands,
     Spectrum,
     band_signal,
@@ -151,7 +151,7 @@ def _candidate(s: Spectrum, b: Bands, k: int, limits: OscillationLimits) -> Osci
     if expected < limits.samples_few * s.dt_s:
         return None
     x, dt = band_signal(s, line)
-    above = float(np.sum(np.abs(s.lines[math.ceil(line / WIDE_BAND) :]) ** 2)) * 2 / s.n**2
+    above = float(np.sum(np.abs(s.lines[math.ceil(line / SIGNALS.wide_band) :]) ** 2)) * 2 / s.n**2
     share = float(x @ x) / x.size / above if above > 0 else 0.0
     found = rhythm(x, dt, expected)
     cycles = s.duration_s / found.period_s

@@ -70,7 +70,7 @@ def frozen_width(x: Trends, e: Floats, said: StatedSettings) -> float:
     inside = np.cumsum(frozen) / np.arange(1, frozen.size + 1)
     beyond = (frozen.sum() - np.cumsum(frozen)) / np.maximum(np.arange(frozen.size)[::-1], 1)
     enough = np.arange(frozen.size) >= limits.frozen_moves
-    good = np.flatnonzero(enough & (inside >= limits.frozen) & (beyond < 0.4 * inside))
+    good = np.flatnonzero(enough & (inside >= limits.frozen) & (beyond < limits.frozen_beyond * inside))
     return float(size[good[-1]]) if good.size else 0.0
 
 
@@ -91,7 +91,7 @@ def gap(x: Trends, e: Floats, said: StatedSettings) -> Finding | None:
     if best > x.limits.gap_leaves * left(0.0, True):
         width = frozen_width(x, e, said)
     inside = still & (np.abs(e) < width)
-    if inside.mean() < 0.02:
+    if inside.mean() < x.limits.gap_share:
         return None
     return Finding({"gap_pct": width}, inside, "controller-gap")
 
@@ -104,7 +104,10 @@ def runs(still: Mask) -> list[tuple[int, int]]:
 
 def asked(x: Trends) -> Mask:
     """True where a move of SP or a limit of OP stands in for the law, and a sample about it, shape (n,)."""
-    here = (np.abs(np.diff(x.sp, prepend=x.sp[0])) > x.limits.asked) | (x.op <= 0.05) | (x.op >= 99.95)
+    least = x.limits.at_limit
+    here = (
+        (np.abs(np.diff(x.sp, prepend=x.sp[0])) > x.limits.asked) | (x.op <= least) | (x.op >= 100.0 - least)
+    )
     return np.convolve(here, np.ones(3), mode="same") > 0
 
 

@@ -16,17 +16,13 @@ from itertools import product
 
 import numpy as np
 
+from identification.limits import LAW
 from identification.models import Pid
 from identification.record import Floats, LoopRecord, Mask
 from identification.simulation.lag import first_order
 
-LONGEST_INTEGRAL = 10.0
-"""Integral time, in lengths of the record, from which there is no integral action; ours: over the record it gives a
-tenth of what the gain gives."""
 PV_FILTERS = (0.0, 1.0, 2.0, 3.0, 5.0, 8.0, 13.0, 21.0)
 """Filters of the controller's PV that are tried [samples]; ours: none is far from one of them."""
-LONGEST_FILTER = 1.0 / 6.0
-"""Longest filter tried, as a share of the period [-]; beyond it the filter, not the law, would be fitted."""
 SLOPE_FILTERS = (0.0, 2.0, 8.0)
 """Filters of the slope that are tried [samples]; ours."""
 MORE_SLOPE_FILTERS = (0.35, 0.7, 1.2, 4.0)
@@ -35,28 +31,6 @@ ON_ERROR = ((1.0, 1.0), (1.0, 0.0), (0.0, 0.0))
 """What gain and derivative take of the set point's moves: the usual three [-]."""
 LONGER = 4
 """Factor between lengths of increments; ours."""
-REACH = 4
-"""Longest increments, in integral times: beyond it the integral gathers PV's rounding rather than errors; ours."""
-FEWEST = 50
-"""Increments from which a length counts; ours."""
-CLAMPED = 4
-"""How many times oftener OP stands at a clamp than at the next value: a sine does so 2.4 times [-]."""
-LEAST_AT_END = 5
-"""Samples at the next value that are added, for those of an OP without steps are one each; ours."""
-FEWEST_LEVELS = 8
-"""Values of OP from which its ends are told from its steps; ours."""
-TELLING = 0.5
-"""Share of OP's increments that the best law explains, from which a length of them tells a law [-]; ours."""
-AS_WELL = 1.15
-"""What a law with fewer settings of its own may leave over the freest; ours: the simplest such is the answer."""
-ENOUGH = 1.25
-"""What a stated law may leave over the freest, where that gives OP, to be in force without further question; ours."""
-GIVES = 0.1
-"""What the freest law leaves at some length where it gives OP [-]; ours."""
-WORTH = 0.1
-"""Logarithm of what a filter, or another of the law's usual ways, must take off what is left, to be taken; ours."""
-SMALL = 0.01
-"""Share of OP's variance under which what is left is of scans and rounding, and of no law [-]; ours."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,7 +80,7 @@ class LawsCompared:
 def integral_time(kp: float, ki: float, record_s: float) -> float:
     """Integral time [s] of a law, inf where its integral does next to nothing in a record of so many seconds."""
     ti = kp / ki if ki != 0 and kp / ki > 0 else math.inf
-    return ti if ti < LONGEST_INTEGRAL * record_s else math.inf
+    return ti if ti < LAW.longest_integral * record_s else math.inf
 
 
 def moves(
@@ -119,7 +93,7 @@ def moves(
     inside = since[samples::step] == since[:-samples:step]
     inside &= ~out_of_law[:-samples:step]
     rows = (columns[samples::step] - columns[:-samples:step])[inside]
-    if len(rows) < FEWEST:
+    if len(rows) < LAW.increments:
         return None
     rows = rows - rows.mean(axis=0) if level else rows
     rows = rows if rows.shape[1] == 5 else _without(rows[:, :5], rows[:, 5])
@@ -153,7 +127,7 @@ def clamped(op: Floats) -> Mask:
     ends = [
         levels[end]
         for end, next_to in ((0, 1), (-1, -2))
-        if levels.size > FEWEST_LEVELS and counts[end] > CLAMPED * (counts[next_to] + LEAST_AT_END)
+        if levels.size > LAW.op_values and counts[end] > LAW.clamped * (counts[next_to] + LAW.end_samples)
     ]
     return np.isin(op, ends)
 
@@ -166,7 +140,7 @@ def fit_pi(record: LoopRecord, period_s: float) -> ControllerFit | None:
     """PI settings by least squares on increments over an eighth of a period [s], or of another time scale on which
     the loop moves; None where OP or the error never moves, or too little of the record is in automatic."""
     step = max(round(period_s / 8 / record.dt_s), 1)
-    if len(record) < 10 * step + 50:
+    if len(record) < 10 * step + LAW.increments:
         return None
     found = moves(_columns(record, record.error), _out_of_law(record), step)
     if found is None:
@@ -190,7 +164,7 @@ def _weights(of: list[Moves]) -> Floats:
     own = [m.explained(_least_squares([m], np.ones(1), np.eye(3), np.zeros(3))) for m in of]
     share = np.clip(own, 0.0, 1.0)
     moved = np.array([m.products[3, 3] for m in of])
-    return np.where(share >= TELLING, share / (1.0 + 2 * SMALL - share) / moved, 0.0)
+    return np.where(share >= LAW.telling, share / (1.0 + 2 * LAW.small - share) / moved, 0.0)
 
 
 def _settings(gains: Floats, record_s: float, stated: Pid) -> Pid | None:
@@ -199,7 +173,7 @@ def _settings(gains: Floats, record_s: float, stated: Pid) -> Pid | None:
     if kp == 0 or kd / kp < -1e-9:
         return None
     ti_s = integral_time(kp, ki, record_s)
-    integral_runs_back = ki / kp < 0 and abs(ki / kp) * record_s > 1.0 / LONGEST_INTEGRAL
+    integral_runs_back = ki / kp < 0 and abs(ki / kp) * record_s > 1.0 / LAW.longest_integral
     return None if integral_runs_back else replace(stated, kp=kp, ti_s=ti_s, td_s=max(kd / kp, 0.0))
 
 
@@ -222,20 +196,20 @@ class _Seen:
 
     def poorness(self, gains: Floats) -> float:
         """How poorly gains give OP: mean logarithm of what they leave, alike in all ways of the law."""
-        return float(np.mean(np.log(SMALL + self.left(gains))))
+        return float(np.mean(np.log(LAW.small + self.left(gains))))
 
     def does(self, gains: Floats) -> bool:
         """Whether gains give OP about as well as any, and that well."""
         left, least = self.left(gains), self.left(self.free)
         blurred = np.array([m.blurred(gains) for m in self.moves])
-        return bool((left - blurred <= ENOUGH * least + SMALL).all() and least.min() < GIVES)
+        return bool((left - blurred <= LAW.enough * least + LAW.small).all() and least.min() < LAW.gives)
 
 
 def _ways(record: LoopRecord, longest_s: float, stated: Pid) -> Iterator[_Seen]:
     """The record as the usual ways of the law see it, the plainest first; longest_s : filter of PV [s]."""
     slope_filters = SLOPE_FILTERS + (MORE_SLOPE_FILTERS if stated.td_s > 0 else ())
     out_of_law, n = _out_of_law(record) | clamped(record.op), len(record)
-    reach = min(n / 20, max(REACH * stated.ti_s / record.dt_s, LONGER))
+    reach = min(n / 20, max(LAW.reach * stated.ti_s / record.dt_s, LONGER))
     lengths = [LONGER**k for k in range(12) if LONGER**k <= reach]
     on_error = ON_ERROR if float(np.ptp(record.sp)) > 0 and not record.sp_estimated else ON_ERROR[:1]
     filters = [f for f in PV_FILTERS if f == 0.0 or f * record.dt_s <= longest_s]
@@ -262,10 +236,10 @@ def compare_laws(record: LoopRecord, period_s: float, stated: Pid) -> LawsCompar
     """
     gains = np.array([stated.kp, stated.kp / stated.ti_s, stated.kp * stated.td_s])
     best, given = None, None
-    for seen in _ways(record, LONGEST_FILTER * period_s, stated):
+    for seen in _ways(record, LAW.longest_filter * period_s, stated):
         if seen.does(gains):
             return LawsCompared(stated, 1.0, 1.0)
-        if best is None or seen.poorness(seen.free) < best.poorness(best.free) - WORTH:
+        if best is None or seen.poorness(seen.free) < best.poorness(best.free) - LAW.worth:
             best = seen
         if given is None or seen.poorness(gains) < given.poorness(gains):
             given = seen
@@ -297,7 +271,7 @@ def _simplest(seen: _Seen, gains: Floats, record_s: float, stated: Pid) -> tuple
         (np.stack((p + whole * d, i)), none),  # kp and ti
         (np.eye(3), none),
     ]
-    enough = AS_WELL * seen.left_over_all(seen.free)
+    enough = LAW.as_well * seen.left_over_all(seen.free)
     for along, held in trials:
         law = _least_squares(seen.moves, seen.weight, along, held)
         pid = _settings(law, record_s, stated)

@@ -40,7 +40,7 @@ def explain(s: Recording, tell: Progress = silent, brought: Floats | None = None
     controller, law = controller_finding_of(s, recorder)
     late = 0.0 if controller is None else controller.values.get(LATE_SAMPLES, 0.0)
     pv = shifted(s.pv, late) if late else s.pv
-    inputs, usable = inputs_of(replace(s, pv=pv)), without_spikes(s.pv, s.usable)
+    inputs, usable = inputs_of(replace(s, pv=pv)), without_spikes(s.pv, s.usable, s.limits.recorder)
     clip = transmitter_end(recorder, pv)
     plain_loop = partial(prepared, inputs, pv - inputs.level, usable, brought, clip, s.limits)
     tell("plain loop")
@@ -81,8 +81,9 @@ def controller_finding_of(s: Recording, recorder: Finding | None) -> tuple[Findi
         return None, None
     if any(straightened(x, s.limits.recorder.straight_law) for x in (s.pv, s.op)):
         return None, None
-    free = s.usable & (s.op > 0.05) & (s.op < 99.95)
-    x = Trends(s.sp, s.pv, s.op, free, s.limits.controller)
+    limits = s.limits.controller
+    free = s.usable & (s.op > limits.at_limit) & (s.op < 100.0 - limits.at_limit)
+    x = Trends(s.sp, s.pv, s.op, free, limits)
     if s.stated is None:
         return None, unstated_law(x)
     return judge(x, s.stated)

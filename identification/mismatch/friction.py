@@ -44,10 +44,8 @@ friction they were 1.1 to 1.8."""
 SHARES, TIMES = (0.4, 0.6, 0.8), (0.12, 0.25, 0.5)
 """Jumps that are tried, in stickbands, and natural times, in samples; ours: faster stems move within a sample, slower
 ones are a lag."""
-FOLLOWED, ENDED = 20, 3
-"""Starts of a stem with mass that are moved by small steps, and that are followed to the end; ours."""
-STEPS, MOST_MOVES = (0.08, 0.04, 0.02, 0.01), 40
-"""Relative steps, and how many are taken at most; ours: a pit is a tenth of the stickband wide."""
+STEPS = (0.08, 0.04, 0.02, 0.01)
+"""Relative steps; ours: a pit is a tenth of the stickband wide."""
 MOVES = (
     *((1, 0, 0, 0), (-1, 0, 0, 0), (0, 1, 0, 0), (0, -1, 0, 0)),
     *((0, 0, 1, 0), (0, 0, -1, 0), (0, 0, 0, 1), (0, 0, 0, -1), (1, 1, 0, 0), (-1, -1, 0, 0)),
@@ -103,7 +101,7 @@ def _as_a_night(p: Problem, play: Fitted, model: Model) -> list[Model]:
 def _with_mass(p: Problem, model: Model) -> list[Model]:
     """The best starts of stems with mass: stickbands about the play's width, jumps and natural times scanned, the
     best moved by ever smaller steps, for slips make pits that a descent does not see from afar."""
-    scanned = []
+    scanned, limits = [], p.limits.search
     for width, share, samples in product(WIDTHS, SHARES, TIMES):
         c = model.c.copy()
         c[Slot.STICKBAND] *= width
@@ -112,9 +110,9 @@ def _with_mass(p: Problem, model: Model) -> list[Model]:
         c[Slot.L] = max(c[Slot.L] - c[Slot.STEM_T], 0.0)
         trial = Model(model.added, c)
         scanned.append((residual_fit(p, trial).loss, trial))
-    best = sorted(scanned, key=lambda pair: pair[0])[:FOLLOWED]
-    moved = (compass(p, trial, loss, _heavier, MOVES, STEPS, most=MOST_MOVES) for loss, trial in best)
-    return [trial for trial, _ in sorted(moved, key=lambda pair: pair[1])[:ENDED]]
+    best = sorted(scanned, key=lambda pair: pair[0])[: limits.masses_moved]
+    moved = (compass(p, trial, loss, _heavier, MOVES, STEPS, most=limits.mass_moves) for loss, trial in best)
+    return [trial for trial, _ in sorted(moved, key=lambda pair: pair[1])[: limits.starts]]
 
 
 def _heavier(p: Problem, model: Model, move: tuple[int, ...], step: float) -> tuple[Model, float]:

@@ -14,39 +14,12 @@ from numba import njit
 from scipy.ndimage import binary_opening
 
 from identification.controller.check import runs
+from identification.limits import LIMITS, LOCATION, SIGNALS
 from identification.record import Floats, Mask
 from identification.signals.robust import robust_deviation
 
-ORDERS = 400
-"""Block orders of the null; ours: a p-value of 0.05 is known within 0.01, and 20,000 samples take under a second."""
-CHANCE = 0.02
-"""Chance, over all features together, of calling any on a residual that is tied to none; ours: one page in fifty."""
-BLOCK_MEMORIES = 3.0
-"""Length of a block in memories of the loop; ours: within it what the loop remembers stays in order."""
-SHORTEST_BLOCK = 30
-"""Fewest samples of a block."""
-MOST_BLOCKS = 150
-"""Most blocks; ours: more only cost memory."""
-FEWEST_BLOCKS = 10
-"""Blocks below which no order says anything; a record shorter than this is located by nothing."""
-MOST_POWER = 16.0
-"""Squared innovations are cut at this many mean squares, four standard deviations: no single event is a place."""
-SHOWN = 12
-"""Parts of a feature's profile, of as many samples each."""
-PIECES = 4
-"""Straight pieces over a level or over time; ours: a step at any place is followed, ten columns are not spent."""
-TURN_SHARE = 0.01
-"""Least travel back, in terms of OP's range, that counts as a turn; ours: less tells nothing of a valve."""
-TURN_NOISE = 4.0
-"""The same in robust standard deviations of OP's change per sample, so that noise alone turns nothing."""
 PAST = 2
 """Samples by which features are older than the innovation; ours: one, and one for what looks at a neighbour."""
-LIMIT = 0.05
-"""Distance from 0 or 100 % of OP that counts as at the limit [% OP]; a historian rounds to that."""
-FEWEST_LEVELS = 12
-"""Values that OP must take for an end of its own range to be a limit; a test signal between two is at none."""
-FEWEST_AT_LIMIT = 10
-"""Samples at a limit below which there is nothing to be told of them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,12 +64,12 @@ def least_turn(op: Floats) -> float:
     change = np.diff(op)
     noise = robust_deviation(change - np.median(change)) if change.size else 0.0
     low, high = np.quantile(op, [0.01, 0.99])
-    return max(TURN_SHARE * float(high - low), TURN_NOISE * noise, 1e-6)
+    return max(LOCATION.turn_share * float(high - low), SIGNALS.outlier * noise, 1e-6)
 
 
-def hats(x: Floats, pieces: int = PIECES) -> Floats:
-    """Straight pieces between even quantiles of a signal, shape (n, k), k <= pieces; none where it stands still."""
-    knots = np.unique(np.quantile(x, np.linspace(0.02, 0.98, pieces + 1)))
+def hats(x: Floats) -> Floats:
+    """Straight pieces between even quantiles of a signal, shape (n, k), none where it stands still."""
+    knots = np.unique(np.quantile(x, np.linspace(0.02, 0.98, LOCATION.pieces + 1)))
     if knots.size < 2:
         return np.zeros((x.size, 0))
     return np.stack([np.interp(x, knots, row) for row in np.eye(knots.size)[1:]], axis=1)
@@ -110,8 +83,9 @@ def ranked(x: Floats) -> Floats:
 
 def at_limits(op: Floats) -> Mask:
     """True where OP is at 0 or 100 %, or stands at an end of its own range for three samples, shape (n,)."""
-    out = (op <= LIMIT) | (op >= 100.0 - LIMIT)
-    ends = (op.max(), op.min()) if np.unique(op).size > FEWEST_LEVELS else ()
+    least = LIMITS.controller.at_limit
+    out = (op <= least) | (op >= 100.0 - least)
+    ends = (op.max(), op.min()) if np.unique(op).size > LOCATION.op_levels else ()
     for end in ends:
         out |= binary_opening(op == end, np.ones(3))
     return out
@@ -147,7 +121,7 @@ def groups(pv: Floats, op: Floats, dt_s: float, late: int, memory: int) -> tuple
         Group("at_limits", limit[:, None].astype(float), limit.astype(float)),
     )
     alive = [g for g in found if g.columns.shape[1] and float(np.ptp(g.columns)) > 0]
-    return tuple(g for g in alive if g.name != "at_limits" or limit.sum() >= FEWEST_AT_LIMIT)
+    return tuple(g for g in alive if g.name != "at_limits" or limit.sum() >= LOCATION.limit_samples)
 
 
 @dataclass(frozen=True, slots=True)
@@ -184,7 +158,7 @@ class Feature:
     @property
     def carries(self) -> bool:
         """Whether the misfit is tied to this feature beside all others."""
-        return self.p <= CHANCE
+        return self.p <= LOCATION.chance
 
 
 @dataclass(frozen=True, slots=True)
@@ -203,9 +177,9 @@ class Located:
 
 def standardized(e: Floats) -> Floats:
     """Power (cut) and sign of innovations about their mean, standardized, shape (n, 2)."""
-    power = np.minimum(e**2 / max(float(np.mean(e**2)), 1e-300), MOST_POWER)
+    power = np.minimum(e**2 / max(float(np.mean(e**2)), 1e-300), SIGNALS.outlier**2)
     size = max(float(np.sqrt(np.mean(e**2))), 1e-300)
-    sign = np.clip(e / size, -np.sqrt(MOST_POWER), np.sqrt(MOST_POWER))
+    sign = np.clip(e / size, -SIGNALS.outlier, SIGNALS.outlier)
     y = np.stack([power, sign], axis=1)
     y -= y.mean(axis=0)
     return y / np.maximum(y.std(axis=0), 1e-12)
@@ -234,22 +208,23 @@ def _basis(x: Floats, scale: float | None = None) -> Floats:
     return np.asarray(u[:, s > 0.03 * max(scale or s[0], 1e-12)])
 
 
-def chances(bases: list[Floats], y: Floats, blocks: int, seed: int) -> tuple[Floats, Floats]:
+def chances(bases: list[Floats], y: Floats, blocks: int) -> tuple[Floats, Floats]:
     """Chance of each group over all groups, (groups,), and each response's excess, (groups, 2).
 
     The largest excess over groups and responses is compared with that of every other order of the blocks (Westfall
     and Young 1993, single step).
     """
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     ends = np.cumsum([0, *(b.shape[1] for b in bases)])
     pairs = block_products(np.concatenate(bases, axis=1), y, blocks)
     here = np.arange(blocks)
     seen = _scores(pairs[here, here].sum(axis=0), ends)
-    null = np.stack([_scores(pairs[here, rng.permutation(blocks)].sum(axis=0), ends) for _ in range(ORDERS)])
+    orders = (rng.permutation(blocks) for _ in range(LOCATION.orders))
+    null = np.stack([_scores(pairs[here, order].sum(axis=0), ends) for order in orders])
     middle, spread = null.mean(axis=0), np.maximum(null.std(axis=0), 1e-9)
     most, excess = ((null - middle) / spread).max(axis=(1, 2)), (seen - middle) / spread
     above = (most[None, :] >= excess.max(axis=1)[:, None]).sum(axis=1)
-    return (1 + above) / (ORDERS + 1), excess
+    return (1 + above) / (LOCATION.orders + 1), excess
 
 
 def block_products(flat: Floats, y: Floats, blocks: int) -> Floats:
@@ -273,9 +248,9 @@ def _scores(products: Floats, ends: np.ndarray) -> Floats:
     return np.asarray((np.cbrt(mean_square) - (1 - 2 / (9 * k))) / np.sqrt(2 / (9 * k)))
 
 
-def profile(x: Floats, y: Floats, parts: int = SHOWN) -> Profile:
+def profile(x: Floats, y: Floats) -> Profile:
     """Innovations y, in standard deviations, along a feature x, shape (n,) each, in parts of as many samples."""
-    order = np.argsort(x, kind="stable")
+    parts, order = LOCATION.profile_parts, np.argsort(x, kind="stable")
     x, y = x[order], y[order]
     levels = np.flatnonzero(np.diff(x, prepend=x[0] - 1.0))
     if levels.size > parts:
@@ -298,24 +273,22 @@ def part_of_range(height: Floats) -> tuple[int, int] | None:
     return int(first), int(last) - 1
 
 
-def located(
-    e: Floats, pv: Floats, op: Floats, judged: Mask, dt_s: float, late: int, memory: int, seed: int = 0
-) -> Located:
+def located(e: Floats, pv: Floats, op: Floats, judged: Mask, dt_s: float, late: int, memory: int) -> Located:
     """Where innovations e [% PV], shape (n,), are large or keep one sign; a record too short is located nowhere.
 
-    late, memory : samples of dead time, and of dead time and time constant together; seed : of the block orders.
+    late, memory : samples of dead time, and of dead time and time constant together.
     """
     count = int(judged.sum())
-    wanted = max(BLOCK_MEMORIES * memory, SHORTEST_BLOCK)
-    blocks = min(max(int(count / wanted), FEWEST_BLOCKS), MOST_BLOCKS)
-    if count // blocks < max(memory, SHORTEST_BLOCK) or float(np.ptp(e[judged])) == 0.0:
+    wanted = max(LOCATION.block_memories * memory, LOCATION.shortest_block)
+    blocks = min(max(int(count / wanted), LOCATION.fewest_blocks), LOCATION.most_blocks)
+    if count // blocks < max(memory, LOCATION.shortest_block) or float(np.ptp(e[judged])) == 0.0:
         return Located((), np.zeros(e.size))
     found = groups(pv, op, dt_s, late, memory)
     columns = [g.columns[judged] for g in found]
     y = standardized(e[judged])
     bases = directions(columns)
     whole = _basis(np.concatenate(columns, axis=1) - np.concatenate(columns, axis=1).mean(axis=0))
-    p, excess = chances(bases, y, blocks, seed)
+    p, excess = chances(bases, y, blocks)
     size = max(float(np.sqrt(np.mean(e[judged] ** 2))), 1e-300)
     features = [
         _feature(g, basis, y, float(p[i]), excess[i], e[judged] / size, judged)

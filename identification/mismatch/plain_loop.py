@@ -18,7 +18,7 @@ from identification.estimation.prediction_error import (
     sensitivities,
 )
 from identification.estimation.start_values import plain_processes
-from identification.limits import LIMITS, ExplainLimits
+from identification.limits import LIMITS, REFERENCE, ExplainLimits, RecorderLimits
 from identification.mismatch.recording import Recording
 from identification.record import Floats, Mask
 from identification.signals.robust import robust_weights
@@ -26,16 +26,6 @@ from identification.simulation.lag import lagged
 from identification.simulation.open_loop import ModelInputs, as_parameters, simulate, through_valve
 from identification.simulation.parameters import Slot
 from identification.simulation.vessel import plain_vessel
-
-SPIKE = 20.0
-"""Jumps there and back, in the median change, from which a single value is none of PV's."""
-BOXES = 32
-"""Past stretches of OP that may act, each with a weight of its own."""
-REACH, MOST_REACH = 8.0, 0.2
-"""How far back they go, in time constants plus dead times, and at most, in the recording; ours: a recycle of seven is
-within it."""
-FEWEST = 3.0
-"""A stretch is at least this many samples."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,13 +45,13 @@ def inputs_of(s: Recording) -> ModelInputs:
     return ModelInputs(s.op, s.dt_s, float(s.op.mean()), level, span, (), neighbour, pv=s.pv - level)
 
 
-def without_spikes(pv: Floats, usable: Mask) -> Mask:
+def without_spikes(pv: Floats, usable: Mask, limits: RecorderLimits = LIMITS.recorder) -> Mask:
     """Usable samples less single values that stand far off both neighbours."""
     rise = np.diff(pv)
     alone = np.zeros(pv.size, dtype=bool)
     size = np.median(np.abs(rise)) + 1e-9
     away = np.minimum(np.abs(rise[:-1]), np.abs(rise[1:]))
-    alone[1:-1] = (away > SPIKE * size) & (np.sign(rise[:-1]) != np.sign(rise[1:]))
+    alone[1:-1] = (away > limits.spike * size) & (np.sign(rise[:-1]) != np.sign(rise[1:]))
     return usable & ~alone
 
 
@@ -133,11 +123,11 @@ def left_freely(p: Problem, fit: Fitted) -> Floats:
 def past_moves(p: Problem, c: Floats, through: Floats) -> list[Floats]:
     """Means of OP behind the valve over past stretches, each shape (n,)."""
     n, dt_s = through.size, p.inputs.dt_s
-    length_s = min(REACH * float(c[Slot.T] + c[Slot.L]), MOST_REACH * n * dt_s)
-    width = max(round(length_s / BOXES / dt_s), int(FEWEST))
+    length_s = min(REFERENCE.reach * float(c[Slot.T] + c[Slot.L]), REFERENCE.most_reach * n * dt_s)
+    width = max(round(length_s / REFERENCE.boxes / dt_s), REFERENCE.least_box)
     total = np.concatenate(([0.0], np.cumsum(through - through.mean())))
-    at = [np.maximum(np.arange(n) - i * width, 0) for i in range(BOXES + 1)]
-    return [(total[at[i]] - total[at[i + 1]]) / width for i in range(BOXES)]
+    at = [np.maximum(np.arange(n) - i * width, 0) for i in range(REFERENCE.boxes + 1)]
+    return [(total[at[i]] - total[at[i + 1]]) / width for i in range(REFERENCE.boxes)]
 
 
 def bent_moves(p: Problem, c: Floats, through: Floats) -> list[Floats]:

@@ -26,8 +26,6 @@ from identification.signals.filters import without_lines
 from identification.simulation.open_loop import simulate
 from identification.simulation.parameters import Slot
 
-BLOCKS = 20
-"""Parts of a record over which a gain has to be spread."""
 ENDS_OF_SIGNAL = ("opspan", "pvspan")
 """Scales of constants that are places in a signal's range."""
 ALL = slice(None)
@@ -77,17 +75,18 @@ def is_in_sound_valves(p: Problem, fit: Fitted, effect: Effect) -> bool:
 
 def is_one_move(p: Problem) -> bool:
     """Whether OP moves in two parts of the record alone: one experiment, of which no part is left to prove it on."""
-    travel = np.sort([float(np.abs(np.diff(part)).sum()) for part in np.array_split(p.inputs.op, BLOCKS)])
-    return float(travel[-2:].sum()) > p.limits.proof.one_move * float(travel.sum())
+    limits = p.limits.proof
+    parts = np.array_split(p.inputs.op, limits.parts)
+    travel = np.sort([float(np.abs(np.diff(part)).sum()) for part in parts])
+    return float(travel[-2:].sum()) > limits.one_move * float(travel.sum())
 
 
 def is_spread(p: Problem, better: Fitted, worse: Fitted) -> bool:
-    """Whether a share of the gain remains without the two of BLOCKS parts that pay most; True where OP moves in two
-    alone."""
+    """Whether a share of the gain remains without the two parts that pay most; True where OP moves in two."""
     if is_one_move(p):
         return True
     won = 0.5 * p.weight * (worse.e**2 - better.e**2) / max(better.loss, 1e-30)
-    parts = np.sort([part.sum() for part in np.array_split(won, BLOCKS)])
+    parts = np.sort([part.sum() for part in np.array_split(won, p.limits.proof.parts)])
     return float(parts[:-2].sum()) > p.limits.proof.spread * float(parts.sum())
 
 

@@ -14,9 +14,6 @@ from identification.limits import LIMITS, ExplainLimits, RecorderLimits
 from identification.models import Backlash, Estimate, Fopdt, Stiction
 from identification.record import Floats, Mask
 
-TYPICAL_SCAN_S = 1.0
-"""Scan of a controller that is not stated [s]; most control systems execute loops at 0.25 to 1 s."""
-
 
 @dataclass(frozen=True, slots=True)
 class SeenInCycles:
@@ -77,10 +74,10 @@ class Recording:
 
     @property
     def circumstances(self) -> Circumstances:
-        """By which effects are asked about or not; a controller that is not stated has TYPICAL_SCAN_S."""
-        scans = self.dt_s / TYPICAL_SCAN_S if self.stated is None else self.stated.scans
-        thinned = scans >= self.limits.controller.thinned
-        return Circumstances(self.kind, not thinned, self.free_valve)
+        """By which effects are asked about or not; a controller that is not stated has the usual scan."""
+        limits = self.limits.controller
+        scans = self.dt_s / limits.typical_scan_s if self.stated is None else self.stated.scans
+        return Circumstances(self.kind, scans < limits.thinned, self.free_valve)
 
 
 STEP = "step_pct"

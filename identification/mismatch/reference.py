@@ -17,6 +17,7 @@ import numpy as np
 
 from identification.estimation.noise import whitened
 from identification.estimation.prediction_error import Fitted, Problem
+from identification.limits import REFERENCE
 from identification.mismatch.plain_loop import bent_moves, past_moves, unfollowed
 from identification.record import Floats
 from identification.simulation.lag import lagged
@@ -24,26 +25,15 @@ from identification.simulation.open_loop import simulate, through_valve
 from identification.simulation.parameters import Slot
 from identification.simulation.vessel import plain_vessel
 
-FOLDS = 5
-"""Parts of a record, each of which is foretold from the others."""
 PRIORS = (0.003, 0.3)
 """Precisions of the ridge's prior over that of a sample, per sample, of which the better counts: of .003 to 3 strange
 physics that rings stands out by the first, all else by the second (proofs/concealed)."""
-CALM = 0.05
-"""The same of a clock's wave, whose signals have half the size; .015 and .05 do alike."""
-FAST = 0.3
-"""Time constants over which a move is a move still; ours."""
-MEMORIES, OF_RECORD = (3.0, 10.0, 30.0, 100.0), 0.05
-"""How far back the loop's history reaches, in time constants, and at most in the recording: what lasts longer is a
-drift; ours."""
+MEMORIES = (3.0, 10.0, 30.0, 100.0)
+"""How far back the loop's history reaches, in time constants; ours."""
 LEVELS, BANDS = (0.2, 0.4, 0.6, 0.8), (0.03, 0.15, 0.4)
 """Quantiles at which something may switch, and its hysteresis in the range; ours."""
-HARMONICS, FEWEST_CYCLES, FINER = 16, 3, 8
-"""Of a clock's wave, for what is switched leaves innovations where it is and none between; cycles that a record has
-to hold; lines of the spectrum for one of the record's, for the last harmonic has to keep step over it. With three
-harmonics a pump by the clock stood out by 4 nat in the median of 21, with sixteen by 41, and nothing else did."""
-WIDEST = 5.0
-"""Standard deviations to which a move that the model foretells is cut; ours: one move is no law."""
+FINER = 8
+"""Lines of a clock's spectrum for one of the record's, for the last harmonic has to keep step over it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +49,7 @@ class Loop:
 
     def ahead(self, x: Floats) -> Floats:
         """What a signal, shape (n,), is ahead of its own lag."""
-        return x - lagged(x, FAST * self.lag_s, self.dt_s)
+        return x - lagged(x, REFERENCE.fast * self.lag_s, self.dt_s)
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,7 +108,7 @@ def by_switch(o: Loop) -> list[Floats]:
 def by_history(o: Loop) -> list[Floats]:
     """Load and gain that go with where PV has been, and with what the valve has travelled."""
     travel = np.abs(np.diff(o.flow, prepend=o.flow[0]))
-    longest_s = OF_RECORD * o.flow.size * o.dt_s
+    longest_s = REFERENCE.of_record * o.flow.size * o.dt_s
     out = []
     for memory_s in (m * o.lag_s for m in MEMORIES if m == MEMORIES[0] or m * o.lag_s <= longest_s):
         been, gone = (lagged(x - x.mean(), memory_s, o.dt_s) for x in (o.pv, travel))
@@ -137,8 +127,7 @@ def by_direction(o: Loop) -> list[Floats]:
 def by_sensor(p: Problem, fit: Fitted) -> list[Floats]:
     """Of innovations as they are: where PV stands, and the move of PV that is foretold, by its size and way."""
     one, two = (np.concatenate((np.full(k, p.y[0]), p.y[:-k])) for k in (1, 2))
-    move = p.y - fit.e - one
-    move = np.clip(move, -WIDEST * np.std(move), WIDEST * np.std(move))
+    move = _bounded(p.y - fit.e - one)
     stands = (one == two).astype(float)
     return [stands, move * stands, move * np.abs(move), np.maximum(move, 0.0), np.abs(move)]
 
@@ -179,9 +168,15 @@ def foretold(p: Problem, fit: Fitted, clock: bool = True) -> Foretold:
     return best
 
 
+def _bounded(x: Floats) -> Floats:
+    """A signal, shape (n,), with its widest moves cut."""
+    most = REFERENCE.widest * np.std(x)
+    return np.clip(x, -most, most)
+
+
 def _folds(n: int) -> Iterator[slice]:
     """The parts of a record."""
-    ends = np.linspace(0, n, FOLDS + 1).astype(int)
+    ends = np.linspace(0, n, REFERENCE.folds + 1).astype(int)
     return (slice(a, b) for a, b in pairwise(ends))
 
 
@@ -198,20 +193,21 @@ def _by_ridge(e: Floats, x: Floats, prior: float) -> Floats:
 
 def _by_clock(e: Floats, root: Floats) -> Floats:
     """The same where a wave foretells it, of the period that has most in all its harmonics in the other parts."""
-    n, out, each = e.size, np.empty(e.size), np.arange(1, HARMONICS + 1)
-    bounded = np.clip(e, -WIDEST * np.std(e), WIDEST * np.std(e))
+    n, out, each = e.size, np.empty(e.size), np.arange(1, REFERENCE.harmonics + 1)
+    bounded = _bounded(e)
     for part in _folds(n):
         known = np.ones(n, dtype=bool)
         known[part] = False
         power = np.abs(np.fft.rfft(bounded * known, FINER * n)) ** 2
-        lines = np.arange(FINER * FEWEST_CYCLES, power.size // (HARMONICS + 1))
+        lines = np.arange(FINER * REFERENCE.clock_cycles, power.size // (each.size + 1))
         if lines.size == 0:
             return e
         angle = 2.0 * np.pi * lines[np.argmax(power[np.outer(each, lines)].sum(axis=0))] / (FINER * n)
         turn = np.outer(np.arange(n) * angle, each)
         wave = np.concatenate((np.cos(turn), np.sin(turn)), axis=1) * root[:, None]
         gram, slope = wave[known].T @ wave[known], wave[known].T @ e[known]
-        out[part] = e[part] - wave[part] @ np.linalg.solve(gram + CALM * n * np.eye(2 * HARMONICS), slope)
+        ridge = REFERENCE.calm * n * np.eye(2 * each.size)
+        out[part] = e[part] - wave[part] @ np.linalg.solve(gram + ridge, slope)
     return out
 
 

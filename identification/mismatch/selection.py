@@ -128,23 +128,24 @@ def worth_following(p: Problem, least: float) -> float:
 def first_try(x: CandidateInputs, span: Span, row: Variant, least: float) -> tuple[list[Model], Candidate]:
     """A row's starts, the best first, and the candidate that a few steps make of the first; a start that will not
     come to anything worth following is left."""
-    p, near = x.p, span.near
+    p, near, limits = x.p, span.near, x.p.limits.search
     models = start_models(x, near, row)
     if row.needs != "line":
-        models = screened(span, models)[:3]
+        models = screened(span, models)[: limits.starts]
     first = models if row.needs == "line" else models[:1]
     if row.modes:
         first = first + mode_starts(p, near, row)
     worth = penalty(p, row) + worth_following(p, least)
     aim = near.loss * math.exp(-2.0 * worth / p.count)
-    return models, best_of(p, near, first, p.limits.search.screen_steps, aim)
+    return models, best_of(p, near, first, limits.screen_steps, aim)
 
 
 def followed(p: Problem, near: Fitted, first: Candidate, models: list[Model], least: float) -> Candidate:
-    """A candidate of the first round followed to the end, from there and from its second and third start."""
+    """A candidate of the first round followed to the end, from there and from its next starts."""
     if first.penalised < worth_following(p, least) and (least > 0.0 or not p.by_simulation):
         return first
-    best = best_of(p, near, [first.fit.model, *models[1:3]], p.limits.search.full_steps)
+    limits = p.limits.search
+    best = best_of(p, near, [first.fit.model, *models[1 : limits.starts]], limits.full_steps)
     return best if best.penalised > first.penalised else first
 
 

@@ -23,21 +23,8 @@ from identification.simulation.vessel import plain_vessel
 
 ANY = Circumstances()
 """Nothing that would leave an effect out."""
-LINES = 4
-"""Lines that are tried."""
-LINE_SIDE = 25
-"""Half of the lines whose median is a line's surroundings."""
 LEAD = 200
 """Samples of rest before a pulse is whitened; ours: the noise model reaches 117 back."""
-JUMPS = 2.0
-"""Times that jumps of PV itself must explain more than load steps before they are believed; ours: in steps that came
-through the process up to 1.2, in bursts of a sensor from 4 on."""
-NEAR, DELAYED = 3, 20
-"""Samples about a step's place in which its onset is looked for, and how much later that of a jump of PV; ours."""
-GAP_SAMPLES = 5
-"""Missing samples from which OP may have moved unseen; ours: an outlier is one or two."""
-FORGOTTEN = 3.0
-"""Time constants after which a gap's OP is forgotten; ours: a twentieth is left."""
 DELAYS = 40
 """Dead times tried at most for two modes, from none to that of the plain loop, which a missing lag or zero has
 lengthened; a mode that answers at once is found to the sample alone."""
@@ -45,8 +32,6 @@ LONGER = (0.7, 1.0, 1.4, 2.0)
 """Time constants tried for the first mode, in that of the plain loop."""
 LEADING = 0.95
 """First coefficient of the noise model that knows nothing: nearly a difference."""
-MODES_KEPT = 2
-"""Starts with two modes that are kept under each noise model."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,10 +94,11 @@ def _best_place(e: Floats, pulse: Floats, shut: Mask) -> int:
 
 def after_gaps(p: Problem, fit: Fitted) -> Mask:
     """True in gaps and until what OP did in them has died away in PV, shape (n,): no step can be told there."""
-    held = round(float(fit.model.c[Slot.L] + FORGOTTEN * fit.model.c[Slot.T]) / p.inputs.dt_s)
+    limits = p.limits.search
+    held = round(float(fit.model.c[Slot.L] + limits.forgotten * fit.model.c[Slot.T]) / p.inputs.dt_s)
     out = np.zeros(p.y.size, dtype=bool)
     for first, last in runs(~p.usable):
-        if last - first >= GAP_SAMPLES:
+        if last - first >= limits.gap_samples:
             out[max(first - 1, 0) : last + held] = True
     return out
 
@@ -121,11 +107,11 @@ def at_inlet(p: Problem, fit: Fitted) -> bool:
     """Whether the steps found by step_places came through the process, or PV jumped by itself, as a sensor does."""
     e = fit.e * (p.weight > 0)
     through, jump = step_pulse(p, fit), _pulse(np.ones(p.y.size), p, fit)
-    came, jumped = 0.0, 0.0
+    near, came, jumped = p.limits.search.step_near, 0.0, 0.0
     for at in dict.fromkeys(p.inputs.step_at):
-        came += max(_share(e, through, at + i) for i in range(-NEAR, NEAR + 1))
-        jumped += max(_share(e, jump, at + i) for i in range(-NEAR, DELAYED))
-    return jumped < JUMPS * came
+        came += max(_share(e, through, at + i) for i in range(-near, near + 1))
+        jumped += max(_share(e, jump, at + i) for i in range(-near, p.limits.search.jump_late))
+    return jumped < p.limits.search.pv_jumps * came
 
 
 def _share(e: Floats, pulse: Floats, at: int) -> float:
@@ -139,11 +125,12 @@ def line_frequencies(p: Problem, fit: Fitted) -> tuple[float, ...]:
     """Angular frequencies [rad/s] of the lines that stand out most from their surroundings in the innovations."""
     e = fit.e * (p.weight > 0)
     power = np.abs(np.fft.rfft(e, 2 * e.size)) ** 2
-    share = power / np.maximum(median_filter(power, 2 * LINE_SIDE, mode="nearest"), 1e-30)
+    limits = p.limits.search
+    share = power / np.maximum(median_filter(power, 2 * limits.line_side, mode="nearest"), 1e-30)
     share[:8] = 0.0
     share[power.size // 3 :] = 0.0
     found = []
-    for _ in range(LINES):
+    for _ in range(limits.lines):
         k = int(np.argmax(share))
         found.append(math.pi * k / (e.size * p.inputs.dt_s))
         share[max(k - 4, 0) : k + 5] = 0.0
@@ -223,7 +210,7 @@ def mode_starts(p: Problem, near: Fitted, row: Variant) -> list[Model]:
     for ar in (near.ar, blind) if near.ar.size else (near.ar,):
         models = [model for _, model in sorted(grid_of_modes(p, near, row, ar), key=lambda point: point[0])]
         low, high = row.mode_share
-        out += [model for model in models if low < model.c[Slot.SHARE] < high][:MODES_KEPT]
+        out += [model for model in models if low < model.c[Slot.SHARE] < high][: p.limits.search.modes_kept]
     return out
 
 

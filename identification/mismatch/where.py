@@ -11,6 +11,7 @@ import numpy as np
 from identification.controller.check import runs
 from identification.estimation.noise import whitened
 from identification.estimation.prediction_error import Fitted, Problem
+from identification.limits import LOCATION
 from identification.mismatch.explanation import Explanation
 from identification.mismatch.location import Located, located
 from identification.mismatch.recording import Recording
@@ -18,27 +19,21 @@ from identification.record import Floats, Mask
 from identification.simulation.open_loop import simulate
 from identification.simulation.parameters import Slot
 
-PARTS = 40
-"""Parts of the record that spans are made of."""
-CARRIES = 0.5
-"""Share of the gain that the named spans carry together."""
 SIGNALS: Mapping[str, list[str]] = {
     "recorder": ["PV", "OP"],
     "sensor": ["PV"],
     "controller": ["SP", "PV", "OP"],
     "load": ["PV"],
 }
-FEWEST_MEMORY = 2
-"""A loop is taken to remember at least this many samples."""
 
 
 def carrying(won: Floats, dt_s: float) -> list[list[float]]:
-    """Parts that together carry CARRIES of a gain, neighbours joined: first and last (excluded) time of each [s]."""
-    edges = np.linspace(0, won.size, PARTS + 1).astype(int)
+    """Parts that together carry a share of a gain, neighbours joined: first and last (excluded) time of each [s]."""
+    edges = np.linspace(0, won.size, LOCATION.span_parts + 1).astype(int)
     parts = np.maximum([won[a:b].sum() for a, b in pairwise(edges)], 0.0)
     order = np.argsort(-parts)
-    count = int(np.searchsorted(np.cumsum(parts[order]), CARRIES * parts.sum())) + 1
-    chosen = np.zeros(PARTS, dtype=bool)
+    count = int(np.searchsorted(np.cumsum(parts[order]), LOCATION.carried * parts.sum())) + 1
+    chosen = np.zeros(LOCATION.span_parts, dtype=bool)
     chosen[order[:count]] = True
     return [[int(edges[a]) * dt_s, int(edges[b]) * dt_s] for a, b in runs(chosen)]
 
@@ -82,8 +77,8 @@ def located_in(p: Problem, fit: Fitted, s: Recording) -> Located:
     """Where a fit's innovations are large or keep one sign."""
     late_s, lag_s = float(fit.model.c[Slot.L]), float(fit.model.c[Slot.T])
     late = min(round(late_s / s.dt_s), s.pv.size // 4)
-    memory = max(round((late_s + lag_s) / s.dt_s), FEWEST_MEMORY)
-    return located(fit.e, s.pv, s.op, p.weight > 0, s.dt_s, late, min(memory, s.pv.size), 0)
+    memory = max(round((late_s + lag_s) / s.dt_s), LOCATION.least_memory)
+    return located(fit.e, s.pv, s.op, p.weight > 0, s.dt_s, late, min(memory, s.pv.size))
 
 
 def won_over(p: Problem, plain: Fitted, best: Fitted) -> tuple[Floats, Floats]:

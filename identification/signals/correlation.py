@@ -8,20 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft
 
+from identification.limits import SIGNALS
 from identification.record import Floats, Mask
 
 CONSTANT = 1e-12
 """Share of its mean square under which an error's variance is a rounding."""
-SMOOTHING = 0.1
-"""The error is averaged over this share of the loop's own time first, for noise is not swiftness [-]."""
-COARSEST = 0.2
-"""Interval of samples beyond which, in the loop's own time, one sample's noise passes for memory [-]; ours."""
-ORDER = 15
-"""Lags of the predictor of minimum variance; ours."""
-SAMPLES = 6
-"""Samples per dead time that the error is thinned to, so that the lags span a few dead times."""
-MOST = 4000
-"""Samples used at most, the latest."""
 
 
 def lag_sums(x: Floats, most: int) -> Floats:
@@ -123,9 +114,9 @@ def correlation_time(error: Floats, good: Mask, dt_s: float, scale_s: float) -> 
     the answer has steps of a tenth of it. None where the record holds fewer than ten of `scale_s`, samples are
     coarser than a fifth of it, or nothing moves.
     """
-    if not math.isfinite(scale_s) or dt_s > COARSEST * scale_s:
+    if not math.isfinite(scale_s) or dt_s > SIGNALS.coarsest * scale_s:
         return None
-    width = max(round(SMOOTHING * scale_s / dt_s), 1)
+    width = max(round(SIGNALS.smoothing * scale_s / dt_s), 1)
     blocks = error.size // width
     if blocks * width * dt_s < 10.0 * scale_s:
         return None
@@ -150,23 +141,23 @@ def harris_index(error: Floats, usable: Mask, dt_s: float, dead_time_s: float) -
 
     error, usable : shape (n,). None where fewer than 200 samples are usable or the error is constant.
     """
-    step = max(int(dead_time_s / SAMPLES / dt_s), 1)
-    e, use = error[::step][-MOST:], usable[::step][-MOST:]
+    step = max(int(dead_time_s / SIGNALS.harris_step / dt_s), 1)
+    e, use = error[::step][-SIGNALS.harris_most :], usable[::step][-SIGNALS.harris_most :]
     ahead = max(round(dead_time_s / (step * dt_s)), 1) + 1
-    reach = ahead + ORDER
+    reach = ahead + SIGNALS.harris_lags
     n = e.size - reach
-    if n < 200:
+    if n < SIGNALS.harris_least:
         return None
     e = e - e[use].mean() if use.any() else e
-    rows = np.stack([e[reach - ahead - k : reach - ahead - k + n] for k in range(ORDER)])
+    rows = np.stack([e[reach - ahead - k : reach - ahead - k + n] for k in range(SIGNALS.harris_lags)])
     seen = np.concatenate(([0], np.cumsum(~use)))
     whole = seen[reach + 1 : reach + 1 + n] == seen[:n]
     y = e[reach : reach + n][whole]
     power = float(y @ y)
-    if y.size < 200 or power <= 0:
+    if y.size < SIGNALS.harris_least or power <= 0:
         return None
     x = rows[:, whole]
     gram = x @ x.T
-    beta = np.linalg.solve(gram + 1e-9 * np.trace(gram) * np.eye(ORDER), x @ y)
+    beta = np.linalg.solve(gram + 1e-9 * np.trace(gram) * np.eye(SIGNALS.harris_lags), x @ y)
     left = y - beta @ x
     return float(np.clip(left @ left / power, 0.0, 1.0))

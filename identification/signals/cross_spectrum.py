@@ -17,20 +17,12 @@ from numpy.typing import NDArray
 from scipy.fft import ifft, next_fast_len
 from scipy.special import betainccinv
 
+from identification.limits import SIGNALS
 from identification.record import Floats
 from identification.signals.spectrum import Complex
 
-HALF_BAND = 0.08
-"""Half width of the band that is compared, as a share of the frequency; ours."""
-PIECE, PIECE_LINES = 0.03, 8
-"""Width of the pieces of the band within which the phase may be taken as constant, as a share of the frequency and in
-lines at least: the delay from loop to loop turns it over the whole band; ours."""
-LEAST_LINES = 4
-"""Fewest lines on each side of the frequency."""
 HANN_WIDTH = 1.8
 """Lines that a Hann taper makes one: neighbours correlate by 2/3, next ones by 1/6, and squares add up."""
-UNEVEN = 1.4
-"""Pieces that count as one, for those with more power count more: mean square over squared mean of the products."""
 DRIFT_BLOCKS = 64
 """Parts of a record whose phases are compared for a drift."""
 DRIFTS = np.arange(-60, 61) / 20.0
@@ -45,8 +37,9 @@ def tapered(lines: Complex) -> Complex:
 
 def band(line: float) -> tuple[int, int, int]:
     """First line, line after the last and width of the pieces [lines] of the band about a frequency [lines]."""
-    half = max(HALF_BAND * line, LEAST_LINES)
-    return max(round(line - half), 1), round(line + half) + 1, max(PIECE_LINES, round(PIECE * line))
+    half = max(SIGNALS.shared_band * line, SIGNALS.side_lines)
+    width = max(SIGNALS.piece_lines, round(SIGNALS.piece * line))
+    return max(round(line - half), 1), round(line + half) + 1, width
 
 
 @cache
@@ -59,7 +52,7 @@ def chance_coherence(lines: int, width: int, chance: float) -> float:
     lines, width : lines of the band, and of one of its pieces.
     """
     free = max(width / HANN_WIDTH, 1.5)
-    pieces = max(lines // width / UNEVEN, 1.0)
+    pieces = max(lines // width / SIGNALS.uneven, 1.0)
     spread = pieces * (free + 1) - 1
     return float(betainccinv(spread / free, spread * (1 - 1 / free), chance))
 

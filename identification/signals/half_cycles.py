@@ -12,21 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.fft import ifft, irfft, next_fast_len
 
+from identification.limits import SIGNALS
 from identification.record import Floats
 from identification.signals.correlation import rhythm
 from identification.signals.robust import robust_deviation
-from identification.signals.spectrum import HALF_BAND, SIDES, Spectrum, band_signal
-
-LEVEL = 1.5
-"""Size to which every half-cycle is cut, in medians of the band's absolute value [-]; ours: a sine is cut by nothing
-(its top is 1.41 medians), so only what stands out of the loop's usual half-cycles is."""
-TURN = 0.25
-"""A half-cycle ends where the signal is beyond this share of its rms on the other side [-]; ours."""
-FIRM_TURN = 0.6
-"""The same in a wide band, where what is faster than the cycle wiggles about zero [-]; ours."""
-SHAPE_BAND = (4.0, 8.0)
-"""Shape is read from f/4 to 8 f: a square keeps its edges there, and halves of half to twice their length their
-fundamental; ours."""
+from identification.signals.spectrum import Spectrum, band_signal
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +38,7 @@ class HalfCycles:
         return robust_deviation(whole - np.median(whole))
 
 
-def half_cycles(x: Floats, dt_s: float, turn: float = TURN) -> HalfCycles:
+def half_cycles(x: Floats, dt_s: float, turn: float = SIGNALS.turn) -> HalfCycles:
     """Half-cycles of a signal without drift, shape (n,), at interval dt_s [s]; those at the ends left out."""
     beyond = turn * math.sqrt(float(x @ x) / max(x.size, 1))
     side = np.where(x > beyond, 1, np.where(x < -beyond, -1, 0))
@@ -69,7 +59,7 @@ def levelled_correlation(x: Floats, dt_s: float, period_s: float) -> float:
     usual = float(np.median(np.abs(x)))
     if usual <= 0.0:
         return 0.0
-    found = rhythm(np.clip(x, -LEVEL * usual, LEVEL * usual), dt_s, period_s)
+    found = rhythm(np.clip(x, -SIGNALS.level * usual, SIGNALS.level * usual), dt_s, period_s)
     return min(found.first, 1.5 * found.trough)
 
 
@@ -89,14 +79,10 @@ def usual_prominence(s: Spectrum, line: float) -> float:
     As the prominence of spectrum.bands, whose mean over time one event can fill: a step in the surroundings, a burst
     at the peak. For Gaussian noise median and mean have one ratio in every band, so both agree.
     """
-    near = _usual_power(s, line / HALF_BAND, line * HALF_BAND)
-    low = _usual_power(s, line / SIDES[1], line / SIDES[0])
-    high = _usual_power(s, line * SIDES[0], min(line * SIDES[1], s.lines.size - 2))
+    near = _usual_power(s, line / SIGNALS.peak_band, line * SIGNALS.peak_band)
+    low = _usual_power(s, line / SIGNALS.side_far, line / SIGNALS.side_near)
+    high = _usual_power(s, line * SIGNALS.side_near, min(line * SIGNALS.side_far, s.lines.size - 2))
     return near / max(math.sqrt(low * high), 1e-12 * near + 1e-300)
-
-
-SIZE_BAND = 1.6
-"""Factor about a frequency within which a cycle's size is read; ours, as that of envelopes."""
 
 
 def size_kurtosis(s: Spectrum, line: float) -> float:
@@ -105,7 +91,7 @@ def size_kurtosis(s: Spectrum, line: float) -> float:
     Noise through a resonance is Gaussian, its envelope Rayleigh's, and has 3 (Rice 1945); a load from a machine, a
     limit cycle, a loop between OP's limits keep their size.
     """
-    x, _ = band_signal(s, line, SIZE_BAND)
+    x, _ = band_signal(s, line, SIGNALS.size_band)
     power = float(x @ x) / x.size
     return float(np.mean(x**4)) / power**2 if power > 0.0 else 3.0
 
@@ -126,8 +112,8 @@ class Shape:
 
 def shape(s: Spectrum, line: float) -> Shape:
     """Shape of the signal about a frequency, wide enough for halves that differ and for edges."""
-    first = max(math.ceil(line / SHAPE_BAND[0]), 1)
-    last = min(int(line * SHAPE_BAND[1]), s.lines.size - 1)
+    first = max(math.ceil(line / SIGNALS.shape_below), 1)
+    last = min(int(line * SIGNALS.shape_above), s.lines.size - 1)
     m = next_fast_len(max(int(line * 24), 2 * last + 2, 16), real=True)
     cut = np.zeros(m // 2 + 1, dtype=np.complex128)
     cut[first : last + 1] = s.lines[first : last + 1]
@@ -135,6 +121,6 @@ def shape(s: Spectrum, line: float) -> Shape:
     power = float(x @ x) / m
     if power <= 0.0:
         return Shape(3.0, 0.0, 0.0)
-    halves = half_cycles(x, s.duration_s / m, FIRM_TURN).duration_s
+    halves = half_cycles(x, s.duration_s / m, SIGNALS.firm_turn).duration_s
     spread = float(np.log(halves).std()) if halves.size > 2 else math.inf
     return Shape(float(np.mean(x**4)) / power**2, spread, power / s.variance)

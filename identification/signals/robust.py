@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from identification.limits import SIGNALS
 from identification.record import Floats, Mask
 
 NORMAL_QUARTILE = 0.6745
@@ -15,13 +16,8 @@ def robust_deviation(e: Floats) -> float:
     return float(np.median(np.abs(e))) / NORMAL_QUARTILE
 
 
-OUTLIER = 4.0
-"""Standard deviations [-] beyond which one innovation (a step of the load, a spike) counts less; ours: it leaves
-0.006 % of Gaussian innovations cut."""
-
-
 def clipped_gain(mine: Floats, other: Floats) -> Floats:
-    """Gain in log likelihood [nat] at every innovation of one model over another's, none counting beyond OUTLIER.
+    """Gain in log likelihood [nat] at every innovation of one model over another's, none counting beyond an outlier.
 
     mine, other : shape (n,), innovations of the two, in one unit; the first give the scale. Returns shape (n,), zero
     where the first have no scale.
@@ -29,11 +25,11 @@ def clipped_gain(mine: Floats, other: Floats) -> Floats:
     scale = robust_deviation(mine)
     if not scale > 0:
         return np.zeros(mine.size)
-    top = (OUTLIER * scale) ** 2
+    top = (SIGNALS.outlier * scale) ** 2
     return (np.minimum(other**2, top) - np.minimum(mine**2, top)) / (2 * scale**2)
 
 
 def robust_weights(e: Floats, inside: Mask) -> Floats:
-    """What each innovation counts in a fit, shape (n,): 1 within OUTLIER, falling beyond (Huber 1964), 0 outside."""
+    """What each innovation counts in a fit, shape (n,): 1, falling from an outlier on (Huber 1964), 0 outside."""
     size = np.abs(e) / max(robust_deviation(e[inside]), 1e-12)
-    return np.where(inside, np.minimum(1.0, OUTLIER / np.maximum(size, OUTLIER)), 0.0)
+    return np.where(inside, np.minimum(1.0, SIGNALS.outlier / np.maximum(size, SIGNALS.outlier)), 0.0)

@@ -4,15 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from identification.limits import SIGNALS
 from identification.record import Floats, Mask
 from identification.signals.spectrum import Complex
 
-SMOOTHING = 0.1
-"""Half width of the band over which a frequency response is taken as constant, as a share of its frequency."""
-FEWEST = 4
-"""Fewest lines on each side over which it is averaged."""
-DIES_S = 2.0
-"""Periods after a move of the set point in which its response dies away; ours."""
 SMALLEST = 1e-200
 """Power of a set point that stands still but for rounding."""
 
@@ -31,7 +26,7 @@ def without_setpoint(error: Complex, sp: Complex) -> Complex:
     error, sp : complex, shape (m,), lines of both signals.
     """
     k = np.arange(error.size)
-    half = np.maximum((SMOOTHING * k).astype(np.int64), FEWEST)
+    half = np.maximum((SIGNALS.response_band * k).astype(np.int64), SIGNALS.side_lines)
     first, last = np.maximum(k - half, 0), np.minimum(k + half, error.size - 1)
     auto = _running((sp.real**2 + sp.imag**2).astype(np.complex128), first, last).real
     cross = _running(error * sp.conj(), first, last)
@@ -48,13 +43,13 @@ def amplitude_at_rest(error: Floats, sp: Floats, usable: Mask, period: float) ->
     """Amplitude of a period where the set point has stood still for long, and the stretches that tell it.
 
     A sine with a straight line is fitted to each stretch of one period, half of one apart, in which every sample is
-    usable and whose set point has not moved for two periods before its end; see DIES_S.
+    usable and whose set point has not moved for two periods before its end.
 
     error, sp : shape (n,); usable : bool, shape (n,); period : [samples]. Returns amplitude : root mean square of the
     stretches' amplitudes, in the unit of the error; 0 without a stretch.
     """
     n = max(round(period), 4)
-    moved = np.convolve(moves(sp), np.ones(round(DIES_S * n)))[: sp.size] > 0
+    moved = np.convolve(moves(sp), np.ones(round(SIGNALS.dies * n)))[: sp.size] > 0
     out = np.concatenate(([0], np.cumsum(moved | ~usable)))
     first = np.arange(0, sp.size - n + 1, max(n // 2, 1))
     first = first[out[first + n] == out[first]]

@@ -9,19 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft
 
+from identification.limits import SIGNALS
 from identification.record import Floats
 
 Complex = NDArray[np.complex128]
 
-HALF_BAND = 1.2
-"""A peak's band reaches from f/1.2 to 1.2 f."""
-SIDES = (1.6, 4.0)
-"""The surroundings of a peak reach from f/4 to f/1.6 and from 1.6 f to 4 f."""
 PER_OCTAVE = 6
 """Centre frequencies tried per octave."""
-WIDE_BAND = 2.5
-"""Correlations are taken of the signal within a factor of 2.5 of a frequency, which keeps drift and sensor
-noise out and leaves flat noise without a peak at its own centre."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,36 +80,37 @@ def _mean(total: Floats, first: Floats, last: Floats, top: int) -> Floats:
     return (total[b + 1] - total[a]) / (b - a + 1)
 
 
+def _about(power: Floats, line: Floats) -> tuple[Floats, Floats]:
+    """Mean power about frequencies [lines], and the geometric mean of that on both sides, shape (b,) each."""
+    total, top = np.concatenate(([0.0], np.cumsum(power))), power.size - 2
+    near = _mean(total, line / SIGNALS.peak_band, line * SIGNALS.peak_band, top)
+    low = _mean(total, line / SIGNALS.side_far, line / SIGNALS.side_near, top)
+    high = _mean(total, line * SIGNALS.side_near, np.minimum(line * SIGNALS.side_far, top), top)
+    return near, np.sqrt(low * high)
+
+
 def bands(power: Floats, fewest_lines: float) -> Bands:
     """Power about trial frequencies over the geometric mean of the power on both sides.
 
     A power law has prominence 1 everywhere; the knee of a double lag reaches 2.8.
     """
-    top = power.size - 2
-    count = max(int(math.log2(max(top / HALF_BAND / fewest_lines, 1.0)) * PER_OCTAVE), 0) + 1
+    highest = (power.size - 2) / SIGNALS.peak_band
+    count = max(int(math.log2(max(highest / fewest_lines, 1.0)) * PER_OCTAVE), 0) + 1
     line = fewest_lines * 2.0 ** (np.arange(count) / PER_OCTAVE)
-    line = line[line * HALF_BAND <= top]
-    total = np.concatenate(([0.0], np.cumsum(power)))
-    near = _mean(total, line / HALF_BAND, line * HALF_BAND, top)
-    low = _mean(total, line / SIDES[1], line / SIDES[0], top)
-    high = _mean(total, line * SIDES[0], np.minimum(line * SIDES[1], top), top)
+    line = line[line * SIGNALS.peak_band <= power.size - 2]
+    near, sides = _about(power, line)
     floor = 1e-12 * max(float(power.max(initial=0.0)), 1e-300)
-    return Bands(line, near, near / np.maximum(np.sqrt(low * high), floor))
+    return Bands(line, near, near / np.maximum(sides, floor))
 
 
 def peak_prominence(power: Floats, line: float) -> float:
     """Power about one frequency over the geometric mean of the power on both sides of it."""
-    top = power.size - 2
-    at = np.array([line])
-    total = np.concatenate(([0.0], np.cumsum(power)))
-    near = _mean(total, at / HALF_BAND, at * HALF_BAND, top)
-    low = _mean(total, at / SIDES[1], at / SIDES[0], top)
-    high = _mean(total, at * SIDES[0], np.minimum(at * SIDES[1], top), top)
-    return float(near[0] / max(math.sqrt(low[0] * high[0]), 1e-12 * float(power.max()) + 1e-300))
+    near, sides = _about(power, np.array([line]))
+    return float(near[0] / max(sides[0], 1e-12 * float(power.max()) + 1e-300))
 
 
 def band_signal(
-    s: Spectrum, line: float, factor: float = WIDE_BAND, per_period: int = 24
+    s: Spectrum, line: float, factor: float = SIGNALS.wide_band, per_period: int = 24
 ) -> tuple[Floats, float]:
     """The signal within a factor of a frequency, at about `per_period` samples a period.
 
@@ -155,10 +150,11 @@ def locked_harmonic(s: Spectrum, period_s: float, order: int = 3, cycle: Spectru
     return float(np.abs(np.mean(turned))) / weight if weight > 0 else 0.0
 
 
-def envelope(s: Spectrum, line: float, factor: float = 1.6, per_period: int = 8) -> tuple[Floats, float]:
+def envelope(s: Spectrum, line: float) -> tuple[Floats, float]:
     """Amplitude of the band about a frequency over time, shape (m,), and its sample interval [s]."""
+    factor = SIGNALS.size_band
     first, last = math.ceil(line / factor), min(int(line * factor), s.lines.size - 1)
-    m = next_fast_len(max(int(line * per_period), last + 2, 16))
+    m = next_fast_len(max(int(line * 8), last + 2, 16))
     cut = np.zeros(m, dtype=np.complex128)
     cut[first : last + 1] = 2 * s.lines[first : last + 1]
     return np.abs(np.fft.ifft(cut)) * (m / s.n), s.duration_s / m

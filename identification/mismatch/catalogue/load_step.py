@@ -1,12 +1,11 @@
 """Load that comes in as up to three steps at the process's inlet."""
 
+from identification.limits import LIMITS
 from identification.mismatch.effect import Block, Effect, Param, Slot, Variant
 from identification.mismatch.pictures import LOAD, Drawing, Picture, course_picture
 from identification.simulation.open_loop import load
 from identification.simulation.parameters import STEPS
 
-PLACE = 6.0
-"""Log likelihood [nat] that the choice of a step's place costs; ours: the largest of many by chance."""
 FREE = tuple(
     Param(int(Slot.STEP) + i, f"size_{i + 1}_pct", "% OP", -50.0, 50.0, title=f"{which} load step")
     for i, which in enumerate(("First", "Second", "Third"))
@@ -37,7 +36,7 @@ EFFECT = Effect(
             FREE[:count],
             (dict.fromkeys((p.slot for p in FREE[:count]), 0.0),),
             label=f"{count}",
-            penalty=PLACE * count,
+            penalty=LIMITS.search.search_penalty * count,
         )
         for count in (1, 2, 3)
     ),

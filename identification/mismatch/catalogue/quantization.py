@@ -2,12 +2,11 @@
 
 import numpy as np
 
+from identification.limits import RecorderLimits
 from identification.mismatch.effect import Block, Ends, Fault, Finding, Floats, Number, Recording
 from identification.mismatch.pictures import PV, Picture, comb
 from identification.mismatch.recording import STEP, level_gaps
 
-OFTEN, FEWEST = 0.2, 4
-"""Share of the mean count from which a value is one at which PV dwells, and samples there at least; ours."""
 STEPS_SHOWN = 24
 """Steps of a coarse sensor that are drawn."""
 
@@ -20,19 +19,19 @@ def coarse_grid(s: Recording) -> Finding | None:
         return None
     if float(gaps.max()) > 4.0 * float(gaps.mean()):
         return None
-    return Finding({STEP: grid_unit(s.pv)}, np.ones(s.pv.size, dtype=bool))
+    return Finding({STEP: grid_unit(s.pv, limits)}, np.ones(s.pv.size, dtype=bool))
 
 
-def grid_unit(pv: Floats) -> float:
+def grid_unit(pv: Floats, limits: RecorderLimits) -> float:
     """The step of values [% PV]: their mean distance where PV dwells, so that none between is left out.
 
     A finer rounding over a converter's steps makes some longer and some shorter, and the mean is theirs.
     """
     levels, counts = np.unique(pv, return_counts=True)
-    often = counts >= max(OFTEN * pv.size / levels.size, FEWEST)
+    often = counts >= max(limits.dwells * pv.size / levels.size, limits.dwell_samples)
     gaps = np.diff(levels)
     dwelt = gaps[often[1:] & often[:-1]]
-    return float(dwelt.mean() if dwelt.size >= FEWEST - 1 else np.median(gaps))
+    return float(dwelt.mean() if dwelt.size >= limits.dwell_samples - 1 else np.median(gaps))
 
 
 def grid(found: Finding, s: Recording, _: Floats) -> Picture:

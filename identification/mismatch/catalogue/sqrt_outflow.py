@@ -1,10 +1,8 @@
 """A vessel whose outflow grows with the root of its level."""
 
+from identification.limits import LIMITS
 from identification.mismatch.effect import Block, Effect, Param, Slot, Variant, each
 from identification.mismatch.pictures import gain_over_pv
-
-TIE = 2.0
-"""Gain [nat] that it may lack beside a bend in the gain and still be told, being the commoner; ours."""
 
 EFFECT = Effect(
     name="sqrt-outflow",
@@ -16,7 +14,9 @@ EFFECT = Effect(
     curve=gain_over_pv,
     variants=(
         Variant(
-            (Param(Slot.ROOT, "root", "", 0.05, 3.0, title="Root"),), each(Slot.ROOT, 0.3, 1.0), penalty=-TIE
+            (Param(Slot.ROOT, "root", "", 0.05, 3.0, title="Root"),),
+            each(Slot.ROOT, 0.3, 1.0),
+            penalty=-LIMITS.search.tie,
         ),
     ),
 )
