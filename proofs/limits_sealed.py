@@ -99,7 +99,7 @@ def of_controller(c: Config) -> list[Any]:
     """What clock and controller did."""
     kept = [thinned(s) for s in subjects()]
     made = (replace(s, limits=c.explain) for s in [*subjects(), *kept])
-    return [(_told(controller_finding_of(s, None)[0]), s.circumstances.every_scan) for s in made]
+    return [(_told(controller_finding_of(s, None)[0]), s.every_scan) for s in made]
 
 
 def of_effects(c: Config) -> list[Any]:

@@ -65,13 +65,9 @@ def is_friction(name: str) -> bool:
 def fit_sticking(p: Problem, play: Fitted, row: Variant, rows: tuple[Variant, ...]) -> Fitted:
     """The best valve that sticks as `row` says, beside `rows`, about a fit whose last row is a play: its stem is
     sought as a night seeks it, or with its mass, and followed to the end beside all that the fit holds."""
-    c = play.model.c.copy()
-    for slot, value in (row.fixed or {}).items():
-        c[slot] = value
+    model = Model((*rows, row), row.set_in(play.model.c))
     has_mass = any(q.slot == Slot.STEM_T for q in row.params)
-    begun = (
-        _with_mass(p, Model((*rows, row), c)) if has_mass else _as_a_night(p, play, Model((*rows, row), c))
-    )
+    begun = _with_mass(p, model) if has_mass else _as_a_night(p, play, model)
     return min((descended(p, m, 2 * p.limits.search.screen_steps) for m in begun), key=lambda fit: fit.loss)
 
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from identification.controller.check import StatedSettings
+from identification.controller.pi_regression import shifted
 from identification.errors import InputError
 from identification.record import Floats
 from identification.simulation.closed_loop import closed_model
@@ -94,11 +95,7 @@ def carried(data: dict[str, Any], op: Floats, pv: Floats, dt_s: float) -> Floats
         out = inputs.level + simulate(inputs, free)
         bias = float(np.mean(pv[inside] - out[inside])) if inside.any() else 0.0
     out = np.clip(out + bias, c[Slot.CLIP_LO], c[Slot.CLIP_HI])
-    late = float(data.get("late_s", 0.0)) / dt_s
-    if late:
-        k = np.arange(out.size)
-        out = np.interp(k - late, k, out)
-    return out
+    return shifted(out, -float(data.get("late_s", 0.0)) / dt_s)
 
 
 def carried_closed(

@@ -132,12 +132,17 @@ def past_moves(p: Problem, c: Floats, through: Floats) -> list[Floats]:
 
 def bent_moves(p: Problem, c: Floats, through: Floats) -> list[Floats]:
     """Responses to OP's fast part by size, to its square and to its cube, each shape (n,)."""
-    c, dt_s, still = c.copy(), p.inputs.dt_s, np.zeros(through.size)
-    c[Slot.K], c[Slot.BIAS], c[Slot.START] = 1.0, 0.0, 0.0
-    moves = []
+    dt_s, moves = p.inputs.dt_s, []
     for share in (0.1, 0.5):
         fast = through - lagged(through, max(share * float(c[Slot.T]), dt_s), dt_s)
         moves += [fast * np.abs(fast), np.abs(fast)]
     level = through - through.mean()
     moves += [level**2, level**3]
-    return [plain_vessel(x - x[0], still, c, dt_s, 0.0) for x in moves]
+    return [response(x, c, dt_s) for x in moves]
+
+
+def response(x: Floats, c: Floats, dt_s: float) -> Floats:
+    """Response of PV to a load at the inlet, shape (n,), of unit gain with a model's lag and dead time."""
+    unit = c.copy()
+    unit[[Slot.K, Slot.BIAS, Slot.START]] = 1.0, 0.0, 0.0
+    return plain_vessel(x - x[0], np.zeros(x.size), unit, dt_s, 0.0)

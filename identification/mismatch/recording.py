@@ -35,19 +35,6 @@ class SeenInCycles:
 
 
 @dataclass(frozen=True, slots=True)
-class Circumstances:
-    """What is known of a recording beside its trends, by which effects are asked about or not.
-
-    kind : the loop's type, lower case; every_scan : whether every scan of the controller is recorded; free_valve :
-    whether the loop cycles and its cycles do not convict the valve.
-    """
-
-    kind: str = ""
-    every_scan: bool = True
-    free_valve: bool = False
-
-
-@dataclass(frozen=True, slots=True)
 class Recording:
     """One recording to be explained.
 
@@ -73,11 +60,11 @@ class Recording:
     limits: ExplainLimits = LIMITS
 
     @property
-    def circumstances(self) -> Circumstances:
-        """By which effects are asked about or not; a controller that is not stated has the usual scan."""
+    def every_scan(self) -> bool:
+        """Whether every scan of the controller is recorded; one that is not stated has the usual scan."""
         limits = self.limits.controller
         scans = self.dt_s / limits.typical_scan_s if self.stated is None else self.stated.scans
-        return Circumstances(self.kind, scans < limits.thinned, self.free_valve)
+        return scans < limits.thinned
 
 
 STEP = "step_pct"

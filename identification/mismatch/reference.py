@@ -18,12 +18,11 @@ import numpy as np
 from identification.estimation.noise import whitened
 from identification.estimation.prediction_error import Fitted, Problem
 from identification.limits import REFERENCE
-from identification.mismatch.plain_loop import bent_moves, past_moves, unfollowed
+from identification.mismatch.plain_loop import bent_moves, past_moves, response, unfollowed
 from identification.record import Floats
 from identification.simulation.lag import lagged
 from identification.simulation.open_loop import simulate, through_valve
 from identification.simulation.parameters import Slot
-from identification.simulation.vessel import plain_vessel
 
 PRIORS = (0.003, 0.3)
 """Precisions of the ridge's prior over that of a sample, per sample, of which the better counts: of .003 to 3 strange
@@ -69,14 +68,9 @@ def loop_of(p: Problem, c: Floats) -> Loop:
     flow, dt_s = through_valve(p.inputs, c), p.inputs.dt_s
     pv = simulate(p.inputs, c) if p.by_simulation else np.concatenate((p.y[:1], p.y[:-1]))
     lag_s = min(max(float(c[Slot.T]), dt_s), 0.1 * flow.size * dt_s)
-    unit, still = c.copy(), np.zeros(flow.size)
-    unit[[Slot.K, Slot.BIAS, Slot.START]] = 1.0, 0.0, 0.0
+    unit = c.copy()
     unit[Slot.T] = lag_s
-
-    def response(x: Floats) -> Floats:
-        return plain_vessel(x - x[0], still, unit, dt_s, 0.0)
-
-    return Loop(flow - flow.mean(), pv - pv.mean(), lag_s, dt_s, response)
+    return Loop(flow - flow.mean(), pv - pv.mean(), lag_s, dt_s, partial(response, c=unit, dt_s=dt_s))
 
 
 def switched(x: Floats, at: float, band: float) -> Floats:

@@ -41,7 +41,7 @@ def one_by_one(found: Explanation, tell: Progress, s: Recording) -> tuple[Explan
     limits, candidates = found.p.limits.search, list[Candidate]()
     rows = (*CANDIDATES, *RIVALS) if has_rivals(s) else CANDIDATES
     for _ in range(limits.rounds):
-        x = candidate_inputs(found.p, found.best, s.circumstances)
+        x = candidate_inputs(found.p, found.best, s)
         candidates = compete(x, found.best, rows, tell)
         if s.cycles is not None and not found.accepted:
             candidates = with_cycles(x.p, found.best, s.cycles, candidates)
@@ -125,7 +125,7 @@ def as_a_set(found: Explanation, tell: Progress, s: Recording) -> Explanation:
     told = shown_by_cycles(s, accepted[:1]) is not None
     if not told:
         tell("other sets of effects")
-        best, accepted = replacement_step(candidate_inputs(p, best, s.circumstances), best, accepted, tell)
+        best, accepted = replacement_step(candidate_inputs(p, best, s), best, accepted, tell)
     best, accepted = without_the_idle(p, best, accepted, int(told))
     return replace(found, best=best, accepted=tuple(accepted))
 

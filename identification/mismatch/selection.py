@@ -13,7 +13,6 @@ from identification.mismatch.effect import Friction
 from identification.mismatch.friction import fit_sticking
 from identification.mismatch.outside import about
 from identification.mismatch.proof import is_one_move
-from identification.mismatch.recording import Circumstances
 from identification.mismatch.starts import CandidateInputs, Span, mode_starts, screened, span_of, start_models
 from identification.simulation.effect import Variant
 from identification.simulation.parameters import Slot, neutral
@@ -22,7 +21,7 @@ Progress = Callable[[str], None]
 KNOWN_TYPES = ("flow", "pressure", "temperature", "level")
 """Loop types under which a row may be left out; any other text says nothing."""
 NEEDS: Mapping[str, Callable[[CandidateInputs], bool]] = {
-    "every scan": lambda x: x.known.every_scan,
+    "every scan": lambda x: x.every_scan,
     "experiment": lambda x: x.p.by_simulation,
     "moves": lambda x: not is_one_move(x.p),
     "neighbour": lambda x: x.p.inputs.neighbour is not None,
@@ -84,18 +83,18 @@ def compete(
 
 def applies(x: CandidateInputs, near: Fitted, row: Variant) -> bool:
     """Whether a row may be added: what it needs is there, and it is not in the model yet."""
-    effect, kind = about(row.name), x.known.kind
+    effect = about(row.name)
     taken = {p.slot for r in near.model.added for p in r.params}
     if row.name in near.names or taken & {p.slot for p in row.params}:
         return False
-    if row.types and kind in KNOWN_TYPES and kind not in row.types:
+    if row.types and x.kind in KNOWN_TYPES and x.kind not in row.types:
         return False
     if row.needs in NEEDS and not NEEDS[row.needs](x):
         return False
     if x.p.by_simulation and effect.timed and row.opponent is None:
         return False  # a load that is added is told by innovations
     # behind one friction a second of the same stem cannot be told without the stem's position
-    told = x.known.free_valve or any(about(name).friction is not None for name in near.names)
+    told = x.free_valve or any(about(name).friction is not None for name in near.names)
     return effect.friction is None or not told
 
 
@@ -169,10 +168,8 @@ def outdoing(p: Problem, near: Fitted, first: Candidate) -> Candidate:
     row = first.row.opponent
     if row is None or not p.by_simulation:
         return first
-    c = near.model.c.copy()
-    for slot, value in (row.fixed or {}).items():
-        c[slot] = value
-    added = descended(p, Model((*near.model.added, row), c), p.limits.search.full_steps)
+    model = Model((*near.model.added, row), row.set_in(near.model.c))
+    added = descended(p, model, p.limits.search.full_steps)
     own = descended(p, first.fit.model, p.limits.search.full_steps)
     limits, moves = p.limits.proof, float(p.weight @ p.y**2 / p.weight.sum())
     if own.loss < limits.course_leaves * near.loss and near.loss > limits.course_from**2 * moves:
@@ -201,7 +198,7 @@ def without(model: Model, rows: Iterable[Variant]) -> Model:
     """A model less some of what is added to it, the constants of those at rest."""
     c, rest, gone = model.c.copy(), neutral(), list(rows)
     for row in gone:
-        for slot in [p.slot for p in row.params] + [int(s) for s in row.fixed or {}]:
+        for slot in [p.slot for p in row.params] + list(row.fixed):
             c[slot] = rest[slot]
     names = {row.name for row in gone}
     return Model(tuple(r for r in model.added if r.name not in names), c)
@@ -214,7 +211,7 @@ def integrating_or_first_order(p: Problem, free: Fitted, kind: str) -> tuple[Pro
     does as well with one constant fewer, the plain loop is one that settles within the record.
     """
     row = next(v for v in CANDIDATES if v.replaces)
-    x = CandidateInputs(p, (), Circumstances(kind))
+    x = CandidateInputs(p, (), kind)
     longest = p.limits.search.settles * p.inputs.dt_s * p.y.size
     if float(free.model.c[Slot.T]) <= longest or not applies(x, free, row):
         return p, free

@@ -14,15 +14,13 @@ from scipy.ndimage import median_filter
 from identification.controller.check import runs
 from identification.estimation.noise import whitened
 from identification.estimation.prediction_error import Fitted, Model, Problem, scales, sensitivities
-from identification.mismatch.recording import Circumstances
+from identification.mismatch.recording import Recording
 from identification.record import Floats, Mask
 from identification.simulation.effect import Variant
 from identification.simulation.open_loop import simulate, through_valve
 from identification.simulation.parameters import STEPS, Slot, neutral
 from identification.simulation.vessel import plain_vessel
 
-ANY = Circumstances()
-"""Nothing that would leave an effect out."""
 LEAD = 200
 """Samples of rest before a pulse is whitened; ours: the noise model reaches 117 back."""
 DELAYS = 40
@@ -36,18 +34,21 @@ LEADING = 0.95
 
 @dataclass(frozen=True, slots=True)
 class CandidateInputs:
-    """A problem with the places and frequencies at which a load may act, and the circumstances of its recording."""
+    """A problem with the places and frequencies at which a load may act, and what is known beside its trends, by
+    which effects are asked about or not; see Recording."""
 
     p: Problem
     omegas: tuple[float, ...]
-    known: Circumstances = ANY
+    kind: str = ""
+    every_scan: bool = True
+    free_valve: bool = False
 
 
-def candidate_inputs(p: Problem, fit: Fitted, known: Circumstances = ANY) -> CandidateInputs:
+def candidate_inputs(p: Problem, fit: Fitted, s: Recording) -> CandidateInputs:
     """Steps and lines located in what a fit leaves."""
     held = p.inputs.step_at if any(r.needs == "steps" for r in fit.model.added) else step_places(p, fit)
     located = replace(p, inputs=replace(p.inputs, step_at=held))
-    return CandidateInputs(located, line_frequencies(p, fit), known)
+    return CandidateInputs(located, line_frequencies(p, fit), s.kind, s.every_scan, s.free_valve)
 
 
 def step_places(p: Problem, fit: Fitted) -> tuple[int, ...]:
@@ -142,9 +143,7 @@ def start_models(x: CandidateInputs, near: Fitted, row: Variant) -> list[Model]:
     on_lines = tuple({int(Slot.OMEGA): w} for w in x.omegas)
     out = []
     for start in on_lines if row.needs == "line" else row.starts:
-        c = near.model.c.copy()
-        for slot, value in (row.fixed or {}).items():
-            c[slot] = value
+        c = row.set_in(near.model.c)
         for param in row.params:
             offset, factor = scales(x.p.inputs, near.model.c, param)
             c[param.slot] = offset + factor * start.get(int(param.slot), 0.0)

@@ -10,7 +10,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.fft import ifft, irfft, next_fast_len
+from scipy.fft import ifft, next_fast_len
 
 from identification.limits import SIGNALS
 from identification.record import Floats
@@ -112,15 +112,10 @@ class Shape:
 
 def shape(s: Spectrum, line: float) -> Shape:
     """Shape of the signal about a frequency, wide enough for halves that differ and for edges."""
-    first = max(math.ceil(line / SIGNALS.shape_below), 1)
-    last = min(int(line * SIGNALS.shape_above), s.lines.size - 1)
-    m = next_fast_len(max(int(line * 24), 2 * last + 2, 16), real=True)
-    cut = np.zeros(m // 2 + 1, dtype=np.complex128)
-    cut[first : last + 1] = s.lines[first : last + 1]
-    x = irfft(cut, m) * (m / s.n)
-    power = float(x @ x) / m
+    x, dt_s = band_signal(s, line, SIGNALS.shape_below, SIGNALS.shape_above)
+    power = float(x @ x) / x.size
     if power <= 0.0:
         return Shape(3.0, 0.0, 0.0)
-    halves = half_cycles(x, s.duration_s / m, SIGNALS.firm_turn).duration_s
+    halves = half_cycles(x, dt_s, SIGNALS.firm_turn).duration_s
     spread = float(np.log(halves).std()) if halves.size > 2 else math.inf
     return Shape(float(np.mean(x**4)) / power**2, spread, power / s.variance)

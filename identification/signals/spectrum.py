@@ -110,14 +110,15 @@ def peak_prominence(power: Floats, line: float) -> float:
 
 
 def band_signal(
-    s: Spectrum, line: float, factor: float = SIGNALS.wide_band, per_period: int = 24
+    s: Spectrum, line: float, below: float = SIGNALS.wide_band, above: float | None = None
 ) -> tuple[Floats, float]:
-    """The signal within a factor of a frequency, at about `per_period` samples a period.
+    """The signal from a factor below a frequency to one above it, the same where none is given, at about 24 samples a
+    period.
 
     Returns the band's signal and its sample interval [s].
     """
-    first, last = math.ceil(line / factor), min(int(line * factor), s.lines.size - 1)
-    m = next_fast_len(max(int(line * per_period), 2 * last + 2, 16), real=True)
+    first, last = math.ceil(line / below), min(int(line * (above or below)), s.lines.size - 1)
+    m = next_fast_len(max(int(line * 24), 2 * last + 2, 16), real=True)
     cut = np.zeros(m // 2 + 1, dtype=np.complex128)
     cut[first : last + 1] = s.lines[first : last + 1]
     return irfft(cut, m) * (m / s.n), s.duration_s / m

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numba import njit
 
@@ -143,8 +141,7 @@ def closed_model(
         )
     op0 = float(inputs.op[0])
     e0 = float(sp[0]) - (inputs.level + float(c[Slot.START]))
-    ti = ti_samples if math.isfinite(ti_samples) else math.inf
-    law = (kp, kp / ti, 0.0, 0.0, 100.0)
+    law = (kp, kp / ti_samples, 0.0, 0.0, 100.0)
     own = counted_from_level(inputs, c)
     frame = (inputs.dt_s, inputs.middle, inputs.level, outflow_head(inputs, c))
     gain, load = gain_over_record(inputs, c), load_over_record(inputs, c)

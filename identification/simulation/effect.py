@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 
 from identification.record import Floats
@@ -49,7 +49,7 @@ class Variant:
 
     params: tuple[Param, ...]
     starts: tuple[Start, ...]
-    fixed: Start | None = None
+    fixed: Start = field(default_factory=dict)
     label: str = ""
     delays: tuple[int, ...] = ()
     replaces: tuple[int, ...] = ()
@@ -63,6 +63,13 @@ class Variant:
     block: str = ""
     needs: str = ""
     types: tuple[str, ...] = ()
+
+    def set_in(self, c: Floats) -> Floats:
+        """A model's parameters, shape (SIZE + own,), with those set that are not searched."""
+        out = c.copy()
+        for slot, value in self.fixed.items():
+            out[slot] = value
+        return out
 
 
 def each(slot: int, *values: float) -> tuple[Start, ...]:

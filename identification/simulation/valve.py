@@ -200,8 +200,3 @@ def stem_position(op: Floats, valve: Valve, start: float | None = None) -> Float
 def play(op: Floats, width: float, start: float | None = None) -> Floats:
     """Stem position [% OP], shape (n,), behind play of full width `width` [% OP]."""
     return stem_position(op, Backlash(width), start)
-
-
-def stick_slip(op: Floats, stickband: float, slip_jump: float, start: float | None = None) -> Floats:
-    """Stem position [% OP], shape (n,), of a stem that rests after each slip."""
-    return stem_position(op, Stiction(stickband, slip_jump), start)

@@ -77,7 +77,7 @@ def compared(cases: pathlib.Path, truths: dict, tag: str) -> dict:
     p, plain = integrating_or_first_order(
         *prepared(inputs, s.pv - inputs.level, without_spikes(s.pv, s.usable)), s.kind
     )
-    candidates = compete(candidate_inputs(p, plain, s.circumstances), plain)
+    candidates = compete(candidate_inputs(p, plain, s), plain)
     mine = [r for r in candidates if kin(r.name, truth["effect"], KIN)]
     wrong = [
         r

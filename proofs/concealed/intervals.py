@@ -51,7 +51,7 @@ def fitted(cases: pathlib.Path, tag: str, effect: str):
     inputs = inputs_of(s)
     begun = prepared(inputs, s.pv - inputs.level, without_spikes(s.pv, s.usable))
     p, plain = integrating_or_first_order(*begun, s.kind)
-    x = candidate_inputs(p, plain, s.circumstances)
+    x = candidate_inputs(p, plain, s)
     rows = tuple(v for v in CANDIDATES if kin(v.name, effect, KIN))
     best = compete(x, plain, rows)[0]
     return x.p, descended(x.p, best.fit.model, x.p.limits.search.full_steps)

@@ -33,7 +33,7 @@ def started(variant: Variant) -> Floats:
     """Parameters of a settling loop with a variant at its first start, sizes that start at nothing at a tenth."""
     c = neutral()
     c[Slot.K], c[Slot.T], c[Slot.L] = 1.2, 20.0, 4.5
-    for slot, value in (variant.fixed or {}).items():
+    for slot, value in variant.fixed.items():
         c[slot] = value
     for i, p in enumerate(variant.params):
         offset, factor = scales(inputs(), c, p)

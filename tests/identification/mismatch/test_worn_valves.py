@@ -16,7 +16,7 @@ from identification.mismatch.explanation import Explanation
 from identification.mismatch.friction import simulated_anew
 from identification.mismatch.plain_loop import inputs_of
 from identification.mismatch.proof import HeldOut, Misfit, runs_out
-from identification.mismatch.recording import Circumstances, Recording, SeenInCycles
+from identification.mismatch.recording import Recording, SeenInCycles
 from identification.mismatch.rounds import without_the_idle
 from identification.mismatch.selection import Candidate, applies
 from identification.mismatch.starts import CandidateInputs
@@ -101,7 +101,7 @@ def test_free_valve_is_asked_for_no_friction() -> None:
     asked = {
         free: {r.name for e in EFFECTS.values() for r in e.candidates if applies(x, near, r)}
         for free in (False, True)
-        for x in [CandidateInputs(p, (), Circumstances(free_valve=free))]
+        for x in [CandidateInputs(p, (), free_valve=free)]
     }
     friction = {name for name, e in EFFECTS.items() if e.friction is not None}
     assert asked[False] - asked[True] == friction
@@ -110,8 +110,8 @@ def test_free_valve_is_asked_for_no_friction() -> None:
 def test_unseen_scans_leave_the_inverse_response_open() -> None:
     """A controller that answers within a sample looks like a PV that goes the wrong way first: not asked there."""
     s = recorded(4, 0.3, 0.01, None)
-    assert s.circumstances.every_scan
-    assert not replace(s, dt_s=5.0).circumstances.every_scan
+    assert s.every_scan
+    assert not replace(s, dt_s=5.0).every_scan
 
 
 def as_problem(seed: int, scatter: float) -> Problem:

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from identification.models import Backlash
+from identification.models import Backlash, Stiction
 from identification.simulation.valve import (
     HALTS,
     SLIDES,
@@ -13,7 +13,6 @@ from identification.simulation.valve import (
     first_slip,
     play,
     stem_position,
-    stick_slip,
     thresholds,
     walk,
 )
@@ -42,7 +41,7 @@ def test_play_agrees_with_slow_twin(op, width):
 def test_stem_never_leaves_breakaway(op, stickband, share):
     """The stem is never further from OP than the breakaway distance (S + J)/2."""
     jump = stickband * share
-    stem = stick_slip(np.array(op), stickband, jump)
+    stem = stem_position(np.array(op), Stiction(stickband, jump))
     assert np.all(np.abs(np.array(op) - stem) <= (stickband + jump) / 2 + 1e-9)
 
 
@@ -50,7 +49,7 @@ def test_equal_stickband_and_jump_is_a_relay():
     """S = J = 2d under a sine of amplitude 2d is a relay of height d switching at d (the study's Eq. 2)."""
     d = 1.0
     op = 2 * d * np.sin(np.linspace(0, 8 * np.pi, 4001))
-    stem = stick_slip(op, 2 * d, 2 * d, start=-d)[1000:]
+    stem = stem_position(op, Stiction(2 * d, 2 * d), -d)[1000:]
     assert set(np.round(np.sign(stem))) == {-1.0, 1.0}
     assert np.abs(np.abs(stem) - d).max() < 0.01
 
