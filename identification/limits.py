@@ -77,6 +77,11 @@ class ControllerLimits(Limits, section="controller"):
 class SearchLimits(Limits, section="search"):
     """Which effects explain a recording: what one has to gain, and how far candidates are followed."""
 
+    @property
+    def one_constant(self) -> float:
+        """Gain that an effect of one constant has to bring [nat]."""
+        return self.search_penalty + self.parameter_penalty
+
 
 class ProofLimits(Limits, section="proof"):
     """When a candidate's gain is real: on data that were not fitted, and spread over the record."""

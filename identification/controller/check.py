@@ -152,7 +152,7 @@ def obeys(x: Trends, said: StatedSettings, found: ControlLaw) -> bool:
     n, length, limits = found.residual.size, found.length, x.limits
     e, y = found.error(x.sp, x.pv)[:n], centred(x.op[:n], length)
     left = y - said.kp * (centred(e, length) + centred(np.cumsum(e), length) / said.ti)
-    lawful = trusted(found.residual, length)
+    lawful = trusted(found.residual, length, limits)
     moved = float(np.mean(y[lawful] ** 2))
     if said.thinned(limits) and float(np.mean(left[lawful] ** 2)) < limits.thinned_leaves * moved:
         return True

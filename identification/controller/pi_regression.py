@@ -88,10 +88,10 @@ def regress(e: Floats, op: Floats, length: int, keep: Mask) -> tuple[float, floa
     return kp, ki, rows[2] - kp * rows[0] - ki * rows[1]
 
 
-def trusted(residual: Floats, length: int) -> Mask:
+def trusted(residual: Floats, length: int, limits: ControllerLimits) -> Mask:
     """True in the spans whose residual is not far above the median span's, shape (m * length,)."""
     size = np.sqrt((residual.reshape(-1, length) ** 2).mean(axis=1))
-    return np.repeat(size <= 2.0 * np.median(size) + 1e-9, length)
+    return np.repeat(size <= limits.trusted * np.median(size) + 1e-9, length)
 
 
 def unbroken(usable: Mask, length: int, limits: ControllerLimits) -> Mask:
@@ -112,7 +112,7 @@ def law(x: Trends, length: int, late: float, smoothed: float = 0.0) -> ControlLa
     keep = fit
     for _ in range(3):
         kp, ki, residual = regress(e[:n], x.op[:n], length, keep)
-        keep = fit & trusted(residual, length)
+        keep = fit & trusted(residual, length, x.limits)
     moved = centred(x.op[:n], length)
     left = float((residual[keep] ** 2).mean()) if keep.any() else math.inf
     power = float((moved[keep] ** 2).mean()) if keep.any() else 1.0

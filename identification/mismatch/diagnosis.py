@@ -79,9 +79,9 @@ def controller_finding_of(s: Recording, recorder: Finding | None) -> tuple[Findi
     that gives OP, stated or not."""
     if s.sp is None or ends(recorder) is Ends.ALL:
         return None, None
-    if any(straightened(x, s.limits.recorder.straight_law) for x in (s.pv, s.op)):
+    recorder_limits, limits = s.limits.recorder, s.limits.controller
+    if any(straightened(x, recorder_limits.straight_law, recorder_limits) for x in (s.pv, s.op)):
         return None, None
-    limits = s.limits.controller
     free = s.usable & (s.op > limits.at_limit) & (s.op < 100.0 - limits.at_limit)
     x = Trends(s.sp, s.pv, s.op, free, limits)
     if s.stated is None:

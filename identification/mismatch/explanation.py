@@ -199,7 +199,7 @@ def is_seconded(found: Explanation, told: Explanation) -> bool:
     """Whether innovations gain what one constant costs by the effects that a simulation's misfit tells: two signs."""
     limits = told.p.limits.search
     seen = descended(told.p, found.best.model, limits.full_steps)
-    return gain(seen, told.plain) > limits.search_penalty + limits.parameter_penalty
+    return gain(seen, told.plain) > limits.one_constant
 
 
 def judged_by_simulation(found: Explanation, other: Explanation) -> Explanation:
@@ -264,7 +264,7 @@ def _compared(
     window = round(windows[0] * others[0].dt_s / p.inputs.dt_s)
     plain, better = (misfit(p.y, course(p, c, window, placed), window) for c in drawn)
     seen = plain, better
-    return HeldOut(0.0, seen, held, seen, drawn, window, placed, limits=p.limits.proof), each
+    return HeldOut(0.0, seen, held, seen, drawn, window, placed, limits=p.limits), each
 
 
 def proven_on(found: Explanation, others: Sequence[Recording]) -> Explanation:

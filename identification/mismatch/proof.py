@@ -16,7 +16,7 @@ import numpy as np
 from identification.estimation.noise import NO_NOISE, whitened
 from identification.estimation.prediction_error import Fitted, Model, Problem, bounds, descended, gain
 from identification.estimation.start_values import simulated_best
-from identification.limits import LIMITS, ProofLimits
+from identification.limits import LIMITS, ExplainLimits
 from identification.mismatch.effect import Effect
 from identification.mismatch.friction import WEARS, simulated_anew
 from identification.mismatch.starts import at_inlet
@@ -180,7 +180,7 @@ class HeldOut:
     window: int = 0
     placed: bool = False
     least_plain: float = np.inf
-    limits: ProofLimits = LIMITS.proof
+    limits: ExplainLimits = LIMITS
 
     @property
     def falls(self) -> bool:
@@ -190,7 +190,7 @@ class HeldOut:
     @property
     def follows(self) -> bool:
         """Whether the better model goes with PV at all on held-out data, and not merely less far astray."""
-        return self.held[1].fit_pct >= self.limits.least_fit
+        return self.held[1].fit_pct >= self.limits.proof.least_fit
 
     @property
     def carries(self) -> bool:
@@ -202,9 +202,9 @@ class HeldOut:
     @property
     def seen_ahead(self) -> bool:
         """Whether innovations of held-out data show the effect, and no plain loop simulates far better."""
-        most, (plain, better) = self.limits.astray, self.overall
+        most, (plain, better) = self.limits.proof.astray, self.overall
         near = self.held[1].rmse <= most * min(self.held[0].rmse, self.least_plain)
-        return self.gain > self.limits.seen_ahead and near and better.rmse <= most * plain.rmse
+        return self.gain > self.limits.search.one_constant and near and better.rmse <= most * plain.rmse
 
     @property
     def share(self) -> float:
@@ -290,7 +290,7 @@ class Criterion:
             self.window,
             self.placed,
             min(self.misfit(c, rest).rmse for c in plains),
-            self.p.limits.proof,
+            self.p.limits,
         )
 
 

@@ -86,17 +86,17 @@ def level_gaps(pv: Floats) -> Floats:
     return np.diff(np.unique(pv[(pv >= low) & (pv <= high)]))
 
 
-def straightened(x: Floats, share: float) -> bool:
+def straightened(x: Floats, share: float, limits: RecorderLimits) -> bool:
     """Whether at least that share of a trend lies on straight lines that no grid makes."""
-    return float(straight(x).mean()) >= share and not on_grid(level_gaps(x))
+    return float(straight(x).mean()) >= share and not on_grid(level_gaps(x), limits)
 
 
-def on_grid(gaps: Floats) -> bool:
+def on_grid(gaps: Floats, limits: RecorderLimits) -> bool:
     """Whether differences of values are multiples of the smallest that is common."""
     if gaps.size < 5:
         return True
     unit = float(np.quantile(gaps, 0.1))
-    return float(np.mean(np.abs(gaps / unit - np.round(gaps / unit)) < 0.05)) > 0.6
+    return float(np.mean(np.abs(gaps / unit - np.round(gaps / unit)) < 0.05)) > limits.grid_multiples
 
 
 def least_jump(pv: Floats, limits: RecorderLimits = LIMITS.recorder) -> float:

@@ -67,7 +67,7 @@ def loop_of(p: Problem, c: Floats) -> Loop:
     """
     flow, dt_s = through_valve(p.inputs, c), p.inputs.dt_s
     pv = simulate(p.inputs, c) if p.by_simulation else np.concatenate((p.y[:1], p.y[:-1]))
-    lag_s = min(max(float(c[Slot.T]), dt_s), 0.1 * flow.size * dt_s)
+    lag_s = min(max(float(c[Slot.T]), dt_s), p.limits.search.settles * flow.size * dt_s)
     unit = c.copy()
     unit[Slot.T] = lag_s
     return Loop(flow - flow.mean(), pv - pv.mean(), lag_s, dt_s, partial(response, c=unit, dt_s=dt_s))

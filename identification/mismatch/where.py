@@ -57,9 +57,9 @@ def direction(op: Floats, won: Floats) -> str:
     """Whether the gain lives in OP's moves up, down, or both."""
     way = np.sign(np.diff(op, prepend=op[0]))
     up, down = float(won[way > 0].sum()), float(won[way < 0].sum())
-    if up > 3 * max(down, 0.0):
+    if up > LOCATION.one_way * max(down, 0.0):
         return "up"
-    return "down" if down > 3 * max(up, 0.0) else "both"
+    return "down" if down > LOCATION.one_way * max(up, 0.0) else "both"
 
 
 def half_power_periods(difference: Floats, dt_s: float) -> list[float]:

@@ -9,7 +9,8 @@ from identification.mismatch.recording import straight, straightened
 
 def straight_segments(s: Recording) -> Finding | None:
     """Straight segments whose breaks stand on no grid (swinging door and the like)."""
-    if not straightened(s.pv, s.limits.recorder.straight):
+    limits = s.limits.recorder
+    if not straightened(s.pv, limits.straight, limits):
         return None
     found = straight(s.pv)
     return Finding({"straight_share": float(found.mean())}, found)

@@ -15,9 +15,9 @@ def coarse_grid(s: Recording) -> Finding | None:
     """Values on a grid coarser than a historian's, the coarser where percent is of the recorded range."""
     gaps, limits = level_gaps(s.pv), s.limits.recorder
     least = limits.grid_step if s.ranged else limits.grid_step_of_range
-    if gaps.size == 0 or gaps.size * 20 > s.pv.size or float(gaps.mean()) < least:
+    if gaps.size == 0 or gaps.size * limits.grid_samples > s.pv.size or float(gaps.mean()) < least:
         return None
-    if float(gaps.max()) > 4.0 * float(gaps.mean()):
+    if float(gaps.max()) > limits.grid_uneven * float(gaps.mean()):
         return None
     return Finding({STEP: grid_unit(s.pv, limits)}, np.ones(s.pv.size, dtype=bool))
 

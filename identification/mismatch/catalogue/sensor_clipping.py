@@ -9,9 +9,9 @@ from identification.mismatch.pictures import PV, TIME, WINDOW, Drawn, Picture, a
 def clipped(s: Recording) -> Finding | None:
     """PV standing at exactly its highest or lowest value far more often than at those next to it."""
     levels, counts = np.unique(s.pv, return_counts=True)
-    if levels.size < 12:
-        return None
     best, limits = None, s.limits.recorder
+    if levels.size < limits.clip_values:
+        return None
     for end, near in ((-1, counts[-7:-1]), (0, counts[1:7])):
         top = int(counts[end])
         enough = top >= limits.clip_samples and top > limits.clip_ratio * float(near.mean())
