@@ -28,7 +28,7 @@ from identification.record import Floats
 from identification.signals.filters import stretch_ends
 from identification.simulation.effect import Signal, Variant, acted
 from identification.simulation.open_loop import as_parameters, from_flow, simulate
-from identification.simulation.parameters import Slot, neutral
+from identification.simulation.parameters import Slot, alone
 from identification.simulation.valve import StemLaw, moved_stem, sticking
 from identification.simulation.valve_chain import before_stem, behind_stem, friction_of
 
@@ -125,9 +125,7 @@ def _heavier(p: Problem, model: Model, move: tuple[int, ...], step: float) -> tu
 
 def _window_behind(p: Problem, c: Floats) -> Window:
     """What a night fits a lag behind a valve to: OP as the stem meets it, PV less what a model has beside both."""
-    inputs, plain = p.inputs, neutral()
-    for slot in (*OF_CYCLES, Slot.BIAS, Slot.START, Slot.LEAK):
-        plain[slot] = c[slot]
+    inputs, plain = p.inputs, alone(c, (*OF_CYCLES, Slot.BIAS, Slot.START, Slot.LEAK))
     op = before_stem(np.ascontiguousarray(acted(Signal.OP, inputs.op, c, inputs.dt_s)), c, inputs.dt_s)
     y = p.y - simulate(inputs, c) + simulate(inputs, plain)
     return Window(y, op, p.usable, inputs.dt_s)

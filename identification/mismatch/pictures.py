@@ -18,7 +18,7 @@ from identification.models import Estimate
 from identification.record import Floats, Mask
 from identification.simulation.effect import Variant
 from identification.simulation.open_loop import ModelInputs, load, simulate
-from identification.simulation.parameters import Slot, neutral
+from identification.simulation.parameters import Slot, alone
 from identification.simulation.pi import free_path
 from identification.simulation.valve_chain import flow
 
@@ -159,10 +159,7 @@ def valve_alone(
     c: Floats, op: Floats, keep: tuple[int, ...], middle: float = 50.0, dt_s: float = 1.0
 ) -> Floats:
     """Flow [% OP], shape (m,), of a valve with some of a model's parameters alone."""
-    own = neutral()
-    for slot in keep:
-        own[slot] = c[slot]
-    return flow(op, own, dt_s, middle)
+    return flow(op, alone(c, keep), dt_s, middle)
 
 
 def stem_over_op(d: Drawing) -> Picture:
@@ -223,10 +220,7 @@ def pv_response(d: Drawing, faster: int | None = None, back: bool = False) -> Pi
     drawn = ModelInputs(op, dt, 0.0, inputs.level, (0.0, 100.0))
 
     def read(c: Floats) -> Floats:
-        process = neutral()  # valve, load, clip and the record's start taken out
-        for slot in DYNAMICS:
-            process[slot] = c[slot]
-        return simulate(drawn, process)
+        return simulate(drawn, alone(c, DYNAMICS))  # valve, load, clip and the record's start taken out
 
     return beside_plain(d, "response", (TIME, Axis("PV", "% PV")), time, read, read(d.plain))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from enum import IntEnum
 
 import numpy as np
@@ -111,3 +112,10 @@ def neutral() -> Floats:
     for slot in (Slot.STOP_LO, Slot.CLIP_LO):
         c[slot] = -math.inf
     return c
+
+
+def alone(c: Floats, slots: Iterable[int]) -> Floats:
+    """Some of a model's parameters, shape (SIZE + own,), all others neutral."""
+    out, kept = neutral(), list(slots)
+    out[kept] = c[kept]
+    return out
