@@ -15,14 +15,14 @@ from itertools import pairwise
 
 import numpy as np
 
-from identification.estimation.noise import whitened
-from identification.estimation.prediction_error import Fitted, Problem
+from identification.estimation.noise import lag_means, whitened
+from identification.estimation.prediction_error import Fitted, Problem, sensitivities
 from identification.limits import REFERENCE
-from identification.mismatch.plain_loop import bent_moves, past_moves, response, unfollowed
 from identification.record import Floats
 from identification.simulation.lag import lagged
 from identification.simulation.open_loop import simulate, through_valve
 from identification.simulation.parameters import Slot
+from identification.simulation.vessel import plain_vessel
 
 PRIORS = (0.003, 0.3)
 """Precisions of the ridge's prior over that of a sample, per sample, of which the better counts: of .003 to 3 strange
@@ -57,6 +57,13 @@ class Foretold:
 
     way: str = ""
     gain: float = 0.0
+
+
+def response(x: Floats, c: Floats, dt_s: float) -> Floats:
+    """Response of PV to a load at the inlet, shape (n,), of unit gain with a model's lag and dead time."""
+    unit = c.copy()
+    unit[[Slot.K, Slot.BIAS, Slot.START]] = 1.0, 0.0, 0.0
+    return plain_vessel(x - x[0], np.zeros(x.size), unit, dt_s, 0.0)
 
 
 def loop_of(p: Problem, c: Floats) -> Loop:
@@ -126,6 +133,27 @@ def by_sensor(p: Problem, fit: Fitted) -> list[Floats]:
     return [stands, move * stands, move * np.abs(move), np.maximum(move, 0.0), np.abs(move)]
 
 
+def past_moves(p: Problem, c: Floats, through: Floats) -> list[Floats]:
+    """Means of OP behind the valve over past stretches, each shape (n,)."""
+    n, dt_s = through.size, p.inputs.dt_s
+    length_s = min(REFERENCE.reach * float(c[Slot.T] + c[Slot.L]), REFERENCE.most_reach * n * dt_s)
+    width = max(round(length_s / REFERENCE.boxes / dt_s), REFERENCE.least_box)
+    total = np.concatenate(([0.0], np.cumsum(through - through.mean())))
+    at = [np.maximum(np.arange(n) - i * width, 0) for i in range(REFERENCE.boxes + 1)]
+    return [(total[at[i]] - total[at[i + 1]]) / width for i in range(REFERENCE.boxes)]
+
+
+def bent_moves(p: Problem, c: Floats, through: Floats) -> list[Floats]:
+    """Responses to OP's fast part by size, to its square and to its cube, each shape (n,)."""
+    dt_s, moves = p.inputs.dt_s, []
+    for share in (0.1, 0.5):
+        fast = through - lagged(through, max(share * float(c[Slot.T]), dt_s), dt_s)
+        moves += [fast * np.abs(fast), np.abs(fast)]
+    level = through - through.mean()
+    moves += [level**2, level**3]
+    return [response(x, c, dt_s) for x in moves]
+
+
 def ways(p: Problem, fit: Fitted) -> Mapping[str, Callable[[], list[Floats]]]:
     """The ways in which anything may act, each as its signals in the innovations' place, shape (n,) each."""
     c = fit.model.c
@@ -145,6 +173,27 @@ def ways(p: Problem, fit: Fitted) -> Mapping[str, Callable[[], list[Floats]]]:
 
     asked = {k: partial(white, v) for k, v in in_pv.items()}
     return asked if p.by_simulation else {**asked, "sensor": partial(by_sensor, p, fit)}
+
+
+def unfollowed(p: Problem, fit: Fitted) -> Callable[[Floats], Floats]:
+    """Takes from signals, shape (n,) or (n, m), weighted as innovations are, what a fit's own constants and its noise
+    model can follow linearly."""
+    r = p.y - simulate(p.inputs, fit.model.c)
+    own = np.concatenate((sensitivities(p, fit.model, fit.ar), lag_means(r, p.edges))) * np.sqrt(p.weight)
+    span = np.linalg.qr(np.nan_to_num(own).T)[0]
+    return lambda x: x - span @ (span.T @ x)
+
+
+def left_freely(p: Problem, fit: Fitted) -> Floats:
+    """What the flexible model leaves of a fit's weighted innovations, shape (n,)."""
+    c, root, rest = fit.model.c, np.sqrt(p.weight), unfollowed(p, fit)
+    through = through_valve(p.inputs, c)
+    free = past_moves(p, c, through) + bent_moves(p, c, through)
+    e = rest(fit.e * root)
+    more = rest((np.stack([whitened(x, fit.ar, p.edges) for x in free]) * root).T)
+    q, scale = np.linalg.qr(more)
+    kept = np.abs(np.diag(scale)) > 1e-8 * np.abs(np.diag(scale)).max()
+    return e - q[:, kept] @ (q[:, kept].T @ e)  # type: ignore[no-any-return]
 
 
 def foretold(p: Problem, fit: Fitted, clock: bool = True) -> Foretold:
