@@ -73,7 +73,7 @@ class Answer:
 def answer(found: Explanation, s: Recording) -> Answer:
     """The answer of an explanation of a recording."""
     proof = found.proven
-    effects = effects_of(found, s, proof if found.accepted else None)
+    effects = effects_of(found, s)
     asked = not found_first(found) and not by_cycles(found)
     silent = unanswered(found) if asked else ""
     lacking = silent or (too_short(found, s) if asked else "")
@@ -152,23 +152,23 @@ def untold_gain(found: Explanation, effects: tuple[EffectFound, ...]) -> str:
     return words.WANDERS if open_ended and found.p.by_simulation else ""
 
 
-def effects_of(found: Explanation, s: Recording, proof: HeldOut | None) -> tuple[EffectFound, ...]:
+def effects_of(found: Explanation, s: Recording) -> tuple[EffectFound, ...]:
     """Every effect found, the likeliest first: what is larger than a grid before the grid."""
     gates = [
         EffectFound(f.name, own.block, {n.name: n.estimate(f, s) for n in own.numbers}, None)
         for f in (found.recorder, found.controller)
         if f is not None and (own := fault(f.name))
     ]
-    rows = found.best.model.added
+    share = found.proven.share
     physics = [
         EffectFound(
             row.name,
             row.block,
             parameters_of(found.p, found.best, row) | (told_by_cycles(found, row) if i == 0 else {}),
-            proof.share if proof is not None and i == 0 and proof.share > 0.0 else None,
+            share if i == 0 and share > 0.0 else None,
             alternatives(found) if i == 0 else (),
         )
-        for i, row in enumerate(rows)
+        for i, row in enumerate(found.best.model.added)
     ]
     return (*physics, *gates) if found.finding is None else (*gates, *physics)
 

@@ -188,9 +188,7 @@ def nearer(one: Explanation, other: Explanation) -> Explanation:
     over_all = timed or is_one_move(one.p)
 
     def missed(found: Explanation) -> float:
-        if found.proof is None:
-            return math.inf
-        return (found.proof.overall if over_all else found.proof.held)[1].rmse
+        return (found.proven.overall if over_all else found.proven.held)[1].rmse
 
     return min(one, other, key=missed)
 

@@ -287,7 +287,8 @@ def located(e: Floats, pv: Floats, op: Floats, judged: Mask, dt_s: float, late: 
     columns = [g.columns[judged] for g in found]
     y = standardized(e[judged])
     bases = directions(columns)
-    whole = _basis(np.concatenate(columns, axis=1) - np.concatenate(columns, axis=1).mean(axis=0))
+    flat = np.concatenate(columns, axis=1)
+    whole = _basis(flat - flat.mean(axis=0))
     p, excess = chances(bases, y, blocks)
     size = max(float(np.sqrt(np.mean(e[judged] ** 2))), 1e-300)
     features = [

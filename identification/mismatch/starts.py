@@ -60,10 +60,8 @@ def step_places(p: Problem, fit: Fitted) -> tuple[int, ...]:
         at = _best_place(e, pulse, shut)
         places.append(at)
         part = pulse[: p.y.size - at]
-        tail = e[at:][: part.size]
-        part = part[: tail.size]
-        e = e.copy()
-        e[at:][: part.size] -= part * float(part @ tail) / max(float(part @ part), 1e-300)
+        tail = e[at : at + part.size]
+        tail -= part * float(part @ tail) / max(float(part @ part), 1e-300)
     return tuple(places)
 
 

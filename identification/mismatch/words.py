@@ -135,7 +135,7 @@ def cycles_told(found: Explanation) -> str:
         f"In {100 * seen.agreeing:.0f} % of {seen.stretches} stretches between {between}, PV goes as behind this "
         "valve and not as behind a free one."
     )
-    return text if found.proof is None or found.proof.carries else f"{text} {STRAYS}"
+    return text if found.proven.carries else f"{text} {STRAYS}"
 
 
 def too_short_told(enough: float, length_s: float, lag_s: float) -> str:
