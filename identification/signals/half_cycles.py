@@ -80,8 +80,8 @@ def usual_prominence(s: Spectrum, line: float) -> float:
     at the peak. For Gaussian noise median and mean have one ratio in every band, so both agree.
     """
     near = _usual_power(s, line / SIGNALS.peak_band, line * SIGNALS.peak_band)
-    low = _usual_power(s, line / SIGNALS.side_far, line / SIGNALS.side_near)
-    high = _usual_power(s, line * SIGNALS.side_near, min(line * SIGNALS.side_far, s.lines.size - 2))
+    low = _usual_power(s, line / SIGNALS.side_far, line / SIGNALS.own_band)
+    high = _usual_power(s, line * SIGNALS.own_band, min(line * SIGNALS.side_far, s.lines.size - 2))
     return near / max(math.sqrt(low * high), 1e-12 * near + 1e-300)
 
 
@@ -91,7 +91,7 @@ def size_kurtosis(s: Spectrum, line: float) -> float:
     Noise through a resonance is Gaussian, its envelope Rayleigh's, and has 3 (Rice 1945); a load from a machine, a
     limit cycle, a loop between OP's limits keep their size.
     """
-    x, _ = band_signal(s, line, SIGNALS.size_band)
+    x, _ = band_signal(s, line, SIGNALS.own_band)
     power = float(x @ x) / x.size
     return float(np.mean(x**4)) / power**2 if power > 0.0 else 3.0
 

@@ -84,8 +84,8 @@ def _about(power: Floats, line: Floats) -> tuple[Floats, Floats]:
     """Mean power about frequencies [lines], and the geometric mean of that on both sides, shape (b,) each."""
     total, top = np.concatenate(([0.0], np.cumsum(power))), power.size - 2
     near = _mean(total, line / SIGNALS.peak_band, line * SIGNALS.peak_band, top)
-    low = _mean(total, line / SIGNALS.side_far, line / SIGNALS.side_near, top)
-    high = _mean(total, line * SIGNALS.side_near, np.minimum(line * SIGNALS.side_far, top), top)
+    low = _mean(total, line / SIGNALS.side_far, line / SIGNALS.own_band, top)
+    high = _mean(total, line * SIGNALS.own_band, np.minimum(line * SIGNALS.side_far, top), top)
     return near, np.sqrt(low * high)
 
 
@@ -153,7 +153,7 @@ def locked_harmonic(s: Spectrum, period_s: float, order: int = 3, cycle: Spectru
 
 def envelope(s: Spectrum, line: float) -> tuple[Floats, float]:
     """Amplitude of the band about a frequency over time, shape (m,), and its sample interval [s]."""
-    factor = SIGNALS.size_band
+    factor = SIGNALS.own_band
     first, last = math.ceil(line / factor), min(int(line * factor), s.lines.size - 1)
     m = next_fast_len(max(int(line * 8), last + 2, 16))
     cut = np.zeros(m, dtype=np.complex128)
