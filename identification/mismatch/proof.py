@@ -37,7 +37,9 @@ def passes(p: Problem, worse: Fitted, better: Fitted, effect: Effect) -> bool:
 
     What an effect that is bound to a time will do later does not follow from what it did, so no span is held out.
     """
-    if runs_out(p, better) or is_in_sound_valves(p, better, effect):
+    limits = p.limits.proof
+    sound = effect.friction in WEARS and better.model.c[Slot.STICKBAND] < limits.sound_valve
+    if sound or runs_out(p, better):
         return False
     if effect.needs == "steps":
         return at_inlet(p, worse)
@@ -45,7 +47,6 @@ def passes(p: Problem, worse: Fitted, better: Fitted, effect: Effect) -> bool:
         return True
     if not effect.local and not is_spread(p, better, worse):
         return False
-    limits = p.limits.proof
     least = limits.held_out_loss - limits.held_out_share * gain(better, worse)
     return held_out_gain(p, fitted_early(p, worse, better)) > least
 
@@ -66,11 +67,6 @@ def runs_out(p: Problem, fit: Fitted) -> bool:
         if at_high or at_low:
             return True
     return False
-
-
-def is_in_sound_valves(p: Problem, fit: Fitted, effect: Effect) -> bool:
-    """Whether an effect is play or stick-slip no wider than a valve in good order has."""
-    return effect.friction in WEARS and float(fit.model.c[Slot.STICKBAND]) < p.limits.proof.sound_valve
 
 
 def is_one_move(p: Problem) -> bool:

@@ -15,7 +15,7 @@ from identification.limits import LOCATION
 from identification.mismatch.explanation import Explanation
 from identification.mismatch.location import Located, located
 from identification.mismatch.recording import Recording
-from identification.record import Floats, Mask
+from identification.record import Floats
 from identification.simulation.open_loop import simulate
 from identification.simulation.parameters import Slot
 
@@ -36,11 +36,6 @@ def carrying(won: Floats, dt_s: float) -> list[list[float]]:
     chosen = np.zeros(LOCATION.span_parts, dtype=bool)
     chosen[order[:count]] = True
     return [[int(edges[a]) * dt_s, int(edges[b]) * dt_s] for a, b in runs(chosen)]
-
-
-def masked_spans(where: Mask, dt_s: float) -> list[list[float]]:
-    """Spans of a mask [s], by the parts that hold most of it; the whole record where it is True throughout."""
-    return [[0.0, where.size * dt_s]] if where.all() else carrying(where.astype(float), dt_s)
 
 
 def ranges(x: Floats, weight: Floats) -> list[float]:
@@ -115,7 +110,9 @@ def where_of(found: Explanation, s: Recording, block: str, at: Located) -> dict[
     after = any(f.name == "after_reversals" for f in at.carrying)
     told: dict[str, Any] = {"features": features_said(at), "after_reversals": after}
     if marked is not None:
-        return {"signals": signals, "spans": masked_spans(marked.where[: s.pv.size], s.dt_s)} | told
+        here = marked.where[: s.pv.size]
+        spans = [[0.0, here.size * s.dt_s]] if here.all() else carrying(here.astype(float), s.dt_s)
+        return {"signals": signals, "spans": spans} | told
     if found.accepted:
         won, difference = won_over(p, found.plain, found.best)
     elif found.left > 0:

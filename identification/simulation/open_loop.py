@@ -169,9 +169,10 @@ def simulate(inputs: ModelInputs, c: Floats) -> Floats:
 def from_flow(inputs: ModelInputs, c: Floats, through: Floats) -> Floats:
     """The same for a flow through the valve during each sample, shape (n,) [% OP]."""
     dt = inputs.dt_s
-    rich = bool((c[WITHIN] != NEUTRAL[WITHIN]).any())
-    vessel_of = _rich if rich else _plain
-    out = vessel_of(inputs, c, through)
+    if (c[WITHIN] != NEUTRAL[WITHIN]).any():
+        out = _rich(inputs, c, through)
+    else:
+        out = plain_vessel(through, load(inputs, c), c, dt, inputs.middle)
     out = acted(Signal.PV, out, c, dt)
     if math.isfinite(c[Slot.CLIP_HI]) or math.isfinite(c[Slot.CLIP_LO]):
         out = np.clip(out, c[Slot.CLIP_LO] - inputs.level, c[Slot.CLIP_HI] - inputs.level)
@@ -212,10 +213,6 @@ def counted_from_level(inputs: ModelInputs, c: Floats) -> Floats:
     out[Slot.CAP] -= inputs.level
     out[Slot.UPPER_CAP] -= inputs.level
     return out
-
-
-def _plain(inputs: ModelInputs, c: Floats, through: Floats) -> Floats:
-    return plain_vessel(through, load(inputs, c), c, inputs.dt_s, inputs.middle)
 
 
 def _rich(inputs: ModelInputs, c: Floats, through: Floats) -> Floats:
