@@ -10,17 +10,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from analyzer.config import Config, limit_of
+from analyzer.config import Config
 from analyzer.lanes.lanes import RULES
-from identification.limits import LAW, LIMITS, LOCATION, REFERENCE, SIGNALS, ExplainLimits
+from identification.limits import LIMITS, ExplainLimits
 from identification.mismatch.answer import answer
 from identification.mismatch.diagnosis import explain
 from identification.mismatch.recording import Recording
 from tests.identification.hand_made import Plant, recording
 
 ROOT = Path(__file__).parents[2]
-OF_METHODS = (LAW, LOCATION, REFERENCE, SIGNALS)
-"""Limits that no file changes."""
 
 
 def read_names() -> set[str]:
@@ -35,17 +33,7 @@ def test_every_limit_is_read():
     those of lanes by their figures' names."""
     read = read_names() | {rule.limit or rule.figure for rule in RULES}
     declared = {f.name for s in fields(Config()) for f in fields(getattr(Config(), s.name))}
-    declared |= {f.name for s in OF_METHODS for f in fields(s)}
     assert {name for name in declared - read if not name.startswith("sign_")} == set()
-
-
-def test_every_number_of_a_method_is_stated_whole():
-    """No number that no file changes is without unit, meaning and source, and each lies in its range."""
-    for limits in OF_METHODS:
-        for f in fields(limits):
-            said = limit_of(f)
-            assert all((said.unit, said.meaning, said.source)), f.name
-            assert said.least <= getattr(limits, f.name) <= said.most, f.name
 
 
 def under(s: Recording, table: str, **changed: Any) -> str:

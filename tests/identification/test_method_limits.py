@@ -1,0 +1,21 @@
+"""The limits of a method, which no file changes: each is read by something and stated whole."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+
+import pytest
+
+from analyzer.config import limit_of
+from identification.limits import LAW, LOCATION, REFERENCE, SIGNALS, Limits
+from tests.identification.test_limits import read_names
+
+
+@pytest.mark.parametrize("limits", [LAW, LOCATION, REFERENCE, SIGNALS], ids=lambda x: type(x).__name__)
+def test_every_number_of_a_method_is_read_and_stated_whole(limits: Limits):
+    """None is without unit, meaning and source, each lies in its range, and some line reads it."""
+    assert {f.name for f in fields(limits)} <= read_names()
+    for f in fields(limits):
+        said = limit_of(f)
+        assert all((said.unit, said.meaning, said.source)), f.name
+        assert said.least <= getattr(limits, f.name) <= said.most, f.name
