@@ -4,18 +4,23 @@ from __future__ import annotations
 
 from dataclasses import fields
 
+import numpy as np
 import pytest
 
 from analyzer.config import limit_of
-from identification.limits import LAW, LOCATION, REFERENCE, SIGNALS, Limits
+from identification.limits import FIT, INTERVALS, LAW, LOCATION, REFERENCE, SIGNALS, SLIPS, STEM, Limits
 from tests.identification.test_limits import read_names
 
+TABLES = (FIT, SLIPS, STEM, INTERVALS, LAW, LOCATION, REFERENCE, SIGNALS)
+"""All of them."""
 
-@pytest.mark.parametrize("limits", [LAW, LOCATION, REFERENCE, SIGNALS], ids=lambda x: type(x).__name__)
+
+@pytest.mark.parametrize("limits", TABLES, ids=lambda x: type(x).__name__)
 def test_every_number_of_a_method_is_read_and_stated_whole(limits: Limits):
     """None is without unit, meaning and source, each lies in its range, and some line reads it."""
     assert {f.name for f in fields(limits)} <= read_names()
     for f in fields(limits):
         said = limit_of(f)
         assert all((said.unit, said.meaning, said.source)), f.name
-        assert said.least <= getattr(limits, f.name) <= said.most, f.name
+        numbers = np.ravel(getattr(limits, f.name))
+        assert said.least <= numbers.min() <= numbers.max() <= said.most, f.name
