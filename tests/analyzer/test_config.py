@@ -10,22 +10,17 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner, Result
 
-from analyzer import limits
 from analyzer.cli import main
 from analyzer.config import Config, configured, limit_of, limits_document, read_config
 from analyzer.explain.case import asked_cases, whole
 from analyzer.loops.changes import TuningChange
 from analyzer.night.asked import Asked
 from analyzer.store.store import Store
-from identification.limits import Limits
 from proofs.plant import START_S, Sketch, simulate, write_export
 from tests.reports.small_store import small_store
-from tuning.limits import METHOD
 
 TANK = Sketch("valve", (60.0, 1800.0, 9.0), 0.9, 40.0, backlash=2.5)
 """A tank on a valve with play."""
-FIXED = [x for x in (*vars(limits).values(), METHOD) if isinstance(x, Limits)]
-"""Limits that no plant changes."""
 READERS = ("run", "check", "tune", "explain", "simulate")
 """Commands that read an EXPORT (contract)."""
 CASES = [
@@ -71,7 +66,7 @@ def test_the_printed_defaults_are_the_defaults():
 
 def test_every_limit_has_unit_range_meaning_and_source():
     """No limit is without unit, meaning and source, and every default lies in its range."""
-    for table in (*(getattr(Config(), section.name) for section in fields(Config)), *FIXED):
+    for table in (getattr(Config(), section.name) for section in fields(Config)):
         for field in fields(table):
             said, value = limit_of(field), getattr(table, field.name)
             assert all((said.unit, said.meaning, said.source)), field.name

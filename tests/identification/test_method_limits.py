@@ -7,11 +7,17 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
+import analyzer.limits
+import identification.limits
+import tuning.limits
 from analyzer.config import limit_of
-from identification.limits import FIT, INTERVALS, LAW, LOCATION, REFERENCE, SIGNALS, SLIPS, STEM, Limits
+from identification.limits import Limits
 from tests.identification.test_limits import read_names
 
-TABLES = (FIT, SLIPS, STEM, INTERVALS, LAW, LOCATION, REFERENCE, SIGNALS)
+MODULES = analyzer.limits, identification.limits, tuning.limits
+TABLES = list(
+    {type(x): x for module in MODULES for x in vars(module).values() if isinstance(x, Limits)}.values()
+)
 """All of them."""
 
 
