@@ -30,8 +30,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analyzer.config import CauseLimits, Config
-from analyzer.loop.cause_weights import PLAIN, chances, likelihood_told, measures, signs_of, width_text
-from analyzer.loop.decisions import CAUSES, OF_LOAD, Cause, Fault, Lack, Needs
+from analyzer.loop.cause_weights import PLAIN, chances, measures, signs_of
+from analyzer.loop.decisions import CAUSES, OF_LOAD, Cause, Fault, Lack, Needs, Shown
 from analyzer.loop.finding import Sign
 from analyzer.loop.fitness import compressed
 from analyzer.loop.identified import sensitivity
@@ -53,7 +53,7 @@ NO_MODEL = "needs trends from which a model can be identified"
 class Verdict:
     """The cause of one loop's oscillation.
 
-    cause; confidence [%] of each cause; fault of the valve; signs in words; needs : what the record lacks for a
+    cause; confidence [%] of each cause; fault of the valve; signs; needs : what the record lacks for a
     cause, None where it lacks nothing; measured; dead : the valve no longer moves PV at all; steady : the same by one
     friction for all slips, where it was told slip by slip since.
     """
@@ -88,8 +88,6 @@ class Verdict:
         return self if self.steady is None or self.cause is not Cause.VALVE else self.steady
 
 
-AGAIN = "stretch after stretch between moves of the stem says so"
-"""What the stretches of a calm loop say of a fault that is narrow beside OP's range, as in a loop of a programme."""
 NO_CAUSE = Verdict(Cause.NONE, dict.fromkeys(CAUSES, 0.0), Fault.NONE)
 
 
@@ -123,8 +121,9 @@ def agrees(m: Measured, limits: CauseLimits) -> bool:
 def quiet_signs(m: Measured, limits: CauseLimits) -> tuple[Sign, ...]:
     """Signs of a valve at fault in a loop that does not oscillate.
 
-    The stretches between moves of the stem must agree. A few moves are told from steps of the load, unless the set
-    point called for them, by more evidence.
+    The stretches between moves of the stem must agree; of a fault that is narrow beside OP's range, as in a loop of a
+    programme, they are a sign of their own. A few moves are told from steps of the load, unless the set point called
+    for them, by more evidence.
     """
     if not agrees(m, limits):
         return ()
@@ -132,13 +131,14 @@ def quiet_signs(m: Measured, limits: CauseLimits) -> tuple[Sign, ...]:
     least = needed(m, limits, False) * (limits.quiet_factor if few else 1.0)
     if not speaks(m, limits, False) or m.evidence < least or (m.moves < limits.moves and not m.excited):
         return ()
-    text, figures = likelihood_told(m.evidence)
-    signs = [Sign("valve", 0.5 + 0.5 * _ramp(m.evidence, least, 4 * least), text, figures=figures)]
+    sure = 0.5 + 0.5 * _ramp(m.evidence, least, 4 * least)
+    signs = [Sign(Cause.VALVE, sure, Shown.CALM_EVIDENCE, (m.evidence,))]
     width = m.play.valve.stickband
     if m.size < limits.size and m.steady >= limits.steady_alone and width >= limits.plain_width:
-        signs.append(Sign("valve", 0.6 + 0.4 * _ramp(m.steady, limits.steady_alone, 10.0), AGAIN))
+        signs.append(Sign(Cause.VALVE, 0.6 + 0.4 * _ramp(m.steady, limits.steady_alone, 10.0), Shown.AGAIN))
     if m.size >= limits.size:
-        signs.append(Sign("valve", 0.6 + 0.4 * _ramp(m.size, limits.size, 0.7), width_text(m.size)))
+        wide = 0.6 + 0.4 * _ramp(m.size, limits.size, 0.7)
+        signs.append(Sign(Cause.VALVE, wide, Shown.CALM_WIDTH, (m.size,)))
     return tuple(signs)
 
 
@@ -250,7 +250,7 @@ def dead_valve(record: LoopRecord, limits: CauseLimits) -> Sign | None:
     one_sided = max(float((e > 0).mean()), float((e < 0).mean()))
     if not still or one_sided < 0.95:
         return None
-    return Sign("valve", 0.9, f"OP winds over {wound:.0f} % while PV stands still off the set point")
+    return Sign(Cause.VALVE, 0.9, Shown.DEAD_VALVE, (wound,))
 
 
 def with_dead_valve(verdict: Verdict, sign: Sign) -> Verdict:
@@ -296,7 +296,7 @@ def _hides(verdict: Verdict, prepared: Prepared, oscillation: Oscillation, confi
         return rough
     if samples < limits.samples_told:
         return Needs(Lack.FASTER, words.too_few(samples, limits.samples_told))
-    if not any(s.points_to == Cause.LOAD and s.name in OF_LOAD for s in verdict.signs):
+    if not any(s.points_to is Cause.LOAD and s.shown in OF_LOAD for s in verdict.signs):
         return Needs(Lack.MANUAL_TEST, words.NO_SIGN_OF_A_LOAD)
     return _beside(verdict, limits)
 

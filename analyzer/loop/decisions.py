@@ -14,9 +14,32 @@ from tuning import Cause as Cause
 
 CAUSES = (Cause.VALVE, Cause.TUNING, Cause.LOAD)
 """Causes that have a confidence of their own."""
-AMPLIFICATION = "amplification"
-"""Name of the sign that tells a loop too tight by what it does, whatever else weighs more."""
-OF_LOAD = ("line_linear", "consistency", "wave_left", "kurtosis")
+
+
+class Shown(StrEnum):
+    """What a sign of a cause shows; those of a loop that oscillates are named for the first measure they rest on."""
+
+    EVIDENCE = "evidence"
+    WIDTH = "size"
+    LOAD_LEFT = "line_linear"
+    AMPLIFICATION = "amplification"
+    LOOP_GAIN = "loop_gain"
+    PROCESS = "consistency"
+    HARMONIC = "harmonic"
+    WAVE_LEFT = "wave_left"
+    REGULARITY = "kurtosis"
+    LIMITS = "saturated"
+    DEAD_TIME = "dead_time_share"
+    CALM_EVIDENCE = "evidence of a calm loop"
+    CALM_WIDTH = "size in a calm loop"
+    AGAIN = "stretch after stretch of a calm loop"
+    DEAD_VALVE = "dead valve"
+    FOLLOWS = "follows"
+    OF_BELOW = "loop below at fault"
+    OF_ABOVE = "loop above cycles"
+
+
+OF_LOAD = (Shown.LOAD_LEFT, Shown.PROCESS, Shown.WAVE_LEFT, Shown.REGULARITY)
 """Signs that a load itself leaves: a peak in what the model leaves, another process away from the period, harmonics
 that no faulty valve makes, a size and rhythm kept. That a valve or a limit is not seen at work is none of them; ours:
 all but one of 22 loads told of untidy and tidy plants have one, of seven levels with play told a load one had."""

@@ -11,25 +11,20 @@ from dataclasses import dataclass, field, replace
 
 from analyzer.config import LaneLimits
 from analyzer.lanes.lanes import action_of, lanes_of
-from analyzer.loop.decisions import CAUSES, Action, Cause, Due, Fault, Lack, Lane, Status, counts
+from analyzer.loop.decisions import CAUSES, Action, Cause, Due, Fault, Lack, Lane, Shown, Status, counts
 
 Cell = str | float | None
 
 
 @dataclass(frozen=True, slots=True)
 class Sign:
-    """One sign: which cause it points to, how strongly (0 to 1), in words, its name, and the figures behind it."""
+    """One sign: which cause it points to, how strongly (0 to 1), what it shows, and the figures and loops that say
+    so, as words/signs.py takes them."""
 
-    points_to: str
+    points_to: Cause
     strength: float
-    text: str
-    name: str = ""
-    figures: str = ""
-
-    @property
-    def whole(self) -> str:
-        """Words and figures."""
-        return f"{self.text} ({self.figures})" if self.figures else self.text
+    shown: Shown
+    figures: tuple[Cell, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,6 +21,7 @@ from analyzer.loops.changes import in_force
 from analyzer.loops.spec import LoopSpec, spec_of
 from analyzer.loops.tags import as_stated
 from analyzer.night.nights import cut, nights_of
+from analyzer.words.signs import whole
 from identification.errors import InputError, NotAssessedError
 from identification.estimation.hammerstein import Fit
 from identification.models import Estimate, Loop, Pid, Process, Valve
@@ -271,7 +272,7 @@ def proposal(asked: Asked, loop: str, drawn: bool) -> tuple[list[str], dict[str,
         raise InputError(seen, "both", "state them, so that new ones can be compared")
     found = assess(prepared, stated, config, spec.type, earlier_settings(row, asked.changes, prepared))
     head = [f"{loop}, night {night.name}: cause {found.verdict.cause}"]
-    text = head + [f"sign of {s.points_to}: {s.whole}" for s in found.verdict.signs]
+    text = head + [f"sign of {s.points_to}: {whole(s)}" for s in found.verdict.signs]
     if found.verdict.measured is None:
         needs = _unfit(prepared, config)
         if found.verdict.cause is not Cause.VALVE:

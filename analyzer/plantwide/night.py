@@ -11,13 +11,12 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from analyzer.config import PlantLimits
-from analyzer.loop.decisions import Cause, GroupRole, Status
+from analyzer.loop.decisions import Cause, GroupRole, Shown, Status
 from analyzer.loop.finding import Cell, Finding, Root, Sign, Swing, following
 from analyzer.plantwide.compare import Lags
 from analyzer.plantwide.groups import Group, groups_of
 from analyzer.plantwide.source import Candidate, Peer, candidates_of
 from analyzer.plantwide.wave import Wave
-from analyzer.words.reason import following_text
 
 Row = Mapping[str, Any]
 LAG_KNOWN = 0.5
@@ -61,7 +60,8 @@ def traced_night(
 def _follower(alone: Finding, known: Finding, root: Root, wave: Wave, limits: PlantLimits) -> Finding:
     """A loop as a follower; as it was where it does not oscillate, not even with its part in what is shared."""
     confidence = follower_confidence(alone.confidence, root, limits)
-    sign = Sign(Cause.LOAD, limits.follower_sign, following_text(root))
+    seen = root.loop, root.lag_s, root.coherence
+    sign = Sign(Cause.LOAD, limits.follower_sign, Shown.FOLLOWS, seen)
     told = following(known, root, swing_of(alone, root, wave, limits), confidence, sign)
     return told if told.oscillates else known
 

@@ -1,6 +1,7 @@
 """Findings as rows of tables and back: the one door between what is known of a loop and the columns that are kept.
 
-In the pieces that workers write of a night the column `reason` holds what a loop lacks; the sentence is made last.
+In the pieces that workers write of a night signs are figures, and the column `reason` holds what a loop lacks; the
+words are made last.
 """
 
 from __future__ import annotations
@@ -12,9 +13,10 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from analyzer.columns import HOURS, row_of
-from analyzer.loop.decisions import CAUSES, Action, Cause, Due, Fault, Lack, Lane, Status
+from analyzer.loop.decisions import CAUSES, Action, Cause, Due, Fault, Lack, Lane, Shown, Status
 from analyzer.loop.finding import Cell, Finding, Remedy, Sign, Swing
 from analyzer.words.reason import reason
+from analyzer.words.signs import as_stored
 
 if TYPE_CHECKING:
     from analyzer.loop.assess import Assessment
@@ -36,7 +38,8 @@ TYPED = (
 
 def night_row(found: Finding) -> dict[str, Any]:
     """The row of one loop and night, with every column."""
-    return {**piece_row(found), "reason": reason(found)}
+    signs = json.dumps([as_stored(s) for s in found.signs]) if found.status is Status.OK else None
+    return {**piece_row(found), "signs": signs, "reason": reason(found)}
 
 
 def piece_row(found: Finding) -> dict[str, Any]:
@@ -82,7 +85,7 @@ def finding_of(row: Row) -> Finding:
         _value(Cause, row["cause"]),
         _value(Fault, row["valve_fault"]),
         {c: row[f"osc_{c}_pct"] for c in CAUSES if row[f"osc_{c}_pct"] is not None},
-        tuple(Sign(**s) for s in json.loads(row["signs"] or "[]")),
+        tuple(_sign(**s) for s in json.loads(row["signs"] or "[]")),
         Remedy(
             _value(Action, row["action"]),
             row["advice"] or "",
@@ -94,6 +97,10 @@ def finding_of(row: Row) -> Finding:
         lanes=tuple(Lane(name) for name in (row["lanes"] or "").split(", ") if name),
         group=row["group"],
     )
+
+
+def _sign(points_to: str, strength: float, shown: str, figures: list[Cell]) -> Sign:
+    return Sign(Cause(points_to), strength, Shown(shown), tuple(figures))
 
 
 def _value(kind: Any, text: str | None) -> Any:

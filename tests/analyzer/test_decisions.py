@@ -10,7 +10,18 @@ import numpy as np
 import pytest
 
 from analyzer.config import PlantLimits
-from analyzer.loop.decisions import CAUSES, Action, Cause, Fault, Lack, LacksError, Needs, Status, counts
+from analyzer.loop.decisions import (
+    CAUSES,
+    Action,
+    Cause,
+    Fault,
+    Lack,
+    LacksError,
+    Needs,
+    Shown,
+    Status,
+    counts,
+)
 from analyzer.loop.finding import Finding, Remedy, Root, Sign, following
 from analyzer.night import chunk
 from analyzer.night.nights import Night
@@ -46,7 +57,7 @@ def test_a_follower_is_under_load_whatever_its_own_signs(own):
     root = Root("FIC101", 0.9, None, 96.0)
     confidence = follower_confidence(dict(zip(CAUSES, own, strict=True)), root, PlantLimits())
     alone = Finding("L", "2026-03-02", Status.OK, remedy=Remedy(Action.RETUNE, kp_new=1.0))
-    told = following(alone, root, None, confidence, Sign("load", 1.0, ""))
+    told = following(alone, root, None, confidence, Sign(Cause.LOAD, 1.0, Shown.FOLLOWS))
     assert (told.cause, told.fault, told.action) == (Cause.LOAD, Fault.NONE, Action.SEE_SOURCE_LOOP)
     assert told.remedy.kp_new is None
     assert confidence[Cause.LOAD] >= max(90.0, own[2])

@@ -1,0 +1,174 @@
+"""What a sign of a cause says: words for everybody, and figures for an expert."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from analyzer.loop.decisions import Cause, Shown
+from analyzer.loop.finding import Sign
+from analyzer.words.units import duration
+
+Told = tuple[str, str]
+"""Words for everybody, and figures for an expert, '' where the words hold them."""
+
+
+def told(sign: Sign) -> Told:
+    """A sign in words and figures."""
+    said = SAYS[sign.shown](*sign.figures)
+    return (said, "") if isinstance(said, str) else said
+
+
+def words(sign: Sign) -> str:
+    """A sign in words alone."""
+    return told(sign)[0]
+
+
+def whole(sign: Sign) -> str:
+    """Words and figures in one."""
+    text, figures = told(sign)
+    return f"{text} ({figures})" if figures else text
+
+
+def as_stored(sign: Sign) -> dict[str, Any]:
+    """A sign as the store keeps it; one that rests on none of the measures that are weighed has no name."""
+    text, figures = told(sign)
+    name = "" if sign.shown in UNNAMED else sign.shown
+    return {
+        "points_to": sign.points_to,
+        "strength": sign.strength,
+        "text": text,
+        "name": name,
+        "figures": figures,
+    }
+
+
+def _calm_evidence(evidence: float) -> Told:
+    """How a faulty valve explains PV against an ideal one."""
+    if evidence <= 0:
+        return "play or stick-slip explains PV no better than an ideal valve", ""
+    return "play or stick-slip explains PV better than an ideal valve", f"log likelihood +{evidence:.0f}"
+
+
+def _evidence(evidence: float, agreeing: float = 0.0, count: int = 0) -> Told:
+    text, figures = _calm_evidence(evidence)
+    if not count or evidence <= 0:
+        return text, figures
+    return f"{text}, in {100 * agreeing:.0f} % of {count} stretches between turns of OP", figures
+
+
+def _width(evidence: float, size: float) -> str:
+    if evidence <= 0:
+        return "no play or stick-slip is seen in PV"
+    return f"the fault that fits best is {100 * size:.0f} % of OP's range wide"
+
+
+def _load_left(linear: float, valve: float) -> Told:
+    plain = f"the load that is left has {'a' if linear >= 1.0 else 'no'} peak at the period"
+    return plain, f"prominence {linear:.1f}, behind a faulty valve {valve:.1f}"
+
+
+def _amplification(*known: float | None) -> str:
+    if not known:
+        return "the identified loop is unstable"
+    (s,) = known
+    if s is None:
+        return "how the loop amplifies at the period is not known, for want of its settings"
+    verb, times = ("amplifies", s) if s > 1.0 else ("weakens", 1.0 / max(s, 1e-3))
+    return f"at the period the loop {verb} load {times:.1f} times"
+
+
+def _loop_gain(gain: float | None = None) -> str:
+    if gain is None:
+        return "the gain of process and controller together is not known, for want of settings"
+    return f"process and controller together have a gain of {gain:.2g}"
+
+
+def _process(consistency: float) -> Told:
+    figures = f"{consistency:.1f} times its gain"
+    if consistency >= 0.5:
+        return "outside the period's band the same process is seen", figures
+    return "away from the period another process is seen", figures
+
+
+def _wave_left(left: float) -> str:
+    if not left:
+        return "a faulty valve leaves few harmonics of the cycle unexplained"
+    return f"a faulty valve leaves harmonics of {100 * left:.0f} % of the cycle unexplained"
+
+
+def _regularity(kurtosis: float, third: float) -> Told:
+    size, rhythm = kurtosis < 2.0, third >= 0.5
+    figures = f"kurtosis {kurtosis:.1f}, noise has 3; rhythm {third:.1f}"
+    if size == rhythm:
+        return f"the cycle {'keeps' if size else 'changes'} its size and its rhythm", figures
+    kept, changed = ("size", "rhythm") if size else ("rhythm", "size")
+    return f"the cycle keeps its {kept} and changes its {changed}", figures
+
+
+def _limits(saturated: float) -> str:
+    share = 100 * saturated
+    return f"OP is at a limit {share:.0f} % of the time" if share >= 1 else "OP stays off its limits"
+
+
+def _dead_time(period_s: float, dead_time_s: float) -> str:
+    if period_s > 50 * dead_time_s:
+        return "the period is long against the dead time"
+    return f"the period is {period_s / dead_time_s:.0f} dead times"
+
+
+def later(lag_s: float | None) -> str:
+    """How much later a loop moves than the one that it follows."""
+    return f" {duration(abs(lag_s))} later" if lag_s is not None and lag_s > 0 else ""
+
+
+def _follows(loop: str, lag_s: float | None, coherence: float) -> str:
+    start = f"where the oscillation seems to start (coherence {coherence:.2f})"
+    return f"moves with {loop}{later(lag_s)}, {start}"
+
+
+def of_below(loop: str, cause: str | None, tie: str) -> str:
+    """What a loop's output hangs on: one that has a fault, or answers as a faulty valve would."""
+    what = {Cause.VALVE: "valve is at fault", Cause.TUNING: "tuning is too tight"}.get(
+        Cause(cause or Cause.NONE)
+    )
+    told = f"whose {what}" if what else "which answers as a faulty valve would"
+    moves = "moves" if tie == "split" else "is the set point of"
+    return f"its output {moves} {loop}, {told}"
+
+
+def _of_above(loop: str, tie: str) -> str:
+    brings = {"master": "its set point is the output", "split": "it is moved by the output"}.get(
+        tie, "its set point is in a ratio to the PV"
+    )
+    return f"{brings} of {loop}, which cycles"
+
+
+SAYS: Mapping[Shown, Callable[..., Told | str]] = {
+    Shown.EVIDENCE: _evidence,
+    Shown.WIDTH: _width,
+    Shown.LOAD_LEFT: _load_left,
+    Shown.AMPLIFICATION: _amplification,
+    Shown.LOOP_GAIN: _loop_gain,
+    Shown.PROCESS: _process,
+    Shown.HARMONIC: lambda third: f"the wave has a phase-locked third harmonic of {100 * third:.0f} %",
+    Shown.WAVE_LEFT: _wave_left,
+    Shown.REGULARITY: _regularity,
+    Shown.LIMITS: _limits,
+    Shown.DEAD_TIME: _dead_time,
+    Shown.CALM_EVIDENCE: _calm_evidence,
+    Shown.CALM_WIDTH: lambda size: f"its width is {100 * size:.0f} % of OP's range",
+    Shown.AGAIN: lambda: "stretch after stretch between moves of the stem says so",
+    Shown.DEAD_VALVE: lambda wound: f"OP winds over {wound:.0f} % while PV stands still off the set point",
+    Shown.FOLLOWS: _follows,
+    Shown.OF_BELOW: of_below,
+    Shown.OF_ABOVE: _of_above,
+}
+"""What each sign says, of its figures."""
+UNNAMED = frozenset(
+    {
+        *(Shown.CALM_EVIDENCE, Shown.CALM_WIDTH, Shown.AGAIN, Shown.DEAD_VALVE),
+        *(Shown.FOLLOWS, Shown.OF_BELOW, Shown.OF_ABOVE),
+    }
+)
+"""Signs that no measure is named for."""
