@@ -26,11 +26,10 @@ from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import no_loops
 from analyzer.night import chunk
 from analyzer.night.chunk import Done, Task
-from analyzer.night.cluster import Cluster
 from analyzer.night.finish import finish_night, is_empty
 from analyzer.night.nights import Night, nights_of
 from analyzer.night.run_files import Identity, in_one_order, require_same
-from analyzer.night.workers import Died, Here, Workers, executor
+from analyzer.night.workers import Died, Executor, executor
 from analyzer.store.lock import locked
 from analyzer.store.store import Store
 from analyzer.store.table import OF_A_NIGHT
@@ -104,17 +103,9 @@ def _tasks(batch: Batch, nights: Sequence[Night], known: set[str]) -> list[Task]
     ]
 
 
-_Workers = Cluster[Task, Done] | Here[Task, Done] | Workers[Task, Done]
-
-
 def _results(tasks: Sequence[Task], jobs: int, config: Config, scheduler: str | None) -> Iterator[Done]:
     """What the chunks give, on a cluster, on worker processes or, with no jobs, in this process, unprotected."""
-    workers: _Workers
-    if scheduler is not None:
-        workers = Cluster(scheduler, chunk.work)
-    else:
-        workers = executor(jobs, len(tasks), chunk.work, config.workers)
-    with workers:
+    with executor(jobs, len(tasks), chunk.work, config.workers, scheduler) as workers:
         for task in tasks:
             workers.submit(task)
         for result in workers.results():
@@ -124,7 +115,7 @@ def _results(tasks: Sequence[Task], jobs: int, config: Config, scheduler: str | 
                 yield result
 
 
-def _mourned(workers: _Workers, died: Died[Task]) -> Iterator[Done]:
+def _mourned(workers: Executor[Task, Done], died: Died[Task]) -> Iterator[Done]:
     """The loop that was in hand is tried once alone, then given up with the reason; others go to other workers. Where
     it is not known which it was, each is tried by itself."""
     task, at = died.task, died.at
