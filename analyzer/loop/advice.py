@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from analyzer.config import AdviceLimits, Config
 from analyzer.loop.assess import Assessment
 from analyzer.loop.cause import Verdict
-from analyzer.loop.decisions import Action, Cause, Due, Lack, Needs
+from analyzer.loop.decisions import Action, Cause, Due, Lack, Need, Needs
 from analyzer.loop.fitness import too_thin
 from analyzer.loop.identified import cautious, load_of, tuned, uncertain
 from analyzer.loop.oscillation import counting
@@ -98,7 +98,7 @@ def advise(
 def _unscaled(kept: Advice | None, needs: Needs) -> Advice:
     """What is left to do where OP is not in percent: a valve is stroked all the same, else the range is stated."""
     if kept is not None and kept.action is Action.REPAIR_VALVE:
-        return replace(kept, reason=needs.text, lack=needs.lack)
+        return replace(kept, reason=str(needs), lack=needs.lack)
     return _lacking(needs)
 
 
@@ -117,7 +117,7 @@ def _sought(
     if proposal.action is Action.UNDECIDED and found.verdict.cause is Cause.VALVE:
         proposal = replace(proposal, action=Action.REPAIR_VALVE)
     elif proposal.action is Action.UNDECIDED:
-        return _lacking(Needs(Lack.LONGER, f"{words.MORE} {proposal.reason}"))
+        return _lacking(Needs(Lack.LONGER, Need.LONGER, (proposal.reason,)))
     beside = None
     if proposed.loop is not None and proposed.load is not None:
         new = held or proposal.controller or proposal.meanwhile
@@ -140,7 +140,7 @@ def _lacking(needs: Needs) -> Advice:
     """The advice to get more data, or a test where no data tell, with what is lacking."""
     tests = (Lack.STROKE, Lack.MANUAL_TEST)
     action = Action.UNDECIDED if needs.lack in tests else Action.NEEDS_DATA
-    return Advice(action, needs.text, lack=needs.lack)
+    return Advice(action, str(needs), lack=needs.lack)
 
 
 def withheld(
@@ -178,7 +178,7 @@ def _unsupported(found: Assessment, controller: Pid | None, config: Config) -> A
     if controller is None:
         return _without_settings(found.verdict)
     if found.judged_h < config.advice.least_h:
-        return _lacking(Needs(Lack.LONGER, words.too_short(found.judged_h, config.advice.least_h)))
+        return _lacking(Needs(Lack.LONGER, Need.HOURS, (config.advice.least_h, found.judged_h)))
     return _too_thin(found, controller, config)
 
 

@@ -29,7 +29,7 @@ from analyzer.loop.cause import (
     told_slip_by_slip,
     with_dead_valve,
 )
-from analyzer.loop.decisions import Cause, Lack, LacksError, Needs
+from analyzer.loop.decisions import Cause, Lack, LacksError, Need, Needs
 from analyzer.loop.fitness import too_thin, unfit_for_cause, unfit_for_settings
 from analyzer.loop.judged_stretch import Earlier, Stretch, differing, judged_stretch
 from analyzer.loop.measure import Measured, measure, time_scale
@@ -39,7 +39,6 @@ from analyzer.loop.quality import Prepared
 from analyzer.loop.setpoint_moves import Move, moves
 from analyzer.loop.shared_valve import Shared
 from analyzer.plantwide.wave import Wave, waves_of
-from analyzer.words import settings as words
 from identification.errors import NotAssessedError
 from identification.models import Pid
 from identification.record import LoopRecord
@@ -94,17 +93,16 @@ def unassessable(record: LoopRecord, config: Config) -> Needs | None:
     q = config.quality
     own = ~record.mask("idle")
     if int(own.sum()) < q.samples:
-        idle = "" if own.all() else f" while it has the valve, {100 * own.mean():.1f} % of the time"
-        return Needs(Lack.SAMPLES, f"needs {q.samples} samples, has {own.sum()}{idle}")
+        has = q.samples, int(own.sum())
+        if own.all():
+            return Needs(Lack.SAMPLES, Need.SAMPLES, has)
+        return Needs(Lack.SAMPLES, Need.SAMPLES_IN_TURN, (*has, 100 * float(own.mean())))
     share = float(record.usable[own].mean())
     if share >= q.usable_share:
         return None
     manual, bad = float(record.mask("manual").mean()), float(record.bad.mean())
-    return Needs(
-        Lack.AUTOMATIC if manual >= bad else Lack.SAMPLES,
-        f"needs {100 * q.usable_share:.0f} % good samples in automatic, has {100 * share:.0f} % "
-        f"(manual {100 * manual:.0f} %, gaps and stale {100 * bad:.0f} %)",
-    )
+    shares = (100 * q.usable_share, 100 * share, 100 * manual, 100 * bad)
+    return Needs(Lack.AUTOMATIC if manual >= bad else Lack.SAMPLES, Need.AUTOMATIC, shares)
 
 
 def cause_of(
@@ -120,7 +118,8 @@ def cause_of(
     try:
         measured = measure(record, oscillation, controller, config.cause, found.spectrum, kind)
     except NotAssessedError as error:
-        verdict = not_assessed(Needs(Lack.UNBROKEN, str(error))) if oscillation is not None else NO_CAUSE
+        needs = Needs(Lack.UNBROKEN, Need.AS_TOLD, (str(error),))
+        verdict = not_assessed(needs) if oscillation is not None else NO_CAUSE
         return with_dead_valve(verdict, dead) if dead else verdict
     verdict = verdict_by_measures(measured, prepared, oscillation, config)
     if oscillation is not None:
@@ -185,12 +184,14 @@ def hidden(record: LoopRecord, found: Oscillations, controller: Pid | None, conf
         folded = None if controller is None else config.advice.cycle_per_ti * controller.ti_s
         if folded is None or folded >= NYQUIST * record.dt_s:
             return None
-        return Needs(Lack.FASTER, f"{words.too_coarse(record.dt_s, folded, samples)}; {words.FOLDED}")
+        return Needs(Lack.FASTER, Need.UNFOLDED, (folded / samples, record.dt_s, folded))
     period = barely_seen(found, config.oscillation)
     if period is None and controller is not None and math.isfinite(controller.ti_s):
         expected = config.advice.cycle_per_ti * controller.ti_s
         period = expected if expected < samples * record.dt_s else None
-    return None if period is None else Needs(Lack.FASTER, words.too_coarse(record.dt_s, period, samples))
+    if period is None:
+        return None
+    return Needs(Lack.FASTER, Need.OF_A_CYCLE, (period / samples, record.dt_s, period))
 
 
 def _dead_time(verdict: Verdict) -> float | None:

@@ -31,14 +31,13 @@ import numpy as np
 
 from analyzer.config import CauseLimits, Config
 from analyzer.loop.cause_weights import PLAIN, chances, measures, signs_of
-from analyzer.loop.decisions import CAUSES, OF_LOAD, Cause, Fault, Lack, Needs, Shown
+from analyzer.loop.decisions import CAUSES, OF_LOAD, Cause, Fault, Lack, Need, Needs, SignKind
 from analyzer.loop.finding import Sign
 from analyzer.loop.fitness import compressed
 from analyzer.loop.identified import sensitivity
 from analyzer.loop.measure import PLAYS, Measured
 from analyzer.loop.oscillation import Oscillation
 from analyzer.loop.quality import Prepared
-from analyzer.words import settings as words
 from identification.errors import NotAssessedError
 from identification.estimation.backlash_stiction import SHORT, generic_noise
 from identification.estimation.gauss_newton import descend
@@ -46,7 +45,7 @@ from identification.estimation.hammerstein import Fit
 from identification.estimation.irregular_slips import SlipPath, fit_irregular, path_evidence
 from identification.record import LoopRecord
 
-NO_MODEL = "needs trends from which a model can be identified"
+NO_MODEL = Needs(None, Need.MODEL)
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,13 +131,15 @@ def quiet_signs(m: Measured, limits: CauseLimits) -> tuple[Sign, ...]:
     if not speaks(m, limits, False) or m.evidence < least or (m.moves < limits.moves and not m.excited):
         return ()
     sure = 0.5 + 0.5 * _ramp(m.evidence, least, 4 * least)
-    signs = [Sign(Cause.VALVE, sure, Shown.CALM_EVIDENCE, (m.evidence,))]
+    signs = [Sign(Cause.VALVE, sure, SignKind.CALM_EVIDENCE, (m.evidence,))]
     width = m.play.valve.stickband
     if m.size < limits.size and m.steady >= limits.steady_alone and width >= limits.plain_width:
-        signs.append(Sign(Cause.VALVE, 0.6 + 0.4 * _ramp(m.steady, limits.steady_alone, 10.0), Shown.AGAIN))
+        signs.append(
+            Sign(Cause.VALVE, 0.6 + 0.4 * _ramp(m.steady, limits.steady_alone, 10.0), SignKind.AGAIN)
+        )
     if m.size >= limits.size:
         wide = 0.6 + 0.4 * _ramp(m.size, limits.size, 0.7)
-        signs.append(Sign(Cause.VALVE, wide, Shown.CALM_WIDTH, (m.size,)))
+        signs.append(Sign(Cause.VALVE, wide, SignKind.CALM_WIDTH, (m.size,)))
     return tuple(signs)
 
 
@@ -250,7 +251,7 @@ def dead_valve(record: LoopRecord, limits: CauseLimits) -> Sign | None:
     one_sided = max(float((e > 0).mean()), float((e < 0).mean()))
     if not still or one_sided < 0.95:
         return None
-    return Sign(Cause.VALVE, 0.9, Shown.DEAD_VALVE, (wound,))
+    return Sign(Cause.VALVE, 0.9, SignKind.DEAD_VALVE, (wound,))
 
 
 def with_dead_valve(verdict: Verdict, sign: Sign) -> Verdict:
@@ -295,9 +296,9 @@ def _hides(verdict: Verdict, prepared: Prepared, oscillation: Oscillation, confi
     if rough is not None:
         return rough
     if samples < limits.samples_told:
-        return Needs(Lack.FASTER, words.too_few(samples, limits.samples_told))
-    if not any(s.points_to is Cause.LOAD and s.shown in OF_LOAD for s in verdict.signs):
-        return Needs(Lack.MANUAL_TEST, words.NO_SIGN_OF_A_LOAD)
+        return Needs(Lack.FASTER, Need.OF_A_LOAD, (limits.samples_told, samples))
+    if not any(s.points_to is Cause.LOAD and s.kind in OF_LOAD for s in verdict.signs):
+        return Needs(Lack.MANUAL_TEST, Need.LOAD_IN_MANUAL)
     return _beside(verdict, limits)
 
 
@@ -308,13 +309,15 @@ def _rough(
     steps = oscillation.amplitude_pct / max(prepared.pv_step, 1e-12)
     if steps >= (limits.steps_told if verdict.cause is Cause.LOAD else limits.steps_tuning):
         return None
-    return Needs(Lack.FINER, words.too_rough(prepared.pv_step, oscillation.amplitude_pct))
+    return Needs(Lack.FINER, Need.FINER, (prepared.pv_step, oscillation.amplitude_pct))
 
 
 def _robust(verdict: Verdict, oscillation: Oscillation, config: Config) -> Needs | None:
     """A test in manual, where signs speak for the tuning and the identified loop is robust; None where it is not."""
     ms = None if verdict.measured is None else sensitivity(verdict.measured, oscillation.period_s)
-    return None if ms is None or ms > config.tuning.ms_most else Needs(Lack.MANUAL_TEST, words.robust(ms))
+    if ms is None or ms > config.tuning.ms_most:
+        return None
+    return Needs(Lack.MANUAL_TEST, Need.TUNING_IN_MANUAL, (ms,))
 
 
 def _beside(verdict: Verdict, limits: CauseLimits) -> Needs | None:
@@ -326,7 +329,7 @@ def _beside(verdict: Verdict, limits: CauseLimits) -> Needs | None:
     crossed = PLAYS[0] <= m.size <= limits.near_size
     if not plain or not crossed or m.trials.agreeing < limits.beside_agreeing or m.wave_left > PLAIN:
         return None
-    return Needs(Lack.STROKE, words.valve_beside(m.size, m.trials.agreeing))
+    return Needs(Lack.STROKE, Need.STROKE, (100 * m.size, 100 * m.trials.agreeing))
 
 
 def told_slip_by_slip(verdict: Verdict, period_s: float, limits: CauseLimits) -> Verdict:

@@ -17,8 +17,8 @@ from importlib.resources import files
 
 import numpy as np
 
-from analyzer.loop.decisions import CAUSES, Cause, Shown
-from analyzer.loop.finding import Cell, Sign
+from analyzer.loop.decisions import CAUSES, Cause, Figures, SignKind
+from analyzer.loop.finding import Sign
 from analyzer.loop.measure import Measured
 from analyzer.loop.oscillation import Oscillation
 from identification.record import Floats
@@ -154,34 +154,34 @@ LEAST_NAT = 0.1
 """Push [nat] below which a sign is not worth a line: it moves the odds by a tenth."""
 
 
-Figures = tuple[Cell, ...]
-
-
-def _evidence(m: Measured, o: Oscillation) -> Figures:
+def _evidence_figures(m: Measured, o: Oscillation) -> Figures:
     t = m.trials
     return (m.evidence,) if t is None else (m.evidence, t.agreeing, t.count)
 
 
-def _amplification(m: Measured, o: Oscillation) -> Figures:
+def _amplification_figures(m: Measured, o: Oscillation) -> Figures:
     return (m.amplification,) if m.stable else ()
 
 
-def _loop_gain(m: Measured, o: Oscillation) -> Figures:
+def _loop_gain_figures(m: Measured, o: Oscillation) -> Figures:
     return () if m.controller is None else (abs(m.linear.gain * m.controller.kp),)
 
 
-GROUPS: Mapping[Shown, tuple[tuple[str, ...], Callable[[Measured, Oscillation], Figures]]] = {
-    Shown.EVIDENCE: (("evidence", "evidence_per_cycle", "agreeing", "steadiness", "jump"), _evidence),
-    Shown.WIDTH: (("size",), lambda m, o: (m.evidence, m.size)),
-    Shown.LOAD_LEFT: (("line_linear", "line_valve"), lambda m, o: (m.line_linear, m.line_valve)),
-    Shown.AMPLIFICATION: (("amplification",), _amplification),
-    Shown.LOOP_GAIN: (("loop_gain",), _loop_gain),
-    Shown.PROCESS: (("consistency",), lambda m, o: (m.consistency,)),
-    Shown.HARMONIC: (("harmonic",), lambda m, o: (m.harmonic,)),
-    Shown.WAVE_LEFT: (("wave_left",), lambda m, o: (m.wave_left if m.wave_left >= PLAIN else 0.0,)),
-    Shown.REGULARITY: (("kurtosis", "rhythm"), lambda m, o: (m.kurtosis, o.rhythm.third)),
-    Shown.LIMITS: (("saturated",), lambda m, o: (m.saturated,)),
-    Shown.DEAD_TIME: (("dead_time_share",), lambda m, o: (o.period_s, m.linear.dead_time_s)),
+GROUPS: Mapping[SignKind, tuple[tuple[str, ...], Callable[[Measured, Oscillation], Figures]]] = {
+    SignKind.EVIDENCE: (
+        ("evidence", "evidence_per_cycle", "agreeing", "steadiness", "jump"),
+        _evidence_figures,
+    ),
+    SignKind.WIDTH: (("size",), lambda m, o: (m.evidence, m.size)),
+    SignKind.LOAD_LEFT: (("line_linear", "line_valve"), lambda m, o: (m.line_linear, m.line_valve)),
+    SignKind.AMPLIFICATION: (("amplification",), _amplification_figures),
+    SignKind.LOOP_GAIN: (("loop_gain",), _loop_gain_figures),
+    SignKind.PROCESS: (("consistency",), lambda m, o: (m.consistency,)),
+    SignKind.HARMONIC: (("harmonic",), lambda m, o: (m.harmonic,)),
+    SignKind.WAVE_LEFT: (("wave_left",), lambda m, o: (m.wave_left if m.wave_left >= PLAIN else 0.0,)),
+    SignKind.REGULARITY: (("kurtosis", "rhythm"), lambda m, o: (m.kurtosis, o.rhythm.third)),
+    SignKind.LIMITS: (("saturated",), lambda m, o: (m.saturated,)),
+    SignKind.DEAD_TIME: (("dead_time_share",), lambda m, o: (o.period_s, m.linear.dead_time_s)),
 }
 """Measures that are one sign together, and the figures it is told by."""
 
@@ -191,12 +191,12 @@ def signs_of(m: Measured, o: Oscillation) -> tuple[Sign, ...]:
     cause."""
     moved = pushes(measures(m, o))
     out = []
-    for shown, (names, figures) in GROUPS.items():
+    for kind, (names, figures) in GROUPS.items():
         push = np.sum([moved[n] for n in names], axis=0)
         k = int(np.argmax(push))
         if push[k] >= LEAST_NAT:
-            out.append(Sign(CAUSES[k], 1.0 - math.exp(-float(push[k])), shown, figures(m, o)))
+            out.append(Sign(CAUSES[k], 1.0 - math.exp(-float(push[k])), kind, figures(m, o)))
     if not m.stable or (m.amplification or 0.0) >= AMPLIFIES:
-        told = [s for s in out if s.shown is not Shown.AMPLIFICATION]
-        return (*told, Sign(Cause.TUNING, 0.05, Shown.AMPLIFICATION, _amplification(m, o)))
+        told = [s for s in out if s.kind is not SignKind.AMPLIFICATION]
+        return (*told, Sign(Cause.TUNING, 0.05, SignKind.AMPLIFICATION, _amplification_figures(m, o)))
     return tuple(out)

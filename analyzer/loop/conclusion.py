@@ -14,7 +14,7 @@ from analyzer.loop.advice import Advice
 from analyzer.loop.assess import Assessment
 from analyzer.loop.cause import Verdict
 from analyzer.loop.cost import RECORDED, STATED, loss
-from analyzer.loop.decisions import Action, Cause, Fault, Lack, Status
+from analyzer.loop.decisions import Action, Cause, Fault, Needs, Status
 from analyzer.loop.finding import Cell, Finding, Remedy, Swing
 from analyzer.loop.identified import gain_room, intervals, is_known
 from analyzer.loop.oscillation import Oscillations
@@ -46,15 +46,16 @@ def stated(spec: LoopSpec) -> Known:
 
 @dataclass(frozen=True, slots=True)
 class Lost:
-    """Why a loop has no results: its status, the reason in words, and what the record lacks where that is known."""
+    """Why a loop has no results: its status, and what the record lacks or the error that ended it."""
 
     status: Status
-    reason: str
-    lack: Lack | None = None
+    why: Needs
 
     def of(self, spec: LoopSpec, night: str, **known: Cell) -> Finding:
         """The same as a finding, with further columns that are known all the same."""
-        return Finding(spec.loop, night, self.status, self.reason, self.lack, known={**stated(spec), **known})
+        return Finding(
+            spec.loop, night, self.status, self.why, self.why.lack, known={**stated(spec), **known}
+        )
 
 
 def concluded(
@@ -80,7 +81,7 @@ def concluded(
         spec.loop,
         night,
         Status.OK,
-        lacking=str(lacks or ""),
+        lacking=lacks,
         lack=advice.lack or (lacks.lack if lacks else None),
         swing=_swing(a.oscillations) if shown else None,
         cause=v.cause if shown else Cause.UNDECIDED,

@@ -9,7 +9,7 @@ from numba import njit
 
 from analyzer.config import QualityLimits
 from analyzer.history.series import Series, main_span
-from analyzer.loop.decisions import Lack, LacksError, Needs
+from analyzer.loop.decisions import Lack, LacksError, Need, Needs
 from identification.record import Floats, Mask
 
 LOOKED_AT = 20_000
@@ -129,11 +129,8 @@ def clock_of(pv: Series, dt_s: float, limits: QualityLimits) -> Floats:
     count = int((pv.stamp_s[-1] - pv.stamp_s[0]) / dt_s + 1e-6) + 1
     if count > limits.ticks_per_sample * pv.stamp_s.size:
         share = 100 * pv.stamp_s.size / count
-        text = (
-            f"needs samples that follow each other, has {pv.stamp_s.size}, mostly {dt_s:g} s apart, spread over "
-            f"{(pv.stamp_s[-1] - pv.stamp_s[0]) / 86400:.1f} days ({share:.1f} % of that time)"
-        )
-        raise LacksError(Needs(Lack.SAMPLES, text))
+        days = (pv.stamp_s[-1] - pv.stamp_s[0]) / 86400
+        raise LacksError(Needs(Lack.SAMPLES, Need.IN_A_ROW, (pv.stamp_s.size, dt_s, days, share)))
     return pv.stamp_s[0] + dt_s * np.arange(count)
 
 

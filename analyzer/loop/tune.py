@@ -11,7 +11,7 @@ from analyzer.config import AdviceLimits, Config
 from analyzer.loop.advice import Advice, model_of, propose, sought_for, withheld
 from analyzer.loop.assess import Assessment, assess
 from analyzer.loop.cause import Verdict
-from analyzer.loop.decisions import Action, Cause, Needs
+from analyzer.loop.decisions import Action, Cause, Need, Needs
 from analyzer.loop.fitness import at_limits, unfit_for_cause
 from analyzer.loop.identified import intervals, load_of, tuned, uncertain
 from analyzer.loop.judged_stretch import controller_of, earlier_settings
@@ -21,7 +21,7 @@ from analyzer.loops.changes import in_force
 from analyzer.loops.spec import LoopSpec, spec_of
 from analyzer.loops.tags import as_stated
 from analyzer.night.nights import cut, nights_of
-from analyzer.words.signs import whole
+from analyzer.words.signs import sign_in_full
 from identification.errors import InputError, NotAssessedError
 from identification.estimation.hammerstein import Fit
 from identification.models import Estimate, Loop, Pid, Process, Valve
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
 MAP_POINTS = 36
 """Points of the map along each axis."""
-NO_MOVES = "needs PV that moves with OP, so that a model can be identified"
+NO_MOVES = Needs(None, Need.MOVING_PV)
 SPREAD = 20.0
 """The map reaches this factor below and above the present settings."""
 FORECAST = {
@@ -272,7 +272,7 @@ def proposal(asked: Asked, loop: str, drawn: bool) -> tuple[list[str], dict[str,
         raise InputError(seen, "both", "state them, so that new ones can be compared")
     found = assess(prepared, stated, config, spec.type, earlier_settings(row, asked.changes, prepared))
     head = [f"{loop}, night {night.name}: cause {found.verdict.cause}"]
-    text = head + [f"sign of {s.points_to}: {whole(s)}" for s in found.verdict.signs]
+    text = head + [f"sign of {s.points_to}: {sign_in_full(s)}" for s in found.verdict.signs]
     if found.verdict.measured is None:
         needs = _unfit(prepared, config)
         if found.verdict.cause is not Cause.VALVE:

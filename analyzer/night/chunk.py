@@ -22,7 +22,7 @@ from analyzer.lanes.standing import standing
 from analyzer.loop.advice import Advice, advise
 from analyzer.loop.assess import Assessment, assess
 from analyzer.loop.conclusion import Lost, concluded
-from analyzer.loop.decisions import Action, Cause, Lack, LacksError, Status
+from analyzer.loop.decisions import Action, Cause, Lack, LacksError, Need, Needs, Status
 from analyzer.loop.finding import Cell, Finding
 from analyzer.loop.judged_stretch import Earlier, controller_of, earlier_settings
 from analyzer.loop.oscillation import counting
@@ -165,15 +165,22 @@ def _settings_row(spec: LoopSpec, night: str, advice: Advice) -> list[dict[str, 
 def _lost(error: Exception, config: Config) -> Lost:
     """What is left of a loop that an error has ended."""
     if isinstance(error, LacksError):
-        return Lost(Status.NOT_ASSESSED, str(error), error.needs.lack)
+        return Lost(Status.NOT_ASSESSED, error.needs)
     if isinstance(error, NotAssessedError):
-        return Lost(Status.NOT_ASSESSED, str(error))
+        return Lost(Status.NOT_ASSESSED, _as_told(str(error)))
     if isinstance(error, TriageError):
-        return Lost(Status.FAILED, str(error))
+        return Lost(Status.FAILED, _as_told(str(error)))
     if isinstance(error, MemoryError):
         most = config.workers.memory_mb
-        return Lost(Status.FAILED, f"needs more memory than the {most:.0f} MB that one loop may take")
-    return Lost(Status.FAILED, f"{type(error).__name__}: {error}")
+        return Lost(
+            Status.FAILED, _as_told(f"needs more memory than the {most:.0f} MB that one loop may take")
+        )
+    return Lost(Status.FAILED, _as_told(f"{type(error).__name__}: {error}"))
+
+
+def _as_told(text: str) -> Needs:
+    """What an error says of itself."""
+    return Needs(None, Need.AS_TOLD, (text,))
 
 
 def _good_h(pv: Series | None) -> float:
@@ -186,7 +193,7 @@ def _read(task: Task, spec: LoopSpec) -> dict[str, Series] | Lost:
     """The loop's raw samples, or why there are none."""
     if spec.pv is None:
         wanted = spec.wanted_pv or f"{spec.loop}.PV"
-        return Lost(Status.NOT_ASSESSED, f"no PV tag {wanted} in the export", Lack.PV)
+        return Lost(Status.NOT_ASSESSED, Needs(Lack.PV, Need.PV_TAG, (wanted,)))
     try:
         return task.export.read(spec.tags)
     except Exception as error:  # a broken column is that loop's result
@@ -213,7 +220,7 @@ def work(task: Task, began: Callable[[int], None] = lambda at: None) -> Done:
 
 def lose(task: Task, reason: str) -> Done:
     """Write the rows of a chunk that no worker could finish."""
-    lost = Lost(Status.FAILED, reason)
+    lost = Lost(Status.FAILED, _as_told(reason))
     for night in task.nights:
         loops = [lost.of(spec, night.name, timezone=night.zone) for spec in task.specs]
         _write_pieces(task, night.name, Rows(nights=loops))

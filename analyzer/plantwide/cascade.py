@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import Any
 
 from analyzer.config import PlantLimits
-from analyzer.loop.decisions import Action, Cause, Due, GroupRole, Shown, Status
+from analyzer.loop.decisions import Action, Cause, Due, GroupRole, SignKind, Status
 from analyzer.loop.finding import Finding, Remedy, Root, Sign, following
 from analyzer.plantwide.night import follower_confidence
 from analyzer.plantwide.structure import Link, Tie
@@ -111,8 +111,8 @@ def _judged(
         cause = Cause.TUNING if below.cause is Cause.TUNING else Cause.VALVE
         root = Root(below.loop, level, None, max(f.confidence.get(cause, 0.0) for f in (above, below)))
         if above.cause is Cause.VALVE or _alike(above, below, limits) or not below.oscillates:
-            shown = Shown.OF_BELOW, (below.loop, below.cause, tie)
-            sign = Sign(Cause.LOAD, limits.follower_sign, *shown)
+            seen = SignKind.OF_BELOW, (below.loop, below.cause, tie)
+            sign = Sign(Cause.LOAD, limits.follower_sign, *seen)
             moved = replace(below, moves=_with(below, above.loop), remedy=_now(below.remedy))
             return _follows(above, root, sign, limits), moved
         if above.remedy.action in ACTING:
@@ -120,7 +120,7 @@ def _judged(
         return above, below
     if not faulty and below.oscillates and above.oscillates and _alike(above, below, limits):
         root = Root(above.loop, level, None, max(above.confidence.values(), default=0.0))
-        sign = Sign(Cause.LOAD, limits.follower_sign, Shown.OF_ABOVE, (above.loop, tie))
+        sign = Sign(Cause.LOAD, limits.follower_sign, SignKind.OF_ABOVE, (above.loop, tie))
         return replace(above, moves=_with(above, below.loop)), _follows(below, root, sign, limits)
     return above, below
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from analyzer.config import PlantLimits
-from analyzer.loop.decisions import Cause, GroupRole, Shown, Status
+from analyzer.loop.decisions import Cause, GroupRole, SignKind, Status
 from analyzer.loop.finding import Cell, Finding, Root, Sign, Swing, following
 from analyzer.plantwide.compare import Lags
 from analyzer.plantwide.groups import Group, groups_of
@@ -61,7 +61,7 @@ def _follower(alone: Finding, known: Finding, root: Root, wave: Wave, limits: Pl
     """A loop as a follower; as it was where it does not oscillate, not even with its part in what is shared."""
     confidence = follower_confidence(alone.confidence, root, limits)
     seen = root.loop, root.lag_s, root.coherence
-    sign = Sign(Cause.LOAD, limits.follower_sign, Shown.FOLLOWS, seen)
+    sign = Sign(Cause.LOAD, limits.follower_sign, SignKind.FOLLOWS, seen)
     told = following(known, root, swing_of(alone, root, wave, limits), confidence, sign)
     return told if told.oscillates else known
 

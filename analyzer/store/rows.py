@@ -1,7 +1,7 @@
 """Findings as rows of tables and back: the one door between what is known of a loop and the columns that are kept.
 
-In the pieces that workers write of a night signs are figures, and the column `reason` holds what a loop lacks; the
-words are made last.
+In the pieces that workers write of a night signs are figures, and so is the column `reason`, which holds what a loop
+lacks; the words are made last.
 """
 
 from __future__ import annotations
@@ -9,11 +9,23 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import asdict, astuple
 from typing import TYPE_CHECKING, Any
 
 from analyzer.columns import HOURS, row_of
-from analyzer.loop.decisions import CAUSES, Action, Cause, Due, Fault, Lack, Lane, Shown, Status
+from analyzer.loop.decisions import (
+    CAUSES,
+    Action,
+    Cause,
+    Due,
+    Fault,
+    Lack,
+    Lane,
+    Need,
+    Needs,
+    SignKind,
+    Status,
+)
 from analyzer.loop.finding import Cell, Finding, Remedy, Sign, Swing
 from analyzer.words.reason import reason
 from analyzer.words.signs import as_stored
@@ -65,7 +77,7 @@ def piece_row(found: Finding) -> dict[str, Any]:
         "kp_new": found.remedy.kp_new,
         "ti_new": found.remedy.ti_new,
         "due": found.remedy.due,
-        "reason": found.lacking,
+        "reason": json.dumps(astuple(found.lacking)) if found.lacking is not None else None,
     }
     return {k: finite(v) for k, v in row_of(row).items()}
 
@@ -79,7 +91,7 @@ def finding_of(row: Row) -> Finding:
         row["loop"],
         row["night"],
         Status(row["status"]),
-        row["reason"] or "",
+        _needs(*json.loads(row["reason"])) if row["reason"] else None,
         _value(Lack, row["lack"]),
         swing,
         _value(Cause, row["cause"]),
@@ -99,8 +111,12 @@ def finding_of(row: Row) -> Finding:
     )
 
 
-def _sign(points_to: str, strength: float, shown: str, figures: list[Cell]) -> Sign:
-    return Sign(Cause(points_to), strength, Shown(shown), tuple(figures))
+def _needs(lack: str | None, need: str, figures: list[Cell]) -> Needs:
+    return Needs(_value(Lack, lack), Need(need), tuple(figures))
+
+
+def _sign(points_to: str, strength: float, kind: str, figures: list[Cell]) -> Sign:
+    return Sign(Cause(points_to), strength, SignKind(kind), tuple(figures))
 
 
 def _value(kind: Any, text: str | None) -> Any:

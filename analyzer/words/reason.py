@@ -6,9 +6,9 @@ Lists and pages show the clauses that make a sentence (`in_short`); the others a
 from __future__ import annotations
 
 from analyzer.lanes.lanes import SAID
-from analyzer.loop.decisions import OF_LOAD, Action, Cause, Due, Fault, Lack, Lane, Shown, Status
+from analyzer.loop.decisions import OF_LOAD, Action, Cause, Due, Fault, Lack, Lane, SignKind, Status
 from analyzer.loop.finding import Finding, Root
-from analyzer.words.signs import later, of_below, words
+from analyzer.words.signs import later, of_below, sign_text
 from analyzer.words.units import duration
 
 MOST_WORDS = 20
@@ -58,16 +58,17 @@ def reason(found: Finding) -> str:
 
 def _whole(found: Finding) -> str:
     """What was found of the loop, and what it has to do with others."""
+    lacking = str(found.lacking or "")
     if found.status is not Status.OK:
-        return found.lacking
+        return lacking
     if found.follows is not None:
         return f"{cycle_text(found)}: {_follows(found.follows)}"
     if found.swing is None:
-        return f"not assessed: {found.remedy.text or found.lacking}"
+        return f"not assessed: {found.remedy.text or lacking}"
     names = ", ".join(found.moves[:MOST_NAMES]) + (" ..." if len(found.moves) > MOST_NAMES else "")
     moves = f"it also moves {names}: fix this one first" if names else None
     at_once = found.remedy.action in SAID_AT_ONCE or found.lack is Lack.OP_RANGE
-    more = found.remedy.text if at_once and found.remedy.text != found.lacking else None
+    more = found.remedy.text if at_once and found.remedy.text != lacking else None
     first, *others = _cause(found).split("; ")
     return joined(first, moves, more, to_stroke(found), *others)
 
@@ -78,7 +79,7 @@ def _cause(found: Finding) -> str:
     if found.cause is Cause.VALVE:
         return f"{cycle}: {valve_text(found)}"
     if found.cause is Cause.TUNING:
-        return f"{cycle}: too tight for its process; {_strongest(found, 1, Shown.AMPLIFICATION)}"
+        return f"{cycle}: too tight for its process; {_strongest(found, 1, SignKind.AMPLIFICATION)}"
     if found.cause is Cause.LOAD:
         return f"{cycle}: driven from outside; {_strongest(found, 1, *OF_LOAD)}"
     if found.cause is Cause.UNDECIDED:
@@ -113,11 +114,11 @@ def valve_text(found: Finding) -> str:
     return f"{PLAIN[fault].format(width=width)}; its width is {100 * size:.0f} % of OP's range"
 
 
-def _strongest(found: Finding, most: int, *first: Shown) -> str:
+def _strongest(found: Finding, most: int, *first: SignKind) -> str:
     """The strongest signs of the cause, those that show some things before all others."""
     signs = [s for s in found.signs if s.points_to is found.cause]
-    order = sorted(signs, key=lambda s: (s.shown not in first, -s.strength))
-    return "; ".join(words(s) for s in order[:most])
+    order = sorted(signs, key=lambda s: (s.kind not in first, -s.strength))
+    return "; ".join(sign_text(s) for s in order[:most])
 
 
 def _follows(root: Root) -> str:

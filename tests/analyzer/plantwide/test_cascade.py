@@ -6,13 +6,13 @@ from dataclasses import replace
 from typing import Any
 
 from analyzer.config import Config
-from analyzer.loop.decisions import CAUSES, Action, Cause, Due, Fault, GroupRole, Shown, Status
+from analyzer.loop.decisions import CAUSES, Action, Cause, Due, Fault, GroupRole, SignKind, Status
 from analyzer.loop.finding import Finding, Remedy, Root, Sign, Swing, following
 from analyzer.plantwide.cascade import led_anew, linked
 from analyzer.plantwide.structure import Link, Tie
 from analyzer.words.reason import reason
 
-FOLLOWS = Sign(Cause.LOAD, 0.9, Shown.FOLLOWS)
+FOLLOWS = Sign(Cause.LOAD, 0.9, SignKind.FOLLOWS)
 
 LIMITS = Config().plant
 HANGS = {"FIC1": Link("TIC1", Tie.MASTER, 0.98)}
@@ -110,7 +110,7 @@ def test_those_that_a_master_moves_follow_its_slave_where_the_slave_is_the_root(
         root,
         Swing(),
         dict.fromkeys(CAUSES, 0.0),
-        Sign(Cause.LOAD, 0.9, Shown.FOLLOWS),
+        Sign(Cause.LOAD, 0.9, SignKind.FOLLOWS),
     )
     master = replace(found("TIC1", Cause.TUNING, 360.0, Action.RETUNE), moves=("PIC7",))
     slave = found("FIC1", Cause.VALVE, 360.0, Action.REPAIR_VALVE)
@@ -132,7 +132,7 @@ def test_a_loop_that_leads_one_group_and_follows_in_another_leads_as_before() ->
         root,
         Swing(),
         dict.fromkeys(CAUSES, 0.0),
-        Sign(Cause.LOAD, 0.9, Shown.FOLLOWS),
+        Sign(Cause.LOAD, 0.9, SignKind.FOLLOWS),
     )
     rows = [{"loop": "FIC2", "group": "1", "role": GroupRole.SOURCE, "source_pct": 90.0}]
     assert led_anew(rows, {"FIC2": leads, "PIC9": found("PIC9", Cause.VALVE, 360.0)}) == rows
