@@ -113,7 +113,7 @@ def run(asked: Asked, store: Path, log_file: Path | None, **how: Any) -> None:
     log.say("begin", version=version("loop-triage"), store=store, export=export, jobs=how["jobs"])
     try:
         with stoppable():
-            outcome, loops = _night(asked, store, log, How(**how))
+            outcome, loops = _run_night(asked, store, log, How(**how))
     except StoppedError as stopped:
         log.say("stopped", signal=stopped, status=STOPPED + stopped.number)
         with suppress(OSError):  # the terminal may be gone
@@ -134,7 +134,7 @@ def _go_on(store: Path) -> str:
     return f"what is done is kept in {store}: go on with the same command and --resume"
 
 
-def _night(asked: Asked, place: Path, log: RunLog, how: How) -> tuple[Outcome, int]:
+def _run_night(asked: Asked, place: Path, log: RunLog, how: How) -> tuple[Outcome, int]:
     """The export read, assessed and, where it is asked for, explained; the outcome and the number of loops."""
     from analyzer.night.asked import opened_apart
     from analyzer.night.batch import Batch
@@ -149,7 +149,7 @@ def _night(asked: Asked, place: Path, log: RunLog, how: How) -> tuple[Outcome, i
         batch = Batch(source, specs, Store(place), asked.config, *span, asked.changes, asked.zone)
         outcome = _assessed(batch, how, log)
         if how.explaining and len(outcome.unassessed) + len(outcome.failed) < len(specs):
-            _explained(batch, how, outcome.nights[-1])
+            _explain_night(batch, how, outcome.nights[-1])
     return outcome, len(specs)
 
 
@@ -182,11 +182,11 @@ def _assessed(batch: Batch, how: How, log: RunLog) -> Outcome:
     return outcome
 
 
-def _explained(batch: Batch, how: How, night: Night) -> None:
+def _explain_night(batch: Batch, how: How, night: Night) -> None:
     """Explain the flagged loops of a night, with progress, and say how many."""
-    from analyzer.explain import night as explain_night
+    from analyzer.explain.night import explain_flagged
 
     with bar("explained") as progress:
-        rows = explain_night.run(batch, night, how.jobs, how.resume, progress)
+        rows = explain_flagged(batch, night, how.jobs, how.resume, progress)
     named = sum(r["verdict"] not in ("none", "unexplained") for r in rows)
     click.echo(f"{len(rows)} flagged loops explained, {named} with a name", err=True)

@@ -123,7 +123,7 @@ def _sought(
         new = held or proposal.controller or proposal.meanwhile
         known = proposed.loop, proposed.load, new, period_s, spec, pv_span, config.tuning
         beside = compared(*known, proposed.others)
-    return replace(_stated(proposal, spec, pv_span), compared=beside)
+    return replace(_as_advice(proposal, spec, pv_span), compared=beside)
 
 
 def _or_repair(verdict: Verdict, other: Advice) -> Advice:
@@ -255,7 +255,7 @@ def _for_valve(verdict: Verdict, loop: Loop, period_s: float | None, config: Con
     return Proposed(recommend(sought, verdict.cause, others, load, config.tuning), sought, load, others)
 
 
-def _stated(proposal: Proposal, spec: LoopSpec, pv_span: float) -> Advice:
+def _as_advice(proposal: Proposal, spec: LoopSpec, pv_span: float) -> Advice:
     """A proposal in the units and form of the plant's controller."""
     before, after = (c.cycle if c is not None else None for c in (proposal.before, proposal.after))
     if proposal.controller is None:

@@ -172,7 +172,7 @@ def verdict_by_measures(
     return told_apart(judge(measured, oscillation, config.cause), prepared, oscillation, config)
 
 
-def _known(figures: Assessments, op: bool) -> Assessments:
+def _known_without_op(figures: Assessments, op: bool) -> Assessments:
     """The figures without those that rest on OP where none is in percent: unknown is empty, never zero."""
     return figures if op else replace(figures, **OF_OP)
 
@@ -194,7 +194,7 @@ def hidden(record: LoopRecord, found: Oscillations, controller: Pid | None, conf
     return Needs(Lack.FASTER, Need.OF_A_CYCLE, (period / samples, record.dt_s, period))
 
 
-def _dead_time(verdict: Verdict) -> float | None:
+def _dead_time_of(verdict: Verdict) -> float | None:
     m = verdict.measured
     return None if m is None else (m.play if verdict.cause is Cause.VALVE else m.linear).dead_time_s
 
@@ -211,7 +211,7 @@ class _Judged:
     settings: Pid | None
 
 
-def _judged(prepared: Prepared, stretch: Stretch, config: Config, kind: str) -> _Judged:
+def _judge_stretch(prepared: Prepared, stretch: Stretch, config: Config, kind: str) -> _Judged:
     """The verdict on the stretch that is judged; one that rests on little is a hint."""
     record = prepared.record
     part = replace(prepared, record=record.span(stretch.first, stretch.last))
@@ -267,16 +267,16 @@ def assess(
     if not prepared.op_scaled:  # settings in percent mean nothing beside such an OP
         controller, earlier = None, [replace(e, controller=None) for e in earlier]
     stretch = judged_stretch(prepared.record, controller, earlier, config)
-    return _assessment(prepared, stretch, _judged(prepared, stretch, config, kind), config)
+    return _assessment(prepared, stretch, _judge_stretch(prepared, stretch, config, kind), config)
 
 
 def _assessment(prepared: Prepared, stretch: Stretch, judged: _Judged, config: Config) -> Assessment:
     """The figures of the whole record beside what was judged."""
     record, found = prepared.record, judged.found
     in_percent = prepared.op_known and prepared.op_scaled
-    night = _known(assess_span(record, config.figures), in_percent)
+    night = _known_without_op(assess_span(record, config.figures), in_percent)
     hours = hourly(record, judged.of_all, config.figures, night.noise_band_pct)
-    dead_time = _dead_time(judged.verdict)
+    dead_time = _dead_time_of(judged.verdict)
     close = close_view(judged.part.record, found, stretch.first)
     end_s = record.start_s + record.duration_s
     return Assessment(
@@ -284,7 +284,7 @@ def _assessment(prepared: Prepared, stretch: Stretch, judged: _Judged, config: C
         start_s=record.start_s,
         duration_s=record.duration_s,
         night=night,
-        hours=tuple(replace(h, figures=_known(h.figures, in_percent)) for h in hours),
+        hours=tuple(replace(h, figures=_known_without_op(h.figures, in_percent)) for h in hours),
         oscillations=found,
         verdict=judged.verdict,
         settings=judged.settings,

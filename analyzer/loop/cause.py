@@ -299,7 +299,7 @@ def _hides(verdict: Verdict, prepared: Prepared, oscillation: Oscillation, confi
         return Needs(Lack.FASTER, Need.OF_A_LOAD, (limits.samples_told, samples))
     if not any(s.points_to is Cause.LOAD and s.kind in OF_LOAD for s in verdict.signs):
         return Needs(Lack.MANUAL_TEST, Need.LOAD_IN_MANUAL)
-    return _beside(verdict, limits)
+    return _play_beside(verdict, limits)
 
 
 def _rough(
@@ -320,7 +320,7 @@ def _robust(verdict: Verdict, oscillation: Oscillation, config: Config) -> Needs
     return Needs(Lack.MANUAL_TEST, Need.TUNING_IN_MANUAL, (ms,))
 
 
-def _beside(verdict: Verdict, limits: CauseLimits) -> Needs | None:
+def _play_beside(verdict: Verdict, limits: CauseLimits) -> Needs | None:
     """A stroke of the valve, where a load is likely and a play shows all the same; None where it does not."""
     m = verdict.measured
     if m is None or m.trials is None or verdict.confidence[Cause.LOAD] >= limits.beside_pct:

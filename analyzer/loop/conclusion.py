@@ -93,7 +93,7 @@ def concluded(
             **stated(spec),
             **a.night.as_row(),
             "loss": loss(a.night.average_absolute_error_pct, spec.importance, spec.has_pv_range),
-            **(_cycle(a) if shown else {}),
+            **(_cycle_known(a) if shown else {}),
             **_measured(a, limits),
             **_cycles_of(advice),
             **(a.shared.as_row() if a.shared is not None else {}),
@@ -116,7 +116,7 @@ def _swing(found: Oscillations) -> Swing:
     return Swing(first.significance, first.oscillating_pct, first.period_s, first.amplitude_pct)
 
 
-def _cycle(a: Assessment) -> Known:
+def _cycle_known(a: Assessment) -> Known:
     """How regular the most significant oscillation is, the periods of all, and the ends of its last ten."""
     first, found = a.oscillations.first, a.oscillations.found
     out: Known = {"periods": "[]"}
@@ -127,12 +127,12 @@ def _cycle(a: Assessment) -> Known:
             "prominence": first.prominence,
             "correlation": first.rhythm.first,
             "periods": json.dumps(periods),
-            "spectrum": _spectrum(a.oscillations),
+            "spectrum": _spectrum_kept(a.oscillations),
         }
     return out if a.close_s is None else {**out, "close_first_s": a.close_s[0], "close_last_s": a.close_s[1]}
 
 
-def _spectrum(found: Oscillations) -> str | None:
+def _spectrum_kept(found: Oscillations) -> str | None:
     """Power in sixths of an octave as the store keeps it."""
     s, b = found.spectrum, found.bands
     if s is None or b is None or not b.line.size:
@@ -158,15 +158,15 @@ def _measured(a: Assessment, limits: AdviceLimits) -> Known:
             "amplification": m.amplification,
             "gain_room": gain_room(m),
         }
-    model = _model(v, limits)
+    model = _model_known(v, limits)
     return {**out, **(model if a.op_scaled else {k: x for k, x in model.items() if k not in PER_OP})}
 
 
-def _model(verdict: Verdict, limits: AdviceLimits) -> Mapping[str, float | None]:
+def _model_known(verdict: Verdict, limits: AdviceLimits) -> Mapping[str, float | None]:
     m = verdict.measured
     if m is None or verdict.cause not in (Cause.VALVE, Cause.TUNING):
         return {}
-    process, valve = _process(verdict.fit, limits), verdict.fit.valve
+    process, valve = _process_known(verdict.fit, limits), verdict.fit.valve
     if verdict.cause is Cause.TUNING:
         return process
     if verdict.fit is m.stick_slip:
@@ -186,7 +186,7 @@ def _of_half(verdict: Verdict, limits: AdviceLimits) -> Known:
     return {"half_slope": slope.value} if one_way and most < KNOWN_WITHIN * least else {}
 
 
-def _process(fit: Fit, limits: AdviceLimits) -> dict[str, float | None]:
+def _process_known(fit: Fit, limits: AdviceLimits) -> dict[str, float | None]:
     """Process constants; gain and time constant apart only where the time constant is well inside the window."""
     known = is_known(fit, limits)
     return {

@@ -40,7 +40,7 @@ def onto_clock(series: Series, clock: Floats, dt_s: float, limits: QualityLimits
     if not good.any():
         return np.zeros(clock.size), np.ones(clock.size, dtype=bool)
     if clock.size == series.stamp_s.size and np.array_equal(clock, series.stamp_s):
-        return _held(series.value, good)
+        return _last_good_held(series.value, good)
     stamp, value = series.stamp_s[good], series.value[good]
     at = np.searchsorted(stamp, clock + 0.01 * dt_s, side="right") - 1
     own = max(interval(stamp), dt_s) if stamp.size > 1 else dt_s
@@ -51,7 +51,7 @@ def onto_clock(series: Series, clock: Floats, dt_s: float, limits: QualityLimits
     return value[np.maximum(at, 0)], (at < 0) | (age > limits.gap_factor * own) | lost
 
 
-def _held(value: Floats, good: Mask) -> tuple[Floats, Mask]:
+def _last_good_held(value: Floats, good: Mask) -> tuple[Floats, Mask]:
     if good.all():
         return value, ~good
     at = np.maximum.accumulate(np.where(good, np.arange(value.size), -1))

@@ -98,7 +98,7 @@ def _answered(record: LoopRecord, part: slice, ramp: int, size: float, spread: f
     begin = float(record.sp[part.start])
     way = (record.pv[part] - begin) / size
     still = spread / abs(size)
-    settled = _settled(np.abs(way[ramp:] - 1.0) > max(2.0 * still, SMALL), stands)
+    settled = _settled_from(np.abs(way[ramp:] - 1.0) > max(2.0 * still, SMALL), stands)
     shown = way.size if settled is None else min(way.size, FOLLOWED * (settled + ramp) + 2)
     course = np.interp(np.linspace(0, shown - 1, POINTS), np.arange(shown), way[:shown])
     return Move(
@@ -114,7 +114,7 @@ def _answered(record: LoopRecord, part: slice, ramp: int, size: float, spread: f
     )
 
 
-def _settled(outside: Mask, least: int) -> int | None:
+def _settled_from(outside: Mask, least: int) -> int | None:
     """First sample from which nothing is outside for as long again as it took, and for some samples at least; None
     where there is none."""
     ends = np.flatnonzero(outside)

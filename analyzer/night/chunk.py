@@ -33,7 +33,7 @@ from analyzer.loop.witness import witness
 from analyzer.loops.changes import TuningChange, in_force, settings_from
 from analyzer.loops.spec import LoopSpec
 from analyzer.night.nights import Night, cut
-from analyzer.pages import compared as settings_page
+from analyzer.pages import compared as settings_pages
 from analyzer.plantwide.structure import Moves, moves_of, moves_table
 from analyzer.plantwide.wave import waves_table
 from analyzer.store.rows import hour_rows, piece_row
@@ -158,7 +158,7 @@ def _settings_row(spec: LoopSpec, night: str, advice: Advice) -> list[dict[str, 
     """The page on which settings are compared, as a row, none where none were sought."""
     if advice.compared is None:
         return []
-    page = settings_page.page(spec.loop, night, advice.compared, spec)
+    page = settings_pages.settings_page(spec.loop, night, advice.compared, spec)
     return [{"loop": spec.loop, "night": night, "settings_page": dumps(page)}]
 
 
@@ -189,7 +189,7 @@ def _good_h(pv: Series | None) -> float:
     return good * interval(pv.stamp_s) / 3600.0 if pv is not None and good > 1 else 0.0
 
 
-def _read(task: Task, spec: LoopSpec) -> dict[str, Series] | Lost:
+def _samples_of(task: Task, spec: LoopSpec) -> dict[str, Series] | Lost:
     """The loop's raw samples, or why there are none."""
     if spec.pv is None:
         wanted = spec.wanted_pv or f"{spec.loop}.PV"
@@ -205,7 +205,7 @@ def work(task: Task, began: Callable[[int], None] = lambda at: None) -> Done:
     kept = {n.name: Rows() for n in task.nights}
     for at, spec in enumerate(task.specs):
         began(at)
-        series = _read(task, spec)
+        series = _samples_of(task, spec)
         for night in task.nights:
             if isinstance(series, Lost):
                 kept[night.name].nights.append(series.of(spec, night.name, timezone=night.zone))

@@ -85,7 +85,7 @@ def action_there(g: GroupView) -> str:
     return action_text(g.loops[g.source["loop"]], g.action) if g.source else g.action
 
 
-def _candidates(g: GroupView) -> str:
+def _candidates_named(g: GroupView) -> str:
     return ", ".join(f"{r['loop']} {r['source_pct']:.0f} %" for r in g.candidates)
 
 
@@ -96,7 +96,9 @@ def sentence(g: GroupView) -> str:
         loop, pct = g.source["loop"], g.source["source_pct"]
         tail = f"it starts at {loop} ({pct:.0f} %)"
     else:
-        tail = f"it starts at one of {_candidates(g)}, or outside what is recorded ({g.unseen_pct:.0f} %)"
+        tail = (
+            f"it starts at one of {_candidates_named(g)}, or outside what is recorded ({g.unseen_pct:.0f} %)"
+        )
     return f"{head}; {tail}; without it the others' average errors fall by {number(g.gain_pct)} % of span together"
 
 
@@ -124,7 +126,7 @@ def _morning_row(g: GroupView, linked: bool) -> tuple[Cell, ...]:
         Cell(f"group {g.number}", kind="strong", href=f"{page_name(g.number)}.html" if linked else ""),
         Cell(str(len(g.rows)), len(g.rows)),
         Cell(duration(g.period_s), g.period_s),
-        Cell(_candidates(g) or "not clear"),
+        Cell(_candidates_named(g) or "not clear"),
         Cell(action_there(g) or "undecided: look at the candidates"),
         plain_cell(g.gain_pct),
         Cell(", ".join(r["loop"] for r in g.rows if r is not g.source)),
@@ -141,11 +143,11 @@ MEMBERS = (
 
 
 def _members(g: GroupView, paged: frozenset[str]) -> Table:
-    rows = tuple(_member(g, r, paged) for r in g.rows)
+    rows = tuple(_member_cells(g, r, paged) for r in g.rows)
     return Table("members", "", MEMBERS, rows, "Lags that the night cannot tell are left empty.", cards=True)
 
 
-def _member(g: GroupView, row: Row, paged: frozenset[str]) -> tuple[Cell, ...]:
+def _member_cells(g: GroupView, row: Row, paged: frozenset[str]) -> tuple[Cell, ...]:
     name, pct = row["loop"], row["source_pct"]
     return (
         Cell(name, kind="strong", href=f"{slug(name)}.html" if name in paged else ""),
@@ -156,7 +158,7 @@ def _member(g: GroupView, row: Row, paged: frozenset[str]) -> tuple[Cell, ...]:
     )
 
 
-def _signs(g: GroupView) -> Table:
+def _signs_table(g: GroupView) -> Table:
     """Why there: the signs of the likeliest candidates side by side."""
     shown = [r for r in g.rows[:5] if r["group_signs"]]
     sign = Column("sign", "Sign", wide=True)
@@ -170,7 +172,7 @@ def _signs(g: GroupView) -> Table:
     return Table("signs", "", heads, rows, note)
 
 
-def page(g: GroupView, trends: Mapping[str, Thinned], night: str, paged: frozenset[str]) -> Page:
+def group_page(g: GroupView, trends: Mapping[str, Thinned], night: str, paged: frozenset[str]) -> Page:
     """A group's page."""
     facts = [("Period", duration(g.period_s)), ("Loops", str(len(g.rows)))]
     if g.source is not None:
@@ -183,7 +185,7 @@ def page(g: GroupView, trends: Mapping[str, Thinned], night: str, paged: frozens
     sections = (
         Section("What and where", (Text((f"{sentence(g)}.",), "lead"), Facts(tuple(facts)), graph(g))),
         Section("Loops", (_members(g, paged),)),
-        Section("Why there", (_signs(g),)),
+        Section("Why there", (_signs_table(g),)),
         *((Section("Trends and spectra", tuple(pictures)),) if pictures else ()),
     )
     subtitle = f"{with_noun(len(g.rows), 'loop')}, night {night}."

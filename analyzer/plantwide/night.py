@@ -208,7 +208,7 @@ def _traced(group: Group, peers: Mapping[str, Peer], limits: PlantLimits) -> Tra
     if not candidates:
         return None
     best = candidates[0]
-    links = _links(group, best, lags)
+    links = _links_to_source(group, best, lags)
     followers = [
         loop
         for loop, link in links.items()
@@ -219,7 +219,7 @@ def _traced(group: Group, peers: Mapping[str, Peer], limits: PlantLimits) -> Tra
     return Traced(group, candidates, links, _parents(best.loop, lags), frozenset(followers))
 
 
-def _links(group: Group, best: Candidate, lags: Lags) -> dict[str, Root]:
+def _links_to_source(group: Group, best: Candidate, lags: Lags) -> dict[str, Root]:
     """How the other loops of a group go with its likeliest source."""
     out = {}
     for loop, coherence in group.coherence.items():

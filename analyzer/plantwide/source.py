@@ -97,7 +97,7 @@ def candidates_of(lags: Lags, peers: Mapping[str, Peer], limits: PlantLimits) ->
     waves = _first_guess(list(lags.waves.values()), peers)
     if not waves:
         return ()
-    signs = _signs(waves, [peers[w.loop] for w in waves], lags)
+    signs = _signs_by_name(waves, [peers[w.loop] for w in waves], lags)
     valves = any(s["valve"] > 0 for s in signs)
     seen = 1.0 - (limits.unseen_beside_valve_pct if valves else limits.unseen_pct) / 100.0
     odds = np.array([sum(getattr(limits, f"sign_{k}") * v for k, v in s.items()) for s in signs])
@@ -107,7 +107,7 @@ def candidates_of(lags: Lags, peers: Mapping[str, Peer], limits: PlantLimits) ->
     return tuple(sorted(found, key=lambda c: (-c.confidence_pct, c.loop)))
 
 
-def _signs(waves: Sequence[Wave], peers: Sequence[Peer], lags: Lags) -> list[dict[str, float]]:
+def _signs_by_name(waves: Sequence[Wave], peers: Sequence[Peer], lags: Lags) -> list[dict[str, float]]:
     """The signs of each candidate by name."""
     first, shared = _leads([w.loop for w in waves], lags)
     own = [p.evidence if p.cause is Cause.VALVE else 0.0 for p in peers]

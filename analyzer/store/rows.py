@@ -92,18 +92,18 @@ def finding_of(row: Row) -> Finding:
         row["night"],
         Status(row["status"]),
         _needs(*json.loads(row["reason"])) if row["reason"] else None,
-        _value(Lack, row["lack"]),
+        _or_none(Lack, row["lack"]),
         swing,
-        _value(Cause, row["cause"]),
-        _value(Fault, row["valve_fault"]),
+        _or_none(Cause, row["cause"]),
+        _or_none(Fault, row["valve_fault"]),
         {c: row[f"osc_{c}_pct"] for c in CAUSES if row[f"osc_{c}_pct"] is not None},
-        tuple(_sign(**s) for s in json.loads(row["signs"] or "[]")),
+        tuple(_sign_of(**s) for s in json.loads(row["signs"] or "[]")),
         Remedy(
-            _value(Action, row["action"]),
+            _or_none(Action, row["action"]),
             row["advice"] or "",
             row["kp_new"],
             row["ti_new"],
-            _value(Due, row["due"]),
+            _or_none(Due, row["due"]),
         ),
         {k: v for k, v in row.items() if k not in TYPED},
         lanes=tuple(Lane(name) for name in (row["lanes"] or "").split(", ") if name),
@@ -112,14 +112,14 @@ def finding_of(row: Row) -> Finding:
 
 
 def _needs(lack: str | None, need: str, figures: list[Cell]) -> Needs:
-    return Needs(_value(Lack, lack), Need(need), tuple(figures))
+    return Needs(_or_none(Lack, lack), Need(need), tuple(figures))
 
 
-def _sign(points_to: str, strength: float, kind: str, figures: list[Cell]) -> Sign:
+def _sign_of(points_to: str, strength: float, kind: str, figures: list[Cell]) -> Sign:
     return Sign(Cause(points_to), strength, SignKind(kind), tuple(figures))
 
 
-def _value(kind: Any, text: str | None) -> Any:
+def _or_none(kind: Any, text: str | None) -> Any:
     return None if text is None else kind(text)
 
 

@@ -62,7 +62,7 @@ def _whole(found: Finding) -> str:
     if found.status is not Status.OK:
         return lacking
     if found.follows is not None:
-        return f"{cycle_text(found)}: {_follows(found.follows)}"
+        return f"{cycle_text(found)}: {_follows_text(found.follows)}"
     if found.swing is None:
         return f"not assessed: {found.remedy.text or lacking}"
     names = ", ".join(found.moves[:MOST_NAMES]) + (" ..." if len(found.moves) > MOST_NAMES else "")
@@ -121,7 +121,7 @@ def _strongest(found: Finding, most: int, *first: SignKind) -> str:
     return "; ".join(sign_text(s) for s in order[:most])
 
 
-def _follows(root: Root) -> str:
+def _follows_text(root: Root) -> str:
     sure = f"fix that loop first (it starts there with {root.confidence_pct:.0f} %)"
     return f"follows {root.loop}{later(root.lag_s)}; {sure}"
 
