@@ -1,13 +1,20 @@
-"""The command `run`: the nightly batch, what it says of itself, and how it ends when it is stopped."""
+"""The command `run`: the nightly batch, what it says of itself, and how it ends when it is stopped.
+
+Its log is one that a person can grep and a program can split: one line an event, appended, logfmt.
+
+2026-03-03T01:00:02Z triage[4711] lost loop=FIC2101 status="not assessed" reason="no PV tag FIC2101.PV in the export"
+"""
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
+from datetime import UTC, datetime
 from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, Any
@@ -16,18 +23,54 @@ import click
 
 from analyzer.commands.options import NOTHING_DONE, PLACE, SOME_LOST, bar, export_options, say, what_failed
 from identification.errors import InputError, TriageError
+from reports.texts import visible
 from reports.whole_file import is_full
 
 if TYPE_CHECKING:
     from analyzer.night.asked import Asked
     from analyzer.night.batch import Batch, Outcome
     from analyzer.night.nights import Night
-    from analyzer.night.run_files import RunLog
 
 STOPPED = 128
 """Exit status of a run that a signal has stopped, less the signal's number: what shells and schedulers expect."""
 FEW = 10
 """Notes on what was read that are printed; the rest is counted."""
+PLAIN = frozenset("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789._:/+-%")
+"""Characters of values that need no quotes."""
+
+
+def logfmt(value: object) -> str:
+    """A value as one word or one quoted text, in printable characters alone."""
+    text = f"{value:.6g}" if isinstance(value, float) else str(value)
+    shown = visible(text)
+    if shown and set(shown) <= PLAIN:
+        return shown
+    return '"' + shown.replace("\\", "\\\\").replace('"', '\\"') + '"'
+
+
+class RunLog:
+    """Where a run says what it does; nowhere without a path.
+
+    A log that cannot be written costs one line on stderr, and never the night.
+    """
+
+    def __init__(self, path: Path | None) -> None:
+        self._path = path
+
+    def say(self, event: str, **facts: object) -> None:
+        """Append one line: time [UTC], process, event, and facts as name=value."""
+        if self._path is None:
+            return
+        now = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
+        told = "".join(f" {name}={logfmt(value)}" for name, value in facts.items())
+        line = f"{now} triage[{os.getpid()}] {event}{told}\n".encode()
+        try:
+            self._path.parent.mkdir(parents=True, exist_ok=True)
+            with self._path.open("ab", buffering=0) as file:
+                file.write(line)
+        except OSError as error:
+            print(f"triage: no log is kept: {self._path}: {error.strerror}", file=sys.stderr)
+            self._path = None
 
 
 class StoppedError(Exception):
@@ -105,8 +148,6 @@ def run(asked: Asked, store: Path, log_file: Path | None, **how: Any) -> None:
     Example: triage run export.parquet --loops loops.csv --store store --jobs 4
     """
     from importlib.metadata import version
-
-    from analyzer.night.run_files import RunLog
 
     log, begun_s = RunLog(log_file), time.monotonic()
     export = " ".join(map(str, asked.export))

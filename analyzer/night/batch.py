@@ -11,9 +11,12 @@ import json
 import math
 import uuid
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Set as AbstractSet
+from dataclasses import dataclass, fields, is_dataclass, replace
 from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
 
 from analyzer.belief.nights import held_pairs
 from analyzer.config import Config
@@ -28,7 +31,6 @@ from analyzer.night import chunk
 from analyzer.night.chunk import Done, Task
 from analyzer.night.finish import finish_night, is_empty
 from analyzer.night.nights import Night, nights_of
-from analyzer.night.run_files import Identity, in_one_order, require_same
 from analyzer.night.workers import Died, Executor, executor
 from analyzer.store.lock import locked
 from analyzer.store.store import Store
@@ -38,6 +40,8 @@ from identification.errors import InputError
 CHUNKS, FEWEST, MOST = 16, 4, 16
 """Tasks of a run that is small, and loops per task: enough to carry its four small tables, few enough for a smooth
 progress bar and for workers that end together."""
+Identity = Mapping[str, Any]
+"""A run as it is written down beside its pieces: fingerprint, and words for people (export, loops, begun)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,6 +135,43 @@ def _mourned(workers: Executor[Task, Done], died: Died[Task]) -> Iterator[Done]:
         workers.submit(replace(task, specs=hand, key=f"{task.key}-alone", alone=True), alone=True)
     else:
         yield chunk.lose(replace(task, specs=hand, key=f"{task.key}-lost"), died.why)
+
+
+def in_one_order(value: object) -> bytes:
+    """A value as bytes that are the same in every process: sets and mappings sorted, dataclasses by their fields.
+
+    Raises
+    ------
+    TypeError
+        The value holds something whose text may differ between processes.
+    """
+    return json.dumps(value, sort_keys=True, default=_as_plain).encode()
+
+
+def _as_plain(value: Any) -> object:
+    if is_dataclass(value):
+        return [type(value).__name__, {f.name: getattr(value, f.name) for f in fields(value)}]
+    if isinstance(value, AbstractSet):
+        return sorted(value)
+    if isinstance(value, Mapping):
+        return dict(value)
+    raise TypeError(f"{type(value).__name__} has no stated order")
+
+
+def require_same(path: Path, run: Identity) -> None:
+    """Raise InputError where the pieces at `path` are of another run; nothing where there are none."""
+    try:
+        stopped = json.loads(path.read_text(encoding="utf-8"))
+        begun = f"{stopped['export']} ({stopped['loops']} loops, begun {stopped['begun']})"
+        same = stopped["fingerprint"] == run["fingerprint"]
+    except (OSError, ValueError, TypeError, KeyError, RecursionError):
+        return
+    if not same:
+        raise InputError(
+            f"the run that was stopped read {begun}, this one reads {run['export']} ({run['loops']} loops)",
+            "--resume with the same EXPORT, --loops, --changes, --since, --until, --config and version",
+            "give them again, or leave out --resume to give up what the stopped run had done",
+        )
 
 
 def identity(batch: Batch) -> Identity:

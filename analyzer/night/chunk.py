@@ -39,7 +39,7 @@ from analyzer.plantwide.wave import waves_table
 from analyzer.store.rows import hour_rows, piece_row
 from analyzer.store.store import Store
 from analyzer.store.table import rows_table, write_table
-from analyzer.words import settings as words
+from analyzer.words import units as words
 from identification.errors import NotAssessedError, TriageError
 from reports.page_file import dumps
 
