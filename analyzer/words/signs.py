@@ -165,10 +165,8 @@ SAYS: Mapping[SignKind, Callable[..., Told | str]] = {
     SignKind.OF_ABOVE: _of_above_says,
 }
 """What each sign says, of its figures."""
-UNNAMED = frozenset(
-    {
-        *(SignKind.CALM_EVIDENCE, SignKind.CALM_WIDTH, SignKind.AGAIN, SignKind.DEAD_VALVE),
-        *(SignKind.FOLLOWS, SignKind.OF_BELOW, SignKind.OF_ABOVE),
-    }
+UNNAMED = (
+    *(SignKind.CALM_EVIDENCE, SignKind.CALM_WIDTH, SignKind.AGAIN, SignKind.DEAD_VALVE),
+    *(SignKind.FOLLOWS, SignKind.OF_BELOW, SignKind.OF_ABOVE),
 )
 """Signs that no measure is named for."""
