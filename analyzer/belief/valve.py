@@ -164,12 +164,10 @@ def valve_with_night(
         before,
         since=before.since or night,
         nights=before.nights + 1,
-        alone=_rounded(share * np.asarray(before.alone) + alone if before.alone else alone),
-        summed=_rounded(summed),
-        best=_rounded(
-            np.maximum(share * np.asarray(before.best), own) if before.best else np.maximum(own, 0.0)
-        ),
-        recent=tuple((n, _rounded(p)) for n, p in recent),
+        alone=_kept(share * np.asarray(before.alone) + alone if before.alone else alone),
+        summed=_kept(summed),
+        best=_kept(np.maximum(share * np.asarray(before.best), own) if before.best else np.maximum(own, 0.0)),
+        recent=tuple((n, _kept(p)) for n, p in recent),
         jump=share * before.jump + jump,
         clear=share * before.clear + clear,
     )
@@ -179,19 +177,19 @@ def _begun_anew(recent: Sequence[tuple[str, Floats]], said: Witness) -> ValveBel
     """The belief in another valve, which the recent nights are of."""
     each = np.array([p for _, p in recent])
     best = np.maximum(each.max(axis=0), 0.0)
-    kept = tuple((n, _rounded(p)) for n, p in recent)
+    kept = tuple((n, _kept(p)) for n, p in recent)
     return ValveBelief(
         recent[0][0],
         len(recent),
-        _rounded(np.minimum(each.sum(axis=0), 0.0)),
-        _rounded(each.sum(axis=0)),
-        _rounded(best),
+        _kept(np.minimum(each.sum(axis=0), 0.0)),
+        _kept(each.sum(axis=0)),
+        _kept(best),
         kept,
         *said["jump"],
     )
 
 
-def _rounded(x: Floats) -> tuple[float, ...]:
+def _kept(x: Floats) -> tuple[float, ...]:
     """As the store keeps it."""
     return tuple(round(float(v), 3) for v in x)
 

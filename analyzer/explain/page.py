@@ -80,15 +80,10 @@ def _if_filled(table: Table) -> tuple[Block, ...]:
 
 def _verdict_blocks(e: Explained) -> tuple[Block, ...]:
     brought = [] if e.brought is None else [Text((e.brought.note,))]
-    return (
-        Text((e.data["reason"],), "lead"),
-        Text((check(e.data),)),
-        *brought,
-        Tiles(tuple(_verdict_tiles(e))),
-    )
+    return (Text((e.data["reason"],), "lead"), Text((check(e.data),)), *brought, Tiles(tuple(_tiles(e))))
 
 
-def _verdict_tiles(e: Explained) -> list[tuple[str, str, str]]:
+def _tiles(e: Explained) -> list[tuple[str, str, str]]:
     d, (plain, better) = e.data, e.found.proven.overall
     seat = "where to look first" if d["verdict"] == "unexplained" else "where it sits"
     tiles = [(d["block"], seat, "")] if d["block"] != "none" else []

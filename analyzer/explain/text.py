@@ -28,7 +28,7 @@ def answer_lines(data: Mapping[str, Any]) -> list[str]:
     head = f"{data['loop']}: {title(data['verdict']) if data['fit'] else 'not told'}"
     block = f" ({data['block']})" if data["block"] != "none" else ""
     out = [head + block, *wrap(data["reason"], WIDTH), *wrap(check(data), WIDTH)]
-    out += _titled_part("Parameters (90 % intervals)", _cell_texts(words.parameters(data)), (2,))
+    out += _titled_part("Parameters (90 % intervals)", _texts(words.parameters(data)), (2,))
     out += _titled_part("Controller, as SP, PV and OP show it", _controller_rows(data), (1,))
     out += _titled_part("Misfit, rms in % of span", _fit_rows(data), (1, 2, 3, 4))
     out += _titled_part("On the recordings held out", _others(data), (1, 3, 4))
@@ -40,7 +40,7 @@ def answer_lines(data: Mapping[str, Any]) -> list[str]:
             out += _wrapped(f"{first['name']} removes {removed} of the held-out misfit's mean square.")
     out += _titled_part("Where", _where_rows(data))
     out += _titled_part("The plain loop's constants moved", _moved(data), (1, 3))
-    return out + _titled_part("Could also be, and what would tell", _cell_texts(words.alternatives(data)))
+    return out + _titled_part("Could also be, and what would tell", _texts(words.alternatives(data)))
 
 
 def _wrapped(sentence: str) -> list[str]:
@@ -68,7 +68,7 @@ def lined_up(rows: Rows, numeric: Sequence[int] = ()) -> list[str]:
     return out
 
 
-def _cell_texts(table: Table) -> list[tuple[str, ...]]:
+def _texts(table: Table) -> list[tuple[str, ...]]:
     return [tuple(cell.text for cell in row) for row in table.rows]
 
 
@@ -82,22 +82,19 @@ def _controller_rows(data: Mapping[str, Any]) -> Rows:
 
 
 def _fit_rows(data: Mapping[str, Any]) -> Rows:
-    rows = [(*row, "") for row in _cell_texts(words.misfits(data))]
+    rows = [(*row, "") for row in _texts(words.misfits(data))]
     return [("", "fitted", "fit %", "held out", "fit %", ""), *rows] if rows else []
 
 
 def _others(data: Mapping[str, Any]) -> Rows:
     rows = [
-        (name, plain, "→", better, removed)
-        for name, plain, better, removed in _cell_texts(words.others(data))
+        (name, plain, "→", better, removed) for name, plain, better, removed in _texts(words.others(data))
     ]
     return [("", "plain", "", "improved", "removed"), *rows] if rows else []
 
 
 def _moved(data: Mapping[str, Any]) -> Rows:
-    return [
-        (name, before, "→", after, unit) for name, before, after, _, unit in _cell_texts(words.moved(data))
-    ]
+    return [(name, before, "→", after, unit) for name, before, after, _, unit in _texts(words.moved(data))]
 
 
 def _where_rows(data: Mapping[str, Any]) -> Rows:
@@ -105,7 +102,7 @@ def _where_rows(data: Mapping[str, Any]) -> Rows:
         (name if name.isupper() else name[:1].lower() + name[1:], text)
         for name, text in places(data["where"])
     ]
-    features = _cell_texts(words.features(data))
+    features = _texts(words.features(data))
     rows += [
         (name, f"{how} (chance {chance})") for name, chance, carries, how in features if carries == "yes"
     ]

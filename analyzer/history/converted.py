@@ -67,7 +67,7 @@ class Converted(Table):
         """
         if where is None:
             return self._columns(self._largest(), columns)
-        files = [_copy_file(self.folder, k) for k in sorted({_bucket(tag) for tag in where[1]})]
+        files = [_file(self.folder, k) for k in sorted({_bucket(tag) for tag in where[1]})]
         parts = [self._columns(path, [*columns, where[0]]) for path in files if path.exists()]
         wanted = pa.array(where[1], pa.string())
         kept = [[a.filter(pc.is_in(part[-1], value_set=wanted)) for a in part[:-1]] for part in parts]
@@ -86,7 +86,7 @@ class Converted(Table):
         return max(self.folder.glob("*.parquet"), key=lambda p: (p.stat().st_size, p.name))
 
 
-def _copy_file(folder: Path, k: int) -> Path:
+def _file(folder: Path, k: int) -> Path:
     return folder / f"{k:03d}.parquet"
 
 
@@ -271,9 +271,7 @@ class _Stream:
     def _write(self, k: int) -> None:
         table = pa.Table.from_batches(self._held.pop(k))
         if k not in self._writers:
-            self._writers[k] = pq.ParquetWriter(
-                _copy_file(self.folder, k), table.schema, compression="snappy"
-            )
+            self._writers[k] = pq.ParquetWriter(_file(self.folder, k), table.schema, compression="snappy")
         self._writers[k].write_table(table.combine_chunks())
 
     def close(self) -> None:

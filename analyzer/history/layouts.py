@@ -337,7 +337,7 @@ def open_long(table: Table, options: ReadOptions) -> LongSource | None:
         return None
     clock = find_clock(table, options)
     check_seconds(table, clock, tag)
-    met = table.tags or _distinct_cells(table, tag).to_pylist()
+    met = table.tags or _kinds(table, tag).to_pylist()
     tags = tuple(str(name) for name in met if name not in (None, ""))
     stated = options.quality_column
     quality = (
@@ -349,14 +349,12 @@ def open_long(table: Table, options: ReadOptions) -> LongSource | None:
     source = LongSource(table, clock, tags, options.good_quality, (said,), tag, value)
     if quality is None:
         return source
-    scheme = scheme_of(
-        table.names[quality], _distinct_cells(table, quality), mostly_one(table.head([quality]))
-    )
+    scheme = scheme_of(table.names[quality], _kinds(table, quality), mostly_one(table.head([quality])))
     codes = f"column '{table.names[quality]}' read as {scheme.value}"
     return replace(source, layout=(said, codes), quality=quality, scheme=scheme)
 
 
-def _distinct_cells(table: Table, column: int) -> pa.Array:
+def _kinds(table: Table, column: int) -> pa.Array:
     """The distinct cells of a column."""
     return pc.unique(pa.concat_arrays([pc.unique(arrays[0]) for arrays in table.each([column])]))
 

@@ -120,7 +120,7 @@ def fields(texts: pa.Array, timezone: str | None = None) -> Fields | None:
         _whole_numbers(part["c"]),
         clock_s,
         offset_s,
-        _readable_stamps(parts, part, known) & shown & (np.abs(offset_s) <= MOST_OFFSET_S),
+        _readable(parts, part, known) & shown & (np.abs(offset_s) <= MOST_OFFSET_S),
         _numpy(pc.not_equal(part["z"], "")),
         _written_order(part),
         _numpy(pc.less_equal(pc.utf8_length(part["c"]), 2)),
@@ -131,9 +131,7 @@ def _numpy(array: pa.Array) -> NDArray[Any]:
     return np.asarray(array.to_numpy(zero_copy_only=False))
 
 
-def _readable_stamps(
-    parts: pa.Array, part: dict[str, pa.Array], known: Mapping[str, float]
-) -> NDArray[np.bool_]:
+def _readable(parts: pa.Array, part: dict[str, pa.Array], known: Mapping[str, float]) -> NDArray[np.bool_]:
     """Stamps that the pattern knows, and whose zone is none of letters or words that mean nothing."""
     letters = pc.match_substring_regex(part["z"], "^[A-Z]+$")
     meant = pc.or_(pc.invert(letters), pc.is_in(pc.utf8_lower(part["z"]), value_set=pa.array(known)))

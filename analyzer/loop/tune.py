@@ -77,9 +77,7 @@ class Tuning:
         return self.proposal.controller or self.proposal.meanwhile
 
 
-def _model_forecast_on(
-    verdict: Verdict, controller: Pid, limits: AdviceLimits
-) -> tuple[Loop, Fit, tuple[Loop, ...]]:
+def _model(verdict: Verdict, controller: Pid, limits: AdviceLimits) -> tuple[Loop, Fit, tuple[Loop, ...]]:
     """The loop that the forecast runs on, its fit, and what else it may be."""
     if verdict.cause is Cause.VALVE:
         return sought_for(verdict, controller, limits)
@@ -121,7 +119,7 @@ def tune(found: Assessment, controller: Pid, config: Config, kept: Advice | None
     verdict = found.verdict
     first = found.oscillations.first
     period = first.period_s if first else None
-    model, fit, others = _model_forecast_on(verdict, controller, config.advice)
+    model, fit, others = _model(verdict, controller, config.advice)
     if kept is not None and kept.reason and kept.action is not None:
         proposal = Proposal(kept.action, kept.reason)
     else:

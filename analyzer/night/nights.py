@@ -56,9 +56,7 @@ def daily(first_s: float, last_s: float, limits: NightLimits, zone: str = UTC_NA
     return [_night_of_middle(a, b, zone) for a, b in pairwise(edges)]
 
 
-def nights_of_spans(
-    spans: Sequence[tuple[float, float]], limits: NightLimits, zone: str = UTC_NAME
-) -> list[Night]:
+def in_nights(spans: Sequence[tuple[float, float]], limits: NightLimits, zone: str = UTC_NAME) -> list[Night]:
     """The nights of an export from the spans of its loops [s].
 
     Where the median loop has over whole_h (36 h), the export is cut into days; else each loop is assessed whole, in
@@ -105,4 +103,4 @@ def nights_of(
     inside = [(max(a, since_s), min(b, until_s - 1.0)) for a, b in spans if a < until_s and b >= since_s]
     if not inside:
         raise InputError("no samples between --since and --until", "a span of the export", "widen it")
-    return nights_of_spans(inside, limits, zone)
+    return in_nights(inside, limits, zone)

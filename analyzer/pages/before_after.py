@@ -76,7 +76,7 @@ def _interval(change: Change) -> str:
     return f"{signed(ends[0])} … {signed(ends[1])} %"
 
 
-def _figure_row(change: Change, found: LoopComparison) -> tuple[Cell, ...]:
+def _row(change: Change, found: LoopComparison) -> tuple[Cell, ...]:
     d = change.found
     remark = "; ".join(found.reasons) or (f"follows {found.source_loop}" if found.source_loop else "")
     return (
@@ -96,12 +96,7 @@ def _figure_row(change: Change, found: LoopComparison) -> tuple[Cell, ...]:
 
 def figures(cases: Sequence[ChangeCase], primary: bool, name: str) -> Table:
     """Figures before and after of all loops (the study's Figure 11)."""
-    rows = [
-        _figure_row(c, case.found)
-        for case in cases
-        for c in case.found.changes
-        if c.measure.primary == primary
-    ]
+    rows = [_row(c, case.found) for case in cases for c in case.found.changes if c.measure.primary == primary]
     return Table(
         name, "", page_columns("figures"), tuple(rows), searchable=len(rows) > 12, facets=("verdict",)
     )
@@ -111,7 +106,7 @@ def _setting(value: float | None) -> str:
     return "–" if value is None else f"{value:g}"
 
 
-def _settings_facts(case: ChangeCase) -> str:
+def _settings_typed(case: ChangeCase) -> str:
     change, row = case.change, case.row
     if change.kp_new is None and change.ti_new is None:
         return change.seen or "not stated"
@@ -128,7 +123,7 @@ def _in_short(case: ChangeCase) -> tuple[Cell, ...]:
     return (
         Cell(case.found.loop, kind="strong"),
         cell(case.row, "description"),
-        Cell(_settings_facts(case)),
+        Cell(_settings_typed(case)),
         *(_change_cell(by_name.get(m.name)) for m in PRIMARY),
         Cell(outcome(case.found), kind=kind),
     )
@@ -158,7 +153,7 @@ def loop_section(case: ChangeCase, number_: int, zone: str = UTC_NAME) -> Sectio
     """What became of one loop: settings, spans, remarks, trends (the study's Figure 10)."""
     found, change = case.found, case.change
     facts = (
-        ("Settings", _settings_facts(case)),
+        ("Settings", _settings_typed(case)),
         ("Changed", f"{stamp(change.time_s, zone)} {zone}" + (f" by {change.who}" if change.who else "")),
         ("Before", _span_text(found.before.first_s, found.before.last_s, found.hours[0], zone)),
         ("After", _span_text(found.after.first_s, found.after.last_s, found.hours[1], zone)),

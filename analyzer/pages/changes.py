@@ -119,7 +119,7 @@ def outcome(found: LoopComparison) -> str:
     return text
 
 
-def _plant_number(row: Row, name: str) -> float | None:
+def _stated(row: Row, name: str) -> float | None:
     """A number of the plant: a column of the night, or of its JSON of the plant's own columns."""
     held = json.loads(row.get("extra") or "{}") | {k: v for k, v in row.items() if v is not None}
     try:
@@ -143,14 +143,11 @@ def wear_texts(found: LoopComparison, row: Row) -> tuple[str, ...]:
     cost_per_error_pct_h : what one percent of average absolute error costs an hour [cost_unit]
     """
     texts = []
-    travel, life = _clear_change(found, "valve_travel_pct_per_h"), _plant_number(row, "valve_life_travel_pct")
+    travel, life = _clear_change(found, "valve_travel_pct_per_h"), _stated(row, "valve_life_travel_pct")
     if travel is not None and life is not None:
         a, b = (life / max(v, 1e-9) / HOURS_A_YEAR for v in (travel.found.before, travel.found.after))
         texts.append(f"Valve life at this travel: {number(a)} years before, {number(b)} years after.")
-    error, cost = (
-        _clear_change(found, "average_absolute_error_pct"),
-        _plant_number(row, "cost_per_error_pct_h"),
-    )
+    error, cost = _clear_change(found, "average_absolute_error_pct"), _stated(row, "cost_per_error_pct_h")
     if error is not None and cost is not None:
         unit = json.loads(row.get("extra") or "{}").get("cost_unit", "") or "units of cost"
         low, high = (number(-end * cost * HOURS_A_YEAR) for end in (error.found.high, error.found.low))

@@ -85,7 +85,7 @@ def action_there(g: GroupView) -> str:
     return action_text(g.loops[g.source["loop"]], g.action) if g.source else g.action
 
 
-def _candidates_named(g: GroupView) -> str:
+def _candidates(g: GroupView) -> str:
     return ", ".join(f"{r['loop']} {r['source_pct']:.0f} %" for r in g.candidates)
 
 
@@ -96,9 +96,7 @@ def sentence(g: GroupView) -> str:
         loop, pct = g.source["loop"], g.source["source_pct"]
         tail = f"it starts at {loop} ({pct:.0f} %)"
     else:
-        tail = (
-            f"it starts at one of {_candidates_named(g)}, or outside what is recorded ({g.unseen_pct:.0f} %)"
-        )
+        tail = f"it starts at one of {_candidates(g)}, or outside what is recorded ({g.unseen_pct:.0f} %)"
     return f"{head}; {tail}; without it the others' average errors fall by {number(g.gain_pct)} % of span together"
 
 
@@ -126,7 +124,7 @@ def _morning_row(g: GroupView, linked: bool) -> tuple[Cell, ...]:
         Cell(f"group {g.number}", kind="strong", href=f"{page_name(g.number)}.html" if linked else ""),
         Cell(str(len(g.rows)), len(g.rows)),
         Cell(duration(g.period_s), g.period_s),
-        Cell(_candidates_named(g) or "not clear"),
+        Cell(_candidates(g) or "not clear"),
         Cell(action_there(g) or "undecided: look at the candidates"),
         plain_cell(g.gain_pct),
         Cell(", ".join(r["loop"] for r in g.rows if r is not g.source)),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from analyzer.lanes.lanes import lanes_in
 from analyzer.loop.decisions import Action, Cause, Fault, Lane, Status
-from analyzer.pages.reading import ShownNight, linked_name
+from analyzer.pages.reading import ShownNight, link_to
 from analyzer.pages.words import ALL_LOOPS, Row, cells, duration, page_columns, plain_cell, texts, with_noun
 from analyzer.words.belief import wear_text
 from analyzer.words.reason import STEPS
@@ -88,9 +88,7 @@ def wearing(night: ShownNight) -> Table:
     rows = [r for r in night.rows if r["wear_pct_per_month"] is not None]
     rows.sort(key=lambda r: -r["wear_pct_per_month"])
     shown = page_columns("wear")
-    told = tuple(
-        cells(r, shown, loop=linked_name(night, r["loop"]), forecast=Cell(wear_text(r))) for r in rows
-    )
+    told = tuple(cells(r, shown, loop=link_to(night, r["loop"]), forecast=Cell(wear_text(r))) for r in rows)
     note = "Play or stickband by all nights; growth, its night of beginning and the forecast with 90 % ends."
     return Table("wear", "", shown, told, note, cards=True)
 
@@ -113,7 +111,7 @@ def _valve_cells(night: ShownNight, row: Row) -> dict[str, Cell]:
     """What the store does not hold as a valve's row shows it."""
     fault = row["valve_fault"]
     return {
-        "loop": linked_name(night, row["loop"]),
+        "loop": link_to(night, row["loop"]),
         "valve_fault": Cell("" if fault in (None, Fault.NONE) else fault, kind="valve"),
         "width": plain_cell(row["stickband_pct"] or row["backlash_pct"]),
         "test": Cell(valve_test(row)),
@@ -126,7 +124,7 @@ def worn(night: ShownNight) -> Table:
     rows = [r for r in night.rows if r["valve_travel_pct_per_h"] is not None]
     rows.sort(key=lambda r: -r["valve_travel_pct_per_h"])
     shown = page_columns("travel")
-    told = tuple(cells(r, shown, loop=linked_name(night, r["loop"])) for r in rows[:TRAVELLED])
+    told = tuple(cells(r, shown, loop=link_to(night, r["loop"])) for r in rows[:TRAVELLED])
     note = "Travel of OP, or of the stem where it is recorded; where the loop is tight, its settings wear the valve."
     return Table("travel", "", shown, told, note, cards=True)
 

@@ -12,7 +12,7 @@ from analyzer.pages import maintenance
 from analyzer.pages.groups import morning_table
 from analyzer.pages.loop_pictures import close_span, sparkline
 from analyzer.pages.plant import NightSum, area_table, plant_history, plant_map
-from analyzer.pages.reading import BESIDE, ShownNight, linked_name, needs_a_look, oscillates
+from analyzer.pages.reading import BESIDE, ShownNight, link_to, needs_a_look, oscillates
 from analyzer.pages.summary import first_things, since
 from analyzer.pages.words import Row, cause_cell, cells, heading, marked_cell, page_columns, with_noun
 from analyzer.plantwide.view import GroupView
@@ -40,7 +40,7 @@ def _settings_cell(row: Row) -> str:
 
 def _of_worst(night: ShownNight, row: Row, follows: bool, by: str) -> dict[str, Cell]:
     """What a loop to touch is shown with and the store does not hold."""
-    name, trend = linked_name(night, row["loop"]), night.trends.get(row["loop"])
+    name, trend = link_to(night, row["loop"]), night.trends.get(row["loop"])
     drawn = None if trend is None else sparkline(trend, close_span(row, trend))
     return {
         "loop": replace(name, text=FOLLOWER + name.text) if follows else name,
@@ -67,7 +67,7 @@ def _of_all(night: ShownNight, row: Row) -> dict[str, Cell]:
     """What a loop is listed with and the store does not hold."""
     own = {name: marked_cell(row, name) for name in (SIGNIFICANCE, *ALL_COSTS)}
     own |= {name: marked_cell(row, name, ".0f") for name in ALL_SHARES}
-    return own | {"loop": linked_name(night, row["loop"]), "cause": cause_cell(row["cause"])}
+    return own | {"loop": link_to(night, row["loop"]), "cause": cause_cell(row["cause"])}
 
 
 def ranking(night: ShownNight) -> Table:

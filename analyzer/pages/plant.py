@@ -11,7 +11,7 @@ import numpy as np
 from analyzer.columns import BY_NAME
 from analyzer.loop.cost import LOSS, SIGNIFICANCE, cost, cost_column
 from analyzer.loop.decisions import CAUSES, Cause, Status, counts
-from analyzer.pages.reading import ShownNight, linked_name, needs_a_look, read_nights
+from analyzer.pages.reading import ShownNight, link_to, needs_a_look, read_nights
 from analyzer.pages.words import Row, cell, number, page_columns, plain_cell
 from analyzer.store.store import Store
 from reports.pages import Block, Cell, Floats, Line, Panels, Plot, Table, Tile, TreeMap
@@ -71,7 +71,7 @@ def area_table(rows: Sequence[Row]) -> Table:
 def _tile(night: ShownNight, row: Row, by: str) -> Tile:
     kind = "calm" if not needs_a_look(row) else row["cause"] if row["cause"] in CAUSES else "unclear"
     text = f"{row['loop']}: {number(cost(row, by))}. {cell(row, 'reason').text}"
-    return Tile(row["loop"], cost(row, by), kind, text, linked_name(night, row["loop"]).href)
+    return Tile(row["loop"], cost(row, by), kind, text, link_to(night, row["loop"]).href)
 
 
 def _plant_tiles(night: ShownNight, rows: Sequence[Row], by: str) -> tuple[Tile, ...]:

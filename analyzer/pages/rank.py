@@ -229,7 +229,7 @@ def brief(row: Row, columns: Sequence[str]) -> dict[str, str]:
     noted = f" [note: {row['note']}]" if row.get("note") else ""
     special["reason"] = in_short(row["reason"] or "")[0] + noted
     return {
-        name: visible(special.get(name, "") or _figure_cell(row[name], name) + mark(row, name))
+        name: visible(special.get(name, "") or _as_text(row[name], name) + mark(row, name))
         for name in columns
     }
 
@@ -255,7 +255,7 @@ def _setting_text(now: float | None, new: float | None, unit: str, off: str = "0
     return f"{present} {unit}" if now else off
 
 
-def _figure_cell(value: Any, column: str) -> str:
+def _as_text(value: Any, column: str) -> str:
     """A cell for people: three digits, empty where not known."""
     if isinstance(value, str):
         return value

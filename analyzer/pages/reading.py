@@ -231,7 +231,7 @@ def read_night(store: Store, name: str | None, top: int, drawn: bool = True) -> 
     )
 
 
-def linked_name(night: ShownNight, loop: str) -> Cell:
+def link_to(night: ShownNight, loop: str) -> Cell:
     """The loop's name, leading to its page where there is one."""
     return Cell(loop, kind="strong", href=f"{slug(loop)}.html" if loop in night.paged else "")
 

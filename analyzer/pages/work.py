@@ -9,7 +9,7 @@ import numpy as np
 
 from analyzer.history.plant_clock import stamp
 from analyzer.loop.decisions import Status
-from analyzer.pages.reading import ShownNight, by_loop, linked_name, oscillates, read_nights
+from analyzer.pages.reading import ShownNight, by_loop, link_to, oscillates, read_nights
 from analyzer.pages.words import ALL_LOOPS, Row, cause_cell, cells, page_columns, with_noun
 from analyzer.store.notes import FINISHED, Work, work_on
 from analyzer.store.store import Store
@@ -61,12 +61,10 @@ def said_since(work: Work, both: Sides) -> str:
     elif was or still:
         text += f": oscillates in {still}, before in {was} of {len(both.before)}"
     changes = [(both.means(column), name) for column, name in FIGURES.items() if column != "loss"]
-    return ", ".join(
-        [text, *(f"{name} {_change_since(*m)}" for m, name in changes if m is not None and m[0] > 0)]
-    )
+    return ", ".join([text, *(f"{name} {_change(*m)}" for m, name in changes if m is not None and m[0] > 0)])
 
 
-def _change_since(before: float, since: float) -> str:
+def _change(before: float, since: float) -> str:
     return f"{100.0 * (since / before - 1.0):+.0f} %".replace("-", "\u2212")
 
 
@@ -74,7 +72,7 @@ def _of_work(night: ShownNight, row: Row, work: Work, both: Sides) -> dict[str, 
     """What is told of a piece of work, and what the nights since say of it."""
     late = bool(work.due) and work.due < night.name and work.state not in FINISHED
     return {
-        "loop": linked_name(night, row["loop"]),
+        "loop": link_to(night, row["loop"]),
         "state": Cell(work.state, kind="better" if work.state in FINISHED else ""),
         "owner": Cell(work.owner),
         "due": Cell(work.due, kind="worse" if late else ""),
@@ -103,7 +101,7 @@ def won(night: ShownNight, works: Mapping[str, Work], history: Mapping[str, Sequ
         before, since = (sum(m[k] for m in known) for k in (0, 1))
         if before > 0.0:
             tone = "better" if since < before else "worse"
-            items.append((_change_since(before, since), f"{name} of {with_noun(len(known), 'loop')}", tone))
+            items.append((_change(before, since), f"{name} of {with_noun(len(known), 'loop')}", tone))
     return Tiles(tuple(items)) if items else None
 
 
