@@ -50,9 +50,9 @@ def _calm_evidence_says(evidence: float) -> Told:
     return "play or stick-slip explains PV better than an ideal valve", f"log likelihood +{evidence:.0f}"
 
 
-def _evidence_says(evidence: float, agreeing: float = 0.0, count: int = 0) -> Told:
+def _evidence_says(evidence: float, agreeing: float = 0.0, count: int | None = None) -> Told:
     text, figures = _calm_evidence_says(evidence)
-    if not count or evidence <= 0:
+    if count is None or evidence <= 0:
         return text, figures
     return f"{text}, in {100 * agreeing:.0f} % of {count} stretches between turns of OP", figures
 
