@@ -201,7 +201,7 @@ def _checked(field: Field[Any], default: Any, value: Any, where: str) -> Any:
     """A value of the field's type, within its range."""
     said = limit_of(field)
     if isinstance(default, tuple):
-        return _table(said, value, where)
+        return _rows_by_type(said, value, where)
     whole = isinstance(default, int)
     if not _is_number(value, said, whole):
         kind = "a whole number" if whole else "a number"
@@ -216,7 +216,7 @@ def _is_number(value: Any, said: Limit, whole: bool = False) -> bool:
     return bool(said.least <= value <= said.most)  # false of NaN
 
 
-def _table(said: Limit, value: Any, where: str) -> tuple[tuple[str, float, float], ...]:
+def _rows_by_type(said: Limit, value: Any, where: str) -> tuple[tuple[str, float, float], ...]:
     """Rows of a loop's type and two numbers."""
     rows = value if isinstance(value, list) else [value]
     for row in rows:
@@ -241,26 +241,26 @@ def _range(said: Limit) -> str:
 
 def limits_document(config: Config) -> str:
     """Limits as TOML, each with unit, range, meaning and source as a comment."""
-    parts = [_part(f.name, getattr(config, f.name)) for f in fields(config)]
+    parts = [_part_of_file(f.name, getattr(config, f.name)) for f in fields(config)]
     return "\n".join(
         ["# Limits of triage; a file given with --config needs only those that it changes.", *parts]
     )
 
 
-def _part(name: str, limits: Any) -> str:
+def _part_of_file(name: str, limits: Any) -> str:
     first = (type(limits).__doc__ or "").splitlines()[0]
     lines = ["", f"# {first}", f"[{name}]"]
     for each in fields(limits):
         said = limit_of(each)
         text = f"{said.meaning}. {_range(said).replace('from', 'From', 1)}; {said.source}."
         lines += [f"# {line}" for line in textwrap.wrap(text, WIDTH)]
-        lines.append(f"{each.name} = {_value(getattr(limits, each.name))}")
+        lines.append(f"{each.name} = {_toml_value(getattr(limits, each.name))}")
     return "\n".join(lines)
 
 
-def _value(value: Any) -> str:
+def _toml_value(value: Any) -> str:
     if isinstance(value, tuple):
-        return "[" + ", ".join(_value(item) for item in value) + "]"
+        return "[" + ", ".join(_toml_value(item) for item in value) + "]"
     if isinstance(value, str):
         return '"' + value.replace("\\", "\\\\").replace('"', '\\"') + '"'
     return repr(value)

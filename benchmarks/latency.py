@@ -74,7 +74,9 @@ def rows() -> list[tuple[str, float, str, float]]:
                 spent = command_s("-m", "analyzer.cli", *ask)
                 found.append((f"{name}, {loops:,} loops", spent, "python with pyarrow and click", arrow))
         big = small_store(Path(folder) / "big", loops=1500, nights=7, hours=False)
-        pages = call_s(lambda: write_html(night.pages(big, None, 50), Path(folder) / "out", single_file=True))
+        pages = call_s(
+            lambda: write_html(night.pages_of_night(big, None, 50), Path(folder) / "out", single_file=True)
+        )
         found.append(
             ("morning page of 1,500 loops and 50 loop pages", pages, "one rfft of 86,400", transform)
         )

@@ -14,8 +14,8 @@ from multiprocessing import Pool
 from pathlib import Path
 
 from analyzer import api
+from analyzer.api import PlantLoop
 from analyzer.loop.decisions import Cause
-from analyzer.night.plant import PlantLoop
 from identification.errors import NotAssessedError
 from proofs.common import command, command_line, publish
 

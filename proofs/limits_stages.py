@@ -83,7 +83,9 @@ def of_oscillation(c: Config) -> list[Any]:
 def _told(v: Any) -> Any:
     """A verdict as an answer."""
     return (
-        v if isinstance(v, str) else (v.cause, v.fault, v.needs, *(round(x) for x in v.confidence.values()))
+        v
+        if isinstance(v, str)
+        else (v.cause, v.fault, str(v.needs), *(round(x) for x in v.confidence.values()))
     )
 
 

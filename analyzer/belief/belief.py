@@ -153,11 +153,11 @@ def step(before: Belief | None, row: Row, repaired_s: Sequence[float], config: C
         return before
     now, limits = before or Belief(row["loop"], ""), config.belief
     share = valve.faded_over(now.night, row["night"], limits) if now.night else 1.0
-    now = _recorded(_after_changes(now, row, repaired_s), row, limits)
-    found = cycle.with_night(now.cycle, share, row, limits)
+    now = _recorded_anew(_after_changes(now, row, repaired_s), row, limits)
+    found = cycle.cycle_with_night(now.cycle, share, row, limits)
     now = _with_witness(replace(now, cycle=found), share, row, repaired_s, config)
     ended = before is not None and before.cycle.loud and not found.loud
-    done = remedy.with_night(RemedyBelief() if ended else now.remedy, share, row, limits)
+    done = remedy.remedy_with_night(RemedyBelief() if ended else now.remedy, share, row, limits)
     seen = Calm(
         row["night"],
         float(row["oscillation_significance"] or 0.0),
@@ -170,7 +170,7 @@ def step(before: Belief | None, row: Row, repaired_s: Sequence[float], config: C
     return replace(now, kp=row["kp"], ti=row["ti"], told=tell(now, row, limits))
 
 
-def _recorded(now: Belief, row: Row, limits: BeliefLimits) -> Belief:
+def _recorded_anew(now: Belief, row: Row, limits: BeliefLimits) -> Belief:
     """The belief with what only one recorder shows begun anew, where another one, or its compression, is at work:
     sizes and constants; the valve is the same."""
     then, straight = now.straight_pct, row["straight_pct"]
@@ -211,7 +211,7 @@ def _with_witness(now: Belief, share: float, row: Row, repaired_s: Sequence[floa
     if said is None:
         return replace(now, constants=constants)
     wrong = valve.doubt(said, now.cycle.cause, counts(row["oscillating_pct"]), config)
-    found = valve.with_night(now.valve, share, row["night"], said, wrong, limits)
+    found = valve.valve_with_night(now.valve, share, row["night"], said, wrong, limits)
     if found.since != now.valve.since:  # another valve
         constants = {k: pool for k, pool in constants.items() if k not in OF_VALVE}
     better = found.since != now.valve.since and found.width < now.valve.width

@@ -65,10 +65,10 @@ def loud_and_top(before: CycleBelief, row: Row, limits: BeliefLimits) -> tuple[b
     return (loud if loud or quiet or not before.nights else before.loud), top
 
 
-def with_night(before: CycleBelief, share: float, row: Row, limits: BeliefLimits) -> CycleBelief:
+def cycle_with_night(before: CycleBelief, share: float, row: Row, limits: BeliefLimits) -> CycleBelief:
     """The belief with one night more, of which what came before counts for a share."""
     loud, top = loud_and_top(before, row, limits)
-    begun = _sized(before, float(row["oscillation_significance"] or 0.0) if loud else 0.0, limits)
+    begun = _usual_size(before, float(row["oscillation_significance"] or 0.0) if loud else 0.0, limits)
     told = replace(begun, since=before.since or row["night"], nights=before.nights + 1, loud=loud, top=top)
     if not counts(row["oscillating_pct"]):
         return told
@@ -79,10 +79,10 @@ def with_night(before: CycleBelief, share: float, row: Row, limits: BeliefLimits
         odds = tuple(x / before.weight for x in before.odds) if before.weight else odds
     summed = tuple(share * a + b for a, b in zip(before.odds, odds, strict=True))
     told = replace(told, weight=weight, odds=summed, sources=sources)
-    return replace(told, cause=_named(told, row, limits))
+    return replace(told, cause=_cause_named(told, row, limits))
 
 
-def _sized(before: CycleBelief, significance: float, limits: BeliefLimits) -> CycleBelief:
+def _usual_size(before: CycleBelief, significance: float, limits: BeliefLimits) -> CycleBelief:
     """The belief with what is usual after a night of some significance [% h]: another size is told by the
     second night in a row that has it."""
     if significance <= 0.0:
@@ -109,7 +109,7 @@ def _log_confidence(row: Row, limits: BeliefLimits) -> tuple[float, ...]:
     return tuple(math.log(x) for x in found)
 
 
-def _named(now: CycleBelief, row: Row, limits: BeliefLimits) -> Cause:
+def _cause_named(now: CycleBelief, row: Row, limits: BeliefLimits) -> Cause:
     """The cause that is named: the first night's own, then the one that the nights have made likely, until they no
     longer do."""
     if now.nights == 1:

@@ -46,16 +46,16 @@ def settle(store: Store, night: str, config: Config) -> list[str]:
     lacking = [n for n in names if not store.file("beliefs", n).exists()]
     first = min([night, *lacking])
     earlier = [n for n in names if n < first]
-    known = read(store, earlier[-1]) if earlier else {}
+    known = read_beliefs(store, earlier[-1]) if earlier else {}
     if known is None:
         return settle_anew(store, config)
-    return _written(store, _followed(store, [n for n in names if n >= first], known, config))
+    return _write_all(store, _followed(store, [n for n in names if n >= first], known, config))
 
 
 def held_pairs(store: Store, night: str) -> dict[str, Held]:
     """Settings that are told of loops before a night; none where the store has no beliefs before it."""
     earlier = [n for n in store.nights() if n < night]
-    known = (read(store, earlier[-1]) if earlier else None) or {}
+    known = (read_beliefs(store, earlier[-1]) if earlier else None) or {}
     told = [(loop, b.told.pair, b) for loop, b in known.items()]
     return {loop: ((b.kp, b.ti), (pair.kp, pair.ti)) for loop, pair, b in told if pair is not None}
 
@@ -63,7 +63,7 @@ def held_pairs(store: Store, night: str) -> dict[str, Held]:
 def settle_anew(store: Store, config: Config) -> list[str]:
     """Make all beliefs of a store anew from its nights; sentences as of `settle`."""
     names = store.nights()
-    return _written(store, _followed(store, names, _of_pruned(store, names), config))
+    return _write_all(store, _followed(store, names, _of_pruned(store, names), config))
 
 
 def unfounded(store: Store, config: Config) -> list[Problem]:
@@ -81,7 +81,7 @@ def unfounded(store: Store, config: Config) -> list[Problem]:
     return [Problem(f"{path}: not what the nights say", remedy) for path in paths]
 
 
-def _written(store: Store, followed: Iterator[Followed]) -> list[str]:
+def _write_all(store: Store, followed: Iterator[Followed]) -> list[str]:
     lost: list[str] = []
     for night, rows, more in followed:
         store.write("beliefs", night, rows_table(rows, BELIEFS))
@@ -98,7 +98,7 @@ def _same(store: Store, night: str, rows: Sequence[Row]) -> bool:
     return {r["loop"]: r for r in kept} == {r["loop"]: row_of(r, BELIEFS) for r in rows}
 
 
-def read(store: Store, night: str) -> dict[str, Belief] | None:
+def read_beliefs(store: Store, night: str) -> dict[str, Belief] | None:
     """The beliefs of a night by loop; None where there are none that this version can read."""
     try:
         rows = store.read("beliefs", night, ["loop", "state"]).to_pylist()
@@ -109,7 +109,7 @@ def read(store: Store, night: str) -> dict[str, Belief] | None:
 
 def _of_pruned(store: Store, names: Sequence[str]) -> dict[str, Belief]:
     """What the oldest night of a store knew of nights before it, which have been deleted."""
-    known = (read(store, names[0]) if names else None) or {}
+    known = (read_beliefs(store, names[0]) if names else None) or {}
     return {k: b for k, b in known.items() if min(b.valve.since or names[0], b.cycle.since) < names[0]}
 
 
@@ -130,7 +130,7 @@ def _followed(
                 own = repaired.get(loop, ())
                 now = before if row is None or known_already else step(before, row, own, config)
                 if now is not None:
-                    out.append(_row(before, now, row, name, config))
+                    out.append(_belief_row(before, now, row, name, config))
                     beliefs[loop] = now
             except Exception as error:  # a belief that fails is that loop's alone, and never the night's end
                 lost.append(f"{loop}: no belief of night {name} ({type(error).__name__}: {error})")
@@ -142,7 +142,9 @@ def repairs(own: Sequence[Note]) -> list[float]:
     return [n.time_s for n in own if words.says_repaired(n.text)]
 
 
-def _row(before: Belief | None, now: Belief, row: Row | None, night: str, config: Config) -> dict[str, Any]:
+def _belief_row(
+    before: Belief | None, now: Belief, row: Row | None, night: str, config: Config
+) -> dict[str, Any]:
     """A belief as a row: what is told where the night tells anything, figures, and what the next night goes on
     from."""
     worn = now.valve.worn_pct(config.belief)
@@ -154,7 +156,7 @@ def _row(before: Belief | None, now: Belief, row: Row | None, night: str, config
         "worn_pct": worn if now.valve.nights else None,
         "worn_nights": float(now.valve.nights),
         "certain_since": now.valve.certain or None,
-        "constants": _constants(now.constants),
+        "constants": _constants_kept(now.constants),
         "state": kept_as(now),
     }
     width = now.constants["width"].pooled if "width" in now.constants else None
@@ -175,7 +177,7 @@ def _row(before: Belief | None, now: Belief, row: Row | None, night: str, config
     return known | told | {"news": text or None, "news_tone": tone or None}
 
 
-def _constants(pools: Mapping[str, Pool]) -> str:
+def _constants_kept(pools: Mapping[str, Pool]) -> str:
     """Pooled constants: value, ends of the 90 % interval, and spread between nights."""
     found = {k: p.pooled for k, p in pools.items()}
     said = {k: [float(f"{x:.4g}") for x in (p.value, p.low, p.high, p.spread)] for k, p in found.items() if p}

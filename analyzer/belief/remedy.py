@@ -64,7 +64,7 @@ class RemedyBelief:
         return Action.NEEDS_DATA if lacking > disagreeing else Action.UNDECIDED
 
 
-def with_night(before: RemedyBelief, share: float, row: Row, limits: BeliefLimits) -> RemedyBelief:
+def remedy_with_night(before: RemedyBelief, share: float, row: Row, limits: BeliefLimits) -> RemedyBelief:
     """The belief with one night more, of which what came before counts for a share."""
     votes = {a: share * v for a, v in before.votes.items()}
     action = row["action"]
@@ -74,7 +74,7 @@ def with_night(before: RemedyBelief, share: float, row: Row, limits: BeliefLimit
     if action == Action.RETUNE and row["kp_new"] and row["ti_new"]:
         pairs = (*pairs, Pair(row["night"], *(row[c] for c in WITH_PAIR)))[-limits.pairs :]
         advised += 1
-    now = _settled(replace(before, votes=votes, pairs=pairs, advised=advised), limits)
+    now = _settled_pair(replace(before, votes=votes, pairs=pairs, advised=advised), limits)
     return replace(now, action=_voted(now, limits))
 
 
@@ -95,7 +95,7 @@ def _voted(now: RemedyBelief, limits: BeliefLimits) -> Action | None:
     return first if not held or known[first] - held > limits.vote_lead * math.sqrt(total) else now.action
 
 
-def _settled(now: RemedyBelief, limits: BeliefLimits) -> RemedyBelief:
+def _settled_pair(now: RemedyBelief, limits: BeliefLimits) -> RemedyBelief:
     """The belief with the pair that is told: the first until enough nights have advised, then that amid theirs; and
     again where twice as many have and their middle lies elsewhere by more than a ratio and twice its own error."""
     if now.held is None:

@@ -128,7 +128,7 @@ def weighed(said: Witness, wrong_by: float, against: float, limits: BeliefLimits
     return np.maximum(found, -limits.most)
 
 
-def with_night(
+def valve_with_night(
     before: ValveBelief,
     share: float,
     night: str,

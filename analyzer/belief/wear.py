@@ -52,7 +52,7 @@ def wear(widths: Sequence[Width], limits: WearLimits) -> dict[str, Any] | None:
     at = bend(days, width, deviation, limits)
     if at is None:
         return None
-    return _forecast(days[days >= at], width[days >= at], limits)
+    return _wear_forecast(days[days >= at], width[days >= at], limits)
 
 
 def bend(days: Floats, width: Floats, deviation: Floats, limits: WearLimits) -> float | None:
@@ -88,7 +88,7 @@ def _left(design: Floats, width: Floats, weight: Floats) -> tuple[float, Floats]
     return float((((width - design @ found) * weight) ** 2).sum()), found
 
 
-def _forecast(days: Floats, width: Floats, limits: WearLimits) -> dict[str, Any] | None:
+def _wear_forecast(days: Floats, width: Floats, limits: WearLimits) -> dict[str, Any] | None:
     """The trend of what grows, carried on until it reaches the next size."""
     from statsmodels.tsa.statespace.structural import UnobservedComponents
 
@@ -116,12 +116,12 @@ def _forecast(days: Floats, width: Floats, limits: WearLimits) -> dict[str, Any]
         "wear_high_pct": MONTH_D * (slope + half),
         "wear_since": date.fromordinal(int(days[0])).isoformat(),
         "reaches_pct": size,
-        "reaches_from": _first(mean + around, size, last),
-        "reaches_by": _first(mean - around, size, last),
+        "reaches_from": _day_reached(mean + around, size, last),
+        "reaches_by": _day_reached(mean - around, size, last),
     }
 
 
-def _first(path: Floats, size: float, last: date) -> str | None:
+def _day_reached(path: Floats, size: float, last: date) -> str | None:
     """The day on which a path reaches a size, None where it does not."""
     there = np.flatnonzero(path >= size)
     return (last + timedelta(days=int(there[0]) + 1)).isoformat() if there.size else None
@@ -161,11 +161,13 @@ def with_repetitions(
         if at is None:
             at = len(out)
             out.append(PhaseKnown(*ends))
-        out[at] = _with(out[at], list(zip(told["start_s"], told["overshoot_pct"], strict=True)), most)
+        out[at] = _with_repetitions(
+            out[at], list(zip(told["start_s"], told["overshoot_pct"], strict=True)), most
+        )
     return tuple(out)
 
 
-def _with(phase: PhaseKnown, found: Sequence[tuple[float, float]], most: int) -> PhaseKnown:
+def _with_repetitions(phase: PhaseKnown, found: Sequence[tuple[float, float]], most: int) -> PhaseKnown:
     last = phase.shown[-1][1] if phase.shown else float("-inf")
     new = [(start, size) for start, size in found if start > last]
     numbered = tuple((phase.count + k, start, size) for k, (start, size) in enumerate(new, 1))

@@ -47,7 +47,7 @@ def explain(
     from analyzer.explain.case import asked_cases
     from analyzer.explain.explained import abstained, explained
     from analyzer.explain.models import read_model
-    from analyzer.explain.page import abstention, page
+    from analyzer.explain.page import abstention, explanation_page
 
     try:
         with trying() as tell:
@@ -61,7 +61,7 @@ def explain(
         sys.exit(NOTHING_DONE)
     if save_model is not None:
         save_model.write_text(json.dumps(found.model(), indent=1))
-    _show(found.data, lambda: page(found, asked.zone), form, out)
+    _show(found.data, lambda: explanation_page(found, asked.zone), form, out)
 
 
 def _show(data: dict[str, Any], page: Callable[[], Page], form: str, out: Path | None) -> None:

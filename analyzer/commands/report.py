@@ -98,7 +98,7 @@ def report(
     Example: triage report store --changes changes.csv --out report
     """
     from analyzer.config import read_config
-    from analyzer.pages.before_after import page
+    from analyzer.pages.before_after import changes_page
     from analyzer.pages.changes import Spans, change_cases
     from analyzer.store.store import Store
 
@@ -107,20 +107,20 @@ def report(
     zone = kept.zone()
     if not days <= MOST_DAYS:  # NaN passes the range that the option states
         raise InputError(f"--days {days}", f"1 to {MOST_DAYS}", "correct it")
-    spans = Spans(days, _span(before, "--before", zone), _span(after, "--after", zone))
+    spans = Spans(days, _span_given(before, "--before", zone), _span_given(after, "--after", zone))
     found, missing = change_cases(kept, _changes(kept, limits, **named), spans, limits.before_after)
     if not found:
         why = "; ".join(f"{tag}: {reason}" for tag, reason in missing) or "no change found"
         raise InputError(why, "loops and times that the store holds", "check the tags and times")
     span = "The stated spans" if before or after else f"{days:g} days"
     subtitle = f"{span} before against after the change, from {store.name}."
-    folder.write(kept, [page(found, missing, subtitle, named["find"], zone)])
+    folder.write(kept, [changes_page(found, missing, subtitle, named["find"], zone)])
     for tag, reason in missing:
         say(f"{tag}: {reason}", err=True)
     sys.exit(SOME_LOST if missing else 0)
 
 
-def _span(texts: Sequence[str] | None, option: str, zone: str) -> Span | None:
+def _span_given(texts: Sequence[str] | None, option: str, zone: str) -> Span | None:
     from analyzer.comparison.before_after import Span
     from analyzer.history.stamps import parse_time
 
@@ -178,7 +178,7 @@ def pages(store: Path, night: str | None, top: int, folder: Folder) -> None:
 
     kept = Store(store)
     kept.require()
-    found = list(night_pages.pages(kept, night, top))
+    found = list(night_pages.pages_of_night(kept, night, top))
     if folder.form == "html":
         found += night_pages.dated_pages(kept, night, lambda name: _stands(kept, folder.out, name))
     folder.write(kept, found)

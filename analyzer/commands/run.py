@@ -1,13 +1,20 @@
-"""The command `run`: the nightly batch, what it says of itself, and how it ends when it is stopped."""
+"""The command `run`: the nightly batch, what it says of itself, and how it ends when it is stopped.
+
+Its log is one that a person can grep and a program can split: one line an event, appended, logfmt.
+
+2026-03-03T01:00:02Z triage[4711] lost loop=FIC2101 status="not assessed" reason="no PV tag FIC2101.PV in the export"
+"""
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
+from datetime import UTC, datetime
 from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, Any
@@ -16,18 +23,54 @@ import click
 
 from analyzer.commands.options import NOTHING_DONE, PLACE, SOME_LOST, bar, export_options, say, what_failed
 from identification.errors import InputError, TriageError
+from reports.texts import visible
 from reports.whole_file import is_full
 
 if TYPE_CHECKING:
     from analyzer.night.asked import Asked
     from analyzer.night.batch import Batch, Outcome
     from analyzer.night.nights import Night
-    from analyzer.night.run_files import RunLog
 
 STOPPED = 128
 """Exit status of a run that a signal has stopped, less the signal's number: what shells and schedulers expect."""
 FEW = 10
 """Notes on what was read that are printed; the rest is counted."""
+PLAIN = frozenset("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789._:/+-%")
+"""Characters of values that need no quotes."""
+
+
+def logfmt(value: object) -> str:
+    """A value as one word or one quoted text, in printable characters alone."""
+    text = f"{value:.6g}" if isinstance(value, float) else str(value)
+    shown = visible(text)
+    if shown and set(shown) <= PLAIN:
+        return shown
+    return '"' + shown.replace("\\", "\\\\").replace('"', '\\"') + '"'
+
+
+class RunLog:
+    """Where a run says what it does; nowhere without a path.
+
+    A log that cannot be written costs one line on stderr, and never the night.
+    """
+
+    def __init__(self, path: Path | None) -> None:
+        self._path = path
+
+    def say(self, event: str, **facts: object) -> None:
+        """Append one line: time [UTC], process, event, and facts as name=value."""
+        if self._path is None:
+            return
+        now = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
+        told = "".join(f" {name}={logfmt(value)}" for name, value in facts.items())
+        line = f"{now} triage[{os.getpid()}] {event}{told}\n".encode()
+        try:
+            self._path.parent.mkdir(parents=True, exist_ok=True)
+            with self._path.open("ab", buffering=0) as file:
+                file.write(line)
+        except OSError as error:
+            print(f"triage: no log is kept: {self._path}: {error.strerror}", file=sys.stderr)
+            self._path = None
 
 
 class StoppedError(Exception):
@@ -106,14 +149,12 @@ def run(asked: Asked, store: Path, log_file: Path | None, **how: Any) -> None:
     """
     from importlib.metadata import version
 
-    from analyzer.night.run_files import RunLog
-
     log, begun_s = RunLog(log_file), time.monotonic()
     export = " ".join(map(str, asked.export))
     log.say("begin", version=version("loop-triage"), store=store, export=export, jobs=how["jobs"])
     try:
         with stoppable():
-            outcome, loops = _night(asked, store, log, How(**how))
+            outcome, loops = _run_night(asked, store, log, How(**how))
     except StoppedError as stopped:
         log.say("stopped", signal=stopped, status=STOPPED + stopped.number)
         with suppress(OSError):  # the terminal may be gone
@@ -134,7 +175,7 @@ def _go_on(store: Path) -> str:
     return f"what is done is kept in {store}: go on with the same command and --resume"
 
 
-def _night(asked: Asked, place: Path, log: RunLog, how: How) -> tuple[Outcome, int]:
+def _run_night(asked: Asked, place: Path, log: RunLog, how: How) -> tuple[Outcome, int]:
     """The export read, assessed and, where it is asked for, explained; the outcome and the number of loops."""
     from analyzer.night.asked import opened_apart
     from analyzer.night.batch import Batch
@@ -149,7 +190,7 @@ def _night(asked: Asked, place: Path, log: RunLog, how: How) -> tuple[Outcome, i
         batch = Batch(source, specs, Store(place), asked.config, *span, asked.changes, asked.zone)
         outcome = _assessed(batch, how, log)
         if how.explaining and len(outcome.unassessed) + len(outcome.failed) < len(specs):
-            _explained(batch, how, outcome.nights[-1])
+            _explain_night(batch, how, outcome.nights[-1])
     return outcome, len(specs)
 
 
@@ -182,11 +223,11 @@ def _assessed(batch: Batch, how: How, log: RunLog) -> Outcome:
     return outcome
 
 
-def _explained(batch: Batch, how: How, night: Night) -> None:
+def _explain_night(batch: Batch, how: How, night: Night) -> None:
     """Explain the flagged loops of a night, with progress, and say how many."""
-    from analyzer.explain import night as explain_night
+    from analyzer.explain.night import explain_flagged
 
     with bar("explained") as progress:
-        rows = explain_night.run(batch, night, how.jobs, how.resume, progress)
+        rows = explain_flagged(batch, night, how.jobs, how.resume, progress)
     named = sum(r["verdict"] not in ("none", "unexplained") for r in rows)
     click.echo(f"{len(rows)} flagged loops explained, {named} with a name", err=True)

@@ -183,12 +183,12 @@ def summary(store: Path, night: str | None, form: str) -> None:
     from dataclasses import replace
 
     from analyzer.commands.report import made
-    from analyzer.pages.summary import page
+    from analyzer.pages.summary import summary_page
     from analyzer.store.store import Store
     from reports import html, markdown, plain
 
     kept = Store(store)
     kept.require()
-    found = replace(page(kept, night), made=made(kept), zone=kept.zone())
+    found = replace(summary_page(kept, night), made=made(kept), zone=kept.zone())
     draw = {"text": plain.render, "html": html.mail, "markdown": lambda p: markdown.render(p, "")}[form]
     click.echo(draw(found).rstrip("\n"))

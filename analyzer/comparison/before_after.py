@@ -217,7 +217,7 @@ def reasons_against(
     return tuple(found)
 
 
-def _verdict(found: Difference, measure: Measure, limits: ComparisonLimits) -> ChangeVerdict:
+def _change_verdict(found: Difference, measure: Measure, limits: ComparisonLimits) -> ChangeVerdict:
     small = abs(found.value) < max(measure.least, limits.least_pct / 100 * abs(found.before))
     if small or found.low <= 0 <= found.high:
         return ChangeVerdict.UNCLEAR
@@ -235,7 +235,7 @@ def change_of(
     d = difference(before, after, 1 - (1 - limits.confidence) / family)
     found = Difference(*(x * measure.scale for x in (d.before, d.after, d.low, d.high)))
     return Change(
-        measure, found, _verdict(found, measure, limits) if comparable else ChangeVerdict.INCOMPARABLE
+        measure, found, _change_verdict(found, measure, limits) if comparable else ChangeVerdict.INCOMPARABLE
     )
 
 

@@ -22,7 +22,7 @@ from analyzer.history.series import Series
 from analyzer.limits import EXPLAIN
 from analyzer.loop.assess import convicted
 from analyzer.loop.cause import NO_CAUSE, Verdict
-from analyzer.loop.decisions import Cause, Fault
+from analyzer.loop.decisions import Cause, Fault, Lack, Need, Needs
 from analyzer.loop.identified import intervals
 from analyzer.loop.oscillation import counting, detect
 from analyzer.loop.quality import Prepared, prepare
@@ -32,7 +32,6 @@ from analyzer.loops.spec import LoopSpec, spec_of
 from analyzer.loops.tags import controller
 from analyzer.night.asked import Asked
 from analyzer.night.nights import Night, cut
-from analyzer.words.settings import stands_and_jumps
 from identification.controller.check import StatedSettings
 from identification.errors import InputError, NotAssessedError
 from identification.estimation.evidence import trials_between_moves
@@ -182,7 +181,8 @@ def case(
     jump = least_jump(r.pv, config.explain.recorder)
     if jump > 0.0:
         stands = float(np.mean(np.diff(r.pv) == 0.0))
-        raise NotAssessedError(f"{spec.loop}: {stands_and_jumps(stands, jump)}")
+        needs = Needs(Lack.FINER, Need.PV_AS_MEASURED, (100.0 * stands, jump))
+        raise NotAssessedError(f"{spec.loop}: {needs}")
     stamps = raw.stamp_s[~raw.bad]
     stamps = stamps[(stamps >= r.start_s - r.dt_s) & (stamps <= r.start_s + r.duration_s)]
     verdict = verdict_on(spec, whole, config)

@@ -209,7 +209,7 @@ def found_plot(e: Explained) -> Plot | None:
         shape = (
             None if drawn is None else drawn(finding, e.case.subject, inputs.level + simulate(inputs, free))
         )
-        return _shown(shape)
+        return _if_shown(shape)
     if said.outside is not None and found.outside is not None:
         fit, added, known = found.outside.fit, found.outside.row, said.outside.parameters
     elif found.accepted:
@@ -218,10 +218,10 @@ def found_plot(e: Explained) -> Plot | None:
         return None
     curve = about(added.name).curve
     drawing = Drawing(inputs, added, known, fit.model.c, found.plain.model.c)
-    return _shown(None if curve is None else curve(drawing))
+    return _if_shown(None if curve is None else curve(drawing))
 
 
-def _shown(shape: Picture | None) -> Plot | None:
+def _if_shown(shape: Picture | None) -> Plot | None:
     if shape is None:
         return None
     what = f"{shape.y.what} over {shape.x.what}"

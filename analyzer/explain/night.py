@@ -57,7 +57,7 @@ def answered(q: Question, began: Callable[[int], None] = lambda at: None) -> Row
 
     page = ""
     try:
-        data, page = _explained(q)
+        data, page = _answer_and_page(q)
     except TriageError as error:
         data = abstained(q.spec.loop, str(error))
     except Exception as error:  # an error of one loop is that loop's answer, never the night's end
@@ -65,11 +65,11 @@ def answered(q: Question, began: Callable[[int], None] = lambda at: None) -> Row
     return answer_row(data, q.night.name, page)
 
 
-def _explained(q: Question) -> tuple[dict[str, Any], str]:
+def _answer_and_page(q: Question) -> tuple[dict[str, Any], str]:
     """The answer as data, and its page."""
     from analyzer.explain.case import case
     from analyzer.explain.explained import explained
-    from analyzer.explain.page import page
+    from analyzer.explain.page import explanation_page
     from reports.page_file import dumps
 
     with_source = [q.source.op] if q.source is not None and q.source.op else []
@@ -77,7 +77,7 @@ def _explained(q: Question) -> tuple[dict[str, Any], str]:
     series = {tag: cut(s, q.night) for tag, s in q.export.read(tags).items()}
     specs = (q.spec,) if q.source is None else (q.spec, q.source)
     found = explained(case(q.spec, specs, series, q.config), lambda name: None)
-    return found.data, dumps(page(found, q.night.zone))
+    return found.data, dumps(explanation_page(found, q.night.zone))
 
 
 def answer_row(data: Mapping[str, Any], night: str, page: str = "") -> Row:
@@ -97,7 +97,7 @@ def questions(batch: Batch, rows: Sequence[Mapping[str, Any]], night: Night) -> 
     ]
 
 
-def _rows(asked: Sequence[Question], jobs: int, config: Config) -> Iterator[Row]:
+def _answer_rows(asked: Sequence[Question], jobs: int, config: Config) -> Iterator[Row]:
     from analyzer.explain.explained import abstained
 
     with executor(jobs, len(asked), answered, config.workers) as workers:
@@ -122,7 +122,7 @@ def keep(store: Store, night: str, rows: Sequence[Row]) -> None:
     store.write(TABLE, night, rows_table(rows, EXPLAINED))
 
 
-def run(
+def explain_flagged(
     batch: Batch,
     night: Night,
     jobs: int = 0,
@@ -156,7 +156,7 @@ def run(
     left = [q for q in asked if q.spec.loop not in done]
     keep(store, night.name, rows)
     progress(len(done), len(asked))
-    for at, row in enumerate(_rows(left, jobs, batch.config), len(done) + 1):
+    for at, row in enumerate(_answer_rows(left, jobs, batch.config), len(done) + 1):
         rows.append(row)
         keep(store, night.name, rows)
         progress(at, len(asked))

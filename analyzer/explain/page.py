@@ -21,27 +21,27 @@ UNTESTED = "The record holds too few memories of the loop for a test of where."
 FIT = "Fit % is 100 where the simulation is exact and 0 where the mean does as well; load and noise keep it lower."
 
 
-def page(e: Explained, zone: str = UTC_NAME) -> Page:
+def explanation_page(e: Explained, zone: str = UTC_NAME) -> Page:
     """The page of one loop's explanation, with times on the plant's clock."""
     with np.errstate(all="ignore"):  # a model that runs away is drawn as far as it goes
         sections = (
-            Section("What it is", _verdict(e)),
+            Section("What it is", _verdict_blocks(e)),
             Section("Recording and simulation", drawings.drawn_trends(e)),
             Section("What was found", _found(e)),
-            Section("Where the misfit lives", (*_where(e.data), drawings.misfit_panels(e))),
+            Section("Where the misfit lives", (*_where_blocks(e.data), drawings.misfit_panels(e))),
             Section(
-                "How well it fits", (words.misfits(e.data, _fit_note(e)), *_filled(words.others(e.data)))
+                "How well it fits", (words.misfits(e.data, _fit_note(e)), *_if_filled(words.others(e.data)))
             ),
-            Section("What it could also be", _filled(words.alternatives(e.data))),
+            Section("What it could also be", _if_filled(words.alternatives(e.data))),
             Section(
                 "All that was tried",
-                _filled(words.tried(e.found.first, e.found.accepted)),
+                _if_filled(words.tried(e.found.first, e.found.accepted)),
                 closed=bool(e.found.accepted),
             ),
-            Section("Does the controller do what is stated?", _controller(e), closed=True),
+            Section("Does the controller do what is stated?", _controller_blocks(e), closed=True),
         )
     spec = e.case.spec
-    about = [spec.description, spec.type, spec.area, _recorded(e, zone)]
+    about = [spec.description, spec.type, spec.area, _recorded_line(e, zone)]
     return Page(
         f"{slug(spec.loop)}-explained",
         f"{spec.loop}: {title(e.said.verdict)}",
@@ -59,7 +59,7 @@ def abstention(data: Data) -> Page:
     return Page(name, f"{data['loop']}: not told", "", (Section("What is missing", (text,)),))
 
 
-def _recorded(e: Explained, zone: str) -> str:
+def _recorded_line(e: Explained, zone: str) -> str:
     r = e.case.prepared.record
     begun, length = f"{stamp(r.start_s, zone)} {zone}", duration(len(r) * r.dt_s)
     return f"{begun}, {length}, a sample each {number_text(r.dt_s, 's')}"
@@ -74,11 +74,11 @@ def _footer(e: Explained) -> str:
     return f"Percent of PV are {how}{pv}; percent of OP of {op}. Intervals are 90 %."
 
 
-def _filled(table: Table) -> tuple[Block, ...]:
+def _if_filled(table: Table) -> tuple[Block, ...]:
     return (table,) if table.rows else ()
 
 
-def _verdict(e: Explained) -> tuple[Block, ...]:
+def _verdict_blocks(e: Explained) -> tuple[Block, ...]:
     brought = [] if e.brought is None else [Text((e.brought.note,))]
     return (Text((e.data["reason"],), "lead"), Text((check(e.data),)), *brought, Tiles(tuple(_tiles(e))))
 
@@ -108,11 +108,11 @@ def _tiles(e: Explained) -> list[tuple[str, str, str]]:
 
 def _found(e: Explained) -> tuple[Block, ...]:
     drawn = drawings.found_plot(e)
-    told = (*_filled(words.parameters(e.data)), *_filled(words.moved(e.data)))
+    told = (*_if_filled(words.parameters(e.data)), *_if_filled(words.moved(e.data)))
     return told if drawn is None else (drawn, *told)
 
 
-def _where(data: Data) -> tuple[Block, ...]:
+def _where_blocks(data: Data) -> tuple[Block, ...]:
     where = data["where"]
     signals = [("Signals", ", ".join(where["signals"]))] if where.get("signals") else []
     facts = (*signals, *places(where))
@@ -137,7 +137,7 @@ def _fit_note(e: Explained) -> str:
     return " ".join(part for part in parts if part)
 
 
-def _controller(e: Explained) -> tuple[Block, ...]:
+def _controller_blocks(e: Explained) -> tuple[Block, ...]:
     drawn, s, law = drawings.law_plot(e), e.case.subject, e.found.law
     if drawn is None or s.stated is None or law is None:
         return ()

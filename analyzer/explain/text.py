@@ -28,26 +28,26 @@ def answer_lines(data: Mapping[str, Any]) -> list[str]:
     head = f"{data['loop']}: {title(data['verdict']) if data['fit'] else 'not told'}"
     block = f" ({data['block']})" if data["block"] != "none" else ""
     out = [head + block, *wrap(data["reason"], WIDTH), *wrap(check(data), WIDTH)]
-    out += _part("Parameters (90 % intervals)", _texts(words.parameters(data)), (2,))
-    out += _part("Controller, as SP, PV and OP show it", _controller(data), (1,))
-    out += _part("Misfit, rms in % of span", _fit(data), (1, 2, 3, 4))
-    out += _part("On the recordings held out", _others(data), (1, 3, 4))
-    out += _told(seen_ahead(data["fit"])) + _told(two_plain_loops(data["fit"]))
-    out += _told(data["fit"].get("brought", {}).get("note", ""))
+    out += _titled_part("Parameters (90 % intervals)", _texts(words.parameters(data)), (2,))
+    out += _titled_part("Controller, as SP, PV and OP show it", _controller_rows(data), (1,))
+    out += _titled_part("Misfit, rms in % of span", _fit_rows(data), (1, 2, 3, 4))
+    out += _titled_part("On the recordings held out", _others(data), (1, 3, 4))
+    out += _wrapped(seen_ahead(data["fit"])) + _wrapped(two_plain_loops(data["fit"]))
+    out += _wrapped(data["fit"].get("brought", {}).get("note", ""))
     for first in data["effects"][:1]:
         if first["held_out_share"] is not None:
             removed = share(first["held_out_share"])
-            out += _told(f"{first['name']} removes {removed} of the held-out misfit's mean square.")
-    out += _part("Where", _where(data))
-    out += _part("The plain loop's constants moved", _moved(data), (1, 3))
-    return out + _part("Could also be, and what would tell", _texts(words.alternatives(data)))
+            out += _wrapped(f"{first['name']} removes {removed} of the held-out misfit's mean square.")
+    out += _titled_part("Where", _where_rows(data))
+    out += _titled_part("The plain loop's constants moved", _moved(data), (1, 3))
+    return out + _titled_part("Could also be, and what would tell", _texts(words.alternatives(data)))
 
 
-def _told(sentence: str) -> list[str]:
+def _wrapped(sentence: str) -> list[str]:
     return ["", *wrap(sentence, WIDTH)] if sentence else []
 
 
-def _part(name: str, rows: Rows, numeric: Sequence[int] = ()) -> list[str]:
+def _titled_part(name: str, rows: Rows, numeric: Sequence[int] = ()) -> list[str]:
     return ["", name, *lined_up(rows, numeric)] if rows else []
 
 
@@ -72,7 +72,7 @@ def _texts(table: Table) -> list[tuple[str, ...]]:
     return [tuple(cell.text for cell in row) for row in table.rows]
 
 
-def _controller(data: Mapping[str, Any]) -> Rows:
+def _controller_rows(data: Mapping[str, Any]) -> Rows:
     law = data.get("controller")
     if law is None:
         return []
@@ -81,7 +81,7 @@ def _controller(data: Mapping[str, Any]) -> Rows:
     return [*rows, ("explains", share(law["explained"]), "of OP's variance")]
 
 
-def _fit(data: Mapping[str, Any]) -> Rows:
+def _fit_rows(data: Mapping[str, Any]) -> Rows:
     rows = [(*row, "") for row in _texts(words.misfits(data))]
     return [("", "fitted", "fit %", "held out", "fit %", ""), *rows] if rows else []
 
@@ -97,7 +97,7 @@ def _moved(data: Mapping[str, Any]) -> Rows:
     return [(name, before, "→", after, unit) for name, before, after, _, unit in _texts(words.moved(data))]
 
 
-def _where(data: Mapping[str, Any]) -> Rows:
+def _where_rows(data: Mapping[str, Any]) -> Rows:
     rows = [
         (name if name.isupper() else name[:1].lower() + name[1:], text)
         for name, text in places(data["where"])

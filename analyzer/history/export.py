@@ -74,7 +74,7 @@ class Export:
             bring(self.sources[home].path, self.origins)
         pieces = []
         for home in homes:
-            with _told(self.sources[home].path):
+            with _faults_told(self.sources[home].path):
                 pieces.append(self.sources[home].read(tags))
         series = {}
         for tag in tags:
@@ -95,7 +95,7 @@ class Export:
     def _span(self, home: int) -> MainSpan:
         """Where the samples of one file lie, found out once."""
         if home not in self._spans:
-            with _told(self.sources[home].path):
+            with _faults_told(self.sources[home].path):
                 self._spans[home] = self.sources[home].span()
         return self._spans[home]
 
@@ -150,7 +150,7 @@ def open_export(paths: Sequence[Path], options: ReadOptions | None = None) -> Ex
     options = options or ReadOptions()
     _check_stated(options)
     paths, origins = at_hand(paths, options.place) if any(map(is_remote, paths)) else (paths, {})
-    opened, skipped = _readable(paths, options)
+    opened, skipped = _readable_files(paths, options)
     sources = _agreed(opened)
     homes: dict[str, tuple[int, ...]] = {}
     for i, source in enumerate(sources):
@@ -190,14 +190,14 @@ def _check_format(written: str) -> None:
         raise InputError(f"--date-format {written!r}", "a format such as '%d-%b-%y %H:%M:%S'", "correct it")
 
 
-def _readable(paths: Sequence[Path], options: ReadOptions) -> tuple[list[Source], list[str]]:
+def _readable_files(paths: Sequence[Path], options: ReadOptions) -> tuple[list[Source], list[str]]:
     """The files that can be read, and why others of a folder cannot: those cost their own loops and no more."""
     sources: list[Source] = []
     skipped: list[InputError] = []
     named = {Path(path) for path in paths}
     for path in export_files(paths):
         try:
-            found, failed = _opened(path, options)
+            found, failed = _opened_tables(path, options)
             sources += found
             skipped += failed
         except InputError as error:
@@ -234,16 +234,16 @@ def _some(names: Sequence[str]) -> str:
     return names[0] if len(names) == 1 else f"{names[0]} and {len(names) - 1} more files"
 
 
-def _opened(path: Path, options: ReadOptions) -> tuple[list[Source], list[InputError]]:
+def _opened_tables(path: Path, options: ReadOptions) -> tuple[list[Source], list[InputError]]:
     """The tables of a file, one but for workbooks, and why other sheets of a workbook are none."""
-    with _told(path):
+    with _faults_told(path):
         parts = unpacked(path, options.place)
     found: list[Source] = []
     failed: list[InputError] = []
     for part in parts:
         try:
-            with _told(path):
-                found.append(_table(part, options))
+            with _faults_told(path):
+                found.append(_table_source(part, options))
         except InputError as error:
             seen = error.seen.replace(str(part), str(path.with_name(part.name)))
             failed.append(InputError(seen, error.expected, error.remedy))
@@ -252,7 +252,7 @@ def _opened(path: Path, options: ReadOptions) -> tuple[list[Source], list[InputE
     return found, failed
 
 
-def _table(plain: Path, options: ReadOptions) -> Source:
+def _table_source(plain: Path, options: ReadOptions) -> Source:
     if is_parquet(plain):
         table = open_parquet(plain)
         tag = tag_column(table) if table.rows >= HISTORY.whole_rows else -1
@@ -263,7 +263,7 @@ def _table(plain: Path, options: ReadOptions) -> Source:
 
 
 @contextmanager
-def _told(path: Path) -> Iterator[None]:
+def _faults_told(path: Path) -> Iterator[None]:
     """Faults of a file that show only when it is read: gone, cut short, damaged, too large, without a stamp."""
     try:
         yield

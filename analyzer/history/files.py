@@ -82,7 +82,7 @@ def export_files(paths: Sequence[Path]) -> list[Path]:
     InputError
         A path is missing, cannot be opened, or is a folder without exports.
     """
-    found = list(dict.fromkeys(file for path in paths for file in _within(Path(path))))
+    found = list(dict.fromkeys(file for path in paths for file in _exports_at(Path(path))))
     if not found:
         raise InputError("no path to an export", "a file or a folder", "name the export to read")
     return found
@@ -129,17 +129,17 @@ def packed_beside(paths: Sequence[Path]) -> list[str]:
     return said
 
 
-def _within(path: Path) -> list[Path]:
+def _exports_at(path: Path) -> list[Path]:
     expected = "an export or a folder of exports"
     try:
         if not path.exists():
             raise InputError(f"{path}: no such file or folder", expected, "correct the path")
-        return _listed(path) if path.is_dir() else [path]
+        return _exports_in(path) if path.is_dir() else [path]
     except OSError as error:
         raise _closed(path, error) from error
 
 
-def _listed(folder: Path) -> list[Path]:
+def _exports_in(folder: Path) -> list[Path]:
     files = [path for path in sorted(folder.iterdir()) if path.is_file() and _is_export(path)]
     files = files or [path for path in sorted(folder.rglob("*")) if path.suffix.lower() in PARQUET_ENDINGS]
     if not files:
@@ -193,13 +193,13 @@ def unpacked(path: Path, place: Path) -> list[Path]:
             with stream(path, "rb") as source:
                 _copied(source, out, path)
             return [out]
-        return [_member(path, folder)]
+        return [_archive_member(path, folder)]
     except (OSError, EOFError, zipfile.BadZipFile, lzma.LZMAError, RuntimeError, zlib.error) as error:
         seen = f"{path}: cannot be unpacked ({_why(error)})"
         raise InputError(seen, "a whole archive", "export it again") from error
 
 
-def _member(path: Path, folder: Path) -> Path:
+def _archive_member(path: Path, folder: Path) -> Path:
     """The one file of a zip archive."""
     with zipfile.ZipFile(path) as archive:
         held = [info for info in archive.infolist() if not info.is_dir()]

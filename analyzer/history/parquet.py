@@ -30,7 +30,7 @@ class ParquetTable(Table):
 
     def head(self, columns: Sequence[int]) -> list[pa.Array]:
         names = [self.names[i] for i in columns]
-        batches = _file(self).iter_batches(batch_size=HEAD_ROWS, columns=names)
+        batches = _parquet_file(self).iter_batches(batch_size=HEAD_ROWS, columns=names)
         batch = next((b for b in batches if b.num_rows), None)
         if batch is None:
             raise InputError(
@@ -41,7 +41,7 @@ class ParquetTable(Table):
     def read(self, columns: Sequence[int], where: tuple[int, Sequence[str]] | None = None) -> list[pa.Array]:
         names = [self.names[i] for i in columns]
         if where is None:
-            table = _file(self).read(columns=names)
+            table = _parquet_file(self).read(columns=names)
         else:
             key, kind = pc.field(self.names[where[0]]), self.types[where[0]]
             text = pa.types.is_string(kind) or pa.types.is_large_string(kind)
@@ -123,10 +123,10 @@ def _first_line(error: Exception) -> str:
 
 
 @lru_cache(maxsize=OPEN_FILES)
-def _opened(path: Path, changed_ns: int, process: int) -> pq.ParquetFile:
+def _opened_once(path: Path, changed_ns: int, process: int) -> pq.ParquetFile:
     return pq.ParquetFile(path)  # not mapped: pages of a file that stays open would stay in memory
 
 
-def _file(table: ParquetTable) -> pq.ParquetFile:
+def _parquet_file(table: ParquetTable) -> pq.ParquetFile:
     """The file, opened once by each process: of a footer with thousands of columns that takes as long as a loop."""
-    return _opened(table.path, table.path.stat().st_mtime_ns, os.getpid())
+    return _opened_once(table.path, table.path.stat().st_mtime_ns, os.getpid())

@@ -73,7 +73,7 @@ def scheme_of(name: str, codes: pa.Array, ones: bool | None = None) -> Scheme:
     """
     number, name = _numbers(codes), plain(name)
     known = number[np.isfinite(number)].astype(np.int64)
-    if name.endswith(COLUMNS["bad_flag"]) and {*_kinds(codes)} <= NOT_BAD | IS_BAD:
+    if name.endswith(COLUMNS["bad_flag"]) and {*_codes_seen(codes)} <= NOT_BAD | IS_BAD:
         return Scheme.BAD_FLAG
     if name == "dataintegrity":
         return Scheme.IGNITION
@@ -103,7 +103,7 @@ def not_good(
     bad, but where codes stand only where something is wrong.
     """
     kinds, place, count = distinct(codes)
-    bad = ~_good(kinds, scheme) if good is None else ~_listed(kinds, good)
+    bad = ~_good(kinds, scheme) if good is None else ~_is_listed(kinds, good)
     names = kinds.to_pylist()
     blank = np.array([name is None or str(name).strip() == "" for name in names])
     if good is None and bad[~blank].all() and 2 * count[blank].sum() > count.sum():
@@ -167,7 +167,7 @@ def _few_kinds(codes: pa.Array) -> bool:
 
 def _is_understood(codes: pa.Array, scheme: Scheme) -> bool:
     """Whether codes under a bare name are quality: texts that are known, or numbers that the scheme has."""
-    kinds = {*_kinds(codes)} - {""}
+    kinds = {*_codes_seen(codes)} - {""}
     if scheme is Scheme.TEXT:
         known = {k for k in kinds if _good_text(k) or k in BAD or k.startswith("bad")}
         return bool(kinds) and 2 * len(known) >= len(kinds)
@@ -187,7 +187,7 @@ def _good(kinds: pa.Array, scheme: Scheme) -> NDArray[np.bool_]:
     if scheme is Scheme.TEXT:
         return np.array([_good_text(str(text)) for text in kinds.to_pylist()])
     if scheme is Scheme.BAD_FLAG:
-        return np.array([_written(code) in NOT_BAD for code in kinds.to_pylist()])
+        return np.array([_code_text(code) in NOT_BAD for code in kinds.to_pylist()])
     number = _numbers(kinds)
     return np.isfinite(number) & IS_GOOD[scheme](np.nan_to_num(number, nan=-1).astype(np.int64))
 
@@ -198,15 +198,15 @@ def _good_text(text: str) -> bool:
     return BAD.isdisjoint(words) and any(word in GOOD or word.startswith("good") for word in words)
 
 
-def _written(code: object) -> str:
+def _code_text(code: object) -> str:
     return "" if code is None else str(code).strip().lower()
 
 
-def _kinds(codes: pa.Array) -> list[str]:
-    return [_written(code) for code in codes.unique().to_pylist()]
+def _codes_seen(codes: pa.Array) -> list[str]:
+    return [_code_text(code) for code in codes.unique().to_pylist()]
 
 
-def _listed(kinds: pa.Array, good: tuple[str, ...]) -> NDArray[np.bool_]:
+def _is_listed(kinds: pa.Array, good: tuple[str, ...]) -> NDArray[np.bool_]:
     wanted = {_canonical(code) for code in good}
     return np.array([_canonical(code) in wanted for code in kinds.to_pylist()])
 

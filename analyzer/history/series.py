@@ -75,10 +75,10 @@ def joined_pieces(pieces: Sequence[Series]) -> Series:
     ready = [_oldest_first(_with_stamps(piece, found), found) for piece in pieces]
     for piece in pieces:
         found.update(piece.found)
-    joined = ready[0] if len(ready) == 1 else _joined(ready)
+    joined = ready[0] if len(ready) == 1 else _joined_pieces(ready)
     if not (np.diff(joined.stamp_s) > 0).all():
         origin = np.repeat(np.arange(len(ready)), [len(piece.value) for piece in ready])
-        joined = _sorted(joined, origin, found)
+        joined = _sorted_by_stamp(joined, origin, found)
     return replace(joined, found=found)
 
 
@@ -98,7 +98,7 @@ def _oldest_first(piece: Series, found: Counter[str]) -> Series:
     return piece.taken(slice(None, None, -1))
 
 
-def _joined(pieces: Sequence[Series]) -> Series:
+def _joined_pieces(pieces: Sequence[Series]) -> Series:
     texts = None
     if any(piece.text is not None for piece in pieces):
         blank = np.array("", dtype=object)
@@ -115,7 +115,7 @@ def _joined(pieces: Sequence[Series]) -> Series:
     )
 
 
-def _sorted(joined: Series, origin: NDArray[np.int64], found: Counter[str]) -> Series:
+def _sorted_by_stamp(joined: Series, origin: NDArray[np.int64], found: Counter[str]) -> Series:
     """Stable sort by stamp, then the last of each stamp; counts what was met on the way."""
     order = np.argsort(joined.stamp_s, kind="stable")
     within_file = np.diff(origin) == 0

@@ -73,11 +73,11 @@ class Loaded:
 def _loaded(sheet: Sheet) -> Loaded:
     """The whole file."""
     try:
-        loaded = as_far_as_numbers_go(sheet, _parsed)
+        loaded = as_far_as_numbers_go(sheet, _parsed_sheet)
         rows = len(loaded.columns[0]) + loaded.left_out
         if not is_swallowed(sheet, rows):
             return loaded
-        again = as_far_as_numbers_go(replace(sheet, unquoted=True), _parsed)
+        again = as_far_as_numbers_go(replace(sheet, unquoted=True), _parsed_sheet)
         return again if len(again.columns[0]) > rows else loaded
     except (UnicodeError, OSError, pa.ArrowInvalid) as error:
         raise unreadable(sheet.path, error) from error
@@ -103,7 +103,7 @@ def as_far_as_numbers_go(sheet: Sheet, read: Callable[[Sheet, Collection[int]], 
 
 def is_swallowed(sheet: Sheet, rows: int) -> bool:
     """Whether so few of a sheet's lines came back as rows that an open quote has swallowed the rest."""
-    lines = _lines(sheet.path, sheet.changed_ns) - sheet.first_row + 1
+    lines = _count_lines(sheet.path, sheet.changed_ns) - sheet.first_row + 1
     return rows < HISTORY.whole_share * lines - 1 and not sheet.unquoted
 
 
@@ -115,7 +115,7 @@ def quotes_told(unquoted: bool, left_out: int) -> list[str]:
 
 
 @lru_cache(maxsize=KEPT_READS)
-def _lines(path: Path, changed_ns: int) -> int:
+def _count_lines(path: Path, changed_ns: int) -> int:
     """Lines of a file that hold anything, within one."""
     count = 0
     with path.open("rb") as file:
@@ -131,7 +131,7 @@ def unreadable(path: Path, error: Exception) -> InputError:
     return InputError(f"{path}: {str(error)[:120]}", "delimited text in one encoding", remedy)
 
 
-def _parsed(sheet: Sheet, texts: Collection[int]) -> Loaded:
+def _parsed_sheet(sheet: Sheet, texts: Collection[int]) -> Loaded:
     left_out: list[int] = []
     table = csv.read_csv(sheet.path, **reading(sheet, left_out, texts))
     return Loaded([trimmed(a, sheet.unquoted) for a in table.columns], len(left_out), sheet.unquoted)

@@ -49,7 +49,7 @@ def open_sheet(path: Path, options: ReadOptions) -> Sheet:
     """
     head = _head(path)
     encoding = options.encoding or detect_encoding(head)
-    first = _lines(path, head, encoding)
+    first = _lines_of_head(path, head, encoding)
     stated = options.delimiter is not None
     plain = None if stated else rewritten(path, encoding, first[: HISTORY.head_lines], options.place)
     if plain is not None:
@@ -58,7 +58,7 @@ def open_sheet(path: Path, options: ReadOptions) -> Sheet:
     delimiter = options.delimiter or _delimiter(path, lines)
     guessed = _taken_as(lines, delimiter)
     place, header = (-1, list(guessed)) if guessed is not None else _header(path, lines, delimiter)
-    rows = _split(_filled(lines[place + 1 :]), delimiter)
+    rows = _split(_data_lines(lines[place + 1 :]), delimiter)
     if not rows:
         raise InputError(f"{path}: a header and no rows", "at least one sample", "export a period with data")
     width = Counter(len(row) for row in rows).most_common(1)[0][0]  # rows may end with a delimiter
@@ -112,7 +112,7 @@ def _head(path: Path) -> bytes:
     return head
 
 
-def _lines(path: Path, head: bytes, encoding: str) -> list[str]:
+def _lines_of_head(path: Path, head: bytes, encoding: str) -> list[str]:
     try:
         text = codecs.getincrementaldecoder(encoding)().decode(head)
     except (LookupError, UnicodeError) as error:
@@ -140,7 +140,7 @@ def _cells(line: str, delimiter: str) -> list[str]:
     return next(iter(_split([line], delimiter)), [])
 
 
-def _filled(lines: Sequence[str]) -> list[str]:
+def _data_lines(lines: Sequence[str]) -> list[str]:
     """Lines that may hold data: no comments, marks of sections or blanks."""
     return [line for line in lines if not NO_DATA_LINE.match(line.strip())]
 
@@ -154,7 +154,7 @@ def _shape(body: Sequence[str], delimiter: str) -> tuple[int, int]:
 
 def _delimiter(path: Path, lines: Sequence[str]) -> str:
     """The delimiter that splits most lines into the same number of columns, the header among them."""
-    body = _filled(lines)
+    body = _data_lines(lines)
     shapes = {mark: _shape(body, mark) for mark in DELIMITERS}
     best = max(DELIMITERS, key=lambda mark: shapes[mark])
     if shapes[best] == (0, 0):
@@ -169,7 +169,7 @@ def _delimiter(path: Path, lines: Sequence[str]) -> str:
 def _header(path: Path, lines: Sequence[str], delimiter: str) -> tuple[int, list[str]]:
     """Line number (from 0) and cells of the header: of the lines as wide as the table above its data the first with a
     name of a time column, else the first."""
-    width = _shape(_filled(lines), delimiter)[1]
+    width = _shape(_data_lines(lines), delimiter)[1]
     above: list[tuple[int, list[str]]] = []
     for place, line in enumerate(lines):
         cells = _cells(line, delimiter)
@@ -241,7 +241,7 @@ def _taken_as(lines: Sequence[str], delimiter: str) -> tuple[str, ...] | None:
     if len(rows) < 3 or len({len(row) for row in rows}) != 1 or len(rows[0]) < 3:
         return None
     columns = [[cell.strip() for cell in column] for column in zip(*rows, strict=True)]
-    kinds = [_kind(column) for column in columns]
+    kinds = [_kind_of_column(column) for column in columns]
     if kinds[0] == "stamp" and set(kinds[1:]) == {"number"}:
         return ("timestamp", *(UNNAMED.format(i + 1) for i in range(1, len(columns))))
     if len(columns) > 8 or kinds.count("stamp") != 1 or "text" not in kinds or "number" not in kinds:
@@ -259,7 +259,7 @@ def _taken_as(lines: Sequence[str], delimiter: str) -> tuple[str, ...] | None:
     return tuple(names)
 
 
-def _kind(cells: Sequence[str]) -> str:
+def _kind_of_column(cells: Sequence[str]) -> str:
     """'stamp', 'number', 'quality' or 'text' for what all cells of a column are; '' where they are not alike."""
     numbers = [float(cell.replace(",", ".")) for cell in cells if NUMBER.match(cell)]
     if NUMBER.match(cells[0]) and len(numbers) >= HISTORY.numbers_share * len(cells):

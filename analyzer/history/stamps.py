@@ -111,7 +111,7 @@ def fields(texts: pa.Array, timezone: str | None = None) -> Fields | None:
     return Fields(
         _number_or_month(part["a"]),
         _number_or_month(part["b"]),
-        _number(part["c"]),
+        _whole_numbers(part["c"]),
         clock_s,
         offset_s,
         _readable(parts, part, known) & shown & (np.abs(offset_s) <= HISTORY.offset_s),
@@ -178,14 +178,14 @@ def _written_order(part: dict[str, pa.Array]) -> NDArray[np.int8]:
     return written.astype(np.int8)
 
 
-def _number(texts: pa.Array) -> NDArray[np.int64]:
+def _whole_numbers(texts: pa.Array) -> NDArray[np.int64]:
     return _numpy(pc.cast(pc.if_else(pc.equal(texts, ""), "0", texts), pa.int64()))
 
 
 def _number_or_month(texts: pa.Array) -> NDArray[np.int64]:
     """Numbers, and months by their names; 0 for what is neither."""
     if pc.all(pc.or_(pc.utf8_is_digit(texts), pc.equal(texts, ""))).as_py():
-        return _number(texts)
+        return _whole_numbers(texts)
     kinds = pc.dictionary_encode(texts)
     meant = [int(t) if t.isdecimal() else _month(t.lower()) for t in kinds.dictionary.to_pylist()]
     return np.array(meant, dtype=np.int64)[_numpy(kinds.indices)]
@@ -199,7 +199,7 @@ def _month(name: str) -> int:
 def _clock(part: dict[str, pa.Array]) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """Time of day [s], 12 h clocks by their first letter; and where a clock shows it, midnight of a
     day's end and leap seconds among them."""
-    hour, minute, second = (_number(part[name]) for name in "hms")
+    hour, minute, second = (_whole_numbers(part[name]) for name in "hms")
     letter = pc.utf8_lower(part["p"])
     noon = _numpy(pc.equal(letter, "p"))
     twelve_hours = _numpy(pc.not_equal(letter, ""))
@@ -215,7 +215,7 @@ def _offset(zone: pa.Array, known: Mapping[str, float]) -> NDArray[np.float64]:
     place = pc.index_in(pc.utf8_lower(zone), value_set=pa.array(known))
     named = np.array([*known.values(), 0.0])[_numpy(pc.fill_null(place, len(known)))]
     digits = pc.replace_substring_regex(zone, r"^[A-Z]+$|[+:-]", "")
-    hour, minute = (_number(pc.utf8_slice_codeunits(digits, k, k + 2)) for k in (0, 2))
+    hour, minute = (_whole_numbers(pc.utf8_slice_codeunits(digits, k, k + 2)) for k in (0, 2))
     west = _numpy(pc.starts_with(zone, "-"))
     return 3600.0 * named + np.where(west, -1.0, 1.0) * (3600 * hour + 60 * minute)
 

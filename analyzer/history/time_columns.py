@@ -46,9 +46,9 @@ def find_clock(table: Table, options: ReadOptions) -> Clock:
     InputError
         No column holds a time, or the one that is named so cannot be read.
     """
-    columns = _candidates(table, options)
+    columns = _time_candidates(table, options)
     heads = dict(zip(columns, table.head(columns), strict=True))
-    kinds = {i: _kind(table.names[i], head, options.timezone) for i, head in heads.items()}
+    kinds = {i: _kind_of_time(table.names[i], head, options.timezone) for i, head in heads.items()}
     clock = _chosen(table, kinds, options)
     if clock is None or _is_doubtful(table, clock, kinds, heads):
         raise _no_time(table, columns)
@@ -95,7 +95,7 @@ def holds_stamps(name: str, head: pa.Array, since_start: bool = True) -> bool:
     if is_number(head.type):
         scale = time_scale_of(filled)
         return name != "" and scale is not None and (since_start or scale not in SINCE_START.values())
-    return _kind(name, filled) == "full"
+    return _kind_of_time(name, filled) == "full"
 
 
 def _with_order(table: Table, clock: Clock, options: ReadOptions) -> Clock:
@@ -104,16 +104,16 @@ def _with_order(table: Table, clock: Clock, options: ReadOptions) -> Clock:
         return replace(clock, order=DateOrder("day" if options.day_first else "month", "as stated"))
     if clock.date_format is not None or clock.scale is not None:
         return clock
-    head = _texts(table.head(clock.columns))
+    head = _stamp_texts(table.head(clock.columns))
     parts = None if head is None else stamps.fields(head, clock.timezone)
     if head is None or parts is None or not parts.open.any():
         return clock
-    whole = stamps.fields(_texts(table.read(clock.columns)), clock.timezone)
+    whole = stamps.fields(_stamp_texts(table.read(clock.columns)), clock.timezone)
     order = None if whole is None else date_order(whole, str(head[0].as_py()), clock.timezone)
     return replace(clock, order=order)
 
 
-def _texts(arrays: Sequence[pa.Array]) -> pa.Array | None:
+def _stamp_texts(arrays: Sequence[pa.Array]) -> pa.Array | None:
     column = date_and_time(arrays)
     return as_text(column) if is_text(column.type) else None
 
@@ -166,7 +166,7 @@ def _is_count(column: pa.Array) -> bool:
     return number.size > 1 and bool((np.diff(number) == 1).all()) and number[0] in (0.0, 1.0)
 
 
-def _candidates(table: Table, options: ReadOptions) -> list[int]:
+def _time_candidates(table: Table, options: ReadOptions) -> list[int]:
     """Columns that may hold a time: the stated one, else by type, by name, and columns of text."""
     if options.time_column is not None:
         return [stated_column(table.path, table.names, options.time_column, "time")]
@@ -181,7 +181,7 @@ def _candidates(table: Table, options: ReadOptions) -> list[int]:
     ]
 
 
-def _kind(name: str, head: pa.Array, timezone: str | None = None) -> str:
+def _kind_of_time(name: str, head: pa.Array, timezone: str | None = None) -> str:
     """'full', 'date', 'time of day', 'number' or '' for what the first rows hold."""
     if pa.types.is_timestamp(head.type):
         return "full"

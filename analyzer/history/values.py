@@ -96,7 +96,7 @@ def parsed(texts: list[str], decimal: str) -> tuple[NDArray[np.float64], list[st
     if decimal == "." and any(COMMA_FRACTION.match(text) for text in plain):
         decimal = ","
         notes.append("values are read with a decimal comma")
-    read = [_number(text, decimal) for text in plain]
+    read = [_number_and_grouping(text, decimal) for text in plain]
     if any(grouped for _, grouped in read):
         notes.append(
             f"values are read with grouped thousands and a decimal {'comma' if decimal == ',' else 'point'}"
@@ -104,7 +104,7 @@ def parsed(texts: list[str], decimal: str) -> tuple[NDArray[np.float64], list[st
     return np.array([number for number, _ in read], dtype=np.float64), notes
 
 
-def _number(text: str, decimal: str) -> tuple[float, bool]:
+def _number_and_grouping(text: str, decimal: str) -> tuple[float, bool]:
     """A text as a number, NaN where it is none, and whether its thousands are grouped."""
     if len(text) > HISTORY.number_length:
         return math.nan, False

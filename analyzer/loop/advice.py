@@ -8,14 +8,14 @@ from dataclasses import dataclass, field, replace
 from analyzer.config import AdviceLimits, Config
 from analyzer.loop.assess import Assessment
 from analyzer.loop.cause import Verdict
-from analyzer.loop.decisions import Action, Cause, Due, Lack, Needs
+from analyzer.loop.decisions import Action, Cause, Due, Lack, Need, Needs
 from analyzer.loop.fitness import too_thin
 from analyzer.loop.identified import cautious, load_of, tuned, uncertain
 from analyzer.loop.oscillation import counting
 from analyzer.loop.settings_side_by_side import Comparison, compared
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import as_stated
-from analyzer.words import settings as words
+from analyzer.words import units as words
 from identification.estimation.hammerstein import Fit
 from identification.limits import FIT
 from identification.models import Loop, Pid
@@ -99,7 +99,7 @@ def advise(
 def _unscaled(kept: Advice | None, needs: Needs) -> Advice:
     """What is left to do where OP is not in percent: a valve is stroked all the same, else the range is stated."""
     if kept is not None and kept.action is Action.REPAIR_VALVE:
-        return replace(kept, reason=needs.text, lack=needs.lack)
+        return replace(kept, reason=str(needs), lack=needs.lack)
     return _lacking(needs)
 
 
@@ -118,13 +118,13 @@ def _sought(
     if proposal.action is Action.UNDECIDED and found.verdict.cause is Cause.VALVE:
         proposal = replace(proposal, action=Action.REPAIR_VALVE)
     elif proposal.action is Action.UNDECIDED:
-        return _lacking(Needs(Lack.LONGER, f"{words.MORE} {proposal.reason}"))
+        return _lacking(Needs(Lack.LONGER, Need.LONGER, (proposal.reason,)))
     beside = None
     if proposed.loop is not None and proposed.load is not None:
         new = held or proposal.controller or proposal.meanwhile
         known = proposed.loop, proposed.load, new, period_s, spec, pv_span, config.tuning
         beside = compared(*known, proposed.others)
-    return replace(_stated(proposal, spec, pv_span), compared=beside)
+    return replace(_as_advice(proposal, spec, pv_span), compared=beside)
 
 
 def _or_repair(verdict: Verdict, other: Advice) -> Advice:
@@ -141,7 +141,7 @@ def _lacking(needs: Needs) -> Advice:
     """The advice to get more data, or a test where no data tell, with what is lacking."""
     tests = (Lack.STROKE, Lack.MANUAL_TEST)
     action = Action.UNDECIDED if needs.lack in tests else Action.NEEDS_DATA
-    return Advice(action, needs.text, lack=needs.lack)
+    return Advice(action, str(needs), lack=needs.lack)
 
 
 def withheld(
@@ -179,7 +179,7 @@ def _unsupported(found: Assessment, controller: Pid | None, config: Config) -> A
     if controller is None:
         return _without_settings(found.verdict)
     if found.judged_h < config.advice.least_h:
-        return _lacking(Needs(Lack.LONGER, words.too_short(found.judged_h, config.advice.least_h)))
+        return _lacking(Needs(Lack.LONGER, Need.HOURS, (config.advice.least_h, found.judged_h)))
     return _too_thin(found, controller, config)
 
 
@@ -256,7 +256,7 @@ def _for_valve(verdict: Verdict, loop: Loop, period_s: float | None, config: Con
     return Proposed(recommend(sought, verdict.cause, others, load, config.tuning), sought, load, others)
 
 
-def _stated(proposal: Proposal, spec: LoopSpec, pv_span: float) -> Advice:
+def _as_advice(proposal: Proposal, spec: LoopSpec, pv_span: float) -> Advice:
     """A proposal in the units and form of the plant's controller."""
     before, after = (c.cycle if c is not None else None for c in (proposal.before, proposal.after))
     if proposal.controller is None:

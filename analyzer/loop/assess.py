@@ -29,7 +29,7 @@ from analyzer.loop.cause import (
     told_slip_by_slip,
     with_dead_valve,
 )
-from analyzer.loop.decisions import Cause, Lack, LacksError, Needs
+from analyzer.loop.decisions import Cause, Lack, LacksError, Need, Needs
 from analyzer.loop.fitness import too_thin, unfit_for_cause, unfit_for_settings
 from analyzer.loop.judged_stretch import Earlier, Stretch, differing, judged_stretch
 from analyzer.loop.measure import Measured, measure, time_scale
@@ -39,7 +39,6 @@ from analyzer.loop.quality import Prepared
 from analyzer.loop.setpoint_moves import Move, moves
 from analyzer.loop.shared_valve import Shared
 from analyzer.plantwide.wave import Wave, waves_of
-from analyzer.words import settings as words
 from identification.errors import NotAssessedError
 from identification.models import Pid
 from identification.record import LoopRecord
@@ -94,17 +93,16 @@ def unassessable(record: LoopRecord, config: Config) -> Needs | None:
     q = config.quality
     own = ~record.mask("idle")
     if int(own.sum()) < q.samples:
-        idle = "" if own.all() else f" while it has the valve, {100 * own.mean():.1f} % of the time"
-        return Needs(Lack.SAMPLES, f"needs {q.samples} samples, has {own.sum()}{idle}")
+        has = q.samples, int(own.sum())
+        if own.all():
+            return Needs(Lack.SAMPLES, Need.SAMPLES, has)
+        return Needs(Lack.SAMPLES, Need.SAMPLES_IN_TURN, (*has, 100 * float(own.mean())))
     share = float(record.usable[own].mean())
     if share >= q.usable_share:
         return None
     manual, bad = float(record.mask("manual").mean()), float(record.bad.mean())
-    return Needs(
-        Lack.AUTOMATIC if manual >= bad else Lack.SAMPLES,
-        f"needs {100 * q.usable_share:.0f} % good samples in automatic, has {100 * share:.0f} % "
-        f"(manual {100 * manual:.0f} %, gaps and stale {100 * bad:.0f} %)",
-    )
+    shares = (100 * q.usable_share, 100 * share, 100 * manual, 100 * bad)
+    return Needs(Lack.AUTOMATIC if manual >= bad else Lack.SAMPLES, Need.AUTOMATIC, shares)
 
 
 def cause_of(
@@ -120,7 +118,8 @@ def cause_of(
     try:
         measured = measure(record, oscillation, controller, config.cause, found.spectrum, kind)
     except NotAssessedError as error:
-        verdict = not_assessed(Needs(Lack.UNBROKEN, str(error))) if oscillation is not None else NO_CAUSE
+        needs = Needs(Lack.UNBROKEN, Need.AS_TOLD, (str(error),))
+        verdict = not_assessed(needs) if oscillation is not None else NO_CAUSE
         return with_dead_valve(verdict, dead) if dead else verdict
     verdict = verdict_by_measures(measured, prepared, oscillation, config)
     if oscillation is not None:
@@ -173,7 +172,7 @@ def verdict_by_measures(
     return told_apart(judge(measured, oscillation, config.cause), prepared, oscillation, config)
 
 
-def _known(figures: Assessments, op: bool) -> Assessments:
+def _known_without_op(figures: Assessments, op: bool) -> Assessments:
     """The figures without those that rest on OP where none is in percent: unknown is empty, never zero."""
     return figures if op else replace(figures, **OF_OP)
 
@@ -185,15 +184,17 @@ def hidden(record: LoopRecord, found: Oscillations, controller: Pid | None, conf
         folded = None if controller is None else config.advice.cycle_per_ti * controller.ti_s
         if folded is None or folded >= NYQUIST * record.dt_s:
             return None
-        return Needs(Lack.FASTER, f"{words.too_coarse(record.dt_s, folded, samples)}; {words.FOLDED}")
+        return Needs(Lack.FASTER, Need.UNFOLDED, (folded / samples, record.dt_s, folded))
     period = barely_seen(found, config.oscillation)
     if period is None and controller is not None and math.isfinite(controller.ti_s):
         expected = config.advice.cycle_per_ti * controller.ti_s
         period = expected if expected < samples * record.dt_s else None
-    return None if period is None else Needs(Lack.FASTER, words.too_coarse(record.dt_s, period, samples))
+    if period is None:
+        return None
+    return Needs(Lack.FASTER, Need.OF_A_CYCLE, (period / samples, record.dt_s, period))
 
 
-def _dead_time(verdict: Verdict) -> float | None:
+def _dead_time_of(verdict: Verdict) -> float | None:
     m = verdict.measured
     return None if m is None else (m.play if verdict.cause is Cause.VALVE else m.linear).dead_time_s
 
@@ -210,7 +211,7 @@ class _Judged:
     settings: Pid | None
 
 
-def _judged(prepared: Prepared, stretch: Stretch, config: Config, kind: str) -> _Judged:
+def _judge_stretch(prepared: Prepared, stretch: Stretch, config: Config, kind: str) -> _Judged:
     """The verdict on the stretch that is judged; one that rests on little is a hint."""
     record = prepared.record
     part = replace(prepared, record=record.span(stretch.first, stretch.last))
@@ -266,16 +267,16 @@ def assess(
     if not prepared.op_scaled:  # settings in percent mean nothing beside such an OP
         controller, earlier = None, [replace(e, controller=None) for e in earlier]
     stretch = judged_stretch(prepared.record, controller, earlier, config)
-    return _assessment(prepared, stretch, _judged(prepared, stretch, config, kind), config)
+    return _assessment(prepared, stretch, _judge_stretch(prepared, stretch, config, kind), config)
 
 
 def _assessment(prepared: Prepared, stretch: Stretch, judged: _Judged, config: Config) -> Assessment:
     """The figures of the whole record beside what was judged."""
     record, found = prepared.record, judged.found
     in_percent = prepared.op_known and prepared.op_scaled
-    night = _known(assess_span(record, config.figures), in_percent)
+    night = _known_without_op(assess_span(record, config.figures), in_percent)
     hours = hourly(record, judged.of_all, config.figures, night.noise_band_pct)
-    dead_time = _dead_time(judged.verdict)
+    dead_time = _dead_time_of(judged.verdict)
     close = close_view(judged.part.record, found, stretch.first)
     end_s = record.start_s + record.duration_s
     return Assessment(
@@ -283,7 +284,7 @@ def _assessment(prepared: Prepared, stretch: Stretch, judged: _Judged, config: C
         start_s=record.start_s,
         duration_s=record.duration_s,
         night=night,
-        hours=tuple(replace(h, figures=_known(h.figures, in_percent)) for h in hours),
+        hours=tuple(replace(h, figures=_known_without_op(h.figures, in_percent)) for h in hours),
         oscillations=found,
         verdict=judged.verdict,
         settings=judged.settings,

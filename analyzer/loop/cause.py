@@ -31,15 +31,14 @@ import numpy as np
 
 from analyzer.config import CauseLimits, Config
 from analyzer.limits import LOOP
-from analyzer.loop.cause_weights import chances, likelihood_told, measures, signs_of, width_text
-from analyzer.loop.decisions import CAUSES, OF_LOAD, Cause, Fault, Lack, Needs
+from analyzer.loop.cause_weights import chances, measures, signs_of
+from analyzer.loop.decisions import CAUSES, OF_LOAD, Cause, Fault, Lack, Need, Needs, SignKind
 from analyzer.loop.finding import Sign
 from analyzer.loop.fitness import compressed
 from analyzer.loop.identified import sensitivity
 from analyzer.loop.measure import Measured
 from analyzer.loop.oscillation import Oscillation
 from analyzer.loop.quality import Prepared
-from analyzer.words import settings as words
 from identification.errors import NotAssessedError
 from identification.estimation.backlash_stiction import generic_noise
 from identification.estimation.gauss_newton import descend
@@ -48,14 +47,14 @@ from identification.estimation.irregular_slips import SlipPath, fit_irregular, p
 from identification.limits import FIT
 from identification.record import LoopRecord
 
-NO_MODEL = "needs trends from which a model can be identified"
+NO_MODEL = Needs(None, Need.MODEL)
 
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
     """The cause of one loop's oscillation.
 
-    cause; confidence [%] of each cause; fault of the valve; signs in words; needs : what the record lacks for a
+    cause; confidence [%] of each cause; fault of the valve; signs; needs : what the record lacks for a
     cause, None where it lacks nothing; measured; dead : the valve no longer moves PV at all; steady : the same by one
     friction for all slips, where it was told slip by slip since.
     """
@@ -90,8 +89,6 @@ class Verdict:
         return self if self.steady is None or self.cause is not Cause.VALVE else self.steady
 
 
-AGAIN = "stretch after stretch between moves of the stem says so"
-"""What the stretches of a calm loop say of a fault that is narrow beside OP's range, as in a loop of a programme."""
 NO_CAUSE = Verdict(Cause.NONE, dict.fromkeys(CAUSES, 0.0), Fault.NONE)
 
 
@@ -125,8 +122,9 @@ def agrees(m: Measured, limits: CauseLimits) -> bool:
 def quiet_signs(m: Measured, limits: CauseLimits) -> tuple[Sign, ...]:
     """Signs of a valve at fault in a loop that does not oscillate.
 
-    The stretches between moves of the stem must agree. A few moves are told from steps of the load, unless the set
-    point called for them, by more evidence.
+    The stretches between moves of the stem must agree; of a fault that is narrow beside OP's range, as in a loop of a
+    programme, they are a sign of their own. A few moves are told from steps of the load, unless the set point called
+    for them, by more evidence.
     """
     if not agrees(m, limits):
         return ()
@@ -134,13 +132,16 @@ def quiet_signs(m: Measured, limits: CauseLimits) -> tuple[Sign, ...]:
     least = needed(m, limits, False) * (limits.quiet_factor if few else 1.0)
     if not speaks(m, limits, False) or m.evidence < least or (m.moves < limits.moves and not m.excited):
         return ()
-    text, figures = likelihood_told(m.evidence)
-    signs = [Sign("valve", 0.5 + 0.5 * _ramp(m.evidence, least, 4 * least), text, figures=figures)]
+    sure = 0.5 + 0.5 * _ramp(m.evidence, least, 4 * least)
+    signs = [Sign(Cause.VALVE, sure, SignKind.CALM_EVIDENCE, (m.evidence,))]
     width = m.play.valve.stickband
     if m.size < limits.size and m.steady >= limits.steady_alone and width >= limits.plain_width:
-        signs.append(Sign("valve", 0.6 + 0.4 * _ramp(m.steady, limits.steady_alone, 10.0), AGAIN))
+        signs.append(
+            Sign(Cause.VALVE, 0.6 + 0.4 * _ramp(m.steady, limits.steady_alone, 10.0), SignKind.AGAIN)
+        )
     if m.size >= limits.size:
-        signs.append(Sign("valve", 0.6 + 0.4 * _ramp(m.size, limits.size, 0.7), width_text(m.size)))
+        wide = 0.6 + 0.4 * _ramp(m.size, limits.size, 0.7)
+        signs.append(Sign(Cause.VALVE, wide, SignKind.CALM_WIDTH, (m.size,)))
     return tuple(signs)
 
 
@@ -252,7 +253,7 @@ def dead_valve(record: LoopRecord, limits: CauseLimits) -> Sign | None:
     one_sided = max(float((e > 0).mean()), float((e < 0).mean()))
     if not still or one_sided < 0.95:
         return None
-    return Sign("valve", 0.9, f"OP winds over {wound:.0f} % while PV stands still off the set point")
+    return Sign(Cause.VALVE, 0.9, SignKind.DEAD_VALVE, (wound,))
 
 
 def with_dead_valve(verdict: Verdict, sign: Sign) -> Verdict:
@@ -297,10 +298,10 @@ def _hides(verdict: Verdict, prepared: Prepared, oscillation: Oscillation, confi
     if rough is not None:
         return rough
     if samples < limits.samples_told:
-        return Needs(Lack.FASTER, words.too_few(samples, limits.samples_told))
-    if not any(s.points_to == Cause.LOAD and s.name in OF_LOAD for s in verdict.signs):
-        return Needs(Lack.MANUAL_TEST, words.NO_SIGN_OF_A_LOAD)
-    return _beside(verdict, limits)
+        return Needs(Lack.FASTER, Need.OF_A_LOAD, (limits.samples_told, samples))
+    if not any(s.points_to is Cause.LOAD and s.kind in OF_LOAD for s in verdict.signs):
+        return Needs(Lack.MANUAL_TEST, Need.LOAD_IN_MANUAL)
+    return _play_beside(verdict, limits)
 
 
 def _rough(
@@ -310,16 +311,18 @@ def _rough(
     steps = oscillation.amplitude_pct / max(prepared.pv_step, 1e-12)
     if steps >= (limits.steps_told if verdict.cause is Cause.LOAD else limits.steps_tuning):
         return None
-    return Needs(Lack.FINER, words.too_rough(prepared.pv_step, oscillation.amplitude_pct))
+    return Needs(Lack.FINER, Need.FINER, (prepared.pv_step, oscillation.amplitude_pct))
 
 
 def _robust(verdict: Verdict, oscillation: Oscillation, config: Config) -> Needs | None:
     """A test in manual, where signs speak for the tuning and the identified loop is robust; None where it is not."""
     ms = None if verdict.measured is None else sensitivity(verdict.measured, oscillation.period_s)
-    return None if ms is None or ms > config.tuning.ms_most else Needs(Lack.MANUAL_TEST, words.robust(ms))
+    if ms is None or ms > config.tuning.ms_most:
+        return None
+    return Needs(Lack.MANUAL_TEST, Need.TUNING_IN_MANUAL, (ms,))
 
 
-def _beside(verdict: Verdict, limits: CauseLimits) -> Needs | None:
+def _play_beside(verdict: Verdict, limits: CauseLimits) -> Needs | None:
     """A stroke of the valve, where a load is likely and a play shows all the same; None where it does not."""
     m = verdict.measured
     if m is None or m.trials is None or verdict.confidence[Cause.LOAD] >= limits.beside_pct:
@@ -329,7 +332,7 @@ def _beside(verdict: Verdict, limits: CauseLimits) -> Needs | None:
     agree = m.trials.agreeing >= limits.beside_agreeing
     if not plain or not crossed or not agree or m.wave_left > LOOP.plain_wave:
         return None
-    return Needs(Lack.STROKE, words.valve_beside(m.size, m.trials.agreeing))
+    return Needs(Lack.STROKE, Need.STROKE, (100 * m.size, 100 * m.trials.agreeing))
 
 
 def told_slip_by_slip(verdict: Verdict, period_s: float, limits: CauseLimits) -> Verdict:

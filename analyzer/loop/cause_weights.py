@@ -1,4 +1,4 @@
-"""The signs of a cause as numbers, what each weighs in a multinomial logit fitted to simulated loops, and its words.
+"""The signs of a cause as numbers, and what each weighs in a multinomial logit fitted to simulated loops.
 
 Each sign counts along a broken line, and the odds of the causes are products over the signs, as in a scorecard (Good
 1950, weight of evidence). Which way a sign may point is fixed by physics; how much it weighs is fitted. Weights and
@@ -18,7 +18,7 @@ from importlib.resources import files
 import numpy as np
 
 from analyzer.limits import LOOP
-from analyzer.loop.decisions import AMPLIFICATION, CAUSES, Cause
+from analyzer.loop.decisions import CAUSES, Cause, Figures, SignKind
 from analyzer.loop.finding import Sign
 from analyzer.loop.measure import Measured
 from analyzer.loop.oscillation import Oscillation
@@ -143,108 +143,39 @@ def measures(m: Measured, o: Oscillation) -> Floats:
     return np.array(found, dtype=np.float64)
 
 
-Told = tuple[str, str]
-"""Words for everybody, and figures for an expert, '' where the words hold them."""
-
-
-def likelihood_told(evidence: float) -> Told:
-    """How a faulty valve explains PV against an ideal one."""
-    if evidence <= 0:
-        return "play or stick-slip explains PV no better than an ideal valve", ""
-    return "play or stick-slip explains PV better than an ideal valve", f"log likelihood +{evidence:.0f}"
-
-
-def width_text(size: float) -> str:
-    """The width of the valve's fault."""
-    return f"its width is {100 * size:.0f} % of OP's range"
-
-
-def _likelihood(m: Measured, o: Oscillation) -> Told:
+def _evidence_figures(m: Measured, o: Oscillation) -> Figures:
     t = m.trials
-    text, figures = likelihood_told(m.evidence)
-    if t is None or m.evidence <= 0:
-        return text, figures
-    return f"{text}, in {100 * t.agreeing:.0f} % of {t.count} stretches between turns of OP", figures
+    return (m.evidence,) if t is None else (m.evidence, t.agreeing, t.count)
 
 
-def _width(m: Measured, o: Oscillation) -> Told:
-    if m.evidence <= 0:
-        return "no play or stick-slip is seen in PV", ""
-    return f"the fault that fits best is {100 * m.size:.0f} % of OP's range wide", ""
+def _amplification_figures(m: Measured, o: Oscillation) -> Figures:
+    return (m.amplification,) if m.stable else ()
 
 
-def _left(m: Measured, o: Oscillation) -> Told:
-    plain = f"the load that is left has {'a' if m.line_linear >= 1.0 else 'no'} peak at the period"
-    return plain, f"prominence {m.line_linear:.1f}, behind a faulty valve {m.line_valve:.1f}"
+def _loop_gain_figures(m: Measured, o: Oscillation) -> Figures:
+    return () if m.controller is None else (abs(m.linear.gain * m.controller.kp),)
 
 
-def _amplification(m: Measured, o: Oscillation) -> Told:
-    if not m.stable:
-        return "the identified loop is unstable", ""
-    if m.amplification is None:
-        return "how the loop amplifies at the period is not known, for want of its settings", ""
-    verb = "amplifies" if m.amplification > 1.0 else "weakens"
-    times = m.amplification if m.amplification > 1.0 else 1.0 / max(m.amplification, 1e-3)
-    return f"at the period the loop {verb} load {times:.1f} times", ""
-
-
-def _loop_gain(m: Measured, o: Oscillation) -> Told:
-    if m.controller is None:
-        return "the gain of process and controller together is not known, for want of settings", ""
-    return f"process and controller together have a gain of {abs(m.linear.gain * m.controller.kp):.2g}", ""
-
-
-def _process(m: Measured, o: Oscillation) -> Told:
-    figures = f"{m.consistency:.1f} times its gain"
-    if m.consistency >= 0.5:
-        return "outside the period's band the same process is seen", figures
-    return "away from the period another process is seen", figures
-
-
-def _wave(m: Measured, o: Oscillation) -> Told:
-    return f"the wave has a phase-locked third harmonic of {100 * m.harmonic:.0f} %", ""
-
-
-def _wave_left(m: Measured, o: Oscillation) -> Told:
-    if m.wave_left < LOOP.plain_wave:
-        return "a faulty valve leaves few harmonics of the cycle unexplained", ""
-    return f"a faulty valve leaves harmonics of {100 * m.wave_left:.0f} % of the cycle unexplained", ""
-
-
-def _size(m: Measured, o: Oscillation) -> Told:
-    size, rhythm = m.kurtosis < 2.0, o.rhythm.third >= 0.5
-    figures = f"kurtosis {m.kurtosis:.1f}, noise has 3; rhythm {o.rhythm.third:.1f}"
-    if size == rhythm:
-        return f"the cycle {'keeps' if size else 'changes'} its size and its rhythm", figures
-    kept, changed = ("size", "rhythm") if size else ("rhythm", "size")
-    return f"the cycle keeps its {kept} and changes its {changed}", figures
-
-
-def _limits(m: Measured, o: Oscillation) -> Told:
-    share = 100 * m.saturated
-    return f"OP is at a limit {share:.0f} % of the time" if share >= 1 else "OP stays off its limits", ""
-
-
-def _dead_time(m: Measured, o: Oscillation) -> Told:
-    if o.period_s > 50 * m.linear.dead_time_s:
-        return "the period is long against the dead time", ""
-    return f"the period is {o.period_s / m.linear.dead_time_s:.0f} dead times", ""
-
-
-GROUPS: tuple[tuple[tuple[str, ...], Callable[[Measured, Oscillation], Told]], ...] = (
-    (("evidence", "evidence_per_cycle", "agreeing", "steadiness", "jump"), _likelihood),
-    (("size",), _width),
-    (("line_linear", "line_valve"), _left),
-    ((AMPLIFICATION,), _amplification),
-    (("loop_gain",), _loop_gain),
-    (("consistency",), _process),
-    (("harmonic",), _wave),
-    (("wave_left",), _wave_left),
-    (("kurtosis", "rhythm"), _size),
-    (("saturated",), _limits),
-    (("dead_time_share",), _dead_time),
-)
-"""Measures that are one sign together, with its words."""
+GROUPS: Mapping[SignKind, tuple[tuple[str, ...], Callable[[Measured, Oscillation], Figures]]] = {
+    SignKind.EVIDENCE: (
+        ("evidence", "evidence_per_cycle", "agreeing", "steadiness", "jump"),
+        _evidence_figures,
+    ),
+    SignKind.WIDTH: (("size",), lambda m, o: (m.evidence, m.size)),
+    SignKind.LOAD_LEFT: (("line_linear", "line_valve"), lambda m, o: (m.line_linear, m.line_valve)),
+    SignKind.AMPLIFICATION: (("amplification",), _amplification_figures),
+    SignKind.LOOP_GAIN: (("loop_gain",), _loop_gain_figures),
+    SignKind.PROCESS: (("consistency",), lambda m, o: (m.consistency,)),
+    SignKind.HARMONIC: (("harmonic",), lambda m, o: (m.harmonic,)),
+    SignKind.WAVE_LEFT: (
+        ("wave_left",),
+        lambda m, o: (m.wave_left if m.wave_left >= LOOP.plain_wave else 0.0,),
+    ),
+    SignKind.REGULARITY: (("kurtosis", "rhythm"), lambda m, o: (m.kurtosis, o.rhythm.third)),
+    SignKind.LIMITS: (("saturated",), lambda m, o: (m.saturated,)),
+    SignKind.DEAD_TIME: (("dead_time_share",), lambda m, o: (o.period_s, m.linear.dead_time_s)),
+}
+"""Measures that are one sign together, and the figures it is told by."""
 
 
 def signs_of(m: Measured, o: Oscillation) -> tuple[Sign, ...]:
@@ -252,13 +183,12 @@ def signs_of(m: Measured, o: Oscillation) -> tuple[Sign, ...]:
     cause."""
     moved = pushes(measures(m, o))
     out = []
-    for names, text in GROUPS:
+    for kind, (names, figures) in GROUPS.items():
         push = np.sum([moved[n] for n in names], axis=0)
         k = int(np.argmax(push))
         if push[k] >= LOOP.least_push:
-            words, figures = text(m, o)
-            out.append(Sign(CAUSES[k], 1.0 - math.exp(-float(push[k])), words, names[0], figures))
+            out.append(Sign(CAUSES[k], 1.0 - math.exp(-float(push[k])), kind, figures(m, o)))
     if not m.stable or (m.amplification or 0.0) >= LOOP.amplifies:
-        told = [s for s in out if s.name != AMPLIFICATION]
-        return (*told, Sign(Cause.TUNING, 0.05, _amplification(m, o)[0], AMPLIFICATION))
+        told = [s for s in out if s.kind is not SignKind.AMPLIFICATION]
+        return (*told, Sign(Cause.TUNING, 0.05, SignKind.AMPLIFICATION, _amplification_figures(m, o)))
     return tuple(out)

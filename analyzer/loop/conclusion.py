@@ -14,7 +14,7 @@ from analyzer.loop.advice import Advice
 from analyzer.loop.assess import Assessment
 from analyzer.loop.cause import Verdict
 from analyzer.loop.cost import RECORDED, STATED, loss
-from analyzer.loop.decisions import Action, Cause, Fault, Lack, Status
+from analyzer.loop.decisions import Action, Cause, Fault, Needs, Status
 from analyzer.loop.finding import Cell, Finding, Remedy, Swing
 from analyzer.loop.identified import gain_room, intervals, is_known
 from analyzer.loop.oscillation import Oscillations
@@ -44,15 +44,16 @@ def stated(spec: LoopSpec) -> Known:
 
 @dataclass(frozen=True, slots=True)
 class Lost:
-    """Why a loop has no results: its status, the reason in words, and what the record lacks where that is known."""
+    """Why a loop has no results: its status, and what the record lacks or the error that ended it."""
 
     status: Status
-    reason: str
-    lack: Lack | None = None
+    why: Needs
 
     def of(self, spec: LoopSpec, night: str, **known: Cell) -> Finding:
         """The same as a finding, with further columns that are known all the same."""
-        return Finding(spec.loop, night, self.status, self.reason, self.lack, known={**stated(spec), **known})
+        return Finding(
+            spec.loop, night, self.status, self.why, self.why.lack, known={**stated(spec), **known}
+        )
 
 
 def concluded(
@@ -78,7 +79,7 @@ def concluded(
         spec.loop,
         night,
         Status.OK,
-        lacking=str(lacks or ""),
+        lacking=lacks,
         lack=advice.lack or (lacks.lack if lacks else None),
         swing=_swing(a.oscillations) if shown else None,
         cause=v.cause if shown else Cause.UNDECIDED,
@@ -90,7 +91,7 @@ def concluded(
             **stated(spec),
             **a.night.as_row(),
             "loss": loss(a.night.average_absolute_error_pct, spec.importance, spec.has_pv_range),
-            **(_cycle(a) if shown else {}),
+            **(_cycle_known(a) if shown else {}),
             **_measured(a, limits),
             **_cycles_of(advice),
             **(a.shared.as_row() if a.shared is not None else {}),
@@ -113,7 +114,7 @@ def _swing(found: Oscillations) -> Swing:
     return Swing(first.significance, first.oscillating_pct, first.period_s, first.amplitude_pct)
 
 
-def _cycle(a: Assessment) -> Known:
+def _cycle_known(a: Assessment) -> Known:
     """How regular the most significant oscillation is, the periods of all, and the ends of its last ten."""
     first, found = a.oscillations.first, a.oscillations.found
     out: Known = {"periods": "[]"}
@@ -124,12 +125,12 @@ def _cycle(a: Assessment) -> Known:
             "prominence": first.prominence,
             "correlation": first.rhythm.first,
             "periods": json.dumps(periods),
-            "spectrum": _spectrum(a.oscillations),
+            "spectrum": _spectrum_kept(a.oscillations),
         }
     return out if a.close_s is None else {**out, "close_first_s": a.close_s[0], "close_last_s": a.close_s[1]}
 
 
-def _spectrum(found: Oscillations) -> str | None:
+def _spectrum_kept(found: Oscillations) -> str | None:
     """Power in sixths of an octave as the store keeps it."""
     s, b = found.spectrum, found.bands
     if s is None or b is None or not b.line.size:
@@ -155,15 +156,15 @@ def _measured(a: Assessment, limits: AdviceLimits) -> Known:
             "amplification": m.amplification,
             "gain_room": gain_room(m),
         }
-    model = _model(v, limits)
+    model = _model_known(v, limits)
     return {**out, **(model if a.op_scaled else {k: x for k, x in model.items() if k not in PER_OP})}
 
 
-def _model(verdict: Verdict, limits: AdviceLimits) -> Mapping[str, float | None]:
+def _model_known(verdict: Verdict, limits: AdviceLimits) -> Mapping[str, float | None]:
     m = verdict.measured
     if m is None or verdict.cause not in (Cause.VALVE, Cause.TUNING):
         return {}
-    process, valve = _process(verdict.fit, limits), verdict.fit.valve
+    process, valve = _process_known(verdict.fit, limits), verdict.fit.valve
     if verdict.cause is Cause.TUNING:
         return process
     if verdict.fit is m.stick_slip:
@@ -183,7 +184,7 @@ def _of_half(verdict: Verdict, limits: AdviceLimits) -> Known:
     return {"half_slope": slope.value} if one_way and most < limits.half_within * least else {}
 
 
-def _process(fit: Fit, limits: AdviceLimits) -> dict[str, float | None]:
+def _process_known(fit: Fit, limits: AdviceLimits) -> dict[str, float | None]:
     """Process constants; gain and time constant apart only where the time constant is well inside the window."""
     known = is_known(fit, limits)
     return {

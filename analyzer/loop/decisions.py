@@ -6,17 +6,43 @@ The values are those of the store and of `triage rank`.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import StrEnum
+from enum import StrEnum, auto
 
 from identification.errors import NotAssessedError
 from tuning import Action as Action
 from tuning import Cause as Cause
 
+Cell = str | float | None
+Figures = tuple[Cell, ...]
+"""What a sentence of words/ is made of: numbers, and names of loops and tags."""
 CAUSES = (Cause.VALVE, Cause.TUNING, Cause.LOAD)
 """Causes that have a confidence of their own."""
-AMPLIFICATION = "amplification"
-"""Name of the sign that tells a loop too tight by what it does, whatever else weighs more."""
-OF_LOAD = ("line_linear", "consistency", "wave_left", "kurtosis")
+
+
+class SignKind(StrEnum):
+    """What a sign of a cause shows; those of a loop that oscillates are named for the first measure they rest on."""
+
+    EVIDENCE = "evidence"
+    WIDTH = "size"
+    LOAD_LEFT = "line_linear"
+    AMPLIFICATION = "amplification"
+    LOOP_GAIN = "loop_gain"
+    PROCESS = "consistency"
+    HARMONIC = "harmonic"
+    WAVE_LEFT = "wave_left"
+    REGULARITY = "kurtosis"
+    LIMITS = "saturated"
+    DEAD_TIME = "dead_time_share"
+    CALM_EVIDENCE = "evidence of a calm loop"
+    CALM_WIDTH = "size in a calm loop"
+    AGAIN = "stretch after stretch of a calm loop"
+    DEAD_VALVE = "dead valve"
+    FOLLOWS = "follows"
+    OF_BELOW = "loop below at fault"
+    OF_ABOVE = "loop above cycles"
+
+
+OF_LOAD = (SignKind.LOAD_LEFT, SignKind.PROCESS, SignKind.WAVE_LEFT, SignKind.REGULARITY)
 """Signs that a load itself leaves: a peak in what the model leaves, another process away from the period, harmonics
 that no faulty valve makes, a size and rhythm kept. That a valve or a limit is not seen at work is none of them; ours:
 all but one of 22 loads told of untidy and tidy plants have one, of seven levels with play told a load one had."""
@@ -91,16 +117,54 @@ class Lack(StrEnum):
     MANUAL_TEST = "some periods in manual"
 
 
+class Need(StrEnum):
+    """What is needed for an answer, each of them a sentence of words/needs.py."""
+
+    PV_TAG = auto()
+    GOOD_PV = auto()
+    MORE_PV = auto()
+    STAMPS = auto()
+    IN_A_ROW = auto()
+    NUMBERS = auto()
+    SAMPLES = auto()
+    SAMPLES_IN_TURN = auto()
+    AUTOMATIC = auto()
+    OP = auto()
+    OP_RANGE = auto()
+    MOVING_OP = auto()
+    MOVING_PV = auto()
+    PV_AS_MEASURED = auto()
+    UNCOMPRESSED = auto()
+    ARCHIVED = auto()
+    OFF_LIMITS = auto()
+    RUNS = auto()
+    MODEL = auto()
+    OF_A_CYCLE = auto()
+    UNFOLDED = auto()
+    OF_A_LOAD = auto()
+    OF_SETTINGS = auto()
+    FINER = auto()
+    HOURS = auto()
+    LONGER = auto()
+    LOAD_IN_MANUAL = auto()
+    TUNING_IN_MANUAL = auto()
+    STROKE = auto()
+    AS_TOLD = auto()
+
+
 @dataclass(frozen=True, slots=True)
 class Needs:
-    """What a record lacks, and in words what it needs and what it has."""
+    """What a record lacks, None where it is an error that ended the loop; what it needs, and the figures of that."""
 
-    lack: Lack
-    text: str
+    lack: Lack | None
+    need: Need
+    figures: Figures = ()
 
     def __str__(self) -> str:
-        """The words."""
-        return self.text
+        """What it needs and what it has, in words."""
+        from analyzer.words.needs import said  # which tells what stands here
+
+        return said(self)
 
 
 class LacksError(NotAssessedError):
@@ -108,7 +172,7 @@ class LacksError(NotAssessedError):
 
     def __init__(self, needs: Needs) -> None:
         self.needs = needs
-        super().__init__(needs.text)
+        super().__init__(str(needs))
 
     def __reduce__(self) -> tuple[type[LacksError], tuple[Needs]]:
         """How it travels between processes: by what it was made of."""

@@ -11,25 +11,32 @@ from dataclasses import dataclass, field, replace
 
 from analyzer.config import LaneLimits
 from analyzer.lanes.lanes import action_of, lanes_of
-from analyzer.loop.decisions import CAUSES, Action, Cause, Due, Fault, Lack, Lane, Status, counts
-
-Cell = str | float | None
+from analyzer.loop.decisions import (
+    CAUSES,
+    Action,
+    Cause,
+    Cell,
+    Due,
+    Fault,
+    Figures,
+    Lack,
+    Lane,
+    Needs,
+    SignKind,
+    Status,
+    counts,
+)
 
 
 @dataclass(frozen=True, slots=True)
 class Sign:
-    """One sign: which cause it points to, how strongly (0 to 1), in words, its name, and the figures behind it."""
+    """One sign: which cause it points to, how strongly (0 to 1), what it shows, and the figures and loops that say
+    so, as words/signs.py takes them."""
 
-    points_to: str
+    points_to: Cause
     strength: float
-    text: str
-    name: str = ""
-    figures: str = ""
-
-    @property
-    def whole(self) -> str:
-        """Words and figures."""
-        return f"{self.text} ({self.figures})" if self.figures else self.text
+    kind: SignKind
+    figures: Figures = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,16 +84,16 @@ class Finding:
     """One loop in one night.
 
     swing, None where the record cannot show whether the loop oscillates; confidence [%] of each cause, none
-    where no verdict was sought; lacking, why there are no results, or what the record lacks for a cause, in
-    words; lack, the same as a value; remedy, what to do; known, all other columns of the loop's row by their
-    names; follows, the loop that moves it; moves, those that it moves; lanes, why it is worth a look; group,
+    where no verdict was sought; lacking, why there are no results, or what the record lacks for a cause; lack, what
+    it lacks for an answer or for new settings; remedy, what to do; known, all other columns of the loop's row by
+    their names; follows, the loop that moves it; moves, those that it moves; lanes, why it is worth a look; group,
     the number of the oscillation that it shares.
     """
 
     loop: str
     night: str
     status: Status
-    lacking: str = ""
+    lacking: Needs | None = None
     lack: Lack | None = None
     swing: Swing | None = None
     cause: Cause | None = None

@@ -6,11 +6,10 @@ import numpy as np
 
 from analyzer.config import Config, QualityLimits
 from analyzer.loop.assessments import at_limits_share
-from analyzer.loop.decisions import Lack, Needs
+from analyzer.loop.decisions import Lack, Need, Needs
 from analyzer.loop.oscillation import Oscillation
 from analyzer.loop.quality import Prepared, op_range
 from analyzer.loop.sample_clock import constant_for
-from analyzer.words import settings as words
 from identification.limits import RecorderLimits
 from identification.mismatch.recording import least_jump
 from identification.models import Pid
@@ -24,9 +23,9 @@ def unfit_for_cause(prepared: Prepared, oscillation: Oscillation | None, config:
     """
     record, q = prepared.record, config.quality
     if not prepared.op_known:
-        return Needs(Lack.OP, "needs OP, which is not recorded")
+        return Needs(Lack.OP, Need.OP)
     if float(np.ptp(record.op)) == 0.0:
-        return Needs(Lack.MOVING_OP, "needs OP that moves, it stands still")
+        return Needs(Lack.MOVING_OP, Need.MOVING_OP)
     jumps = _jumps(record, config.explain.recorder)
     return jumps or compressed(prepared, oscillation, q) or _scattered(record, q) or at_limits(record, q)
 
@@ -36,21 +35,20 @@ def _jumps(record: LoopRecord, limits: RecorderLimits) -> Needs | None:
     None of any other."""
     jump = least_jump(record.pv[~record.bad], limits)
     stands = float(np.mean(np.diff(record.pv) == 0.0))
-    return Needs(Lack.FINER, words.stands_and_jumps(stands, jump)) if jump > 0.0 else None
+    return Needs(Lack.FINER, Need.PV_AS_MEASURED, (100.0 * stands, jump)) if jump > 0.0 else None
 
 
 def compressed(prepared: Prepared, oscillation: Oscillation | None, q: QualityLimits) -> Needs | None:
     """What trends lack that a historian compressed; None where it did not, or kept enough of each cycle."""
     if prepared.compressed_share <= q.straight_share:
         return None
-    lie = f"{100 * prepared.compressed_share:.0f} % lie on straight segments"
+    straight_pct = 100 * prepared.compressed_share
     if oscillation is None:
-        return Needs(Lack.UNCOMPRESSED, f"needs trends without compression, {lie}")
+        return Needs(Lack.UNCOMPRESSED, Need.UNCOMPRESSED, (straight_pct,))
     points = prepared.archived_share * oscillation.period_s / prepared.record.dt_s
     if points >= q.archived_points:
         return None
-    wanted = f"needs trends without compression, or {q.archived_points:g} archived samples a cycle"
-    return Needs(Lack.UNCOMPRESSED, f"{wanted}: there are {points:.2g}, {lie}")
+    return Needs(Lack.UNCOMPRESSED, Need.ARCHIVED, (q.archived_points, points, straight_pct))
 
 
 def at_limits(record: LoopRecord, q: QualityLimits) -> Needs | None:
@@ -58,8 +56,7 @@ def at_limits(record: LoopRecord, q: QualityLimits) -> Needs | None:
     saturated = at_limits_share(record)
     if saturated <= q.saturated_share:
         return None
-    text = f"needs OP within its limits, it is at one for {100 * saturated:.0f} % of the time"
-    return Needs(Lack.OP_OFF_LIMITS, text)
+    return Needs(Lack.OP_OFF_LIMITS, Need.OFF_LIMITS, (100 * saturated,))
 
 
 def _scattered(record: LoopRecord, q: QualityLimits) -> Needs | None:
@@ -68,14 +65,13 @@ def _scattered(record: LoopRecord, q: QualityLimits) -> Needs | None:
     share = float((good & constant_for(good.astype(np.float64), q.run_samples)).sum()) / max(len(record), 1)
     if share >= q.run_share:
         return None
-    wanted = f"{100 * q.run_share:.0f} % of the time in runs of {q.run_samples} good samples"
-    return Needs(Lack.UNBROKEN, f"needs {wanted}, has {100 * share:.0f} %")
+    return Needs(Lack.UNBROKEN, Need.RUNS, (100 * q.run_share, q.run_samples, 100 * share))
 
 
 def unfit_for_settings(prepared: Prepared, config: Config) -> Needs | None:
     """What these trends lack for new settings; None where nothing that they show by themselves."""
     if not prepared.op_scaled:
-        return Needs(Lack.OP_RANGE, op_range(prepared.scale, prepared.record.op))
+        return op_range(prepared.scale, prepared.record.op)
     return compressed(prepared, None, config.quality)
 
 
@@ -84,4 +80,4 @@ def too_thin(dt_s: float, controller: Pid | None, config: Config) -> Needs | Non
     samples = config.settings.ti_samples
     if controller is None or dt_s <= controller.ti_s / samples:
         return None
-    return Needs(Lack.FASTER, words.sampled_too_thinly(dt_s, controller.ti_s, samples))
+    return Needs(Lack.FASTER, Need.OF_SETTINGS, (controller.ti_s / samples, controller.ti_s, dt_s))

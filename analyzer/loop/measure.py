@@ -120,7 +120,7 @@ def _prominence(x: Floats, dt_s: float, period_s: float) -> float:
     return peak_prominence(tapered_power(s), s.duration_s / period_s)
 
 
-def _wave_left(fit: Fit, period_s: float) -> float:
+def _harmonics_left(fit: Fit, period_s: float) -> float:
     """Second and third harmonic locked to PV's cycle in what a fit leaves of PV, over PV's fundamental."""
     window = fit.window
     if window.duration_s < LOOP.harmonic_cycles * period_s:
@@ -217,7 +217,7 @@ def _of_a_cycle(
         harmonic=locked_harmonic(error, scale),
         trials=trials(best, linear, scale),
         kurtosis=size_kurtosis(error, error.duration_s / scale),
-        wave_left=_wave_left(best, scale),
+        wave_left=_harmonics_left(best, scale),
         expected=expected_evidence(linear, _play(m.size) * op_range, scale),
     )
 
@@ -228,8 +228,8 @@ def _fits(
     """The candidates' fits, by a recorded stem where one shows a fault."""
     shown = None if window.position is None else seen(window.op, window.position)
     if shown is not None:
-        return _shown(window, shown, due, scale)
-    return _candidates(replace(window, position=None), scale, due, limits, oscillation)
+        return _stem_shown(window, shown, due, scale)
+    return _candidate_fits(replace(window, position=None), scale, due, limits, oscillation)
 
 
 def _check_judged(window: Window, limits: CauseLimits) -> None:
@@ -265,7 +265,7 @@ def _hopeful(window: Window, due: Mask, limits: CauseLimits) -> float:
     return limits.hopeless * limits.needed(count, bool(due.any()), False)
 
 
-def _candidates(
+def _candidate_fits(
     window: Window, scale_s: float, due: Mask, limits: CauseLimits, oscillation: Oscillation | None
 ) -> Fits:
     """Plain fit, play, stick-slip if it was tried, the better valve, its evidence and that of the jump [nat]."""
@@ -289,7 +289,7 @@ def _candidates(
     return linear, play, stick, best, gained, jump
 
 
-def _shown(window: Window, shown: Seen, due: Mask, scale_s: float) -> Fits:
+def _stem_shown(window: Window, shown: Seen, due: Mask, scale_s: float) -> Fits:
     """The same where the stem is recorded: its fault is seen, and PV answers the stem itself."""
     linear = fit_linear(window, scale_s)
     behind = window if window.position is None else replace(window, op=window.position)

@@ -185,7 +185,7 @@ def barely_seen(found: Oscillations, limits: OscillationLimits) -> float | None:
     return seen[0] if seen else None
 
 
-def _sized(
+def _sized_by_envelope(
     s: Spectrum, o: Oscillation, usable: Mask, limits: OscillationLimits
 ) -> tuple[Oscillation, Mask, Floats, float]:
     """Amplitude, share of time and significance from the envelope of the band."""
@@ -232,7 +232,7 @@ def _longest_seen(record: LoopRecord) -> float:
     return max(b - a for a, b in runs(~idle)) * record.dt_s / 2.0
 
 
-def _is_harmonic(o: Oscillation, other: Oscillation) -> bool:
+def _is_harmonic_of(o: Oscillation, other: Oscillation) -> bool:
     """Whether one oscillation is a whole multiple (2 to 7) of a stronger one's frequency."""
     ratio = other.period_s / o.period_s
     whole = round(ratio)
@@ -260,9 +260,9 @@ def detect(record: LoopRecord, limits: OscillationLimits) -> Oscillations:
         o = _candidate(s, b, k, limits)
         if o is None or any(abs(math.log(o.period_s / p.period_s)) < math.log(1.3) for p in kept):
             continue
-        if o.period_s <= longest and not any(_is_harmonic(o, p) for p in kept):
+        if o.period_s <= longest and not any(_is_harmonic_of(o, p) for p in kept):
             kept.append(o)
-    each = (_sized(s, o, usable, limits) for o in kept[: LOOP.reported])
+    each = (_sized_by_envelope(s, o, usable, limits) for o in kept[: LOOP.reported])
     sized = sorted((r for r in each if _lasts(record, r[0], limits)), key=lambda r: -r[0].significance)
     if not sized:
         return Oscillations(spectrum=s, bands=b)

@@ -14,7 +14,7 @@ import numpy as np
 
 from analyzer.config import QualityLimits
 from analyzer.history.series import Series
-from analyzer.loop.decisions import Lack, LacksError, Needs
+from analyzer.loop.decisions import Lack, LacksError, Need, Needs
 from analyzer.loop.sample_clock import (
     archived_share,
     clock_of,
@@ -108,16 +108,16 @@ def scale_of(spec: LoopSpec, pv: Floats) -> Scale:
 def _trimmed(pv: Series | None, spec: LoopSpec, limits: QualityLimits) -> tuple[Series, float]:
     """PV between its first and last good sample, and the interval of its samples [s]."""
     if pv is None:
-        raise LacksError(Needs(Lack.PV, f"no PV tag {spec.pv or spec.loop + '.PV'} in the export"))
+        raise LacksError(Needs(Lack.PV, Need.PV_TAG, (spec.pv or f"{spec.loop}.PV",)))
     good = int((~pv.bad).sum())
     if good == 0:
-        raise LacksError(Needs(Lack.SAMPLES, "needs PV samples, has none that is good"))
+        raise LacksError(Needs(Lack.SAMPLES, Need.GOOD_PV))
     if good < limits.samples:
-        raise LacksError(Needs(Lack.SAMPLES, f"needs {limits.samples} good PV samples, has {good}"))
+        raise LacksError(Needs(Lack.SAMPLES, Need.MORE_PV, (limits.samples, good)))
     trimmed = without_stray_ends(pv)
     dt = interval(trimmed.stamp_s)
     if not dt > 0:
-        raise LacksError(Needs(Lack.SAMPLES, "needs samples at different times, has one stamp"))
+        raise LacksError(Needs(Lack.SAMPLES, Need.STAMPS))
     return trimmed, dt
 
 
@@ -192,11 +192,7 @@ def _numeric(spec: LoopSpec, series: Mapping[str, Series], limits: QualityLimits
         if found is None:
             continue
         if found.unread > limits.unread_share * max(found.value.size, 1):
-            text = (
-                f"{found.unread} values of {tag}, such as '{found.example}', are not understood as numbers; needs "
-                "plain numbers: export them so, or state --decimal and --delimiter"
-            )
-            raise LacksError(Needs(Lack.READABLE, text))
+            raise LacksError(Needs(Lack.READABLE, Need.NUMBERS, (found.unread, tag, found.example)))
         out[tag] = replace(found, bad=found.bad | ~np.isfinite(found.value), text=None)
     return out
 
@@ -267,14 +263,10 @@ def _mode_mask(mode: Series, clock: Floats) -> Mask | None:
     return (mode.value == 0)[at] & ~mode.bad[at]
 
 
-def op_range(scale: Scale, op: Floats) -> str:
+def op_range(scale: Scale, op: Floats) -> Needs:
     """What to state where OP [% of the range assumed] cannot be percent of that range."""
     low, high = (scale.op_low + 0.01 * scale.op_span * float(x) for x in (op.min(), op.max()))
-    assumed = f"{scale.op_low:g} to {scale.op_low + scale.op_span:g}"
-    return (
-        f"OP runs from {low:.3g} to {high:.3g}, which is no plausible part of {assumed}: state op_lo and op_hi in "
-        "loops.csv; without them nothing is told in % of OP"
-    )
+    return Needs(Lack.OP_RANGE, Need.OP_RANGE, (low, high, scale.op_low, scale.op_low + scale.op_span))
 
 
 def _described(
@@ -290,7 +282,7 @@ def _described(
         notes.append("no OP recorded: no cause can be told")
     op_scaled = not op_known or op_in_range(record.op, limits)
     if not op_scaled:
-        notes.append(op_range(scale, record.op))
+        notes.append(str(op_range(scale, record.op)))
     for name in ("gap", "stale", "saturated", "manual", "idle"):
         share = float(record.mask(name).mean())
         if share > 0.005:

@@ -10,7 +10,7 @@ from numba import njit
 from analyzer.config import QualityLimits
 from analyzer.history.series import Series, main_span
 from analyzer.limits import LOOP
-from analyzer.loop.decisions import Lack, LacksError, Needs
+from analyzer.loop.decisions import Lack, LacksError, Need, Needs
 from identification.record import Floats, Mask
 
 
@@ -36,7 +36,7 @@ def onto_clock(series: Series, clock: Floats, dt_s: float, limits: QualityLimits
     if not good.any():
         return np.zeros(clock.size), np.ones(clock.size, dtype=bool)
     if clock.size == series.stamp_s.size and np.array_equal(clock, series.stamp_s):
-        return _held(series.value, good)
+        return _last_good_held(series.value, good)
     stamp, value = series.stamp_s[good], series.value[good]
     at = np.searchsorted(stamp, clock + 0.01 * dt_s, side="right") - 1
     own = max(interval(stamp), dt_s) if stamp.size > 1 else dt_s
@@ -47,7 +47,7 @@ def onto_clock(series: Series, clock: Floats, dt_s: float, limits: QualityLimits
     return value[np.maximum(at, 0)], (at < 0) | (age > limits.gap_factor * own) | lost
 
 
-def _held(value: Floats, good: Mask) -> tuple[Floats, Mask]:
+def _last_good_held(value: Floats, good: Mask) -> tuple[Floats, Mask]:
     if good.all():
         return value, ~good
     at = np.maximum.accumulate(np.where(good, np.arange(value.size), -1))
@@ -125,11 +125,8 @@ def clock_of(pv: Series, dt_s: float, limits: QualityLimits) -> Floats:
     count = int((pv.stamp_s[-1] - pv.stamp_s[0]) / dt_s + 1e-6) + 1
     if count > limits.ticks_per_sample * pv.stamp_s.size:
         share = 100 * pv.stamp_s.size / count
-        text = (
-            f"needs samples that follow each other, has {pv.stamp_s.size}, mostly {dt_s:g} s apart, spread over "
-            f"{(pv.stamp_s[-1] - pv.stamp_s[0]) / 86400:.1f} days ({share:.1f} % of that time)"
-        )
-        raise LacksError(Needs(Lack.SAMPLES, text))
+        days = (pv.stamp_s[-1] - pv.stamp_s[0]) / 86400
+        raise LacksError(Needs(Lack.SAMPLES, Need.IN_A_ROW, (pv.stamp_s.size, dt_s, days, share)))
     return pv.stamp_s[0] + dt_s * np.arange(count)
 
 

@@ -95,7 +95,9 @@ def _answered(
     begin = float(record.sp[part.start])
     way = (record.pv[part] - begin) / size
     still = spread / abs(size)
-    settled = _settled(np.abs(way[ramp:] - 1.0) > max(2.0 * still, limits.move_settled), limits.move_stands)
+    settled = _settled_from(
+        np.abs(way[ramp:] - 1.0) > max(2.0 * still, limits.move_settled), limits.move_stands
+    )
     shown = way.size if settled is None else min(way.size, FOLLOWED * (settled + ramp) + 2)
     course = np.interp(np.linspace(0, shown - 1, POINTS), np.arange(shown), way[:shown])
     return Move(
@@ -111,7 +113,7 @@ def _answered(
     )
 
 
-def _settled(outside: Mask, least: int) -> int | None:
+def _settled_from(outside: Mask, least: int) -> int | None:
     """First sample from which nothing is outside for as long again as it took, and for some samples at least; None
     where there is none."""
     ends = np.flatnonzero(outside)

@@ -78,7 +78,7 @@ def middle_ti(loop: Loop) -> float:
     return ti if math.isfinite(ti) else simc(loop.process, scan_s=max(loop.controller.scan_s, 1.0)).ti_s
 
 
-def _map(loop: Loop, settings: Sequence[Pid]) -> TravelMap | None:
+def _map_of_settings(loop: Loop, settings: Sequence[Pid]) -> TravelMap | None:
     """The travel map about the present settings, reaching to the others."""
     if loop.valve is None:
         return None
@@ -130,7 +130,7 @@ def compared(
         load,
         each,
         {t.name: _piece(t.record, period_s) for t in each},
-        _map(loop, tuple(settings.values())),
+        _map_of_settings(loop, tuple(settings.values())),
         {name: as_stated(pid, spec, pv_span) for name, pid in settings.items()},
         pv_span,
         {name: rejection(loop.process, pid).peak / now.peak for name, pid in settings.items()},

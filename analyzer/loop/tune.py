@@ -11,7 +11,7 @@ from analyzer.config import AdviceLimits, Config
 from analyzer.loop.advice import Advice, model_of, propose, sought_for, withheld
 from analyzer.loop.assess import Assessment, assess
 from analyzer.loop.cause import Verdict
-from analyzer.loop.decisions import Action, Cause, Needs
+from analyzer.loop.decisions import Action, Cause, Need, Needs
 from analyzer.loop.fitness import at_limits, unfit_for_cause
 from analyzer.loop.identified import intervals, load_of, tuned, uncertain
 from analyzer.loop.judged_stretch import controller_of, earlier_settings
@@ -21,6 +21,7 @@ from analyzer.loops.changes import in_force
 from analyzer.loops.spec import LoopSpec, spec_of
 from analyzer.loops.tags import as_stated
 from analyzer.night.nights import cut, nights_of
+from analyzer.words.signs import sign_in_full
 from identification.errors import InputError, NotAssessedError
 from identification.estimation.hammerstein import Fit
 from identification.models import Estimate, Loop, Pid, Process, Valve
@@ -38,7 +39,7 @@ if TYPE_CHECKING:
 
 MAP_POINTS = 36
 """Points of the map along each axis."""
-NO_MOVES = "needs PV that moves with OP, so that a model can be identified"
+NO_MOVES = Needs(None, Need.MOVING_PV)
 SPREAD = 20.0
 """The map reaches this factor below and above the present settings."""
 FORECAST = {
@@ -144,7 +145,7 @@ def _between(e: Estimate) -> str:
     return f"{e.value:.3g} ({e.low:.3g} to {e.high:.3g}) {e.unit}"
 
 
-def _cycle(t: Tuning) -> list[str]:
+def _cycle_lines(t: Tuning) -> list[str]:
     recorded = "none"
     if t.period_s is not None and t.amplitude_pct is not None:
         recorded = f"{t.period_s:.3g} s, ±{t.amplitude_pct:.3g} % of PV span"
@@ -159,7 +160,7 @@ def _cycle(t: Tuning) -> list[str]:
     ]
 
 
-def _forecast(t: Tuning) -> list[str]:
+def _forecast_lines(t: Tuning) -> list[str]:
     if t.forecast is None:
         return []
     proposal_lines = ["forecast on the reconstructed load (90 % intervals):"]
@@ -175,20 +176,20 @@ def proposal_lines(t: Tuning, spec: LoopSpec, pv_span: float) -> list[str]:
     out = [f"{name}: {_between(e)}" for name, e in t.estimates.items()]
     if "gain" not in t.estimates:
         out.append("gain and time constant: only their ratio is known from this record")
-    out += [*_cycle(t), f"action: {t.proposal.action}"]
+    out += [*_cycle_lines(t), f"action: {t.proposal.action}"]
     for title, pid in (("new settings", t.proposal.controller), ("until the repair", t.proposal.meanwhile)):
         if pid is not None:
             kp, ti = as_stated(pid, spec, pv_span)
             out.append(f"{title}: kp {kp:.3g}, ti {ti:.3g} {spec.ti_unit} ({spec.gain_unit}, {spec.form})")
-    return [*out, t.proposal.reason, *_forecast(t)]
+    return [*out, t.proposal.reason, *_forecast_lines(t)]
 
 
 def pictures(t: Tuning, title: str) -> tuple[Picture, ...]:
     """Describing functions, travel map and forecast, as far as there are any."""
     out: tuple[Picture, ...] = ()
     if t.model.valve is not None:
-        out = (_curves(t, title), _map(t, title))
-    return out if t.new is None else (*out, _trends(t, t.new, title))
+        out = (_curves(t, title), _map_field(t, title))
+    return out if t.new is None else (*out, _trend_panels(t, t.new, title))
 
 
 def _curves(t: Tuning, title: str) -> Plot:
@@ -211,7 +212,7 @@ def _curves(t: Tuning, title: str) -> Plot:
     return Plot("limit-cycle", whole, "real", "imaginary", proposal_lines, reach=(0.0,), places=places)
 
 
-def _map(t: Tuning, title: str) -> Field:
+def _map_field(t: Tuning, title: str) -> Field:
     """Valve travel of each pair of settings, where the loop comes to rest, and where it is unstable."""
     from analyzer.pages.compared import travel_field
     from reports.pages import Place
@@ -226,7 +227,7 @@ def _map(t: Tuning, title: str) -> Field:
     return travel_field(found, places, f"{title}: predicted travel", "OP")
 
 
-def _trends(t: Tuning, new: Pid, title: str) -> Panels:
+def _trend_panels(t: Tuning, new: Pid, title: str) -> Panels:
     """Both tunings on the same reconstructed load."""
     from reports.pages import Line, Panels, Plot
 
@@ -271,7 +272,7 @@ def proposal(asked: Asked, loop: str, drawn: bool) -> tuple[list[str], dict[str,
         raise InputError(seen, "both", "state them, so that new ones can be compared")
     found = assess(prepared, stated, config, spec.type, earlier_settings(row, asked.changes, prepared))
     head = [f"{loop}, night {night.name}: cause {found.verdict.cause}"]
-    text = head + [f"sign of {s.points_to}: {s.whole}" for s in found.verdict.signs]
+    text = head + [f"sign of {s.points_to}: {sign_in_full(s)}" for s in found.verdict.signs]
     if found.verdict.measured is None:
         needs = _unfit(prepared, config)
         if found.verdict.cause is not Cause.VALVE:
@@ -279,15 +280,15 @@ def proposal(asked: Asked, loop: str, drawn: bool) -> tuple[list[str], dict[str,
         return [*text, f"action: {Action.REPAIR_VALVE}", f"no settings: {needs or NO_MOVES}"], {}
     tuning = tune(found, stated, config, withheld(found, spec, stated, prepared.scale.span, config))
     text += proposal_lines(tuning, spec, prepared.scale.span)
-    return _beside(tuning, spec, prepared.scale.span, config, night.name, text, drawn)
+    return _with_settings_beside(tuning, spec, prepared.scale.span, config, night.name, text, drawn)
 
 
-def _beside(
+def _with_settings_beside(
     t: Tuning, spec: LoopSpec, pv_span: float, config: Config, night: str, text: list[str], drawn: bool
 ) -> tuple[list[str], dict[str, bytes]]:
     """Text with the settings to choose between; pictures by file name and, among them, the page of settings."""
     from analyzer.loop.settings_side_by_side import compared
-    from analyzer.pages.compared import choices, page
+    from analyzer.pages.compared import choices, settings_page
     from reports.html import render
     from reports.pictures import as_file
 
@@ -302,5 +303,5 @@ def _beside(
         return text, {}
     files = {f"{p.name}.svg": as_file(p).encode() for p in pictures(t, spec.loop)}
     if found is not None:
-        files["settings.html"] = render(page(spec.loop, night, found, spec), True).encode()
+        files["settings.html"] = render(settings_page(spec.loop, night, found, spec), True).encode()
     return text, files

@@ -57,7 +57,7 @@ def witness(verdict: Verdict, oscillates: bool, prepared: Prepared, config: Conf
         "jump": [round(x, 1) for x in jump],
         **{
             k: [float(f"{x:.4g}") for x in known]
-            for k, known in _constants(m, slips, limits, oscillates).items()
+            for k, known in _constants_of_fit(m, slips, limits, oscillates).items()
         },
     }
     return json.dumps(said, separators=(",", ":"))
@@ -75,7 +75,7 @@ def _profile(m: Measured, noise_widths: float) -> Floats:
     return np.where(found > 0.0, found * max(m.evidence, 0.0) / most, found)
 
 
-def _constants(
+def _constants_of_fit(
     m: Measured, slips: Measured | None, limits: CauseLimits, oscillates: bool
 ) -> Mapping[str, Known]:
     """Constants of the better fit: of the valve's where PV speaks for its fault, else of the process alone; a valve's
@@ -86,7 +86,7 @@ def _constants(
     assert fit is not None
     spread, found = covariance(fit, free_width=worn), {}
     if np.isfinite(spread).all() and fit.gain != 0.0:
-        found = _process(fit, spread)
+        found = _process_of_fit(fit, spread)
         if worn:
             relative = math.sqrt(spread[2, 2]) / max(fit.valve.stickband, 1e-9)
             found |= {"width": (fit.valve.stickband, relative), "slip_jump": (fit.valve.slip_jump, relative)}
@@ -97,7 +97,7 @@ def _constants(
     return found
 
 
-def _process(fit: Fit, spread: Floats) -> dict[str, Known]:
+def _process_of_fit(fit: Fit, spread: Floats) -> dict[str, Known]:
     """Slope, time constant, gain and dead time of a fit, by its covariance of (log T, L, stickband, gain)."""
     dead_s = fit.process.dead_time_s
     return {

@@ -42,7 +42,7 @@ class TuningChange:
     seen: str = ""
 
 
-def _number(text: str, where: str, column: str) -> float | None:
+def _number_or_none(text: str, where: str, column: str) -> float | None:
     if not text:
         return None
     try:
@@ -75,11 +75,11 @@ def read_changes(path: Path, zone: str = UTC_NAME, day_first: bool | None = None
         raise InputError(f"{path}: no changes", "one row a change below the header", "add the changes")
     places = [f"{path}, row {row}" for row, _ in rows]
     times = parse_times([cells.get("time", "") for _, cells in rows], places, zone, day_first).tolist()
-    return tuple(_change(cells, *at) for (_, cells), *at in zip(rows, places, times, strict=True))
+    return tuple(_change_of_row(cells, *at) for (_, cells), *at in zip(rows, places, times, strict=True))
 
 
-def _change(row: Mapping[str, str], where: str, time_s: float) -> TuningChange:
-    kp_old, ti_old, kp_new, ti_new = (_number(row.get(c, ""), where, c) for c in COLUMNS[2:6])
+def _change_of_row(row: Mapping[str, str], where: str, time_s: float) -> TuningChange:
+    kp_old, ti_old, kp_new, ti_new = (_number_or_none(row.get(c, ""), where, c) for c in COLUMNS[2:6])
     return TuningChange(row["loop"], time_s, kp_old, ti_old, kp_new, ti_new, row.get("who", ""))
 
 
@@ -144,7 +144,7 @@ def _daily_spread(y: Floats, at: Floats) -> float:
     return float(np.std(medians, ddof=1)) if len(medians) > 1 else 0.0
 
 
-def _dated(spec: LoopSpec, at_s: float) -> LoopSpec:
+def _valid_at(spec: LoopSpec, at_s: float) -> LoopSpec:
     """A loop with the settings of the last of its rows that was valid at a time, of the first where none was."""
     if not spec.earlier:
         return spec
@@ -161,7 +161,7 @@ def in_force(spec: LoopSpec, changes: Sequence[TuningChange], at_s: float) -> Lo
     Those of its row of loops.csv that was valid then, and of the last change before it; before the first change the
     old ones that it states; where neither is known, those of loops.csv.
     """
-    spec = _dated(spec, at_s)
+    spec = _valid_at(spec, at_s)
     own = sorted((c for c in changes if c.loop == spec.loop), key=lambda c: c.time_s)
     changed = {}
     for kind in ("kp", "ti"):
@@ -199,7 +199,7 @@ def settings_from(spec: LoopSpec, changes: Sequence[TuningChange], at_s: float, 
     now = in_force(spec, changes, at_s)
     if now.kp is None and now.ti is None:
         return ""
-    dated = _dated(spec, at_s)
+    dated = _valid_at(spec, at_s)
     own = sorted((c for c in changes if c.loop == spec.loop), key=lambda c: c.time_s)
     last_s = max((c.time_s for c in own if c.time_s <= at_s), default=None)
     if (now.kp, now.ti) != (dated.kp, dated.ti) and last_s is None:

@@ -149,10 +149,10 @@ def read_loops(path: Path, zone: str = UTC_NAME, day_first: bool | None = None) 
     if not specs:
         raise InputError(f"{path}: no loops", "one row a loop below the header", "add the loops")
     _check_unique(path, specs)
-    return _dated([spec for _, spec in specs])
+    return _latest_rows([spec for _, spec in specs])
 
 
-def _dated(specs: Sequence[LoopSpec]) -> tuple[LoopSpec, ...]:
+def _latest_rows(specs: Sequence[LoopSpec]) -> tuple[LoopSpec, ...]:
     """Each loop once, its latest row with those before it."""
     rows: dict[str, list[LoopSpec]] = {}
     for spec in specs:
@@ -219,7 +219,7 @@ def _spec(path: Path, row: int, cells: Mapping[str, str], zone: str, day_first: 
     if "loop" not in filled:
         raise InputError(f"{path}, row {row}: no loop name", "a name in column 'loop'", "name the loop")
     given: dict[str, Any] = {name: filled[name] for name in (*TEXTS, *ROLES) if name in filled}
-    numbers = {name: _number(path, row, name, filled[name]) for name in NUMBERS if name in filled}
+    numbers = {name: _number_in_bounds(path, row, name, filled[name]) for name in NUMBERS if name in filled}
     given |= {name: value for name, value in numbers.items() if value != 0.0 or name not in OFF_IS_EMPTY}
     given |= {name: _choice(path, row, name, filled[name]) for name in CHOICES if name in filled}
     if VALID_FROM in filled:
@@ -232,7 +232,7 @@ def _spec(path: Path, row: int, cells: Mapping[str, str], zone: str, day_first: 
     return spec
 
 
-def _number(path: Path, row: int, name: str, cell: str) -> float:
+def _number_in_bounds(path: Path, row: int, name: str, cell: str) -> float:
     try:
         number = float(cell if "." in cell else cell.replace(",", "."))
     except ValueError:

@@ -92,7 +92,7 @@ def match(specs: Sequence[LoopSpec], tags: Iterable[str]) -> tuple[tuple[LoopSpe
     by_ending = loops_of(known)
     alone = tuple(_matched(spec, known, by_ending.get(spec.loop, {})) for spec in specs)
     by_loop = {spec.loop: spec for spec in alone}
-    matched = tuple(_beside(spec, by_loop, known) for spec in alone)
+    matched = tuple(_with_tags_beside(spec, by_loop, known) for spec in alone)
     notes = list(by_place)
     notes += [note for before, after in zip(specs, matched, strict=True) for note in _missing(before, after)]
     taken = {tag for spec in matched for tag in spec.tags}
@@ -127,7 +127,7 @@ def _matched(spec: LoopSpec, known: Mapping[str, None], found: Mapping[str, str]
     return replace(spec, **present, wanted_pv=wanted["pv"])
 
 
-def _beside(spec: LoopSpec, by_loop: Mapping[str, LoopSpec], known: Mapping[str, None]) -> LoopSpec:
+def _with_tags_beside(spec: LoopSpec, by_loop: Mapping[str, LoopSpec], known: Mapping[str, None]) -> LoopSpec:
     """A loop with the tags of those that it is judged beside, where the export has them."""
     beside = spec.override_with or spec.split_of
     other, fed = by_loop.get(beside) if beside != spec.loop else None, by_loop.get(spec.feedforward)

@@ -11,9 +11,12 @@ import json
 import math
 import uuid
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Set as AbstractSet
+from dataclasses import dataclass, fields, is_dataclass, replace
 from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
 
 from analyzer.belief.nights import held_pairs
 from analyzer.config import Config
@@ -26,11 +29,9 @@ from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import no_loops
 from analyzer.night import chunk
 from analyzer.night.chunk import Done, Task
-from analyzer.night.cluster import Cluster
 from analyzer.night.finish import finish_night, is_empty
 from analyzer.night.nights import Night, nights_of
-from analyzer.night.run_files import Identity, in_one_order, require_same
-from analyzer.night.workers import Died, Here, Workers, executor
+from analyzer.night.workers import Died, Executor, executor
 from analyzer.store.lock import locked
 from analyzer.store.store import Store
 from analyzer.store.table import OF_A_NIGHT
@@ -39,6 +40,8 @@ from identification.errors import InputError
 CHUNKS, FEWEST, MOST = 16, 4, 16
 """Tasks of a run that is small, and loops per task: enough to carry its four small tables, few enough for a smooth
 progress bar and for workers that end together."""
+Identity = Mapping[str, Any]
+"""A run as it is written down beside its pieces: fingerprint, and words for people (export, loops, begun)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,17 +107,9 @@ def _tasks(batch: Batch, nights: Sequence[Night], known: set[str]) -> list[Task]
     ]
 
 
-_Workers = Cluster[Task, Done] | Here[Task, Done] | Workers[Task, Done]
-
-
 def _results(tasks: Sequence[Task], jobs: int, config: Config, scheduler: str | None) -> Iterator[Done]:
     """What the chunks give, on a cluster, on worker processes or, with no jobs, in this process, unprotected."""
-    workers: _Workers
-    if scheduler is not None:
-        workers = Cluster(scheduler, chunk.work)
-    else:
-        workers = executor(jobs, len(tasks), chunk.work, config.workers)
-    with workers:
+    with executor(jobs, len(tasks), chunk.work, config.workers, scheduler) as workers:
         for task in tasks:
             workers.submit(task)
         for result in workers.results():
@@ -124,7 +119,7 @@ def _results(tasks: Sequence[Task], jobs: int, config: Config, scheduler: str | 
                 yield result
 
 
-def _mourned(workers: _Workers, died: Died[Task]) -> Iterator[Done]:
+def _mourned(workers: Executor[Task, Done], died: Died[Task]) -> Iterator[Done]:
     """The loop that was in hand is tried once alone, then given up with the reason; others go to other workers. Where
     it is not known which it was, each is tried by itself."""
     task, at = died.task, died.at
@@ -140,6 +135,43 @@ def _mourned(workers: _Workers, died: Died[Task]) -> Iterator[Done]:
         workers.submit(replace(task, specs=hand, key=f"{task.key}-alone", alone=True), alone=True)
     else:
         yield chunk.lose(replace(task, specs=hand, key=f"{task.key}-lost"), died.why)
+
+
+def in_one_order(value: object) -> bytes:
+    """A value as bytes that are the same in every process: sets and mappings sorted, dataclasses by their fields.
+
+    Raises
+    ------
+    TypeError
+        The value holds something whose text may differ between processes.
+    """
+    return json.dumps(value, sort_keys=True, default=_as_plain).encode()
+
+
+def _as_plain(value: Any) -> object:
+    if is_dataclass(value):
+        return [type(value).__name__, {f.name: getattr(value, f.name) for f in fields(value)}]
+    if isinstance(value, AbstractSet):
+        return sorted(value)
+    if isinstance(value, Mapping):
+        return dict(value)
+    raise TypeError(f"{type(value).__name__} has no stated order")
+
+
+def require_same(path: Path, run: Identity) -> None:
+    """Raise InputError where the pieces at `path` are of another run; nothing where there are none."""
+    try:
+        stopped = json.loads(path.read_text(encoding="utf-8"))
+        begun = f"{stopped['export']} ({stopped['loops']} loops, begun {stopped['begun']})"
+        same = stopped["fingerprint"] == run["fingerprint"]
+    except (OSError, ValueError, TypeError, KeyError, RecursionError):
+        return
+    if not same:
+        raise InputError(
+            f"the run that was stopped read {begun}, this one reads {run['export']} ({run['loops']} loops)",
+            "--resume with the same EXPORT, --loops, --changes, --since, --until, --config and version",
+            "give them again, or leave out --resume to give up what the stopped run had done",
+        )
 
 
 def identity(batch: Batch) -> Identity:

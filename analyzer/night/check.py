@@ -28,7 +28,7 @@ def _tags(spec: LoopSpec) -> str:
     return ", ".join(f"{role.upper()} {tag}" for role, tag in found if tag)
 
 
-def _fit(lacking: Needs | None, spec: LoopSpec, prepared: Prepared, config: Config) -> str:
+def _fit_for(lacking: Needs | None, spec: LoopSpec, prepared: Prepared, config: Config) -> str:
     """Which questions the record is fit for, in words, as a run judges it."""
     if lacking is not None:
         return f"fit for nothing: {lacking}"
@@ -53,12 +53,12 @@ def loop_line(export: Export, spec: LoopSpec, asked: Asked) -> tuple[str, bool]:
         return f"{spec.loop}: {_tags(spec)}; fit for nothing: {error}", True
     record = prepared.record
     lacking = unassessable(record, asked.config)
-    fit = _fit(lacking, spec, prepared, asked.config)
+    fit = _fit_for(lacking, spec, prepared, asked.config)
     parts = [_tags(spec), f"{len(record)} samples every {record.dt_s:g} s", *prepared.notes, fit]
     return f"{spec.loop}: " + "; ".join(parts), lacking is not None
 
 
-def _dated(changes: Sequence[TuningChange], specs: Sequence[LoopSpec]) -> str:
+def _changes_counted(changes: Sequence[TuningChange], specs: Sequence[LoopSpec]) -> str:
     """What the changes of settings are of."""
     here = {s.loop for s in specs}
     others = sorted({c.loop for c in changes} - here)
@@ -83,7 +83,7 @@ def check_lines(asked: Asked) -> Iterator[tuple[str, bool]]:
     if specs and specs[0].defaults:
         yield "assumed where loops.csv is silent: " + ", ".join(specs[0].defaults), False
     if specs and asked.changes:
-        yield _dated(asked.changes, specs), False
+        yield _changes_counted(asked.changes, specs), False
     for spec in specs:
         yield loop_line(export, in_force(spec, asked.changes, last), asked)
     for note in export.notes:

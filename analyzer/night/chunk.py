@@ -22,7 +22,7 @@ from analyzer.lanes.standing import standing
 from analyzer.loop.advice import Advice, advise
 from analyzer.loop.assess import Assessment, assess
 from analyzer.loop.conclusion import Lost, concluded
-from analyzer.loop.decisions import Action, Cause, Lack, LacksError, Status
+from analyzer.loop.decisions import Action, Cause, Lack, LacksError, Need, Needs, Status
 from analyzer.loop.finding import Cell, Finding
 from analyzer.loop.judged_stretch import Earlier, controller_of, earlier_settings
 from analyzer.loop.oscillation import counting
@@ -33,13 +33,13 @@ from analyzer.loop.witness import witness
 from analyzer.loops.changes import TuningChange, in_force, settings_from
 from analyzer.loops.spec import LoopSpec
 from analyzer.night.nights import Night, cut
-from analyzer.pages import compared as settings_page
+from analyzer.pages import compared as settings_pages
 from analyzer.plantwide.structure import Moves, moves_of, moves_table
 from analyzer.plantwide.wave import waves_table
 from analyzer.store.rows import hour_rows, piece_row
 from analyzer.store.store import Store
 from analyzer.store.table import rows_table, write_table
-from analyzer.words import settings as words
+from analyzer.words import units as words
 from identification.errors import NotAssessedError, TriageError
 from reports.page_file import dumps
 
@@ -156,22 +156,29 @@ def _settings_row(spec: LoopSpec, night: str, advice: Advice) -> list[dict[str, 
     """The page on which settings are compared, as a row, none where none were sought."""
     if advice.compared is None:
         return []
-    page = settings_page.page(spec.loop, night, advice.compared, spec)
+    page = settings_pages.settings_page(spec.loop, night, advice.compared, spec)
     return [{"loop": spec.loop, "night": night, "settings_page": dumps(page)}]
 
 
 def _lost(error: Exception, config: Config) -> Lost:
     """What is left of a loop that an error has ended."""
     if isinstance(error, LacksError):
-        return Lost(Status.NOT_ASSESSED, str(error), error.needs.lack)
+        return Lost(Status.NOT_ASSESSED, error.needs)
     if isinstance(error, NotAssessedError):
-        return Lost(Status.NOT_ASSESSED, str(error))
+        return Lost(Status.NOT_ASSESSED, _as_told(str(error)))
     if isinstance(error, TriageError):
-        return Lost(Status.FAILED, str(error))
+        return Lost(Status.FAILED, _as_told(str(error)))
     if isinstance(error, MemoryError):
         most = config.workers.memory_mb
-        return Lost(Status.FAILED, f"needs more memory than the {most:.0f} MB that one loop may take")
-    return Lost(Status.FAILED, f"{type(error).__name__}: {error}")
+        return Lost(
+            Status.FAILED, _as_told(f"needs more memory than the {most:.0f} MB that one loop may take")
+        )
+    return Lost(Status.FAILED, _as_told(f"{type(error).__name__}: {error}"))
+
+
+def _as_told(text: str) -> Needs:
+    """What an error says of itself."""
+    return Needs(None, Need.AS_TOLD, (text,))
 
 
 def _good_h(pv: Series | None) -> float:
@@ -180,11 +187,11 @@ def _good_h(pv: Series | None) -> float:
     return good * interval(pv.stamp_s) / 3600.0 if pv is not None and good > 1 else 0.0
 
 
-def _read(task: Task, spec: LoopSpec) -> dict[str, Series] | Lost:
+def _samples_of(task: Task, spec: LoopSpec) -> dict[str, Series] | Lost:
     """The loop's raw samples, or why there are none."""
     if spec.pv is None:
         wanted = spec.wanted_pv or f"{spec.loop}.PV"
-        return Lost(Status.NOT_ASSESSED, f"no PV tag {wanted} in the export", Lack.PV)
+        return Lost(Status.NOT_ASSESSED, Needs(Lack.PV, Need.PV_TAG, (wanted,)))
     try:
         return task.export.read(spec.tags)
     except Exception as error:  # a broken column is that loop's result
@@ -196,7 +203,7 @@ def work(task: Task, began: Callable[[int], None] = lambda at: None) -> Done:
     kept = {n.name: Rows() for n in task.nights}
     for at, spec in enumerate(task.specs):
         began(at)
-        series = _read(task, spec)
+        series = _samples_of(task, spec)
         for night in task.nights:
             if isinstance(series, Lost):
                 kept[night.name].nights.append(series.of(spec, night.name, timezone=night.zone))
@@ -211,7 +218,7 @@ def work(task: Task, began: Callable[[int], None] = lambda at: None) -> Done:
 
 def lose(task: Task, reason: str) -> Done:
     """Write the rows of a chunk that no worker could finish."""
-    lost = Lost(Status.FAILED, reason)
+    lost = Lost(Status.FAILED, _as_told(reason))
     for night in task.nights:
         loops = [lost.of(spec, night.name, timezone=night.zone) for spec in task.specs]
         _write_pieces(task, night.name, Rows(nights=loops))

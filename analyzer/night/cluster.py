@@ -10,9 +10,9 @@ import logging
 from collections.abc import Callable, Iterator
 from concurrent.futures import CancelledError
 from contextlib import contextmanager
-from typing import Any, Generic
+from typing import Any, Self
 
-from analyzer.night.workers import Died, R, T
+from analyzer.night.workers import Died, Executor, R, T
 from identification.errors import InputError
 
 CONNECT = "10s"
@@ -20,8 +20,8 @@ CONNECT = "10s"
 WHY = "ended several workers of the cluster"
 
 
-class Cluster(Generic[T, R]):
-    """The workers of a scheduler at an address, tcp://HOST:PORT, carry out one function on many tasks.
+class Cluster(Executor[T, R]):
+    """The workers of a scheduler at an address, tcp://HOST:PORT.
 
     Raises
     ------
@@ -34,7 +34,7 @@ class Cluster(Generic[T, R]):
         self._tasks: dict[Any, T] = {}
         self._coming: Any = None
 
-    def __enter__(self) -> Cluster[T, R]:
+    def __enter__(self) -> Self:
         try:
             from distributed import Client, as_completed
         except ImportError as error:
@@ -60,14 +60,12 @@ class Cluster(Generic[T, R]):
         self._client.close()
 
     def submit(self, task: T, alone: bool = False) -> None:
-        """Add a task."""
         with self._told():
             future = self._client.submit(self._function, task, pure=False)
             self._tasks[future] = task
             self._coming.add(future)
 
     def results(self) -> Iterator[R | Died[T]]:
-        """What comes back, as it comes."""
         from distributed import KilledWorker
 
         with self._told():

@@ -82,7 +82,7 @@ def finish_night(
     links = links_of(moves_in(store.read_parts(night, "moves", keys)), config.plant)
     loops = linked(traced, links, config.plant)
     rows = {loop: night_row(in_lanes(found, config.lanes)) for loop, found in loops.items()}
-    old = {} if replace else {r["loop"]: r for r in _held(store, "nights", night, NIGHTS)}
+    old = {} if replace else {r["loop"]: r for r in _rows_held(store, "nights", night, NIGHTS)}
     kept = {loop for loop, row in rows.items() if loop in old and fuller(old[loop], row, config.nights)}
     beside = [loop for loop in old if loop not in rows]
     joined = [old[k] if k in kept else rows[k] for k in order if k in rows] + [old[k] for k in beside]
@@ -93,29 +93,29 @@ def finish_night(
     store.write("nights", night, rows_table(joined, NIGHTS))
     store.forget_explained(night, None if replace else mine)
     store.forget_compared()
-    return (*settle(store, night, config), *_told(night, rows, old, kept, beside))
+    return (*settle(store, night, config), *_joining_told(night, rows, old, kept, beside))
 
 
 def _join_others(store: Store, night: str, keys: Sequence[str], mine: Sequence[str], replace: bool) -> None:
     """Join the tables beside that of the night, one at a time: trends are most of a night."""
     for name in JOINED:
         before = None if replace else store.read_if_there(name, night)
-        store.write(name, night, _joined(before, store.read_parts(night, name, keys), mine))
+        store.write(name, night, _joined_table(before, store.read_parts(night, name, keys), mine))
 
 
-def _held(store: Store, table: str, night: str, columns: Sequence[Column]) -> list[dict[str, Any]]:
+def _rows_held(store: Store, table: str, night: str, columns: Sequence[Column]) -> list[dict[str, Any]]:
     """The rows that the store has of a night, none where it has no such table."""
     return store.own_rows(table, night, names(columns)) if store.file(table, night).exists() else []
 
 
 def _other_groups(store: Store, night: str, mine: Container[str]) -> list[dict[str, Any]]:
     """The groups that the store has of a night and that hold none of these loops."""
-    rows = _held(store, "groups", night, GROUPS)
+    rows = _rows_held(store, "groups", night, GROUPS)
     gone = {r["group"] for r in rows if r["loop"] in mine}
     return [r for r in rows if r["group"] not in gone]
 
 
-def _joined(before: pa.Table | None, piece: pa.Table | None, mine: Sequence[str]) -> pa.Table | None:
+def _joined_table(before: pa.Table | None, piece: pa.Table | None, mine: Sequence[str]) -> pa.Table | None:
     """Rows of a table of the store, those of some loops taken from a piece."""
     tables = [] if before is None else [rows_of_loops(before, mine, others=True)]
     tables += [] if piece is None else [rows_of_loops(piece, mine)]
@@ -123,7 +123,7 @@ def _joined(before: pa.Table | None, piece: pa.Table | None, mine: Sequence[str]
     return pa.concat_tables(tables, promote_options="default").unify_dictionaries() if tables else None
 
 
-def _told(
+def _joining_told(
     night: str, rows: Mapping[str, Row], old: Mapping[str, Row], kept: set[str], beside: Sequence[str]
 ) -> tuple[str, ...]:
     """What is worth saying of a night that was there already."""

@@ -30,7 +30,7 @@ class Night:
     zone: str = UTC_NAME
 
 
-def _named(first_s: float, last_s: float, zone: str) -> Night:
+def _night_of_middle(first_s: float, last_s: float, zone: str) -> Night:
     return Night(date_of((first_s + last_s) / 2, zone), first_s, last_s, zone)
 
 
@@ -53,10 +53,10 @@ def daily(first_s: float, last_s: float, limits: NightLimits, zone: str = UTC_NA
     cuts = midnights(first_s, last_s, zone)
     inner = [c for c in cuts if c - first_s >= least_s and last_s - c >= least_s]
     edges = [first_s, *inner, last_s + 1.0]
-    return [_named(a, b, zone) for a, b in pairwise(edges)]
+    return [_night_of_middle(a, b, zone) for a, b in pairwise(edges)]
 
 
-def nights(spans: Sequence[tuple[float, float]], limits: NightLimits, zone: str = UTC_NAME) -> list[Night]:
+def in_nights(spans: Sequence[tuple[float, float]], limits: NightLimits, zone: str = UTC_NAME) -> list[Night]:
     """The nights of an export from the spans of its loops [s].
 
     Where the median loop has over whole_h (36 h), the export is cut into days; else each loop is assessed whole, in
@@ -68,7 +68,7 @@ def nights(spans: Sequence[tuple[float, float]], limits: NightLimits, zone: str 
     if lengths[len(lengths) // 2] > limits.whole_h * 3600.0:
         return daily(first, last, limits, zone)
     latest = max(spans, key=lambda s: s[1])
-    return [replace(_named(*latest, zone), first_s=first, last_s=last + 1.0)]
+    return [replace(_night_of_middle(*latest, zone), first_s=first, last_s=last + 1.0)]
 
 
 def cut(series: Series, night: Night) -> Series:
@@ -103,4 +103,4 @@ def nights_of(
     inside = [(max(a, since_s), min(b, until_s - 1.0)) for a, b in spans if a < until_s and b >= since_s]
     if not inside:
         raise InputError("no samples between --since and --until", "a span of the export", "widen it")
-    return nights(inside, limits, zone)
+    return in_nights(inside, limits, zone)

@@ -17,11 +17,12 @@ import sys
 import threading
 import time
 import warnings
+from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection, wait
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, Self, TypeVar
 
 from analyzer.config import WorkerLimits
 
@@ -50,25 +51,45 @@ class Died(Generic[T]):
     again: bool
 
 
+class Executor(ABC, Generic[T, R]):
+    """Who carries out one function on many tasks, for as long as it is entered."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    @abstractmethod
+    def __exit__(self, *_: object) -> None:
+        """Give up what is not done."""
+
+    @abstractmethod
+    def submit(self, task: T, alone: bool = False) -> None:
+        """Add a task; one that is to run alone waits until nothing else does that it might end."""
+
+    @abstractmethod
+    def results(self) -> Iterator[R | Died[T]]:
+        """What comes back, as it comes, until no task is left; tasks may be added meanwhile.
+
+        Raises
+        ------
+        Exception
+            Whatever the function raised: an error of an item is the function's business.
+        """
+
+
 @dataclass(slots=True)
-class Here(Generic[T, R]):
-    """This process carries out the tasks, one after the other, unprotected; used as `Workers` are."""
+class Here(Executor[T, R]):
+    """This process carries out the tasks, one after the other, unprotected."""
 
     function: Callable[[T], R]
     _waiting: deque[T] = field(default_factory=deque)
-
-    def __enter__(self) -> Here[T, R]:
-        return self
 
     def __exit__(self, *_: object) -> None:
         self._waiting.clear()
 
     def submit(self, task: T, alone: bool = False) -> None:
-        """Add a task."""
         self._waiting.append(task)
 
     def results(self) -> Iterator[R | Died[T]]:
-        """What comes back, task by task."""
         while self._waiting:
             yield self.function(self._waiting.popleft())
 
@@ -87,8 +108,8 @@ class _Worker:
 
 
 @dataclass(slots=True)
-class Workers(Generic[T, R]):
-    """Some processes that carry out one function on many tasks, for as long as they are entered.
+class Workers(Executor[T, R]):
+    """Some processes of this machine.
 
     Parameters
     ----------
@@ -106,9 +127,6 @@ class Workers(Generic[T, R]):
     _alone: deque[T] = field(default_factory=deque)
     _workers: list[_Worker] = field(default_factory=list)
 
-    def __enter__(self) -> Workers[T, R]:
-        return self
-
     def __exit__(self, *_: object) -> None:
         """End all processes at once, whatever they are at."""
         for worker in self._workers:
@@ -119,17 +137,9 @@ class Workers(Generic[T, R]):
         self._workers.clear()
 
     def submit(self, task: T, alone: bool = False) -> None:
-        """Add a task; those that are to run alone wait until nothing else does."""
         (self._alone if alone else self._waiting).append(task)
 
     def results(self) -> Iterator[R | Died[T]]:
-        """What comes back, as it comes, until no task is left; tasks may be added meanwhile.
-
-        Raises
-        ------
-        Exception
-            Whatever the function raised: an error of an item is the function's business.
-        """
         while self._waiting or self._alone or any(w.busy for w in self._workers):
             self._feed()
             yield from self._gathered()
@@ -190,9 +200,14 @@ class Workers(Generic[T, R]):
 
 
 def executor(
-    jobs: int, tasks: int, function: Callable[..., R], limits: WorkerLimits
-) -> Here[Any, R] | Workers[Any, R]:
-    """Worker processes for so many tasks; this process where there are to be no jobs."""
+    jobs: int, tasks: int, function: Callable[..., R], limits: WorkerLimits, scheduler: str | None = None
+) -> Executor[Any, R]:
+    """The cluster of a scheduler, else worker processes for so many tasks, or this process where there are to be no
+    jobs."""
+    if scheduler is not None:
+        from analyzer.night.cluster import Cluster  # it is one of these
+
+        return Cluster(scheduler, function)
     return Workers(min(jobs, max(tasks, 1)), function, limits) if jobs else Here(function)
 
 

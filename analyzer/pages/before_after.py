@@ -60,7 +60,7 @@ TREND_BUCKETS = 4000
 """Buckets of a trend on this page: two weeks at two pixels a bucket, 64 kB a loop; ours."""
 
 
-def _tiles(cases: Sequence[ChangeCase]) -> Tiles:
+def _outcome_tiles(cases: Sequence[ChangeCase]) -> Tiles:
     known = texts("outcomes")
     found = [known[grade(c.found)] for c in cases]
     counts = {o["tile"]: (sum(x["tile"] == o["tile"] for x in found), o["tone"]) for o in known.values()}
@@ -106,7 +106,7 @@ def _setting(value: float | None) -> str:
     return "–" if value is None else f"{value:g}"
 
 
-def _settings(case: ChangeCase) -> str:
+def _settings_typed(case: ChangeCase) -> str:
     change, row = case.change, case.row
     if change.kp_new is None and change.ti_new is None:
         return change.seen or "not stated"
@@ -123,7 +123,7 @@ def _in_short(case: ChangeCase) -> tuple[Cell, ...]:
     return (
         Cell(case.found.loop, kind="strong"),
         cell(case.row, "description"),
-        Cell(_settings(case)),
+        Cell(_settings_typed(case)),
         *(_change_cell(by_name.get(m.name)) for m in PRIMARY),
         Cell(outcome(case.found), kind=kind),
     )
@@ -136,7 +136,7 @@ def _change_cell(change: Change | None) -> Cell:
     return Cell(f"{signed(change.value_pct)} ({low} … {high})", change.value_pct, KINDS[change.verdict])
 
 
-def in_short(cases: Sequence[ChangeCase]) -> Table:
+def changes_in_short(cases: Sequence[ChangeCase]) -> Table:
     """A row a loop."""
     note = "Change of each figure in % of what it was before, with its interval; less is better in all four."
     *first, last = page_columns("changes")
@@ -145,7 +145,7 @@ def in_short(cases: Sequence[ChangeCase]) -> Table:
     return Table("loops", "", (*first, *four, last), tuple(map(_in_short, cases)), note, cards=True)
 
 
-def _span(first_s: float, last_s: float, usable_h: float, zone: str) -> str:
+def _span_text(first_s: float, last_s: float, usable_h: float, zone: str) -> str:
     return f"{stamp(first_s, zone)} to {stamp(last_s, zone)} {zone}, {usable_h:.0f} usable hours"
 
 
@@ -153,10 +153,10 @@ def loop_section(case: ChangeCase, number_: int, zone: str = UTC_NAME) -> Sectio
     """What became of one loop: settings, spans, remarks, trends (the study's Figure 10)."""
     found, change = case.found, case.change
     facts = (
-        ("Settings", _settings(case)),
+        ("Settings", _settings_typed(case)),
         ("Changed", f"{stamp(change.time_s, zone)} {zone}" + (f" by {change.who}" if change.who else "")),
-        ("Before", _span(found.before.first_s, found.before.last_s, found.hours[0], zone)),
-        ("After", _span(found.after.first_s, found.after.last_s, found.hours[1], zone)),
+        ("Before", _span_text(found.before.first_s, found.before.last_s, found.hours[0], zone)),
+        ("After", _span_text(found.after.first_s, found.after.last_s, found.hours[1], zone)),
     )
     text = outcome(found)
     blocks: list[Block] = [Text((text[:1].upper() + text[1:] + ".",), "lead"), Facts(facts)]
@@ -223,7 +223,7 @@ def _method(limits: ComparisonLimits) -> Section:
 OFFERED = "These changes were not stated but seen in the loops' behaviour: confirm them first."
 
 
-def page(
+def changes_page(
     cases: Sequence[ChangeCase],
     missing: Sequence[tuple[str, str]],
     subtitle: str,
@@ -232,7 +232,7 @@ def page(
 ) -> Page:
     """The page of all changes on the plant's clock; `missing` could not be looked at, with the reason."""
     short: list[Block] = [Text((OFFERED,))] if offered else []
-    short += [_tiles(cases), in_short(cases)]
+    short += [_outcome_tiles(cases), changes_in_short(cases)]
     if missing:
         short.append(Listing(tuple((loop, f"not looked at: {why}") for loop, why in missing)))
     comparable = [

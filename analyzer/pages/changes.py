@@ -127,7 +127,7 @@ def _stated(row: Row, name: str) -> float | None:
     return value if math.isfinite(value) and value > 0 else None
 
 
-def _change(found: LoopComparison, name: str) -> Change | None:
+def _clear_change(found: LoopComparison, name: str) -> Change | None:
     """The change of a figure, where it is clear."""
     unclear = (ChangeVerdict.INCOMPARABLE, ChangeVerdict.UNCLEAR)
     return next((c for c in found.changes if c.measure.name == name and c.verdict not in unclear), None)
@@ -141,11 +141,11 @@ def wear_texts(found: LoopComparison, row: Row) -> tuple[str, ...]:
     cost_per_error_pct_h : what one percent of average absolute error costs an hour [cost_unit]
     """
     texts = []
-    travel, life = _change(found, "valve_travel_pct_per_h"), _stated(row, "valve_life_travel_pct")
+    travel, life = _clear_change(found, "valve_travel_pct_per_h"), _stated(row, "valve_life_travel_pct")
     if travel is not None and life is not None:
         a, b = (life / max(v, 1e-9) / HOURS_A_YEAR for v in (travel.found.before, travel.found.after))
         texts.append(f"Valve life at this travel: {number(a)} years before, {number(b)} years after.")
-    error, cost = _change(found, "average_absolute_error_pct"), _stated(row, "cost_per_error_pct_h")
+    error, cost = _clear_change(found, "average_absolute_error_pct"), _stated(row, "cost_per_error_pct_h")
     if error is not None and cost is not None:
         unit = json.loads(row.get("extra") or "{}").get("cost_unit", "") or "units of cost"
         low, high = (number(-end * cost * HOURS_A_YEAR) for end in (error.found.high, error.found.low))

@@ -129,18 +129,18 @@ def choices(c: Comparison, spec: LoopSpec) -> list[str]:
 def _priced(c: Comparison, name: str) -> str:
     """What settings win and cost on that of all loops that the data allow where each is worst, and on a load step."""
     found = c.everywhere[name]
-    worst = f"travel {_change(found.worst_travel)}, error {_change(found.worst_error)} at worst"
-    return f"{worst}, a load step goes {number(c.peaks[name])} times as far"
+    travel, error = (_against_now_pct(x) for x in (found.worst_travel, found.worst_error))
+    return f"travel {travel}, error {error} at worst, a load step goes {number(c.peaks[name])} times as far"
 
 
 def _against_now(c: Comparison, t: Tried) -> str:
     """Change of travel and error against the present settings, on the identified loop."""
     now = c.tried[0]
     travel, error = t.stem_travel / max(now.stem_travel, 1e-9), t.error / max(now.error, 1e-9)
-    return f"travel {_change(travel)}, error {_change(error)}"
+    return f"travel {_against_now_pct(travel)}, error {_against_now_pct(error)}"
 
 
-def _change(ratio: float) -> str:
+def _against_now_pct(ratio: float) -> str:
     """A change against now; of what hardly is now no percentage."""
     if ratio > PAGES.many_times:
         return f"over {PAGES.many_times:g} times"
@@ -156,7 +156,7 @@ def _times(t: Tried, now: Tried) -> float | None:
 def table(c: Comparison, spec: LoopSpec, unit: str) -> Table:
     """The settings with what they do on the load."""
     shown = (*c.tried, *((c.repaired,) if c.repaired is not None else ()))
-    rows = tuple(_row(t, c, spec, unit) for t in shown)
+    rows = tuple(_tried_row(t, c, spec, unit) for t in shown)
     lasts = duration(c.load.size * scan_step(c.loop))
     note = (
         f"Each simulated on the {lasts} of load that the night leaves behind the identified loop. {CAUTION}"
@@ -166,10 +166,10 @@ def table(c: Comparison, spec: LoopSpec, unit: str) -> Table:
     return Table("settings", "", page_columns("settings"), rows, note, cards=True)
 
 
-def _row(t: Tried, c: Comparison, spec: LoopSpec, unit: str) -> tuple[Cell, ...]:
+def _tried_row(t: Tried, c: Comparison, spec: LoopSpec, unit: str) -> tuple[Cell, ...]:
     scale, now, (kp, ti) = c.pv_span / 100.0, c.tried[0], c.stated.get(t.name, c.stated[NOW])
     found = c.everywhere.get(t.name) if t is not now else None
-    worst = "" if found is None else f"{_change(found.worst_travel)}, {_change(found.worst_error)}"
+    worst = "" if found is None else ", ".join(map(_against_now_pct, (found.worst_travel, found.worst_error)))
     ms = "unstable" if math.isinf(t.ms) else f"{t.ms:.2f}"
     derivative = f", {_td(c, t.name, spec)}" if t.name == DERIVATIVE else ""
     return (
@@ -311,7 +311,7 @@ def model(c: Comparison, spec: LoopSpec, unit: str) -> str:
     )
 
 
-def page(loop: str, night: str, c: Comparison, spec: LoopSpec) -> Page:
+def settings_page(loop: str, night: str, c: Comparison, spec: LoopSpec) -> Page:
     """A loop's page of settings."""
     known = spec.pv_lo is not None and spec.pv_hi is not None
     unit = (spec.pv_unit or "own unit") if known else "%"

@@ -140,11 +140,11 @@ MEMBERS = (
 
 
 def _members(g: GroupView, paged: frozenset[str]) -> Table:
-    rows = tuple(_member(g, r, paged) for r in g.rows)
+    rows = tuple(_member_cells(g, r, paged) for r in g.rows)
     return Table("members", "", MEMBERS, rows, "Lags that the night cannot tell are left empty.", cards=True)
 
 
-def _member(g: GroupView, row: Row, paged: frozenset[str]) -> tuple[Cell, ...]:
+def _member_cells(g: GroupView, row: Row, paged: frozenset[str]) -> tuple[Cell, ...]:
     name, pct = row["loop"], row["source_pct"]
     return (
         Cell(name, kind="strong", href=f"{slug(name)}.html" if name in paged else ""),
@@ -155,7 +155,7 @@ def _member(g: GroupView, row: Row, paged: frozenset[str]) -> tuple[Cell, ...]:
     )
 
 
-def _signs(g: GroupView) -> Table:
+def _signs_table(g: GroupView) -> Table:
     """Why there: the signs of the likeliest candidates side by side."""
     shown = [r for r in g.rows[:5] if r["group_signs"]]
     sign = Column("sign", "Sign", wide=True)
@@ -169,7 +169,7 @@ def _signs(g: GroupView) -> Table:
     return Table("signs", "", heads, rows, note)
 
 
-def page(g: GroupView, trends: Mapping[str, Thinned], night: str, paged: frozenset[str]) -> Page:
+def group_page(g: GroupView, trends: Mapping[str, Thinned], night: str, paged: frozenset[str]) -> Page:
     """A group's page."""
     facts = [("Period", duration(g.period_s)), ("Loops", str(len(g.rows)))]
     if g.source is not None:
@@ -182,7 +182,7 @@ def page(g: GroupView, trends: Mapping[str, Thinned], night: str, paged: frozens
     sections = (
         Section("What and where", (Text((f"{sentence(g)}.",), "lead"), Facts(tuple(facts)), graph(g))),
         Section("Loops", (_members(g, paged),)),
-        Section("Why there", (_signs(g),)),
+        Section("Why there", (_signs_table(g),)),
         *((Section("Trends and spectra", tuple(pictures)),) if pictures else ()),
     )
     subtitle = f"{with_noun(len(g.rows), 'loop')}, night {night}."

@@ -94,7 +94,7 @@ COLUMNS = (
 """What a loop's page reads of the table of nights."""
 
 
-def _known(row: Row, names: Sequence[str]) -> tuple[tuple[str, str], ...]:
+def _known_figures(row: Row, names: Sequence[str]) -> tuple[tuple[str, str], ...]:
     """Figures that the night knows, with their titles and units."""
     return tuple(titled(name, number(row[name])) for name in names if row[name] is not None)
 
@@ -105,7 +105,7 @@ def _facts(row: Row) -> Facts:
     facts += [titled(f"osc_{c}_pct", f"{share:.0f}") for c, share in shares if share is not None]
     fault = () if row["valve_fault"] == Fault.NONE else ("valve_fault",)
     facts += [titled(name, row[name]) for name in (*fault, *BUILT) if row[name]]
-    facts += _known(row, SHARED)
+    facts += _known_figures(row, SHARED)
     if row["period_s"] is not None:
         facts.append(("Period", duration(row["period_s"])))
         facts.append(titled("pv_amplitude_pct", number(row["pv_amplitude_pct"])))
@@ -122,7 +122,7 @@ def _notes(notes: Sequence[str]) -> tuple[Section, ...]:
     return (Section("Notes", (Listing(tuple(("", n) for n in reversed(notes))),)),) if notes else ()
 
 
-def _first(row: Row, thin: Thinned | None) -> Section:
+def _first_section(row: Row, thin: Thinned | None) -> Section:
     """What is wrong, what to do in three lines, and ten periods of it."""
     reason = cell(row, "reason").text or "nothing was found"
     blocks: list[Block] = [Text((reason[:1].upper() + reason[1:] + ".",), "lead")]
@@ -139,13 +139,13 @@ def _first(row: Row, thin: Thinned | None) -> Section:
     return Section("What to do", tuple(blocks))
 
 
-def _verdict(row: Row) -> Section:
+def _verdict_section(row: Row) -> Section:
     """What was found, and on how many nights it rests."""
     believed = (Facts(_believed(row)),) if row["believed_nights"] else ()
     return Section("What and why", (_facts(row), *believed))
 
 
-def _evidence(row: Row) -> Section:
+def _evidence_section(row: Row) -> Section:
     signs = sorted(json.loads(row["signs"] or "[]"), key=lambda s: -s["strength"])
     rows = tuple(
         (
@@ -161,7 +161,7 @@ def _evidence(row: Row) -> Section:
     more = in_short(row["reason"] or "")[1]
     if more:
         blocks.insert(0, Text((more[:1].upper() + more[1:] + ".",)))
-    known = _known(row, (*MODEL, *LIKELIHOOD))
+    known = _known_figures(row, (*MODEL, *LIKELIHOOD))
     if known:
         blocks.append(Facts(known))
     if row["advice"]:
@@ -171,7 +171,7 @@ def _evidence(row: Row) -> Section:
     return Section("Evidence, for experts", tuple(blocks), closed=True)
 
 
-def _figure(name: str, row: Row, scale: PvScale) -> tuple[str, str]:
+def _figure_with_unit(name: str, row: Row, scale: PvScale) -> tuple[str, str]:
     """A figure with its unit, and in the loop's own unit too where it is a percentage of span."""
     term, text = titled(name, number(row[name]) + mark(row, name))
     own = "" if name in LEVELS else beside(BY_NAME[name].unit, row[name], scale)
@@ -184,7 +184,7 @@ def _moves(row: Row) -> list[Section]:
     if drawn is None:
         return []
     names = ("sp_moves", "rise_time_s", "overshoot_pct", "settling_time_s")
-    facts = Facts(_known(row, names))
+    facts = Facts(_known_figures(row, names))
     growing = [Text((row["growing"] + ".",), "lead")] if row["growing"] else []
     return [Section("Moves of the set point", (*growing, facts, drawn, *_phases(row)))]
 
@@ -215,7 +215,7 @@ def _limit_cycle(row: Row) -> list[Section]:
     return [Section("Limit cycle", (Table("limit-cycle", "", page_columns("limit-cycle"), rows),))]
 
 
-def _trends(thin: Thinned | None, row: Row) -> list[Section]:
+def _picture_sections(thin: Thinned | None, row: Row) -> list[Section]:
     if thin is None or thin.time_s.size < 2:
         return []
     last = thin.between(row["start_s"] or 0.0, float("inf"))
@@ -223,7 +223,7 @@ def _trends(thin: Thinned | None, row: Row) -> list[Section]:
     return [Section("PV over OP, and its rhythm", pictures)]
 
 
-def _night(row: Row) -> tuple[Cell, ...]:
+def _night_cells(row: Row) -> tuple[Cell, ...]:
     """One night's cells; the last says why where the loop was not assessed."""
     lost = {} if row["status"] == Status.OK else {"action": Cell(f"{row['status']}: {row['reason']}")}
     return cells(row, page_columns("history"), **lost)
@@ -235,7 +235,7 @@ def nights_section(rows: Sequence[Row]) -> Section:
     drawn = (*(_over_nights(rows, column) for column in OVER_NIGHTS), _widths(rows))
     plots = tuple(p for p in drawn if p is not None)
     pictures = (Panels("nights", "Night by night", plots),) if plots else ()
-    table = Table("history", "", page_columns("history"), tuple(map(_night, reversed(rows))))
+    table = Table("history", "", page_columns("history"), tuple(map(_night_cells, reversed(rows))))
     return Section("Over the nights", (*pictures, table))
 
 
@@ -288,7 +288,7 @@ def _own_width(row: Row) -> float | None:
     return found[0] if found else None
 
 
-def _explained(found: Row | None, row: Row) -> list[Section]:
+def _explained_section(found: Row | None, row: Row) -> list[Section]:
     """What the plain loop lacks, where the night was explained, and how that goes with the night's verdict."""
     if found is None:
         return []
@@ -298,7 +298,7 @@ def _explained(found: Row | None, row: Row) -> list[Section]:
     return [Section("What the plain loop lacks", (text,))]
 
 
-def page(
+def loop_page(
     rows: Sequence[Row],
     thin: Thinned | None,
     explained: Row | None = None,
@@ -328,13 +328,13 @@ def page(
     """
     row = rows[-1]
     sections = [
-        _first(row, thin),
+        _first_section(row, thin),
         *_notes(notes),
-        _verdict(row),
+        _verdict_section(row),
         *(() if shared is None else (shared,)),
-        *_explained(explained, row),
-        _evidence(row),
-        *_trends(thin, row),
+        *_explained_section(explained, row),
+        _evidence_section(row),
+        *_picture_sections(thin, row),
         *_moves(row),
         *_limit_cycle(row),
         *(() if settings is None else (_of_settings(settings),)),
@@ -342,7 +342,7 @@ def page(
         nights_section(rows),
     ]
     group = None if shared is None else row["group"]
-    links = (ALL_LOOPS, *_links(more, settings, group), *_beside_source(row))
+    links = (ALL_LOOPS, *_links_beside(more, settings, group), *_beside_source(row))
     return Page(slug(row["loop"]), row["loop"], _subtitle(row), tuple(sections), links)
 
 
@@ -355,7 +355,7 @@ def _of_settings(found: Page) -> Section:
 def _figures(row: Row) -> Section:
     """The figures of the night that are known, folded."""
     scale = pv_scale_of(row)
-    figures = tuple(_figure(k, row, scale) for k in FIGURES if row[k] is not None)
+    figures = tuple(_figure_with_unit(k, row, scale) for k in FIGURES if row[k] is not None)
     return Section("Figures of the night, for experts", (Facts(figures),), closed=True)
 
 
@@ -373,7 +373,7 @@ def _beside_source(row: Row) -> Iterator[tuple[str, str]]:
         yield f"Beside {source}", f"{BESIDE}.html#{pair}"
 
 
-def _links(more: Page | None, settings: Page | None, group: str | None) -> Iterator[tuple[str, str]]:
+def _links_beside(more: Page | None, settings: Page | None, group: str | None) -> Iterator[tuple[str, str]]:
     """To the loop's other pages and to its group's."""
     if more is not None:
         yield "The explanation", f"{more.name}.html"

@@ -73,7 +73,7 @@ def sparkline(thin: Thinned, span: tuple[float, float] | None = None) -> Sparkli
     return Sparkline(known.extremes["pv_min"][shown], known.extremes["pv_max"][shown])
 
 
-def _held(middle: float, scale: PvScale) -> tuple[float, float]:
+def _least_ends(middle: float, scale: PvScale) -> tuple[float, float]:
     """Ends that an axis of PV around a value reaches at least."""
     half = 0.5 * LEAST_PCT * scale.span / 100.0
     return middle - half, middle + half
@@ -87,7 +87,7 @@ def pv_over_op(thin: Thinned, row: Row) -> Plot:
     line = Line("PV over OP", op, pv, joined=close is not None)
     caption = "A cloud along a line: a sound valve. An ellipse or a parallelogram: lag, play or stick-slip."
     title = "PV over OP, " + ("the last ten periods" if close else "the last night")
-    reach = _held(float(np.median(pv)) if pv.size else 0.0, scale)
+    reach = _least_ends(float(np.median(pv)) if pv.size else 0.0, scale)
     return Plot("pv-op", title, "OP [%]", f"PV [{scale.label}]", (line,), (), caption, reach=reach)
 
 
@@ -99,7 +99,7 @@ def rhythm_plots(thin: Thinned, period_s: float | None) -> tuple[Plot | Text, ..
     if period_s is not None and period_s < LEAST_BUCKETS * step:
         text = f"The stored trend, a bucket each {step:.0f} s, cannot show a period of {duration(period_s)}."
         return (Text((text,), "note"),)
-    return _correlation(error, step, period_s), _spectrum(error, step, period_s)
+    return _correlation(error, step, period_s), _spectrum_plot(error, step, period_s)
 
 
 def _even_error(time_s: Floats, error: Floats, known: Mask) -> tuple[Floats, float]:
@@ -128,7 +128,7 @@ def _correlation(error: Floats, step: float, period_s: float | None) -> Plot:
     return Plot("autocorrelation", "Autocorrelation of the error", "lag [min]", "–", (line,), marks, caption)
 
 
-def _spectrum(error: Floats, step: float, period_s: float | None) -> Plot:
+def _spectrum_plot(error: Floats, step: float, period_s: float | None) -> Plot:
     """The share of the error's power at each frequency, by Welch's periodogram (1967)."""
     from scipy.signal import welch  # its import takes longer than a page
 
@@ -152,7 +152,7 @@ def turn_panels(row: Row, scale: PvScale) -> Panels | None:
     pv, minutes = f"PV [{scale.label}]", "min since OP's turn"
     paths = zip(*(_half_cycle(h, scale, kept["step_s"]) for h in kept["halves"]), strict=True)
     op_lines, pv_lines, plane = map(_laid_over, paths)
-    reach = _held(float(np.median(plane[0].y)), scale)
+    reach = _least_ends(float(np.median(plane[0].y)), scale)
     plots = (
         Plot("turns-op", "OP since its turn", minutes, "OP [%]", op_lines, reach=(0.0, 0.0)),
         Plot("turns-pv", "PV since OP's turn", minutes, pv, pv_lines, reach=(0.0, 0.0)),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from analyzer.lanes.lanes import lanes_in
 from analyzer.limits import PAGES
 from analyzer.loop.decisions import Action, Cause, Fault, Lane, Status
-from analyzer.pages.reading import ShownNight, linked
+from analyzer.pages.reading import ShownNight, link_to
 from analyzer.pages.words import ALL_LOOPS, Row, cells, duration, page_columns, plain_cell, texts, with_noun
 from analyzer.words.belief import wear_text
 from analyzer.words.units import changed_settings
@@ -14,14 +14,14 @@ from reports.pages import Cell, Page, Section, Table
 NAME = "maintenance"
 
 
-def _width(row: Row) -> float | None:
+def _fault_width(row: Row) -> float | None:
     """Stickband or play [% of OP]; None where there is none."""
     return row["stickband_pct"] or row["backlash_pct"] or None
 
 
 def _answer(row: Row) -> str:
     """What a valve at fault does in a stroke test; '' where it does not answer."""
-    width, kind = _width(row), texts("by_hand").get(row["valve_fault"], "")
+    width, kind = _fault_width(row), texts("by_hand").get(row["valve_fault"], "")
     return kind.format(width=width) if width else ""
 
 
@@ -32,7 +32,7 @@ def valve_test(row: Row) -> str:
 
 
 def _step(row: Row) -> str:
-    return f"{(_width(row) or 0.0) / PAGES.stroke_steps:.2g}"
+    return f"{(_fault_width(row) or 0.0) / PAGES.stroke_steps:.2g}"
 
 
 def _case(row: Row) -> str:
@@ -86,7 +86,7 @@ def wearing(night: ShownNight) -> Table:
     rows = [r for r in night.rows if r["wear_pct_per_month"] is not None]
     rows.sort(key=lambda r: -r["wear_pct_per_month"])
     shown = page_columns("wear")
-    told = tuple(cells(r, shown, loop=linked(night, r["loop"]), forecast=Cell(wear_text(r))) for r in rows)
+    told = tuple(cells(r, shown, loop=link_to(night, r["loop"]), forecast=Cell(wear_text(r))) for r in rows)
     note = "Play or stickband by all nights; growth, its night of beginning and the forecast with 90 % ends."
     return Table("wear", "", shown, told, note, cards=True)
 
@@ -94,22 +94,22 @@ def wearing(night: ShownNight) -> Table:
 def faulty(night: ShownNight) -> Table:
     """Valves at fault, those to be repaired first, then by width."""
     rows = [r for r in night.rows if r["status"] == Status.OK and is_at_fault(r)]
-    rows.sort(key=lambda r: (r["action"] != Action.REPAIR_VALVE, -(_width(r) or 0.0)))
+    rows.sort(key=lambda r: (r["action"] != Action.REPAIR_VALVE, -(_fault_width(r) or 0.0)))
     note = (
         "Test: in manual, with the process calm, move OP in steps, four up and four down, and wait each time; "
         "then look at positioner feedback, linkage, packing and actuator. "
         "With new settings a loop can wait for the shutdown."
     )
     shown = page_columns("valves")
-    told = tuple(cells(r, shown, **_of_valve(night, r)) for r in rows)
+    told = tuple(cells(r, shown, **_valve_cells(night, r)) for r in rows)
     return Table("valves", "", shown, told, note, cards=True)
 
 
-def _of_valve(night: ShownNight, row: Row) -> dict[str, Cell]:
+def _valve_cells(night: ShownNight, row: Row) -> dict[str, Cell]:
     """What the store does not hold as a valve's row shows it."""
     fault = row["valve_fault"]
     return {
-        "loop": linked(night, row["loop"]),
+        "loop": link_to(night, row["loop"]),
         "valve_fault": Cell("" if fault in (None, Fault.NONE) else fault, kind="valve"),
         "width": plain_cell(row["stickband_pct"] or row["backlash_pct"]),
         "test": Cell(valve_test(row)),
@@ -122,12 +122,12 @@ def worn(night: ShownNight) -> Table:
     rows = [r for r in night.rows if r["valve_travel_pct_per_h"] is not None]
     rows.sort(key=lambda r: -r["valve_travel_pct_per_h"])
     shown = page_columns("travel")
-    told = tuple(cells(r, shown, loop=linked(night, r["loop"])) for r in rows[: PAGES.travelled])
+    told = tuple(cells(r, shown, loop=link_to(night, r["loop"])) for r in rows[: PAGES.travelled])
     note = "Travel of OP, or of the stem where it is recorded; where the loop is tight, its settings wear the valve."
     return Table("travel", "", shown, told, note, cards=True)
 
 
-def page(night: ShownNight) -> Page:
+def maintenance_page(night: ShownNight) -> Page:
     """The sheet of a night."""
     first, growing, second = faulty(night), wearing(night), worn(night)
     sections = (

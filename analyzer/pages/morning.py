@@ -12,7 +12,7 @@ from analyzer.pages import maintenance
 from analyzer.pages.groups import morning_table
 from analyzer.pages.loop_pictures import close_span, sparkline
 from analyzer.pages.plant import NightSum, area_table, plant_history, plant_map
-from analyzer.pages.reading import BESIDE, ShownNight, linked, needs_a_look, oscillates
+from analyzer.pages.reading import BESIDE, ShownNight, link_to, needs_a_look, oscillates
 from analyzer.pages.summary import first_things, since
 from analyzer.pages.words import Row, cause_cell, cells, heading, marked_cell, page_columns, with_noun
 from analyzer.plantwide.view import GroupView
@@ -33,21 +33,21 @@ LINKS = (
 )
 
 
-def _settings(row: Row) -> str:
+def _settings_cell(row: Row) -> str:
     known = row["kp_new"] is not None or row["ti_new"] is not None
     return changed_settings(row) if known else row_settings(row)
 
 
 def _of_worst(night: ShownNight, row: Row, follows: bool, by: str) -> dict[str, Cell]:
     """What a loop to touch is shown with and the store does not hold."""
-    name, trend = linked(night, row["loop"]), night.trends.get(row["loop"])
+    name, trend = link_to(night, row["loop"]), night.trends.get(row["loop"])
     drawn = None if trend is None else sparkline(trend, close_span(row, trend))
     return {
         "loop": replace(name, text=FOLLOWER + name.text) if follows else name,
         "trend": Cell("", figure=drawn),
         by: marked_cell(row, by),
         "cause": cause_cell(row["cause"]),
-        "settings": Cell(_settings(row)),
+        "settings": Cell(_settings_cell(row)),
         "note": Cell(night.note(row["loop"])),
     }
 
@@ -67,7 +67,7 @@ def _of_all(night: ShownNight, row: Row) -> dict[str, Cell]:
     """What a loop is listed with and the store does not hold."""
     own = {name: marked_cell(row, name) for name in (SIGNIFICANCE, *ALL_COSTS)}
     own |= {name: marked_cell(row, name, ".0f") for name in ALL_SHARES}
-    return own | {"loop": linked(night, row["loop"]), "cause": cause_cell(row["cause"])}
+    return own | {"loop": link_to(night, row["loop"]), "cause": cause_cell(row["cause"])}
 
 
 def ranking(night: ShownNight) -> Table:
@@ -85,7 +85,7 @@ def waiting(night: ShownNight) -> list[tuple[str, str]]:
     return [(f"{r['loop']} waits:", night.note(r["loop"])) for r in rows]
 
 
-def _tiles(night: ShownNight) -> Tiles:
+def _night_tiles(night: ShownNight) -> Tiles:
     assessed = [r for r in night.rows if r["status"] == Status.OK]
     causes = [r["cause"] for r in assessed if needs_a_look(r)]
     items = [(f"{len(assessed)} of {len(night.rows)}", "loops assessed", "")]
@@ -103,7 +103,7 @@ def lost_table(night: ShownNight) -> Table:
     return Table("not-assessed", "", shown, rows, searchable=len(rows) > 12)
 
 
-def page(
+def morning_page(
     night: ShownNight,
     groups: Sequence[GroupView] = (),
     sums: Sequence[NightSum] = (),
@@ -117,7 +117,7 @@ def page(
     first = Listing((*(("", text) for text in first_things(seen, groups)), *waiting(night)))
     drawn, lost, together = plant_map(night), lost_table(night), morning_table(groups, bool(night.paged))
     sections = (
-        Section("First", (first, _tiles(night))),
+        Section("First", (first, _night_tiles(night))),
         since(night),
         Section("Loops worth a look", (worst_table(night),)),
         *([Section("One cause, several loops", (together,))] if groups else ()),

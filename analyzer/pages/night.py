@@ -23,7 +23,7 @@ BUCKETS = 720
 """Buckets of a trend beside others at most; ours: two minutes of a day, and some kilobytes a loop."""
 
 
-def pages(store: Store, name: str | None = None, top: int = 200) -> Iterator[Page]:
+def pages_of_night(store: Store, name: str | None = None, top: int = 200) -> Iterator[Page]:
     """The morning page of a night (the latest by default), its sheets, and the pages of its groups and loops.
 
     Raises
@@ -35,15 +35,15 @@ def pages(store: Store, name: str | None = None, top: int = 200) -> Iterator[Pag
     shared = read_groups(store, night.name)
     nights = [n for n in store.nights() if n <= night.name]
     links = nights_around(nights[-PAGES.dated :], night.name)
-    about = morning.page(night, shared, read_sums(store, night.name), links)
-    yield replace(about, choices=choices(nights[-PAGES.dated :], night.name))
-    yield maintenance.page(night)
+    about = morning.morning_page(night, shared, read_sums(store, night.name), links)
+    yield replace(about, choices=nights_to_choose(nights[-PAGES.dated :], night.name))
+    yield maintenance.maintenance_page(night)
     yield side_by_side(store, night)
-    yield work.page(store, night)
+    yield work.work_page(store, night)
     members = {r["loop"] for g in shared for r in g.rows[: PAGES.group_loops]}
     trends = read_trends(store, members, [night.name])
     for g in shared:
-        yield groups.page(g, trends, night.name, frozenset(night.paged))
+        yield groups.group_page(g, trends, night.name, frozenset(night.paged))
     yield from _loop_pages(store, night, nights[-PAGES.history :], shared, {**trends, **night.trends})
 
 
@@ -82,7 +82,7 @@ def _loop_pages(
         group = by_number.get(own[-1]["group"] or "")
         said = [n.said(night.zone) for n in night.notes.get(tag, ())]
         part = None if group is None else groups.member_section(group, tag, around)
-        about = loop.page(own, trends.get(tag), found, drawn, part, said, settings)
+        about = loop.loop_page(own, trends.get(tag), found, drawn, part, said, settings)
         yield about
         for more in (settings, drawn):
             if more is not None:
@@ -119,7 +119,7 @@ def nights_around(nights: Sequence[str], night: str) -> tuple[tuple[str, str], .
     return tuple((text, f"{name_of(nights[k])}.html") for text, k in around if 0 <= k < len(nights))
 
 
-def choices(nights: Sequence[str], night: str) -> tuple[tuple[str, str], ...]:
+def nights_to_choose(nights: Sequence[str], night: str) -> tuple[tuple[str, str], ...]:
     """Nights that have a page, the latest first, with their pages; '' for the one that is shown."""
     pages = {n: f"{name_of(n)}.html" for n in nights} | {nights[-1]: LATEST[1], night: ""}
     return tuple((n, pages[n]) for n in reversed(nights)) if len(nights) > 1 else ()
@@ -129,9 +129,9 @@ def _dated_page(store: Store, night: str, nights: Sequence[str], sums: Sequence[
     """A night's morning page without links to loops' pages, which are those of the latest night alone."""
     own = [s for s in sums if s.name <= night]
     without_pages = replace(read_night(store, night, PAGES.dated_loops), paged=())
-    found = morning.page(without_pages, read_groups(store, night), own)
+    found = morning.morning_page(without_pages, read_groups(store, night), own)
     links = (*nights_around(nights, night), LATEST)
-    return replace(found, name=name_of(night), links=links, choices=choices(nights, night))
+    return replace(found, name=name_of(night), links=links, choices=nights_to_choose(nights, night))
 
 
 def kept_page(text: str | None) -> Page | None:

@@ -12,7 +12,7 @@ from analyzer.columns import BY_NAME
 from analyzer.limits import PAGES
 from analyzer.loop.cost import LOSS, SIGNIFICANCE, cost, cost_column
 from analyzer.loop.decisions import CAUSES, Cause, Status, counts
-from analyzer.pages.reading import ShownNight, linked, needs_a_look, read_nights
+from analyzer.pages.reading import ShownNight, link_to, needs_a_look, read_nights
 from analyzer.pages.words import Row, cell, number, page_columns, plain_cell
 from analyzer.store.store import Store
 from reports.pages import Block, Cell, Floats, Line, Panels, Plot, Table, Tile, TreeMap
@@ -65,10 +65,10 @@ def area_table(rows: Sequence[Row]) -> Table:
 def _tile(night: ShownNight, row: Row, by: str) -> Tile:
     kind = "calm" if not needs_a_look(row) else row["cause"] if row["cause"] in CAUSES else "unclear"
     text = f"{row['loop']}: {number(cost(row, by))}. {cell(row, 'reason').text}"
-    return Tile(row["loop"], cost(row, by), kind, text, linked(night, row["loop"]).href)
+    return Tile(row["loop"], cost(row, by), kind, text, link_to(night, row["loop"]).href)
 
 
-def _tiles(night: ShownNight, rows: Sequence[Row], by: str) -> tuple[Tile, ...]:
+def _plant_tiles(night: ShownNight, rows: Sequence[Row], by: str) -> tuple[Tile, ...]:
     ordered = sorted(rows, key=lambda r: (-cost(r, by), r["loop"]))
     tiles = [_tile(night, r, by) for r in ordered[: PAGES.area_tiles]]
     rest = ordered[PAGES.area_tiles :]
@@ -86,7 +86,7 @@ def plant_map(night: ShownNight) -> TreeMap | None:
     if not any(cost(r, by) > 0 for r in rows):
         return None
     what = "average absolute error times importance" if by == LOSS else "oscillation significance"
-    groups = tuple((area or NO_AREA, _tiles(night, own, by)) for area, own in by_area(rows).items())
+    groups = tuple((area or NO_AREA, _plant_tiles(night, own, by)) for area, own in by_area(rows).items())
     return TreeMap("plant", f"The plant by area: size is {what}", groups, KEYS)
 
 

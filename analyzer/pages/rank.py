@@ -86,15 +86,15 @@ def ranked(
     if column is not None and column not in SORTABLE:
         raise InputError(f"column {column!r}", "one of " + ", ".join(SORTABLE), "correct --by")
     name = night or store.require()
-    rows = _within(_read(store, name), area)
+    rows = _rows_of_area(_rows_read(store, name), area)
     if lane is not None:
         rows = [r for r in rows if lane in lanes_in(r)]
     if column is None and not ascending:
         return worst_first(rows, None if lane is None else FIGURE[lane])[:top], name
-    return _sorted(rows, column or SIGNIFICANCE, ascending)[:top], name
+    return _sorted_by_column(rows, column or SIGNIFICANCE, ascending)[:top], name
 
 
-def _read(store: Store, night: str) -> list[dict[str, Any]]:
+def _rows_read(store: Store, night: str) -> list[dict[str, Any]]:
     """The night's rows; columns that an older version did not write are None."""
     wanted = (*KEPT, *LANE_FIGURES, "timezone")
     known = notes.read_notes(store.path)
@@ -114,7 +114,7 @@ def hidden_loops(rows: Sequence[Row], night: str) -> tuple[str, ...]:
     return tuple(r["loop"] for r in rows if notes.hides(r["hidden_until"], night))
 
 
-def _sorted(rows: Sequence[dict[str, Any]], column: str, ascending: bool) -> list[dict[str, Any]]:
+def _sorted_by_column(rows: Sequence[dict[str, Any]], column: str, ascending: bool) -> list[dict[str, Any]]:
     """Rows by a column, ties and loops without a figure by name."""
     by_name = sorted(rows, key=lambda r: r["loop"])
     known = [r for r in by_name if r[column] not in (None, "")]
@@ -130,8 +130,8 @@ def worst_first(rows: Sequence[dict[str, Any]], column: str | None = None) -> li
     known or compares with no other's.
     """
     by = cost_column(rows)
-    alike = _sorted([r for r in rows if compares(r, column or by)], column or by, False)
-    others = _sorted([r for r in rows if not compares(r, column or by)], SIGNIFICANCE, False)
+    alike = _sorted_by_column([r for r in rows if compares(r, column or by)], column or by, False)
+    others = _sorted_by_column([r for r in rows if not compares(r, column or by)], SIGNIFICANCE, False)
     return sorted((*alike, *others), key=lambda row: _worth(row, by == LOSS))
 
 
@@ -145,7 +145,7 @@ def _worth(row: Row, lossy: bool) -> int:
     return 2 if not lanes else 0 if lossy else 1
 
 
-def _within(rows: list[dict[str, Any]], area: str | None) -> list[dict[str, Any]]:
+def _rows_of_area(rows: list[dict[str, Any]], area: str | None) -> list[dict[str, Any]]:
     """The rows of an area, all where none is named; capitals do not matter."""
     if area is None:
         return rows
@@ -223,13 +223,14 @@ def brief(row: Row, columns: Sequence[str]) -> dict[str, str]:
     gain = gain_unit(row.get("gain_unit"), row.get("pv_unit"), row.get("op_unit"))
     special = {
         "period_s": duration(row["period_s"]),
-        "kp": _settings(row["kp"], row["kp_new"], gain),
-        "ti": _settings(row["ti"], row["ti_new"], row.get("ti_unit") or "s", "none"),
+        "kp": _setting_text(row["kp"], row["kp_new"], gain),
+        "ti": _setting_text(row["ti"], row["ti_new"], row.get("ti_unit") or "s", "none"),
     }
     noted = f" [note: {row['note']}]" if row.get("note") else ""
     special["reason"] = in_short(row["reason"] or "")[0] + noted
     return {
-        name: visible(special.get(name, "") or _figure(row[name], name) + mark(row, name)) for name in columns
+        name: visible(special.get(name, "") or _as_text(row[name], name) + mark(row, name))
+        for name in columns
     }
 
 
@@ -244,7 +245,7 @@ def _fitting(shown: Sequence[Mapping[str, str]], width: int) -> tuple[str, ...]:
     return tuple(kept)
 
 
-def _settings(now: float | None, new: float | None, unit: str, off: str = "0") -> str:
+def _setting_text(now: float | None, new: float | None, unit: str, off: str = "0") -> str:
     """A setting and what to make of it, with its unit; empty where it is not known, `off` where it is 0."""
     if now is None:
         return ""
@@ -254,7 +255,7 @@ def _settings(now: float | None, new: float | None, unit: str, off: str = "0") -
     return f"{present} {unit}" if now else off
 
 
-def _figure(value: Any, column: str) -> str:
+def _as_text(value: Any, column: str) -> str:
     """A cell for people: three digits, empty where not known."""
     if isinstance(value, str):
         return value

@@ -120,10 +120,10 @@ def read_trends(store: Store, loops: Collection[str], nights: Sequence[str]) -> 
         return {}
     joined = pa.concat_tables(tables)
     tags = joined.column("loop").to_numpy(zero_copy_only=False)
-    return {str(tag): _thinned(joined.filter(pa.array(tags == tag))) for tag in dict.fromkeys(tags)}
+    return {str(tag): _thinned_from(joined.filter(pa.array(tags == tag))) for tag in dict.fromkeys(tags)}
 
 
-def _thinned(table: pa.Table) -> Thinned:
+def _thinned_from(table: pa.Table) -> Thinned:
     held = {c: table.column(c).to_numpy(zero_copy_only=False).astype(float) for c in TREND}
     _, order = np.unique(held["time_s"], return_index=True)
     held = {c: v[order] for c, v in held.items()}
@@ -230,7 +230,7 @@ def read_night(store: Store, name: str | None, top: int, drawn: bool = True) -> 
     )
 
 
-def linked(night: ShownNight, loop: str) -> Cell:
+def link_to(night: ShownNight, loop: str) -> Cell:
     """The loop's name, leading to its page where there is one."""
     return Cell(loop, kind="strong", href=f"{slug(loop)}.html" if loop in night.paged else "")
 

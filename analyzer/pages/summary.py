@@ -9,7 +9,7 @@ from analyzer.limits import PAGES
 from analyzer.loop.cost import cost, cost_column
 from analyzer.loop.decisions import CAUSES, Action, Cause, Due, Fault, GroupRole, Lane, Status
 from analyzer.pages.maintenance import work_order
-from analyzer.pages.reading import ShownNight, action_text, linked, needs_a_look, oscillates, read_night
+from analyzer.pages.reading import ShownNight, action_text, link_to, needs_a_look, oscillates, read_night
 from analyzer.pages.words import Row, cell, cells, duration, enumerated, page_columns, texts, with_noun
 from analyzer.plantwide.view import GroupView, read_groups
 from analyzer.store.store import Store
@@ -131,7 +131,7 @@ def news_table(night: ShownNight, tones: Sequence[str], name: str, title: str) -
     told = ((row, *_news(night, row)) for row in night.rows)
     rows = tuple(
         (
-            linked(night, row["loop"]),
+            link_to(night, row["loop"]),
             Cell(text, kind=tone),
             *(cell(r, "oscillation_significance") for r in (night.earlier[row["loop"]][-1], row)),
             Cell(action_text(row)),
@@ -174,7 +174,7 @@ def _counts(night: ShownNight) -> str:
     )
 
 
-def page(store: Store, name: str | None = None) -> Page:
+def summary_page(store: Store, name: str | None = None) -> Page:
     """The summary of a night, the latest by default.
 
     Raises

@@ -44,11 +44,11 @@ def enumerated(names: list[str]) -> str:
 @cache
 def texts(subject: str) -> dict[str, Any]:
     """What texts.toml says of a subject."""
-    return _stated("texts.toml")[subject]
+    return _toml_of("texts.toml")[subject]
 
 
 @cache
-def _stated(name: str) -> dict[str, Any]:
+def _toml_of(name: str) -> dict[str, Any]:
     return tomllib.loads((files("analyzer.pages") / name).read_text("utf-8"))
 
 
@@ -61,7 +61,7 @@ def heading(name: str, **more: bool) -> Column:
 @cache
 def page_columns(table: str) -> tuple[Column, ...]:
     """The columns of a table of a page, as tables.toml declares them."""
-    return tuple(_column(stated) for stated in _stated("tables.toml")[table])
+    return tuple(_column(stated) for stated in _toml_of("tables.toml")[table])
 
 
 def _column(stated: str | dict[str, Any]) -> Column:

@@ -10,7 +10,7 @@ import numpy as np
 from analyzer.history.plant_clock import stamp
 from analyzer.limits import PAGES
 from analyzer.loop.decisions import Status
-from analyzer.pages.reading import ShownNight, by_loop, linked, oscillates, read_nights
+from analyzer.pages.reading import ShownNight, by_loop, link_to, oscillates, read_nights
 from analyzer.pages.words import ALL_LOOPS, Row, cause_cell, cells, page_columns, with_noun
 from analyzer.store.notes import FINISHED, Work, work_on
 from analyzer.store.store import Store
@@ -70,7 +70,7 @@ def _of_work(night: ShownNight, row: Row, work: Work, both: Sides) -> dict[str, 
     """What is told of a piece of work, and what the nights since say of it."""
     late = bool(work.due) and work.due < night.name and work.state not in FINISHED
     return {
-        "loop": linked(night, row["loop"]),
+        "loop": link_to(night, row["loop"]),
         "state": Cell(work.state, kind="better" if work.state in FINISHED else ""),
         "owner": Cell(work.owner),
         "due": Cell(work.due, kind="worse" if late else ""),
@@ -103,7 +103,7 @@ def won(night: ShownNight, works: Mapping[str, Work], history: Mapping[str, Sequ
     return Tiles(tuple(items)) if items else None
 
 
-def page(store: Store, night: ShownNight) -> Page:
+def work_page(store: Store, night: ShownNight) -> Page:
     """The work list as it stands after a night."""
     works = {loop: work_on(notes) for loop, notes in night.notes.items() if notes}
     names = [n for n in store.nights() if n <= night.name][-PAGES.work_nights :]

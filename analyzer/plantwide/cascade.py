@@ -8,11 +8,11 @@ from dataclasses import replace
 from typing import Any
 
 from analyzer.config import PlantLimits
-from analyzer.loop.decisions import Action, Cause, Due, GroupRole, Status
+from analyzer.loop.decisions import Action, Cause, Due, GroupRole, SignKind, Status
 from analyzer.loop.finding import Finding, Remedy, Root, Sign, following
 from analyzer.plantwide.night import follower_confidence
 from analyzer.plantwide.structure import Link, Tie
-from analyzer.words.reason import above_text, below_first, below_text, halves_apart
+from analyzer.words.reason import below_first, halves_apart
 
 COLUMN = {Tie.MASTER: "master", Tie.SPLIT: "split_of", Tie.RATIO: "ratio_of"}
 """The column that names the loop that another one hangs on."""
@@ -37,7 +37,7 @@ def linked(
         above = own.text(COLUMN[tie]) if tie is not None else ""
         if tie is not None and above in done and above != loop:
             led = done[above].moves
-            done[above], done[loop] = _judged(done[above], own, tie, links.get(loop), limits)
+            done[above], done[loop] = _judged_together(done[above], own, tie, links.get(loop), limits)
             root = done[above].follows
             if root is not None and root.loop == loop:
                 _send_on(done, [k for k in led if k != loop], above, root)
@@ -69,7 +69,7 @@ def _send_on(done: dict[str, Finding], led: Sequence[str], above: str, root: Roo
             done[k] = replace(done[k], follows=Root(root.loop, level, None, sure))
             sent.append(k)
     done[above] = replace(done[above], moves=())
-    done[root.loop] = replace(done[root.loop], moves=_with(done[root.loop], *sent))
+    done[root.loop] = replace(done[root.loop], moves=_moves_with(done[root.loop], *sent))
 
 
 def led_anew(rows: Sequence[Mapping[str, Any]], loops: Mapping[str, Finding]) -> list[dict[str, Any]]:
@@ -98,7 +98,7 @@ def _built(own: Finding, link: Link | None) -> Finding:
     return replace(own, known={**own.known, COLUMN[link.tie]: link.loop, "link_agreement": link.agreement})
 
 
-def _judged(
+def _judged_together(
     above: Finding, below: Finding, tie: Tie, link: Link | None, limits: PlantLimits
 ) -> tuple[Finding, Finding]:
     """A loop and the one that hangs on it; as they were where either follows another one already."""
@@ -111,16 +111,17 @@ def _judged(
         cause = Cause.TUNING if below.cause is Cause.TUNING else Cause.VALVE
         root = Root(below.loop, level, None, max(f.confidence.get(cause, 0.0) for f in (above, below)))
         if above.cause is Cause.VALVE or _alike(above, below, limits) or not below.oscillates:
-            sign = Sign(Cause.LOAD, limits.follower_sign, below_text(below, tie))
-            moved = replace(below, moves=_with(below, above.loop), remedy=_now(below.remedy))
-            return _follows(above, root, sign, limits), moved
+            seen = SignKind.OF_BELOW, (below.loop, below.cause, tie)
+            sign = Sign(Cause.LOAD, limits.follower_sign, *seen)
+            moved = replace(below, moves=_moves_with(below, above.loop), remedy=_now(below.remedy))
+            return _as_follower(above, root, sign, limits), moved
         if above.remedy.action in ACTING:
             return replace(above, remedy=Remedy(Action.UNDECIDED, below_first(below, tie))), below
         return above, below
     if not faulty and below.oscillates and above.oscillates and _alike(above, below, limits):
         root = Root(above.loop, level, None, max(above.confidence.values(), default=0.0))
-        sign = Sign(Cause.LOAD, limits.follower_sign, above_text(above, tie))
-        return replace(above, moves=_with(above, below.loop)), _follows(below, root, sign, limits)
+        sign = Sign(Cause.LOAD, limits.follower_sign, SignKind.OF_ABOVE, (above.loop, tie))
+        return replace(above, moves=_moves_with(above, below.loop)), _as_follower(below, root, sign, limits)
     return above, below
 
 
@@ -129,11 +130,11 @@ def _now(remedy: Remedy) -> Remedy:
     return Remedy(remedy.action, due=Due.NOW) if remedy.due is Due.SHUTDOWN else remedy
 
 
-def _follows(own: Finding, root: Root, sign: Sign, limits: PlantLimits) -> Finding:
+def _as_follower(own: Finding, root: Root, sign: Sign, limits: PlantLimits) -> Finding:
     return following(own, root, own.swing, follower_confidence(own.confidence, root, limits), sign)
 
 
-def _with(own: Finding, *loops: str) -> tuple[str, ...]:
+def _moves_with(own: Finding, *loops: str) -> tuple[str, ...]:
     return tuple(sorted({*own.moves, *loops}))
 
 

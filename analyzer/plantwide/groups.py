@@ -107,9 +107,9 @@ class _Neighbours:
         )
         found = self._coherences(one, near)
         own = 1.0 - limits.lost - limits.lost_to_noise * (self._own_noise[one] + self._own_noise[near])
-        near, found = _kept((found >= loose) & (found >= own), near, found)
+        near, found = _each_at((found >= loose) & (found >= own), near, found)
         over = found / np.maximum(self._by_chance(one, near), 1e-9)
-        near, found, over = _kept(over >= limits.over_chance, near, found, over)
+        near, found, over = _each_at(over >= limits.over_chance, near, found, over)
         drifts = np.array([self._drift(wave, self.waves[j]) for j in near])
         sure = (found >= strict) & (drifts <= limits.drift)
         sure |= (over >= limits.over_chance_in_step) & (drifts <= limits.drift_in_step)
@@ -137,7 +137,7 @@ class _Neighbours:
         return abs(drift(x, y))
 
 
-def _kept(which: np.ndarray, *arrays: np.ndarray) -> list[np.ndarray]:
+def _each_at(which: np.ndarray, *arrays: np.ndarray) -> list[np.ndarray]:
     return [x[which] for x in arrays]
 
 
@@ -192,7 +192,7 @@ def _merged(groups: Sequence[Group], limits: PlantLimits) -> list[Group]:
     kept: list[Group] = []
     for group in sorted(groups, key=lambda g: (-g.period_s, -len(g.waves))):
         for k, other in enumerate(kept):
-            if _is_same(group, other, limits) or _is_harmonic(group, other, limits):
+            if _is_same(group, other, limits) or _is_group_of_harmonics(group, other, limits):
                 kept[k] = other.with_lacking(group.waves, group.coherence)
                 break
         else:
@@ -207,7 +207,7 @@ def _is_same(one: Group, other: Group, limits: PlantLimits) -> bool:
     return 2 * one.shared(other) > min(len(one.waves), len(other.waves))
 
 
-def _is_harmonic(one: Group, other: Group, limits: PlantLimits) -> bool:
+def _is_group_of_harmonics(one: Group, other: Group, limits: PlantLimits) -> bool:
     """Whether the waves of a group are harmonics of a loop of another one."""
     ratio = other.period_s / one.period_s
     if round(ratio) < 2 or abs(math.log(ratio / round(ratio))) > limits.harmonic:

@@ -11,13 +11,12 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from analyzer.config import PlantLimits
-from analyzer.loop.decisions import Cause, GroupRole, Status
+from analyzer.loop.decisions import Cause, GroupRole, SignKind, Status
 from analyzer.loop.finding import Cell, Finding, Root, Sign, Swing, following
 from analyzer.plantwide.compare import Lags
 from analyzer.plantwide.groups import Group, groups_of
 from analyzer.plantwide.source import Candidate, Peer, candidates_of
 from analyzer.plantwide.wave import Wave
-from analyzer.words.reason import following_text
 
 Row = Mapping[str, Any]
 
@@ -55,7 +54,8 @@ def traced_night(
 def _follower(alone: Finding, known: Finding, root: Root, wave: Wave, limits: PlantLimits) -> Finding:
     """A loop as a follower; as it was where it does not oscillate, not even with its part in what is shared."""
     confidence = follower_confidence(alone.confidence, root, limits)
-    sign = Sign(Cause.LOAD, limits.follower_sign, following_text(root))
+    seen = root.loop, root.lag_s, root.coherence
+    sign = Sign(Cause.LOAD, limits.follower_sign, SignKind.FOLLOWS, seen)
     told = following(known, root, swing_of(alone, root, wave, limits), confidence, sign)
     return told if told.oscillates else known
 
@@ -202,7 +202,7 @@ def _traced(group: Group, peers: Mapping[str, Peer], limits: PlantLimits) -> Tra
     if not candidates:
         return None
     best = candidates[0]
-    links = _links(group, best, lags, limits)
+    links = _links_to_source(group, best, lags, limits)
     followers = [
         loop
         for loop, link in links.items()
@@ -213,7 +213,7 @@ def _traced(group: Group, peers: Mapping[str, Peer], limits: PlantLimits) -> Tra
     return Traced(group, candidates, links, _parents(best.loop, lags, limits), frozenset(followers))
 
 
-def _links(group: Group, best: Candidate, lags: Lags, limits: PlantLimits) -> dict[str, Root]:
+def _links_to_source(group: Group, best: Candidate, lags: Lags, limits: PlantLimits) -> dict[str, Root]:
     """How the other loops of a group go with its likeliest source."""
     out = {}
     for loop, coherence in group.coherence.items():

@@ -90,7 +90,7 @@ def candidates_of(lags: Lags, peers: Mapping[str, Peer], limits: PlantLimits) ->
     waves = _first_guess(list(lags.waves.values()), peers, limits.candidates)
     if not waves:
         return ()
-    signs = _signs(waves, [peers[w.loop] for w in waves], lags, limits)
+    signs = _signs_by_name(waves, [peers[w.loop] for w in waves], lags, limits)
     valves = any(s["valve"] > 0 for s in signs)
     seen = 1.0 - (limits.unseen_beside_valve_pct if valves else limits.unseen_pct) / 100.0
     odds = np.array([sum(getattr(limits, f"sign_{k}") * v for k, v in s.items()) for s in signs])
@@ -100,7 +100,7 @@ def candidates_of(lags: Lags, peers: Mapping[str, Peer], limits: PlantLimits) ->
     return tuple(sorted(found, key=lambda c: (-c.confidence_pct, c.loop)))
 
 
-def _signs(
+def _signs_by_name(
     waves: Sequence[Wave], peers: Sequence[Peer], lags: Lags, limits: PlantLimits
 ) -> list[dict[str, float]]:
     """The signs of each candidate by name."""

@@ -100,12 +100,12 @@ def _best(moves: Sequence[Moves], role: str, tie: Tie, least: float) -> dict[str
         return {}
     begin = min(m.first for m in moves)
     size = max(m.first - begin + max(m.sp.size, m.pv.size, m.op.size) for m in moves)
-    signals = _rows(given, role, begin, size)
+    signals = _on_one_clock(given, role, begin, size)
     names = np.array([m.loop for m in given])
     out = {}
     for k in range(0, len(asked), ROWS):
         part = asked[k : k + ROWS]
-        level = np.abs(_rows(part, "sp", begin, size) @ signals.T)
+        level = np.abs(_on_one_clock(part, "sp", begin, size) @ signals.T)
         level[np.array([m.loop for m in part])[:, None] == names[None]] = 0.0
         for m, row in zip(part, level, strict=True):
             best = int(np.argmax(row))
@@ -114,7 +114,7 @@ def _best(moves: Sequence[Moves], role: str, tie: Tie, least: float) -> dict[str
     return out
 
 
-def _rows(moves: Sequence[Moves], role: str, begin: int, size: int) -> np.ndarray:
+def _on_one_clock(moves: Sequence[Moves], role: str, begin: int, size: int) -> np.ndarray:
     """Moves on one clock, each of length one, shape (loops, size)."""
     out = np.zeros((len(moves), size), np.float32)
     for row, m in zip(out, moves, strict=True):

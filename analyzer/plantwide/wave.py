@@ -86,7 +86,7 @@ def _centred(s: Spectrum, line: float) -> float:
     return s.duration_s / float(power @ at / power.sum())
 
 
-def _thinned(error: Floats, dt_s: float, start_s: float, period_s: float) -> tuple[float, int, Floats]:
+def _thinned_wave(error: Floats, dt_s: float, start_s: float, period_s: float) -> tuple[float, int, Floats]:
     """Step [s], number of the first step and means of an error at 12 to 24 steps a period, the last ones.
 
     Steps are the sample interval times a power of two and begin at whole multiples of themselves, so that those of
@@ -124,7 +124,7 @@ def _cut(
         float(power[near].sum()) / above if above > 0 else 0.0,
         math.hypot(*(locked_harmonic(s, period_s, m) for m in HARMONICS)),
         (s.lines[low : high + 1] * (2.0 / s.n)).astype(np.complex64),
-        *_thinned(error, s.dt_s, start_s, period_s),
+        *_thinned_wave(error, s.dt_s, start_s, period_s),
     )
 
 

@@ -135,7 +135,7 @@ def locked(store: Path) -> Iterator[None]:
     with ExitStack() as held:
         if is_remote(store):
             _require_unsigned(store)
-            _sign(store, mine)
+            _sign_lock(store, mine)
             held.callback(_unsign, store, mine)
             held.enter_context(_renewed(store, mine))
         else:
@@ -145,7 +145,7 @@ def locked(store: Path) -> Iterator[None]:
                 raise _in_use(store)
             held.callback(lock.release)
             held.callback(_unsign, store, mine)
-            _sign(store, mine)
+            _sign_lock(store, mine)
         yield
 
 
@@ -166,7 +166,7 @@ def _renewed(store: Path, mine: Signature) -> Iterator[None]:
     def live() -> None:
         while not ended.wait(STORE.alive_s):
             with contextlib.suppress(Exception):  # the next one may succeed
-                _sign(store, mine)
+                _sign_lock(store, mine)
 
     alive = threading.Thread(target=live, daemon=True)
     alive.start()
@@ -200,7 +200,7 @@ def _signature_of_this() -> Signature:
     }
 
 
-def _sign(store: Path, mine: Signature) -> None:
+def _sign_lock(store: Path, mine: Signature) -> None:
     """Write down who holds the store, and that it lives."""
     (store / OWNER).write_text(json.dumps(mine | {"alive_s": time.time()}), encoding="utf-8")
 

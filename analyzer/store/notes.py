@@ -105,7 +105,7 @@ def new(
     )
 
 
-def _lines(store: Path) -> list[str]:
+def _note_lines(store: Path) -> list[str]:
     try:
         return (store / FILE).read_text(encoding="utf-8", errors="replace").split("\n")
     except OSError:
@@ -115,17 +115,17 @@ def _lines(store: Path) -> list[str]:
 def read_notes(store: Path) -> dict[str, tuple[Note, ...]]:
     """The notes of a store by loop, oldest first; lines that are none are passed over."""
     out: dict[str, list[Note]] = {}
-    for note in filter(None, map(_parsed, _lines(store))):
+    for note in filter(None, map(_parsed_note, _note_lines(store))):
         out.setdefault(note.loop, []).append(note)
     return {loop: tuple(sorted(own, key=lambda n: n.time_s)) for loop, own in out.items()}
 
 
 def broken(store: Path) -> int:
     """Lines of a store's notes that are none."""
-    return sum(bool(line.strip()) and _parsed(line) is None for line in _lines(store))
+    return sum(bool(line.strip()) and _parsed_note(line) is None for line in _note_lines(store))
 
 
-def _parsed(line: str) -> Note | None:
+def _parsed_note(line: str) -> Note | None:
     """The note of a line; None where it is none, whatever else it is."""
     try:
         kept = json.loads(line)

@@ -1,6 +1,7 @@
 """Findings as rows of tables and back: the one door between what is known of a loop and the columns that are kept.
 
-In the pieces that workers write of a night the column `reason` holds what a loop lacks; the sentence is made last.
+In the pieces that workers write of a night signs are figures, and so is the column `reason`, which holds what a loop
+lacks; the words are made last.
 """
 
 from __future__ import annotations
@@ -8,13 +9,26 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import asdict, astuple
 from typing import TYPE_CHECKING, Any
 
 from analyzer.columns import HOURS, row_of
-from analyzer.loop.decisions import CAUSES, Action, Cause, Due, Fault, Lack, Lane, Status
+from analyzer.loop.decisions import (
+    CAUSES,
+    Action,
+    Cause,
+    Due,
+    Fault,
+    Lack,
+    Lane,
+    Need,
+    Needs,
+    SignKind,
+    Status,
+)
 from analyzer.loop.finding import Cell, Finding, Remedy, Sign, Swing
 from analyzer.words.reason import reason
+from analyzer.words.signs import as_stored
 
 if TYPE_CHECKING:
     from analyzer.loop.assess import Assessment
@@ -36,7 +50,8 @@ TYPED = (
 
 def night_row(found: Finding) -> dict[str, Any]:
     """The row of one loop and night, with every column."""
-    return {**piece_row(found), "reason": reason(found)}
+    signs = json.dumps([as_stored(s) for s in found.signs]) if found.status is Status.OK else None
+    return {**piece_row(found), "signs": signs, "reason": reason(found)}
 
 
 def piece_row(found: Finding) -> dict[str, Any]:
@@ -62,7 +77,7 @@ def piece_row(found: Finding) -> dict[str, Any]:
         "kp_new": found.remedy.kp_new,
         "ti_new": found.remedy.ti_new,
         "due": found.remedy.due,
-        "reason": found.lacking,
+        "reason": json.dumps(astuple(found.lacking)) if found.lacking is not None else None,
     }
     return {k: finite(v) for k, v in row_of(row).items()}
 
@@ -76,19 +91,19 @@ def finding_of(row: Row) -> Finding:
         row["loop"],
         row["night"],
         Status(row["status"]),
-        row["reason"] or "",
-        _value(Lack, row["lack"]),
+        _needs(*json.loads(row["reason"])) if row["reason"] else None,
+        _or_none(Lack, row["lack"]),
         swing,
-        _value(Cause, row["cause"]),
-        _value(Fault, row["valve_fault"]),
+        _or_none(Cause, row["cause"]),
+        _or_none(Fault, row["valve_fault"]),
         {c: row[f"osc_{c}_pct"] for c in CAUSES if row[f"osc_{c}_pct"] is not None},
-        tuple(Sign(**s) for s in json.loads(row["signs"] or "[]")),
+        tuple(_sign_of(**s) for s in json.loads(row["signs"] or "[]")),
         Remedy(
-            _value(Action, row["action"]),
+            _or_none(Action, row["action"]),
             row["advice"] or "",
             row["kp_new"],
             row["ti_new"],
-            _value(Due, row["due"]),
+            _or_none(Due, row["due"]),
         ),
         {k: v for k, v in row.items() if k not in TYPED},
         lanes=tuple(Lane(name) for name in (row["lanes"] or "").split(", ") if name),
@@ -96,7 +111,15 @@ def finding_of(row: Row) -> Finding:
     )
 
 
-def _value(kind: Any, text: str | None) -> Any:
+def _needs(lack: str | None, need: str, figures: list[Cell]) -> Needs:
+    return Needs(_or_none(Lack, lack), Need(need), tuple(figures))
+
+
+def _sign_of(points_to: str, strength: float, kind: str, figures: list[Cell]) -> Sign:
+    return Sign(Cause(points_to), strength, SignKind(kind), tuple(figures))
+
+
+def _or_none(kind: Any, text: str | None) -> Any:
     return None if text is None else kind(text)
 
 

@@ -218,7 +218,7 @@ class Store:
         path = self.path / VERSION_FILE
         try:
             with answering(self.path) if is_remote(self.path) else nullcontext():
-                return _stated(path)
+                return _stated_schema(path)
         except (OSError, ValueError, TypeError, KeyError, RecursionError) as error:
             right = json.dumps({"schema": SCHEMA})
             raise InputError(
@@ -269,7 +269,7 @@ class Store:
         return changed
 
 
-def _stated(path: Path) -> int:
+def _stated_schema(path: Path) -> int:
     try:
         return int(json.loads(content(path).decode("utf-8"))["schema"])
     except (FileNotFoundError, NotADirectoryError):

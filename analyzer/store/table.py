@@ -115,7 +115,7 @@ def read_stored(
         The file is damaged, or holds other columns than results have.
     """
     wanted = list(columns) if columns else None
-    with _opened(path) as held:
+    with _for_parquet(path) as held:
         if filters is not None:
             table = pq.read_table(held, columns=wanted, filters=filters, page_checksum_verification=True)
         else:  # read_table would import pandas, which takes longer than the rest
@@ -128,14 +128,14 @@ def read_stored(
 
 def stored_names(path: Path) -> list[str]:
     """Names of the columns of a table of the store; errors as of `read_stored`."""
-    with _opened(path) as held, pq.ParquetFile(held, page_checksum_verification=True) as file:
+    with _for_parquet(path) as held, pq.ParquetFile(held, page_checksum_verification=True) as file:
         schema = file.schema_arrow
     _require_declared(path, schema, None)
     return list(schema.names)
 
 
 @contextmanager
-def _opened(path: Path) -> Iterator[Any]:
+def _for_parquet(path: Path) -> Iterator[Any]:
     """A path as Parquet's reader takes it: itself, or an open object of shared storage."""
     try:
         if is_remote(path):

@@ -77,11 +77,11 @@ def told(now: Belief, row: Row) -> dict[str, Any]:
         "kp_new": None if pair is None else pair.kp,
         "ti_new": None if pair is None else pair.ti,
         "advice": _advice(now, row),
-        "reason": reason(now, row),
+        "reason": belief_reason(now, row),
     }
     if pair is not None:
         out |= {"expected_period_s": pair.period_s, "expected_pv_amplitude_pct": pair.amplitude_pct}
-    return out | _of_valve(now, row)
+    return out | _valve_columns(now, row)
 
 
 def _advice(now: Belief, row: Row) -> str | None:
@@ -103,7 +103,7 @@ def _spread(now: Belief, held: Pair, row: Row) -> str:
     return f"{len(pairs)} nights advise Kp {kp} and Ti {ti} {row['ti_unit'] or 's'}; that of {held.night} is held."
 
 
-def _of_valve(now: Belief, row: Row) -> dict[str, Any]:
+def _valve_columns(now: Belief, row: Row) -> dict[str, Any]:
     """Play or stickband: the night's own, the pooled one where it has none of the fault that is told."""
     names = ("backlash_pct", "stickband_pct", "slip_jump_pct")
     found = {k: p.pooled for k, p in now.constants.items()}
@@ -117,7 +117,7 @@ def _of_valve(now: Belief, row: Row) -> dict[str, Any]:
     return out
 
 
-def reason(now: Belief, row: Row) -> str:
+def belief_reason(now: Belief, row: Row) -> str:
     """The sentence of a loop: the night's own where the nights agree, else what they say together; with the valve's
     width over the nights where it is worn."""
     t, nights = now.told, now.valve.nights

@@ -7,8 +7,9 @@ from __future__ import annotations
 
 from analyzer.lanes.lanes import SAID
 from analyzer.limits import PAGES
-from analyzer.loop.decisions import AMPLIFICATION, OF_LOAD, Action, Cause, Due, Fault, Lack, Lane, Status
+from analyzer.loop.decisions import OF_LOAD, Action, Cause, Due, Fault, Lack, Lane, SignKind, Status
 from analyzer.loop.finding import Finding, Root
+from analyzer.words.signs import later, of_below, sign_text
 from analyzer.words.units import duration
 
 PLAIN = {
@@ -54,16 +55,17 @@ def reason(found: Finding) -> str:
 
 def _whole(found: Finding) -> str:
     """What was found of the loop, and what it has to do with others."""
+    lacking = str(found.lacking or "")
     if found.status is not Status.OK:
-        return found.lacking
+        return lacking
     if found.follows is not None:
-        return f"{cycle_text(found)}: {_follows(found.follows)}"
+        return f"{cycle_text(found)}: {_follows_text(found.follows)}"
     if found.swing is None:
-        return f"not assessed: {found.remedy.text or found.lacking}"
+        return f"not assessed: {found.remedy.text or lacking}"
     names = ", ".join(found.moves[:MOST_NAMES]) + (" ..." if len(found.moves) > MOST_NAMES else "")
     moves = f"it also moves {names}: fix this one first" if names else None
     at_once = found.remedy.action in SAID_AT_ONCE or found.lack is Lack.OP_RANGE
-    more = found.remedy.text if at_once and found.remedy.text != found.lacking else None
+    more = found.remedy.text if at_once and found.remedy.text != lacking else None
     first, *others = _cause(found).split("; ")
     return joined(first, moves, more, to_stroke(found), *others)
 
@@ -74,7 +76,7 @@ def _cause(found: Finding) -> str:
     if found.cause is Cause.VALVE:
         return f"{cycle}: {valve_text(found)}"
     if found.cause is Cause.TUNING:
-        return f"{cycle}: too tight for its process; {_strongest(found, 1, AMPLIFICATION)}"
+        return f"{cycle}: too tight for its process; {_strongest(found, 1, SignKind.AMPLIFICATION)}"
     if found.cause is Cause.LOAD:
         return f"{cycle}: driven from outside; {_strongest(found, 1, *OF_LOAD)}"
     if found.cause is Cause.UNDECIDED:
@@ -109,42 +111,21 @@ def valve_text(found: Finding) -> str:
     return f"{PLAIN[fault].format(width=width)}; its width is {100 * size:.0f} % of OP's range"
 
 
-def _strongest(found: Finding, most: int, *first: str) -> str:
-    """The strongest signs of the cause, those of some names before all others."""
-    signs = [s for s in found.signs if s.points_to == found.cause]
-    order = sorted(signs, key=lambda s: (s.name not in first, -s.strength))
-    return "; ".join(s.text for s in order[:most])
+def _strongest(found: Finding, most: int, *first: SignKind) -> str:
+    """The strongest signs of the cause, those that show some things before all others."""
+    signs = [s for s in found.signs if s.points_to is found.cause]
+    order = sorted(signs, key=lambda s: (s.kind not in first, -s.strength))
+    return "; ".join(sign_text(s) for s in order[:most])
 
 
-def later(root: Root) -> str:
-    """How much later a loop moves than the one that it follows."""
-    return f" {duration(abs(root.lag_s))} later" if root.lag_s is not None and root.lag_s > 0 else ""
-
-
-def _follows(root: Root) -> str:
+def _follows_text(root: Root) -> str:
     sure = f"fix that loop first (it starts there with {root.confidence_pct:.0f} %)"
-    return f"follows {root.loop}{later(root)}; {sure}"
-
-
-def following_text(root: Root) -> str:
-    """The sign of a loop that follows another one."""
-    start = f"where the oscillation seems to start (coherence {root.coherence:.2f})"
-    return f"moves with {root.loop}{later(root)}, {start}"
-
-
-def below_text(below: Finding, tie: str = "master") -> str:
-    """The sign of a master whose slave has a fault, or answers as a faulty valve would."""
-    what = {Cause.VALVE: "valve is at fault", Cause.TUNING: "tuning is too tight"}.get(
-        below.cause or Cause.NONE
-    )
-    told = f"whose {what}" if what else "which answers as a faulty valve would"
-    moves = "moves" if tie == "split" else "is the set point of"
-    return f"its output {moves} {below.loop}, {told}"
+    return f"follows {root.loop}{later(root.lag_s)}; {sure}"
 
 
 def below_first(below: Finding, tie: str = "master") -> str:
     """Why a master gets no advice of its own."""
-    return f"{below_text(below, tie)}: mend that first, then look again."
+    return f"{of_below(below.loop, below.cause, tie)}: mend that first, then look again."
 
 
 def halves_apart(stronger: str, weaker: str, times: float) -> str:
@@ -154,14 +135,6 @@ def halves_apart(stronger: str, weaker: str, times: float) -> str:
         f"PV answers {stronger} {times:.1f} times as much as {weaker}: give {stronger} {share:.0f} % of the output's "
         "range, then look again."
     )
-
-
-def above_text(above: Finding, tie: str) -> str:
-    """The sign of a loop whose set point brings the cycle."""
-    brings = {"master": "its set point is the output", "split": "it is moved by the output"}.get(
-        tie, "its set point is in a ratio to the PV"
-    )
-    return f"{brings} of {above.loop}, which cycles"
 
 
 def joined(*clauses: str | None) -> str:

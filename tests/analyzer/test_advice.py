@@ -14,7 +14,7 @@ from analyzer.loop.advice import advise, propose, sought_for
 from analyzer.loop.assess import Assessment, assess
 from analyzer.loop.cause import NO_CAUSE, not_assessed
 from analyzer.loop.conclusion import concluded
-from analyzer.loop.decisions import Lack, Needs
+from analyzer.loop.decisions import Lack, Need, Needs
 from analyzer.loop.identified import lag_factor, load_of, scan_noise, tuned, uncertain
 from analyzer.loop.oscillation import Oscillations
 from analyzer.loop.quality import prepare
@@ -147,7 +147,7 @@ def test_load_is_left_alone():
 def test_no_cause_no_settings(pipe):
     """Verdicts without a cause and verdicts that abstain get no settings."""
     row = spec(kp=1.0, ti=10.0)
-    asked = [replace(pipe, verdict=v) for v in (NO_CAUSE, not_assessed(Needs(Lack.OP, "needs OP")))]
+    asked = [replace(pipe, verdict=v) for v in (NO_CAUSE, not_assessed(Needs(Lack.OP, Need.OP)))]
     assert [advise(a, row, Pid(1, 10), 100.0, CONFIG).action for a in asked] == ["none", "needs data"]
 
 
@@ -235,9 +235,9 @@ def test_unstated_settings_are_asked_for(pipe):
 
 def test_settings_are_not_asked_for_where_they_would_help_nothing(pipe):
     """On a record that bears no settings the reason is the record, stated kp and ti or not."""
-    packed = replace(pipe, for_settings=Needs(Lack.UNCOMPRESSED, "compressed"))
+    packed = replace(pipe, for_settings=Needs(Lack.UNCOMPRESSED, Need.UNCOMPRESSED, (90.0,)))
     reasons = {advise(packed, spec(), pid, 100.0, CONFIG).reason for pid in (None, PIPE.controller)}
-    assert reasons == {"no new settings: compressed"}
+    assert reasons == {f"no new settings: {packed.for_settings}"}
 
 
 def test_wrong_sign_is_told(pipe):

@@ -259,7 +259,7 @@ def test_what_cannot_be_assessed_says_what_it_needs_and_has():
     found = unassessable(r, CONFIG)
     assert found is not None
     assert found.lack is Lack.AUTOMATIC
-    assert found.text.startswith("needs 30 % good samples in automatic, has 20 % (manual 80 %")
+    assert str(found).startswith("needs 30 % good samples in automatic, has 20 % (manual 80 %")
 
 
 def test_a_constant_loop_is_assessed_without_cause():

@@ -14,6 +14,7 @@ from analyzer.loop.decisions import Lack
 from analyzer.loop.quality import prepare
 from analyzer.plantwide.night import followers_of, trace
 from analyzer.plantwide.source import Peer
+from analyzer.words.signs import sign_text
 from identification.errors import NotAssessedError
 from proofs.plant import CONFIG, START_S, Sketch, Trends, prepared, record, series, simulate, spec
 from proofs.untidy.recorder import swinging_door
@@ -90,7 +91,7 @@ def test_the_cause_is_named_for_two_reasons(name):
     assert verdict.confidence[verdict.cause] >= 50
     pointing = [sign for sign in verdict.signs if sign.points_to == verdict.cause]
     assert len(pointing) >= 2
-    assert all(sign.text and 0 < sign.strength <= 1 for sign in pointing)
+    assert all(sign_text(sign) and 0 < sign.strength <= 1 for sign in pointing)
 
 
 @pytest.mark.parametrize("name", [n for n in named("valve") if SKETCHES[n].backlash])
@@ -287,7 +288,7 @@ def test_a_dead_valve_is_blamed_without_oscillation():
     found = assess(prepared(wound()), None, CONFIG)
     assert found.oscillations.first is None
     assert (found.verdict.cause, found.verdict.fault) == ("valve", "undecided")
-    assert "OP winds over 60 %" in found.verdict.signs[0].text
+    assert "OP winds over 60 %" in sign_text(found.verdict.signs[0])
 
 
 def test_a_valve_that_answers_is_not_dead():

@@ -10,7 +10,19 @@ import numpy as np
 import pytest
 
 from analyzer.config import PlantLimits
-from analyzer.loop.decisions import CAUSES, Action, Cause, Fault, Lack, LacksError, Needs, Status, counts
+from analyzer.loop.decisions import (
+    CAUSES,
+    Action,
+    Cause,
+    Fault,
+    Lack,
+    LacksError,
+    Need,
+    Needs,
+    SignKind,
+    Status,
+    counts,
+)
 from analyzer.loop.finding import Finding, Remedy, Root, Sign, following
 from analyzer.night import chunk
 from analyzer.night.nights import Night
@@ -46,7 +58,7 @@ def test_a_follower_is_under_load_whatever_its_own_signs(own):
     root = Root("FIC101", 0.9, None, 96.0)
     confidence = follower_confidence(dict(zip(CAUSES, own, strict=True)), root, PlantLimits())
     alone = Finding("L", "2026-03-02", Status.OK, remedy=Remedy(Action.RETUNE, kp_new=1.0))
-    told = following(alone, root, None, confidence, Sign("load", 1.0, ""))
+    told = following(alone, root, None, confidence, Sign(Cause.LOAD, 1.0, SignKind.FOLLOWS))
     assert (told.cause, told.fault, told.action) == (Cause.LOAD, Fault.NONE, Action.SEE_SOURCE_LOOP)
     assert told.remedy.kp_new is None
     assert confidence[Cause.LOAD] >= max(90.0, own[2])
@@ -55,7 +67,7 @@ def test_a_follower_is_under_load_whatever_its_own_signs(own):
 
 def test_what_a_record_lacks_travels_between_processes():
     """An error that says what a record lacks is the same behind a pipe, text and kind."""
-    error = pickle.loads(pickle.dumps(LacksError(Needs(Lack.SAMPLES, "needs 200 samples, has 12"))))
+    error = pickle.loads(pickle.dumps(LacksError(Needs(Lack.SAMPLES, Need.SAMPLES, (200, 12)))))
     assert (error.needs.lack, str(error)) == (Lack.SAMPLES, "needs 200 samples, has 12")
 
 

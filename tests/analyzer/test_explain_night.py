@@ -12,7 +12,16 @@ import pytest
 from analyzer.config import Config
 from analyzer.explain import night as explain_night
 from analyzer.explain.explained import abstained
-from analyzer.explain.night import Question, answer_row, answered, flagged, keep, known, questions, run
+from analyzer.explain.night import (
+    Question,
+    answer_row,
+    answered,
+    explain_flagged,
+    flagged,
+    keep,
+    known,
+    questions,
+)
 from analyzer.loops.spec import LoopSpec
 from analyzer.night.batch import Batch
 from analyzer.night.nights import Night
@@ -106,9 +115,9 @@ def test_worst_loop_comes_first_with_the_loop_that_leads_it(store: Store) -> Non
 
 def test_one_failing_loop_never_stops_the_night(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
     """A loop that breaks and one that abstains have their reason as answer; all others are explained."""
-    monkeypatch.setattr(explain_night, "_explained", told)
+    monkeypatch.setattr(explain_night, "_answer_and_page", told)
     seen: list[tuple[int, int]] = []
-    rows = run(batch_in(store), NIGHT, progress=lambda *x: seen.append(x))
+    rows = explain_flagged(batch_in(store), NIGHT, progress=lambda *x: seen.append(x))
     by = {r["loop"]: r for r in known(store, NIGHT.name)}
     assert len(by) == len(rows) == seen[-1][0] == seen[-1][1]
     assert {"unexplained", "backlash"} == {r["verdict"] for r in rows}
@@ -119,26 +128,26 @@ def test_one_failing_loop_never_stops_the_night(store: Store, monkeypatch: pytes
 
 def test_dead_worker_costs_its_loop_alone(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
     """Where every second worker dies, every second loop says so and the others have their answers."""
-    monkeypatch.setattr(explain_night, "_explained", told)
+    monkeypatch.setattr(explain_night, "_answer_and_page", told)
     monkeypatch.setattr("analyzer.night.workers.Workers", DyingWorkers)
-    rows = run(batch_in(store), NIGHT, 2)
+    rows = explain_flagged(batch_in(store), NIGHT, 2)
     dead = [r for r in rows if "SIGKILL" in r["reason"]]
     assert abs(2 * len(dead) - len(rows)) <= 1
 
 
 def test_resumed_night_keeps_what_it_has(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
     """A stopped night goes on with the loops that have no answer yet."""
-    monkeypatch.setattr(explain_night, "_explained", told)
-    whole = run(batch_in(store), NIGHT)
+    monkeypatch.setattr(explain_night, "_answer_and_page", told)
+    whole = explain_flagged(batch_in(store), NIGHT)
     keep(store, NIGHT.name, [whole[0] | {"reason": "kept"}])
-    again = run(batch_in(store), NIGHT, resume=True)
+    again = explain_flagged(batch_in(store), NIGHT, resume=True)
     assert again[0]["reason"] == "kept"
     assert {r["loop"] for r in again} == {r["loop"] for r in whole}
 
 
 def test_failure_is_an_answer(monkeypatch: pytest.MonkeyPatch) -> None:
     """An abstention's reason stands as it is, an error's with its kind."""
-    monkeypatch.setattr(explain_night, "_explained", told)
+    monkeypatch.setattr(explain_night, "_answer_and_page", told)
     spec = {s.loop: s for s in SPECS}
     ask = [answered(Question(EXPORT, spec[n], None, NIGHT, Config()))["reason"] for n in NASTY[1:3]]
     assert ask == ["not explained: ZeroDivisionError: broken", "needs OP, has none"]
@@ -147,12 +156,12 @@ def test_failure_is_an_answer(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_loop_page_shows_the_explanation(store: Store) -> None:
     """The loop's page has the explanation's sentence and what to look at, escaped; without one it has no section."""
     name = store.nights()[-1]
-    before = {p.title: p for p in night_pages.pages(store, name, 8)}
+    before = {p.title: p for p in night_pages.pages_of_night(store, name, 8)}
     tag = next(t for t in before if t in tags(30))
     evil = "<script>evil</script>"
     data = abstained(tag, evil) | {"verdict": "backlash", "block": "valve"}
     keep(store, name, [answer_row(data, name)])
-    after = {p.title: p for p in night_pages.pages(store, name, 8)}
+    after = {p.title: p for p in night_pages.pages_of_night(store, name, 8)}
     title = "What the plain loop lacks"
     assert title not in [s.title for s in before[tag].sections]
     section = next(s for s in after[tag].sections if s.title == title)
@@ -165,14 +174,14 @@ def test_loop_page_shows_the_explanation(store: Store) -> None:
 def test_kept_page_is_drawn_with_the_night(store: Store) -> None:
     """The page that a night kept of an explanation is written beside the loop's, which links it; a broken one not."""
     name = store.nights()[-1]
-    tag = next(t for t in {p.title: p for p in night_pages.pages(store, name, 8)} if t in tags(30))
+    tag = next(t for t in {p.title: p for p in night_pages.pages_of_night(store, name, 8)} if t in tags(30))
     data = abstained(tag, "reason") | {"verdict": "backlash", "block": "valve"}
     kept = Page(f"{tag}-explained", f"{tag}: backlash", "", (Section("What it is", (Text(("words",)),)),))
     keep(store, name, [answer_row(data, name, dumps(kept))])
-    after = {p.title: p for p in night_pages.pages(store, name, 8)}
+    after = {p.title: p for p in night_pages.pages_of_night(store, name, 8)}
     drawn = after[kept.title]
     assert drawn.sections == kept.sections
     assert [text for text, _ in drawn.links] == ["All loops", tag]
     assert ("The explanation", f"{kept.name}.html") in after[tag].links
     keep(store, name, [answer_row(data, name, "{}")])
-    assert kept.title not in {p.title for p in night_pages.pages(store, name, 8)}
+    assert kept.title not in {p.title for p in night_pages.pages_of_night(store, name, 8)}

@@ -32,7 +32,7 @@ def test_each_kind_of_answer_has_a_whole_page(kind: str) -> None:
     """Whatever the verdict, the page has its sentence, the recording, where the misfit lives and the fit."""
     e = explanation(kind)
     assert e.said.verdict == kind
-    page = pages.page(e)
+    page = pages.explanation_page(e)
     titles = [s.title for s in page.sections]
     assert titles[:2] == ["What it is", "Recording and simulation"]
     assert {"Where the misfit lives", "How well it fits"} <= set(titles)
@@ -47,7 +47,7 @@ def test_each_kind_of_answer_has_a_whole_page(kind: str) -> None:
 @pytest.mark.parametrize("kind", ["backlash", "quantization", "controller-settings"])
 def test_findings_have_a_picture(kind: str) -> None:
     """Play, a coarse sensor and other settings are each drawn."""
-    page = pages.page(explanation(kind))
+    page = pages.explanation_page(explanation(kind))
     section = next(s for s in page.sections if s.title == "What was found")
     plot = next(b for b in section.blocks if isinstance(b, Plot))
     assert all(np.isfinite(line.y).all() for line in plot.lines)
@@ -56,7 +56,7 @@ def test_findings_have_a_picture(kind: str) -> None:
 def test_page_of_play_shows_both_models_and_the_users(tmp_path: Path) -> None:
     """Plain, improved and brought simulation stand in trend and table, the improved one nearest to the recording."""
     e = explanation("backlash")
-    page = pages.page(e)
+    page = pages.explanation_page(e)
     whole = next(b for b in blocks(page) if isinstance(b, Trend))
     assert {"recorded", "baseline", "model", "brought"} <= {b.kind for b in whole.bands}
     size = {k: float(np.std(e.case.subject.pv - x)) for k, x in simulations(e).items()}

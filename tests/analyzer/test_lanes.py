@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from analyzer.lanes.lanes import FIGURE, action_of
-from analyzer.loop.decisions import Action, Lane, Status
+from analyzer.loop.decisions import Action, Lane, Need, Needs, Status
 from analyzer.loop.finding import Finding, in_lanes
 from analyzer.loops.spec import LoopSpec
 from analyzer.night import chunk
@@ -189,7 +189,7 @@ def test_without_importance_oscillation_comes_first() -> None:
 
 def test_a_failed_loop_asks_for_nothing() -> None:
     """What failed has no action; its reason stands."""
-    failed = Finding("L", "2026-03-02", Status.FAILED, "ValueError: x")
+    failed = Finding("L", "2026-03-02", Status.FAILED, Needs(None, Need.AS_TOLD, ("ValueError: x",)))
     done = night_row(in_lanes(failed, CONFIG.lanes))
     assert (done["action"], done["reason"], done["lanes"]) == (None, "ValueError: x", None)
 

@@ -78,7 +78,7 @@ def store(tmp_path_factory: pytest.TempPathFactory) -> Store:
 
 def test_every_figure_of_every_table_is_the_store_s(store: Store, tmp_path: Path) -> None:
     """Loops' figures in all tables of all pages have the store's value, to three digits and in full for sorting."""
-    write_html(list(night.pages(store)), tmp_path)
+    write_html(list(night.pages_of_night(store)), tmp_path)
     held: dict[tuple[str, str], dict[str, Any]] = {
         (row["loop"], name): row
         for name in store.nights()

@@ -8,8 +8,8 @@ import numpy as np
 import pandas as pd
 
 from analyzer import api
+from analyzer.api import PlantLoop
 from analyzer.loop.oscillation import counting
-from analyzer.night.plant import PlantLoop
 from identification.models import Backlash, Fopdt, Loop, Motion, Pid, Stiction
 from identification.simulation.closed_loop import closed_loop
 

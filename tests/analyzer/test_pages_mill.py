@@ -97,5 +97,7 @@ def kept_part(text: str) -> str:
 
 def test_markdown_says_what_it_said(found: dict[str, ChangeCase]) -> None:
     """The report's summary and verdicts in Markdown are those kept beside this test."""
-    text = render(before_after.page(list(found.values()), [], "7 days before against after the change."))
+    text = render(
+        before_after.changes_page(list(found.values()), [], "7 days before against after the change.")
+    )
     assert kept_part(text) == (Path(__file__).parent / "test_pages_mill.md").read_text("utf-8")

@@ -49,7 +49,7 @@ def column(found: Table, key: str) -> list[float | None]:
 
 def test_ranking_holds_the_nights_numbers(store: Store) -> None:
     """Every number of the ranking equals the store's, to the last digit."""
-    found = table(morning.page(read_night(store, None, 5)), "ranking")
+    found = table(morning.morning_page(read_night(store, None, 5)), "ranking")
     rows = {r["loop"]: r for r in store.read("nights", store.require()).to_pylist()}
     tags = [row[0].text for row in found.rows]
     assert sorted(tags) == sorted(rows)
@@ -78,7 +78,7 @@ def test_loops_that_the_store_lacks_are_named(store: Store) -> None:
     )
     assert [c.found.loop for c in found] == [NASTY[1]]
     assert [m[0] for m in missing] == ["GONE"]
-    assert "GONE" in render(before_after.page(found, missing, ""))
+    assert "GONE" in render(before_after.changes_page(found, missing, ""))
 
 
 def test_morning_page_names_every_loop_once(tmp_path: Path) -> None:
@@ -86,7 +86,7 @@ def test_morning_page_names_every_loop_once(tmp_path: Path) -> None:
     store = small_store(tmp_path)
     settle_anew(store, Config())
     view = read_night(store, "2026-03-09", 50)
-    page = morning.page(view)
+    page = morning.morning_page(view)
     lost = table(page, "not-assessed")
     assert [row[0].text for row in lost.rows] == sorted(r["loop"] for r in view.rows if r["status"] != "ok")
     assert all("needs a PV" in row[2].text for row in lost.rows)
@@ -97,7 +97,7 @@ def test_morning_page_names_every_loop_once(tmp_path: Path) -> None:
 
 def test_first_night_has_nothing_before(store: Store) -> None:
     """The first night's page says that there is none before."""
-    page = morning.page(read_night(store, "2026-03-02", 3))
+    page = morning.morning_page(read_night(store, "2026-03-02", 3))
     texts = [b.paragraphs[0] for s in page.sections for b in s.blocks if isinstance(b, Text)]
     assert "This is the first night in the store." in texts
 
@@ -105,7 +105,7 @@ def test_first_night_has_nothing_before(store: Store) -> None:
 def test_unknown_night_is_an_error(store: Store) -> None:
     """A night that the store lacks is refused with those it has."""
     with pytest.raises(InputError, match="2026-03-15"):
-        list(night.pages(store, "1999-01-01"))
+        list(night.pages_of_night(store, "1999-01-01"))
 
 
 def test_trends_keep_extremes_and_gaps(store: Store) -> None:
@@ -176,7 +176,7 @@ def test_wear_is_never_invented(store: Store) -> None:
 
 def test_everything_is_written(store: Store, tmp_path: Path) -> None:
     """HTML, Markdown with its pictures, and a CSV of every table are written, all inside the folder."""
-    pages = list(night.pages(store, None, 3))
+    pages = list(night.pages_of_night(store, None, 3))
     html, text = write_html(pages, tmp_path / "h"), write_markdown(pages, tmp_path / "m")
     tables = [p for page in pages for p in write_csv(page, tmp_path / "c")]
     assert len(html) == len(text) == 7
@@ -205,7 +205,7 @@ def test_behaviour_changes_are_offered(tmp_path: Path) -> None:
 def test_a_big_plant_is_small(tmp_path: Path) -> None:
     """The morning page of 1,500 loops is under 1 MB beside its assets, 50 loop pages with a week under 1.5 MB."""
     big = small_store(tmp_path / "store", loops=1500, nights=7, hours=False)
-    written = write_html(night.pages(big, None, 50), tmp_path / "out", single_file=True)
+    written = write_html(night.pages_of_night(big, None, 50), tmp_path / "out", single_file=True)
     assert len(written) == 54
     assets = sum(len(html.asset(name)) for name in html.ASSETS)
     assert written[0].stat().st_size - assets < 1e6
@@ -241,7 +241,7 @@ def test_a_follower_is_laid_beside_its_source() -> None:
     """The page of a loop that follows another one links to both on one time axis, whatever their names hold."""
     known = {"loop": "A 1", "night": "2026-03-02", "status": "ok", "source_loop": "B,2"}
     row = row_of(known)
-    links = loop.page([row | dict.fromkeys(set(loop.COLUMNS) - set(row))], None).links
+    links = loop.loop_page([row | dict.fromkeys(set(loop.COLUMNS) - set(row))], None).links
     assert ("Beside B,2", "side-by-side.html#B%2C2,A%201") in links
 
 

@@ -15,7 +15,7 @@ from analyzer.cli import main
 from analyzer.config import Config
 from analyzer.history import plant_clock
 from analyzer.history.stamps import parse_time
-from analyzer.night.nights import nights
+from analyzer.night.nights import in_nights
 from analyzer.store.store import Store
 from identification.errors import InputError
 
@@ -31,7 +31,7 @@ def at(text: str) -> float:
 def test_a_local_day_is_one_night_through_both_clock_changes(first: str, hours: list[int]) -> None:
     """The Sundays on which Helsinki's clock changes are one night each, of 23 and 25 hours, named by their date."""
     start = at(first)
-    found = nights([(start, start + 3600.0 * sum(hours) - 1.0)], Config().nights, HELSINKI)
+    found = in_nights([(start, start + 3600.0 * sum(hours) - 1.0)], Config().nights, HELSINKI)
     assert [round((n.last_s - n.first_s) / 3600) for n in found] == hours
     local = [plant_clock.local(n.first_s, HELSINKI) for n in found]
     assert [(t.hour, t.minute) for t in local] == [(0, 0)] * 2
@@ -41,7 +41,7 @@ def test_a_local_day_is_one_night_through_both_clock_changes(first: str, hours: 
 def test_utc_is_the_default() -> None:
     """Without a zone the nights are those of UTC."""
     start = at("2026-03-28T00:00")
-    found = nights([(start, start + 2 * 86400.0 - 1)], Config().nights)
+    found = in_nights([(start, start + 2 * 86400.0 - 1)], Config().nights)
     assert [n.first_s for n in found] == [start, start + 86400.0]
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from analyzer.loop.advice import propose
 from analyzer.loop.cause import Verdict
-from analyzer.words import settings as words
+from analyzer.words import units as words
 from identification.models import Pid
 from proofs.coverage import FAMILIES, Made, assessed, made
 from proofs.plant import CONFIG

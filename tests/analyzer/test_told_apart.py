@@ -8,7 +8,7 @@ import pytest
 
 from analyzer.loop.assess import assess
 from analyzer.loop.cause import told_apart
-from analyzer.loop.decisions import Cause, Lack
+from analyzer.loop.decisions import Cause, Lack, SignKind
 from analyzer.loop.finding import Sign
 from analyzer.loop.oscillation import counting
 from identification.models import Fopdt, Loop
@@ -39,7 +39,7 @@ def test_a_load_is_told_by_a_sign_of_its_own(loaded, names, cause):
     rhythm kept, does. What is not told asks for a test in manual."""
     made, found = loaded
     assert found.verdict.cause == "load"
-    verdict = replace(found.verdict, signs=tuple(Sign("load", 0.3, "x", name) for name in names))
+    verdict = replace(found.verdict, signs=tuple(Sign(Cause.LOAD, 0.3, SignKind(name)) for name in names))
     told = told_apart(verdict, made, counting(found.oscillations), CONFIG)
     assert told.cause == cause
     assert (told.needs is not None and told.needs.lack is Lack.MANUAL_TEST) == (cause == "undecided")

@@ -10,7 +10,7 @@ from click.testing import CliRunner
 
 from analyzer.cli import main
 from analyzer.pages.reading import read_night
-from analyzer.pages.work import page, said_since, sides
+from analyzer.pages.work import said_since, sides, work_page
 from analyzer.store import notes
 from analyzer.store.notes import Note, work_on
 from analyzer.store.store import Store
@@ -91,7 +91,7 @@ def test_the_page_lists_what_waits_before_what_is_done_and_says_what_was_won(sto
         Note("FIC0002", at("2026-03-09"), "to be stroked", "Berg", "", "open", "2026-03-10"),
     ):
         notes.add(store.path, note)
-    found = page(store, read_night(store, None, 50))
+    found = work_page(store, read_night(store, None, 50))
     table = found.tables()[0]
     keys = [c.key for c in table.columns]
     first, last = (dict(zip(keys, row, strict=True)) for row in table.rows)

@@ -22,7 +22,7 @@ KINDS = ("backlash", "none", "quantization", "controller-settings", "unexplained
 def explained(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     """A page in one file for each kind of verdict."""
     out = tmp_path_factory.mktemp("explained")
-    return [write_html([pages.page(explanation(k))], out / k, True)[0] for k in KINDS]
+    return [write_html([pages.explanation_page(explanation(k))], out / k, True)[0] for k in KINDS]
 
 
 def test_explanations_load_without_complaint(browser: Any, explained: list[Path]) -> None:

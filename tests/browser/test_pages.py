@@ -40,8 +40,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     store = small_store(out / "store", loops=40)
     changes = [TuningChange(tag, START_S + 7 * 86400.0, 1, 2, 3, 4, "<b>me</b>") for tag in NASTY[:3]]
     found, missing = change_cases(store, changes, Spans())
-    report = before_after.page(found, missing, "seven days")
-    written = [*night.pages(store, None, 8), report]
+    report = before_after.changes_page(found, missing, "seven days")
+    written = [*night.pages_of_night(store, None, 8), report]
     write_html(written, out / "folder")
     write_html(written, out / "single", single_file=True)
     return out

@@ -13,7 +13,7 @@ from analyzer.config import Config
 from analyzer.loop.settings_side_by_side import compared
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import controller
-from analyzer.pages.compared import page
+from analyzer.pages.compared import settings_page
 from identification.models import Backlash, Fopdt, Form, Loop, Motion, Stiction
 from reports.folder import write_html
 from reports.pages import as_held
@@ -66,7 +66,9 @@ def settings(tmp_path_factory: pytest.TempPathFactory) -> Path:
         new = replace(loop_of(name).controller, kp=0.4, ti_s=60.0)
         found = compared(loop_of(name), load(), new, 120.0, spec, SPAN, Config().tuning)
         assert found is not None
-        write_html([replace(page(spec.loop, "2026-03-08", found, spec), name=name)], out, single_file=True)
+        write_html(
+            [replace(settings_page(spec.loop, "2026-03-08", found, spec), name=name)], out, single_file=True
+        )
     return out
 
 

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from analyzer.night.run_files import RunLog
+from analyzer.commands.run import RunLog
 from analyzer.store.store import Store
 from proofs.plant import Sketch, simulate, write_export
 

@@ -108,7 +108,7 @@ def test_a_stem_that_rests_has_nothing_to_trade():
     assert (found.curve, dict(found.everywhere), found.repaired) == ((), {}, None)
     assert page.price(found, "%") is None
     assert page.choices(found, spec) == []
-    assert page.page("L", "2026-03-02", found, spec).sections
+    assert page.settings_page("L", "2026-03-02", found, spec).sections
 
 
 def test_a_derivative_is_offered_where_it_pays_alone():

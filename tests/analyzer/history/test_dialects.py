@@ -226,8 +226,8 @@ def test_a_file_too_big_to_keep(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
 
 def test_a_text_is_parsed_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """What was parsed to find out how a text is written serves the samples too."""
-    parsed, whole = [], sheet._parsed
-    monkeypatch.setattr(sheet, "_parsed", lambda *how: parsed.append(how) or whole(*how))
+    parsed, whole = [], sheet._parsed_sheet
+    monkeypatch.setattr(sheet, "_parsed_sheet", lambda *how: parsed.append(how) or whole(*how))
     table = day()
     (tmp_path / "x.csv").write_text(as_text(table, "%d.%m.%Y %H:%M:%S", ";", ",", ""))
     assert_read(tmp_path / "x.csv", table)

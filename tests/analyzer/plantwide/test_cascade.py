@@ -6,11 +6,13 @@ from dataclasses import replace
 from typing import Any
 
 from analyzer.config import Config
-from analyzer.loop.decisions import CAUSES, Action, Cause, Due, Fault, GroupRole, Status
+from analyzer.loop.decisions import CAUSES, Action, Cause, Due, Fault, GroupRole, SignKind, Status
 from analyzer.loop.finding import Finding, Remedy, Root, Sign, Swing, following
 from analyzer.plantwide.cascade import led_anew, linked
 from analyzer.plantwide.structure import Link, Tie
 from analyzer.words.reason import reason
+
+FOLLOWS = Sign(Cause.LOAD, 0.9, SignKind.FOLLOWS)
 
 LIMITS = Config().plant
 HANGS = {"FIC1": Link("TIC1", Tie.MASTER, 0.98)}
@@ -104,7 +106,11 @@ def test_those_that_a_master_moves_follow_its_slave_where_the_slave_is_the_root(
     """A group has one root: who followed the master is sent to the slave with it, in the rows of the group too."""
     root = Root("TIC1", 0.9, 30.0, 80.0)
     third = following(
-        found("PIC7", Cause.LOAD, 360.0), root, Swing(), dict.fromkeys(CAUSES, 0.0), Sign(Cause.LOAD, 0.9, "")
+        found("PIC7", Cause.LOAD, 360.0),
+        root,
+        Swing(),
+        dict.fromkeys(CAUSES, 0.0),
+        Sign(Cause.LOAD, 0.9, SignKind.FOLLOWS),
     )
     master = replace(found("TIC1", Cause.TUNING, 360.0, Action.RETUNE), moves=("PIC7",))
     slave = found("FIC1", Cause.VALVE, 360.0, Action.REPAIR_VALVE)
@@ -122,7 +128,11 @@ def test_a_loop_that_leads_one_group_and_follows_in_another_leads_as_before() ->
     """Only a master gives its lead up, and only to its own slave."""
     root = Root("PIC9", 0.9, None, 80.0)
     leads = following(
-        found("FIC2", Cause.LOAD, 360.0), root, Swing(), dict.fromkeys(CAUSES, 0.0), Sign(Cause.LOAD, 0.9, "")
+        found("FIC2", Cause.LOAD, 360.0),
+        root,
+        Swing(),
+        dict.fromkeys(CAUSES, 0.0),
+        Sign(Cause.LOAD, 0.9, SignKind.FOLLOWS),
     )
     rows = [{"loop": "FIC2", "group": "1", "role": GroupRole.SOURCE, "source_pct": 90.0}]
     assert led_anew(rows, {"FIC2": leads, "PIC9": found("PIC9", Cause.VALVE, 360.0)}) == rows

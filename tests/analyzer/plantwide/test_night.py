@@ -15,7 +15,7 @@ from analyzer.cli import main
 from analyzer.columns import GROUP_LIST, names
 from analyzer.lanes.lanes import lanes_in
 from analyzer.loop.decisions import counts
-from analyzer.pages.night import pages
+from analyzer.pages.night import pages_of_night
 from analyzer.store.store import Store
 from reports.html import render
 from reports.pages import Graph, HeatMap, Trend
@@ -97,7 +97,7 @@ def test_the_group_is_listed_in_every_format(run_plant: RunPlant):
 
 def test_groups_have_pages_with_pictures(run_plant: RunPlant):
     """The morning page links a page of the group, which draws way, trends and spectra of its loops."""
-    found = {p.name: p for p in pages(Store(run_plant.store))}
+    found = {p.name: p for p in pages_of_night(Store(run_plant.store))}
     assert 'href="group-1.html"' in render(found["index"])
     blocks = [b for s in found["group-1"].sections for b in s.blocks]
     (way,) = (b for b in blocks if isinstance(b, Graph))

@@ -1,0 +1,76 @@
+"""A finding holds figures; its words are made at the store's door, the same whichever way it came there."""
+
+from __future__ import annotations
+
+import json
+
+from analyzer.loop.decisions import Cause, Lack, Need, Needs, SignKind, Status
+from analyzer.loop.finding import Finding, Sign, Swing
+from analyzer.store.rows import finding_of, night_row, piece_row
+from analyzer.words import needs, signs
+
+SIGNS = (
+    Sign(Cause.VALVE, 0.9, SignKind.EVIDENCE, (41.3, 0.75, 12)),
+    Sign(Cause.LOAD, 0.25, SignKind.LOAD_LEFT, (2.0, 0.5)),
+    Sign(Cause.VALVE, 0.5, SignKind.AGAIN),
+)
+STORED = [
+    {
+        "points_to": "valve",
+        "strength": 0.9,
+        "text": "play or stick-slip explains PV better than an ideal valve, in 75 % of 12 stretches between "
+        "turns of OP",
+        "name": "evidence",
+        "figures": "log likelihood +41",
+    },
+    {
+        "points_to": "load",
+        "strength": 0.25,
+        "text": "the load that is left has a peak at the period",
+        "name": "line_linear",
+        "figures": "prominence 2.0, behind a faulty valve 0.5",
+    },
+    {
+        "points_to": "valve",
+        "strength": 0.5,
+        "text": "stretch after stretch between moves of the stem says so",
+        "name": "",
+        "figures": "",
+    },
+]
+"""The same as the store has kept them from its first version on."""
+FOUND = Finding(
+    "FIC1",
+    "2026-03-02",
+    Status.OK,
+    Needs(Lack.FINER, Need.FINER, (0.5, 0.8)),
+    Lack.FINER,
+    Swing(20.0, 90.0, 60.0, 2.0),
+    Cause.UNDECIDED,
+    signs=SIGNS,
+)
+
+
+def test_each_kind_has_its_words() -> None:
+    """There is no sign, and nothing that is needed, that words do not tell."""
+    assert set(signs.SAYS) == set(SignKind)
+    assert set(needs.SAYS) == set(Need)
+
+
+def test_the_store_keeps_words_as_ever() -> None:
+    """Signs stand in a row as cause, strength, text, name and figures."""
+    assert night_row(FOUND)["signs"] == json.dumps(STORED)
+
+
+def test_a_piece_keeps_figures_and_gives_the_same_night() -> None:
+    """What a worker writes holds no sentence, and the night made of it says what the finding says."""
+    piece = piece_row(FOUND)
+    assert "explains" not in piece["signs"]
+    assert "finer" not in json.loads(piece["reason"])[2]
+    again = finding_of(piece)
+    assert (again.signs, again.lacking) == (FOUND.signs, FOUND.lacking)
+    assert night_row(again) == night_row(FOUND)
+    assert (
+        "needs finer values: PV is recorded in steps of 0.5 % and swings by 0.8 %"
+        in night_row(again)["reason"]
+    )
