@@ -210,11 +210,15 @@ def _sized_by_envelope(
     return sized, active, smooth, dt
 
 
-def _lasts(record: LoopRecord, o: Oscillation, limits: OscillationLimits) -> bool:
-    """Whether a period is seen where the set point has rested too; one in every second cycle of which the set point
-    moves is the set point's. Of a set point that never moves, or never rests, it is not asked."""
+def _lasts(s: Spectrum, record: LoopRecord, o: Oscillation, limits: OscillationLimits) -> bool:
+    """Whether a period is the loop's own: of a set point that swings in its band by less than a loop's sensitivity
+    makes of it, or seen where the set point has rested; one in every second cycle of which the set point moves is the
+    set point's. Of a set point that never rests it is not asked."""
     moving = moves(record.sp)
     if record.sp_estimated or not moving.any() or moving.mean() > limits.programme_moves:
+        return True
+    asked, _ = band_signal(spectrum(record.sp[len(record) - s.n :], record.dt_s), o.cycles)
+    if limits.sensitive * math.sqrt(2 * float(asked @ asked) / asked.size) < o.amplitude_pct:
         return True
     left, count = amplitude_at_rest(record.error, record.sp, record.usable, o.period_s / record.dt_s)
     if count >= limits.rest_stretches:
@@ -263,7 +267,7 @@ def detect(record: LoopRecord, limits: OscillationLimits) -> Oscillations:
         if o.period_s <= longest and not any(_is_harmonic_of(o, p) for p in kept):
             kept.append(o)
     each = (_sized_by_envelope(s, o, usable, limits) for o in kept[: LOOP.reported])
-    sized = sorted((r for r in each if _lasts(record, r[0], limits)), key=lambda r: -r[0].significance)
+    sized = sorted((r for r in each if _lasts(s, record, r[0], limits)), key=lambda r: -r[0].significance)
     if not sized:
         return Oscillations(spectrum=s, bands=b)
     first = sized[0]
