@@ -41,10 +41,8 @@ class OscillationLimits(Limits, section="oscillation"):
             **{name: getattr(self, name) - self.near for name in asked},
             shape_prominence=self.near_prominence,
             share=self.near_share,
-            shape_correlation=-1.0,
             swing_cycles=self.periods,
             swing_spread=math.inf,
-            swing_share=0.0,
         )
 
 

@@ -103,15 +103,6 @@ def error_spectrum(record: LoopRecord) -> Spectrum:
     return replace(found, lines=lines, variance=power)
 
 
-def _agree(limits: OscillationLimits, cycles: float, prominence: float, correlation: float) -> bool:
-    """Whether spectrum and autocorrelation together are more than noise shows in so many periods."""
-    asked = limits.prominence + limits.prominence_few * max(6.0 - cycles, 0.0) / 3.0
-    scatter = min(limits.correlation + limits.correlation_few / math.sqrt(cycles), limits.correlation_most)
-    if prominence < max(limits.least * asked, limits.prominence) or correlation < limits.correlation:
-        return False
-    return correlation - scatter + limits.trade * math.log2(prominence / asked) >= 0
-
-
 def _in_shape(
     s: Spectrum,
     line: float,
@@ -132,16 +123,16 @@ def _in_shape(
     usual = 0.5 * math.log2(prominence * max(usual_prominence(s, line), 1e-3))
     total, scatter = usual + limits.shape_trade * levelled, limits.shape_few / math.sqrt(cycles)
     few = s.duration_s / line < limits.samples * s.dt_s
-    least = limits.shape_correlation_few if few else limits.shape_correlation
-    enough = total >= max(limits.shape + scatter, limits.shape_least) and levelled >= least
+    enough = total >= max(limits.shape + scatter, limits.shape_least)
+    if few and levelled < limits.shape_correlation_few:
+        return False
     if prominence >= limits.least * limits.prominence and enough:
         return True
     if few or cycles < limits.swing_cycles or total + 2 * limits.swing_trade < limits.swing + scatter:
         return False
     found = shape(s, line)
     total += limits.swing_trade * max(3.0 - found.kurtosis, 0.0)
-    even = found.spread <= limits.swing_spread and found.share >= limits.swing_share
-    return even and total >= max(limits.swing + scatter, limits.swing_least)
+    return found.spread <= limits.swing_spread and total >= max(limits.swing + scatter, limits.swing_least)
 
 
 def _candidate(s: Spectrum, b: Bands, k: int, limits: OscillationLimits) -> Oscillation | None:
@@ -158,8 +149,7 @@ def _candidate(s: Spectrum, b: Bands, k: int, limits: OscillationLimits) -> Osci
     if cycles < limits.periods or share < limits.share:
         return None
     prominence, correlation = float(b.prominence[k]), min(found.first, 1.5 * found.trough)
-    tonal = expected >= limits.samples * s.dt_s and _agree(limits, cycles, prominence, correlation)
-    if not tonal and not _in_shape(s, line, x, dt, (cycles, prominence, correlation), limits):
+    if not _in_shape(s, line, x, dt, (cycles, prominence, correlation), limits):
         return None
     amplitude = math.sqrt(2 * float(x @ x) / x.size)
     return Oscillation(found.period_s, amplitude, 0, 0, found, prominence, cycles)
@@ -259,8 +249,7 @@ def detect(record: LoopRecord, limits: OscillationLimits) -> Oscillations:
     usable = record.at_work[len(record) - s.n :]
     kept: list[Oscillation] = []
     longest = _longest_seen(record)
-    strong = peaks(b, limits.prominence)
-    for k in strong + [k for k in peaks(b, limits.shape_prominence) if k not in strong]:
+    for k in peaks(b, limits.shape_prominence):
         o = _candidate(s, b, k, limits)
         if o is None or any(abs(math.log(o.period_s / p.period_s)) < math.log(1.3) for p in kept):
             continue
