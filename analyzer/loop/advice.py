@@ -139,8 +139,7 @@ def _without_settings(verdict: Verdict) -> Advice:
 
 def _lacking(needs: Needs) -> Advice:
     """The advice to get more data, or a test where no data tell, with what is lacking."""
-    tests = (Lack.STROKE, Lack.MANUAL_TEST)
-    action = Action.UNDECIDED if needs.lack in tests else Action.NEEDS_DATA
+    action = Action.UNDECIDED if needs.lack is Lack.MANUAL_TEST else Action.NEEDS_DATA
     return Advice(action, str(needs), lack=needs.lack)
 
 

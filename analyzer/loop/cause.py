@@ -23,16 +23,14 @@ distances that scatter, rather than play?
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from analyzer.config import CauseLimits, Config
-from analyzer.limits import LOOP
 from analyzer.loop.cause_weights import chances, measures, signs_of
-from analyzer.loop.decisions import CAUSES, OF_LOAD, Cause, Fault, Lack, Need, Needs, SignKind
+from analyzer.loop.decisions import CAUSES, Cause, Fault, Lack, Need, Needs, SignKind
 from analyzer.loop.finding import Sign
 from analyzer.loop.fitness import compressed
 from analyzer.loop.identified import sensitivity
@@ -130,7 +128,7 @@ def quiet_signs(m: Measured, limits: CauseLimits) -> tuple[Sign, ...]:
         return ()
     few = m.moves < limits.few_moves and not m.excited
     least = needed(m, limits, False) * (limits.quiet_factor if few else 1.0)
-    if not speaks(m, limits, False) or m.evidence < least or (m.moves < limits.moves and not m.excited):
+    if not speaks(m, limits, False) or m.evidence < least:
         return ()
     sure = 0.5 + 0.5 * _ramp(m.evidence, least, 4 * least)
     signs = [Sign(Cause.VALVE, sure, SignKind.CALM_EVIDENCE, (m.evidence,))]
@@ -185,7 +183,7 @@ def judge(m: Measured, oscillation: Oscillation | None, limits: CauseLimits) -> 
     found = chances(seen)
     first = max(found, key=lambda c: found[c])
     confidence = {c: 100.0 * p for c, p in found.items()}
-    if first is Cause.VALVE and (m.size < limits.least_size or not speaks(m, limits, True)):
+    if first is Cause.VALVE and not speaks(m, limits, True):
         confidence[first] = min(confidence[first], 0.9 * limits.named_pct)
     cause = first if confidence[first] >= _least(first, m, limits) else Cause.UNDECIDED
     fault = fault_of(m, limits) if cause is Cause.VALVE else Fault.NONE
@@ -195,14 +193,12 @@ def judge(m: Measured, oscillation: Oscillation | None, limits: CauseLimits) -> 
 def _least(cause: Cause, m: Measured, limits: CauseLimits) -> float:
     """Confidence [%] from which a cause is named.
 
-    A stickband that is small beside OP's range makes no square of PV, and a cycle that keeps its size may be brought.
+    A cycle that keeps its size may be brought, where the stickband is small beside OP's range.
     """
     if cause is not Cause.VALVE:
         return limits.named_pct
     if m.size >= limits.small_size:
         return limits.valve_pct
-    if m.harmonic > limits.square:
-        return math.inf
     return limits.small_pct if m.kurtosis < limits.changing else limits.changing_pct
 
 
@@ -272,9 +268,8 @@ def with_dead_valve(verdict: Verdict, sign: Sign) -> Verdict:
 def told_apart(
     verdict: Verdict, prepared: Prepared, oscillation: Oscillation | None, config: Config
 ) -> Verdict:
-    """The verdict, or none where so few samples a cycle, or so coarse a grid, make other causes look like it; where
-    trends on straight segments make a likely valve of a load; where nothing but the want of other causes shows a
-    load, or a valve's play shows beside it; and where the loop that is called too tight is robust."""
+    """The verdict, or none where trends on straight segments make a likely valve of a load, where the loop that is
+    called too tight is robust, and where a load is not likely enough: it is what is left where nothing else shows."""
     if oscillation is None or verdict.cause not in CAUSES:
         return verdict
     lacking = _hides(verdict, prepared, oscillation, config)
@@ -287,31 +282,12 @@ def told_apart(
 
 def _hides(verdict: Verdict, prepared: Prepared, oscillation: Oscillation, config: Config) -> Needs | None:
     """What the recording lacks to tell the cause that is named from others; None where it lacks nothing."""
-    limits = config.cause
-    if verdict.cause is Cause.VALVE:
-        sure = verdict.confidence[Cause.VALVE] >= limits.compressed_pct
-        return None if sure else compressed(prepared, None, config.quality)
+    limits, pct = config.cause, verdict.confidence[verdict.cause]
     if verdict.cause is Cause.TUNING:
-        return _robust(verdict, oscillation, config) or _rough(verdict, prepared, oscillation, limits)
-    samples = oscillation.period_s / prepared.record.dt_s
-    rough = _rough(verdict, prepared, oscillation, limits)
-    if rough is not None:
-        return rough
-    if samples < limits.samples_told:
-        return Needs(Lack.FASTER, Need.OF_A_LOAD, (limits.samples_told, samples))
-    if not any(s.points_to is Cause.LOAD and s.kind in OF_LOAD for s in verdict.signs):
-        return Needs(Lack.MANUAL_TEST, Need.LOAD_IN_MANUAL)
-    return _play_beside(verdict, limits)
-
-
-def _rough(
-    verdict: Verdict, prepared: Prepared, oscillation: Oscillation, limits: CauseLimits
-) -> Needs | None:
-    """Finer values, where PV's grid has too few steps in the swing; None where it has enough."""
-    steps = oscillation.amplitude_pct / max(prepared.pv_step, 1e-12)
-    if steps >= (limits.steps_told if verdict.cause is Cause.LOAD else limits.steps_tuning):
-        return None
-    return Needs(Lack.FINER, Need.FINER, (prepared.pv_step, oscillation.amplitude_pct))
+        return _robust(verdict, oscillation, config)
+    if verdict.cause is Cause.VALVE:
+        return None if pct >= limits.compressed_pct else compressed(prepared, None, config.quality)
+    return None if pct >= limits.load_pct else Needs(Lack.MANUAL_TEST, Need.LOAD_IN_MANUAL, (pct,))
 
 
 def _robust(verdict: Verdict, oscillation: Oscillation, config: Config) -> Needs | None:
@@ -320,19 +296,6 @@ def _robust(verdict: Verdict, oscillation: Oscillation, config: Config) -> Needs
     if ms is None or ms > config.tuning.ms_most:
         return None
     return Needs(Lack.MANUAL_TEST, Need.TUNING_IN_MANUAL, (ms,))
-
-
-def _play_beside(verdict: Verdict, limits: CauseLimits) -> Needs | None:
-    """A stroke of the valve, where a load is likely and a play shows all the same; None where it does not."""
-    m = verdict.measured
-    if m is None or m.trials is None or verdict.confidence[Cause.LOAD] >= limits.beside_pct:
-        return None
-    plain = m.evidence > limits.beside_share * (m.expected + limits.evidence)
-    crossed = LOOP.least_play <= m.size <= limits.near_size
-    agree = m.trials.agreeing >= limits.beside_agreeing
-    if not plain or not crossed or not agree or m.wave_left > LOOP.plain_wave:
-        return None
-    return Needs(Lack.STROKE, Need.STROKE, (100 * m.size, 100 * m.trials.agreeing))
 
 
 def told_slip_by_slip(verdict: Verdict, period_s: float, limits: CauseLimits) -> Verdict:

@@ -44,8 +44,7 @@ class SignKind(StrEnum):
 
 OF_LOAD = (SignKind.LOAD_LEFT, SignKind.PROCESS, SignKind.WAVE_LEFT, SignKind.REGULARITY)
 """Signs that a load itself leaves: a peak in what the model leaves, another process away from the period, harmonics
-that no faulty valve makes, a size and rhythm kept. That a valve or a limit is not seen at work is none of them; ours:
-all but one of 22 loads told of untidy and tidy plants have one, of seven levels with play told a load one had."""
+that no faulty valve makes, a size and rhythm kept; that a valve or a limit is not seen at work is none of them."""
 COUNTS_PCT = 50.0
 """A loop counts as oscillating from this share of the time on [%]; contract of the ranking."""
 
@@ -113,7 +112,6 @@ class Lack(StrEnum):
     FASTER = "faster samples"
     FINER = "finer values"
     LONGER = "longer record"
-    STROKE = "a stroke of the valve"
     MANUAL_TEST = "some periods in manual"
 
 
@@ -137,18 +135,14 @@ class Need(StrEnum):
     UNCOMPRESSED = auto()
     ARCHIVED = auto()
     OFF_LIMITS = auto()
-    RUNS = auto()
     MODEL = auto()
     OF_A_CYCLE = auto()
     UNFOLDED = auto()
-    OF_A_LOAD = auto()
     OF_SETTINGS = auto()
-    FINER = auto()
     HOURS = auto()
     LONGER = auto()
     LOAD_IN_MANUAL = auto()
     TUNING_IN_MANUAL = auto()
-    STROKE = auto()
     AS_TOLD = auto()
 
 

@@ -9,7 +9,6 @@ from analyzer.loop.assessments import at_limits_share
 from analyzer.loop.decisions import Lack, Need, Needs
 from analyzer.loop.oscillation import Oscillation
 from analyzer.loop.quality import Prepared, op_range
-from analyzer.loop.sample_clock import constant_for
 from identification.limits import RecorderLimits
 from identification.mismatch.recording import least_jump
 from identification.models import Pid
@@ -27,7 +26,7 @@ def unfit_for_cause(prepared: Prepared, oscillation: Oscillation | None, config:
     if float(np.ptp(record.op)) == 0.0:
         return Needs(Lack.MOVING_OP, Need.MOVING_OP)
     jumps = _jumps(record, config.explain.recorder)
-    return jumps or compressed(prepared, oscillation, q) or _scattered(record, q) or at_limits(record, q)
+    return jumps or compressed(prepared, oscillation, q) or at_limits(record, q)
 
 
 def _jumps(record: LoopRecord, limits: RecorderLimits) -> Needs | None:
@@ -57,15 +56,6 @@ def at_limits(record: LoopRecord, q: QualityLimits) -> Needs | None:
     if saturated <= q.saturated_share:
         return None
     return Needs(Lack.OP_OFF_LIMITS, Need.OFF_LIMITS, (100 * saturated,))
-
-
-def _scattered(record: LoopRecord, q: QualityLimits) -> Needs | None:
-    """What good samples lack that are too scattered for a model; None where enough of them follow each other."""
-    good = ~record.bad
-    share = float((good & constant_for(good.astype(np.float64), q.run_samples)).sum()) / max(len(record), 1)
-    if share >= q.run_share:
-        return None
-    return Needs(Lack.UNBROKEN, Need.RUNS, (100 * q.run_share, q.run_samples, 100 * share))
 
 
 def unfit_for_settings(prepared: Prepared, config: Config) -> Needs | None:

@@ -22,7 +22,6 @@ from identification.estimation.backlash_stiction import (
 from identification.estimation.evidence import (
     Trials,
     evidence,
-    expected_evidence,
     gains,
     stem_moves,
     trials,
@@ -68,9 +67,8 @@ class Measured:
     better valve sets out; excited, whether set point moves drove the loop; trials, how the stretches between OP's
     turns agree on the better valve, None with too few; kurtosis [-] of the band at the period, 3 for noise, 1.5 where
     the size is kept; wave_left [-], harmonics of PV's cycle that the better valve leaves, over its fundamental;
-    expected [nat], the evidence that a play would bring in such a recording; steady [-], of a calm loop, how the
-    stretches between moves of the stem agree on the better valve: their mean gain over its standard error, and asked,
-    what it gains while PV is due to answer moves of the set point [nat].
+    steady [-], of a calm loop, how the stretches between moves of the stem agree on the better valve: their mean gain
+    over its standard error, and asked, what it gains while PV is due to answer moves of the set point [nat].
     """
 
     linear: Fit
@@ -92,7 +90,6 @@ class Measured:
     trials: Trials | None = None
     kurtosis: float = 3.0
     wave_left: float = 0.0
-    expected: float = 0.0
     steady: float = 0.0
     asked: float = 0.0
 
@@ -127,11 +124,6 @@ def _harmonics_left(fit: Fit, period_s: float) -> float:
         return 0.0
     left, cycle = spectrum(residual(fit), window.dt_s), spectrum(window.centred, window.dt_s)
     return math.hypot(*(locked_harmonic(left, period_s, order, cycle) for order in HARMONICS))
-
-
-def _play(size: float) -> float:
-    """Width of the play that is looked for, over OP's range: that which fits best, where it could make a cycle."""
-    return min(max(size, LOOP.least_play), LOOP.most_play)
 
 
 def _consistency(fit: Fit, period_s: float) -> float:
@@ -189,7 +181,7 @@ def measure(
             return replace(seen_alone, steady=math.inf)
         alone = not record.mask("idle").any()  # else another one moves PV too
         return _without_a_cycle(seen_alone, best, linear, due if alone else None)
-    return _of_a_cycle(seen_alone, best, linear, scale, op_range, error)
+    return _of_a_cycle(seen_alone, best, linear, scale, error)
 
 
 def _without_a_cycle(m: Measured, best: Fit, linear: Fit, due: Mask | None) -> Measured:
@@ -199,9 +191,7 @@ def _without_a_cycle(m: Measured, best: Fit, linear: Fit, due: Mask | None) -> M
     return replace(m, steady=0.0 if shown is None else shown.steadiness, asked=asked)
 
 
-def _of_a_cycle(
-    m: Measured, best: Fit, linear: Fit, scale: float, op_range: float, error: Spectrum | None
-) -> Measured:
+def _of_a_cycle(m: Measured, best: Fit, linear: Fit, scale: float, error: Spectrum | None) -> Measured:
     """What a cycle of this period shows beside: in the load that the fits leave, and in the wave of the error."""
     dt_s = linear.window.dt_s
     found = replace(
@@ -218,7 +208,6 @@ def _of_a_cycle(
         trials=trials(best, linear, scale),
         kurtosis=size_kurtosis(error, error.duration_s / scale),
         wave_left=_harmonics_left(best, scale),
-        expected=expected_evidence(linear, _play(m.size) * op_range, scale),
     )
 
 

@@ -34,23 +34,17 @@ SAYS: Mapping[Need, str] = {
     Need.ARCHIVED: "needs trends without compression, or {0:g} archived samples a cycle: there are {1:.2g}, {2:.0f} "
     "% lie on straight segments",
     Need.OFF_LIMITS: "needs OP within its limits, it is at one for {0:.0f} % of the time",
-    Need.RUNS: "needs {0:.0f} % of the time in runs of {1} good samples, has {2:.0f} %",
     Need.MODEL: "needs trends from which a model can be identified",
     Need.OF_A_CYCLE: TOO_COARSE,
     Need.UNFOLDED: f"{TOO_COARSE}; what is seen may be such a cycle, folded by the sampling",
-    Need.OF_A_LOAD: "a load from outside needs {0:g} samples a cycle to be told from a valve or the tuning, there "
-    "are {1:.2g}",
     Need.OF_SETTINGS: "new settings need a sample every {0:.2g} s or faster for an integral time of {1:.3g} s, there "
     "is one every {2:g} s: take this as a hint",
-    Need.FINER: "needs finer values: PV is recorded in steps of {0:.2g} % and swings by {1:.2g} %",
     Need.HOURS: "new settings need {0:g} good hours in automatic, there are {1:.3g}: take this as a hint",
     Need.LONGER: "needs a longer record, or one with set point moves, for new settings. {0}",
-    Need.LOAD_IN_MANUAL: "a load is likeliest, but only because no valve and no tuning is seen at work; needs some "
-    "periods in manual: a swing that goes on comes from outside",
+    Need.LOAD_IN_MANUAL: "a load is likeliest, but by {0:.0f} % alone; needs some periods in manual: a swing that "
+    "goes on comes from outside",
     Need.TUNING_IN_MANUAL: "it swings as a loop too tight for its process does, but the one identified is robust (Ms "
     "{0:.2f}); needs some periods in manual: a swing that stops is the loop's own",
-    Need.STROKE: "a load is likelier, but PV fits a play of {0:.0f} % of OP's range as well, in {1:.0f} % of the "
-    "stretches between OP's turns; needs some periods in manual, or the valve stroked in small steps",
     Need.AS_TOLD: "{0}",
 }
 

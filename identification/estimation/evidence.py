@@ -1,4 +1,4 @@
-"""How much better one model explains PV than another, no single event deciding, and what a play would have shown."""
+"""How much better one model explains PV than another, no single event deciding."""
 
 from __future__ import annotations
 
@@ -8,15 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numba import njit
 
-from identification.estimation.backlash_stiction import begin
 from identification.estimation.gauss_newton import descend
-from identification.estimation.hammerstein import Fit, disturbance, residual, stem_of
+from identification.estimation.hammerstein import Fit, disturbance, stem_of
 from identification.estimation.noise import every_lag, judged, whitened
-from identification.estimation.search import prepare, search, starts
 from identification.limits import FIT
 from identification.record import Floats, Mask
 from identification.signals.robust import clipped_gain
-from identification.simulation.valve import IDEAL, sticking
 
 
 def innovations(fit: Fit) -> Floats:
@@ -60,35 +57,6 @@ def with_load_step(fit: Fit, answering: Mask, noise: Floats) -> Fit:
     tried = descend(stepped), descend(replace(stepped, ar=noise))
     trial = max(tried, key=lambda f: f.log_likelihood)
     return trial if trial.log_likelihood - fit.log_likelihood > FIT.step_penalty else fit
-
-
-def expected_evidence(linear: Fit, width: float, period_s: float) -> float:
-    """Log likelihood [nat] that a play would win over no play, under the noise that the recording has.
-
-    PV is simulated behind the play, as large as the process without one makes it, and a process without play is
-    fitted to that: what it leaves, against the innovations of the recording, is the Kullback-Leibler divergence of
-    the two models (Kullback 1951). Noise, few samples and a short record make it small. A play that is there brings
-    as much to three times as much: noise keeps the plain process from fitting as well as it does here.
-
-    linear : the process behind an ideal valve, fitted in blocks; width : of the play [% OP]; period_s :
-    period of the oscillation [s].
-    """
-    blocks = replace(linear.window, fine=False, position=None)
-    free, behind = (
-        _pv(replace(linear, window=blocks, valve=valve)) for valve in (IDEAL, sticking(width, 0.0))
-    )
-    moves = float(np.std(behind))
-    if moves == 0.0 or linear.sigma2 <= 0.0:
-        return 0.0
-    simulated = replace(blocks, y=behind * (float(np.std(free)) / moves))
-    prepared = prepare(simulated, IDEAL, linear.ar)
-    left = begin(simulated, prepared, search(prepared, starts(simulated, period_s))).sigma2
-    return 0.5 * linear.count * math.log1p(left / linear.sigma2)
-
-
-def _pv(fit: Fit) -> Floats:
-    """PV of a process behind a valve, free of load and noise [% PV], shape (n,)."""
-    return fit.window.centred - residual(fit)
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from analyzer.loop.assess import Assessment, assess
-from analyzer.loop.cause import dead_valve, judge
+from analyzer.loop.cause import Verdict, dead_valve, judge
 from analyzer.loop.decisions import Lack
 from analyzer.loop.quality import prepare
 from analyzer.plantwide.night import followers_of, trace
@@ -215,18 +215,28 @@ def test_a_healthy_loop_is_blamed_for_nothing_behind_a_swinging_door(name):
         assert found.verdict.cause in ("none", "undecided")
 
 
-@pytest.mark.parametrize("every", [2, 3, 1200])
-def test_scattered_samples_tell_no_cause(every):
-    """With every second or third PV bad, or every other ten minutes, no cause is told and the verdict says why."""
-    made = trends("play, tank")
+def holed(name: str, bad: np.ndarray) -> Verdict:
+    """The verdict on a loop of a kind whose PV is bad where it is said to be."""
+    made = trends(name)
     stamp = START_S + np.arange(made.pv.size, dtype=float)
-    at = np.arange(made.pv.size)
-    bad = at % every != 0 if every < 10 else at % every < every // 2
-    found = {f"L.{name.upper()}": series(stamp, getattr(made, name)) for name in ("sp", "op")}
-    found["L.PV"] = series(stamp, np.where(bad, np.nan, made.pv), bad)
-    verdict = assess(prepare(spec("L"), found, CONFIG.quality), None, CONFIG).verdict
+    found = {f"L.{role.upper()}": series(stamp, getattr(made, role)) for role in ("sp", "op")}
+    found["L.PV"] = series(stamp, np.where(bad[: stamp.size], np.nan, made.pv), bad[: stamp.size])
+    return assess(prepare(spec("L"), found, CONFIG.quality), None, CONFIG).verdict
+
+
+@pytest.mark.parametrize("every", [2, 3])
+def test_scattered_samples_tell_no_cause(every):
+    """With all but every second or third PV bad no cause is told and the verdict says why."""
+    verdict = holed("play, tank", np.arange(200_000) % every != 0)
     assert verdict.cause in ("none", "undecided")
     assert verdict.needs is None or verdict.needs.lack is Lack.UNBROKEN
+
+
+def test_what_is_left_of_half_a_record_tells_a_cause():
+    """Where every other ten minutes are lost a tank's play is told from the rest, and no healthy loop is blamed."""
+    lost = np.arange(200_000) % 1200 < 600
+    assert holed("play, tank", lost).cause == "valve"
+    assert {holed(name, lost).cause for name in named("none")} <= {"none", "undecided"}
 
 
 def test_a_loop_in_manual_is_not_assessed():

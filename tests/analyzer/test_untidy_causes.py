@@ -10,16 +10,11 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from analyzer.loop.advice import withheld
-from analyzer.loop.assess import assess, cause_of, convicted
-from analyzer.loop.decisions import Action, Lack
+from analyzer.loop.assess import cause_of, convicted
 from analyzer.loop.measure import measure
 from analyzer.loop.oscillation import counting, detect
 from analyzer.loop.quality import prepare
-from analyzer.loops.spec import LoopSpec
 from proofs.plant import CONFIG, START_S, series, spec
-from proofs.plant import prepared as sketched
-from proofs.sensitivity import SKETCHES, Cell, made
 from proofs.untidy.draw import draw
 from proofs.untidy.loop import Plant, Stem, run
 from proofs.untidy.recorder import rounded
@@ -96,7 +91,7 @@ def test_a_tuning_is_told_on_a_grid_of_two_steps_an_amplitude(seed):
     drawn = draw(seed)
     ready, stated = recorded(drawn, CONFIG)
     found = detect(ready.record, CONFIG.oscillation)
-    assert counting(found).amplitude_pct < CONFIG.cause.steps_told * ready.pv_step
+    assert counting(found).amplitude_pct < 3.0 * ready.pv_step
     assert drawn.truth["cause"] == cause_of(ready, found, stated, CONFIG, drawn.kind).cause == "tuning"
 
 
@@ -146,17 +141,6 @@ def test_a_healthy_loop_s_near_cycle_counts_for_nothing():
         found, _ = convicted(ready, seen, stated, eager, drawn.kind)
         assert counting(found) is None
     assert looked > 0
-
-
-def test_no_load_is_told_alone_where_noise_half_hides_a_play():
-    """Behind noise of a third of its cycle, on PV alone, a level that a play swings is not said to be driven."""
-    cell = Cell("play, noise on PV alone", 3.0, 20.0)
-    for seed in range(3):
-        stated = SKETCHES[cell.name].controller
-        found = assess(sketched(made(cell, seed)), stated, CONFIG)
-        if found.verdict.cause != "valve":
-            assert found.verdict.needs.lack is Lack.STROKE
-            assert withheld(found, LoopSpec("L"), stated, 100.0, CONFIG).action is Action.UNDECIDED
 
 
 @pytest.mark.parametrize("seed", [1508212, 1509512, 1600279, 1800233])

@@ -43,7 +43,7 @@ FOUND = Finding(
     "FIC1",
     "2026-03-02",
     Status.OK,
-    Needs(Lack.FINER, Need.FINER, (0.5, 0.8)),
+    Needs(Lack.FINER, Need.PV_AS_MEASURED, (98.0, 0.8)),
     Lack.FINER,
     Swing(20.0, 90.0, 60.0, 2.0),
     Cause.UNDECIDED,
@@ -66,11 +66,8 @@ def test_a_piece_keeps_figures_and_gives_the_same_night() -> None:
     """What a worker writes holds no sentence, and the night made of it says what the finding says."""
     piece = piece_row(FOUND)
     assert "explains" not in piece["signs"]
-    assert "finer" not in json.loads(piece["reason"])[2]
+    assert "measured" not in json.loads(piece["reason"])[2]
     again = finding_of(piece)
     assert (again.signs, again.lacking) == (FOUND.signs, FOUND.lacking)
     assert night_row(again) == night_row(FOUND)
-    assert (
-        "needs finer values: PV is recorded in steps of 0.5 % and swings by 0.8 %"
-        in night_row(again)["reason"]
-    )
+    assert "needs PV as measured; it stands for 98 % of the samples" in night_row(again)["reason"]
