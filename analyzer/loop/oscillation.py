@@ -1,8 +1,7 @@
 """Whether a loop oscillates: periods, amplitude, regularity, share of time, significance.
 
-A peak counts where three signs agree: it stands out of the spectrum about it, the autocorrelation of its band
-comes back after one period, and it carries a fair share of the error. A cycle that is regular only in shape counts
-where it stands out most of the time and its half-cycles, none larger than the usual one, come back: see _in_shape.
+A peak of the spectrum counts where it carries a fair share of the error, stands out most of the time, and its
+half-cycles, none larger than the usual one, come back, by more than noise shows in so many cycles: see _in_shape.
 What the set point explains is taken out first, so set point steps and a cascade's moving set point are not
 oscillation of the loop, nor is what dies away where the set point rests, as a programme's corners do. A cycle a
 little short of that counts where PV convicts the valve of making it: see `assess.convicted`.
@@ -167,7 +166,7 @@ def barely_seen(found: Oscillations, limits: OscillationLimits) -> float | None:
     s, b = found.spectrum, found.bands
     if s is None or b is None:
         return None
-    few = replace(limits, samples=limits.samples_least, samples_few=limits.samples_least)
+    few = replace(limits, samples_few=limits.samples_least)
     fast = [
         k for k in peaks(b, limits.prominence) if s.duration_s / float(b.line[k]) < limits.samples * s.dt_s
     ]
