@@ -1,0 +1,154 @@
+"""What each rule of the verdict on one record is worth: python -m proofs.rules [--loops 1200] [--seed 13000000]
+
+Loops of proofs/untidy are judged with all rules, and with each left out or a threshold moved. Counted are cycles
+found of those that show; causes right and wrong of the clear ones, and of all that show (proofs/untidy_loops.py);
+valves blamed that move freely; healthy loops of which anything is named. A rule whose absence makes nothing worse is
+not worth its lines. Writes proofs/rules.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from multiprocessing import Pool
+from types import ModuleType
+from typing import Any
+
+from analyzer.config import Config
+from analyzer.loop import assess, cause, fitness, oscillation
+from analyzer.loop.measure import Measured
+from analyzer.loop.oscillation import counting, detect
+from identification.errors import NotAssessedError
+from proofs.common import command, command_line, publish, table
+from proofs.untidy.draw import draw
+from proofs.untidy_loops import NAMED, clear, recorded, shows
+
+WHOLE = Config()
+HEADS = "rule | found | clear right | clear wrong | shown right | shown wrong | free valves blamed | healthy named"
+Rule = tuple[Mapping[tuple[ModuleType, str], Callable[..., Any]], Config]
+"""What stands in a function's place, and the limits."""
+
+
+def _never(*_: Any, **__: Any) -> None:
+    """A rule that asks for nothing."""
+
+
+def _always(*_: Any, **__: Any) -> bool:
+    """A rule that is content."""
+    return True
+
+
+def _limits(section: str, **changed: float) -> Rule:
+    return {}, replace(WHOLE, **{section: replace(getattr(WHOLE, section), **changed)})
+
+
+RULES: Mapping[str, Rule] = {
+    "all": ({}, WHOLE),
+    "a set point's response asked for at rest alone": _limits("oscillation", sensitive=1e9),
+    "no set point's response": ({(oscillation, "_lasts"): _always}, WHOLE),
+    "no cycle of few samples": _limits("oscillation", samples_few=WHOLE.oscillation.samples),
+    "no swing between limits": _limits("oscillation", swing_least=1e9),
+    "no cycle for its valve's sake": _limits("cause", near_evidence=1e9),
+    "loads from 50 %": _limits("cause", load_pct=50.0),
+    "loads from 80 %": _limits("cause", load_pct=80.0),
+    "valves from 65 %": _limits("cause", valve_pct=65.0),
+    "small stickbands as others": _limits("cause", small_size=0.0),
+    "tight loops that are robust": ({(cause, "_robust"): _never}, WHOLE),
+    "likely valves of compressed trends": ({(cause, "compressed"): _never}, WHOLE),
+    "causes of compressed trends": ({(fitness, "compressed"): _never}, WHOLE),
+    "PV that stands and jumps": ({(fitness, "_jumps"): _never}, WHOLE),
+    "plays within PV's grid": ({(assess, "hidden_by_grid"): lambda *_: False}, WHOLE),
+    "calm loops whose stretches do not agree": ({(cause, "agrees"): _always}, WHOLE),
+    "calm loops with one sign": _limits("cause", signs=1),
+}
+
+
+@contextmanager
+def _under(places: Mapping[tuple[ModuleType, str], Callable[..., Any]]) -> Iterator[None]:
+    """Functions in other ones' places, for a while."""
+    before = {place: getattr(*place) for place in places}
+    for (module, name), other in places.items():
+        setattr(module, name, other)
+    try:
+        yield
+    finally:
+        for (module, name), own in before.items():
+            setattr(module, name, own)
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A drawn loop: its cause, whether that shows and is clear; by rule, whether a cycle was found and what named."""
+
+    cause: str
+    shows: bool
+    clear: bool
+    said: Mapping[str, tuple[bool, str]]
+
+
+def judged(seed: int) -> Judged | None:
+    """A loop's verdicts; None of one without a good sample."""
+    drawn, fits = draw(seed), {}
+    prepared, stated = recorded(drawn, WHOLE)
+    if not prepared.record.at_work.any():
+        return None
+    measure = assess.measure
+
+    def once(record: Any, cycle: Any, *rest: Any) -> Measured:
+        key = id(record), None if cycle is None else cycle.period_s
+        if key not in fits:
+            try:
+                fits[key] = measure(record, cycle, *rest)
+            except NotAssessedError as error:
+                fits[key] = error
+        if isinstance(fits[key], NotAssessedError):
+            raise fits[key]
+        return fits[key]  # type: ignore[no-any-return]
+
+    said = {}
+    for name, (places, config) in RULES.items():
+        own = {(assess, "measure"): once, (assess, "told_slip_by_slip"): lambda verdict, *_: verdict}
+        with _under({**places, **own}):
+            seen = detect(prepared.record, config.oscillation)
+            found, verdict = assess.convicted(prepared, seen, stated, config, drawn.kind)
+        said[name] = counting(found) is not None, str(verdict.cause)
+    return Judged(drawn.truth["cause"], shows(drawn), clear(drawn), said)
+
+
+def counts(name: str, loops: list[Judged]) -> list[int]:
+    """The columns of a rule."""
+    ill = [(x, *x.said[name]) for x in loops if x.cause != "healthy"]
+    named = [(x, cause == NAMED[x.cause]) for x, _, cause in ill if cause not in ("undecided", "none")]
+    shown = [right for x, right in named if x.shows]
+    plain = [right for x, right in named if x.clear]
+    free = (x.said[name][1] for x in loops if x.cause in ("healthy", "tuning", "load"))
+    well = (x.said[name][1] for x in loops if x.cause == "healthy")
+    return [
+        sum(found for x, found, _ in ill if x.shows),
+        *(sum(plain), len(plain) - sum(plain), sum(shown), len(shown) - sum(shown)),
+        sum(cause == "valve" for cause in free),
+        sum(cause not in ("undecided", "none") for cause in well),
+    ]
+
+
+def main() -> None:
+    """Judge all loops and write the table beside this file."""
+    options = command_line(__doc__, loops=1200, seed=13_000_000, jobs=2)
+    with Pool(options.jobs) as pool:
+        every = pool.map(judged, range(options.seed, options.seed + options.loops), chunksize=10)
+    loops = [x for x in every if x is not None]
+    show, plain, well = (sum(test(x) for x in loops) for test in TESTS)
+    said = f"Of {len(loops)} loops {show} show their cause, {plain} clearly; {well} are healthy."
+    text = table(HEADS, [[name, *counts(name, loops)] for name in RULES])
+    publish(__file__, "Rules left out", command(__file__, loops=options.loops, seed=options.seed), text, said)
+
+
+TESTS = (
+    lambda x: x.shows and x.cause != "healthy",
+    lambda x: x.clear and x.cause != "healthy",
+    lambda x: x.cause == "healthy",
+)
+
+if __name__ == "__main__":
+    main()
