@@ -128,7 +128,7 @@ def quiet_signs(m: Measured, limits: CauseLimits) -> tuple[Sign, ...]:
         return ()
     few = m.moves < limits.few_moves and not m.excited
     least = needed(m, limits, False) * (limits.quiet_factor if few else 1.0)
-    if not speaks(m, limits, False) or m.evidence < least:
+    if not speaks(m, limits, False) or m.evidence < least or (m.moves < limits.moves and not m.excited):
         return ()
     sure = 0.5 + 0.5 * _ramp(m.evidence, least, 4 * least)
     signs = [Sign(Cause.VALVE, sure, SignKind.CALM_EVIDENCE, (m.evidence,))]
