@@ -52,6 +52,8 @@ RULES: Mapping[str, Rule] = {
     "no cycle for its valve's sake": _limits("cause", near_evidence=1e9),
     "loads from 50 %": _limits("cause", load_pct=50.0),
     "loads from 80 %": _limits("cause", load_pct=80.0),
+    "loads on a coarse grid": _limits("cause", steps_told=0.0),
+    "loads of few samples": _limits("cause", samples_told=0.0),
     "valves from 65 %": _limits("cause", valve_pct=65.0),
     "small stickbands as others": _limits("cause", small_size=0.0),
     "tight loops that are robust": ({(cause, "_robust"): _never}, WHOLE),

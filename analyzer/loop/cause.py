@@ -269,7 +269,8 @@ def told_apart(
     verdict: Verdict, prepared: Prepared, oscillation: Oscillation | None, config: Config
 ) -> Verdict:
     """The verdict, or none where trends on straight segments make a likely valve of a load, where the loop that is
-    called too tight is robust, and where a load is not likely enough: it is what is left where nothing else shows."""
+    called too tight is robust, and where a load is not likely enough, or what is recorded too coarse for another
+    cause to show: a load is what is left then."""
     if oscillation is None or verdict.cause not in CAUSES:
         return verdict
     lacking = _hides(verdict, prepared, oscillation, config)
@@ -287,7 +288,20 @@ def _hides(verdict: Verdict, prepared: Prepared, oscillation: Oscillation, confi
         return _robust(verdict, oscillation, config)
     if verdict.cause is Cause.VALVE:
         return None if pct >= limits.compressed_pct else compressed(prepared, None, config.quality)
-    return None if pct >= limits.load_pct else Needs(Lack.MANUAL_TEST, Need.LOAD_IN_MANUAL, (pct,))
+    unlikely = None if pct >= limits.load_pct else Needs(Lack.MANUAL_TEST, Need.LOAD_IN_MANUAL, (pct,))
+    return _too_coarse_for_a_load(prepared, oscillation, limits) or unlikely
+
+
+def _too_coarse_for_a_load(prepared: Prepared, oscillation: Oscillation, limits: CauseLimits) -> Needs | None:
+    """What a recording lacks in which every cause looks like a load: a wave of few samples, or of few steps of PV's
+    grid, has lost what a valve writes into it; None where it lacks nothing."""
+    steps = oscillation.amplitude_pct / max(prepared.pv_step, 1e-12)
+    if steps < limits.steps_told:
+        return Needs(Lack.FINER, Need.FINER, (prepared.pv_step, oscillation.amplitude_pct))
+    samples = oscillation.period_s / prepared.record.dt_s
+    if samples < limits.samples_told:
+        return Needs(Lack.FASTER, Need.OF_A_LOAD, (limits.samples_told, samples))
+    return None
 
 
 def _robust(verdict: Verdict, oscillation: Oscillation, config: Config) -> Needs | None:

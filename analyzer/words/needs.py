@@ -37,8 +37,11 @@ SAYS: Mapping[Need, str] = {
     Need.MODEL: "needs trends from which a model can be identified",
     Need.OF_A_CYCLE: TOO_COARSE,
     Need.UNFOLDED: f"{TOO_COARSE}; what is seen may be such a cycle, folded by the sampling",
+    Need.OF_A_LOAD: "a load from outside needs {0:g} samples a cycle to be told from a valve or the tuning, there "
+    "are {1:.2g}",
     Need.OF_SETTINGS: "new settings need a sample every {0:.2g} s or faster for an integral time of {1:.3g} s, there "
     "is one every {2:g} s: take this as a hint",
+    Need.FINER: "needs finer values: PV is recorded in steps of {0:.2g} % and swings by {1:.2g} %",
     Need.HOURS: "new settings need {0:g} good hours in automatic, there are {1:.3g}: take this as a hint",
     Need.LONGER: "needs a longer record, or one with set point moves, for new settings. {0}",
     Need.LOAD_IN_MANUAL: "a load is likeliest, but by {0:.0f} % alone; needs some periods in manual: a swing that "
