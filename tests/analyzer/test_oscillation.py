@@ -105,6 +105,14 @@ def test_a_loop_that_oscillates_beside_its_set_point_still_does():
     assert first_of(record(pv, sp)).period_s == pytest.approx(90, rel=0.01)
 
 
+def test_a_set_point_that_steps_by_little_hides_no_cycle():
+    """A cycle of a percent is the loop's own though the set point steps by hundredths in every period; what steps of
+    its own size make is the set point's (test_batches.py)."""
+    sp = 50 + 0.02 * np.random.default_rng(4).random(N // 60)[T // 60]
+    pv = sp + np.sin(2 * np.pi * T / 90) + 0.05 * noise(5)
+    assert first_of(record(pv, sp)).period_s == pytest.approx(90, rel=0.01)
+
+
 def test_too_few_periods_are_not_called_oscillation():
     """Two and a half periods of a sine in noise are not enough to tell it from drift."""
     assert found_in(record(50 + 3 * np.sin(2 * np.pi * T / (N / 2.5)) + 0.3 * noise(7))).first is None
