@@ -55,6 +55,7 @@ RULES: Mapping[str, Rule] = {
     "loads on a coarse grid": _limits("cause", steps_told=0.0),
     "loads of few samples": _limits("cause", samples_told=0.0),
     "valves from 65 %": _limits("cause", valve_pct=65.0),
+    "stickbands of any size": _limits("cause", least_size=0.0),
     "small stickbands as others": _limits("cause", small_size=0.0),
     "tight loops that are robust": ({(cause, "_robust"): _never}, WHOLE),
     "likely valves of compressed trends": ({(cause, "compressed"): _never}, WHOLE),

@@ -23,6 +23,7 @@ distances that scatter, rather than play?
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
@@ -183,7 +184,7 @@ def judge(m: Measured, oscillation: Oscillation | None, limits: CauseLimits) -> 
     found = chances(seen)
     first = max(found, key=lambda c: found[c])
     confidence = {c: 100.0 * p for c, p in found.items()}
-    if first is Cause.VALVE and not speaks(m, limits, True):
+    if first is Cause.VALVE and (m.size < limits.least_size or not speaks(m, limits, True)):
         confidence[first] = min(confidence[first], 0.9 * limits.named_pct)
     cause = first if confidence[first] >= _least(first, m, limits) else Cause.UNDECIDED
     fault = fault_of(m, limits) if cause is Cause.VALVE else Fault.NONE
@@ -193,12 +194,14 @@ def judge(m: Measured, oscillation: Oscillation | None, limits: CauseLimits) -> 
 def _least(cause: Cause, m: Measured, limits: CauseLimits) -> float:
     """Confidence [%] from which a cause is named.
 
-    A cycle that keeps its size may be brought, where the stickband is small beside OP's range.
+    A stickband that is small beside OP's range makes no square of PV, and a cycle that keeps its size may be brought.
     """
     if cause is not Cause.VALVE:
         return limits.named_pct
     if m.size >= limits.small_size:
         return limits.valve_pct
+    if m.harmonic > limits.square:
+        return math.inf
     return limits.small_pct if m.kurtosis < limits.changing else limits.changing_pct
 
 

@@ -215,6 +215,13 @@ def test_a_healthy_loop_is_blamed_for_nothing_behind_a_swinging_door(name):
         assert found.verdict.cause in ("none", "undecided")
 
 
+def test_a_slow_healthy_loop_is_blamed_for_nothing_in_a_day():
+    """A day of noise that swings slowly, as half a day does not show, convicts no valve of making it."""
+    sketch = SKETCHES["healthy temperature"]
+    found = assess(prepared(simulate(sketch, 24.0, 10), sketch.kind), sketch.controller, CONFIG, sketch.kind)
+    assert (found.verdict.cause, found.oscillations.first) == ("none", None)
+
+
 def holed(name: str, bad: np.ndarray) -> Verdict:
     """The verdict on a loop of a kind whose PV is bad where it is said to be."""
     made = trends(name)
