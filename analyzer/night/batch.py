@@ -40,6 +40,7 @@ from identification.errors import InputError
 CHUNKS, FEWEST, MOST = 16, 4, 16
 """Tasks of a run that is small, and loops per task: enough to carry its four small tables, few enough for a smooth
 progress bar and for workers that end together."""
+PACKAGES = ("identification", "tuning", "analyzer", "reports")
 Identity = Mapping[str, Any]
 """A run as it is written down beside its pieces: fingerprint, and words for people (export, loops, begun)."""
 
@@ -174,9 +175,18 @@ def require_same(path: Path, run: Identity) -> None:
         )
 
 
+def of_code() -> bytes:
+    """A digest of the code and the limits that judge: pieces of a run that others began are no pieces of this one."""
+    mark, here = hashlib.blake2b(digest_size=16), Path(__file__).parents[2]
+    for package in PACKAGES:
+        for path in sorted(p for p in (here / package).rglob("*") if p.suffix in (".py", ".toml", ".json")):
+            mark.update(path.read_bytes())
+    return mark.digest()
+
+
 def identity(batch: Batch) -> Identity:
     """What a run that goes on with the pieces of a batch must have in common with it."""
-    mark = hashlib.blake2b(digest_size=16)
+    mark = hashlib.blake2b(of_code(), digest_size=16)
     for source in batch.export.sources:
         mark.update(ends_of(source.path))
         mark.update(in_one_order(source.clock))

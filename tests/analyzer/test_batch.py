@@ -20,6 +20,7 @@ from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import find_loops
 from analyzer.night import batch, chunk
 from analyzer.store.store import Store
+from identification.errors import InputError
 from proofs.plant import CONFIG, START_S, Sketch, Trends, simulate, write_export
 
 LOOPS = 40
@@ -174,6 +175,20 @@ def test_a_chunk_stopped_half_written_is_not_kept_twice(night, whole, tmp_path):
             batch.run(batch.Batch(export, specs, Store(store), CONFIG))
     CliRunner().invoke(main, ["run", str(night), "--store", str(store), "--resume", "--jobs", "2"])
     assert tables(store) == tables(whole)
+
+
+def test_a_run_that_other_code_began_is_not_gone_on_with(night, tmp_path, monkeypatch):
+    """Pieces of a run stopped before an update are refused in one line, and a run without --resume begins."""
+    export, specs = opened(night)
+    mine = batch.Batch(export, specs[:4], Store(tmp_path / "store"), CONFIG)
+    mine.store.run_file.parent.mkdir(parents=True, exist_ok=True)
+    with monkeypatch.context() as older:
+        older.setattr(batch, "of_code", lambda: b"another")
+        mine.store.run_file.write_text(json.dumps(batch.identity(mine)), encoding="utf-8")
+    with pytest.raises(InputError, match="and version"):
+        batch.run(mine, resume=True)
+    batch.run(mine)
+    assert mine.store.nights() == ["2026-03-02"]
 
 
 def test_without_resume_a_run_starts_anew(night, whole, tmp_path):
