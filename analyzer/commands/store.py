@@ -42,10 +42,10 @@ def store() -> None:
     """
 
 
-@store.command()
+@store.command("check")
 @click.argument("path", metavar="STORE", type=PLACE)
 @CONFIG
-def check(path: Path, config: Path | None) -> None:
+def check_store(path: Path, config: Path | None) -> None:
     """Read every table of a store and say what is damaged, left over or not finished, or does not follow from its
     nights.
 

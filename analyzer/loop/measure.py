@@ -31,10 +31,7 @@ from identification.estimation.evidence import (
 from identification.estimation.gauss_newton import descend
 from identification.estimation.hammerstein import Fit, residual
 from identification.estimation.noise import judged
-from identification.estimation.search import (
-    prepare,
-    score,
-)
+from identification.estimation.search import prepare, score
 from identification.estimation.stem_position import Seen, seen
 from identification.estimation.window import Window, block_means
 from identification.limits import FIT

@@ -39,7 +39,7 @@ def simulated_series(loop: Loop, seed: int) -> dict[str, Series]:
     return {f"L.{role}": Series(stamp, x, good) for role, x in trends.items()}
 
 
-def main() -> None:
+def compile_all() -> None:
     """Assess a loop of each kind, with advice."""
     begun, config = time.monotonic(), Config()
     for seed, loop in enumerate(LOOPS):
@@ -53,4 +53,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    compile_all()

@@ -83,7 +83,7 @@ def integral_time(kp: float, ki: float, record_s: float) -> float:
     return ti if ti < LAW.longest_integral * record_s else math.inf
 
 
-def moves(
+def increments(
     columns: Floats, out_of_law: Mask, samples: int, step: int = 1, level: bool = False
 ) -> Moves | None:
     """Increments over so many samples, begun every `step`, of the columns, shape (n, 5), that span none that is out
@@ -142,7 +142,7 @@ def fit_pi(record: LoopRecord, period_s: float) -> ControllerFit | None:
     step = max(round(period_s / 8 / record.dt_s), 1)
     if len(record) < 10 * step + LAW.increments:
         return None
-    found = moves(_columns(record, record.error), _out_of_law(record), step)
+    found = increments(_columns(record, record.error), _out_of_law(record), step)
     if found is None:
         return None
     gains = _least_squares([found], np.ones(1), np.eye(3)[:2], np.zeros(3))
@@ -221,7 +221,9 @@ def _ways(record: LoopRecord, longest_s: float, stated: Pid) -> Iterator[_Seen]:
             columns = _columns(record, record.sp - pv, first_order(slope, narrow))
             columns[:, 0] = on_gain * record.sp - pv
             found = [
-                m for k in lengths if (m := moves(columns, out_of_law, k, max(k // 8, 1), True)) is not None
+                m
+                for k in lengths
+                if (m := increments(columns, out_of_law, k, max(k // 8, 1), True)) is not None
             ]
             weight = _weights(found)
             if weight.any():
