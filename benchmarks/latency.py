@@ -6,7 +6,6 @@ without; calls by the processor time of this process. The least of some runs cou
 
 from __future__ import annotations
 
-import os
 import resource
 import subprocess
 import sys
@@ -14,8 +13,6 @@ import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
-
-os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import numpy as np
 

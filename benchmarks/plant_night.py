@@ -10,7 +10,6 @@ plants of 100, 1,000 and 10,000 loops of 2 h at 5 s instead. Writes plant_night.
 from __future__ import annotations
 
 import csv
-import os
 import resource
 import subprocess
 import sys
@@ -19,9 +18,6 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-
-os.environ.setdefault("OMP_NUM_THREADS", "1")
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 import pyarrow as pa
