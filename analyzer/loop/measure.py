@@ -153,7 +153,7 @@ def measure(
     window = window_of(record, scale, limits, kind, calm)
     _check_judged(window, limits)
     controller = controller or recovered(record, scale)
-    due = due_to_answer(record, window, scale, calm)
+    due = due_to_answer(record, window, scale)
     linear, play, stick, best, gained, jump = _fits(window, scale, due, limits, oscillation)
     hopeless = oscillation is None and gained < _hopeful(window, due, limits)
     op_range = _op_range(window, scale, oscillation is not None)
@@ -351,17 +351,23 @@ def window_of(
     op = np.ascontiguousarray(part.op)
     stem = None if part.position is None else np.ascontiguousarray(part.position)
     return Window(
-        block_means(part.pv, factor), op, usable, record.dt_s * factor, factor, *most, position=stem
+        block_means(part.pv, factor),
+        op,
+        usable,
+        record.dt_s * factor,
+        factor,
+        *most,
+        position=stem,
+        first=first,
     )
 
 
-def due_to_answer(record: LoopRecord, window: Window, scale_s: float, calm: bool = False) -> Mask:
+def due_to_answer(record: LoopRecord, window: Window, scale_s: float) -> Mask:
     """True where PV is due to answer a set point move, shape of the window.
 
     From a move for scale_s [s], and on until PV has come to the set point, however long the valve takes.
     """
-    first = latest_fit_stretch(record, window.y.size * window.factor, calm)
-    sp = record.sp[first :: window.factor][: window.y.size]
+    sp = record.sp[window.first :: window.factor][: window.y.size]
     moves = np.flatnonzero(np.abs(np.diff(sp)) > 1e-6) + 1
     out = np.zeros(window.y.size, dtype=bool)
     if record.sp_estimated or not 0 < moves.size <= window.y.size / 10:

@@ -101,10 +101,13 @@ def _thinned_wave(error: Floats, dt_s: float, start_s: float, period_s: float) -
 
 
 def _cut(
-    s: Spectrum, loop: str, start_s: float, error: Floats, period_s: float, harmonic: int, own: bool
+    s: Spectrum, power: Floats, loop: str, start_s: float, error: Floats, asked: tuple[float, int, bool]
 ) -> Wave | None:
-    """The wave about one period of a loop's error, None where the spectrum does not hold enough of it."""
-    power = s.lines.real**2 + s.lines.imag**2
+    """The wave about one period of a loop's error, None where the spectrum does not hold enough of it.
+
+    power : of all lines; asked : period [s], harmonic and whether the loop oscillates with it by itself.
+    """
+    period_s, harmonic, own = asked
     line = s.duration_s / period_s
     low = max(math.floor(line / WAVES.reach) - BESIDE, 0)
     high = min(math.ceil(line * WAVES.reach) + BESIDE, s.lines.size - 1)
@@ -155,8 +158,8 @@ def waves_of(loop: str, found: Oscillations, end_s: float, limits: PlantLimits) 
             wanted.append((period, 1, False))
         if len(wanted) >= limits.waves:
             break
-    error = irfft(s.lines, s.n)
-    cut = (_cut(s, loop, end_s - s.duration_s, error, *asked) for asked in wanted)
+    error, power = irfft(s.lines, s.n), s.lines.real**2 + s.lines.imag**2
+    cut = (_cut(s, power, loop, end_s - s.duration_s, error, asked) for asked in wanted)
     return tuple(w for w in cut if w is not None)
 
 

@@ -84,40 +84,41 @@ def integral_time(kp: float, ki: float, record_s: float) -> float:
 
 
 def increments(
-    columns: Floats, out_of_law: Mask, samples: int, step: int = 1, level: bool = False
+    rows: Floats, out_of_law: Mask, samples: int, step: int = 1, level: bool = False
 ) -> Moves | None:
-    """Increments over so many samples, begun every `step`, of the columns, shape (n, 5), that span none that is out
-    of the law, less what goes with those of a sixth column, where there is one; `level`: less their means, for a
-    constant error of PV's makes the integral run away."""
+    """Increments over so many samples, begun every `step`, of the rows, shape (5, n), that span none that is out of
+    the law, less what goes with those of a sixth row, where there is one; `level`: less their means, for a constant
+    error of PV's makes the integral run away."""
     since = np.cumsum(out_of_law)
-    inside = since[samples::step] == since[:-samples:step]
-    inside &= ~out_of_law[:-samples:step]
-    rows = (columns[samples::step] - columns[:-samples:step])[inside]
-    if len(rows) < LAW.increments:
+    inside = (since[samples::step] == since[:-samples:step]) & ~out_of_law[:-samples:step]
+    count = int(np.count_nonzero(inside))
+    if count < LAW.increments:
         return None
-    rows = rows - rows.mean(axis=0) if level else rows
-    rows = rows if rows.shape[1] == 5 else _without(rows[:, :5], rows[:, 5])
-    products = rows.T @ rows / len(rows)
+    moved = (rows[:, samples::step] - rows[:, :-samples:step]) * inside
+    if level:
+        moved -= np.outer(moved.sum(axis=1) / count, inside)
+    moved = moved if len(moved) == 5 else _without(moved[:5], moved[5])
+    products = moved @ moved.T / count
     if not (products[3, 3] > 0 and products[0, 0] > 0):
         return None
     return Moves(products[:4, :4], samples, float(products[4, 4]))
 
 
-def _without(rows: Floats, feed: Floats) -> Floats:
+def _without(moved: Floats, feed: Floats) -> Floats:
     """Increments without their part along those of what is fed forward (Frisch and Waugh 1933): its gain, whatever it
     is, then changes nothing."""
     size = float(feed @ feed)
-    return rows - np.outer(feed, feed @ rows) / size if size > 0 else rows
+    return moved - np.outer(moved @ feed, feed) / size if size > 0 else moved
 
 
-def _columns(record: LoopRecord, error: Floats, slope: Floats | None = None) -> Floats:
-    """Error, integral [% s], slope [% / s], OP, and what the integral of every second sample lacks, shape (n, 5);
-    what is fed forward as a sixth column, where there is some."""
+def _rows(record: LoopRecord, error: Floats, slope: Floats | None = None) -> Floats:
+    """Error, integral [% s], slope [% / s], OP, and what the integral of every second sample lacks, shape (5, n);
+    what is fed forward as a sixth row, where there is some."""
     none = np.zeros(error.size) if slope is None else slope
     coarser = np.repeat(error[::2], 2)[: error.size]
     whole, lacking = np.cumsum(error) * record.dt_s, np.cumsum(error - coarser) * record.dt_s
     feed = () if record.feed is None else (record.feed,)
-    return np.column_stack((error, whole, none, record.op, lacking, *feed))
+    return np.stack((error, whole, none, record.op, lacking, *feed))
 
 
 def clamped(op: Floats) -> Mask:
@@ -142,7 +143,7 @@ def fit_pi(record: LoopRecord, period_s: float) -> ControllerFit | None:
     step = max(round(period_s / 8 / record.dt_s), 1)
     if len(record) < 10 * step + LAW.increments:
         return None
-    found = increments(_columns(record, record.error), _out_of_law(record), step)
+    found = increments(_rows(record, record.error), _out_of_law(record), step)
     if found is None:
         return None
     gains = _least_squares([found], np.ones(1), np.eye(3)[:2], np.zeros(3))
@@ -218,12 +219,10 @@ def _ways(record: LoopRecord, longest_s: float, stated: Pid) -> Iterator[_Seen]:
         pv = np.concatenate((pv[:1], pv[:-1])) if late else pv
         for (on_gain, on_slope), narrow in product(on_error, slope_filters):
             slope = np.diff(on_slope * record.sp - pv, prepend=on_slope * record.sp[0] - pv[0]) / record.dt_s
-            columns = _columns(record, record.sp - pv, first_order(slope, narrow))
-            columns[:, 0] = on_gain * record.sp - pv
+            rows = _rows(record, record.sp - pv, first_order(slope, narrow))
+            rows[0] = on_gain * record.sp - pv
             found = [
-                m
-                for k in lengths
-                if (m := increments(columns, out_of_law, k, max(k // 8, 1), True)) is not None
+                m for k in lengths if (m := increments(rows, out_of_law, k, max(k // 8, 1), True)) is not None
             ]
             weight = _weights(found)
             if weight.any():

@@ -41,7 +41,7 @@ class Window:
     load steps, 0 where it does not; position : stem [% OP], shape of op, where recorded or, `decoded`, told from PV;
     fine : whether responses are stepped at the record's own interval rather than in blocks. Within a block OP
     answers PV's noise, which a fine response meets where the dead time is shorter than the block; in blocks it counts
-    from the next one on.
+    from the next one on. first : sample of its record that it begins at.
     """
 
     y: Floats
@@ -55,6 +55,7 @@ class Window:
     position: Floats | None = None
     fine: bool = False
     decoded: bool = False
+    first: int = 0
 
     @cached_property
     def extra(self) -> Floats:
