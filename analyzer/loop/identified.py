@@ -10,8 +10,8 @@ from analyzer.config import AdviceLimits
 from analyzer.limits import LOOP
 from analyzer.loop.measure import Measured
 from identification.estimation.covariance import NINETY, half_width, reaching
-from identification.estimation.gauss_newton import covariance
-from identification.estimation.hammerstein import Fit, disturbance
+from identification.estimation.gauss_newton import covariance, disturbance
+from identification.estimation.hammerstein import Fit
 from identification.estimation.window import Window
 from identification.limits import INTERVALS
 from identification.models import Estimate, Fopdt, Integrator, Loop, Pid, Process

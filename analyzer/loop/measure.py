@@ -28,8 +28,8 @@ from identification.estimation.evidence import (
     trials_between_moves,
     with_load_step,
 )
-from identification.estimation.gauss_newton import descend
-from identification.estimation.hammerstein import Fit, residual
+from identification.estimation.gauss_newton import descend, residual
+from identification.estimation.hammerstein import Fit
 from identification.estimation.noise import judged
 from identification.estimation.search import prepare, score
 from identification.estimation.stem_position import Seen, seen

@@ -8,19 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numba import njit
 
-from identification.estimation.gauss_newton import descend
-from identification.estimation.hammerstein import Fit, disturbance, stem_of
-from identification.estimation.noise import every_lag, judged, whitened
+from identification.estimation.gauss_newton import descend, innovations
+from identification.estimation.hammerstein import Fit, stem_of
+from identification.estimation.noise import judged
 from identification.limits import FIT
 from identification.record import Floats, Mask
 from identification.signals.robust import clipped_gain
-
-
-def innovations(fit: Fit) -> Floats:
-    """Innovations of a fit at the samples judged [% PV]."""
-    order = fit.ar.size
-    white = whitened(np.ascontiguousarray(disturbance(fit)), fit.ar, every_lag(order))
-    return white[judged(fit.window.usable, order)]
 
 
 def evidence(ours: Fit, theirs: Fit) -> float:

@@ -208,8 +208,34 @@ def _theta(fit: Fit) -> Floats:
     return np.concatenate((head, fit.base, fit.ar))
 
 
-def _law(valve: StemLaw) -> StemLaw:
-    return StemLaw(float(valve.breakaway), float(valve.sliding), float(valve.tolerance))
+def _at(fit: Fit, free_width: bool = False) -> tuple[_Bench, Floats, StemLaw]:
+    """Where a fit stands: what its descent shares, its constants and its valve, in the kernels' own types."""
+    bench = _bench(fit.window, fit.ar.size, free_width)
+    return bench, _theta(fit), StemLaw(*(float(x) for x in fit.valve))
+
+
+def innovations(fit: Fit) -> Floats:
+    """Innovations of a fit at the samples judged [% PV]."""
+    return _point(*_at(fit)).e
+
+
+def disturbance(fit: Fit) -> Floats:
+    """PV less the whole model, slow terms included [% PV], shape (n,)."""
+    return _point(*_at(fit)).r
+
+
+def residual(fit: Fit) -> Floats:
+    """PV less the response to the stem [% PV], shape (n,): load and noise, with the model's slow terms in it.
+
+    In a fine window the response is stepped at the record's own interval and then averaged over blocks, as PV was.
+    """
+    return np.asarray(fit.window.centred - fit.gain * _point(*_at(fit)).x)
+
+
+def slow_terms(fit: Fit) -> Floats:
+    """Mean, trend, decay and step of PV by a fit [% PV], shape (n,)."""
+    point = _point(*_at(fit))
+    return np.asarray(fit.window.centred - fit.gain * point.x - point.r)
 
 
 def covariance(fit: Fit, free_width: bool = False) -> Floats:
@@ -217,8 +243,8 @@ def covariance(fit: Fit, free_width: bool = False) -> Floats:
 
     The noise model's and the slow terms' share is in it (covariance.py).
     """
-    b = _bench(fit.window, fit.ar.size, free_width)
-    found = _point(b, _theta(fit), _law(fit.valve))
+    b, theta, valve = _at(fit, free_width)
+    found = _point(b, theta, valve)
     slopes = _slopes(b, found)
     gram = slopes @ slopes.T
     free = np.flatnonzero(np.diag(gram) > 0)
@@ -234,9 +260,10 @@ def descend(fit: Fit, free_width: bool = False) -> Fit:
     Time constant, dead time, gain, slow terms and the noise model, and with `free_width` the stickband, move at
     once, because they trade against each other along narrow valleys.
     """
-    b, steps = _bench(fit.window, fit.ar.size, free_width), FIT.iterations
+    b, theta, valve = _at(fit, free_width)
+    steps = FIT.iterations
     rule = Descent(steps, steps, b.at.size, FIT.settled, 10.0, 5.0, steps)
-    best = _descend(b, _theta(fit), _law(fit.valve), rule)
+    best = _descend(b, theta, valve, rule)
     theta = best.theta
     return Fit(
         float(theta[3]),

@@ -18,7 +18,6 @@ from identification.estimation.descent import nats
 from identification.estimation.window import Stems, Window
 from identification.models import Fopdt
 from identification.record import Floats
-from identification.simulation.lag import respond, unit_lag
 from identification.simulation.valve import RESTS, StemLaw, first_slip, stem_step
 
 
@@ -109,34 +108,3 @@ def stem_of(s: Stems, law: StemLaw) -> Floats:
         return s.recorded
     stem = stem_blocks(s, law)
     return stem - stem.mean()
-
-
-def residual(fit: Fit) -> Floats:
-    """PV less the response to the stem [% PV], shape (n,): load and noise, with the model's slow terms in it.
-
-    In a fine window the response is stepped at the record's own interval and then averaged over blocks, as PV was.
-    """
-    window = fit.window
-    stem = stem_of(window.stems, fit.valve)
-    if window.fine:
-        lag = unit_lag(fit.time_constant_s, fit.process.dead_time_s, window.dt_s / window.factor)
-        x = respond(stem, lag, window.factor)
-    else:
-        x = respond(stem, unit_lag(fit.time_constant_s, fit.dead_time_s, window.dt_s))
-    return window.centred - fit.gain * x
-
-
-def slow_terms(fit: Fit) -> Floats:
-    """Mean, trend, decay and step of PV by a fit [% PV], shape (n,)."""
-    window = fit.window
-    n = window.y.size
-    t = 2.0 * np.arange(n) / n - 1.0
-    decay = np.exp(-np.arange(n) * window.dt_s / fit.time_constant_s)
-    if fit.time_constant_s > 0.5 * window.duration_s:
-        decay[:] = 0.0
-    return np.asarray(fit.base[0] + fit.base[1] * t + fit.base[2] * decay + fit.base[3] * window.extra)
-
-
-def disturbance(fit: Fit) -> Floats:
-    """PV less the whole model, slow terms included [% PV], shape (n,)."""
-    return residual(fit) - slow_terms(fit)

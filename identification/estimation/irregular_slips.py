@@ -10,8 +10,8 @@ import numpy as np
 
 from identification.estimation.descent import compass
 from identification.estimation.evidence import evidence
-from identification.estimation.gauss_newton import descend
-from identification.estimation.hammerstein import Fit, disturbance, residual, slow_terms
+from identification.estimation.gauss_newton import descend, disturbance, residual, slow_terms
+from identification.estimation.hammerstein import Fit
 from identification.estimation.noise import every_lag, judged, whitened
 from identification.estimation.slip_beam import Noise, Response, SlipDistances, decoded, log_chance
 from identification.estimation.window import Window

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from identification.estimation.backlash_stiction import better_linear, fit_linear, fit_play, fit_stick_slip
-from identification.estimation.evidence import evidence, innovations
-from identification.estimation.gauss_newton import descend
+from identification.estimation.evidence import evidence
+from identification.estimation.gauss_newton import descend, innovations
 from identification.estimation.hammerstein import stem_blocks
 from identification.estimation.window import Stems, Window, block_means
 from identification.models import Backlash, Fopdt, Loop, Pid

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from identification.estimation.backlash_stiction import generic_noise
-from identification.estimation.gauss_newton import covariance
+from identification.estimation.gauss_newton import covariance, residual
 from identification.estimation.gauss_newton import descend as descend_lag
-from identification.estimation.hammerstein import Fit, residual
+from identification.estimation.hammerstein import Fit
 from identification.estimation.prediction_error import Model, deviations, problem
 from identification.estimation.prediction_error import descended as descend_any
 from identification.estimation.window import Window
