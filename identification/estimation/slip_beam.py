@@ -150,10 +150,9 @@ class Events(NamedTuple):
     place: Floats
 
 
-@njit(cache=True)
-def _answered(b: Beam, h: int, k: int, r: Response) -> None:
+@njit(cache=True, inline="always")
+def _answered(own: Floats, marks: Indices, k: int, r: Response) -> None:
     """PV's response of a path stepped on by one sample."""
-    own, marks = b.numbers[h], b.marks[h]
     own[TOTAL] += own[X]
     before = own[LATE]
     if marks[PENDING] > 0 and marks[DUE] <= k:
@@ -176,7 +175,7 @@ def _slipped(b: Beam, events: Events, at: tuple[int, int, int, int], place: floa
     marks[PENDING] += 1
     events.parent[event], events.moment[event], events.place[event] = marks[EVENT], k, place
     marks[EVENT] = event
-    _answered(b, to, k, r)
+    _answered(own, marks, k, r)
     marks[COMING] = k + 1
 
 
@@ -233,7 +232,7 @@ def _through(
                 count, slips = count + 1, slips + 1
             own[SCORE] += math.log(max(1.0 - chance, 1e-12))
             own[side] = far
-        _answered(b, h, k, r)
+        _answered(own, marks, k, r)
     marks[COMING] = last
     return count, slips
 
@@ -269,17 +268,16 @@ def judge_block(
 ) -> None:
     """Score all paths by their innovation of a block, of which `left` is PV less its slow terms."""
     order, past = n.ar.size, PLACED + WAITING
+    numbers, now = b.numbers, block % order
     for h in range(count):
-        own = b.numbers[h]
-        residual = left - r.gain * own[TOTAL] / factor
-        own[TOTAL] = 0.0
+        residual = left - r.gain * numbers[h, TOTAL] / factor
+        numbers[h, TOTAL] = 0.0
         if counts:
-            e, at = residual, block % order
+            e = residual
             for i in range(order):
-                at = at - 1 if at > 0 else order - 1
-                e -= n.ar[i] * own[past + at]
-            own[SCORE] -= 0.5 * e * e / n.sigma2
-        own[past + block % order] = residual
+                e -= n.ar[i] * numbers[h, past + (now - 1 - i if now > i else now - 1 - i + order)]
+            numbers[h, SCORE] -= 0.5 * e * e / n.sigma2
+        numbers[h, past + now] = residual
 
 
 PLACES = 13
