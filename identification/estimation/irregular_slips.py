@@ -113,6 +113,8 @@ def _screened(play: Fit, noise: Floats, rest: int, gains: Gains) -> list[_Trial]
                 least = _bound(out, band, share)
                 path, score = _decoded(window, r, Noise(noise, sigma2), f, SLIPS.screened, least)
                 out = _chosen([*out, _Trial(score, _slips(path), band, share, later, gain, path)])
+        if not out:  # a gain under which no friction slips at the play's own dead time lets none slip later
+            break
     return out
 
 
@@ -156,6 +158,7 @@ def _followed(play: Fit, begun: _Trial, rest: int) -> SlipPath:
     later_s = begun.later * window.dt_s
     fit = replace(play, dead_time_s=play.dead_time_s + later_s, gain=begun.gain)
     best = path = _path(fit, valve, stem)
+    hopeless = play.log_likelihood - SLIPS.hopeless * play.count
     for k in range(1, SLIPS.rounds):
         f = _friction(begun.band, begun.share, rest if k == 1 else window.op.size)
         stem = _decoded_by(path.fit, path.mean, f, SLIPS.hot[min(k - 1, len(SLIPS.hot) - 1)])
@@ -163,6 +166,8 @@ def _followed(play: Fit, begun: _Trial, rest: int) -> SlipPath:
             break
         path = _path(path.fit, valve, stem)
         best = max(best, path, key=lambda p: p.worth)
+        if path.worth < hopeless:
+            break
     return best
 
 
