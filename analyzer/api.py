@@ -1,6 +1,6 @@
 """What a notebook needs: read an export, assess a loop, fit, simulate, tune, explain, read a store into pandas.
 
-Heavy parts are imported when they are used. From the project's folder:
+From the project's folder:
 >>> import analyzer as triage
 >>> plant = triage.read("sample_data/mill.parquet", loops="sample_data/loops.csv", changes="sample_data/changes.csv")
 >>> len(plant.loops), plant.nights[0]
@@ -23,22 +23,27 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from analyzer.config import Config
+from analyzer.history.export import Export
+from analyzer.loop import assess as of_night
+from analyzer.loop import tune as of_settings
+from analyzer.loop.advice import withheld
+from analyzer.loop.judged_stretch import Earlier, controller_of, earlier_settings
+from analyzer.loop.quality import Prepared, prepare
+from analyzer.loops.changes import TuningChange, in_force, read_changes
+from analyzer.loops.spec import LoopSpec, spec_of
+from analyzer.night.asked import opened
+from analyzer.night.nights import Night, cut, nights_of
+from analyzer.store.store import Store
+from identification.errors import InputError, NotAssessedError
 from identification.models import Estimate, Loop, Pid, Process, Valve
 from identification.record import Floats, LoopRecord
+from identification.simulation.closed_loop import closed_loop
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from analyzer.config import Config
     from analyzer.explain.explained import Explained
-    from analyzer.history.export import Export
-    from analyzer.loop.assess import Assessment
-    from analyzer.loop.judged_stretch import Earlier
-    from analyzer.loop.quality import Prepared
-    from analyzer.loop.tune import Tuning
-    from analyzer.loops.changes import TuningChange
-    from analyzer.loops.spec import LoopSpec
-    from analyzer.night.nights import Night
 
 __all__ = [
     "Identified",
@@ -77,16 +82,11 @@ class PlantLoop:
     @property
     def controller(self) -> Pid | None:
         """The stated settings in percent and seconds; None where loops.csv does not state them."""
-        from analyzer.loop.judged_stretch import controller_of
-
         return controller_of(self.spec, self.prepared)
 
     @property
     def earlier(self) -> tuple[Earlier, ...]:
         """Settings that were in force in the record before its last ones, oldest first."""
-        from analyzer.loop.judged_stretch import earlier_settings
-        from analyzer.loops.spec import spec_of
-
         stated = spec_of(self.plant.specs, self.spec.loop)
         return earlier_settings(stated, self.plant.changes, self.prepared)
 
@@ -109,9 +109,7 @@ class Plant:
     @cached_property
     def spans(self) -> Mapping[str, Night]:
         """Nights by name, oldest first."""
-        from analyzer.night import nights
-
-        return {n.name: n for n in nights.nights_of(self.export, list(self.specs), self.config.nights)}
+        return {n.name: n for n in nights_of(self.export, list(self.specs), self.config.nights)}
 
     @property
     def nights(self) -> tuple[str, ...]:
@@ -128,12 +126,6 @@ class Plant:
         NotAssessedError
             Its trends hold too little to be put on a clock.
         """
-        from analyzer.loop.quality import prepare
-        from analyzer.loops.changes import in_force
-        from analyzer.loops.spec import spec_of
-        from analyzer.night.nights import cut
-        from identification.errors import InputError
-
         spec = spec_of(self.specs, name)
         if night is not None and night not in self.spans:
             raise InputError(f"night {night}", f"one of {', '.join(self.nights[-3:])}", "see Plant.nights")
@@ -170,17 +162,13 @@ def read(
     InputError
         The export or a table cannot be used; the text says what was seen, what was expected and what to do.
     """
-    from analyzer.config import Config as Defaults
-    from analyzer.loops.changes import read_changes
-    from analyzer.night.asked import opened
-
     paths = [export] if isinstance(export, str | Path) else list(export)
     source, specs, notes = opened([Path(p) for p in paths], None if loops is None else Path(loops), **reading)
     dated = () if changes is None else read_changes(Path(changes))
-    return Plant(source, specs, dated, notes, config or Defaults())
+    return Plant(source, specs, dated, notes, config or Config())
 
 
-def assess(loop: PlantLoop) -> Assessment:
+def assess(loop: PlantLoop) -> of_night.Assessment:
     """What a night says of a loop: does it oscillate, why, and its figures.
 
     Raises
@@ -188,9 +176,7 @@ def assess(loop: PlantLoop) -> Assessment:
     NotAssessedError
         The record cannot support it; the text says what it needs.
     """
-    from analyzer.loop.assess import assess as assessed
-
-    return assessed(loop.prepared, loop.controller, loop.plant.config, loop.spec.type, loop.earlier)
+    return of_night.assess(loop.prepared, loop.controller, loop.plant.config, loop.spec.type, loop.earlier)
 
 
 @dataclass(frozen=True)
@@ -219,9 +205,7 @@ def fit(loop: PlantLoop) -> Identified:
     NotAssessedError
         The trends give no model; the text says what they lack.
     """
-    from analyzer.loop.tune import identified
-
-    return Identified(*identified(assess(loop), loop.plant.config.advice))
+    return Identified(*of_settings.identified(assess(loop), loop.plant.config.advice))
 
 
 def simulate(
@@ -251,12 +235,10 @@ def simulate(
     op_start : float
         OP of the loop at rest [% OP].
     """
-    from identification.simulation.closed_loop import closed_loop
-
     return closed_loop(Loop(process, controller, valve), np.asarray(sp), np.asarray(load), op_start)
 
 
-def tune(loop: PlantLoop) -> Tuning:
+def tune(loop: PlantLoop) -> of_settings.Tuning:
     """New settings for a loop, what they would do, and why.
 
     Raises
@@ -266,17 +248,13 @@ def tune(loop: PlantLoop) -> Tuning:
     NotAssessedError
         The trends give no model.
     """
-    from analyzer.loop.advice import withheld
-    from analyzer.loop.tune import tune as tuned
-    from identification.errors import InputError, NotAssessedError
-
     controller, found = loop.controller, assess(loop)
     if controller is None:
         raise InputError(f"{loop.spec.loop}: no kp and ti in loops.csv", "both", "state them")
     if found.verdict.measured is None:
         raise NotAssessedError(f"{loop.spec.loop}: {found.verdict.needs or 'no model can be identified'}")
     keep = withheld(found, loop.spec, controller, loop.prepared.scale.span, loop.plant.config)
-    return tuned(found, controller, loop.plant.config, keep)
+    return of_settings.tune(found, controller, loop.plant.config, keep)
 
 
 def explain(loop: PlantLoop) -> Explained:
@@ -289,7 +267,6 @@ def explain(loop: PlantLoop) -> Explained:
     """
     from analyzer.explain.case import case, tags_of
     from analyzer.explain.explained import explained
-    from analyzer.night.nights import cut
 
     plant, spec = loop.plant, loop.spec
     series = plant.export.read(tags_of(spec, plant.specs))
@@ -315,8 +292,6 @@ def nights(store: str | Path, table: str = "nights") -> pd.DataFrame:
         There is no such store.
     """
     import pandas as pd
-
-    from analyzer.store.store import Store
 
     kept = Store(Path(store))
     kept.require()
