@@ -30,7 +30,8 @@ class Cluster(Executor[T, R]):
     """
 
     def __init__(self, address: str, function: Callable[[T], R]) -> None:
-        self._address, self._function = address, function
+        super().__init__(function)
+        self._address = address
         self._tasks: dict[Any, T] = {}
         self._coming: Any = None
 
