@@ -83,9 +83,7 @@ def _voted(now: RemedyBelief, limits: BeliefLimits) -> Action | None:
     says nothing against those of others."""
     lacking = sum(now.votes.get(a, 0.0) for a in (Action.NEEDS_DATA, Action.UNDECIDED))
     known = {a: now.votes.get(a, 0.0) for a in CHOICES}
-    if not known[Action.RETUNE] or known[Action.RETUNE] < limits.advised_share * (
-        known[Action.RETUNE] + lacking
-    ):
+    if known[Action.RETUNE] < limits.advised_share * (known[Action.RETUNE] + lacking):
         known[Action.RETUNE] = 0.0
     total = sum(known.values())
     if total == 0.0:
