@@ -79,13 +79,7 @@ def candidates_of(lags: Lags, peers: Mapping[str, Peer], limits: PlantLimits) ->
     """The candidates of a group with their confidences, the likeliest first; what is left to 100 % is a source
     unseen.
 
-    Parameters
-    ----------
-    lags : Lags
-        Of the group's waves, on one clock.
-    peers : mapping
-        Verdicts by loop; a loop that is not in it is no candidate.
-    limits : PlantLimits
+    lags : of the group's waves, on one clock; peers : verdicts by loop; a loop that is not in it is no candidate.
     """
     waves = _first_guess(list(lags.waves.values()), peers, limits.candidates)
     if not waves:

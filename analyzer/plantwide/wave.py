@@ -74,9 +74,8 @@ class Wave:
         padded = np.pad(power, width, mode="reflect")
         level = np.sqrt(np.convolve(padded, np.ones(width) / width, mode="same"))[width:-width]
         top = float(np.quantile(level, 0.9))
-        return (
-            100.0 * float(np.mean(level >= WAVES.envelope * top)) if top > 0 and math.isfinite(top) else 0.0
-        )
+        on = level >= WAVES.envelope * top if top > 0 and math.isfinite(top) else np.zeros(1)
+        return 100.0 * float(np.mean(on))
 
 
 def _centred(s: Spectrum, line: float) -> float:
@@ -131,14 +130,8 @@ def _cut(
 def waves_of(loop: str, found: Oscillations, end_s: float, limits: PlantLimits) -> tuple[Wave, ...]:
     """The waves of a loop: its oscillations, the harmonics of the first, and weaker peaks of its spectrum.
 
-    Parameters
-    ----------
-    loop : str
-    found : Oscillations
-        With spectrum and bands.
-    end_s : float
-        End of the record [s since 1970-01-01 UTC]; the spectrum is of its last samples.
-    limits : PlantLimits
+    found : with spectrum and bands; end_s : end of the record [s since 1970-01-01 UTC]; the spectrum is of its last
+    samples.
     """
     s, b = found.spectrum, found.bands
     if s is None or b is None:
