@@ -18,10 +18,9 @@ from typing import Any, get_args, get_origin, get_type_hints
 
 import numpy as np
 
-from analyzer.belief import cycle, remedy, valve
-from analyzer.belief.cycle import CycleBelief
+from analyzer.belief import cycle, valve
+from analyzer.belief.cycle import CycleBelief, Pair, RemedyBelief
 from analyzer.belief.pool import Pool
-from analyzer.belief.remedy import Pair, RemedyBelief
 from analyzer.belief.valve import ValveBelief, Witness
 from analyzer.belief.wear import PhaseKnown, Width, forgotten, with_repetitions
 from analyzer.config import BeliefLimits, Config
@@ -145,7 +144,7 @@ def step(before: Belief | None, row: Row, repaired_s: Sequence[float], config: C
     found = cycle.cycle_with_night(now.cycle, share, row, limits)
     now = _with_witness(replace(now, cycle=found), share, row, repaired_s, config)
     ended = before is not None and before.cycle.loud and not found.loud
-    done = remedy.remedy_with_night(RemedyBelief() if ended else now.remedy, share, row, limits)
+    done = cycle.remedy_with_night(RemedyBelief() if ended else now.remedy, share, row, limits)
     size, share_pct = float(row["oscillation_significance"] or 0.0), float(row["oscillating_pct"])
     seen = Calm(row["night"], size, share_pct, row["period_s"])
     phases = with_repetitions(now.phases, row, limits.repetitions)
@@ -251,7 +250,7 @@ def _own(row: Row) -> Told:
     """What a night says by itself."""
     pair = None
     if row["action"] == Action.RETUNE and row["kp_new"] and row["ti_new"]:
-        pair = Pair(row["night"], *(row[c] for c in remedy.WITH_PAIR))
+        pair = Pair(row["night"], *(row[c] for c in cycle.WITH_PAIR))
     return Told(
         Cause(row["cause"]),
         {c: row[f"osc_{c}_pct"] for c in CAUSES if row[f"osc_{c}_pct"] is not None},

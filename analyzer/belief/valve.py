@@ -24,6 +24,8 @@ from identification.record import Floats
 
 Witness = Mapping[str, Any]
 """What a night says, as analyzer/loop/witness.py puts it."""
+Doubt = tuple[float, float, float]
+"""What a night may be wrong by: as one of several, by itself, and in what it says against a width."""
 Recent = tuple[str, tuple[float, ...]]
 """A night and what it said of each width, as it counts today [nat]."""
 
@@ -99,7 +101,7 @@ def faded_over(before: str, night: str, limits: BeliefLimits) -> float:
     return float(0.5 ** (max(gap, 0) / limits.half_life))
 
 
-def doubt(said: Witness, cause: Cause, oscillates: bool, config: Config) -> tuple[float, float, float]:
+def doubt(said: Witness, cause: Cause, oscillates: bool, config: Config) -> Doubt:
     """What a night's likelihood may be wrong by, in the evidence that a verdict of one night needs [-]: as one of
     several nights, by itself, and in what it says against a width.
 
@@ -129,12 +131,7 @@ def weighed(said: Witness, wrong_by: float, against: float, limits: BeliefLimits
 
 
 def valve_with_night(
-    before: ValveBelief,
-    share: float,
-    night: str,
-    said: Witness,
-    wrong: tuple[float, float, float],
-    limits: BeliefLimits,
+    before: ValveBelief, share: float, night: str, said: Witness, wrong: Doubt, limits: BeliefLimits
 ) -> ValveBelief:
     """The belief with one night more, what it was before counting for a share [-].
 
