@@ -83,8 +83,9 @@ def _lag(one: Wave, other: Wave) -> Delay:
     return lag(x, y, one.duration_s, max(WAVES.lag_periods * one.period_s, WAVES.lag_least_s))
 
 
-def _on_common_steps(waves: Sequence[Wave]) -> tuple[list[int], Floats]:
-    """Which of some waves have trends whose steps lie on each other, and those trends, shape (k, n)."""
+def _foreseeing(waves: Sequence[Wave]) -> tuple[list[int], Floats]:
+    """Which of some waves have trends whose steps lie on each other, and Granger's F of each on each, shape (k, k);
+    none where fewer than two have, or over too few steps."""
     step = max((w.step_s for w in waves if w.trend.size), default=0.0)
     found: list[tuple[int, int, Floats]] = []
     for i, w in enumerate(waves):
@@ -97,18 +98,18 @@ def _on_common_steps(waves: Sequence[Wave]) -> tuple[list[int], Floats]:
         found.append((i, (w.trend_first + skip) // few, means))
     begin = max((first for _, first, _ in found), default=0)
     end = min((first + x.size for _, first, x in found), default=0)
-    if end - begin < WAVES.least_steps:
+    if len(found) < 2 or end - begin < WAVES.least_steps:
         return [], np.zeros((0, 0))
-    return [i for i, *_ in found], np.array([x[begin - first : end - first] for _, first, x in found], float)
+    trends = np.array([x[begin - first : end - first] for _, first, x in found], float)
+    return [i for i, *_ in found], granger_f(trends, WAVES.foreseen)
 
 
 def foresees(waves: Sequence[Wave]) -> Floats:
     """Mean over the others of how much better each foresees them than they foresee it (-1 to 1), by Granger's F."""
     out = np.zeros(len(waves))
-    known, trends = _on_common_steps(waves)
-    if len(known) < 2:
+    known, f = _foreseeing(waves)
+    if not known:
         return out
-    f = granger_f(trends, WAVES.foreseen)
     clear = np.maximum(f, f.T) >= WAVES.least_f
     ratio = np.log(np.maximum(f, 0.1) / np.maximum(f.T, 0.1)) / math.log(WAVES.plain_ratio)
     out[known] = np.where(clear, np.clip(ratio, -1.0, 1.0), 0.0).sum(axis=1) / (len(known) - 1)
@@ -117,9 +118,8 @@ def foresees(waves: Sequence[Wave]) -> Floats:
 
 def foresight(one: Wave, others: Sequence[Wave]) -> float:
     """F with which one wave's past foresees others, in the median; 0 where theirs foresees it as well or better."""
-    known, trends = _on_common_steps([one, *others])
-    if len(known) < 2 or known[0] != 0:
+    known, f = _foreseeing([one, *others])
+    if known[:1] != [0]:
         return 0.0
-    f = granger_f(trends, WAVES.foreseen)
     forth, back = float(np.median(f[0, 1:])), float(np.median(f[1:, 0]))
     return forth if forth > back else 0.0

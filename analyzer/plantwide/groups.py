@@ -136,7 +136,7 @@ class _Neighbours:
 def groups_of(waves: Sequence[Wave], limits: PlantLimits) -> list[Group]:
     """Groups of loops that share an oscillation by all waves of a night, those of more loops first; none of a single
     loop."""
-    known = [w for w in on_one_clock(waves) if w.cycles >= limits.follow_cycles and np.any(w.lines)]
+    known = [w for w in on_one_clock(waves) if w.line >= limits.follow_cycles and np.any(w.lines)]
     if not known:
         return []
     beside = _Neighbours(known, limits)

@@ -19,10 +19,12 @@ from analyzer.plantwide.source import Candidate, Peer, candidates_of
 from analyzer.plantwide.wave import Wave
 
 Row = Mapping[str, Any]
+Loops = Mapping[str, Finding]
+"""The loops of a night by name."""
 
 
 def traced_night(
-    loops: Mapping[str, Finding], waves: Sequence[Wave], limits: PlantLimits, first: int = 1
+    loops: Loops, waves: Sequence[Wave], limits: PlantLimits, first: int = 1
 ) -> tuple[dict[str, Finding], list[dict[str, Any]]]:
     """What the plant-wide pass makes of a night: its loops, followers and their sources changed, and rows of groups.
 
@@ -61,7 +63,7 @@ def swing_of(own: Finding, root: Root, wave: Wave, limits: PlantLimits) -> Swing
     return Swing(amplitude * root.coherence * hours, share, wave.period_s, amplitude)
 
 
-def _peers(loops: Mapping[str, Finding]) -> dict[str, Peer]:
+def _peers(loops: Loops) -> dict[str, Peer]:
     """The verdicts of the loops that were assessed."""
     return {
         k: Peer(f.cause or Cause.NONE, f.number("evidence"), f.confidence.get(Cause.TUNING, 0.0))
@@ -90,11 +92,7 @@ def _role(loop: str, found: Traced, followers: Mapping[str, Root], limits: Plant
 
 
 def group_rows(
-    number: int,
-    found: Traced,
-    followers: Mapping[str, Root],
-    loops: Mapping[str, Finding],
-    limits: PlantLimits,
+    number: int, found: Traced, followers: Mapping[str, Root], loops: Loops, limits: PlantLimits
 ) -> list[dict[str, Any]]:
     """A row for each loop of a group that is told, the source first, then by amplitude."""
     known = {c.loop: c for c in found.candidates}

@@ -51,12 +51,7 @@ class Wave:
 
     @property
     def line(self) -> float:
-        """The period's frequency in lines."""
-        return self.duration_s / self.period_s
-
-    @property
-    def cycles(self) -> float:
-        """Periods that the record holds."""
+        """The period's frequency in lines: how many periods the record holds."""
         return self.duration_s / self.period_s
 
     @property
@@ -70,7 +65,7 @@ class Wave:
         """Share of the time that the wave is on [%]."""
         size = next_fast_len(max(4 * self.lines.size, 16))
         power = (np.abs(ifft(self.lines, size)) * size) ** 2
-        width = max(round(2 * size / self.cycles), 1)
+        width = max(round(2 * size / self.line), 1)
         padded = np.pad(power, width, mode="reflect")
         level = np.sqrt(np.convolve(padded, np.ones(width) / width, mode="same"))[width:-width]
         top = float(np.quantile(level, 0.9))
