@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from analyzer.config import PlantLimits
-from analyzer.plantwide.compare import foresight, on_one_clock
-from analyzer.plantwide.wave import Wave
+from analyzer.plantwide.source import foresight
+from analyzer.plantwide.wave import Wave, on_one_clock
 from identification.record import Floats
 from identification.signals.cross_spectrum import Whole, band, chance_coherence, coherences, drift, tapered
 

@@ -13,9 +13,8 @@ from typing import Any
 from analyzer.config import PlantLimits
 from analyzer.loop.decisions import Cause, GroupRole, SignKind, Status
 from analyzer.loop.finding import Finding, Root, Sign, Swing, following
-from analyzer.plantwide.compare import Lags
 from analyzer.plantwide.groups import Group, groups_of
-from analyzer.plantwide.source import Candidate, Peer, candidates_of
+from analyzer.plantwide.source import Candidate, Lags, Peer, candidates_of
 from analyzer.plantwide.wave import Wave
 
 Row = Mapping[str, Any]

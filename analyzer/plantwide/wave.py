@@ -1,14 +1,16 @@
-"""What is kept of a loop for the plant-wide pass: the lines of its error about each period that it might share."""
+"""What is kept of a loop for the plant-wide pass: the lines of its error about each period that it might share, and
+how those of many loops come onto one clock."""
 
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 import pyarrow as pa
-from scipy.fft import ifft, irfft, next_fast_len
+from scipy.fft import fft, ifft, irfft, next_fast_len
 
 from analyzer.config import PlantLimits
 from analyzer.limits import WAVES
@@ -16,6 +18,8 @@ from analyzer.loop.oscillation import Oscillations, peaks
 from identification.record import Floats
 from identification.signals.spectrum import Complex, Spectrum, locked_harmonic, peak_prominence
 
+FINE = 8
+"""Samples of the envelope for each line."""
 BESIDE = 6
 """Lines kept beyond that on either side."""
 HARMONICS = (2, 3)
@@ -87,11 +91,17 @@ def _thinned_wave(error: Floats, dt_s: float, start_s: float, period_s: float) -
     other loops with the same interval lie on them or join in pairs.
     """
     few = 2 ** max(math.floor(math.log2(max(period_s / (WAVES.steps * dt_s), 1.0))), 0)
-    begin = round(start_s / dt_s)
-    skip = -begin % few
-    count = (error.size - skip) // few
-    means = error[skip : skip + count * few].reshape(count, few).mean(axis=1)[-WAVES.trend_steps :]
-    return few * dt_s, (begin + skip) // few + count - means.size, means.astype(np.float32)
+    first, means = in_steps(error, round(start_s / dt_s), few)
+    last = means[-WAVES.trend_steps :]
+    return few * dt_s, first + means.size - last.size, last.astype(np.float32)
+
+
+def in_steps(x: Floats, first: int, few: int) -> tuple[int, Floats]:
+    """Means of so many samples each, from a whole multiple of them on, and the number of the first of these steps;
+    `first` is that of the first sample."""
+    skip = -first % few
+    count = (x.size - skip) // few
+    return (first + skip) // few, x[skip : skip + count * few].reshape(count, few).mean(axis=1)
 
 
 def _cut(
@@ -167,3 +177,41 @@ def waves_in(table: pa.Table | None) -> list[Wave]:
     known = table.select(SCALARS).to_pylist()
     real, imag, trend = (table.column(name).to_numpy() for name in ("real", "imag", "trend"))
     return [Wave(**s, lines=x + 1j * y, trend=t) for s, x, y, t in zip(known, real, imag, trend, strict=True)]
+
+
+def on_one_clock(waves: Sequence[Wave]) -> list[Wave]:
+    """The waves that can be compared, all over the span that most of them have."""
+    if not waves:
+        return []
+    counted = Counter((w.start_s, w.duration_s) for w in waves)
+    span = max(counted, key=lambda span: (counted[span], span[1]))
+    moved = (_on_span(w, span) for w in waves)
+    return [w for w in moved if w is not None]
+
+
+def _on_span(wave: Wave, span: tuple[float, float]) -> Wave | None:
+    """The wave with the lines that it has over another span, start and duration [s]; None where its record covers too
+    little of that."""
+    start, length = span
+    if abs(wave.start_s - start) + abs(wave.duration_s - length) <= WAVES.same * wave.period_s:
+        return wave
+    begin, end = max(start, wave.start_s), min(start + length, wave.start_s + wave.duration_s)
+    if end - begin < WAVES.covered * length:
+        return None
+    count = wave.lines.size
+    size = next_fast_len(FINE * count)
+    padded = np.zeros(size, dtype=np.complex128)
+    padded[:count] = wave.lines
+    envelope = ifft(padded) * size  # of the lines from wave.first on
+    fresh = next_fast_len(max(math.ceil(FINE * count * length / wave.duration_s), 16))
+    t = start + np.arange(fresh) * (length / fresh)
+    at = (t - wave.start_s) / wave.duration_s * size
+    inside = (at >= 0) & (at <= size - 1)
+    real = np.interp(at, np.arange(size), envelope.real)
+    imag = np.interp(at, np.arange(size), envelope.imag)
+    z = np.where(inside, real + 1j * imag, 0.0)
+    low = math.ceil(wave.first * length / wave.duration_s)
+    turns = wave.first * (t - wave.start_s) / wave.duration_s - low * (t - start) / length
+    lines = fft(z * np.exp(2j * np.pi * turns)) / fresh
+    most = max(math.floor((wave.first + count) * length / wave.duration_s) - low, 1)
+    return replace(wave, start_s=start, duration_s=length, first=low, lines=lines[:most].astype(np.complex64))
