@@ -36,7 +36,11 @@ OF_VALVE = ("width", "slip_jump")
 """Those of them that a repair changes."""
 FIRST = (Action.CHECK_MEASUREMENT, Action.CHECK_SETTINGS)
 """What is told in the night that finds it: no settings of other nights hold where these are not known."""
-
+AGAINST = {
+    Cause.VALVE: (Action.REPAIR_VALVE, Action.CHECK_SETTINGS),
+    Cause.TUNING: (Action.UNDECIDED, Action.CHECK_SETTINGS, Action.NEEDS_DATA),
+}
+"""What is done against a cause where no settings are, the first unless the nights vote for another of them."""
 GIST = attrgetter("cause", "fault", "action", "source")
 """What makes a difference between what two tell."""
 
@@ -248,18 +252,10 @@ def _left_alone(told: Told) -> Told:
 
 def _own(row: Row) -> Told:
     """What a night says by itself."""
-    pair = None
-    if row["action"] == Action.RETUNE and row["kp_new"] and row["ti_new"]:
-        pair = Pair(row["night"], *(row[c] for c in cycle.WITH_PAIR))
-    return Told(
-        Cause(row["cause"]),
-        {c: row[f"osc_{c}_pct"] for c in CAUSES if row[f"osc_{c}_pct"] is not None},
-        Fault(row["valve_fault"]),
-        row["source_loop"],
-        Action(row["action"]) if row["action"] else None,
-        Due(row["due"]) if row["due"] else None,
-        pair,
-    )
+    confidence = {c: row[f"osc_{c}_pct"] for c in CAUSES if row[f"osc_{c}_pct"] is not None}
+    action, due = Action(row["action"]) if row["action"] else None, Due(row["due"]) if row["due"] else None
+    cause, fault, source = Cause(row["cause"]), Fault(row["valve_fault"]), row["source_loop"]
+    return Told(cause, confidence, fault, source, action, due, cycle.advised_pair(row))
 
 
 def _of_calm(now: Belief, own: Told, limits: BeliefLimits) -> Told:
@@ -310,9 +306,6 @@ def _with_remedy(now: Belief, own: Told, told: Told, limits: BeliefLimits) -> To
     action, held = now.remedy.action, now.remedy.held
     if action is Action.RETUNE and held is not None:
         return replace(told, action=action, pair=held)
-    if told.cause is Cause.VALVE:
-        keeps = action in (Action.CHECK_SETTINGS, Action.REPAIR_VALVE)
-        action = action if keeps else Action.REPAIR_VALVE
-        return replace(told, action=action, due=Due.NOW if action is Action.REPAIR_VALVE else None)
-    keeps = action in (Action.CHECK_SETTINGS, Action.NEEDS_DATA)
-    return replace(told, action=action if keeps else Action.UNDECIDED)
+    usual, *others = AGAINST[told.cause]
+    action = action if action in others else usual
+    return replace(told, action=action, due=Due.NOW if action is Action.REPAIR_VALVE else None)

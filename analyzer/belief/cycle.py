@@ -154,6 +154,12 @@ class Pair:
         return math.log(abs(self.kp)), math.log(abs(self.ti))
 
 
+def advised_pair(row: Row) -> Pair | None:
+    """The pair that a night advises, if any."""
+    advises = row["action"] == Action.RETUNE and row["kp_new"] and row["ti_new"]
+    return Pair(row["night"], *(row[c] for c in WITH_PAIR)) if advises else None
+
+
 @dataclass(frozen=True, slots=True)
 class RemedyBelief:
     """Votes by action, older nights counting less; the pairs advised of late; the action and the pair that are
@@ -179,10 +185,9 @@ def remedy_with_night(before: RemedyBelief, share: float, row: Row, limits: Beli
     action = row["action"]
     if action in TOLD_AGAIN:
         votes[Action(action)] = votes.get(Action(action), 0.0) + 1.0
-    pairs, advised = before.pairs, before.advised
-    if action == Action.RETUNE and row["kp_new"] and row["ti_new"]:
-        pairs = (*pairs, Pair(row["night"], *(row[c] for c in WITH_PAIR)))[-limits.pairs :]
-        advised += 1
+    pairs, advised, pair = before.pairs, before.advised, advised_pair(row)
+    if pair is not None:
+        pairs, advised = (*pairs, pair)[-limits.pairs :], advised + 1
     now = _settled_pair(replace(before, votes=votes, pairs=pairs, advised=advised), limits)
     return replace(now, action=_voted(now, limits))
 
