@@ -25,14 +25,15 @@ import numpy as np
 
 from analyzer.config import Config
 from analyzer.history.export import Export
+from analyzer.history.plant_clock import UTC_NAME
 from analyzer.loop import assess as of_night
 from analyzer.loop import tune as of_settings
 from analyzer.loop.advice import withheld
 from analyzer.loop.judged_stretch import Earlier, controller_of, earlier_settings
 from analyzer.loop.quality import Prepared, prepare
-from analyzer.loops.changes import TuningChange, in_force, read_changes
+from analyzer.loops.changes import TuningChange, in_force
 from analyzer.loops.spec import LoopSpec, spec_of
-from analyzer.night.asked import opened
+from analyzer.night.asked import asked_of
 from analyzer.night.nights import Night, cut, nights_of
 from analyzer.store.store import Store
 from identification.errors import InputError, NotAssessedError
@@ -93,13 +94,14 @@ class PlantLoop:
 
 @dataclass(frozen=True)
 class Plant:
-    """An export, its loops and the changes of their settings, as `read` returns it."""
+    """An export, its loops and the changes of their settings, and the plant's time zone, as `read` returns it."""
 
     export: Export
     specs: tuple[LoopSpec, ...]
     changes: tuple[TuningChange, ...]
     notes: tuple[str, ...]
     config: Config
+    zone: str = UTC_NAME
 
     @property
     def loops(self) -> tuple[str, ...]:
@@ -109,7 +111,8 @@ class Plant:
     @cached_property
     def spans(self) -> Mapping[str, Night]:
         """Nights by name, oldest first."""
-        return {n.name: n for n in nights_of(self.export, list(self.specs), self.config.nights)}
+        found = nights_of(self.export, self.specs, self.config.nights, zone=self.zone)
+        return {night.name: night for night in found}
 
     @property
     def nights(self) -> tuple[str, ...]:
@@ -117,15 +120,8 @@ class Plant:
         return tuple(self.spans)
 
     def loop(self, name: str, night: str | None = None) -> PlantLoop:
-        """One loop, over one night or over all that the export holds.
-
-        Raises
-        ------
-        InputError
-            There is no such loop or night, or the loop has no PV.
-        NotAssessedError
-            Its trends hold too little to be put on a clock.
-        """
+        """One loop, over one night or over all that the export holds. Raises InputError where there is no such loop
+        or night, or the loop has no PV; NotAssessedError where its trends hold too little to be put on a clock."""
         spec = spec_of(self.specs, name)
         if night is not None and night not in self.spans:
             raise InputError(f"night {night}", f"one of {', '.join(self.nights[-3:])}", "see Plant.nights")
@@ -143,7 +139,8 @@ def read(
     config: Config | None = None,
     **reading: Any,
 ) -> Plant:
-    """Open an export.
+    """Open an export. Raises InputError where the export or a table cannot be used; the text says what was seen, what
+    was expected and what to do.
 
     Parameters
     ----------
@@ -156,26 +153,17 @@ def read(
     **reading
         How to read text: timezone, delimiter, decimal, encoding, day_first, date_format, time_column,
         quality_column, good_quality.
-
-    Raises
-    ------
-    InputError
-        The export or a table cannot be used; the text says what was seen, what was expected and what to do.
     """
-    paths = [export] if isinstance(export, str | Path) else list(export)
-    source, specs, notes = opened([Path(p) for p in paths], None if loops is None else Path(loops), **reading)
-    dated = () if changes is None else read_changes(Path(changes))
-    return Plant(source, specs, dated, notes, config or Config())
+    paths = [Path(p) for p in ([export] if isinstance(export, str | Path) else export)]
+    stated, dated = (None if path is None else Path(path) for path in (loops, changes))
+    asked = asked_of(paths, stated, dated, config or Config(), **reading)
+    source, specs, notes = asked.opened()
+    return Plant(source, specs, asked.changes, notes, asked.config, asked.zone)
 
 
 def assess(loop: PlantLoop) -> of_night.Assessment:
-    """What a night says of a loop: does it oscillate, why, and its figures.
-
-    Raises
-    ------
-    NotAssessedError
-        The record cannot support it; the text says what it needs.
-    """
+    """What a night says of a loop: does it oscillate, why, and its figures. Raises NotAssessedError where the record
+    cannot support it; the text says what it needs."""
     return of_night.assess(loop.prepared, loop.controller, loop.plant.config, loop.spec.type, loop.earlier)
 
 
@@ -189,7 +177,8 @@ class Identified:
 
 
 def fit(loop: PlantLoop) -> Identified:
-    """Process and valve from the trends of a loop.
+    """Process and valve from the trends of a loop. Raises NotAssessedError where they give no model; the text says
+    what they lack.
 
     >>> import analyzer as triage
     >>> plant = triage.read("sample_data/mill.parquet", loops="sample_data/loops.csv")
@@ -199,11 +188,6 @@ def fit(loop: PlantLoop) -> Identified:
     >>> estimate = model.estimates["backlash_pct"]
     >>> bool(estimate.low < estimate.value < estimate.high), estimate.unit
     (True, '% of OP')
-
-    Raises
-    ------
-    NotAssessedError
-        The trends give no model; the text says what they lack.
     """
     return Identified(*of_settings.identified(assess(loop), loop.plant.config.advice))
 
@@ -239,15 +223,8 @@ def simulate(
 
 
 def tune(loop: PlantLoop) -> of_settings.Tuning:
-    """New settings for a loop, what they would do, and why.
-
-    Raises
-    ------
-    InputError
-        loops.csv does not state the present settings.
-    NotAssessedError
-        The trends give no model.
-    """
+    """New settings for a loop, what they would do, and why. Raises InputError where loops.csv does not state the
+    present settings; NotAssessedError where the trends give no model."""
     controller, found = loop.controller, assess(loop)
     if controller is None:
         raise InputError(f"{loop.spec.loop}: no kp and ti in loops.csv", "both", "state them")
@@ -258,13 +235,8 @@ def tune(loop: PlantLoop) -> of_settings.Tuning:
 
 
 def explain(loop: PlantLoop) -> Explained:
-    """What physics the loop's plain model lacks; `.data` is what `triage explain --format json` prints.
-
-    Raises
-    ------
-    NotAssessedError
-        OP or PV is missing or never moves.
-    """
+    """What physics the loop's plain model lacks; `.data` is what `triage explain --format json` prints. Raises
+    NotAssessedError where OP or PV is missing or never moves."""
     from analyzer.explain.case import case, tags_of
     from analyzer.explain.explained import explained
 
@@ -276,7 +248,7 @@ def explain(loop: PlantLoop) -> Explained:
 
 
 def nights(store: str | Path, table: str = "nights") -> pd.DataFrame:
-    """Every night of a store as one frame, with the column `night`.
+    """Every night of a store as one frame, with the column `night`. Raises InputError where there is no such store.
 
     Parameters
     ----------
@@ -285,11 +257,6 @@ def nights(store: str | Path, table: str = "nights") -> pd.DataFrame:
     table : str
         nights (a row a loop, as that night says by itself), beliefs (what nights say together), hours, trends,
         groups or explained.
-
-    Raises
-    ------
-    InputError
-        There is no such store.
     """
     import pandas as pd
 
