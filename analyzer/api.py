@@ -156,7 +156,7 @@ def read(
     """
     paths = [Path(p) for p in ([export] if isinstance(export, str | Path) else export)]
     stated, dated = (None if path is None else Path(path) for path in (loops, changes))
-    asked = asked_of(paths, stated, dated, config or Config(), **reading)
+    asked = asked_of(paths, stated, dated, config or Config(), None, None, **reading)
     source, specs, notes = asked.opened()
     return Plant(source, specs, asked.changes, notes, asked.config, asked.zone)
 

@@ -77,6 +77,12 @@ def test_a_notebook_has_the_plants_nights_and_times(tmp_path: Path) -> None:
     assert [c.time_s for c in plant.changes] == [at("2026-07-02T05:00")]
 
 
+def test_a_notebook_is_refused_what_only_commands_take(tmp_path: Path) -> None:
+    """`read` takes no span of time, and says so in place of leaving it aside."""
+    with pytest.raises(TypeError, match="since"):
+        read(tmp_path / "export.parquet", since="2026-07-01")
+
+
 def test_the_store_and_its_pages_keep_the_zone(tmp_path: Path) -> None:
     """`run --timezone` cuts at the plant's midnight, --since is the plant's, and the page's axis has that zone."""
     start = at("2026-07-01T00:00")
