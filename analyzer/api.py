@@ -1,6 +1,6 @@
 """What a notebook needs: read an export, assess a loop, fit, simulate, tune, explain, read a store into pandas.
 
-Heavy parts are imported when they are used. From the project's folder:
+From the project's folder:
 >>> import analyzer as triage
 >>> plant = triage.read("sample_data/mill.parquet", loops="sample_data/loops.csv", changes="sample_data/changes.csv")
 >>> len(plant.loops), plant.nights[0]
@@ -23,22 +23,28 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from analyzer.config import Config
+from analyzer.history.export import Export
+from analyzer.history.plant_clock import UTC_NAME
+from analyzer.loop import assess as of_night
+from analyzer.loop import tune as of_settings
+from analyzer.loop.advice import withheld
+from analyzer.loop.judged_stretch import Earlier, controller_of, earlier_settings
+from analyzer.loop.quality import Prepared, prepare
+from analyzer.loops.changes import TuningChange, in_force
+from analyzer.loops.spec import LoopSpec, spec_of
+from analyzer.night.asked import asked_of
+from analyzer.night.nights import Night, cut, nights_of
+from analyzer.store.store import Store
+from identification.errors import InputError, NotAssessedError
 from identification.models import Estimate, Loop, Pid, Process, Valve
 from identification.record import Floats, LoopRecord
+from identification.simulation.closed_loop import closed_loop
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from analyzer.config import Config
     from analyzer.explain.explained import Explained
-    from analyzer.history.export import Export
-    from analyzer.loop.assess import Assessment
-    from analyzer.loop.judged_stretch import Earlier
-    from analyzer.loop.quality import Prepared
-    from analyzer.loop.tune import Tuning
-    from analyzer.loops.changes import TuningChange
-    from analyzer.loops.spec import LoopSpec
-    from analyzer.night.nights import Night
 
 __all__ = [
     "Identified",
@@ -77,29 +83,25 @@ class PlantLoop:
     @property
     def controller(self) -> Pid | None:
         """The stated settings in percent and seconds; None where loops.csv does not state them."""
-        from analyzer.loop.judged_stretch import controller_of
-
         return controller_of(self.spec, self.prepared)
 
     @property
     def earlier(self) -> tuple[Earlier, ...]:
         """Settings that were in force in the record before its last ones, oldest first."""
-        from analyzer.loop.judged_stretch import earlier_settings
-        from analyzer.loops.spec import spec_of
-
         stated = spec_of(self.plant.specs, self.spec.loop)
         return earlier_settings(stated, self.plant.changes, self.prepared)
 
 
 @dataclass(frozen=True)
 class Plant:
-    """An export, its loops and the changes of their settings, as `read` returns it."""
+    """An export, its loops and the changes of their settings, and the plant's time zone, as `read` returns it."""
 
     export: Export
     specs: tuple[LoopSpec, ...]
     changes: tuple[TuningChange, ...]
     notes: tuple[str, ...]
     config: Config
+    zone: str = UTC_NAME
 
     @property
     def loops(self) -> tuple[str, ...]:
@@ -109,9 +111,8 @@ class Plant:
     @cached_property
     def spans(self) -> Mapping[str, Night]:
         """Nights by name, oldest first."""
-        from analyzer.night import nights
-
-        return {n.name: n for n in nights.nights_of(self.export, list(self.specs), self.config.nights)}
+        found = nights_of(self.export, self.specs, self.config.nights, zone=self.zone)
+        return {night.name: night for night in found}
 
     @property
     def nights(self) -> tuple[str, ...]:
@@ -119,21 +120,8 @@ class Plant:
         return tuple(self.spans)
 
     def loop(self, name: str, night: str | None = None) -> PlantLoop:
-        """One loop, over one night or over all that the export holds.
-
-        Raises
-        ------
-        InputError
-            There is no such loop or night, or the loop has no PV.
-        NotAssessedError
-            Its trends hold too little to be put on a clock.
-        """
-        from analyzer.loop.quality import prepare
-        from analyzer.loops.changes import in_force
-        from analyzer.loops.spec import spec_of
-        from analyzer.night.nights import cut
-        from identification.errors import InputError
-
+        """One loop, over one night or over all that the export holds. Raises InputError where there is no such loop
+        or night, or the loop has no PV; NotAssessedError where its trends hold too little to be put on a clock."""
         spec = spec_of(self.specs, name)
         if night is not None and night not in self.spans:
             raise InputError(f"night {night}", f"one of {', '.join(self.nights[-3:])}", "see Plant.nights")
@@ -151,7 +139,8 @@ def read(
     config: Config | None = None,
     **reading: Any,
 ) -> Plant:
-    """Open an export.
+    """Open an export. Raises InputError where the export or a table cannot be used; the text says what was seen, what
+    was expected and what to do.
 
     Parameters
     ----------
@@ -164,33 +153,18 @@ def read(
     **reading
         How to read text: timezone, delimiter, decimal, encoding, day_first, date_format, time_column,
         quality_column, good_quality.
-
-    Raises
-    ------
-    InputError
-        The export or a table cannot be used; the text says what was seen, what was expected and what to do.
     """
-    from analyzer.config import Config as Defaults
-    from analyzer.loops.changes import read_changes
-    from analyzer.night.asked import opened
-
-    paths = [export] if isinstance(export, str | Path) else list(export)
-    source, specs, notes = opened([Path(p) for p in paths], None if loops is None else Path(loops), **reading)
-    dated = () if changes is None else read_changes(Path(changes))
-    return Plant(source, specs, dated, notes, config or Defaults())
+    paths = [Path(p) for p in ([export] if isinstance(export, str | Path) else export)]
+    stated, dated = (None if path is None else Path(path) for path in (loops, changes))
+    asked = asked_of(paths, stated, dated, config or Config(), None, None, **reading)
+    source, specs, notes = asked.opened()
+    return Plant(source, specs, asked.changes, notes, asked.config, asked.zone)
 
 
-def assess(loop: PlantLoop) -> Assessment:
-    """What a night says of a loop: does it oscillate, why, and its figures.
-
-    Raises
-    ------
-    NotAssessedError
-        The record cannot support it; the text says what it needs.
-    """
-    from analyzer.loop.assess import assess as assessed
-
-    return assessed(loop.prepared, loop.controller, loop.plant.config, loop.spec.type, loop.earlier)
+def assess(loop: PlantLoop) -> of_night.Assessment:
+    """What a night says of a loop: does it oscillate, why, and its figures. Raises NotAssessedError where the record
+    cannot support it; the text says what it needs."""
+    return of_night.assess(loop.prepared, loop.controller, loop.plant.config, loop.spec.type, loop.earlier)
 
 
 @dataclass(frozen=True)
@@ -203,7 +177,8 @@ class Identified:
 
 
 def fit(loop: PlantLoop) -> Identified:
-    """Process and valve from the trends of a loop.
+    """Process and valve from the trends of a loop. Raises NotAssessedError where they give no model; the text says
+    what they lack.
 
     >>> import analyzer as triage
     >>> plant = triage.read("sample_data/mill.parquet", loops="sample_data/loops.csv")
@@ -213,15 +188,8 @@ def fit(loop: PlantLoop) -> Identified:
     >>> estimate = model.estimates["backlash_pct"]
     >>> bool(estimate.low < estimate.value < estimate.high), estimate.unit
     (True, '% of OP')
-
-    Raises
-    ------
-    NotAssessedError
-        The trends give no model; the text says what they lack.
     """
-    from analyzer.loop.tune import identified
-
-    return Identified(*identified(assess(loop), loop.plant.config.advice))
+    return Identified(*of_settings.identified(assess(loop), loop.plant.config.advice))
 
 
 def simulate(
@@ -251,45 +219,26 @@ def simulate(
     op_start : float
         OP of the loop at rest [% OP].
     """
-    from identification.simulation.closed_loop import closed_loop
-
     return closed_loop(Loop(process, controller, valve), np.asarray(sp), np.asarray(load), op_start)
 
 
-def tune(loop: PlantLoop) -> Tuning:
-    """New settings for a loop, what they would do, and why.
-
-    Raises
-    ------
-    InputError
-        loops.csv does not state the present settings.
-    NotAssessedError
-        The trends give no model.
-    """
-    from analyzer.loop.advice import withheld
-    from analyzer.loop.tune import tune as tuned
-    from identification.errors import InputError, NotAssessedError
-
+def tune(loop: PlantLoop) -> of_settings.Tuning:
+    """New settings for a loop, what they would do, and why. Raises InputError where loops.csv does not state the
+    present settings; NotAssessedError where the trends give no model."""
     controller, found = loop.controller, assess(loop)
     if controller is None:
         raise InputError(f"{loop.spec.loop}: no kp and ti in loops.csv", "both", "state them")
     if found.verdict.measured is None:
         raise NotAssessedError(f"{loop.spec.loop}: {found.verdict.needs or 'no model can be identified'}")
     keep = withheld(found, loop.spec, controller, loop.prepared.scale.span, loop.plant.config)
-    return tuned(found, controller, loop.plant.config, keep)
+    return of_settings.tune(found, controller, loop.plant.config, keep)
 
 
 def explain(loop: PlantLoop) -> Explained:
-    """What physics the loop's plain model lacks; `.data` is what `triage explain --format json` prints.
-
-    Raises
-    ------
-    NotAssessedError
-        OP or PV is missing or never moves.
-    """
+    """What physics the loop's plain model lacks; `.data` is what `triage explain --format json` prints. Raises
+    NotAssessedError where OP or PV is missing or never moves."""
     from analyzer.explain.case import case, tags_of
     from analyzer.explain.explained import explained
-    from analyzer.night.nights import cut
 
     plant, spec = loop.plant, loop.spec
     series = plant.export.read(tags_of(spec, plant.specs))
@@ -299,7 +248,7 @@ def explain(loop: PlantLoop) -> Explained:
 
 
 def nights(store: str | Path, table: str = "nights") -> pd.DataFrame:
-    """Every night of a store as one frame, with the column `night`.
+    """Every night of a store as one frame, with the column `night`. Raises InputError where there is no such store.
 
     Parameters
     ----------
@@ -308,15 +257,8 @@ def nights(store: str | Path, table: str = "nights") -> pd.DataFrame:
     table : str
         nights (a row a loop, as that night says by itself), beliefs (what nights say together), hours, trends,
         groups or explained.
-
-    Raises
-    ------
-    InputError
-        There is no such store.
     """
     import pandas as pd
-
-    from analyzer.store.store import Store
 
     kept = Store(Path(store))
     kept.require()

@@ -9,18 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from analyzer.commands import explain, report, run, store
-from analyzer.commands.options import (
-    FILE,
-    NIGHT,
-    SOME_LOST,
-    STORE,
-    OneLineErrors,
-    export_options,
-    formats,
-    of_loop,
-    say,
-)
+from analyzer.commands import explain, options, report, run, store
+from analyzer.commands.options import say
 from analyzer.loop.decisions import Lane
 
 if TYPE_CHECKING:
@@ -33,7 +23,8 @@ way. Set before numpy is imported."""
 
 
 @click.group(
-    cls=OneLineErrors, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110}
+    cls=options.OneLineErrors,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
 )
 @click.version_option(package_name="loop-triage", prog_name="triage")
 def main() -> None:
@@ -46,7 +37,7 @@ def main() -> None:
 
 
 @main.command()
-@export_options
+@options.export_options
 def check(asked: Asked) -> None:
     """What was read: loops, tags, gaps, quality, and which questions it is fit for.
 
@@ -58,11 +49,11 @@ def check(asked: Asked) -> None:
     for line, bad in check_lines(asked):
         lost += bad
         say(line)
-    sys.exit(SOME_LOST if lost else 0)
+    sys.exit(options.SOME_LOST if lost else 0)
 
 
 @main.command()
-@STORE
+@options.STORE
 @click.option(
     "--by",
     "column",
@@ -70,7 +61,7 @@ def check(asked: Asked) -> None:
     "oscillation_significance.",
 )
 @click.option("--top", type=click.IntRange(1), help="Number of loops shown.")
-@NIGHT
+@options.NIGHT
 @click.option("--ascending", is_flag=True, help="Smallest first.")
 @click.option("--area", help="Loops of this area alone.")
 @click.option(
@@ -82,7 +73,7 @@ def check(asked: Asked) -> None:
 @click.option("--groups", is_flag=True, help="Loops that share an oscillation, and where each starts.")
 @click.option("--all", "everything", is_flag=True, help="Loops that notes hide from the table, too.")
 @click.option("--wide", is_flag=True, help="All columns of the table, however narrow the terminal.")
-@formats("table", "csv", "json", "markdown", text="Output format.")
+@options.formats("table", "csv", "json", "markdown", text="Output format.")
 def rank(
     store: Path, top: int | None, groups: bool, everything: bool, wide: bool, form: str, **by: Any
 ) -> None:
@@ -108,9 +99,9 @@ def rank(
 
 
 @main.command()
-@export_options
-@of_loop("The loop to tune.")
-@click.option("--out", type=FILE, help="Directory for pictures, and a page to try settings on.")
+@options.export_options
+@options.of_loop("The loop to tune.")
+@click.option("--out", type=options.FILE, help="Directory for pictures, and a page to try settings on.")
 def tune(asked: Asked, tag: str, out: Path | None) -> None:
     """One loop: model, limit cycle predicted, new Kp and Ti with reasons, forecast, travel map.
 

@@ -110,20 +110,10 @@ def names(columns: Sequence[Column]) -> tuple[str, ...]:
     return tuple(c.name for c in columns)
 
 
-def require_declared(row: Mapping[str, Any], columns: Sequence[Column]) -> None:
-    """Raise ValueError for a cell of a row whose column is declared nowhere."""
-    unknown = sorted(row.keys() - {c.name for c in columns})
+def row_of(values: Mapping[str, Any], columns: Sequence[Column] = NIGHTS) -> dict[str, Any]:
+    """A row with every column of a table, None where nothing is known. Raises ValueError for a value whose column is
+    declared nowhere."""
+    unknown = sorted(values.keys() - {c.name for c in columns})
     if unknown:
         raise ValueError(f"no such column: {', '.join(unknown)}; declare it in analyzer/columns.toml")
-
-
-def row_of(values: Mapping[str, Any], columns: Sequence[Column] = NIGHTS) -> dict[str, Any]:
-    """A row with every column of a table, None where nothing is known.
-
-    Raises
-    ------
-    ValueError
-        For a value whose column is declared nowhere.
-    """
-    require_declared(values, columns)
     return {c.name: values.get(c.name) for c in columns}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import textwrap
 import tomllib
@@ -137,38 +138,26 @@ class Config:
     @property
     def explain(self) -> ExplainLimits:
         """What decides about the explanation of one recording."""
-        return ExplainLimits(
-            self.explain_recorder, self.explain_controller, self.explain_search, self.explain_proof
-        )
+        recorder, controller = self.explain_recorder, self.explain_controller
+        return ExplainLimits(recorder, controller, self.explain_search, self.explain_proof)
 
 
 def read_config(path: Path | None) -> Config:
-    """The limits of a file, defaults where it is silent; the defaults alone without one.
-
-    Raises
-    ------
-    InputError
-        Where the file is not TOML, or has an unknown name, a wrong type or a value out of range.
-    """
+    """The limits of a file, defaults where it is silent; the defaults alone without one. Raises InputError where the
+    file is not TOML, or has an unknown name, a wrong type or a value out of range."""
     if path is None:
         return Config()
     try:
         stated = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except (ValueError, RecursionError) as error:  # of the decoder, of the encoding, of numbers without end
-        raise InputError(
-            f"{path}: {error}", "TOML in UTF-8", "begin with what 'triage config' prints"
-        ) from error
+        remedy = "begin with what 'triage config' prints"
+        raise InputError(f"{path}: {error}", "TOML in UTF-8", remedy) from error
     return configured(stated, str(path))
 
 
 def configured(stated: Mapping[str, Any], where: str) -> Config:
-    """The limits with those that are stated, by section and name, in place of the defaults.
-
-    Raises
-    ------
-    InputError
-        For an unknown name, a wrong type or a value out of range.
-    """
+    """The limits with those that are stated, by section and name, in place of the defaults. Raises InputError for an
+    unknown name, a wrong type or a value out of range."""
     config = Config()
     changed = {}
     for name, section in stated.items():
@@ -197,10 +186,9 @@ def _section(limits: Any, stated: Mapping[str, Any], where: str) -> Any:
 
 def _checked(field: Field[Any], default: Any, value: Any, where: str) -> Any:
     """A value of the field's type, within its range."""
-    said = limit_of(field)
+    said, whole = limit_of(field), isinstance(default, int)
     if isinstance(default, tuple):
         return _rows_by_type(said, value, where)
-    whole = isinstance(default, int)
     if not _is_number(value, said, whole):
         kind = "a whole number" if whole else "a number"
         raise InputError(f"{where} is {value!r}", f"{kind} {_range(said)}", REMEDY)
@@ -220,9 +208,8 @@ def _rows_by_type(said: Limit, value: Any, where: str) -> tuple[tuple[str, float
     for row in rows:
         shaped = isinstance(row, list) and len(row) == 3 and isinstance(row[0], str)
         if not shaped or not all(_is_number(cell, said) for cell in row[1:]):
-            raise InputError(
-                f"{where} has {row!r}", f'rows such as ["flow", 60.0, 30.0], {_range(said)}', REMEDY
-            )
+            expected = f'rows such as ["flow", 60.0, 30.0], {_range(said)}'
+            raise InputError(f"{where} has {row!r}", expected, REMEDY)
     return tuple((row[0].lower(), float(row[1]), float(row[2])) for row in rows)
 
 
@@ -239,10 +226,8 @@ def _range(said: Limit) -> str:
 
 def limits_document(config: Config) -> str:
     """Limits as TOML, each with unit, range, meaning and source as a comment."""
-    parts = [_part_of_file(f.name, getattr(config, f.name)) for f in fields(config)]
-    return "\n".join(
-        ["# Limits of triage; a file given with --config needs only those that it changes.", *parts]
-    )
+    head = "# Limits of triage; a file given with --config needs only those that it changes."
+    return "\n".join([head, *(_part_of_file(f.name, getattr(config, f.name)) for f in fields(config))])
 
 
 def _part_of_file(name: str, limits: Any) -> str:
@@ -252,13 +237,6 @@ def _part_of_file(name: str, limits: Any) -> str:
         said = limit_of(each)
         text = f"{said.meaning}. {_range(said).replace('from', 'From', 1)}; {said.source}."
         lines += [f"# {line}" for line in textwrap.wrap(text, WIDTH)]
-        lines.append(f"{each.name} = {_toml_value(getattr(limits, each.name))}")
+        value = getattr(limits, each.name)  # JSON's numbers, text and lists are TOML's
+        lines.append(f"{each.name} = {json.dumps(value, ensure_ascii=False)}")
     return "\n".join(lines)
-
-
-def _toml_value(value: Any) -> str:
-    if isinstance(value, tuple):
-        return "[" + ", ".join(_toml_value(item) for item in value) + "]"
-    if isinstance(value, str):
-        return '"' + value.replace("\\", "\\\\").replace('"', '\\"') + '"'
-    return repr(value)

@@ -26,13 +26,8 @@ NEEDED = "pip install 'loop-triage[remote]', and for other storage than s3 the f
 
 
 def place(text: str) -> Path:
-    """A path of this machine, or of shared storage where the text is a URL.
-
-    Raises
-    ------
-    InputError
-        A URL of storage for which no package is installed.
-    """
+    """A path of this machine, or of shared storage where the text is a URL. Raises InputError for a URL of storage
+    for which no package is installed."""
     if not URL.match(text):
         return Path(text)
     if urlsplit(text).scheme == "file":
@@ -70,12 +65,8 @@ def remove_tree(path: Path) -> None:
 def content(path: Path) -> bytes:
     """What a small file holds now.
 
-    One of shared storage is asked for in one request: it may be written anew while it is read.
-
-    Raises
-    ------
-    FileNotFoundError
-        There is none.
+    One of shared storage is asked for in one request: it may be written anew while it is read. Raises
+    FileNotFoundError where there is none.
     """
     if not is_remote(path):
         return path.read_bytes()
@@ -85,19 +76,8 @@ def content(path: Path) -> bytes:
 
 
 def at_hand(paths: Sequence[Path], into: Path) -> tuple[list[Path], dict[Path, str]]:
-    """Paths of this machine, and from which URL each file among them was copied.
-
-    Parameters
-    ----------
-    paths : sequence of Path
-    into : Path
-        Directory in which copies are laid, each with its own name.
-
-    Raises
-    ------
-    InputError
-        There is nothing at a URL.
-    """
+    """Paths of this machine, and from which URL each file among them was copied into a directory, each with its own
+    name. Raises InputError where there is nothing at a URL."""
     found: list[Path] = []
     origins: dict[Path, str] = {}
     for path in paths:
@@ -116,13 +96,8 @@ def at_hand(paths: Sequence[Path], into: Path) -> tuple[list[Path], dict[Path, s
 
 @contextmanager
 def answering(url: Path) -> Iterator[None]:
-    """What shared storage refuses as one line with the URL that was asked for.
-
-    Raises
-    ------
-    InputError
-        It refuses, or nobody answers there.
-    """
+    """What shared storage refuses as one line with the URL that was asked for. Raises InputError where it refuses, or
+    nobody answers there."""
     try:
         yield
     except Exception as error:
@@ -143,9 +118,8 @@ def _files(path: Path, copied: Path) -> list[tuple[Path, Path]]:
         raise InputError(f"{path}: nothing there", "a file or a folder of exports", "correct the URL")
     for url, local in found:  # objects may be named as no file can be, or as one outside the copies
         if not local.resolve().is_relative_to(copied.resolve()):
-            raise InputError(
-                f"{url}: a name that leads out of its folder", "names without ..", "rename the object"
-            )
+            seen = f"{url}: a name that leads out of its folder"
+            raise InputError(seen, "names without ..", "rename the object")
     return found
 
 

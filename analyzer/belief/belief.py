@@ -18,10 +18,9 @@ from typing import Any, get_args, get_origin, get_type_hints
 
 import numpy as np
 
-from analyzer.belief import cycle, remedy, valve
-from analyzer.belief.cycle import CycleBelief
+from analyzer.belief import cycle, valve
+from analyzer.belief.cycle import CycleBelief, Pair, RemedyBelief
 from analyzer.belief.pool import Pool
-from analyzer.belief.remedy import Pair, RemedyBelief
 from analyzer.belief.valve import ValveBelief, Witness
 from analyzer.belief.wear import PhaseKnown, Width, forgotten, with_repetitions
 from analyzer.config import BeliefLimits, Config
@@ -37,7 +36,11 @@ OF_VALVE = ("width", "slip_jump")
 """Those of them that a repair changes."""
 FIRST = (Action.CHECK_MEASUREMENT, Action.CHECK_SETTINGS)
 """What is told in the night that finds it: no settings of other nights hold where these are not known."""
-
+AGAINST = {
+    Cause.VALVE: (Action.REPAIR_VALVE, Action.CHECK_SETTINGS),
+    Cause.TUNING: (Action.UNDECIDED, Action.CHECK_SETTINGS, Action.NEEDS_DATA),
+}
+"""What is done against a cause where no settings are, the first unless the nights vote for another of them."""
 GIST = attrgetter("cause", "fault", "action", "source")
 """What makes a difference between what two tell."""
 
@@ -132,22 +135,10 @@ def _read_as(kind: Any, kept: Any) -> Any:
 
 
 def step(before: Belief | None, row: Row, repaired_s: Sequence[float], config: Config) -> Belief | None:
-    """The belief after a night.
+    """The belief after a night: as it was where the night tells nothing, None where no night has told anything.
 
-    Parameters
-    ----------
-    before : Belief or None
-        That of the night before, None where there is none.
-    row : mapping
-        The loop's row of the night.
-    repaired_s : sequence of float
-        When notes say that its valve was repaired [s since 1970-01-01 UTC].
-    config : Config
-
-    Returns
-    -------
-    Belief or None
-        As it was where the night tells nothing; None where no night has told anything.
+    before : that of the night before, None where there is none; row : the loop's of the night; repaired_s : when
+    notes say that its valve was repaired [s since 1970-01-01 UTC].
     """
     if row["status"] != Status.OK or row["oscillating_pct"] is None:
         return before
@@ -157,17 +148,18 @@ def step(before: Belief | None, row: Row, repaired_s: Sequence[float], config: C
     found = cycle.cycle_with_night(now.cycle, share, row, limits)
     now = _with_witness(replace(now, cycle=found), share, row, repaired_s, config)
     ended = before is not None and before.cycle.loud and not found.loud
-    done = remedy.remedy_with_night(RemedyBelief() if ended else now.remedy, share, row, limits)
-    seen = Calm(
-        row["night"],
-        float(row["oscillation_significance"] or 0.0),
-        float(row["oscillating_pct"]),
-        row["period_s"],
-    )
-    end_s = (row["start_s"] or 0.0) + (row["duration_s"] or 0.0)
-    seen_phases = with_repetitions(now.phases, row, limits.repetitions)
-    now = replace(now, night=row["night"], end_s=end_s, remedy=done, last=seen, phases=seen_phases)
+    done = cycle.remedy_with_night(RemedyBelief() if ended else now.remedy, share, row, limits)
+    size, share_pct = float(row["oscillation_significance"] or 0.0), float(row["oscillating_pct"])
+    seen = Calm(row["night"], size, share_pct, row["period_s"])
+    phases = with_repetitions(now.phases, row, limits.repetitions)
+    now = replace(now, night=row["night"], end_s=_span(row)[1], remedy=done, last=seen, phases=phases)
     return replace(now, kp=row["kp"], ti=row["ti"], told=tell(now, row, limits))
+
+
+def _span(row: Row) -> tuple[float, float]:
+    """When a night's record began and ended [s since 1970-01-01 UTC]."""
+    start_s = row["start_s"] or 0.0
+    return start_s, start_s + (row["duration_s"] or 0.0)
 
 
 def _recorded_anew(now: Belief, row: Row, limits: BeliefLimits) -> Belief:
@@ -177,25 +169,23 @@ def _recorded_anew(now: Belief, row: Row, limits: BeliefLimits) -> Belief:
     now = replace(now, straight_pct=straight)
     if then is None or straight is None or abs(straight - then) <= limits.recorder:
         return now
-    same = replace(now.cycle, usual=None, off=0)
-    valve_as_seen = valve.recorded_otherwise(now.valve)
-    return replace(now, cycle=same, valve=valve_as_seen, constants={}, widths=(), recorder=row["night"])
+    same, seen = replace(now.cycle, usual=None, off=0), valve.recorded_otherwise(now.valve)
+    return replace(now, cycle=same, valve=seen, constants={}, widths=(), recorder=row["night"])
 
 
 def _after_changes(now: Belief, row: Row, repaired_s: Sequence[float]) -> Belief:
     """The belief with what a change of settings, stated or seen in OP, or a repair since the night before has ended
     begun anew."""
     settings, fresh = (row["kp"], row["ti"]), CycleBelief(top=now.cycle.top, loud=now.cycle.loud)
-    anew = replace(now, cycle=fresh, remedy=RemedyBelief(), before=now.last)
-    anew = replace(anew, phases=forgotten(now.phases))
+    phases = forgotten(now.phases)
+    anew = replace(now, cycle=fresh, remedy=RemedyBelief(), before=now.last, phases=phases)
     listed = now.remedy.action is Action.CHECK_SETTINGS
     if now.night and None not in (now.kp, *settings) and (now.kp, now.ti) != settings:
         # a list that is put right changes no loop
         now = replace(now, remedy=RemedyBelief()) if listed else anew
     elif now.night and not listed and row["action"] == Action.CHECK_SETTINGS:
         now = anew
-    end_s = (row["start_s"] or 0.0) + (row["duration_s"] or 0.0)
-    if any(now.end_s < at <= end_s for at in repaired_s) and now.night:
+    if any(now.end_s < at <= _span(row)[1] for at in repaired_s) and now.night:
         kept = {k: v for k, v in now.constants.items() if k not in OF_VALVE}
         now = replace(now, valve=ValveBelief(), constants=kept, widths=(), cycle=fresh, remedy=RemedyBelief())
     return now
@@ -204,26 +194,25 @@ def _after_changes(now: Belief, row: Row, repaired_s: Sequence[float]) -> Belief
 def _with_witness(now: Belief, share: float, row: Row, repaired_s: Sequence[float], config: Config) -> Belief:
     """The belief in valve and process with what a night says of them; nothing where it says nothing, or where the
     valve was repaired within it."""
-    start_s = row["start_s"] or 0.0
-    mixed = any(start_s < at < start_s + (row["duration_s"] or 0.0) for at in repaired_s)
+    start_s, end_s = _span(row)
+    mixed = any(start_s < at < end_s for at in repaired_s)
     constants = {k: pool.faded(share) for k, pool in now.constants.items()}
     said, limits = None if mixed else said_of(row), config.belief
     if said is None:
         return replace(now, constants=constants)
     wrong = valve.doubt(said, now.cycle.cause, counts(row["oscillating_pct"]), config)
     found = valve.valve_with_night(now.valve, share, row["night"], said, wrong, limits)
-    if found.since != now.valve.since:  # another valve
+    another = found.since != now.valve.since
+    if another:
         constants = {k: pool for k, pool in constants.items() if k not in OF_VALVE}
-    better = found.since != now.valve.since and found.width < now.valve.width
-    widths = () if better else now.widths
+    widths = () if another and found.width < now.valve.width else now.widths
     if "width" in said:
         widths = (*widths, (row["night"], *said["width"]))[-limits.remembered :]
     for name in CONSTANTS:
         if name in said:
             pool, (value, deviation) = constants.get(name, Pool()), said[name]
             constants[name] = pool.plus(value, deviation, limits.least_deviation, limits.most_deviation)
-    worn = found.is_worn(limits)
-    certain = (now.valve.certain if found.since == now.valve.since else "") or row["night"] if worn else ""
+    certain = ("" if another else now.valve.certain) or row["night"] if found.is_worn(limits) else ""
     return replace(now, valve=replace(found, certain=certain), constants=constants, widths=widths)
 
 
@@ -246,9 +235,7 @@ def tell(now: Belief, row: Row, limits: BeliefLimits) -> Told:
     alone = now.cycle.nights == 1 and now.valve.nights <= 1
     cycles = counts(row["oscillating_pct"])
     dead = own.cause is Cause.VALVE and own.fault is Fault.UNDECIDED and not cycles
-    told = own
-    if not alone and not dead:
-        told = _of_cycle(now, own, limits) if cycles else _of_calm(now, own, limits)
+    told = own if alone or dead else (_of_cycle if cycles else _of_calm)(now, own, limits)
     if cycles and told.cause is Cause.VALVE and now.is_calmed(limits):
         told = _left_alone(told)
     return replace(told, own=GIST(told) == GIST(own))
@@ -265,18 +252,10 @@ def _left_alone(told: Told) -> Told:
 
 def _own(row: Row) -> Told:
     """What a night says by itself."""
-    pair = None
-    if row["action"] == Action.RETUNE and row["kp_new"] and row["ti_new"]:
-        pair = Pair(row["night"], *(row[c] for c in remedy.WITH_PAIR))
-    return Told(
-        Cause(row["cause"]),
-        {c: row[f"osc_{c}_pct"] for c in CAUSES if row[f"osc_{c}_pct"] is not None},
-        Fault(row["valve_fault"]),
-        row["source_loop"],
-        Action(row["action"]) if row["action"] else None,
-        Due(row["due"]) if row["due"] else None,
-        pair,
-    )
+    confidence = {c: row[f"osc_{c}_pct"] for c in CAUSES if row[f"osc_{c}_pct"] is not None}
+    action, due = Action(row["action"]) if row["action"] else None, Due(row["due"]) if row["due"] else None
+    cause, fault, source = Cause(row["cause"]), Fault(row["valve_fault"]), row["source_loop"]
+    return Told(cause, confidence, fault, source, action, due, cycle.advised_pair(row))
 
 
 def _of_calm(now: Belief, own: Told, limits: BeliefLimits) -> Told:
@@ -327,9 +306,6 @@ def _with_remedy(now: Belief, own: Told, told: Told, limits: BeliefLimits) -> To
     action, held = now.remedy.action, now.remedy.held
     if action is Action.RETUNE and held is not None:
         return replace(told, action=action, pair=held)
-    if told.cause is Cause.VALVE:
-        keeps = action in (Action.CHECK_SETTINGS, Action.REPAIR_VALVE)
-        action = action if keeps else Action.REPAIR_VALVE
-        return replace(told, action=action, due=Due.NOW if action is Action.REPAIR_VALVE else None)
-    keeps = action in (Action.CHECK_SETTINGS, Action.NEEDS_DATA)
-    return replace(told, action=action if keeps else Action.UNDECIDED)
+    usual, *others = AGAINST[told.cause]
+    action = action if action in others else usual
+    return replace(told, action=action, due=Due.NOW if action is Action.REPAIR_VALVE else None)

@@ -8,14 +8,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from analyzer.belief.belief import Belief, belief_of, kept_as, step
-from analyzer.belief.pool import Pool
+from analyzer.belief.pool import Pooled
 from analyzer.belief.wear import growth, wear
 from analyzer.columns import BELIEFS, row_of
 from analyzer.config import Config
 from analyzer.loop.decisions import CAUSES, Lane
 from analyzer.store import notes
 from analyzer.store.care import Problem
-from analyzer.store.notes import Note
 from analyzer.store.store import Store
 from analyzer.store.table import rows_table
 from analyzer.words import belief as words
@@ -43,37 +42,45 @@ def settle(store: Store, night: str, config: Config) -> list[str]:
     """Write the beliefs of a night and of all after it, and of any before that has none; sentences on loops of which
     that failed."""
     names = store.nights()
-    lacking = [n for n in names if not store.file("beliefs", n).exists()]
-    first = min([night, *lacking])
-    earlier = [n for n in names if n < first]
-    known = read_beliefs(store, earlier[-1]) if earlier else {}
+    first = min([night, *(n for n in names if not store.file("beliefs", n).exists())])
+    known = _beliefs_before(store, first)
     if known is None:
         return settle_anew(store, config)
     return _write_all(store, _followed(store, [n for n in names if n >= first], known, config))
 
 
+def _beliefs_before(store: Store, night: str) -> dict[str, Belief] | None:
+    """What was believed before a night, nothing of the first of all; None where that cannot be read."""
+    earlier = [n for n in store.nights() if n < night]
+    return read_beliefs(store, earlier[-1]) if earlier else {}
+
+
 def held_pairs(store: Store, night: str) -> dict[str, Held]:
     """Settings that are told of loops before a night; none where the store has no beliefs before it."""
-    earlier = [n for n in store.nights() if n < night]
-    known = (read_beliefs(store, earlier[-1]) if earlier else None) or {}
-    told = [(loop, b.told.pair, b) for loop, b in known.items()]
+    told = [(loop, b.told.pair, b) for loop, b in (_beliefs_before(store, night) or {}).items()]
     return {loop: ((b.kp, b.ti), (pair.kp, pair.ti)) for loop, pair, b in told if pair is not None}
 
 
 def settle_anew(store: Store, config: Config) -> list[str]:
     """Make all beliefs of a store anew from its nights; sentences as of `settle`."""
+    return _write_all(store, _followed_anew(store, config))
+
+
+def _followed_anew(store: Store, config: Config) -> Iterator[Followed]:
+    """All nights with their beliefs, from what the oldest knew of nights before it, which have been deleted."""
     names = store.nights()
-    return _write_all(store, _followed(store, names, _of_pruned(store, names), config))
+    known = (read_beliefs(store, names[0]) if names else None) or {}
+    pruned = {k: b for k, b in known.items() if min(b.valve.since or names[0], b.cycle.since) < names[0]}
+    return _followed(store, names, pruned, config)
 
 
 def unfounded(store: Store, config: Config) -> list[Problem]:
     """Beliefs of a store that do not follow from its nights; none where a table of nights is damaged, or an earlier
     version kept no beliefs."""
-    names = store.nights()
     if not store.files("beliefs"):
         return []
     try:
-        followed = list(_followed(store, names, _of_pruned(store, names), config))
+        followed = list(_followed_anew(store, config))
     except InputError:
         return []
     remedy = "'triage store beliefs' makes them anew"
@@ -107,18 +114,15 @@ def read_beliefs(store: Store, night: str) -> dict[str, Belief] | None:
         return None
 
 
-def _of_pruned(store: Store, names: Sequence[str]) -> dict[str, Belief]:
-    """What the oldest night of a store knew of nights before it, which have been deleted."""
-    known = (read_beliefs(store, names[0]) if names else None) or {}
-    return {k: b for k, b in known.items() if min(b.valve.since or names[0], b.cycle.since) < names[0]}
-
-
 def _followed(
     store: Store, names: Sequence[str], known: Mapping[str, Belief], config: Config
 ) -> Iterator[Followed]:
     """Nights, oldest first, with their beliefs, from what was believed before them."""
     beliefs = dict(known)
-    repaired = {loop: repairs(own) for loop, own in notes.read_notes(store.path).items()}
+    repaired = {
+        loop: [n.time_s for n in own if words.says_repaired(n.text)]
+        for loop, own in notes.read_notes(store.path).items()
+    }
     for name in names:
         rows = {r["loop"]: r for r in store.own_rows("nights", name, READ)}
         out, lost = [], []
@@ -137,17 +141,13 @@ def _followed(
         yield name, out, lost
 
 
-def repairs(own: Sequence[Note]) -> list[float]:
-    """When notes of a loop say that its valve was repaired [s since 1970-01-01 UTC]."""
-    return [n.time_s for n in own if words.says_repaired(n.text)]
-
-
 def _belief_row(
     before: Belief | None, now: Belief, row: Row | None, night: str, config: Config
 ) -> dict[str, Any]:
     """A belief as a row: what is told where the night tells anything, figures, and what the next night goes on
     from."""
     worn = now.valve.worn_pct(config.belief)
+    pools = {name: pool.pooled for name, pool in now.constants.items()}
     known: dict[str, Any] = {
         "loop": now.loop,
         "night": night,
@@ -156,15 +156,14 @@ def _belief_row(
         "worn_pct": worn if now.valve.nights else None,
         "worn_nights": float(now.valve.nights),
         "certain_since": now.valve.certain or None,
-        "constants": _constants_kept(now.constants),
+        "constants": _constants_kept(pools),
         "state": kept_as(now),
     }
-    width = now.constants["width"].pooled if "width" in now.constants else None
+    width = pools.get("width")
     if width is not None:
         known |= {"width_pct": width.value, "width_low_pct": width.low, "width_high_pct": width.high}
     found = wear(now.widths, config.wear) if now.valve.certain else None
-    if found is not None:
-        known |= found
+    known |= found or {}
     if row is None or now.night != night:
         return known
     grown = [(p, g) for p in now.phases if (g := growth(p, config.wear)) is not None]
@@ -177,8 +176,7 @@ def _belief_row(
     return known | told | {"news": text or None, "news_tone": tone or None}
 
 
-def _constants_kept(pools: Mapping[str, Pool]) -> str:
+def _constants_kept(pools: Mapping[str, Pooled | None]) -> str:
     """Pooled constants: value, ends of the 90 % interval, and spread between nights."""
-    found = {k: p.pooled for k, p in pools.items()}
-    said = {k: [float(f"{x:.4g}") for x in (p.value, p.low, p.high, p.spread)] for k, p in found.items() if p}
+    said = {k: [float(f"{x:.4g}") for x in (p.value, p.low, p.high, p.spread)] for k, p in pools.items() if p}
     return json.dumps(said, separators=(",", ":"))

@@ -48,15 +48,9 @@ class Pool:
         if value == 0.0 or not math.isfinite(value) or not deviation <= most:
             return self
         x, w = math.log(abs(value)), 1.0 / max(INTERVALS.wider * deviation, least) ** 2
-        return Pool(
-            self.count + 1.0,
-            self.total + x,
-            self.weight + w,
-            self.first + w * x,
-            self.second + w * x * x,
-            self.squares + w * w,
-            math.copysign(1.0, value),
-        )
+        more = {"count": 1.0, "total": x, "weight": w, "first": w * x, "second": w * x * x, "squares": w * w}
+        sums = {name: getattr(self, name) + term for name, term in more.items()}
+        return Pool(**sums | {"sign": math.copysign(1.0, value)})
 
     @property
     def pooled(self) -> Pooled | None:

@@ -24,6 +24,8 @@ from identification.record import Floats
 
 Witness = Mapping[str, Any]
 """What a night says, as analyzer/loop/witness.py puts it."""
+Doubt = tuple[float, float, float]
+"""What a night may be wrong by: as one of several, by itself, and in what it says against a width."""
 Recent = tuple[str, tuple[float, ...]]
 """A night and what it said of each width, as it counts today [nat]."""
 
@@ -99,7 +101,7 @@ def faded_over(before: str, night: str, limits: BeliefLimits) -> float:
     return float(0.5 ** (max(gap, 0) / limits.half_life))
 
 
-def doubt(said: Witness, cause: Cause, oscillates: bool, config: Config) -> tuple[float, float, float]:
+def doubt(said: Witness, cause: Cause, oscillates: bool, config: Config) -> Doubt:
     """What a night's likelihood may be wrong by, in the evidence that a verdict of one night needs [-]: as one of
     several nights, by itself, and in what it says against a width.
 
@@ -129,26 +131,11 @@ def weighed(said: Witness, wrong_by: float, against: float, limits: BeliefLimits
 
 
 def valve_with_night(
-    before: ValveBelief,
-    share: float,
-    night: str,
-    said: Witness,
-    wrong: tuple[float, float, float],
-    limits: BeliefLimits,
+    before: ValveBelief, share: float, night: str, said: Witness, wrong: Doubt, limits: BeliefLimits
 ) -> ValveBelief:
-    """The belief with one night more.
+    """The belief with one night more, what it was before counting for a share [-].
 
-    Parameters
-    ----------
-    before : ValveBelief
-    share : float
-        How much of it still counts [-].
-    night : str
-    said : dict
-        The night's witness.
-    wrong : tuple of float
-        What it may be wrong by, as `doubt` gives it.
-    limits : BeliefLimits
+    said : the night's witness; wrong : what it may be wrong by, as `doubt` gives it.
     """
     *each, against = wrong
     own, alone = (weighed(said, x, against, limits) for x in each)
@@ -166,7 +153,7 @@ def valve_with_night(
         alone=_kept(share * np.asarray(before.alone) + alone if before.alone else alone),
         summed=_kept(summed),
         best=_kept(np.maximum(share * np.asarray(before.best), own) if before.best else np.maximum(own, 0.0)),
-        recent=tuple((n, _kept(p)) for n, p in recent),
+        recent=_nights_kept(recent),
         jump=share * before.jump + jump,
         clear=share * before.clear + clear,
     )
@@ -175,17 +162,9 @@ def valve_with_night(
 def _begun_anew(recent: Sequence[tuple[str, Floats]], said: Witness) -> ValveBelief:
     """The belief in another valve, which the recent nights are of."""
     each = np.array([p for _, p in recent])
-    best = np.maximum(each.max(axis=0), 0.0)
-    kept = tuple((n, _kept(p)) for n, p in recent)
-    return ValveBelief(
-        recent[0][0],
-        len(recent),
-        _kept(np.minimum(each.sum(axis=0), 0.0)),
-        _kept(each.sum(axis=0)),
-        _kept(best),
-        kept,
-        *said["jump"],
-    )
+    summed, best = each.sum(axis=0), np.maximum(each.max(axis=0), 0.0)
+    alone, summed, best = map(_kept, (np.minimum(summed, 0.0), summed, best))
+    return ValveBelief(recent[0][0], len(recent), alone, summed, best, _nights_kept(recent), *said["jump"])
 
 
 def _kept(x: Floats) -> tuple[float, ...]:
@@ -193,19 +172,16 @@ def _kept(x: Floats) -> tuple[float, ...]:
     return tuple(round(float(v), 3) for v in x)
 
 
+def _nights_kept(recent: Sequence[tuple[str, Floats]]) -> tuple[Recent, ...]:
+    return tuple((night, _kept(p)) for night, p in recent)
+
+
 def changed_at(summed: Floats, recent: Sequence[Floats], least: float, nights: int) -> int | None:
     """The first of the recent nights from which on the valve is another one; None where all nights agree.
 
-    Parameters
-    ----------
-    summed : ndarray of shape (w,)
-        Evidence of all nights together [nat].
-    recent : sequence of ndarray of shape (w,)
-        Of the last of them, as they count in it.
-    least : float
-        Gain in log likelihood [nat] of two valves over one from which it is told.
-    nights : int
-        How many of them that takes at least: one can be odd.
+    summed : evidence of all nights together [nat], shape (w,); recent : of the last of them, as they count in it,
+    shape (w,) each; least : gain in log likelihood [nat] of two valves over one from which it is told; nights : how
+    many of them that takes at least: one can be odd.
     """
     together = max(float(summed.max()), 0.0)
     after, best, gain = np.zeros(summed.size), None, least

@@ -30,19 +30,10 @@ MONTH_D = 30.0
 
 
 def wear(widths: Sequence[Width], limits: WearLimits) -> dict[str, Any] | None:
-    """Whether a width grows, by the nights that tell it; None where it stays or too few do.
+    """Whether a width grows, by the nights that tell it, oldest first; None where it stays or too few do.
 
-    Parameters
-    ----------
-    widths : sequence of Width
-        Oldest first.
-    limits : WearLimits
-
-    Returns
-    -------
-    dict or None
-        Columns of a belief: the night since which it grows, growth in thirty days with its 90 % interval [% OP], the
-        size that it will reach [% OP], and the days between which it does with 90 %, None where not within sight.
+    As columns of a belief: the night since which it grows, growth in thirty days with its 90 % interval [% OP], the
+    size that it will reach [% OP], and the days between which it does with 90 %, None where not within sight.
     """
     if len(widths) < limits.nights:
         return None
@@ -57,14 +48,7 @@ def wear(widths: Sequence[Width], limits: WearLimits) -> dict[str, Any] | None:
 
 def bend(days: Floats, width: Floats, deviation: Floats, limits: WearLimits) -> float | None:
     """The day from which on a width, or another figure, grows: the best of all bends, where it is a better story than
-    that it stays; None where it is not.
-
-    Parameters
-    ----------
-    days, width, deviation : ndarray of shape (n,)
-        When, what, and its standard deviation.
-    limits : WearLimits
-    """
+    that it stays; None where it is not. Days, figure and its standard deviation are of shape (n,)."""
     weight = 1.0 / deviation
     flat = _left(np.ones((days.size, 1)), width, weight)[0]
     best, least, slope = None, math.inf, 0.0
@@ -157,21 +141,15 @@ def with_repetitions(
     out = list(known)
     for told in json.loads(row.get("phases") or "[]"):
         ends = told["begin"], told["end"]
-        at = next((k for k, p in enumerate(out) if alike((p.begin, p.end), ends)), None)
-        if at is None:
-            at = len(out)
-            out.append(PhaseKnown(*ends))
-        out[at] = _with_repetitions(
-            out[at], list(zip(told["start_s"], told["overshoot_pct"], strict=True)), most
-        )
+        at = next((k for k, p in enumerate(out) if alike((p.begin, p.end), ends)), len(out))
+        phase = out[at] if at < len(out) else PhaseKnown(*ends)
+        last = phase.shown[-1][1] if phase.shown else -math.inf
+        found = zip(told["start_s"], told["overshoot_pct"], strict=True)
+        new = [(start, size) for start, size in found if start > last]
+        numbered = tuple((phase.count + k, *each) for k, each in enumerate(new, 1))
+        shown = (*phase.shown, *numbered)[-most:]
+        out[at : at + 1] = [replace(phase, count=phase.count + len(new), shown=shown)]
     return tuple(out)
-
-
-def _with_repetitions(phase: PhaseKnown, found: Sequence[tuple[float, float]], most: int) -> PhaseKnown:
-    last = phase.shown[-1][1] if phase.shown else float("-inf")
-    new = [(start, size) for start, size in found if start > last]
-    numbered = tuple((phase.count + k, start, size) for k, (start, size) in enumerate(new, 1))
-    return replace(phase, count=phase.count + len(new), shown=(*phase.shown, *numbered)[-most:])
 
 
 def forgotten(known: Sequence[PhaseKnown]) -> tuple[PhaseKnown, ...]:

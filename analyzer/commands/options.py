@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import sys
 import time
 import warnings
@@ -10,15 +9,17 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import reduce, wraps
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from analyzer.history.plant_clock import utc_seconds, zone_of
 from analyzer.places import place, refused
 from identification.errors import InputError, TriageError
 from reports.texts import visible, visible_lines
 from reports.whole_file import is_full
+
+if TYPE_CHECKING:
+    from analyzer.store.store import Store
 
 Command = Callable[..., Any]
 SOME_LOST, NOTHING_DONE = 1, 2
@@ -98,6 +99,17 @@ NIGHT = click.option("--night", help="Night to show, e.g. 2026-03-08. Default: t
 CONFIG = click.option(
     "--config", type=FILE, help="TOML with limits to change; 'triage config' prints all of them."
 )
+
+
+def opened_store(path: Path) -> Store:
+    """A store that holds a night. Raises InputError where there is none."""
+    from analyzer.store.store import Store
+
+    kept = Store(path)
+    kept.require()
+    return kept
+
+
 TIMES = ("%Y-%m-%d", *(f"%Y-%m-%d{between}%H:%M{end}" for between in "T " for end in (":%S", "")))
 """How --since and --until may be written."""
 
@@ -156,19 +168,10 @@ def export_options(command: Command) -> Command:
         export: tuple[Path, ...], loops: Path | None, changes: Path | None, config: Path | None, **given: Any
     ) -> Any:
         from analyzer.config import read_config
-        from analyzer.loops.changes import read_changes
-        from analyzer.night.asked import Asked
+        from analyzer.night.asked import asked_of
 
-        reading = {name: given.pop(name) for name in names}
-        zone = str(zone_of(reading["timezone"]))
-        dated = () if changes is None else tuple(read_changes(changes, zone, reading["day_first"]))
-        since, until = given.pop("since"), given.pop("until")
-        first = -math.inf if since is None else utc_seconds(since, zone)
-        last = math.inf if until is None else utc_seconds(until, zone)
-        if last <= first:
-            raise InputError(f"--since {since} --until {until}", "an end after the start", "swap them")
-        asked = Asked(export, loops, dated, first, last, read_config(config), zone, reading)
-        return command(asked=asked, **given)
+        reading = {name: given.pop(name) for name in ("since", "until", *names)}
+        return command(asked=asked_of(export, loops, changes, read_config(config), **reading), **given)
 
     reads = [click.option(name, help=text, **KINDS.get(name, {})) for name, text in READING.items()]
     options: list[Any] = [*SPAN, *reads]

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from functools import wraps
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from analyzer.commands.options import CONFIG, FILE, NIGHT, SOME_LOST, STORE, Command, formats, say
+from analyzer.commands import options
+from analyzer.commands.options import FILE, SOME_LOST, Command, opened_store, say
 from identification.errors import InputError
 
 if TYPE_CHECKING:
@@ -25,39 +25,24 @@ MOST_DAYS = 3660
 """Longest span that is compared [d]: ten years."""
 
 
-@dataclass(frozen=True, slots=True)
-class Folder:
-    """Where pages are written, in which format, and whether each is to stand by itself."""
-
-    form: str
-    single_file: bool
-    out: Path
-
-    def write(self, store: Store, pages: Sequence[Page]) -> None:
-        """Write a store's pages and their tables, and say where."""
-        from reports.folder import write_csv, write_html, write_markdown
-
-        head, zone, html = made(store), store.zone(), self.form == "html"
-        pages = [replace(page, made=head, zone=zone) for page in pages]
-        paths = write_html(pages, self.out, self.single_file) if html else write_markdown(pages, self.out)
-        for page in pages:
-            write_csv(page, self.out)
-        click.echo(f"{paths[0]}" + (f" and {len(paths) - 1} more" if len(paths) > 1 else ""))
-
-
 def into_folder(single_text: str) -> Callable[[Command], Command]:
-    """--format, --single-file and --out, handed over as one `folder`."""
+    """--format, --single-file and --out: in which format pages are written, whether each is to stand by itself, and
+    where."""
     single = click.option("--single-file", is_flag=True, help=single_text)
     where = click.option("--out", required=True, type=FILE, help="Folder to write into.")
+    return lambda command: options.formats("html", "markdown")(single(where(command)))
 
-    def collecting(command: Command) -> Command:
-        @wraps(command)
-        def collected(form: str, single_file: bool, out: Path, **given: Any) -> Any:
-            return command(folder=Folder(form, single_file, out), **given)
 
-        return formats("html", "markdown")(single(where(collected)))
+def write(store: Store, pages: Sequence[Page], form: str, single_file: bool, out: Path) -> None:
+    """Write a store's pages and their tables, and say where."""
+    from reports.folder import write_csv, write_html, write_markdown
 
-    return collecting
+    head, zone = made(store), store.zone()
+    pages = [replace(page, made=head, zone=zone) for page in pages]
+    paths = write_html(pages, out, single_file) if form == "html" else write_markdown(pages, out)
+    for page in pages:
+        write_csv(page, out)
+    click.echo(f"{paths[0]}" + (f" and {len(paths) - 1} more" if len(paths) > 1 else ""))
 
 
 def made(store: Store) -> str:
@@ -72,7 +57,7 @@ def made(store: Store) -> str:
 
 
 @click.command()
-@STORE
+@options.STORE
 @click.option("--changes", type=FILE, help="CSV: loop, time, kp_old ... ti_new, who.")
 @click.option("--loop", help="One loop's tag.")
 @click.option("--changed", help="When that loop was changed, e.g. 2026-03-09T08:00Z.")
@@ -83,14 +68,16 @@ def made(store: Store) -> str:
 @click.option("--before", nargs=2, help="Span before, start and end, instead of --days.")
 @click.option("--after", nargs=2, help="Span after, start and end, instead of --days.")
 @into_folder("Everything in the page itself.")
-@CONFIG
+@options.CONFIG
 def report(
     store: Path,
     days: float,
     before: tuple[str, str] | None,
     after: tuple[str, str] | None,
-    folder: Folder,
     config: Path | None,
+    form: str,
+    single_file: bool,
+    out: Path,
     **named: Any,
 ) -> None:
     """Before and after: what changes of controllers brought, with intervals and verdicts.
@@ -100,10 +87,8 @@ def report(
     from analyzer.config import read_config
     from analyzer.pages.before_after import changes_page
     from analyzer.pages.changes import Spans, change_cases
-    from analyzer.store.store import Store
 
-    kept, limits = Store(store), read_config(config)
-    kept.require()
+    limits, kept = read_config(config), opened_store(store)
     zone = kept.zone()
     if not days <= MOST_DAYS:  # NaN passes the range that the option states
         raise InputError(f"--days {days}", f"1 to {MOST_DAYS}", "correct it")
@@ -114,7 +99,8 @@ def report(
         raise InputError(why, "loops and times that the store holds", "check the tags and times")
     span = "The stated spans" if before or after else f"{days:g} days"
     subtitle = f"{span} before against after the change, from {store.name}."
-    folder.write(kept, [changes_page(found, missing, subtitle, named["find"], zone)])
+    page = changes_page(found, missing, subtitle, named["find"], zone)
+    write(kept, [page], form, single_file, out)
     for tag, reason in missing:
         say(f"{tag}: {reason}", err=True)
     sys.exit(SOME_LOST if missing else 0)
@@ -158,8 +144,8 @@ def _changes(
 
 
 @click.command()
-@STORE
-@NIGHT
+@options.STORE
+@options.NIGHT
 @click.option(
     "--top",
     default=200,
@@ -168,31 +154,28 @@ def _changes(
     help="Loops with a page, the worst first.",
 )
 @into_folder("Style and scripts in each page itself.")
-def pages(store: Path, night: str | None, top: int, folder: Folder) -> None:
+def pages(store: Path, night: str | None, top: int, form: str, single_file: bool, out: Path) -> None:
     """The morning page of a night and a page for each of its loops, the worst first.
 
     Example: triage pages store --out pages --top 50
     """
     from analyzer.pages import night as night_pages
-    from analyzer.store.store import Store
+    from reports.folder import forget_stale
 
-    kept = Store(store)
-    kept.require()
+    kept = opened_store(store)
+
+    def page_of(night: str) -> Path:
+        return out / f"{night_pages.name_of(night)}.html"
+
+    def stands(night: str) -> bool:
+        """Whether a night's dated page was written after its results."""
+        page, results = page_of(night), kept.file("nights", night)
+        return page.exists() and page.stat().st_mtime > results.stat().st_mtime
+
     found = list(night_pages.pages_of_night(kept, night, top))
-    if folder.form == "html":
-        found += night_pages.dated_pages(kept, night, lambda name: _stands(kept, folder.out, name))
-    folder.write(kept, found)
-    if folder.form == "html":
-        from analyzer.pages.night import name_of
-        from reports.folder import forget_stale
-
-        dated = {f"{name_of(night)}.html" for night in kept.nights()}
-        forget_stale(folder.out, [f"{page.name}.html" for page in found], kept_names=dated)
-
-
-def _stands(store: Store, out: Path, night: str) -> bool:
-    """Whether a night's dated page was written after its results."""
-    from analyzer.pages.night import name_of
-
-    page, results = out / f"{name_of(night)}.html", store.path / "nights" / f"{night}.parquet"
-    return page.exists() and page.stat().st_mtime > results.stat().st_mtime
+    if form == "html":
+        found += night_pages.dated_pages(kept, night, stands)
+    write(kept, found, form, single_file, out)
+    if form == "html":
+        dated = {page_of(night).name for night in kept.nights()}
+        forget_stale(out, [f"{page.name}.html" for page in found], kept_names=dated)

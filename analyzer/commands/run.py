@@ -11,9 +11,9 @@ import os
 import signal
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 from types import FrameType
@@ -107,18 +107,6 @@ def stoppable() -> Iterator[None]:
             signal.signal(number, handler)
 
 
-@dataclass(frozen=True, slots=True)
-class How:
-    """Worker processes, whether pieces of a stopped run are gone on with, whether what the store has of the nights is
-    forgotten first, the address of a scheduler, if any, and whether flagged loops are explained."""
-
-    jobs: int
-    resume: bool
-    replacing: bool
-    scheduler: str | None
-    explaining: bool
-
-
 @click.command()
 @export_options
 @click.option(
@@ -137,7 +125,7 @@ class How:
     help="File to which a line is appended for each thing that happened.",
 )
 @click.option("--explain", "explaining", is_flag=True, help="Explain the last night's flagged loops as well.")
-def run(asked: Asked, store: Path, log_file: Path | None, **how: Any) -> None:
+def run(asked: Asked, store: Path, log_file: Path | None, explaining: bool, **how: Any) -> None:
     """The nightly batch: assess every loop and keep the results in a store.
 
     An export of several days is kept day by day; new settings are advised on for the last of them. A second export of
@@ -154,7 +142,7 @@ def run(asked: Asked, store: Path, log_file: Path | None, **how: Any) -> None:
     log.say("begin", version=version("loop-triage"), store=store, export=export, jobs=how["jobs"])
     try:
         with stoppable():
-            outcome, loops = _run_night(asked, store, log, How(**how))
+            outcome, loops = _run_night(asked, store, log, explaining, how)
     except StoppedError as stopped:
         log.say("stopped", signal=stopped, status=STOPPED + stopped.number)
         with suppress(OSError):  # the terminal may be gone
@@ -175,22 +163,25 @@ def _go_on(store: Path) -> str:
     return f"what is done is kept in {store}: go on with the same command and --resume"
 
 
-def _run_night(asked: Asked, place: Path, log: RunLog, how: How) -> tuple[Outcome, int]:
-    """The export read, assessed and, where it is asked for, explained; the outcome and the number of loops."""
+def _run_night(
+    asked: Asked, place: Path, log: RunLog, explaining: bool, how: Mapping[str, Any]
+) -> tuple[Outcome, int]:
+    """The export read, assessed as `how` says to analyzer/night/batch.py and, where it is asked for, explained; the
+    outcome and the number of loops."""
     from analyzer.night.asked import opened_apart
     from analyzer.night.batch import Batch
     from analyzer.store.lock import scratch
     from analyzer.store.store import Store
 
-    with scratch(place, how.resume) as copies:
+    with scratch(place, how["resume"]) as copies:
         reading = {**asked.reading, "scratch": copies}
         source, specs, notes = opened_apart(replace(asked, reading=reading))
         _say(notes, log)
         span = asked.since_s, asked.until_s
         batch = Batch(source, specs, Store(place), asked.config, *span, asked.changes, asked.zone)
         outcome = _assessed(batch, how, log)
-        if how.explaining and len(outcome.unassessed) + len(outcome.failed) < len(specs):
-            _explain_night(batch, how, outcome.nights[-1])
+        if explaining and len(outcome.unassessed) + len(outcome.failed) < len(specs):
+            _explain_night(batch, outcome.nights[-1], how["jobs"], how["resume"])
     return outcome, len(specs)
 
 
@@ -200,12 +191,12 @@ def _say(notes: Sequence[str], log: RunLog) -> None:
         log.say("note", text=note)
 
 
-def _assessed(batch: Batch, how: How, log: RunLog) -> Outcome:
+def _assessed(batch: Batch, how: Mapping[str, Any], log: RunLog) -> Outcome:
     """Run the batch with progress and say what came of it: what was lost, how many were assessed, of which night."""
     from analyzer.night import batch as nightly
 
     with bar("loops") as progress:
-        outcome = nightly.run(batch, how.jobs, how.resume, how.replacing, how.scheduler, progress)
+        outcome = nightly.run(batch, **how, progress=progress)
     _say(outcome.notes[:FEW], log)
     if len(outcome.notes) > FEW:
         more = len(outcome.notes) - FEW
@@ -223,11 +214,11 @@ def _assessed(batch: Batch, how: How, log: RunLog) -> Outcome:
     return outcome
 
 
-def _explain_night(batch: Batch, how: How, night: Night) -> None:
+def _explain_night(batch: Batch, night: Night, jobs: int, resume: bool) -> None:
     """Explain the flagged loops of a night, with progress, and say how many."""
     from analyzer.explain.night import explain_flagged
 
     with bar("explained") as progress:
-        rows = explain_flagged(batch, night, how.jobs, how.resume, progress)
+        rows = explain_flagged(batch, night, jobs, resume, progress)
     named = sum(r["verdict"] not in ("none", "unexplained") for r in rows)
     click.echo(f"{len(rows)} flagged loops explained, {named} with a name", err=True)

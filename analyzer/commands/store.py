@@ -9,7 +9,7 @@ from pathlib import Path
 
 import click
 
-from analyzer.commands.options import CONFIG, NIGHT, PLACE, SOME_LOST, STORE, formats, say
+from analyzer.commands.options import CONFIG, NIGHT, PLACE, SOME_LOST, STORE, formats, opened_store, say
 from analyzer.store.notes import STATES
 from identification.errors import InputError
 
@@ -19,18 +19,11 @@ SHOWN = 20
 
 
 def days(text: str, option: str) -> int:
-    """Days that a text such as 400d, 26w or 2y states.
-
-    Raises
-    ------
-    InputError
-        It states none.
-    """
+    """Days that a text such as 400d, 26w or 2y states. Raises InputError where it states none."""
     found = re.fullmatch(r"(\d{1,5})([dwy])", text.strip())
     if found is None or int(found[1]) == 0:
-        raise InputError(
-            f"{option} {text}", "a number of days, weeks or years such as 400d, 26w or 2y", "correct it"
-        )
+        expected = "a number of days, weeks or years such as 400d, 26w or 2y"
+        raise InputError(f"{option} {text}", expected, "correct it")
     return int(found[1]) * DAYS[found[2]]
 
 
@@ -79,10 +72,8 @@ def prune(path: Path, keep: str, keep_trends: str | None, dry_run: bool) -> None
     """
     from analyzer.store import care as store_care
     from analyzer.store.lock import locked
-    from analyzer.store.store import Store
 
-    kept = Store(path)
-    kept.require()
+    kept = opened_store(path)
     detail = None if keep_trends is None else days(keep_trends, "--keep-trends")
     with locked(path):
         gone = store_care.pruned(kept, days(keep, "--keep"), detail, dry_run)
@@ -107,10 +98,8 @@ def beliefs(path: Path, config: Path | None) -> None:
     from analyzer.belief.nights import settle_anew
     from analyzer.config import read_config
     from analyzer.store.lock import locked
-    from analyzer.store.store import Store
 
-    kept = Store(path)
-    kept.require()
+    kept = opened_store(path)
     with locked(path):
         lost = settle_anew(kept, read_config(config))
     for line in lost:
@@ -149,11 +138,9 @@ def note(
     Example: triage note store FIC2110 "stroked, packing tight" --state ordered --due 2026-04-01 --owner Laine
     """
     from analyzer.store import notes
-    from analyzer.store.store import Store
-    from identification.errors import InputError
 
-    kept = Store(store)
-    night = kept.require()
+    kept = opened_store(store)
+    night = kept.nights()[-1]
     known = kept.read("nights", night, ["loop"]).column(0).to_pylist()
     if loop not in known:
         from difflib import get_close_matches
@@ -184,11 +171,9 @@ def summary(store: Path, night: str | None, form: str) -> None:
 
     from analyzer.commands.report import made
     from analyzer.pages.summary import summary_page
-    from analyzer.store.store import Store
     from reports import html, markdown, plain
 
-    kept = Store(store)
-    kept.require()
+    kept = opened_store(store)
     found = replace(summary_page(kept, night), made=made(kept), zone=kept.zone())
     draw = {"text": plain.render, "html": html.mail, "markdown": lambda p: markdown.render(p, "")}[form]
     click.echo(draw(found).rstrip("\n"))

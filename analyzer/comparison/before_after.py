@@ -56,12 +56,6 @@ def gridded(hours: Hours, span: Span, column: str) -> Side:
     return Side(value, weight)
 
 
-def _mean(hours: Hours, span: Span, column: str) -> float | None:
-    """Mean of a column over the usable hours of a span, None where there are none."""
-    side = gridded(hours, span, column)
-    return side.mean if side.weight.sum() > 0 else None
-
-
 @dataclass(frozen=True, slots=True)
 class Measure:
     """A figure that is compared.
@@ -180,18 +174,11 @@ def _too_little(hours: tuple[float, float], spans: tuple[Span, Span], limits: Co
     for name, usable, span in zip(("before", "after"), hours, spans, strict=True):
         total = max((span.last_s - span.first_s) / HOUR_S, 0.0)
         if usable < 24 * limits.least_days:
-            found.append(
-                f"too little time {name}: needs {limits.least_days:g} usable days, has {usable / 24:.1f}"
-            )
+            least = f"{limits.least_days:g} usable days"
+            found.append(f"too little time {name}: needs {least}, has {usable / 24:.1f}")
         elif usable < limits.usable_share * total:
             found.append(f"gaps {name}: {usable:.0f} of {total:.0f} h are usable")
     return found
-
-
-def _differs(name: str, a: float | None, b: float | None, most: float, unit: str) -> list[str]:
-    if a is None or b is None or abs(b - a) <= most:
-        return []
-    return [f"different {name}: {a:.3g} {unit} before, {b:.3g} {unit} after"]
 
 
 def reasons_against(
@@ -199,15 +186,21 @@ def reasons_against(
 ) -> tuple[str, ...]:
     """Why the two spans cannot be compared; empty where they can."""
 
-    def pair(column: str) -> tuple[float | None, float | None]:
-        return _mean(hours, before, column), _mean(hours, after, column)
+    def pair(column: str) -> list[float | None]:
+        """Means over the usable hours of both spans, None where there are none."""
+        sides = (gridded(hours, span, column) for span in (before, after))
+        return [side.mean if side.weight.sum() > 0 else None for side in sides]
 
-    found = [
-        *_differs("set point", *pair("sp_mean_pct"), limits.set_point_pct, "%"),
-        *_differs("PV level", *pair("pv_mean_pct"), limits.set_point_pct, "%"),
-        *_differs("load (mean OP)", *pair("op_mean_pct"), limits.load_pct, "%"),
-        *_differs("share of time in automatic", *pair("normal_pct"), limits.mode_points, "%"),
-    ]
+    found = []
+    for name, column, most in (
+        ("set point", "sp_mean_pct", limits.set_point_pct),
+        ("PV level", "pv_mean_pct", limits.set_point_pct),
+        ("load (mean OP)", "op_mean_pct", limits.load_pct),
+        ("share of time in automatic", "normal_pct", limits.mode_points),
+    ):
+        a, b = pair(column)
+        if a is not None and b is not None and abs(b - a) > most:
+            found.append(f"different {name}: {a:.3g} % before, {b:.3g} % after")
     a, b = (x or 0.0 for x in pair("sp_travel_pct"))
     if max(a, b) > limits.sp_travel_floor and max(a, b) > limits.sp_travel_ratio * min(a, b):
         found.append(f"different set point travel: {a:.3g} %/h before, {b:.3g} %/h after")
@@ -234,9 +227,8 @@ def change_of(
     family = sum(m.primary == measure.primary for m in MEASURES)
     d = difference(before, after, 1 - (1 - limits.confidence) / family)
     found = Difference(*(x * measure.scale for x in (d.before, d.after, d.low, d.high)))
-    return Change(
-        measure, found, _change_verdict(found, measure, limits) if comparable else ChangeVerdict.INCOMPARABLE
-    )
+    verdict = _change_verdict(found, measure, limits) if comparable else ChangeVerdict.INCOMPARABLE
+    return Change(measure, found, verdict)
 
 
 def compare(

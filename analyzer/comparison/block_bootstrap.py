@@ -130,9 +130,8 @@ def difference(before: Side, after: Side, level: float, seed: int = 0) -> Differ
     """
     rng = np.random.default_rng(seed)
     left, right = replicates(before, rng), replicates(after, rng)
-    wide = student(before, after, (float(left.std()), float(right.std())), level) * drift_factor(
-        before, after
-    )
+    spread = float(left.std()), float(right.std())
+    wide = student(before, after, spread, level) * drift_factor(before, after)
     value = after.mean - before.mean
     low, high = np.percentile(right - left, PERCENTILES) - value
     return Difference(before.mean, after.mean, value + wide * min(low, 0.0), value + wide * max(high, 0.0))

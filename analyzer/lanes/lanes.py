@@ -62,11 +62,8 @@ def _side(found: Finding) -> str:
 
 def _lasting(found: Finding) -> str:
     text = f"PV stays {found.number('lasting_error_pct'):.3g} % of span {_side(found)} SP"
-    if Lane.AT_LIMIT in found.lanes:
-        return text
-    return (
-        f"{text} though the loop is in automatic and OP off its limits; do tags and ranges belong together?"
-    )
+    odd = "though the loop is in automatic and OP off its limits; do tags and ranges belong together?"
+    return text if Lane.AT_LIMIT in found.lanes else f"{text} {odd}"
 
 
 def _slow(found: Finding, limits: LaneLimits) -> bool:

@@ -64,16 +64,8 @@ def standing(
 
     manual_pct, at_limits_pct : shares of the good time [%], the latter of that in automatic where there is any;
     frozen_pct : share of the time in which PV stands while OP moves [%]; lasting_error_pct : median over the hours of
-    the size of the hour's mean error [% of span]; error_memory_ti : correlation time of the error in Ti [-]
-
-    Parameters
-    ----------
-    prepared : Prepared
-    controller : Pid or None
-        The settings in force; without them nothing is sluggish.
-    kind : str
-        The loop's type.
-    config : Config
+    the size of the hour's mean error [% of span]; error_memory_ti : correlation time of the error in Ti [-]. Without
+    a controller, the settings in force, nothing is sluggish; `kind` is the loop's type.
     """
     record, op = prepared.record, prepared.op_known
     scaled = op and prepared.op_scaled

@@ -263,7 +263,7 @@ def proposal(asked: Asked, loop: str, drawn: bool) -> tuple[list[str], dict[str,
     """
     export, specs, _ = asked.opened()
     row, config = spec_of(specs, loop), asked.config
-    night = nights_of(export, [row], config.nights, asked.since_s, asked.until_s, asked.zone)[-1]
+    night = nights_of(export, [row], config.nights, (asked.since_s, asked.until_s), asked.zone)[-1]
     spec = in_force(row, asked.changes, night.last_s)
     prepared = prepare(spec, {t: cut(s, night) for t, s in export.read(spec.tags).items()}, config.quality)
     stated = controller_of(spec, prepared)

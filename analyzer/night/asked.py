@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
 from analyzer.config import Config, WorkerLimits
 from analyzer.history.export import Export, ReadOptions, open_export
-from analyzer.history.plant_clock import zone_of
+from analyzer.history.plant_clock import utc_seconds, zone_of
 from analyzer.history.series import Series
-from analyzer.loops.changes import TuningChange
+from analyzer.loops.changes import TuningChange, read_changes
 from analyzer.loops.spec import LoopSpec, unknown_columns
 from analyzer.loops.tags import find_loops, match, read_loops
 from analyzer.night.nights import Night, cut
@@ -53,6 +55,25 @@ class Asked:
         return {tag: cut(found, span) for tag, found in series.items()}
 
 
+def asked_of(
+    export: Sequence[Path],
+    loops: Path | None,
+    changes: Path | None,
+    config: Config,
+    since: datetime | None = None,
+    until: datetime | None = None,
+    **reading: Any,
+) -> Asked:
+    """What a command line or a notebook asks; times that state no zone are of the plant's clock."""
+    zone = str(zone_of(reading.get("timezone")))
+    dated = () if changes is None else read_changes(changes, zone, reading.get("day_first"))
+    first = -math.inf if since is None else utc_seconds(since, zone)
+    last = math.inf if until is None else utc_seconds(until, zone)
+    if last <= first:
+        raise InputError(f"--since {since} --until {until}", "an end after the start", "swap them")
+    return Asked(tuple(export), loops, dated, first, last, config, zone, reading)
+
+
 def opened(export: Sequence[Path], loops: Path | None, **reading: Any) -> Opened:
     """An export and its loops, which are found by their tags' endings where no loops.csv is given."""
     reading["good_quality"] = tuple(reading.get("good_quality") or ()) or None
@@ -71,30 +92,21 @@ def opened(export: Sequence[Path], loops: Path | None, **reading: Any) -> Opened
 def _of_no_loop(changes: Sequence[TuningChange], specs: Sequence[LoopSpec]) -> tuple[str, ...]:
     """A note on changes of loops that are not among those that are read."""
     strange = sorted({change.loop for change in changes} - {spec.loop for spec in specs})
-    if not strange:
-        return ()
     more = f" and {len(strange) - MOST_NAMES} more" if len(strange) > MOST_NAMES else ""
-    named = ", ".join(strange[:MOST_NAMES]) + more
-    return (f"--changes: {named}: no such loop is read; these changes are left aside: correct the name",)
+    text = f"{', '.join(strange[:MOST_NAMES])}{more}: no such loop is read; these changes are left aside"
+    return (f"--changes: {text}: correct the name",) if strange else ()
 
 
 def opened_apart(asked: Asked) -> Opened:
-    """The same, found out about in a worker process: a damaged file may take memory or time without end.
-
-    Raises
-    ------
-    InputError
-        The export cannot be used, or the process that read it died.
-    """
+    """The same, found out about in a worker process: a damaged file may take memory or time without end. Raises
+    InputError where the export cannot be used, or the process that read it died."""
     with Workers(1, find_out, _allowed(asked)) as workers:
         workers.submit(asked)
         (found,) = workers.results()
     if isinstance(found, Died):
-        raise InputError(
-            f"{asked.export[0]}: reading it ended without a result ({found.why})",
-            "files that are whole and fit into memory",
-            "export them again or in parts; 'triage check FILE' on each finds the one",
-        )
+        seen = f"{asked.export[0]}: reading it ended without a result ({found.why})"
+        remedy = "export them again or in parts; 'triage check FILE' on each finds the one"
+        raise InputError(seen, "files that are whole and fit into memory", remedy)
     return found
 
 
@@ -105,12 +117,8 @@ def _allowed(asked: Asked) -> WorkerLimits:
     limits = asked.config.opening
     more_s = sum(file.stat().st_size for file in files if file.is_file()) / limits.bytes_per_s
     more_s += limits.fetched_s * (len(near) < len(asked.export))
-    return replace(
-        asked.config.workers,
-        memory_mb=limits.memory_mb,
-        processor_s=limits.processor_s + more_s,
-        wall_s=limits.wall_s + 6.0 * more_s,
-    )
+    taking = {"processor_s": limits.processor_s + more_s, "wall_s": limits.wall_s + 6.0 * more_s}
+    return replace(asked.config.workers, memory_mb=limits.memory_mb, **taking)
 
 
 def find_out(asked: Asked, began: Callable[[int], None]) -> Opened:

@@ -15,6 +15,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, fields, is_dataclass, replace
 from datetime import UTC, datetime
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -63,10 +64,6 @@ class Batch:
     changes: Sequence[TuningChange] = ()
     zone: str = UTC_NAME
 
-    def nights(self) -> list[Night]:
-        """The nights that the span holds, oldest first."""
-        return nights_of(self.export, self.specs, self.config.nights, self.since_s, self.until_s, self.zone)
-
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
@@ -92,20 +89,14 @@ def _tasks(batch: Batch, nights: Sequence[Night], known: set[str]) -> list[Task]
     left = [s for s in batch.specs if s.loop not in known]
     size = chunk_size(len(left))
     mark = uuid.uuid4().hex[:8]  # a worker of a killed run may write yet; its pieces have another mark
-    about = batch.store, batch.config
     held = held_pairs(batch.store, nights[0].name)
-    return [
-        Task(
-            batch.export,
-            tuple(left[i : i + size]),
-            tuple(nights),
-            *about,
-            f"{mark}-{i:06d}",
-            tuple(batch.changes),
-            held={s.loop: held[s.loop] for s in left[i : i + size] if s.loop in held},
-        )
-        for i in range(0, len(left), size)
-    ]
+    whole = Task(batch.export, (), tuple(nights), batch.store, batch.config, mark, tuple(batch.changes))
+    tasks = []
+    for i in range(0, len(left), size):
+        part = tuple(left[i : i + size])
+        told = {s.loop: held[s.loop] for s in part if s.loop in held}
+        tasks.append(replace(whole, specs=part, key=f"{mark}-{i:06d}", held=told))
+    return tasks
 
 
 def _results(tasks: Sequence[Task], jobs: int, config: Config, scheduler: str | None) -> Iterator[Done]:
@@ -114,10 +105,7 @@ def _results(tasks: Sequence[Task], jobs: int, config: Config, scheduler: str | 
         for task in tasks:
             workers.submit(task)
         for result in workers.results():
-            if isinstance(result, Died):
-                yield from _mourned(workers, result)
-            else:
-                yield result
+            yield from _mourned(workers, result) if isinstance(result, Died) else (result,)
 
 
 def _mourned(workers: Executor[Task, Done], died: Died[Task]) -> Iterator[Done]:
@@ -139,24 +127,19 @@ def _mourned(workers: Executor[Task, Done], died: Died[Task]) -> Iterator[Done]:
 
 
 def in_one_order(value: object) -> bytes:
-    """A value as bytes that are the same in every process: sets and mappings sorted, dataclasses by their fields.
+    """A value as bytes that are the same in every process: sets and mappings sorted, dataclasses by their fields;
+    TypeError where it holds something whose text may differ between processes."""
 
-    Raises
-    ------
-    TypeError
-        The value holds something whose text may differ between processes.
-    """
-    return json.dumps(value, sort_keys=True, default=_as_plain).encode()
+    def plain(part: Any) -> object:
+        if is_dataclass(part):
+            return [type(part).__name__, {f.name: getattr(part, f.name) for f in fields(part)}]
+        if isinstance(part, AbstractSet):
+            return sorted(part)
+        if isinstance(part, Mapping):
+            return dict(part)
+        raise TypeError(f"{type(part).__name__} has no stated order")
 
-
-def _as_plain(value: Any) -> object:
-    if is_dataclass(value):
-        return [type(value).__name__, {f.name: getattr(value, f.name) for f in fields(value)}]
-    if isinstance(value, AbstractSet):
-        return sorted(value)
-    if isinstance(value, Mapping):
-        return dict(value)
-    raise TypeError(f"{type(value).__name__} has no stated order")
+    return json.dumps(value, sort_keys=True, default=plain).encode()
 
 
 def require_same(path: Path, run: Identity) -> None:
@@ -168,11 +151,10 @@ def require_same(path: Path, run: Identity) -> None:
     except (OSError, ValueError, TypeError, KeyError, RecursionError):
         return
     if not same:
-        raise InputError(
-            f"the run that was stopped read {begun}, this one reads {run['export']} ({run['loops']} loops)",
-            "--resume with the same EXPORT, --loops, --changes, --since, --until, --config and version",
-            "give them again, or leave out --resume to give up what the stopped run had done",
-        )
+        seen = f"the run that was stopped read {begun}, this one reads {run['export']} ({run['loops']} loops)"
+        expected = "--resume with the same EXPORT, --loops, --changes, --since, --until, --config and version"
+        remedy = "give them again, or leave out --resume to give up what the stopped run had done"
+        raise InputError(seen, expected, remedy)
 
 
 def of_code() -> bytes:
@@ -192,15 +174,10 @@ def identity(batch: Batch) -> Identity:
         mark.update(in_one_order(source.clock))
     stated = (*batch.specs, *batch.changes, batch.zone)
     mark.update(in_one_order((stated, batch.since_s, batch.until_s, batch.config)))
-    names = [source.path.name for source in batch.export.sources]
-    more = f" and {len(names) - 1} more files" if len(names) > 1 else ""
+    first, *others = [source.path.name for source in batch.export.sources]
+    read = first + (f" and {len(others)} more files" if others else "")
     now = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
-    return {
-        "fingerprint": mark.hexdigest(),
-        "export": names[0] + more,
-        "loops": len(batch.specs),
-        "begun": now,
-    }
+    return {"fingerprint": mark.hexdigest(), "export": read, "loops": len(batch.specs), "begun": now}
 
 
 def _begun(batch: Batch, nights: Sequence[Night], resume: bool) -> list[str]:
@@ -220,17 +197,12 @@ def _begun(batch: Batch, nights: Sequence[Night], resume: bool) -> list[str]:
 def _is_readable(store: Store, nights: Sequence[Night], key: str) -> bool:
     """Whether a chunk's pieces can be read; a damaged one is not done, and is worked on again."""
     try:
-        for night in nights:
-            for table in (t for t in OF_A_NIGHT if t.in_pieces):
+        for night, table in product(nights, OF_A_NIGHT):
+            if table.in_pieces:
                 store.read_parts(night.name, table.name, [key])
     except InputError:
         return False
     return True
-
-
-def _loops_in(store: Store, night: str, keys: Sequence[str]) -> set[str]:
-    table = store.read_parts(night, "nights", keys)
-    return set() if table is None else set(table.column("loop").to_pylist())
 
 
 def run(
@@ -243,32 +215,22 @@ def run(
 ) -> Outcome:
     """Assess all loops of an export and keep the results.
 
-    Parameters
-    ----------
-    jobs : int
-        Worker processes; 0 works in this one, where a loop that takes all memory takes the run with it.
-    resume : bool
-        Go on with the pieces of a run that was stopped, instead of starting anew.
-    replacing : bool
-        Forget what the store has of these nights.
-    scheduler : str or None
-        Address of a Dask scheduler whose workers do the loops, instead of processes of this machine.
-    progress : callable
-        Called with loops done and loops in all.
-
-    Raises
-    ------
-    InputError
-        No loops, no nights, another run on the store, or pieces of another run to be gone on with.
+    jobs : worker processes; 0 works in this one, where a loop that takes all memory takes the run with it; resume :
+    go on with the pieces of a run that was stopped, instead of starting anew; replacing : forget what the store has
+    of these nights; scheduler : address of a Dask scheduler whose workers do the loops, instead of processes of this
+    machine; progress : called with loops done and loops in all. Raises InputError for no loops, no nights, another
+    run on the store, or pieces of another run to be gone on with.
     """
     if not batch.specs:
         raise no_loops(batch.export.tags)
     with locked(batch.store.path):
         batch.store.upgrade()
-        nights = batch.nights()
+        span = batch.since_s, batch.until_s
+        nights = nights_of(batch.export, batch.specs, batch.config.nights, span, batch.zone)
         said = [line for night in nights for line in batch.store.set_aside_damaged(night.name)]
         keys, met = _begun(batch, nights, resume), Counter[str]()
-        known = _loops_in(batch.store, nights[-1].name, keys)
+        whole = batch.store.read_parts(nights[-1].name, "nights", keys)
+        known = set() if whole is None else set(whole.column("loop").to_pylist())
         done, of = len(known), len(batch.specs)
         progress(done, of)
         for result in _results(_tasks(batch, nights, known), jobs, batch.config, scheduler):
@@ -300,6 +262,6 @@ def _outcome(batch: Batch, nights: Sequence[Night], notes: Sequence[str]) -> Out
     wanted = {s.loop for s in batch.specs}
     rows = batch.store.read("nights", nights[-1].name, ["loop", "status", "reason"]).to_pylist()
     lost = [r for r in rows if r["loop"] in wanted and r["status"] != Status.OK]
-    unassessed = [(r["loop"], r["reason"]) for r in lost if r["status"] == Status.NOT_ASSESSED]
-    failed = [(r["loop"], r["reason"]) for r in lost if r["status"] != Status.NOT_ASSESSED]
-    return Outcome(tuple(nights), tuple(unassessed), tuple(failed), tuple(notes))
+    unassessed = tuple((r["loop"], r["reason"]) for r in lost if r["status"] == Status.NOT_ASSESSED)
+    failed = tuple((r["loop"], r["reason"]) for r in lost if r["status"] != Status.NOT_ASSESSED)
+    return Outcome(tuple(nights), unassessed, failed, tuple(notes))

@@ -67,23 +67,18 @@ def _changes_counted(changes: Sequence[TuningChange], specs: Sequence[LoopSpec])
 
 
 def check_lines(asked: Asked) -> Iterator[tuple[str, bool]]:
-    """All lines on an export, each with whether a loop of it cannot be assessed.
-
-    Raises
-    ------
-    InputError
-        It cannot be used; once the lines on it are told, where it has no loops.
-    """
+    """All lines on an export, each with whether a loop of it cannot be assessed. Raises InputError where it cannot be
+    used; once the lines on it are told, where it has no loops."""
     export, specs, notes = asked.opened()
     first, last = export.span()
     span = f"{stamp(first, asked.zone)} to {stamp(last, asked.zone)} {asked.zone}"
     yield f"{len(export.tags)} tags, {len(specs)} loops, {span}", False
+    if specs and specs[0].defaults:
+        notes = (*notes, "assumed where loops.csv is silent: " + ", ".join(specs[0].defaults))
+    if specs and asked.changes:
+        notes = (*notes, _changes_counted(asked.changes, specs))
     for note in notes:
         yield note, False
-    if specs and specs[0].defaults:
-        yield "assumed where loops.csv is silent: " + ", ".join(specs[0].defaults), False
-    if specs and asked.changes:
-        yield _changes_counted(asked.changes, specs), False
     for spec in specs:
         yield loop_line(export, in_force(spec, asked.changes, last), asked)
     for note in export.notes:

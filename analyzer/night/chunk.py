@@ -164,16 +164,10 @@ def _lost(error: Exception, config: Config) -> Lost:
     """What is left of a loop that an error has ended."""
     if isinstance(error, LacksError):
         return Lost(Status.NOT_ASSESSED, error.needs)
-    if isinstance(error, NotAssessedError):
-        return Lost(Status.NOT_ASSESSED, _as_told(str(error)))
-    if isinstance(error, TriageError):
-        return Lost(Status.FAILED, _as_told(str(error)))
+    told = str(error) if isinstance(error, TriageError) else f"{type(error).__name__}: {error}"
     if isinstance(error, MemoryError):
-        most = config.workers.memory_mb
-        return Lost(
-            Status.FAILED, _as_told(f"needs more memory than the {most:.0f} MB that one loop may take")
-        )
-    return Lost(Status.FAILED, _as_told(f"{type(error).__name__}: {error}"))
+        told = f"needs more memory than the {config.workers.memory_mb:.0f} MB that one loop may take"
+    return Lost(Status.NOT_ASSESSED if isinstance(error, NotAssessedError) else Status.FAILED, _as_told(told))
 
 
 def _as_told(text: str) -> Needs:
@@ -227,9 +221,11 @@ def lose(task: Task, reason: str) -> Done:
 
 def _write_pieces(task: Task, night: str, kept: Rows) -> None:
     """The piece of the table of nights comes last: where it is, the chunk is whole."""
+    names = (pa.array([a.loop] * len(a.trend["time_s"])).dictionary_encode() for a in kept.found)
+    trends = [pa.table({"loop": loop, **a.trend}) for loop, a in zip(names, kept.found, strict=True)]
     made = {
         "hours": rows_table([row for a in kept.found for row in hour_rows(a, night)], HOURS),
-        "trends": _trend_table(kept.found),
+        "trends": pa.concat_tables(trends).unify_dictionaries() if trends else None,
         "waves": waves_table([wave for a in kept.found for wave in a.waves]),
         "moves": moves_table(kept.moves),
         "compared": rows_table(kept.compared, SETTINGS),
@@ -238,12 +234,3 @@ def _write_pieces(task: Task, night: str, kept: Rows) -> None:
     for name, table in made.items():
         if table is not None and table.num_rows:
             write_table(table, task.store.part(night, name, task.key))
-
-
-def _trend_table(found: Sequence[Assessment]) -> pa.Table | None:
-    tables = []
-    for a in found:
-        columns = {k: pa.array(v) for k, v in a.trend.items()}
-        n = len(a.trend["time_s"])
-        tables.append(pa.table({"loop": pa.array([a.loop] * n).dictionary_encode(), **columns}))
-    return pa.concat_tables(tables).unify_dictionaries() if tables else None

@@ -21,16 +21,12 @@ WHY = "ended several workers of the cluster"
 
 
 class Cluster(Executor[T, R]):
-    """The workers of a scheduler at an address, tcp://HOST:PORT.
-
-    Raises
-    ------
-    InputError
-        Dask is not installed, no scheduler answers there, or it died before all was done.
-    """
+    """The workers of a scheduler at an address, tcp://HOST:PORT. Raises InputError where Dask is not installed, no
+    scheduler answers there, or it died before all was done."""
 
     def __init__(self, address: str, function: Callable[[T], R]) -> None:
-        self._address, self._function = address, function
+        super().__init__(function)
+        self._address = address
         self._tasks: dict[Any, T] = {}
         self._coming: Any = None
 
@@ -38,19 +34,14 @@ class Cluster(Executor[T, R]):
         try:
             from distributed import Client, as_completed
         except ImportError as error:
-            raise InputError(
-                f"--scheduler {self._address}: no Dask here",
-                "the extra 'cluster'",
-                "pip install 'loop-triage[cluster]'",
-            ) from error
+            seen = f"--scheduler {self._address}: no Dask here"
+            raise InputError(seen, "the extra 'cluster'", "pip install 'loop-triage[cluster]'") from error
         try:
             self._client: Any = Client(self._address, timeout=CONNECT, set_as_default=False)
         except (OSError, ValueError, TimeoutError) as error:
-            raise InputError(
-                f"--scheduler {self._address}: no scheduler answers",
-                "the address that 'dask scheduler' prints",
-                "start it, or correct it",
-            ) from error
+            seen = f"--scheduler {self._address}: no scheduler answers"
+            expected = "the address that 'dask scheduler' prints"
+            raise InputError(seen, expected, "start it, or correct it") from error
         # what ends the run is told in one line below
         logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
         self._coming = as_completed([], loop=self._client.loop)

@@ -6,7 +6,7 @@ newer of two that are alike, so that the same night twice replaces and a good ni
 
 from __future__ import annotations
 
-from collections.abc import Container, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import pyarrow as pa
@@ -33,11 +33,14 @@ Row = Mapping[str, Any]
 
 def fuller(old: Row, new: Row, limits: NightLimits) -> bool:
     """Whether the record that the store has of a loop is worth more than the new one."""
-    worth = [WORTH.get(r["status"], 0) for r in (old, new)]
-    if worth[0] != worth[1]:
-        return worth[0] > worth[1]
-    had, has = (r.get("good_h") or 0.0 for r in (old, new))
-    return had > limits.fuller_share * has + limits.fuller_h
+    before, after = (WORTH.get(r["status"], 0) for r in (old, new))
+    if before != after:
+        return before > after
+    return _good_h(old) > limits.fuller_share * _good_h(new) + limits.fuller_h
+
+
+def _good_h(row: Row) -> float:
+    return float(row.get("good_h") or 0.0)
 
 
 def is_empty(store: Store, night: str, keys: Sequence[str]) -> bool:
@@ -54,28 +57,17 @@ def finish_night(
 ) -> tuple[str, ...]:
     """Put one night together from its pieces and keep it; nothing where it has none.
 
-    Parameters
-    ----------
-    store : Store
-    night : str
-    order : sequence of str
-        The loops of the run, in the order in which they are kept.
-    config : Config
-    keys : sequence of str
-        The chunks whose pieces count.
-    replace : bool
-        Forget what the store has of the night.
-
-    Returns
-    -------
-    tuple of str
-        Sentences on what was joined, and on loops whose earlier record was kept.
+    order : the loops of the run, in the order in which they are kept; keys : the chunks whose pieces count; replace :
+    forget what the store has of the night. Returns sentences on what was joined, and on loops whose earlier record
+    was kept.
     """
     table = store.read_parts(night, "nights", keys)
     if table is None:
         return ()
     fresh = {r["loop"]: finding_of(r) for r in table.to_pylist()}
-    other = [] if replace else _other_groups(store, night, fresh)
+    other = [] if replace else _rows_held(store, "groups", night, GROUPS)
+    gone = {r["group"] for r in other if r["loop"] in fresh}  # a group of any of these loops is told anew
+    other = [r for r in other if r["group"] not in gone]
     first = 1 + max((int(r["group"]) for r in other), default=0)
     waves = waves_in(store.read_parts(night, "waves", keys))
     traced, found = traced_night(fresh, waves, config.plant, first)
@@ -87,7 +79,9 @@ def finish_night(
     beside = [loop for loop in old if loop not in rows]
     joined = [old[k] if k in kept else rows[k] for k in order if k in rows] + [old[k] for k in beside]
     mine = [loop for loop in rows if loop not in kept]
-    _join_others(store, night, keys, mine, replace)
+    for name in JOINED:  # one at a time: trends are most of a night
+        before = None if replace else store.read_if_there(name, night)
+        store.write(name, night, _joined_table(before, store.read_parts(night, name, keys), mine))
     groups = [*other, *led_anew(found, loops)]
     store.write("groups", night, rows_table(groups, GROUPS) if groups else None)
     store.write("nights", night, rows_table(joined, NIGHTS))
@@ -96,23 +90,9 @@ def finish_night(
     return (*settle(store, night, config), *_joining_told(night, rows, old, kept, beside))
 
 
-def _join_others(store: Store, night: str, keys: Sequence[str], mine: Sequence[str], replace: bool) -> None:
-    """Join the tables beside that of the night, one at a time: trends are most of a night."""
-    for name in JOINED:
-        before = None if replace else store.read_if_there(name, night)
-        store.write(name, night, _joined_table(before, store.read_parts(night, name, keys), mine))
-
-
 def _rows_held(store: Store, table: str, night: str, columns: Sequence[Column]) -> list[dict[str, Any]]:
     """The rows that the store has of a night, none where it has no such table."""
     return store.own_rows(table, night, names(columns)) if store.file(table, night).exists() else []
-
-
-def _other_groups(store: Store, night: str, mine: Container[str]) -> list[dict[str, Any]]:
-    """The groups that the store has of a night and that hold none of these loops."""
-    rows = _rows_held(store, "groups", night, GROUPS)
-    gone = {r["group"] for r in rows if r["loop"] in mine}
-    return [r for r in rows if r["group"] not in gone]
 
 
 def _joined_table(before: pa.Table | None, piece: pa.Table | None, mine: Sequence[str]) -> pa.Table | None:
@@ -131,9 +111,8 @@ def _joining_told(
     if beside:
         said.append(f"night {night}: {len(beside)} loops of an earlier run are kept beside these")
     for loop in sorted(kept):
-        had, has = (r.get("good_h") or 0.0 for r in (old[loop], rows[loop]))
         said.append(
-            f"{loop}: the store has {had:.1f} good hours of night {night}, this export {has:.1f}; the fuller record "
-            "is kept (--replace takes this one)"
+            f"{loop}: the store has {_good_h(old[loop]):.1f} good hours of night {night}, this export "
+            f"{_good_h(rows[loop]):.1f}; the fuller record is kept (--replace takes this one)"
         )
     return tuple(said)

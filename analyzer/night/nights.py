@@ -17,6 +17,9 @@ from analyzer.loops.spec import LoopSpec
 from identification.errors import InputError
 
 DAY_S = 86400.0
+Span = tuple[float, float]
+"""Start and end of a span of time [s since 1970-01-01 UTC]."""
+ALWAYS: Span = (-math.inf, math.inf)
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,33 +33,26 @@ class Night:
     zone: str = UTC_NAME
 
 
-def _night_of_middle(first_s: float, last_s: float, zone: str) -> Night:
-    return Night(date_of((first_s + last_s) / 2, zone), first_s, last_s, zone)
+def _name(first_s: float, last_s: float, zone: str) -> str:
+    """The plant's date of a span's middle."""
+    return date_of((first_s + last_s) / 2, zone)
 
 
-def daily(first_s: float, last_s: float, limits: NightLimits, zone: str = UTC_NAME) -> list[Night]:
-    """Cut a span of time at the plant's midnights; a short first or last piece joins its neighbour.
-
-    Raises
-    ------
-    InputError
-        There would be more of them than one run may have.
-    """
+def _daily(first_s: float, last_s: float, limits: NightLimits, zone: str) -> list[Night]:
+    """Cut a span of time at the plant's midnights; a short first or last piece joins its neighbour. Raises InputError
+    where there would be more of them than one run may have."""
     if last_s - first_s > limits.most * DAY_S:
         days, ends = (last_s - first_s) / DAY_S, f"{stamp_text(first_s)} to {stamp_text(last_s)} UTC"
+        remedy = "state the part that is meant with --since and --until"
         raise InputError(
-            f"the export spans {days:.0f} days, {ends}",
-            f"at most {limits.most} nights in one run",
-            "state the part that is meant with --since and --until",
+            f"the export spans {days:.0f} days, {ends}", f"at most {limits.most} nights in one run", remedy
         )
     least_s = 3600.0 * limits.least_piece_h
-    cuts = midnights(first_s, last_s, zone)
-    inner = [c for c in cuts if c - first_s >= least_s and last_s - c >= least_s]
-    edges = [first_s, *inner, last_s + 1.0]
-    return [_night_of_middle(a, b, zone) for a, b in pairwise(edges)]
+    inner = [c for c in midnights(first_s, last_s, zone) if min(c - first_s, last_s - c) >= least_s]
+    return [Night(_name(a, b, zone), a, b, zone) for a, b in pairwise([first_s, *inner, last_s + 1.0])]
 
 
-def in_nights(spans: Sequence[tuple[float, float]], limits: NightLimits, zone: str = UTC_NAME) -> list[Night]:
+def in_nights(spans: Sequence[Span], limits: NightLimits, zone: str = UTC_NAME) -> list[Night]:
     """The nights of an export from the spans of its loops [s].
 
     Where the median loop has over whole_h (36 h), the export is cut into days; else each loop is assessed whole, in
@@ -66,9 +62,9 @@ def in_nights(spans: Sequence[tuple[float, float]], limits: NightLimits, zone: s
     lengths = sorted(last - first for first, last in spans)
     first, last = min(s[0] for s in spans), max(s[1] for s in spans)
     if lengths[len(lengths) // 2] > limits.whole_h * 3600.0:
-        return daily(first, last, limits, zone)
+        return _daily(first, last, limits, zone)
     latest = max(spans, key=lambda s: s[1])
-    return [replace(_night_of_middle(*latest, zone), first_s=first, last_s=last + 1.0)]
+    return [Night(_name(*latest, zone), first, last + 1.0, zone)]
 
 
 def cut(series: Series, night: Night) -> Series:
@@ -81,24 +77,15 @@ def cut(series: Series, night: Night) -> Series:
 
 
 def nights_of(
-    export: Export,
-    specs: Sequence[LoopSpec],
-    limits: NightLimits,
-    since_s: float = -math.inf,
-    until_s: float = math.inf,
-    zone: str = UTC_NAME,
+    export: Export, specs: Sequence[LoopSpec], limits: NightLimits, span: Span = ALWAYS, zone: str = UTC_NAME
 ) -> list[Night]:
-    """The nights of an export within a span of time, cut at the plant's midnights.
-
-    Raises
-    ------
-    InputError
-        Where the export has no PV of any loop, or nothing within the span.
-    """
+    """The nights of an export within a span of time, cut at the plant's midnights. Raises InputError where the export
+    has no PV of any loop, or nothing within the span."""
     present = [s.pv for s in specs if s.pv is not None]
     if not present:
         wanted = specs[0].wanted_pv or f"{specs[0].loop}.PV"
         raise InputError("no PV tag of any loop is in the export", f"tags such as {wanted}", "check --loops")
+    since_s, until_s = span
     spans = [export.span(tag) for tag in present]
     inside = [(max(a, since_s), min(b, until_s - 1.0)) for a, b in spans if a < until_s and b >= since_s]
     if not inside:

@@ -43,10 +43,8 @@ def compile_all() -> None:
     """Assess a loop of each kind, with advice."""
     begun, config = time.monotonic(), Config()
     for seed, loop in enumerate(LOOPS):
-        pid = loop.controller
-        stated = LoopSpec(
-            "L", sp="L.SP", pv="L.PV", op="L.OP", pv_lo=0.0, pv_hi=100.0, kp=pid.kp, ti=pid.ti_s
-        )
+        kp, ti = loop.controller.kp, loop.controller.ti_s
+        stated = LoopSpec("L", sp="L.SP", pv="L.PV", op="L.OP", pv_lo=0.0, pv_hi=100.0, kp=kp, ti=ti)
         prepared = prepare(stated, simulated_series(loop, seed), config.quality)
         assess_loop(stated, prepared, config)
     print(f"kernels are ready after {time.monotonic() - begun:.0f} s", file=sys.stderr)

@@ -17,10 +17,9 @@ import sys
 import threading
 import time
 import warnings
-from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 from typing import Any, Generic, Self, TypeVar
 
@@ -51,47 +50,32 @@ class Died(Generic[T]):
     again: bool
 
 
-class Executor(ABC, Generic[T, R]):
-    """Who carries out one function on many tasks, for as long as it is entered."""
+class Executor(Generic[T, R]):
+    """Who carries out one function on many tasks, for as long as it is entered: by itself this process, one after
+    the other, unprotected."""
+
+    def __init__(self, function: Callable[..., R]) -> None:
+        self._function = function
+        self._waiting: deque[T] = deque()
 
     def __enter__(self) -> Self:
         return self
 
-    @abstractmethod
     def __exit__(self, *_: object) -> None:
         """Give up what is not done."""
-
-    @abstractmethod
-    def submit(self, task: T, alone: bool = False) -> None:
-        """Add a task; one that is to run alone waits until nothing else does that it might end."""
-
-    @abstractmethod
-    def results(self) -> Iterator[R | Died[T]]:
-        """What comes back, as it comes, until no task is left; tasks may be added meanwhile.
-
-        Raises
-        ------
-        Exception
-            Whatever the function raised: an error of an item is the function's business.
-        """
-
-
-@dataclass(slots=True)
-class Here(Executor[T, R]):
-    """This process carries out the tasks, one after the other, unprotected."""
-
-    function: Callable[[T], R]
-    _waiting: deque[T] = field(default_factory=deque)
-
-    def __exit__(self, *_: object) -> None:
         self._waiting.clear()
 
     def submit(self, task: T, alone: bool = False) -> None:
+        """Add a task; one that is to run alone waits until nothing else does that it might end."""
         self._waiting.append(task)
 
     def results(self) -> Iterator[R | Died[T]]:
+        """What comes back, as it comes, until no task is left; tasks may be added meanwhile.
+
+        Whatever the function raises is raised: an error of an item is the function's business.
+        """
         while self._waiting:
-            yield self.function(self._waiting.popleft())
+            yield self._function(self._waiting.popleft())
 
 
 @dataclass(slots=True)
@@ -107,25 +91,17 @@ class _Worker:
         return self.task is not None
 
 
-@dataclass(slots=True)
 class Workers(Executor[T, R]):
-    """Some processes of this machine.
+    """Some processes of this machine, so many at most.
 
-    Parameters
-    ----------
-    count : int
-        Processes at most.
-    function : callable
-        Of a task and of `Began`; importable by name, for the processes are started afresh.
-    limits : WorkerLimits
+    The function, of a task and of `Began`, is importable by name, for the processes are started afresh.
     """
 
-    count: int
-    function: Callable[[T, Began], R]
-    limits: WorkerLimits
-    _waiting: deque[T] = field(default_factory=deque)
-    _alone: deque[T] = field(default_factory=deque)
-    _workers: list[_Worker] = field(default_factory=list)
+    def __init__(self, count: int, function: Callable[[T, Began], R], limits: WorkerLimits) -> None:
+        super().__init__(function)
+        self.count, self.limits = count, limits
+        self._alone: deque[T] = deque()
+        self._workers: list[_Worker] = []
 
     def __exit__(self, *_: object) -> None:
         """End all processes at once, whatever they are at."""
@@ -159,7 +135,7 @@ class Workers(Executor[T, R]):
     def _started(self) -> _Worker:
         context = multiprocessing.get_context("spawn")
         ours, theirs = context.Pipe()
-        process = context.Process(target=_serve, args=(theirs, self.function, self.limits), daemon=True)
+        process = context.Process(target=_serve, args=(theirs, self._function, self.limits), daemon=True)
         process.start()
         theirs.close()
         worker = _Worker(process, ours)
@@ -208,7 +184,7 @@ def executor(
         from analyzer.night.cluster import Cluster  # it is one of these
 
         return Cluster(scheduler, function)
-    return Workers(min(jobs, max(tasks, 1)), function, limits) if jobs else Here(function)
+    return Workers(min(jobs, max(tasks, 1)), function, limits) if jobs else Executor(function)
 
 
 def _cause_of_death(status: int | None, limits: WorkerLimits) -> str:

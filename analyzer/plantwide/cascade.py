@@ -113,7 +113,10 @@ def _judged_together(
         if above.cause is Cause.VALVE or _alike(above, below, limits) or not below.oscillates:
             seen = SignKind.OF_BELOW, (below.loop, below.cause, tie)
             sign = Sign(Cause.LOAD, limits.follower_sign, *seen)
-            moved = replace(below, moves=_moves_with(below, above.loop), remedy=_now(below.remedy))
+            # a repair that could wait if the loop were alone: its master cycles for it
+            waits = below.remedy.due is Due.SHUTDOWN
+            remedy = Remedy(below.remedy.action, due=Due.NOW) if waits else below.remedy
+            moved = replace(below, moves=_moves_with(below, above.loop), remedy=remedy)
             return _as_follower(above, root, sign, limits), moved
         if above.remedy.action in ACTING:
             return replace(above, remedy=Remedy(Action.UNDECIDED, below_first(below, tie))), below
@@ -123,11 +126,6 @@ def _judged_together(
         sign = Sign(Cause.LOAD, limits.follower_sign, SignKind.OF_ABOVE, (above.loop, tie))
         return replace(above, moves=_moves_with(above, below.loop)), _as_follower(below, root, sign, limits)
     return above, below
-
-
-def _now(remedy: Remedy) -> Remedy:
-    """A repair that could wait if the loop were alone: its master cycles for it."""
-    return Remedy(remedy.action, due=Due.NOW) if remedy.due is Due.SHUTDOWN else remedy
 
 
 def _as_follower(own: Finding, root: Root, sign: Sign, limits: PlantLimits) -> Finding:

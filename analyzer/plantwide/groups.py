@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from analyzer.config import PlantLimits
-from analyzer.plantwide.compare import foresight, on_one_clock
-from analyzer.plantwide.wave import Wave
+from analyzer.plantwide.source import foresight
+from analyzer.plantwide.wave import Wave, on_one_clock
 from identification.record import Floats
 from identification.signals.cross_spectrum import Whole, band, chance_coherence, coherences, drift, tapered
 
@@ -38,17 +38,11 @@ class Group:
         """Names of its loops."""
         return tuple(self.waves)
 
-    def shared(self, other: Group) -> int:
-        """How many loops it has in common with another."""
-        return len(self.waves.keys() & other.waves.keys())
-
     def with_lacking(self, waves: Mapping[str, Wave], coherence: Mapping[str, float]) -> Group:
         """The group with those of some loops that it lacks."""
         lacking = [loop for loop in waves if loop not in self.waves]
-        return Group(
-            {**self.waves, **{loop: waves[loop] for loop in lacking}},
-            {**self.coherence, **{loop: coherence[loop] for loop in lacking}},
-        )
+        more = {loop: waves[loop] for loop in lacking}, {loop: coherence[loop] for loop in lacking}
+        return Group({**self.waves, **more[0]}, {**self.coherence, **more[1]})
 
 
 class _Neighbours:
@@ -107,9 +101,11 @@ class _Neighbours:
         )
         found = self._coherences(one, near)
         own = 1.0 - limits.lost - limits.lost_to_noise * (self._own_noise[one] + self._own_noise[near])
-        near, found = _each_at((found >= loose) & (found >= own), near, found)
+        kept = (found >= loose) & (found >= own)
+        near, found = near[kept], found[kept]
         over = found / np.maximum(self._by_chance(one, near), 1e-9)
-        near, found, over = _each_at(over >= limits.over_chance, near, found, over)
+        kept = over >= limits.over_chance
+        near, found, over = near[kept], found[kept], over[kept]
         drifts = np.array([self._drift(wave, self.waves[j]) for j in near])
         sure = (found >= strict) & (drifts <= limits.drift)
         sure |= (over >= limits.over_chance_in_step) & (drifts <= limits.drift_in_step)
@@ -137,20 +133,10 @@ class _Neighbours:
         return abs(drift(x, y))
 
 
-def _each_at(which: np.ndarray, *arrays: np.ndarray) -> list[np.ndarray]:
-    return [x[which] for x in arrays]
-
-
 def groups_of(waves: Sequence[Wave], limits: PlantLimits) -> list[Group]:
-    """Groups of loops that share an oscillation, those of more loops first; none of a single loop.
-
-    Parameters
-    ----------
-    waves : sequence of Wave
-        Of all loops of a night.
-    limits : PlantLimits
-    """
-    known = [w for w in on_one_clock(waves) if w.cycles >= limits.follow_cycles and np.any(w.lines)]
+    """Groups of loops that share an oscillation by all waves of a night, those of more loops first; none of a single
+    loop."""
+    known = [w for w in on_one_clock(waves) if w.line >= limits.follow_cycles and np.any(w.lines)]
     if not known:
         return []
     beside = _Neighbours(known, limits)
@@ -204,7 +190,8 @@ def _is_same(one: Group, other: Group, limits: PlantLimits) -> bool:
     """Whether two groups have one period and most of the smaller one's loops in common."""
     if abs(math.log(one.period_s / other.period_s)) > limits.same_period:
         return False
-    return 2 * one.shared(other) > min(len(one.waves), len(other.waves))
+    shared = one.waves.keys() & other.waves.keys()
+    return 2 * len(shared) > min(len(one.waves), len(other.waves))
 
 
 def _is_group_of_harmonics(one: Group, other: Group, limits: PlantLimits) -> bool:

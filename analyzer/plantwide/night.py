@@ -12,29 +12,22 @@ from typing import Any
 
 from analyzer.config import PlantLimits
 from analyzer.loop.decisions import Cause, GroupRole, SignKind, Status
-from analyzer.loop.finding import Cell, Finding, Root, Sign, Swing, following
-from analyzer.plantwide.compare import Lags
+from analyzer.loop.finding import Finding, Root, Sign, Swing, following
 from analyzer.plantwide.groups import Group, groups_of
-from analyzer.plantwide.source import Candidate, Peer, candidates_of
+from analyzer.plantwide.source import Candidate, Lags, Peer, candidates_of
 from analyzer.plantwide.wave import Wave
 
 Row = Mapping[str, Any]
+Loops = Mapping[str, Finding]
+"""The loops of a night by name."""
 
 
 def traced_night(
-    loops: Mapping[str, Finding], waves: Sequence[Wave], limits: PlantLimits, first: int = 1
+    loops: Loops, waves: Sequence[Wave], limits: PlantLimits, first: int = 1
 ) -> tuple[dict[str, Finding], list[dict[str, Any]]]:
     """What the plant-wide pass makes of a night: its loops, followers and their sources changed, and rows of groups.
 
-    Parameters
-    ----------
-    loops : mapping
-        The loops by name, each with its own verdict.
-    waves : sequence of Wave
-        Of all loops.
-    limits : PlantLimits
-    first : int
-        Number of the first group.
+    loops : by name, each with its own verdict; waves : of all loops; first : number of the first group.
     """
     traced = trace(waves, _peers(loops), limits)
     told = [t for t in traced if any(k in loops and loops[k].oscillates for k in t.group.loops)]
@@ -69,7 +62,7 @@ def swing_of(own: Finding, root: Root, wave: Wave, limits: PlantLimits) -> Swing
     return Swing(amplitude * root.coherence * hours, share, wave.period_s, amplitude)
 
 
-def _peers(loops: Mapping[str, Finding]) -> dict[str, Peer]:
+def _peers(loops: Loops) -> dict[str, Peer]:
     """The verdicts of the loops that were assessed."""
     return {
         k: Peer(f.cause or Cause.NONE, f.number("evidence"), f.confidence.get(Cause.TUNING, 0.0))
@@ -97,46 +90,36 @@ def _role(loop: str, found: Traced, followers: Mapping[str, Root], limits: Plant
     return GroupRole.CANDIDATE if loop in likely(found, limits) else GroupRole.SHARES
 
 
-def gain_pct(wave: Wave, error_pct: Cell) -> float | None:
-    """Part of the average absolute error that goes with a wave [% of span]."""
-    if not isinstance(error_pct, float):
-        return None
-    return error_pct * (1.0 - math.sqrt(max(1.0 - min(wave.share, 1.0), 0.0)))
-
-
 def group_rows(
-    number: int,
-    found: Traced,
-    followers: Mapping[str, Root],
-    loops: Mapping[str, Finding],
-    limits: PlantLimits,
+    number: int, found: Traced, followers: Mapping[str, Root], loops: Loops, limits: PlantLimits
 ) -> list[dict[str, Any]]:
     """A row for each loop of a group that is told, the source first, then by amplitude."""
     known = {c.loop: c for c in found.candidates}
+    itself = Root("", 1.0, 0.0, 0.0)
     out = []
     for loop, wave in found.group.waves.items():
         if loop not in loops:
             continue
-        link, candidate = found.links.get(loop), known.get(loop)
-        out.append(
-            {
-                "loop": loop,
-                "night": loops[loop].night,
-                "group": str(number),
-                "role": _role(loop, found, followers, limits),
-                "source_pct": candidate.confidence_pct if candidate else 0.0,
-                "group_period_s": found.group.period_s,
-                "parent": found.parents.get(loop),
-                "coherence": link.coherence if link else 1.0,
-                "lag_s": link.lag_s if link else 0.0,
-                "wave_amplitude_pct": wave.amplitude_pct,
-                "wave_share_pct": 100.0 * min(wave.share, 1.0),
-                "gain_pct": gain_pct(wave, loops[loop].known.get("average_absolute_error_pct")),
-                "group_signs": json.dumps({k: round(v, 3) for k, v in candidate.signs.items()})
-                if candidate
-                else None,
-            }
-        )
+        link, candidate = found.links.get(loop, itself), known.get(loop, Candidate(loop, {}, 0.0))
+        share, error = min(wave.share, 1.0), loops[loop].known.get("average_absolute_error_pct")
+        gone = 1.0 - math.sqrt(max(1.0 - share, 0.0))  # part of the error that goes with the wave
+        signs = json.dumps({k: round(v, 3) for k, v in candidate.signs.items()}) if loop in known else None
+        row = {
+            "loop": loop,
+            "night": loops[loop].night,
+            "group": str(number),
+            "role": _role(loop, found, followers, limits),
+            "source_pct": candidate.confidence_pct,
+            "group_period_s": found.group.period_s,
+            "parent": found.parents.get(loop),
+            "coherence": link.coherence,
+            "lag_s": link.lag_s,
+            "wave_amplitude_pct": wave.amplitude_pct,
+            "wave_share_pct": 100.0 * share,
+            "gain_pct": error * gone if isinstance(error, float) else None,
+            "group_signs": signs,
+        }
+        out.append(row)
     return sorted(out, key=lambda r: (-r["source_pct"], -r["wave_amplitude_pct"], r["loop"]))
 
 
@@ -146,11 +129,8 @@ def own_groups(rows: Sequence[Row]) -> dict[str, str]:
     def worth(row: Row) -> tuple[bool, float]:
         return row["role"] in (GroupRole.FOLLOWER, GroupRole.SOURCE), row["wave_amplitude_pct"]
 
-    best: dict[str, Row] = {}
-    for row in rows:
-        if row["loop"] not in best or worth(row) > worth(best[row["loop"]]):
-            best[row["loop"]] = row
-    return {loop: row["group"] for loop, row in best.items()}
+    worthiest_first = sorted(rows, key=worth, reverse=True)
+    return {row["loop"]: row["group"] for row in reversed(worthiest_first)}
 
 
 @dataclass(frozen=True, slots=True)
@@ -203,14 +183,10 @@ def _traced(group: Group, peers: Mapping[str, Peer], limits: PlantLimits) -> Tra
         return None
     best = candidates[0]
     links = _links_to_source(group, best, lags, limits)
-    followers = [
-        loop
-        for loop, link in links.items()
-        if best.confidence_pct >= limits.source_pct
-        and loop in peers
-        and may_follow(peers[loop], peers[best.loop], link.coherence, limits)
-    ]
-    return Traced(group, candidates, links, _parents(best.loop, lags, limits), frozenset(followers))
+    asked = links.keys() & peers.keys() if best.confidence_pct >= limits.source_pct else ()
+    lead = peers[best.loop]
+    followers = frozenset(k for k in asked if may_follow(peers[k], lead, links[k].coherence, limits))
+    return Traced(group, candidates, links, _parents(best.loop, lags, limits), followers)
 
 
 def _links_to_source(group: Group, best: Candidate, lags: Lags, limits: PlantLimits) -> dict[str, Root]:

@@ -1,9 +1,9 @@
 """Where a shared oscillation starts: candidates ranked by signs that do not rest on each other.
 
-The loop's own verdict (a valve at fault, a tuning at its limit of stability), who moves first, whose wave is the
-clearest and so the least mixed with others, whose shape is the least filtered (nonlinearity is strongest at its
-source and falls along the way, Thornhill 2005). Each sign is a number about 0 to 1; the weighted sum is the log odds
-of a candidate against the others of its group.
+The loop's own verdict (a valve at fault, a tuning at its limit of stability), who moves first, whose past foresees
+the others, whose wave is the clearest and so the least mixed with others, whose shape is the least filtered
+(nonlinearity is strongest at its source and falls along the way, Thornhill 2005). Each sign is a number about 0 to 1;
+the weighted sum is the log odds of a candidate against the others of its group.
 """
 
 from __future__ import annotations
@@ -16,10 +16,11 @@ from itertools import combinations
 import numpy as np
 
 from analyzer.config import PlantLimits
+from analyzer.limits import WAVES
 from analyzer.loop.decisions import Cause
-from analyzer.plantwide.compare import Lags, foresees
-from analyzer.plantwide.wave import Wave
+from analyzer.plantwide.wave import Wave, in_steps
 from identification.record import Floats
+from identification.signals.cross_spectrum import Delay, band, granger_f, lag, tapered
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,13 +80,7 @@ def candidates_of(lags: Lags, peers: Mapping[str, Peer], limits: PlantLimits) ->
     """The candidates of a group with their confidences, the likeliest first; what is left to 100 % is a source
     unseen.
 
-    Parameters
-    ----------
-    lags : Lags
-        Of the group's waves, on one clock.
-    peers : mapping
-        Verdicts by loop; a loop that is not in it is no candidate.
-    limits : PlantLimits
+    lags : of the group's waves, on one clock; peers : verdicts by loop; a loop that is not in it is no candidate.
     """
     waves = _first_guess(list(lags.waves.values()), peers, limits.candidates)
     if not waves:
@@ -120,3 +115,67 @@ def _signs_by_name(
         "nonlinear": _relative(np.array([w.nonlinearity for w in waves])),
     }
     return [{name: float(x[i]) for name, x in columns.items()} for i in range(len(waves))]
+
+
+class Lags:
+    """How much later each of some loops is than each other one; a pair is compared once."""
+
+    def __init__(self, waves: Mapping[str, Wave]) -> None:
+        self.waves = waves
+        self._known: dict[tuple[str, str], Delay] = {}
+
+    def between(self, one: str, other: str) -> Delay:
+        """How much later the second loop's wave is than the first one's."""
+        pair = one, other
+        if pair not in self._known:
+            self._known[pair] = _lag(self.waves[one], self.waves[other])
+        return self._known[pair]
+
+
+def _lag(one: Wave, other: Wave) -> Delay:
+    low, high, _ = band(one.line)
+    low = max(low, one.first + 1, other.first + 1)
+    high = min(high, one.first + one.lines.size - 1, other.first + other.lines.size - 1)
+    if high - low < 4:
+        return Delay(0.0, math.inf, 0.0)
+    x, y = (tapered(w.lines[low - w.first - 1 : high - w.first + 1]) for w in (one, other))
+    return lag(x, y, one.duration_s, max(WAVES.lag_periods * one.period_s, WAVES.lag_least_s))
+
+
+def _foreseeing(waves: Sequence[Wave]) -> tuple[list[int], Floats]:
+    """Which of some waves have trends whose steps lie on each other, and Granger's F of each on each, shape (k, k);
+    none where fewer than two have, or over too few steps."""
+    step = max((w.step_s for w in waves if w.trend.size), default=0.0)
+    found: list[tuple[int, int, Floats]] = []
+    for i, w in enumerate(waves):
+        few = round(step / w.step_s) if w.trend.size else 0
+        if few < 1 or abs(few * w.step_s / step - 1.0) > 1e-6:
+            continue
+        found.append((i, *in_steps(w.trend, w.trend_first, few)))
+    begin = max((first for _, first, _ in found), default=0)
+    end = min((first + x.size for _, first, x in found), default=0)
+    if len(found) < 2 or end - begin < WAVES.least_steps:
+        return [], np.zeros((0, 0))
+    trends = np.array([x[begin - first : end - first] for _, first, x in found], float)
+    return [i for i, *_ in found], granger_f(trends, WAVES.foreseen)
+
+
+def foresees(waves: Sequence[Wave]) -> Floats:
+    """Mean over the others of how much better each foresees them than they foresee it (-1 to 1), by Granger's F."""
+    out = np.zeros(len(waves))
+    known, f = _foreseeing(waves)
+    if not known:
+        return out
+    clear = np.maximum(f, f.T) >= WAVES.least_f
+    ratio = np.log(np.maximum(f, 0.1) / np.maximum(f.T, 0.1)) / math.log(WAVES.plain_ratio)
+    out[known] = np.where(clear, np.clip(ratio, -1.0, 1.0), 0.0).sum(axis=1) / (len(known) - 1)
+    return out
+
+
+def foresight(one: Wave, others: Sequence[Wave]) -> float:
+    """F with which one wave's past foresees others, in the median; 0 where theirs foresees it as well or better."""
+    known, f = _foreseeing([one, *others])
+    if known[:1] != [0]:
+        return 0.0
+    forth, back = float(np.median(f[0, 1:])), float(np.median(f[1:, 0]))
+    return forth if forth > back else 0.0

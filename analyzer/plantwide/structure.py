@@ -133,6 +133,5 @@ def moves_in(table: pa.Table | None) -> list[Moves]:
     """The moves of a table, none without one."""
     if table is None or not table.num_rows:
         return []
-    return [
-        Moves(*row) for row in zip(*(table.column(f.name).to_numpy() for f in fields(Moves)), strict=True)
-    ]
+    columns = (table.column(f.name).to_numpy() for f in fields(Moves))
+    return [Moves(*row) for row in zip(*columns, strict=True)]

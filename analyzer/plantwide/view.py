@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -83,10 +83,7 @@ def read_groups(store: Store, night: str) -> list[GroupView]:
     lacking = set(ALWAYS) - set(store.columns("groups", night))
     if by_number and lacking:
         raise no_column(store.file("groups", night), min(lacking))
-    found = [GroupView(number, tuple(_sorted_by_source(own)), loops) for number, own in by_number.items()]
+    for own in by_number.values():
+        own.sort(key=lambda r: (-r["source_pct"], -(r["wave_amplitude_pct"] or 0.0), r["loop"]))
+    found = [GroupView(number, tuple(own), loops) for number, own in by_number.items()]
     return sorted(found, key=lambda g: (-g.gain_pct, int(g.number)))
-
-
-def _sorted_by_source(rows: Sequence[Row]) -> list[Row]:
-    """The rows of a group, the likeliest source first."""
-    return sorted(rows, key=lambda r: (-r["source_pct"], -(r["wave_amplitude_pct"] or 0.0), r["loop"]))

@@ -1,14 +1,16 @@
-"""What is kept of a loop for the plant-wide pass: the lines of its error about each period that it might share."""
+"""What is kept of a loop for the plant-wide pass: the lines of its error about each period that it might share, and
+how those of many loops come onto one clock."""
 
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 import pyarrow as pa
-from scipy.fft import ifft, irfft, next_fast_len
+from scipy.fft import fft, ifft, irfft, next_fast_len
 
 from analyzer.config import PlantLimits
 from analyzer.limits import WAVES
@@ -16,6 +18,8 @@ from analyzer.loop.oscillation import Oscillations, peaks
 from identification.record import Floats
 from identification.signals.spectrum import Complex, Spectrum, locked_harmonic, peak_prominence
 
+FINE = 8
+"""Samples of the envelope for each line."""
 BESIDE = 6
 """Lines kept beyond that on either side."""
 HARMONICS = (2, 3)
@@ -51,12 +55,7 @@ class Wave:
 
     @property
     def line(self) -> float:
-        """The period's frequency in lines."""
-        return self.duration_s / self.period_s
-
-    @property
-    def cycles(self) -> float:
-        """Periods that the record holds."""
+        """The period's frequency in lines: how many periods the record holds."""
         return self.duration_s / self.period_s
 
     @property
@@ -70,13 +69,12 @@ class Wave:
         """Share of the time that the wave is on [%]."""
         size = next_fast_len(max(4 * self.lines.size, 16))
         power = (np.abs(ifft(self.lines, size)) * size) ** 2
-        width = max(round(2 * size / self.cycles), 1)
+        width = max(round(2 * size / self.line), 1)
         padded = np.pad(power, width, mode="reflect")
         level = np.sqrt(np.convolve(padded, np.ones(width) / width, mode="same"))[width:-width]
         top = float(np.quantile(level, 0.9))
-        return (
-            100.0 * float(np.mean(level >= WAVES.envelope * top)) if top > 0 and math.isfinite(top) else 0.0
-        )
+        on = level >= WAVES.envelope * top if top > 0 and math.isfinite(top) else np.zeros(1)
+        return 100.0 * float(np.mean(on))
 
 
 def _centred(s: Spectrum, line: float) -> float:
@@ -93,11 +91,17 @@ def _thinned_wave(error: Floats, dt_s: float, start_s: float, period_s: float) -
     other loops with the same interval lie on them or join in pairs.
     """
     few = 2 ** max(math.floor(math.log2(max(period_s / (WAVES.steps * dt_s), 1.0))), 0)
-    begin = round(start_s / dt_s)
-    skip = -begin % few
-    count = (error.size - skip) // few
-    means = error[skip : skip + count * few].reshape(count, few).mean(axis=1)[-WAVES.trend_steps :]
-    return few * dt_s, (begin + skip) // few + count - means.size, means.astype(np.float32)
+    first, means = in_steps(error, round(start_s / dt_s), few)
+    last = means[-WAVES.trend_steps :]
+    return few * dt_s, first + means.size - last.size, last.astype(np.float32)
+
+
+def in_steps(x: Floats, first: int, few: int) -> tuple[int, Floats]:
+    """Means of so many samples each, from a whole multiple of them on, and the number of the first of these steps;
+    `first` is that of the first sample."""
+    skip = -first % few
+    count = (x.size - skip) // few
+    return (first + skip) // few, x[skip : skip + count * few].reshape(count, few).mean(axis=1)
 
 
 def _cut(
@@ -134,14 +138,8 @@ def _cut(
 def waves_of(loop: str, found: Oscillations, end_s: float, limits: PlantLimits) -> tuple[Wave, ...]:
     """The waves of a loop: its oscillations, the harmonics of the first, and weaker peaks of its spectrum.
 
-    Parameters
-    ----------
-    loop : str
-    found : Oscillations
-        With spectrum and bands.
-    end_s : float
-        End of the record [s since 1970-01-01 UTC]; the spectrum is of its last samples.
-    limits : PlantLimits
+    found : with spectrum and bands; end_s : end of the record [s since 1970-01-01 UTC]; the spectrum is of its last
+    samples.
     """
     s, b = found.spectrum, found.bands
     if s is None or b is None:
@@ -182,3 +180,41 @@ def waves_in(table: pa.Table | None) -> list[Wave]:
     known = table.select(SCALARS).to_pylist()
     real, imag, trend = (table.column(name).to_numpy() for name in ("real", "imag", "trend"))
     return [Wave(**s, lines=x + 1j * y, trend=t) for s, x, y, t in zip(known, real, imag, trend, strict=True)]
+
+
+def on_one_clock(waves: Sequence[Wave]) -> list[Wave]:
+    """The waves that can be compared, all over the span that most of them have."""
+    if not waves:
+        return []
+    counted = Counter((w.start_s, w.duration_s) for w in waves)
+    span = max(counted, key=lambda span: (counted[span], span[1]))
+    moved = (_on_span(w, span) for w in waves)
+    return [w for w in moved if w is not None]
+
+
+def _on_span(wave: Wave, span: tuple[float, float]) -> Wave | None:
+    """The wave with the lines that it has over another span, start and duration [s]; None where its record covers too
+    little of that."""
+    start, length = span
+    if abs(wave.start_s - start) + abs(wave.duration_s - length) <= WAVES.same * wave.period_s:
+        return wave
+    begin, end = max(start, wave.start_s), min(start + length, wave.start_s + wave.duration_s)
+    if end - begin < WAVES.covered * length:
+        return None
+    count = wave.lines.size
+    size = next_fast_len(FINE * count)
+    padded = np.zeros(size, dtype=np.complex128)
+    padded[:count] = wave.lines
+    envelope = ifft(padded) * size  # of the lines from wave.first on
+    fresh = next_fast_len(max(math.ceil(FINE * count * length / wave.duration_s), 16))
+    t = start + np.arange(fresh) * (length / fresh)
+    at = (t - wave.start_s) / wave.duration_s * size
+    inside = (at >= 0) & (at <= size - 1)
+    real = np.interp(at, np.arange(size), envelope.real)
+    imag = np.interp(at, np.arange(size), envelope.imag)
+    z = np.where(inside, real + 1j * imag, 0.0)
+    low = math.ceil(wave.first * length / wave.duration_s)
+    turns = wave.first * (t - wave.start_s) / wave.duration_s - low * (t - start) / length
+    lines = fft(z * np.exp(2j * np.pi * turns)) / fresh
+    most = max(math.floor((wave.first + count) * length / wave.duration_s) - low, 1)
+    return replace(wave, start_s=start, duration_s=length, first=low, lines=lines[:most].astype(np.complex64))

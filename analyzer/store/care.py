@@ -36,32 +36,21 @@ def size_text(store: Store) -> str:
 
 
 def problems(store: Store) -> Iterator[Problem]:
-    """All that is wrong with a store, every table read whole.
-
-    Raises
-    ------
-    InputError
-        There is no such directory.
-    """
+    """All that is wrong with a store, every table read whole. Raises InputError where there is no such directory."""
     if not store.path.is_dir():
         raise InputError(f"{store.path}: no such directory", "a store", MAKE_ONE)
     yield from _version(store)
     whole = set(store.nights())
     for table in KEPT:
-        for path in sorted((store.path / table.name).glob("*")):
-            found = _wrong(path, whole)
-            if found is not None:
-                yield found
+        files = sorted((store.path / table.name).glob("*"))
+        yield from filter(None, (_wrong(path, whole) for path in files))
     lines = notes.broken(store.path)
     if lines:
-        yield Problem(
-            f"{store.path / notes.FILE}: {lines} lines are no notes", "nothing: they are passed over"
-        )
+        seen = f"{store.path / notes.FILE}: {lines} lines are no notes"
+        yield Problem(seen, "nothing: they are passed over")
     for night in store.begun():
-        yield Problem(
-            f"{store.path / 'parts' / night}: a run that was begun and not finished",
-            "run it again with --resume; without, the next run starts anew",
-        )
+        seen = f"{store.path / 'parts' / night}: a run that was begun and not finished"
+        yield Problem(seen, "run it again with --resume; without, the next run starts anew")
 
 
 def _version(store: Store) -> Iterator[Problem]:
@@ -96,31 +85,18 @@ def _wrong(path: Path, whole: set[str]) -> Problem | None:
 def pruned(store: Store, keep_d: int, detail_d: int | None, dry: bool = False) -> list[Path]:
     """Delete nights that lie more than `keep_d` days before the latest, and files left over; what was deleted.
 
-    A night ahead of this machine's clock, of a historian whose clock was wrong, is no measure of what is old: without
-    an earlier one nothing goes. The table of nights goes first, so that no reader meets half of one. Notes stay. The
-    caller holds the store.
-
-    Parameters
-    ----------
-    store : Store
-    keep_d : int
-        Days of nights that are kept.
-    detail_d : int or None
-        Days of which bulky tables, hours and trends, are kept, None as long as the nights.
-    dry : bool
-        Only say what would go.
+    Bulky tables, hours and trends, are kept for `detail_d` days, None as long as the nights; a dry run only says what
+    would go. A night ahead of this machine's clock, of a historian whose clock was wrong, is no measure of what is
+    old: without an earlier one nothing goes. The table of nights goes first, so that no reader meets half of one.
+    Notes stay. The caller holds the store.
     """
     tomorrow = (date.today() + timedelta(days=1)).isoformat()
     latest = date.fromisoformat(max((n for n in store.nights() if n <= tomorrow), default=NEVER))
     first = _days_before(latest, keep_d)
-    detailed = first if detail_d is None else _days_before(latest, detail_d)
-    gone = []
-    for table in KEPT:
-        oldest = max(first, detailed) if table.bulky else first
-        gone += [path for path in store.files(table.name) if path.stem < oldest]
-    now = time.time()
-    half_written = sorted(store.path.rglob(f".*{SUFFIX}"))
-    gone += [path for path in half_written if now - path.stat().st_mtime > STORE.left_over_s]
+    detailed = first if detail_d is None else max(first, _days_before(latest, detail_d))
+    gone = [p for t in KEPT for p in store.files(t.name) if p.stem < (detailed if t.bulky else first)]
+    half_written, before = sorted(store.path.rglob(f".*{SUFFIX}")), time.time() - STORE.left_over_s
+    gone += [path for path in half_written if path.stat().st_mtime < before]
     if not dry:
         for path in gone:
             path.unlink(missing_ok=True)

@@ -48,13 +48,8 @@ def scratch(store: Path, resume: bool = False) -> Iterator[Path]:
     storage one of this machine.
 
     That it can be made shows, before any work is done, that the store can be written. It goes with the run; where an
-    exception ends the run and a whole copy was made, it stays, as that of a run that was killed does: a run that
-    goes on (`resume`) takes it up, any other forgets it.
-
-    Raises
-    ------
-    OSError
-        The store cannot be made or written.
+    exception ends the run and a whole copy was made, it stays, as that of a run that was killed does: a run that goes
+    on (`resume`) takes it up, any other forgets it. Raises OSError where the store cannot be made or written.
     """
     if is_remote(store):
         with answering(store):
@@ -124,13 +119,7 @@ def _changed_s(path: Path) -> float:
 
 @contextmanager
 def locked(store: Path) -> Iterator[None]:
-    """Hold the store for one run.
-
-    Raises
-    ------
-    InputError
-        Another run holds it; says who, where and since when.
-    """
+    """Hold the store for one run. Raises InputError where another run holds it; says who, where and since when."""
     mine = _signature_of_this()
     with ExitStack() as held:
         if is_remote(store):
@@ -182,11 +171,8 @@ def _in_use(store: Path, more: str = "") -> InputError:
     with contextlib.suppress(OSError, KeyError):  # as far as it is written down
         known = _signature(store)
         owner = f"process {known['process']} of {known['user']} on {known['host']} since {known['since']}"
-    return InputError(
-        f"{store}: in use by {owner}",
-        "one run on a store at a time",
-        f"wait until that run ends, or give another --store{more}",
-    )
+    remedy = f"wait until that run ends, or give another --store{more}"
+    return InputError(f"{store}: in use by {owner}", "one run on a store at a time", remedy)
 
 
 def _signature_of_this() -> Signature:

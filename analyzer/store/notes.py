@@ -12,7 +12,6 @@ import os
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
-from io import FileIO
 from pathlib import Path
 
 from analyzer.history.plant_clock import stamp
@@ -60,13 +59,8 @@ def user() -> str:
 
 
 def add(store: Path, note: Note) -> None:
-    """Add a note to a store, on a line of its own whatever stands before it.
-
-    Raises
-    ------
-    OSError
-        It could not be written whole, on a full disk for example.
-    """
+    """Add a note to a store, on a line of its own whatever stands before it. Raises OSError where it could not be
+    written whole, on a full disk for example."""
     line = (json.dumps(asdict(note), ensure_ascii=False) + "\n").encode("utf-8")
     if is_remote(store):  # an object cannot be added to
         path = store / FILE
@@ -74,35 +68,22 @@ def add(store: Path, note: Note) -> None:
         path.write_bytes(before + (b"" if before[-1:] in (b"", b"\n") else b"\n") + line)
         return
     with (store / FILE).open("ab+", buffering=0) as kept:
-        if kept.tell() and not _ends_a_line(kept):
-            line = b"\n" + line
+        if kept.tell():
+            kept.seek(-1, os.SEEK_END)
+            line = line if kept.read(1) == b"\n" else b"\n" + line
         if kept.write(line) != len(line):
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(store / FILE))
-
-
-def _ends_a_line(kept: FileIO) -> bool:
-    kept.seek(-1, os.SEEK_END)
-    return kept.read(1) == b"\n"
 
 
 def new(
     loop: str, text: str, owner: str | None, hidden_until: str = "", state: str = "", due: str = ""
 ) -> Note:
-    """A note of now.
-
-    Raises
-    ------
-    InputError
-        The text says nothing.
-    """
-    told = " ".join(visible(text).split())
+    """A note of now. Raises InputError where the text says nothing."""
+    told, by = " ".join(visible(text).split()), visible(user() if owner is None else owner)
     if not told:
-        raise InputError(
-            f"an empty note on {loop}", "what was seen or done", 'say it: triage note STORE LOOP "..."'
-        )
-    return Note(
-        loop, time.time(), told, visible(user() if owner is None else owner), hidden_until, state, due
-    )
+        remedy = 'say it: triage note STORE LOOP "..."'
+        raise InputError(f"an empty note on {loop}", "what was seen or done", remedy)
+    return Note(loop, time.time(), told, by, hidden_until, state, due)
 
 
 def _note_lines(store: Path) -> list[str]:

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, astuple
 from typing import TYPE_CHECKING, Any
 
-from analyzer.columns import HOURS, row_of
+from analyzer.columns import row_of
 from analyzer.loop.decisions import (
     CAUSES,
     Action,
@@ -84,7 +84,7 @@ def piece_row(found: Finding) -> dict[str, Any]:
 
 def finding_of(row: Row) -> Finding:
     """What a worker's piece says of a loop."""
-    swing = None
+    swing, action = None, _or_none(Action, row["action"])
     if row["oscillating_pct"] is not None:
         swing = Swing(**{name: row[c] for c, name in SWING.items()})
     return Finding(
@@ -98,13 +98,7 @@ def finding_of(row: Row) -> Finding:
         _or_none(Fault, row["valve_fault"]),
         {c: row[f"osc_{c}_pct"] for c in CAUSES if row[f"osc_{c}_pct"] is not None},
         tuple(_sign_of(**s) for s in json.loads(row["signs"] or "[]")),
-        Remedy(
-            _or_none(Action, row["action"]),
-            row["advice"] or "",
-            row["kp_new"],
-            row["ti_new"],
-            _or_none(Due, row["due"]),
-        ),
+        Remedy(action, row["advice"] or "", row["kp_new"], row["ti_new"], _or_none(Due, row["due"])),
         {k: v for k, v in row.items() if k not in TYPED},
         lanes=tuple(Lane(name) for name in (row["lanes"] or "").split(", ") if name),
         group=row["group"],
@@ -132,17 +126,9 @@ def finite(value: Any) -> Cell:
 
 def hour_rows(a: Assessment, night: str) -> list[dict[str, Any]]:
     """Rows of the hourly table."""
-    return [
-        row_of(
-            {
-                "loop": a.loop,
-                "night": night,
-                "hour_s": h.start_s,
-                "oscillation_significance": h.oscillation_significance,
-                "oscillating_pct": h.oscillating_pct,
-                **{k: finite(v) for k, v in h.figures.as_row().items()},
-            },
-            HOURS,
-        )
-        for h in a.hours
-    ]
+    rows = []
+    for h in a.hours:
+        figures = {k: finite(v) for k, v in h.figures.as_row().items()}
+        figures |= {k: getattr(h, k) for k in ("oscillation_significance", "oscillating_pct")}
+        rows.append({"loop": a.loop, "night": night, "hour_s": h.start_s, **figures})
+    return rows

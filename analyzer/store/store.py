@@ -73,13 +73,8 @@ class Store:
         return next((z for z in stated if z), "UTC")
 
     def require(self) -> str:
-        """The latest night.
-
-        Raises
-        ------
-        InputError
-            Where the path is no store, is one of a newer version, or holds no complete night.
-        """
+        """The latest night. Raises InputError where the path is no store, is one of a newer version, or holds no
+        complete night."""
         self.require_known()
         nights = self.nights()
         if not nights:
@@ -90,22 +85,15 @@ class Store:
 
     def read(self, table: str, night: str, columns: Sequence[str] | None = None) -> pa.Table:
         """One night of one table, or some of its columns."""
-        try:
-            return read_stored(self.file(table, night), columns)
-        except FileNotFoundError as error:
+        found = self.read_if_there(table, night, columns)
+        if found is None:
             known = ", ".join(self.nights()[-3:]) or "none"
-            raise InputError(
-                f"night {night} is not in {self.path}", f"one of {known}", "check --night"
-            ) from error
+            raise InputError(f"night {night} is not in {self.path}", f"one of {known}", "check --night")
+        return found
 
     def columns(self, table: str, night: str) -> list[str]:
-        """Names of the columns that one night of one table has.
-
-        Raises
-        ------
-        InputError
-            Where the store holds no such night.
-        """
+        """Names of the columns that one night of one table has. Raises InputError where the store holds no such
+        night."""
         try:
             return stored_names(self.file(table, night))
         except FileNotFoundError:
@@ -136,10 +124,10 @@ class Store:
         found = read_stored(self.file(table, night), [c for c in columns if c in names], where)
         return [{**dict.fromkeys(columns), **row} for row in found.to_pylist()]
 
-    def read_if_there(self, table: str, night: str) -> pa.Table | None:
-        """One night of one table, None where the store has none."""
+    def read_if_there(self, table: str, night: str, columns: Sequence[str] | None = None) -> pa.Table | None:
+        """The same, None where the store has none."""
         try:
-            return read_stored(self.file(table, night))
+            return read_stored(self.file(table, night), columns)
         except FileNotFoundError:
             return None
 
@@ -208,32 +196,17 @@ class Store:
         remove_tree(self.path / "parts")
 
     def version(self) -> int:
-        """The version of its tables, 1 where it states none.
-
-        Raises
-        ------
-        InputError
-            What states it is damaged.
-        """
+        """The version of its tables, 1 where it states none. Raises InputError where what states it is damaged."""
         path = self.path / VERSION_FILE
         try:
             with answering(self.path) if is_remote(self.path) else nullcontext():
                 return _stated_schema(path)
         except (OSError, ValueError, TypeError, KeyError, RecursionError) as error:
-            right = json.dumps({"schema": SCHEMA})
-            raise InputError(
-                f"{path}: damaged, and nothing else: {self._standing()}",
-                right,
-                f"write {right} into it and go on",
-            ) from error
-
-    def _standing(self) -> str:
-        """Which nights there are, in words."""
-        nights = self.nights()
-        if not nights:
-            return "no night is in the store"
-        several = f" to {nights[-1]}" if len(nights) > 1 else ""
-        return f"the tables of {len(nights)} nights, {nights[0]}{several}, stand as they were"
+            right, nights = json.dumps({"schema": SCHEMA}), self.nights()
+            ends = " to ".join(dict.fromkeys((*nights[:1], *nights[-1:])))
+            stand = f"the tables of {len(nights)} nights, {ends}, stand as they were"
+            seen = f"{path}: damaged, and nothing else: {stand if nights else 'no night is in the store'}"
+            raise InputError(seen, right, f"write {right} into it and go on") from error
 
     def require_known(self) -> None:
         """Raise InputError where a newer version of this program wrote the store."""
@@ -246,12 +219,8 @@ class Store:
         """Bring its tables up to date in place, one by one, and say so in it; returns how many were changed.
 
         From 1 to 2 tables of nights get every column that is declared, empty where nothing is known. An upgrade that
-        was cut short is done again from where it stood; a table is whole at any time.
-
-        Raises
-        ------
-        InputError
-            The store is of a newer version.
+        was cut short is done again from where it stood; a table is whole at any time. Raises InputError where the
+        store is of a newer version.
         """
         self.require_known()
         path, old, changed = self.path / VERSION_FILE, self.version() < SCHEMA, 0

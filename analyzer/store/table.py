@@ -12,17 +12,8 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from analyzer.columns import (
-    BELIEFS,
-    EXPLAINED,
-    GROUPS,
-    HOURS,
-    NIGHTS,
-    SETTINGS,
-    Column,
-    Kind,
-    require_declared,
-)
+from analyzer import columns as declared
+from analyzer.columns import Column, Kind, row_of
 from analyzer.loop.decisions import Action
 from analyzer.places import is_remote
 from analyzer.words.units import SECONDS
@@ -47,15 +38,15 @@ class StoredTable:
 
 
 OF_A_NIGHT = (
-    StoredTable("nights", NIGHTS),
-    StoredTable("hours", HOURS, bulky=True),
+    StoredTable("nights", declared.NIGHTS),
+    StoredTable("hours", declared.HOURS, bulky=True),
     StoredTable("trends", bulky=True),
     StoredTable("waves", kept=False),
     StoredTable("moves", kept=False),
-    StoredTable("groups", GROUPS, in_pieces=False),
-    StoredTable("beliefs", BELIEFS, in_pieces=False),
-    StoredTable("explained", EXPLAINED, in_pieces=False),
-    StoredTable("compared", SETTINGS),
+    StoredTable("groups", declared.GROUPS, in_pieces=False),
+    StoredTable("beliefs", declared.BELIEFS, in_pieces=False),
+    StoredTable("explained", declared.EXPLAINED, in_pieces=False),
+    StoredTable("compared", declared.SETTINGS),
 )
 """All there are; whoever deletes begins with the first, without which there is no night."""
 KEPT = tuple(t for t in OF_A_NIGHT if t.kept)
@@ -63,7 +54,8 @@ TREND = ("time_s", *(f"{signal}_{end}" for signal in ("sp", "pv", "op") for end 
 """Columns of a table of trends beside `loop`, all of them numbers."""
 DECLARED = {c.name: c for table in reversed(OF_A_NIGHT) for c in table.columns}
 """Every column that a table of results may have, by name, but for those of trends."""
-PARSED = frozenset(c.name for c in (*NIGHTS, *GROUPS, *BELIEFS) if c.kind is Kind.JSON)
+WITH_JSON = *declared.NIGHTS, *declared.GROUPS, *declared.BELIEFS
+PARSED = frozenset(c.name for c in WITH_JSON if c.kind is Kind.JSON)
 """Columns that hold JSON; pages that are kept whole are not among them: those of another version are passed over."""
 WORDS: Mapping[str, Sequence[str]] = {"action": tuple(Action), "ti_unit": (*SECONDS, "repeats/min")}
 """Columns that hold one of a few words."""
@@ -74,17 +66,10 @@ REMEDY = (
 
 
 def rows_table(rows: Sequence[Mapping[str, Any]], columns: Sequence[Column]) -> pa.Table:
-    """Rows as a table with the types that its columns declare, empty where not known.
-
-    Raises
-    ------
-    ValueError
-        For a cell whose column is declared nowhere.
-    """
-    for row in rows:
-        require_declared(row, columns)
+    """Rows as a table with the types that its columns declare, empty where not known. Raises ValueError for a cell
+    whose column is declared nowhere."""
     schema = pa.schema([(c.name, pa.float64() if c.is_number else pa.string()) for c in columns])
-    return pa.Table.from_pylist(list(rows), schema=schema)
+    return pa.Table.from_pylist([row_of(row, columns) for row in rows], schema=schema)
 
 
 def rows_of_loops(table: pa.Table, loops: Sequence[str], others: bool = False) -> pa.Table:
@@ -105,15 +90,8 @@ def write_table(table: pa.Table, path: Path) -> None:
 def read_stored(
     path: Path, columns: Sequence[str] | None = None, filters: list[tuple[str, str, Any]] | None = None
 ) -> pa.Table:
-    """A table of the store, or some of its columns and rows.
-
-    Raises
-    ------
-    FileNotFoundError
-        There is none.
-    InputError
-        The file is damaged, or holds other columns than results have.
-    """
+    """A table of the store, or some of its columns and rows. Raises FileNotFoundError where there is none; InputError
+    where the file is damaged, or holds other columns than results have."""
     wanted = list(columns) if columns else None
     with _for_parquet(path) as held:
         if filters is not None:
@@ -160,10 +138,10 @@ def _require_declared(path: Path, schema: pa.Schema, wanted: list[str] | None) -
     if (wanted is None or "loop" in wanted) and "loop" not in schema.names:
         raise no_column(path, "loop")
     for field in schema:
-        declared = DECLARED.get(field.name)
-        if declared is None and field.name not in TREND:
+        column = DECLARED.get(field.name)
+        if column is None and field.name not in TREND:
             continue
-        numbers = declared is None or declared.is_number
+        numbers = column is None or column.is_number
         if not _holds(field.type, numbers):
             raise _of_another_kind(path, field.name, str(field.type), "numbers" if numbers else "text")
 

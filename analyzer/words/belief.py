@@ -12,7 +12,7 @@ from analyzer.words.units import Row, duration
 
 if TYPE_CHECKING:
     from analyzer.belief.belief import Belief
-    from analyzer.belief.remedy import Pair
+    from analyzer.belief.cycle import Pair
     from analyzer.belief.wear import Growth, PhaseKnown
 
 REPAIRED = re.compile(

@@ -11,6 +11,7 @@ import pyarrow.parquet as pq
 import pytest
 from click.testing import CliRunner
 
+from analyzer.api import read
 from analyzer.cli import main
 from analyzer.config import Config
 from analyzer.history import plant_clock
@@ -59,6 +60,27 @@ def test_an_unknown_zone_is_one_line() -> None:
     """A zone that does not exist is told with an example."""
     with pytest.raises(InputError, match="Europe/Berlin"):
         plant_clock.zone_of("Europe/Nowhere")
+
+
+def test_a_notebook_has_the_plants_nights_and_times(tmp_path: Path) -> None:
+    """`read(timezone=...)` cuts at the midnights that `run --timezone` cuts at, and reads changes on that clock."""
+    start = at("2026-07-01T00:00")
+    stamp = (start + 60.0 * np.arange(2880)) * 1e6
+    table = {"timestamp": pa.array(stamp.astype("int64"), pa.timestamp("us", tz="UTC"))}
+    table |= {f"FIC1.{r}": pa.array(np.full(2880, 50.0)) for r in ("SP", "PV", "OP")}
+    pq.write_table(pa.table(table), tmp_path / "export.parquet")
+    (tmp_path / "changes.csv").write_text("loop,time,kp_new\nFIC1,2026-07-02 08:00,2.0\n", encoding="utf-8")
+    plant = read(tmp_path / "export.parquet", changes=tmp_path / "changes.csv", timezone=HELSINKI)
+    midnight = at("2026-07-01T21:00")
+    assert [n.last_s for n in plant.spans.values()][:-1] == [midnight]
+    assert {n.zone for n in plant.spans.values()} == {HELSINKI}
+    assert [c.time_s for c in plant.changes] == [at("2026-07-02T05:00")]
+
+
+def test_a_notebook_is_refused_what_only_commands_take(tmp_path: Path) -> None:
+    """`read` takes no span of time, and says so in place of leaving it aside."""
+    with pytest.raises(TypeError, match="since"):
+        read(tmp_path / "export.parquet", since="2026-07-01")
 
 
 def test_the_store_and_its_pages_keep_the_zone(tmp_path: Path) -> None:
