@@ -90,7 +90,7 @@ def answer(found: Explanation, s: Recording) -> Answer:
         f"Not told: {lacking}."
         if lacking and (verdict, block) == ("unexplained", "none")
         else words.note(found),
-        (lacking or (words.ONE_MOVE_ONLY if found.unproven else untold_gain(found, effects)))
+        (lacking or (words.TOLD["one_move"] if found.unproven else untold_gain(found, effects)))
         if effects
         else "",
         words.cycles_told(found) if by_cycles(found) else "",
@@ -133,7 +133,7 @@ def unanswered(found: Explanation) -> str:
     found = found.by_innovations or found
     loaded = any(row.block == Block.LOAD for row in found.best.model.added)  # counted in terms of the gain
     moves = brings(found.p, found.plain if loaded else found.best)
-    return "" if moves >= found.p.limits.proof.answers else words.INSENSITIVE
+    return "" if moves >= found.p.limits.proof.answers else words.TOLD["insensitive"]
 
 
 def too_short(found: Explanation, s: Recording) -> str:
@@ -149,7 +149,7 @@ def untold_gain(found: Explanation, effects: tuple[EffectFound, ...]) -> str:
     """What an experiment does not tell of a supply whose flow at rest may be anything; empty of any other."""
     at_rest = next((e.parameters[AT_REST] for e in effects if AT_REST in e.parameters), None)
     open_ended = at_rest is not None and at_rest.low < 0.0 < at_rest.high
-    return words.WANDERS if open_ended and found.p.by_simulation else ""
+    return words.TOLD["wanders"] if open_ended and found.p.by_simulation else ""
 
 
 def effects_of(found: Explanation, s: Recording) -> tuple[EffectFound, ...]:

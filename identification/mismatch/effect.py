@@ -99,14 +99,9 @@ class Effect:
 
     @property
     def called(self) -> dict[str, str]:
-        """What pages call each of its numbers; none for those that another number stands for."""
-        params = {p.name: p.title for v in self.variants for p in v.params if p.title and not p.hidden}
-        return params | dict(self.titles)
-
-    @property
-    def hidden(self) -> frozenset[str]:
-        """Names of parameters whose meaning another number carries."""
-        return frozenset(p.name for v in self.variants for p in v.params if p.hidden)
+        """What pages call each of its numbers; nothing for those that another number stands for."""
+        params = [p for v in self.variants for p in v.params if p.title or p.hidden]
+        return {p.name: "" if p.hidden else p.title for p in params} | dict(self.titles)
 
 
 @dataclass(frozen=True, slots=True)

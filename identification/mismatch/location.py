@@ -164,10 +164,11 @@ class Feature:
 @dataclass(frozen=True, slots=True)
 class Located:
     """The features, the likeliest first; local : power of the misfit that they give at each sample, in mean squares,
-    shape (n,), 0 where not judged."""
+    shape (n,), 0 where not judged; groups : the features as asked, also where they were not tested."""
 
     features: tuple[Feature, ...]
     local: Floats = field(repr=False)
+    groups: tuple[Group, ...] = field(repr=False)
 
     @property
     def carrying(self) -> tuple[Feature, ...]:
@@ -281,9 +282,9 @@ def located(e: Floats, pv: Floats, op: Floats, judged: Mask, dt_s: float, late: 
     count = int(judged.sum())
     wanted = max(LOCATION.block_memories * memory, LOCATION.shortest_block)
     blocks = min(max(int(count / wanted), LOCATION.fewest_blocks), LOCATION.most_blocks)
+    found, local = groups(pv, op, dt_s, late, memory), np.zeros(e.size)
     if count // blocks < max(memory, LOCATION.shortest_block) or float(np.ptp(e[judged])) == 0.0:
-        return Located((), np.zeros(e.size))
-    found = groups(pv, op, dt_s, late, memory)
+        return Located((), local, found)
     columns = [g.columns[judged] for g in found]
     y = standardized(e[judged])
     bases = directions(columns)
@@ -295,9 +296,8 @@ def located(e: Floats, pv: Floats, op: Floats, judged: Mask, dt_s: float, late: 
         _feature(g, basis, y, float(p[i]), excess[i], e[judged] / size, judged)
         for i, (g, basis) in enumerate(zip(found, bases, strict=True))
     ]
-    local = np.zeros(e.size)
     local[judged] = np.maximum(_along(whole, y[:, :1])[:, 0], 0.0)
-    return Located(tuple(sorted(features, key=lambda f: (f.p, -f.share))), local)
+    return Located(tuple(sorted(features, key=lambda f: (f.p, -f.share))), local, found)
 
 
 def _feature(

@@ -79,7 +79,6 @@ class Picture:
     kind : loop (the band is two more loops, least and most), curve, response, course or comb.
     """
 
-    effect: str
     kind: str
     x: Axis
     y: Axis
@@ -100,11 +99,6 @@ class Drawing:
     known: Mapping[str, Estimate]
     best: Floats = field(repr=False)
     plain: Floats = field(repr=False)
-
-    @property
-    def name(self) -> str:
-        """The effect's name."""
-        return self.variant.name
 
     @property
     def ends(self) -> tuple[tuple[int, float, float], ...]:
@@ -140,7 +134,7 @@ def beside_plain(
     """What parameters make of x, with its band, beside what the plain loop has there, shape (m,) each."""
     y, low, high = banded(read, d)
     still = np.broadcast_to(np.asarray(plain, dtype=np.float64), x.shape)
-    return Picture(d.name, kind, *axes, (Drawn("found", x, y, low, high), Drawn("plain", x, still)), places)
+    return Picture(kind, *axes, (Drawn("found", x, y, low, high), Drawn("plain", x, still)), places)
 
 
 def op_range(inputs: ModelInputs) -> Floats:
@@ -176,7 +170,7 @@ def stem_over_op(d: Drawing) -> Picture:
         other[Slot.JUMP] = min(other[Slot.JUMP], other[Slot.STICKBAND])
         curves.append(Drawn(name, op[last], valve_alone(other, op, FRICTION)[last]))
     curves.append(Drawn("plain", op[last], op[last]))
-    return Picture(d.name, "loop", OP, STEM, tuple(curves))
+    return Picture("loop", OP, STEM, tuple(curves))
 
 
 def flow_over_op(d: Drawing) -> Picture:
@@ -291,11 +285,11 @@ def around(where: Mask, length: int) -> slice:
     return slice(start, start + length)
 
 
-def comb(name: str, axis: Axis, at: Floats, count: np.ndarray) -> Picture:
+def comb(axis: Axis, at: Floats, count: np.ndarray) -> Picture:
     """How often each of some values occurs."""
     x, none = np.repeat(at, 3), np.zeros(at.size)
     y = np.stack([none, count, none], axis=1).ravel().astype(float)
-    return Picture(name, "comb", axis, Axis("samples", ""), (Drawn("recorded", x, y),))
+    return Picture("comb", axis, Axis("samples", ""), (Drawn("recorded", x, y),))
 
 
 def rebuilt(e: Floats, op: Floats, kp: float, ti: float) -> Floats:
@@ -305,13 +299,11 @@ def rebuilt(e: Floats, op: Floats, kp: float, ti: float) -> Floats:
     return np.asarray(free - free.mean() + op.mean())
 
 
-def rebuilt_course(
-    name: str, s: Recording, part: slice, laws: dict[str, tuple[Floats, StatedSettings]]
-) -> Picture:
+def rebuilt_course(s: Recording, part: slice, laws: dict[str, tuple[Floats, StatedSettings]]) -> Picture:
     """A stretch of recorded OP, and OP rebuilt from errors, shape (n,), by some laws."""
     time, own = np.arange(part.start, part.stop) * s.dt_s, s.op[part]
     curves = [Drawn(k, time, rebuilt(e[part], own, law.kp, law.ti)) for k, (e, law) in laws.items()]
-    return Picture(name, "course", TIME, OP, (*curves, Drawn("recorded", time, own)))
+    return Picture("course", TIME, OP, (*curves, Drawn("recorded", time, own)))
 
 
 def law_window(s: Recording, ti: float) -> int:
@@ -319,7 +311,7 @@ def law_window(s: Recording, ti: float) -> int:
     return int(np.clip(LAW_WINDOW * ti, WINDOW, min(MOST_WINDOW, s.pv.size)))
 
 
-def by_stated_law(name: str, s: Recording, where: Mask | None = None) -> Picture | None:
+def by_stated_law(s: Recording, where: Mask | None = None) -> Picture | None:
     """OP about a mask's longest stretch (the busiest where None) and as the stated settings would have moved it.
 
     None without SP or settings.
@@ -328,4 +320,4 @@ def by_stated_law(name: str, s: Recording, where: Mask | None = None) -> Picture
         return None
     length = law_window(s, s.stated.ti)
     part = busiest(s.op, length, s.usable) if where is None else around(where[: s.op.size], length)
-    return rebuilt_course(name, s, part, {"stated": (s.sp - s.pv, s.stated)})
+    return rebuilt_course(s, part, {"stated": (s.sp - s.pv, s.stated)})

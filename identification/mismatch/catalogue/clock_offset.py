@@ -15,7 +15,7 @@ def other_clock(found: Finding, s: Recording, _: Floats) -> Picture | None:
     part = biggest_move(s.sp if float(np.ptp(s.sp)) > 0 else s.op, WINDOW // 4, s.usable)
     right = s.sp - shifted(s.pv, found.values[LATE_SAMPLES])
     laws = {"found": (right, s.stated), "stated": (s.sp - s.pv, s.stated)}
-    return rebuilt_course(found.name, s, part, laws)
+    return rebuilt_course(s, part, laws)
 
 
 EFFECT = Fault(

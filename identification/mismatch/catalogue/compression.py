@@ -21,7 +21,7 @@ def straight_lines(found: Finding, s: Recording, _: Floats) -> Picture:
     part = busiest(s.pv, WINDOW)
     time, x, marked = np.arange(part.start, part.stop) * s.dt_s, s.pv[part], found.where[part]
     curves = (Drawn("points", time[marked], x[marked]), Drawn("recorded", time, x))
-    return Picture(found.name, "course", TIME, PV, curves)
+    return Picture("course", TIME, PV, curves)
 
 
 EFFECT = Fault(

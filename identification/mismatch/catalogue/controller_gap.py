@@ -23,7 +23,7 @@ def gap_profile(found: Finding, s: Recording, _: Floats) -> Picture | None:
     middle = 0.5 * (edges[1:] + edges[:-1])
     curve = Drawn("recorded", middle[held], 100.0 * stood[held] / count[held])
     x, y = Axis("size of SP − PV", "%"), Axis("OP stands still", "% of samples")
-    return Picture(found.name, "curve", x, y, (curve,), (width,))
+    return Picture("curve", x, y, (curve,), (width,))
 
 
 EFFECT = Fault(

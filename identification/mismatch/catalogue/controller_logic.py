@@ -10,5 +10,5 @@ EFFECT = Fault(
     check="Look for tracking, overrides, limits or an operator's hand in those spans.",
     caption="OP recorded, and OP as the stated settings would have moved it from there.",
     numbers=(Number("share_pct", "%", "Time outside the law", "share", 100.0, share=0.1),),
-    drawn=lambda found, s, _: by_stated_law(found.name, s, found.where),
+    drawn=lambda found, s, _: by_stated_law(s, found.where),
 )

@@ -11,7 +11,7 @@ def other_settings(found: Finding, s: Recording, _: Floats) -> Picture | None:
         return None
     part, e = busiest(s.op, law_window(s, s.stated.ti), s.usable), s.sp - s.pv
     own = StatedSettings(found.values["kp"], found.values["ti_samples"])
-    return rebuilt_course(found.name, s, part, {"found": (e, own), "stated": (e, s.stated)})
+    return rebuilt_course(s, part, {"found": (e, own), "stated": (e, s.stated)})
 
 
 EFFECT = Fault(

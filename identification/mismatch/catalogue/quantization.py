@@ -38,7 +38,7 @@ def grid(found: Finding, s: Recording, _: Floats) -> Picture:
     """How often each value of PV occurs within some steps of a coarse sensor."""
     middle = float(np.median(s.pv))
     near = s.pv[np.abs(s.pv - middle) <= 0.5 * STEPS_SHOWN * found.values["step_pct"]]
-    return comb(found.name, PV, *np.unique(near, return_counts=True))
+    return comb(PV, *np.unique(near, return_counts=True))
 
 
 EFFECT = Fault(

@@ -23,7 +23,7 @@ def spacings(found: Finding, s: Recording, _: Floats) -> Picture:
     """How often each spacing of two stamps occurs."""
     spacing = np.diff(s.stamp_s)
     count, edge = np.histogram(spacing[(spacing > 0) & (spacing < 2 * s.dt_s)], HISTOGRAM)
-    return comb(found.name, Axis("time between samples", "s"), 0.5 * (edge[1:] + edge[:-1]), count)
+    return comb(Axis("time between samples", "s"), 0.5 * (edge[1:] + edge[:-1]), count)
 
 
 EFFECT = Fault(

@@ -35,7 +35,7 @@ def range_end(found: Finding, s: Recording, free: Floats) -> Picture:
         Drawn("recorded", time, s.pv[part]),
         Drawn("limit", time, end),
     )
-    return Picture(found.name, "course", TIME, PV, curves)
+    return Picture("course", TIME, PV, curves)
 
 
 EFFECT = Fault(
