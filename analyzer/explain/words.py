@@ -13,7 +13,7 @@ from analyzer.pages.words import duration, number, page_columns, plain_cell, tex
 from identification.mismatch import effect
 from identification.mismatch.catalogue import EFFECTS
 from identification.mismatch.effect import Block, Ends
-from identification.mismatch.outside import OUTSIDE, about
+from identification.mismatch.outside import about
 from identification.mismatch.selection import Candidate
 from identification.mismatch.words import discriminating_test, is_along, place
 from reports.pages import Cell, Table
@@ -22,8 +22,6 @@ Data = Mapping[str, Any]
 
 TOLD = texts("explanation")
 FEATURES, CURVES, ROWS, NOTES = (TOLD[part] for part in ("features", "curves", "rows", "notes"))
-HIDDEN = {name for e in {**EFFECTS, **OUTSIDE}.values() for name, title in e.called.items() if not title}
-"""Parameters whose meaning another one carries."""
 SHOWN = 12
 """Names shown of those that were tried."""
 
@@ -89,7 +87,7 @@ def parameters(data: Data) -> Table:
         (Cell(x["name"]), Cell(called), plain_cell(v["value"]), Cell(interval_text(v)), Cell(v["unit"]))
         for x in [*data["effects"], *([data["outside"]] if "outside" in data else [])]
         for k, v in x["parameters"].items()
-        if (called := about(x["name"]).called.get(k, k.replace("_", " "))) and k not in HIDDEN
+        if (called := about(x["name"]).called.get(k, k.replace("_", " ")))
     )
     return Table("parameters", "Parameters", page_columns("effects_found"), rows)
 
