@@ -13,6 +13,7 @@ from identification.mismatch.effect import Friction
 from identification.mismatch.friction import fit_sticking
 from identification.mismatch.outside import about
 from identification.mismatch.proof import is_one_move
+from identification.mismatch.recording import Recording
 from identification.mismatch.starts import CandidateInputs, Span, mode_starts, screened, span_of, start_models
 from identification.simulation.effect import Variant
 from identification.simulation.parameters import Slot, neutral
@@ -21,7 +22,7 @@ Progress = Callable[[str], None]
 KNOWN_TYPES = ("flow", "pressure", "temperature", "level")
 """Loop types under which a row may be left out; any other text says nothing."""
 NEEDS: Mapping[str, Callable[[CandidateInputs], bool]] = {
-    "every scan": lambda x: x.every_scan,
+    "every scan": lambda x: x.s.every_scan,
     "experiment": lambda x: x.p.by_simulation,
     "moves": lambda x: not is_one_move(x.p),
     "neighbour": lambda x: x.p.inputs.neighbour is not None,
@@ -87,14 +88,14 @@ def applies(x: CandidateInputs, near: Fitted, row: Variant) -> bool:
     taken = {p.slot for r in near.model.added for p in r.params}
     if row.name in near.names or taken & {p.slot for p in row.params}:
         return False
-    if row.types and x.kind in KNOWN_TYPES and x.kind not in row.types:
+    if row.types and x.s.kind in KNOWN_TYPES and x.s.kind not in row.types:
         return False
     if row.needs in NEEDS and not NEEDS[row.needs](x):
         return False
     if x.p.by_simulation and effect.timed and row.opponent is None:
         return False  # a load that is added is told by innovations
     # behind one friction a second of the same stem cannot be told without the stem's position
-    told = x.free_valve or any(about(name).friction is not None for name in near.names)
+    told = x.s.free_valve or any(about(name).friction is not None for name in near.names)
     return effect.friction is None or not told
 
 
@@ -204,14 +205,14 @@ def without(model: Model, rows: Iterable[Variant]) -> Model:
     return Model(tuple(r for r in model.added if r.name not in names), c)
 
 
-def integrating_or_first_order(p: Problem, free: Fitted, kind: str) -> tuple[Problem, Fitted]:
+def integrating_or_first_order(p: Problem, free: Fitted, s: Recording) -> tuple[Problem, Fitted]:
     """Problem and plain fit, the time constant kept within the record where it might as well have no end.
 
     A plain loop whose time constant outlasts the record is an integrator under another name. Where an integrator
     does as well with one constant fewer, the plain loop is one that settles within the record.
     """
     row = next(v for v in CANDIDATES if v.replaces)
-    x = CandidateInputs(p, (), kind)
+    x = CandidateInputs(p, (), s)
     longest = p.limits.search.settles * p.inputs.dt_s * p.y.size
     if float(free.model.c[Slot.T]) <= longest or not applies(x, free, row):
         return p, free

@@ -34,21 +34,18 @@ LEADING = 0.95
 
 @dataclass(frozen=True, slots=True)
 class CandidateInputs:
-    """A problem with the places and frequencies at which a load may act, and what is known beside its trends, by
-    which effects are asked about or not; see Recording."""
+    """A problem, the places and frequencies at which a load may act, and the recording, which says what is asked."""
 
     p: Problem
     omegas: tuple[float, ...]
-    kind: str = ""
-    every_scan: bool = True
-    free_valve: bool = False
+    s: Recording
 
 
 def candidate_inputs(p: Problem, fit: Fitted, s: Recording) -> CandidateInputs:
     """Steps and lines located in what a fit leaves."""
     held = p.inputs.step_at if any(r.needs == "steps" for r in fit.model.added) else step_places(p, fit)
     located = replace(p, inputs=replace(p.inputs, step_at=held))
-    return CandidateInputs(located, line_frequencies(p, fit), s.kind, s.every_scan, s.free_valve)
+    return CandidateInputs(located, line_frequencies(p, fit), s)
 
 
 def step_places(p: Problem, fit: Fitted) -> tuple[int, ...]:
@@ -97,8 +94,7 @@ def after_gaps(p: Problem, fit: Fitted) -> Mask:
     held = round(float(fit.model.c[Slot.L] + limits.forgotten * fit.model.c[Slot.T]) / p.inputs.dt_s)
     out = np.zeros(p.y.size, dtype=bool)
     for first, last in runs(~p.usable):
-        if last - first >= limits.gap_samples:
-            out[max(first - 1, 0) : last + held] = True
+        out[max(first - 1, 0) : last + held] |= last - first >= limits.gap_samples
     return out
 
 

@@ -75,7 +75,7 @@ def compared(cases: pathlib.Path, truths: dict, tag: str) -> dict:
     s = fit.subject
     inputs = inputs_of(s)
     p, plain = integrating_or_first_order(
-        *prepared(inputs, s.pv - inputs.level, without_spikes(s.pv, s.usable)), s.kind
+        *prepared(inputs, s.pv - inputs.level, without_spikes(s.pv, s.usable)), s
     )
     candidates = compete(candidate_inputs(p, plain, s), plain)
     mine = [r for r in candidates if kin(r.name, truth["effect"], KIN)]

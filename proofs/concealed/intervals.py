@@ -50,7 +50,7 @@ def fitted(cases: pathlib.Path, tag: str, effect: str):
     s = case(spec, specs, source.read(list(spec.tags) + [t for o in specs for t in o.tags]), Config()).subject
     inputs = inputs_of(s)
     begun = prepared(inputs, s.pv - inputs.level, without_spikes(s.pv, s.usable))
-    p, plain = integrating_or_first_order(*begun, s.kind)
+    p, plain = integrating_or_first_order(*begun, s)
     x = candidate_inputs(p, plain, s)
     rows = tuple(v for v in CANDIDATES if kin(v.name, effect, KIN))
     best = compete(x, plain, rows)[0]

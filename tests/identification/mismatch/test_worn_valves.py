@@ -101,7 +101,7 @@ def test_free_valve_is_asked_for_no_friction() -> None:
     asked = {
         free: {r.name for e in EFFECTS.values() for r in e.candidates if applies(x, near, r)}
         for free in (False, True)
-        for x in [CandidateInputs(p, (), free_valve=free)]
+        for x in [CandidateInputs(p, (), replace(s, free_valve=free))]
     }
     friction = {name for name, e in EFFECTS.items() if e.friction is not None}
     assert asked[False] - asked[True] == friction
