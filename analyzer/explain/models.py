@@ -171,6 +171,11 @@ def saved_scale(data: Mapping[str, Any], now: Scale) -> Scale:
     return Scale(low, span, op_low, op_span, now.recorded)
 
 
+def rescaled(now: Scale, then: Scale, pv: Floats, op: Floats) -> tuple[Floats, Floats]:
+    """PV (or SP) and OP, shape (n,) each, in the percent of another recording's ranges."""
+    return then.pv_pct(now.low + pv * now.span / 100.0), then.op_pct(now.op_low + op * now.op_span / 100.0)
+
+
 def simulated(c: Case, data: dict[str, Any], stamps: Floats, closed: bool) -> tuple[Floats, Floats]:
     """PV and OP in their own units at each stamp, from a saved model run open loop or, if wished, closed.
 
@@ -179,10 +184,10 @@ def simulated(c: Case, data: dict[str, Any], stamps: Floats, closed: bool) -> tu
     InputError
         The loop is to be closed and its controller is not known.
     """
-    r, law = c.prepared.record, c.subject.stated
-    scale, now = saved_scale(data, c.prepared.scale), c.prepared.scale
-    sp, pv = (scale.pv_pct(now.low + x * now.span / 100.0) for x in (r.sp, r.pv))
-    op = scale.op_pct(now.op_low + r.op * now.op_span / 100.0)
+    r, law, now = c.prepared.record, c.subject.stated, c.prepared.scale
+    scale = saved_scale(data, now)
+    pv, op = rescaled(now, scale, r.pv, r.op)
+    sp, _ = rescaled(now, scale, r.sp, r.op)
     if closed and law is None:
         seen = f"{c.spec.loop}: no settings of its controller"
         raise InputError(seen, "kp and ti", "state them in loops.csv")

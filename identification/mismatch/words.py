@@ -86,12 +86,16 @@ def too_short_told(enough: float, length_s: float, lag_s: float) -> str:
     return TOLD["too_short"].format(enough=enough, held=length_s / lag_s, length=length, lag=lag)
 
 
-def sentence(said: Answer) -> str:
-    """One sentence for the verdict, with the numbers that it needs."""
-    if not said.effects:
-        return TOLD["nothing_left"]
-    others = [e.name for e in said.effects[1:]]
-    return _filled(said.effects[0]) + (f" Then also: {', '.join(others)}." if others else "")
+def reason(said: Answer) -> str:
+    """The verdict in words: with the numbers that it needs and what the recording lacks; of what has no name what is
+    left, where it lives, and why it has none."""
+    if said.verdict == "unexplained":
+        outside = "" if said.outside is None else f"{TOLD['better']}: {_filled(said.outside)}."
+        return f"{said.note or outside or TOLD['no_name']} {located_sentence(said.where)}".strip()
+    first = _filled(said.effects[0]) if said.effects else TOLD["nothing_left"]
+    others = f"Then also: {', '.join(e.name for e in said.effects[1:])}." if len(said.effects) > 1 else ""
+    caution = f"The figures are rough: it {said.caution}." if said.caution else ""
+    return " ".join(filter(None, (first, others, caution, said.shown)))
 
 
 def _filled(found: EffectFound) -> str:
@@ -101,12 +105,6 @@ def _filled(found: EffectFound) -> str:
     for name, parameters in effect.spoken.items():
         shown[name] = next((shown[k] for k in parameters if k in shown), "?")
     return effect.sentence.format_map(defaultdict(lambda: "?", shown))
-
-
-def unexplained_reason(said: Answer) -> str:
-    """What is left, where it lives, and why it has no name."""
-    outside = "" if said.outside is None else f"{TOLD['better']}: {_filled(said.outside)}."
-    return f"{said.note or outside or TOLD['no_name']} {located_sentence(said.where)}".strip()
 
 
 def is_along(feature: Mapping[str, Any]) -> bool:
