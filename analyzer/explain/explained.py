@@ -17,7 +17,7 @@ from analyzer.explain.models import SCALE, Brought, judged, plain_start, rescale
 from identification.controller.pi_regression import ControlLaw
 from identification.controller.pid_regression import integral_time
 from identification.mismatch.answer import Answer, answer
-from identification.mismatch.diagnosis import explain, transmitter_end
+from identification.mismatch.diagnosis import explain
 from identification.mismatch.explanation import Explanation, proven_on
 from identification.mismatch.model_file import to_data
 from identification.mismatch.recording import Recording
@@ -42,11 +42,7 @@ class Explained:
         c, found, s = self.case, self.found, self.case.prepared.scale
         scale = dict(zip(SCALE, (s.low, s.span, s.op_low, s.op_span), strict=True))
         names = tuple(e.name for e in self.said.effects)
-        data = to_data(c.spec.loop, found.p.inputs, found.best.model.c, names, found.late_s, scale)
-        end = transmitter_end(found.recorder, c.subject.pv)
-        if end is not None:
-            data["constants"]["CLIP_HI" if end.upper else "CLIP_LO"] = end.value
-        return data
+        return to_data(c.spec.loop, found.p.inputs, found.best.model.c, names, found.late_s, scale)
 
 
 def explained(

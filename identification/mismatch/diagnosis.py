@@ -21,6 +21,7 @@ from identification.mismatch.recording import Recording, is_experiment, straight
 from identification.mismatch.rounds import physics
 from identification.mismatch.selection import Progress, silent
 from identification.record import Floats
+from identification.simulation.parameters import Slot
 
 
 def explain(s: Recording, tell: Progress = silent, brought: Floats | None = None) -> Explanation:
@@ -94,4 +95,5 @@ def transmitter_end(recorder: Finding | None, pv: Floats) -> Clip | None:
     if recorder is None or not fault(recorder.name).censors:
         return None
     (value,) = recorder.values.values()
-    return Clip(value, value > float(np.median(pv)), recorder.where)
+    upper = value > float(np.median(pv))
+    return Clip(value, Slot.CLIP_HI if upper else Slot.CLIP_LO, recorder.where)

@@ -27,10 +27,10 @@ from identification.simulation.parameters import Slot
 
 @dataclass(frozen=True, slots=True)
 class Clip:
-    """A transmitter's end: its value [% PV], whether it is the upper one, and where PV stands at it, shape (n,)."""
+    """A transmitter's end: its value [% PV], the model's constant for it, and where PV stands at it, shape (n,)."""
 
     value: float
-    upper: bool
+    slot: Slot
     where: Mask
 
 
@@ -80,11 +80,12 @@ def plain(p: Problem, brought: Floats | None = None, clip: Clip | None = None) -
     starts = [] if brought is None else [brought.copy()]
     for process in plain_processes(p.y, p.inputs.op, p.usable, p.inputs.dt_s):
         c = as_parameters(process)
-        if clip is not None:
-            c[Slot.CLIP_HI if clip.upper else Slot.CLIP_LO] = clip.value
         c[Slot.START] = p.y[0]
         c[Slot.BIAS] = float(np.mean(p.y)) - process.gain * float(np.mean(p.inputs.op) - p.inputs.middle)
         starts.append(c)
+    if clip is not None:
+        for c in starts:
+            c[clip.slot] = clip.value
     fits = [descended(p, Model((), c), p.limits.search.full_steps) for c in starts]
     return min(fits, key=lambda fit: fit.loss)
 
