@@ -131,7 +131,7 @@ def misfit_panels(e: Explained) -> Panels:
 
 def feature_plot(e: Explained, g: Group, f: Feature | None) -> Plot:
     """Mean (or size) of the one-step errors along one feature, before and after, with two standard errors."""
-    judged, by = e.found.p.weight > 0, "sign" if f is None else f.of
+    judged, by = e.found.p.weight > 0, "sign" if f is None else f.by
     fits = {"baseline": e.found.plain} | ({"model": e.found.best} if e.found.accepted else {})
     known = FEATURES[g.name]
     log = "powers" in known and float(g.signal[judged].max(initial=0.0)) > 0

@@ -144,16 +144,15 @@ class Feature:
     """What one feature says of the misfit.
 
     p : chance, over all features, of as much on an untied residual; share : part of the variance of the misfit's
-    power or sign that it alone gives; of : "power" or "sign", by which it shows more; low, high : part of the
-    feature's range in which the misfit is above its mean, None where it has no order.
+    power or sign that it alone gives; by : "power" or "sign", by which it shows more; range : ends of the part of the
+    feature's range in which the misfit is above its mean, none where it has no order.
     """
 
     name: str
     p: float
     share: float
-    of: str
-    low: float | None = None
-    high: float | None = None
+    by: str
+    range: tuple[float, ...] = ()
 
     @property
     def carries(self) -> bool:
@@ -308,5 +307,5 @@ def _feature(
     along = scaled if g.sense is None else scaled * g.sense[judged]
     drawn = profile(g.signal[judged], along)
     run = part_of_range(drawn.power if by == 0 else np.abs(drawn.mean))
-    low, high = (None, None) if run is None else (float(drawn.low[run[0]]), float(drawn.high[run[1]]))
-    return Feature(g.name, p, float(own[by]), ("power", "sign")[by], low, high)
+    ends = () if run is None else (float(drawn.low[run[0]]), float(drawn.high[run[1]]))
+    return Feature(g.name, p, float(own[by]), ("power", "sign")[by], ends)

@@ -149,36 +149,32 @@ def drawn_step(size: float, n: int, dt_s: float, back: bool = False) -> tuple[Fl
     return time, np.where(on, size, 0.0)
 
 
-def valve_alone(
-    c: Floats, op: Floats, keep: tuple[int, ...], middle: float = 50.0, dt_s: float = 1.0
-) -> Floats:
-    """Flow [% OP], shape (m,), of a valve with some of a model's parameters alone."""
-    return flow(op, alone(c, keep), dt_s, middle)
-
-
 def stem_over_op(d: Drawing) -> Picture:
     """Stem over OP of a valve with play or stick-slip, with the loops of the narrowest and the widest band."""
     reach = SWEEP * max(float(d.best[Slot.STICKBAND]), 1e-3)
-    one = np.concatenate((np.linspace(-1, 1, POINTS), np.linspace(1, -1, POINTS)))
+    one, half = np.concatenate((np.linspace(-1, 1, POINTS), np.linspace(1, -1, POINTS))), 2 * POINTS
     op = d.inputs.middle + reach * np.concatenate((one, one))
-    last = slice(2 * POINTS, None)
-    curves = [Drawn("found", op[last], valve_alone(d.best, op, FRICTION)[last])]
-    for name, i in (("least", 1), ("most", 2)):
-        other = d.best.copy()
-        for place in d.ends:
-            other[place[0]] = place[i]
-        other[Slot.JUMP] = min(other[Slot.JUMP], other[Slot.STICKBAND])
-        curves.append(Drawn(name, op[last], valve_alone(other, op, FRICTION)[last]))
-    curves.append(Drawn("plain", op[last], op[last]))
-    return Picture("loop", OP, STEM, tuple(curves))
+    least, most = d.best.copy(), d.best.copy()
+    for slot, low, high in d.ends:
+        least[slot], most[slot] = low, high
+    for c in (least, most):
+        c[Slot.JUMP] = min(c[Slot.JUMP], c[Slot.STICKBAND])
+    curves = []
+    for name, c in (("found", d.best), ("least", least), ("most", most)):
+        stem = flow(op, alone(c, FRICTION), 1.0, d.inputs.middle)
+        curves.append(Drawn(name, op[half:], stem[half:]))
+    return Picture("loop", OP, STEM, (*curves, Drawn("plain", op[half:], op[half:])))
 
 
 def flow_over_op(d: Drawing) -> Picture:
     """Flow over OP at rest: characteristic, stop or second valve."""
     op, ends = op_range(d.inputs), (Slot.STOP_LO, Slot.STOP_HI, Slot.SPLIT)
     places = tuple(float(d.best[s]) for s in ends if np.isfinite(d.best[s]))
-    middle = d.inputs.middle
-    return beside_plain(d, "curve", (OP, FLOW), op, lambda c: valve_alone(c, op, AT_REST, middle), op, places)
+
+    def read(c: Floats) -> Floats:
+        return flow(op, alone(c, AT_REST), 1.0, d.inputs.middle)
+
+    return beside_plain(d, "curve", (OP, FLOW), op, read, op, places)
 
 
 def step_size(d: Drawing) -> float:
@@ -190,7 +186,10 @@ def stem_response(d: Drawing, length_s: float, keep: tuple[int, ...]) -> Picture
     """Stem after a step of OP, which takes about `length_s`, with the parameters that are at work."""
     fine = max(length_s * STEM_LENGTH, FEWEST_SAMPLES * d.inputs.dt_s) / POINTS
     time, op = drawn_step(step_size(d), POINTS, fine)
-    return beside_plain(d, "response", (TIME, STEM), time, lambda c: valve_alone(c, op, keep, dt_s=fine), op)
+    middle = d.inputs.middle
+    return beside_plain(
+        d, "response", (TIME, STEM), time, lambda c: flow(op, alone(c, keep), fine, middle), op
+    )
 
 
 def _pv_length_s(d: Drawing, fast_s: float | None) -> float:

@@ -25,6 +25,8 @@ SIGNALS: Mapping[str, list[str]] = {
     "controller": ["SP", "PV", "OP"],
     "load": ["PV"],
 }
+TOLD = ("name", "p", "carries", "share", "by", "range")
+"""What is told of a feature."""
 
 
 def carrying(won: Floats, dt_s: float) -> list[list[float]]:
@@ -83,21 +85,6 @@ def won_over(p: Problem, plain: Fitted, best: Fitted) -> tuple[Floats, Floats]:
     return p.weight * (e0**2 - e1**2), after - before
 
 
-def features_said(found: Located) -> list[dict[str, Any]]:
-    """The features as data: name, chance, whether they carry the misfit, by what, in which part of their range."""
-    return [
-        {
-            "name": f.name,
-            "p": f.p,
-            "carries": f.carries,
-            "share": f.share,
-            "by": f.of,
-            "range": [] if f.low is None or f.high is None else [f.low, f.high],
-        }
-        for f in found.features
-    ]
-
-
 def where_of(found: Explanation, s: Recording, block: str, at: Located) -> dict[str, Any]:
     """Where the misfit is: signals, spans [s], ranges, direction of OP, periods [s] and the features that carry it.
 
@@ -107,8 +94,9 @@ def where_of(found: Explanation, s: Recording, block: str, at: Located) -> dict[
     block : of the verdict; at : of the plain loop's innovations, of the last model's where something is left over.
     """
     p, marked, signals = found.p, found.finding, SIGNALS.get(block, ["OP", "PV"])
+    features = [{key: getattr(f, key) for key in TOLD} for f in at.features]
     after = any(f.name == "after_reversals" for f in at.carrying)
-    told: dict[str, Any] = {"features": features_said(at), "after_reversals": after}
+    told: dict[str, Any] = {"features": features, "after_reversals": after}
     if marked is not None:
         here = marked.where[: s.pv.size]
         spans = [[0.0, here.size * s.dt_s]] if here.all() else carrying(here.astype(float), s.dt_s)
