@@ -53,15 +53,8 @@ def explained(
 ) -> Explained:
     """Explain one loop.
 
-    Parameters
-    ----------
-    c : Case
-    tell : callable
-        Is told what is tried.
-    brought : mapping or None
-        The user's own model, which is judged and is one more start of the search.
-    held_out : mapping or None
-        Other recordings of the loop by name, on which the explanation is proven.
+    tell : is told what is tried; brought : the user's own model, which is judged and is one more start of the search;
+    held_out : other recordings of the loop by name, on which the explanation is proven.
     """
     own, others, scale = None, held_out or {}, c.prepared.scale
     with np.errstate(all="ignore"):  # a candidate that runs away loses; its overflow is nobody's business

@@ -127,12 +127,8 @@ def within(ratio: float, ends: tuple[float, float]) -> bool:
 def wrong_units(own: Floats, found: Mapping[str, float]) -> str:
     """What looks wrong with a model's units against the process as identified; empty where nothing does.
 
-    Parameters
-    ----------
-    own : ndarray of shape (SIZE,)
-        Constants of the user's model.
-    found : mapping
-        gain [% PV/% OP] and time_constant_s of the plain loop fitted to the recording.
+    own : constants of the user's model, shape (SIZE,); found : gain [% PV/% OP] and time_constant_s of the plain loop
+    fitted to the recording.
     """
     gain, lag_s = found["gain"], found["time_constant_s"]
     its, said = f"its gain, {own[Slot.K]:.3g},", []

@@ -187,12 +187,7 @@ def agreement(row: Mapping[str, Any], verdict: str, block: str) -> str:
     kind of fault is the explanation's where it is proven on held-out data. What still differs, for the night and the
     recording explained need not be the same, is said here, with what would settle it.
 
-    Parameters
-    ----------
-    row : mapping
-        The loop's row of the night: cause, valve_fault.
-    verdict, block : str
-        The explanation's name and block.
+    row : the loop's row of the night: cause, valve_fault; verdict, block : the explanation's name and block.
     """
     known, told = EFFECTS.get(verdict), TOLD["beside_verdict"]
     friction = known is not None and known.friction is not None

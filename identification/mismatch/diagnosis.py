@@ -27,13 +27,8 @@ from identification.simulation.parameters import Slot
 def explain(s: Recording, tell: Progress = silent, brought: Floats | None = None) -> Explanation:
     """Explain where a plain loop and a recording differ.
 
-    Parameters
-    ----------
-    s : Recording
-    tell : callable
-        Is told what is tried, for progress.
-    brought : ndarray of shape (SIZE,) or None
-        Constants of the user's own model, with which the plain loop's search begins beside its own starts.
+    tell : is told what is tried, for progress; brought : constants of the user's own model, shape (SIZE,), with which
+    the plain loop's search begins beside its own starts.
     """
     held = unlogged(s.stamp_s, s.pv.size, s.dt_s, s.limits.recorder)
     s = replace(s, usable=s.usable & ~held)

@@ -7,7 +7,9 @@ another order against the features, so that nothing is left of any link while co
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -110,27 +112,22 @@ def groups(pv: Floats, op: Floats, dt_s: float, late: int, memory: int) -> tuple
     fading = np.exp(-since_s / (max(memory, 2) * dt_s))
     rate = ranked(travel) - 0.5
     index = dt_s * np.arange(pv.size, dtype=np.float64)
-    limit = at_limits(o)
-    found = (
+    limit = at_limits(o).astype(float)
+    found = [
         Group("pv_level", hats(before), before),
         Group("op_level", hats(o), o),
         Group("op_direction", way[:, None], way),
         Group("op_rate", np.stack([rate, rate * way], axis=1), travel, way),
         Group("after_reversals", np.stack([fading, fading * way], axis=1), since_s, way),
         Group("time_in_record", hats(index), index),
-        Group("at_limits", limit[:, None].astype(float), limit.astype(float)),
-    )
-    alive = [g for g in found if g.columns.shape[1] and float(np.ptp(g.columns)) > 0]
-    return tuple(g for g in alive if g.name != "at_limits" or limit.sum() >= LOCATION.limit_samples)
+    ]
+    if limit.sum() >= LOCATION.limit_samples:
+        found.append(Group("at_limits", limit[:, None], limit))
+    return tuple(g for g in found if g.columns.shape[1] and float(np.ptp(g.columns)) > 0)
 
 
-@dataclass(frozen=True, slots=True)
-class Profile:
-    """Misfit along one feature: ends of each part, samples, mean and mean square of the innovations, shape (b,) each.
-
-    Mean and mean square are in standard deviations and mean squares of the whole record; of OP's rate and the time
-    since its turn the mean is along OP's direction.
-    """
+class Profile(NamedTuple):
+    """Misfit along one feature: ends of each part, samples, mean and mean square of innovations, shape (b,) each."""
 
     low: Floats
     high: Floats
@@ -177,9 +174,9 @@ class Located:
 
 def standardized(e: Floats) -> Floats:
     """Power (cut) and sign of innovations about their mean, standardized, shape (n, 2)."""
-    power = np.minimum(e**2 / max(float(np.mean(e**2)), 1e-300), SIGNALS.outlier**2)
-    size = max(float(np.sqrt(np.mean(e**2))), 1e-300)
-    sign = np.clip(e / size, -SIGNALS.outlier, SIGNALS.outlier)
+    square = float(np.mean(e**2))
+    power = np.minimum(e**2 / max(square, 1e-300), SIGNALS.outlier**2)
+    sign = np.clip(e / max(math.sqrt(square), 1e-300), -SIGNALS.outlier, SIGNALS.outlier)
     y = np.stack([power, sign], axis=1)
     y -= y.mean(axis=0)
     return y / np.maximum(y.std(axis=0), 1e-12)
@@ -263,10 +260,8 @@ def profile(x: Floats, y: Floats) -> Profile:
 
 def part_of_range(height: Floats) -> tuple[int, int] | None:
     """First and last (included) place of the longest run of a profile well above its middle; None without one."""
-    if height.size < 4:
-        return None
     line = 0.5 * float(height.max() + np.median(height))
-    high = runs(height > line)
+    high = runs(height > line) if height.size >= 4 else []
     if not high:
         return None
     first, last = max(high, key=lambda run: height[run[0] : run[1]].sum())
@@ -281,31 +276,24 @@ def located(e: Floats, pv: Floats, op: Floats, judged: Mask, dt_s: float, late: 
     count = int(judged.sum())
     wanted = max(LOCATION.block_memories * memory, LOCATION.shortest_block)
     blocks = min(max(int(count / wanted), LOCATION.fewest_blocks), LOCATION.most_blocks)
-    found, local = groups(pv, op, dt_s, late, memory), np.zeros(e.size)
-    if count // blocks < max(memory, LOCATION.shortest_block) or float(np.ptp(e[judged])) == 0.0:
+    found, local, left = groups(pv, op, dt_s, late, memory), np.zeros(e.size), e[judged]
+    if count // blocks < max(memory, LOCATION.shortest_block) or float(np.ptp(left)) == 0.0:
         return Located((), local, found)
-    columns = [g.columns[judged] for g in found]
-    y = standardized(e[judged])
-    bases = directions(columns)
-    flat = np.concatenate(columns, axis=1)
+    columns, y = [g.columns[judged] for g in found], standardized(left)
+    bases, flat = directions(columns), np.concatenate(columns, axis=1)
     whole = _basis(flat - flat.mean(axis=0))
-    p, excess = chances(bases, y, blocks)
-    size = max(float(np.sqrt(np.mean(e[judged] ** 2))), 1e-300)
-    features = [
-        _feature(g, basis, y, float(p[i]), excess[i], e[judged] / size, judged)
-        for i, (g, basis) in enumerate(zip(found, bases, strict=True))
-    ]
+    scaled = left / max(float(np.sqrt(np.mean(left**2))), 1e-300)
+    features = []
+    for g, basis, p, excess in zip(found, bases, *chances(bases, y, blocks), strict=True):
+        own, by = ((basis.T @ y) ** 2).sum(axis=0) / y.shape[0], int(np.argmax(excess))
+        ends = _carrying_part(g, scaled, judged, by)
+        features.append(Feature(g.name, float(p), float(own[by]), ("power", "sign")[by], ends))
     local[judged] = np.maximum(_along(whole, y[:, :1])[:, 0], 0.0)
     return Located(tuple(sorted(features, key=lambda f: (f.p, -f.share))), local, found)
 
 
-def _feature(
-    g: Group, basis: Floats, y: Floats, p: float, excess: Floats, scaled: Floats, judged: Mask
-) -> Feature:
-    own = ((basis.T @ y) ** 2).sum(axis=0) / y.shape[0]
-    by = int(np.argmax(excess))
-    along = scaled if g.sense is None else scaled * g.sense[judged]
-    drawn = profile(g.signal[judged], along)
+def _carrying_part(g: Group, scaled: Floats, judged: Mask, by: int) -> tuple[float, ...]:
+    """Ends of the part of a feature's range in which innovations are large (by 0) or keep one sign; none without."""
+    drawn = profile(g.signal[judged], scaled if g.sense is None else scaled * g.sense[judged])
     run = part_of_range(drawn.power if by == 0 else np.abs(drawn.mean))
-    ends = () if run is None else (float(drawn.low[run[0]]), float(drawn.high[run[1]]))
-    return Feature(g.name, p, float(own[by]), ("power", "sign")[by], ends)
+    return () if run is None else (float(drawn.low[run[0]]), float(drawn.high[run[1]]))
