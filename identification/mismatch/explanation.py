@@ -233,24 +233,19 @@ def window_of(found: Explanation, s: Recording) -> int:
 
 def compared(found: Explanation, others: Sequence[Recording]) -> tuple[HeldOut, tuple[OnOther, ...]]:
     """The proof on other recordings: over the whole of each, or over windows where the whole shows the load alone."""
-    whole = _compared(found, others, [0] * len(others), False)
-    if whole[0].carries:
-        return whole
-    return _compared(found, others, [window_of(found, s) for s in others], found.proven.placed)
-
-
-def _compared(
-    found: Explanation, others: Sequence[Recording], windows: Sequence[int], placed: bool
-) -> tuple[HeldOut, tuple[OnOther, ...]]:
-    """The same over windows of each recording, 0 for the whole."""
-    p, drawn = found.p, found.proven.drawn
-    each = tuple(on_other(found, s, window) for s, window in zip(others, windows, strict=True))
-    samples = [x.samples for x in each]
-    held = together([x.baseline for x in each], samples), together([x.explained for x in each], samples)
-    window = round(windows[0] * others[0].dt_s / p.inputs.dt_s)
-    plain, better = (misfit(p.y, course(p, c, window, placed), window) for c in drawn)
-    seen = plain, better
-    return HeldOut(0.0, seen, held, seen, drawn, window, placed, limits=p.limits), each
+    p, drawn, over_all = found.p, found.proven.drawn, [0] * len(others)
+    own = [window_of(found, s) for s in others]
+    for windows, placed in ((over_all, False), (own, found.proven.placed)):
+        each = tuple(on_other(found, s, window) for s, window in zip(others, windows, strict=True))
+        samples = [x.samples for x in each]
+        held = together([x.baseline for x in each], samples), together([x.explained for x in each], samples)
+        window = round(windows[0] * others[0].dt_s / p.inputs.dt_s)
+        plain, better = (misfit(p.y, course(p, c, window, placed), window) for c in drawn)
+        seen = plain, better
+        proof = HeldOut(0.0, seen, held, seen, drawn, window, placed, limits=p.limits)
+        if proof.carries:
+            break
+    return proof, each
 
 
 def proven_on(found: Explanation, others: Sequence[Recording]) -> Explanation:
