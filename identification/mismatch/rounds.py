@@ -22,7 +22,7 @@ from identification.mismatch.selection import (
     penalty,
     without,
 )
-from identification.mismatch.starts import CandidateInputs, candidate_inputs
+from identification.mismatch.starts import Round, round_of
 from identification.models import Stiction
 
 
@@ -46,8 +46,8 @@ def one_by_one(found: Explanation, tell: Progress, s: Recording) -> tuple[Explan
     limits, candidates = found.p.limits.search, list[Candidate]()
     has_rivals = s.cycles is None and not s.free_valve and not is_experiment(s)
     for _ in range(limits.rounds):
-        x = candidate_inputs(found.p, found.best, s)
-        candidates = compete(x, found.best, (*CANDIDATES, *RIVALS) if has_rivals else CANDIDATES, tell)
+        x = round_of(found.p, found.best, s)
+        candidates = compete(x, (*CANDIDATES, *RIVALS) if has_rivals else CANDIDATES, tell)
         if s.cycles is not None and not found.accepted:
             candidates = with_cycles(x.p, found.best, s.cycles, candidates)
         if not found.first:
@@ -121,14 +121,12 @@ def as_a_set(found: Explanation, tell: Progress, s: Recording) -> Explanation:
     told = shown_by_cycles(s, accepted[:1]) is not None
     if not told:
         tell("other sets of effects")
-        best, accepted = replacement_step(candidate_inputs(p, best, s), best, accepted, tell)
+        best, accepted = replacement_step(round_of(p, best, s), accepted, tell)
     best, accepted = without_the_idle(p, best, accepted, int(told))
     return replace(found, best=best, accepted=tuple(accepted))
 
 
-def replacement_step(
-    x: CandidateInputs, best: Fitted, accepted: list[Candidate], tell: Progress
-) -> tuple[Fitted, list[Candidate]]:
+def replacement_step(x: Round, accepted: list[Candidate], tell: Progress) -> tuple[Fitted, list[Candidate]]:
     """The accepted effects, each given up once for whatever does better beside the others: another, or another way
     of the same.
 
@@ -136,14 +134,14 @@ def replacement_step(
     experiment none bound to a time takes the place of one that lasts, for through whatever a model lacks a course can
     be drawn.
     """
-    limits = x.p.limits.search
+    limits, best = x.p.limits.search, x.near
     for i, old in enumerate(accepted):
         lasts = x.p.by_simulation and not EFFECTS[old.name].timed
         near = descended(x.p, without(best.model, [old.row]), limits.full_steps)
         least = max(gain(best, near) - penalty(x.p, old.row) + limits.tie, 0.0)
         others = (
             c
-            for c in compete(x, near, CANDIDATES, tell, least)
+            for c in compete(replace(x, near=near), CANDIDATES, tell, least)
             if (c.name, c.row.label) != (old.name, old.row.label) and not (lasts and EFFECTS[c.name].timed)
         )
         first = next(others, None)
