@@ -154,7 +154,7 @@ def errors_along(g: Group, fit: Fitted, judged: Mask, by: str) -> tuple[Floats, 
     """Places along a feature, mean (or size) of a fit's one-step errors there, and two standard errors, (m,) each."""
     errors = fit.e[judged] if by == "power" or g.sense is None else fit.e[judged] * g.sense[judged]
     found = profile(g.signal[judged], errors)
-    half, place = ERRORS * np.sqrt(found.power / found.count), 0.5 * (found.low + found.high)
+    half, place = ERRORS * np.sqrt(found.power / found.samples), 0.5 * (found.low + found.high)
     return (place, np.sqrt(found.power), half / np.sqrt(2.0)) if by == "power" else (place, found.mean, half)
 
 

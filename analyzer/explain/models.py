@@ -53,23 +53,25 @@ def read_model(path: Path, loop: str) -> dict[str, Any]:
 
 def checked(data: Mapping[str, Any], path: Path) -> None:
     """Raise InputError where a number of a model is none."""
-    held = data["constants"] if isinstance(data["constants"], dict) else {}
-    placed = {k: data.get(k, 0.0) for k in ("middle_op_pct", "level_pv_pct", "late_s")}
-    scale, most = data["scale"] if isinstance(data.get("scale"), dict) else {}, EXPLAIN.largest
+
+    def refused(seen: str, expected: str, todo: str = "save the model anew") -> InputError:
+        return InputError(f"{path}: {seen}", expected, todo)
+
+    held, scale = (data[k] if isinstance(data.get(k), dict) else {} for k in ("constants", "scale"))
+    placed, most = {k: data.get(k, 0.0) for k in ("middle_op_pct", "level_pv_pct", "late_s")}, EXPLAIN.largest
     for name, value in {**held, **placed, **scale}.items():
         number = not isinstance(value, bool) and isinstance(value, int | float)
         if not number or not abs(value) <= most:  # false of NaN
-            seen, wanted = f"{path}: {name} is {str(value)[:40]}", f"a number of at most {most:g} in size"
-            raise InputError(seen, wanted, "correct it or save the model anew")
+            wanted, todo = f"a number of at most {most:g} in size", "correct it or save the model anew"
+            raise refused(f"{name} is {str(value)[:40]}", wanted, todo)
     for name in ("pv_span", "op_span"):
         if name in scale and not scale[name] > 0:
-            raise InputError(f"{path}: {name} is {scale[name]:g}", "a span above 0", "save the model anew")
+            raise refused(f"{name} is {scale[name]:g}", "a span above 0")
     if not held.get("CLIP_LO", -most) < held.get("CLIP_HI", most) or held.get("RATE", 1.0) <= 0:
-        seen = f"{path}: limits that nothing fits between"
-        raise InputError(seen, "CLIP_LO below CLIP_HI, RATE above 0", "save the model anew")
+        raise refused("limits that nothing fits between", "CLIP_LO below CLIP_HI, RATE above 0")
     if data.get("version", VERSION) != VERSION:
-        seen = f"{path}: a model of version {str(data['version'])[:20]}"
-        raise InputError(seen, f"version {VERSION}", "save it anew with this triage")
+        seen = f"a model of version {str(data['version'])[:20]}"
+        raise refused(seen, f"version {VERSION}", "save it anew with this triage")
     constants(dict(data))
 
 

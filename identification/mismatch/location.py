@@ -131,7 +131,7 @@ class Profile(NamedTuple):
 
     low: Floats
     high: Floats
-    count: Floats
+    samples: Floats
     mean: Floats
     power: Floats
 

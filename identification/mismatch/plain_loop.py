@@ -61,7 +61,8 @@ def prepared(
     limits: ExplainLimits = LIMITS,
     experiment: bool = False,
 ) -> tuple[Problem, Fitted]:
-    """A problem whose outliers count less, and its plain fit; an experiment's is judged by simulation.
+    """A problem whose outliers count less, and its plain fit; an experiment's is judged by simulation, with the
+    memory of what the most flexible model leaves: the nearest to its noise.
 
     Samples at a clip are left out; those after them still count, and the model is clipped too. `brought` are the
     constants of the user's own model, shape (SIZE,), one start more.
@@ -72,7 +73,10 @@ def prepared(
     first = plain(p, brought, clip)
     calm = replace(p, weight=robust_weights(first.e, p.weight > 0))
     fit = descended(calm, first.model, p.limits.search.full_steps)
-    return with_memory(calm, fit) if experiment else (calm, fit)
+    if experiment:
+        calm = replace(calm, memory=correlated(left_freely(calm, fit)[calm.weight > 0]))
+        fit = replace(fit, count=calm.independent(fit.e))
+    return calm, fit
 
 
 def plain(p: Problem, brought: Floats | None = None, clip: Clip | None = None) -> Fitted:
@@ -88,10 +92,3 @@ def plain(p: Problem, brought: Floats | None = None, clip: Clip | None = None) -
             c[clip.slot] = clip.value
     fits = [descended(p, Model((), c), p.limits.search.full_steps) for c in starts]
     return min(fits, key=lambda fit: fit.loss)
-
-
-def with_memory(p: Problem, fit: Fitted) -> tuple[Problem, Fitted]:
-    """An experiment and its fit, with the memory of what the most flexible model leaves: the nearest to its noise."""
-    left = left_freely(p, fit)
-    known = replace(p, memory=correlated(left[p.weight > 0]))
-    return known, replace(fit, count=known.independent(fit.e))
