@@ -161,7 +161,7 @@ def effects_of(found: Explanation, s: Recording) -> tuple[EffectFound, ...]:
     interval. A simulation with one friction over hours knows them less well, and takes them for surer.
     """
     gates = [
-        EffectFound(f.name, own.block, {n.name: n.estimate(f, s) for n in own.numbers}, None)
+        EffectFound(f.name, own.block, own.numbers(f, s), None)
         for f in (found.recorder, found.controller)
         if f is not None and (own := fault(f.name))
     ]

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from identification.mismatch.effect import Block, Ends, Fault, Finding, Floats, Number, Recording
+from identification.mismatch.effect import Block, Ends, Fault, Finding, Floats, Recording, exact
 from identification.mismatch.pictures import PV, TIME, WINDOW, Drawn, Picture, busiest
 from identification.mismatch.recording import straight, straightened
 
@@ -33,6 +33,7 @@ EFFECT = Fault(
     order=0,
     find=straight_segments,
     ends=Ends.ALL,
-    numbers=(Number("straight_share", "", "Samples on straight lines"),),
+    numbers=lambda found, _: {"straight_share": exact(found.values["straight_share"], "")},
+    titles={"straight_share": "Samples on straight lines"},
     drawn=straight_lines,
 )

@@ -3,7 +3,7 @@
 import numpy as np
 
 from identification.limits import RecorderLimits
-from identification.mismatch.effect import Block, Ends, Fault, Finding, Floats, Number, Recording
+from identification.mismatch.effect import Block, Ends, Fault, Finding, Floats, Recording, within
 from identification.mismatch.pictures import PV, Picture, comb
 from identification.mismatch.recording import STEP, level_gaps
 
@@ -51,6 +51,7 @@ EFFECT = Fault(
     order=2,
     find=coarse_grid,
     ends=Ends.SMALLER,
-    numbers=(Number("step_pct", "% PV", "Step of values", share=0.01),),
+    numbers=lambda found, _: {STEP: within(0.01, found.values[STEP], "% PV")},
+    titles={STEP: "Step of values"},
     drawn=grid,
 )
