@@ -63,11 +63,8 @@ def explain(s: Recording, tell: Progress = silent, brought: Floats | None = None
 
 def recorder_finding_of(s: Recording) -> Finding | None:
     """The first thing that the recorder did to the trends."""
-    for effect in RECORDER_FAULTS:
-        found = effect.find(s) if effect.find is not None else None
-        if found is not None:
-            return replace(found, name=effect.name)
-    return None
+    found = ((effect.name, effect.find(s)) for effect in RECORDER_FAULTS if effect.find is not None)
+    return next((replace(finding, name=name) for name, finding in found if finding is not None), None)
 
 
 def controller_finding_of(s: Recording, recorder: Finding | None) -> tuple[Finding | None, ControlLaw | None]:
