@@ -107,7 +107,7 @@ def groups(pv: Floats, op: Floats, dt_s: float, late: int, memory: int) -> tuple
     """
     o, before = delayed(op, late + PAST), delayed(pv, PAST)
     way, since = turns(o, least_turn(o))
-    since_s, window = since * dt_s, max(memory // 4, 1)
+    since_s, window = since * dt_s, min(max(memory // 4, 1), pv.size)
     travel = np.abs(o - delayed(o, window)) / (window * dt_s)
     fading = np.exp(-since_s / (max(memory, 2) * dt_s))
     rate = ranked(travel) - 0.5

@@ -75,7 +75,7 @@ def located_in(p: Problem, fit: Fitted, s: Recording) -> Located:
     late_s, lag_s = float(fit.model.c[Slot.L]), float(fit.model.c[Slot.T])
     late = min(round(late_s / s.dt_s), s.pv.size // 4)
     memory = max(round((late_s + lag_s) / s.dt_s), LOCATION.least_memory)
-    return located(fit.e, s.pv, s.op, p.weight > 0, s.dt_s, late, min(memory, s.pv.size))
+    return located(fit.e, s.pv, s.op, p.weight > 0, s.dt_s, late, memory)
 
 
 def won_over(p: Problem, plain: Fitted, best: Fitted) -> tuple[Floats, Floats]:
