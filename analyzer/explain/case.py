@@ -242,15 +242,7 @@ def parts(
 ) -> list[Part]:
     """The parts of a recording, the one with most samples first; one where nothing changed.
 
-    Parameters
-    ----------
-    spec : LoopSpec
-    series : mapping
-        The recording's trends by tag, PV's among them.
-    changes : sequence of TuningChange
-        Of any loops.
-    zone : str
-        The plant's time zone, in which parts are named.
+    series : trends by tag, PV's among them; changes : of any loops; zone : the plant's, in which parts are named.
     """
     stamps = series[spec.pv or ""].stamp_s
     first, last = float(stamps[0]), float(stamps[-1])

@@ -5,16 +5,16 @@ from __future__ import annotations
 import numpy as np
 
 from analyzer.explain.explained import Explained
-from analyzer.explain.words import BROUGHT, CURVES, FEATURES, ROWS, caption
+from analyzer.explain.words import CURVES, FEATURES, NOTES, ROWS, TOLD
 from analyzer.pages.words import number
 from identification.estimation.prediction_error import Fitted
 from identification.mismatch.catalogue import fault
-from identification.mismatch.location import Feature, Group, Located, groups, profile
+from identification.mismatch.location import Feature, Group, profile
 from identification.mismatch.outside import about
 from identification.mismatch.pictures import Drawing, Picture, busiest, by_stated_law
 from identification.mismatch.proof import course
 from identification.mismatch.where import located_in, won_over
-from identification.record import Floats
+from identification.record import Floats, Mask
 from identification.simulation.open_loop import simulate
 from identification.simulation.parameters import Slot
 from reports.pages import Area, Band, Line, Mark, Panels, Plot, Trend
@@ -37,7 +37,7 @@ SPECTRUM_POINTS = 120
 """Points of a spectrum."""
 ERRORS = 2.0
 """Half width of a profile's band in standard errors."""
-LABELS = {"baseline": ROWS["baseline"], "model": "improved", "brought": BROUGHT}
+LABELS = {"baseline": ROWS["baseline"], "model": "improved", "brought": ROWS["brought"]}
 SHORT = {"baseline": ROWS["baseline"], "model": ROWS["explained"]}
 
 
@@ -57,15 +57,14 @@ def simulations(e: Explained) -> dict[str, Floats]:
 
 def drawn_trends(e: Explained) -> tuple[Trend, ...]:
     """The whole recording, and the stretch that tells most at full resolution."""
-    marked = "Shaded: the spans that carry the misfit. " if e.said.where.get("spans") else ""
-    how = "Drag, or the wheel with Ctrl, zooms; shift-drag or arrows move, double click shows all."
-    drawn, n = signals(e), e.case.subject.pv.size
-    first = trend(e, drawn, slice(0, n), WHOLE, ("recording", "The whole recording", marked + how))
-    part = close_part(e)
+    marked = bool(e.said.where.get("spans"))
+    drawn, n, part = signals(e), e.case.subject.pv.size, close_part(e)
+    how = NOTES["shaded"] * marked + NOTES["zoom"]
+    whole = trend(e, drawn, slice(0, n), WHOLE, ("recording", "The whole recording", how))
     if part.stop - part.start >= n:
-        return (first,)
+        return (whole,)
     title = "A closer look where the misfit is" if marked else "A closer look where OP moves most"
-    return first, trend(e, drawn, part, CLOSE, ("closer", title, "Each sample, as recorded."))
+    return whole, trend(e, drawn, part, CLOSE, ("closer", title, "Each sample, as recorded."))
 
 
 def signals(e: Explained) -> list[tuple[str, str, int, Floats]]:
@@ -123,23 +122,16 @@ def weight(e: Explained) -> Floats:
 
 def misfit_panels(e: Explained) -> Panels:
     """The one-step errors along each feature that a table does not say better, and the spectrum, before and after."""
-    found, s = e.found, e.case.subject
-    at: Located = located_in(found.p, found.plain, s)
-    known, c = {f.name: f for f in at.features}, found.plain.model.c
-    late, memory = float(c[Slot.L]) / s.dt_s, float(c[Slot.L] + c[Slot.T]) / s.dt_s
-    along = groups(s.pv, s.op, s.dt_s, min(round(late), s.pv.size // 4), max(round(memory), 2))
-    plots = [feature_plot(e, g, known.get(g.name)) for g in along if "axis" in FEATURES[g.name]]
-    said = (
-        "One-step errors: simulation plus noise model against PV, sample by sample; bands are two standard errors. "
-        "A sound model lies flat."
-    )
-    plots.append(spectrum_plot(e))
-    return Panels("misfit", "The misfit along what the loop was doing", tuple(plots), said)
+    at = located_in(e.found.p, e.found.plain, e.case.subject)
+    known = {f.name: f for f in at.features}
+    along = (feature_plot(e, g, known.get(g.name)) for g in at.groups if "axis" in FEATURES[g.name])
+    plots = *along, spectrum_plot(e)
+    return Panels("misfit", "The misfit along what the loop was doing", plots, NOTES["misfit"])
 
 
 def feature_plot(e: Explained, g: Group, f: Feature | None) -> Plot:
     """Mean (or size) of the one-step errors along one feature, before and after, with two standard errors."""
-    judged, by = e.found.p.weight > 0, "sign" if f is None else f.of
+    judged, by = e.found.p.weight > 0, "sign" if f is None else f.by
     fits = {"baseline": e.found.plain} | ({"model": e.found.best} if e.found.accepted else {})
     known = FEATURES[g.name]
     log = "powers" in known and float(g.signal[judged].max(initial=0.0)) > 0
@@ -150,23 +142,20 @@ def feature_plot(e: Explained, g: Group, f: Feature | None) -> Plot:
             x = np.maximum(x, 0.5 * np.min(x[x > 0], initial=np.inf))
         lines.append(Line(SHORT[kind], x, y, kind=kind))
         areas.append(Area(x, y - half, y + half, kind))
-    along = " along OP's direction" if by == "sign" and g.sense is not None else ""
-    label = "size of errors [% PV]" if by == "power" else f"mean error{along} [% PV]"
+    along = " along OP's direction" if g.sense is not None else ""
+    middle, label = (1.0, "size of errors") if by == "power" else (0.0, f"mean error{along}")
     size = float(np.sqrt(np.mean(fit.e[judged] ** 2)))
-    reach = (1 - SEEN, 1 + SEEN) if by == "power" else (-SEEN, SEEN)
-    ends, words = (reach[0] * size, reach[1] * size), (known["title"], known["axis"], label)
-    return Plot(
-        f"misfit-{g.name}", *words, tuple(lines), (), note_of(f), tuple(areas), "x" if log else "", ends
-    )
+    ends = (middle - SEEN) * size, (middle + SEEN) * size
+    words = f"misfit-{g.name}", known["title"], known["axis"], f"{label} [% PV]"
+    return Plot(*words, tuple(lines), (), note_of(f), tuple(areas), "x" if log else "", ends)
 
 
-def errors_along(g: Group, fit: Fitted, judged: np.ndarray, by: str) -> tuple[Floats, Floats, Floats]:
+def errors_along(g: Group, fit: Fitted, judged: Mask, by: str) -> tuple[Floats, Floats, Floats]:
     """Places along a feature, mean (or size) of a fit's one-step errors there, and two standard errors, (m,) each."""
     errors = fit.e[judged] if by == "power" or g.sense is None else fit.e[judged] * g.sense[judged]
     found = profile(g.signal[judged], errors)
-    y = np.sqrt(found.power) if by == "power" else found.mean
-    half = ERRORS * np.sqrt(found.power / found.count) / (np.sqrt(2.0) if by == "power" else 1.0)
-    return 0.5 * (found.low + found.high), y, half
+    half, place = ERRORS * np.sqrt(found.power / found.samples), 0.5 * (found.low + found.high)
+    return (place, np.sqrt(found.power), half / np.sqrt(2.0)) if by == "power" else (place, found.mean, half)
 
 
 def note_of(f: Feature | None) -> str:
@@ -181,9 +170,8 @@ def spectrum_plot(e: Explained) -> Plot:
     pv, dt_s = recorded_pv(e), e.case.subject.dt_s
     left = {k: pv - x for k, x in simulations(e).items() if k != "brought"}
     lines = tuple(Line(SHORT[k], *spectrum(x, dt_s), kind=k) for k, x in left.items())
-    note = "Load and noise are in it as well: they stay."
-    title = "Spectrum of what is left"
-    return Plot("misfit-spectrum", title, "period [s]", "% PV per octave", lines, (), note, (), "x")
+    words = "misfit-spectrum", "Spectrum of what is left", "period [s]", "% PV per octave"
+    return Plot(*words, lines, (), NOTES["spectrum"], (), "x")
 
 
 def spectrum(x: Floats, dt_s: float) -> tuple[Floats, Floats]:
@@ -201,42 +189,37 @@ def spectrum(x: Floats, dt_s: float) -> tuple[Floats, Floats]:
 def found_plot(e: Explained) -> Plot | None:
     """The picture of what has no name and explains the loop best, else of the first effect found."""
     found, said, finding = e.found, e.said, e.found.finding
-    inputs = found.p.inputs
+    inputs, plain = found.p.inputs, found.plain.model.c
     if finding is not None:
-        free = found.plain.model.c.copy()
+        free, shown = plain.copy(), fault(finding.name)
         free[Slot.CLIP_HI], free[Slot.CLIP_LO] = np.inf, -np.inf
-        drawn = fault(finding.name).drawn
-        shape = (
-            None if drawn is None else drawn(finding, e.case.subject, inputs.level + simulate(inputs, free))
-        )
-        return _if_shown(shape)
+        model = inputs.level + simulate(inputs, free)
+        return shape_plot(shown.drawn and shown.drawn(finding, e.case.subject, model), shown.caption)
     if said.outside is not None and found.outside is not None:
-        fit, added, known = found.outside.fit, found.outside.row, said.outside.parameters
+        fit, known = found.outside.fit, said.outside.parameters
+        added = found.outside.row
     elif found.accepted:
-        fit, added, known = found.best, found.best.model.added[0], said.effects[0].parameters
+        fit, known = found.best, said.effects[0].parameters
+        added = fit.model.added[0]
     else:
         return None
-    curve = about(added.name).curve
-    drawing = Drawing(inputs, added, known, fit.model.c, found.plain.model.c)
-    return _if_shown(None if curve is None else curve(drawing))
-
-
-def _if_shown(shape: Picture | None) -> Plot | None:
-    if shape is None:
-        return None
-    what = f"{shape.y.what} over {shape.x.what}"
-    return shape_plot(shape, "shape", what[:1].upper() + what[1:])
+    effect = about(added.name)
+    drawing = Drawing(inputs, added, known, fit.model.c, plain)
+    return shape_plot(effect.curve and effect.curve(drawing), effect.caption)
 
 
 def law_plot(e: Explained) -> Plot | None:
     """OP rebuilt by the stated settings where nothing is wrong with them."""
-    sound = e.found.controller is None and e.found.law is not None
-    shape = by_stated_law("controller", e.case.subject) if sound else None
-    return None if shape is None else shape_plot(shape, "law", "OP rebuilt and recorded")
+    if e.found.controller is not None or e.found.law is None:
+        return None
+    shape, said = by_stated_law(e.case.subject), NOTES["sound_controller"]
+    return shape_plot(shape, said, "law", "OP rebuilt and recorded")
 
 
-def shape_plot(shape: Picture, name: str, title: str) -> Plot:
-    """A shape as a plot: what was recorded below, what was found above."""
+def shape_plot(shape: Picture | None, said: str, name: str = "shape", title: str = "") -> Plot | None:
+    """A shape as a plot: what was recorded below, what was found above; `said` of it, or what its kind says."""
+    if shape is None:
+        return None
     lines, areas = [], []
     for d in sorted(shape.curves, key=lambda d: CURVES[d.name]["above"]):
         kind = CURVES[d.name]["kind"]
@@ -245,5 +228,6 @@ def shape_plot(shape: Picture, name: str, title: str) -> Plot:
             areas.append(Area(d.x, d.low, d.high, kind))
     marks = tuple(Mark(x, number(x)) for x in shape.places)
     across, along = (f"{a.what} [{a.unit}]" if a.unit else a.what for a in (shape.x, shape.y))
-    said = caption(shape.effect, shape.kind)
-    return Plot(name, title, across, along, tuple(lines), marks, said, tuple(areas))
+    what = f"{shape.y.what} over {shape.x.what}"
+    words = name, title or what[:1].upper() + what[1:], across, along
+    return Plot(*words, tuple(lines), marks, said or TOLD["shapes"].get(shape.kind, ""), tuple(areas))

@@ -53,23 +53,25 @@ def read_model(path: Path, loop: str) -> dict[str, Any]:
 
 def checked(data: Mapping[str, Any], path: Path) -> None:
     """Raise InputError where a number of a model is none."""
-    held = data["constants"] if isinstance(data["constants"], dict) else {}
-    placed = {k: data.get(k, 0.0) for k in ("middle_op_pct", "level_pv_pct", "late_s")}
-    scale, most = data["scale"] if isinstance(data.get("scale"), dict) else {}, EXPLAIN.largest
+
+    def refused(seen: str, expected: str, todo: str = "save the model anew") -> InputError:
+        return InputError(f"{path}: {seen}", expected, todo)
+
+    held, scale = (data[k] if isinstance(data.get(k), dict) else {} for k in ("constants", "scale"))
+    placed, most = {k: data.get(k, 0.0) for k in ("middle_op_pct", "level_pv_pct", "late_s")}, EXPLAIN.largest
     for name, value in {**held, **placed, **scale}.items():
         number = not isinstance(value, bool) and isinstance(value, int | float)
         if not number or not abs(value) <= most:  # false of NaN
-            seen, wanted = f"{path}: {name} is {str(value)[:40]}", f"a number of at most {most:g} in size"
-            raise InputError(seen, wanted, "correct it or save the model anew")
+            wanted, todo = f"a number of at most {most:g} in size", "correct it or save the model anew"
+            raise refused(f"{name} is {str(value)[:40]}", wanted, todo)
     for name in ("pv_span", "op_span"):
         if name in scale and not scale[name] > 0:
-            raise InputError(f"{path}: {name} is {scale[name]:g}", "a span above 0", "save the model anew")
+            raise refused(f"{name} is {scale[name]:g}", "a span above 0")
     if not held.get("CLIP_LO", -most) < held.get("CLIP_HI", most) or held.get("RATE", 1.0) <= 0:
-        seen = f"{path}: limits that nothing fits between"
-        raise InputError(seen, "CLIP_LO below CLIP_HI, RATE above 0", "save the model anew")
+        raise refused("limits that nothing fits between", "CLIP_LO below CLIP_HI, RATE above 0")
     if data.get("version", VERSION) != VERSION:
-        seen = f"{path}: a model of version {str(data['version'])[:20]}"
-        raise InputError(seen, f"version {VERSION}", "save it anew with this triage")
+        seen = f"a model of version {str(data['version'])[:20]}"
+        raise refused(seen, f"version {VERSION}", "save it anew with this triage")
     constants(dict(data))
 
 
@@ -127,12 +129,8 @@ def within(ratio: float, ends: tuple[float, float]) -> bool:
 def wrong_units(own: Floats, found: Mapping[str, float]) -> str:
     """What looks wrong with a model's units against the process as identified; empty where nothing does.
 
-    Parameters
-    ----------
-    own : ndarray of shape (SIZE,)
-        Constants of the user's model.
-    found : mapping
-        gain [% PV/% OP] and time_constant_s of the plain loop fitted to the recording.
+    own : constants of the user's model, shape (SIZE,); found : gain [% PV/% OP] and time_constant_s of the plain loop
+    fitted to the recording.
     """
     gain, lag_s = found["gain"], found["time_constant_s"]
     its, said = f"its gain, {own[Slot.K]:.3g},", []
@@ -171,6 +169,11 @@ def saved_scale(data: Mapping[str, Any], now: Scale) -> Scale:
     return Scale(low, span, op_low, op_span, now.recorded)
 
 
+def rescaled(now: Scale, then: Scale, pv: Floats, op: Floats) -> tuple[Floats, Floats]:
+    """PV (or SP) and OP, shape (n,) each, in the percent of another recording's ranges."""
+    return then.pv_pct(now.low + pv * now.span / 100.0), then.op_pct(now.op_low + op * now.op_span / 100.0)
+
+
 def simulated(c: Case, data: dict[str, Any], stamps: Floats, closed: bool) -> tuple[Floats, Floats]:
     """PV and OP in their own units at each stamp, from a saved model run open loop or, if wished, closed.
 
@@ -179,10 +182,10 @@ def simulated(c: Case, data: dict[str, Any], stamps: Floats, closed: bool) -> tu
     InputError
         The loop is to be closed and its controller is not known.
     """
-    r, law = c.prepared.record, c.subject.stated
-    scale, now = saved_scale(data, c.prepared.scale), c.prepared.scale
-    sp, pv = (scale.pv_pct(now.low + x * now.span / 100.0) for x in (r.sp, r.pv))
-    op = scale.op_pct(now.op_low + r.op * now.op_span / 100.0)
+    r, law, now = c.prepared.record, c.subject.stated, c.prepared.scale
+    scale = saved_scale(data, now)
+    pv, op = rescaled(now, scale, r.pv, r.op)
+    sp, _ = rescaled(now, scale, r.sp, r.op)
     if closed and law is None:
         seen = f"{c.spec.loop}: no settings of its controller"
         raise InputError(seen, "kp and ti", "state them in loops.csv")

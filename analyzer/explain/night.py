@@ -7,7 +7,7 @@ loop with verdict, block, reason, the whole answer as JSON and its page as it is
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -97,20 +97,6 @@ def questions(batch: Batch, rows: Sequence[Mapping[str, Any]], night: Night) -> 
     ]
 
 
-def _answer_rows(asked: Sequence[Question], jobs: int, config: Config) -> Iterator[Row]:
-    from analyzer.explain.explained import abstained
-
-    with executor(jobs, len(asked), answered, config.workers) as workers:
-        for q in asked:
-            workers.submit(q)
-        for result in workers.results():
-            if isinstance(result, Died):
-                q = result.task
-                yield answer_row(abstained(q.spec.loop, f"not explained: {result.why}"), q.night.name)
-            else:
-                yield result
-
-
 def known(store: Store, night: str) -> list[Row]:
     """Rows that the store holds of a night; none where nothing was explained."""
     held = store.read_if_there(TABLE, night)
@@ -129,26 +115,14 @@ def explain_flagged(
     resume: bool = False,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> list[Row]:
-    """Explain the flagged loops of an assessed night and keep the answers.
+    """Explain the flagged loops of an assessed night and keep the answers: the rows, in the order in which they came.
 
-    Parameters
-    ----------
-    batch : Batch
-        Whose store holds the night.
-    night : Night
-    jobs : int
-        Worker processes; 0 works in this one.
-    resume : bool
-        Leave out loops that the store holds an answer of.
-    progress : callable
-        Called with loops done and loops in all.
-
-    Returns
-    -------
-    list of dict
-        The rows kept, in the order in which they came.
+    batch : whose store holds the night; jobs : worker processes, 0 works in this one; resume : leave out loops that
+    the store holds an answer of; progress : called with loops done and loops in all.
     """
-    store = batch.store
+    from analyzer.explain.explained import abstained
+
+    store, config = batch.store, batch.config
     asked = questions(batch, store.read("nights", night.name, ASKED).to_pylist(), night)
     names = {q.spec.loop for q in asked}
     rows = [r for r in known(store, night.name) if resume or r["loop"] not in names]
@@ -156,8 +130,14 @@ def explain_flagged(
     left = [q for q in asked if q.spec.loop not in done]
     keep(store, night.name, rows)
     progress(len(done), len(asked))
-    for at, row in enumerate(_answer_rows(left, jobs, batch.config), len(done) + 1):
-        rows.append(row)
-        keep(store, night.name, rows)
-        progress(at, len(asked))
+    with executor(jobs, len(left), answered, config.workers) as workers:
+        for q in left:
+            workers.submit(q)
+        for at, result in enumerate(workers.results(), len(done) + 1):
+            if isinstance(result, Died):
+                why = abstained(result.task.spec.loop, f"not explained: {result.why}")
+                result = answer_row(why, night.name)
+            rows.append(result)
+            keep(store, night.name, rows)
+            progress(at, len(asked))
     return [r for r in rows if r["loop"] in names]

@@ -9,7 +9,7 @@ import numpy as np
 
 from analyzer.explain import drawings, words
 from analyzer.explain.explained import Explained
-from analyzer.explain.words import number_text, places, rms, share, title
+from analyzer.explain.words import NOTES, number_text, places, rms, share, title
 from analyzer.history.plant_clock import UTC_NAME
 from analyzer.pages.words import duration, number, stamp
 from identification.mismatch.words import check, located_sentence, seen_ahead, two_plain_loops
@@ -17,39 +17,38 @@ from reports.pages import Block, Facts, Page, Section, Table, Text, Tiles
 from reports.texts import slug
 
 Data = Mapping[str, Any]
-UNTESTED = "The record holds too few memories of the loop for a test of where."
-FIT = "Fit % is 100 where the simulation is exact and 0 where the mean does as well; load and noise keep it lower."
 
 
 def explanation_page(e: Explained, zone: str = UTC_NAME) -> Page:
     """The page of one loop's explanation, with times on the plant's clock."""
+    data, named = e.data, bool(e.found.accepted)
     with np.errstate(all="ignore"):  # a model that runs away is drawn as far as it goes
         sections = (
-            Section("What it is", _verdict_blocks(e)),
-            Section("Recording and simulation", drawings.drawn_trends(e)),
-            Section("What was found", _found(e)),
-            Section("Where the misfit lives", (*_where_blocks(e.data), drawings.misfit_panels(e))),
-            Section(
-                "How well it fits", (words.misfits(e.data, _fit_note(e)), *_if_filled(words.others(e.data)))
-            ),
-            Section("What it could also be", _if_filled(words.alternatives(e.data))),
-            Section(
-                "All that was tried",
-                _if_filled(words.tried(e.found.first, e.found.accepted)),
-                closed=bool(e.found.accepted),
-            ),
-            Section("Does the controller do what is stated?", _controller_blocks(e), closed=True),
+            _section("What it is", *_verdict_blocks(e)),
+            _section("Recording and simulation", *drawings.drawn_trends(e)),
+            _section("What was found", drawings.found_plot(e), words.parameters(data), words.moved(data)),
+            _section("Where the misfit lives", *_where_blocks(data), drawings.misfit_panels(e)),
+            _section("How well it fits", words.misfits(data, _fit_note(e)), words.others(data)),
+            _section("What it could also be", words.alternatives(data)),
+            _section("All that was tried", words.tried(e.found.first, e.found.accepted), closed=named),
+            _section("Does the controller do what is stated?", *_controller_blocks(e), closed=True),
         )
     spec = e.case.spec
     about = [spec.description, spec.type, spec.area, _recorded_line(e, zone)]
     return Page(
         f"{slug(spec.loop)}-explained",
         f"{spec.loop}: {title(e.said.verdict)}",
-        ", ".join(a for a in about if a),
+        ", ".join(filter(None, about)),
         tuple(s for s in sections if s.blocks),
         footer=_footer(e),
         zone=zone,
     )
+
+
+def _section(name: str, *blocks: Block | None, closed: bool = False) -> Section:
+    """A section of what there is: neither of pictures that could not be drawn nor of tables without rows."""
+    shown = (b for b in blocks if b is not None and (not isinstance(b, Table) or b.rows))
+    return Section(name, tuple(shown), closed=closed)
 
 
 def abstention(data: Data) -> Page:
@@ -74,13 +73,9 @@ def _footer(e: Explained) -> str:
     return f"Percent of PV are {how}{pv}; percent of OP of {op}. Intervals are 90 %."
 
 
-def _if_filled(table: Table) -> tuple[Block, ...]:
-    return (table,) if table.rows else ()
-
-
-def _verdict_blocks(e: Explained) -> tuple[Block, ...]:
-    brought = [] if e.brought is None else [Text((e.brought.note,))]
-    return (Text((e.data["reason"],), "lead"), Text((check(e.data),)), *brought, Tiles(tuple(_tiles(e))))
+def _verdict_blocks(e: Explained) -> tuple[Block | None, ...]:
+    brought = None if e.brought is None else Text((e.brought.note,))
+    return Text((e.data["reason"],), "lead"), Text((check(e.data),)), brought, Tiles(tuple(_tiles(e)))
 
 
 def _tiles(e: Explained) -> list[tuple[str, str, str]]:
@@ -90,26 +85,19 @@ def _tiles(e: Explained) -> list[tuple[str, str, str]]:
     if e.found.accepted:
         horizon = d["fit"]["horizon_s"]
         over = f"within windows of {duration(horizon)}" if horizon else "over the recording"
-        less = "better" if e.found.proven.falls else ""
-        tiles.append(
-            (f"{rms(plain.rmse)} → {rms(better.rmse)}", f"rms misfit {over}, plain and improved", less)
-        )
+        both, less = f"{rms(plain.rmse)} → {rms(better.rmse)}", "better" if e.found.proven.falls else ""
+        tiles.append((both, f"rms misfit {over}, plain and improved", less))
     else:
         rest = ": load and noise" if d["verdict"] == "none" else ""
         tiles.append((rms(plain.rmse), f"rms misfit of the plain simulation{rest}", ""))
     held = next((x["held_out_share"] for x in d["effects"] if x["held_out_share"] is not None), None)
     if held is not None:
         tiles.append((share(held), "of the misfit on held-out data removed", "better"))
-    others = d["effects"][0]["alternatives"] if d["effects"] else []
-    if others:
-        tiles.append((str(len(others)), "other names fit as well or look alike", "incomparable"))
+    for first in d["effects"][:1]:
+        if first["alternatives"]:
+            alike = "other names fit as well or look alike"
+            tiles.append((str(len(first["alternatives"])), alike, "incomparable"))
     return tiles
-
-
-def _found(e: Explained) -> tuple[Block, ...]:
-    drawn = drawings.found_plot(e)
-    told = (*_if_filled(words.parameters(e.data)), *_if_filled(words.moved(e.data)))
-    return told if drawn is None else (drawn, *told)
 
 
 def _where_blocks(data: Data) -> tuple[Block, ...]:
@@ -118,23 +106,16 @@ def _where_blocks(data: Data) -> tuple[Block, ...]:
     facts = (*signals, *places(where))
     told = (Facts(facts),) if facts else ()
     if not where.get("features"):
-        return (*told, Text((UNTESTED,), "note"))
+        return (*told, Text((NOTES["untested"],), "note"))
     return (Text((located_sentence(where),)), *told, words.features(data))
 
 
 def _fit_note(e: Explained) -> str:
-    fit, held_out = e.data["fit"], e.found.p.limits.proof.held_out
-    held = f"the last {100 * held_out:.0f} % of the recording, on which models fitted to the first part are judged"
-    if e.found.others:
-        held = "the other recordings below, on which nothing but a constant bias was fitted"
+    fit, share_held = e.data["fit"], 100 * e.found.p.limits.proof.held_out
+    held = NOTES["other_recordings" if e.found.others else "last_part"].format(share=share_held)
     horizon = fit["horizon_s"] and duration(fit["horizon_s"])
-    anew = (
-        f"The simulations begin anew every {horizon}, so that slow load does not drown them."
-        if horizon
-        else ""
-    )
-    parts = (f"Held out: {held}.", FIT, anew, seen_ahead(fit), two_plain_loops(fit))
-    return " ".join(part for part in parts if part)
+    anew = NOTES["anew"].format(horizon=horizon) if horizon else ""
+    return " ".join(filter(None, (held, NOTES["fit"], anew, seen_ahead(fit), two_plain_loops(fit))))
 
 
 def _controller_blocks(e: Explained) -> tuple[Block, ...]:

@@ -18,37 +18,38 @@ Rows = Sequence[Sequence[str]]
 
 
 def answer_lines(data: Mapping[str, Any]) -> list[str]:
-    """The answer as lines of text.
-
-    Parameters
-    ----------
-    data : mapping
-        The contract's answer.
-    """
-    head = f"{data['loop']}: {title(data['verdict']) if data['fit'] else 'not told'}"
+    """The contract's answer as lines of text."""
+    fit = data["fit"]
+    head = f"{data['loop']}: {title(data['verdict']) if fit else 'not told'}"
     block = f" ({data['block']})" if data["block"] != "none" else ""
     out = [head + block, *wrap(data["reason"], WIDTH), *wrap(check(data), WIDTH)]
-    out += _titled_part("Parameters (90 % intervals)", _texts(words.parameters(data)), (2,))
-    out += _titled_part("Controller, as SP, PV and OP show it", _controller_rows(data), (1,))
-    out += _titled_part("Misfit, rms in % of span", _fit_rows(data), (1, 2, 3, 4))
-    out += _titled_part("On the recordings held out", _others(data), (1, 3, 4))
-    out += _wrapped(seen_ahead(data["fit"])) + _wrapped(two_plain_loops(data["fit"]))
-    out += _wrapped(data["fit"].get("brought", {}).get("note", ""))
-    for first in data["effects"][:1]:
-        if first["held_out_share"] is not None:
-            removed = share(first["held_out_share"])
-            out += _wrapped(f"{first['name']} removes {removed} of the held-out misfit's mean square.")
-    out += _titled_part("Where", _where_rows(data))
-    out += _titled_part("The plain loop's constants moved", _moved(data), (1, 3))
-    return out + _titled_part("Could also be, and what would tell", _texts(words.alternatives(data)))
+    out += _part("Parameters (90 % intervals)", _texts(words.parameters(data)), (2,))
+    out += _part("Controller, as SP, PV and OP show it", _controller_rows(data), (1,))
+    simulations = _headed(("", "fitted", "fit %", "held out", "fit %"), _texts(words.misfits(data)))
+    out += _part("Misfit, rms in % of span", [(*row, "") for row in simulations], (1, 2, 3, 4))
+    others = [(name, plain, "→", *rest) for name, plain, *rest in _texts(words.others(data))]
+    held_out = _headed(("", "plain", "", "improved", "removed"), others)
+    out += _part("On the recordings held out", held_out, (1, 3, 4))
+    removed = [
+        f"{first['name']} removes {share(first['held_out_share'])} of the held-out misfit's mean square."
+        for first in data["effects"][:1]
+        if first["held_out_share"] is not None
+    ]
+    brought = fit.get("brought", {}).get("note", "")
+    for sentence in filter(None, (seen_ahead(fit), two_plain_loops(fit), brought, *removed)):
+        out += ["", *wrap(sentence, WIDTH)]
+    out += _part("Where", _where_rows(data))
+    moved = [(name, before, "→", after, unit) for name, before, after, _, unit in _texts(words.moved(data))]
+    out += _part("The plain loop's constants moved", moved, (1, 3))
+    return out + _part("Could also be, and what would tell", _texts(words.alternatives(data)))
 
 
-def _wrapped(sentence: str) -> list[str]:
-    return ["", *wrap(sentence, WIDTH)] if sentence else []
-
-
-def _titled_part(name: str, rows: Rows, numeric: Sequence[int] = ()) -> list[str]:
+def _part(name: str, rows: Rows, numeric: Sequence[int] = ()) -> list[str]:
     return ["", name, *lined_up(rows, numeric)] if rows else []
+
+
+def _headed(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> list[tuple[str, ...]]:
+    return [head, *rows] if rows else []
 
 
 def lined_up(rows: Rows, numeric: Sequence[int] = ()) -> list[str]:
@@ -81,30 +82,14 @@ def _controller_rows(data: Mapping[str, Any]) -> Rows:
     return [*rows, ("explains", share(law["explained"]), "of OP's variance")]
 
 
-def _fit_rows(data: Mapping[str, Any]) -> Rows:
-    rows = [(*row, "") for row in _texts(words.misfits(data))]
-    return [("", "fitted", "fit %", "held out", "fit %", ""), *rows] if rows else []
-
-
-def _others(data: Mapping[str, Any]) -> Rows:
-    rows = [
-        (name, plain, "→", better, removed) for name, plain, better, removed in _texts(words.others(data))
-    ]
-    return [("", "plain", "", "improved", "removed"), *rows] if rows else []
-
-
-def _moved(data: Mapping[str, Any]) -> Rows:
-    return [(name, before, "→", after, unit) for name, before, after, _, unit in _texts(words.moved(data))]
-
-
 def _where_rows(data: Mapping[str, Any]) -> Rows:
-    rows = [
-        (name if name.isupper() else name[:1].lower() + name[1:], text)
-        for name, text in places(data["where"])
-    ]
     features = _texts(words.features(data))
-    rows += [
-        (name, f"{how} (chance {chance})") for name, chance, carries, how in features if carries == "yes"
-    ]
     rest = ", ".join(name for name, _, carries, _ in features if carries == "no")
-    return [*rows, ("not tied to", rest)] if rest else rows
+    return [
+        *(
+            (name if name.isupper() else name[:1].lower() + name[1:], at)
+            for name, at in places(data["where"])
+        ),
+        *((name, f"{how} (chance {p})") for name, p, carries, how in features if carries == "yes"),
+        *([("not tied to", rest)] if rest else []),
+    ]

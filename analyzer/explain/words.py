@@ -11,46 +11,24 @@ from analyzer.limits import EXPLAIN
 from analyzer.loop.decisions import Cause, Fault
 from analyzer.pages.words import duration, number, page_columns, plain_cell, texts
 from identification.mismatch import effect
-from identification.mismatch.catalogue import EFFECTS, fault
+from identification.mismatch.catalogue import EFFECTS
 from identification.mismatch.effect import Block, Ends
-from identification.mismatch.outside import OUTSIDE
+from identification.mismatch.outside import about
 from identification.mismatch.selection import Candidate
-from identification.mismatch.words import ALONG, discriminating_test, place
+from identification.mismatch.words import discriminating_test, is_along, place
 from reports.pages import Cell, Table
 
 Data = Mapping[str, Any]
 
-KNOWN = {**EFFECTS, **OUTSIDE}
-"""Every effect, named or not."""
-PARAMETERS = {name: text for e in KNOWN.values() for name, text in e.called.items()}
-"""Parameters as they are called on a page; others by their own name."""
-HIDDEN = frozenset(name for e in KNOWN.values() for name in e.hidden)
-"""Parameters whose meaning another one carries."""
 TOLD = texts("explanation")
-FEATURES, CURVES = TOLD["features"], TOLD["curves"]
-BROUGHT = "your model"
-ROWS = {"baseline": "plain loop", "explained": "improved loop", "brought": BROUGHT}
-OBEYED = "OP rebuilt from SP and PV by the stated settings lies on OP as recorded."
-"""What the picture of a controller without fault shows."""
-BENT = "What was left out had to be made up for by these; with it they move back."
-KEPT = "They hardly move: what was left out had not bent them."
+FEATURES, CURVES, ROWS, NOTES = (TOLD[part] for part in ("features", "curves", "rows", "notes"))
 SHOWN = 12
 """Names shown of those that were tried."""
-
-
-def caption(effect: str, kind: str) -> str:
-    """What a picture shows: by its effect where that says more than its kind."""
-    return (KNOWN[effect].caption if effect in KNOWN else OBEYED) or TOLD["shapes"].get(kind, "")
 
 
 def title(verdict: str) -> str:
     """The verdict as a heading."""
     return TOLD["titles"].get(verdict, verdict.replace("-", " "))
-
-
-def called(name: str) -> str:
-    """A parameter's name on a page."""
-    return PARAMETERS.get(name, name.replace("_", " "))
 
 
 def number_text(value: float | None, unit: str = "") -> str:
@@ -89,21 +67,6 @@ def rms(value: float) -> str:
     return f"{value:.3g} %"
 
 
-def chance(p: float) -> str:
-    """A chance as engineers write it."""
-    return "< 0.01" if p < 0.01 else f"{p:.2f}"
-
-
-def carried_by(feature: Mapping[str, Any]) -> str:
-    """Where a feature puts the misfit, and whether as bias or size; empty where it does not carry it."""
-    if not feature["carries"]:
-        return ""
-    if feature["by"] == "sign" and feature["name"] in ALONG:
-        return place(feature)
-    how = "errors of one sign at" if feature["by"] == "sign" else "larger errors at"
-    return f"{how} {place(feature)}"
-
-
 def places(where: Mapping[str, Any]) -> list[tuple[str, str]]:
     """Spans, ranges, periods and direction of OP that carry the misfit, each with its name."""
     out = []
@@ -121,10 +84,10 @@ def places(where: Mapping[str, Any]) -> list[tuple[str, str]]:
 def parameters(data: Data) -> Table:
     """Parameters with intervals of all effects, and of physics that has no name."""
     rows = tuple(
-        (Cell(x["name"]), Cell(called(k)), plain_cell(v["value"]), Cell(interval_text(v)), Cell(v["unit"]))
+        (Cell(x["name"]), Cell(called), plain_cell(v["value"]), Cell(interval_text(v)), Cell(v["unit"]))
         for x in [*data["effects"], *([data["outside"]] if "outside" in data else [])]
         for k, v in x["parameters"].items()
-        if k not in HIDDEN
+        if (called := about(x["name"]).called.get(k, k.replace("_", " ")))
     )
     return Table("parameters", "Parameters", page_columns("effects_found"), rows)
 
@@ -137,20 +100,17 @@ def moved(data: Data) -> Table:
         for k, (a, b) in data["moved"].items()
     )
     most = max((abs(b / a - 1) if a else 0.0 for a, b in data["moved"].values()), default=0.0)
-    note = KEPT if most < EXPLAIN.hardly else BENT
+    note = NOTES["kept" if most < EXPLAIN.hardly else "bent"]
     return Table("moved", "How the plain loop's constants moved", page_columns("constants_moved"), rows, note)
 
 
 def misfits(data: Data, note: str = "") -> Table:
     """Misfit of the simulations, fitted and held out."""
-    shown = [k for k in ROWS if k in data["fit"] and (k != "explained" or data["moved"])]
-    rows = []
-    for key in shown:
-        cells = [Cell(ROWS[key])]
-        for part in ("fitted", "held_out"):
-            m = data["fit"][key][part]
-            cells += [_rms(m), Cell(f"{m['fit_pct']:.1f}", m["fit_pct"])]
-        rows.append(tuple(cells))
+    rows = [
+        (Cell(name), *(cell for m in (fit["fitted"], fit["held_out"]) for cell in (_rms(m), _fit(m))))
+        for key, name in ROWS.items()
+        if (fit := data["fit"].get(key)) and (key != "explained" or data["moved"])
+    ]
     return Table("fit", "", page_columns("simulations"), tuple(rows), note)
 
 
@@ -167,22 +127,28 @@ def _rms(misfit: Mapping[str, float]) -> Cell:
     return Cell(rms(misfit["rmse"]), misfit["rmse"])
 
 
+def _fit(misfit: Mapping[str, float]) -> Cell:
+    return Cell(f"{misfit['fit_pct']:.1f}", misfit["fit_pct"])
+
+
 def features(data: Data) -> Table:
-    """What the misfit is tied to."""
+    """What the misfit is tied to, by which chance, and where it is by that, as bias or size."""
     rows = tuple(
         (
             Cell(FEATURES[f["name"]]["title"], kind="strong" if f["carries"] else ""),
-            Cell(chance(f["p"]), f["p"]),
+            Cell("< 0.01" if f["p"] < 0.01 else f"{f['p']:.2f}", f["p"]),
             Cell("yes" if f["carries"] else "no"),
-            Cell(carried_by(f)),
+            Cell(_carried_by(f) if f["carries"] else ""),
         )
         for f in data["where"].get("features", [])
     )
-    note = (
-        "The plain loop's one-step errors in one joint regression: each row is what it adds to the others; chances "
-        "from blocks in other orders."
-    )
-    return Table("where", "", page_columns("misfit_tied_to"), rows, note)
+    return Table("where", "", page_columns("misfit_tied_to"), rows, NOTES["features"])
+
+
+def _carried_by(feature: Mapping[str, Any]) -> str:
+    if is_along(feature):
+        return place(feature)
+    return f"{'errors of one sign' if feature['by'] == 'sign' else 'larger errors'} at {place(feature)}"
 
 
 def alternatives(data: Data) -> Table:
@@ -200,15 +166,10 @@ def tried(first: tuple[Candidate, ...], taken: tuple[Candidate, ...]) -> Table:
     names = {c.name for c in taken}
     best = {c.name: c for c in sorted(first, key=lambda c: c.penalised)}
     rows = tuple(
-        (Cell(c.name), _nats(c.gain), _nats(c.penalised), Cell(_standing(c, names)))
+        (Cell(c.name), *(Cell(str(round(x)), x) for x in (c.gain, c.penalised)), Cell(_standing(c, names)))
         for c in sorted(best.values(), key=lambda c: -c.penalised)[:SHOWN]
     )
-    note = "Each name was fitted with all constants free; the best of so many gains about five nat by chance."
-    return Table("candidates", "", page_columns("effects_tried"), rows, note)
-
-
-def _nats(value: float) -> Cell:
-    return Cell(str(round(value)), value)
+    return Table("candidates", "", page_columns("effects_tried"), rows, NOTES["tried"])
 
 
 def _standing(c: Candidate, taken: set[str]) -> str:
@@ -226,12 +187,7 @@ def agreement(row: Mapping[str, Any], verdict: str, block: str) -> str:
     kind of fault is the explanation's where it is proven on held-out data. What still differs, for the night and the
     recording explained need not be the same, is said here, with what would settle it.
 
-    Parameters
-    ----------
-    row : mapping
-        The loop's row of the night: cause, valve_fault.
-    verdict, block : str
-        The explanation's name and block.
+    row : the loop's row of the night: cause, valve_fault; verdict, block : the explanation's name and block.
     """
     known, told = EFFECTS.get(verdict), TOLD["beside_verdict"]
     friction = known is not None and known.friction is not None
@@ -242,5 +198,5 @@ def agreement(row: Mapping[str, Any], verdict: str, block: str) -> str:
         same = kind in (verdict, Fault.UNDECIDED, Fault.NONE)
         said = told["agree"] if same else told["other_kind"]
         return said.format(kind=kind, verdict=verdict, stroke=told["stroke"])
-    unasked = isinstance(known, effect.Fault) and fault(verdict).ends is not Ends.NOTHING
+    unasked = isinstance(known, effect.Fault) and known.ends is not Ends.NOTHING
     return told["stopped"] if unasked else told["not_borne_out"].format(stroke=told["stroke"])

@@ -16,7 +16,6 @@ from identification.mismatch.catalogue import EFFECTS, fault
 from identification.mismatch.effect import Block, exact
 from identification.mismatch.explanation import Explanation, by_cycles, is_stack
 from identification.mismatch.outside import about
-from identification.mismatch.proof import HeldOut
 from identification.mismatch.recording import Recording
 from identification.mismatch.where import Located, located_in, where_of
 from identification.models import Estimate
@@ -72,29 +71,32 @@ class Answer:
 
 def answer(found: Explanation, s: Recording) -> Answer:
     """The answer of an explanation of a recording."""
-    proof = found.proven
-    effects = effects_of(found, s)
+    effects, outside, note, caution = effects_of(found, s), None, words.note(found), ""
     asked = not found_first(found) and not by_cycles(found)
     silent = unanswered(found) if asked else ""
     lacking = silent or (too_short(found, s) if asked else "")
     at = located_in(found.p, found.best if found.left > 0 else found.plain, s)
     verdict, block = verdict_of(found, effects, lacking, bool(silent), at)
+    if lacking and (verdict, block) == ("unexplained", "none"):
+        note = f"Not told: {lacking}."
+    if effects:
+        one_move = words.TOLD["one_move"] if found.unproven else untold_gain(found, effects)
+        caution = lacking or one_move
+    if verdict == "unexplained" and found.outside is not None:
+        row, fit = found.outside.row, found.outside.fit
+        outside = EffectFound(row.name, row.block, parameters_of(found.p, fit, row), None)
     return Answer(
         verdict,
         block,
         effects,
         where_of(found, s, block, at),
-        fit_of(proof, s.dt_s) | {"plain_loops": plain_loops(found), "ahead_nat": ahead(found)},
+        fit_of(found, s.dt_s),
         constants_moved(found),
-        (1.0 - proof.overall[1].fit_pct / 100.0) ** 2,
-        f"Not told: {lacking}."
-        if lacking and (verdict, block) == ("unexplained", "none")
-        else words.note(found),
-        (lacking or (words.ONE_MOVE_ONLY if found.unproven else untold_gain(found, effects)))
-        if effects
-        else "",
+        (1.0 - found.proven.overall[1].fit_pct / 100.0) ** 2,
+        note,
+        caution,
         words.cycles_told(found) if by_cycles(found) else "",
-        outside_of(found) if verdict == "unexplained" else None,
+        outside,
     )
 
 
@@ -133,7 +135,7 @@ def unanswered(found: Explanation) -> str:
     found = found.by_innovations or found
     loaded = any(row.block == Block.LOAD for row in found.best.model.added)  # counted in terms of the gain
     moves = brings(found.p, found.plain if loaded else found.best)
-    return "" if moves >= found.p.limits.proof.answers else words.INSENSITIVE
+    return "" if moves >= found.p.limits.proof.answers else words.TOLD["insensitive"]
 
 
 def too_short(found: Explanation, s: Recording) -> str:
@@ -149,27 +151,30 @@ def untold_gain(found: Explanation, effects: tuple[EffectFound, ...]) -> str:
     """What an experiment does not tell of a supply whose flow at rest may be anything; empty of any other."""
     at_rest = next((e.parameters[AT_REST] for e in effects if AT_REST in e.parameters), None)
     open_ended = at_rest is not None and at_rest.low < 0.0 < at_rest.high
-    return words.WANDERS if open_ended and found.p.by_simulation else ""
+    return words.TOLD["wanders"] if open_ended and found.p.by_simulation else ""
 
 
 def effects_of(found: Explanation, s: Recording) -> tuple[EffectFound, ...]:
-    """Every effect found, the likeliest first: what is larger than a grid before the grid."""
+    """Every effect found, the likeliest first: what is larger than a grid before the grid.
+
+    A valve that the loop's cycles show has its figures from them, as the night tells them: one estimate and one
+    interval. A simulation with one friction over hours knows them less well, and takes them for surer.
+    """
     gates = [
-        EffectFound(f.name, own.block, {n.name: n.estimate(f, s) for n in own.numbers}, None)
+        EffectFound(f.name, own.block, own.numbers(f, s), None)
         for f in (found.recorder, found.controller)
         if f is not None and (own := fault(f.name))
     ]
-    share = found.proven.share
     physics = [
-        EffectFound(
-            row.name,
-            row.block,
-            parameters_of(found.p, found.best, row) | (told_by_cycles(found, row) if i == 0 else {}),
-            share if i == 0 and share > 0.0 else None,
-            alternatives(found) if i == 0 else (),
-        )
-        for i, row in enumerate(found.best.model.added)
+        EffectFound(row.name, row.block, parameters_of(found.p, found.best, row), None)
+        for row in found.best.model.added
     ]
+    for first in physics[:1]:
+        share, told = found.proven.share, {} if found.cycles is None else dict(found.cycles.told)
+        if told.keys() == {q.name for q in found.best.model.added[0].params}:
+            first.parameters.update(told)
+        held_out_share = share if share > 0.0 else None
+        physics[0] = replace(first, held_out_share=held_out_share, alternatives=alternatives(found))
     return (*physics, *gates) if found.finding is None else (*gates, *physics)
 
 
@@ -186,21 +191,6 @@ def parameters_of(p: Problem, fit: Fitted, row: Variant) -> dict[str, Estimate]:
             out[q.name] = exact(value, q.unit, half)
     derived = about(row.name).derived
     return out | (derived(out) if derived is not None else {})
-
-
-def told_by_cycles(found: Explanation, row: Variant) -> dict[str, Estimate]:
-    """Figures of a valve that the loop's cycles show, as the night tells them: one estimate and one interval. A
-    simulation with one friction over hours knows them less well than the cycles, and takes them for surer."""
-    told = {} if found.cycles is None else dict(found.cycles.told)
-    return told if told.keys() == {q.name for q in row.params} else {}
-
-
-def outside_of(found: Explanation) -> EffectFound | None:
-    """What explains a loop better than anything that has a name."""
-    if found.outside is None:
-        return None
-    row, fit = found.outside.row, found.outside.fit
-    return EffectFound(row.name, row.block, parameters_of(found.p, fit, row), None)
 
 
 def alternatives(found: Explanation) -> tuple[str, ...]:
@@ -223,19 +213,20 @@ def plain_loops(found: Explanation) -> dict[str, dict[str, float]]:
     return {"simulated": restored(drawn), "one_step_ahead": restored(ahead)}
 
 
-def ahead(found: Explanation) -> float | None:
-    """Gain on held-out data [nat] of effects that innovations show and no smaller misfit; None of any other."""
+def fit_of(found: Explanation, dt_s: float) -> dict[str, Any]:
+    """Misfit before and after, fitted and held out, the horizon that simulations run over [s], None: all, and what
+    effects gain on held-out data [nat] that innovations show and no smaller misfit, None of any other."""
     proof = found.proven
-    return proof.gain if found.accepted and proof.share <= 0.0 and proof.seen_ahead else None
-
-
-def fit_of(proof: HeldOut, dt_s: float) -> dict[str, Any]:
-    """Misfit before and after, fitted and held out, and the horizon that simulations run over [s]; None: all."""
-    both: dict[str, Any] = {
-        name: {"fitted": asdict(proof.fitted[i]), "held_out": asdict(proof.held[i])}
-        for i, name in enumerate(("baseline", "explained"))
+    ahead = found.accepted and proof.share <= 0.0 and proof.seen_ahead
+    return {
+        **{
+            name: {"fitted": asdict(proof.fitted[i]), "held_out": asdict(proof.held[i])}
+            for i, name in enumerate(("baseline", "explained"))
+        },
+        "horizon_s": proof.window * dt_s if proof.window else None,
+        "plain_loops": plain_loops(found),
+        "ahead_nat": proof.gain if ahead else None,
     }
-    return both | {"horizon_s": proof.window * dt_s if proof.window else None}
 
 
 def constants_moved(found: Explanation) -> dict[str, tuple[float, float]]:

@@ -21,18 +21,14 @@ from identification.mismatch.recording import Recording, is_experiment, straight
 from identification.mismatch.rounds import physics
 from identification.mismatch.selection import Progress, silent
 from identification.record import Floats
+from identification.simulation.parameters import Slot
 
 
 def explain(s: Recording, tell: Progress = silent, brought: Floats | None = None) -> Explanation:
     """Explain where a plain loop and a recording differ.
 
-    Parameters
-    ----------
-    s : Recording
-    tell : callable
-        Is told what is tried, for progress.
-    brought : ndarray of shape (SIZE,) or None
-        Constants of the user's own model, with which the plain loop's search begins beside its own starts.
+    tell : is told what is tried, for progress; brought : constants of the user's own model, shape (SIZE,), with which
+    the plain loop's search begins beside its own starts.
     """
     held = unlogged(s.stamp_s, s.pv.size, s.dt_s, s.limits.recorder)
     s = replace(s, usable=s.usable & ~held)
@@ -67,11 +63,8 @@ def explain(s: Recording, tell: Progress = silent, brought: Floats | None = None
 
 def recorder_finding_of(s: Recording) -> Finding | None:
     """The first thing that the recorder did to the trends."""
-    for effect in RECORDER_FAULTS:
-        found = effect.find(s) if effect.find is not None else None
-        if found is not None:
-            return replace(found, name=effect.name)
-    return None
+    found = ((effect.name, effect.find(s)) for effect in RECORDER_FAULTS if effect.find is not None)
+    return next((replace(finding, name=name) for name, finding in found if finding is not None), None)
 
 
 def controller_finding_of(s: Recording, recorder: Finding | None) -> tuple[Finding | None, ControlLaw | None]:
@@ -94,4 +87,5 @@ def transmitter_end(recorder: Finding | None, pv: Floats) -> Clip | None:
     if recorder is None or not fault(recorder.name).censors:
         return None
     (value,) = recorder.values.values()
-    return Clip(value, value > float(np.median(pv)), recorder.where)
+    upper = value > float(np.median(pv))
+    return Clip(value, Slot.CLIP_HI if upper else Slot.CLIP_LO, recorder.where)

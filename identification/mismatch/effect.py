@@ -18,8 +18,8 @@ from identification.simulation.effect import Act, Param, Signal, Start, Variant,
 from identification.simulation.parameters import Slot, own_slot
 
 __all__ = ["Act", "Block", "Effect", "Ends", "Estimate", "Fault", "Finding", "Floats", "Friction"]
-__all__ += ["Number", "Param", "Parameters", "Recording", "Signal", "Slot", "Start", "Variant"]
-__all__ += ["each", "exact", "own_slot"]
+__all__ += ["Param", "Parameters", "Recording", "Signal", "Slot", "Start", "Variant"]
+__all__ += ["each", "exact", "own_slot", "within"]
 Parameters = Mapping[str, Estimate]
 
 
@@ -99,38 +99,9 @@ class Effect:
 
     @property
     def called(self) -> dict[str, str]:
-        """What pages call each of its numbers; none for those that another number stands for."""
-        params = {p.name: p.title for v in self.variants for p in v.params if p.title and not p.hidden}
-        return params | dict(self.titles)
-
-    @property
-    def hidden(self) -> frozenset[str]:
-        """Names of parameters whose meaning another number carries."""
-        return frozenset(p.name for v in self.variants for p in v.params if p.hidden)
-
-
-@dataclass(frozen=True, slots=True)
-class Number:
-    """A number of a finding, as answered.
-
-    name, unit, title : as answered and as pages call it; of : its name in the finding, where another; times : factor
-    to the finding's; in_time : whether it is a time, which the finding has in samples; share : half width of its
-    interval, in itself, ours; half : the same of its own kind.
-    """
-
-    name: str
-    unit: str
-    title: str
-    of: str = ""
-    times: float = 1.0
-    in_time: bool = False
-    share: float = 0.0
-    half: Callable[[Recording], float] | None = None
-
-    def estimate(self, found: Finding, s: Recording) -> Estimate:
-        """The number of a finding in a recording."""
-        value = self.times * found.values[self.of or self.name] * (s.dt_s if self.in_time else 1.0)
-        return exact(value, self.unit, self.share * abs(value) if self.half is None else self.half(s))
+        """What pages call each of its numbers; nothing for those that another number stands for."""
+        params = [p for v in self.variants for p in v.params if p.title or p.hidden]
+        return {p.name: "" if p.hidden else p.title for p in params} | dict(self.titles)
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,23 +110,23 @@ class Fault(Effect):
 
     order : place among the questions; find : the finding in a recording, None of what the controller's check finds
     (check.py); ends : what is asked after it; censors : whether samples where it is tell no more than that PV is
-    beyond; numbers : what is answered of it; drawn : its picture, from the finding, the recording and the plain
-    model's PV.
+    beyond; numbers : what is answered of a finding in a recording; drawn : its picture, from the finding, the
+    recording and the plain model's PV.
     """
 
     order: int = 0
     find: Callable[[Recording], Finding | None] | None = None
     ends: Ends = Ends.NOTHING
     censors: bool = False
-    numbers: tuple[Number, ...] = ()
+    numbers: Callable[[Finding, Recording], dict[str, Estimate]] = lambda found, s: {}
     drawn: Callable[[Finding, Recording, Floats], Picture | None] | None = None
-
-    @property
-    def called(self) -> dict[str, str]:
-        """What pages call each of its numbers."""
-        return {n.name: n.title for n in self.numbers}
 
 
 def exact(value: float, unit: str, half: float = 0.0) -> Estimate:
     """An estimate with a symmetric interval."""
     return Estimate(value, value - half, value + half, unit)
+
+
+def within(share: float, value: float, unit: str) -> Estimate:
+    """An estimate that is known within a share of itself."""
+    return exact(value, unit, share * abs(value))

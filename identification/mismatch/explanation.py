@@ -102,8 +102,8 @@ def beyond_the_grid(found: Explanation) -> Explanation:
     step = 0.0 if found.recorder is None else found.recorder.values.get(STEP, 0.0)
     if step <= 0.0:
         return found
-    count, kept = len(found.accepted), found
-    while count > int(by_cycles(found)) and mark(kept) < found.p.limits.recorder.grid_mark * step:
+    count, kept, least = len(found.accepted), found, found.p.limits.recorder.grid_mark * step
+    while count > int(by_cycles(found)) and mark(kept) < least:
         count -= 1
         kept = first_effects(found, count)
     return kept
@@ -132,10 +132,12 @@ def carried_over(found: Explanation) -> Explanation:
     A valve that the loop's cycles show is proven by them.
     """
     names = tuple(r.name for r in found.accepted)
+    cycle_s = 0.0 if found.cycles is None else found.cycles.cycle_s
+    cycle = max(round(cycle_s / found.p.inputs.dt_s), found.p.limits.proof.least_cycle)
     for count in range(len(names), 0, -1):
         kept = found if count == len(names) else first_effects(found, count)
         cycling = count == 1 and by_cycles(found)
-        proof = held_out(kept.p, kept.plain, kept.best, cycle_of(found) if cycling else 0)
+        proof = held_out(kept.p, kept.plain, kept.best, cycle if cycling else 0)
         unproven = not proof.carries and proof.falls and is_one_move(found.p)
         timed = proof.falls and all(EFFECTS[name].timed for name in names[:count])
         if proof.carries or unproven or cycling or timed:
@@ -143,12 +145,6 @@ def carried_over(found: Explanation) -> Explanation:
     proof = held_out(found.p, found.plain, found.plain)
     outside = None if names else found.outside
     return replace(found, best=found.plain, accepted=(), proof=proof, refuted=names, outside=outside)
-
-
-def cycle_of(found: Explanation) -> int:
-    """Samples of one cycle of a loop whose cycles show a faulty valve."""
-    cycle_s = 0.0 if found.cycles is None else found.cycles.cycle_s
-    return max(round(cycle_s / found.p.inputs.dt_s), found.p.limits.proof.least_cycle)
 
 
 def first_effects(found: Explanation, count: int) -> Explanation:
@@ -159,14 +155,19 @@ def first_effects(found: Explanation, count: int) -> Explanation:
 
 
 def agreed(told: Explanation, by_misfit: Explanation) -> Explanation:
-    """Of an experiment's explanations by innovations and by the simulation's misfit the nearer one.
+    """Of an experiment's explanations by innovations, fitted anew to what its simulation misses, and by the
+    simulation's misfit the nearer one.
 
-    What the misfit tells, innovations have to second. What is left is what both miss: a load that wanders is no lack
-    of the model, and innovations see none in it.
+    What the misfit tells, innovations have to second: by a gain of what one constant costs, two signs. What is left
+    is what both miss: a load that wanders is no lack of the model, and innovations see none in it.
     """
-    by_misfit = replace(by_misfit, left=min(told.left, by_misfit.left), by_innovations=told)
-    other = judged_by_simulation(told, by_misfit)
-    return nearer(other, by_misfit) if is_seconded(by_misfit, told) else other
+    p, limits, left = by_misfit.p, told.p.limits.search, min(told.left, by_misfit.left)
+    anew = descended(p, told.best.model, limits.full_steps)
+    other = replace(told, p=p, plain=by_misfit.plain, best=anew, left=left, by_innovations=told)
+    other = carried_over(most_telling_first(other))
+    seen = descended(told.p, by_misfit.best.model, limits.full_steps)
+    is_seconded = gain(seen, told.plain) > limits.one_constant
+    return nearer(other, replace(by_misfit, left=left, by_innovations=told)) if is_seconded else other
 
 
 def most_telling_first(found: Explanation) -> Explanation:
@@ -193,35 +194,22 @@ def nearer(one: Explanation, other: Explanation) -> Explanation:
     return min(one, other, key=missed)
 
 
-def is_seconded(found: Explanation, told: Explanation) -> bool:
-    """Whether innovations gain what one constant costs by the effects that a simulation's misfit tells: two signs."""
-    limits = told.p.limits.search
-    seen = descended(told.p, found.best.model, limits.full_steps)
-    return gain(seen, told.plain) > limits.one_constant
-
-
-def judged_by_simulation(found: Explanation, other: Explanation) -> Explanation:
-    """An experiment's explanation by innovations, fitted anew to what its simulation misses, as the other one is."""
-    best = descended(other.p, found.best.model, other.p.limits.search.full_steps)
-    anew = replace(found, p=other.p, plain=other.plain, best=best, left=other.left, by_innovations=found)
-    return carried_over(most_telling_first(anew))
-
-
-def simulated_there(found: Explanation, c: Floats, s: Recording, window: int) -> Floats:
-    """PV [% PV], shape (n,), that constants give for another recording's OP, anchored in windows."""
-    data = to_data("", found.p.inputs, c, found.best.names, found.late_s, None)
-    if window and found.proven.placed:
-        c, here = constants(data), inputs_for(data, s.op, s.pv, s.dt_s)
-        c[Slot.START] = float(s.pv[0]) - here.level
-        return here.level + course(problem(here, s.pv - here.level, s.usable), c, window, True)
-    return anchored(s.pv, carried(data, s.op, s.pv, s.dt_s), window)
-
-
 def on_other(found: Explanation, s: Recording, window: int) -> OnOther:
-    """Both models on another recording, the plain one by either criterion, and the better without its effects."""
+    """Both models on another recording, anchored in windows, the plain one by either criterion, and the better one
+    without its effects."""
     best = found.best.model
+
+    def left(c: Floats) -> Misfit:
+        data = to_data("", found.p.inputs, c, found.best.names, found.late_s, None)
+        if not (window and found.proven.placed):
+            return misfit(s.pv, anchored(s.pv, carried(data, s.op, s.pv, s.dt_s), window), window)
+        c, here = constants(data), inputs_for(data, s.op, s.pv, s.dt_s)
+        y = s.pv - here.level
+        c[Slot.START] = float(y[0])
+        return misfit(s.pv, here.level + course(problem(here, y, s.usable), c, window, True), window)
+
     models = (found.plain.model.c, found.proven.drawn[0], best.c, without(best, best.added).c)
-    own, drawn, better, cleared = (misfit(s.pv, simulated_there(found, c, s, window), window) for c in models)
+    own, drawn, better, cleared = (left(c) for c in models)
     return OnOther(min(own, drawn, key=lambda x: x.rmse), better, cleared, s.pv.size)
 
 
@@ -245,24 +233,19 @@ def window_of(found: Explanation, s: Recording) -> int:
 
 def compared(found: Explanation, others: Sequence[Recording]) -> tuple[HeldOut, tuple[OnOther, ...]]:
     """The proof on other recordings: over the whole of each, or over windows where the whole shows the load alone."""
-    whole = _compared(found, others, [0] * len(others), False)
-    if whole[0].carries:
-        return whole
-    return _compared(found, others, [window_of(found, s) for s in others], found.proven.placed)
-
-
-def _compared(
-    found: Explanation, others: Sequence[Recording], windows: Sequence[int], placed: bool
-) -> tuple[HeldOut, tuple[OnOther, ...]]:
-    """The same over windows of each recording, 0 for the whole."""
-    p, drawn = found.p, found.proven.drawn
-    each = tuple(on_other(found, s, window) for s, window in zip(others, windows, strict=True))
-    samples = [x.samples for x in each]
-    held = together([x.baseline for x in each], samples), together([x.explained for x in each], samples)
-    window = round(windows[0] * others[0].dt_s / p.inputs.dt_s)
-    plain, better = (misfit(p.y, course(p, c, window, placed), window) for c in drawn)
-    seen = plain, better
-    return HeldOut(0.0, seen, held, seen, drawn, window, placed, limits=p.limits), each
+    p, drawn, over_all = found.p, found.proven.drawn, [0] * len(others)
+    own = [window_of(found, s) for s in others]
+    for windows, placed in ((over_all, False), (own, found.proven.placed)):
+        each = tuple(on_other(found, s, window) for s, window in zip(others, windows, strict=True))
+        samples = [x.samples for x in each]
+        held = together([x.baseline for x in each], samples), together([x.explained for x in each], samples)
+        window = round(windows[0] * others[0].dt_s / p.inputs.dt_s)
+        plain, better = (misfit(p.y, course(p, c, window, placed), window) for c in drawn)
+        seen = plain, better
+        proof = HeldOut(0.0, seen, held, seen, drawn, window, placed, limits=p.limits)
+        if proof.carries:
+            break
+    return proof, each
 
 
 def proven_on(found: Explanation, others: Sequence[Recording]) -> Explanation:

@@ -7,7 +7,9 @@ another order against the features, so that nothing is left of any link while co
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -105,36 +107,31 @@ def groups(pv: Floats, op: Floats, dt_s: float, late: int, memory: int) -> tuple
     """
     o, before = delayed(op, late + PAST), delayed(pv, PAST)
     way, since = turns(o, least_turn(o))
-    since_s, window = since * dt_s, max(memory // 4, 1)
+    since_s, window = since * dt_s, min(max(memory // 4, 1), pv.size)
     travel = np.abs(o - delayed(o, window)) / (window * dt_s)
     fading = np.exp(-since_s / (max(memory, 2) * dt_s))
     rate = ranked(travel) - 0.5
     index = dt_s * np.arange(pv.size, dtype=np.float64)
-    limit = at_limits(o)
-    found = (
+    limit = at_limits(o).astype(float)
+    found = [
         Group("pv_level", hats(before), before),
         Group("op_level", hats(o), o),
         Group("op_direction", way[:, None], way),
         Group("op_rate", np.stack([rate, rate * way], axis=1), travel, way),
         Group("after_reversals", np.stack([fading, fading * way], axis=1), since_s, way),
         Group("time_in_record", hats(index), index),
-        Group("at_limits", limit[:, None].astype(float), limit.astype(float)),
-    )
-    alive = [g for g in found if g.columns.shape[1] and float(np.ptp(g.columns)) > 0]
-    return tuple(g for g in alive if g.name != "at_limits" or limit.sum() >= LOCATION.limit_samples)
+    ]
+    if limit.sum() >= LOCATION.limit_samples:
+        found.append(Group("at_limits", limit[:, None], limit))
+    return tuple(g for g in found if g.columns.shape[1] and float(np.ptp(g.columns)) > 0)
 
 
-@dataclass(frozen=True, slots=True)
-class Profile:
-    """Misfit along one feature: ends of each part, samples, mean and mean square of the innovations, shape (b,) each.
-
-    Mean and mean square are in standard deviations and mean squares of the whole record; of OP's rate and the time
-    since its turn the mean is along OP's direction.
-    """
+class Profile(NamedTuple):
+    """Misfit along one feature: ends of each part, samples, mean and mean square of innovations, shape (b,) each."""
 
     low: Floats
     high: Floats
-    count: Floats
+    samples: Floats
     mean: Floats
     power: Floats
 
@@ -144,16 +141,15 @@ class Feature:
     """What one feature says of the misfit.
 
     p : chance, over all features, of as much on an untied residual; share : part of the variance of the misfit's
-    power or sign that it alone gives; of : "power" or "sign", by which it shows more; low, high : part of the
-    feature's range in which the misfit is above its mean, None where it has no order.
+    power or sign that it alone gives; by : "power" or "sign", by which it shows more; range : ends of the part of the
+    feature's range in which the misfit is above its mean, none where it has no order.
     """
 
     name: str
     p: float
     share: float
-    of: str
-    low: float | None = None
-    high: float | None = None
+    by: str
+    range: tuple[float, ...] = ()
 
     @property
     def carries(self) -> bool:
@@ -164,10 +160,11 @@ class Feature:
 @dataclass(frozen=True, slots=True)
 class Located:
     """The features, the likeliest first; local : power of the misfit that they give at each sample, in mean squares,
-    shape (n,), 0 where not judged."""
+    shape (n,), 0 where not judged; groups : the features as asked, also where they were not tested."""
 
     features: tuple[Feature, ...]
     local: Floats = field(repr=False)
+    groups: tuple[Group, ...] = field(repr=False)
 
     @property
     def carrying(self) -> tuple[Feature, ...]:
@@ -177,9 +174,9 @@ class Located:
 
 def standardized(e: Floats) -> Floats:
     """Power (cut) and sign of innovations about their mean, standardized, shape (n, 2)."""
-    power = np.minimum(e**2 / max(float(np.mean(e**2)), 1e-300), SIGNALS.outlier**2)
-    size = max(float(np.sqrt(np.mean(e**2))), 1e-300)
-    sign = np.clip(e / size, -SIGNALS.outlier, SIGNALS.outlier)
+    square = float(np.mean(e**2))
+    power = np.minimum(e**2 / max(square, 1e-300), SIGNALS.outlier**2)
+    sign = np.clip(e / max(math.sqrt(square), 1e-300), -SIGNALS.outlier, SIGNALS.outlier)
     y = np.stack([power, sign], axis=1)
     y -= y.mean(axis=0)
     return y / np.maximum(y.std(axis=0), 1e-12)
@@ -263,10 +260,8 @@ def profile(x: Floats, y: Floats) -> Profile:
 
 def part_of_range(height: Floats) -> tuple[int, int] | None:
     """First and last (included) place of the longest run of a profile well above its middle; None without one."""
-    if height.size < 4:
-        return None
     line = 0.5 * float(height.max() + np.median(height))
-    high = runs(height > line)
+    high = runs(height > line) if height.size >= 4 else []
     if not high:
         return None
     first, last = max(high, key=lambda run: height[run[0] : run[1]].sum())
@@ -281,32 +276,24 @@ def located(e: Floats, pv: Floats, op: Floats, judged: Mask, dt_s: float, late: 
     count = int(judged.sum())
     wanted = max(LOCATION.block_memories * memory, LOCATION.shortest_block)
     blocks = min(max(int(count / wanted), LOCATION.fewest_blocks), LOCATION.most_blocks)
-    if count // blocks < max(memory, LOCATION.shortest_block) or float(np.ptp(e[judged])) == 0.0:
-        return Located((), np.zeros(e.size))
-    found = groups(pv, op, dt_s, late, memory)
-    columns = [g.columns[judged] for g in found]
-    y = standardized(e[judged])
-    bases = directions(columns)
-    flat = np.concatenate(columns, axis=1)
+    found, local, left = groups(pv, op, dt_s, late, memory), np.zeros(e.size), e[judged]
+    if count // blocks < max(memory, LOCATION.shortest_block) or float(np.ptp(left)) == 0.0:
+        return Located((), local, found)
+    columns, y = [g.columns[judged] for g in found], standardized(left)
+    bases, flat = directions(columns), np.concatenate(columns, axis=1)
     whole = _basis(flat - flat.mean(axis=0))
-    p, excess = chances(bases, y, blocks)
-    size = max(float(np.sqrt(np.mean(e[judged] ** 2))), 1e-300)
-    features = [
-        _feature(g, basis, y, float(p[i]), excess[i], e[judged] / size, judged)
-        for i, (g, basis) in enumerate(zip(found, bases, strict=True))
-    ]
-    local = np.zeros(e.size)
+    scaled = left / max(float(np.sqrt(np.mean(left**2))), 1e-300)
+    features = []
+    for g, basis, p, excess in zip(found, bases, *chances(bases, y, blocks), strict=True):
+        own, by = ((basis.T @ y) ** 2).sum(axis=0) / y.shape[0], int(np.argmax(excess))
+        ends = _carrying_part(g, scaled, judged, by)
+        features.append(Feature(g.name, float(p), float(own[by]), ("power", "sign")[by], ends))
     local[judged] = np.maximum(_along(whole, y[:, :1])[:, 0], 0.0)
-    return Located(tuple(sorted(features, key=lambda f: (f.p, -f.share))), local)
+    return Located(tuple(sorted(features, key=lambda f: (f.p, -f.share))), local, found)
 
 
-def _feature(
-    g: Group, basis: Floats, y: Floats, p: float, excess: Floats, scaled: Floats, judged: Mask
-) -> Feature:
-    own = ((basis.T @ y) ** 2).sum(axis=0) / y.shape[0]
-    by = int(np.argmax(excess))
-    along = scaled if g.sense is None else scaled * g.sense[judged]
-    drawn = profile(g.signal[judged], along)
+def _carrying_part(g: Group, scaled: Floats, judged: Mask, by: int) -> tuple[float, ...]:
+    """Ends of the part of a feature's range in which innovations are large (by 0) or keep one sign; none without."""
+    drawn = profile(g.signal[judged], scaled if g.sense is None else scaled * g.sense[judged])
     run = part_of_range(drawn.power if by == 0 else np.abs(drawn.mean))
-    low, high = (None, None) if run is None else (float(drawn.low[run[0]]), float(drawn.high[run[1]]))
-    return Feature(g.name, p, float(own[by]), ("power", "sign")[by], low, high)
+    return () if run is None else (float(drawn.low[run[0]]), float(drawn.high[run[1]]))

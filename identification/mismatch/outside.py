@@ -30,14 +30,6 @@ PLACES, BANDS = tuple(0.05 * i for i in range(2, 19)), (0.5, 3.0)
 twentieth of the span off."""
 
 
-def gain_by_history(d: Drawing) -> Picture:
-    """The gain over the recording, as PV's past makes it."""
-    rest = float(d.plain[Slot.K])
-    return pictures.course_picture(
-        d, pictures.GAIN, lambda inputs, c: c[Slot.K] * gain_over_record(inputs, c), rest
-    )
-
-
 def hurried(flow: Floats, c: Floats, dt_s: float) -> Floats:
     """Flow, shape (n,) [% OP], with the square of what it is ahead of its own lag, of the move's sign."""
     ahead = flow - lagged(flow, float(c[HURRY_T]), dt_s)
@@ -57,7 +49,7 @@ HISTORY = Effect(
     block=Block.PROCESS,
     sentence="the process gain goes with where PV has been over the last {recall_s}, by {recall} of it per 10 % PV",
     check="Ask what PV changes slowly in the process: coating, wetting, scale, a catalyst, a bed that fills.",
-    curve=gain_by_history,
+    curve=lambda d: pictures.gain_over_record(d, gain_over_record),
     variants=(
         Variant(
             (

@@ -79,7 +79,6 @@ class Picture:
     kind : loop (the band is two more loops, least and most), curve, response, course or comb.
     """
 
-    effect: str
     kind: str
     x: Axis
     y: Axis
@@ -100,11 +99,6 @@ class Drawing:
     known: Mapping[str, Estimate]
     best: Floats = field(repr=False)
     plain: Floats = field(repr=False)
-
-    @property
-    def name(self) -> str:
-        """The effect's name."""
-        return self.variant.name
 
     @property
     def ends(self) -> tuple[tuple[int, float, float], ...]:
@@ -140,7 +134,7 @@ def beside_plain(
     """What parameters make of x, with its band, beside what the plain loop has there, shape (m,) each."""
     y, low, high = banded(read, d)
     still = np.broadcast_to(np.asarray(plain, dtype=np.float64), x.shape)
-    return Picture(d.name, kind, *axes, (Drawn("found", x, y, low, high), Drawn("plain", x, still)), places)
+    return Picture(kind, *axes, (Drawn("found", x, y, low, high), Drawn("plain", x, still)), places)
 
 
 def op_range(inputs: ModelInputs) -> Floats:
@@ -155,36 +149,32 @@ def drawn_step(size: float, n: int, dt_s: float, back: bool = False) -> tuple[Fl
     return time, np.where(on, size, 0.0)
 
 
-def valve_alone(
-    c: Floats, op: Floats, keep: tuple[int, ...], middle: float = 50.0, dt_s: float = 1.0
-) -> Floats:
-    """Flow [% OP], shape (m,), of a valve with some of a model's parameters alone."""
-    return flow(op, alone(c, keep), dt_s, middle)
-
-
 def stem_over_op(d: Drawing) -> Picture:
     """Stem over OP of a valve with play or stick-slip, with the loops of the narrowest and the widest band."""
     reach = SWEEP * max(float(d.best[Slot.STICKBAND]), 1e-3)
-    one = np.concatenate((np.linspace(-1, 1, POINTS), np.linspace(1, -1, POINTS)))
+    one, half = np.concatenate((np.linspace(-1, 1, POINTS), np.linspace(1, -1, POINTS))), 2 * POINTS
     op = d.inputs.middle + reach * np.concatenate((one, one))
-    last = slice(2 * POINTS, None)
-    curves = [Drawn("found", op[last], valve_alone(d.best, op, FRICTION)[last])]
-    for name, i in (("least", 1), ("most", 2)):
-        other = d.best.copy()
-        for place in d.ends:
-            other[place[0]] = place[i]
-        other[Slot.JUMP] = min(other[Slot.JUMP], other[Slot.STICKBAND])
-        curves.append(Drawn(name, op[last], valve_alone(other, op, FRICTION)[last]))
-    curves.append(Drawn("plain", op[last], op[last]))
-    return Picture(d.name, "loop", OP, STEM, tuple(curves))
+    least, most = d.best.copy(), d.best.copy()
+    for slot, low, high in d.ends:
+        least[slot], most[slot] = low, high
+    for c in (least, most):
+        c[Slot.JUMP] = min(c[Slot.JUMP], c[Slot.STICKBAND])
+    curves = []
+    for name, c in (("found", d.best), ("least", least), ("most", most)):
+        stem = flow(op, alone(c, FRICTION), 1.0, d.inputs.middle)
+        curves.append(Drawn(name, op[half:], stem[half:]))
+    return Picture("loop", OP, STEM, (*curves, Drawn("plain", op[half:], op[half:])))
 
 
 def flow_over_op(d: Drawing) -> Picture:
     """Flow over OP at rest: characteristic, stop or second valve."""
     op, ends = op_range(d.inputs), (Slot.STOP_LO, Slot.STOP_HI, Slot.SPLIT)
     places = tuple(float(d.best[s]) for s in ends if np.isfinite(d.best[s]))
-    middle = d.inputs.middle
-    return beside_plain(d, "curve", (OP, FLOW), op, lambda c: valve_alone(c, op, AT_REST, middle), op, places)
+
+    def read(c: Floats) -> Floats:
+        return flow(op, alone(c, AT_REST), 1.0, d.inputs.middle)
+
+    return beside_plain(d, "curve", (OP, FLOW), op, read, op, places)
 
 
 def step_size(d: Drawing) -> float:
@@ -196,7 +186,10 @@ def stem_response(d: Drawing, length_s: float, keep: tuple[int, ...]) -> Picture
     """Stem after a step of OP, which takes about `length_s`, with the parameters that are at work."""
     fine = max(length_s * STEM_LENGTH, FEWEST_SAMPLES * d.inputs.dt_s) / POINTS
     time, op = drawn_step(step_size(d), POINTS, fine)
-    return beside_plain(d, "response", (TIME, STEM), time, lambda c: valve_alone(c, op, keep, dt_s=fine), op)
+    middle = d.inputs.middle
+    return beside_plain(
+        d, "response", (TIME, STEM), time, lambda c: flow(op, alone(c, keep), fine, middle), op
+    )
 
 
 def _pv_length_s(d: Drawing, fast_s: float | None) -> float:
@@ -256,6 +249,11 @@ def course_picture(
     return beside_plain(d, "course", (TIME, axis), time, lambda c: values(d.inputs, c)[at], rest, places)
 
 
+def gain_over_record(d: Drawing, change: Callable[[ModelInputs, Floats], Floats]) -> Picture:
+    """The process gain over the recording, which goes as `change` says."""
+    return course_picture(d, GAIN, lambda x, c: c[Slot.K] * change(x, c), float(d.plain[Slot.K]))
+
+
 def load_over_time(d: Drawing) -> Picture:
     """The load at the inlet over the recording."""
     return course_picture(d, LOAD, load)
@@ -291,11 +289,11 @@ def around(where: Mask, length: int) -> slice:
     return slice(start, start + length)
 
 
-def comb(name: str, axis: Axis, at: Floats, count: np.ndarray) -> Picture:
+def comb(axis: Axis, at: Floats, count: np.ndarray) -> Picture:
     """How often each of some values occurs."""
     x, none = np.repeat(at, 3), np.zeros(at.size)
     y = np.stack([none, count, none], axis=1).ravel().astype(float)
-    return Picture(name, "comb", axis, Axis("samples", ""), (Drawn("recorded", x, y),))
+    return Picture("comb", axis, Axis("samples", ""), (Drawn("recorded", x, y),))
 
 
 def rebuilt(e: Floats, op: Floats, kp: float, ti: float) -> Floats:
@@ -305,13 +303,11 @@ def rebuilt(e: Floats, op: Floats, kp: float, ti: float) -> Floats:
     return np.asarray(free - free.mean() + op.mean())
 
 
-def rebuilt_course(
-    name: str, s: Recording, part: slice, laws: dict[str, tuple[Floats, StatedSettings]]
-) -> Picture:
+def rebuilt_course(s: Recording, part: slice, laws: dict[str, tuple[Floats, StatedSettings]]) -> Picture:
     """A stretch of recorded OP, and OP rebuilt from errors, shape (n,), by some laws."""
     time, own = np.arange(part.start, part.stop) * s.dt_s, s.op[part]
     curves = [Drawn(k, time, rebuilt(e[part], own, law.kp, law.ti)) for k, (e, law) in laws.items()]
-    return Picture(name, "course", TIME, OP, (*curves, Drawn("recorded", time, own)))
+    return Picture("course", TIME, OP, (*curves, Drawn("recorded", time, own)))
 
 
 def law_window(s: Recording, ti: float) -> int:
@@ -319,7 +315,7 @@ def law_window(s: Recording, ti: float) -> int:
     return int(np.clip(LAW_WINDOW * ti, WINDOW, min(MOST_WINDOW, s.pv.size)))
 
 
-def by_stated_law(name: str, s: Recording, where: Mask | None = None) -> Picture | None:
+def by_stated_law(s: Recording, where: Mask | None = None) -> Picture | None:
     """OP about a mask's longest stretch (the busiest where None) and as the stated settings would have moved it.
 
     None without SP or settings.
@@ -328,4 +324,4 @@ def by_stated_law(name: str, s: Recording, where: Mask | None = None) -> Picture
         return None
     length = law_window(s, s.stated.ti)
     part = busiest(s.op, length, s.usable) if where is None else around(where[: s.op.size], length)
-    return rebuilt_course(name, s, part, {"stated": (s.sp - s.pv, s.stated)})
+    return rebuilt_course(s, part, {"stated": (s.sp - s.pv, s.stated)})

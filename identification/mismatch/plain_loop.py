@@ -27,10 +27,10 @@ from identification.simulation.parameters import Slot
 
 @dataclass(frozen=True, slots=True)
 class Clip:
-    """A transmitter's end: its value [% PV], whether it is the upper one, and where PV stands at it, shape (n,)."""
+    """A transmitter's end: its value [% PV], the model's constant for it, and where PV stands at it, shape (n,)."""
 
     value: float
-    upper: bool
+    slot: Slot
     where: Mask
 
 
@@ -61,7 +61,8 @@ def prepared(
     limits: ExplainLimits = LIMITS,
     experiment: bool = False,
 ) -> tuple[Problem, Fitted]:
-    """A problem whose outliers count less, and its plain fit; an experiment's is judged by simulation.
+    """A problem whose outliers count less, and its plain fit; an experiment's is judged by simulation, with the
+    memory of what the most flexible model leaves: the nearest to its noise.
 
     Samples at a clip are left out; those after them still count, and the model is clipped too. `brought` are the
     constants of the user's own model, shape (SIZE,), one start more.
@@ -72,7 +73,10 @@ def prepared(
     first = plain(p, brought, clip)
     calm = replace(p, weight=robust_weights(first.e, p.weight > 0))
     fit = descended(calm, first.model, p.limits.search.full_steps)
-    return with_memory(calm, fit) if experiment else (calm, fit)
+    if experiment:
+        calm = replace(calm, memory=correlated(left_freely(calm, fit)[calm.weight > 0]))
+        fit = replace(fit, count=calm.independent(fit.e))
+    return calm, fit
 
 
 def plain(p: Problem, brought: Floats | None = None, clip: Clip | None = None) -> Fitted:
@@ -80,17 +84,11 @@ def plain(p: Problem, brought: Floats | None = None, clip: Clip | None = None) -
     starts = [] if brought is None else [brought.copy()]
     for process in plain_processes(p.y, p.inputs.op, p.usable, p.inputs.dt_s):
         c = as_parameters(process)
-        if clip is not None:
-            c[Slot.CLIP_HI if clip.upper else Slot.CLIP_LO] = clip.value
         c[Slot.START] = p.y[0]
         c[Slot.BIAS] = float(np.mean(p.y)) - process.gain * float(np.mean(p.inputs.op) - p.inputs.middle)
         starts.append(c)
+    if clip is not None:
+        for c in starts:
+            c[clip.slot] = clip.value
     fits = [descended(p, Model((), c), p.limits.search.full_steps) for c in starts]
     return min(fits, key=lambda fit: fit.loss)
-
-
-def with_memory(p: Problem, fit: Fitted) -> tuple[Problem, Fitted]:
-    """An experiment and its fit, with the memory of what the most flexible model leaves: the nearest to its noise."""
-    left = left_freely(p, fit)
-    known = replace(p, memory=correlated(left[p.weight > 0]))
-    return known, replace(fit, count=known.independent(fit.e))

@@ -20,7 +20,6 @@ from identification.limits import LIMITS, ExplainLimits
 from identification.mismatch.effect import Effect
 from identification.mismatch.friction import WEARS, simulated_anew
 from identification.mismatch.starts import at_inlet
-from identification.models import Fopdt
 from identification.record import Floats, Mask
 from identification.signals.filters import without_lines
 from identification.simulation.open_loop import simulate
@@ -28,7 +27,6 @@ from identification.simulation.parameters import Slot
 
 ENDS_OF_SIGNAL = ("opspan", "pvspan")
 """Scales of constants that are places in a signal's range."""
-ALL = slice(None)
 
 
 def passes(p: Problem, worse: Fitted, better: Fitted, effect: Effect) -> bool:
@@ -94,9 +92,9 @@ def early_part(p: Problem) -> tuple[Problem, int]:
 
 def fitted_early(p: Problem, worse: Fitted, better: Fitted) -> tuple[Fitted, Fitted]:
     """Both models fitted anew to the first part of the record; a model's START is of its first sample."""
-    early, _ = early_part(p)
-    steps = p.limits.search.screen_steps
-    return descended(early, worse.model, steps), descended(early, better.model, steps)
+    early, steps = early_part(p)[0], p.limits.search.screen_steps
+    first = descended(early, worse.model, steps)
+    return first, first if better is worse else descended(early, better.model, steps)
 
 
 def held_out_gain(p: Problem, fits: tuple[Fitted, Fitted]) -> float:
@@ -148,14 +146,12 @@ def anchored(y: Floats, simulated: Floats, window: int) -> Floats:
     return y - without_lines(left, window)
 
 
-def misfit(y: Floats, simulated: Floats, window: int = 0) -> Misfit:
-    """Misfit of a simulation anchored in windows; fit_pct is 100 (1 - rms error / rms of PV so anchored itself)."""
-    return _of_what_is_left(y - anchored(y, simulated, window), without_lines(y, window))
-
-
-def _of_what_is_left(left: Floats, still: Floats) -> Misfit:
-    rmse = float(np.std(left))
-    return Misfit(rmse, 100.0 * (1.0 - rmse / max(float(np.std(still)), 1e-12)))
+def misfit(y: Floats, simulated: Floats, window: int = 0, part: slice = slice(None)) -> Misfit:
+    """Misfit of a simulation anchored in windows, in a part of it; fit_pct is 100 (1 - rms error / rms of PV so
+    anchored itself)."""
+    left, still = y - anchored(y, simulated, window), without_lines(y, window)
+    rmse = float(np.std(left[part]))
+    return Misfit(rmse, 100.0 * (1.0 - rmse / max(float(np.std(still[part])), 1e-12)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -216,19 +212,19 @@ def course(p: Problem, c: Floats, window: int, placed: bool) -> Floats:
 
 @dataclass(frozen=True, slots=True)
 class Pair:
-    """The plain and the better model as fitted to what is judged, bool, shape (n,), and the process of least squares
-    there."""
+    """The plain and the better model as fitted to what is judged, bool, shape (n,), and least squares' plain loop."""
 
     plain: Model
     better: Model
+    simulated: Model
     judged: Mask
-    process: Fopdt
 
 
 def pair_of(p: Problem, fits: tuple[Fitted, Fitted], judged: Mask) -> Pair:
     """The models of two fits, the worse first."""
-    process = simulated_best(p.y, p.inputs.op, judged, p.inputs.dt_s)
-    return Pair(fits[0].model, fits[1].model, judged, process)
+    process, c = simulated_best(p.y, p.inputs.op, judged, p.inputs.dt_s), fits[0].model.c.copy()
+    c[Slot.K], c[Slot.T], c[Slot.L] = process.gain, process.time_constant_s, process.dead_time_s
+    return Pair(fits[0].model, fits[1].model, Model((), c), judged)
 
 
 @dataclass(frozen=True, slots=True)
@@ -240,12 +236,13 @@ class Criterion:
     window: int = 0
     placed: bool = False
 
-    def misfit(self, c: Floats, part: slice = ALL) -> Misfit:
+    def misfit(self, c: Floats, part: slice = slice(None)) -> Misfit:
         """What constants, shape (SIZE,), leave of a part of PV."""
-        left = self.p.y - course(self.p, c, self.window, self.placed)
-        return _of_what_is_left(left[part], without_lines(self.p.y, self.window)[part])
+        p = self.p
+        free = simulated_anew(p, c, self.window) if self.placed else simulate(p.inputs, c)
+        return misfit(p.y, free, self.window, part)
 
-    def least(self, models: Iterable[Floats], part: slice = ALL) -> Floats:
+    def least(self, models: Iterable[Floats], part: slice = slice(None)) -> Floats:
         """Of models' constants those that leave least of a part."""
         return min(models, key=lambda c: self.misfit(c, part).rmse)
 
@@ -257,11 +254,8 @@ class Criterion:
 
     def candidates(self, pair: Pair) -> tuple[list[Floats], list[Floats]]:
         """Constants of the plain and of the better model by both criteria, each from several starts."""
-        plain, better = pair.plain, pair.better
-        c = plain.c.copy()
-        c[Slot.K], c[Slot.T] = pair.process.gain, pair.process.time_constant_s
-        c[Slot.L] = pair.process.dead_time_s
-        plains = [plain.c, self.nearer(plain, pair.judged), self.nearer(Model((), c), pair.judged)]
+        better = pair.better
+        plains = [pair.plain.c, *(self.nearer(model, pair.judged) for model in (pair.plain, pair.simulated))]
         if not better.added:
             return plains, plains
         begun, best = better.c.copy(), self.least(plains)

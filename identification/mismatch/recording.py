@@ -87,16 +87,13 @@ def level_gaps(pv: Floats) -> Floats:
 
 
 def straightened(x: Floats, share: float, limits: RecorderLimits) -> bool:
-    """Whether at least that share of a trend lies on straight lines that no grid makes."""
-    return float(straight(x).mean()) >= share and not on_grid(level_gaps(x), limits)
-
-
-def on_grid(gaps: Floats, limits: RecorderLimits) -> bool:
-    """Whether differences of values are multiples of the smallest that is common."""
-    if gaps.size < 5:
-        return True
-    unit = float(np.quantile(gaps, 0.1))
-    return float(np.mean(np.abs(gaps / unit - np.round(gaps / unit)) < 0.05)) > limits.grid_multiples
+    """Whether at least that share of a trend lies on straight lines that no grid makes; on one, differences of values
+    are multiples of the smallest that is common."""
+    gaps = level_gaps(x)
+    if gaps.size < 5 or float(straight(x).mean()) < share:
+        return False
+    steps = gaps / float(np.quantile(gaps, 0.1))
+    return float(np.mean(np.abs(steps - np.round(steps)) < 0.05)) <= limits.grid_multiples
 
 
 def least_jump(pv: Floats, limits: RecorderLimits = LIMITS.recorder) -> float:
@@ -110,10 +107,8 @@ def least_jump(pv: Floats, limits: RecorderLimits = LIMITS.recorder) -> float:
         return 0.0
     jump = float(np.quantile(moves, 0.02))
     low, high = np.quantile(pv, [0.05, 0.95])
-    coarse = jump > limits.jump_steps * float(np.quantile(gaps, 0.1)) and jump > limits.jump_share * (
-        high - low
-    )
-    return jump if coarse else 0.0
+    least = max(limits.jump_steps * float(np.quantile(gaps, 0.1)), limits.jump_share * float(high - low))
+    return jump if jump > least else 0.0
 
 
 def unlogged(stamp_s: Floats, n: int, dt_s: float, limits: RecorderLimits = LIMITS.recorder) -> Mask:

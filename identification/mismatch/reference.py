@@ -8,7 +8,7 @@ on data that no weight was fitted to, so what a way foretells there is physics t
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
@@ -154,25 +154,21 @@ def bent_moves(p: Problem, c: Floats, through: Floats) -> list[Floats]:
     return [response(x, c, dt_s) for x in moves]
 
 
-def ways(p: Problem, fit: Fitted) -> Mapping[str, Callable[[], list[Floats]]]:
-    """The ways in which anything may act, each as its signals in the innovations' place, shape (n,) each."""
-    c = fit.model.c
-    loop = loop_of(p, c)
-    through = through_valve(p.inputs, c)
-    in_pv: Mapping[str, Callable[[], list[Floats]]] = {
-        "past": lambda: past_moves(p, c, through),
-        "size": lambda: bent_moves(p, c, through),
-        "level": partial(by_level, loop),
-        "switch": partial(by_switch, loop),
-        "history": partial(by_history, loop),
-        "direction": partial(by_direction, loop),
-    }
+def ways(p: Problem, fit: Fitted) -> Iterator[tuple[str, list[Floats]]]:
+    """The ways in which anything may act, each with its signals in the innovations' place, shape (n,) each."""
+    c, loop, through = fit.model.c, loop_of(p, fit.model.c), through_valve(p.inputs, fit.model.c)
 
-    def white(signals: Callable[[], list[Floats]]) -> list[Floats]:
-        return [whitened(x, fit.ar, p.edges) for x in signals()]
+    def white(signals: list[Floats]) -> list[Floats]:
+        return [whitened(x, fit.ar, p.edges) for x in signals]
 
-    asked = {k: partial(white, v) for k, v in in_pv.items()}
-    return asked if p.by_simulation else {**asked, "sensor": partial(by_sensor, p, fit)}
+    yield "past", white(past_moves(p, c, through))
+    yield "size", white(bent_moves(p, c, through))
+    yield "level", white(by_level(loop))
+    yield "switch", white(by_switch(loop))
+    yield "history", white(by_history(loop))
+    yield "direction", white(by_direction(loop))
+    if not p.by_simulation:
+        yield "sensor", by_sensor(p, fit)
 
 
 def unfollowed(p: Problem, fit: Fitted) -> Callable[[Floats], Floats]:
@@ -202,8 +198,8 @@ def foretold(p: Problem, fit: Fitted, clock: bool = True) -> Foretold:
     root, rest = np.sqrt(p.weight), unfollowed(p, fit)
     e = rest(fit.e * root)
     best = Foretold("clock", _gained(fit, e, _by_clock(e, root))) if clock else Foretold()
-    for way, signals in ways(p, fit).items():
-        x = rest(np.nan_to_num(np.stack(signals()) * root).T)
+    for way, signals in ways(p, fit):
+        x = rest(np.nan_to_num(np.stack(signals) * root).T)
         size = x.std(axis=0)
         kept = size > 1e-9 * size.max(initial=1e-30)
         won = max(_gained(fit, e, _by_ridge(e, x[:, kept] / size[kept], prior)) for prior in PRIORS)

@@ -22,13 +22,13 @@ from identification.mismatch.selection import (
     penalty,
     without,
 )
-from identification.mismatch.starts import CandidateInputs, candidate_inputs
+from identification.mismatch.starts import Round, round_of
 from identification.models import Stiction
 
 
 def physics(found: Explanation, tell: Progress, s: Recording) -> Explanation:
     """The explanation with the effects of the catalogue that pass, and the gain [nat] of what is left beyond them."""
-    p, best = integrating_or_first_order(found.p, found.plain, s.kind)
+    p, best = integrating_or_first_order(found.p, found.plain, s)
     found, last = one_by_one(replace(found, p=p, plain=best, best=best), tell, s)
     if len(found.accepted) > 1:
         found = as_a_set(found, tell, s)
@@ -37,12 +37,17 @@ def physics(found: Explanation, tell: Progress, s: Recording) -> Explanation:
 
 
 def one_by_one(found: Explanation, tell: Progress, s: Recording) -> tuple[Explanation, list[Candidate]]:
-    """Effects added as long as one passes, first a valve that the cycles show, and the last round's candidates."""
+    """Effects added as long as one passes, first a valve that the cycles show, and the last round's candidates.
+
+    Physics of no name, which goes with PV as recorded, competes neither in a loop that cycles, where PV of any while
+    ago tells PV, whatever makes it cycle, nor in an experiment, which is judged by its simulation: what is fed with
+    recorded PV is none.
+    """
     limits, candidates = found.p.limits.search, list[Candidate]()
-    rows = (*CANDIDATES, *RIVALS) if has_rivals(s) else CANDIDATES
+    has_rivals = s.cycles is None and not s.free_valve and not is_experiment(s)
     for _ in range(limits.rounds):
-        x = candidate_inputs(found.p, found.best, s)
-        candidates = compete(x, found.best, rows, tell)
+        x = round_of(found.p, found.best, s)
+        candidates = compete(x, (*CANDIDATES, *RIVALS) if has_rivals else CANDIDATES, tell)
         if s.cycles is not None and not found.accepted:
             candidates = with_cycles(x.p, found.best, s.cycles, candidates)
         if not found.first:
@@ -71,21 +76,12 @@ def chosen(p: Problem, found: Explanation, s: Recording, candidates: list[Candid
     return named if little or near else winner
 
 
-def has_rivals(s: Recording) -> bool:
-    """Whether physics of no name, which goes with PV as recorded, may be what acts.
-
-    In a loop that cycles, PV of any while ago tells PV, whatever makes it cycle; in an experiment, which is judged by
-    its simulation, what is fed with recorded PV is no simulation.
-    """
-    return s.cycles is None and not s.free_valve and not is_experiment(s)
-
-
 def with_cycles(p: Problem, near: Fitted, seen: SeenInCycles, candidates: list[Candidate]) -> list[Candidate]:
     """The candidates and those begun where the cycles show a valve, best first; of each name the better."""
     begun = [penalised(p, near, fit) for fit in from_cycles(p, near, seen, CANDIDATES)]
-    best: dict[str, Candidate] = {}
+    best: dict[tuple[str, str], Candidate] = {}
     for c in sorted([*candidates, *begun], key=lambda c: -c.penalised):
-        best.setdefault(f"{c.name} {c.row.label}", c)
+        best.setdefault((c.name, c.row.label), c)
     return list(best.values())
 
 
@@ -125,35 +121,35 @@ def as_a_set(found: Explanation, tell: Progress, s: Recording) -> Explanation:
     told = shown_by_cycles(s, accepted[:1]) is not None
     if not told:
         tell("other sets of effects")
-        best, accepted = replacement_step(candidate_inputs(p, best, s), best, accepted, tell)
+        best, accepted = replacement_step(round_of(p, best, s), accepted, tell)
     best, accepted = without_the_idle(p, best, accepted, int(told))
     return replace(found, best=best, accepted=tuple(accepted))
 
 
-def replacement_step(
-    x: CandidateInputs, best: Fitted, accepted: list[Candidate], tell: Progress
-) -> tuple[Fitted, list[Candidate]]:
-    """The accepted effects, each given up once for whatever does better beside the others.
+def replacement_step(x: Round, accepted: list[Candidate], tell: Progress) -> tuple[Fitted, list[Candidate]]:
+    """The accepted effects, each given up once for whatever does better beside the others: another, or another way
+    of the same.
 
-    Effects are added one at a time, so the first may have been taken in the place of two that act together.
+    Effects are added one at a time, so the first may have been taken in the place of two that act together. In an
+    experiment none bound to a time takes the place of one that lasts, for through whatever a model lacks a course can
+    be drawn.
     """
-    limits = x.p.limits.search
+    limits, best = x.p.limits.search, x.near
     for i, old in enumerate(accepted):
+        lasts = x.p.by_simulation and not EFFECTS[old.name].timed
         near = descended(x.p, without(best.model, [old.row]), limits.full_steps)
         least = max(gain(best, near) - penalty(x.p, old.row) + limits.tie, 0.0)
-        first = next((c for c in compete(x, near, CANDIDATES, tell, least) if may_replace(x.p, c, old)), None)
+        others = (
+            c
+            for c in compete(replace(x, near=near), CANDIDATES, tell, least)
+            if (c.name, c.row.label) != (old.name, old.row.label) and not (lasts and EFFECTS[c.name].timed)
+        )
+        first = next(others, None)
         if first is None or first.penalised <= least or not passes(x.p, near, first.fit, EFFECTS[first.name]):
             continue
         best = descended(x.p, first.fit.model, limits.full_steps)
         accepted = [*accepted[:i], first, *accepted[i + 1 :]]
     return best, accepted
-
-
-def may_replace(p: Problem, new: Candidate, old: Candidate) -> bool:
-    """Whether a candidate may stand in an effect's place: another, or another way of the same; in an experiment none
-    bound to a time for one that lasts, for through whatever a model lacks a course can be drawn."""
-    bound = EFFECTS[new.name].timed and not EFFECTS[old.name].timed
-    return (new.name, new.row.label) != (old.name, old.row.label) and not (bound and p.by_simulation)
 
 
 def without_the_idle(

@@ -13,15 +13,16 @@ from identification.mismatch.effect import Friction
 from identification.mismatch.friction import fit_sticking
 from identification.mismatch.outside import about
 from identification.mismatch.proof import is_one_move
-from identification.mismatch.starts import CandidateInputs, Span, mode_starts, screened, span_of, start_models
+from identification.mismatch.recording import Recording
+from identification.mismatch.starts import Round, mode_starts, screened, start_models
 from identification.simulation.effect import Variant
 from identification.simulation.parameters import Slot, neutral
 
 Progress = Callable[[str], None]
 KNOWN_TYPES = ("flow", "pressure", "temperature", "level")
 """Loop types under which a row may be left out; any other text says nothing."""
-NEEDS: Mapping[str, Callable[[CandidateInputs], bool]] = {
-    "every scan": lambda x: x.every_scan,
+NEEDS: Mapping[str, Callable[[Round], bool]] = {
+    "every scan": lambda x: x.s.every_scan,
     "experiment": lambda x: x.p.by_simulation,
     "moves": lambda x: not is_one_move(x.p),
     "neighbour": lambda x: x.p.inputs.neighbour is not None,
@@ -53,48 +54,42 @@ def silent(_: str) -> None:
 
 
 def compete(
-    x: CandidateInputs,
-    near: Fitted,
-    rows: tuple[Variant, ...] = CANDIDATES,
-    tell: Progress = silent,
-    least: float = 0.0,
+    x: Round, rows: tuple[Variant, ...] = CANDIDATES, tell: Progress = silent, least: float = 0.0
 ) -> list[Candidate]:
     """All rows as candidates of a fit to which each is added, best first; the better half followed to the end.
 
     tell : is told each row's name before it is tried; least : what a candidate has to come to, penalty taken off, to
     be of any use [nat].
     """
-    p, span = x.p, span_of(x.p, near)
     starts, firsts = [], []
     for row in rows:
-        if applies(x, near, row):
+        if applies(x, row):
             tell(row.name)
-            models, first = first_try(x, span, row, least)
+            models, first = first_try(x, row, least)
             starts.append(models)
             firsts.append(first)
-    tried = sorted(zip(counted_alike(p, near, firsts), starts, strict=True), key=lambda t: -t[0].penalised)
-    most = p.limits.search.followed
-    ended = [followed(p, near, first, models, least) for first, models in tried[:most]]
-    sticking = sticking_candidates(x, near, [first for first, _ in tried], rows, tell)
-    left = [first for first, _ in tried[most:]]
-    found = [*(outdoing(p, near, c) for c in ended), *sticking, *(outdoing(p, near, c) for c in left)]
-    return sorted(counted_alike(p, near, found), key=lambda c: -c.penalised)
+    tried = sorted(zip(counted_alike(x, firsts), starts, strict=True), key=lambda t: -t[0].penalised)
+    most = x.p.limits.search.followed
+    ended = [outdoing(x, followed(x, first, models, least)) for first, models in tried[:most]]
+    sticking = sticking_candidates(x, [first for first, _ in tried], rows, tell)
+    found = [*ended, *sticking, *(outdoing(x, first) for first, _ in tried[most:])]
+    return sorted(counted_alike(x, found), key=lambda c: -c.penalised)
 
 
-def applies(x: CandidateInputs, near: Fitted, row: Variant) -> bool:
+def applies(x: Round, row: Variant) -> bool:
     """Whether a row may be added: what it needs is there, and it is not in the model yet."""
-    effect = about(row.name)
+    effect, near = about(row.name), x.near
     taken = {p.slot for r in near.model.added for p in r.params}
     if row.name in near.names or taken & {p.slot for p in row.params}:
         return False
-    if row.types and x.kind in KNOWN_TYPES and x.kind not in row.types:
+    if row.types and x.s.kind in KNOWN_TYPES and x.s.kind not in row.types:
         return False
     if row.needs in NEEDS and not NEEDS[row.needs](x):
         return False
     if x.p.by_simulation and effect.timed and row.opponent is None:
         return False  # a load that is added is told by innovations
     # behind one friction a second of the same stem cannot be told without the stem's position
-    told = x.free_valve or any(about(name).friction is not None for name in near.names)
+    told = x.s.free_valve or any(about(name).friction is not None for name in near.names)
     return effect.friction is None or not told
 
 
@@ -112,9 +107,9 @@ def penalised(p: Problem, near: Fitted, fit: Fitted) -> Candidate:
     return Candidate(fit, won, won - penalty(p, fit.model.added[-1]))
 
 
-def best_of(p: Problem, near: Fitted, models: list[Model], steps: int, aim: float = math.inf) -> Candidate:
+def best_of(x: Round, models: list[Model], steps: int, aim: float = math.inf) -> Candidate:
     """The best of some starts, followed for some steps, as far as they come under `aim`."""
-    return penalised(p, near, min((descended(p, m, steps, aim) for m in models), key=lambda f: f.loss))
+    return penalised(x.p, x.near, min((descended(x.p, m, steps, aim) for m in models), key=lambda f: f.loss))
 
 
 def worth_following(p: Problem, least: float) -> float:
@@ -124,53 +119,51 @@ def worth_following(p: Problem, least: float) -> float:
     return min(limits.may_come_to * least, least + limits.worth_following)
 
 
-def first_try(x: CandidateInputs, span: Span, row: Variant, least: float) -> tuple[list[Model], Candidate]:
+def first_try(x: Round, row: Variant, least: float) -> tuple[list[Model], Candidate]:
     """A row's starts, the best first, and the candidate that a few steps make of the first; a start that will not
     come to anything worth following is left."""
-    p, near, limits = x.p, span.near, x.p.limits.search
-    models = start_models(x, near, row)
+    p, near, limits = x.p, x.near, x.p.limits.search
+    first = models = start_models(x, row)
     if row.needs != "line":
-        models = screened(span, models)[: limits.starts]
-    first = models if row.needs == "line" else models[:1]
+        models = screened(x, models)[: limits.starts]
+        first = models[:1]
     if row.modes:
         first = first + mode_starts(p, near, row)
     worth = penalty(p, row) + worth_following(p, least)
     aim = near.loss * math.exp(-2.0 * worth / p.count)
-    return models, best_of(p, near, first, limits.screen_steps, aim)
+    return models, best_of(x, first, limits.screen_steps, aim)
 
 
-def followed(p: Problem, near: Fitted, first: Candidate, models: list[Model], least: float) -> Candidate:
+def followed(x: Round, first: Candidate, models: list[Model], least: float) -> Candidate:
     """A candidate of the first round followed to the end, from there and from its next starts."""
-    if first.penalised < worth_following(p, least) and (least > 0.0 or not p.by_simulation):
+    if first.penalised < worth_following(x.p, least) and (least > 0.0 or not x.p.by_simulation):
         return first
-    limits = p.limits.search
-    best = best_of(p, near, [first.fit.model, *models[1 : limits.starts]], limits.full_steps)
+    limits = x.p.limits.search
+    best = best_of(x, [first.fit.model, *models[1 : limits.starts]], limits.full_steps)
     return best if best.penalised > first.penalised else first
 
 
-def counted_alike(p: Problem, near: Fitted, found: list[Candidate]) -> list[Candidate]:
+def counted_alike(x: Round, found: list[Candidate]) -> list[Candidate]:
     """An experiment's candidates with errors that count as many as those of the one that leaves the whitest: what
     another leaves is correlated by what it lacks, and not by the noise. A course takes the noise itself up, and is
     counted by itself."""
-    lasting = [c.fit.count for c in found if c.row.opponent is None]
-    if not p.by_simulation or not lasting:
+    most = max((c.fit.count for c in found if c.row.opponent is None), default=0)
+    if not x.p.by_simulation:
         return found
     return [
-        c if c.row.opponent is not None else penalised(p, near, replace(c.fit, count=max(lasting)))
-        for c in found
+        c if c.row.opponent is not None else penalised(x.p, x.near, replace(c.fit, count=most)) for c in found
     ]
 
 
-def outdoing(p: Problem, near: Fitted, first: Candidate) -> Candidate:
+def outdoing(x: Round, first: Candidate) -> Candidate:
     """A candidate of an experiment that has an opponent, by what it gains over that: the same course of a load that
     is added, which is no effect but the plain loop's own. One that moves PV as much as OP does needs no such proof:
     whether it changes the gain too, the record may not tell."""
-    row = first.row.opponent
+    p, near, row = x.p, x.near, first.row.opponent
     if row is None or not p.by_simulation:
         return first
-    model = Model((*near.model.added, row), row.set_in(near.model.c))
-    added = descended(p, model, p.limits.search.full_steps)
-    own = descended(p, first.fit.model, p.limits.search.full_steps)
+    model, steps = Model((*near.model.added, row), row.set_in(near.model.c)), p.limits.search.full_steps
+    added, own = descended(p, model, steps), descended(p, first.fit.model, steps)
     limits, moves = p.limits.proof, float(p.weight @ p.y**2 / p.weight.sum())
     if own.loss < limits.course_leaves * near.loss and near.loss > limits.course_from**2 * moves:
         return penalised(p, near, own)
@@ -179,7 +172,7 @@ def outdoing(p: Problem, near: Fitted, first: Candidate) -> Candidate:
 
 
 def sticking_candidates(
-    x: CandidateInputs, near: Fitted, tried: list[Candidate], rows: tuple[Variant, ...], tell: Progress
+    x: Round, tried: list[Candidate], rows: tuple[Variant, ...], tell: Progress
 ) -> list[Candidate]:
     """Sticking valves scanned about the best play, where a play or the like gains anything at all."""
     plays = [c for c in tried if about(c.name).friction is Friction.PLAY]
@@ -190,7 +183,8 @@ def sticking_candidates(
     for row in rows:
         if about(row.name).friction is Friction.STICKS:
             tell(row.name)
-            out.append(penalised(x.p, near, fit_sticking(x.p, plays[0].fit, row, near.model.added)))
+            fit = fit_sticking(x.p, plays[0].fit, row, x.near.model.added)
+            out.append(penalised(x.p, x.near, fit))
     return out
 
 
@@ -204,18 +198,17 @@ def without(model: Model, rows: Iterable[Variant]) -> Model:
     return Model(tuple(r for r in model.added if r.name not in names), c)
 
 
-def integrating_or_first_order(p: Problem, free: Fitted, kind: str) -> tuple[Problem, Fitted]:
+def integrating_or_first_order(p: Problem, free: Fitted, s: Recording) -> tuple[Problem, Fitted]:
     """Problem and plain fit, the time constant kept within the record where it might as well have no end.
 
     A plain loop whose time constant outlasts the record is an integrator under another name. Where an integrator
     does as well with one constant fewer, the plain loop is one that settles within the record.
     """
-    row = next(v for v in CANDIDATES if v.replaces)
-    x = CandidateInputs(p, (), kind)
+    row, x = next(v for v in CANDIDATES if v.replaces), Round(p, free, s)
     longest = p.limits.search.settles * p.inputs.dt_s * p.y.size
-    if float(free.model.c[Slot.T]) <= longest or not applies(x, free, row):
+    if float(free.model.c[Slot.T]) <= longest or not applies(x, row):
         return p, free
-    ended = best_of(p, free, start_models(x, free, row), p.limits.search.full_steps)
+    ended = best_of(x, start_models(x, row), p.limits.search.full_steps)
     if ended.gain < -p.limits.search.same:
         return p, free
     held = replace(p, inputs=replace(p.inputs, longest_s=longest))

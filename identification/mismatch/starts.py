@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import product
 
 import numpy as np
@@ -32,23 +33,50 @@ LEADING = 0.95
 """First coefficient of the noise model that knows nothing: nearly a difference."""
 
 
-@dataclass(frozen=True, slots=True)
-class CandidateInputs:
-    """A problem with the places and frequencies at which a load may act, and what is known beside its trends, by
-    which effects are asked about or not; see Recording."""
+@dataclass(frozen=True)
+class Round:
+    """One round of the search: a problem with the places at which a load may step in, a fit to which effects are
+    added, the recording, which says what is asked, and the frequencies at which a load may act [rad/s]."""
 
     p: Problem
-    omegas: tuple[float, ...]
-    kind: str = ""
-    every_scan: bool = True
-    free_valve: bool = False
+    near: Fitted
+    s: Recording
+    omegas: tuple[float, ...] = ()
+
+    @cached_property
+    def directions(self) -> Floats:
+        """Orthonormal directions in which the fit's own constants move its weighted innovations, shape (n, m)."""
+        moves = sensitivities(self.p, self.near.model, self.near.ar) * np.sqrt(self.p.weight)
+        return np.linalg.qr(moves.T)[0]
+
+    def free(self, x: Floats) -> Floats:
+        """Weighted innovations of what is left, shape (n,), that the fit's own constants cannot lessen, linearly."""
+        e = whitened(x, self.near.ar, self.p.edges) * np.sqrt(self.p.weight)
+        return e - self.directions @ (self.directions.T @ e)  # type: ignore[no-any-return]
+
+    def left(self, model: Model) -> float:
+        """Sum of squares that a model leaves so."""
+        e = self.free(self.p.y - simulate(self.p.inputs, model.c))
+        return float(e @ e)
+
+    def on_line(self, model: Model) -> Model:
+        """A start with the parameter that PV goes with in a straight line where it leaves least."""
+        slot = model.added[-1].linear
+        if slot is None:
+            return model
+        none, one, c = model.c.copy(), model.c.copy(), model.c.copy()
+        none[slot], one[slot] = 0.0, 1.0
+        still = simulate(self.p.inputs, none)
+        along = self.free(simulate(self.p.inputs, one) - still)
+        c[slot] = float(along @ self.free(self.p.y - still)) / max(float(along @ along), 1e-300)
+        return Model(model.added, c)
 
 
-def candidate_inputs(p: Problem, fit: Fitted, s: Recording) -> CandidateInputs:
-    """Steps and lines located in what a fit leaves."""
-    held = p.inputs.step_at if any(r.needs == "steps" for r in fit.model.added) else step_places(p, fit)
+def round_of(p: Problem, near: Fitted, s: Recording) -> Round:
+    """A round of which steps and lines are located in what a fit leaves."""
+    held = p.inputs.step_at if any(r.needs == "steps" for r in near.model.added) else step_places(p, near)
     located = replace(p, inputs=replace(p.inputs, step_at=held))
-    return CandidateInputs(located, line_frequencies(p, fit), s.kind, s.every_scan, s.free_valve)
+    return Round(located, near, s, line_frequencies(p, near))
 
 
 def step_places(p: Problem, fit: Fitted) -> tuple[int, ...]:
@@ -97,8 +125,7 @@ def after_gaps(p: Problem, fit: Fitted) -> Mask:
     held = round(float(fit.model.c[Slot.L] + limits.forgotten * fit.model.c[Slot.T]) / p.inputs.dt_s)
     out = np.zeros(p.y.size, dtype=bool)
     for first, last in runs(~p.usable):
-        if last - first >= limits.gap_samples:
-            out[max(first - 1, 0) : last + held] = True
+        out[max(first - 1, 0) : last + held] |= last - first >= limits.gap_samples
     return out
 
 
@@ -136,14 +163,14 @@ def line_frequencies(p: Problem, fit: Fitted) -> tuple[float, ...]:
     return tuple(found)
 
 
-def start_models(x: CandidateInputs, near: Fitted, row: Variant) -> list[Model]:
+def start_models(x: Round, row: Variant) -> list[Model]:
     """Starts of a row added to a fit; of an oscillating load one a frequency."""
     on_lines = tuple({int(Slot.OMEGA): w} for w in x.omegas)
-    out = []
+    begun, out = x.near.model, []
     for start in on_lines if row.needs == "line" else row.starts:
-        c = row.set_in(near.model.c)
+        c = row.set_in(begun.c)
         for param in row.params:
-            offset, factor = scales(x.p.inputs, near.model.c, param)
+            offset, factor = scales(x.p.inputs, begun.c, param)
             c[param.slot] = offset + factor * start.get(int(param.slot), 0.0)
         stood = sum(c[slot] for slot in row.delays) + max(-c[Slot.SHARE] * c[Slot.T], 0.0)
         if row.enter is not None:
@@ -151,52 +178,13 @@ def start_models(x: CandidateInputs, near: Fitted, row: Variant) -> list[Model]:
         for part in (0.4, 1.0) if stood > 0 else (0.0,):
             shorter = c.copy()
             shorter[Slot.L] = max(c[Slot.L] - part * stood, 0.2 * c[Slot.L])
-            out.append(Model((*near.model.added, row), shorter))
+            out.append(Model((*begun.added, row), shorter))
     return out
 
 
-@dataclass(frozen=True, slots=True)
-class Span:
-    """What a fit's own constants follow linearly: orthonormal directions of weighted innovations, shape (n, m)."""
-
-    p: Problem
-    near: Fitted
-    directions: Floats
-
-    def free(self, x: Floats) -> Floats:
-        """Weighted innovations of what is left, shape (n,), that the fit's own constants cannot lessen."""
-        e = whitened(x, self.near.ar, self.p.edges) * np.sqrt(self.p.weight)
-        return e - self.directions @ (self.directions.T @ e)  # type: ignore[no-any-return]
-
-    def left(self, model: Model) -> float:
-        """Sum of squares that a model leaves so."""
-        e = self.free(self.p.y - simulate(self.p.inputs, model.c))
-        return float(e @ e)
-
-    def on_line(self, model: Model) -> Model:
-        """A start with the parameter that PV goes with in a straight line where it leaves least."""
-        slot = model.added[-1].linear
-        if slot is None:
-            return model
-        none, one, c = model.c.copy(), model.c.copy(), model.c.copy()
-        none[slot], one[slot] = 0.0, 1.0
-        still = simulate(self.p.inputs, none)
-        along = self.free(simulate(self.p.inputs, one) - still)
-        c[slot] = float(along @ self.free(self.p.y - still)) / max(float(along @ along), 1e-300)
-        return Model(model.added, c)
-
-
-def span_of(p: Problem, near: Fitted) -> Span:
-    """The directions in which a fit's own constants move its innovations."""
-    moves = sensitivities(p, near.model, near.ar) * np.sqrt(p.weight)
-    return Span(p, near, np.linalg.qr(moves.T)[0])
-
-
-def screened(span: Span, models: list[Model]) -> list[Model]:
+def screened(x: Round, models: list[Model]) -> list[Model]:
     """Starts ordered by the innovations that they leave once the fit's own constants have followed, linearly."""
-    if len(models) == 1:
-        return models
-    return sorted((span.on_line(model) for model in models), key=span.left)
+    return models if len(models) == 1 else sorted(map(x.on_line, models), key=x.left)
 
 
 def mode_starts(p: Problem, near: Fitted, row: Variant) -> list[Model]:
@@ -221,7 +209,10 @@ def grid_of_modes(p: Problem, near: Fitted, row: Variant, ar: Floats) -> Iterato
     for samples in range(0, longest + 1, longest // DELAYS + 1):
         late = {t: np.concatenate((np.full(samples, x[0]), x[: x.size - samples])) for t, x in found.items()}
         for first, other in product(firsts, others):
-            (one, two), left = both_gains(y, np.stack([late[first], late[other], level]), p.weight)
+            rows = np.stack([late[first], late[other], level])
+            weighted = rows * p.weight
+            beta = np.linalg.lstsq(weighted @ rows.T, weighted @ y, rcond=1e-12)[0]
+            (one, two), left = beta[:2], float((p.weight * y) @ y - beta @ (weighted @ y))
             c = near.model.c.copy()
             c[Slot.T], c[Slot.L], c[Slot.MODE_T] = first, samples * dt_s, max(other, 0.1 * dt_s)
             c[Slot.K], c[Slot.SHARE] = one + two, two / (one + two) if one + two != 0 else np.inf
@@ -238,10 +229,3 @@ def responses(p: Problem, near: Fitted, times: set[float], ar: Floats) -> dict[f
         c[Slot.T] = max(t, 0.1 * inputs.dt_s)
         out[t] = whitened(plain_vessel(through, still, c, inputs.dt_s, inputs.middle), ar, p.edges)
     return out
-
-
-def both_gains(y: Floats, rows: Floats, weight: Floats) -> tuple[tuple[float, float], float]:
-    """Both gains and what is left, of whitened PV on two responses and a level, shape (3, n)."""
-    weighted = rows * weight
-    beta = np.linalg.lstsq(weighted @ rows.T, weighted @ y, rcond=1e-12)[0]
-    return (float(beta[0]), float(beta[1])), float((weight * y) @ y - beta @ (weighted @ y))

@@ -25,6 +25,8 @@ SIGNALS: Mapping[str, list[str]] = {
     "controller": ["SP", "PV", "OP"],
     "load": ["PV"],
 }
+TOLD = ("name", "p", "carries", "share", "by", "range")
+"""What is told of a feature."""
 
 
 def carrying(won: Floats, dt_s: float) -> list[list[float]]:
@@ -73,7 +75,7 @@ def located_in(p: Problem, fit: Fitted, s: Recording) -> Located:
     late_s, lag_s = float(fit.model.c[Slot.L]), float(fit.model.c[Slot.T])
     late = min(round(late_s / s.dt_s), s.pv.size // 4)
     memory = max(round((late_s + lag_s) / s.dt_s), LOCATION.least_memory)
-    return located(fit.e, s.pv, s.op, p.weight > 0, s.dt_s, late, min(memory, s.pv.size))
+    return located(fit.e, s.pv, s.op, p.weight > 0, s.dt_s, late, memory)
 
 
 def won_over(p: Problem, plain: Fitted, best: Fitted) -> tuple[Floats, Floats]:
@@ -81,21 +83,6 @@ def won_over(p: Problem, plain: Fitted, best: Fitted) -> tuple[Floats, Floats]:
     before, after = simulate(p.inputs, plain.model.c), simulate(p.inputs, best.model.c)
     e0, e1 = (whitened(p.y - x, best.ar, p.edges) for x in (before, after))
     return p.weight * (e0**2 - e1**2), after - before
-
-
-def features_said(found: Located) -> list[dict[str, Any]]:
-    """The features as data: name, chance, whether they carry the misfit, by what, in which part of their range."""
-    return [
-        {
-            "name": f.name,
-            "p": f.p,
-            "carries": f.carries,
-            "share": f.share,
-            "by": f.of,
-            "range": [] if f.low is None or f.high is None else [f.low, f.high],
-        }
-        for f in found.features
-    ]
 
 
 def where_of(found: Explanation, s: Recording, block: str, at: Located) -> dict[str, Any]:
@@ -107,8 +94,9 @@ def where_of(found: Explanation, s: Recording, block: str, at: Located) -> dict[
     block : of the verdict; at : of the plain loop's innovations, of the last model's where something is left over.
     """
     p, marked, signals = found.p, found.finding, SIGNALS.get(block, ["OP", "PV"])
+    features = [{key: getattr(f, key) for key in TOLD} for f in at.features]
     after = any(f.name == "after_reversals" for f in at.carrying)
-    told: dict[str, Any] = {"features": features_said(at), "after_reversals": after}
+    told: dict[str, Any] = {"features": features, "after_reversals": after}
     if marked is not None:
         here = marked.where[: s.pv.size]
         spans = [[0.0, here.size * s.dt_s]] if here.all() else carrying(here.astype(float), s.dt_s)

@@ -31,7 +31,7 @@ from identification.mismatch.catalogue import CANDIDATES, EFFECTS
 from identification.mismatch.model_file import carried, to_data
 from identification.mismatch.plain_loop import inputs_of, prepared, without_spikes
 from identification.mismatch.selection import Candidate, compete, integrating_or_first_order
-from identification.mismatch.starts import candidate_inputs
+from identification.mismatch.starts import round_of
 from proofs.concealed.proof import interval, place_section, table
 from proofs.concealed.score import KIN, kin
 
@@ -75,9 +75,9 @@ def compared(cases: pathlib.Path, truths: dict, tag: str) -> dict:
     s = fit.subject
     inputs = inputs_of(s)
     p, plain = integrating_or_first_order(
-        *prepared(inputs, s.pv - inputs.level, without_spikes(s.pv, s.usable)), s.kind
+        *prepared(inputs, s.pv - inputs.level, without_spikes(s.pv, s.usable)), s
     )
-    candidates = compete(candidate_inputs(p, plain, s), plain)
+    candidates = compete(round_of(p, plain, s))
     mine = [r for r in candidates if kin(r.name, truth["effect"], KIN)]
     wrong = [
         r

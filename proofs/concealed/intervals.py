@@ -27,7 +27,7 @@ from identification.mismatch.answer import parameters_of
 from identification.mismatch.catalogue import CANDIDATES
 from identification.mismatch.plain_loop import inputs_of, prepared, without_spikes
 from identification.mismatch.selection import compete, integrating_or_first_order
-from identification.mismatch.starts import candidate_inputs
+from identification.mismatch.starts import round_of
 from proofs.concealed.effects import NAMES
 from proofs.concealed.make import read_residuals, seal
 from proofs.concealed.plan import Case
@@ -50,10 +50,10 @@ def fitted(cases: pathlib.Path, tag: str, effect: str):
     s = case(spec, specs, source.read(list(spec.tags) + [t for o in specs for t in o.tags]), Config()).subject
     inputs = inputs_of(s)
     begun = prepared(inputs, s.pv - inputs.level, without_spikes(s.pv, s.usable))
-    p, plain = integrating_or_first_order(*begun, s.kind)
-    x = candidate_inputs(p, plain, s)
+    p, plain = integrating_or_first_order(*begun, s)
+    x = round_of(p, plain, s)
     rows = tuple(v for v in CANDIDATES if kin(v.name, effect, KIN))
-    best = compete(x, plain, rows)[0]
+    best = compete(x, rows)[0]
     return x.p, descended(x.p, best.fit.model, x.p.limits.search.full_steps)
 
 

@@ -12,7 +12,7 @@ from analyzer.explain import page as pages
 from analyzer.explain.drawings import close_part, drawn_trends, simulations
 from analyzer.explain.explained import abstained
 from analyzer.explain.text import answer_lines, lined_up
-from analyzer.explain.words import change, interval_text
+from analyzer.explain.words import change, interval_text, parameters
 from reports.folder import write_markdown
 from reports.html import render
 from reports.markdown import render as as_markdown
@@ -109,6 +109,16 @@ def test_narrow_intervals_keep_their_width() -> None:
     assert interval_text({"low": 1.0691, "high": 1.0704}) == "1.069 … 1.07"
     assert interval_text({"low": 1.0, "high": 2.0}) == "1 … 2"
     assert interval_text({"low": 3.0, "high": 3.0}) == "–"
+
+
+def test_a_number_that_one_effect_hides_is_shown_of_another() -> None:
+    """A supply's flow at rest is told as a number of its own, although physics of no name has one that is not."""
+    numbers = {
+        name: {"value": 8.0, "low": 6.0, "high": 10.0, "unit": "% OP"}
+        for name in ("flow_at_rest_pct", "head_1")
+    }
+    supply = {"effects": [{"name": "supply-variation", "parameters": numbers}]}
+    assert [row[1].text for row in parameters(supply).rows] == ["Flow at rest"]
 
 
 @pytest.mark.parametrize(("after", "said"), [(1.001, "0 %"), (0.999, "0 %"), (1.5, "+50 %"), (0.5, "-50 %")])

@@ -4,7 +4,7 @@ import numpy as np
 
 from identification.controller.check import LATE_SAMPLES
 from identification.controller.pi_regression import LATE_STEP, shifted
-from identification.mismatch.effect import Block, Fault, Finding, Floats, Number, Recording
+from identification.mismatch.effect import Block, Fault, Finding, Floats, Recording, exact
 from identification.mismatch.pictures import WINDOW, Picture, biggest_move, rebuilt_course
 
 
@@ -15,7 +15,7 @@ def other_clock(found: Finding, s: Recording, _: Floats) -> Picture | None:
     part = biggest_move(s.sp if float(np.ptp(s.sp)) > 0 else s.op, WINDOW // 4, s.usable)
     right = s.sp - shifted(s.pv, found.values[LATE_SAMPLES])
     laws = {"found": (right, s.stated), "stated": (s.sp - s.pv, s.stated)}
-    return rebuilt_course(found.name, s, part, laws)
+    return rebuilt_course(s, part, laws)
 
 
 EFFECT = Fault(
@@ -24,8 +24,7 @@ EFFECT = Fault(
     sentence="PV is stamped {shift_s} later than OP: the two clocks differ.",
     check="Record PV and OP from one source or synchronize the clocks.",
     caption="OP recorded, and rebuilt with PV's clock set right (found) and as stamped.",
-    numbers=(
-        Number("shift_s", "s", "PV late by", LATE_SAMPLES, in_time=True, half=lambda s: LATE_STEP * s.dt_s),
-    ),
+    numbers=lambda found, s: {"shift_s": exact(found.values[LATE_SAMPLES] * s.dt_s, "s", LATE_STEP * s.dt_s)},
+    titles={"shift_s": "PV late by"},
     drawn=other_clock,
 )

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from identification.mismatch.effect import Block, Ends, Fault, Finding, Floats, Number, Recording
+from identification.mismatch.effect import Block, Ends, Fault, Finding, Floats, Recording, exact
 from identification.mismatch.pictures import PV, TIME, WINDOW, Drawn, Picture, busiest
 from identification.mismatch.recording import straight, straightened
 
@@ -21,7 +21,7 @@ def straight_lines(found: Finding, s: Recording, _: Floats) -> Picture:
     part = busiest(s.pv, WINDOW)
     time, x, marked = np.arange(part.start, part.stop) * s.dt_s, s.pv[part], found.where[part]
     curves = (Drawn("points", time[marked], x[marked]), Drawn("recorded", time, x))
-    return Picture(found.name, "course", TIME, PV, curves)
+    return Picture("course", TIME, PV, curves)
 
 
 EFFECT = Fault(
@@ -33,6 +33,7 @@ EFFECT = Fault(
     order=0,
     find=straight_segments,
     ends=Ends.ALL,
-    numbers=(Number("straight_share", "", "Samples on straight lines"),),
+    numbers=lambda found, _: {"straight_share": exact(found.values["straight_share"], "")},
+    titles={"straight_share": "Samples on straight lines"},
     drawn=straight_lines,
 )

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from identification.mismatch.effect import Block, Fault, Finding, Floats, Number, Recording
+from identification.mismatch.effect import Block, Fault, Finding, Floats, Recording, within
 from identification.mismatch.pictures import Axis, Drawn, Picture
 
 GAPS_SHOWN, GAP_CLASSES, FEWEST_IN_CLASS = 4.0, 32, 5
@@ -23,7 +23,7 @@ def gap_profile(found: Finding, s: Recording, _: Floats) -> Picture | None:
     middle = 0.5 * (edges[1:] + edges[:-1])
     curve = Drawn("recorded", middle[held], 100.0 * stood[held] / count[held])
     x, y = Axis("size of SP − PV", "%"), Axis("OP stands still", "% of samples")
-    return Picture(found.name, "curve", x, y, (curve,), (width,))
+    return Picture("curve", x, y, (curve,), (width,))
 
 
 EFFECT = Fault(
@@ -32,6 +32,7 @@ EFFECT = Fault(
     sentence="The controller stands still while the error is under {gap_pct}.",
     check="Look for a dead band or gap action in the controller's configuration.",
     caption="A plain controller moves OP at every error; under the gap it stands still.",
-    numbers=(Number("gap_pct", "% PV", "Gap", share=0.2),),
+    numbers=lambda found, _: {"gap_pct": within(0.2, found.values["gap_pct"], "% PV")},
+    titles={"gap_pct": "Gap"},
     drawn=gap_profile,
 )

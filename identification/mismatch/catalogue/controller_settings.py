@@ -1,7 +1,7 @@
 """A controller that runs with other settings than stated."""
 
 from identification.controller.check import StatedSettings
-from identification.mismatch.effect import Block, Fault, Finding, Floats, Number, Recording
+from identification.mismatch.effect import Block, Fault, Finding, Floats, Recording, within
 from identification.mismatch.pictures import Picture, busiest, law_window, rebuilt_course
 
 
@@ -11,7 +11,7 @@ def other_settings(found: Finding, s: Recording, _: Floats) -> Picture | None:
         return None
     part, e = busiest(s.op, law_window(s, s.stated.ti), s.usable), s.sp - s.pv
     own = StatedSettings(found.values["kp"], found.values["ti_samples"])
-    return rebuilt_course(found.name, s, part, {"found": (e, own), "stated": (e, s.stated)})
+    return rebuilt_course(s, part, {"found": (e, own), "stated": (e, s.stated)})
 
 
 EFFECT = Fault(
@@ -20,9 +20,10 @@ EFFECT = Fault(
     sentence="The controller runs with other settings than stated: Kp {kp} and Ti {ti_s}.",
     check="Read Kp, Ti and form in the controller and correct loops.csv or the controller.",
     caption="OP recorded, and OP rebuilt from SP and PV by the settings found and by those stated.",
-    numbers=(
-        Number("kp", "% OP/% PV", "Kp", share=0.02),
-        Number("ti_s", "s", "Ti", "ti_samples", in_time=True, share=0.02),
-    ),
+    numbers=lambda found, s: {
+        "kp": within(0.02, found.values["kp"], "% OP/% PV"),
+        "ti_s": within(0.02, found.values["ti_samples"] * s.dt_s, "s"),
+    },
+    titles={"kp": "Kp", "ti_s": "Ti"},
     drawn=other_settings,
 )

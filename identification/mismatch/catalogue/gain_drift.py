@@ -1,15 +1,9 @@
 """A process gain that changes over the recording: fouling, wear."""
 
 from identification.mismatch.effect import Block, Effect, Param, Slot, Variant, each
-from identification.mismatch.pictures import GAIN, Drawing, Picture, course_picture
+from identification.mismatch.pictures import gain_over_record
 
 DRIFT = Param(Slot.DRIFT, "gain_drift", "per record", -1.9, 1.9, title="Gain drift")
-
-
-def gain_over_time(d: Drawing) -> Picture:
-    """The gain as it drifts."""
-    rest = float(d.plain[Slot.K])
-    return course_picture(d, GAIN, lambda x, c: c[Slot.K] * (1.0 + c[Slot.DRIFT] * x.clock), rest)
 
 
 EFFECT = Effect(
@@ -18,6 +12,6 @@ EFFECT = Effect(
     sentence="The process gain changed by {gain_drift} over the recording.",
     check="Ask what fouled, wore or changed over the recording.",
     timed=True,
-    curve=gain_over_time,
+    curve=lambda d: gain_over_record(d, lambda x, c: 1.0 + c[Slot.DRIFT] * x.clock),
     variants=(Variant((DRIFT,), each(Slot.DRIFT, -0.2, 0.2)),),
 )

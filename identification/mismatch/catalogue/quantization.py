@@ -3,7 +3,7 @@
 import numpy as np
 
 from identification.limits import RecorderLimits
-from identification.mismatch.effect import Block, Ends, Fault, Finding, Floats, Number, Recording
+from identification.mismatch.effect import Block, Ends, Fault, Finding, Floats, Recording, within
 from identification.mismatch.pictures import PV, Picture, comb
 from identification.mismatch.recording import STEP, level_gaps
 
@@ -38,7 +38,7 @@ def grid(found: Finding, s: Recording, _: Floats) -> Picture:
     """How often each value of PV occurs within some steps of a coarse sensor."""
     middle = float(np.median(s.pv))
     near = s.pv[np.abs(s.pv - middle) <= 0.5 * STEPS_SHOWN * found.values["step_pct"]]
-    return comb(found.name, PV, *np.unique(near, return_counts=True))
+    return comb(PV, *np.unique(near, return_counts=True))
 
 
 EFFECT = Fault(
@@ -51,6 +51,7 @@ EFFECT = Fault(
     order=2,
     find=coarse_grid,
     ends=Ends.SMALLER,
-    numbers=(Number("step_pct", "% PV", "Step of values", share=0.01),),
+    numbers=lambda found, _: {STEP: within(0.01, found.values[STEP], "% PV")},
+    titles={STEP: "Step of values"},
     drawn=grid,
 )

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from identification.mismatch.effect import Block, Ends, Fault, Finding, Floats, Number, Recording
+from identification.mismatch.effect import Block, Ends, Fault, Finding, Floats, Recording, within
 from identification.mismatch.pictures import Axis, Picture, comb
 
 HISTOGRAM = 160
@@ -23,7 +23,7 @@ def spacings(found: Finding, s: Recording, _: Floats) -> Picture:
     """How often each spacing of two stamps occurs."""
     spacing = np.diff(s.stamp_s)
     count, edge = np.histogram(spacing[(spacing > 0) & (spacing < 2 * s.dt_s)], HISTOGRAM)
-    return comb(found.name, Axis("time between samples", "s"), 0.5 * (edge[1:] + edge[:-1]), count)
+    return comb(Axis("time between samples", "s"), 0.5 * (edge[1:] + edge[:-1]), count)
 
 
 EFFECT = Fault(
@@ -35,6 +35,7 @@ EFFECT = Fault(
     order=1,
     find=scattered_stamps,
     ends=Ends.ALL,
-    numbers=(Number("jitter_samples", "samples", "Scatter of stamps", share=0.1),),
+    numbers=lambda found, _: {"jitter_samples": within(0.1, found.values["jitter_samples"], "samples")},
+    titles={"jitter_samples": "Scatter of stamps"},
     drawn=spacings,
 )

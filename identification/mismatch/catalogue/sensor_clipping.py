@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from identification.mismatch.effect import Block, Fault, Finding, Floats, Number, Recording
+from identification.mismatch.effect import Block, Estimate, Fault, Finding, Floats, Recording, exact
 from identification.mismatch.pictures import PV, TIME, WINDOW, Drawn, Picture, around
 
 
@@ -20,9 +20,10 @@ def clipped(s: Recording) -> Finding | None:
     return best
 
 
-def step(s: Recording) -> float:
-    """A step of the recording [% PV], to which the end is known."""
-    return float(np.median(np.diff(np.unique(s.pv))))
+def end_of_range(found: Finding, s: Recording) -> dict[str, Estimate]:
+    """The end, which is known to a step of the recording [% PV]."""
+    step = float(np.median(np.diff(np.unique(s.pv))))
+    return {"clip_pct": exact(found.values["clip_pct"], "% PV", step)}
 
 
 def range_end(found: Finding, s: Recording, free: Floats) -> Picture:
@@ -35,7 +36,7 @@ def range_end(found: Finding, s: Recording, free: Floats) -> Picture:
         Drawn("recorded", time, s.pv[part]),
         Drawn("limit", time, end),
     )
-    return Picture(found.name, "course", TIME, PV, curves)
+    return Picture("course", TIME, PV, curves)
 
 
 EFFECT = Fault(
@@ -47,6 +48,7 @@ EFFECT = Fault(
     order=3,
     find=clipped,
     censors=True,
-    numbers=(Number("clip_pct", "% PV", "Range ends at", half=step),),
+    numbers=end_of_range,
+    titles={"clip_pct": "Range ends at"},
     drawn=range_end,
 )

@@ -11,7 +11,7 @@ from identification.controller.check import StatedSettings
 from identification.mismatch.answer import AT_REST, answer, untold_gain
 from identification.mismatch.diagnosis import explain
 from identification.mismatch.recording import coarser_by, is_experiment
-from identification.mismatch.words import WANDERS
+from identification.mismatch.words import TOLD
 from identification.models import Estimate
 from proofs.experiments import Plant, asked, carried_misfit, drawn, slow_mode
 
@@ -84,4 +84,4 @@ def test_a_supply_whose_part_in_the_gain_is_not_seen_is_told_with_that() -> None
     assert said.verdict == "supply-variation"
     assert not said.caution
     any_sign = replace(said.effects[0], parameters={AT_REST: Estimate(10.0, -35.0, 55.0, "% OP")})
-    assert untold_gain(found, (any_sign,)) == WANDERS
+    assert untold_gain(found, (any_sign,)) == TOLD["wanders"]

@@ -74,8 +74,7 @@ def test_residual_above_an_op_is_located_there() -> None:
     found = at(e, pv, op)
     assert found.features[0].name == "op_level"
     assert "pv_level" not in names(found)
-    low = found.features[0].low
-    assert low is not None
+    low, _ = found.features[0].range
     assert 57 < low < 63
 
 
@@ -91,7 +90,7 @@ def test_residual_of_one_sign_per_direction_is_laid_to_direction() -> None:
     pv, op = trends(6)
     way = np.roll(turns(op, least_turn(op))[0], 2)
     first = at(np.random.default_rng(7).normal(0, 1, N) + 0.4 * way, pv, op).features[0]
-    assert (first.name, first.of) == ("op_direction", "sign")
+    assert (first.name, first.by) == ("op_direction", "sign")
 
 
 def test_residual_after_reversals_is_laid_to_them() -> None:
@@ -101,8 +100,8 @@ def test_residual_after_reversals_is_laid_to_them() -> None:
     e = np.random.default_rng(9).normal(0, 1, N) - 0.8 * way * (since < 10)
     first = at(e, pv, op).features[0]
     assert first.name == "after_reversals"
-    assert first.low is not None
-    assert first.low < 10
+    low, _ = first.range
+    assert low < 10
 
 
 def test_late_residual_is_laid_to_time() -> None:

@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from identification.estimation.prediction_error import problem
+from identification.mismatch.plain_loop import Clip, inputs_of, plain
 from identification.mismatch.proof import anchored
+from identification.models import Fopdt
 from identification.signals.filters import without_lines
+from identification.simulation.open_loop import as_parameters
+from identification.simulation.parameters import Slot
 from proofs.plain_loop import KINDS, of_recording, of_simulated
+from tests.identification.scenes import recording
 
 FIELD = Path(__file__).parents[4] / "shared" / "recordings" / "field"
 
@@ -26,6 +33,17 @@ def test_the_heated_box_shows_the_plain_loop_that_least_squares_finds() -> None:
     _, found = of_recording(FIELD / "BOX6.parquet")
     assert found is not None
     assert found < 1.05
+
+
+def test_a_brought_model_ends_where_the_transmitter_does() -> None:
+    """The user's own model, as good as it may be, is clipped at the transmitter's end as every other start is."""
+    s = recording(1)
+    top = float(np.quantile(s.pv, 0.9))
+    s = replace(s, pv=np.minimum(s.pv, top))
+    clip, inputs = Clip(top, Slot.CLIP_HI, s.pv >= top), inputs_of(s)
+    p = problem(inputs, s.pv - inputs.level, s.usable & ~clip.where)
+    fit = plain(p, as_parameters(Fopdt(1.2, 20.0, 3.4)), clip)
+    assert fit.model.c[Slot.CLIP_HI] == top
 
 
 def test_lines_taken_out_of_stretches_are_those_of_polyfit() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from identification.mismatch.catalogue import EFFECTS
 from identification.mismatch.location import groups
-from identification.mismatch.words import LONGER, PLACES, check, discriminating_test, located_sentence
+from identification.mismatch.words import TOLD, check, discriminating_test, located_sentence
 
 NAMED_ONLY = {"sensor-lag"}
 """Names that are answered as alternatives alone: nothing in SP, PV and OP can find them."""
@@ -14,7 +14,7 @@ def test_indistinguishable_effects_have_a_test_of_their_own() -> None:
     """Names that the catalogue calls alike are told apart by a line of their own, whichever comes first."""
     for effect in EFFECTS.values():
         for other in effect.indistinguishable:
-            assert discriminating_test(effect.name, other) != LONGER
+            assert discriminating_test(effect.name, other) != TOLD["longer"]
             assert discriminating_test(other, effect.name) == discriminating_test(effect.name, other)
 
 
@@ -36,7 +36,7 @@ def test_every_feature_has_a_place() -> None:
 
     op = 50 + 60 * np.sin(np.arange(500) / 9.0)
     names = {g.name for g in groups(op, np.clip(op, 0, 100), 1.0, 0, 10)}
-    assert names == set(PLACES)
+    assert names == set(TOLD["features"])
 
 
 def test_place_is_said_by_size_with_its_range() -> None:

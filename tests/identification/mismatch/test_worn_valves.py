@@ -19,7 +19,7 @@ from identification.mismatch.proof import HeldOut, Misfit, runs_out
 from identification.mismatch.recording import Recording, SeenInCycles
 from identification.mismatch.rounds import without_the_idle
 from identification.mismatch.selection import Candidate, applies
-from identification.mismatch.starts import CandidateInputs
+from identification.mismatch.starts import Round
 from identification.models import Fopdt, Stiction
 from identification.record import Floats
 from identification.simulation.open_loop import as_parameters, simulate
@@ -99,9 +99,9 @@ def test_free_valve_is_asked_for_no_friction() -> None:
     p = problem(inputs_of(s), s.pv - s.pv.mean(), s.usable)
     near = Fitted(Model((), as_parameters(Fopdt(GAIN, LAG, DEAD))), 1.0, N, np.zeros(3), np.zeros(N))
     asked = {
-        free: {r.name for e in EFFECTS.values() for r in e.candidates if applies(x, near, r)}
+        free: {r.name for e in EFFECTS.values() for r in e.candidates if applies(x, r)}
         for free in (False, True)
-        for x in [CandidateInputs(p, (), free_valve=free)]
+        for x in [Round(p, near, replace(s, free_valve=free))]
     }
     friction = {name for name, e in EFFECTS.items() if e.friction is not None}
     assert asked[False] - asked[True] == friction
