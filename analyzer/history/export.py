@@ -19,7 +19,7 @@ from pathlib import Path
 
 import pyarrow as pa
 
-from analyzer.history.converted import converted, converted_parquet
+from analyzer.history.converted import converted
 from analyzer.history.files import export_files, is_parquet, packed_beside, unpacked
 from analyzer.history.layouts import Source, source_of, tag_column
 from analyzer.history.parquet import open_parquet
@@ -256,7 +256,7 @@ def _table_source(plain: Path, options: ReadOptions) -> Source:
     if is_parquet(plain):
         table = open_parquet(plain)
         tag = tag_column(table) if table.rows >= HISTORY.whole_rows else -1
-        return source_of(table if tag < 0 else converted_parquet(table, tag, options.place), options)
+        return source_of(table if tag < 0 else converted(table, tag, options.place), options)
     sheet = open_sheet(plain, options)
     big = sheet.bytes >= HISTORY.whole_bytes
     return source_of(converted(sheet, tag_column(sheet), options.place) if big else sheet, options)

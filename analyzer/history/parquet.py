@@ -5,7 +5,8 @@ from __future__ import annotations
 import contextlib
 import os
 import threading
-from collections.abc import Sequence
+import zlib
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -20,17 +21,21 @@ from analyzer.limits import HISTORY
 from identification.errors import InputError
 
 OPEN_FILES = 4
+PIECES = 64
+"""Files of a long copy; ours: of 4,500 tags each holds seventy, and a loop's four lie in a sixteenth of all."""
 
 
 @dataclass(frozen=True, slots=True)
 class ParquetTable(Table):
-    """A Parquet file, known by its footer."""
+    """A Parquet file, known by its footer; or a copy in a `folder` (converted.py), its columns named by position: one
+    piece, or of a long table those in which a row is by its tag."""
 
     rows: int = 0
+    folder: Path | None = None
 
     def head(self, columns: Sequence[int]) -> list[pa.Array]:
-        names = [self.names[i] for i in columns]
-        batches = _parquet_file(self).iter_batches(batch_size=HEAD_ROWS, columns=names)
+        names = self._stored(columns)
+        batches = _opened(self._largest()).iter_batches(batch_size=HEAD_ROWS, columns=names)
         batch = next((b for b in batches if b.num_rows), None)
         if batch is None:
             raise InputError(
@@ -39,15 +44,46 @@ class ParquetTable(Table):
         return [batch.column(name) for name in names]
 
     def read(self, columns: Sequence[int], where: tuple[int, Sequence[str]] | None = None) -> list[pa.Array]:
-        names = [self.names[i] for i in columns]
+        """Whole columns, or the rows where the tag's column holds one of some texts.
+
+        Without `where`, of a long copy the rows of one piece stand for all: they are of all times.
+        """
         if where is None:
-            table = _parquet_file(self).read(columns=names)
-        else:
-            key, kind = pc.field(self.names[where[0]]), self.types[where[0]]
-            text = pa.types.is_string(kind) or pa.types.is_large_string(kind)
-            kept = (key if text else key.cast(pa.string())).isin([*where[1]])
-            table = pq.read_table(self.path, columns=names, filters=kept, partitioning=None)
+            return self._columns(self._largest(), columns)
+        kind, (key,), names = self.types[where[0]], self._stored(where[:1]), self._stored(columns)
+        text = pa.types.is_string(kind) or pa.types.is_large_string(kind)
+        kept = (pc.field(key) if text else pc.field(key).cast(pa.string())).isin([*where[1]])
+        files = self._pieces({piece_of(tag) for tag in where[1]})
+        table = pq.read_table(files, columns=names, filters=kept, partitioning=None)
         return [one_array(table.column(name)) for name in names]
+
+    def each(self, columns: Sequence[int]) -> Iterator[list[pa.Array]]:
+        return (self._columns(path, columns) for path in self._pieces())
+
+    def _columns(self, path: Path, columns: Sequence[int]) -> list[pa.Array]:
+        names = self._stored(columns)
+        table = _opened(path).read(columns=names)
+        return [one_array(table.column(name)) for name in names]
+
+    def _stored(self, columns: Sequence[int]) -> list[str]:
+        """Names of columns as they stand in the files."""
+        return [self.names[i] if self.folder is None else str(i) for i in columns]
+
+    def _pieces(self, wanted: Collection[int] | None = None) -> list[Path]:
+        """The files, or those of some numbers."""
+        if self.folder is None:
+            return [self.path]
+        return [p for p in sorted(self.folder.glob("*.parquet")) if wanted is None or int(p.stem) in wanted]
+
+    def _largest(self) -> Path:
+        return max(self._pieces(), key=lambda p: (p.stat().st_size, p.name))
+
+
+@lru_cache(maxsize=100_000)
+def piece_of(tag: str) -> int:
+    """The piece of a tag: that of its loop, which is what stands before its last point, stroke or colon."""
+    loop = tag[: max(tag.rfind(mark) for mark in "./:|")] or tag
+    return zlib.crc32(loop.encode("utf-8")) % PIECES
 
 
 def open_parquet(path: Path) -> ParquetTable:
@@ -127,6 +163,6 @@ def _opened_once(path: Path, changed_ns: int, process: int) -> pq.ParquetFile:
     return pq.ParquetFile(path)  # not mapped: pages of a file that stays open would stay in memory
 
 
-def _parquet_file(table: ParquetTable) -> pq.ParquetFile:
+def _opened(path: Path) -> pq.ParquetFile:
     """The file, opened once by each process: of a footer with thousands of columns that takes as long as a loop."""
-    return _opened_once(table.path, table.path.stat().st_mtime_ns, os.getpid())
+    return _opened_once(path, path.stat().st_mtime_ns, os.getpid())

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, TypeVar
@@ -33,7 +33,7 @@ class Sheet(Table):
     """
 
     first_row: int
-    changed_ns: int
+    changed_ns: int = field(repr=False)
     bytes: int
     encoding: str
     delimiter: str
@@ -72,18 +72,33 @@ class Loaded:
 @lru_cache(maxsize=KEPT_READS)
 def _loaded(sheet: Sheet) -> Loaded:
     """The whole file."""
+    return read_through(sheet, _parsed_sheet)
+
+
+def read_through(sheet: Sheet, read: Callable[[Sheet, Collection[int]], tuple[int, int, Read]]) -> Read:
+    """What `read` finds in a sheet, beside the numbers of its rows and of the lines that it leaves out; quotes are
+    taken as they stand where so few lines came back that an open quote has swallowed the rest.
+
+    Raises
+    ------
+    InputError
+        The text cannot be read to its end.
+    """
     try:
-        loaded = as_far_as_numbers_go(sheet, _parsed_sheet)
-        rows = len(loaded.columns[0]) + loaded.left_out
-        if not is_swallowed(sheet, rows):
-            return loaded
-        again = as_far_as_numbers_go(replace(sheet, unquoted=True), _parsed_sheet)
-        return again if len(again.columns[0]) > rows else loaded
-    except (UnicodeError, OSError, pa.ArrowInvalid) as error:
-        raise unreadable(sheet.path, error) from error
+        rows, left_out, found = _as_far_as_numbers_go(sheet, read)
+        lines = _count_lines(sheet.path, sheet.changed_ns) - sheet.first_row + 1
+        if sheet.unquoted or rows + left_out >= HISTORY.whole_share * lines - 1:
+            return found
+        plain = replace(sheet, unquoted=True)
+        more, _, others = _as_far_as_numbers_go(plain, read)
+        return others if more > rows + left_out else _as_far_as_numbers_go(sheet, read)[2]
+    except (UnicodeError, pa.ArrowInvalid) as error:
+        remedy = "state --encoding or export the file again"
+        seen = f"{sheet.path}: {str(error)[:120]}"
+        raise InputError(seen, "delimited text in one encoding", remedy) from error
 
 
-def as_far_as_numbers_go(sheet: Sheet, read: Callable[[Sheet, Collection[int]], Read]) -> Read:
+def _as_far_as_numbers_go(sheet: Sheet, read: Callable[[Sheet, Collection[int]], Read]) -> Read:
     """What `read` gives of a sheet, begun anew with a column as text where only its first block is all numbers, or in
     another encoding where a letter late in the file shows it."""
     texts = set[int]()
@@ -99,12 +114,6 @@ def as_far_as_numbers_go(sheet: Sheet, read: Callable[[Sheet, Collection[int]], 
                 texts.update([int(late["column"])] if few else range(len(sheet.names)))
             else:
                 raise
-
-
-def is_swallowed(sheet: Sheet, rows: int) -> bool:
-    """Whether so few of a sheet's lines came back as rows that an open quote has swallowed the rest."""
-    lines = _count_lines(sheet.path, sheet.changed_ns) - sheet.first_row + 1
-    return rows < HISTORY.whole_share * lines - 1 and not sheet.unquoted
 
 
 def quotes_told(unquoted: bool, left_out: int) -> list[str]:
@@ -125,16 +134,11 @@ def _count_lines(path: Path, changed_ns: int) -> int:
     return count
 
 
-def unreadable(path: Path, error: Exception) -> InputError:
-    """What is said of text that cannot be read to its end."""
-    remedy = "state --encoding or export the file again"
-    return InputError(f"{path}: {str(error)[:120]}", "delimited text in one encoding", remedy)
-
-
-def _parsed_sheet(sheet: Sheet, texts: Collection[int]) -> Loaded:
+def _parsed_sheet(sheet: Sheet, texts: Collection[int]) -> tuple[int, int, Loaded]:
     left_out: list[int] = []
     table = csv.read_csv(sheet.path, **reading(sheet, left_out, texts))
-    return Loaded([trimmed(a, sheet.unquoted) for a in table.columns], len(left_out), sheet.unquoted)
+    columns = [trimmed(column, sheet.unquoted) for column in table.columns]
+    return table.num_rows, len(left_out), Loaded(columns, len(left_out), sheet.unquoted)
 
 
 @lru_cache(maxsize=KEPT_READS)
