@@ -214,14 +214,13 @@ def _agreed(sources: Sequence[Source]) -> tuple[Source, ...]:
     where one file shows that its clock does."""
     winter_s = next((s.clock.winter_s for s in sources if s.clock.winter_s is not None), None)
     if winter_s is not None:
-        sources = [s.with_clock(replace(s.clock, winter_s=winter_s)) if s.clock.local else s for s in sources]
+        sources = [s.with_clock(winter_s=winter_s) if s.clock.local else s for s in sources]
     sure = next((s for s in sources if s.clock.order is not None and s.clock.order.sure), None)
     if sure is None or sure.clock.order is None:
         return tuple(sources)
     order = replace(sure.clock.order, why=f"as in {sure.path.name}")
     return tuple(
-        s if s.clock.order is None or s.clock.order.sure else s.with_clock(replace(s.clock, order=order))
-        for s in sources
+        s if s.clock.order is None or s.clock.order.sure else s.with_clock(order=order) for s in sources
     )
 
 
