@@ -13,7 +13,7 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from analyzer.history import stamps, zones
-from analyzer.history.stamps import DateOrder, by_gaps, days_seen
+from analyzer.history.stamps import DateOrder, shown_order
 from analyzer.history.table import as_text, is_text, numbers
 from analyzer.limits import HISTORY
 
@@ -36,11 +36,10 @@ class TimeScale:
     def note(self) -> str:
         """How stamps of this scale are read."""
         said = f"stamps are {'texts' if self is ELAPSED else 'numbers'}, read as {self.name}"
-        if self in SINCE_START.values():
-            said += (
-                ", from 1970 on; state the unit in the column's name, as in 'Time (ms)', where it is another"
-            )
-        return said
+        another = (
+            ", from 1970 on; state the unit in the column's name, as in 'Time (ms)', where it is another"
+        )
+        return said + another if self in SINCE_START.values() else said
 
 
 DAY_S = 86400.0
@@ -122,15 +121,17 @@ class Clock:
         if self.below_s > 0:
             second, local = replace(self, below_s=0.0).seconds(arrays[:-1])
             return second + numbers(pc.fill_null(arrays[-1], 0)) * self.below_s, local
-        column = date_and_time(arrays)
-        if self.scale is ELAPSED:
+        column, scale = date_and_time(arrays), self.scale
+        if scale is ELAPSED:
             return counted_s(as_text(column)), False
         if pa.types.is_date(column.type):
             column = pc.cast(column, pa.timestamp("s"))
         if pa.types.is_timestamp(column.type):
-            return _from_timestamps(column), column.type.tz is None
-        if self.scale is not None and not is_text(column.type):
-            return _from_numbers(column, self.scale), self.scale.local
+            ticks = column.view(pa.int64()).to_numpy(zero_copy_only=False)
+            return ticks / TICKS_PER_S[column.type.unit], column.type.tz is None
+        if scale is not None and not is_text(column.type):
+            digits = 3 if scale.name == "Excel days" else 6
+            return np.round(numbers(column) * scale.unit_s + scale.origin_s, digits), scale.local
         return self._from_texts(as_text(column))
 
     def utc(self, second: NDArray[np.float64], local: bool) -> tuple[NDArray[np.float64], Counter[str]]:
@@ -165,14 +166,11 @@ class Clock:
         parts = stamps.fields(texts, self.timezone)
         if parts is None:
             return np.full(len(texts), np.nan), True
-        second = stamps.stamp_seconds(parts, self._first(parts))
+        order = self.order or (
+            shown_order(parts) if parts.open.any() else None
+        )  # where the head left nothing open
+        second = stamps.stamp_seconds(parts, "month" if order is None else order.first)
         return stamps.midnights_told(second, parts), not parts.stated.any()
-
-    def _first(self, parts: stamps.Fields) -> str:
-        """What stands first in these stamps; where the head left nothing open and these do, they decide."""
-        if self.order is not None:
-            return self.order.first
-        return (days_seen(parts) or by_gaps(parts) if parts.open.any() else None) or "month"
 
 
 def time_scale_of(column: pa.Array, unit: str = "") -> TimeScale | None:
@@ -215,17 +213,6 @@ def date_and_time(arrays: Sequence[pa.Array]) -> pa.Array:
         return arrays[0]
     texts = (pc.replace_substring_regex(as_text(array), MIDNIGHT, "") for array in arrays)
     return pc.binary_join_element_wise(*texts, " ")
-
-
-def _from_timestamps(column: pa.Array) -> NDArray[np.float64]:
-    ticks = column.view(pa.int64()).to_numpy(zero_copy_only=False)
-    return ticks / TICKS_PER_S[column.type.unit]
-
-
-def _from_numbers(column: pa.Array, scale: TimeScale) -> NDArray[np.float64]:
-    number = numbers(column)
-    digits = 3 if scale.name == "Excel days" else 6
-    return np.round(number * scale.unit_s + scale.origin_s, digits)
 
 
 def _formatted(texts: pa.Array, date_format: str) -> tuple[NDArray[np.float64], bool]:

@@ -237,33 +237,25 @@ def date_order(parts: Fields, example: str, timezone: str | None) -> DateOrder:
     by_year = _with_short_year(parts, pointed and "-" not in date and "/" not in date)
     if by_year is not None:
         return by_year
-    seen = days_seen(parts)
-    if seen is not None:
-        return DateOrder(seen, f"the {'first' if seen == 'day' else 'second'} number exceeds 12")
-    running = by_gaps(parts)
-    if running is not None:
-        return DateOrder(running, WITHOUT_LEAP)
+    shown = shown_order(parts)
+    if shown is not None:
+        return shown
     if pointed:
         return DateOrder("day", "dates with points; no day above 12 occurs")
     usual, other = ("day", "month") if _day_is_usual(parts, timezone) else ("month", "day")
     return DateOrder(usual, f"every date fits both orders; state --{other}-first if so", sure=False)
 
 
-def days_seen(parts: Fields) -> str | None:
-    """'day' where a first number above 12 shows it first, 'month' where a second one does, else None."""
-    first, second = (parts.a[parts.open] > 12).any(), (parts.b[parts.open] > 12).any()
-    return None if first == second else "day" if first else "month"
-
-
-def by_gaps(parts: Fields) -> str | None:
-    """The order of day and month in which the stamps run without a leap; None where they do so in either."""
-    day, month = (_largest_gap(parts, first) for first in ("day", "month"))
-    return None if day == month else "day" if day < month else "month"
-
-
-def _largest_gap(parts: Fields, first: str) -> float:
-    second = np.unique(stamp_seconds(parts, first))
-    return float(np.max(np.diff(second[np.isfinite(second)]), initial=0.0))
+def shown_order(parts: Fields) -> DateOrder | None:
+    """The order that a number above 12 shows, or else that in which alone the stamps run without a leap; or None."""
+    first, second = ((part[parts.open] > 12).any() for part in (parts.a, parts.b))
+    if first != second:
+        return DateOrder(
+            "day" if first else "month", f"the {'first' if first else 'second'} number exceeds 12"
+        )
+    known = (np.unique(stamp_seconds(parts, order)) for order in ("day", "month"))
+    day, month = (np.max(np.diff(second[np.isfinite(second)]), initial=0.0) for second in known)
+    return None if day == month else DateOrder("day" if day < month else "month", WITHOUT_LEAP)
 
 
 def _day_is_usual(parts: Fields, timezone: str | None) -> bool:
@@ -306,9 +298,8 @@ def _with_short_year(parts: Fields, pointed: bool) -> DateOrder | None:
         first = next(iter(latest))
     else:
         return None
-    return DateOrder(
-        first, "the year may stand in front or behind; state --date-format if it is not so", sure=False
-    )
+    why = "the year may stand in front or behind; state --date-format if it is not so"
+    return DateOrder(first, why, sure=False)
 
 
 def _may_begin_with_year(parts: Fields) -> bool:
