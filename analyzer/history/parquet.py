@@ -38,9 +38,8 @@ class ParquetTable(Table):
         batches = _opened(self._largest()).iter_batches(batch_size=HEAD_ROWS, columns=names)
         batch = next((b for b in batches if b.num_rows), None)
         if batch is None:
-            raise InputError(
-                f"{self.path}: rows that its pages do not hold", "a whole Parquet file", "export it again"
-            )
+            seen = f"{self.path}: rows that its pages do not hold"
+            raise InputError(seen, "a whole Parquet file", "export it again")
         return [batch.column(name) for name in names]
 
     def read(self, columns: Sequence[int], where: tuple[int, Sequence[str]] | None = None) -> list[pa.Array]:
@@ -98,25 +97,21 @@ def open_parquet(path: Path) -> ParquetTable:
         with pq.ParquetFile(path) as file:
             schema, rows, long_text = file.schema_arrow, file.metadata.num_rows, _longest_text(file.metadata)
     except (pa.ArrowException, OSError) as error:
-        raise InputError(
-            f"{path}: named as Parquet, but cannot be read as such ({_first_line(error)})",
-            "a whole Parquet file",
-            "export it again, or give it the ending .csv if it is text",
-        ) from error
+        why = str(error).splitlines()[0][:100] if str(error) else type(error).__name__
+        seen = f"{path}: named as Parquet, but cannot be read as such ({why})"
+        remedy = "export it again, or give it the ending .csv if it is text"
+        raise InputError(seen, "a whole Parquet file", remedy) from error
     check_once(path, schema.names)
-    if rows > HISTORY.many_rows and rows > HISTORY.rows_a_byte * path.stat().st_size:
-        raise InputError(
-            f"{path}: {rows} rows in {path.stat().st_size} bytes",
-            f"at most {HISTORY.rows_a_byte:g} rows a byte",
-            "export it again; a file that unpacks to so much more is not read",
-        )
+    size = path.stat().st_size
+    if rows > HISTORY.many_rows and rows > HISTORY.rows_a_byte * size:
+        remedy = "export it again; a file that unpacks to so much more is not read"
+        expected = f"at most {HISTORY.rows_a_byte:g} rows a byte"
+        raise InputError(f"{path}: {rows} rows in {size} bytes", expected, remedy)
     if long_text > HISTORY.longest_text:
-        raise InputError(
-            f"{path}: texts of {long_text:.0f} bytes on average",
-            f"at most {HISTORY.longest_text:g} bytes for a tag, a stamp or a state",
-            "export numbers, tags and stamps alone",
-        )
-    if path.stat().st_size < HISTORY.probed_bytes:
+        expected = f"at most {HISTORY.longest_text:g} bytes for a tag, a stamp or a state"
+        seen = f"{path}: texts of {long_text:.0f} bytes on average"
+        raise InputError(seen, expected, "export numbers, tags and stamps alone")
+    if size < HISTORY.probed_bytes:
         _check_pages(path)
     if rows == 0:
         raise InputError(f"{path}: Parquet without rows", "at least one sample", "export a period with data")
@@ -132,11 +127,8 @@ def _check_pages(path: Path) -> None:
     reading.start()
     reading.join(HISTORY.probe_s)
     if reading.is_alive():
-        raise InputError(
-            f"{path}: its pages take longer than {HISTORY.probe_s:g} s to read",
-            "a whole Parquet file",
-            "export it again",
-        )
+        seen = f"{path}: its pages take longer than {HISTORY.probe_s:g} s to read"
+        raise InputError(seen, "a whole Parquet file", "export it again")
 
 
 def _read_through(path: Path) -> None:
@@ -152,10 +144,6 @@ def _longest_text(footer: pq.FileMetaData) -> float:
     groups = [footer.row_group(k) for k in range(footer.num_row_groups)]
     sizes = [(g.column(j).total_uncompressed_size, g.num_rows) for g in groups for j in texts]
     return max((size / max(rows, 1) for size, rows in sizes if size > HISTORY.much_text), default=0.0)
-
-
-def _first_line(error: Exception) -> str:
-    return str(error).splitlines()[0][:100] if str(error) else type(error).__name__
 
 
 @lru_cache(maxsize=OPEN_FILES)

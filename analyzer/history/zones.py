@@ -10,7 +10,6 @@ from collections import Counter
 from collections.abc import Mapping
 from datetime import datetime
 from functools import lru_cache
-from itertools import pairwise
 from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
 
 import numpy as np
@@ -112,18 +111,14 @@ def winter_offset_s(local_s: NDArray[np.float64], zone: str) -> float | None:
     keeps = max(spring) > HISTORY.in_spring if spring else bool(autumn) and max(autumn) < HISTORY.in_autumn
     if not keeps:
         return None
-    year = datetime(1970, 1, 1).year + int(np.median(hour) * HOUR_S / (365.2425 * DAY_S))
-    return min(_offset_s(datetime(year, month, 1), zone) for month in (1, 7))
+    year = 1970 + int(np.median(hour) * HOUR_S / (365.2425 * DAY_S))
+    days = (datetime(year, month, 1, tzinfo=ZoneInfo(zone)).utcoffset() for month in (1, 7))
+    return min(day.total_seconds() for day in days if day is not None)
 
 
 def is_fixed(zone: str) -> bool:
     """Whether a zone, such as UTC, has no summer time of any year."""
     return ZoneInfo(zone).utcoffset(None) is not None
-
-
-def _offset_s(at: datetime, zone: str) -> float:
-    offset = at.replace(tzinfo=ZoneInfo(zone)).utcoffset()
-    return 0.0 if offset is None else offset.total_seconds()
 
 
 def _shares(hours: NDArray[np.float64], held: dict[float, int], least: int) -> list[float]:
@@ -158,12 +153,10 @@ def _second_pass(local_s: NDArray[np.float64], twice: NDArray[np.bool_]) -> NDAr
     doubtful = np.flatnonzero(twice)
     if doubtful.size == 0:
         return second
-    days = np.floor(local_s[doubtful] / DAY_S)
     steps = np.diff(local_s)
     typical = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
-    cuts = np.r_[0, np.flatnonzero(np.diff(days)) + 1, doubtful.size]
-    for a, b in pairwise(cuts.tolist()):
-        rows = doubtful[a:b]
+    new_day = np.diff(np.floor(local_s[doubtful] / DAY_S)) != 0
+    for rows in np.split(doubtful, np.flatnonzero(new_day) + 1):
         second[rows[_set_back(local_s, rows, typical) :]] = True
     return second
 

@@ -4,7 +4,7 @@ settings were in force at a time, by them and by the dates of loops.csv."""
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
@@ -64,23 +64,22 @@ def read_changes(path: Path, zone: str = UTC_NAME, day_first: bool | None = None
     places = [f"{path}, row {row}" for row, _ in rows]
     times = parse_times([cells.get("time", "") for _, cells in rows], places, zone, day_first).tolist()
     return tuple(
-        TuningChange(cells["loop"], time_s, *_settings(cells, place), cells.get("who", ""))
+        TuningChange(cells["loop"], time_s, **_settings(cells, place), who=cells.get("who", ""))
         for (_, cells), place, time_s in zip(rows, places, times, strict=True)
     )
 
 
-def _settings(cells: Mapping[str, str], where: str) -> Iterator[float | None]:
-    """Old and new settings of a row."""
-    for column in COLUMNS[2:6]:
-        text = cells.get(column, "")
+def _settings(cells: Mapping[str, str], where: str) -> dict[str, Any]:
+    """Old and new settings of a row, as far as they are given."""
+    found: dict[str, Any] = {}
+    for column, text in ((c, cells[c]) for c in COLUMNS[2:6] if cells.get(c)):
         try:
-            value = float(text.replace(",", ".")) if text else None
+            found[column] = float(text.replace(",", "."))
         except ValueError:
-            value = math.nan
-        wrong = value is not None and (not math.isfinite(value) or (column.startswith("ti") and value < 0))
-        if wrong:
+            found[column] = math.nan
+        if not math.isfinite(found[column]) or (column.startswith("ti") and found[column] < 0):
             raise InputError(f"{where}: {column} {text[:40]!r}", "a number or nothing", "correct the cell")
-        yield value
+    return found
 
 
 def stated_changes(rows: Sequence[Mapping[str, Any]]) -> list[TuningChange]:
