@@ -13,12 +13,12 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from analyzer.history import stamps, zones
+from analyzer.history.names import WORDS
 from analyzer.history.stamps import DateOrder, shown_order
 from analyzer.history.table import as_text, is_text, numbers
 from analyzer.limits import HISTORY
 
 TICKS_PER_S = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
-EXCEL_ORIGIN_S = -25569 * 86400.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,34 +43,13 @@ class TimeScale:
 
 
 DAY_S = 86400.0
-SINCE_START_MOST = 1e8
-"""Largest number of a clock that counts from the start of the export; above it are the seconds since 1970."""
-SINCE_START = {
-    "ms": TimeScale("milliseconds since the start", 0, 1e11, 1e-3),
-    "s": TimeScale("seconds since the start", 0, SINCE_START_MOST, 1.0),
-    "min": TimeScale("minutes since the start", 0, SINCE_START_MOST, 60.0),
-    "h": TimeScale("hours since the start", 0, SINCE_START_MOST, 3600.0),
-    "d": TimeScale("days since the start", 0, 2e4, DAY_S),
-}
-"""Clocks that count from the start, by the unit that the column's name states; seconds where it states none."""
+SCALES = tuple(TimeScale(**scale) for scale in WORDS["scales"])
+SINCE_START = {unit: TimeScale(**scale) for unit, scale in WORDS["since_start"].items()}
+"""Clocks that count from the start, by the unit that the column's name states."""
 ELAPSED = TimeScale("hours, minutes and seconds since the start", 0, 0, 1.0)
 """A clock in text that counts from the start, such as 25:10:03."""
 MIDNIGHT = r"[ T]0?0:00:00(?:\.0+)?$"
 COUNTED = r"^\s*(?P<h>\d{1,5}):(?P<m>[0-5]\d):(?P<s>[0-5]\d(?:[.,]\d+)?)\s*$"
-SECONDS = TimeScale("seconds since 1970", 1e8, 3e9, 1.0)
-SCALES = (
-    TimeScale("Excel days", 2e4, 8e4, DAY_S, EXCEL_ORIGIN_S, local=True),
-    TimeScale("days since year 0", 7.1e5, 7.7e5, DAY_S, -719529 * DAY_S, local=True),
-    TimeScale("Julian days", 2.43e6, 2.49e6, DAY_S, -2440587.5 * DAY_S),
-    SECONDS,
-    TimeScale("seconds since 1904", 3e9, 4.1e9, 1.0, -2082844800.0),
-    TimeScale("millions of Excel days", 2e10, 8e10, 0.0864, EXCEL_ORIGIN_S, local=True),
-    TimeScale("milliseconds since 1970", 1e11, 4e12, 1e-3),
-    TimeScale("microseconds since 1970", 1e14, 4e15, 1e-6),
-    TimeScale("hundreds of nanoseconds since 1601", 1.1e17, 1.7e17, 1e-7, -11644473600.0),
-    TimeScale("hundreds of nanoseconds since year 1", 6.2e17, 6.7e17, 1e-7, -62135596800.0),
-    TimeScale("nanoseconds since 1970", 1e17, 4e18, 1e-9),
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -181,10 +160,12 @@ def time_scale_of(column: pa.Array, unit: str = "") -> TimeScale | None:
         return None
     middle, reach = float(np.median(number)), float(np.ptp(number))
     found = next((scale for scale in SCALES if scale.low <= middle < scale.high), None)
-    in_days = found is not None and found.unit_s == DAY_S  # such numbers hardly change over an export
-    other = unit in ("ms", "s", "min", "h") if in_days else unit not in ("", "s") and found is SECONDS
-    if found is not None and not (other or (in_days and reach > HISTORY.excel_days)):
-        return found
+    if found is not None:
+        in_days = found.unit_s == DAY_S  # such numbers hardly change over an export
+        seconds = (found.unit_s, found.origin_s) == (1.0, 0.0)
+        other = unit in ("ms", "s", "min", "h") if in_days else unit not in ("", "s") and seconds
+        if not (other or (in_days and reach > HISTORY.excel_days)):
+            return found
     since = SINCE_START[unit or _unit_by_step(number)]
     return since if since.low <= middle < since.high else None
 

@@ -185,11 +185,8 @@ def open_wide(table: Table, options: ReadOptions) -> Source:
     partner, said = quality_columns(table, free)
     values_in = [i for i in free if i not in partner.values()]
     if not values_in or not _any_number(table, values_in):
-        raise InputError(
-            f"{table.path}: no values beside the time column '{table.names[clock.columns[0]]}'",
-            "a column of values for each tag, named as the tag",
-            "export the tags' values",
-        )
+        seen = f"{table.path}: no values beside the time column '{table.names[clock.columns[0]]}'"
+        raise InputError(seen, "a column of values for each tag, named as the tag", "export the tags' values")
     names = [table.names[i] for i in values_in]
     check_once(table.path, names)
     tags = with_loop(names, table.path.stem)
@@ -232,12 +229,11 @@ def open_pairs(table: Table, options: ReadOptions) -> Source | None:
     groups = _groups(table)
     if len(groups) < 2:
         return None
-    found = [(_tag(table, c), c) for time, beside in groups for c in _paired(table, time, beside, options)]
-    tags = tuple(tag for tag, _ in found)
+    columns = tuple(c for time, beside in groups for c in _paired(table, time, beside, options))
+    tags = tuple(_tag(table, c) for c in columns)
     if len(tags) < 2 or not all(tags):
         return None
     check_once(table.path, tags)
-    columns = tuple(column for _, column in found)
     clocks = len({c.clock.columns for c in columns})
     layout = f"pairs of columns, {len(tags)} tags with {clocks} clocks of their own"
     return Source(table, tags, columns, options.good_quality, (layout,), paired=True)
@@ -250,8 +246,6 @@ def _groups(table: Table) -> list[tuple[int, list[int]]]:
         for i, kind in enumerate(table.types)
         if is_text(kind) or pa.types.is_temporal(kind) or _time_name(table, i)
     ]
-    if len(likely) < 2:
-        return []
     heads = dict(zip(likely, table.head(likely), strict=True))
     times = [i for i in likely if holds_stamps(_time_name(table, i), heads[i], _is_time(table.names[i]))]
     if len(times) < 2 or times[0] != 0:

@@ -141,14 +141,11 @@ def _missing(before: LoopSpec, after: LoopSpec) -> list[str]:
     notes = [] if after.pv else [f"{after.loop}: not assessed, no PV tag {after.wanted_pv} in the export"]
     stated = [(role, getattr(before, role)) for role in ROLES if role != "pv" and getattr(before, role)]
     lost = [(role, tag) for role, tag in stated if getattr(after, role) is None]
-    if (after.override_with or after.split_of) and after.beside is None:
-        notes.append(
-            f"{after.loop}: no OP of {after.override_with or after.split_of} in the export, judged alone"
-        )
-    if after.feedforward and after.feed is None:
-        notes.append(
-            f"{after.loop}: feedforward {after.feedforward} is neither a loop nor a tag of the export"
-        )
+    beside, feed = after.override_with or after.split_of, after.feedforward
+    if beside and after.beside is None:
+        notes.append(f"{after.loop}: no OP of {beside} in the export, judged alone")
+    if feed and after.feed is None:
+        notes.append(f"{after.loop}: feedforward {feed} is neither a loop nor a tag of the export")
     return notes + [f"{after.loop}: {role.upper()} tag {tag} is not in the export" for role, tag in lost]
 
 
