@@ -103,13 +103,10 @@ def is_parquet(path: Path) -> bool:
     Raises
     ------
     InputError
-        The file is empty or cannot be opened.
+        The file is empty, or packed as none that is read.
     """
-    try:
-        with path.open("rb") as file:
-            start = file.read(4)
-    except OSError as error:
-        raise _closed(path, error) from error
+    with path.open("rb") as file:
+        start = file.read(4)
     if not start:
         raise InputError(f"{path}: empty file", "a table with a header and samples", "export it again")
     if start == SEVEN_ZIP:
@@ -129,20 +126,19 @@ def packed_beside(paths: Sequence[Path]) -> list[str]:
 
 
 def _exports_at(path: Path) -> list[Path]:
-    expected = "an export or a folder of exports"
     try:
         if not path.exists():
+            expected = "an export or a folder of exports"
             raise InputError(f"{path}: no such file or folder", expected, "correct the path")
-        return _exports_in(path) if path.is_dir() else [path]
+        if not path.is_dir():
+            return [path]
+        files = [found for found in sorted(path.iterdir()) if found.is_file() and _is_export(found)]
+        files = files or [p for p in sorted(path.rglob("*")) if p.suffix.lower() in PARQUET_ENDINGS]
+        seen = next(iter(packed_beside([path])), f"{path}: a folder without exports")
     except OSError as error:
-        raise _closed(path, error) from error
-
-
-def _exports_in(folder: Path) -> list[Path]:
-    files = [path for path in sorted(folder.iterdir()) if path.is_file() and _is_export(path)]
-    files = files or [path for path in sorted(folder.rglob("*")) if path.suffix.lower() in PARQUET_ENDINGS]
+        seen = f"{path}: cannot be opened ({error.strerror or error})"
+        raise InputError(seen, "a file that may be read", "grant the permission to read") from error
     if not files:
-        seen = next(iter(packed_beside([folder])), f"{folder}: a folder without exports")
         expected = "files ending in .csv, .txt, .tsv, .parquet, .pq or .xlsx"
         raise InputError(seen, expected, "name the folder that holds the exports")
     return files
@@ -151,11 +147,6 @@ def _exports_in(folder: Path) -> list[Path]:
 def _is_export(path: Path) -> bool:
     known = path.suffix.lower() in READ_ENDINGS and path.name.lower() not in NO_EXPORTS
     return known and not path.name.startswith((".", "~$"))
-
-
-def _closed(path: Path, error: OSError) -> InputError:
-    seen = f"{path}: cannot be opened ({error.strerror or error})"
-    return InputError(seen, "a file that may be read", "grant the permission to read")
 
 
 @lru_cache(maxsize=1)

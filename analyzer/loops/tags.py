@@ -106,7 +106,8 @@ def match(specs: Sequence[LoopSpec], tags: Iterable[str]) -> tuple[tuple[LoopSpe
 def in_order(specs: Sequence[LoopSpec], tags: Sequence[str]) -> tuple[Sequence[LoopSpec], tuple[str, ...]]:
     """Loops with the columns of a table without a header for their tags, in the order in which loops.csv states them,
     and a sentence on it; the loops as they are where the columns have names or are not as many."""
-    stated = [(k, role) for k, spec in enumerate(specs) for role in _stated_roles(spec)]
+    roles = ([role for role in ROLES if getattr(spec, role)] or ROLES[:3] for spec in specs)
+    stated = [(k, role) for k, own in enumerate(roles) for role in own]
     if not tags or not all(UNNAMED.fullmatch(tag) for tag in tags) or len(stated) != len(tags):
         return specs, ()
     taken: list[dict[str, str]] = [{} for _ in specs]
@@ -116,10 +117,6 @@ def in_order(specs: Sequence[LoopSpec], tags: Sequence[str]) -> tuple[Sequence[L
     more = " ..." if len(specs) > 1 else ""
     said = f"no header: columns are taken in the order of loops.csv: {', '.join(first)}{more}"
     return tuple(replace(s, **own) for s, own in zip(specs, taken, strict=True)), (said,)  # type: ignore[arg-type]
-
-
-def _stated_roles(spec: LoopSpec) -> tuple[str, ...]:
-    return tuple(role for role in ROLES if getattr(spec, role)) or ROLES[:3]
 
 
 def _matched(spec: LoopSpec, known: Mapping[str, None], found: Mapping[str, str]) -> LoopSpec:
