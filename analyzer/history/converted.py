@@ -15,7 +15,6 @@ import os
 import shutil
 import tempfile
 from collections.abc import Collection
-from dataclasses import asdict, dataclass
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
@@ -28,7 +27,7 @@ from pyarrow import csv
 
 from analyzer.history.files import ends_of
 from analyzer.history.parquet import PIECES, ParquetTable, piece_of
-from analyzer.history.sheet import Sheet, quotes_told, read_through, reading
+from analyzer.history.sheet import Sheet, read_through, reading
 from analyzer.history.table import trimmed
 from identification.errors import InputError
 
@@ -41,12 +40,8 @@ DONE = "done.json"
 NAMED = "converted-"
 
 
-@dataclass(frozen=True, slots=True)
-class Laid:
-    """What a pass over an export found out: notes, and the tags of a long table in the order of their first rows."""
-
-    notes: tuple[str, ...] = ()
-    tags: tuple[str, ...] = ()
+Said = dict[str, list[str]]
+"""What a pass over an export found out: notes, and the tags of a long table in the order of their first rows."""
 
 
 def converted(table: Sheet | ParquetTable, tag: int, place: Path) -> ParquetTable:
@@ -78,10 +73,10 @@ def converted(table: Sheet | ParquetTable, tag: int, place: Path) -> ParquetTabl
         table.path,
         table.names,
         tuple(pq.read_schema(first).types),
-        (*table.found, *done.notes),
+        (*table.found, *done["notes"]),
         table.decimal,
         table.first_row,
-        done.tags,
+        tuple(done["tags"]),
         folder=folder,
     )
 
@@ -98,18 +93,18 @@ def forget_halves(place: Path) -> None:
             shutil.rmtree(left, ignore_errors=True)
 
 
-def _said(folder: Path) -> Laid | None:
+def _said(folder: Path) -> Said | None:
     """What a whole copy says of itself; None where there is none, or a file of it lost its end with the power."""
     try:
         found = json.loads((folder / DONE).read_text(encoding="utf-8"))
         for path in folder.glob("*.parquet"):
             pq.read_metadata(path)
-        return Laid(tuple(found["notes"]), tuple(found["tags"]))
+        return {"notes": [*found["notes"]], "tags": [*found["tags"]]}
     except (pa.ArrowException, OSError, ValueError, TypeError, KeyError):
         return None
 
 
-def _laid(table: Sheet | ParquetTable, tag: int, folder: Path) -> Laid:
+def _laid(table: Sheet | ParquetTable, tag: int, folder: Path) -> Said:
     """Lay a copy into a folder, which is there once it is whole."""
     room = table.path.stat().st_size * (1 if isinstance(table, Sheet) else 4)
     if shutil.disk_usage(folder.parent).free < room:
@@ -117,15 +112,16 @@ def _laid(table: Sheet | ParquetTable, tag: int, folder: Path) -> Laid:
         raise InputError(seen, "free disk", "make room")
     made = Path(tempfile.mkdtemp(prefix=NAMED, dir=folder.parent))
     once = partial(_pass, tag, made)
-    done = read_through(table, once) if isinstance(table, Sheet) else _parted(table, tag, made)
-    (made / DONE).write_text(json.dumps(asdict(done)), encoding="utf-8")
+    tags, notes = read_through(table, once) if isinstance(table, Sheet) else (_parted(table, tag, made), [])
+    done = {"notes": notes, "tags": tags}
+    (made / DONE).write_text(json.dumps(done), encoding="utf-8")
     shutil.rmtree(folder, ignore_errors=True)
     os.replace(made, folder)
     return done
 
 
-def _pass(tag: int, folder: Path, sheet: Sheet, texts: Collection[int]) -> tuple[int, int, Laid]:
-    """How many lines of a sheet were rows and how many were left out, and what else was found out."""
+def _pass(tag: int, folder: Path, sheet: Sheet, texts: Collection[int]) -> tuple[int, int, list[str]]:
+    """How many lines of a sheet were rows and how many were left out, and the tags."""
     for left in folder.glob("*.parquet"):  # of a pass that was begun anew
         left.unlink()
     left_out: list[int] = []
@@ -134,12 +130,11 @@ def _pass(tag: int, folder: Path, sheet: Sheet, texts: Collection[int]) -> tuple
         for batch in reader:
             stream.take([trimmed(a, sheet.unquoted) for a in batch.columns])
     stream.close()
-    notes = tuple(quotes_told(sheet.unquoted, len(left_out)))
-    return stream.rows, len(left_out), Laid(notes, tuple(stream.tags))
+    return stream.rows, len(left_out), list(stream.tags)
 
 
-def _parted(table: ParquetTable, tag: int, folder: Path) -> Laid:
-    """A table's rows laid into a folder, dictionaries decoded: their batches are not of one type."""
+def _parted(table: ParquetTable, tag: int, folder: Path) -> list[str]:
+    """The tags of a table, its rows laid into a folder, dictionaries decoded: their batches are not of one type."""
     stream = _Stream(folder, tag)
     with pq.ParquetFile(table.path) as file:
         for batch in file.iter_batches(batch_size=BATCH_ROWS):
@@ -148,7 +143,7 @@ def _parted(table: ParquetTable, tag: int, folder: Path) -> Laid:
                 [a.dictionary_decode() if d else a for a, d in zip(batch.columns, kinds, strict=True)]
             )
     stream.close()
-    return Laid((), tuple(stream.tags))
+    return list(stream.tags)
 
 
 class _Stream:

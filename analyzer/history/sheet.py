@@ -43,8 +43,7 @@ class Sheet(Table):
     @property
     def notes(self) -> tuple[str, ...]:
         """How the file is written, and the lines of it that do not fit its header."""
-        loaded = _loaded(self)
-        return (*self.found, *quotes_told(loaded.unquoted, loaded.left_out))
+        return (*self.found, *_loaded(self)[1])
 
     def head(self, columns: Sequence[int]) -> list[pa.Array]:
         if self.bytes >= HISTORY.whole_bytes:
@@ -52,7 +51,7 @@ class Sheet(Table):
         return [array.slice(0, HEAD_ROWS) for array in self.read(columns)]
 
     def read(self, columns: Sequence[int], where: tuple[int, Sequence[str]] | None = None) -> list[pa.Array]:
-        columns_read = _loaded(self).columns
+        columns_read = _loaded(self)[0]
         arrays = [columns_read[i] for i in columns]
         if where is None:
             return arrays
@@ -60,42 +59,39 @@ class Sheet(Table):
         return [array.filter(keep) for array in arrays]
 
 
-@dataclass(frozen=True, slots=True)
-class Loaded:
-    """Columns by position, the number of lines left out, and whether quotes were taken as they stand."""
-
-    columns: list[pa.Array]
-    left_out: int
-    unquoted: bool
-
-
 @lru_cache(maxsize=KEPT_READS)
-def _loaded(sheet: Sheet) -> Loaded:
-    """The whole file."""
+def _loaded(sheet: Sheet) -> tuple[list[pa.Array], list[str]]:
+    """Columns of the whole file by position, and sentences on it."""
     return read_through(sheet, _parsed_sheet)
 
 
-def read_through(sheet: Sheet, read: Callable[[Sheet, Collection[int]], tuple[int, int, Read]]) -> Read:
-    """What `read` finds in a sheet, beside the numbers of its rows and of the lines that it leaves out; quotes are
-    taken as they stand where so few lines came back that an open quote has swallowed the rest.
+def read_through(
+    sheet: Sheet, read: Callable[[Sheet, Collection[int]], tuple[int, int, Read]]
+) -> tuple[Read, list[str]]:
+    """What `read` finds in a sheet, beside the numbers of its rows and of lines that it leaves out; and what is to be
+    told of these. Quotes are taken as they stand where so few lines came back that an open one swallowed others.
 
     Raises
     ------
     InputError
         The text cannot be read to its end.
     """
+    notes = []
     try:
         rows, left_out, found = _as_far_as_numbers_go(sheet, read)
         lines = _count_lines(sheet.path, sheet.changed_ns) - sheet.first_row + 1
-        if sheet.unquoted or rows + left_out >= HISTORY.whole_share * lines - 1:
-            return found
-        plain = replace(sheet, unquoted=True)
-        more, _, others = _as_far_as_numbers_go(plain, read)
-        return others if more > rows + left_out else _as_far_as_numbers_go(sheet, read)[2]
+        if rows + left_out < HISTORY.whole_share * lines - 1:
+            more, others_left_out, found = _as_far_as_numbers_go(replace(sheet, unquoted=True), read)
+            if more > rows + left_out:
+                left_out, notes = others_left_out, ["a quote is not closed: quotes are taken as they stand"]
+            else:
+                found = _as_far_as_numbers_go(sheet, read)[2]
     except (UnicodeError, pa.ArrowInvalid) as error:
         remedy = "state --encoding or export the file again"
         seen = f"{sheet.path}: {str(error)[:120]}"
         raise InputError(seen, "delimited text in one encoding", remedy) from error
+    lost = f"{left_out} lines do not have as many columns as the header and are left out"
+    return found, [*notes, lost] if left_out else notes
 
 
 def _as_far_as_numbers_go(sheet: Sheet, read: Callable[[Sheet, Collection[int]], Read]) -> Read:
@@ -116,13 +112,6 @@ def _as_far_as_numbers_go(sheet: Sheet, read: Callable[[Sheet, Collection[int]],
                 raise
 
 
-def quotes_told(unquoted: bool, left_out: int) -> list[str]:
-    """Sentences on quotes that are none, and on lines that do not fit their header."""
-    quotes = ["a quote is not closed: quotes are taken as they stand"] if unquoted else []
-    lost = f"{left_out} lines do not have as many columns as the header and are left out"
-    return [*quotes, lost] if left_out else quotes
-
-
 @lru_cache(maxsize=KEPT_READS)
 def _count_lines(path: Path, changed_ns: int) -> int:
     """Lines of a file that hold anything, within one."""
@@ -134,11 +123,10 @@ def _count_lines(path: Path, changed_ns: int) -> int:
     return count
 
 
-def _parsed_sheet(sheet: Sheet, texts: Collection[int]) -> tuple[int, int, Loaded]:
+def _parsed_sheet(sheet: Sheet, texts: Collection[int]) -> tuple[int, int, list[pa.Array]]:
     left_out: list[int] = []
     table = csv.read_csv(sheet.path, **reading(sheet, left_out, texts))
-    columns = [trimmed(column, sheet.unquoted) for column in table.columns]
-    return table.num_rows, len(left_out), Loaded(columns, len(left_out), sheet.unquoted)
+    return table.num_rows, len(left_out), [trimmed(column, sheet.unquoted) for column in table.columns]
 
 
 @lru_cache(maxsize=KEPT_READS)
