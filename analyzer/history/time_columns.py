@@ -139,9 +139,9 @@ def _with_zone(table: Table, clock: Clock) -> Clock:
     name, head = table.names[clock.columns[0]], table.head(clock.columns[:1])[0].drop_null()
     text = str(head[0].as_py()) if clock.local and is_text(head.type) and len(head) else ""
     zone = zones.named_zone(name) or zones.named_zone(text) or clock.timezone
-    several = zones.of_several(name, zone)
+    offset_s, several = zones.header_zone(name, zone)
     doubt = f", for '{several}' means several zones; state --timezone" if several else ""
-    return replace(clock, offset_s=zones.header_offset_s(name, zone), timezone=zone, doubt=doubt)
+    return replace(clock, offset_s=offset_s, timezone=zone, doubt=doubt)
 
 
 def _with_winter_time(table: Table, clock: Clock) -> Clock:

@@ -56,27 +56,21 @@ def named_zone(text: str) -> str | None:
         return None
 
 
-def header_offset_s(name: str, timezone: str | None = None) -> float | None:
+def header_zone(name: str, timezone: str | None = None) -> tuple[float | None, str]:
     """The offset from UTC that a time column's name states, as in 'Time (UTC+01:00)' [s]; None where none, or where
-    it is what the stated zone calls itself, which may change within the export."""
+    it is what the stated zone calls itself, which may change within the export. And letters there that mean several
+    zones; '' where there are none, or a zone is stated."""
     if plain(name) in ("utc", "timeutc", "utctime"):
-        return 0.0
+        return 0.0, ""
     found = HEADER_ZONE.search(name[-40:])
-    if found is None or not (found["name"] or found["offset"]):
-        return None
-    if found["offset"] is None:
-        letters = found["name"].lower()
-        hours = None if letters in own_letters(timezone) else OFFSETS_H.get(letters)
-        return None if hours is None else 3600.0 * hours
+    letters = "" if found is None else found["name"] or ""
+    several = letters if timezone is None and letters.lower() in SEVERAL else ""
+    if found is None or found["offset"] is None:
+        own = letters.lower() in own_letters(timezone)
+        hours = None if own else OFFSETS_H.get(letters.lower())
+        return None if hours is None else 3600.0 * hours, several
     sign, digits = (-1.0 if found["offset"][0] == "-" else 1.0), found["offset"][1:].replace(":", "")
-    return sign * (3600.0 * float(digits[:2]) + 60.0 * float(digits[2:] or 0))
-
-
-def of_several(name: str, timezone: str | None) -> str:
-    """Letters in a time column's name that mean several zones; '' where there are none, or a zone is stated."""
-    found = HEADER_ZONE.search(name[-40:])
-    letters = (found["name"] or "") if found is not None and timezone is None else ""
-    return letters if letters.lower() in SEVERAL else ""
+    return sign * (3600.0 * float(digits[:2]) + 60.0 * float(digits[2:] or 0)), several
 
 
 def to_utc(local_s: NDArray[np.float64], zone: str) -> tuple[NDArray[np.float64], Counter[str]]:
