@@ -161,14 +161,14 @@ def _is_coded(table: Table, i: int) -> bool:
     codes = table.head([i])[0].drop_null()
     if len(codes) == 0:
         return True
-    if pa.types.is_floating(codes.type) and not pc.all(pc.equal(codes, pc.floor(codes))).as_py():
+    fractions = pa.types.is_floating(codes.type) and not pc.all(pc.equal(codes, pc.floor(codes))).as_py()
+    if fractions or not _few_kinds(codes):
         return False
     scheme, kinds = scheme_of(table.names[i], codes), {*_codes_seen(codes)} - {""}
     if scheme is Scheme.TEXT:
         known = {k for k in kinds if _good_text(k) or k in BAD or k.startswith("bad")}
-        return _few_kinds(codes) and bool(kinds) and 2 * len(known) >= len(kinds)
-    zero = not kinds.isdisjoint({"0", "0.0"}) or any(k.startswith("0x") for k in kinds)
-    return _few_kinds(codes) and (zero or scheme is not Scheme.UA)
+        return bool(kinds) and 2 * len(known) >= len(kinds)
+    return scheme is not Scheme.UA or any(k in ("0", "0.0") or k.startswith("0x") for k in kinds)
 
 
 def _few_kinds(codes: pa.Array) -> bool:

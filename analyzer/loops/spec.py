@@ -127,17 +127,22 @@ def read_loops(path: Path, zone: str = UTC_NAME, day_first: bool | None = None) 
     """
     header, rows = csv_table(path, "loop")
     _check_header(path, header)
-    specs = [(row, _spec(f"{path}, row {row}", cells, zone, day_first)) for row, cells in rows]
-    if not specs:
+    if not rows:
         raise InputError(f"{path}: no loops", "one row a loop below the header", "add the loops")
-    _check_unique(path, specs)
+    specs = [_spec(f"{path}, row {row}", cells, zone, day_first) for row, cells in rows]
+    dated: dict[tuple[str, float | None], list[int]] = {}
     by_loop: dict[str, list[LoopSpec]] = {}
-    for _, spec in sorted(
-        specs, key=lambda at: -math.inf if at[1].valid_from_s is None else at[1].valid_from_s
-    ):
+    for (row, _), spec in zip(rows, specs, strict=True):
+        dated.setdefault((spec.loop, spec.valid_from_s), []).append(row)
         by_loop.setdefault(spec.loop, []).append(spec)
-    latest = (by_loop[loop] for loop in dict.fromkeys(spec.loop for _, spec in specs))
-    return tuple(replace(own[-1], earlier=tuple(own[:-1])) for own in latest)
+    twice = next(((loop, places) for (loop, _), places in dated.items() if len(places) > 1), None)
+    if twice is not None:
+        seen = f"{path}: loop {twice[0]} in rows {', '.join(map(str, twice[1]))}"
+        expected = "each loop once, or its rows with different times in valid_from"
+        raise InputError(seen, expected, "remove all but one, or date them")
+    for own in by_loop.values():
+        own.sort(key=lambda s: -math.inf if s.valid_from_s is None else s.valid_from_s)
+    return tuple(replace(own[-1], earlier=tuple(own[:-1])) for own in by_loop.values())
 
 
 def unknown_columns(specs: Sequence[LoopSpec]) -> tuple[str, ...]:
@@ -234,19 +239,6 @@ def _choice(where: str, name: str, cell: str) -> str:
         seen = f"{where}, column '{name}': '{cell}'"
         raise InputError(seen, f"one of {', '.join(CHOICES[name])}", "correct the cell or empty it")
     return Form(cell.lower()) if name == "form" else cell.lower()
-
-
-def _check_unique(path: Path, loops: Sequence[tuple[int, LoopSpec]]) -> None:
-    rows: dict[tuple[str, float | None], list[int]] = {}
-    for row, spec in loops:
-        rows.setdefault((spec.loop, spec.valid_from_s), []).append(row)
-    for (loop, _), places in rows.items():
-        if len(places) > 1:
-            raise InputError(
-                f"{path}: loop {loop} in rows {', '.join(map(str, places))}",
-                "each loop once, or its rows with different times in valid_from",
-                "remove all but one, or date them",
-            )
 
 
 def spec_of(specs: Sequence[LoopSpec], loop: str) -> LoopSpec:
