@@ -88,15 +88,12 @@ class Export:
         Stray stamps, far from the rest of their file, do not count and are told in the notes.
         """
         homes = range(len(self.sources)) if tag is None else self._homes[tag]
-        spans = [self._span(home) for home in homes]
+        for home in homes:
+            if home not in self._spans:
+                with _faults_told(self.sources[home].path):
+                    self._spans[home] = self.sources[home].span()
+        spans = [self._spans[home] for home in homes]
         return min(s.first_s for s in spans), max(s.last_s for s in spans)
-
-    def _span(self, home: int) -> MainSpan:
-        """Where the samples of one file lie, found out once."""
-        if home not in self._spans:
-            with _faults_told(self.sources[home].path):
-                self._spans[home] = self.sources[home].span()
-        return self._spans[home]
 
     @property
     def notes(self) -> tuple[str, ...]:
