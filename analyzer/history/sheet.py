@@ -46,8 +46,6 @@ class Sheet(Table):
         return (*self.found, *_loaded(self)[1])
 
     def head(self, columns: Sequence[int]) -> list[pa.Array]:
-        if self.bytes >= HISTORY.whole_bytes:
-            return [_first_block(self)[i] for i in columns]
         return [array.slice(0, HEAD_ROWS) for array in self.read(columns)]
 
     def read(self, columns: Sequence[int], where: tuple[int, Sequence[str]] | None = None) -> list[pa.Array]:
@@ -129,12 +127,12 @@ def _parsed_sheet(sheet: Sheet, texts: Collection[int]) -> tuple[int, int, list[
     return table.num_rows, len(left_out), [trimmed(column, sheet.unquoted) for column in table.columns]
 
 
-@lru_cache(maxsize=KEPT_READS)
-def _first_block(sheet: Sheet) -> list[pa.Array]:
-    """First rows of all columns, without reading further."""
+def types_of(sheet: Sheet) -> tuple[pa.DataType, ...]:
+    """Types of all columns; of a big file those of its first rows, without reading further."""
+    if sheet.bytes < HISTORY.whole_bytes:
+        return tuple(array.type for array in _loaded(sheet)[0])
     with csv.open_csv(sheet.path, **reading(sheet, [], ())) as reader:
-        batch = reader.read_next_batch().slice(0, HEAD_ROWS)
-    return [trimmed(a, sheet.unquoted) for a in batch.columns]
+        return tuple(reader.schema.types)
 
 
 def reading(sheet: Sheet, left_out: list[int], texts: Collection[int]) -> dict[str, Any]:

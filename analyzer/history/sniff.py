@@ -20,7 +20,7 @@ from analyzer.history.clock import SINCE_START, time_scale_of
 from analyzer.history.files import detect_encoding
 from analyzer.history.names import WORDS, is_stamp, without_unit
 from analyzer.history.rewritten import rewritten
-from analyzer.history.sheet import Sheet
+from analyzer.history.sheet import Sheet, types_of
 from analyzer.history.table import ReadOptions
 from analyzer.limits import HISTORY
 from identification.errors import InputError
@@ -81,7 +81,7 @@ def open_sheet(path: Path, options: ReadOptions) -> Sheet:
         delimiter=delimiter,
         as_written=options.date_format is not None,
     )
-    return replace(sheet, types=tuple(array.type for array in sheet.head(range(len(names)))))
+    return replace(sheet, types=types_of(sheet))
 
 
 def detect_decimal(rows: Sequence[Sequence[str]], delimiter: str) -> tuple[str, str]:

@@ -126,8 +126,7 @@ def distinct(column: pa.Array) -> tuple[pa.Array, NDArray[np.int64], NDArray[np.
 
 def one_array(column: pa.Array | pa.ChunkedArray) -> pa.Array:
     """A column in one piece."""
-    array = column.combine_chunks() if isinstance(column, pa.ChunkedArray) else column
-    return pa.concat_arrays(array.chunks) if isinstance(array, pa.ChunkedArray) else array
+    return column.combine_chunks() if isinstance(column, pa.ChunkedArray) else column
 
 
 def trimmed(column: pa.Array | pa.ChunkedArray, unquoted: bool) -> pa.Array:
