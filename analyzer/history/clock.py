@@ -13,12 +13,12 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from analyzer.history import stamps, zones
-from analyzer.history.stamps import DateOrder, by_gaps, days_seen
+from analyzer.history.names import WORDS
+from analyzer.history.stamps import DateOrder, shown_order
 from analyzer.history.table import as_text, is_text, numbers
 from analyzer.limits import HISTORY
 
 TICKS_PER_S = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
-EXCEL_ORIGIN_S = -25569 * 86400.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,42 +36,20 @@ class TimeScale:
     def note(self) -> str:
         """How stamps of this scale are read."""
         said = f"stamps are {'texts' if self is ELAPSED else 'numbers'}, read as {self.name}"
-        if self in SINCE_START.values():
-            said += (
-                ", from 1970 on; state the unit in the column's name, as in 'Time (ms)', where it is another"
-            )
-        return said
+        another = (
+            ", from 1970 on; state the unit in the column's name, as in 'Time (ms)', where it is another"
+        )
+        return said + another if self in SINCE_START.values() else said
 
 
 DAY_S = 86400.0
-SINCE_START_MOST = 1e8
-"""Largest number of a clock that counts from the start of the export; above it are the seconds since 1970."""
-SINCE_START = {
-    "ms": TimeScale("milliseconds since the start", 0, 1e11, 1e-3),
-    "s": TimeScale("seconds since the start", 0, SINCE_START_MOST, 1.0),
-    "min": TimeScale("minutes since the start", 0, SINCE_START_MOST, 60.0),
-    "h": TimeScale("hours since the start", 0, SINCE_START_MOST, 3600.0),
-    "d": TimeScale("days since the start", 0, 2e4, DAY_S),
-}
-"""Clocks that count from the start, by the unit that the column's name states; seconds where it states none."""
+SCALES = tuple(TimeScale(**scale) for scale in WORDS["scales"])
+SINCE_START = {unit: TimeScale(**scale) for unit, scale in WORDS["since_start"].items()}
+"""Clocks that count from the start, by the unit that the column's name states."""
 ELAPSED = TimeScale("hours, minutes and seconds since the start", 0, 0, 1.0)
 """A clock in text that counts from the start, such as 25:10:03."""
 MIDNIGHT = r"[ T]0?0:00:00(?:\.0+)?$"
 COUNTED = r"^\s*(?P<h>\d{1,5}):(?P<m>[0-5]\d):(?P<s>[0-5]\d(?:[.,]\d+)?)\s*$"
-SECONDS = TimeScale("seconds since 1970", 1e8, 3e9, 1.0)
-SCALES = (
-    TimeScale("Excel days", 2e4, 8e4, DAY_S, EXCEL_ORIGIN_S, local=True),
-    TimeScale("days since year 0", 7.1e5, 7.7e5, DAY_S, -719529 * DAY_S, local=True),
-    TimeScale("Julian days", 2.43e6, 2.49e6, DAY_S, -2440587.5 * DAY_S),
-    SECONDS,
-    TimeScale("seconds since 1904", 3e9, 4.1e9, 1.0, -2082844800.0),
-    TimeScale("millions of Excel days", 2e10, 8e10, 0.0864, EXCEL_ORIGIN_S, local=True),
-    TimeScale("milliseconds since 1970", 1e11, 4e12, 1e-3),
-    TimeScale("microseconds since 1970", 1e14, 4e15, 1e-6),
-    TimeScale("hundreds of nanoseconds since 1601", 1.1e17, 1.7e17, 1e-7, -11644473600.0),
-    TimeScale("hundreds of nanoseconds since year 1", 6.2e17, 6.7e17, 1e-7, -62135596800.0),
-    TimeScale("nanoseconds since 1970", 1e17, 4e18, 1e-9),
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,15 +100,17 @@ class Clock:
         if self.below_s > 0:
             second, local = replace(self, below_s=0.0).seconds(arrays[:-1])
             return second + numbers(pc.fill_null(arrays[-1], 0)) * self.below_s, local
-        column = date_and_time(arrays)
-        if self.scale is ELAPSED:
+        column, scale = date_and_time(arrays), self.scale
+        if scale is ELAPSED:
             return counted_s(as_text(column)), False
         if pa.types.is_date(column.type):
             column = pc.cast(column, pa.timestamp("s"))
         if pa.types.is_timestamp(column.type):
-            return _from_timestamps(column), column.type.tz is None
-        if self.scale is not None and not is_text(column.type):
-            return _from_numbers(column, self.scale), self.scale.local
+            ticks = column.view(pa.int64()).to_numpy(zero_copy_only=False)
+            return ticks / TICKS_PER_S[column.type.unit], column.type.tz is None
+        if scale is not None and not is_text(column.type):
+            digits = 3 if scale.name == "Excel days" else 6
+            return np.round(numbers(column) * scale.unit_s + scale.origin_s, digits), scale.local
         return self._from_texts(as_text(column))
 
     def utc(self, second: NDArray[np.float64], local: bool) -> tuple[NDArray[np.float64], Counter[str]]:
@@ -165,14 +145,11 @@ class Clock:
         parts = stamps.fields(texts, self.timezone)
         if parts is None:
             return np.full(len(texts), np.nan), True
-        second = stamps.stamp_seconds(parts, self._first(parts))
+        order = self.order or (
+            shown_order(parts) if parts.open.any() else None
+        )  # where the head left nothing open
+        second = stamps.stamp_seconds(parts, "month" if order is None else order.first)
         return stamps.midnights_told(second, parts), not parts.stated.any()
-
-    def _first(self, parts: stamps.Fields) -> str:
-        """What stands first in these stamps; where the head left nothing open and these do, they decide."""
-        if self.order is not None:
-            return self.order.first
-        return (days_seen(parts) or by_gaps(parts) if parts.open.any() else None) or "month"
 
 
 def time_scale_of(column: pa.Array, unit: str = "") -> TimeScale | None:
@@ -183,10 +160,12 @@ def time_scale_of(column: pa.Array, unit: str = "") -> TimeScale | None:
         return None
     middle, reach = float(np.median(number)), float(np.ptp(number))
     found = next((scale for scale in SCALES if scale.low <= middle < scale.high), None)
-    in_days = found is not None and found.unit_s == DAY_S  # such numbers hardly change over an export
-    other = unit in ("ms", "s", "min", "h") if in_days else unit not in ("", "s") and found is SECONDS
-    if found is not None and not (other or (in_days and reach > HISTORY.excel_days)):
-        return found
+    if found is not None:
+        in_days = found.unit_s == DAY_S  # such numbers hardly change over an export
+        seconds = (found.unit_s, found.origin_s) == (1.0, 0.0)
+        other = unit in ("ms", "s", "min", "h") if in_days else unit not in ("", "s") and seconds
+        if not (other or (in_days and reach > HISTORY.excel_days)):
+            return found
     since = SINCE_START[unit or _unit_by_step(number)]
     return since if since.low <= middle < since.high else None
 
@@ -215,17 +194,6 @@ def date_and_time(arrays: Sequence[pa.Array]) -> pa.Array:
         return arrays[0]
     texts = (pc.replace_substring_regex(as_text(array), MIDNIGHT, "") for array in arrays)
     return pc.binary_join_element_wise(*texts, " ")
-
-
-def _from_timestamps(column: pa.Array) -> NDArray[np.float64]:
-    ticks = column.view(pa.int64()).to_numpy(zero_copy_only=False)
-    return ticks / TICKS_PER_S[column.type.unit]
-
-
-def _from_numbers(column: pa.Array, scale: TimeScale) -> NDArray[np.float64]:
-    number = numbers(column)
-    digits = 3 if scale.name == "Excel days" else 6
-    return np.round(number * scale.unit_s + scale.origin_s, digits)
 
 
 def _formatted(texts: pa.Array, date_format: str) -> tuple[NDArray[np.float64], bool]:

@@ -19,7 +19,7 @@ from pathlib import Path
 
 import pyarrow as pa
 
-from analyzer.history.converted import converted, converted_parquet
+from analyzer.history.converted import converted
 from analyzer.history.files import export_files, is_parquet, packed_beside, unpacked
 from analyzer.history.layouts import Source, source_of, tag_column
 from analyzer.history.parquet import open_parquet
@@ -70,10 +70,9 @@ class Export:
         """
         self._check_known(tags)
         homes = sorted({home for tag in tags for home in self._homes[tag]})
-        for home in homes:
-            bring(self.sources[home].path, self.origins)
         pieces = []
         for home in homes:
+            bring(self.sources[home].path, self.origins)
             with _faults_told(self.sources[home].path):
                 pieces.append(self.sources[home].read(tags))
         series = {}
@@ -89,15 +88,12 @@ class Export:
         Stray stamps, far from the rest of their file, do not count and are told in the notes.
         """
         homes = range(len(self.sources)) if tag is None else self._homes[tag]
-        spans = [self._span(home) for home in homes]
+        for home in homes:
+            if home not in self._spans:
+                with _faults_told(self.sources[home].path):
+                    self._spans[home] = self.sources[home].span()
+        spans = [self._spans[home] for home in homes]
         return min(s.first_s for s in spans), max(s.last_s for s in spans)
-
-    def _span(self, home: int) -> MainSpan:
-        """Where the samples of one file lie, found out once."""
-        if home not in self._spans:
-            with _faults_told(self.sources[home].path):
-                self._spans[home] = self.sources[home].span()
-        return self._spans[home]
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -121,15 +117,12 @@ class Export:
         return sum((self._met[tag] for tag in tags if tag in self._met), Counter())
 
     def _check_known(self, tags: Sequence[str]) -> None:
-        missing = [tag for tag in tags if tag not in self._homes]
-        if not missing:
-            return
-        near = get_close_matches(missing[0], self.tags, n=3)
-        raise InputError(
-            f"tag {missing[0]} is not in the export",
-            f"one of its {len(self.tags)} tags" + (f" (near: {', '.join(near)})" if near else ""),
-            "correct the tag in loops.csv or export it too",
-        )
+        missing = next((tag for tag in tags if tag not in self._homes), None)
+        if missing is not None:
+            near = ", ".join(get_close_matches(missing, self.tags, n=3))
+            expected = f"one of its {len(self.tags)} tags" + (f" (near: {near})" if near else "")
+            seen = f"tag {missing} is not in the export"
+            raise InputError(seen, expected, "correct the tag in loops.csv or export it too")
 
 
 def open_export(paths: Sequence[Path], options: ReadOptions | None = None) -> Export:
@@ -162,32 +155,30 @@ def _check_stated(options: ReadOptions) -> None:
     """Raise InputError for options that no file could be read with."""
     if options.timezone is not None:
         zone_of(options.timezone or "nowhere")
-    mark = options.delimiter
+    mark, encoding, written = options.delimiter, options.encoding, options.date_format
     if mark is not None and (len(mark) != 1 or mark in '\r\n"\0'):
         raise InputError(f"--delimiter {mark!r}", "one character, no quote and no end of line", "correct it")
-    if options.encoding is not None:
-        _check_encoding(options.encoding)
-    if options.date_format is not None:
-        _check_format(options.date_format)
+    if encoding is not None and not _is_encoding(encoding):
+        raise InputError(
+            f"--encoding {encoding!r}", "an encoding of text such as utf-8 or cp1252", "correct it"
+        )
+    if written is not None and not _is_format(written):
+        raise InputError(f"--date-format {written!r}", "a format such as '%d-%b-%y %H:%M:%S'", "correct it")
 
 
-def _check_encoding(name: str) -> None:
+def _is_encoding(name: str) -> bool:
     try:
-        known = codecs.lookup(name)._is_text_encoding
+        return codecs.lookup(name)._is_text_encoding
     except LookupError:
-        known = False
-    if not known:
-        raise InputError(f"--encoding {name!r}", "an encoding of text such as utf-8 or cp1252", "correct it")
+        return False
 
 
-def _check_format(written: str) -> None:
+def _is_format(written: str) -> bool:
     try:
         again = datetime.strptime(datetime(2026, 5, 12, 8, 9, 10).strftime(written), written)
-        known = again.year == 2026  # a format without a year reads as 1900
     except (ValueError, re.error):
-        known = False
-    if not known:
-        raise InputError(f"--date-format {written!r}", "a format such as '%d-%b-%y %H:%M:%S'", "correct it")
+        return False
+    return again.year == 2026  # a format without a year reads as 1900
 
 
 def _readable_files(paths: Sequence[Path], options: ReadOptions) -> tuple[list[Source], list[str]]:
@@ -196,17 +187,44 @@ def _readable_files(paths: Sequence[Path], options: ReadOptions) -> tuple[list[S
     skipped: list[InputError] = []
     named = {Path(path) for path in paths}
     for path in export_files(paths):
-        try:
-            found, failed = _opened_tables(path, options)
-            sources += found
-            skipped += failed
-        except InputError as error:
-            if path in named:
-                raise
-            skipped.append(error)
+        found, failed = _opened_tables(path, options)
+        if path in named and not found:
+            raise failed[0]
+        sources += found
+        skipped += failed if found else failed[:1]
     if not sources:
         raise skipped[0]
     return sources, [f"left out: {error}" for error in skipped]
+
+
+def _opened_tables(path: Path, options: ReadOptions) -> tuple[list[Source], list[InputError]]:
+    """The tables of a file, one but for workbooks, and why it or other sheets of a workbook are none."""
+    try:
+        with _faults_told(path):
+            parts = unpacked(path, options.place)
+    except InputError as error:
+        return [], [error]
+    found: list[Source] = []
+    failed: list[InputError] = []
+    for part in parts:
+        try:
+            with _faults_told(path):
+                found.append(_table_source(part, options))
+        except InputError as error:
+            seen = error.seen.replace(str(part), str(path.with_name(part.name)))
+            failed.append(InputError(seen, error.expected, error.remedy))
+    return found, failed
+
+
+def _table_source(plain: Path, options: ReadOptions) -> Source:
+    if is_parquet(plain):
+        table = open_parquet(plain)
+        tag = tag_column(table)
+        whole = tag < 0 or table.rows < HISTORY.whole_rows
+        return source_of(table if whole else converted(table, tag, options.place), options)
+    sheet = open_sheet(plain, options)
+    whole = sheet.bytes < HISTORY.whole_bytes
+    return source_of(sheet if whole else converted(sheet, tag_column(sheet), options.place), options)
 
 
 def _agreed(sources: Sequence[Source]) -> tuple[Source, ...]:
@@ -214,15 +232,13 @@ def _agreed(sources: Sequence[Source]) -> tuple[Source, ...]:
     where one file shows that its clock does."""
     winter_s = next((s.clock.winter_s for s in sources if s.clock.winter_s is not None), None)
     if winter_s is not None:
-        sources = [s.with_clock(replace(s.clock, winter_s=winter_s)) if s.clock.local else s for s in sources]
-    sure = next((s for s in sources if s.clock.order is not None and s.clock.order.sure), None)
-    if sure is None or sure.clock.order is None:
+        sources = [s.with_clock(winter_s=winter_s) if s.clock.local else s for s in sources]
+    orders = ((s.clock.order, s.path.name) for s in sources)
+    sure = next((replace(order, why=f"as in {name}") for order, name in orders if order and order.sure), None)
+    if sure is None:
         return tuple(sources)
-    order = replace(sure.clock.order, why=f"as in {sure.path.name}")
-    return tuple(
-        s if s.clock.order is None or s.clock.order.sure else s.with_clock(replace(s.clock, order=order))
-        for s in sources
-    )
+    doubtful = (s.clock.order is not None and not s.clock.order.sure for s in sources)
+    return tuple(s.with_clock(order=sure) if d else s for s, d in zip(sources, doubtful, strict=True))
 
 
 def met_told(met: Counter[str]) -> list[str]:
@@ -234,43 +250,14 @@ def _some(names: Sequence[str]) -> str:
     return names[0] if len(names) == 1 else f"{names[0]} and {len(names) - 1} more files"
 
 
-def _opened_tables(path: Path, options: ReadOptions) -> tuple[list[Source], list[InputError]]:
-    """The tables of a file, one but for workbooks, and why other sheets of a workbook are none."""
-    with _faults_told(path):
-        parts = unpacked(path, options.place)
-    found: list[Source] = []
-    failed: list[InputError] = []
-    for part in parts:
-        try:
-            with _faults_told(path):
-                found.append(_table_source(part, options))
-        except InputError as error:
-            seen = error.seen.replace(str(part), str(path.with_name(part.name)))
-            failed.append(InputError(seen, error.expected, error.remedy))
-    if not found:
-        raise failed[0]
-    return found, failed
-
-
-def _table_source(plain: Path, options: ReadOptions) -> Source:
-    if is_parquet(plain):
-        table = open_parquet(plain)
-        tag = tag_column(table) if table.rows >= HISTORY.whole_rows else -1
-        return source_of(table if tag < 0 else converted_parquet(table, tag, options.place), options)
-    sheet = open_sheet(plain, options)
-    big = sheet.bytes >= HISTORY.whole_bytes
-    return source_of(converted(sheet, tag_column(sheet), options.place) if big else sheet, options)
-
-
 @contextmanager
 def _faults_told(path: Path) -> Iterator[None]:
     """Faults of a file that show only when it is read: gone, cut short, damaged, too large, without a stamp."""
     try:
         yield
     except MemoryError as error:
-        raise InputError(
-            f"{path}: takes more memory than there is", "files that fit", "export it in parts"
-        ) from error
+        seen = f"{path}: takes more memory than there is"
+        raise InputError(seen, "files that fit", "export it in parts") from error
     except NoStampError as error:
         expected = "stamps of our time that the time zone has"
         raise InputError(f"{path}: no readable time stamp", expected, "check dates and --timezone") from error

@@ -10,7 +10,6 @@ import atexit
 import bz2
 import codecs
 import csv
-import datetime as dt
 import gzip
 import importlib.util
 import lzma
@@ -104,13 +103,10 @@ def is_parquet(path: Path) -> bool:
     Raises
     ------
     InputError
-        The file is empty or cannot be opened.
+        The file is empty, or packed as none that is read.
     """
-    try:
-        with path.open("rb") as file:
-            start = file.read(4)
-    except OSError as error:
-        raise _closed(path, error) from error
+    with path.open("rb") as file:
+        start = file.read(4)
     if not start:
         raise InputError(f"{path}: empty file", "a table with a header and samples", "export it again")
     if start == SEVEN_ZIP:
@@ -130,36 +126,27 @@ def packed_beside(paths: Sequence[Path]) -> list[str]:
 
 
 def _exports_at(path: Path) -> list[Path]:
-    expected = "an export or a folder of exports"
     try:
         if not path.exists():
+            expected = "an export or a folder of exports"
             raise InputError(f"{path}: no such file or folder", expected, "correct the path")
-        return _exports_in(path) if path.is_dir() else [path]
+        if not path.is_dir():
+            return [path]
+        files = [found for found in sorted(path.iterdir()) if found.is_file() and _is_export(found)]
+        files = files or [p for p in sorted(path.rglob("*")) if p.suffix.lower() in PARQUET_ENDINGS]
+        seen = next(iter(packed_beside([path])), f"{path}: a folder without exports")
     except OSError as error:
-        raise _closed(path, error) from error
-
-
-def _exports_in(folder: Path) -> list[Path]:
-    files = [path for path in sorted(folder.iterdir()) if path.is_file() and _is_export(path)]
-    files = files or [path for path in sorted(folder.rglob("*")) if path.suffix.lower() in PARQUET_ENDINGS]
+        seen = f"{path}: cannot be opened ({error.strerror or error})"
+        raise InputError(seen, "a file that may be read", "grant the permission to read") from error
     if not files:
-        packed = packed_beside([folder])
-        raise InputError(
-            packed[0] if packed else f"{folder}: a folder without exports",
-            "files ending in .csv, .txt, .tsv, .parquet, .pq or .xlsx",
-            "name the folder that holds the exports",
-        )
+        expected = "files ending in .csv, .txt, .tsv, .parquet, .pq or .xlsx"
+        raise InputError(seen, expected, "name the folder that holds the exports")
     return files
 
 
 def _is_export(path: Path) -> bool:
     known = path.suffix.lower() in READ_ENDINGS and path.name.lower() not in NO_EXPORTS
     return known and not path.name.startswith((".", "~$"))
-
-
-def _closed(path: Path, error: OSError) -> InputError:
-    seen = f"{path}: cannot be opened ({error.strerror or error})"
-    return InputError(seen, "a file that may be read", "grant the permission to read")
 
 
 @lru_cache(maxsize=1)
@@ -180,23 +167,35 @@ def unpacked(path: Path, place: Path) -> list[Path]:
     """
     with path.open("rb") as file:
         start = file.read(5)
-    if is_workbook(path, start):
-        _check_parts(path, place)
+    members = _members(path) if start.startswith(ZIP) else []
+    named = (
+        start.startswith(ZIP) and path.suffix.lower() in WORKBOOK_ENDINGS
+    )  # text that is only called one is none
+    if start.startswith(OLD) or named or any(info.filename.startswith("xl/") for info in members):
+        _check_size(path, sum(info.file_size for info in members), 0, place)
         return sheets_as_text(path, Path(tempfile.mkdtemp(prefix="workbook-", dir=place)))
     stream = next((STREAMS[magic] for magic in STREAMS if start.startswith(magic)), None)
     if stream is None and not start.startswith(ZIP):
         return [path]
     folder = Path(tempfile.mkdtemp(prefix="unpacked-", dir=place))
     try:
-        if stream is not None:
-            out = folder / (path.stem if path.suffix.lower() in PACKED_ENDINGS else path.name)
-            with stream(path, "rb") as source:
-                _copied(source, out, path)
-            return [out]
-        return [_archive_member(path, folder)]
+        if stream is None:
+            return [_archive_member(path, folder)]
+        out = folder / (path.stem if path.suffix.lower() in PACKED_ENDINGS else path.name)
+        with stream(path, "rb") as source:
+            return [_copied(source, out, path)]
     except (OSError, EOFError, zipfile.BadZipFile, lzma.LZMAError, RuntimeError, zlib.error) as error:
         seen = f"{path}: cannot be unpacked ({_why(error)})"
         raise InputError(seen, "a whole archive", "export it again") from error
+
+
+def _members(path: Path) -> list[zipfile.ZipInfo]:
+    """What an archive holds; nothing where it is damaged, which its reader tells."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            return archive.infolist()
+    except (zipfile.BadZipFile, OSError):
+        return []
 
 
 def _archive_member(path: Path, folder: Path) -> Path:
@@ -212,21 +211,10 @@ def _archive_member(path: Path, folder: Path) -> Path:
         _check_size(path, held[0].file_size, 0, folder)
         out = folder / Path(held[0].filename.replace("\\", "/")).name
         with archive.open(held[0]) as source:
-            _copied(source, out, path)
-        return out
+            return _copied(source, out, path)
 
 
-def _check_parts(path: Path, folder: Path) -> None:
-    """Raise InputError for a workbook (an archive, but for the old kind) whose parts unpack beyond all measure."""
-    try:
-        with zipfile.ZipFile(path) as archive:
-            declared = sum(info.file_size for info in archive.infolist())
-    except zipfile.BadZipFile:  # of the old kind, or damaged, which its reader tells
-        return
-    _check_size(path, declared, 0, folder)
-
-
-def _copied(source: IO[Any], out: Path, path: Path) -> None:
+def _copied(source: IO[Any], out: Path, path: Path) -> Path:
     """Copy what a stream unpacks, stopping where it grows beyond all measure."""
     done = 0
     with out.open("wb") as file:
@@ -234,6 +222,7 @@ def _copied(source: IO[Any], out: Path, path: Path) -> None:
             done += len(block)
             _check_size(path, done, done, out.parent)
             file.write(block)
+    return out
 
 
 def _check_size(path: Path, size: int, written: int, folder: Path) -> None:
@@ -241,30 +230,13 @@ def _check_size(path: Path, size: int, written: int, folder: Path) -> None:
     disk's room."""
     packed = path.stat().st_size
     if size > max(HISTORY.unpacked_times * packed, HISTORY.unpacked_bytes):
-        raise InputError(
-            f"{path}: {packed} bytes that unpack to more than {size / 1e6:.0f} MB",
-            f"at most {HISTORY.unpacked_times:g} times as much",
-            "unpack it where there is room, and name what comes out",
-        )
+        seen = f"{path}: {packed} bytes that unpack to more than {size / 1e6:.0f} MB"
+        remedy = "unpack it where there is room, and name what comes out"
+        raise InputError(seen, f"at most {HISTORY.unpacked_times:g} times as much", remedy)
     room = shutil.disk_usage(folder).free + written
     if size > HISTORY.unpacked_bytes and size > HISTORY.disk_share * room:
         remedy = "unpack it elsewhere and name what comes out"
         raise InputError(f"{path}: no room to unpack it", "free disk", remedy)
-
-
-def is_workbook(path: Path, start: bytes) -> bool:
-    """Whether a file that begins so is a workbook; text that is only called one is none."""
-    if start.startswith(OLD):
-        return True
-    if not start.startswith(b"PK\x03\x04"):
-        return False
-    if path.suffix.lower() in WORKBOOK_ENDINGS:
-        return True
-    try:
-        with zipfile.ZipFile(path) as archive:
-            return any(name.startswith("xl/") for name in archive.namelist())
-    except (zipfile.BadZipFile, OSError):
-        return False
 
 
 def can_be_read() -> bool:
@@ -281,23 +253,22 @@ def sheets_as_text(path: Path, folder: Path) -> list[Path]:
         The package is missing, the file is damaged or has a password, or no sheet holds a table.
     """
     if not can_be_read():
-        raise InputError(
-            f"{path}: a workbook",
-            "delimited text or Parquet, or the extra 'excel'",
-            "pip install 'loop-triage[excel]', or save the sheet as CSV and name that file",
-        )
+        remedy = "pip install 'loop-triage[excel]', or save the sheet as CSV and name that file"
+        raise InputError(f"{path}: a workbook", "delimited text or Parquet, or the extra 'excel'", remedy)
+    from python_calamine import CalamineError
+
     try:
         found = _sheets(path, folder)
-    except (OSError, ValueError, RuntimeError) as error:
-        raise _damaged(path, error) from error
     except BaseException as error:  # a panic of the reader is no Exception
-        if type(error).__name__ != "PanicException":
+        known = isinstance(error, OSError | ValueError | RuntimeError | CalamineError)
+        if not known and type(error).__name__ != "PanicException":
             raise
-        raise _damaged(path, error) from error
+        seen = f"{path}: cannot be read as a workbook ({_why(error)})"
+        remedy = "open it and save it anew, without a password, or as CSV"
+        raise InputError(seen, "a whole workbook", remedy) from error
     if not found:
-        raise InputError(
-            f"{path}: no sheet with a table", "stamps, tags and samples in a sheet", "name another file"
-        )
+        seen = f"{path}: no sheet with a table"
+        raise InputError(seen, "stamps, tags and samples in a sheet", "name another file")
     return found
 
 
@@ -305,30 +276,19 @@ def _why(error: BaseException) -> str:
     return " ".join(str(error).split())[:80] or type(error).__name__
 
 
-def _damaged(path: Path, error: BaseException) -> InputError:
-    remedy = "open it and save it anew, without a password, or as CSV"
-    return InputError(f"{path}: cannot be read as a workbook ({_why(error)})", "a whole workbook", remedy)
-
-
 def _sheets(path: Path, folder: Path) -> list[Path]:
     from python_calamine import CalamineError, CalamineWorkbook
 
-    try:
-        book = CalamineWorkbook.from_path(str(path))
-        names = list(book.sheet_names)
-    except CalamineError as error:
-        raise ValueError(str(error)) from error
+    book = CalamineWorkbook.from_path(str(path))
     out = []
-    for at, name in enumerate(names):
+    for at, name in enumerate(book.sheet_names):
         try:
             sheet = book.get_sheet_by_index(at)
         except CalamineError:  # a chart, or a macro
             continue
-        if sheet.height < FEWEST or sheet.width < FEWEST:
-            continue
-        written = folder / f"{path.name}, sheet {at + 1} {PLAIN.sub('_', name)[:40]}".rstrip()
-        _write(sheet.iter_rows(), written)
-        out.append(written)
+        if sheet.height >= FEWEST and sheet.width >= FEWEST:
+            out.append(folder / f"{path.name}, sheet {at + 1} {PLAIN.sub('_', name)[:40]}".rstrip())
+            _write(sheet.iter_rows(), out[-1])
     return out
 
 
@@ -349,10 +309,4 @@ def _text(cell: Any) -> str:
     """A cell as text: stamps in ISO form, numbers with all their digits."""
     if isinstance(cell, bool):
         return str(int(cell))
-    if isinstance(cell, float):
-        return f"{cell:.15g}"
-    if isinstance(cell, dt.datetime):
-        return cell.isoformat(sep=" ")
-    if isinstance(cell, dt.date | dt.time):
-        return cell.isoformat()
-    return str(cell)
+    return f"{cell:.15g}" if isinstance(cell, float) else str(cell)

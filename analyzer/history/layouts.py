@@ -4,12 +4,11 @@ each sample, with the tag in a column of its own)."""
 from __future__ import annotations
 
 import re
-from abc import ABC, abstractmethod
 from collections import Counter
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Self
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -36,6 +35,8 @@ VALUE_WORDS = re.compile(r"(?:^|[ ._:/-])\(?(?:value|val|wert)\)?(?:[ ._]\d+)?$"
 NUMBERED = re.compile(r"[ ._]\d+$")
 Stamps = tuple[NDArray[np.float64], Counter[str]]
 """Stamps of rows [s since 1970-01-01 UTC], and what was met in them."""
+Rows = NDArray[np.int64] | None
+"""Rows of a table, None for all of them."""
 
 
 def source_of(table: Table, options: ReadOptions) -> Source:
@@ -51,54 +52,8 @@ def source_of(table: Table, options: ReadOptions) -> Source:
 
 
 @dataclass(frozen=True, slots=True)
-class Source(ABC):
-    """One file whose layout is understood; small, picklable, holds no samples. `layout` says of what kind it is."""
-
-    table: Table
-    clock: Clock
-    tags: tuple[str, ...]
-    good_quality: tuple[str, ...] | None
-    layout: tuple[str, ...]
-
-    @property
-    def path(self) -> Path:
-        """The file."""
-        return self.table.path
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """Format and layout of the file."""
-        return (*self.table.notes, *self.layout, *self.clock.notes)
-
-    def with_clock(self, clock: Clock) -> Self:
-        """The same file, its stamps read in the order of day and month, and the winter time, of another clock."""
-        return replace(self, clock=clock)
-
-    @abstractmethod
-    def read(self, tags: Sequence[str]) -> dict[str, Series]:
-        """Samples of those of `tags` that the file holds."""
-
-    @abstractmethod
-    def span(self) -> MainSpan:
-        """Where the samples lie in time, stray ones apart [s since 1970-01-01 UTC]."""
-
-    def _series(
-        self, stamps: Stamps, value: pa.Array, codes: pa.Array | None, scheme: Scheme | None
-    ) -> Series:
-        """One tag's samples from its columns of values and of quality codes."""
-        stamp_s, met = stamps
-        read = values(stamp_s, value, self.table.decimal)
-        bad, found = read.bad, read.found + met
-        if codes is not None and scheme is not None:
-            rejected, counts = not_good(codes, scheme, self.good_quality)
-            bad, found = bad | rejected, found + counts
-        return replace(read, bad=bad, found=found)
-
-
-@dataclass(frozen=True, slots=True)
 class TagColumn:
-    """One tag of a table with a column for each: its clock, and its columns of values and of quality codes (-1:
-    none)."""
+    """A tag's clock, and its columns of values and of quality codes (-1: none)."""
 
     clock: Clock
     value: int
@@ -106,63 +61,123 @@ class TagColumn:
 
 
 @dataclass(frozen=True, slots=True)
-class WideSource(Source):
-    """A table with a column for each tag; `ones` says whether most codes of quality are 1 and not 0 (None: found out
-    of each column), `paired` whether rows without a stamp lie below a tag's last one."""
+class Source:
+    """One file whose layout is understood; small, picklable, holds no samples.
 
+    Parameters
+    ----------
+    table : Table
+    tags : tuple of str
+    columns : tuple of TagColumn
+        One a tag; of a long table one for all.
+    good_quality : tuple of str or None
+        As in `ReadOptions`.
+    layout : tuple of str
+        Of what kind it is, in words.
+    tag : int
+        Column of the tags of a long table, -1 of any other.
+    scheme : Scheme or None
+        Of all codes of quality; None: found out of each column.
+    ones : bool or None
+        Whether most codes are 1 and not 0; None: found out of each column.
+    paired : bool
+        Whether rows without a stamp lie below a tag's last one.
+    """
+
+    table: Table
+    tags: tuple[str, ...]
     columns: tuple[TagColumn, ...]
+    good_quality: tuple[str, ...] | None
+    layout: tuple[str, ...]
+    tag: int = -1
+    scheme: Scheme | None = None
     ones: bool | None = None
     paired: bool = False
 
-    def with_clock(self, clock: Clock) -> Self:
-        """The same file, all its stamps read in the order of day and month, and the winter time, of another clock."""
-        columns = tuple(
-            replace(c, clock=replace(c.clock, order=clock.order, winter_s=clock.winter_s))
-            for c in self.columns
-        )
-        return replace(self, clock=columns[0].clock, columns=columns)
+    @property
+    def path(self) -> Path:
+        """The file."""
+        return self.table.path
+
+    @property
+    def clock(self) -> Clock:
+        """The clock of its first tag."""
+        return self.columns[0].clock
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Format and layout of the file."""
+        return (*self.table.notes, *self.layout, *self.clock.notes)
+
+    def with_clock(self, **known: Any) -> Source:
+        """The same file with what is known of its clocks from other files, by the fields of `Clock`."""
+        columns = (replace(c, clock=replace(c.clock, **known)) for c in self.columns)
+        return replace(self, columns=tuple(columns))
 
     def read(self, tags: Sequence[str]) -> dict[str, Series]:
-        asked = set(tags)
-        wanted = {tag: c for tag, c in zip(self.tags, self.columns, strict=True) if tag in asked}
+        """Samples of those of `tags` that the file holds."""
+        asked, long = set(tags), self.tag >= 0
+        wanted = {tag: self.columns[0 if long else k] for k, tag in enumerate(self.tags) if tag in asked}
         if not wanted:
             return {}
-        needed = {i for c in wanted.values() for i in (*c.clock.columns, c.value, c.quality) if i >= 0}
-        arrays = self._arrays(needed)
-        timed = {clock: self._timed(clock, arrays) for clock in {c.clock for c in wanted.values()}}
-        return {tag: self._samples(c, arrays, *timed[c.clock]) for tag, c in wanted.items()}
+        clocks = {c.clock for c in wanted.values()}
+        held = {c.value for c in wanted.values()} | {c.quality for c in wanted.values()} | {self.tag}
+        needed = sorted((held | {i for clock in clocks for i in clock.columns}) - {-1})
+        where = (self.tag, list(wanted)) if long else None
+        arrays = dict(zip(needed, self.table.read(needed, where), strict=True))
+        if not long:
+            timed = {clock: self._timed(clock, arrays) for clock in clocks}
+            return {tag: self._samples(c, arrays, *timed[c.clock]) for tag, c in wanted.items()}
+        second, local = self.clock.seconds([arrays[i] for i in self.clock.columns])
+        rows = _rows_of(arrays[self.tag], list(wanted))
+        return {
+            tag: self._samples(c, arrays, self.clock.utc(second[rows[tag]], local), rows[tag])
+            for tag, c in wanted.items()
+        }
 
     def span(self) -> MainSpan:
+        """Where the samples lie in time, stray ones apart [s since 1970-01-01 UTC]."""
         clocks = dict.fromkeys(c.clock for c in self.columns)
-        arrays = self._arrays({i for clock in clocks for i in clock.columns})
-        stamps = [c.utc(*c.seconds([arrays[i] for i in c.columns]))[0] for c in clocks]
-        return main_span(np.concatenate(stamps))
+        needed = sorted({i for clock in clocks for i in clock.columns})
+        spans = []
+        for arrays in self.table.each(needed):
+            held = dict(zip(needed, arrays, strict=True))
+            stamp_s = [c.utc(*c.seconds([held[i] for i in c.columns]))[0] for c in clocks]
+            if np.isfinite(joined := np.concatenate(stamp_s)).any():
+                spans.append(main_span(joined))
+        if not spans:
+            raise NoStampError
+        first, last = min(s.first_s for s in spans), max(s.last_s for s in spans)
+        return MainSpan(first, last, sum(s.stray for s in spans))
 
-    def _arrays(self, columns: Collection[int]) -> dict[int, pa.Array]:
-        """Whole columns by their positions."""
-        return dict(zip(sorted(columns), self.table.read(sorted(columns)), strict=True))
-
-    def _timed(self, clock: Clock, arrays: dict[int, pa.Array]) -> tuple[Stamps, pa.Array | None]:
-        """Stamps of one clock's rows, and which rows of the table these are; None where all are."""
+    def _timed(self, clock: Clock, arrays: dict[int, pa.Array]) -> tuple[Stamps, Rows]:
+        """Stamps of one clock's rows, and which rows of the table these are."""
         times = [arrays[i] for i in clock.columns]
         if not self.paired:
             return clock.utc(*clock.seconds(times)), None
         filled = pc.is_valid(times[0])
         if pa.types.is_string(times[0].type):
             filled = pc.and_(filled, pc.fill_null(pc.not_equal(times[0], ""), False))
-        return clock.utc(*clock.seconds([a.filter(filled) for a in times])), filled
+        rows = np.flatnonzero(filled)
+        return clock.utc(*clock.seconds([_taken(a, rows) for a in times])), rows
 
-    def _samples(
-        self, column: TagColumn, arrays: dict[int, pa.Array], stamps: Stamps, rows: pa.Array | None
-    ) -> Series:
-        value, codes = (None if i < 0 else arrays[i] for i in (column.value, column.quality))
-        if rows is not None:
-            value, codes = (None if a is None else a.filter(rows) for a in (value, codes))
-        scheme = None if codes is None else scheme_of(self.table.names[column.quality], codes, self.ones)
-        return self._series(stamps, value, codes, scheme)
+    def _samples(self, column: TagColumn, arrays: dict[int, pa.Array], stamps: Stamps, rows: Rows) -> Series:
+        """One tag's samples in some rows."""
+        stamp_s, met = stamps
+        read = values(stamp_s, _taken(arrays[column.value], rows), self.table.decimal)
+        if column.quality < 0:
+            return replace(read, found=read.found + met)
+        codes = _taken(arrays[column.quality], rows)
+        scheme = self.scheme or scheme_of(self.table.names[column.quality], codes, self.ones)
+        rejected, counts = not_good(codes, scheme, self.good_quality)
+        return replace(read, bad=read.bad | rejected, found=read.found + met + counts)
 
 
-def open_wide(table: Table, options: ReadOptions) -> WideSource:
+def _taken(column: pa.Array, rows: Rows) -> pa.Array:
+    return column if rows is None else column.take(pa.array(rows))
+
+
+def open_wide(table: Table, options: ReadOptions) -> Source:
     """Take a table as wide: one time column, and a column for each tag."""
     clock = find_clock(table, options)
     check_seconds(table, clock)
@@ -170,31 +185,20 @@ def open_wide(table: Table, options: ReadOptions) -> WideSource:
     partner, said = quality_columns(table, free)
     values_in = [i for i in free if i not in partner.values()]
     if not values_in or not _any_number(table, values_in):
-        raise InputError(
-            f"{table.path}: no values beside the time column '{table.names[clock.columns[0]]}'",
-            "a column of values for each tag, named as the tag",
-            "export the tags' values",
-        )
+        seen = f"{table.path}: no values beside the time column '{table.names[clock.columns[0]]}'"
+        raise InputError(seen, "a column of values for each tag, named as the tag", "export the tags' values")
     names = [table.names[i] for i in values_in]
     check_once(table.path, names)
     tags = with_loop(names, table.path.stem)
-    coded = sorted({*partner.values()})
-    ones = mostly_one(table.head(coded))
+    ones = mostly_one(table.head(sorted({*partner.values()})))
     columns = tuple(TagColumn(clock, i, partner.get(i, -1)) for i in values_in)
-    layout = (f"wide table, {len(tags)} tags", *_quality_notes(table, columns, ones, said))
-    return WideSource(table, clock, tags, options.good_quality, layout, columns, ones)
-
-
-def _quality_notes(table: Table, columns: Sequence[TagColumn], ones: bool, said: Sequence[str]) -> list[str]:
-    """Which columns of codes a wide table has, and codes of which another reading is possible."""
-    coded = {table.names[c.quality]: c.quality for c in columns if c.quality >= 0}
-    used = sorted(coded)
-    more = f" and {len(used) - 1} more" if len(used) > 1 else ""
-    notes = [f"quality in column '{used[0]}'{more}"] if used else []
-    positions = {c.quality for c in columns if c.quality >= 0} if ones else set()
-    schemes = {scheme_of(table.names[i], table.head([i])[0], ones) for i in positions}
-    read_as = [f"quality is read as {Scheme.ONE_GOOD.value}"] if Scheme.ONE_GOOD in schemes else []
-    return [*notes, *said, *read_as]
+    layout = [f"wide table, {len(tags)} tags", *said]
+    if used := {table.names[c.quality]: c.quality for c in columns if c.quality >= 0}:
+        more = f" and {len(used) - 1} more" if len(used) > 1 else ""
+        layout.insert(1, f"quality in column '{min(used)}'{more}")
+    if ones and Scheme.ONE_GOOD in {scheme_of(name, table.head([i])[0], ones) for name, i in used.items()}:
+        layout.append(f"quality is read as {Scheme.ONE_GOOD.value}")
+    return Source(table, tags, columns, options.good_quality, tuple(layout), ones=ones)
 
 
 def _any_number(table: Table, columns: Sequence[int]) -> bool:
@@ -218,22 +222,21 @@ def _holds_values(table: Table, i: int) -> bool:
     return bool(is_number(kind) or is_text(kind) or others)
 
 
-def open_pairs(table: Table, options: ReadOptions) -> WideSource | None:
+def open_pairs(table: Table, options: ReadOptions) -> Source | None:
     """Take a table as pairs where two or more columns hold stamps, each with values behind it; else None."""
     if options.time_column is not None or options.date_format is not None:
         return None
     groups = _groups(table)
     if len(groups) < 2:
         return None
-    found = [(_tag(table, c), c) for time, beside in groups for c in _paired(table, time, beside, options)]
-    tags = tuple(tag for tag, _ in found)
+    columns = tuple(c for time, beside in groups for c in _paired(table, time, beside, options))
+    tags = tuple(_tag(table, c) for c in columns)
     if len(tags) < 2 or not all(tags):
         return None
     check_once(table.path, tags)
-    columns = tuple(column for _, column in found)
     clocks = len({c.clock.columns for c in columns})
     layout = f"pairs of columns, {len(tags)} tags with {clocks} clocks of their own"
-    return WideSource(table, columns[0].clock, tags, options.good_quality, (layout,), columns, paired=True)
+    return Source(table, tags, columns, options.good_quality, (layout,), paired=True)
 
 
 def _groups(table: Table) -> list[tuple[int, list[int]]]:
@@ -243,8 +246,6 @@ def _groups(table: Table) -> list[tuple[int, list[int]]]:
         for i, kind in enumerate(table.types)
         if is_text(kind) or pa.types.is_temporal(kind) or _time_name(table, i)
     ]
-    if len(likely) < 2:
-        return []
     heads = dict(zip(likely, table.head(likely), strict=True))
     times = [i for i in likely if holds_stamps(_time_name(table, i), heads[i], _is_time(table.names[i]))]
     if len(times) < 2 or times[0] != 0:
@@ -286,52 +287,13 @@ def _tag(table: Table, column: TagColumn) -> str:
     return VALUE_WORDS.sub("", own[: HISTORY.name_length]) or own
 
 
-@dataclass(frozen=True, slots=True)
-class LongSource(Source):
-    """A long table; `tag`, `value` and `quality` are positions of columns (-1: none)."""
-
-    tag: int
-    value: int
-    quality: int = -1
-    scheme: Scheme | None = None
-
-    def read(self, tags: Sequence[str]) -> dict[str, Series]:
-        present = set(self.tags)
-        wanted = [tag for tag in tags if tag in present]
-        if not wanted:
-            return {}
-        columns = [*self.clock.columns, self.tag, self.value, *([self.quality] if self.quality >= 0 else [])]
-        arrays = self.table.read(columns, where=(self.tag, wanted))
-        times, (tag, *data) = arrays[: len(self.clock.columns)], arrays[len(self.clock.columns) :]
-        second, local = self.clock.seconds(times)
-        rows = _rows_of(tag, wanted)
-        return {name: self._samples(second, local, data, rows[name]) for name in wanted}
-
-    def span(self) -> MainSpan:
-        spans = [
-            main_span(stamp_s)
-            for arrays in self.table.each(self.clock.columns)
-            if np.isfinite(stamp_s := self.clock.utc(*self.clock.seconds(arrays))[0]).any()
-        ]
-        if not spans:
-            raise NoStampError
-        first, last = min(s.first_s for s in spans), max(s.last_s for s in spans)
-        return MainSpan(first, last, sum(s.stray for s in spans))
-
-    def _samples(
-        self, second: NDArray[np.float64], local: bool, data: list[pa.Array], rows: NDArray[np.int64]
-    ) -> Series:
-        value, codes = (*(a.take(pa.array(rows)) for a in data), None)[:2]
-        return self._series(self.clock.utc(second[rows], local), value, codes, self.scheme)
-
-
 def tag_column(table: Table) -> int:
     """The column of tags of a long table, -1 of any other."""
     tag = first_named(table.names, COLUMNS["tag"])
     return -1 if tag is None or _value_column(table) is None else tag
 
 
-def open_long(table: Table, options: ReadOptions) -> LongSource | None:
+def open_long(table: Table, options: ReadOptions) -> Source | None:
     """Take a table as long where it has columns for tag and value; else None."""
     tag, value = tag_column(table), _value_column(table)
     if tag < 0 or value is None:
@@ -340,19 +302,15 @@ def open_long(table: Table, options: ReadOptions) -> LongSource | None:
     check_seconds(table, clock, tag)
     met = table.tags or _kinds(table, tag).to_pylist()
     tags = tuple(str(name) for name in met if name not in (None, ""))
-    stated = options.quality_column
-    quality = (
-        first_named(table.names, COLUMNS["quality"])
-        if stated is None
-        else stated_column(table.path, table.names, stated, "quality")
-    )
-    said = f"long table, {len(tags)} tags in column '{table.names[tag]}'"
-    source = LongSource(table, clock, tags, options.good_quality, (said,), tag, value)
-    if quality is None:
-        return source
-    scheme = scheme_of(table.names[quality], _kinds(table, quality), mostly_one(table.head([quality])))
-    codes = f"column '{table.names[quality]}' read as {scheme.value}"
-    return replace(source, layout=(said, codes), quality=quality, scheme=scheme)
+    quality, scheme = first_named(table.names, COLUMNS["quality"]), None
+    if options.quality_column is not None:
+        quality = stated_column(table.path, table.names, options.quality_column, "quality")
+    layout = [f"long table, {len(tags)} tags in column '{table.names[tag]}'"]
+    if quality is not None:
+        scheme = scheme_of(table.names[quality], _kinds(table, quality), mostly_one(table.head([quality])))
+        layout.append(f"column '{table.names[quality]}' read as {scheme.value}")
+    columns = (TagColumn(clock, value, -1 if quality is None else quality),)
+    return Source(table, tags, columns, options.good_quality, tuple(layout), tag, scheme)
 
 
 def _kinds(table: Table, column: int) -> pa.Array:

@@ -76,11 +76,9 @@ def stated_column(path: Path, names: Sequence[str], stated: str, kind: str) -> i
         There is none of that name.
     """
     if stated not in names:
-        raise InputError(
-            f"{path}: no column '{stated}' among {', '.join(names[:8])}",
-            f"the name of the {kind} column as it stands in the header",
-            f"correct --{kind}-column",
-        )
+        seen = f"{path}: no column '{stated}' among {', '.join(names[:8])}"
+        expected = f"the name of the {kind} column as it stands in the header"
+        raise InputError(seen, expected, f"correct --{kind}-column")
     return names.index(stated)
 
 

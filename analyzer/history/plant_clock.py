@@ -21,10 +21,8 @@ def zone_of(name: str | None) -> ZoneInfo:
     try:
         return ZoneInfo(name or UTC_NAME)
     except (ZoneInfoNotFoundError, ValueError, OSError) as error:
-        seen = f"time zone '{name}'"
-        raise InputError(
-            seen, "an IANA name such as Europe/Berlin", "correct the name of the time zone"
-        ) from error
+        expected = "an IANA name such as Europe/Berlin"
+        raise InputError(f"time zone '{name}'", expected, "correct the name of the time zone") from error
 
 
 def local(at_s: float, zone: str | None) -> datetime:

@@ -103,14 +103,20 @@ def not_good(
     bad, but where codes stand only where something is wrong.
     """
     kinds, place, count = distinct(codes)
-    bad = ~_good(kinds, scheme) if good is None else ~_is_listed(kinds, good)
     names = kinds.to_pylist()
+    if good is None:
+        bad = ~_good(kinds, scheme)
+    else:
+        listed = {_code_text(code).removesuffix(".0") for code in good}
+        bad = np.array([str(name).strip().lower().removesuffix(".0") not in listed for name in names])
     blank = np.array([name is None or str(name).strip() == "" for name in names])
     if good is None and bad[~blank].all() and 2 * count[blank].sum() > count.sum():
         bad = bad & ~blank
     told = "samples have quality '{:.60}', taken as bad"
     found = Counter({told.format(str(names[i])): int(count[i]) for i in np.flatnonzero(bad)})
-    found[FLAGGED_INTERPOLATED] = int(count[_interpolated(kinds, scheme)].sum())
+    if scheme is Scheme.DA:
+        code = np.nan_to_num(_numbers(kinds), nan=0).astype(np.int64)
+        found[FLAGGED_INTERPOLATED] = int(count[(code > 0) & ((code & INTERPOLATED) != 0)].sum())
     return bad[place], +found
 
 
@@ -155,25 +161,19 @@ def _is_coded(table: Table, i: int) -> bool:
     codes = table.head([i])[0].drop_null()
     if len(codes) == 0:
         return True
-    if pa.types.is_floating(codes.type) and not pc.all(pc.equal(codes, pc.floor(codes))).as_py():
+    fractions = pa.types.is_floating(codes.type) and not pc.all(pc.equal(codes, pc.floor(codes))).as_py()
+    if fractions or not _few_kinds(codes):
         return False
-    return _few_kinds(codes) and _is_understood(codes, scheme_of(table.names[i], codes))
+    scheme, kinds = scheme_of(table.names[i], codes), {*_codes_seen(codes)} - {""}
+    if scheme is Scheme.TEXT:
+        known = {k for k in kinds if _good_text(k) or k in BAD or k.startswith("bad")}
+        return bool(kinds) and 2 * len(known) >= len(kinds)
+    return scheme is not Scheme.UA or any(k in ("0", "0.0") or k.startswith("0x") for k in kinds)
 
 
 def _few_kinds(codes: pa.Array) -> bool:
     """Whether a column has few distinct values, as codes have."""
     return len(codes) > 0 and len(codes.unique()) <= max(len(codes) // 10, 8)
-
-
-def _is_understood(codes: pa.Array, scheme: Scheme) -> bool:
-    """Whether codes under a bare name are quality: texts that are known, or numbers that the scheme has."""
-    kinds = {*_codes_seen(codes)} - {""}
-    if scheme is Scheme.TEXT:
-        known = {k for k in kinds if _good_text(k) or k in BAD or k.startswith("bad")}
-        return bool(kinds) and 2 * len(known) >= len(kinds)
-    if scheme is Scheme.UA:
-        return not kinds.isdisjoint({"0", "0.0"}) or any(k.startswith("0x") for k in kinds)
-    return True
 
 
 def _numbers(codes: pa.Array) -> NDArray[np.float64]:
@@ -204,17 +204,3 @@ def _code_text(code: object) -> str:
 
 def _codes_seen(codes: pa.Array) -> list[str]:
     return [_code_text(code) for code in codes.unique().to_pylist()]
-
-
-def _is_listed(kinds: pa.Array, good: tuple[str, ...]) -> NDArray[np.bool_]:
-    wanted = {_canonical(code) for code in good}
-    return np.array([_canonical(code) in wanted for code in kinds.to_pylist()])
-
-
-def _canonical(code: object) -> str:
-    return str(code).strip().lower().removesuffix(".0")
-
-
-def _interpolated(kinds: pa.Array, scheme: Scheme) -> NDArray[np.bool_]:
-    code = np.nan_to_num(_numbers(kinds), nan=0).astype(np.int64)
-    return (scheme is Scheme.DA) & (code > 0) & ((code & INTERPOLATED) != 0)

@@ -32,7 +32,8 @@ def rewritten(path: Path, encoding: str, lines: Sequence[str], place: Path) -> P
 
     `lines` are the file's first ones, the copy is laid under `place`.
     """
-    rewrite = _blocks(lines) or _columns(lines) or _words(lines)
+    filled = [line for line in lines if line.strip()]
+    rewrite = _blocks(filled) or _columns(filled[: 4 * HISTORY.layout_lines])
     if rewrite is None:
         return None
     out = Path(tempfile.mkdtemp(prefix="rewritten-", dir=place)) / path.name
@@ -56,9 +57,8 @@ def _title(line: str) -> str:
     return (BEHIND.sub("", tag) or tag[:1]) if found.re is TITLE else tag.strip('"')
 
 
-def _blocks(lines: Sequence[str]) -> Rewrite | None:
+def _blocks(filled: Sequence[str]) -> Rewrite | None:
     """How blocks of one tag after another are read, where the first lines are such a block's."""
-    filled = [line for line in lines if line.strip()]
     at = next((k for k, line in enumerate(filled[: HISTORY.layout_lines]) if _title(line)), None)
     if at is None:
         return None
@@ -74,27 +74,22 @@ def _blocks(lines: Sequence[str]) -> Rewrite | None:
         yield "tag", "timestamp", "value", "quality"
         tag = ""
         for line in source:
-            if STAMPED.match(line):
+            if not STAMPED.match(line):
+                tag = _title(line) or tag
+            elif tag:
                 cells = [cell.strip().strip('"') for cell in line.rstrip("\n").split(delimiter)]
-                if tag:
-                    yield (
-                        [tag, *cells, *[""] * (3 - len(cells))][:4]
-                        if len(cells) > 2
-                        else [tag, *cells, "good"]
-                    )
-            elif _title(line):
-                tag = _title(line)
+                yield [tag, *cells, *(["good"] if len(cells) < 3 else [])][:4]
 
     return rows
 
 
-def _columns(lines: Sequence[str]) -> Rewrite | None:
-    """How columns that blanks part are read, where the first lines are such columns and hold no delimiter."""
-    filled = [line for line in lines if line.strip()][: 4 * HISTORY.layout_lines]
+def _columns(filled: Sequence[str]) -> Rewrite | None:
+    """How columns that blanks part are read, where the first lines are such columns and hold no delimiter: under a
+    ruled line by its strokes, by two blanks or more, or by one."""
     if len(filled) < 4 or any(d in line for d in DELIMITERS for line in filled[:4]):
         return None
-    rule = next((line for line in filled[: HISTORY.layout_lines] if RULE.match(line)), None)
-    edges = [m.start() for m in re.finditer(r"(?<!\S)-", rule)] if rule is not None else []
+    rule = next((line for line in filled[: HISTORY.layout_lines] if RULE.match(line)), "")
+    edges = [m.start() for m in re.finditer(r"(?<!\S)-", rule)]
 
     def cells(line: str) -> list[str]:
         if edges:
@@ -103,26 +98,22 @@ def _columns(lines: Sequence[str]) -> Rewrite | None:
 
     widths = [len(cells(line)) for line in filled if not RULE.match(line)]
     if widths[0] < 2 or sum(w == widths[0] for w in widths) < 0.9 * len(widths):
-        return None
+        return _words(filled)
 
     def rows(source: Iterator[str]) -> Iterator[Sequence[str]]:
-        for line in source:
-            found = cells(line) if line.strip() and not RULE.match(line) else []
-            if len(found) == widths[0]:
-                yield found
+        found = (cells(line) for line in source if line.strip() and not RULE.match(line))
+        return (row for row in found if len(row) == widths[0])
 
     return rows
 
 
-def _words(lines: Sequence[str]) -> Rewrite | None:
+def _words(filled: Sequence[str]) -> Rewrite | None:
     """How a table is read whose columns are parted by one blank, below a header as wide or, where a stamp is a date
     and a time of day under one name, a word narrower."""
-    head, *rest = [line.split() for line in lines if line.strip()][: 4 * HISTORY.layout_lines] or [[]]
-    more = (Counter(map(len, rest)).most_common(1) or [(0, 0)])[0][0] - len(head)
+    head, *rest = [line.split() for line in filled]
+    more = Counter(map(len, rest)).most_common(1)[0][0] - len(head)
     fitting = sum(len(row) == len(head) + more and NUMBERED.match(row[0]) is not None for row in rest)
     if len(head) < 2 or more not in (0, 1) or fitting < max(3, 0.9 * len(rest)) or NUMBERED.match(head[0]):
-        return None
-    if any(d in line for d in DELIMITERS for line in lines[:4]):
         return None
 
     def rows(source: Iterator[str]) -> Iterator[Sequence[str]]:

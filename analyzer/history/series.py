@@ -72,44 +72,39 @@ def joined_pieces(pieces: Sequence[Series]) -> Series:
         In the order of the files; of equal stamps the last sample counts.
     """
     found: Counter[str] = Counter()
-    ready = [_oldest_first(_with_stamps(piece, found), found) for piece in pieces]
+    ready = [_oldest_first(piece, found) for piece in pieces]
     for piece in pieces:
         found.update(piece.found)
-    joined = ready[0] if len(ready) == 1 else _joined_pieces(ready)
+    joined = ready[0] if len(ready) == 1 else _end_to_end(ready)
     if not (np.diff(joined.stamp_s) > 0).all():
         origin = np.repeat(np.arange(len(ready)), [len(piece.value) for piece in ready])
         joined = _sorted_by_stamp(joined, origin, found)
     return replace(joined, found=found)
 
 
-def _with_stamps(piece: Series, found: Counter[str]) -> Series:
-    readable = np.isfinite(piece.stamp_s)
-    if readable.all():
-        return piece
-    found[NO_STAMP] += int((~readable).sum())
-    return piece.taken(readable)
-
-
 def _oldest_first(piece: Series, found: Counter[str]) -> Series:
+    """The samples of a file that have a stamp, turned round where they run newest first."""
+    readable = np.isfinite(piece.stamp_s)
+    if not readable.all():
+        found[NO_STAMP] += int((~readable).sum())
+        piece = piece.taken(readable)
     step = np.diff(piece.stamp_s)
-    if not (step < 0).any() or (step < 0).sum() <= (step > 0).sum():
+    if (step < 0).sum() <= (step > 0).sum():
         return piece
     found[NEWEST_FIRST] += 1
     return piece.taken(slice(None, None, -1))
 
 
-def _joined_pieces(pieces: Sequence[Series]) -> Series:
+def _end_to_end(pieces: Sequence[Series]) -> Series:
     texts = None
     if any(piece.text is not None for piece in pieces):
         blank = np.array("", dtype=object)
-        texts = np.concatenate(
-            [np.broadcast_to(blank if p.text is None else p.text, p.value.shape) for p in pieces]
-        )
+        texts = [np.broadcast_to(blank if p.text is None else p.text, p.value.shape) for p in pieces]
     return Series(
         np.concatenate([piece.stamp_s for piece in pieces]),
         np.concatenate([piece.value for piece in pieces]),
         np.concatenate([piece.bad for piece in pieces]),
-        texts,
+        None if texts is None else np.concatenate(texts),
         unread=sum(piece.unread for piece in pieces),
         example=next((piece.example for piece in pieces if piece.example), ""),
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, TypeVar
@@ -33,7 +33,7 @@ class Sheet(Table):
     """
 
     first_row: int
-    changed_ns: int
+    changed_ns: int = field(repr=False)
     bytes: int
     encoding: str
     delimiter: str
@@ -43,16 +43,13 @@ class Sheet(Table):
     @property
     def notes(self) -> tuple[str, ...]:
         """How the file is written, and the lines of it that do not fit its header."""
-        loaded = _loaded(self)
-        return (*self.found, *quotes_told(loaded.unquoted, loaded.left_out))
+        return (*self.found, *_loaded(self)[1])
 
     def head(self, columns: Sequence[int]) -> list[pa.Array]:
-        if self.bytes >= HISTORY.whole_bytes:
-            return [_first_block(self)[i] for i in columns]
         return [array.slice(0, HEAD_ROWS) for array in self.read(columns)]
 
     def read(self, columns: Sequence[int], where: tuple[int, Sequence[str]] | None = None) -> list[pa.Array]:
-        columns_read = _loaded(self).columns
+        columns_read = _loaded(self)[0]
         arrays = [columns_read[i] for i in columns]
         if where is None:
             return arrays
@@ -60,30 +57,42 @@ class Sheet(Table):
         return [array.filter(keep) for array in arrays]
 
 
-@dataclass(frozen=True, slots=True)
-class Loaded:
-    """Columns by position, the number of lines left out, and whether quotes were taken as they stand."""
-
-    columns: list[pa.Array]
-    left_out: int
-    unquoted: bool
-
-
 @lru_cache(maxsize=KEPT_READS)
-def _loaded(sheet: Sheet) -> Loaded:
-    """The whole file."""
+def _loaded(sheet: Sheet) -> tuple[list[pa.Array], list[str]]:
+    """Columns of the whole file by position, and sentences on it."""
+    return read_through(sheet, _parsed_sheet)
+
+
+def read_through(
+    sheet: Sheet, read: Callable[[Sheet, Collection[int]], tuple[int, int, Read]]
+) -> tuple[Read, list[str]]:
+    """What `read` finds in a sheet, beside the numbers of its rows and of lines that it leaves out; and what is to be
+    told of these. Quotes are taken as they stand where so few lines came back that an open one swallowed others.
+
+    Raises
+    ------
+    InputError
+        The text cannot be read to its end.
+    """
+    notes = []
     try:
-        loaded = as_far_as_numbers_go(sheet, _parsed_sheet)
-        rows = len(loaded.columns[0]) + loaded.left_out
-        if not is_swallowed(sheet, rows):
-            return loaded
-        again = as_far_as_numbers_go(replace(sheet, unquoted=True), _parsed_sheet)
-        return again if len(again.columns[0]) > rows else loaded
-    except (UnicodeError, OSError, pa.ArrowInvalid) as error:
-        raise unreadable(sheet.path, error) from error
+        rows, left_out, found = _as_far_as_numbers_go(sheet, read)
+        lines = _count_lines(sheet.path, sheet.changed_ns) - sheet.first_row + 1
+        if rows + left_out < HISTORY.whole_share * lines - 1:
+            more, others_left_out, found = _as_far_as_numbers_go(replace(sheet, unquoted=True), read)
+            if more > rows + left_out:
+                left_out, notes = others_left_out, ["a quote is not closed: quotes are taken as they stand"]
+            else:
+                found = _as_far_as_numbers_go(sheet, read)[2]
+    except (UnicodeError, pa.ArrowInvalid) as error:
+        remedy = "state --encoding or export the file again"
+        seen = f"{sheet.path}: {str(error)[:120]}"
+        raise InputError(seen, "delimited text in one encoding", remedy) from error
+    lost = f"{left_out} lines do not have as many columns as the header and are left out"
+    return found, [*notes, lost] if left_out else notes
 
 
-def as_far_as_numbers_go(sheet: Sheet, read: Callable[[Sheet, Collection[int]], Read]) -> Read:
+def _as_far_as_numbers_go(sheet: Sheet, read: Callable[[Sheet, Collection[int]], Read]) -> Read:
     """What `read` gives of a sheet, begun anew with a column as text where only its first block is all numbers, or in
     another encoding where a letter late in the file shows it."""
     texts = set[int]()
@@ -101,19 +110,6 @@ def as_far_as_numbers_go(sheet: Sheet, read: Callable[[Sheet, Collection[int]], 
                 raise
 
 
-def is_swallowed(sheet: Sheet, rows: int) -> bool:
-    """Whether so few of a sheet's lines came back as rows that an open quote has swallowed the rest."""
-    lines = _count_lines(sheet.path, sheet.changed_ns) - sheet.first_row + 1
-    return rows < HISTORY.whole_share * lines - 1 and not sheet.unquoted
-
-
-def quotes_told(unquoted: bool, left_out: int) -> list[str]:
-    """Sentences on quotes that are none, and on lines that do not fit their header."""
-    quotes = ["a quote is not closed: quotes are taken as they stand"] if unquoted else []
-    lost = f"{left_out} lines do not have as many columns as the header and are left out"
-    return [*quotes, lost] if left_out else quotes
-
-
 @lru_cache(maxsize=KEPT_READS)
 def _count_lines(path: Path, changed_ns: int) -> int:
     """Lines of a file that hold anything, within one."""
@@ -125,24 +121,18 @@ def _count_lines(path: Path, changed_ns: int) -> int:
     return count
 
 
-def unreadable(path: Path, error: Exception) -> InputError:
-    """What is said of text that cannot be read to its end."""
-    remedy = "state --encoding or export the file again"
-    return InputError(f"{path}: {str(error)[:120]}", "delimited text in one encoding", remedy)
-
-
-def _parsed_sheet(sheet: Sheet, texts: Collection[int]) -> Loaded:
+def _parsed_sheet(sheet: Sheet, texts: Collection[int]) -> tuple[int, int, list[pa.Array]]:
     left_out: list[int] = []
     table = csv.read_csv(sheet.path, **reading(sheet, left_out, texts))
-    return Loaded([trimmed(a, sheet.unquoted) for a in table.columns], len(left_out), sheet.unquoted)
+    return table.num_rows, len(left_out), [trimmed(column, sheet.unquoted) for column in table.columns]
 
 
-@lru_cache(maxsize=KEPT_READS)
-def _first_block(sheet: Sheet) -> list[pa.Array]:
-    """First rows of all columns, without reading further."""
+def types_of(sheet: Sheet) -> tuple[pa.DataType, ...]:
+    """Types of all columns; of a big file those of its first rows, without reading further."""
+    if sheet.bytes < HISTORY.whole_bytes:
+        return tuple(array.type for array in _loaded(sheet)[0])
     with csv.open_csv(sheet.path, **reading(sheet, [], ())) as reader:
-        batch = reader.read_next_batch().slice(0, HEAD_ROWS)
-    return [trimmed(a, sheet.unquoted) for a in batch.columns]
+        return tuple(reader.schema.types)
 
 
 def reading(sheet: Sheet, left_out: list[int], texts: Collection[int]) -> dict[str, Any]:

@@ -10,6 +10,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
+from operator import itemgetter
 from pathlib import Path
 
 import pyarrow as pa
@@ -19,7 +20,7 @@ from analyzer.history.clock import SINCE_START, time_scale_of
 from analyzer.history.files import detect_encoding
 from analyzer.history.names import WORDS, is_stamp, without_unit
 from analyzer.history.rewritten import rewritten
-from analyzer.history.sheet import Sheet
+from analyzer.history.sheet import Sheet, types_of
 from analyzer.history.table import ReadOptions
 from analyzer.limits import HISTORY
 from identification.errors import InputError
@@ -47,13 +48,11 @@ def open_sheet(path: Path, options: ReadOptions) -> Sheet:
     InputError
         The file is empty, binary, has no header, or no table of at least two columns.
     """
-    head = _head(path)
-    encoding = options.encoding or detect_encoding(head)
-    first = _lines_of_head(path, head, encoding)
-    stated = options.delimiter is not None
-    plain = None if stated else rewritten(path, encoding, first[: HISTORY.head_lines], options.place)
-    if plain is not None:
-        return open_sheet(plain, replace(options, delimiter="\t", encoding="utf-8"))
+    encoding, first = _lines_of_head(path, options.encoding)
+    if options.delimiter is None:
+        plain = rewritten(path, encoding, first[: HISTORY.head_lines], options.place)
+        if plain is not None:
+            return open_sheet(plain, replace(options, delimiter="\t", encoding="utf-8"))
     lines, above = _after_data_mark(first)
     delimiter = options.delimiter or _delimiter(path, lines)
     guessed = _taken_as(lines, delimiter)
@@ -65,12 +64,15 @@ def open_sheet(path: Path, options: ReadOptions) -> Sheet:
     names = (*(name.strip() for name in header), *[""] * (width - len(header)))
     decimal, doubt = (options.decimal, "") if options.decimal else detect_decimal(rows, delimiter)
     between, mark = DELIMITERS.get(delimiter, repr(delimiter)), "comma" if decimal == "," else "point"
-    said = [f"delimited text: {between} between columns, decimal {mark}, encoding {encoding}"]
-    said += [] if guessed is None else [f"no header: columns are taken as {', '.join(guessed)}"]
+    said = [
+        f"delimited text: {between} between columns, decimal {mark}, encoding {encoding}",
+        "" if guessed is None else f"no header: columns are taken as {', '.join(guessed)}",
+        doubt,
+    ]
     sheet = Sheet(
         path,
         names,
-        found=(*said, doubt) if doubt else tuple(said),
+        found=tuple(filter(None, said)),
         decimal=decimal,
         first_row=place + above + 2,
         changed_ns=path.stat().st_mtime_ns,
@@ -79,7 +81,7 @@ def open_sheet(path: Path, options: ReadOptions) -> Sheet:
         delimiter=delimiter,
         as_written=options.date_format is not None,
     )
-    return replace(sheet, types=tuple(array.type for array in sheet.head(range(len(names)))))
+    return replace(sheet, types=types_of(sheet))
 
 
 def detect_decimal(rows: Sequence[Sequence[str]], delimiter: str) -> tuple[str, str]:
@@ -104,15 +106,13 @@ def detect_decimal(rows: Sequence[Sequence[str]], delimiter: str) -> tuple[str, 
     return mark, f"{seen} with a decimal {name}; state --decimal '{other}' if it groups thousands"
 
 
-def _head(path: Path) -> bytes:
+def _lines_of_head(path: Path, stated: str | None) -> tuple[str, list[str]]:
+    """Encoding of a text, and the lines of its beginning."""
     with path.open("rb") as file:
         head = file.read(HISTORY.head_bytes)
     if not head.strip(b"\r\n\t \x00\xef\xbb\xbf\xff\xfe"):
         raise InputError(f"{path}: empty file", "a table with a header and samples", "export it again")
-    return head
-
-
-def _lines_of_head(path: Path, head: bytes, encoding: str) -> list[str]:
+    encoding = stated or detect_encoding(head)
     try:
         text = codecs.getincrementaldecoder(encoding)().decode(head)
     except (LookupError, UnicodeError) as error:
@@ -122,7 +122,7 @@ def _lines_of_head(path: Path, head: bytes, encoding: str) -> list[str]:
     if other:
         raise InputError(f"{path}: {other}", "delimited text or Parquet", "export as CSV or Parquet")
     lines = re.split(r"\r\n|\n|\r", text)
-    return lines if len(head) < HISTORY.head_bytes else lines[:-1]
+    return encoding, lines if len(head) < HISTORY.head_bytes else lines[:-1]
 
 
 def _after_data_mark(lines: list[str]) -> tuple[list[str], int]:
@@ -155,20 +155,16 @@ def _shape(body: Sequence[str], delimiter: str) -> tuple[int, int]:
 def _delimiter(path: Path, lines: Sequence[str]) -> str:
     """The delimiter that splits most lines into the same number of columns, the header among them."""
     body = _data_lines(lines)
-    shapes = {mark: _shape(body, mark) for mark in DELIMITERS}
-    best = max(DELIMITERS, key=lambda mark: shapes[mark])
-    if shapes[best] == (0, 0):
-        raise InputError(
-            f"{path}: no columns; the first line is '{body[0][:60] if body else ''}'",
-            "columns separated by comma, semicolon, tab or bar",
-            "state the delimiter",
-        )
+    shape, best = max(((_shape(body, mark), mark) for mark in DELIMITERS), key=itemgetter(0))
+    if shape == (0, 0):
+        seen = f"{path}: no columns; the first line is '{body[0][:60] if body else ''}'"
+        raise InputError(seen, "columns separated by comma, semicolon, tab or bar", "state the delimiter")
     return best
 
 
 def _header(path: Path, lines: Sequence[str], delimiter: str) -> tuple[int, list[str]]:
     """Line number (from 0) and cells of the header: of the lines as wide as the table above its data the first with a
-    name of a time column, else the first."""
+    name of a time column; else such a line under a preamble that looks like data; else the first of them."""
     width = _shape(_data_lines(lines), delimiter)[1]
     above: list[tuple[int, list[str]]] = []
     for place, line in enumerate(lines):
@@ -200,10 +196,8 @@ def _names_time(cells: Sequence[str]) -> bool:
 def _header_below(
     lines: Sequence[str], start: int, delimiter: str, width: int
 ) -> tuple[int, list[str]] | None:
-    """A header under lines of a preamble that look like data: as wide as the table, no data, over a row of data.
-
-    Within a few lines, with a name of a time column among its cells; a table without a header has none.
-    """
+    """A line of names within a few lines below a row that looks like data, over a row of data; a table without a
+    header has none."""
     rows = [(k, _cells(lines[k], delimiter)) for k in range(start + 1, len(lines))][: HISTORY.preamble_lines]
     for (place, cells), (_, after) in pairwise(rows):
         if len(cells) >= width - 1 and _names_time(cells) and not _is_data(cells) and _is_data(after):
@@ -216,18 +210,15 @@ def _commented(path: Path, lines: Sequence[str], data: int, delimiter: str) -> t
     above = _cells(lines[data - 1].lstrip("# "), delimiter) if data else []
     if len(above) == len(_cells(lines[data], delimiter)) and not _is_data(above):
         return data - 1, above
-    raise InputError(
-        f"{path}: no header; row {data + 1} is already data ('{lines[data][:60]}')",
-        "a line of column names above the samples",
-        "add a header line such as timestamp,FIC101.SP,FIC101.PV,FIC101.OP",
-    )
+    seen = f"{path}: no header; row {data + 1} is already data ('{lines[data][:60]}')"
+    remedy = "add a header line such as timestamp,FIC101.SP,FIC101.PV,FIC101.OP"
+    raise InputError(seen, "a line of column names above the samples", remedy)
 
 
 def _is_data(cells: Sequence[str]) -> bool:
     filled = [cell.strip() for cell in cells if cell.strip()]
-    return any(STAMP.match(cell) for cell in filled) or len(list(filter(NUMBER.match, filled))) * 2 > len(
-        filled
-    )
+    numbers = sum(NUMBER.match(cell) is not None for cell in filled)
+    return any(STAMP.match(cell) for cell in filled) or numbers * 2 > len(filled)
 
 
 def _taken_as(lines: Sequence[str], delimiter: str) -> tuple[str, ...] | None:

@@ -90,6 +90,12 @@ class Fields:
         """Where the writing leaves open which number is the day."""
         return np.asarray(self.readable & (self.order == OPEN))
 
+    @property
+    def year_may_begin(self) -> NDArray[np.bool_]:
+        """Where a year of two digits may stand in front: 24-11-21 as 21 November 2024."""
+        fits = (self.b >= 1) & (self.b <= 12) & (self.c >= 1) & (self.c <= 31)
+        return np.asarray(self.open & self.short & fits)
+
 
 def fields(texts: pa.Array, timezone: str | None = None) -> Fields | None:
     """Take written stamps apart, shape (n,); None where not one of them can be read.
@@ -161,13 +167,9 @@ def midnights_told(second: NDArray[np.float64], parts: Fields) -> NDArray[np.flo
     if not midnight.any():
         return second
     begins = second - 86400.0 * midnight
-    return begins if _turns(begins) < _turns(second) else second
-
-
-def _turns(second: NDArray[np.float64]) -> int:
-    """Steps against the run of the stamps."""
-    step = np.diff(second)
-    return int(min((step < 0).sum(), (step > 0).sum()))
+    steps = np.diff([begins, second])
+    turns = np.minimum((steps < 0).sum(axis=1), (steps > 0).sum(axis=1))
+    return begins if turns[0] < turns[1] else second
 
 
 def _written_order(part: dict[str, pa.Array]) -> NDArray[np.int8]:
@@ -231,49 +233,38 @@ class DateOrder:
 
 
 def date_order(parts: Fields, example: str, timezone: str | None) -> DateOrder:
-    """The order of all dates of a file, one of which is `example`, in a stated zone."""
+    """The order of all dates of a file, one of which is `example`, in a stated zone.
+
+    Where nothing in them tells, the month first may lie ahead of us, or the day first be usual in the zone.
+    """
     date = example.split(" ")[0]
     pointed = "." in date
     by_year = _with_short_year(parts, pointed and "-" not in date and "/" not in date)
     if by_year is not None:
         return by_year
-    seen = days_seen(parts)
-    if seen is not None:
-        return DateOrder(seen, f"the {'first' if seen == 'day' else 'second'} number exceeds 12")
-    running = by_gaps(parts)
-    if running is not None:
-        return DateOrder(running, WITHOUT_LEAP)
+    shown = shown_order(parts)
+    if shown is not None:
+        return shown
     if pointed:
         return DateOrder("day", "dates with points; no day above 12 occurs")
-    usual, other = ("day", "month") if _day_is_usual(parts, timezone) else ("month", "day")
-    return DateOrder(usual, f"every date fits both orders; state --{other}-first if so", sure=False)
-
-
-def days_seen(parts: Fields) -> str | None:
-    """'day' where a first number above 12 shows it first, 'month' where a second one does, else None."""
-    first, second = (parts.a[parts.open] > 12).any(), (parts.b[parts.open] > 12).any()
-    return None if first == second else "day" if first else "month"
-
-
-def by_gaps(parts: Fields) -> str | None:
-    """The order of day and month in which the stamps run without a leap; None where they do so in either."""
-    day, month = (_largest_gap(parts, first) for first in ("day", "month"))
-    return None if day == month else "day" if day < month else "month"
-
-
-def _largest_gap(parts: Fields, first: str) -> float:
-    second = np.unique(stamp_seconds(parts, first))
-    return float(np.max(np.diff(second[np.isfinite(second)]), initial=0.0))
-
-
-def _day_is_usual(parts: Fields, timezone: str | None) -> bool:
-    """Whether dates that read either way have the day first: where the month first would lie ahead of us, or as
-    is usual in the stated zone."""
     limit = time.time() + HISTORY.ahead_s
-    day, month = (bool((stamp_seconds(parts, first) > limit).any()) for first in ("day", "month"))
-    if day != month:
-        return month
-    return timezone is not None and timezone.startswith(DAY_FIRST_ZONES)
+    ahead = [bool((stamp_seconds(parts, first) > limit).any()) for first in ("day", "month")]
+    usual = timezone is not None and timezone.startswith(DAY_FIRST_ZONES)
+    day = ahead[1] if ahead[0] != ahead[1] else usual
+    first, other = ("day", "month") if day else ("month", "day")
+    return DateOrder(first, f"every date fits both orders; state --{other}-first if so", sure=False)
+
+
+def shown_order(parts: Fields) -> DateOrder | None:
+    """The order that a number above 12 shows, or else that in which alone the stamps run without a leap; or None."""
+    first, second = ((part[parts.open] > 12).any() for part in (parts.a, parts.b))
+    if first != second:
+        return DateOrder(
+            "day" if first else "month", f"the {'first' if first else 'second'} number exceeds 12"
+        )
+    known = (np.unique(stamp_seconds(parts, order)) for order in ("day", "month"))
+    day, month = (np.max(np.diff(second[np.isfinite(second)]), initial=0.0) for second in known)
+    return None if day == month else DateOrder("day" if day < month else "month", WITHOUT_LEAP)
 
 
 def _with_short_year(parts: Fields, pointed: bool) -> DateOrder | None:
@@ -282,12 +273,12 @@ def _with_short_year(parts: Fields, pointed: bool) -> DateOrder | None:
     Dates with points have the year in front only where no other reading fits as well; of others that read several
     ways the latest counts, for exports are of late.
     """
-    if not _may_begin_with_year(parts):
+    if not parts.open.any() or not parts.short.all() or (parts.open & ~parts.year_may_begin).any():
         return None
     limit = time.time() + HISTORY.ahead_s
     readings = {first: stamp_seconds(parts, first) for first in ("year", "day", "month")}
     possible = {
-        first: found for first, found in readings.items() if np.isfinite(found).all() and found.max() <= limit
+        k: found for k, found in readings.items() if np.isfinite(found).all() and found.max() <= limit
     }
     if "year" not in possible:
         return None
@@ -306,16 +297,8 @@ def _with_short_year(parts: Fields, pointed: bool) -> DateOrder | None:
         first = next(iter(latest))
     else:
         return None
-    return DateOrder(
-        first, "the year may stand in front or behind; state --date-format if it is not so", sure=False
-    )
-
-
-def _may_begin_with_year(parts: Fields) -> bool:
-    """Whether all dates may have a year of two digits in front: 24-11-21 as 21 November 2024."""
-    b, c = parts.b[parts.open], parts.c[parts.open]
-    fits = (c < 100) & (b >= 1) & (b <= 12) & (c >= 1) & (c <= 31)
-    return bool(b.size and fits.all() and parts.short.all())
+    why = "the year may stand in front or behind; state --date-format if it is not so"
+    return DateOrder(first, why, sure=False)
 
 
 def parse_time(text: str, where: str, zone: str = UTC_NAME, day_first: bool | None = None) -> float:
@@ -372,7 +355,8 @@ def _stated_order(
     either = parts.order == OPEN
     if stated is not None:
         return either & stated, np.ones(len(texts), dtype=bool)
-    year = either & parts.short & (parts.b >= 1) & (parts.b <= 12) & (parts.c >= 1) & (parts.c <= 31)
     above = (parts.a > 12) != (parts.b > 12)
     pointed = np.array(["." in text.split(" ")[0] for text in texts]) | (parts.a == parts.b)
-    return either & np.where(above, parts.a > 12, pointed), ~either | (~year & (above | pointed))
+    return either & np.where(above, parts.a > 12, pointed), ~either | (
+        ~parts.year_may_begin & (above | pointed)
+    )

@@ -65,10 +65,10 @@ class Table(ABC):
     `decimal` the mark in numbers that stand among texts, `first_row` the number of the first row of data as
     an editor counts them (None for binary files), `tags` the tags of a long table in the order in which they were
     met, where these are known. What was found out does not tell two tables of one file apart, so that a read that is
-    kept serves both.
+    kept serves both; and its `repr` says how a file is written, not where it lies or when it came there.
     """
 
-    path: Path
+    path: Path = field(repr=False)
     names: tuple[str, ...]
     types: tuple[pa.DataType, ...] = field(default=(), compare=False)
     found: tuple[str, ...] = field(default=(), compare=False)
@@ -126,8 +126,7 @@ def distinct(column: pa.Array) -> tuple[pa.Array, NDArray[np.int64], NDArray[np.
 
 def one_array(column: pa.Array | pa.ChunkedArray) -> pa.Array:
     """A column in one piece."""
-    array = column.combine_chunks() if isinstance(column, pa.ChunkedArray) else column
-    return pa.concat_arrays(array.chunks) if isinstance(array, pa.ChunkedArray) else array
+    return column.combine_chunks() if isinstance(column, pa.ChunkedArray) else column
 
 
 def trimmed(column: pa.Array | pa.ChunkedArray, unquoted: bool) -> pa.Array:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +11,15 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from analyzer.history import stamps, zones
-from analyzer.history.clock import ELAPSED, SINCE_START, Clock, counted_s, date_and_time, time_scale_of
+from analyzer.history.clock import (
+    ELAPSED,
+    SINCE_START,
+    Clock,
+    TimeScale,
+    counted_s,
+    date_and_time,
+    time_scale_of,
+)
 from analyzer.history.names import (
     BELOW_SECOND,
     COLUMNS,
@@ -49,7 +57,7 @@ def find_clock(table: Table, options: ReadOptions) -> Clock:
     columns = _time_candidates(table, options)
     heads = dict(zip(columns, table.head(columns), strict=True))
     kinds = {i: _kind_of_time(table.names[i], head, options.timezone) for i, head in heads.items()}
-    clock = _chosen(table, kinds, options)
+    clock = _chosen(table, kinds, heads, options)
     if clock is None or _is_doubtful(table, clock, kinds, heads):
         raise _no_time(table, columns)
     clock = _with_fraction(table, _with_order(table, clock, options))
@@ -77,11 +85,12 @@ def check_seconds(table: Table, clock: Clock, tag: int = -1) -> None:
     tags = as_text(table.head([tag])[0]).to_pylist() if tag >= 0 else [""] * len(second)
     kept = {(tags[k], second[k]) for k in np.flatnonzero(known)}
     if len(kept) <= HISTORY.minutes_share * known.sum():
-        raise InputError(
-            f"{table.path}: stamps without their seconds, {known.sum()} samples on {len(kept)} whole minutes",
-            "a stamp of its own for each sample",
-            "export the time with its seconds (in a spreadsheet, format the column as yyyy-mm-dd hh:mm:ss)",
+        samples = f"{known.sum()} samples on {len(kept)} whole minutes"
+        remedy = (
+            "export the time with its seconds (in a spreadsheet, format the column as yyyy-mm-dd hh:mm:ss)"
         )
+        seen = f"{table.path}: stamps without their seconds, {samples}"
+        raise InputError(seen, "a stamp of its own for each sample", remedy)
 
 
 def holds_stamps(name: str, head: pa.Array, since_start: bool = True) -> bool:
@@ -102,20 +111,15 @@ def _with_order(table: Table, clock: Clock, options: ReadOptions) -> Clock:
     """The clock with what stands first in its dates, decided from as much of the column as it takes."""
     if options.day_first is not None:
         return replace(clock, order=DateOrder("day" if options.day_first else "month", "as stated"))
-    if clock.date_format is not None or clock.scale is not None:
+    head = date_and_time(table.head(clock.columns))
+    if clock.date_format is not None or clock.scale is not None or not is_text(head.type):
         return clock
-    head = _stamp_texts(table.head(clock.columns))
-    parts = None if head is None else stamps.fields(head, clock.timezone)
-    if head is None or parts is None or not parts.open.any():
+    parts = stamps.fields(as_text(head), clock.timezone)
+    if parts is None or not parts.open.any():
         return clock
-    whole = stamps.fields(_stamp_texts(table.read(clock.columns)), clock.timezone)
+    whole = stamps.fields(as_text(date_and_time(table.read(clock.columns))), clock.timezone)
     order = None if whole is None else date_order(whole, str(head[0].as_py()), clock.timezone)
     return replace(clock, order=order)
-
-
-def _stamp_texts(arrays: Sequence[pa.Array]) -> pa.Array | None:
-    column = date_and_time(arrays)
-    return as_text(column) if is_text(column.type) else None
 
 
 def _with_fraction(table: Table, clock: Clock) -> Clock:
@@ -135,9 +139,9 @@ def _with_zone(table: Table, clock: Clock) -> Clock:
     name, head = table.names[clock.columns[0]], table.head(clock.columns[:1])[0].drop_null()
     text = str(head[0].as_py()) if clock.local and is_text(head.type) and len(head) else ""
     zone = zones.named_zone(name) or zones.named_zone(text) or clock.timezone
-    several = zones.of_several(name, zone)
+    offset_s, several = zones.header_zone(name, zone)
     doubt = f", for '{several}' means several zones; state --timezone" if several else ""
-    return replace(clock, offset_s=zones.header_offset_s(name, zone), timezone=zone, doubt=doubt)
+    return replace(clock, offset_s=offset_s, timezone=zone, doubt=doubt)
 
 
 def _with_winter_time(table: Table, clock: Clock) -> Clock:
@@ -149,20 +153,17 @@ def _with_winter_time(table: Table, clock: Clock) -> Clock:
     return replace(clock, winter_s=zones.winter_offset_s(second, zone))
 
 
-def _is_doubtful(table: Table, clock: Clock, kinds: dict[int, str], heads: dict[int, pa.Array]) -> bool:
+def _is_doubtful(
+    table: Table, clock: Clock, kinds: Mapping[int, str | TimeScale], heads: Mapping[int, pa.Array]
+) -> bool:
     """Whether what was chosen stands in for a time column that cannot be read, or merely counts the rows."""
     chosen = clock.columns[0]
     if is_stamp(table.names[chosen]):
         return False
     unread = [i for i, head in heads.items() if kinds[i] == "" and head.null_count < len(head)]
-    return any(is_stamp(table.names[i]) for i in unread) or (
-        clock.scale is not None and _is_count(heads[chosen])
-    )
-
-
-def _is_count(column: pa.Array) -> bool:
-    """Whether numbers merely count the rows: whole, and each one more than the one before."""
-    number = numbers(column)
+    if any(is_stamp(table.names[i]) for i in unread) or clock.scale in (None, ELAPSED):
+        return any(is_stamp(table.names[i]) for i in unread)
+    number = numbers(heads[chosen])
     return number.size > 1 and bool((np.diff(number) == 1).all()) and number[0] in (0.0, 1.0)
 
 
@@ -170,19 +171,13 @@ def _time_candidates(table: Table, options: ReadOptions) -> list[int]:
     """Columns that may hold a time: the stated one, else by type, by name, and columns of text."""
     if options.time_column is not None:
         return [stated_column(table.path, table.names, options.time_column, "time")]
-    return [
-        i
-        for i, (name, kind) in enumerate(zip(table.names, table.types, strict=True))
-        if is_stamp(name)
-        or name.startswith("__index_level_")
-        or name in ("", "index")
-        or pa.types.is_temporal(kind)
-        or is_text(kind)
-    ]
+    named = (is_stamp(n) or n in ("", "index") or n.startswith("__index_level_") for n in table.names)
+    held = (pa.types.is_temporal(kind) or is_text(kind) for kind in table.types)
+    return [i for i, may in enumerate(zip(named, held, strict=True)) if any(may)]
 
 
-def _kind_of_time(name: str, head: pa.Array, timezone: str | None = None) -> str:
-    """'full', 'date', 'time of day', 'number' or '' for what the first rows hold."""
+def _kind_of_time(name: str, head: pa.Array, timezone: str | None = None) -> str | TimeScale:
+    """'full', 'date', 'time of day' or '' for what the first rows hold, or how their numbers mean a time."""
     if pa.types.is_timestamp(head.type):
         return "full"
     if pa.types.is_date(head.type):
@@ -193,11 +188,7 @@ def _kind_of_time(name: str, head: pa.Array, timezone: str | None = None) -> str
         return _text_kind(as_text(head).drop_null(), timezone)
     if not is_number(head.type):
         return ""
-    return (
-        "number"
-        if time_scale_of(head, time_unit(name)) is not None
-        else _text_kind(as_text(head.drop_null()))
-    )
+    return time_scale_of(head, time_unit(name)) or _text_kind(as_text(head.drop_null()))
 
 
 def _text_kind(texts: pa.Array, timezone: str | None = None) -> str:
@@ -212,32 +203,29 @@ def _text_kind(texts: pa.Array, timezone: str | None = None) -> str:
     return "full" if (parts.clock_s != 0).any() or len(texts) == 1 else "date"
 
 
-def _chosen(table: Table, kinds: dict[int, str], options: ReadOptions) -> Clock | None:
-    """The clock of the column, or of the columns of date and time of day, that say most."""
-    by_kind = {kind: _by_name(table, [i for i in kinds if kinds[i] == kind]) for kind in set(kinds.values())}
+def _chosen(
+    table: Table, kinds: Mapping[int, str | TimeScale], heads: Mapping[int, pa.Array], options: ReadOptions
+) -> Clock | None:
+    """The clock of the column, or of the columns of date and time of day, that say most; of times without a date such
+    as count from the start: they begin with zero or pass a day."""
     clock = Clock((0,), date_format=options.date_format, timezone=options.timezone)
     if options.date_format is not None:
         named = _by_name(table, [i for i in kinds if is_stamp(table.names[i])] or list(kinds))
         return replace(clock, columns=(named[0],)) if named else None
-    if "date" in by_kind and "time of day" in by_kind:
-        return replace(clock, columns=(by_kind["date"][0], by_kind["time of day"][0]))
-    of_numbers = by_kind.get("number", [])
-    finer = next((i for i in of_numbers if plain(table.names[i]) == FINER), None)
-    if finer is not None and (scale := time_scale_of(table.head([finer])[0])) is not None:
-        return replace(clock, columns=(finer,), scale=scale)
-    if "full" not in by_kind and of_numbers:
-        scale = time_scale_of(table.head(of_numbers[:1])[0], time_unit(table.names[of_numbers[0]]))
-        return replace(clock, columns=(of_numbers[0],), scale=scale)
-    of_text = by_kind.get("full") or by_kind.get("date")
-    if of_text:
-        return replace(clock, columns=(of_text[0],))
-    return _elapsed(table, clock, by_kind.get("time of day", ()))
-
-
-def _elapsed(table: Table, clock: Clock, columns: Sequence[int]) -> Clock | None:
-    """The clock of times without a date, where they begin with zero or pass a day: they count from the start."""
-    for i in columns:
-        second = counted_s(as_text(table.head([i])[0]))
+    full, dates, times = (
+        _by_name(table, [i for i in kinds if kinds[i] == kind]) for kind in ("full", "date", "time of day")
+    )
+    if dates and times:
+        return replace(clock, columns=(dates[0], times[0]))
+    scales = {i: kind for i, kind in kinds.items() if isinstance(kind, TimeScale)}
+    finer = [i for i in scales if plain(table.names[i]) == FINER]
+    if finer or (scales and not full):
+        i = _by_name(table, finer or list(scales))[0]
+        return replace(clock, columns=(i,), scale=scales[i])
+    if full or dates:
+        return replace(clock, columns=((full or dates)[0],))
+    for i in times:
+        second = counted_s(as_text(heads[i]))
         known = second[np.isfinite(second)]
         if known.size and (known[0] < 60.0 or known.max() > 86400.0):
             return replace(clock, columns=(i,), scale=ELAPSED)
@@ -253,11 +241,9 @@ def _no_time(table: Table, columns: Sequence[int]) -> InputError:
     named = [i for i in columns if is_stamp(table.names[i])]
     if named:
         return _unreadable(table, named[0])
-    return InputError(
-        f"{table.path}: no time column among {', '.join(table.names[:8])}",
-        "a column of time stamps, named timestamp, time or the like",
-        "add the stamps to the export, or name their column timestamp",
-    )
+    seen = f"{table.path}: no time column among {', '.join(table.names[:8])}"
+    remedy = "add the stamps to the export, or name their column timestamp"
+    return InputError(seen, "a column of time stamps, named timestamp, time or the like", remedy)
 
 
 def _unreadable(table: Table, column: int) -> InputError:
@@ -268,8 +254,5 @@ def _unreadable(table: Table, column: int) -> InputError:
     letters = LETTERS_BEHIND.search(text)
     if letters is not None and letters[1].lower() in zones.SEVERAL:
         return InputError(seen, f"one zone, but '{letters[1]}' means several", "state --timezone")
-    return InputError(
-        seen,
-        "stamps such as 2024-11-21 08:00:00 or 21.11.2024 08:00:00",
-        "state the date format, such as --date-format '%y%m%d %H%M%S'",
-    )
+    remedy = "state the date format, such as --date-format '%y%m%d %H%M%S'"
+    return InputError(seen, "stamps such as 2024-11-21 08:00:00 or 21.11.2024 08:00:00", remedy)

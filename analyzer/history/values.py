@@ -69,19 +69,19 @@ def _from_texts(stamp_s: NDArray[np.float64], column: pa.Array, decimal: str) ->
     cells, place, count = distinct(column)
     kinds = [str(text or "").strip() for text in cells.to_pylist()]
     number, notes = parsed(kinds, decimal)
+    read = np.isfinite(number)
     blank = np.array([text == "" for text in kinds])
     error = np.array([text.lower() in ERROR_TEXTS or ERROR_SHAPES.match(text) is not None for text in kinds])
-    error &= ~np.isfinite(number)
-    word = ~np.isfinite(number) & ~blank & ~error
+    error, word = error & ~read, ~(read | blank | error)
     found = _as_bad(kinds, count, error) + Counter({BLANK: int(count[blank].sum())})
-    found.update({note: int(count[np.isfinite(number)].sum()) for note in notes})
+    found.update({note: int(count[read].sum()) for note in notes})
     unread = word & np.array([LIKE_NUMBER.match(text) is not None for text in kinds])
     lost, example = int(count[unread].sum()), next((kinds[i] for i in np.flatnonzero(unread)), "")
     if count[word].sum() * 2 > count[~blank & ~error].sum() and not lost:
         text = np.array(kinds, dtype=object)
         return Series(stamp_s, number[place], (blank | error)[place], text[place], found=found)
     found.update(_as_bad(kinds, count, word))
-    return Series(stamp_s, number[place], ~np.isfinite(number[place]), None, lost, example, found)
+    return Series(stamp_s, number[place], ~read[place], None, lost, example, found)
 
 
 def parsed(texts: list[str], decimal: str) -> tuple[NDArray[np.float64], list[str]]:
@@ -98,9 +98,8 @@ def parsed(texts: list[str], decimal: str) -> tuple[NDArray[np.float64], list[st
         notes.append("values are read with a decimal comma")
     read = [_number_and_grouping(text, decimal) for text in plain]
     if any(grouped for _, grouped in read):
-        notes.append(
-            f"values are read with grouped thousands and a decimal {'comma' if decimal == ',' else 'point'}"
-        )
+        mark = "comma" if decimal == "," else "point"
+        notes.append(f"values are read with grouped thousands and a decimal {mark}")
     return np.array([number for number, _ in read], dtype=np.float64), notes
 
 

@@ -10,7 +10,6 @@ from collections import Counter
 from collections.abc import Mapping
 from datetime import datetime
 from functools import lru_cache
-from itertools import pairwise
 from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
 
 import numpy as np
@@ -57,27 +56,21 @@ def named_zone(text: str) -> str | None:
         return None
 
 
-def header_offset_s(name: str, timezone: str | None = None) -> float | None:
+def header_zone(name: str, timezone: str | None = None) -> tuple[float | None, str]:
     """The offset from UTC that a time column's name states, as in 'Time (UTC+01:00)' [s]; None where none, or where
-    it is what the stated zone calls itself, which may change within the export."""
+    it is what the stated zone calls itself, which may change within the export. And letters there that mean several
+    zones; '' where there are none, or a zone is stated."""
     if plain(name) in ("utc", "timeutc", "utctime"):
-        return 0.0
+        return 0.0, ""
     found = HEADER_ZONE.search(name[-40:])
-    if found is None or not (found["name"] or found["offset"]):
-        return None
-    if found["offset"] is None:
-        letters = found["name"].lower()
-        hours = None if letters in own_letters(timezone) else OFFSETS_H.get(letters)
-        return None if hours is None else 3600.0 * hours
+    letters = "" if found is None else found["name"] or ""
+    several = letters if timezone is None and letters.lower() in SEVERAL else ""
+    if found is None or found["offset"] is None:
+        own = letters.lower() in own_letters(timezone)
+        hours = None if own else OFFSETS_H.get(letters.lower())
+        return None if hours is None else 3600.0 * hours, several
     sign, digits = (-1.0 if found["offset"][0] == "-" else 1.0), found["offset"][1:].replace(":", "")
-    return sign * (3600.0 * float(digits[:2]) + 60.0 * float(digits[2:] or 0))
-
-
-def of_several(name: str, timezone: str | None) -> str:
-    """Letters in a time column's name that mean several zones; '' where there are none, or a zone is stated."""
-    found = HEADER_ZONE.search(name[-40:])
-    letters = (found["name"] or "") if found is not None and timezone is None else ""
-    return letters if letters.lower() in SEVERAL else ""
+    return sign * (3600.0 * float(digits[:2]) + 60.0 * float(digits[2:] or 0)), several
 
 
 def to_utc(local_s: NDArray[np.float64], zone: str) -> tuple[NDArray[np.float64], Counter[str]]:
@@ -112,18 +105,14 @@ def winter_offset_s(local_s: NDArray[np.float64], zone: str) -> float | None:
     keeps = max(spring) > HISTORY.in_spring if spring else bool(autumn) and max(autumn) < HISTORY.in_autumn
     if not keeps:
         return None
-    year = datetime(1970, 1, 1).year + int(np.median(hour) * HOUR_S / (365.2425 * DAY_S))
-    return min(_offset_s(datetime(year, month, 1), zone) for month in (1, 7))
+    year = 1970 + int(np.median(hour) * HOUR_S / (365.2425 * DAY_S))
+    days = (datetime(year, month, 1, tzinfo=ZoneInfo(zone)).utcoffset() for month in (1, 7))
+    return min(day.total_seconds() for day in days if day is not None)
 
 
 def is_fixed(zone: str) -> bool:
     """Whether a zone, such as UTC, has no summer time of any year."""
     return ZoneInfo(zone).utcoffset(None) is not None
-
-
-def _offset_s(at: datetime, zone: str) -> float:
-    offset = at.replace(tzinfo=ZoneInfo(zone)).utcoffset()
-    return 0.0 if offset is None else offset.total_seconds()
 
 
 def _shares(hours: NDArray[np.float64], held: dict[float, int], least: int) -> list[float]:
@@ -158,12 +147,10 @@ def _second_pass(local_s: NDArray[np.float64], twice: NDArray[np.bool_]) -> NDAr
     doubtful = np.flatnonzero(twice)
     if doubtful.size == 0:
         return second
-    days = np.floor(local_s[doubtful] / DAY_S)
     steps = np.diff(local_s)
     typical = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
-    cuts = np.r_[0, np.flatnonzero(np.diff(days)) + 1, doubtful.size]
-    for a, b in pairwise(cuts.tolist()):
-        rows = doubtful[a:b]
+    new_day = np.diff(np.floor(local_s[doubtful] / DAY_S)) != 0
+    for rows in np.split(doubtful, np.flatnonzero(new_day) + 1):
         second[rows[_set_back(local_s, rows, typical) :]] = True
     return second
 

@@ -42,18 +42,6 @@ class TuningChange:
     seen: str = ""
 
 
-def _number_or_none(text: str, where: str, column: str) -> float | None:
-    if not text:
-        return None
-    try:
-        value = float(text.replace(",", "."))
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value) or (column in ("ti_old", "ti_new") and value < 0):
-        raise InputError(f"{where}: {column} {text[:40]!r}", "a number or nothing", "correct the cell")
-    return value
-
-
 def read_changes(path: Path, zone: str = UTC_NAME, day_first: bool | None = None) -> tuple[TuningChange, ...]:
     """Read changes.csv: loop and time are required, the settings and `who` are shown where they are given.
 
@@ -75,12 +63,23 @@ def read_changes(path: Path, zone: str = UTC_NAME, day_first: bool | None = None
         raise InputError(f"{path}: no changes", "one row a change below the header", "add the changes")
     places = [f"{path}, row {row}" for row, _ in rows]
     times = parse_times([cells.get("time", "") for _, cells in rows], places, zone, day_first).tolist()
-    return tuple(_change_of_row(cells, *at) for (_, cells), *at in zip(rows, places, times, strict=True))
+    return tuple(
+        TuningChange(cells["loop"], time_s, **_settings(cells, place), who=cells.get("who", ""))
+        for (_, cells), place, time_s in zip(rows, places, times, strict=True)
+    )
 
 
-def _change_of_row(row: Mapping[str, str], where: str, time_s: float) -> TuningChange:
-    kp_old, ti_old, kp_new, ti_new = (_number_or_none(row.get(c, ""), where, c) for c in COLUMNS[2:6])
-    return TuningChange(row["loop"], time_s, kp_old, ti_old, kp_new, ti_new, row.get("who", ""))
+def _settings(cells: Mapping[str, str], where: str) -> dict[str, Any]:
+    """Old and new settings of a row, as far as they are given."""
+    found: dict[str, Any] = {}
+    for column, text in ((c, cells[c]) for c in COLUMNS[2:6] if cells.get(c)):
+        try:
+            found[column] = float(text.replace(",", "."))
+        except ValueError:
+            found[column] = math.nan
+        if not math.isfinite(found[column]) or (column.startswith("ti") and found[column] < 0):
+            raise InputError(f"{where}: {column} {text[:40]!r}", "a number or nothing", "correct the cell")
+    return found
 
 
 def stated_changes(rows: Sequence[Mapping[str, Any]]) -> list[TuningChange]:
@@ -100,14 +99,6 @@ def stated_changes(rows: Sequence[Mapping[str, Any]]) -> list[TuningChange]:
     ]
 
 
-def _ratio(hours: Mapping[str, Floats]) -> tuple[Floats, Floats]:
-    """Logarithm of travel over variability and the hour's start [s], of the hours where both are known."""
-    travel, spread = hours["valve_travel_pct_per_h"], hours["variability_pct"]
-    with np.errstate(invalid="ignore"):
-        known = np.isfinite(travel) & np.isfinite(spread) & (travel > 0.5) & (spread > 0.01)
-    return np.log(travel[known] / spread[known]), hours["hour_s"][known]
-
-
 def behaviour_change(loop: str, hours: Mapping[str, Floats], config: Config) -> TuningChange | None:
     """The hour at which a loop's controller began to answer differently, or None.
 
@@ -116,30 +107,29 @@ def behaviour_change(loop: str, hours: Mapping[str, Floats], config: Config) -> 
     offered where the step is large and clear against how days differ by themselves.
     """
     limits, least_s = config.changes, config.before_after.least_days * DAY_S
-    y, at = _ratio(hours)
-    first = np.searchsorted(at, at[0] + least_s) if y.size else 0
-    last = np.searchsorted(at, at[-1] - least_s) if y.size else 0
-    if last - first < 1:
+    travel, spread = hours["valve_travel_pct_per_h"], hours["variability_pct"]
+    known = (travel > 0.5) & (spread > 0.01) & np.isfinite(travel) & np.isfinite(spread)
+    y, at = np.log(travel[known] / spread[known]), hours["hour_s"][known]
+    if y.size == 0:
+        return None
+    split = np.arange(*np.searchsorted(at, [at[0] + least_s, at[-1] - least_s]))
+    if split.size == 0:
         return None
     total, n = np.cumsum(y), np.arange(1, y.size + 1)
-    split = np.arange(first, last)
     left, right = total[split - 1] / n[split - 1], (total[-1] - total[split - 1]) / (y.size - n[split - 1])
     gained = n[split - 1] * (y.size - n[split - 1]) * (left - right) ** 2
     best = int(np.argmax(gained))
-    cut = int(split[best])
-    step = abs(float(right[best] - left[best]))
-    spread = max(_daily_spread(y[:cut], at[:cut]), _daily_spread(y[cut:], at[cut:]))
-    if step < limits.least_step or step < limits.least_ratio * spread:
+    cut, step = int(split[best]), float(right[best] - left[best])
+    spread_of_days = max(_daily_spread(y[:cut], at[:cut]), _daily_spread(y[cut:], at[cut:]))
+    if abs(step) < limits.least_step or abs(step) < limits.least_ratio * spread_of_days:
         return None
-    factor = float(np.exp(right[best] - left[best]))
-    return TuningChange(
-        loop, float(at[cut]), seen=f"OP moves {factor:.2g} times as much for the same error since"
-    )
+    seen = f"OP moves {float(np.exp(step)):.2g} times as much for the same error since"
+    return TuningChange(loop, float(at[cut]), seen=seen)
 
 
 def _daily_spread(y: Floats, at: Floats) -> float:
     """Standard deviation of the daily medians [-]."""
-    day = ((at - at[0]) // DAY_S).astype(int)
+    day = (at - at[0]) // DAY_S
     medians = [float(np.median(y[day == d])) for d in np.unique(day)]
     return float(np.std(medians, ddof=1)) if len(medians) > 1 else 0.0
 

@@ -21,31 +21,13 @@ from identification.errors import InputError
 from identification.models import Form
 
 STATED: dict[str, Any] = tomllib.loads(Path(__file__).with_name("loops.toml").read_text(encoding="utf-8"))
-"""What tags end in, what other systems call the columns, and what is assumed where a row is silent."""
+"""What tags end in, what columns may hold and other systems call them, and what is assumed where a row is silent."""
 ROLES = ("sp", "pv", "op", "mode", "position")
-RELATIONS = ("master", "ratio_of", "split_of", "override_with", "feedforward")
-"""What names another loop."""
-TEXTS = ("loop", "description", "type", "area", *RELATIONS, "pv_unit")
-NUMBERS: Mapping[str, tuple[float, float]] = {
-    **dict.fromkeys(("pv_lo", "pv_hi", "op_lo", "op_hi"), (1e-9, 1e12)),
-    "kp": (1e-6, 1e6),
-    "ti": (1e-3, 1e12),  # no integral is written as 0 or as many nines
-    "td": (1e-6, 1e6),
-    "scan_s": (1e-3, 1e5),
-    "importance": (1e-6, 1e6),
-}
-"""Least and largest size of a number that is meant, beside 0; ours: beyond them a cell is a slip."""
-OFF_IS_EMPTY = ("kp", "scan_s")
-"""Numbers that control systems export as 0 where there is none: a cell that says nothing."""
-SIGNED = ("pv_lo", "pv_hi", "op_lo", "op_hi", "kp")
-"""Numbers that may be below 0."""
-CHOICES: Mapping[str, tuple[str, ...]] = {
-    "form": tuple(Form),
-    "gain_unit": ("percent", "engineering", "band"),
-    "ti_unit": ("s", "min", "repeats/min"),
-}
+CELLS: Mapping[str, Any] = STATED["cells"]
+NUMBERS: Mapping[str, tuple[float, float]] = CELLS["numbers"]
+CHOICES: Mapping[str, Sequence[str]] = CELLS["choices"]
 VALID_FROM = "valid_from"
-COLUMNS = (*TEXTS, *ROLES, *NUMBERS, *CHOICES, VALID_FROM)
+COLUMNS = (*CELLS["texts"], *ROLES, *NUMBERS, *CHOICES, VALID_FROM)
 OWN_COLUMNS = ("op_unit", "sp_unit")  # near to a known name, and yet none misspelt
 OTHER_NAMES = {other: ours for ours, others in STATED["other_names"].items() for other in others}
 
@@ -145,21 +127,22 @@ def read_loops(path: Path, zone: str = UTC_NAME, day_first: bool | None = None) 
     """
     header, rows = csv_table(path, "loop")
     _check_header(path, header)
-    specs = [(row, _spec(path, row, cells, zone, day_first)) for row, cells in rows]
-    if not specs:
+    if not rows:
         raise InputError(f"{path}: no loops", "one row a loop below the header", "add the loops")
-    _check_unique(path, specs)
-    return _latest_rows([spec for _, spec in specs])
-
-
-def _latest_rows(specs: Sequence[LoopSpec]) -> tuple[LoopSpec, ...]:
-    """Each loop once, its latest row with those before it."""
-    rows: dict[str, list[LoopSpec]] = {}
-    for spec in specs:
-        rows.setdefault(spec.loop, []).append(spec)
-    for own in rows.values():
+    specs = [_spec(f"{path}, row {row}", cells, zone, day_first) for row, cells in rows]
+    dated: dict[tuple[str, float | None], list[int]] = {}
+    by_loop: dict[str, list[LoopSpec]] = {}
+    for (row, _), spec in zip(rows, specs, strict=True):
+        dated.setdefault((spec.loop, spec.valid_from_s), []).append(row)
+        by_loop.setdefault(spec.loop, []).append(spec)
+    twice = next(((loop, places) for (loop, _), places in dated.items() if len(places) > 1), None)
+    if twice is not None:
+        seen = f"{path}: loop {twice[0]} in rows {', '.join(map(str, twice[1]))}"
+        expected = "each loop once, or its rows with different times in valid_from"
+        raise InputError(seen, expected, "remove all but one, or date them")
+    for own in by_loop.values():
         own.sort(key=lambda s: -math.inf if s.valid_from_s is None else s.valid_from_s)
-    return tuple(replace(own[-1], earlier=tuple(own[:-1])) for own in rows.values())
+    return tuple(replace(own[-1], earlier=tuple(own[:-1])) for own in by_loop.values())
 
 
 def unknown_columns(specs: Sequence[LoopSpec]) -> tuple[str, ...]:
@@ -214,66 +197,48 @@ def _check_header(path: Path, header: Sequence[str]) -> None:
         raise InputError(f"{path}: column '{twice[0]}' stands twice", "each column once", "remove one")
 
 
-def _spec(path: Path, row: int, cells: Mapping[str, str], zone: str, day_first: bool | None) -> LoopSpec:
+def _spec(where: str, cells: Mapping[str, str], zone: str, day_first: bool | None) -> LoopSpec:
+    """The loop of a row, of which `where` tells the place."""
     filled = {name: cell for name, cell in cells.items() if cell}
     if "loop" not in filled:
-        raise InputError(f"{path}, row {row}: no loop name", "a name in column 'loop'", "name the loop")
-    given: dict[str, Any] = {name: filled[name] for name in (*TEXTS, *ROLES) if name in filled}
-    numbers = {name: _number_in_bounds(path, row, name, filled[name]) for name in NUMBERS if name in filled}
-    given |= {name: value for name, value in numbers.items() if value != 0.0 or name not in OFF_IS_EMPTY}
-    given |= {name: _choice(path, row, name, filled[name]) for name in CHOICES if name in filled}
+        raise InputError(f"{where}: no loop name", "a name in column 'loop'", "name the loop")
+    given: dict[str, Any] = {name: filled[name] for name in (*CELLS["texts"], *ROLES) if name in filled}
+    numbers = {name: _number_in_bounds(where, name, filled[name]) for name in NUMBERS if name in filled}
+    given |= {name: value for name, value in numbers.items() if value or name not in CELLS["off_is_empty"]}
+    given |= {name: _choice(where, name, filled[name]) for name in CHOICES if name in filled}
     if VALID_FROM in filled:
-        where = f"{path}, row {row}, column '{VALID_FROM}'"
-        given["valid_from_s"] = parse_time(filled[VALID_FROM], where, zone, day_first)
+        place = f"{where}, column '{VALID_FROM}'"
+        given["valid_from_s"] = parse_time(filled[VALID_FROM], place, zone, day_first)
     extra = {name: cell for name, cell in cells.items() if name and name not in COLUMNS}
     spec = LoopSpec(**given, extra=extra, stated=frozenset(given))
-    _check_range(path, row, "pv", spec.pv_lo, spec.pv_hi)
-    _check_range(path, row, "op", spec.op_lo, spec.op_hi)
+    for signal, low, high in (("pv", spec.pv_lo, spec.pv_hi), ("op", spec.op_lo, spec.op_hi)):
+        if (low, high) == (None, None):
+            continue
+        if low is None or high is None or not high - low > 1e-9 * max(abs(low), abs(high), 1.0):
+            seen = f"{where}: {signal}_lo {low} and {signal}_hi {high}"
+            raise InputError(seen, f"{signal}_hi above {signal}_lo, both or neither", "correct the range")
     return spec
 
 
-def _number_in_bounds(path: Path, row: int, name: str, cell: str) -> float:
+def _number_in_bounds(where: str, name: str, cell: str) -> float:
     try:
         number = float(cell if "." in cell else cell.replace(",", "."))
     except ValueError:
         number = math.nan
     least, most = NUMBERS[name]
     sized = least <= abs(number) <= most or number == 0.0  # false of NaN and inf
-    if sized and (number >= 0.0 or name in SIGNED):
+    if sized and (number >= 0.0 or name in CELLS["signed"]):
         return number
-    expected = f"a number{'' if name in SIGNED else ', not below 0'}, of {least:g} to {most:g} in size"
-    seen = f"{path}, row {row}, column '{name}': '{cell[:40]}'"
-    raise InputError(seen, expected, "correct the cell or empty it")
+    sign = "" if name in CELLS["signed"] else ", not below 0"
+    expected = f"a number{sign}, of {least:g} to {most:g} in size"
+    raise InputError(f"{where}, column '{name}': '{cell[:40]}'", expected, "correct the cell or empty it")
 
 
-def _choice(path: Path, row: int, name: str, cell: str) -> str:
-    allowed = CHOICES[name]
-    if cell.lower() not in allowed:
-        seen = f"{path}, row {row}, column '{name}': '{cell}'"
-        raise InputError(seen, f"one of {', '.join(allowed)}", "correct the cell or empty it")
+def _choice(where: str, name: str, cell: str) -> str:
+    if cell.lower() not in CHOICES[name]:
+        seen = f"{where}, column '{name}': '{cell}'"
+        raise InputError(seen, f"one of {', '.join(CHOICES[name])}", "correct the cell or empty it")
     return Form(cell.lower()) if name == "form" else cell.lower()
-
-
-def _check_range(path: Path, row: int, signal: str, low: float | None, high: float | None) -> None:
-    if low is None and high is None:
-        return
-    if low is None or high is None or not high - low > 1e-9 * max(abs(low), abs(high), 1.0):
-        seen = f"{path}, row {row}: {signal}_lo {low} and {signal}_hi {high}"
-        raise InputError(seen, f"{signal}_hi above {signal}_lo, both or neither", "correct the range")
-
-
-def _check_unique(path: Path, loops: Sequence[tuple[int, LoopSpec]]) -> None:
-    rows: dict[tuple[str, float | None], list[int]] = {}
-    for row, spec in loops:
-        rows.setdefault((spec.loop, spec.valid_from_s), []).append(row)
-    for (loop, _), places in rows.items():
-        if len(places) > 1:
-            where = ", ".join(str(place) for place in places)
-            raise InputError(
-                f"{path}: loop {loop} in rows {where}",
-                "each loop once, or its rows with different times in valid_from",
-                "remove all but one, or date them",
-            )
 
 
 def spec_of(specs: Sequence[LoopSpec], loop: str) -> LoopSpec:

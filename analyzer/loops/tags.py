@@ -98,14 +98,16 @@ def match(specs: Sequence[LoopSpec], tags: Iterable[str]) -> tuple[tuple[LoopSpe
     taken = {tag for spec in matched for tag in spec.tags}
     others = [loop for loop, roles in by_ending.items() if roles["pv"] not in taken]
     if others:
-        notes.append(f"{len(others)} loops of the export are not in loops.csv, not assessed: {_few(others)}")
+        few = ", ".join(others[:5]) + (" ..." if len(others) > 5 else "")
+        notes.append(f"{len(others)} loops of the export are not in loops.csv, not assessed: {few}")
     return matched, tuple(notes)
 
 
 def in_order(specs: Sequence[LoopSpec], tags: Sequence[str]) -> tuple[Sequence[LoopSpec], tuple[str, ...]]:
     """Loops with the columns of a table without a header for their tags, in the order in which loops.csv states them,
     and a sentence on it; the loops as they are where the columns have names or are not as many."""
-    stated = [(k, role) for k, spec in enumerate(specs) for role in _stated_roles(spec)]
+    roles = ([role for role in ROLES if getattr(spec, role)] or ROLES[:3] for spec in specs)
+    stated = [(k, role) for k, own in enumerate(roles) for role in own]
     if not tags or not all(UNNAMED.fullmatch(tag) for tag in tags) or len(stated) != len(tags):
         return specs, ()
     taken: list[dict[str, str]] = [{} for _ in specs]
@@ -115,10 +117,6 @@ def in_order(specs: Sequence[LoopSpec], tags: Sequence[str]) -> tuple[Sequence[L
     more = " ..." if len(specs) > 1 else ""
     said = f"no header: columns are taken in the order of loops.csv: {', '.join(first)}{more}"
     return tuple(replace(s, **own) for s, own in zip(specs, taken, strict=True)), (said,)  # type: ignore[arg-type]
-
-
-def _stated_roles(spec: LoopSpec) -> tuple[str, ...]:
-    return tuple(role for role in ROLES if getattr(spec, role)) or ROLES[:3]
 
 
 def _matched(spec: LoopSpec, known: Mapping[str, None], found: Mapping[str, str]) -> LoopSpec:
@@ -140,19 +138,12 @@ def _missing(before: LoopSpec, after: LoopSpec) -> list[str]:
     notes = [] if after.pv else [f"{after.loop}: not assessed, no PV tag {after.wanted_pv} in the export"]
     stated = [(role, getattr(before, role)) for role in ROLES if role != "pv" and getattr(before, role)]
     lost = [(role, tag) for role, tag in stated if getattr(after, role) is None]
-    if (after.override_with or after.split_of) and after.beside is None:
-        notes.append(
-            f"{after.loop}: no OP of {after.override_with or after.split_of} in the export, judged alone"
-        )
-    if after.feedforward and after.feed is None:
-        notes.append(
-            f"{after.loop}: feedforward {after.feedforward} is neither a loop nor a tag of the export"
-        )
+    beside, feed = after.override_with or after.split_of, after.feedforward
+    if beside and after.beside is None:
+        notes.append(f"{after.loop}: no OP of {beside} in the export, judged alone")
+    if feed and after.feed is None:
+        notes.append(f"{after.loop}: feedforward {feed} is neither a loop nor a tag of the export")
     return notes + [f"{after.loop}: {role.upper()} tag {tag} is not in the export" for role, tag in lost]
-
-
-def _few(names: Sequence[str]) -> str:
-    return ", ".join(names[:5]) + (" ..." if len(names) > 5 else "")
 
 
 def controller(spec: LoopSpec, pv_span: float | None) -> Pid | None:
@@ -178,9 +169,19 @@ def controller(spec: LoopSpec, pv_span: float | None) -> Pid | None:
     """
     if spec.kp is None or spec.ti is None or spec.kp == 0:
         return None
-    gain = 100 / spec.kp if spec.gain_unit == "band" else spec.kp
-    ti_s, td_s = _seconds(spec.ti, spec.ti_unit), (spec.td or 0.0) * (1 if spec.ti_unit == "s" else 60)
-    kp, ti_s, td_s = _to_ideal(spec.form, gain, ti_s, td_s)
+    kp = 100 / spec.kp if spec.gain_unit == "band" else spec.kp
+    ti_s = (
+        math.inf
+        if spec.ti == 0
+        else 60 / spec.ti
+        if spec.ti_unit == "repeats/min"
+        else spec.ti * _unit_s(spec)
+    )
+    td_s = (spec.td or 0.0) * _unit_s(spec)
+    if spec.form is Form.PARALLEL:
+        ti_s, td_s = abs(kp) * ti_s, td_s / abs(kp)
+    elif spec.form is Form.SERIES and td_s != 0 and math.isfinite(ti_s):
+        kp, ti_s, td_s = kp * (1 + td_s / ti_s), ti_s + td_s, ti_s * td_s / (ti_s + td_s)
     scan = {} if spec.scan_s is None else {"scan_s": spec.scan_s}
     return Pid(kp * unit_ratio(spec, pv_span), ti_s, td_s, **scan)
 
@@ -192,21 +193,18 @@ def as_stated(pid: Pid, spec: LoopSpec, pv_span: float | None) -> tuple[float, f
     it gets the nearest, both its times alike.
     """
     gain = pid.kp / unit_ratio(spec, pv_span)
-    gain, ti_s = _from_ideal(spec.form, gain, pid.ti_s, pid.td_s)
-    kp = 100 / gain if spec.gain_unit == "band" else gain
-    return kp, 0.0 if math.isinf(ti_s) else {"s": ti_s, "min": ti_s / 60, "repeats/min": 60 / ti_s}[
-        spec.ti_unit
-    ]
+    share = _series_share(pid, spec)
+    ti_s = pid.ti_s / abs(gain) if spec.form is Form.PARALLEL else pid.ti_s * share
+    kp = 100 / (gain * share) if spec.gain_unit == "band" else gain * share
+    if math.isinf(ti_s):
+        return kp, 0.0
+    return kp, 60 / ti_s if spec.ti_unit == "repeats/min" else ti_s / _unit_s(spec)
 
 
 def derivative_as_stated(pid: Pid, spec: LoopSpec, pv_span: float | None) -> float:
     """Derivative time of `pid` in the unit of time and the form of `spec`; 0 for none."""
-    td_s = pid.td_s
-    if spec.form is Form.PARALLEL:
-        td_s *= abs(pid.kp / unit_ratio(spec, pv_span))
-    elif spec.form is Form.SERIES and td_s > 0.0 and math.isfinite(pid.ti_s):
-        td_s /= _from_ideal(spec.form, 1.0, pid.ti_s, td_s)[0]
-    return td_s / (1.0 if spec.ti_unit == "s" else 60.0)
+    ratio = abs(pid.kp / unit_ratio(spec, pv_span)) if spec.form is Form.PARALLEL else 1.0
+    return pid.td_s * ratio / _series_share(pid, spec) / _unit_s(spec)
 
 
 def unit_ratio(spec: LoopSpec, pv_span: float | None) -> float:
@@ -219,23 +217,13 @@ def unit_ratio(spec: LoopSpec, pv_span: float | None) -> float:
     return pv_span / (spec.op_hi - spec.op_lo)
 
 
-def _seconds(ti: float, unit: str) -> float:
-    """Integral time [s]; infinite where 0 switches the integral action off."""
-    return math.inf if ti == 0 else {"s": ti, "min": 60 * ti, "repeats/min": 60 / ti}[unit]
+def _unit_s(spec: LoopSpec) -> float:
+    """The unit of the stated times [s]; of the derivative time alone where the integral time is in repeats/min."""
+    return 1.0 if spec.ti_unit == "s" else 60.0
 
 
-def _to_ideal(form: Form, gain: float, ti_s: float, td_s: float) -> tuple[float, float, float]:
-    if form is Form.PARALLEL:
-        return gain, abs(gain) * ti_s, td_s / abs(gain)
-    if form is Form.IDEAL or td_s == 0 or math.isinf(ti_s):
-        return gain, ti_s, td_s
-    return gain * (1 + td_s / ti_s), ti_s + td_s, ti_s * td_s / (ti_s + td_s)
-
-
-def _from_ideal(form: Form, gain: float, ti_s: float, td_s: float) -> tuple[float, float]:
-    if form is Form.PARALLEL:
-        return gain, ti_s / abs(gain)
-    if form is Form.IDEAL or td_s == 0 or math.isinf(ti_s):
-        return gain, ti_s
-    share = (1 + math.sqrt(max(0.0, 1 - 4 * td_s / ti_s))) / 2
-    return gain * share, ti_s * share
+def _series_share(pid: Pid, spec: LoopSpec) -> float:
+    """Gain and integral time of the series form over those of the ideal form; 1 of any other form."""
+    if spec.form is not Form.SERIES or pid.td_s == 0 or math.isinf(pid.ti_s):
+        return 1.0
+    return (1 + math.sqrt(max(0.0, 1 - 4 * pid.td_s / pid.ti_s))) / 2

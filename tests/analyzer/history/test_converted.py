@@ -14,8 +14,8 @@ import pyarrow.parquet as pq
 import pytest
 
 import analyzer.history.converted as converted_module
-from analyzer.history.converted import Converted
 from analyzer.history.export import Export, open_export
+from analyzer.history.parquet import ParquetTable
 from analyzer.history.series import Series
 from analyzer.history.table import ReadOptions
 from analyzer.limits import HISTORY
@@ -64,8 +64,21 @@ def both(path: Path, monkeypatch: pytest.MonkeyPatch, scratch: Path) -> tuple[Ex
     monkeypatch.setattr("analyzer.history.export.HISTORY", replace(HISTORY, whole_bytes=100))
     monkeypatch.setattr("analyzer.history.sheet.BLOCK_BYTES", 1 << 14)
     streamed = open_export([path], ReadOptions(scratch=scratch))
-    assert isinstance(streamed.sources[0].table, Converted)  # type: ignore[attr-defined]
+    table = streamed.sources[0].table
+    assert isinstance(table, ParquetTable)
+    assert table.folder is not None
     return whole, streamed
+
+
+def test_a_tag_that_ends_in_a_quote_keeps_its_samples(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A tag is called the same, and has the same samples, whether its file is read whole or streamed."""
+    rows = [f'"FIC1 ""a""",{stamp(k)},{k},192\nFIC1 b,{stamp(k)},{-k},192\n' for k in range(ROWS)]
+    (tmp_path / "x.csv").write_text("Tag,Time,Value,Quality\n" + "".join(rows))
+    whole, streamed = both(tmp_path / "x.csv", monkeypatch, tmp_path)
+    assert streamed.tags == whole.tags == ('FIC1 "a"', "FIC1 b")
+    np.testing.assert_array_equal(streamed.read(whole.tags)[whole.tags[0]].value, np.arange(ROWS))
 
 
 @pytest.mark.parametrize("kind", ["wide", "long", "long, umlaut late"])
@@ -122,7 +135,9 @@ def test_a_long_parquet_is_parted_once(tmp_path: Path, monkeypatch: pytest.Monke
     whole = open_export([tmp_path / "x.parquet"])
     monkeypatch.setattr("analyzer.history.export.HISTORY", replace(HISTORY, whole_rows=100))
     parted = open_export([tmp_path / "x.parquet"], ReadOptions(scratch=tmp_path))
-    assert isinstance(parted.sources[0].table, Converted)  # type: ignore[attr-defined]
+    table = parted.sources[0].table
+    assert isinstance(table, ParquetTable)
+    assert table.folder is not None
     assert (parted.tags, parted.span()) == (whole.tags, whole.span())
     a, b = whole.read(TAGS[:9]), parted.read(TAGS[:9])
     for tag in TAGS[:9]:

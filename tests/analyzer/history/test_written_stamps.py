@@ -143,3 +143,12 @@ def test_eastern_time_has_summer(tmp_path: Path) -> None:
     (tmp_path / "x.csv").write_text(f"Time (EST);a.PV\n{rows}\n")
     export = open_export([tmp_path / "x.csv"], ReadOptions(timezone="America/New_York"))
     assert export.read(["a.PV"])["a.PV"].stamp_s[0] == datetime(2024, 7, 1, 12, tzinfo=UTC).timestamp()
+
+
+def test_times_that_pass_a_day_need_no_name(tmp_path: Path) -> None:
+    """A column of times such as 25:10:03 is the clock, counted from the start, whatever its name is."""
+    rows = "".join(f"25:10:{k:02d},{k},{2 * k}\n" for k in range(40))
+    (tmp_path / "x.csv").write_text("Z1,A,B\n" + rows)
+    export = open_export([tmp_path / "x.csv"])
+    assert export.tags == ("A", "B")
+    assert export.span() == (25 * 3600 + 600.0, 25 * 3600 + 639.0)
