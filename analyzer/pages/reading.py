@@ -143,7 +143,17 @@ NIGHT_COLUMNS = (
     *("oscillating_pct", "osc_valve_pct", "osc_tuning_pct", "osc_load_pct", "cause", "valve_fault", "loss"),
     *("period_s", "source_loop", "average_absolute_error_pct", "valve_travel_pct_per_h", "kp", "ti"),
     *("variability_pct", "kp_new", "ti_new", "action", "reason", "form", "gain_unit", "ti_unit", "pv_unit"),
-    *("op_unit", "group", "close_first_s", "close_last_s", "timezone", "backlash_pct", "stickband_pct"),
+    *(
+        "pv_lo",
+        "pv_hi",
+        "op_unit",
+        "group",
+        "close_first_s",
+        "close_last_s",
+        "timezone",
+        "backlash_pct",
+        "stickband_pct",
+    ),
     *("advice", "due", "percent_of", *FIGURE.values(), "news", "news_tone", "width_pct"),
     *("wear_low_pct", "wear_high_pct", "wear_since", "reaches_pct", "reaches_from", "reaches_by"),
 )
