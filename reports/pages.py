@@ -8,10 +8,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+T = TypeVar("T")
 Floats = NDArray[np.float64]
 Masks = NDArray[np.bool_]
 
@@ -401,6 +403,17 @@ class Section:
     title: str
     blocks: tuple[Block, ...]
     closed: bool = False
+
+
+def there(*parts: T | None) -> tuple[T, ...]:
+    """The parts of a page that there are: those that are None are left out."""
+    return tuple(part for part in parts if part is not None)
+
+
+def section(title: str, *blocks: Block | None, closed: bool = False) -> Section | None:
+    """A section of the blocks that there are; None without any."""
+    shown = there(*blocks)
+    return Section(title, shown, closed) if shown else None
 
 
 @dataclass(frozen=True, slots=True)

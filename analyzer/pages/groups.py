@@ -8,11 +8,20 @@ from typing import Any
 
 import numpy as np
 
-from analyzer.columns import GROUP_LIST, GROUPS, row_of
+from analyzer.columns import GROUP_LIST, row_of
 from analyzer.limits import PAGES
 from analyzer.loop.decisions import GroupRole
 from analyzer.pages.reading import Thinned, action_text
-from analyzer.pages.words import ALL_LOOPS, cause_cell, page_columns, plain_cell, texts, with_noun
+from analyzer.pages.words import (
+    ALL_LOOPS,
+    cause_cell,
+    lead,
+    page_columns,
+    page_table,
+    plain_cell,
+    texts,
+    with_noun,
+)
 from analyzer.plantwide.view import GroupView, read_groups
 from analyzer.store.store import Store
 from analyzer.words.units import Row, duration, number
@@ -32,15 +41,15 @@ from reports.pages import (
     Table,
     Text,
     Trend,
+    section,
+    there,
 )
 from reports.texts import slug
 
-DECLARED = {c.name: c for c in GROUPS}
 PERIODS = 12.0
 """Periods that the aligned trends show."""
 FLOOR_DB = 30.0
 """Level under a loop's peak from which a colour is empty [dB]."""
-FIGURES = ("coherence", "lag_s", "wave_amplitude_pct", "wave_share_pct", "gain_pct")
 
 
 def grouped(
@@ -104,44 +113,21 @@ def page_name(number: str) -> str:
     return f"group-{number}"
 
 
-def _heading(name: str) -> Column:
-    declared = DECLARED[name]
-    unit = f" [{declared.unit}]" if declared.unit else ""
-    return Column(name, declared.heading + unit, declared.is_number, declared.hint)
-
-
 def morning_table(groups: Sequence[GroupView], linked: bool) -> Table:
     """One cause, several loops: the groups of a night, those that cost most first; `linked` to their pages."""
-    note = "Repair or retune the first loop, then look at the others again."
-    return Table(
-        "groups", "", page_columns("groups"), tuple(_morning_row(g, linked) for g in groups), note, cards=True
+    rows = (
+        (
+            Cell(f"group {g.number}", kind="strong", href=f"{page_name(g.number)}.html" if linked else ""),
+            Cell(str(len(g.rows)), len(g.rows)),
+            Cell(duration(g.period_s), g.period_s),
+            Cell(_candidates(g) or "not clear"),
+            Cell(action_there(g) or "undecided: look at the candidates"),
+            plain_cell(g.gain_pct),
+            Cell(", ".join(r["loop"] for r in g.rows if r is not g.source)),
+        )
+        for g in groups
     )
-
-
-def _morning_row(g: GroupView, linked: bool) -> tuple[Cell, ...]:
-    return (
-        Cell(f"group {g.number}", kind="strong", href=f"{page_name(g.number)}.html" if linked else ""),
-        Cell(str(len(g.rows)), len(g.rows)),
-        Cell(duration(g.period_s), g.period_s),
-        Cell(_candidates(g) or "not clear"),
-        Cell(action_there(g) or "undecided: look at the candidates"),
-        plain_cell(g.gain_pct),
-        Cell(", ".join(r["loop"] for r in g.rows if r is not g.source)),
-    )
-
-
-MEMBERS = (
-    Column("loop", "Loop"),
-    _heading("role"),
-    _heading("source_pct"),
-    Column("cause", "Cause"),
-    *map(_heading, FIGURES),
-)
-
-
-def _members(g: GroupView, paged: frozenset[str]) -> Table:
-    rows = tuple(_member_cells(g, r, paged) for r in g.rows)
-    return Table("members", "", MEMBERS, rows, "Lags that the night cannot tell are left empty.", cards=True)
+    return page_table("groups", rows)
 
 
 def _member_cells(g: GroupView, row: Row, paged: frozenset[str]) -> tuple[Cell, ...]:
@@ -151,22 +137,19 @@ def _member_cells(g: GroupView, row: Row, paged: frozenset[str]) -> tuple[Cell, 
         Cell(row["role"]),
         Cell(f"{pct:.0f}" if pct >= 1 else "under 1", pct),
         cause_cell(g.loops[name]["cause"]),
-        *(plain_cell(row[n]) for n in FIGURES),
+        *(plain_cell(row[c.key]) for c in page_columns("members")[4:]),
     )
 
 
 def _signs_table(g: GroupView) -> Table:
     """Why there: the signs of the likeliest candidates side by side."""
-    shown = [r for r in g.rows[:5] if r["group_signs"]]
-    sign = Column("sign", "Sign", wide=True)
-    heads = (sign, *(Column(r["loop"], r["loop"], True) for r in shown))
-    kept = [json.loads(r["group_signs"]) for r in shown]
-    rows = tuple(
-        (Cell(text), *(Cell(f"{signs.get(k, 0.0):.2f}", signs.get(k, 0.0)) for signs in kept))
+    shown = {r["loop"]: json.loads(r["group_signs"]) for r in g.rows[:5] if r["group_signs"]}
+    columns = (*page_columns("signs"), *(Column(loop, loop, True) for loop in shown))
+    rows = (
+        (Cell(text), *(Cell(f"{signs.get(k, 0.0):.2f}", signs.get(k, 0.0)) for signs in shown.values()))
         for k, text in texts("signs").items()
     )
-    note = "From 0 to 1; who is first from -1 to 1. triage config says what each adds to the odds."
-    return Table("signs", "", heads, rows, note)
+    return page_table("signs", rows, columns=columns)
 
 
 def group_page(g: GroupView, trends: Mapping[str, Thinned], night: str, paged: frozenset[str]) -> Page:
@@ -174,16 +157,14 @@ def group_page(g: GroupView, trends: Mapping[str, Thinned], night: str, paged: f
     facts = [("Period", duration(g.period_s)), ("Loops", str(len(g.rows)))]
     if g.source is not None:
         facts += [("Fix first", g.source["loop"]), ("Action there", action_there(g))]
-    facts += [
-        ("Others gain", f"{number(g.gain_pct)} % of span"),
-        ("It starts elsewhere", f"{g.unseen_pct:.0f} %"),
-    ]
-    pictures = [b for b in (aligned(g, trends), heat_map(g)) if b is not None]
-    sections = (
-        Section("What and where", (Text((f"{sentence(g)}.",), "lead"), Facts(tuple(facts)), graph(g))),
-        Section("Loops", (_members(g, paged),)),
+    facts.append(("Others gain", f"{number(g.gain_pct)} % of span"))
+    facts.append(("It starts elsewhere", f"{g.unseen_pct:.0f} %"))
+    members = page_table("members", (_member_cells(g, r, paged) for r in g.rows))
+    sections = there(
+        Section("What and where", (lead(sentence(g)), Facts(tuple(facts)), graph(g))),
+        Section("Loops", (members,)),
         Section("Why there", (_signs_table(g),)),
-        *((Section("Trends and spectra", tuple(pictures)),) if pictures else ()),
+        section("Trends and spectra", aligned(g, trends), heat_map(g)),
     )
     subtitle = f"{with_noun(len(g.rows), 'loop')}, night {night}."
     return Page(page_name(g.number), f"Group {g.number}: one oscillation", subtitle, sections, (ALL_LOOPS,))
@@ -198,8 +179,7 @@ def member_section(g: GroupView, loop: str, trends: Mapping[str, Thinned]) -> Se
         late = f", {row['lag_s']:.0f} s later" if row["lag_s"] is not None else ""
         said.append(f"{loop} follows {source['loop']} with a coherence of {row['coherence']:.2f}{late}.")
     beneath = [loop, *[r["loop"] for r in g.rows if r["loop"] != loop][:1]]
-    picture = aligned(g, trends, beneath)
-    return Section("Moves with other loops", (Text(tuple(said)), *((picture,) if picture else ())))
+    return Section("Moves with other loops", there(Text(tuple(said)), aligned(g, trends, beneath)))
 
 
 def graph(g: GroupView) -> Graph:
