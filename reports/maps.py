@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -50,7 +51,7 @@ def heat_map(m: HeatMap) -> Drawing:
             cell = box(NAMES + j * step, ROW * i + 1, step + 0.3, ROW - 2)
             body.append(f'<rect class="heat" {cell} fill-opacity="{min(m.shares[i, j], 1.0):.2f}"/>')
     for tick in log_ticks(float(m.x.min()), float(m.x.max())) if m.x.size > 1 else []:
-        body += tick_x(axis.at(tick), (0, foot), f"{tick:g}")
+        body.append(tick_x(axis.at(tick), (0, foot), f"{tick:g}"))
     for mark in m.marks:
         at = axis.at(mark.x)
         body += [upright(at, (0, foot), "mark"), written(at, foot + 28, mark.label, "middle", "marked")]
@@ -91,10 +92,10 @@ def field(f: Field, alone: bool = False) -> Drawing:
     x, y = Axis.of_cells(f.x, *across), Axis.of_cells(f.y, height, 0.0)
     body = _cells(f)
     for tick in log_ticks(float(f.x[0]), float(f.x[-1])):
-        body += tick_x(x.at(tick), along, f"{tick:g}")
+        body.append(tick_x(x.at(tick), along, f"{tick:g}"))
     for tick in log_ticks(float(f.y[0]), float(f.y[-1])):
         down, text = y.at(tick), f"{tick:g}"
-        body += tick_y(down, across, "" if alone and down < TITLED and len(text) > 3 else text)
+        body.append(tick_y(down, across, "" if alone and down < TITLED and len(text) > 3 else text))
     body.append(written(left + width / 2, height + 32, f.x_label, "middle", "axis"))
     body.append(written(4, 12, f.y_label, "start", "axis"))
     held = [(min(max(x.at(p.x), left), left + width), min(max(y.at(p.y), 0.0), height)) for p in f.places]
@@ -105,44 +106,37 @@ def field(f: Field, alone: bool = False) -> Drawing:
 
 def places(g: Graph) -> dict[str, tuple[float, float]]:
     """Upper left corner of every box: columns from left to right, each centred."""
-    by_column: dict[int, list[Node]] = {}
+    columns: dict[int, list[Node]] = defaultdict(list)
     for node in g.nodes:
-        by_column.setdefault(node.column, []).append(node)
-    most = max((len(nodes) for nodes in by_column.values()), default=0)
+        columns[node.column].append(node)
+    most = max(map(len, columns.values()), default=0)
     out = {}
-    for at, column in enumerate(sorted(by_column)):
-        nodes = by_column[column]
+    for at, (_, nodes) in enumerate(sorted(columns.items())):
         top = 0.5 * (most - len(nodes)) * (BOX[1] + GAP[1])
         for i, node in enumerate(nodes):
             out[node.name] = 4 + at * (BOX[0] + GAP[0]), 4 + top + i * (BOX[1] + GAP[1])
     return out
 
 
-def _arrow(first: tuple[float, float], last: tuple[float, float], text: str) -> list[str]:
-    """A curve from one place to another with a tip and a text at its end."""
-    (a, b), (c, d) = first, last
+def _arrow(first: tuple[float, float], last: tuple[float, float], text: str) -> str:
+    """A curve from one box to another with a tip and a text at its end."""
+    a, b, c, d = first[0] + BOX[0], first[1] + BOX[1] / 2, last[0] - 2, last[1] + BOX[1] / 2
     middle = digits(0.5 * (a + c))
     curve = f"M{digits(a)},{digits(b)}C{middle},{digits(b)} {middle},{digits(d)} {digits(c - 6)},{digits(d)}"
-    tip = f"M{digits(c)},{digits(d)}l-8,-4v8Z"
-    drawn = f'<path class="line flow" d="{curve}"/><path class="tip" d="{tip}"/>'
-    return [drawn, written(c - 10, d - 6, text, "end", "tick")]
+    tip = f'<path class="tip" d="M{digits(c)},{digits(d)}l-8,-4v8Z"/>'
+    return f'<path class="line flow" d="{curve}"/>{tip}' + written(c - 10, d - 6, text, "end", "tick")
 
 
 def graph(g: Graph) -> Drawing:
     """Boxes and arrows."""
     at = places(g)
-    body = []
-    for arrow in g.arrows:
-        if arrow.first in at and arrow.last in at:
-            (x1, y1), (x2, y2) = at[arrow.first], at[arrow.last]
-            body += _arrow((x1 + BOX[0], y1 + BOX[1] / 2), (x2 - 2, y2 + BOX[1] / 2), arrow.text)
+    body = [_arrow(at[a.first], at[a.last], a.text) for a in g.arrows if a.first in at and a.last in at]
     for node in g.nodes:
         x, y = at[node.name]
         body.append(f'<rect class="box {node.kind}" rx="5" {box(x, y, *BOX)}/>')
         body.append(written(x + 8, y + 16, node.name, "start", "strong"))
         body.append(written(x + 8, y + 31, node.text, "start", "tick"))
-    width = max((x for x, _ in at.values()), default=0.0) + BOX[0] + 4
-    height = max((y for _, y in at.values()), default=0.0) + BOX[1] + 4
+    width, height = (max((place[k] for place in at.values()), default=0.0) + BOX[k] + 4 for k in (0, 1))
     return Drawing(width, height, "".join(body), g.title, "graph", natural=True)
 
 
@@ -183,19 +177,15 @@ def _row(areas: Sequence[float], side: float) -> int:
 
 def _laid(areas: Sequence[float], room: Room) -> tuple[list[Room], Room]:
     """A row along the shorter side of a room, and the room that is left."""
-    if room.w < room.h:
-        row, left = _laid(areas, _mirrored(room))
-        return [_mirrored(r) for r in row], _mirrored(left)
+    if room.w < room.h:  # the same of the room turned over
+        row, left = _laid(areas, Room(room.y, room.x, room.h, room.w))
+        return [Room(r.y, r.x, r.h, r.w) for r in row], Room(left.y, left.x, left.h, left.w)
     out, at = [], room.y
     width = sum(areas) / room.h
     for area in areas:
         out.append(Room(room.x, at, width, area / width))
         at += area / width
     return out, Room(room.x + width, room.y, max(room.w - width, 1e-9), room.h)
-
-
-def _mirrored(room: Room) -> Room:
-    return Room(room.y, room.x, room.h, room.w)
 
 
 def laid_out(m: TreeMap, width: float, height: float) -> list[tuple[str, Room, list[tuple[Tile, Room]]]]:

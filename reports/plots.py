@@ -84,11 +84,11 @@ def _line(line: Line, x: Floats, y: Floats) -> str:
     return f'<path class="dots {line.kind}" d="{"".join(f"M{p}h0" for p in there)}"/>'
 
 
-def _mark(mark: Mark, x: Axis, ends: tuple[float, float]) -> list[str]:
+def _mark(mark: Mark, x: Axis, ends: tuple[float, float]) -> str:
     """A marked place with its name, on the side where there is room."""
     at = x.at(mark.x)
     anchor, aside = ("start", 4) if at < PLOT[0] * 0.6 else ("end", -4)
-    return [upright(at, ends, "mark"), written(at + aside, ends[0] + 12, mark.label, anchor, "marked")]
+    return upright(at, ends, "mark") + written(at + aside, ends[0] + 12, mark.label, anchor, "marked")
 
 
 def _turned(x: float, y: float, text: str) -> str:
@@ -101,13 +101,13 @@ def plot(p: Plot) -> Drawing:
     """Lines or points over two axes."""
     x, y = _axes(p)
     across, along = (x.first, x.last), (y.last, y.first)
-    body = [part for v in x.ticks(6) for part in tick_x(x.at(v), along, f"{v:.6g}", 16)]
-    body += [part for v in y.ticks(5) for part in tick_y(y.at(v), across, f"{v:.6g}")]
+    body = [tick_x(x.at(v), along, f"{v:.6g}", 16) for v in x.ticks(6)]
+    body += [tick_y(y.at(v), across, f"{v:.6g}") for v in y.ticks(5)]
     for a in p.areas:
         outline = between(x.places(_few(a.x)), y.places(_few(a.low)), y.places(_few(a.high)))
         body += [f'<path class="area {a.kind}" d="{outline}"/>'] if outline else []
     body += [_line(line, x.places(_few(line.x)), y.places(_few(line.y))) for line in p.lines]
-    body += [part for mark in p.marks for part in _mark(mark, x, along)]
+    body += [_mark(mark, x, along) for mark in p.marks]
     named = [(place, x.at(place.x), y.at(place.y)) for place in p.places]
     body += named_places(named, (across[0], along[0], across[1], along[1]))
     body.append(written((x.first + x.last) / 2, PLOT[1] - 6, p.x_label, "middle", "axis"))
@@ -134,7 +134,7 @@ def _panel(chart: IntervalChart, label: str, rows: list[str]) -> str:
     x, foot = Axis(low, high, LABELS, LABELS + PANEL[0]), 26 + ROW * len(rows)
     body = [written(LABELS, 14, label, "start", "strong")]
     for tick in x.ticks(4):
-        body += tick_x(x.at(tick), (22, foot), f"{tick:g}", 14, "grid" if tick else "zero")
+        body.append(tick_x(x.at(tick), (22, foot), f"{tick:g}", 14, "grid" if tick else "zero"))
     own = [b for b in chart.bars if b.label == label]
     return "".join([*body, *(_interval(b, 38 + ROW * rows.index(b.group), x) for b in own)])
 
@@ -161,15 +161,14 @@ def trend(t: Trend, zone: str) -> Drawing:
     for k, label in enumerate(t.panels):
         foot = top + (OTHER if k else FIRST)
         y = Axis(*_held(t, k), foot, top)
-        body += [part for v in y.ticks(5) for part in tick_y(y.at(v), across, f"{v:.6g}")]
+        body += [tick_y(y.at(v), across, f"{v:.6g}") for v in y.ticks(5)]
         body += [upright(x.at(at), (top, foot)) for at, _ in _times(start, end, zone)]
         for a, b in t.spans:
             left, right = x.places(np.clip([a, b], start, end))
             body.append(f'<rect class="span" {box(left, top, right - left, foot - top)}/>')
-        for band in t.bands:
-            body += _band(band, t, x, y) if band.panel == k else []
+        body += [_band(band, t, x, y) for band in t.bands if band.panel == k]
         for mark in t.marks:
-            body += _mark(mark, x, (top, foot)) if not k else [upright(x.at(mark.x), (top, foot), "mark")]
+            body.append(_mark(mark, x, (top, foot)) if not k else upright(x.at(mark.x), (top, foot), "mark"))
         body.append(_turned(13, (top + foot) / 2, label))
         top = foot + 12
     body += [written(x.at(at), top + 4, text, "middle", "tick") for at, text in _times(start, end, zone)]
@@ -193,7 +192,7 @@ def _held(t: Trend, panel: int) -> tuple[float, float]:
     return low - more, high + more
 
 
-def _band(band: Band, t: Trend, x: Axis, y: Axis) -> list[str]:
+def _band(band: Band, t: Trend, x: Axis, y: Axis) -> str:
     """A signal's outlines, one between two gaps; neighbouring buckets are joined where there are too many."""
     n = t.time_s.size
     edges = np.unique(np.arange(min(BUCKETS, n)) * n // max(min(BUCKETS, n), 1))
@@ -201,7 +200,7 @@ def _band(band: Band, t: Trend, x: Axis, y: Axis) -> list[str]:
     low, high, at = np.fmin.reduceat(low, edges), np.fmax.reduceat(high, edges), x.places(t.time_s[edges])
     parts = np.split(np.arange(edges.size), np.flatnonzero(np.diff(np.isfinite(low).astype(int))) + 1)
     outlines = [between(at[i], y.places(low[i]), y.places(high[i])) for i in parts]
-    return [f'<path class="band {band.kind}" d="{"".join(outlines)}"/>']
+    return f'<path class="band {band.kind}" d="{"".join(outlines)}"/>'
 
 
 def _times(start: float, end: float, zone: str) -> list[tuple[float, str]]:
