@@ -31,23 +31,7 @@ from analyzer.pages.words import (
     texts,
 )
 from analyzer.words.units import gain_unit
-from reports.pages import (
-    Cell,
-    Column,
-    Facts,
-    IntervalBar,
-    IntervalChart,
-    Listing,
-    Mark,
-    Page,
-    Section,
-    Table,
-    Text,
-    Tiles,
-    Trend,
-    section,
-    there,
-)
+from reports import pages as parts
 
 PRIMARY = tuple(m for m in MEASURES if m.primary)
 """The study's four figures."""
@@ -63,16 +47,16 @@ TREND_BUCKETS = 4000
 OFFERED = "These changes were not stated but seen in the loops' behaviour: confirm them first."
 
 
-def _outcome_tiles(cases: Sequence[ChangeCase]) -> Tiles:
+def _outcome_tiles(cases: Sequence[ChangeCase]) -> parts.Tiles:
     """How many changes came out how, in the order of the outcomes."""
     known = texts("outcomes")
     counts = Counter(known[grade(c.found)]["tile"] for c in cases)
     tones = {o["tile"]: o["tone"] for o in known.values()}
     shown = ((str(counts[tile]), tile, tone) for tile, tone in tones.items() if counts[tile])
-    return Tiles(((str(len(cases)), "changes looked at", ""), *shown))
+    return parts.Tiles(((str(len(cases)), "changes looked at", ""), *shown))
 
 
-def _row(change: Change, found: LoopComparison) -> tuple[Cell, ...]:
+def _row(change: Change, found: LoopComparison) -> tuple[parts.Cell, ...]:
     """A figure before and after; the interval is in percent of before, in the figure's unit where that is zero."""
     d, ends, unit = change.found, change.interval_pct, change.measure.unit
     interval = f"{number(d.low)} … {number(d.high)} {unit}"
@@ -80,17 +64,17 @@ def _row(change: Change, found: LoopComparison) -> tuple[Cell, ...]:
         interval = f"{signed(ends[0])} … {signed(ends[1])} %"
     follows = f"follows {found.source_loop}" if found.source_loop else ""
     return (
-        *map(Cell, (found.loop, change.measure.title, unit)),
+        *map(parts.Cell, (found.loop, change.measure.title, unit)),
         *map(plain_cell, (d.before, d.after)),
-        Cell(signed(change.value_pct), change.value_pct),
-        Cell(interval),
+        parts.Cell(signed(change.value_pct), change.value_pct),
+        parts.Cell(interval),
         *map(plain_cell, (d.low, d.high)),
-        Cell(change.verdict.value, kind=KINDS[change.verdict]),
-        Cell("; ".join(found.reasons) or follows),
+        parts.Cell(change.verdict.value, kind=KINDS[change.verdict]),
+        parts.Cell("; ".join(found.reasons) or follows),
     )
 
 
-def figures(cases: Sequence[ChangeCase], primary: bool, name: str) -> Table:
+def figures(cases: Sequence[ChangeCase], primary: bool, name: str) -> parts.Table:
     """Figures before and after of all loops (the study's Figure 11)."""
     rows = [_row(c, case.found) for case in cases for c in case.found.changes if c.measure.primary == primary]
     return page_table("figures", rows, name=name, searchable=len(rows) > 12)
@@ -109,35 +93,35 @@ def _settings_typed(case: ChangeCase) -> str:
     return f"Kp {kp}, Ti {ti} ({row['form'] or 'ideal'} form, Kp in {gain}, Ti in {row['ti_unit'] or 's'})"
 
 
-def _in_short(case: ChangeCase) -> tuple[Cell, ...]:
+def _in_short(case: ChangeCase) -> tuple[parts.Cell, ...]:
     """A loop in one row: what was typed in, the four changes, and what to make of them."""
     by_name = {c.measure.name: c for c in case.found.primary}
     kind = texts("outcomes")[grade(case.found)]["tone"]
     return (
-        Cell(case.found.loop, kind="strong"),
+        parts.Cell(case.found.loop, kind="strong"),
         words.cell(case.row, "description"),
-        Cell(_settings_typed(case)),
+        parts.Cell(_settings_typed(case)),
         *(_change_cell(by_name.get(m.name)) for m in PRIMARY),
-        Cell(outcome(case.found), kind=kind),
+        parts.Cell(outcome(case.found), kind=kind),
     )
 
 
-def _change_cell(change: Change | None) -> Cell:
+def _change_cell(change: Change | None) -> parts.Cell:
     if change is None or change.verdict is ChangeVerdict.INCOMPARABLE or change.interval_pct is None:
-        return Cell("–")
+        return parts.Cell("–")
     low, high = map(signed, change.interval_pct)
-    return Cell(f"{signed(change.value_pct)} ({low} … {high})", change.value_pct, KINDS[change.verdict])
+    return parts.Cell(f"{signed(change.value_pct)} ({low} … {high})", change.value_pct, KINDS[change.verdict])
 
 
-def changes_in_short(cases: Sequence[ChangeCase]) -> Table:
+def changes_in_short(cases: Sequence[ChangeCase]) -> parts.Table:
     """A row a loop."""
     *first, last = page_columns("changes")
     hint = "Change, with its interval"
-    four = (Column(m.name, f"{m.short_title}, % of before", True, hint, True) for m in PRIMARY)
+    four = (parts.Column(m.name, f"{m.short_title}, % of before", True, hint, True) for m in PRIMARY)
     return page_table("changes", map(_in_short, cases), columns=(*first, *four, last))
 
 
-def loop_section(case: ChangeCase, number_: int, zone: str = UTC_NAME) -> Section:
+def loop_section(case: ChangeCase, number_: int, zone: str = UTC_NAME) -> parts.Section:
     """What became of one loop: settings, spans, remarks, trends (the study's Figure 10)."""
     found, change = case.found, case.change
     spans = [
@@ -146,19 +130,19 @@ def loop_section(case: ChangeCase, number_: int, zone: str = UTC_NAME) -> Sectio
     ]
     when = f"{stamp(change.time_s, zone)} {zone}" + (f" by {change.who}" if change.who else "")
     names = ("Settings", "Changed", "Before", "After")
-    facts = Facts(tuple(zip(names, (_settings_typed(case), when, *spans), strict=True)))
+    facts = parts.Facts(tuple(zip(names, (_settings_typed(case), when, *spans), strict=True)))
     wear = wear_texts(found, case.row)
-    blocks = there(
+    blocks = parts.there(
         words.lead(outcome(found)), facts, words.listing(wear) if wear else None, _trend(case, number_)
     )
-    return Section(f"{found.loop} {case.row['description'] or ''}".strip(), blocks)
+    return parts.Section(f"{found.loop} {case.row['description'] or ''}".strip(), blocks)
 
 
-def _trend(case: ChangeCase, number_: int) -> Trend | None:
+def _trend(case: ChangeCase, number_: int) -> parts.Trend | None:
     """Both spans of a loop; None where the store holds no trends of them, for they may have been pruned."""
     if case.trend is None or case.trend.time_s.size < 2:
         return None
-    found, marks = case.found, (Mark(case.change.time_s, "changed"),)
+    found, marks = case.found, (parts.Mark(case.change.time_s, "changed"),)
     thin = case.trend.between(found.before.first_s, found.after.last_s).coarser(TREND_BUCKETS)
     title = f"{found.loop}: before and after on one scale"
     if thin.time_s.size < 2:
@@ -166,41 +150,45 @@ def _trend(case: ChangeCase, number_: int) -> Trend | None:
     return trend_block(f"trend-{number_}", title, thin, marks, pv_scale_of(case.row))
 
 
-def per_loop_chart(cases: Sequence[ChangeCase]) -> IntervalChart:
+def per_loop_chart(cases: Sequence[ChangeCase]) -> parts.IntervalChart:
     """Change per loop and assessment (the study's Figure 12)."""
     bars = []
     for case in cases:
         for c in case.found.primary:
             ends, kind = c.interval_pct or (None, None), KINDS[c.verdict]
             text = f"{signed(c.value_pct)} %" if c.interval_pct else c.verdict.value
-            bars.append(IntervalBar(case.found.loop, c.measure.short_title, c.value_pct, *ends, kind, text))
+            bars.append(
+                parts.IntervalBar(case.found.loop, c.measure.short_title, c.value_pct, *ends, kind, text)
+            )
     caption = "Bars: change in % of the span before; lines: its interval. Less is better in all four."
-    return IntervalChart(
+    return parts.IntervalChart(
         "change-per-loop", "Change per loop and assessment", "% of before", tuple(bars), caption
     )
 
 
-def _average(cases: Sequence[ChangeCase], measure: Measure) -> IntervalBar:
+def _average(cases: Sequence[ChangeCase], measure: Measure) -> parts.IntervalBar:
     """Mean of the comparable loops' changes; errors of different loops taken as independent."""
     changes = [c for case in cases for c in case.found.primary if c.measure == measure]
     known = [c for c in changes if c.verdict is not ChangeVerdict.INCOMPARABLE and c.value_pct is not None]
     group = words.with_noun(len(known), "loop")
     if not known:
-        return IntervalBar(group, measure.short_title, None, None, None, "incomparable", "nothing comparable")
+        return parts.IntervalBar(
+            group, measure.short_title, None, None, None, "incomparable", "nothing comparable"
+        )
     values = np.array([c.value_pct for c in known], float)
     ends = np.array([c.interval_pct for c in known], float)
     down, up = np.sqrt(((ends - values[:, None]) ** 2).sum(axis=0)) / len(known)
     mean = float(values.mean())
     low, high = max(mean - float(down), -100.0), mean + float(up)
     kind = "unclear" if low <= 0 <= high else "better" if mean < 0 else "worse"
-    return IntervalBar(group, measure.short_title, mean, low, high, kind, f"{signed(mean)} %")
+    return parts.IntervalBar(group, measure.short_title, mean, low, high, kind, f"{signed(mean)} %")
 
 
-def average_chart(cases: Sequence[ChangeCase]) -> IntervalChart:
+def average_chart(cases: Sequence[ChangeCase]) -> parts.IntervalChart:
     """Average change of all comparable loops (the study's Figure 13)."""
     bars = tuple(_average(cases, m) for m in PRIMARY)
     caption = "Mean over the loops that can be compared; loops that were not better count as they are."
-    return IntervalChart("average-change", "Average change", "% of before", bars, caption)
+    return parts.IntervalChart("average-change", "Average change", "% of before", bars, caption)
 
 
 def changes_page(
@@ -209,22 +197,22 @@ def changes_page(
     subtitle: str,
     offered: bool = False,
     zone: str = UTC_NAME,
-) -> Page:
+) -> parts.Page:
     """The page of all changes on the plant's clock; `missing` could not be looked at, with the reason."""
-    lost = Listing(tuple((loop, f"not looked at: {why}") for loop, why in missing)) if missing else None
-    seen = Text((OFFERED,)) if offered else None
+    lost = parts.Listing(tuple((loop, f"not looked at: {why}") for loop, why in missing)) if missing else None
+    seen = parts.Text((OFFERED,)) if offered else None
     told = [(c, {x.verdict for x in c.found.primary} - {ChangeVerdict.INCOMPARABLE}) for c in cases]
     comparable = [c for c, verdicts in told if verdicts]
     charts = (average_chart(cases), per_loop_chart(comparable)) if len(comparable) > 1 else ()
     limits = cases[0].found.limits if cases else LIMITS
     said = {"m": limits, "error": 100 * (1 - limits.confidence), "share": 100 * limits.usable_share}
-    method = Text(tuple(text.format(**said) for text in texts("method").values()))
-    sections = there(
-        section("In short", seen, _outcome_tiles(cases), changes_in_short(cases), lost),
-        section("In pictures", *charts),
+    method = parts.Text(tuple(text.format(**said) for text in texts("method").values()))
+    sections = parts.there(
+        parts.section("In short", seen, _outcome_tiles(cases), changes_in_short(cases), lost),
+        parts.section("In pictures", *charts),
         *(loop_section(c, i, zone) for i, c in enumerate(cases)),
-        Section("Figures before and after", (figures(cases, True, "figures"),), closed=True),
-        Section("Other figures", (figures(cases, False, "other-figures"),), closed=True),
-        Section("How the figures are made", (method,), closed=True),
+        parts.Section("Figures before and after", (figures(cases, True, "figures"),), closed=True),
+        parts.Section("Other figures", (figures(cases, False, "other-figures"),), closed=True),
+        parts.Section("How the figures are made", (method,), closed=True),
     )
-    return Page("before-after", "What the changes brought", subtitle, sections, zone=zone)
+    return parts.Page("before-after", "What the changes brought", subtitle, sections, zone=zone)

@@ -26,24 +26,7 @@ from analyzer.plantwide.view import GroupView, read_groups
 from analyzer.store.store import Store
 from analyzer.words.units import Row, duration, number
 from identification.signals.spectrum import PER_OCTAVE
-from reports.pages import (
-    Arrow,
-    Band,
-    Cell,
-    Column,
-    Facts,
-    Graph,
-    HeatMap,
-    Mark,
-    Node,
-    Page,
-    Section,
-    Table,
-    Text,
-    Trend,
-    section,
-    there,
-)
+from reports import pages as parts
 from reports.texts import slug
 
 PERIODS = 12.0
@@ -113,46 +96,51 @@ def page_name(number: str) -> str:
     return f"group-{number}"
 
 
-def morning_table(groups: Sequence[GroupView], linked: bool) -> Table:
+def morning_table(groups: Sequence[GroupView], linked: bool) -> parts.Table:
     """One cause, several loops: the groups of a night, those that cost most first; `linked` to their pages."""
     rows = (
         (
-            Cell(f"group {g.number}", kind="strong", href=f"{page_name(g.number)}.html" if linked else ""),
-            Cell(str(len(g.rows)), len(g.rows)),
-            Cell(duration(g.period_s), g.period_s),
-            Cell(_candidates(g) or "not clear"),
-            Cell(action_there(g) or "undecided: look at the candidates"),
+            parts.Cell(
+                f"group {g.number}", kind="strong", href=f"{page_name(g.number)}.html" if linked else ""
+            ),
+            parts.Cell(str(len(g.rows)), len(g.rows)),
+            parts.Cell(duration(g.period_s), g.period_s),
+            parts.Cell(_candidates(g) or "not clear"),
+            parts.Cell(action_there(g) or "undecided: look at the candidates"),
             plain_cell(g.gain_pct),
-            Cell(", ".join(r["loop"] for r in g.rows if r is not g.source)),
+            parts.Cell(", ".join(r["loop"] for r in g.rows if r is not g.source)),
         )
         for g in groups
     )
     return page_table("groups", rows)
 
 
-def _member_cells(g: GroupView, row: Row, paged: frozenset[str]) -> tuple[Cell, ...]:
+def _member_cells(g: GroupView, row: Row, paged: frozenset[str]) -> tuple[parts.Cell, ...]:
     name, pct = row["loop"], row["source_pct"]
     return (
-        Cell(name, kind="strong", href=f"{slug(name)}.html" if name in paged else ""),
-        Cell(row["role"]),
-        Cell(f"{pct:.0f}" if pct >= 1 else "under 1", pct),
+        parts.Cell(name, kind="strong", href=f"{slug(name)}.html" if name in paged else ""),
+        parts.Cell(row["role"]),
+        parts.Cell(f"{pct:.0f}" if pct >= 1 else "under 1", pct),
         cause_cell(g.loops[name]["cause"]),
         *(plain_cell(row[c.key]) for c in page_columns("members")[4:]),
     )
 
 
-def _signs_table(g: GroupView) -> Table:
+def _signs_table(g: GroupView) -> parts.Table:
     """Why there: the signs of the likeliest candidates side by side."""
     shown = {r["loop"]: json.loads(r["group_signs"]) for r in g.rows[:5] if r["group_signs"]}
-    columns = (*page_columns("signs"), *(Column(loop, loop, True) for loop in shown))
+    columns = (*page_columns("signs"), *(parts.Column(loop, loop, True) for loop in shown))
     rows = (
-        (Cell(text), *(Cell(f"{signs.get(k, 0.0):.2f}", signs.get(k, 0.0)) for signs in shown.values()))
+        (
+            parts.Cell(text),
+            *(parts.Cell(f"{signs.get(k, 0.0):.2f}", signs.get(k, 0.0)) for signs in shown.values()),
+        )
         for k, text in texts("signs").items()
     )
     return page_table("signs", rows, columns=columns)
 
 
-def group_page(g: GroupView, trends: Mapping[str, Thinned], night: str, paged: frozenset[str]) -> Page:
+def group_page(g: GroupView, trends: Mapping[str, Thinned], night: str, paged: frozenset[str]) -> parts.Page:
     """A group's page."""
     facts = [("Period", duration(g.period_s)), ("Loops", str(len(g.rows)))]
     if g.source is not None:
@@ -160,17 +148,19 @@ def group_page(g: GroupView, trends: Mapping[str, Thinned], night: str, paged: f
     facts.append(("Others gain", f"{number(g.gain_pct)} % of span"))
     facts.append(("It starts elsewhere", f"{g.unseen_pct:.0f} %"))
     members = page_table("members", (_member_cells(g, r, paged) for r in g.rows))
-    sections = there(
-        Section("What and where", (lead(sentence(g)), Facts(tuple(facts)), graph(g))),
-        Section("Loops", (members,)),
-        Section("Why there", (_signs_table(g),)),
-        section("Trends and spectra", aligned(g, trends), heat_map(g)),
+    sections = parts.there(
+        parts.Section("What and where", (lead(sentence(g)), parts.Facts(tuple(facts)), graph(g))),
+        parts.Section("Loops", (members,)),
+        parts.Section("Why there", (_signs_table(g),)),
+        parts.section("Trends and spectra", aligned(g, trends), heat_map(g)),
     )
     subtitle = f"{with_noun(len(g.rows), 'loop')}, night {night}."
-    return Page(page_name(g.number), f"Group {g.number}: one oscillation", subtitle, sections, (ALL_LOOPS,))
+    return parts.Page(
+        page_name(g.number), f"Group {g.number}: one oscillation", subtitle, sections, (ALL_LOOPS,)
+    )
 
 
-def member_section(g: GroupView, loop: str, trends: Mapping[str, Thinned]) -> Section:
+def member_section(g: GroupView, loop: str, trends: Mapping[str, Thinned]) -> parts.Section:
     """The part of a member's page: its place in the group, its trend above the source's."""
     row = next(r for r in g.rows if r["loop"] == loop)
     source = g.source
@@ -179,10 +169,12 @@ def member_section(g: GroupView, loop: str, trends: Mapping[str, Thinned]) -> Se
         late = f", {row['lag_s']:.0f} s later" if row["lag_s"] is not None else ""
         said.append(f"{loop} follows {source['loop']} with a coherence of {row['coherence']:.2f}{late}.")
     beneath = [loop, *[r["loop"] for r in g.rows if r["loop"] != loop][:1]]
-    return Section("Moves with other loops", there(Text(tuple(said)), aligned(g, trends, beneath)))
+    return parts.Section(
+        "Moves with other loops", parts.there(parts.Text(tuple(said)), aligned(g, trends, beneath))
+    )
 
 
-def graph(g: GroupView) -> Graph:
+def graph(g: GroupView) -> parts.Graph:
     """The way of the oscillation from loop to loop."""
     shown = [r for r in g.rows if r["role"] != GroupRole.SHARES or r is g.rows[0]][: PAGES.group_loops]
     by_name = {r["loop"]: r for r in shown}
@@ -196,16 +188,16 @@ def graph(g: GroupView) -> Graph:
             depth[name] = 1 + column(parent if parent in by_name else first)
         return depth[name]
 
-    nodes = tuple(Node(n, _node_text(r), str(r["role"]), column(n)) for n, r in by_name.items())
+    nodes = tuple(parts.Node(n, _node_text(r), str(r["role"]), column(n)) for n, r in by_name.items())
     arrows = tuple(
-        Arrow(r["parent"] if r["parent"] in by_name else first, n, _arrow_text(r))
+        parts.Arrow(r["parent"] if r["parent"] in by_name else first, n, _arrow_text(r))
         for n, r in by_name.items()
         if n != first
     )
     left = len(g.rows) - len(shown)
     caption = "From left to right as coherence falls; lags are behind the likeliest source."
     caption += f" {left} more not drawn." if left else ""
-    return Graph("way", "Where it starts and whom it moves", nodes, arrows, caption)
+    return parts.Graph("way", "Where it starts and whom it moves", nodes, arrows, caption)
 
 
 def _node_text(r: Row) -> str:
@@ -218,7 +210,7 @@ def _arrow_text(r: Row) -> str:
     return f"{lag:+.0f} s" if lag is not None else f"{r['coherence']:.2f}"
 
 
-def heat_map(g: GroupView) -> HeatMap | None:
+def heat_map(g: GroupView) -> parts.HeatMap | None:
     """Spectra of the members beneath each other; None where the night kept none."""
     rows = g.rows[: PAGES.group_loops]
     kept = [(r["loop"], json.loads(s)) for r in rows if (s := g.loops[r["loop"]]["spectrum"])]
@@ -234,15 +226,15 @@ def heat_map(g: GroupView) -> HeatMap | None:
         near = at[inside]
         shares[i, near] = np.clip(1.0 + (level[inside] - level.max()) / FLOOR_DB, 0.0, 1.0)
     periods = longest / 2.0 ** (np.arange(count) / PER_OCTAVE)
-    mark = Mark(g.period_s, duration(g.period_s))
+    mark = parts.Mark(g.period_s, duration(g.period_s))
     caption = "Depth of colour: level of the error in each band under the loop's own peak, 30 dB to nothing."
     loops = tuple(n for n, _ in kept)
-    return HeatMap(
+    return parts.HeatMap(
         "spectra", "Spectra", "period [s]", periods[::-1], loops, shares[:, ::-1], (mark,), caption
     )
 
 
-def aligned(g: GroupView, trends: Mapping[str, Thinned], only: Sequence[str] = ()) -> Trend | None:
+def aligned(g: GroupView, trends: Mapping[str, Thinned], only: Sequence[str] = ()) -> parts.Trend | None:
     """PV of the members beneath each other over some periods; None where the trends are too coarse to show any."""
     names = [r["loop"] for r in g.rows if r["loop"] in trends and (not only or r["loop"] in only)]
     names = (sorted(names, key=only.index) if only else names)[: PAGES.group_loops]
@@ -257,8 +249,8 @@ def aligned(g: GroupView, trends: Mapping[str, Thinned], only: Sequence[str] = (
     for i, name in enumerate(names):
         t = trends[name]
         low, high = (np.interp(lead.time_s, t.time_s, t.extremes[f"pv_{end}"]) for end in ("min", "max"))
-        bands.append(Band(f"{name}.PV", "pv", i, low, high))
+        bands.append(parts.Band(f"{name}.PV", "pv", i, low, high))
     top = "" if only else ", the likeliest source on top"
     caption = f"PV [% of span] over {PERIODS:g} periods in the middle of the night{top}."
     title = "Trends, aligned"
-    return Trend("aligned", title, lead.time_s, lead.gap, tuple(bands), tuple(names), (), caption)
+    return parts.Trend("aligned", title, lead.time_s, lead.gap, tuple(bands), tuple(names), (), caption)

@@ -84,10 +84,8 @@ def read_nights(
     store: Store, nights: Sequence[str], columns: Sequence[str], loops: Collection[str] | None = None
 ) -> list[dict[str, Any]]:
     """Rows of several nights, oldest first; columns that a night lacks are None."""
-    rows: list[dict[str, Any]] = []
-    for night in nights if loops is None or loops else ():
-        rows += [{**row, "night": night} for row in store.rows("nights", night, columns, loops)]
-    return rows
+    read = nights if loops is None or loops else ()
+    return [{**r, "night": night} for night in read for r in store.rows("nights", night, columns, loops)]
 
 
 def by_loop(rows: Sequence[Row]) -> dict[str, list[Row]]:

@@ -8,20 +8,9 @@ from analyzer.lanes.lanes import FIGURE, lanes_in
 from analyzer.limits import PAGES
 from analyzer.loop.cost import cost, cost_column
 from analyzer.loop.decisions import CAUSES, Action, Cause, Due, Fault, GroupRole, Lane, Status
+from analyzer.pages import words
 from analyzer.pages.maintenance import work_order
 from analyzer.pages.reading import ShownNight, action_text, link_to, needs_a_look, oscillates, read_night
-from analyzer.pages.words import (
-    Row,
-    cell,
-    cells,
-    duration,
-    enumerated,
-    listing,
-    page_columns,
-    page_table,
-    texts,
-    with_noun,
-)
 from analyzer.plantwide.view import GroupView, read_groups
 from analyzer.store.store import Store
 from analyzer.words.units import changed_settings
@@ -33,10 +22,12 @@ CALM = "No loop needs a touch this morning."
 def listed(names: Sequence[str]) -> str:
     """Names in a sentence, the first few of them."""
     more = len(names) - PAGES.named
-    return ", ".join(names[: PAGES.named]) + f" and {more} more" if more > 0 else enumerated(list(names))
+    return (
+        ", ".join(names[: PAGES.named]) + f" and {more} more" if more > 0 else words.enumerated(list(names))
+    )
 
 
-def first_things(rows: Sequence[Row], groups: Sequence[GroupView] = ()) -> tuple[str, ...]:
+def first_things(rows: Sequence[words.Row], groups: Sequence[GroupView] = ()) -> tuple[str, ...]:
     """At most three sentences, the one that gains most first; one that says so where there is nothing to do."""
     by_loop, by = {r["loop"]: r for r in rows}, cost_column(rows)
     told: set[str] = set()
@@ -50,7 +41,7 @@ def first_things(rows: Sequence[Row], groups: Sequence[GroupView] = ()) -> tuple
         told |= set(members)
         found.append((sum(cost(by_loop[m], by) for m in members), _of_group(source, others)))
     left = sorted((r for r in rows if r["loop"] not in told), key=lambda r: (-cost(r, by), r["loop"]))
-    for work in texts("work"):
+    for work in words.texts("work"):
         mine = [r for r in left if work in _work(r)]
         if mine:  # what waits for a shutdown is worth nothing tonight
             worth = 0.0 if work == "shutdown" else sum(cost(r, by) for r in mine)
@@ -59,7 +50,7 @@ def first_things(rows: Sequence[Row], groups: Sequence[GroupView] = ()) -> tuple
     return tuple(text for _, text in ordered[: PAGES.sentences]) or (CALM,)
 
 
-def _work(row: Row) -> set[str]:
+def _work(row: words.Row) -> set[str]:
     """The kinds of work that a row asks for."""
     tuning = row["cause"] == Cause.TUNING
     kinds = {
@@ -74,16 +65,16 @@ def _work(row: Row) -> set[str]:
     return {kinds.get(row["action"], ""), "limit" if at_limit else "", "windup" if winds_up else ""}
 
 
-def _asked(work: str, rows: Sequence[Row]) -> str:
+def _asked(work: str, rows: Sequence[words.Row]) -> str:
     """The sentence of a kind of work on some loops."""
     sticks = sum(r["valve_fault"] == Fault.STICTION for r in rows)
     fault = "sticks" if sticks == len(rows) else "has play" if sticks == 0 else "sticks or has play"
-    said = texts("work")[work]
+    said = words.texts("work")[work]
     text = said["one"] if len(rows) == 1 else said.get("several", said["one"])
     return text.format(names=listed([r["loop"] for r in rows]), fault=fault)
 
 
-def _of_group(source: Row, others: Sequence[str]) -> str:
+def _of_group(source: words.Row, others: Sequence[str]) -> str:
     name, moved = source["loop"], f"it also moves {listed(others)}"
     unasked = source["action"] is None and source["cause"] == Cause.VALVE  # of a night that got no advice
     if source["action"] == Action.REPAIR_VALVE or unasked:
@@ -91,11 +82,11 @@ def _of_group(source: Row, others: Sequence[str]) -> str:
     if source["action"] == Action.RETUNE:
         return f"Type new settings into {name}: {moved}."
     if source["cause"] == Cause.LOAD:
-        return f"Find what moves {name} every {duration(source['period_s'])} from outside: {moved}."
+        return f"Find what moves {name} every {words.duration(source['period_s'])} from outside: {moved}."
     return f"Look at {name} first: {moved}."
 
 
-def _news(night: ShownNight) -> list[tuple[Row, str, str]]:
+def _news(night: ShownNight) -> list[tuple[words.Row, str, str]]:
     """Loops of which there is something new since the night before: what it is, and its colour."""
     found = []
     for row in night.rows:
@@ -106,7 +97,7 @@ def _news(night: ShownNight) -> list[tuple[Row, str, str]]:
     return found
 
 
-def _lane_news(nights: Sequence[Row]) -> tuple[str, str] | None:
+def _lane_news(nights: Sequence[words.Row]) -> tuple[str, str] | None:
     """Lanes beside oscillation that a loop came into or left, of those whose figures both nights know."""
     old, row = nights[-2:]
     known = [x for x in Lane if x is not Lane.OSCILLATION and None not in (old[FIGURE[x]], row[FIGURE[x]])]
@@ -117,7 +108,7 @@ def _lane_news(nights: Sequence[Row]) -> tuple[str, str] | None:
     return (f"no more: {', '.join(left)}", "better") if left else None
 
 
-def _inside(nights: Sequence[Row], lane: Lane) -> list[bool]:
+def _inside(nights: Sequence[words.Row], lane: Lane) -> list[bool]:
     """Whether a loop was in a lane in each night; one that is inferred has to be told some nights in a row."""
     told = [lane in lanes_in(row) for row in nights]
     if lane is not Lane.SLUGGISH:
@@ -142,13 +133,13 @@ def news_table(night: ShownNight, tones: Sequence[str], name: str, title: str) -
         (
             link_to(night, row["loop"]),
             Cell(text, kind=tone),
-            *(cell(r, "oscillation_significance") for r in (night.earlier[row["loop"]][-1], row)),
+            *(words.cell(r, "oscillation_significance") for r in (night.earlier[row["loop"]][-1], row)),
             Cell(action_text(row)),
         )
         for row, text, tone in _news(night)
         if tone in tones
     ]
-    return page_table("news", rows, name=name, title=f"{title} ({len(rows)})")
+    return words.page_table("news", rows, name=name, title=f"{title} ({len(rows)})")
 
 
 def since(night: ShownNight) -> Section:
@@ -162,7 +153,7 @@ def since(night: ShownNight) -> Section:
     return Section(f"Since {night.before_name}", tuple(blocks))
 
 
-def _do(row: Row) -> str:
+def _do(row: words.Row) -> str:
     if row["kp_new"] is not None or row["ti_new"] is not None:
         return f"{row['action']}: {changed_settings(row)}"
     if row["action"] == Action.UNDECIDED:
@@ -174,9 +165,7 @@ def _counts(night: ShownNight) -> str:
     assessed = [r for r in night.rows if r["status"] == Status.OK]
     swinging = [r for r in assessed if oscillates(r)]
     of = ", ".join(f"{sum(r['cause'] == c for r in swinging)} by {c}" for c in CAUSES)
-    return (
-        f"{len(assessed)} of {with_noun(len(night.rows), 'loop')} assessed, {len(swinging)} oscillate: {of}."
-    )
+    return f"{len(assessed)} of {words.with_noun(len(night.rows), 'loop')} assessed, {len(swinging)} oscillate: {of}."
 
 
 def summary_page(store: Store, name: str | None = None) -> Page:
@@ -189,10 +178,10 @@ def summary_page(store: Store, name: str | None = None) -> Page:
     """
     night = read_night(store, name, PAGES.summary_loops, drawn=False)
     seen = [r for r in night.rows if r["loop"] not in night.hidden]
-    first = listing(first_things(seen, read_groups(store, night.name)))
+    first = words.listing(first_things(seen, read_groups(store, night.name)))
     left, lines, most = sum(map(needs_a_look, seen)) - len(night.worst), news_lines(night), PAGES.news
     news = [*lines[:most], f"{len(lines) - most} more"] if len(lines) > most else lines
-    told = listing(news) if news else Text(("Nothing new.",))
+    told = words.listing(news) if news else Text(("Nothing new.",))
     sections = there(
         Section("First", (first, Text((_counts(night),)))),
         section(f"Since {night.before_name}", told) if night.before_name else None,
@@ -204,9 +193,11 @@ def summary_page(store: Store, name: str | None = None) -> Page:
 def _worst(night: ShownNight, left: int) -> Table:
     """The worst loops with what to do, and how many are left out; their notes where there are any."""
     noted = [(r, night.note(r["loop"])) for r in night.worst]
-    shown = page_columns("summary")[: 4 if any(note for _, note in noted) else 3]
+    shown = words.page_columns("summary")[: 4 if any(note for _, note in noted) else 3]
     rows = (
-        cells(r, shown, loop=Cell(r["loop"], kind="strong"), do=Cell(_do(r)), note=Cell(note))
+        words.cells(r, shown, loop=Cell(r["loop"], kind="strong"), do=Cell(_do(r)), note=Cell(note))
         for r, note in noted
     )
-    return page_table("summary", rows, columns=shown, note=f"{left} more in the list." if left > 0 else "")
+    return words.page_table(
+        "summary", rows, columns=shown, note=f"{left} more in the list." if left > 0 else ""
+    )
