@@ -154,7 +154,10 @@ def _interval(bar: IntervalBar, y: float, x: Axis) -> str:
 def trend(t: Trend, zone: str) -> Drawing:
     """Panels over one time axis on the clock of a zone, each signal as the band between least and greatest; of a
     trend that opens on a span, that span."""
-    t = _opened(t)
+    if t.opening is not None:
+        part = slice(*np.searchsorted(t.time_s, t.opening))
+        bands = tuple(replace(b, low=b.low[part], high=b.high[part]) for b in t.bands)
+        t = replace(t, time_s=t.time_s[part], gap=t.gap[part], bands=bands)
     start, end = (float(t.time_s[k]) if t.time_s.size else float(k + 1) for k in (0, -1))
     x = Axis(start, max(end, start + 1e-3), MARGIN[0], TREND - 2 * MARGIN[1])
     across, top, body = (x.first, x.last), MARGIN[2], []
@@ -174,14 +177,6 @@ def trend(t: Trend, zone: str) -> Drawing:
     body += [written(x.at(at), top + 4, text, "middle", "tick") for at, text in _times(start, end, zone)]
     body.append(written((x.first + x.last) / 2, top + 22, zone, "middle", "axis"))
     return Drawing(TREND, top + 30, "".join(body), t.title, "plot")
-
-
-def _opened(t: Trend) -> Trend:
-    if t.opening is None:
-        return t
-    part = slice(*np.searchsorted(t.time_s, t.opening))
-    bands = tuple(replace(b, low=b.low[part], high=b.high[part]) for b in t.bands)
-    return replace(t, time_s=t.time_s[part], gap=t.gap[part], bands=bands)
 
 
 def _held(t: Trend, panel: int) -> tuple[float, float]:

@@ -132,7 +132,7 @@ def loop_section(case: ChangeCase, number_: int, zone: str = UTC_NAME) -> parts.
     names = ("Settings", "Changed", "Before", "After")
     facts = parts.Facts(tuple(zip(names, (_settings_typed(case), when, *spans), strict=True)))
     wear = wear_texts(found, case.row)
-    blocks = parts.there(
+    blocks: tuple[parts.Block, ...] = parts.there(
         words.lead(outcome(found)), facts, words.listing(wear) if wear else None, _trend(case, number_)
     )
     return parts.Section(f"{found.loop} {case.row['description'] or ''}".strip(), blocks)
@@ -155,11 +155,10 @@ def per_loop_chart(cases: Sequence[ChangeCase]) -> parts.IntervalChart:
     bars = []
     for case in cases:
         for c in case.found.primary:
-            ends, kind = c.interval_pct or (None, None), KINDS[c.verdict]
+            low, high = c.interval_pct or (None, None)
             text = f"{signed(c.value_pct)} %" if c.interval_pct else c.verdict.value
-            bars.append(
-                parts.IntervalBar(case.found.loop, c.measure.short_title, c.value_pct, *ends, kind, text)
-            )
+            name, kind = c.measure.short_title, KINDS[c.verdict]
+            bars.append(parts.IntervalBar(case.found.loop, name, c.value_pct, low, high, kind, text))
     caption = "Bars: change in % of the span before; lines: its interval. Less is better in all four."
     return parts.IntervalChart(
         "change-per-loop", "Change per loop and assessment", "% of before", tuple(bars), caption

@@ -23,7 +23,21 @@ from analyzer.words.belief import wear_text
 from analyzer.words.reason import in_short
 from analyzer.words.units import row_settings
 from identification.mismatch.words import check
-from reports.pages import Cell, Facts, Line, Listing, Page, Panels, Plot, Section, Table, Text, section, there
+from reports.pages import (
+    Block,
+    Cell,
+    Facts,
+    Line,
+    Listing,
+    Page,
+    Panels,
+    Plot,
+    Section,
+    Table,
+    Text,
+    section,
+    there,
+)
 from reports.texts import slug
 
 WEEK = 7
@@ -168,7 +182,7 @@ def _evidence_section(row: Row) -> Section:
     ]
     more = in_short(row["reason"] or "")[1]
     known = known_figures(row, keys("model"))
-    blocks = there(
+    blocks: tuple[Block, ...] = there(
         Text(lead(more).paragraphs) if more else None,
         page_table("evidence", rows) if rows else Text(("No sign of a fault.",)),
         known if known.items else None,

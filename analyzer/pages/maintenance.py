@@ -83,8 +83,8 @@ def wearing(night: ShownNight) -> Table:
 def faulty(night: ShownNight) -> Table:
     """Valves at fault, by making a cycle or for all that nights say: those to be repaired first, then by width."""
     assessed = [r for r in night.rows if r["status"] == Status.OK]
-    worn = (Fault.BACKLASH, Fault.STICTION)
-    rows = [r for r in assessed if r["cause"] == Cause.VALVE or r["valve_fault"] in worn]
+    faults = (Fault.BACKLASH, Fault.STICTION)
+    rows = [r for r in assessed if r["cause"] == Cause.VALVE or r["valve_fault"] in faults]
     rows.sort(key=lambda r: (r["action"] != Action.REPAIR_VALVE, -(_fault_width(r) or 0.0)))
     return page_table("valves", (_valve_cells(night, r) for r in rows))
 

@@ -37,7 +37,12 @@ MOST_NAMES = 10
 """Areas that are named in an error."""
 WIDEST, PIPED = 240, 180
 """Characters of a line of a wide table, and of one that no terminal shows."""
-CAUSE_STYLES = {Cause.VALVE: "red", Cause.TUNING: "yellow", Cause.LOAD: "cyan", Cause.UNDECIDED: "magenta"}
+CAUSE_STYLES: Mapping[str, str] = {
+    Cause.VALVE: "red",
+    Cause.TUNING: "yellow",
+    Cause.LOAD: "cyan",
+    Cause.UNDECIDED: "magenta",
+}
 """Colours of causes on the terminal."""
 SHARES = tuple(f"osc_{cause}_pct" for cause in CAUSES)
 SHOWN = keys("list")
