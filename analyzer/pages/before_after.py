@@ -20,16 +20,6 @@ from analyzer.history.plant_clock import UTC_NAME
 from analyzer.pages import words
 from analyzer.pages.changes import ChangeCase, outcome, wear_texts
 from analyzer.pages.loop_pictures import trend_block
-from analyzer.pages.words import (
-    number,
-    page_columns,
-    page_table,
-    plain_cell,
-    pv_scale_of,
-    signed,
-    stamp,
-    texts,
-)
 from analyzer.words.units import gain_unit
 from reports import pages as parts
 
@@ -49,7 +39,7 @@ OFFERED = "These changes were not stated but seen in the loops' behaviour: confi
 
 def _outcome_tiles(cases: Sequence[ChangeCase]) -> parts.Tiles:
     """How many changes came out how, in the order of the outcomes."""
-    known = texts("outcomes")
+    known = words.texts("outcomes")
     counts = Counter(known[grade(c.found)]["tile"] for c in cases)
     tones = {o["tile"]: o["tone"] for o in known.values()}
     shown = ((str(counts[tile]), tile, tone) for tile, tone in tones.items() if counts[tile])
@@ -59,16 +49,16 @@ def _outcome_tiles(cases: Sequence[ChangeCase]) -> parts.Tiles:
 def _row(change: Change, found: LoopComparison) -> tuple[parts.Cell, ...]:
     """A figure before and after; the interval is in percent of before, in the figure's unit where that is zero."""
     d, ends, unit = change.found, change.interval_pct, change.measure.unit
-    interval = f"{number(d.low)} … {number(d.high)} {unit}"
+    interval = f"{words.number(d.low)} … {words.number(d.high)} {unit}"
     if ends is not None:
-        interval = f"{signed(ends[0])} … {signed(ends[1])} %"
+        interval = f"{words.signed(ends[0])} … {words.signed(ends[1])} %"
     follows = f"follows {found.source_loop}" if found.source_loop else ""
     return (
         *map(parts.Cell, (found.loop, change.measure.title, unit)),
-        *map(plain_cell, (d.before, d.after)),
-        parts.Cell(signed(change.value_pct), change.value_pct),
+        *map(words.plain_cell, (d.before, d.after)),
+        parts.Cell(words.signed(change.value_pct), change.value_pct),
         parts.Cell(interval),
-        *map(plain_cell, (d.low, d.high)),
+        *map(words.plain_cell, (d.low, d.high)),
         parts.Cell(change.verdict.value, kind=KINDS[change.verdict]),
         parts.Cell("; ".join(found.reasons) or follows),
     )
@@ -77,7 +67,7 @@ def _row(change: Change, found: LoopComparison) -> tuple[parts.Cell, ...]:
 def figures(cases: Sequence[ChangeCase], primary: bool, name: str) -> parts.Table:
     """Figures before and after of all loops (the study's Figure 11)."""
     rows = [_row(c, case.found) for case in cases for c in case.found.changes if c.measure.primary == primary]
-    return page_table("figures", rows, name=name, searchable=len(rows) > 12)
+    return words.page_table("figures", rows, name=name, searchable=len(rows) > 12)
 
 
 def _settings_typed(case: ChangeCase) -> str:
@@ -96,7 +86,7 @@ def _settings_typed(case: ChangeCase) -> str:
 def _in_short(case: ChangeCase) -> tuple[parts.Cell, ...]:
     """A loop in one row: what was typed in, the four changes, and what to make of them."""
     by_name = {c.measure.name: c for c in case.found.primary}
-    kind = texts("outcomes")[grade(case.found)]["tone"]
+    kind = words.texts("outcomes")[grade(case.found)]["tone"]
     return (
         parts.Cell(case.found.loop, kind="strong"),
         words.cell(case.row, "description"),
@@ -109,26 +99,28 @@ def _in_short(case: ChangeCase) -> tuple[parts.Cell, ...]:
 def _change_cell(change: Change | None) -> parts.Cell:
     if change is None or change.verdict is ChangeVerdict.INCOMPARABLE or change.interval_pct is None:
         return parts.Cell("–")
-    low, high = map(signed, change.interval_pct)
-    return parts.Cell(f"{signed(change.value_pct)} ({low} … {high})", change.value_pct, KINDS[change.verdict])
+    low, high = map(words.signed, change.interval_pct)
+    return parts.Cell(
+        f"{words.signed(change.value_pct)} ({low} … {high})", change.value_pct, KINDS[change.verdict]
+    )
 
 
 def changes_in_short(cases: Sequence[ChangeCase]) -> parts.Table:
     """A row a loop."""
-    *first, last = page_columns("changes")
+    *first, last = words.page_columns("changes")
     hint = "Change, with its interval"
     four = (parts.Column(m.name, f"{m.short_title}, % of before", True, hint, True) for m in PRIMARY)
-    return page_table("changes", map(_in_short, cases), columns=(*first, *four, last))
+    return words.page_table("changes", map(_in_short, cases), columns=(*first, *four, last))
 
 
 def loop_section(case: ChangeCase, number_: int, zone: str = UTC_NAME) -> parts.Section:
     """What became of one loop: settings, spans, remarks, trends (the study's Figure 10)."""
     found, change = case.found, case.change
     spans = [
-        f"{stamp(s.first_s, zone)} to {stamp(s.last_s, zone)} {zone}, {usable_h:.0f} usable hours"
+        f"{words.stamp(s.first_s, zone)} to {words.stamp(s.last_s, zone)} {zone}, {usable_h:.0f} usable hours"
         for s, usable_h in zip((found.before, found.after), found.hours, strict=True)
     ]
-    when = f"{stamp(change.time_s, zone)} {zone}" + (f" by {change.who}" if change.who else "")
+    when = f"{words.stamp(change.time_s, zone)} {zone}" + (f" by {change.who}" if change.who else "")
     names = ("Settings", "Changed", "Before", "After")
     facts = parts.Facts(tuple(zip(names, (_settings_typed(case), when, *spans), strict=True)))
     wear = wear_texts(found, case.row)
@@ -147,7 +139,7 @@ def _trend(case: ChangeCase, number_: int) -> parts.Trend | None:
     title = f"{found.loop}: before and after on one scale"
     if thin.time_s.size < 2:
         return None
-    return trend_block(f"trend-{number_}", title, thin, marks, pv_scale_of(case.row))
+    return trend_block(f"trend-{number_}", title, thin, marks, words.pv_scale_of(case.row))
 
 
 def per_loop_chart(cases: Sequence[ChangeCase]) -> parts.IntervalChart:
@@ -156,7 +148,7 @@ def per_loop_chart(cases: Sequence[ChangeCase]) -> parts.IntervalChart:
     for case in cases:
         for c in case.found.primary:
             low, high = c.interval_pct or (None, None)
-            text = f"{signed(c.value_pct)} %" if c.interval_pct else c.verdict.value
+            text = f"{words.signed(c.value_pct)} %" if c.interval_pct else c.verdict.value
             name, kind = c.measure.short_title, KINDS[c.verdict]
             bars.append(parts.IntervalBar(case.found.loop, name, c.value_pct, low, high, kind, text))
     caption = "Bars: change in % of the span before; lines: its interval. Less is better in all four."
@@ -180,7 +172,7 @@ def _average(cases: Sequence[ChangeCase], measure: Measure) -> parts.IntervalBar
     mean = float(values.mean())
     low, high = max(mean - float(down), -100.0), mean + float(up)
     kind = "unclear" if low <= 0 <= high else "better" if mean < 0 else "worse"
-    return parts.IntervalBar(group, measure.short_title, mean, low, high, kind, f"{signed(mean)} %")
+    return parts.IntervalBar(group, measure.short_title, mean, low, high, kind, f"{words.signed(mean)} %")
 
 
 def average_chart(cases: Sequence[ChangeCase]) -> parts.IntervalChart:
@@ -205,7 +197,7 @@ def changes_page(
     charts = (average_chart(cases), per_loop_chart(comparable)) if len(comparable) > 1 else ()
     limits = cases[0].found.limits if cases else LIMITS
     said = {"m": limits, "error": 100 * (1 - limits.confidence), "share": 100 * limits.usable_share}
-    method = parts.Text(tuple(text.format(**said) for text in texts("method").values()))
+    method = parts.Text(tuple(text.format(**said) for text in words.texts("method").values()))
     sections = parts.there(
         parts.section("In short", seen, _outcome_tiles(cases), changes_in_short(cases), lost),
         parts.section("In pictures", *charts),

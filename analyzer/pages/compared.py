@@ -20,21 +20,7 @@ from identification.models import Integrator
 from identification.simulation.closed_loop import scan_step
 from identification.simulation.lag import discretize
 from identification.simulation.valve import law_of
-from reports.pages import (
-    Cell,
-    Field,
-    Line,
-    Listing,
-    Page,
-    Panels,
-    Place,
-    Plot,
-    Section,
-    Table,
-    Text,
-    WhatIf,
-    there,
-)
+from reports import pages as parts
 from reports.texts import slug
 from tuning.describing import band, is_play
 from tuning.forecast import CALMER, DERIVATIVE, NOW, RECOMMENDED, REPAIRED, SMALLER, Tried
@@ -131,17 +117,17 @@ def _times(t: Tried, now: Tried) -> float | None:
 
 def _with_repaired(c: Comparison) -> tuple[Tried, ...]:
     """All that was tried, and what a repair would bring."""
-    return there(*c.tried, c.repaired)
+    return parts.there(*c.tried, c.repaired)
 
 
-def table(c: Comparison, spec: LoopSpec, unit: str) -> Table:
+def table(c: Comparison, spec: LoopSpec, unit: str) -> parts.Table:
     """The settings with what they do on the load."""
     said, lasts = texts("settings_tried"), duration(c.load.size * scan_step(c.loop))
     note = said["note"].format(lasts=lasts) + said["derivative"] * (c.loop.controller.td_s > 0.0)
     return page_table("settings", (_tried_row(t, c, spec, unit) for t in _with_repaired(c)), note=note)
 
 
-def _tried_row(t: Tried, c: Comparison, spec: LoopSpec, unit: str) -> tuple[Cell, ...]:
+def _tried_row(t: Tried, c: Comparison, spec: LoopSpec, unit: str) -> tuple[parts.Cell, ...]:
     scale, now, (kp, ti) = c.pv_span / 100.0, c.tried[0], c.stated.get(t.name, c.stated[NOW])
     found = c.everywhere.get(t.name) if t is not now else None
     worst = "" if found is None else ", ".join(map(_against_now_pct, (found.worst_travel, found.worst_error)))
@@ -149,32 +135,34 @@ def _tried_row(t: Tried, c: Comparison, spec: LoopSpec, unit: str) -> tuple[Cell
     derivative = f", {_td(c, t.name, spec)}" if t.name == DERIVATIVE else ""
     rejected = (c.peaks.get(t.name, 1.0), _times(t, now))
     return (
-        Cell(t.name, kind="strong" if t.name == RECOMMENDED else ""),
-        Cell(f"{kp:.3g} {gain_unit(spec.gain_unit, spec.pv_unit, spec.op_unit)}", kp),
-        Cell("none" if ti == 0 else f"{ti:.3g} {spec.ti_unit}{derivative}", ti),
-        Cell(number(t.stem_travel), t.stem_travel, _against(t.stem_travel, now.stem_travel)),
-        Cell(f"{number(scale * t.error)} {unit}", t.error, _against(t.error, now.error)),
-        Cell(f"{number(scale * t.peak)} {unit}", t.peak, _against(t.peak, now.peak)),
-        Cell(worst),
-        *(Cell("–") if x is None else Cell(number(x), x, _against(x, 1.0)) for x in rejected),
-        Cell(ms, None if math.isinf(t.ms) else t.ms),
+        parts.Cell(t.name, kind="strong" if t.name == RECOMMENDED else ""),
+        parts.Cell(f"{kp:.3g} {gain_unit(spec.gain_unit, spec.pv_unit, spec.op_unit)}", kp),
+        parts.Cell("none" if ti == 0 else f"{ti:.3g} {spec.ti_unit}{derivative}", ti),
+        parts.Cell(number(t.stem_travel), t.stem_travel, _against(t.stem_travel, now.stem_travel)),
+        parts.Cell(f"{number(scale * t.error)} {unit}", t.error, _against(t.error, now.error)),
+        parts.Cell(f"{number(scale * t.peak)} {unit}", t.peak, _against(t.peak, now.peak)),
+        parts.Cell(worst),
+        *(parts.Cell("–") if x is None else parts.Cell(number(x), x, _against(x, 1.0)) for x in rejected),
+        parts.Cell(ms, None if math.isinf(t.ms) else t.ms),
     )
 
 
-def panels(c: Comparison, unit: str) -> Panels:
+def panels(c: Comparison, unit: str) -> parts.Panels:
     """The end of each simulation on the same axes."""
     scale, plots = c.pv_span / 100.0, []
     most = scale * max(float(np.abs(s.error).max(initial=0.0)) for s in c.shown.values())
     for t in c.tried:
         shown = c.shown[t.name]
-        line = Line("SP − PV", shown.time_s / 60.0, scale * shown.error)
+        line = parts.Line("SP − PV", shown.time_s / 60.0, scale * shown.error)
         words = f"travel {number(t.stem_travel)} %/h, error {number(scale * t.error)} {unit}"
         name, axis = f"tried-{slug(t.name)}", f"SP − PV [{unit}]"
-        plots.append(Plot(name, t.name, "minutes", axis, (line,), (), words, reach=(-most, most)))
-    return Panels("tried", "The error under each of them, on the same load", tuple(plots))
+        plots.append(parts.Plot(name, t.name, "minutes", axis, (line,), (), words, reach=(-most, most)))
+    return parts.Panels("tried", "The error under each of them, on the same load", tuple(plots))
 
 
-def travel_field(found: TravelMap, places: Sequence[Place], title: str, moves: str, rest: str = "") -> Field:
+def travel_field(
+    found: TravelMap, places: Sequence[parts.Place], title: str, moves: str, rest: str = ""
+) -> parts.Field:
     """The travel of the limit cycle over Kp and Ti, with settings as points.
 
     moves, rest : what travels, and what is said of settings at rest.
@@ -182,14 +170,14 @@ def travel_field(found: TravelMap, places: Sequence[Place], title: str, moves: s
     swings = f"limit cycle, the darker the more {moves} travels"
     keys = (("swings", swings), ("calm", f"comes to rest{rest}"), ("unstable", "unstable"))
     cells = np.abs(found.kp), found.ti_s, 3600.0 * found.travel, found.rests, found.unstable
-    return Field("travel-map", title, "Kp [%/%]", "Ti [s]", *cells, tuple(places), keys)
+    return parts.Field("travel-map", title, "Kp [%/%]", "Ti [s]", *cells, tuple(places), keys)
 
 
-def _place(x: float, y: float, t: Tried) -> Place:
-    return Place(x, y, t.name, PLACED.get(t.name, "rule"))
+def _place(x: float, y: float, t: Tried) -> parts.Place:
+    return parts.Place(x, y, t.name, PLACED.get(t.name, "rule"))
 
 
-def price(c: Comparison, unit: str) -> Plot | None:
+def price(c: Comparison, unit: str) -> parts.Plot | None:
     """Travel over error of the settings that no others beat in both, and of those compared; None without such."""
     if len(c.curve) < 2:
         return None
@@ -200,15 +188,17 @@ def price(c: Comparison, unit: str) -> Plot | None:
     error, travel = np.array(found, float).reshape(-1, 2).T
     at = np.array([(p.x, p.y) for p in places], float).reshape(-1, 2)
     lines = (
-        Line("none of the robust ones beats these", scale * now.error * error, now.stem_travel * travel),
-        Line("compared", at[:, 0], at[:, 1], joined=False),
+        parts.Line(
+            "none of the robust ones beats these", scale * now.error * error, now.stem_travel * travel
+        ),
+        parts.Line("compared", at[:, 0], at[:, 1], joined=False),
     )
     title = "What each costs: the lower and the further left, the better"
     axes = f"average absolute error [{unit}]", "stem travel [%/h]"
-    return Plot("price", title, *axes, lines, reach=(0.0,), places=places)
+    return parts.Plot("price", title, *axes, lines, reach=(0.0,), places=places)
 
 
-def field(c: Comparison) -> Field | None:
+def field(c: Comparison) -> parts.Field | None:
     """The travel map with all settings that are compared; None where the valve is free."""
     if c.travel is None:
         return None
@@ -275,20 +265,20 @@ def model(c: Comparison, spec: LoopSpec, unit: str) -> str:
     return json.dumps(found)
 
 
-def settings_page(loop: str, night: str, c: Comparison, spec: LoopSpec) -> Page:
+def settings_page(loop: str, night: str, c: Comparison, spec: LoopSpec) -> parts.Page:
     """A loop's page of settings."""
     known = spec.pv_lo is not None and spec.pv_hi is not None
     unit, said = (spec.pv_unit or "own unit") if known else "%", texts("settings_tried")
     meant = texts("settings") | (
         texts("settings_of_integrators") if isinstance(c.loop.process, Integrator) else {}
     )
-    first = (Text((opening(c, spec, unit),), "lead"), panels(c, unit), table(c, spec, unit))
-    tried = WhatIf("try", said["title"], model(c, spec, unit), c.load, said["caption"])
-    named = Listing(tuple((f"{t.name}:", meant[t.name]) for t in _with_repaired(c)))
+    first = (parts.Text((opening(c, spec, unit),), "lead"), panels(c, unit), table(c, spec, unit))
+    tried = parts.WhatIf("try", said["title"], model(c, spec, unit), c.load, said["caption"])
+    named = parts.Listing(tuple((f"{t.name}:", meant[t.name]) for t in _with_repaired(c)))
     sections = (
-        Section("Settings compared", there(*first, price(c, unit), field(c))),
-        Section("Try settings", (Text((said["hint"],)), tried)),
-        Section("What the settings are, for experts", (named,), closed=True),
+        parts.Section("Settings compared", parts.there(*first, price(c, unit), field(c))),
+        parts.Section("Try settings", (parts.Text((said["hint"],)), tried)),
+        parts.Section("What the settings are, for experts", (named,), closed=True),
     )
     subtitle = f"settings compared and tried on night {night}"
-    return Page(f"{slug(loop)}-settings", f"{loop}: settings", subtitle, sections)
+    return parts.Page(f"{slug(loop)}-settings", f"{loop}: settings", subtitle, sections)

@@ -11,17 +11,8 @@ import numpy as np
 from analyzer.columns import GROUP_LIST, row_of
 from analyzer.limits import PAGES
 from analyzer.loop.decisions import GroupRole
+from analyzer.pages import words
 from analyzer.pages.reading import Thinned, action_text
-from analyzer.pages.words import (
-    ALL_LOOPS,
-    cause_cell,
-    lead,
-    page_columns,
-    page_table,
-    plain_cell,
-    texts,
-    with_noun,
-)
 from analyzer.plantwide.view import GroupView, read_groups
 from analyzer.store.store import Store
 from analyzer.words.units import Row, duration, number
@@ -107,12 +98,12 @@ def morning_table(groups: Sequence[GroupView], linked: bool) -> parts.Table:
             parts.Cell(duration(g.period_s), g.period_s),
             parts.Cell(_candidates(g) or "not clear"),
             parts.Cell(action_there(g) or "undecided: look at the candidates"),
-            plain_cell(g.gain_pct),
+            words.plain_cell(g.gain_pct),
             parts.Cell(", ".join(r["loop"] for r in g.rows if r is not g.source)),
         )
         for g in groups
     )
-    return page_table("groups", rows)
+    return words.page_table("groups", rows)
 
 
 def _member_cells(g: GroupView, row: Row, paged: frozenset[str]) -> tuple[parts.Cell, ...]:
@@ -121,23 +112,23 @@ def _member_cells(g: GroupView, row: Row, paged: frozenset[str]) -> tuple[parts.
         parts.Cell(name, kind="strong", href=f"{slug(name)}.html" if name in paged else ""),
         parts.Cell(row["role"]),
         parts.Cell(f"{pct:.0f}" if pct >= 1 else "under 1", pct),
-        cause_cell(g.loops[name]["cause"]),
-        *(plain_cell(row[c.key]) for c in page_columns("members")[4:]),
+        words.cause_cell(g.loops[name]["cause"]),
+        *(words.plain_cell(row[c.key]) for c in words.page_columns("members")[4:]),
     )
 
 
 def _signs_table(g: GroupView) -> parts.Table:
     """Why there: the signs of the likeliest candidates side by side."""
     shown = {r["loop"]: json.loads(r["group_signs"]) for r in g.rows[:5] if r["group_signs"]}
-    columns = (*page_columns("signs"), *(parts.Column(loop, loop, True) for loop in shown))
+    columns = (*words.page_columns("signs"), *(parts.Column(loop, loop, True) for loop in shown))
     rows = (
         (
             parts.Cell(text),
             *(parts.Cell(f"{signs.get(k, 0.0):.2f}", signs.get(k, 0.0)) for signs in shown.values()),
         )
-        for k, text in texts("signs").items()
+        for k, text in words.texts("signs").items()
     )
-    return page_table("signs", rows, columns=columns)
+    return words.page_table("signs", rows, columns=columns)
 
 
 def group_page(g: GroupView, trends: Mapping[str, Thinned], night: str, paged: frozenset[str]) -> parts.Page:
@@ -147,16 +138,16 @@ def group_page(g: GroupView, trends: Mapping[str, Thinned], night: str, paged: f
         facts += [("Fix first", g.source["loop"]), ("Action there", action_there(g))]
     facts.append(("Others gain", f"{number(g.gain_pct)} % of span"))
     facts.append(("It starts elsewhere", f"{g.unseen_pct:.0f} %"))
-    members = page_table("members", (_member_cells(g, r, paged) for r in g.rows))
+    members = words.page_table("members", (_member_cells(g, r, paged) for r in g.rows))
     sections = parts.there(
-        parts.Section("What and where", (lead(sentence(g)), parts.Facts(tuple(facts)), graph(g))),
+        parts.Section("What and where", (words.lead(sentence(g)), parts.Facts(tuple(facts)), graph(g))),
         parts.Section("Loops", (members,)),
         parts.Section("Why there", (_signs_table(g),)),
         parts.section("Trends and spectra", aligned(g, trends), heat_map(g)),
     )
-    subtitle = f"{with_noun(len(g.rows), 'loop')}, night {night}."
+    subtitle = f"{words.with_noun(len(g.rows), 'loop')}, night {night}."
     return parts.Page(
-        page_name(g.number), f"Group {g.number}: one oscillation", subtitle, sections, (ALL_LOOPS,)
+        page_name(g.number), f"Group {g.number}: one oscillation", subtitle, sections, (words.ALL_LOOPS,)
     )
 
 

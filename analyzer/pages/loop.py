@@ -23,21 +23,7 @@ from analyzer.words.belief import wear_text
 from analyzer.words.reason import in_short
 from analyzer.words.units import row_settings
 from identification.mismatch.words import check
-from reports.pages import (
-    Block,
-    Cell,
-    Facts,
-    Line,
-    Listing,
-    Page,
-    Panels,
-    Plot,
-    Section,
-    Table,
-    Text,
-    section,
-    there,
-)
+from reports import pages as parts
 from reports.texts import slug
 
 WEEK = 7
@@ -57,11 +43,11 @@ def loop_page(
     rows: Sequence[Row],
     thin: Thinned | None,
     explained: Row | None = None,
-    more: Page | None = None,
-    shared: Section | None = None,
+    more: parts.Page | None = None,
+    shared: parts.Section | None = None,
     notes: Sequence[str] = (),
-    settings: Page | None = None,
-) -> Page:
+    settings: parts.Page | None = None,
+) -> parts.Page:
     """A loop's page.
 
     Parameters
@@ -70,20 +56,20 @@ def loop_page(
         The loop's nights, oldest first; the last is the night that the page is about.
     thin : Thinned or None
         Its trends of the last week.
-    explained, more : mapping or None, Page or None
+    explained, more : mapping or None, parts.Page or None
         The night's explanation of the loop (analyzer.columns.EXPLAINED), and its page.
-    shared : Section or None
+    shared : parts.Section or None
         What it shares with other loops.
     notes : sequence of str
         What people wrote about it, oldest first.
-    settings : Page or None
+    settings : parts.Page or None
         The page on which settings are tried; what it opens with stands here too.
     """
     row = rows[-1]
-    sections = there(
+    sections = parts.there(
         _first_section(row, thin),
-        section("Notes", words.listing(reversed(notes)) if notes else None),
-        section("What and why", _facts(row), _believed(row) if row["believed_nights"] else None),
+        parts.section("Notes", words.listing(reversed(notes)) if notes else None),
+        parts.section("What and why", _facts(row), _believed(row) if row["believed_nights"] else None),
         shared,
         _explained_section(explained, row),
         _evidence_section(row),
@@ -91,15 +77,17 @@ def loop_page(
         _moves(row),
         _limit_cycle(row),
         _of_settings(settings),
-        Section("Figures of the night, for experts", (_figures(row),), closed=True),
+        parts.Section("Figures of the night, for experts", (_figures(row),), closed=True),
         nights_section(rows),
     )
     about = [row["description"], row["type"], row["area"], f"night {row['night']}"]
     links = tuple(_links(row, more, settings, shared is not None))
-    return Page(slug(row["loop"]), row["loop"], ", ".join(filter(None, about)), sections, links)
+    return parts.Page(slug(row["loop"]), row["loop"], ", ".join(filter(None, about)), sections, links)
 
 
-def _links(row: Row, more: Page | None, settings: Page | None, shared: bool) -> Iterator[tuple[str, str]]:
+def _links(
+    row: Row, more: parts.Page | None, settings: parts.Page | None, shared: bool
+) -> Iterator[tuple[str, str]]:
     """To all loops, the loop's other pages, its group's, and to it beside the loop that it follows."""
     yield words.ALL_LOOPS
     if more is not None:
@@ -113,7 +101,7 @@ def _links(row: Row, more: Page | None, settings: Page | None, shared: bool) -> 
         yield f"Beside {row['source_loop']}", f"{BESIDE}.html#{pair}"
 
 
-def _first_section(row: Row, thin: Thinned | None) -> Section:
+def _first_section(row: Row, thin: Thinned | None) -> parts.Section:
     """What is wrong, what to do in three lines, and ten periods of it."""
     reason, drawn, scale = words.cell(row, "reason").text, None, words.pv_scale_of(row)
     order = tuple((f"{head}:", text) for head, text in work_order(row) if text)
@@ -121,11 +109,11 @@ def _first_section(row: Row, thin: Thinned | None) -> Section:
         opening = loop_pictures.close_span(row, thin)
         name = "SP, PV and OP" + (", the last ten periods" if opening else "")
         drawn = loop_pictures.trend_block("trend", name, thin, (), scale, opening)
-    do, events = Listing(order) if order else None, loop_pictures.turn_panels(row, scale)
-    return Section("What to do", there(lead(reason or "nothing was found"), do, drawn, events))
+    do, events = parts.Listing(order) if order else None, loop_pictures.turn_panels(row, scale)
+    return parts.Section("What to do", parts.there(lead(reason or "nothing was found"), do, drawn, events))
 
 
-def _facts(row: Row) -> Facts:
+def _facts(row: Row) -> parts.Facts:
     """What was found of a loop, to what it is tied, and its settings."""
     facts = [titled("action", row["action"] or "–"), titled("cause", row["cause"] or "not assessed")]
     shares = [(name, row[name]) for name in (f"osc_{c}_pct" for c in CAUSES)]
@@ -141,10 +129,10 @@ def _facts(row: Row) -> Facts:
         facts.append(("Settings in force", f"{row_settings(row)} ({row['form']} form{source})"))
     if row["kp_new"] is not None or row["ti_new"] is not None:
         facts.append(("Settings to type in", row_settings(row, "kp_new", "ti_new")))
-    return Facts(tuple(facts))
+    return parts.Facts(tuple(facts))
 
 
-def _believed(row: Row) -> Facts:
+def _believed(row: Row) -> parts.Facts:
     """What the nights together say, and how many they are."""
     nights = words.with_noun(int(row["believed_nights"]), "night")
     out = [("The verdict rests on", f"{nights} since {row['believed_since']}")]
@@ -157,60 +145,62 @@ def _believed(row: Row) -> Facts:
         out.append(("Play or stickband", f"{number(row['width_pct'])} % of OP ({ends})"))
     if row["wear_pct_per_month"] is not None:
         out.append(("It wears", wear_text(row)))
-    return Facts(tuple(out))
+    return parts.Facts(tuple(out))
 
 
-def _explained_section(found: Row | None, row: Row) -> Section | None:
+def _explained_section(found: Row | None, row: Row) -> parts.Section | None:
     """What the plain loop lacks, where the night was explained, and how that goes with the night's verdict."""
     if found is None:
         return None
     together = agreement(row, found["verdict"], found["block"])
     said = (f"{title(found['verdict']).capitalize()}: {found['reason']}", check(found))
-    return Section("What the plain loop lacks", (Text((*said, together) if together else said),))
+    return parts.Section("What the plain loop lacks", (parts.Text((*said, together) if together else said),))
 
 
-def _evidence_section(row: Row) -> Section:
+def _evidence_section(row: Row) -> parts.Section:
     """The clauses of the reason that no list shows, the signs, the model, the advice and what the data lack."""
     signs = sorted(json.loads(row["signs"] or "[]"), key=lambda s: -s["strength"])
     rows = [
         (
             words.cause_cell(s["points_to"]),
-            Cell(f"{s['strength']:.2f}", s["strength"]),
-            Cell(f"{s['text']} ({s['figures']})" if s.get("figures") else s["text"]),
+            parts.Cell(f"{s['strength']:.2f}", s["strength"]),
+            parts.Cell(f"{s['text']} ({s['figures']})" if s.get("figures") else s["text"]),
         )
         for s in signs
     ]
     more = in_short(row["reason"] or "")[1]
     known = known_figures(row, keys("model"))
-    blocks: tuple[Block, ...] = there(
-        Text(lead(more).paragraphs) if more else None,
-        page_table("evidence", rows) if rows else Text(("No sign of a fault.",)),
+    blocks: tuple[parts.Block, ...] = parts.there(
+        parts.Text(lead(more).paragraphs) if more else None,
+        page_table("evidence", rows) if rows else parts.Text(("No sign of a fault.",)),
         known if known.items else None,
-        Text((f"The advice rests on this: {row['advice']}",)) if row["advice"] else None,
-        Text((f"About the data: {row['notes']}.",), "note") if row["notes"] else None,
+        parts.Text((f"The advice rests on this: {row['advice']}",)) if row["advice"] else None,
+        parts.Text((f"About the data: {row['notes']}.",), "note") if row["notes"] else None,
     )
-    return Section("Evidence, for experts", blocks, closed=True)
+    return parts.Section("Evidence, for experts", blocks, closed=True)
 
 
-def _picture_section(thin: Thinned | None, row: Row) -> Section | None:
+def _picture_section(thin: Thinned | None, row: Row) -> parts.Section | None:
     """The last night's plane of PV over OP, and the rhythm of its error."""
     if thin is None or thin.time_s.size < 2:
         return None
     last = thin.between(row["start_s"] or 0.0, float("inf"))
     rhythm = loop_pictures.rhythm_plots(last, row["period_s"])
-    return Section("PV over OP, and its rhythm", (loop_pictures.pv_over_op(last, row), *rhythm))
+    return parts.Section("PV over OP, and its rhythm", (loop_pictures.pv_over_op(last, row), *rhythm))
 
 
-def _moves(row: Row) -> Section | None:
+def _moves(row: Row) -> parts.Section | None:
     """How PV answers moves of the set point, where there were some."""
     drawn = loop_pictures.answered_moves(row)
     if drawn is None:
         return None
-    growing = Text((row["growing"] + ".",), "lead") if row["growing"] else None
-    return section("Moves of the set point", growing, known_figures(row, keys("moves")), drawn, _phases(row))
+    growing = parts.Text((row["growing"] + ".",), "lead") if row["growing"] else None
+    return parts.section(
+        "Moves of the set point", growing, known_figures(row, keys("moves")), drawn, _phases(row)
+    )
 
 
-def _phases(row: Row) -> Table | None:
+def _phases(row: Row) -> parts.Table | None:
     """Moves of a programme that come back, a row a kind: how often, and the medians of their answers."""
     low, span = row["pv_lo"] or 0.0, (row["pv_hi"] or 100.0) - (row["pv_lo"] or 0.0)
     rows = []
@@ -223,22 +213,26 @@ def _phases(row: Row) -> Table | None:
     return page_table("phases", rows, note=unit) if rows else None
 
 
-def _limit_cycle(row: Row) -> Section | None:
+def _limit_cycle(row: Row) -> parts.Section | None:
     """Recorded against predicted limit cycle, and what new settings promise, where the night holds them."""
     known = [(name, row[f"{of}period_s"], row[f"{of}pv_amplitude_pct"]) for name, of in CYCLES.items()]
-    rows = [(Cell(n), Cell(duration(p), p), words.plain_cell(a)) for n, p, a in known if p is not None]
-    return Section("Limit cycle", (page_table("limit-cycle", rows),)) if len(rows) > 1 else None
+    rows = [
+        (parts.Cell(n), parts.Cell(duration(p), p), words.plain_cell(a)) for n, p, a in known if p is not None
+    ]
+    return parts.Section("Limit cycle", (page_table("limit-cycle", rows),)) if len(rows) > 1 else None
 
 
-def _of_settings(found: Page | None) -> Section | None:
+def _of_settings(found: parts.Page | None) -> parts.Section | None:
     """What the page of settings opens with: what is won and what it costs, in a sentence and a picture."""
     if found is None:
         return None
     first = found.sections[0]
-    return Section(first.title, tuple(b for b in first.blocks if isinstance(b, Text | Plot)))
+    return parts.Section(
+        first.title, tuple(b for b in first.blocks if isinstance(b, parts.Text | parts.Plot))
+    )
 
 
-def _figures(row: Row) -> Facts:
+def _figures(row: Row) -> parts.Facts:
     """The figures of the night that are known, in the loop's own unit too where they are percentages of span."""
     facts, scale = [], words.pv_scale_of(row)
     for name in keys("figures-of-a-night"):
@@ -246,32 +240,35 @@ def _figures(row: Row) -> Facts:
             term, text = titled(name, number(row[name]) + mark(row, name))
             own = "" if name in LEVELS else words.beside(BY_NAME[name].unit, row[name], scale)
             facts.append((term, text + own))
-    return Facts(tuple(facts))
+    return parts.Facts(tuple(facts))
 
 
-def nights_section(rows: Sequence[Row]) -> Section:
+def nights_section(rows: Sequence[Row]) -> parts.Section:
     """A table of a loop's nights, the last first, and pictures of how its oscillation and the width of its valve's
     fault grew or fell."""
-    plots = there(*(_over_nights(rows, column) for column in keys("figures-over-nights")), _widths(rows))
+    plots = parts.there(
+        *(_over_nights(rows, column) for column in keys("figures-over-nights")), _widths(rows)
+    )
     table = page_table("history", map(_night_cells, reversed(rows)))
-    return Section(
-        "Over the nights", there(Panels("nights", "Night by night", plots) if plots else None, table)
+    return parts.Section(
+        "Over the nights",
+        parts.there(parts.Panels("nights", "Night by night", plots) if plots else None, table),
     )
 
 
-def _night_cells(row: Row) -> tuple[Cell, ...]:
+def _night_cells(row: Row) -> tuple[parts.Cell, ...]:
     """One night's cells; the last says why where the loop was not assessed."""
-    lost = {} if row["status"] == Status.OK else {"action": Cell(f"{row['status']}: {row['reason']}")}
+    lost = {} if row["status"] == Status.OK else {"action": parts.Cell(f"{row['status']}: {row['reason']}")}
     return words.cells(row, "history", **lost)
 
 
-def _over_nights(rows: Sequence[Row], column: str) -> Plot | None:
+def _over_nights(rows: Sequence[Row], column: str) -> parts.Plot | None:
     """A figure over the nights."""
     line, shown = _by_night("each night", [r[column] for r in rows]), BY_NAME[column]
     return _nights_plot(f"nights-{slug(column)}", shown.title, shown.unit, (line,), 0.0)
 
 
-def _widths(rows: Sequence[Row]) -> Plot | None:
+def _widths(rows: Sequence[Row]) -> parts.Plot | None:
     """Width of the valve's fault as each night tells it, and as they do together, where it is certain."""
     alone = [(json.loads(r["witness"] or "{}").get("width") or [None])[0] for r in rows]
     certain = [r["width_pct"] if r["certain_since"] else None for r in rows]
@@ -281,15 +278,17 @@ def _widths(rows: Sequence[Row]) -> Plot | None:
     return _nights_plot("widths", "Width of the valve's fault", "% of OP", lines, 1.0)
 
 
-def _by_night(label: str, figures: Sequence[float | None], **drawn: Any) -> Line:
+def _by_night(label: str, figures: Sequence[float | None], **drawn: Any) -> parts.Line:
     """A figure of the nights up to this one, where it is known."""
     known = [(i - len(figures) + 1.0, y) for i, y in enumerate(figures) if y is not None]
     x, y = np.array(known, float).reshape(-1, 2).T
-    return Line(label, x, y, **drawn)
+    return parts.Line(label, x, y, **drawn)
 
 
-def _nights_plot(name: str, title: str, unit: str, lines: tuple[Line, ...], least: float) -> Plot | None:
+def _nights_plot(
+    name: str, title: str, unit: str, lines: tuple[parts.Line, ...], least: float
+) -> parts.Plot | None:
     """Figures over the nights, from 0 to `least` at least; None where fewer than three nights know them."""
     if min(line.x.size for line in lines) < 3:
         return None
-    return Plot(name, title, "nights before this one", unit, lines, reach=(0.0, least))
+    return parts.Plot(name, title, "nights before this one", unit, lines, reach=(0.0, least))

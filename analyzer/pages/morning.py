@@ -8,22 +8,12 @@ from dataclasses import replace
 from analyzer.columns import BY_NAME
 from analyzer.loop.cost import MARK, OF_RECORDED, SIGNIFICANCE, cost_column, mark
 from analyzer.loop.decisions import CAUSES, Cause, Status
-from analyzer.pages import maintenance
+from analyzer.pages import maintenance, words
 from analyzer.pages.groups import morning_table
 from analyzer.pages.loop_pictures import close_span, sparkline
 from analyzer.pages.plant import NightSum, area_table, plant_history, plant_map
 from analyzer.pages.reading import BESIDE, ShownNight, link_to, needs_a_look, oscillates
 from analyzer.pages.summary import first_things, since
-from analyzer.pages.words import (
-    Row,
-    cause_cell,
-    cells,
-    heading,
-    marked_cell,
-    page_columns,
-    page_table,
-    with_noun,
-)
 from analyzer.plantwide.view import GroupView
 from analyzer.words.units import changed_settings, row_settings
 from reports.pages import Cell, Listing, Page, Section, Table, Tiles, section, there
@@ -40,7 +30,7 @@ LINKS = (
 )
 
 
-def _of_worst(night: ShownNight, row: Row, follows: bool, by: str) -> dict[str, Cell]:
+def _of_worst(night: ShownNight, row: words.Row, follows: bool, by: str) -> dict[str, Cell]:
     """What a loop to touch is shown with and the store does not hold."""
     name, trend = link_to(night, row["loop"]), night.trends.get(row["loop"])
     drawn = None if trend is None else sparkline(trend, close_span(row, trend))
@@ -48,14 +38,14 @@ def _of_worst(night: ShownNight, row: Row, follows: bool, by: str) -> dict[str, 
     return {
         "loop": replace(name, text=FOLLOWER + name.text) if follows else name,
         "trend": Cell("", figure=drawn),
-        by: marked_cell(row, by),
-        "cause": cause_cell(row["cause"]),
+        by: words.marked_cell(row, by),
+        "cause": words.cause_cell(row["cause"]),
         "settings": Cell(changed_settings(row) if changed else row_settings(row)),
         "note": Cell(night.note(row["loop"])),
     }
 
 
-def _what_marks(rows: Sequence[Row], *columns: str) -> str:
+def _what_marks(rows: Sequence[words.Row], *columns: str) -> str:
     """What the mark behind figures means; '' where none of some columns has one."""
     return f"{MARK} {OF_RECORDED}." if any(mark(row, name) for row in rows for name in columns) else ""
 
@@ -64,21 +54,21 @@ def worst_table(night: ShownNight) -> Table:
     """The loops to touch, the worst first, followers under the loop that moves them."""
     here, by = {r["loop"] for r in night.worst}, cost_column(night.rows)
     noted = any(night.note(r["loop"]) for r in night.worst)
-    declared = page_columns("worst") if noted else page_columns("worst")[:-1]
-    shown = (*declared[:4], heading(by), *declared[4:])
-    rows = (cells(r, shown, **_of_worst(night, r, r["source_loop"] in here, by)) for r in night.worst)
-    return page_table("worst", rows, columns=shown, note=_what_marks(night.worst, by))
+    declared = words.page_columns("worst") if noted else words.page_columns("worst")[:-1]
+    shown = (*declared[:4], words.heading(by), *declared[4:])
+    rows = (words.cells(r, shown, **_of_worst(night, r, r["source_loop"] in here, by)) for r in night.worst)
+    return words.page_table("worst", rows, columns=shown, note=_what_marks(night.worst, by))
 
 
 def ranking(night: ShownNight) -> Table:
     """All loops of the night."""
     rows = []
     for r in night.rows:
-        own = {name: marked_cell(r, name) for name in ALL_COSTS}
-        own |= {name: marked_cell(r, name, ".0f") for name in ALL_SHARES}
-        own |= {"loop": link_to(night, r["loop"]), "cause": cause_cell(r["cause"])}
-        rows.append(cells(r, "ranking", **own))
-    return page_table("ranking", rows, note=_what_marks(night.rows, *ALL_COSTS))
+        own = {name: words.marked_cell(r, name) for name in ALL_COSTS}
+        own |= {name: words.marked_cell(r, name, ".0f") for name in ALL_SHARES}
+        own |= {"loop": link_to(night, r["loop"]), "cause": words.cause_cell(r["cause"])}
+        rows.append(words.cells(r, "ranking", **own))
+    return words.page_table("ranking", rows, note=_what_marks(night.rows, *ALL_COSTS))
 
 
 def waiting(night: ShownNight) -> list[tuple[str, str]]:
@@ -100,7 +90,9 @@ def _night_tiles(night: ShownNight) -> Tiles:
 def lost_table(night: ShownNight) -> Table:
     """Loops that were not assessed, and why."""
     lost = sorted((r for r in night.rows if r["status"] != Status.OK), key=lambda r: r["loop"])
-    return page_table("not-assessed", (cells(r, "not-assessed") for r in lost), searchable=len(lost) > 12)
+    return words.page_table(
+        "not-assessed", (words.cells(r, "not-assessed") for r in lost), searchable=len(lost) > 12
+    )
 
 
 def morning_page(
@@ -127,5 +119,5 @@ def morning_page(
         Section(f"Not assessed ({len(lost.rows)})", (lost,)),
     )
     by = BY_NAME[cost_column(night.rows)].title.lower()
-    subtitle = f"{with_noun(len(night.rows), 'loop')}, the worst first by {by}."
+    subtitle = f"{words.with_noun(len(night.rows), 'loop')}, the worst first by {by}."
     return Page("index", f"Loops in the morning of {night.name}", subtitle, sections, (*LINKS, *links))

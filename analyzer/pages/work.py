@@ -80,11 +80,6 @@ def _of_work(night: ShownNight, row: Row, work: Work, both: Sides) -> dict[str, 
     }
 
 
-def _order(work: Work) -> tuple[bool, str, float]:
-    """What is not finished first, by its date; then what was reached last."""
-    return work.state in FINISHED, work.due or "9999", -work.since_s
-
-
 def won(night: ShownNight, works: Mapping[str, Work], history: Mapping[str, Sequence[Row]]) -> Tiles | None:
     """What work that was finished since the start of the month brought; None where none was."""
     month = night.name[:7]
@@ -109,8 +104,9 @@ def work_page(store: Store, night: ShownNight) -> Page:
     names = [n for n in store.nights() if n <= night.name][-PAGES.work_nights :]
     history = by_loop(read_nights(store, names, READ, works))
     rows = {r["loop"]: r for r in night.rows if r["loop"] in works}
-    told = []
-    for k in sorted(rows, key=lambda loop: (_order(works[loop]), loop)):
+    told = []  # what is not finished first, by its date; then what was reached last
+    order = {k: (w.state in FINISHED, w.due or "9999", -w.since_s, k) for k, w in works.items()}
+    for k in sorted(rows, key=lambda loop: order[loop]):
         both = sides(history.get(k, ()), stamp(works[k].since_s, night.zone)[:10])
         told.append(cells(rows[k], "work", **_of_work(night, rows[k], works[k], both)))
     note = f"Since: nights after the day of the note, beside the {PAGES.before_work} before it."
