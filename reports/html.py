@@ -89,17 +89,13 @@ def _environment() -> Environment:
     return env
 
 
-def _digest(text: str) -> str:
-    return "'sha256-" + base64.b64encode(hashlib.sha256(text.encode()).digest()).decode() + "'"
-
-
 def policy(single_file: bool) -> str:
     """The content security policy: nothing from outside, no inline code but that of this page."""
+    scripts = styles = "'self' file:"
     if single_file:
-        scripts = " ".join(_digest(asset(a)) for a in ASSETS if a.endswith(".js"))
-        styles = " ".join(_digest(asset(a)) for a in ASSETS if a.endswith(".css"))
-    else:
-        scripts = styles = "'self' file:"
+        digests = {name: hashlib.sha256(asset(name).encode()).digest() for name in ASSETS}
+        allowed = {name: f"'sha256-{base64.b64encode(digest).decode()}'" for name, digest in digests.items()}
+        scripts, styles = (" ".join(allowed[a] for a in ASSETS if a.endswith(end)) for end in (".js", ".css"))
     parts = ("default-src 'none'", f"script-src {scripts}", f"style-src {styles}", "img-src data:")
     return "; ".join((*parts, "base-uri 'none'", "form-action 'none'"))
 

@@ -60,19 +60,18 @@ def area_table(rows: Sequence[Row]) -> Table:
     return page_table("areas", sorted(cells, key=lambda c: 101.0 if c[1].number is None else c[1].number))
 
 
-def _tile(night: ShownNight, row: Row, by: str) -> Tile:
-    kind = "calm" if not needs_a_look(row) else row["cause"] if row["cause"] in CAUSES else "unclear"
-    text = f"{row['loop']}: {number(cost(row, by))}. {cell(row, 'reason').text}"
-    return Tile(row["loop"], cost(row, by), kind, text, link_to(night, row["loop"]).href)
-
-
 def _plant_tiles(night: ShownNight, rows: Sequence[Row], by: str) -> tuple[Tile, ...]:
-    ordered = sorted(rows, key=lambda r: (-cost(r, by), r["loop"]))
-    tiles = [_tile(night, r, by) for r in ordered[: PAGES.area_tiles]]
-    rest = ordered[PAGES.area_tiles :]
+    """An area's loops, those that cost most first, and the others in one."""
+    ordered = sorted(((cost(r, by), r) for r in rows), key=lambda c: (-c[0], c[1]["loop"]))
+    tiles = []
+    for worth, row in ordered[: PAGES.area_tiles]:
+        kind = "calm" if not needs_a_look(row) else row["cause"] if row["cause"] in CAUSES else "unclear"
+        text = f"{row['loop']}: {number(worth)}. {cell(row, 'reason').text}"
+        tiles.append(Tile(row["loop"], worth, kind, text, link_to(night, row["loop"]).href))
+    rest = [worth for worth, _ in ordered[PAGES.area_tiles :]]
     if rest:
-        total = sum(cost(r, by) for r in rest)
-        tiles.append(Tile(f"{len(rest)} more", total, "calm", f"{len(rest)} more loops: {number(total)}"))
+        text = f"{len(rest)} more loops: {number(sum(rest))}"
+        tiles.append(Tile(f"{len(rest)} more", sum(rest), "calm", text))
     return tuple(tiles)
 
 

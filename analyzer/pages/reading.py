@@ -73,11 +73,9 @@ def nights_within(store: Store, span: Span) -> list[str]:
 def _tables(
     store: Store, table: str, loops: Collection[str], nights: Sequence[str], columns: Sequence[str] | None
 ) -> list[pa.Table]:
-    if not loops:
-        return []
-    paths = [store.file(table, night) for night in nights]
-    where = [("loop", "in", sorted(loops))]
-    return [read_stored(p, columns, where) for p in paths if p.exists()]
+    """The rows of some loops in a table of each night that has one."""
+    paths = [store.file(table, night) for night in nights] if loops else []
+    return [read_stored(p, columns, [("loop", "in", sorted(loops))]) for p in paths if p.exists()]
 
 
 def read_nights(
