@@ -24,16 +24,8 @@ WRITTEN = "pages.json"
 
 
 def forget_stale(out: Path, names: Sequence[str], kept_names: Collection[str] = ()) -> list[str]:
-    """Delete pages that an earlier writing left in a folder and this one did not write; nothing else is touched.
-
-    Parameters
-    ----------
-    out : Path
-    names : sequence of str
-        Files that this writing wrote.
-    kept_names : collection of str
-        Files that stay though this writing did not write them.
-    """
+    """Delete pages that an earlier writing left in a folder, but for the files that this one wrote (`names`) or that
+    stay all the same; nothing else is touched."""
     try:
         before = json.loads((out / WRITTEN).read_text("utf-8"))
     except (OSError, ValueError):

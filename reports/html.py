@@ -16,7 +16,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from reports import svg
-from reports.pages import MOST_LEVEL, Band, Cell, Floats, Page, Trend, WhatIf, levels
+from reports.pages import MOST_LEVEL, Cell, Floats, Page, Trend, WhatIf, levels
 from reports.pictures import asset, drawings, keys
 from reports.texts import visible_parts
 
@@ -38,22 +38,22 @@ def _coded(values: Floats, gap: np.ndarray) -> dict[str, object]:
     return {"low": low, "step": step, "data": base64.b64encode(level.astype("<u2").tobytes()).decode()}
 
 
-def _band(band: Band, gap: np.ndarray) -> dict[str, object]:
-    ends = {"low": _coded(band.low, gap), "high": _coded(band.high, gap)}
-    return {"label": band.label, "kind": band.kind, "panel": band.panel, **ends}
-
-
 def trend_data(trend: Trend) -> Markup:
     """A trend as JSON for the page's script; '<' is written as an escape, so that no text ends the script."""
     start = float(trend.time_s[0]) if trend.time_s.size else 0.0
     passed = trend.time_s - start
     tick = 1.0 if np.abs(passed - np.round(passed)).max(initial=0.0) < FINE_S else FINE_S
     offset = np.round(passed / tick).astype("<u4")
+    bands = [
+        {"label": b.label, "kind": b.kind, "panel": b.panel}
+        | {"low": _coded(b.low, trend.gap), "high": _coded(b.high, trend.gap)}
+        for b in trend.bands
+    ]
     data = {
         "start": start,
         "tick": tick,
         "time": base64.b64encode(offset.tobytes()).decode(),
-        "bands": [_band(b, trend.gap) for b in trend.bands],
+        "bands": bands,
         "panels": list(trend.panels),
         "marks": [{"x": m.x, "label": m.label} for m in trend.marks],
         "spans": [list(s) for s in trend.spans],
@@ -89,17 +89,13 @@ def _environment() -> Environment:
     return env
 
 
-def _digest(text: str) -> str:
-    return "'sha256-" + base64.b64encode(hashlib.sha256(text.encode()).digest()).decode() + "'"
-
-
 def policy(single_file: bool) -> str:
     """The content security policy: nothing from outside, no inline code but that of this page."""
+    scripts = styles = "'self' file:"
     if single_file:
-        scripts = " ".join(_digest(asset(a)) for a in ASSETS if a.endswith(".js"))
-        styles = " ".join(_digest(asset(a)) for a in ASSETS if a.endswith(".css"))
-    else:
-        scripts = styles = "'self' file:"
+        digests = {name: hashlib.sha256(asset(name).encode()).digest() for name in ASSETS}
+        allowed = {name: f"'sha256-{base64.b64encode(digest).decode()}'" for name, digest in digests.items()}
+        scripts, styles = (" ".join(allowed[a] for a in ASSETS if a.endswith(end)) for end in (".js", ".css"))
     parts = ("default-src 'none'", f"script-src {scripts}", f"style-src {styles}", "img-src data:")
     return "; ".join((*parts, "base-uri 'none'", "form-action 'none'"))
 

@@ -2,26 +2,15 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from markupsafe import escape
 
+from reports import svg
 from reports.pages import Field, Floats, Graph, HeatMap, Node, Tile, TreeMap
-from reports.svg import (
-    LETTER,
-    Axis,
-    Drawing,
-    box,
-    digits,
-    log_ticks,
-    named_places,
-    tick_x,
-    tick_y,
-    upright,
-    written,
-)
 
 NAMES, WIDTH, ROW, FOOT = 120.0, 640.0, 20.0, 44.0
 """Of a colour map: room for names, width of the map, height of a row, room below for the axis."""
@@ -39,23 +28,26 @@ HEAD = 17.0
 """Of a treemap: width and height, and room for a group's name."""
 
 
-def heat_map(m: HeatMap) -> Drawing:
+def heat_map(m: HeatMap) -> svg.Drawing:
     """Rows of cells whose colour is the deeper, the larger their share."""
     step, foot = WIDTH / max(m.x.size, 1), ROW * len(m.rows)
-    axis = Axis.of_cells(m.x, NAMES, NAMES + WIDTH)
+    axis = svg.Axis.of_cells(m.x, NAMES, NAMES + WIDTH)
     body = []
     for i, name in enumerate(m.rows):
-        body.append(written(NAMES - 8, ROW * i + 14, name, "end"))
+        body.append(svg.written(NAMES - 8, ROW * i + 14, name, "end"))
         for j in np.flatnonzero(np.isfinite(m.shares[i]) & (m.shares[i] > 0.02)):
-            cell = box(NAMES + j * step, ROW * i + 1, step + 0.3, ROW - 2)
+            cell = svg.box(NAMES + j * step, ROW * i + 1, step + 0.3, ROW - 2)
             body.append(f'<rect class="heat" {cell} fill-opacity="{min(m.shares[i, j], 1.0):.2f}"/>')
-    for tick in log_ticks(float(m.x.min()), float(m.x.max())) if m.x.size > 1 else []:
-        body += tick_x(axis.at(tick), (0, foot), f"{tick:g}")
+    for tick in svg.log_ticks(float(m.x.min()), float(m.x.max())) if m.x.size > 1 else []:
+        body.append(svg.tick_x(axis.at(tick), (0, foot), f"{tick:g}"))
     for mark in m.marks:
         at = axis.at(mark.x)
-        body += [upright(at, (0, foot), "mark"), written(at, foot + 28, mark.label, "middle", "marked")]
-    body.append(written(NAMES + WIDTH / 2, foot + 41, m.x_label, "middle", "axis"))
-    return Drawing(NAMES + WIDTH + 10, foot + FOOT, "".join(body), m.title, "chart")
+        body += [
+            svg.upright(at, (0, foot), "mark"),
+            svg.written(at, foot + 28, mark.label, "middle", "marked"),
+        ]
+    body.append(svg.written(NAMES + WIDTH / 2, foot + 41, m.x_label, "middle", "axis"))
+    return svg.Drawing(NAMES + WIDTH + 10, foot + FOOT, "".join(body), m.title, "chart")
 
 
 def opacities(value: Floats) -> Floats:
@@ -79,71 +71,64 @@ def _cells(f: Field) -> list[str]:
         if kind == "swings" and opacity[i, j] <= 0:
             continue
         shade = f' fill-opacity="{opacity[i, j]:.2f}"' if kind == "swings" else ""
-        cell = box(left + j * wide, height - (i + 1) * high, wide + 0.3, high + 0.3)
+        cell = svg.box(left + j * wide, height - (i + 1) * high, wide + 0.3, high + 0.3)
         out.append(f'<rect class="cell {kind}" {cell}{shade}/>')
     return out
 
 
-def field(f: Field, alone: bool = False) -> Drawing:
+def field(f: Field, alone: bool = False) -> svg.Drawing:
     """Cells coloured by their value, two axes, and named points; `alone`, without the figure under an axis's name."""
     left, width, height, foot = FIELD
     across, along = (left, left + width), (0.0, height)
-    x, y = Axis.of_cells(f.x, *across), Axis.of_cells(f.y, height, 0.0)
+    x, y = svg.Axis.of_cells(f.x, *across), svg.Axis.of_cells(f.y, height, 0.0)
     body = _cells(f)
-    for tick in log_ticks(float(f.x[0]), float(f.x[-1])):
-        body += tick_x(x.at(tick), along, f"{tick:g}")
-    for tick in log_ticks(float(f.y[0]), float(f.y[-1])):
+    for tick in svg.log_ticks(float(f.x[0]), float(f.x[-1])):
+        body.append(svg.tick_x(x.at(tick), along, f"{tick:g}"))
+    for tick in svg.log_ticks(float(f.y[0]), float(f.y[-1])):
         down, text = y.at(tick), f"{tick:g}"
-        body += tick_y(down, across, "" if alone and down < TITLED and len(text) > 3 else text)
-    body.append(written(left + width / 2, height + 32, f.x_label, "middle", "axis"))
-    body.append(written(4, 12, f.y_label, "start", "axis"))
+        body.append(svg.tick_y(down, across, "" if alone and down < TITLED and len(text) > 3 else text))
+    body.append(svg.written(left + width / 2, height + 32, f.x_label, "middle", "axis"))
+    body.append(svg.written(4, 12, f.y_label, "start", "axis"))
     held = [(min(max(x.at(p.x), left), left + width), min(max(y.at(p.y), 0.0), height)) for p in f.places]
     named = [(place, *at) for place, at in zip(f.places, held, strict=True)]
-    body += named_places(named, (left, 0.0, left + width, height))
-    return Drawing(left + width + 10, height + foot, "".join(body), f.title, "graph", natural=True)
+    body += svg.named_places(named, (left, 0.0, left + width, height))
+    return svg.Drawing(left + width + 10, height + foot, "".join(body), f.title, "graph", natural=True)
 
 
 def places(g: Graph) -> dict[str, tuple[float, float]]:
     """Upper left corner of every box: columns from left to right, each centred."""
-    by_column: dict[int, list[Node]] = {}
+    columns: dict[int, list[Node]] = defaultdict(list)
     for node in g.nodes:
-        by_column.setdefault(node.column, []).append(node)
-    most = max((len(nodes) for nodes in by_column.values()), default=0)
+        columns[node.column].append(node)
+    most = max(map(len, columns.values()), default=0)
     out = {}
-    for at, column in enumerate(sorted(by_column)):
-        nodes = by_column[column]
+    for at, (_, nodes) in enumerate(sorted(columns.items())):
         top = 0.5 * (most - len(nodes)) * (BOX[1] + GAP[1])
         for i, node in enumerate(nodes):
             out[node.name] = 4 + at * (BOX[0] + GAP[0]), 4 + top + i * (BOX[1] + GAP[1])
     return out
 
 
-def _arrow(first: tuple[float, float], last: tuple[float, float], text: str) -> list[str]:
-    """A curve from one place to another with a tip and a text at its end."""
-    (a, b), (c, d) = first, last
-    middle = digits(0.5 * (a + c))
-    curve = f"M{digits(a)},{digits(b)}C{middle},{digits(b)} {middle},{digits(d)} {digits(c - 6)},{digits(d)}"
-    tip = f"M{digits(c)},{digits(d)}l-8,-4v8Z"
-    drawn = f'<path class="line flow" d="{curve}"/><path class="tip" d="{tip}"/>'
-    return [drawn, written(c - 10, d - 6, text, "end", "tick")]
+def _arrow(first: tuple[float, float], last: tuple[float, float], text: str) -> str:
+    """A curve from one box to another with a tip and a text at its end."""
+    a, b, c, d = first[0] + BOX[0], first[1] + BOX[1] / 2, last[0] - 2, last[1] + BOX[1] / 2
+    x1, y1, middle, end, x2, y2 = map(svg.digits, (a, b, 0.5 * (a + c), c - 6, c, d))
+    curve = f"M{x1},{y1}C{middle},{y1} {middle},{y2} {end},{y2}"
+    tip = f'<path class="tip" d="M{x2},{y2}l-8,-4v8Z"/>'
+    return f'<path class="line flow" d="{curve}"/>{tip}' + svg.written(c - 10, d - 6, text, "end", "tick")
 
 
-def graph(g: Graph) -> Drawing:
+def graph(g: Graph) -> svg.Drawing:
     """Boxes and arrows."""
     at = places(g)
-    body = []
-    for arrow in g.arrows:
-        if arrow.first in at and arrow.last in at:
-            (x1, y1), (x2, y2) = at[arrow.first], at[arrow.last]
-            body += _arrow((x1 + BOX[0], y1 + BOX[1] / 2), (x2 - 2, y2 + BOX[1] / 2), arrow.text)
+    body = [_arrow(at[a.first], at[a.last], a.text) for a in g.arrows if a.first in at and a.last in at]
     for node in g.nodes:
         x, y = at[node.name]
-        body.append(f'<rect class="box {node.kind}" rx="5" {box(x, y, *BOX)}/>')
-        body.append(written(x + 8, y + 16, node.name, "start", "strong"))
-        body.append(written(x + 8, y + 31, node.text, "start", "tick"))
-    width = max((x for x, _ in at.values()), default=0.0) + BOX[0] + 4
-    height = max((y for _, y in at.values()), default=0.0) + BOX[1] + 4
-    return Drawing(width, height, "".join(body), g.title, "graph", natural=True)
+        body.append(f'<rect class="box {node.kind}" rx="5" {svg.box(x, y, *BOX)}/>')
+        body.append(svg.written(x + 8, y + 16, node.name, "start", "strong"))
+        body.append(svg.written(x + 8, y + 31, node.text, "start", "tick"))
+    width, height = (max((place[k] for place in at.values()), default=0.0) + BOX[k] + 4 for k in (0, 1))
+    return svg.Drawing(width, height, "".join(body), g.title, "graph", natural=True)
 
 
 class Room(NamedTuple):
@@ -183,19 +168,15 @@ def _row(areas: Sequence[float], side: float) -> int:
 
 def _laid(areas: Sequence[float], room: Room) -> tuple[list[Room], Room]:
     """A row along the shorter side of a room, and the room that is left."""
-    if room.w < room.h:
-        row, left = _laid(areas, _mirrored(room))
-        return [_mirrored(r) for r in row], _mirrored(left)
+    if room.w < room.h:  # the same of the room turned over
+        row, left = _laid(areas, Room(room.y, room.x, room.h, room.w))
+        return [Room(r.y, r.x, r.h, r.w) for r in row], Room(left.y, left.x, left.h, left.w)
     out, at = [], room.y
     width = sum(areas) / room.h
     for area in areas:
         out.append(Room(room.x, at, width, area / width))
         at += area / width
     return out, Room(room.x + width, room.y, max(room.w - width, 1e-9), room.h)
-
-
-def _mirrored(room: Room) -> Room:
-    return Room(room.y, room.x, room.h, room.w)
 
 
 def laid_out(m: TreeMap, width: float, height: float) -> list[tuple[str, Room, list[tuple[Tile, Room]]]]:
@@ -213,22 +194,22 @@ def laid_out(m: TreeMap, width: float, height: float) -> list[tuple[str, Room, l
 
 def fitting(text: str, width: float) -> str:
     """A text cut to a width, '' where not even four letters fit."""
-    most = int((width - 6) / LETTER)
+    most = int((width - 6) / svg.LETTER)
     return text if len(text) <= most else text[: most - 1] + "…" if most >= 4 else ""
 
 
-def tree_map(m: TreeMap) -> Drawing:
+def tree_map(m: TreeMap) -> svg.Drawing:
     """The map, each tile with its text for who points at it."""
     body = []
     for name, room, tiles in laid_out(m, *TREE):
-        body.append(written(room.x + 3, room.y + 13, fitting(name, room.w), kind="strong"))
+        body.append(svg.written(room.x + 3, room.y + 13, fitting(name, room.w), kind="strong"))
         body += [_tile(t, p) for t, p in tiles]
-    return Drawing(*TREE, "".join(body), m.title, "chart treemap", role="group")
+    return svg.Drawing(*TREE, "".join(body), m.title, "chart treemap", role="group")
 
 
 def _tile(t: Tile, p: Room) -> str:
     title = f"<title>{escape(t.text)}</title>"
-    drawn = f'<rect class="tile {escape(t.kind)}" {box(*p)}>{title}</rect>'
+    drawn = f'<rect class="tile {escape(t.kind)}" {svg.box(*p)}>{title}</rect>'
     if p.h >= 16:
-        drawn += written(p.x + 4, p.y + 13, fitting(t.name, p.w), kind="on")
+        drawn += svg.written(p.x + 4, p.y + 13, fitting(t.name, p.w), kind="on")
     return f'<a href="{escape(t.href)}">{drawn}</a>' if t.href else drawn

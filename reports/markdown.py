@@ -5,20 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 
-from reports.pages import (
-    Beside,
-    Block,
-    Cell,
-    Facts,
-    Listing,
-    Page,
-    Picture,
-    Section,
-    Table,
-    Text,
-    Tiles,
-    WhatIf,
-)
+from reports import pages as parts
 from reports.texts import visible
 
 MARKS = re.compile(r"([\\`*_\[\]#!|~$])")
@@ -35,7 +22,7 @@ def escaped(text: str) -> str:
     return ADDRESSES.sub(r"\g<0>&#8203;", text).replace("@", "&#64;")
 
 
-def _cell(cell: Cell) -> str:
+def _cell(cell: parts.Cell) -> str:
     text, href = escaped(cell.text), re.sub(r"\.html\Z", ".md", cell.href)
     return f"[{text}]({href})" if href and text else text
 
@@ -46,7 +33,7 @@ def rows_of_table(head: Sequence[str], rows: Iterable[Iterable[str]], rules: Seq
     return [f"| {' | '.join(head)} |", drawn, *(f"| {' | '.join(row)} |" for row in rows)]
 
 
-def _table(table: Table) -> list[str]:
+def _table(table: parts.Table) -> list[str]:
     shown = [i for i, c in enumerate(table.columns) if c.key != "trend" and not c.csv_only]
     head = [escaped(table.columns[i].title) for i in shown]
     body = ([_cell(row[i]) for i in shown] for row in table.rows)
@@ -56,21 +43,21 @@ def _table(table: Table) -> list[str]:
     return [*title, *lines, *note]
 
 
-def _block(block: Block, folder: str) -> list[str]:
+def _block(block: parts.Block, folder: str) -> list[str]:
     match block:
-        case Table():
+        case parts.Table():
             return _table(block)
-        case Text():
+        case parts.Text():
             return [line for p in block.paragraphs for line in (escaped(p), "")][:-1]
-        case Listing():
+        case parts.Listing():
             return [
                 f"- {f'**{escaped(lead)}** ' if lead else ''}{escaped(text)}" for lead, text in block.items
             ]
-        case Facts():
+        case parts.Facts():
             return [f"- {escaped(term)}: {escaped(detail)}" for term, detail in block.items]
-        case Tiles():
+        case parts.Tiles():
             return [f"- **{escaped(figure)}** {escaped(what)}" for figure, what, _ in block.items]
-        case WhatIf() | Beside():
+        case parts.WhatIf() | parts.Beside():
             return []
         case _:
             if not folder:
@@ -79,13 +66,13 @@ def _block(block: Block, folder: str) -> list[str]:
             return [f"![{escaped(block.title)}]({folder}/{block.name}.svg)", *caption]
 
 
-def _section(section: Section, folder: str) -> list[str]:
+def _section(section: parts.Section, folder: str) -> list[str]:
     shown = [lines for b in section.blocks if (lines := _block(b, folder))]
-    parts = [line for lines in shown for line in (*lines, "")]
-    return [f"## {escaped(section.title)}", "", *parts] if parts else []
+    told = [line for lines in shown for line in (*lines, "")]
+    return [f"## {escaped(section.title)}", "", *told] if told else []
 
 
-def render(page: Page, folder: str = "pictures") -> str:
+def render(page: parts.Page, folder: str = "pictures") -> str:
     """A page as Markdown.
 
     Parameters
@@ -100,6 +87,6 @@ def render(page: Page, folder: str = "pictures") -> str:
     return "\n".join([*head, *body, *foot]).rstrip() + "\n"
 
 
-def pictures(page: Page) -> Sequence[Picture]:
+def pictures(page: parts.Page) -> Sequence[parts.Picture]:
     """The blocks that become pictures."""
-    return [b for s in page.sections for b in s.blocks if isinstance(b, Picture)]
+    return [b for s in page.sections for b in s.blocks if isinstance(b, parts.Picture)]

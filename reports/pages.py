@@ -8,10 +8,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+T = TypeVar("T")
 Floats = NDArray[np.float64]
 Masks = NDArray[np.bool_]
 
@@ -60,12 +62,18 @@ MOST_ROWS = 3000
 
 
 @dataclass(frozen=True, slots=True)
-class Table:
-    """A table; `facets`: keys of columns whose values filter it; `cards`: on a phone a card a row;
-    `beside`: the page on which rows are laid beside each other, '' for none."""
+class Named:
+    """What a block has that is referred to: its name in files and addresses, and its title."""
 
     name: str
     title: str
+
+
+@dataclass(frozen=True, slots=True)
+class Table(Named):
+    """A table; `facets`: keys of columns whose values filter it; `cards`: on a phone a card a row;
+    `beside`: the page on which rows are laid beside each other, '' for none."""
+
     columns: tuple[Column, ...]
     rows: tuple[tuple[Cell, ...], ...]
     note: str = ""
@@ -101,11 +109,9 @@ class IntervalBar:
 
 
 @dataclass(frozen=True, slots=True)
-class IntervalChart:
+class IntervalChart(Named):
     """Changes as bars with intervals, grouped."""
 
-    name: str
-    title: str
     unit: str
     bars: tuple[IntervalBar, ...]
     caption: str = ""
@@ -151,15 +157,13 @@ class Area:
 
 
 @dataclass(frozen=True, slots=True)
-class Plot:
+class Plot(Named):
     """Lines and points over two axes, with areas under them and marks.
 
     log : axes that count in powers of ten, of "x" and "y"; all that lies on them is above zero; reach : values that
     the vertical axis holds at least, so that small things look small
     """
 
-    name: str
-    title: str
     x_label: str
     y_label: str
     lines: tuple[Line, ...]
@@ -172,11 +176,9 @@ class Plot:
 
 
 @dataclass(frozen=True, slots=True)
-class Panels:
+class Panels(Named):
     """Small plots of one figure, side by side as room allows, with one key for all."""
 
-    name: str
-    title: str
     plots: tuple[Plot, ...]
     caption: str = ""
 
@@ -193,7 +195,7 @@ class Band:
 
 
 @dataclass(frozen=True, slots=True)
-class Trend:
+class Trend(Named):
     """Signals over time on linked axes.
 
     time_s : start of each bucket [s since 1970-01-01 UTC], rising, shape (b,); gap : True where nothing is
@@ -201,8 +203,6 @@ class Trend:
     first, all where None; least : height of each panel's axis at least [its unit], so that small things look small
     """
 
-    name: str
-    title: str
     time_s: Floats
     gap: Masks
     bands: tuple[Band, ...]
@@ -215,26 +215,22 @@ class Trend:
 
 
 @dataclass(frozen=True, slots=True)
-class Beside:
+class Beside(Named):
     """Trends of which a reader shows up to `most` under each other on one time axis; ours: as a screen holds."""
 
-    name: str
-    title: str
     trends: tuple[Trend, ...]
     caption: str = ""
     most: int = 6
 
 
 @dataclass(frozen=True, slots=True)
-class HeatMap:
+class HeatMap(Named):
     """Rows of shares as colours over one axis that counts in powers.
 
     x : middle of each column, rising evenly in logarithms, shape (b,); rows : names; shares : 0 (nothing) to 1 (full
     colour), NaN where there is none, shape (rows, b); marks lie on the axis
     """
 
-    name: str
-    title: str
     x_label: str
     x: Floats
     rows: tuple[str, ...]
@@ -244,15 +240,13 @@ class HeatMap:
 
 
 @dataclass(frozen=True, slots=True)
-class Field:
+class Field(Named):
     """A value over two axes that count in powers.
 
     x, shape (n,), and y, shape (m,), rising evenly in logarithms; value, shape (m, n), coloured by its logarithm, 0
     where there is none; calm and unstable, bool, shape (m, n), with colours of their own; keys names the colours
     """
 
-    name: str
-    title: str
     x_label: str
     y_label: str
     x: Floats
@@ -285,11 +279,9 @@ class Arrow:
 
 
 @dataclass(frozen=True, slots=True)
-class Graph:
+class Graph(Named):
     """Boxes with arrows between them, drawn from left to right."""
 
-    name: str
-    title: str
     nodes: tuple[Node, ...]
     arrows: tuple[Arrow, ...]
     caption: str = ""
@@ -307,27 +299,23 @@ class Tile:
 
 
 @dataclass(frozen=True, slots=True)
-class TreeMap:
+class TreeMap(Named):
     """Rectangles as large as what they stand for, those of a group together under its name; `keys` names the colours:
     (kind, what it is)."""
 
-    name: str
-    title: str
     groups: tuple[tuple[str, tuple[Tile, ...]], ...]
     keys: tuple[tuple[str, str], ...] = ()
     caption: str = ""
 
 
 @dataclass(frozen=True, slots=True)
-class WhatIf:
+class WhatIf(Named):
     """A loop to be tried with other settings in the page itself.
 
     model : process, valve, law, units and named settings as JSON (analyzer.pages.compared); load : what adds to PV at
     each scan [% PV], shape (n,)
     """
 
-    name: str
-    title: str
     model: str
     load: Floats
     caption: str = ""
@@ -401,6 +389,17 @@ class Section:
     title: str
     blocks: tuple[Block, ...]
     closed: bool = False
+
+
+def there(*parts: T | None) -> tuple[T, ...]:
+    """The parts of a page that there are: those that are None are left out."""
+    return tuple(part for part in parts if part is not None)
+
+
+def section(title: str, *blocks: Block | None, closed: bool = False) -> Section | None:
+    """A section of the blocks that there are; None without any."""
+    shown: tuple[Block, ...] = there(*blocks)
+    return Section(title, shown, closed) if shown else None
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from importlib.resources import files
 
@@ -29,6 +29,15 @@ OWN = (
 """What the style sheet does not say, for pages draw their trends by a script."""
 
 
+DRAWN: Mapping[type[Picture], Callable[..., Drawing]] = {
+    Plot: plots.plot,
+    HeatMap: maps.heat_map,
+    Graph: maps.graph,
+    TreeMap: maps.tree_map,
+}
+"""How blocks of one drawing are drawn."""
+
+
 @cache
 def asset(name: str) -> str:
     """Text of a style sheet, script or licence."""
@@ -40,23 +49,15 @@ def drawings(block: Picture, zone: str = "UTC", alone: bool = False) -> list[tup
 
     alone : whether they are drawn for a file of its own.
     """
-    match block:
-        case Plot():
-            return [("", plots.plot(block))]
-        case Panels():
-            return [(p.title, plots.plot(p)) for p in block.plots]
-        case IntervalChart():
-            return [("", drawn) for drawn in plots.intervals(block)]
-        case Trend():
-            return [("", plots.trend(block, zone))]
-        case HeatMap():
-            return [("", maps.heat_map(block))]
-        case Field():
-            return [("", maps.field(block, alone))]
-        case Graph():
-            return [("", maps.graph(block))]
-        case TreeMap():
-            return [("", maps.tree_map(block))]
+    if isinstance(block, Panels):
+        return [(p.title, plots.plot(p)) for p in block.plots]
+    if isinstance(block, IntervalChart):
+        return [("", drawn) for drawn in plots.intervals(block)]
+    if isinstance(block, Trend):
+        return [("", plots.trend(block, zone))]
+    if isinstance(block, Field):
+        return [("", maps.field(block, alone))]
+    return [("", DRAWN[type(block)](block))]
 
 
 def _swatches(block: Picture) -> list[tuple[str, str]]:
@@ -70,15 +71,12 @@ def _swatches(block: Picture) -> list[tuple[str, str]]:
     else:
         shown = block.plots if isinstance(block, Panels) else (block,) if isinstance(block, Plot) else ()
         named = {line.label: (line.kind, line.joined) for p in shown for line in p.lines}
+    dots, line = 'class="dots {}" d="M5,6h0M11,6h0M17,6h0"', 'class="line {}" d="M0,6H22"'
     lines = [
-        (label, f'<path class="line {kind}" d="M0,6H22"/>' if joined else _dots(kind))
+        (label, f"<path {(line if joined else dots).format(kind)}/>")
         for label, (kind, joined) in named.items()
     ]
     return lines if len(lines) > 1 else []
-
-
-def _dots(kind: str) -> str:
-    return f'<path class="dots {kind}" d="M5,6h0M11,6h0M17,6h0"/>'
 
 
 def keys(block: Picture) -> Markup:

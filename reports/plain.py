@@ -9,7 +9,7 @@ import textwrap
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from rich.cells import cell_len, chop_cells, set_cell_size
+from rich.cells import cell_len, chop_cells
 
 from reports.pages import Block, Cell, Column, Facts, Listing, Page, Table, Text, Tiles
 from reports.texts import harmless, visible, visible_parts
@@ -133,11 +133,9 @@ def _folded(text: str, width: int) -> list[str]:
 
 
 def _line(cells: Sequence[str], columns: Sequence[Column], sizes: Sequence[int]) -> str:
-    padded = (_padded(cell, h.numeric, size) for cell, h, size in zip(cells, columns, sizes, strict=True))
-    return f" {GAP.join(padded)}".rstrip()
-
-
-def _padded(text: str, right: bool, size: int) -> str:
-    if text.isascii():
-        return text.rjust(size) if right else text.ljust(size)
-    return " " * (size - cell_len(text)) + text if right else set_cell_size(text, size)
+    """Cells side by side, each filled up to its column's size on the screen."""
+    filled = []
+    for text, column, size in zip(cells, columns, sizes, strict=True):
+        space = " " * (size - cell_len(text))
+        filled.append(space + text if column.numeric else text + space)
+    return f" {GAP.join(filled)}".rstrip()

@@ -9,20 +9,8 @@ from zoneinfo import ZoneInfo
 
 import numpy as np
 
+from reports import svg
 from reports.pages import Band, Floats, IntervalBar, IntervalChart, Line, Mark, Plot, Trend
-from reports.svg import (
-    Axis,
-    Drawing,
-    between,
-    box,
-    digits,
-    named_places,
-    points,
-    tick_x,
-    tick_y,
-    upright,
-    written,
-)
 
 PLOT = (520.0, 300.0)
 MARGIN = (56.0, 12.0, 12.0, 42.0)
@@ -59,7 +47,7 @@ def _extent(values: list[Floats], pad: float) -> tuple[float, float]:
     return low - space, high + space
 
 
-def _axes(p: Plot) -> tuple[Axis, Axis]:
+def _axes(p: Plot) -> tuple[svg.Axis, svg.Axis]:
     """Both axes of a plot, with room around points but none beside lines."""
     joined = any(line.joined for line in p.lines)
     x = [line.x for line in p.lines] + [a.x for a in p.areas]
@@ -68,8 +56,8 @@ def _axes(p: Plot) -> tuple[Axis, Axis]:
     logs = {axis: axis in p.log for axis in "xy"}
     x, y = ([np.log10(np.maximum(v, 1e-300)) if logs[a] else v for v in of] for a, of in (("x", x), ("y", y)))
     (width, height), (left, right, top, bottom) = PLOT, MARGIN
-    across = Axis(*_extent(x, 0.0 if joined else 0.04), left, width - right, logs["x"])
-    return across, Axis(*_extent(y, 0.04), height - bottom, top, logs["y"])
+    across = svg.Axis(*_extent(x, 0.0 if joined else 0.04), left, width - right, logs["x"])
+    return across, svg.Axis(*_extent(y, 0.04), height - bottom, top, logs["y"])
 
 
 def _few(values: Floats) -> Floats:
@@ -78,52 +66,52 @@ def _few(values: Floats) -> Floats:
 
 
 def _line(line: Line, x: Floats, y: Floats) -> str:
-    there = points(x, y)
+    there = svg.points(x, y)
     if line.joined:
         return f'<path class="line {line.kind}" d="M{"L".join(there)}"/>' if there else ""
     return f'<path class="dots {line.kind}" d="{"".join(f"M{p}h0" for p in there)}"/>'
 
 
-def _mark(mark: Mark, x: Axis, ends: tuple[float, float]) -> list[str]:
+def _mark(mark: Mark, x: svg.Axis, ends: tuple[float, float]) -> str:
     """A marked place with its name, on the side where there is room."""
     at = x.at(mark.x)
     anchor, aside = ("start", 4) if at < PLOT[0] * 0.6 else ("end", -4)
-    return [upright(at, ends, "mark"), written(at + aside, ends[0] + 12, mark.label, anchor, "marked")]
+    return svg.upright(at, ends, "mark") + svg.written(at + aside, ends[0] + 12, mark.label, anchor, "marked")
 
 
 def _turned(x: float, y: float, text: str) -> str:
     """The label of a vertical axis."""
-    label = written(0, 0, text, "middle", "axis")
-    return f'<g transform="translate({digits(x)} {digits(y)}) rotate(-90)">{label}</g>'
+    label = svg.written(0, 0, text, "middle", "axis")
+    return f'<g transform="translate({svg.digits(x)} {svg.digits(y)}) rotate(-90)">{label}</g>'
 
 
-def plot(p: Plot) -> Drawing:
+def plot(p: Plot) -> svg.Drawing:
     """Lines or points over two axes."""
     x, y = _axes(p)
     across, along = (x.first, x.last), (y.last, y.first)
-    body = [part for v in x.ticks(6) for part in tick_x(x.at(v), along, f"{v:.6g}", 16)]
-    body += [part for v in y.ticks(5) for part in tick_y(y.at(v), across, f"{v:.6g}")]
+    body = [svg.tick_x(x.at(v), along, f"{v:.6g}", 16) for v in x.ticks(6)]
+    body += [svg.tick_y(y.at(v), across, f"{v:.6g}") for v in y.ticks(5)]
     for a in p.areas:
-        outline = between(x.places(_few(a.x)), y.places(_few(a.low)), y.places(_few(a.high)))
+        outline = svg.between(x.places(_few(a.x)), y.places(_few(a.low)), y.places(_few(a.high)))
         body += [f'<path class="area {a.kind}" d="{outline}"/>'] if outline else []
     body += [_line(line, x.places(_few(line.x)), y.places(_few(line.y))) for line in p.lines]
-    body += [part for mark in p.marks for part in _mark(mark, x, along)]
+    body += [_mark(mark, x, along) for mark in p.marks]
     named = [(place, x.at(place.x), y.at(place.y)) for place in p.places]
-    body += named_places(named, (across[0], along[0], across[1], along[1]))
-    body.append(written((x.first + x.last) / 2, PLOT[1] - 6, p.x_label, "middle", "axis"))
+    body += svg.named_places(named, (across[0], along[0], across[1], along[1]))
+    body.append(svg.written((x.first + x.last) / 2, PLOT[1] - 6, p.x_label, "middle", "axis"))
     body.append(_turned(13, (y.first + y.last) / 2, p.y_label))
-    return Drawing(*PLOT, "".join(body), f"{p.title}: {p.y_label} over {p.x_label}", "plot")
+    return svg.Drawing(*PLOT, "".join(body), f"{p.title}: {p.y_label} over {p.x_label}", "plot")
 
 
-def intervals(chart: IntervalChart) -> list[Drawing]:
+def intervals(chart: IntervalChart) -> list[svg.Drawing]:
     """Changes as bars with intervals: a picture for each label, side by side as room allows, a row for each group;
     labels of which nothing is known are left out."""
     rows = list(dict.fromkeys(b.group for b in chart.bars))
     known = [b.label for b in chart.bars if b.value is not None]
-    names = "".join(written(0, 42 + ROW * i, row) for i, row in enumerate(rows))
+    names = "".join(svg.written(0, 42 + ROW * i, row) for i, row in enumerate(rows))
     size = LABELS + sum(PANEL), 46 + ROW * len(rows)
     return [
-        Drawing(*size, names + _panel(chart, label, rows), f"{label}, {chart.unit}", "chart small")
+        svg.Drawing(*size, names + _panel(chart, label, rows), f"{label}, {chart.unit}", "chart small")
         for label in dict.fromkeys(known)
     ]
 
@@ -131,58 +119,54 @@ def intervals(chart: IntervalChart) -> list[Drawing]:
 def _panel(chart: IntervalChart, label: str, rows: list[str]) -> str:
     ends = [x for b in chart.bars for x in (b.low, b.high, b.value) if x is not None and math.isfinite(x)]
     low, high = min([-10.0, *(max(e, -RIM) for e in ends)]), max([10.0, *(min(e, RIM) for e in ends)])
-    x, foot = Axis(low, high, LABELS, LABELS + PANEL[0]), 26 + ROW * len(rows)
-    body = [written(LABELS, 14, label, "start", "strong")]
+    x, foot = svg.Axis(low, high, LABELS, LABELS + PANEL[0]), 26 + ROW * len(rows)
+    body = [svg.written(LABELS, 14, label, "start", "strong")]
     for tick in x.ticks(4):
-        body += tick_x(x.at(tick), (22, foot), f"{tick:g}", 14, "grid" if tick else "zero")
+        body.append(svg.tick_x(x.at(tick), (22, foot), f"{tick:g}", 14, "grid" if tick else "zero"))
     own = [b for b in chart.bars if b.label == label]
     return "".join([*body, *(_interval(b, 38 + ROW * rows.index(b.group), x) for b in own)])
 
 
-def _interval(bar: IntervalBar, y: float, x: Axis) -> str:
+def _interval(bar: IntervalBar, y: float, x: svg.Axis) -> str:
     """A bar from zero to the change, its interval as a line, both cut at the ends; the figure beside it."""
     if bar.value is None or bar.low is None or bar.high is None:
-        return written(x.last + PANEL[1], y + 4, "–", "end", "quiet")
+        return svg.written(x.last + PANEL[1], y + 4, "–", "end", "quiet")
     zero, value, low, high = x.places(np.clip([0.0, bar.value, bar.low, bar.high], x.low, x.high))
     left, right = sorted((zero, value))
-    body = f'<rect class="bar {bar.kind}" {box(left, y - 6, right - left, 12)}/>'
-    ends = f"M{digits(low)},{digits(y - 4)}v8M{digits(high)},{digits(y - 4)}v8"
-    whisker = f'<path class="whisker" d="M{digits(low)},{digits(y)}H{digits(high)}{ends}"/>'
-    return body + whisker + written(x.last + PANEL[1], y + 4, bar.text, "end", bar.kind)
+    body = f'<rect class="bar {bar.kind}" {svg.box(left, y - 6, right - left, 12)}/>'
+    ends = f"M{svg.digits(low)},{svg.digits(y - 4)}v8M{svg.digits(high)},{svg.digits(y - 4)}v8"
+    whisker = f'<path class="whisker" d="M{svg.digits(low)},{svg.digits(y)}H{svg.digits(high)}{ends}"/>'
+    return body + whisker + svg.written(x.last + PANEL[1], y + 4, bar.text, "end", bar.kind)
 
 
-def trend(t: Trend, zone: str) -> Drawing:
+def trend(t: Trend, zone: str) -> svg.Drawing:
     """Panels over one time axis on the clock of a zone, each signal as the band between least and greatest; of a
     trend that opens on a span, that span."""
-    t = _opened(t)
+    if t.opening is not None:
+        part = slice(*np.searchsorted(t.time_s, t.opening))
+        bands = tuple(replace(b, low=b.low[part], high=b.high[part]) for b in t.bands)
+        t = replace(t, time_s=t.time_s[part], gap=t.gap[part], bands=bands)
     start, end = (float(t.time_s[k]) if t.time_s.size else float(k + 1) for k in (0, -1))
-    x = Axis(start, max(end, start + 1e-3), MARGIN[0], TREND - 2 * MARGIN[1])
+    x = svg.Axis(start, max(end, start + 1e-3), MARGIN[0], TREND - 2 * MARGIN[1])
     across, top, body = (x.first, x.last), MARGIN[2], []
     for k, label in enumerate(t.panels):
         foot = top + (OTHER if k else FIRST)
-        y = Axis(*_held(t, k), foot, top)
-        body += [part for v in y.ticks(5) for part in tick_y(y.at(v), across, f"{v:.6g}")]
-        body += [upright(x.at(at), (top, foot)) for at, _ in _times(start, end, zone)]
+        y = svg.Axis(*_held(t, k), foot, top)
+        body += [svg.tick_y(y.at(v), across, f"{v:.6g}") for v in y.ticks(5)]
+        body += [svg.upright(x.at(at), (top, foot)) for at, _ in _times(start, end, zone)]
         for a, b in t.spans:
             left, right = x.places(np.clip([a, b], start, end))
-            body.append(f'<rect class="span" {box(left, top, right - left, foot - top)}/>')
-        for band in t.bands:
-            body += _band(band, t, x, y) if band.panel == k else []
+            body.append(f'<rect class="span" {svg.box(left, top, right - left, foot - top)}/>')
+        body += [_band(band, t, x, y) for band in t.bands if band.panel == k]
         for mark in t.marks:
-            body += _mark(mark, x, (top, foot)) if not k else [upright(x.at(mark.x), (top, foot), "mark")]
+            body.append(
+                _mark(mark, x, (top, foot)) if not k else svg.upright(x.at(mark.x), (top, foot), "mark")
+            )
         body.append(_turned(13, (top + foot) / 2, label))
         top = foot + 12
-    body += [written(x.at(at), top + 4, text, "middle", "tick") for at, text in _times(start, end, zone)]
-    body.append(written((x.first + x.last) / 2, top + 22, zone, "middle", "axis"))
-    return Drawing(TREND, top + 30, "".join(body), t.title, "plot")
-
-
-def _opened(t: Trend) -> Trend:
-    if t.opening is None:
-        return t
-    part = slice(*np.searchsorted(t.time_s, t.opening))
-    bands = tuple(replace(b, low=b.low[part], high=b.high[part]) for b in t.bands)
-    return replace(t, time_s=t.time_s[part], gap=t.gap[part], bands=bands)
+    body += [svg.written(x.at(at), top + 4, text, "middle", "tick") for at, text in _times(start, end, zone)]
+    body.append(svg.written((x.first + x.last) / 2, top + 22, zone, "middle", "axis"))
+    return svg.Drawing(TREND, top + 30, "".join(body), t.title, "plot")
 
 
 def _held(t: Trend, panel: int) -> tuple[float, float]:
@@ -193,15 +177,15 @@ def _held(t: Trend, panel: int) -> tuple[float, float]:
     return low - more, high + more
 
 
-def _band(band: Band, t: Trend, x: Axis, y: Axis) -> list[str]:
+def _band(band: Band, t: Trend, x: svg.Axis, y: svg.Axis) -> str:
     """A signal's outlines, one between two gaps; neighbouring buckets are joined where there are too many."""
     n = t.time_s.size
     edges = np.unique(np.arange(min(BUCKETS, n)) * n // max(min(BUCKETS, n), 1))
     low, high = (np.where(t.gap, np.nan, v) for v in (band.low, band.high))
     low, high, at = np.fmin.reduceat(low, edges), np.fmax.reduceat(high, edges), x.places(t.time_s[edges])
     parts = np.split(np.arange(edges.size), np.flatnonzero(np.diff(np.isfinite(low).astype(int))) + 1)
-    outlines = [between(at[i], y.places(low[i]), y.places(high[i])) for i in parts]
-    return [f'<path class="band {band.kind}" d="{"".join(outlines)}"/>']
+    outlines = [svg.between(at[i], y.places(low[i]), y.places(high[i])) for i in parts]
+    return f'<path class="band {band.kind}" d="{"".join(outlines)}"/>'
 
 
 def _times(start: float, end: float, zone: str) -> list[tuple[float, str]]:

@@ -26,6 +26,8 @@ BESIDE = tuple(
     if (down, side) != (4.0, "middle")
 )
 """Where the name of a point may stand from it: down, across, and how it is anchored; the first that is free."""
+ANCHORED = {"start": 0.0, "middle": 0.5, "end": 1.0}
+"""Part of a text's width that stands left of its place."""
 Corners = tuple[float, float, float, float]
 """Left, top, right and foot of a rectangle."""
 
@@ -107,17 +109,15 @@ def upright(x: float, ends: tuple[float, float], kind: str = "grid") -> str:
     return f'<path class="{kind}" d="M{digits(x)},{digits(ends[0])}V{digits(ends[1])}"/>'
 
 
-def tick_x(
-    x: float, ends: tuple[float, float], text: str, below: float = 15.0, kind: str = "grid"
-) -> list[str]:
+def tick_x(x: float, ends: tuple[float, float], text: str, below: float = 15.0, kind: str = "grid") -> str:
     """A line of the grid with its figure below it."""
-    return [upright(x, ends, kind), written(x, ends[1] + below, text, "middle", "tick")]
+    return upright(x, ends, kind) + written(x, ends[1] + below, text, "middle", "tick")
 
 
-def tick_y(y: float, ends: tuple[float, float], text: str) -> list[str]:
+def tick_y(y: float, ends: tuple[float, float], text: str) -> str:
     """A line of the grid with its figure at its left."""
     line = f'<path class="grid" d="M{digits(ends[0])},{digits(y)}H{digits(ends[1])}"/>'
-    return [line, written(ends[0] - 6, y + 4, text, "end", "tick")]
+    return line + written(ends[0] - 6, y + 4, text, "end", "tick")
 
 
 def points(x: Iterable[float], y: Iterable[float]) -> list[str]:
@@ -138,32 +138,24 @@ def named_places(points: Sequence[tuple[Place, float, float]], room: Corners) ->
     taken = [(x - POINT, y - POINT, x + POINT, y + POINT) for _, x, y in points]
     out = []
     for place, x, y in points:
-        wide = LETTER * len(place.label)
-        spots = [(x + dx, y + dy, side) for dy, dx, side in BESIDE]
-        boxes = [_letters(across, down, side, wide) for across, down, side in spots]
-        best = min(range(len(spots)), key=lambda k: (_covered(boxes[k], taken) + _outside(boxes[k], room), k))
-        taken.append(boxes[best])
-        across, down, side = spots[best]
+        wide, spots = LETTER * len(place.label), []
+        for k, (dy, dx, side) in enumerate(BESIDE):
+            left, down = x + dx - wide * ANCHORED[side], y + dy
+            own = (left, down - 10.0, left + wide, down + 3.0)
+            outside = (own[2] - own[0]) * (own[3] - own[1]) - _covered(own, [room])
+            bad = _covered(own, taken) + outside
+            spots.append((bad, k, own, (x + dx, down, place.label, side, "placed")))
+        _, _, own, text = min(spots)
+        taken.append(own)
         out.append(f'<circle class="place {place.kind}" cx="{digits(x)}" cy="{digits(y)}" r="{POINT}"/>')
-        out.append(written(across, down, place.label, side, "placed"))
+        out.append(written(*text))
     return out
-
-
-def _letters(x: float, y: float, anchor: str, wide: float) -> Corners:
-    """Where a text's letters stand."""
-    left = x - wide * {"start": 0.0, "middle": 0.5, "end": 1.0}[anchor]
-    return left, y - 10.0, left + wide, y + 3.0
 
 
 def _covered(own: Corners, others: Iterable[Corners]) -> float:
     """Area that a rectangle shares with others."""
     sides = ((min(own[2], o[2]) - max(own[0], o[0]), min(own[3], o[3]) - max(own[1], o[1])) for o in others)
     return sum(max(w, 0.0) * max(h, 0.0) for w, h in sides)
-
-
-def _outside(own: Corners, room: Corners) -> float:
-    """Area of a rectangle that lies outside another one."""
-    return (own[2] - own[0]) * (own[3] - own[1]) - _covered(own, [room])
 
 
 def nice_ticks(low: float, high: float, most: int = 6) -> list[float]:

@@ -18,13 +18,10 @@ LONGEST = 40
 def visible(text: str) -> str:
     """The text with characters that steer a terminal or turn the direction of writing as escapes such as \\u202e,
     blanks of any kind as blanks."""
-    return text if text.isprintable() else "".join(map(_visible, text))
-
-
-def _visible(character: str) -> str:
-    if character.isprintable():
-        return character
-    return " " if character.isspace() else character.encode("unicode_escape").decode("ascii")
+    if text.isprintable():
+        return text
+    blank = "".join(" " if c.isspace() else c for c in text)
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in blank)
 
 
 def visible_lines(text: str) -> str:

@@ -47,7 +47,8 @@ def whole_file(path: Path, kept: bool = False) -> Iterator[Path]:
     try:
         yield temporary
         if kept:
-            _to_disk(temporary)
+            with temporary.open("r+b") as handle:
+                os.fsync(handle.fileno())
         os.replace(temporary, path)
     except OSError as error:
         temporary.unlink(missing_ok=True)
@@ -68,11 +69,3 @@ def _uploaded(path: Any) -> Iterator[Path]:
         temporary.touch()
         yield temporary
         path.fs.put_file(str(temporary), path.path)
-
-
-def _to_disk(path: Path) -> None:
-    handle = os.open(path, os.O_RDWR)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)

@@ -22,13 +22,10 @@ from analyzer.config import ComparisonLimits, Config
 from analyzer.loop.decisions import counts
 from analyzer.loops.changes import TuningChange, behaviour_change, stated_changes
 from analyzer.pages.reading import Thinned, by_loop, nights_within, read_hours, read_nights, read_trends
-from analyzer.pages.words import Row, enumerated, number, texts
+from analyzer.pages.words import Row, enumerated, keys, number, texts
 from analyzer.store.store import Store
 
-COLUMNS = (
-    *("loop", "night", "description", "type", "gain_unit", "ti_unit", "pv_unit", "op_unit", "form", "kp"),
-    *("ti", "start_s", "status", "source_loop", "oscillating_pct", "extra", "pv_lo", "pv_hi"),
-)
+COLUMNS = keys("of-a-change")
 HOURS_A_YEAR = 8760.0
 
 
@@ -75,16 +72,8 @@ def detected(store: Store, loops: Sequence[str] | None, config: Config) -> list[
 def change_cases(
     store: Store, changes: Sequence[TuningChange], spans: Spans, limits: ComparisonLimits = LIMITS
 ) -> tuple[list[ChangeCase], list[tuple[str, str]]]:
-    """Every change with what came of it, and those that could not be looked at, with the reason.
-
-    Parameters
-    ----------
-    store : Store
-    changes : sequence of TuningChange
-        Several of one loop end each other's spans.
-    spans : Spans
-    limits : ComparisonLimits
-    """
+    """Every change with what came of it, and those that could not be looked at, with the reason; several changes of
+    one loop end each other's spans."""
     if not changes:
         return [], []
     of = [spans.of(c, [o.time_s for o in changes if o.loop == c.loop and o != c], limits) for c in changes]

@@ -6,45 +6,24 @@ import json
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from analyzer.limits import PAGES
-from analyzer.loop.settings_side_by_side import SPREAD, Comparison, Shown
+from analyzer.loop.settings_side_by_side import SPREAD, Comparison
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import derivative_as_stated, unit_ratio
-from analyzer.pages.words import number, page_columns, signed, texts
+from analyzer.pages.words import number, page_table, signed, texts
 from analyzer.words.units import duration, gain_unit
 from identification.models import Integrator
 from identification.simulation.closed_loop import scan_step
 from identification.simulation.lag import discretize
 from identification.simulation.valve import law_of
-from reports.pages import (
-    Block,
-    Cell,
-    Field,
-    Line,
-    Listing,
-    Page,
-    Panels,
-    Place,
-    Plot,
-    Section,
-    Table,
-    Text,
-    WhatIf,
-)
+from reports import pages as parts
 from reports.texts import slug
 from tuning.describing import band, is_play
-from tuning.forecast import (
-    CALMER,
-    DERIVATIVE,
-    NOW,
-    RECOMMENDED,
-    REPAIRED,
-    SMALLER,
-    Tried,
-)
+from tuning.forecast import CALMER, DERIVATIVE, NOW, RECOMMENDED, REPAIRED, SMALLER, Tried
 from tuning.frequency_response import slowest_s
 from tuning.harmonic_balance import TravelMap
 from tuning.limit_cycle import KICK
@@ -55,43 +34,51 @@ OFFERED = (CALMER, SMALLER, DERIVATIVE)
 """Settings between which may be chosen beside the recommended ones."""
 PLACED = {NOW: "now", RECOMMENDED: "recommended"}
 """Colours of settings in a picture; others are those of a rule."""
-CAUTION = (
-    "Recommended are only settings that keep robustness, load rejection and error on all that the night's data "
-    "allow, with little more gain: a valve that jumps looks like one with play behind a process of less gain."
-)
-HINT = "Move a slider, or begin from one of the settings; drag over a trend to zoom, double click for all."
 
 
 def _against(value: float, now: float) -> str:
     return "better" if value < PAGES.better * now else "worse" if value > PAGES.worse * now else ""
 
 
-def _rejection(ratio: float | None) -> Cell:
-    """What a load step does, against now."""
-    if ratio is None:
-        return Cell("–")
-    return Cell(number(ratio), ratio, _against(ratio, 1.0))
-
-
 def opening(c: Comparison, spec: LoopSpec, unit: str) -> str:
     """What the recommended settings win and cost, in a sentence; of a loop without them what is compared."""
     now, new = c.tried[0], next((t for t in c.tried if t.name == RECOMMENDED), None)
     if new is None:
-        return (
-            f"No settings are recommended: none wins on all that the loop may be without a price. {_offer(c)}"
+        offers = "; ".join(
+            _offers(c, [f"{n}: {_priced(c, n)}" for n in OFFERED if n in c.shown], "a repaired valve")
         )
-    scale, typed = c.pv_span / 100.0, _typed(c, RECOMMENDED, spec)
-    errors = f"{number(scale * now.error)} to {number(scale * new.error)} {unit}"
-    text = (
-        f"On the night's load {typed} take the stem's travel from {number(now.stem_travel)} to "
-        f"{number(new.stem_travel)} %/h and the average absolute error from {errors}"
+        said = "No settings are recommended: none wins on all that the loop may be without a price."
+        return f"{said} {f'To choose between: {offers}.' if offers else ''}"
+    scale, ratio = c.pv_span / 100.0, _times(new, now)
+    travel, error = (
+        f"{number(a)} to {number(b)}"
+        for a, b in ((now.stem_travel, new.stem_travel), (scale * now.error, scale * new.error))
     )
-    ratio = _times(new, now)
+    text = (
+        f"On the night's load {_typed(c, RECOMMENDED, spec)} take the stem's travel from {travel} %/h and the "
+        f"average absolute error from {error} {unit}"
+    )
     if ratio is None:
         return f"{text}."
-    longer = ratio > PAGES.worse
-    cost = f"the error that a lasting load leaves sums up to {number(ratio)} times as much"
-    return f"{text}; the price is that {cost}." if longer else f"{text}, and {cost}."
+    so = "; the price is that" if ratio > PAGES.worse else ", and"
+    return f"{text}{so} the error that a lasting load leaves sums up to {number(ratio)} times as much."
+
+
+def choices(c: Comparison, spec: LoopSpec) -> list[str]:
+    """The settings between which an engineer may choose, a line each, and what a repair would bring."""
+    named = [t.name for t in c.tried if t.name in (RECOMMENDED, *OFFERED) and t.name in c.everywhere]
+    lines = _offers(c, [f"{name}: {_typed(c, name, spec)}: {_priced(c, name)}" for name in named], REPAIRED)
+    return ["to choose between, on all that the loop may be:", *(f"  {x}" for x in lines)] if lines else []
+
+
+def _offers(c: Comparison, settings: list[str], repair: str) -> list[str]:
+    """Settings with what they win and cost, and what a repair brings against now, on the identified loop."""
+    if c.repaired is None:
+        return settings
+    t, now = c.repaired, c.tried[0]
+    ratios = t.stem_travel / max(now.stem_travel, 1e-9), t.error / max(now.error, 1e-9)
+    travel, error = map(_against_now_pct, ratios)
+    return [*settings, f"{repair}: travel {travel}, error {error}"]
 
 
 def _typed(c: Comparison, name: str, spec: LoopSpec) -> str:
@@ -104,40 +91,15 @@ def _typed(c: Comparison, name: str, spec: LoopSpec) -> str:
 
 def _td(c: Comparison, name: str, spec: LoopSpec) -> str:
     """A derivative time as it is typed in."""
-    pid = next(t.controller for t in c.tried if t.name == name)
-    td = derivative_as_stated(pid, spec, c.pv_span)
+    td = derivative_as_stated(next(t.controller for t in c.tried if t.name == name), spec, c.pv_span)
     return f"Td {td:.3g} {'s' if spec.ti_unit == 's' else 'min'}"
-
-
-def _offer(c: Comparison) -> str:
-    """What may be chosen all the same, and what a repair would bring."""
-    offers = [f"{name}: {_priced(c, name)}" for name in OFFERED if name in c.shown]
-    if c.repaired is not None:
-        offers.append(f"a repaired valve: {_against_now(c, c.repaired)}")
-    return f"To choose between: {'; '.join(offers)}." if offers else ""
-
-
-def choices(c: Comparison, spec: LoopSpec) -> list[str]:
-    """The settings between which an engineer may choose, a line each, and what a repair would bring."""
-    named = [t for t in c.tried if t.name in (RECOMMENDED, *OFFERED) and t.name in c.everywhere]
-    lines = [f"  {t.name}: {_typed(c, t.name, spec)}: {_priced(c, t.name)}" for t in named]
-    if c.repaired is not None:
-        lines.append(f"  {REPAIRED}: {_against_now(c, c.repaired)}")
-    return ["to choose between, on all that the loop may be:", *lines] if lines else []
 
 
 def _priced(c: Comparison, name: str) -> str:
     """What settings win and cost on that of all loops that the data allow where each is worst, and on a load step."""
     found = c.everywhere[name]
-    travel, error = (_against_now_pct(x) for x in (found.worst_travel, found.worst_error))
+    travel, error = map(_against_now_pct, (found.worst_travel, found.worst_error))
     return f"travel {travel}, error {error} at worst, a load step goes {number(c.peaks[name])} times as far"
-
-
-def _against_now(c: Comparison, t: Tried) -> str:
-    """Change of travel and error against the present settings, on the identified loop."""
-    now = c.tried[0]
-    travel, error = t.stem_travel / max(now.stem_travel, 1e-9), t.error / max(now.error, 1e-9)
-    return f"travel {_against_now_pct(travel)}, error {_against_now_pct(error)}"
 
 
 def _against_now_pct(ratio: float) -> str:
@@ -153,64 +115,54 @@ def _times(t: Tried, now: Tried) -> float | None:
     return t.integral_s / now.integral_s if known else None
 
 
-def table(c: Comparison, spec: LoopSpec, unit: str) -> Table:
+def _with_repaired(c: Comparison) -> tuple[Tried, ...]:
+    """All that was tried, and what a repair would bring."""
+    return parts.there(*c.tried, c.repaired)
+
+
+def table(c: Comparison, spec: LoopSpec, unit: str) -> parts.Table:
     """The settings with what they do on the load."""
-    shown = (*c.tried, *((c.repaired,) if c.repaired is not None else ()))
-    rows = tuple(_tried_row(t, c, spec, unit) for t in shown)
-    lasts = duration(c.load.size * scan_step(c.loop))
-    note = (
-        f"Each simulated on the {lasts} of load that the night leaves behind the identified loop. {CAUTION}"
-    )
-    if c.loop.controller.td_s > 0.0:
-        note += " The derivative time is the present one in all of them."
-    return Table("settings", "", page_columns("settings"), rows, note, cards=True)
+    said, lasts = texts("settings_tried"), duration(c.load.size * scan_step(c.loop))
+    note = said["note"].format(lasts=lasts) + said["derivative"] * (c.loop.controller.td_s > 0.0)
+    return page_table("settings", (_tried_row(t, c, spec, unit) for t in _with_repaired(c)), note=note)
 
 
-def _tried_row(t: Tried, c: Comparison, spec: LoopSpec, unit: str) -> tuple[Cell, ...]:
+def _tried_row(t: Tried, c: Comparison, spec: LoopSpec, unit: str) -> tuple[parts.Cell, ...]:
     scale, now, (kp, ti) = c.pv_span / 100.0, c.tried[0], c.stated.get(t.name, c.stated[NOW])
     found = c.everywhere.get(t.name) if t is not now else None
     worst = "" if found is None else ", ".join(map(_against_now_pct, (found.worst_travel, found.worst_error)))
     ms = "unstable" if math.isinf(t.ms) else f"{t.ms:.2f}"
     derivative = f", {_td(c, t.name, spec)}" if t.name == DERIVATIVE else ""
+    rejected = (c.peaks.get(t.name, 1.0), _times(t, now))
     return (
-        Cell(t.name, kind="strong" if t.name == RECOMMENDED else ""),
-        Cell(f"{kp:.3g} {gain_unit(spec.gain_unit, spec.pv_unit, spec.op_unit)}", kp),
-        Cell("none" if ti == 0 else f"{ti:.3g} {spec.ti_unit}{derivative}", ti),
-        Cell(number(t.stem_travel), t.stem_travel, _against(t.stem_travel, now.stem_travel)),
-        Cell(f"{number(scale * t.error)} {unit}", t.error, _against(t.error, now.error)),
-        Cell(f"{number(scale * t.peak)} {unit}", t.peak, _against(t.peak, now.peak)),
-        Cell(worst),
-        _rejection(c.peaks.get(t.name, 1.0)),
-        _rejection(_times(t, now)),
-        Cell(ms, None if math.isinf(t.ms) else t.ms),
+        parts.Cell(t.name, kind="strong" if t.name == RECOMMENDED else ""),
+        parts.Cell(f"{kp:.3g} {gain_unit(spec.gain_unit, spec.pv_unit, spec.op_unit)}", kp),
+        parts.Cell("none" if ti == 0 else f"{ti:.3g} {spec.ti_unit}{derivative}", ti),
+        parts.Cell(number(t.stem_travel), t.stem_travel, _against(t.stem_travel, now.stem_travel)),
+        parts.Cell(f"{number(scale * t.error)} {unit}", t.error, _against(t.error, now.error)),
+        parts.Cell(f"{number(scale * t.peak)} {unit}", t.peak, _against(t.peak, now.peak)),
+        parts.Cell(worst),
+        *(parts.Cell("–") if x is None else parts.Cell(number(x), x, _against(x, 1.0)) for x in rejected),
+        parts.Cell(ms, None if math.isinf(t.ms) else t.ms),
     )
 
 
-def meanings(c: Comparison) -> Listing:
-    """What the names of the settings mean."""
-    known = texts("settings") | (
-        texts("settings_of_integrators") if isinstance(c.loop.process, Integrator) else {}
-    )
-    named = [t.name for t in c.tried] + ([] if c.repaired is None else [REPAIRED])
-    return Listing(tuple((f"{name}:", known[name]) for name in named))
-
-
-def _plot(t: Tried, shown: Shown, scale: float, unit: str, reach: float) -> Plot:
-    line = Line("SP − PV", shown.time_s / 60.0, scale * shown.error)
-    words = f"travel {number(t.stem_travel)} %/h, error {number(scale * t.error)} {unit}"
-    name, axis, ends = f"tried-{slug(t.name)}", f"SP − PV [{unit}]", (-reach, reach)
-    return Plot(name, t.name, "minutes", axis, (line,), (), words, reach=ends)
-
-
-def panels(c: Comparison, unit: str) -> Panels:
+def panels(c: Comparison, unit: str) -> parts.Panels:
     """The end of each simulation on the same axes."""
-    scale = c.pv_span / 100.0
+    scale, plots = c.pv_span / 100.0, []
     most = scale * max(float(np.abs(s.error).max(initial=0.0)) for s in c.shown.values())
-    plots = tuple(_plot(t, c.shown[t.name], scale, unit, most) for t in c.tried)
-    return Panels("tried", "The error under each of them, on the same load", plots)
+    for t in c.tried:
+        shown = c.shown[t.name]
+        line = parts.Line("SP − PV", shown.time_s / 60.0, scale * shown.error)
+        words = f"travel {number(t.stem_travel)} %/h, error {number(scale * t.error)} {unit}"
+        name, axis = f"tried-{slug(t.name)}", f"SP − PV [{unit}]"
+        plots.append(parts.Plot(name, t.name, "minutes", axis, (line,), (), words, reach=(-most, most)))
+    return parts.Panels("tried", "The error under each of them, on the same load", tuple(plots))
 
 
-def travel_field(found: TravelMap, places: Sequence[Place], title: str, moves: str, rest: str = "") -> Field:
+def travel_field(
+    found: TravelMap, places: Sequence[parts.Place], title: str, moves: str, rest: str = ""
+) -> parts.Field:
     """The travel of the limit cycle over Kp and Ti, with settings as points.
 
     moves, rest : what travels, and what is said of settings at rest.
@@ -218,39 +170,40 @@ def travel_field(found: TravelMap, places: Sequence[Place], title: str, moves: s
     swings = f"limit cycle, the darker the more {moves} travels"
     keys = (("swings", swings), ("calm", f"comes to rest{rest}"), ("unstable", "unstable"))
     cells = np.abs(found.kp), found.ti_s, 3600.0 * found.travel, found.rests, found.unstable
-    return Field("travel-map", title, "Kp [%/%]", "Ti [s]", *cells, tuple(places), keys)
+    return parts.Field("travel-map", title, "Kp [%/%]", "Ti [s]", *cells, tuple(places), keys)
 
 
-def _place(x: float, y: float, t: Tried) -> Place:
-    return Place(x, y, t.name, PLACED.get(t.name, "rule"))
+def _place(x: float, y: float, t: Tried) -> parts.Place:
+    return parts.Place(x, y, t.name, PLACED.get(t.name, "rule"))
 
 
-def price(c: Comparison, unit: str) -> Plot | None:
+def price(c: Comparison, unit: str) -> parts.Plot | None:
     """Travel over error of the settings that no others beat in both, and of those compared; None without such."""
     if len(c.curve) < 2:
         return None
-    now, scale = c.tried[0], c.pv_span / 100.0
-    most = PAGES.shown_ratio
+    now, scale, most = c.tried[0], c.pv_span / 100.0, PAGES.shown_ratio
     shown = [t for t in c.tried if t.stem_travel < most * now.stem_travel and t.error < most * now.error]
     places = tuple(_place(scale * t.error, t.stem_travel, t) for t in shown)
     found = [(x.error, x.travel) for x in c.curve if x.travel < most and x.error < most]
     error, travel = np.array(found, float).reshape(-1, 2).T
     at = np.array([(p.x, p.y) for p in places], float).reshape(-1, 2)
     lines = (
-        Line("none of the robust ones beats these", scale * now.error * error, now.stem_travel * travel),
-        Line("compared", at[:, 0], at[:, 1], joined=False),
+        parts.Line(
+            "none of the robust ones beats these", scale * now.error * error, now.stem_travel * travel
+        ),
+        parts.Line("compared", at[:, 0], at[:, 1], joined=False),
     )
     title = "What each costs: the lower and the further left, the better"
     axes = f"average absolute error [{unit}]", "stem travel [%/h]"
-    return Plot("price", title, *axes, lines, reach=(0.0,), places=places)
+    return parts.Plot("price", title, *axes, lines, reach=(0.0,), places=places)
 
 
-def field(c: Comparison) -> Field | None:
+def field(c: Comparison) -> parts.Field | None:
     """The travel map with all settings that are compared; None where the valve is free."""
     if c.travel is None:
         return None
-    known = ((t, t.controller) for t in c.tried if math.isfinite(t.controller.ti_s))
-    places = [_place(abs(pid.kp), pid.ti_s, t) for t, pid in known]
+    known = [t for t in c.tried if math.isfinite(t.controller.ti_s)]
+    places = [_place(abs(t.controller.kp), t.controller.ti_s, t) for t in known]
     rest = "" if is_play(c.loop.valve) else " (seldom with stick-slip)"
     title = "Travel by describing function, without load"
     caption = "Kp in percent of OP over percent of PV, whatever unit the controller has."
@@ -264,8 +217,9 @@ def _kick(c: Comparison) -> dict[str, float]:
     """
     width = band(c.loop.valve)
     free = replace(c.loop, controller=replace(c.loop.controller, ti_s=math.inf))
+    kick = KICK * width if is_play(c.loop.valve) and width > 0.0 else 0.0
     return {
-        "kick": KICK * width if is_play(c.loop.valve) and width > 0.0 else 0.0,
+        "kick": kick,
         "slowest_s": slowest_s(free),
         "times": METHOD.prelude,
         "least": METHOD.least_prelude,
@@ -282,49 +236,49 @@ def model(c: Comparison, spec: LoopSpec, unit: str) -> str:
     d, pid = discretize(loop.process, h), c.loop.controller
     breakaway, sliding, tolerance = law_of(loop.valve)
     alike = [t for t in c.tried if t.controller.td_s == pid.td_s]  # the sliders move Kp and Ti alone
-    settings = [{"name": t.name, "kp": t.controller.kp, "ti_s": _finite(t.controller.ti_s)} for t in alike]
-    return json.dumps(
-        {
-            "process": {"pole": d.pole, "now": d.now, "before": d.before, "delay": d.delay},
-            "valve": {"breakaway": breakaway, "sliding": sliding, "tolerance": _finite(tolerance)},
-            "scan_s": h,
-            "td_s": pid.td_s,
-            "op_lo": pid.op_lo,
-            "op_hi": pid.op_hi,
-            "op_start": 0.5 * (pid.op_lo + pid.op_hi),
-            "warm_up": METHOD.warm_up,
-            "prelude": _kick(c),
-            "settings": settings,
-            "ti_middle_s": simc(loop.process, scan_s=h).ti_s,
-            "spread": SPREAD,
-            "opening_h": max(float(s.time_s[-1]) for s in c.shown.values()) / 3600.0,
-            "pv_scale": c.pv_span / 100.0,
-            "pv_unit": unit,
-            "law": {
-                "form": str(spec.form),
-                "band": spec.gain_unit == "band",
-                "ratio": unit_ratio(spec, c.pv_span),
-                "kp_unit": gain_unit(spec.gain_unit, spec.pv_unit, spec.op_unit),
-                "ti_unit": spec.ti_unit,
-            },
-        }
-    )
+    found: dict[str, Any] = {
+        "process": {"pole": d.pole, "now": d.now, "before": d.before, "delay": d.delay},
+        "valve": {"breakaway": breakaway, "sliding": sliding, "tolerance": _finite(tolerance)},
+        "scan_s": h,
+        "td_s": pid.td_s,
+        "op_lo": pid.op_lo,
+        "op_hi": pid.op_hi,
+        "op_start": 0.5 * (pid.op_lo + pid.op_hi),
+        "warm_up": METHOD.warm_up,
+        "prelude": _kick(c),
+        "settings": [
+            {"name": t.name, "kp": t.controller.kp, "ti_s": _finite(t.controller.ti_s)} for t in alike
+        ],
+        "ti_middle_s": simc(loop.process, scan_s=h).ti_s,
+        "spread": SPREAD,
+        "opening_h": max(float(s.time_s[-1]) for s in c.shown.values()) / 3600.0,
+        "pv_scale": c.pv_span / 100.0,
+        "pv_unit": unit,
+    }
+    found["law"] = {
+        "form": str(spec.form),
+        "band": spec.gain_unit == "band",
+        "ratio": unit_ratio(spec, c.pv_span),
+        "kp_unit": gain_unit(spec.gain_unit, spec.pv_unit, spec.op_unit),
+        "ti_unit": spec.ti_unit,
+    }
+    return json.dumps(found)
 
 
-def settings_page(loop: str, night: str, c: Comparison, spec: LoopSpec) -> Page:
+def settings_page(loop: str, night: str, c: Comparison, spec: LoopSpec) -> parts.Page:
     """A loop's page of settings."""
     known = spec.pv_lo is not None and spec.pv_hi is not None
-    unit = (spec.pv_unit or "own unit") if known else "%"
-    drawn = field(c)
-    first: list[Block] = [Text((opening(c, spec, unit),), "lead"), panels(c, unit), table(c, spec, unit)]
-    first += [block for block in (price(c, unit), drawn) if block is not None]
-    said = "The load adds to PV as it did in the night; what the model lacks, and a load that changes, are not in it."
-    tried = WhatIf("try", "Kp and Ti moved, the night simulated again", model(c, spec, unit), c.load, said)
-    hint = Text((HINT,))
+    unit, said = (spec.pv_unit or "own unit") if known else "%", texts("settings_tried")
+    meant = texts("settings") | (
+        texts("settings_of_integrators") if isinstance(c.loop.process, Integrator) else {}
+    )
+    first = (parts.Text((opening(c, spec, unit),), "lead"), panels(c, unit), table(c, spec, unit))
+    tried = parts.WhatIf("try", said["title"], model(c, spec, unit), c.load, said["caption"])
+    named = parts.Listing(tuple((f"{t.name}:", meant[t.name]) for t in _with_repaired(c)))
     sections = (
-        Section("Settings compared", tuple(first)),
-        Section("Try settings", (hint, tried)),
-        Section("What the settings are, for experts", (meanings(c),), closed=True),
+        parts.Section("Settings compared", parts.there(*first, price(c, unit), field(c))),
+        parts.Section("Try settings", (parts.Text((said["hint"],)), tried)),
+        parts.Section("What the settings are, for experts", (named,), closed=True),
     )
     subtitle = f"settings compared and tried on night {night}"
-    return Page(f"{slug(loop)}-settings", f"{loop}: settings", subtitle, sections)
+    return parts.Page(f"{slug(loop)}-settings", f"{loop}: settings", subtitle, sections)

@@ -8,39 +8,22 @@ from typing import Any
 
 import numpy as np
 
-from analyzer.columns import GROUP_LIST, GROUPS, row_of
+from analyzer.columns import GROUP_LIST, row_of
 from analyzer.limits import PAGES
 from analyzer.loop.decisions import GroupRole
+from analyzer.pages import words
 from analyzer.pages.reading import Thinned, action_text
-from analyzer.pages.words import ALL_LOOPS, cause_cell, page_columns, plain_cell, texts, with_noun
 from analyzer.plantwide.view import GroupView, read_groups
 from analyzer.store.store import Store
 from analyzer.words.units import Row, duration, number
 from identification.signals.spectrum import PER_OCTAVE
-from reports.pages import (
-    Arrow,
-    Band,
-    Cell,
-    Column,
-    Facts,
-    Graph,
-    HeatMap,
-    Mark,
-    Node,
-    Page,
-    Section,
-    Table,
-    Text,
-    Trend,
-)
+from reports import pages as parts
 from reports.texts import slug
 
-DECLARED = {c.name: c for c in GROUPS}
 PERIODS = 12.0
 """Periods that the aligned trends show."""
 FLOOR_DB = 30.0
 """Level under a loop's peak from which a colour is empty [dB]."""
-FIGURES = ("coherence", "lag_s", "wave_amplitude_pct", "wave_share_pct", "gain_pct")
 
 
 def grouped(
@@ -104,92 +87,71 @@ def page_name(number: str) -> str:
     return f"group-{number}"
 
 
-def _heading(name: str) -> Column:
-    declared = DECLARED[name]
-    unit = f" [{declared.unit}]" if declared.unit else ""
-    return Column(name, declared.heading + unit, declared.is_number, declared.hint)
-
-
-def morning_table(groups: Sequence[GroupView], linked: bool) -> Table:
+def morning_table(groups: Sequence[GroupView], linked: bool) -> parts.Table:
     """One cause, several loops: the groups of a night, those that cost most first; `linked` to their pages."""
-    note = "Repair or retune the first loop, then look at the others again."
-    return Table(
-        "groups", "", page_columns("groups"), tuple(_morning_row(g, linked) for g in groups), note, cards=True
+    rows = (
+        (
+            parts.Cell(
+                f"group {g.number}", kind="strong", href=f"{page_name(g.number)}.html" if linked else ""
+            ),
+            parts.Cell(str(len(g.rows)), len(g.rows)),
+            parts.Cell(duration(g.period_s), g.period_s),
+            parts.Cell(_candidates(g) or "not clear"),
+            parts.Cell(action_there(g) or "undecided: look at the candidates"),
+            words.plain_cell(g.gain_pct),
+            parts.Cell(", ".join(r["loop"] for r in g.rows if r is not g.source)),
+        )
+        for g in groups
     )
+    return words.page_table("groups", rows)
 
 
-def _morning_row(g: GroupView, linked: bool) -> tuple[Cell, ...]:
-    return (
-        Cell(f"group {g.number}", kind="strong", href=f"{page_name(g.number)}.html" if linked else ""),
-        Cell(str(len(g.rows)), len(g.rows)),
-        Cell(duration(g.period_s), g.period_s),
-        Cell(_candidates(g) or "not clear"),
-        Cell(action_there(g) or "undecided: look at the candidates"),
-        plain_cell(g.gain_pct),
-        Cell(", ".join(r["loop"] for r in g.rows if r is not g.source)),
-    )
-
-
-MEMBERS = (
-    Column("loop", "Loop"),
-    _heading("role"),
-    _heading("source_pct"),
-    Column("cause", "Cause"),
-    *map(_heading, FIGURES),
-)
-
-
-def _members(g: GroupView, paged: frozenset[str]) -> Table:
-    rows = tuple(_member_cells(g, r, paged) for r in g.rows)
-    return Table("members", "", MEMBERS, rows, "Lags that the night cannot tell are left empty.", cards=True)
-
-
-def _member_cells(g: GroupView, row: Row, paged: frozenset[str]) -> tuple[Cell, ...]:
+def _member_cells(g: GroupView, row: Row, paged: frozenset[str]) -> tuple[parts.Cell, ...]:
     name, pct = row["loop"], row["source_pct"]
     return (
-        Cell(name, kind="strong", href=f"{slug(name)}.html" if name in paged else ""),
-        Cell(row["role"]),
-        Cell(f"{pct:.0f}" if pct >= 1 else "under 1", pct),
-        cause_cell(g.loops[name]["cause"]),
-        *(plain_cell(row[n]) for n in FIGURES),
+        parts.Cell(name, kind="strong", href=f"{slug(name)}.html" if name in paged else ""),
+        parts.Cell(row["role"]),
+        parts.Cell(f"{pct:.0f}" if pct >= 1 else "under 1", pct),
+        words.cause_cell(g.loops[name]["cause"]),
+        *(words.plain_cell(row[c.key]) for c in words.page_columns("members")[4:]),
     )
 
 
-def _signs_table(g: GroupView) -> Table:
+def _signs_table(g: GroupView) -> parts.Table:
     """Why there: the signs of the likeliest candidates side by side."""
-    shown = [r for r in g.rows[:5] if r["group_signs"]]
-    sign = Column("sign", "Sign", wide=True)
-    heads = (sign, *(Column(r["loop"], r["loop"], True) for r in shown))
-    kept = [json.loads(r["group_signs"]) for r in shown]
-    rows = tuple(
-        (Cell(text), *(Cell(f"{signs.get(k, 0.0):.2f}", signs.get(k, 0.0)) for signs in kept))
-        for k, text in texts("signs").items()
+    shown = {r["loop"]: json.loads(r["group_signs"]) for r in g.rows[:5] if r["group_signs"]}
+    columns = (*words.page_columns("signs"), *(parts.Column(loop, loop, True) for loop in shown))
+    rows = (
+        (
+            parts.Cell(text),
+            *(parts.Cell(f"{signs.get(k, 0.0):.2f}", signs.get(k, 0.0)) for signs in shown.values()),
+        )
+        for k, text in words.texts("signs").items()
     )
-    note = "From 0 to 1; who is first from -1 to 1. triage config says what each adds to the odds."
-    return Table("signs", "", heads, rows, note)
+    return words.page_table("signs", rows, columns=columns)
 
 
-def group_page(g: GroupView, trends: Mapping[str, Thinned], night: str, paged: frozenset[str]) -> Page:
+def group_page(g: GroupView, trends: Mapping[str, Thinned], night: str, paged: frozenset[str]) -> parts.Page:
     """A group's page."""
     facts = [("Period", duration(g.period_s)), ("Loops", str(len(g.rows)))]
     if g.source is not None:
         facts += [("Fix first", g.source["loop"]), ("Action there", action_there(g))]
-    facts += [
-        ("Others gain", f"{number(g.gain_pct)} % of span"),
-        ("It starts elsewhere", f"{g.unseen_pct:.0f} %"),
-    ]
-    pictures = [b for b in (aligned(g, trends), heat_map(g)) if b is not None]
-    sections = (
-        Section("What and where", (Text((f"{sentence(g)}.",), "lead"), Facts(tuple(facts)), graph(g))),
-        Section("Loops", (_members(g, paged),)),
-        Section("Why there", (_signs_table(g),)),
-        *((Section("Trends and spectra", tuple(pictures)),) if pictures else ()),
+    facts.append(("Others gain", f"{number(g.gain_pct)} % of span"))
+    facts.append(("It starts elsewhere", f"{g.unseen_pct:.0f} %"))
+    members = words.page_table("members", (_member_cells(g, r, paged) for r in g.rows))
+    sections = parts.there(
+        parts.Section("What and where", (words.lead(sentence(g)), parts.Facts(tuple(facts)), graph(g))),
+        parts.Section("Loops", (members,)),
+        parts.Section("Why there", (_signs_table(g),)),
+        parts.section("Trends and spectra", aligned(g, trends), heat_map(g)),
     )
-    subtitle = f"{with_noun(len(g.rows), 'loop')}, night {night}."
-    return Page(page_name(g.number), f"Group {g.number}: one oscillation", subtitle, sections, (ALL_LOOPS,))
+    subtitle = f"{words.with_noun(len(g.rows), 'loop')}, night {night}."
+    return parts.Page(
+        page_name(g.number), f"Group {g.number}: one oscillation", subtitle, sections, (words.ALL_LOOPS,)
+    )
 
 
-def member_section(g: GroupView, loop: str, trends: Mapping[str, Thinned]) -> Section:
+def member_section(g: GroupView, loop: str, trends: Mapping[str, Thinned]) -> parts.Section:
     """The part of a member's page: its place in the group, its trend above the source's."""
     row = next(r for r in g.rows if r["loop"] == loop)
     source = g.source
@@ -198,11 +160,12 @@ def member_section(g: GroupView, loop: str, trends: Mapping[str, Thinned]) -> Se
         late = f", {row['lag_s']:.0f} s later" if row["lag_s"] is not None else ""
         said.append(f"{loop} follows {source['loop']} with a coherence of {row['coherence']:.2f}{late}.")
     beneath = [loop, *[r["loop"] for r in g.rows if r["loop"] != loop][:1]]
-    picture = aligned(g, trends, beneath)
-    return Section("Moves with other loops", (Text(tuple(said)), *((picture,) if picture else ())))
+    return parts.Section(
+        "Moves with other loops", parts.there(parts.Text(tuple(said)), aligned(g, trends, beneath))
+    )
 
 
-def graph(g: GroupView) -> Graph:
+def graph(g: GroupView) -> parts.Graph:
     """The way of the oscillation from loop to loop."""
     shown = [r for r in g.rows if r["role"] != GroupRole.SHARES or r is g.rows[0]][: PAGES.group_loops]
     by_name = {r["loop"]: r for r in shown}
@@ -216,16 +179,16 @@ def graph(g: GroupView) -> Graph:
             depth[name] = 1 + column(parent if parent in by_name else first)
         return depth[name]
 
-    nodes = tuple(Node(n, _node_text(r), str(r["role"]), column(n)) for n, r in by_name.items())
+    nodes = tuple(parts.Node(n, _node_text(r), str(r["role"]), column(n)) for n, r in by_name.items())
     arrows = tuple(
-        Arrow(r["parent"] if r["parent"] in by_name else first, n, _arrow_text(r))
+        parts.Arrow(r["parent"] if r["parent"] in by_name else first, n, _arrow_text(r))
         for n, r in by_name.items()
         if n != first
     )
     left = len(g.rows) - len(shown)
     caption = "From left to right as coherence falls; lags are behind the likeliest source."
     caption += f" {left} more not drawn." if left else ""
-    return Graph("way", "Where it starts and whom it moves", nodes, arrows, caption)
+    return parts.Graph("way", "Where it starts and whom it moves", nodes, arrows, caption)
 
 
 def _node_text(r: Row) -> str:
@@ -238,7 +201,7 @@ def _arrow_text(r: Row) -> str:
     return f"{lag:+.0f} s" if lag is not None else f"{r['coherence']:.2f}"
 
 
-def heat_map(g: GroupView) -> HeatMap | None:
+def heat_map(g: GroupView) -> parts.HeatMap | None:
     """Spectra of the members beneath each other; None where the night kept none."""
     rows = g.rows[: PAGES.group_loops]
     kept = [(r["loop"], json.loads(s)) for r in rows if (s := g.loops[r["loop"]]["spectrum"])]
@@ -254,15 +217,15 @@ def heat_map(g: GroupView) -> HeatMap | None:
         near = at[inside]
         shares[i, near] = np.clip(1.0 + (level[inside] - level.max()) / FLOOR_DB, 0.0, 1.0)
     periods = longest / 2.0 ** (np.arange(count) / PER_OCTAVE)
-    mark = Mark(g.period_s, duration(g.period_s))
+    mark = parts.Mark(g.period_s, duration(g.period_s))
     caption = "Depth of colour: level of the error in each band under the loop's own peak, 30 dB to nothing."
     loops = tuple(n for n, _ in kept)
-    return HeatMap(
+    return parts.HeatMap(
         "spectra", "Spectra", "period [s]", periods[::-1], loops, shares[:, ::-1], (mark,), caption
     )
 
 
-def aligned(g: GroupView, trends: Mapping[str, Thinned], only: Sequence[str] = ()) -> Trend | None:
+def aligned(g: GroupView, trends: Mapping[str, Thinned], only: Sequence[str] = ()) -> parts.Trend | None:
     """PV of the members beneath each other over some periods; None where the trends are too coarse to show any."""
     names = [r["loop"] for r in g.rows if r["loop"] in trends and (not only or r["loop"] in only)]
     names = (sorted(names, key=only.index) if only else names)[: PAGES.group_loops]
@@ -277,8 +240,8 @@ def aligned(g: GroupView, trends: Mapping[str, Thinned], only: Sequence[str] = (
     for i, name in enumerate(names):
         t = trends[name]
         low, high = (np.interp(lead.time_s, t.time_s, t.extremes[f"pv_{end}"]) for end in ("min", "max"))
-        bands.append(Band(f"{name}.PV", "pv", i, low, high))
+        bands.append(parts.Band(f"{name}.PV", "pv", i, low, high))
     top = "" if only else ", the likeliest source on top"
     caption = f"PV [% of span] over {PERIODS:g} periods in the middle of the night{top}."
     title = "Trends, aligned"
-    return Trend("aligned", title, lead.time_s, lead.gap, tuple(bands), tuple(names), (), caption)
+    return parts.Trend("aligned", title, lead.time_s, lead.gap, tuple(bands), tuple(names), (), caption)

@@ -9,7 +9,6 @@ import numpy as np
 
 from analyzer.pages.reading import Thinned
 from analyzer.pages.words import PLAIN, PvScale, Row, duration, pv_scale_of, texts
-from identification.record import Mask
 from identification.signals.correlation import lag_sums
 from reports.pages import Band, Floats, Line, Mark, Panels, Plot, Sparkline, Text, Trend
 
@@ -95,20 +94,16 @@ def rhythm_plots(thin: Thinned, period_s: float | None) -> tuple[Plot | Text, ..
     """Autocorrelation and spectrum of the error, or a sentence on why the trend cannot show them."""
     if thin.time_s.size < LEAST_SAMPLES or int((~thin.gap).sum()) < LEAST_SAMPLES:
         return (Text(("Too few samples for autocorrelation and spectrum.",), "note"),)
-    error, step = _even_error(thin.time_s, thin.middle("sp") - thin.middle("pv"), ~thin.gap)
+    step = float(np.median(np.diff(thin.time_s)))
     if period_s is not None and period_s < LEAST_BUCKETS * step:
         text = f"The stored trend, a bucket each {step:.0f} s, cannot show a period of {duration(period_s)}."
         return (Text((text,), "note"),)
+    grid = np.arange(
+        thin.time_s[0], thin.time_s[-1] + 0.5 * step, step
+    )  # drawn straight where nothing is known
+    error = np.interp(grid, thin.time_s[~thin.gap], (thin.middle("sp") - thin.middle("pv"))[~thin.gap])
+    error -= error.mean()
     return _correlation(error, step, period_s), _spectrum_plot(error, step, period_s)
-
-
-def _even_error(time_s: Floats, error: Floats, known: Mask) -> tuple[Floats, float]:
-    """Error [% of span] on an even grid, drawn straight where it is not known, its mean taken off, and the grid's
-    step [s]."""
-    step = float(np.median(np.diff(time_s)))
-    grid = np.arange(time_s[0], time_s[-1] + 0.5 * step, step)
-    filled = np.interp(grid, time_s[known], error[known])
-    return filled - filled.mean(), step
 
 
 def autocorrelation(x: Floats) -> Floats:
@@ -177,22 +172,17 @@ def _half_cycle(kept: Row, scale: PvScale, step_s: float) -> tuple[Course, Cours
 
 def _laid_over(paths: Sequence[Course]) -> tuple[Line, ...]:
     """Paths over one another, where the stem stands marked on top."""
-    lines = [Line("since the turn", x, y) for x, y, _ in paths]
     stuck = [Line(STANDS, x[part], y[part], kind="stuck") for x, y, part in paths if x[part].size > 1]
-    return (*lines, *stuck)
+    return (*(Line("since the turn", x, y) for x, y, _ in paths), *stuck)
 
 
 def answered_moves(row: Row) -> Plot | None:
     """PV's answers to moves of the set point over one another, each from 0 to 1; None where there were none."""
     every = json.loads(row["moves"] or "[]")
-    found = [
-        m for m in every if not m.get("ramp_s")
-    ] or every  # ramps are long, and set the course themselves
-    if not found:
-        return None
-    lines = tuple(
-        Line("PV", np.linspace(0.0, m["lasts_s"], len(m["course"])), np.array(m["course"]), kind="pv")
-        for m in found
-    )
+    steps = [m for m in every if not m.get("ramp_s")]  # ramps are long, and set the course themselves
+    lines = [
+        Line("PV", np.linspace(0.0, m["lasts_s"], len(m["course"])), np.array(m["course"]))
+        for m in steps or every
+    ]
     title = "PV after moves of the set point, which go from 0 to 1"
-    return Plot("moves", title, "s", "share of the move", lines, reach=(0.0, 1.0))
+    return Plot("moves", title, "s", "share of the move", tuple(lines), reach=(0.0, 1.0)) if lines else None

@@ -6,10 +6,10 @@ from analyzer.lanes.lanes import lanes_in
 from analyzer.limits import PAGES
 from analyzer.loop.decisions import Action, Cause, Fault, Lane, Status
 from analyzer.pages.reading import ShownNight, link_to
-from analyzer.pages.words import ALL_LOOPS, Row, cells, duration, page_columns, plain_cell, texts, with_noun
+from analyzer.pages.words import ALL_LOOPS, Row, cells, duration, page_table, plain_cell, texts, with_noun
 from analyzer.words.belief import wear_text
 from analyzer.words.units import changed_settings
-from reports.pages import Cell, Page, Section, Table
+from reports.pages import Cell, Page, Section, Table, section, there
 
 NAME = "maintenance"
 
@@ -19,26 +19,22 @@ def _fault_width(row: Row) -> float | None:
     return row["stickband_pct"] or row["backlash_pct"] or None
 
 
-def _answer(row: Row) -> str:
-    """What a valve at fault does in a stroke test; '' where it does not answer."""
-    width, kind = _fault_width(row), texts("by_hand").get(row["valve_fault"], "")
-    return kind.format(width=width) if width else ""
+def _stroke(row: Row) -> tuple[str, str]:
+    """Steps of the stroke test of a valve at fault [%], and what it does in them; '' where it does not answer."""
+    width, kind = _fault_width(row) or 0.0, texts("by_hand").get(row["valve_fault"], "")
+    return f"{width / PAGES.stroke_steps:.2g}", kind.format(width=width) if width else ""
 
 
 def valve_test(row: Row) -> str:
     """The stroke test of a valve at fault in a few words; its order says how it is done."""
-    answer = _answer(row) or "PV, or the stem, does not answer"
-    return f"steps of {_step(row) if _answer(row) else 5} %: {answer}"
-
-
-def _step(row: Row) -> str:
-    return f"{(_fault_width(row) or 0.0) / PAGES.stroke_steps:.2g}"
+    step, answer = _stroke(row)
+    return f"steps of {step} %: {answer}" if answer else "steps of 5 %: PV, or the stem, does not answer"
 
 
 def _case(row: Row) -> str:
     """The order that a row asks for."""
     action = Action(row["action"])
-    if action is Action.REPAIR_VALVE and not _answer(row):
+    if action is Action.REPAIR_VALVE and not _stroke(row)[1]:
         return "dead valve"
     if action is Action.NONE and row["cause"] == Cause.LOAD:
         return "moved from outside"
@@ -68,7 +64,7 @@ def work_order(row: Row) -> tuple[tuple[str, str], ...]:
     }
     said |= {"lack": f": {row['lack']}" if row.get("lack") else "", "period": duration(row.get("period_s"))}
     if row["action"] == Action.REPAIR_VALVE:
-        said |= {"answer": _answer(row), "step": _step(row)}
+        said |= dict(zip(("step", "answer"), _stroke(row), strict=True))
     if row["action"] == Action.RETUNE:
         said |= {"settings": changed_settings(row), "expected": _expected(row)}
     order = {part: text.format(**said) for part, text in texts("orders")[_case(row)].items()}
@@ -76,66 +72,47 @@ def work_order(row: Row) -> tuple[tuple[str, str], ...]:
     return ("Do", order["do"]), ("Look for", look), ("Then", order["after"])
 
 
-def is_at_fault(row: Row) -> bool:
-    """Whether a valve is at fault, by making a cycle or for all that nights say of it."""
-    return row["cause"] == Cause.VALVE or row["valve_fault"] in (Fault.BACKLASH, Fault.STICTION)
-
-
 def wearing(night: ShownNight) -> Table:
     """Valves whose width grows, the fastest first: for the next shutdown."""
     rows = [r for r in night.rows if r["wear_pct_per_month"] is not None]
     rows.sort(key=lambda r: -r["wear_pct_per_month"])
-    shown = page_columns("wear")
-    told = tuple(cells(r, shown, loop=link_to(night, r["loop"]), forecast=Cell(wear_text(r))) for r in rows)
-    note = "Play or stickband by all nights; growth, its night of beginning and the forecast with 90 % ends."
-    return Table("wear", "", shown, told, note, cards=True)
+    told = (cells(r, "wear", loop=link_to(night, r["loop"]), forecast=Cell(wear_text(r))) for r in rows)
+    return page_table("wear", told)
 
 
 def faulty(night: ShownNight) -> Table:
-    """Valves at fault, those to be repaired first, then by width."""
-    rows = [r for r in night.rows if r["status"] == Status.OK and is_at_fault(r)]
+    """Valves at fault, by making a cycle or for all that nights say: those to be repaired first, then by width."""
+    assessed = [r for r in night.rows if r["status"] == Status.OK]
+    faults = (Fault.BACKLASH, Fault.STICTION)
+    rows = [r for r in assessed if r["cause"] == Cause.VALVE or r["valve_fault"] in faults]
     rows.sort(key=lambda r: (r["action"] != Action.REPAIR_VALVE, -(_fault_width(r) or 0.0)))
-    note = (
-        "Test: in manual, with the process calm, move OP in steps, four up and four down, and wait each time; "
-        "then look at positioner feedback, linkage, packing and actuator. "
-        "With new settings a loop can wait for the shutdown."
-    )
-    shown = page_columns("valves")
-    told = tuple(cells(r, shown, **_valve_cells(night, r)) for r in rows)
-    return Table("valves", "", shown, told, note, cards=True)
+    return page_table("valves", (_valve_cells(night, r) for r in rows))
 
 
-def _valve_cells(night: ShownNight, row: Row) -> dict[str, Cell]:
-    """What the store does not hold as a valve's row shows it."""
-    fault = row["valve_fault"]
-    return {
-        "loop": link_to(night, row["loop"]),
-        "valve_fault": Cell("" if fault in (None, Fault.NONE) else fault, kind="valve"),
-        "width": plain_cell(row["stickband_pct"] or row["backlash_pct"]),
-        "test": Cell(valve_test(row)),
-        "found": Cell(""),
-    }
+def _valve_cells(night: ShownNight, row: Row) -> tuple[Cell, ...]:
+    """A valve's row, with what the store does not hold and place for what is found."""
+    fault = "" if row["valve_fault"] in (None, Fault.NONE) else row["valve_fault"]
+    own = {"loop": link_to(night, row["loop"]), "valve_fault": Cell(fault, kind="valve"), "found": Cell("")}
+    own |= {"width": plain_cell(row["stickband_pct"] or row["backlash_pct"]), "test": Cell(valve_test(row))}
+    return cells(row, "valves", **own)
 
 
 def worn(night: ShownNight) -> Table:
     """The valves that travel most."""
     rows = [r for r in night.rows if r["valve_travel_pct_per_h"] is not None]
     rows.sort(key=lambda r: -r["valve_travel_pct_per_h"])
-    shown = page_columns("travel")
-    told = tuple(cells(r, shown, loop=link_to(night, r["loop"])) for r in rows[: PAGES.travelled])
-    note = "Travel of OP, or of the stem where it is recorded; where the loop is tight, its settings wear the valve."
-    return Table("travel", "", shown, told, note, cards=True)
+    shown = rows[: PAGES.travelled]
+    return page_table("travel", (cells(r, "travel", loop=link_to(night, r["loop"])) for r in shown))
 
 
 def maintenance_page(night: ShownNight) -> Page:
     """The sheet of a night."""
-    first, growing, second = faulty(night), wearing(night), worn(night)
-    sections = (
+    first, growing = faulty(night), wearing(night)
+    sections = there(
         Section(f"Valves at fault ({len(first.rows)})", (first,)),
-        *((Section(f"Valves that wear ({len(growing.rows)})", (growing,)),) if growing.rows else ()),
-        Section("Valves that travel most", (second,)),
+        section(f"Valves that wear ({len(growing.rows)})", growing if growing.rows else None),
+        Section("Valves that travel most", (worn(night),)),
     )
-    subtitle = (
-        f"{with_noun(len(first.rows), 'valve')} at fault in the night of {night.name}, for the valve shop."
-    )
+    valves = with_noun(len(first.rows), "valve")
+    subtitle = f"{valves} at fault in the night of {night.name}, for the valve shop."
     return Page(NAME, "Hand-over to maintenance", subtitle, sections, (ALL_LOOPS,))

@@ -9,7 +9,7 @@ from analyzer.explain.night import known
 from analyzer.limits import PAGES
 from analyzer.pages import groups, loop, maintenance, morning, work
 from analyzer.pages.loop_pictures import trend_block
-from analyzer.pages.plant import NightSum, read_sums
+from analyzer.pages.plant import read_sums
 from analyzer.pages.reading import BESIDE, ShownNight, Thinned, by_loop, read_night, read_nights, read_trends
 from analyzer.pages.words import ALL_LOOPS, pv_scale_of
 from analyzer.plantwide.view import GroupView, read_groups
@@ -90,21 +90,20 @@ def _loop_pages(
 
 
 def dated_pages(store: Store, name: str | None, written: Callable[[str], bool]) -> Iterator[Page]:
-    """Morning pages under their dates, up to a night (the latest by default); those that stand already are left out.
-
-    Parameters
-    ----------
-    store : Store
-    name : str or None
-    written : callable
-        Told a night; True where its page was written after its results.
-    """
+    """Morning pages under their dates, up to a night (the latest by default); those of the last two apart, nights are
+    left out of which `written` says that their page was written after their results."""
     last = name or store.require()
     nights = [n for n in store.nights() if n <= last][-PAGES.dated :]
     sums = read_sums(store, last)
     for night in nights:
         if night in nights[-2:] or not written(night):
-            yield _dated_page(store, night, nights, sums)
+            shown = replace(
+                read_night(store, night, PAGES.dated_loops), paged=()
+            )  # loops' pages are the latest night's
+            own = [s for s in sums if s.name <= night]
+            found = morning.morning_page(shown, read_groups(store, night), own)
+            links, choices = (*nights_around(nights, night), LATEST), nights_to_choose(nights, night)
+            yield replace(found, name=name_of(night), links=links, choices=choices)
 
 
 def name_of(night: str) -> str:
@@ -123,15 +122,6 @@ def nights_to_choose(nights: Sequence[str], night: str) -> tuple[tuple[str, str]
     """Nights that have a page, the latest first, with their pages; '' for the one that is shown."""
     pages = {n: f"{name_of(n)}.html" for n in nights} | {nights[-1]: LATEST[1], night: ""}
     return tuple((n, pages[n]) for n in reversed(nights)) if len(nights) > 1 else ()
-
-
-def _dated_page(store: Store, night: str, nights: Sequence[str], sums: Sequence[NightSum]) -> Page:
-    """A night's morning page without links to loops' pages, which are those of the latest night alone."""
-    own = [s for s in sums if s.name <= night]
-    without_pages = replace(read_night(store, night, PAGES.dated_loops), paged=())
-    found = morning.morning_page(without_pages, read_groups(store, night), own)
-    links = (*nights_around(nights, night), LATEST)
-    return replace(found, name=name_of(night), links=links, choices=nights_to_choose(nights, night))
 
 
 def kept_page(text: str | None) -> Page | None:

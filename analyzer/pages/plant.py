@@ -13,9 +13,9 @@ from analyzer.limits import PAGES
 from analyzer.loop.cost import LOSS, SIGNIFICANCE, cost, cost_column
 from analyzer.loop.decisions import CAUSES, Cause, Status, counts
 from analyzer.pages.reading import ShownNight, link_to, needs_a_look, read_nights
-from analyzer.pages.words import Row, cell, number, page_columns, plain_cell
+from analyzer.pages.words import Row, cell, number, page_table, plain_cell
 from analyzer.store.store import Store
-from reports.pages import Block, Cell, Floats, Line, Panels, Plot, Table, Tile, TreeMap
+from reports.pages import Cell, Line, Panels, Plot, Table, Tile, TreeMap
 
 NO_AREA = "no area stated"
 KEYS = (
@@ -57,24 +57,21 @@ def _area(name: str, rows: Sequence[Row]) -> tuple[Cell, ...]:
 def area_table(rows: Sequence[Row]) -> Table:
     """Areas with their worst loops, the lowest score first."""
     cells = [_area(name, own) for name, own in by_area(rows).items()]
-    cells.sort(key=lambda c: 101.0 if c[1].number is None else c[1].number)
-    note = "Score: share of the assessed loops, by importance, in which no fault was found; 100 is best."
-    return Table("areas", "", page_columns("areas"), tuple(cells), note)
-
-
-def _tile(night: ShownNight, row: Row, by: str) -> Tile:
-    kind = "calm" if not needs_a_look(row) else row["cause"] if row["cause"] in CAUSES else "unclear"
-    text = f"{row['loop']}: {number(cost(row, by))}. {cell(row, 'reason').text}"
-    return Tile(row["loop"], cost(row, by), kind, text, link_to(night, row["loop"]).href)
+    return page_table("areas", sorted(cells, key=lambda c: 101.0 if c[1].number is None else c[1].number))
 
 
 def _plant_tiles(night: ShownNight, rows: Sequence[Row], by: str) -> tuple[Tile, ...]:
-    ordered = sorted(rows, key=lambda r: (-cost(r, by), r["loop"]))
-    tiles = [_tile(night, r, by) for r in ordered[: PAGES.area_tiles]]
-    rest = ordered[PAGES.area_tiles :]
+    """An area's loops, those that cost most first, and the others in one."""
+    ordered = sorted(((cost(r, by), r) for r in rows), key=lambda c: (-c[0], c[1]["loop"]))
+    tiles = []
+    for worth, row in ordered[: PAGES.area_tiles]:
+        kind = "calm" if not needs_a_look(row) else row["cause"] if row["cause"] in CAUSES else "unclear"
+        text = f"{row['loop']}: {number(worth)}. {cell(row, 'reason').text}"
+        tiles.append(Tile(row["loop"], worth, kind, text, link_to(night, row["loop"]).href))
+    rest = [worth for worth, _ in ordered[PAGES.area_tiles :]]
     if rest:
-        total = sum(cost(r, by) for r in rest)
-        tiles.append(Tile(f"{len(rest)} more", total, "calm", f"{len(rest)} more loops: {number(total)}"))
+        text = f"{len(rest)} more loops: {number(sum(rest))}"
+        tiles.append(Tile(f"{len(rest)} more", sum(rest), "calm", text))
     return tuple(tiles)
 
 
@@ -115,25 +112,20 @@ def read_sums(store: Store, night: str) -> list[NightSum]:
     return [summed(n, read_nights(store, [n], SUMMED)) for n in names]
 
 
-def plant_history(sums: Sequence[NightSum]) -> tuple[Block, ...]:
-    """Curves over the nights; none where there are too few."""
+def plant_history(sums: Sequence[NightSum]) -> Panels | None:
+    """Curves over the nights: loops that oscillate, and what all cost, of the nights whose figure is that of the last
+    one; None where there are too few."""
     if len(sums) < PAGES.curve_nights:
-        return ()
+        return None
     day = np.array([date.fromisoformat(s.name[:10]).toordinal() for s in sums], float)
     day -= day[-1]
     lines = [Line("all that oscillate", day, np.array([s.oscillate for s in sums], float), kind="recorded")]
     kinds = ((Cause.VALVE, "op"), (Cause.TUNING, "baseline"), (Cause.LOAD, "pv"))
     lines += [Line(f"by {c}", day, np.array([s.causes[c] for s in sums], float), kind=k) for c, k in kinds]
-    axis = "days before this night"
-    most = max(s.oscillate for s in sums)
-    loops = Plot("oscillating", "Loops that oscillate", axis, "loops", tuple(lines), reach=(0.0, most + 1.0))
-    return (Panels("over-the-nights", "The plant over the nights", (loops, _costs(sums, day, axis))),)
-
-
-def _costs(sums: Sequence[NightSum], day: Floats, axis: str) -> Plot:
-    """What all loops cost together, of the nights whose figure is that of the last one."""
+    axis, most = "days before this night", max(s.oscillate for s in sums) + 1.0
+    loops = Plot("oscillating", "Loops that oscillate", axis, "loops", tuple(lines), reach=(0.0, most))
     by = sums[-1].by
-    cost = np.array([s.cost if s.by == by else np.nan for s in sums])
-    named = BY_NAME[by].heading.lower()
+    cost, named = np.array([s.cost if s.by == by else np.nan for s in sums]), BY_NAME[by].heading.lower()
     title = f"The loops' {named} together, now {number(float(cost[-1]))}"
-    return Plot("loss", title, axis, named, (Line(named, day, cost, kind="recorded"),), reach=(0.0, 1.0))
+    costs = Plot("loss", title, axis, named, (Line(named, day, cost, kind="recorded"),), reach=(0.0, 1.0))
+    return Panels("over-the-nights", "The plant over the nights", (loops, costs))

@@ -14,11 +14,11 @@ from analyzer.columns import BELIEVED, BY_NAME, GROUP_LIST, LISTED, NOTED, RANKI
 from analyzer.lanes.lanes import FIGURE, lanes_in
 from analyzer.loop.cost import LOSS, MARK, OF_RECORDED, SIGNIFICANCE, compares, cost_column, mark
 from analyzer.loop.decisions import CAUSES, Cause, Due, Lane
+from analyzer.pages.words import Row, duration, keys, number, page_columns
 from analyzer.store import notes
-from analyzer.store.notes import Note
 from analyzer.store.store import Store
 from analyzer.words.reason import in_short
-from analyzer.words.units import Row, duration, gain_unit, number
+from analyzer.words.units import gain_unit
 from identification.errors import InputError
 from reports.markdown import escaped, rows_of_table
 from reports.pages import Column
@@ -37,7 +37,6 @@ MOST_NAMES = 10
 """Areas that are named in an error."""
 WIDEST, PIPED = 240, 180
 """Characters of a line of a wide table, and of one that no terminal shows."""
-OF_GROUPS = ("group", "loops", "period", "starts at", "action there", "others gain %", "members")
 CAUSE_STYLES: Mapping[str, str] = {
     Cause.VALVE: "red",
     Cause.TUNING: "yellow",
@@ -46,20 +45,12 @@ CAUSE_STYLES: Mapping[str, str] = {
 }
 """Colours of causes on the terminal."""
 SHARES = tuple(f"osc_{cause}_pct" for cause in CAUSES)
-SHOWN = (
-    *("loop", "oscillation_significance", "oscillating_pct", *SHARES),
-    *("average_absolute_error_pct", "valve_travel_pct_per_h", "period_s", "kp", "ti", "action", "reason"),
-)
+SHOWN = keys("list")
 """Columns for people, in their order; new settings stand in the cells of the old ones."""
 WHOLE = frozenset({"oscillating_pct", *SHARES})
 """Shares that are shown without decimals."""
 WITH_UNITS = frozenset({"period_s", "kp", "ti"})
 """Numbers that are shown with their units, and so as texts."""
-WORTH_LEAST = (
-    *("osc_load_pct", "osc_tuning_pct", "osc_valve_pct", "valve_travel_pct_per_h", "oscillating_pct"),
-    *("average_absolute_error_pct", "ti", "kp", "period_s", "loss", "oscillation_significance"),
-)
-"""Columns that a narrow table leaves out, the first of them first; loop, action and reason stay."""
 LEAST_REASON = 44
 """Characters of a line of the reason at least."""
 
@@ -86,7 +77,9 @@ def ranked(
     if column is not None and column not in SORTABLE:
         raise InputError(f"column {column!r}", "one of " + ", ".join(SORTABLE), "correct --by")
     name = night or store.require()
-    rows = _rows_of_area(_rows_read(store, name), area)
+    known = notes.read_notes(store.path)
+    rows = [_noted(row, known) for row in store.rows("nights", name, (*KEPT, *LANE_FIGURES, "timezone"))]
+    rows = _rows_of_area(rows, area)
     if lane is not None:
         rows = [r for r in rows if lane in lanes_in(r)]
     if column is None and not ascending:
@@ -94,14 +87,7 @@ def ranked(
     return _sorted_by_column(rows, column or SIGNIFICANCE, ascending)[:top], name
 
 
-def _rows_read(store: Store, night: str) -> list[dict[str, Any]]:
-    """The night's rows; columns that an older version did not write are None."""
-    wanted = (*KEPT, *LANE_FIGURES, "timezone")
-    known = notes.read_notes(store.path)
-    return [_noted(row, known) for row in store.rows("nights", night, wanted)]
-
-
-def _noted(row: dict[str, Any], known: Mapping[str, tuple[Note, ...]]) -> dict[str, Any]:
+def _noted(row: dict[str, Any], known: Mapping[str, tuple[notes.Note, ...]]) -> dict[str, Any]:
     """A row with the newest note of its loop; numbers that are none are not known."""
     row = {k: None if isinstance(v, float) and not math.isfinite(v) else v for k, v in row.items()}
     found = notes.last(known, row["loop"])
@@ -116,11 +102,10 @@ def hidden_loops(rows: Sequence[Row], night: str) -> tuple[str, ...]:
 
 def _sorted_by_column(rows: Sequence[dict[str, Any]], column: str, ascending: bool) -> list[dict[str, Any]]:
     """Rows by a column, ties and loops without a figure by name."""
-    by_name = sorted(rows, key=lambda r: r["loop"])
-    known = [r for r in by_name if r[column] not in (None, "")]
-    falls = BY_NAME[column].is_number and not ascending
-    known.sort(key=lambda r: -r[column] if falls else r[column])
-    return known + [r for r in by_name if r[column] in (None, "")]
+    known, unknown = ([r for r in rows if (r[column] in (None, "")) is empty] for empty in (False, True))
+    known.sort(key=lambda r: r["loop"])
+    known.sort(key=lambda r: r[column], reverse=BY_NAME[column].is_number and not ascending)
+    return known + sorted(unknown, key=lambda r: r["loop"])
 
 
 def worst_first(rows: Sequence[dict[str, Any]], column: str | None = None) -> list[dict[str, Any]]:
@@ -221,25 +206,27 @@ def _shown_of(rows: Sequence[Row], figure: str | None) -> tuple[str, ...]:
 def brief(row: Row, columns: Sequence[str]) -> dict[str, str]:
     """A row for people, by column: figures in few characters, settings as old and new in one cell."""
     gain = gain_unit(row.get("gain_unit"), row.get("pv_unit"), row.get("op_unit"))
+    noted = f" [note: {row['note']}]" if row.get("note") else ""
     special = {
         "period_s": duration(row["period_s"]),
         "kp": _setting_text(row["kp"], row["kp_new"], gain),
         "ti": _setting_text(row["ti"], row["ti_new"], row.get("ti_unit") or "s", "none"),
+        "reason": in_short(row["reason"] or "")[0] + noted,
     }
-    noted = f" [note: {row['note']}]" if row.get("note") else ""
-    special["reason"] = in_short(row["reason"] or "")[0] + noted
-    return {
-        name: visible(special.get(name, "") or _as_text(row[name], name) + mark(row, name))
-        for name in columns
-    }
+    for name in (n for n in columns if not special.get(n)):
+        value = row[name]
+        whole = name in WHOLE and value is not None
+        special[name] = value if isinstance(value, str) else f"{value:.0f}" if whole else number(value)
+    return {name: visible(special[name] + mark(row, name)) for name in columns}
 
 
 def _fitting(shown: Sequence[Mapping[str, str]], width: int) -> tuple[str, ...]:
-    """The columns that fit into so many characters with all tags whole; none without rows."""
+    """The columns that fit into so many characters with all tags whole, those worth least left out; none without
+    rows."""
     kept = list(shown[0]) if shown else []
     size = {name: max(map(len, (BY_NAME[name].heading, *(row[name] for row in shown)))) + 1 for name in kept}
     size |= {"reason": LEAST_REASON + 1} if shown else {}
-    for name in WORTH_LEAST:
+    for name in keys("list-worth-least"):
         if name in kept and sum(size[n] for n in kept) + 1 > width:
             kept.remove(name)
     return tuple(kept)
@@ -255,13 +242,6 @@ def _setting_text(now: float | None, new: float | None, unit: str, off: str = "0
     return f"{present} {unit}" if now else off
 
 
-def _as_text(value: Any, column: str) -> str:
-    """A cell for people: three digits, empty where not known."""
-    if isinstance(value, str):
-        return value
-    return f"{value:.0f}" if column in WHOLE and value is not None else number(value)
-
-
 def rendered_groups(rows: Sequence[Row], form: str, night: str) -> str:
     """Groups (analyzer.pages.groups.group_row) as text in one of the formats."""
     if form == "csv":
@@ -272,17 +252,16 @@ def rendered_groups(rows: Sequence[Row], form: str, night: str) -> str:
         return json.dumps(held, indent=1)
     if form == "table":
         return _group_table(rows, night)
-    return "\n".join(rows_of_table(OF_GROUPS, [map(escaped, _group_cells(r)) for r in rows]))
+    heads = [column.title for column in page_columns("list-of-groups")]
+    return "\n".join(rows_of_table(heads, [map(escaped, _group_cells(r)) for r in rows]))
 
 
 def _group_cells(row: Row) -> tuple[str, ...]:
     start = ", ".join(f"{loop} {pct:.0f} %" for loop, pct in json.loads(row["candidates"]).items())
-    members = [m for m in json.loads(row["members"]) if m != row["fix_first"]]
-    cells = (
-        *(row["group"], f"{row['loops']:.0f}", duration(row["group_period_s"]), start or "unseen"),
-        *(row["source_action"] or "undecided", number(row["others_gain_pct"]), ", ".join(members)),
-    )
-    return tuple(map(visible, cells))
+    members = ", ".join(m for m in json.loads(row["members"]) if m != row["fix_first"])
+    head = row["group"], f"{row['loops']:.0f}", duration(row["group_period_s"]), start or "unseen"
+    tail = row["source_action"] or "undecided", number(row["others_gain_pct"]), members
+    return tuple(map(visible, (*head, *tail)))
 
 
 def _group_table(rows: Sequence[Row], night: str) -> str:
@@ -294,8 +273,8 @@ def _group_table(rows: Sequence[Row], night: str) -> str:
     if not rows:
         return f"Night {night}: no loops share an oscillation"
     drawn = Table(box=SIMPLE_HEAD, title=f"Night {night}: one cause, several loops", title_justify="left")
-    for name in OF_GROUPS:
-        drawn.add_column(name, justify="right" if name in ("loops", "others gain %") else "left")
+    for column in page_columns("list-of-groups"):
+        drawn.add_column(column.title, justify="right" if column.numeric else "left")
     for row in rows:
         drawn.add_row(*(Text(cell) for cell in _group_cells(row)))
     console = Console(width=None if interactive() else PIPED)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta
@@ -16,6 +17,7 @@ from analyzer.lanes.lanes import FIGURE
 from analyzer.limits import PAGES
 from analyzer.loop.decisions import Cause, Status, counts
 from analyzer.pages.rank import worst_first
+from analyzer.pages.words import keys
 from analyzer.store import notes
 from analyzer.store.notes import Note, is_hidden, last
 from analyzer.store.store import Store
@@ -71,29 +73,25 @@ def nights_within(store: Store, span: Span) -> list[str]:
 def _tables(
     store: Store, table: str, loops: Collection[str], nights: Sequence[str], columns: Sequence[str] | None
 ) -> list[pa.Table]:
-    if not loops:
-        return []
-    paths = [store.file(table, night) for night in nights]
-    where = [("loop", "in", sorted(loops))]
-    return [read_stored(p, columns, where) for p in paths if p.exists()]
+    """The rows of some loops in a table of each night that has one."""
+    paths = [store.file(table, night) for night in nights] if loops else []
+    return [read_stored(p, columns, [("loop", "in", sorted(loops))]) for p in paths if p.exists()]
 
 
 def read_nights(
     store: Store, nights: Sequence[str], columns: Sequence[str], loops: Collection[str] | None = None
 ) -> list[dict[str, Any]]:
     """Rows of several nights, oldest first; columns that a night lacks are None."""
-    rows: list[dict[str, Any]] = []
-    for night in nights if loops is None or loops else ():
-        rows += [{**row, "night": night} for row in store.rows("nights", night, columns, loops)]
-    return rows
+    read = nights if loops is None or loops else ()
+    return [{**r, "night": night} for night in read for r in store.rows("nights", night, columns, loops)]
 
 
 def by_loop(rows: Sequence[Row]) -> dict[str, list[Row]]:
     """Rows of nights by their loop, in their order."""
-    out: dict[str, list[Row]] = {}
+    out: dict[str, list[Row]] = defaultdict(list)
     for row in rows:
-        out.setdefault(row["loop"], []).append(row)
-    return out
+        out[row["loop"]].append(row)
+    return dict(out)
 
 
 def read_hours(store: Store, loops: Collection[str], nights: Sequence[str]) -> dict[str, dict[str, Floats]]:
@@ -138,15 +136,7 @@ def _thinned_from(table: pa.Table) -> Thinned:
     )
 
 
-NIGHT_COLUMNS = (
-    *("loop", "type", "area", "description", "importance", "status", "oscillation_significance", "lanes"),
-    *("oscillating_pct", "osc_valve_pct", "osc_tuning_pct", "osc_load_pct", "cause", "valve_fault", "loss"),
-    *("period_s", "source_loop", "average_absolute_error_pct", "valve_travel_pct_per_h", "kp", "ti"),
-    *("variability_pct", "kp_new", "ti_new", "action", "reason", "form", "gain_unit", "ti_unit", "pv_unit"),
-    *("op_unit", "group", "close_first_s", "close_last_s", "timezone", "backlash_pct", "stickband_pct"),
-    *("advice", "due", "percent_of", *FIGURE.values(), "news", "news_tone", "width_pct"),
-    *("wear_low_pct", "wear_high_pct", "wear_since", "reaches_pct", "reaches_from", "reaches_by"),
-)
+NIGHT_COLUMNS = tuple(dict.fromkeys((*keys("of-a-night"), *FIGURE.values())))
 """What the pages of a night read of its rows."""
 REMEMBERED = ("loop", "lanes", *FIGURE.values())
 """What is read of the nights before."""
@@ -202,9 +192,9 @@ def needs_a_look(row: Row) -> bool:
 def followers_under(rows: Sequence[Row]) -> list[Row]:
     """Rows in their order, each loop that follows another one right under it."""
     present = {r["loop"] for r in rows}
-    under: dict[str, list[Row]] = {}
+    under: dict[str, list[Row]] = defaultdict(list)
     for row in rows:
-        under.setdefault(row["source_loop"] if row["source_loop"] in present else "", []).append(row)
+        under[row["source_loop"] if row["source_loop"] in present else ""].append(row)
     out: list[Row] = []
     for row in under.pop("", []):
         out += [row, *under.pop(row["loop"], [])]

@@ -8,26 +8,26 @@ from analyzer.lanes.lanes import FIGURE, lanes_in
 from analyzer.limits import PAGES
 from analyzer.loop.cost import cost, cost_column
 from analyzer.loop.decisions import CAUSES, Action, Cause, Due, Fault, GroupRole, Lane, Status
+from analyzer.pages import words
 from analyzer.pages.maintenance import work_order
 from analyzer.pages.reading import ShownNight, action_text, link_to, needs_a_look, oscillates, read_night
-from analyzer.pages.words import Row, cell, cells, duration, enumerated, page_columns, texts, with_noun
 from analyzer.plantwide.view import GroupView, read_groups
 from analyzer.store.store import Store
 from analyzer.words.units import changed_settings
-from reports.pages import Block, Cell, Listing, Page, Section, Table, Text
+from reports.pages import Block, Cell, Page, Section, Table, Text, section, there
 
 CALM = "No loop needs a touch this morning."
-NOTHING = ("", "")
-"""No news, in no colour."""
 
 
 def listed(names: Sequence[str]) -> str:
     """Names in a sentence, the first few of them."""
     more = len(names) - PAGES.named
-    return ", ".join(names[: PAGES.named]) + f" and {more} more" if more > 0 else enumerated(list(names))
+    return (
+        ", ".join(names[: PAGES.named]) + f" and {more} more" if more > 0 else words.enumerated(list(names))
+    )
 
 
-def first_things(rows: Sequence[Row], groups: Sequence[GroupView] = ()) -> tuple[str, ...]:
+def first_things(rows: Sequence[words.Row], groups: Sequence[GroupView] = ()) -> tuple[str, ...]:
     """At most three sentences, the one that gains most first; one that says so where there is nothing to do."""
     by_loop, by = {r["loop"]: r for r in rows}, cost_column(rows)
     told: set[str] = set()
@@ -41,7 +41,7 @@ def first_things(rows: Sequence[Row], groups: Sequence[GroupView] = ()) -> tuple
         told |= set(members)
         found.append((sum(cost(by_loop[m], by) for m in members), _of_group(source, others)))
     left = sorted((r for r in rows if r["loop"] not in told), key=lambda r: (-cost(r, by), r["loop"]))
-    for work in texts("work"):
+    for work in words.texts("work"):
         mine = [r for r in left if work in _work(r)]
         if mine:  # what waits for a shutdown is worth nothing tonight
             worth = 0.0 if work == "shutdown" else sum(cost(r, by) for r in mine)
@@ -50,7 +50,7 @@ def first_things(rows: Sequence[Row], groups: Sequence[GroupView] = ()) -> tuple
     return tuple(text for _, text in ordered[: PAGES.sentences]) or (CALM,)
 
 
-def _work(row: Row) -> set[str]:
+def _work(row: words.Row) -> set[str]:
     """The kinds of work that a row asks for."""
     tuning = row["cause"] == Cause.TUNING
     kinds = {
@@ -65,16 +65,16 @@ def _work(row: Row) -> set[str]:
     return {kinds.get(row["action"], ""), "limit" if at_limit else "", "windup" if winds_up else ""}
 
 
-def _asked(work: str, rows: Sequence[Row]) -> str:
+def _asked(work: str, rows: Sequence[words.Row]) -> str:
     """The sentence of a kind of work on some loops."""
     sticks = sum(r["valve_fault"] == Fault.STICTION for r in rows)
     fault = "sticks" if sticks == len(rows) else "has play" if sticks == 0 else "sticks or has play"
-    said = texts("work")[work]
+    said = words.texts("work")[work]
     text = said["one"] if len(rows) == 1 else said.get("several", said["one"])
     return text.format(names=listed([r["loop"] for r in rows]), fault=fault)
 
 
-def _of_group(source: Row, others: Sequence[str]) -> str:
+def _of_group(source: words.Row, others: Sequence[str]) -> str:
     name, moved = source["loop"], f"it also moves {listed(others)}"
     unasked = source["action"] is None and source["cause"] == Cause.VALVE  # of a night that got no advice
     if source["action"] == Action.REPAIR_VALVE or unasked:
@@ -82,31 +82,33 @@ def _of_group(source: Row, others: Sequence[str]) -> str:
     if source["action"] == Action.RETUNE:
         return f"Type new settings into {name}: {moved}."
     if source["cause"] == Cause.LOAD:
-        return f"Find what moves {name} every {duration(source['period_s'])} from outside: {moved}."
+        return f"Find what moves {name} every {words.duration(source['period_s'])} from outside: {moved}."
     return f"Look at {name} first: {moved}."
 
 
-def _news(night: ShownNight, row: Row) -> tuple[str, str]:
-    """What is new about a loop since the night before, and its colour; '' where nothing is."""
-    earlier = night.earlier.get(row["loop"])
-    if not earlier:
-        return NOTHING
-    return (row["news"], row["news_tone"]) if row["news"] else _lane_news([*earlier, row])
+def _news(night: ShownNight) -> list[tuple[words.Row, str, str]]:
+    """Loops of which there is something new since the night before: what it is, and its colour."""
+    found = []
+    for row in night.rows:
+        earlier = night.earlier.get(row["loop"])
+        if earlier:
+            new = (row["news"], row["news_tone"]) if row["news"] else _lane_news([*earlier, row])
+            found += [(row, *new)] if new else []
+    return found
 
 
-def _lane_news(nights: Sequence[Row]) -> tuple[str, str]:
+def _lane_news(nights: Sequence[words.Row]) -> tuple[str, str] | None:
     """Lanes beside oscillation that a loop came into or left, of those whose figures both nights know."""
     old, row = nights[-2:]
     known = [x for x in Lane if x is not Lane.OSCILLATION and None not in (old[FIGURE[x]], row[FIGURE[x]])]
-    states = {x: _inside(nights, x) for x in known}
-    came = [x for x in known if states[x][-1] and not states[x][-2]]
-    left = [x for x in known if states[x][-2] and not states[x][-1]]
+    states = {x: _inside(nights, x)[-2:] for x in known}
+    came, left = ([x for x in known if states[x] == change] for change in ([False, True], [True, False]))
     if came:
         return f"new: {', '.join(came)}", "worse"
-    return (f"no more: {', '.join(left)}", "better") if left else NOTHING
+    return (f"no more: {', '.join(left)}", "better") if left else None
 
 
-def _inside(nights: Sequence[Row], lane: Lane) -> list[bool]:
+def _inside(nights: Sequence[words.Row], lane: Lane) -> list[bool]:
     """Whether a loop was in a lane in each night; one that is inferred has to be told some nights in a row."""
     told = [lane in lanes_in(row) for row in nights]
     if lane is not Lane.SLUGGISH:
@@ -120,44 +122,38 @@ def _inside(nights: Sequence[Row], lane: Lane) -> list[bool]:
 
 def news_lines(night: ShownNight) -> list[str]:
     """What is new since the night before, a line a loop, what got worse first."""
-    found = [(row["loop"], *_news(night, row)) for row in night.rows]
     order = {"worse": 0, "unclear": 1, "better": 2}
-    told = sorted((order[tone], loop, text) for loop, text, tone in found if text)
+    told = sorted((order[tone], row["loop"], text) for row, text, tone in _news(night))
     return [f"{loop} {text}" for _, loop, text in told]
 
 
 def news_table(night: ShownNight, tones: Sequence[str], name: str, title: str) -> Table:
     """Loops of which there is something new, of the colours asked for."""
-    told = ((row, *_news(night, row)) for row in night.rows)
-    rows = tuple(
+    rows = [
         (
             link_to(night, row["loop"]),
             Cell(text, kind=tone),
-            *(cell(r, "oscillation_significance") for r in (night.earlier[row["loop"]][-1], row)),
+            *(words.cell(r, "oscillation_significance") for r in (night.earlier[row["loop"]][-1], row)),
             Cell(action_text(row)),
         )
-        for row, text, tone in told
-        if text and tone in tones
-    )
-    return Table(name, f"{title} ({len(rows)})", page_columns("news"), rows)
-
-
-def _news_blocks(night: ShownNight) -> tuple[Block, ...]:
-    tables = (
-        news_table(night, ("worse", "unclear"), "new", "New"),
-        news_table(night, ("better",), "better", "Better"),
-    )
-    return tuple(t if t.rows else Text((f"{t.title.split(' (')[0]}: nothing.",), "note") for t in tables)
+        for row, text, tone in _news(night)
+        if tone in tones
+    ]
+    return words.page_table("news", rows, name=name, title=f"{title} ({len(rows)})")
 
 
 def since(night: ShownNight) -> Section:
     """The section of what changed overnight."""
     if not night.before_name:
         return Section("Since the night before", (Text(("This is the first night in the store.",)),))
-    return Section(f"Since {night.before_name}", _news_blocks(night))
+    blocks: list[Block] = []
+    for title, tones in {"New": ("worse", "unclear"), "Better": ("better",)}.items():
+        table = news_table(night, tones, title.lower(), title)
+        blocks.append(table if table.rows else Text((f"{title}: nothing.",), "note"))
+    return Section(f"Since {night.before_name}", tuple(blocks))
 
 
-def _do(row: Row) -> str:
+def _do(row: words.Row) -> str:
     if row["kp_new"] is not None or row["ti_new"] is not None:
         return f"{row['action']}: {changed_settings(row)}"
     if row["action"] == Action.UNDECIDED:
@@ -169,9 +165,7 @@ def _counts(night: ShownNight) -> str:
     assessed = [r for r in night.rows if r["status"] == Status.OK]
     swinging = [r for r in assessed if oscillates(r)]
     of = ", ".join(f"{sum(r['cause'] == c for r in swinging)} by {c}" for c in CAUSES)
-    return (
-        f"{len(assessed)} of {with_noun(len(night.rows), 'loop')} assessed, {len(swinging)} oscillate: {of}."
-    )
+    return f"{len(assessed)} of {words.with_noun(len(night.rows), 'loop')} assessed, {len(swinging)} oscillate: {of}."
 
 
 def summary_page(store: Store, name: str | None = None) -> Page:
@@ -183,28 +177,27 @@ def summary_page(store: Store, name: str | None = None) -> Page:
         Where the store holds no such night.
     """
     night = read_night(store, name, PAGES.summary_loops, drawn=False)
-    first = first_things(
-        [r for r in night.rows if r["loop"] not in night.hidden], read_groups(store, night.name)
-    )
-    shown = page_columns("summary")[: 4 if any(night.note(r["loop"]) for r in night.worst) else 3]
-    rows = tuple(
-        cells(
-            r, shown, loop=Cell(r["loop"], kind="strong"), do=Cell(_do(r)), note=Cell(night.note(r["loop"]))
-        )
-        for r in night.worst
-    )
-    left = sum(needs_a_look(r) and r["loop"] not in night.hidden for r in night.rows) - len(rows)
-    note = f"{left} more in the list." if left > 0 else ""
-    lines, most = news_lines(night), PAGES.news
-    more = [("", f"{len(lines) - most} more")] if len(lines) > most else []
-    news = (
-        (Listing((*(("", text) for text in lines[:most]), *more)),) if lines else (Text(("Nothing new.",)),)
-    )
-    sections = (
-        Section("First", (Listing(tuple(("", text) for text in first)), Text((_counts(night),)))),
-        *((Section(f"Since {night.before_name}", news),) if night.before_name else ()),
-        Section(
-            "Loops worth a look", (Table("worst", "", shown, rows, note),) if rows else (Text(("None.",)),)
-        ),
+    seen = [r for r in night.rows if r["loop"] not in night.hidden]
+    first = words.listing(first_things(seen, read_groups(store, night.name)))
+    left, lines, most = sum(map(needs_a_look, seen)) - len(night.worst), news_lines(night), PAGES.news
+    news = [*lines[:most], f"{len(lines) - most} more"] if len(lines) > most else lines
+    told = words.listing(news) if news else Text(("Nothing new.",))
+    sections = there(
+        Section("First", (first, Text((_counts(night),)))),
+        section(f"Since {night.before_name}", told) if night.before_name else None,
+        Section("Loops worth a look", (_worst(night, left) if night.worst else Text(("None.",)),)),
     )
     return Page("summary", f"Loops in the morning of {night.name}", "", sections)
+
+
+def _worst(night: ShownNight, left: int) -> Table:
+    """The worst loops with what to do, and how many are left out; their notes where there are any."""
+    noted = [(r, night.note(r["loop"])) for r in night.worst]
+    shown = words.page_columns("summary")[: 4 if any(note for _, note in noted) else 3]
+    rows = (
+        words.cells(r, shown, loop=Cell(r["loop"], kind="strong"), do=Cell(_do(r)), note=Cell(note))
+        for r, note in noted
+    )
+    return words.page_table(
+        "summary", rows, columns=shown, note=f"{left} more in the list." if left > 0 else ""
+    )

@@ -9,18 +9,20 @@ from functools import cache
 from importlib.resources import files
 from typing import Any
 
-from analyzer.columns import BY_NAME
+from analyzer.columns import BY_NAME, GROUPS
 from analyzer.history.plant_clock import stamp
 from analyzer.loop.cost import mark
 from analyzer.loop.decisions import CAUSES
 from analyzer.words.reason import in_short
 from analyzer.words.units import Row, duration, number
-from reports.pages import Cell, Column, Floats
+from reports.pages import Cell, Column, Facts, Floats, Listing, Table, Text
 
 __all__ = ["Row", "duration", "number", "stamp"]  # of the words that are not chosen here
 
 ALL_LOOPS = ("All loops", "index.html")
 """The link from a page to the morning page."""
+OF_GROUPS = {c.name: c for c in GROUPS if c.name not in BY_NAME}
+"""Columns of the table of groups alone; in a heading their unit stands too."""
 
 
 def signed(value: float | None) -> str:
@@ -54,14 +56,15 @@ def _toml_of(name: str) -> dict[str, Any]:
 
 def heading(name: str, **more: bool) -> Column:
     """A column of the store as one of a page."""
-    declared = BY_NAME[name]
-    return Column(name, declared.heading, declared.is_number, declared.hint, **more)
+    declared = BY_NAME.get(name) or OF_GROUPS[name]
+    unit = f" [{declared.unit}]" if name in OF_GROUPS and declared.unit else ""
+    return Column(name, declared.heading + unit, declared.is_number, declared.hint, **more)
 
 
 @cache
 def page_columns(table: str) -> tuple[Column, ...]:
     """The columns of a table of a page, as tables.toml declares them."""
-    return tuple(_column(stated) for stated in _toml_of("tables.toml")[table])
+    return tuple(map(_column, _toml_of("tables.toml")[table]["columns"]))
 
 
 def _column(stated: str | dict[str, Any]) -> Column:
@@ -71,10 +74,37 @@ def _column(stated: str | dict[str, Any]) -> Column:
     return heading(name, **dict.fromkeys(more, True))
 
 
+def keys(*tables: str) -> tuple[str, ...]:
+    """The keys of the columns of some tables, each once."""
+    return tuple(dict.fromkeys(c.key for table in tables for c in page_columns(table)))
+
+
+def page_table(declared: str, rows: Iterable[tuple[Cell, ...]], **own: Any) -> Table:
+    """A table of a page with its rows: as tables.toml declares it, but for what is its `own`."""
+    stated = {k: tuple(v) if isinstance(v, list) else v for k, v in _toml_of("tables.toml")[declared].items()}
+    whole = {"name": declared, "title": "", **stated, "columns": page_columns(declared), "rows": tuple(rows)}
+    return Table(**whole | own)
+
+
+def lead(*clauses: str) -> Text:
+    """Clauses as sentences at the head of a section."""
+    return Text(tuple(f"{text[:1].upper()}{text[1:]}." for text in clauses), "lead")
+
+
+def listing(texts: Iterable[str]) -> Listing:
+    """A list of texts, none of them with a lead."""
+    return Listing(tuple(("", text) for text in texts))
+
+
 def titled(name: str, text: str) -> tuple[str, str]:
     """A figure as a fact: the column's title, and a text with the column's unit."""
     declared = BY_NAME[name]
     return declared.title, f"{text} {declared.unit}".strip()
+
+
+def known_figures(row: Row, names: Iterable[str]) -> Facts:
+    """Figures of a row that are known, with their titles and units."""
+    return Facts(tuple(titled(name, number(row[name])) for name in names if row[name] is not None))
 
 
 def plain_cell(value: float | None) -> Cell:
@@ -92,9 +122,10 @@ def cell(row: Row, name: str) -> Cell:
     return Cell(duration(value) if name == "period_s" else number(value), value)
 
 
-def cells(row: Row, columns: Iterable[Column], **own: Cell) -> tuple[Cell, ...]:
+def cells(row: Row, columns: str | Iterable[Column], **own: Cell) -> tuple[Cell, ...]:
     """A row of a table by the keys of its columns: cells of its own, else what the store holds."""
-    return tuple(own[c.key] if c.key in own else cell(row, c.key) for c in columns)
+    shown = page_columns(columns) if isinstance(columns, str) else columns
+    return tuple(own[c.key] if c.key in own else cell(row, c.key) for c in shown)
 
 
 def marked_cell(row: Row, name: str, digits: str = "") -> Cell:

@@ -11,10 +11,10 @@ from analyzer.history.plant_clock import stamp
 from analyzer.limits import PAGES
 from analyzer.loop.decisions import Status
 from analyzer.pages.reading import ShownNight, by_loop, link_to, oscillates, read_nights
-from analyzer.pages.words import ALL_LOOPS, Row, cause_cell, cells, page_columns, with_noun
+from analyzer.pages.words import ALL_LOOPS, Row, cause_cell, cells, page_table, with_noun
 from analyzer.store.notes import FINISHED, Work, work_on
 from analyzer.store.store import Store
-from reports.pages import Cell, Page, Section, Table, Text, Tiles
+from reports.pages import Cell, Page, Section, Text, Tiles, section, there
 
 NAME = "work"
 FIGURES = {
@@ -80,11 +80,6 @@ def _of_work(night: ShownNight, row: Row, work: Work, both: Sides) -> dict[str, 
     }
 
 
-def _order(work: Work) -> tuple[bool, str, float]:
-    """What is not finished first, by its date; then what was reached last."""
-    return work.state in FINISHED, work.due or "9999", -work.since_s
-
-
 def won(night: ShownNight, works: Mapping[str, Work], history: Mapping[str, Sequence[Row]]) -> Tiles | None:
     """What work that was finished since the start of the month brought; None where none was."""
     month = night.name[:7]
@@ -109,25 +104,17 @@ def work_page(store: Store, night: ShownNight) -> Page:
     names = [n for n in store.nights() if n <= night.name][-PAGES.work_nights :]
     history = by_loop(read_nights(store, names, READ, works))
     rows = {r["loop"]: r for r in night.rows if r["loop"] in works}
-    listed = sorted(rows, key=lambda loop: (_order(works[loop]), loop))
-    shown, told = page_columns("work"), []
-    for k in listed:
+    told = []  # what is not finished first, by its date; then what was reached last
+    order = {k: (w.state in FINISHED, w.due or "9999", -w.since_s, k) for k, w in works.items()}
+    for k in sorted(rows, key=lambda loop: order[loop]):
         both = sides(history.get(k, ()), stamp(works[k].since_s, night.zone)[:10])
-        told.append(cells(rows[k], shown, **_of_work(night, rows[k], works[k], both)))
+        told.append(cells(rows[k], "work", **_of_work(night, rows[k], works[k], both)))
     note = f"Since: nights after the day of the note, beside the {PAGES.before_work} before it."
-    table = Table("work-list", "", shown, tuple(told), note, True, ("state", "owner", "area"), True)
-    brought = won(night, works, history)
     empty = Text(('Nothing is noted: triage note STORE LOOP "..." --state open --due DATE.',))
-    sections = (
-        *(() if brought is None else (Section(f"Won since {night.name[:7]}-01", (brought,)),)),
-        Section("Work", (table if told else empty,)),
+    sections = there(
+        section(f"Won since {night.name[:7]}-01", won(night, works, history)),
+        Section("Work", (page_table("work", told, note=note) if told else empty,)),
     )
     links = (ALL_LOOPS, ("As CSV", f"csv/{NAME}-work-list.csv"))
-    open_ones = sum(works[k].state not in FINISHED for k in rows)
-    return Page(
-        NAME,
-        "Work list",
-        f"{with_noun(open_ones, 'loop')} waiting after the night of {night.name}",
-        sections,
-        links,
-    )
+    waiting = with_noun(sum(works[k].state not in FINISHED for k in rows), "loop")
+    return Page(NAME, "Work list", f"{waiting} waiting after the night of {night.name}", sections, links)

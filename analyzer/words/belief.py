@@ -12,7 +12,6 @@ from analyzer.words.units import Row, duration
 
 if TYPE_CHECKING:
     from analyzer.belief.belief import Belief
-    from analyzer.belief.cycle import Pair
     from analyzer.belief.wear import Growth, PhaseKnown
 
 REPAIRED = re.compile(
@@ -74,33 +73,28 @@ def told(now: Belief, row: Row) -> dict[str, Any]:
         "source_loop": t.source,
         "action": t.action,
         "due": t.due,
-        "kp_new": None if pair is None else pair.kp,
-        "ti_new": None if pair is None else pair.ti,
-        "advice": _advice(now, row),
-        "reason": belief_reason(now, row),
     }
+    out |= {"kp_new": pair and pair.kp, "ti_new": pair and pair.ti}
+    out |= {"advice": _advice(now, row), "reason": belief_reason(now, row)}
     if pair is not None:
         out |= {"expected_period_s": pair.period_s, "expected_pv_amplitude_pct": pair.amplitude_pct}
     return out | _valve_columns(now, row)
 
 
 def _advice(now: Belief, row: Row) -> str | None:
-    """The advice in full: that of the night which the pair is of, else the night's own where it is told."""
-    if now.told.calmed:
+    """The advice in full: that of the night which the pair is of, with what else nights have advised; else the
+    night's own where it is told."""
+    t, pairs = now.told, now.remedy.pairs
+    if t.calmed:
         return CALMED
-    if now.told.action is Action.RETUNE and now.told.pair is not None:
-        return " ".join(filter(None, (now.told.pair.advice, _spread(now, now.told.pair, row))))
-    return row["advice"] if row["action"] == now.told.action else ""
-
-
-def _spread(now: Belief, held: Pair, row: Row) -> str:
-    """What else nights have advised; '' where one night alone has."""
-    pairs = now.remedy.pairs
-    if len(pairs) < 2:
-        return ""
-    ends = ((min(x), max(x)) for x in (tuple(p.kp for p in pairs), tuple(p.ti for p in pairs)))
-    kp, ti = (f"{low:.3g} to {high:.3g}" for low, high in ends)
-    return f"{len(pairs)} nights advise Kp {kp} and Ti {ti} {row['ti_unit'] or 's'}; that of {held.night} is held."
+    if t.action is not Action.RETUNE or t.pair is None:
+        return row["advice"] if row["action"] == t.action else ""
+    spread = ""
+    if len(pairs) > 1:
+        kp, ti = (f"{min(x):.3g} to {max(x):.3g}" for x in ([p.kp for p in pairs], [p.ti for p in pairs]))
+        unit, held = row["ti_unit"] or "s", t.pair.night
+        spread = f"{len(pairs)} nights advise Kp {kp} and Ti {ti} {unit}; that of {held} is held."
+    return " ".join(filter(None, (t.pair.advice, spread)))
 
 
 def _valve_columns(now: Belief, row: Row) -> dict[str, Any]:
@@ -172,7 +166,7 @@ def news(before: Belief | None, now: Belief, row: Row) -> tuple[str, str]:
     """What is new of a loop since the night before, and its colour; '' where nothing is."""
     if before is None or now.recorder == now.night:  # another recorder shows other sizes of the same
         return "", ""
-    return _swing_news(before, now, row) or _valve_news(before, now) or _cause_news(before, now) or ("", "")
+    return _swing_news(before, now, row) or _fault_news(before, now) or ("", "")
 
 
 def growing(phase: PhaseKnown, found: Growth, row: Row) -> str:
@@ -206,17 +200,13 @@ def _swing_news(before: Belief, now: Belief, row: Row) -> tuple[str, str] | None
     return None
 
 
-def _valve_news(before: Belief, now: Belief) -> tuple[str, str] | None:
-    """That a valve is known to be worn, or to be sound again."""
+def _fault_news(before: Belief, now: Belief) -> tuple[str, str] | None:
+    """That a valve is known to be worn, or to be sound again; that the cause of a cycle is told as another one, or
+    other settings are advised."""
     if now.valve.certain and not before.valve.certain:
         return f"{width_text(now)}: certain by {now.valve.nights} nights", "worse"
     if before.valve.certain and not now.valve.certain:
         return "no fault of the valve is seen any more", "better"
-    return None
-
-
-def _cause_news(before: Belief, now: Belief) -> tuple[str, str] | None:
-    """That the cause of a cycle is told as another one, or other settings are advised."""
     then, cause = before.told.cause, now.told.cause
     if then in CAUSES and cause in CAUSES and then is not cause:
         return f"the cause is now told as {cause} (was {then})", "unclear"

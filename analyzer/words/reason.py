@@ -7,25 +7,12 @@ from __future__ import annotations
 
 from analyzer.lanes.lanes import SAID
 from analyzer.limits import PAGES
-from analyzer.loop.decisions import OF_LOAD, Action, Cause, Due, Fault, Lack, Lane, SignKind, Status
-from analyzer.loop.finding import Finding, Root
+from analyzer.loop.decisions import OF_LOAD, Action, Cause, Due, Lack, Lane, SignKind, Status
+from analyzer.loop.finding import Finding
+from analyzer.words import texts
 from analyzer.words.signs import later, of_below, sign_text
 from analyzer.words.units import duration
 
-PLAIN = {
-    Fault.BACKLASH: "the valve has {width:.2g} % play",
-    Fault.STICTION: "the valve sticks by {width:.2g} %",
-}
-WITHOUT_WIDTH = {
-    Fault.BACKLASH: "the valve has play over {share:.0f} % of OP's range",
-    Fault.STICTION: "the valve sticks over {share:.0f} % of OP's range",
-}
-"""The same where OP is not in percent."""
-BY_HAND = {
-    Due.NOW: "stroke it in steps of {step:.2g} %",
-    Due.SHUTDOWN: "at the next shutdown stroke it in steps of {step:.2g} %",
-}
-"""How a valve's fault is confirmed, and when."""
 MOST_NAMES = 5
 """Followers that are named in a row."""
 SAID_AT_ONCE = (Action.CHECK_SETTINGS, Action.NEEDS_DATA)
@@ -59,7 +46,9 @@ def _whole(found: Finding) -> str:
     if found.status is not Status.OK:
         return lacking
     if found.follows is not None:
-        return f"{cycle_text(found)}: {_follows_text(found.follows)}"
+        root = found.follows
+        sure = f"fix that loop first (it starts there with {root.confidence_pct:.0f} %)"
+        return f"{cycle_text(found)}: follows {root.loop}{later(root.lag_s)}; {sure}"
     if found.swing is None:
         return f"not assessed: {found.remedy.text or lacking}"
     names = ", ".join(found.moves[:MOST_NAMES]) + (" ..." if len(found.moves) > MOST_NAMES else "")
@@ -98,17 +87,17 @@ def to_stroke(found: Finding) -> str:
     width = found.width_pct
     if found.remedy.action is not Action.REPAIR_VALVE or width is None:
         return ""
-    return BY_HAND[found.remedy.due or Due.NOW].format(step=width / PAGES.stroke_steps)
+    return texts("by_hand")[found.remedy.due or Due.NOW].format(step=width / PAGES.stroke_steps)
 
 
 def valve_text(found: Finding) -> str:
     """What is wrong with the valve, in figures where there are any."""
     size, width, fault = found.known.get("valve_size"), found.width_pct, found.fault
-    if fault not in PLAIN or not isinstance(size, float):
+    if fault not in texts("width") or not isinstance(size, float):
         return f"the valve is at fault; {_strongest(found, 2)}"
     if width is None:
-        return WITHOUT_WIDTH[fault].format(share=100 * size)
-    return f"{PLAIN[fault].format(width=width)}; its width is {100 * size:.0f} % of OP's range"
+        return texts("share")[fault].format(share=100 * size)
+    return f"{texts('width')[fault].format(width=width)}; its width is {100 * size:.0f} % of OP's range"
 
 
 def _strongest(found: Finding, most: int, *first: SignKind) -> str:
@@ -116,11 +105,6 @@ def _strongest(found: Finding, most: int, *first: SignKind) -> str:
     signs = [s for s in found.signs if s.points_to is found.cause]
     order = sorted(signs, key=lambda s: (s.kind not in first, -s.strength))
     return "; ".join(sign_text(s) for s in order[:most])
-
-
-def _follows_text(root: Root) -> str:
-    sure = f"fix that loop first (it starts there with {root.confidence_pct:.0f} %)"
-    return f"follows {root.loop}{later(root.lag_s)}; {sure}"
 
 
 def below_first(below: Finding, tie: str = "master") -> str:
@@ -139,10 +123,6 @@ def halves_apart(stronger: str, weaker: str, times: float) -> str:
 
 def joined(*clauses: str | None) -> str:
     """Clauses with a semicolon between, those that say nothing left out; a full stop at the end of one goes."""
-    return "; ".join(filter(None, map(_open, clauses)))
-
-
-def _open(clause: str | None) -> str:
-    """A clause to which another one may be added."""
-    text = (clause or "").strip()
-    return text if text[-2:] == ".." else text.removesuffix(".").strip()
+    said = ((clause or "").strip() for clause in clauses)
+    kept = (text if text[-2:] == ".." else text.removesuffix(".").strip() for text in said)
+    return "; ".join(filter(None, kept))

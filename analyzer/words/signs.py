@@ -34,27 +34,19 @@ def as_stored(sign: Sign) -> dict[str, Any]:
     """A sign as the store keeps it; one that rests on none of the measures that are weighed has no name."""
     text, figures = sign_parts(sign)
     name = "" if sign.kind in UNNAMED else sign.kind
-    return {
-        "points_to": sign.points_to,
-        "strength": sign.strength,
-        "text": text,
-        "name": name,
-        "figures": figures,
-    }
-
-
-def _calm_evidence_says(evidence: float) -> Told:
-    """How a faulty valve explains PV against an ideal one."""
-    if evidence <= 0:
-        return "play or stick-slip explains PV no better than an ideal valve", ""
-    return "play or stick-slip explains PV better than an ideal valve", f"log likelihood +{evidence:.0f}"
+    told = {"points_to": sign.points_to, "strength": sign.strength}
+    return told | {"text": text, "name": name, "figures": figures}
 
 
 def _evidence_says(evidence: float, agreeing: float = 0.0, count: int | None = None) -> Told:
-    text, figures = _calm_evidence_says(evidence)
-    if count is None or evidence <= 0:
-        return text, figures
-    return f"{text}, in {100 * agreeing:.0f} % of {count} stretches between turns of OP", figures
+    """How a faulty valve explains PV against an ideal one."""
+    if evidence <= 0:
+        return "play or stick-slip explains PV no better than an ideal valve", ""
+    where = "" if count is None else f", in {100 * agreeing:.0f} % of {count} stretches between turns of OP"
+    return (
+        f"play or stick-slip explains PV better than an ideal valve{where}",
+        f"log likelihood +{evidence:.0f}",
+    )
 
 
 def _width_says(evidence: float, size: float) -> str:
@@ -156,7 +148,7 @@ SAYS: Mapping[SignKind, Callable[..., Told | str]] = {
     SignKind.REGULARITY: _regularity_says,
     SignKind.LIMITS: _limits_says,
     SignKind.DEAD_TIME: _dead_time_says,
-    SignKind.CALM_EVIDENCE: _calm_evidence_says,
+    SignKind.CALM_EVIDENCE: _evidence_says,
     SignKind.CALM_WIDTH: lambda size: f"its width is {100 * size:.0f} % of OP's range",
     SignKind.AGAIN: lambda: "stretch after stretch between moves of the stem says so",
     SignKind.DEAD_VALVE: lambda wound: f"OP winds over {wound:.0f} % while PV stands still off the set point",

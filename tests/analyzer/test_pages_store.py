@@ -24,7 +24,7 @@ from identification.errors import InputError
 from reports import html
 from reports.folder import write_csv, write_html, write_markdown
 from reports.html import render
-from reports.pages import Page, Plot, Table, Text
+from reports.pages import Beside, Page, Plot, Table, Text
 from tests.reports.small_store import NASTY, START_S, small_store
 
 CHANGED_S = START_S + 7 * 86400.0
@@ -243,6 +243,23 @@ def test_a_follower_is_laid_beside_its_source() -> None:
     row = row_of(known)
     links = loop.loop_page([row | dict.fromkeys(set(loop.COLUMNS) - set(row))], None).links
     assert ("Beside B,2", "side-by-side.html#B%2C2,A%201") in links
+
+
+def test_loops_side_by_side_stand_in_their_own_units(tmp_path: Path) -> None:
+    """Beside others a loop's trend has the unit and the figures that it has on its own page."""
+    store = small_store(tmp_path / "store")
+    file = store.file("nights", store.require())
+    whole = pq.read_table(file)
+    for name, value in {"pv_lo": -40.0, "pv_hi": 160.0, "pv_unit": "degC"}.items():
+        at = whole.column_names.index(name)
+        whole = whole.set_column(at, whole.schema.field(name), [[value] * whole.num_rows])
+    pq.write_table(whole, file)
+    (beside,) = night.side_by_side(store, read_night(store, None, 1)).sections[0].blocks
+    assert isinstance(beside, Beside)
+    (shown,) = beside.trends
+    thin = read_trends(store, [shown.title], [store.require()])[shown.title]
+    assert shown.panels[0] == "SP, PV [degC]"
+    assert shown.bands[0].low.min() == pytest.approx(-40.0 + 2.0 * thin.extremes["pv_min"].min())
 
 
 def test_beliefs_without_a_column_of_this_version_are_read(tmp_path: Path) -> None:
