@@ -19,6 +19,7 @@ from analyzer.history.stamps import parse_times
 from analyzer.loops.spec import LoopSpec, csv_table
 from identification.errors import InputError
 
+TIMES = ("ti_old", "ti_new")
 COLUMNS = ("loop", "time", "kp_old", "ti_old", "kp_new", "ti_new", "who")
 DAY_S = 86400.0
 SETTINGS = ("kp", "ti", "td", "form", "gain_unit", "ti_unit", "scan_s")
@@ -77,7 +78,7 @@ def _settings(cells: Mapping[str, str], where: str) -> dict[str, Any]:
             found[column] = float(text.replace(",", "."))
         except ValueError:
             found[column] = math.nan
-        if not math.isfinite(found[column]) or (column.startswith("ti") and found[column] < 0):
+        if not math.isfinite(found[column]) or (column in TIMES and found[column] < 0):
             raise InputError(f"{where}: {column} {text[:40]!r}", "a number or nothing", "correct the cell")
     return found
 
