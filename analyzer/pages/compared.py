@@ -86,13 +86,13 @@ def _typed(c: Comparison, name: str, spec: LoopSpec) -> str:
     kp, ti = c.stated[name]
     gain = gain_unit(spec.gain_unit, spec.pv_unit, spec.op_unit)
     derivative = "" if name != DERIVATIVE else f" and {_td(c, name, spec)}"
-    return f"Kp {kp:.3g} {gain} and Ti {ti:.3g} {spec.ti_unit}{derivative}"
+    return f"Kp {number(kp)} {gain} and Ti {number(ti)} {spec.ti_unit}{derivative}"
 
 
 def _td(c: Comparison, name: str, spec: LoopSpec) -> str:
     """A derivative time as it is typed in."""
     td = derivative_as_stated(next(t.controller for t in c.tried if t.name == name), spec, c.pv_span)
-    return f"Td {td:.3g} {'s' if spec.ti_unit == 's' else 'min'}"
+    return f"Td {number(td)} {'s' if spec.ti_unit == 's' else 'min'}"
 
 
 def _priced(c: Comparison, name: str) -> str:
@@ -136,8 +136,8 @@ def _tried_row(t: Tried, c: Comparison, spec: LoopSpec, unit: str) -> tuple[part
     rejected = (c.peaks.get(t.name, 1.0), _times(t, now))
     return (
         parts.Cell(t.name, kind="strong" if t.name == RECOMMENDED else ""),
-        parts.Cell(f"{kp:.3g} {gain_unit(spec.gain_unit, spec.pv_unit, spec.op_unit)}", kp),
-        parts.Cell("none" if ti == 0 else f"{ti:.3g} {spec.ti_unit}{derivative}", ti),
+        parts.Cell(f"{number(kp)} {gain_unit(spec.gain_unit, spec.pv_unit, spec.op_unit)}", kp),
+        parts.Cell("none" if ti == 0 else f"{number(ti)} {spec.ti_unit}{derivative}", ti),
         parts.Cell(number(t.stem_travel), t.stem_travel, _against(t.stem_travel, now.stem_travel)),
         parts.Cell(f"{number(scale * t.error)} {unit}", t.error, _against(t.error, now.error)),
         parts.Cell(f"{number(scale * t.peak)} {unit}", t.peak, _against(t.peak, now.peak)),

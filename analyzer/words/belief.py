@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from analyzer.history.plant_clock import local
 from analyzer.loop.decisions import CAUSES, Action, Cause, Fault, counts
 from analyzer.words.reason import joined
-from analyzer.words.units import Row, duration
+from analyzer.words.units import Row, duration, number
 
 if TYPE_CHECKING:
     from analyzer.belief.belief import Belief
@@ -91,7 +91,9 @@ def _advice(now: Belief, row: Row) -> str | None:
         return row["advice"] if row["action"] == t.action else ""
     spread = ""
     if len(pairs) > 1:
-        kp, ti = (f"{min(x):.3g} to {max(x):.3g}" for x in ([p.kp for p in pairs], [p.ti for p in pairs]))
+        kp, ti = (
+            f"{number(min(x))} to {number(max(x))}" for x in ([p.kp for p in pairs], [p.ti for p in pairs])
+        )
         unit, held = row["ti_unit"] or "s", t.pair.night
         spread = f"{len(pairs)} nights advise Kp {kp} and Ti {ti} {unit}; that of {held} is held."
     return " ".join(filter(None, (t.pair.advice, spread)))

@@ -42,9 +42,9 @@ def gain_unit(kind: str | None, pv_unit: str | None, op_unit: str | None = "%") 
 
 def settings(kp: float | None, ti: float | None, gain: str, time: str) -> str:
     """Kp and Ti with their units; '' where neither is known, 'no integral action' for a Ti of 0."""
-    parts = [f"Kp {kp:.3g} {gain}"] if kp is not None else []
+    parts = [f"Kp {number(kp)} {gain}"] if kp is not None else []
     if ti is not None:
-        parts.append(f"Ti {ti:.3g} {time}" if ti else "no integral action")
+        parts.append(f"Ti {number(ti)} {time}" if ti else "no integral action")
     return ", ".join(parts)
 
 
@@ -105,7 +105,7 @@ def of_controller(pid: Pid, spec: LoopSpec, pv_span: float) -> str:
     kp, ti = as_stated(pid, spec, pv_span)
     known = settings(kp, ti, gain_unit(spec.gain_unit, spec.pv_unit, spec.op_unit), spec.ti_unit)
     td = derivative_as_stated(pid, spec, pv_span)
-    return f"{known}, Td {td:.3g} {'s' if spec.ti_unit == 's' else 'min'}" if td else known
+    return f"{known}, Td {number(td)} {'s' if spec.ti_unit == 's' else 'min'}" if td else known
 
 
 def settings_changed(old: LoopSpec, new: LoopSpec, clock: str) -> str:
@@ -132,6 +132,6 @@ def settings_differ(stated: Pid, recorded: Pid, spec: LoopSpec, pv_span: float) 
 def beyond_record(dead_time_s: float, duration_s: float) -> str:
     """Why a model gets no advice."""
     return (
-        f"No settings: the model found has a dead time of {dead_time_s:.3g} s, more than a record of "
+        f"No settings: the model found has a dead time of {number(dead_time_s)} s, more than a record of "
         f"{duration_s / 3600:.2g} h can show."
     )

@@ -10,7 +10,7 @@ from analyzer.columns import row_of
 from analyzer.loop.conclusion import stated
 from analyzer.loops.spec import LoopSpec
 from analyzer.pages.rank import brief
-from analyzer.words.units import arrow, gain_unit, number
+from analyzer.words.units import arrow, gain_unit, number, settings
 from identification.controller.pid_regression import fit_pi
 from identification.models import Fopdt, Loop, Pid
 from identification.simulation.closed_loop import closed_loop
@@ -43,3 +43,9 @@ def test_a_number_just_under_a_thousand_has_no_exponent() -> None:
     """999.7 rounds to 1000, in a cell and between two settings; -0 is 0, and what is not known is said so."""
     assert [number(x) for x in (999.7, 99.96, 0.01234, -0.0, None)] == ["1000", "100", "0.0123", "0", ""]
     assert arrow(999.7, None) == "1000 \u2192 none"
+
+
+def test_settings_are_typed_in_without_an_exponent() -> None:
+    """Settings that somebody types in stand as the controller takes them: 1150 s, not 1.15e+03 s."""
+    assert settings(7.8, 1153.956, "%/m", "s") == "Kp 7.8 %/m, Ti 1154 s"
+    assert settings(5209.5, 0.0, "% band", "s") == "Kp 5210 % band, no integral action"
