@@ -13,7 +13,7 @@ from analyzer.loop.decisions import Cause
 from analyzer.loop.oscillation import Oscillations, counting
 from analyzer.loop.quality import Prepared
 from identification.estimation.evidence import turns_of
-from identification.estimation.hammerstein import Fit
+from identification.estimation.window import Fit
 from identification.record import LoopRecord
 from identification.signals.turns import StemMarks, halves
 

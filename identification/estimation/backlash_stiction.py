@@ -8,8 +8,7 @@ import numpy as np
 from numba import njit
 
 from identification.estimation.gauss_newton import descend
-from identification.estimation.hammerstein import Fit, stem_blocks
-from identification.estimation.noise import arx_noise
+from identification.estimation.noise import generic_noise
 from identification.estimation.search import (
     Dynamics,
     Prepared,
@@ -17,6 +16,7 @@ from identification.estimation.search import (
     WhitePv,
     behind,
     faded_products,
+    learnt_noise,
     level_of,
     prepare,
     score,
@@ -27,7 +27,7 @@ from identification.estimation.search import (
     white_pv,
     whitened_stem,
 )
-from identification.estimation.window import Window
+from identification.estimation.window import Fit, Window, stem_blocks
 from identification.limits import FIT
 from identification.record import Floats
 from identification.simulation.lag import Lag, respond, unit_lag
@@ -55,20 +55,11 @@ def fit_linear(window: Window, period_s: float) -> Fit:
 
     period_s : period of the oscillation, or other scale of the loop [s], about which the search begins.
     """
-    stem = window.stems_in_blocks.ideal
-    learnt = arx_noise(window.centred, stem, window.usable, FIT.ar_order, FIT.input_lags)
     fits = []
-    for ar in (learnt, generic_noise()):
+    for ar in (learnt_noise(window), generic_noise()):
         prepared = prepare(window, IDEAL, ar)
         fits.append(descend(begin(window, prepared, search(prepared, starts(window, period_s)))))
     return max(fits, key=lambda fit: fit.log_likelihood)
-
-
-def generic_noise() -> Floats:
-    """The noise model that knows nothing, shape (FIT.ar_order,)."""
-    out = np.zeros(FIT.ar_order)
-    out[0] = FIT.generic
-    return out
 
 
 def _ranked(window: Window, ar: Floats, valves: list[StemLaw], begins: list[Dynamics]) -> list[Fit]:

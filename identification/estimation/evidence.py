@@ -9,8 +9,8 @@ import numpy as np
 from numba import njit
 
 from identification.estimation.gauss_newton import descend, innovations
-from identification.estimation.hammerstein import Fit, stem_of
 from identification.estimation.noise import judged
+from identification.estimation.window import Fit, stem_of
 from identification.limits import FIT
 from identification.record import Floats, Mask
 from identification.signals.robust import clipped_gain

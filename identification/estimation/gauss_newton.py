@@ -17,9 +17,8 @@ from numpy.typing import NDArray
 
 from identification.estimation.covariance import inverse, scattered
 from identification.estimation.descent import Descent, down
-from identification.estimation.hammerstein import Fit, stem_of
 from identification.estimation.noise import every_lag, judged, whitened
-from identification.estimation.window import Stems, Window
+from identification.estimation.window import Fit, Stems, Window, stem_of
 from identification.limits import FIT
 from identification.record import Floats
 from identification.simulation.lag import respond, respond_together, unit_lag

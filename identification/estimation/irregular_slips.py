@@ -11,10 +11,9 @@ import numpy as np
 from identification.estimation.descent import compass
 from identification.estimation.evidence import evidence
 from identification.estimation.gauss_newton import descend, disturbance, residual, slow_terms
-from identification.estimation.hammerstein import Fit
 from identification.estimation.noise import every_lag, judged, whitened
 from identification.estimation.slip_beam import Noise, Response, SlipDistances, decoded, log_chance
-from identification.estimation.window import Window
+from identification.estimation.window import Fit, Window
 from identification.limits import SLIPS
 from identification.record import Floats
 from identification.simulation.lag import unit_lag

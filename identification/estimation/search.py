@@ -1,6 +1,7 @@
 """Where a fit begins: time constant and dead time searched, and many valves tried, under a given noise model.
 
 The search knows blocks alone and solves gain and slow terms linearly; the descent ends at the record's own interval.
+So do the starts of `explain`'s plain loop, whose descent is another.
 """
 
 from __future__ import annotations
@@ -13,14 +14,14 @@ from numba import njit
 from numba.extending import register_jitable
 
 from identification.estimation.descent import compass
-from identification.estimation.hammerstein import stem_of
-from identification.estimation.noise import every_lag, judged, whitened
-from identification.estimation.window import Stems, Window
+from identification.estimation.noise import arx_noise, every_lag, generic_noise, judged, whitened
+from identification.estimation.window import Stems, Window, stem_of
 from identification.limits import FIT
+from identification.models import Fopdt
 from identification.record import Floats, Mask
 from identification.signals.filters import notch
 from identification.simulation.lag import Lag, stepped, unit_lag
-from identification.simulation.valve import StemLaw
+from identification.simulation.valve import IDEAL, StemLaw
 
 FADED = 1e-17
 """A decay under this share of its start is over; numbers have sixteen digits."""
@@ -30,6 +31,8 @@ COMPASS = (0.02, 0.007, 0.0025)
 """Relative steps of the search within a pit of stickband and jump."""
 PIT_MOVES = ((1, 0), (-1, 0), (0, 1), (0, -1))
 """Steps of stickband and jump that are tried in a pit."""
+NO_WHITENING = np.zeros(1)
+"""The noise model of a simulation judged by its own errors: none."""
 
 
 @njit(cache=True)
@@ -248,3 +251,39 @@ def starts(window: Window, period_s: float) -> list[Dynamics]:
     deads = [period_s * s for s in (0.0, 0.06, 0.15, 0.33)]
     most_t, most_dead = window.bounds
     return sorted({(min(t, 0.7 * most_t), min(d, most_dead)) for t in times for d in deads})
+
+
+def record_starts(samples: int, dt_s: float) -> list[Dynamics]:
+    """Time constants and dead times [s] from which the search begins, over all time scales of the record."""
+    count = 1 + math.ceil(math.log(max(samples / FIT.shortest, FIT.apart)) / math.log(FIT.apart))
+    times = FIT.shortest * FIT.apart ** np.arange(count)
+    pairs = {(t, min(round(t * d, 1), FIT.longest_delay * samples)) for t in times for d in FIT.delays}
+    return [(t * dt_s, d * dt_s) for t, d in sorted(pairs)]
+
+
+def _plain(window: Window, ar: Floats) -> Fopdt:
+    """The process behind an ideal valve that explains a window best under one noise model."""
+    prepared = prepare(window, IDEAL, np.ascontiguousarray(ar))
+    found = search(prepared, record_starts(window.y.size, window.dt_s), 2)
+    return Fopdt(float(score(prepared, *found)[2][0]), *found)
+
+
+def simulated_best(y: Floats, op: Floats, usable: Mask, dt_s: float) -> Fopdt:
+    """The plain loop whose simulation leaves least of PV, a straight line of load taken out; see plain_processes."""
+    return _plain(Window(y, op, usable, dt_s), NO_WHITENING)
+
+
+def learnt_noise(window: Window) -> Floats:
+    """A first noise model of a window, shape (FIT.ar_order,), learnt without a process."""
+    stem = window.stems_in_blocks.ideal
+    return arx_noise(window.centred, stem, window.usable, FIT.ar_order, FIT.input_lags)
+
+
+def plain_processes(y: Floats, op: Floats, usable: Mask, dt_s: float) -> list[Fopdt]:
+    """Plain loops that explain PV from OP best: one step ahead under each of two first noise models, and simulated.
+
+    y, op : shape (n,), PV and OP [% of span]; usable : bool, shape (n,), False where a sample must not be used; dt_s
+    : sample interval [s]. Returns starts for a descent, one for each; the last is the simulated one.
+    """
+    window = Window(y, op, usable, dt_s)
+    return [_plain(window, ar) for ar in (learnt_noise(window), generic_noise(), NO_WHITENING)]

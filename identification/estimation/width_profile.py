@@ -7,10 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from identification.estimation.backlash_stiction import generic_noise
-from identification.estimation.hammerstein import Fit
+from identification.estimation.noise import generic_noise
 from identification.estimation.search import Dynamics, WhitePv, behind, score, search, white_pv
-from identification.estimation.window import Window
+from identification.estimation.window import Fit, Window
 from identification.limits import FIT
 from identification.record import Floats
 from identification.simulation.valve import IDEAL, StemLaw, sticking
