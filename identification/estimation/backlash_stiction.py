@@ -176,9 +176,7 @@ def _scan(pv: WhitePv, pairs: Floats, tolerance: float, time_constant_s: float, 
         decay[:] = pv.rows[1] * pole ** np.arange(n)
     fv, _, f1, ft, ff = faded_products(x, pv.rows, pole, outlasts)
     for i in range(pairs.shape[0]):
-        width, share = pairs[i, 0], pairs[i, 1]
-        law = StemLaw(0.5 * width * (1 + share), 0.5 * width * (1 - share), tolerance)
-        stem = stem_blocks(pv.stems, law)
+        stem = stem_blocks(pv.stems, sticking(pairs[i, 0], pairs[i, 1], tolerance))
         whole = respond(whitened_stem(stem - stem.mean(), pv.ar), Lag(pole, 1.0, 0.0, 0))
         for dead_s in deads_s:
             lag = unit_lag(time_constant_s, dead_s, pv.dt_s)

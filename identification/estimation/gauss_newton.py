@@ -22,7 +22,7 @@ from identification.estimation.window import Fit, Stems, Window, stem_of
 from identification.limits import FIT
 from identification.record import Floats
 from identification.simulation.lag import respond, respond_together, unit_lag
-from identification.simulation.valve import StemLaw
+from identification.simulation.valve import StemLaw, sticking
 
 NARROWEST = 0.2
 """Stickband after a step, in terms of that before, that is tried no more."""
@@ -113,8 +113,7 @@ def _widened(valve: StemLaw, step: float) -> StemLaw:
     """The valve with a stickband wider by a step, its jump share kept."""
     stickband = valve.breakaway + valve.sliding
     share = (valve.breakaway - valve.sliding) / stickband if stickband > 0 else 0.0
-    wider = stickband + step
-    return StemLaw(0.5 * wider * (1 + share), 0.5 * wider * (1 - share), valve.tolerance)
+    return sticking(stickband + step, share, valve.tolerance)  # type: ignore[no-any-return]
 
 
 @njit(cache=True)

@@ -21,7 +21,7 @@ from identification.models import Fopdt
 from identification.record import Floats, Mask
 from identification.signals.filters import notch
 from identification.simulation.lag import Lag, stepped, unit_lag
-from identification.simulation.valve import IDEAL, StemLaw
+from identification.simulation.valve import IDEAL, StemLaw, sticking
 
 FADED = 1e-17
 """A decay under this share of its start is over; numbers have sixteen digits."""
@@ -234,7 +234,7 @@ def _valve_tried(
     pv, (time_constant_s, dead_time_s) = at
     width = (valve.breakaway + valve.sliding) * (1 + move[0] * step)
     share = min((valve.breakaway - valve.sliding) * (1 + 2 * move[1] * step), width) / width
-    other = StemLaw(0.5 * width * (1 + share), 0.5 * width * (1 - share), valve.tolerance)
+    other = sticking(width, share, valve.tolerance)
     return other, score(behind(pv, other), time_constant_s, dead_time_s)[0]
 
 

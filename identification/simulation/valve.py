@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
+from numba.extending import register_jitable
 
 from identification.models import Backlash, Motion, Stiction, Valve
 from identification.record import Floats
@@ -58,6 +59,7 @@ class StemLaw(NamedTuple):
 IDEAL = StemLaw()
 
 
+@register_jitable  # type: ignore[untyped-decorator]
 def sticking(stickband: float, jump_share: float, tolerance: float = RESTS) -> StemLaw:
     """Valve of stickband S [% OP] and slip jump J = jump_share S."""
     return StemLaw(0.5 * stickband * (1 + jump_share), 0.5 * stickband * (1 - jump_share), tolerance)
