@@ -20,7 +20,6 @@ from identification.simulation.valve import (
     TOLERANCES,
     StemLaw,
     first_slip,
-    heavy_walk,
     moved_stem,
     thresholds,
     walk,
@@ -156,6 +155,5 @@ def flow(op: Floats, c: Floats, dt_s: float, middle: float) -> Floats:
         moves = float(np.abs(x - x[0]).max()) > law.breakaway
         start = float(x[0]) if moves else first_slip(x, law)
         start += float(c[Slot.PLACE]) * law.breakaway
-        stem_s = float(c[Slot.STEM_T])
-        x = heavy_walk(x, law, start, stem_s, dt_s) if stem_s > 0.0 else walk(x, law, start)
+        x = walk(x, law, start, float(c[Slot.STEM_T]), dt_s)
     return np.asarray(behind_stem(x, c, dt_s, middle))
