@@ -11,15 +11,12 @@ from identification.estimation.gauss_newton import descend
 from identification.estimation.noise import generic_noise
 from identification.estimation.search import (
     Dynamics,
-    Prepared,
     Products,
     WhitePv,
     behind,
     faded_products,
     learnt_noise,
     level_of,
-    prepare,
-    score,
     search,
     settled,
     starts,
@@ -40,34 +37,25 @@ FINE_JUMPS = tuple(float(j) for j in np.arange(0.1, 1.01, 0.06))
 """Slip jumps tried about a play, as shares of the stickband."""
 
 
-def begin(window: Window, prepared: Prepared, dynamics: Dynamics) -> Fit:
-    """The fit at given dynamics under a given noise model, a start for the descent."""
-    sigma2, count, beta = score(prepared, *dynamics)
-    t, dead = dynamics
-    base = np.array([beta[1], beta[2], 0.0, 0.0])
-    return Fit(
-        float(beta[0]), t, dead, prepared.valve, float(sigma2), int(count), prepared.pv.ar, base, window
-    )
-
-
 def fit_linear(window: Window, period_s: float) -> Fit:
     """The process behind an ideal valve.
 
     period_s : period of the oscillation, or other scale of the loop [s], about which the search begins.
     """
-    fits = []
-    for ar in (learnt_noise(window), generic_noise()):
-        prepared = prepare(window, IDEAL, ar)
-        fits.append(descend(begin(window, prepared, search(prepared, starts(window, period_s)))))
+    noises, begins = (learnt_noise(window), generic_noise()), starts(window, period_s)
+    fits = [descend(_ranked(window, ar, [IDEAL], begins, 3)[0]) for ar in noises]
     return max(fits, key=lambda fit: fit.log_likelihood)
 
 
-def _ranked(window: Window, ar: Floats, valves: list[StemLaw], begins: list[Dynamics]) -> list[Fit]:
-    """Valves with dynamics searched anew under one noise model, best first."""
+def _ranked(
+    window: Window, ar: Floats, valves: list[StemLaw], begins: list[Dynamics], halvings: int = 2
+) -> list[Fit]:
+    """Starts for the descent: valves with dynamics searched anew under one noise model, best first."""
     trials, pv = [], white_pv(window, ar)
     for valve in valves:
-        prepared = behind(pv, valve)
-        trials.append(begin(window, prepared, search(prepared, begins, 2)))
+        (t, dead), sigma2, count, beta = search(behind(pv, valve), begins, halvings)
+        base = np.array([beta[1], beta[2], 0.0, 0.0])
+        trials.append(Fit(float(beta[0]), t, dead, valve, sigma2, count, ar, base, window))
     return sorted(trials, key=lambda fit: fit.sigma2)
 
 

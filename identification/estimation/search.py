@@ -146,14 +146,13 @@ class Prepared(NamedTuple):
     """The same with the stem behind one valve, whitened for many dynamics: a lag and A(q) commute."""
 
     pv: WhitePv
-    valve: StemLaw
     stem: Floats
 
 
 @njit(cache=True)
 def behind(pv: WhitePv, valve: StemLaw) -> Prepared:
     """Whitened PV with the whitened stem behind a valve."""
-    return Prepared(pv, valve, whitened_stem(stem_of(pv.stems, valve), pv.ar))
+    return Prepared(pv, whitened_stem(stem_of(pv.stems, valve), pv.ar))
 
 
 @njit(cache=True)
@@ -219,11 +218,13 @@ def _least(p: Prepared, begins: Floats, halvings: int) -> Dynamics:
     return math.exp(t), dead_s
 
 
-def search(prepared: Prepared, begins: list[Dynamics], halvings: int = 3) -> Dynamics:
-    """Time constant and dead time [s] of least innovations variance: the best start, then compass search."""
+def search(prepared: Prepared, begins: list[Dynamics], halvings: int) -> tuple[Dynamics, float, int, Floats]:
+    """Time constant and dead time [s] of least innovations variance, and their score: the best start, then compass
+    search."""
     (most_t, most_dead), dt_s = prepared.pv.most, prepared.pv.dt_s
     first = [[math.log(min(max(t, 0.06 * dt_s), 0.95 * most_t)), min(d, most_dead)] for t, d in begins]
-    return _least(prepared, np.array(first), halvings)  # type: ignore[no-any-return]
+    found = _least(prepared, np.array(first), halvings)
+    return found, *score(prepared, *found)
 
 
 @register_jitable  # type: ignore[untyped-decorator]
@@ -263,9 +264,9 @@ def record_starts(samples: int, dt_s: float) -> list[Dynamics]:
 
 def _plain(window: Window, ar: Floats) -> Fopdt:
     """The process behind an ideal valve that explains a window best under one noise model."""
-    prepared = prepare(window, IDEAL, np.ascontiguousarray(ar))
-    found = search(prepared, record_starts(window.y.size, window.dt_s), 2)
-    return Fopdt(float(score(prepared, *found)[2][0]), *found)
+    prepared = behind(white_pv(window, np.ascontiguousarray(ar)), IDEAL)
+    dynamics, _, _, beta = search(prepared, record_starts(window.y.size, window.dt_s), 2)
+    return Fopdt(float(beta[0]), *dynamics)
 
 
 def simulated_best(y: Floats, op: Floats, usable: Mask, dt_s: float) -> Fopdt:
