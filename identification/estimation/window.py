@@ -89,19 +89,19 @@ class Window:
     @cached_property
     def stems_in_blocks(self) -> Stems:
         """Stems that are known beforehand, in blocks."""
-        recorded = np.empty(0) if self.position is None else block_means(self.position, self.factor)
-        n = self.op.size // self.factor
-        blocks = self.op[: n * self.factor].reshape(n, self.factor)
-        low, high = blocks.min(axis=1), blocks.max(axis=1)
-        return Stems(self.op, low, high, less_mean(self.op_blocks), less_mean(recorded), self.factor)
+        return self._stems(self.factor)
 
     @cached_property
     def stems(self) -> Stems:
         """The same at the interval at which responses are stepped."""
-        if not self.fine:
-            return self.stems_in_blocks
+        return self._stems(1) if self.fine else self.stems_in_blocks
+
+    def _stems(self, factor: int) -> Stems:
         recorded = np.empty(0) if self.position is None else self.position
-        return Stems(self.op, self.op, self.op, less_mean(self.op), less_mean(recorded), 1)
+        blocks = self.op[: self.op.size // factor * factor].reshape(-1, factor)
+        low, high = blocks.min(axis=1), blocks.max(axis=1)
+        ideal, known = (less_mean(block_means(x, factor)) for x in (self.op, recorded))
+        return Stems(self.op, low, high, ideal, known, factor)
 
     @cached_property
     def bounds(self) -> tuple[float, float]:
