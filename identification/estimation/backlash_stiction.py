@@ -136,10 +136,10 @@ def pits(play: Fit, tolerances: tuple[float, ...]) -> list[Fit]:
     """
     window = play.window
     pairs = np.array([(w * play.valve.stickband, j) for w in FINE_WIDTHS for j in FINE_JUMPS])
-    begins = [(play.time_constant_s, play.dead_time_s + blocks * window.dt_s) for blocks in FIT.later]
-    out = []
+    t, deads = play.time_constant_s, play.dead_time_s + np.array(FIT.later) * window.dt_s
+    out, pv, begins = [], white_pv(window, generic_noise()), [(t, float(dead)) for dead in deads]
     for tolerance in tolerances:
-        left = scan(window, pairs, tolerance, generic_noise(), begins)
+        left = _scan(pv, pairs, tolerance, t, deads)
         best = [sticking(pairs[i, 0], pairs[i, 1], tolerance) for i in np.argsort(left)[: FIT.finalists]]
         fits = _ranked(window, generic_noise(), best, begins)
         out += [_bottom(descend(fit)) for fit in fits]
@@ -156,6 +156,11 @@ def _bottom(fit: Fit) -> Fit:
 
 @njit(cache=True)
 def _scan(pv: WhitePv, pairs: Floats, tolerance: float, time_constant_s: float, deads_s: Floats) -> Floats:
+    """Innovations variance of many stick-slips at once, of the best of some dead times [% PV squared], shape (m,).
+
+    pairs : shape (m, 2), stickband [% OP] and slip jump as a share of it; tolerance : how the stems behave in motion
+    (valve.py).
+    """
     n, level = pv.rows.shape[1], level_of(pv.ar)
     out, x, decay = np.full(pairs.shape[0], np.inf), np.zeros(n), np.zeros(n)
     pole = unit_lag(time_constant_s, 0.0, pv.dt_s).pole
@@ -195,14 +200,3 @@ def _later(whole: Floats, lag: Lag, rows: Floats, decay: Floats, out: Floats) ->
         xv, x1, xt, xx = xv + x * v[k], x1 + weighted, xt + x * t[k], xx + x * weighted
         xf += x * f[k]
     return (xv, x1, xt, xx), xf
-
-
-def scan(window: Window, pairs: Floats, tolerance: float, ar: Floats, begins: list[Dynamics]) -> Floats:
-    """Innovations variance of many stick-slips at once.
-
-    pairs : shape (m, 2), stickband [% OP] and slip jump as a share of it; tolerance : how the stems behave in motion
-    (valve.py); ar : shape (p,), noise model; begins : time constants, all the same, and dead times tried [s]; the
-    best counts. Returns shape (m,), least innovations variance of each pair [% PV squared].
-    """
-    (time_constant_s, _), deads_s = begins[0], np.array([dead for _, dead in begins])
-    return _scan(white_pv(window, ar), pairs, tolerance, time_constant_s, deads_s)  # type: ignore[no-any-return]

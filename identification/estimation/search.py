@@ -182,19 +182,16 @@ def whitened_stem(x: Floats, ar: Floats) -> Floats:
 
 def white_pv(window: Window, ar: Floats, notch_period: float = 0.0) -> WhitePv:
     """Whiten PV with one noise model; notch_period in blocks, 0: none."""
-    y = _notched(whitened_stem(window.centred, ar), notch_period)
+    white = whitened_stem(window.centred, ar)
+    y = white if notch_period <= 0 else notch(white, notch_period, FIT.notch_width)
     rows, sums = _known(y, judged(window.usable, ar.size), ar.size + int(notch_period))
     return WhitePv(window.stems_in_blocks, rows, sums, ar, window.dt_s, window.bounds)
 
 
-def prepare(window: Window, valve: StemLaw, ar: Floats, notch_period: float = 0.0) -> Prepared:
-    """Whiten PV and the stem with one noise model; notch_period in blocks, 0: none."""
+def prepare(window: Window, valve: StemLaw, ar: Floats, notch_period: float) -> Prepared:
+    """Whiten PV and the stem with one noise model, a period [blocks] left out of both."""
     whole = behind(white_pv(window, ar, notch_period), valve)
-    return whole._replace(stem=_notched(whole.stem, notch_period))  # type: ignore[no-any-return]
-
-
-def _notched(x: Floats, period: float) -> Floats:
-    return x if period <= 0 else notch(x, period, FIT.notch_width)
+    return whole._replace(stem=notch(whole.stem, notch_period, FIT.notch_width))  # type: ignore[no-any-return]
 
 
 @register_jitable  # type: ignore[untyped-decorator]
