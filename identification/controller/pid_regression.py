@@ -65,7 +65,7 @@ def integral_time(kp: float, ki: float, record_s: float) -> float:
 
 
 def explained(products: Floats, gains: Floats) -> float:
-    """Share of OP's variance that gains of error, integral and slope, shape (3,), give of products of increments [-]."""
+    """Share of OP's variance, in products of increments, that gains of error, integral and slope give, shape (3,)."""
     law = np.append(-gains, 1.0)
     return 1.0 - float(law @ products[:4, :4] @ law) / float(products[3, 3])
 
