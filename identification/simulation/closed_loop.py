@@ -41,9 +41,8 @@ def _closed(
     pv, op, stem = np.empty(n), np.empty(n), np.empty(n)
     y, u = 0.0, op0
     moved, rest = (op0, 0.0, op0), op0
-    e1 = sp[0] - (sp[0] + load[0])
-    y1 = sp[0] + load[0]
-    y2 = y1
+    y1 = y2 = sp[0] + load[0]
+    e1 = sp[0] - y1
     for k in range(n):
         pv[k] = sp[0] + y + load[k]
         e = sp[k] - pv[k]
