@@ -18,10 +18,10 @@ from identification.signals.correlation import rhythm
 from identification.signals.spectrum import Spectrum, band_signal
 
 
-def half_cycles(x: Floats, dt_s: float, turn: float = SIGNALS.turn) -> Floats:
+def half_cycles(x: Floats, dt_s: float) -> Floats:
     """Lengths [s], shape (h,), of the half-cycles of a signal without drift, shape (n,), at interval dt_s [s]; those
     at the ends left out."""
-    beyond = turn * math.sqrt(float(x @ x) / max(x.size, 1))
+    beyond = SIGNALS.turn * math.sqrt(float(x @ x) / max(x.size, 1))
     side = np.where(x > beyond, 1, np.where(x < -beyond, -1, 0))
     outside = np.flatnonzero(side)
     return np.diff(outside[np.flatnonzero(np.diff(side[outside])) + 1]) * dt_s
@@ -93,6 +93,6 @@ def shape(s: Spectrum, line: float) -> Shape:
     power = float(x @ x) / x.size
     if power <= 0.0:
         return Shape(3.0, 0.0, 0.0)
-    halves = half_cycles(x, dt_s, SIGNALS.firm_turn)
+    halves = half_cycles(x, dt_s)
     spread = float(np.log(halves).std()) if halves.size > 2 else math.inf
     return Shape(float(np.mean(x**4)) / power**2, spread, power / s.variance)
