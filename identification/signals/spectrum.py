@@ -153,6 +153,9 @@ def locked_harmonic(s: Spectrum, period_s: float, order: int = 3, cycle: Spectru
 
 def envelope(s: Spectrum, line: float) -> tuple[Floats, float]:
     """Amplitude of the band about a frequency over time, shape (m,), and its sample interval [s]."""
-    last = min(int(line * SIGNALS.own_band), s.lines.size - 1)
+    factor = SIGNALS.own_band
+    first, last = math.ceil(line / factor), min(int(line * factor), s.lines.size - 1)
     m = next_fast_len(max(int(line * 8), last + 2, 16))
-    return np.abs(analytic(s, line, SIGNALS.own_band, m)), s.duration_s / m
+    cut = np.zeros(m, dtype=np.complex128)
+    cut[first : last + 1] = 2 * s.lines[first : last + 1]
+    return np.abs(np.fft.ifft(cut)) * (m / s.n), s.duration_s / m
