@@ -13,14 +13,8 @@ class TriageError(Exception):
 class InputError(TriageError):
     """An export, a loops.csv or an option cannot be used as it is.
 
-    Parameters
-    ----------
-    seen : str
-        What was found, with file, tag, column and row where they are known.
-    expected : str
-        What would have been usable.
-    remedy : str
-        What the user can do.
+    seen : what was found, with file, tag, column and row where they are known; expected : what would have been
+    usable; remedy : what the user can do.
     """
 
     def __init__(self, seen: str, expected: str, remedy: str) -> None:

@@ -14,30 +14,14 @@ Mask = NDArray[np.bool_]
 
 @dataclass(frozen=True, slots=True)
 class LoopRecord:
-    """SP, PV and OP of one loop on a uniform clock.
+    """SP, PV and OP of one loop on a uniform clock; arrays of shape (n,).
 
-    Parameters
-    ----------
-    tag : str
-        The loop's name.
-    start_s : float
-        Time of the first sample [s since 1970-01-01 UTC].
-    dt_s : float
-        Sample interval [s].
-    sp, pv : ndarray of shape (n,)
-        Set point and process value [% of PV span].
-    op : ndarray of shape (n,)
-        Controller output [% of OP span].
-    bad : ndarray of bool, shape (n,)
-        True where a sample must not be used (gap, bad quality). Values there are filled, never NaN.
-    position : ndarray of shape (n,) or None
-        Stem position [% of OP span] where recorded.
-    sp_estimated : bool
-        True where no SP was recorded and one was estimated from PV.
-    feed : ndarray of shape (n,) or None
-        What acts on OP beside the error, in its own unit, where stated and recorded.
-    masks : mapping of str to ndarray of bool, shape (n,)
-        True where the named thing happens: gap, stale, compressed, quantized, saturated, manual, idle.
+    tag : the loop's name; start_s : time of the first sample [s since 1970-01-01 UTC]; dt_s : sample interval [s];
+    sp, pv : set point and process value [% of PV span]; op : controller output [% of OP span]; bad : True where a
+    sample must not be used (gap, bad quality), values there are filled, never NaN; position : stem position [% of OP
+    span] where recorded; sp_estimated : whether no SP was recorded and one was estimated from PV; masks : True where
+    the named thing happens: gap, stale, compressed, quantized, saturated, manual, idle; feed : what acts on OP beside
+    the error, in its own unit, where stated and recorded.
     """
 
     tag: str

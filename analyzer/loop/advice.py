@@ -16,7 +16,7 @@ from analyzer.loop.settings_side_by_side import Comparison, compared
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import as_stated
 from analyzer.words import units as words
-from identification.estimation.hammerstein import Fit
+from identification.estimation.window import Fit
 from identification.limits import FIT
 from identification.models import Loop, Pid
 from identification.record import Floats

@@ -39,10 +39,10 @@ from analyzer.loop.measure import Measured
 from analyzer.loop.oscillation import Oscillation
 from analyzer.loop.quality import Prepared
 from identification.errors import NotAssessedError
-from identification.estimation.backlash_stiction import generic_noise
 from identification.estimation.gauss_newton import descend
-from identification.estimation.hammerstein import Fit
 from identification.estimation.irregular_slips import SlipPath, fit_irregular, path_evidence
+from identification.estimation.noise import generic_noise
+from identification.estimation.window import Fit
 from identification.limits import FIT
 from identification.record import LoopRecord
 

@@ -20,7 +20,7 @@ from analyzer.loop.identified import gain_room, intervals, is_known
 from analyzer.loop.oscillation import Oscillations
 from analyzer.loop.setpoint_moves import as_row
 from analyzer.loops.spec import LoopSpec
-from identification.estimation.hammerstein import Fit
+from identification.estimation.window import Fit
 
 Known = dict[str, Cell]
 AS_STATED = (

@@ -11,8 +11,7 @@ from analyzer.limits import LOOP
 from analyzer.loop.measure import Measured
 from identification.estimation.covariance import NINETY, half_width, reaching
 from identification.estimation.gauss_newton import covariance, disturbance
-from identification.estimation.hammerstein import Fit
-from identification.estimation.window import Window
+from identification.estimation.window import Fit, Window
 from identification.limits import INTERVALS
 from identification.models import Estimate, Fopdt, Integrator, Loop, Pid, Process
 from identification.record import Floats

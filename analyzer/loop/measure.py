@@ -29,11 +29,10 @@ from identification.estimation.evidence import (
     with_load_step,
 )
 from identification.estimation.gauss_newton import descend, residual
-from identification.estimation.hammerstein import Fit
 from identification.estimation.noise import judged
 from identification.estimation.search import prepare, score
 from identification.estimation.stem_position import Seen, seen
-from identification.estimation.window import Window, block_means
+from identification.estimation.window import Fit, Window, block_means
 from identification.limits import FIT
 from identification.models import Fopdt, Loop, Pid
 from identification.record import Floats, LoopRecord, Mask

@@ -12,10 +12,9 @@ from analyzer.limits import LOOP
 from analyzer.loop.decisions import Cause
 from analyzer.loop.oscillation import Oscillations, counting
 from analyzer.loop.quality import Prepared
-from identification.estimation.evidence import turns_of
-from identification.estimation.hammerstein import Fit
+from identification.estimation.window import Fit
 from identification.record import LoopRecord
-from identification.signals.turns import StemMarks, halves
+from identification.signals.turns import StemMarks, halves, turns_of
 
 if TYPE_CHECKING:
     from analyzer.loop.assess import Assessment

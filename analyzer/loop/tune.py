@@ -23,7 +23,7 @@ from analyzer.loops.tags import as_stated
 from analyzer.night.nights import cut, nights_of
 from analyzer.words.signs import sign_in_full
 from identification.errors import InputError, NotAssessedError
-from identification.estimation.hammerstein import Fit
+from identification.estimation.window import Fit
 from identification.models import Estimate, Loop, Pid, Process, Valve
 from identification.record import Floats
 from tuning.describing import describe

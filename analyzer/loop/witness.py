@@ -17,8 +17,8 @@ from analyzer.loop.identified import slope_deviation
 from analyzer.loop.measure import Measured
 from analyzer.loop.quality import Prepared
 from identification.estimation.gauss_newton import covariance
-from identification.estimation.hammerstein import Fit
 from identification.estimation.width_profile import WIDTHS, width_profile
+from identification.estimation.window import Fit
 from identification.limits import INTERVALS
 from identification.record import Floats
 from identification.signals.robust import robust_deviation

@@ -94,22 +94,17 @@ def trusted(residual: Floats, length: int, limits: ControllerLimits) -> Mask:
     return np.repeat(size <= limits.trusted * np.median(size) + 1e-9, length)
 
 
-def unbroken(usable: Mask, length: int, limits: ControllerLimits) -> Mask:
-    """True in spans that are usable throughout, shape (m * length,); the samples themselves where too few are.
-
-    A limit or a hole within a span leaves the integral another constant behind it than before.
-    """
-    whole = np.repeat(usable.reshape(-1, length).all(axis=1), length)
-    return whole if whole.sum() >= limits.spans * length else usable.copy()
-
-
 def law(x: Trends, length: int, late: float, smoothed: float = 0.0) -> ControlLaw:
     """The PI law at a given lateness of PV and a filter's time constant [samples], spans that do not obey it left
-    out twice."""
+    out twice.
+
+    Spans count that are usable throughout, all samples where too few are: a limit or a hole within a span leaves the
+    integral another constant behind it than before.
+    """
     e = x.sp - first_order(shifted(x.pv, late), smoothed)
     n = (e.size // length) * length
-    fit = unbroken(x.usable[:n], length, x.limits)
-    keep = fit
+    whole = np.repeat(x.usable[:n].reshape(-1, length).all(axis=1), length)
+    keep = fit = whole if whole.sum() >= x.limits.spans * length else x.usable[:n]
     for _ in range(3):
         kp, ki, residual = regress(e[:n], x.op[:n], length, keep)
         keep = fit & trusted(residual, length, x.limits)

@@ -10,7 +10,7 @@ gain and derivative, one sample between PV's stamp and OP's) every law takes wha
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from itertools import product
 
@@ -31,25 +31,6 @@ ON_ERROR = ((1.0, 1.0), (1.0, 0.0), (0.0, 0.0))
 """What gain and derivative take of the set point's moves: the usual three [-]."""
 LONGER = 4
 """Factor between lengths of increments; ours."""
-
-
-@dataclass(frozen=True, slots=True)
-class Moves:
-    """Mean products of increments over so many samples of error, integral, slope and OP, shape (4, 4), and the mean
-    square by which the integral is unsure, for the controller scans between the samples [(% s)^2]."""
-
-    products: Floats
-    samples: int
-    unsure: float
-
-    def explained(self, gains: Floats) -> float:
-        """Share of OP's variance that gains of error, integral and slope give, shape (3,) [-]."""
-        law = np.append(-gains, 1.0)
-        return 1.0 - float(law @ self.products @ law) / float(self.products[3, 3])
-
-    def blurred(self, gains: Floats) -> float:
-        """Share of OP's variance that the true law would leave for its integral being unsure [-]."""
-        return float(gains[1] ** 2 * self.unsure / self.products[3, 3])
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,12 +64,24 @@ def integral_time(kp: float, ki: float, record_s: float) -> float:
     return ti if ti < LAW.longest_integral * record_s else math.inf
 
 
+def explained(products: Floats, gains: Floats) -> float:
+    """Share of OP's variance, in products of increments, that gains of error, integral and slope give, shape (3,)."""
+    law = np.append(-gains, 1.0)
+    return 1.0 - float(law @ products[:4, :4] @ law) / float(products[3, 3])
+
+
+def blurred(products: Floats, gains: Floats) -> float:
+    """Share of OP's variance that the true law would leave for its integral being unsure, for the controller scans
+    between the samples [-]."""
+    return float(gains[1] ** 2 * products[4, 4] / products[3, 3])
+
+
 def increments(
     rows: Floats, out_of_law: Mask, samples: int, step: int = 1, level: bool = False
-) -> Moves | None:
-    """Increments over so many samples, begun every `step`, of the rows, shape (5, n), that span none that is out of
-    the law, less what goes with those of a sixth row, where there is one; `level`: less their means, for a constant
-    error of PV's makes the integral run away."""
+) -> Floats | None:
+    """Mean products, shape (5, 5), of increments over so many samples, begun every `step`, of the rows, shape (5, n),
+    that span none that is out of the law, less what goes with those of a sixth row, where there is one; `level`: less
+    their means, for a constant error of PV's makes the integral run away."""
     since = np.cumsum(out_of_law)
     inside = (since[samples::step] == since[:-samples:step]) & ~out_of_law[:-samples:step]
     count = int(np.count_nonzero(inside))
@@ -99,9 +92,7 @@ def increments(
         moved -= np.outer(moved.sum(axis=1) / count, inside)
     moved = moved if len(moved) == 5 else _without(moved[:5], moved[5])
     products = moved @ moved.T / count
-    if not (products[3, 3] > 0 and products[0, 0] > 0):
-        return None
-    return Moves(products[:4, :4], samples, float(products[4, 4]))
+    return products if products[3, 3] > 0 and products[0, 0] > 0 else None
 
 
 def _without(moved: Floats, feed: Floats) -> Floats:
@@ -148,23 +139,23 @@ def fit_pi(record: LoopRecord, period_s: float) -> ControllerFit | None:
         return None
     gains = _least_squares([found], np.ones(1), np.eye(3)[:2], np.zeros(3))
     ti_s = integral_time(gains[0], gains[1], record.duration_s)
-    return ControllerFit(float(gains[0]), ti_s, found.explained(gains))
+    return ControllerFit(float(gains[0]), ti_s, explained(found, gains))
 
 
-def _least_squares(of: list[Moves], weight: Floats, free: Floats, held: Floats) -> Floats:
+def _least_squares(of: Iterable[Floats], weight: Floats, free: Floats, held: Floats) -> Floats:
     """Gains, shape (3,), that are `held` plus what suits best along the rows of `free`, shape (k, 3)."""
-    total = np.einsum("i,ijk->jk", weight, np.stack([m.products for m in of]))
+    total = np.einsum("i,ijk->jk", weight, np.stack([m[:4, :4] for m in of]))
     gram, asked = free @ total[:3, :3] @ free.T, free @ (total[:3, 3] - total[:3, :3] @ held)
     scale = np.sqrt(np.maximum(np.diag(gram), 0.0)) + 1e-150
     along = np.linalg.lstsq(gram / np.outer(scale, scale), asked / scale, rcond=1e-10)[0] / scale
     return np.asarray(held + along @ free)
 
 
-def _weights(of: list[Moves]) -> Floats:
+def _weights(of: Iterable[Floats]) -> Floats:
     """Weight of each length of increments: by what its own best law explains of it."""
-    own = [m.explained(_least_squares([m], np.ones(1), np.eye(3), np.zeros(3))) for m in of]
+    own = [explained(m, _least_squares([m], np.ones(1), np.eye(3), np.zeros(3))) for m in of]
     share = np.clip(own, 0.0, 1.0)
-    moved = np.array([m.products[3, 3] for m in of])
+    moved = np.array([m[3, 3] for m in of])
     return np.where(share >= LAW.telling, share / (1.0 + 2 * LAW.small - share) / moved, 0.0)
 
 
@@ -180,19 +171,20 @@ def _settings(gains: Floats, record_s: float, stated: Pid) -> Pid | None:
 
 @dataclass(frozen=True, slots=True)
 class _Seen:
-    """A record as one way of the law's sees it: increments of every length, what each weighs, and the freest law."""
+    """A record as one way of the law's sees it: products of increments by their length in samples, what each weighs,
+    and the freest law."""
 
-    moves: list[Moves]
+    moves: dict[int, Floats]
     weight: Floats
     free: Floats
 
     def left(self, gains: Floats) -> Floats:
         """Share of OP's variance that gains leave at each length of increments [-]."""
-        return np.array([1.0 - m.explained(gains) for m in self.moves])
+        return np.array([1.0 - explained(m, gains) for m in self.moves.values()])
 
     def left_over_all(self, gains: Floats) -> float:
         """The same, of all of them by their weights [-]."""
-        moved = self.weight * np.array([m.products[3, 3] for m in self.moves])
+        moved = self.weight * np.array([m[3, 3] for m in self.moves.values()])
         return float(moved @ self.left(gains) / moved.sum())
 
     def poorness(self, gains: Floats) -> float:
@@ -202,8 +194,8 @@ class _Seen:
     def does(self, gains: Floats) -> bool:
         """Whether gains give OP about as well as any, and that well."""
         left, least = self.left(gains), self.left(self.free)
-        blurred = np.array([m.blurred(gains) for m in self.moves])
-        return bool((left - blurred <= LAW.enough * least + LAW.small).all() and least.min() < LAW.gives)
+        unsure = np.array([blurred(m, gains) for m in self.moves.values()])
+        return bool((left - unsure <= LAW.enough * least + LAW.small).all() and least.min() < LAW.gives)
 
 
 def _ways(record: LoopRecord, longest_s: float, stated: Pid) -> Iterator[_Seen]:
@@ -221,12 +213,12 @@ def _ways(record: LoopRecord, longest_s: float, stated: Pid) -> Iterator[_Seen]:
             slope = np.diff(on_slope * record.sp - pv, prepend=on_slope * record.sp[0] - pv[0]) / record.dt_s
             rows = _rows(record, record.sp - pv, first_order(slope, narrow))
             rows[0] = on_gain * record.sp - pv
-            found = [
-                m for k in lengths if (m := increments(rows, out_of_law, k, max(k // 8, 1), True)) is not None
-            ]
-            weight = _weights(found)
+            of = {k: increments(rows, out_of_law, k, max(k // 8, 1), True) for k in lengths}
+            found = {k: m for k, m in of.items() if m is not None}
+            weight = _weights(found.values())
             if weight.any():
-                yield _Seen(found, weight, _least_squares(found, weight, np.eye(3), np.zeros(3)))
+                free = _least_squares(found.values(), weight, np.eye(3), np.zeros(3))
+                yield _Seen(found, weight, free)
 
 
 def compare_laws(record: LoopRecord, period_s: float, stated: Pid) -> LawsCompared | None:
@@ -252,11 +244,11 @@ def compare_laws(record: LoopRecord, period_s: float, stated: Pid) -> LawsCompar
 
 def _most_apart(best: _Seen, given: _Seen, gains: Floats, pid: Pid, law: Floats) -> LawsCompared | None:
     """The law found beside the stated one, over the increments that tell them apart."""
-    stated = {m.samples: m.explained(gains) + m.blurred(gains) for m in given.moves}
+    stated = {k: explained(m, gains) + blurred(m, gains) for k, m in given.moves.items()}
     laws = [
-        LawsCompared(pid, m.explained(law), stated[m.samples])
-        for m, weight in zip(best.moves, best.weight, strict=True)
-        if weight > 0 and m.samples in stated
+        LawsCompared(pid, explained(m, law), stated[k])
+        for (k, m), weight in zip(best.moves.items(), best.weight, strict=True)
+        if weight > 0 and k in stated
     ]
     return max(laws, key=lambda x: x.left * x.explained, default=None)
 
@@ -274,7 +266,7 @@ def _simplest(seen: _Seen, gains: Floats, record_s: float, stated: Pid) -> tuple
     ]
     enough = LAW.as_well * seen.left_over_all(seen.free)
     for along, held in trials:
-        law = _least_squares(seen.moves, seen.weight, along, held)
+        law = _least_squares(seen.moves.values(), seen.weight, along, held)
         pid = _settings(law, record_s, stated)
         if pid is not None and seen.left_over_all(law) <= enough:
             return pid, law

@@ -8,18 +8,15 @@ import numpy as np
 from numba import njit
 
 from identification.estimation.gauss_newton import descend
-from identification.estimation.hammerstein import Fit, stem_blocks
-from identification.estimation.noise import arx_noise
+from identification.estimation.noise import generic_noise
 from identification.estimation.search import (
     Dynamics,
-    Prepared,
     Products,
     WhitePv,
     behind,
     faded_products,
+    learnt_noise,
     level_of,
-    prepare,
-    score,
     search,
     settled,
     starts,
@@ -27,7 +24,7 @@ from identification.estimation.search import (
     white_pv,
     whitened_stem,
 )
-from identification.estimation.window import Window
+from identification.estimation.window import Fit, Window, stem_blocks
 from identification.limits import FIT
 from identification.record import Floats
 from identification.simulation.lag import Lag, respond, unit_lag
@@ -40,43 +37,25 @@ FINE_JUMPS = tuple(float(j) for j in np.arange(0.1, 1.01, 0.06))
 """Slip jumps tried about a play, as shares of the stickband."""
 
 
-def begin(window: Window, prepared: Prepared, dynamics: Dynamics) -> Fit:
-    """The fit at given dynamics under a given noise model, a start for the descent."""
-    sigma2, count, beta = score(prepared, *dynamics)
-    t, dead = dynamics
-    base = np.array([beta[1], beta[2], 0.0, 0.0])
-    return Fit(
-        float(beta[0]), t, dead, prepared.valve, float(sigma2), int(count), prepared.pv.ar, base, window
-    )
-
-
 def fit_linear(window: Window, period_s: float) -> Fit:
     """The process behind an ideal valve.
 
     period_s : period of the oscillation, or other scale of the loop [s], about which the search begins.
     """
-    stem = window.stems_in_blocks.ideal
-    learnt = arx_noise(window.centred, stem, window.usable, FIT.ar_order, FIT.input_lags)
-    fits = []
-    for ar in (learnt, generic_noise()):
-        prepared = prepare(window, IDEAL, ar)
-        fits.append(descend(begin(window, prepared, search(prepared, starts(window, period_s)))))
+    noises, begins = (learnt_noise(window), generic_noise()), starts(window, period_s)
+    fits = [descend(_ranked(window, ar, [IDEAL], begins, 3)[0]) for ar in noises]
     return max(fits, key=lambda fit: fit.log_likelihood)
 
 
-def generic_noise() -> Floats:
-    """The noise model that knows nothing, shape (FIT.ar_order,)."""
-    out = np.zeros(FIT.ar_order)
-    out[0] = FIT.generic
-    return out
-
-
-def _ranked(window: Window, ar: Floats, valves: list[StemLaw], begins: list[Dynamics]) -> list[Fit]:
-    """Valves with dynamics searched anew under one noise model, best first."""
+def _ranked(
+    window: Window, ar: Floats, valves: list[StemLaw], begins: list[Dynamics], halvings: int = 2
+) -> list[Fit]:
+    """Starts for the descent: valves with dynamics searched anew under one noise model, best first."""
     trials, pv = [], white_pv(window, ar)
     for valve in valves:
-        prepared = behind(pv, valve)
-        trials.append(begin(window, prepared, search(prepared, begins, 2)))
+        (t, dead), sigma2, count, beta = search(behind(pv, valve), begins, halvings)
+        base = np.array([beta[1], beta[2], 0.0, 0.0])
+        trials.append(Fit(float(beta[0]), t, dead, valve, sigma2, count, ar, base, window))
     return sorted(trials, key=lambda fit: fit.sigma2)
 
 
@@ -157,10 +136,10 @@ def pits(play: Fit, tolerances: tuple[float, ...]) -> list[Fit]:
     """
     window = play.window
     pairs = np.array([(w * play.valve.stickband, j) for w in FINE_WIDTHS for j in FINE_JUMPS])
-    begins = [(play.time_constant_s, play.dead_time_s + blocks * window.dt_s) for blocks in FIT.later]
-    out = []
+    t, deads = play.time_constant_s, play.dead_time_s + np.array(FIT.later) * window.dt_s
+    out, pv, begins = [], white_pv(window, generic_noise()), [(t, float(dead)) for dead in deads]
     for tolerance in tolerances:
-        left = scan(window, pairs, tolerance, generic_noise(), begins)
+        left = _scan(pv, pairs, tolerance, t, deads)
         best = [sticking(pairs[i, 0], pairs[i, 1], tolerance) for i in np.argsort(left)[: FIT.finalists]]
         fits = _ranked(window, generic_noise(), best, begins)
         out += [_bottom(descend(fit)) for fit in fits]
@@ -177,6 +156,11 @@ def _bottom(fit: Fit) -> Fit:
 
 @njit(cache=True)
 def _scan(pv: WhitePv, pairs: Floats, tolerance: float, time_constant_s: float, deads_s: Floats) -> Floats:
+    """Innovations variance of many stick-slips at once, of the best of some dead times [% PV squared], shape (m,).
+
+    pairs : shape (m, 2), stickband [% OP] and slip jump as a share of it; tolerance : how the stems behave in motion
+    (valve.py).
+    """
     n, level = pv.rows.shape[1], level_of(pv.ar)
     out, x, decay = np.full(pairs.shape[0], np.inf), np.zeros(n), np.zeros(n)
     pole = unit_lag(time_constant_s, 0.0, pv.dt_s).pole
@@ -185,9 +169,7 @@ def _scan(pv: WhitePv, pairs: Floats, tolerance: float, time_constant_s: float, 
         decay[:] = pv.rows[1] * pole ** np.arange(n)
     fv, _, f1, ft, ff = faded_products(x, pv.rows, pole, outlasts)
     for i in range(pairs.shape[0]):
-        width, share = pairs[i, 0], pairs[i, 1]
-        law = StemLaw(0.5 * width * (1 + share), 0.5 * width * (1 - share), tolerance)
-        stem = stem_blocks(pv.stems, law)
+        stem = stem_blocks(pv.stems, sticking(pairs[i, 0], pairs[i, 1], tolerance))
         whole = respond(whitened_stem(stem - stem.mean(), pv.ar), Lag(pole, 1.0, 0.0, 0))
         for dead_s in deads_s:
             lag = unit_lag(time_constant_s, dead_s, pv.dt_s)
@@ -218,14 +200,3 @@ def _later(whole: Floats, lag: Lag, rows: Floats, decay: Floats, out: Floats) ->
         xv, x1, xt, xx = xv + x * v[k], x1 + weighted, xt + x * t[k], xx + x * weighted
         xf += x * f[k]
     return (xv, x1, xt, xx), xf
-
-
-def scan(window: Window, pairs: Floats, tolerance: float, ar: Floats, begins: list[Dynamics]) -> Floats:
-    """Innovations variance of many stick-slips at once.
-
-    pairs : shape (m, 2), stickband [% OP] and slip jump as a share of it; tolerance : how the stems behave in motion
-    (valve.py); ar : shape (p,), noise model; begins : time constants, all the same, and dead times tried [s]; the
-    best counts. Returns shape (m,), least innovations variance of each pair [% PV squared].
-    """
-    (time_constant_s, _), deads_s = begins[0], np.array([dead for _, dead in begins])
-    return _scan(white_pv(window, ar), pairs, tolerance, time_constant_s, deads_s)  # type: ignore[no-any-return]

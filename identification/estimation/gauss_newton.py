@@ -17,13 +17,12 @@ from numpy.typing import NDArray
 
 from identification.estimation.covariance import inverse, scattered
 from identification.estimation.descent import Descent, down
-from identification.estimation.hammerstein import Fit, stem_of
 from identification.estimation.noise import every_lag, judged, whitened
-from identification.estimation.window import Stems, Window
+from identification.estimation.window import Fit, Stems, stem_of
 from identification.limits import FIT
 from identification.record import Floats
 from identification.simulation.lag import respond, respond_together, unit_lag
-from identification.simulation.valve import StemLaw
+from identification.simulation.valve import StemLaw, sticking
 
 NARROWEST = 0.2
 """Stickband after a step, in terms of that before, that is tried no more."""
@@ -48,25 +47,6 @@ class _Bench(NamedTuple):
     dt_s: float
     factor: int
     ranges: tuple[float, float, float, float]
-
-
-def _bench(window: Window, order: int, free_width: bool) -> _Bench:
-    most_t, most_dead = window.bounds
-    return _Bench(
-        window.centred,
-        window.stems,
-        window.extra,
-        np.flatnonzero(judged(window.usable, order)),
-        free_width,
-        window.dt_s,
-        window.factor if window.fine else 1,
-        (
-            math.log(0.05 * window.dt_s),
-            math.log(most_t),
-            -window.half_block_s if window.fine else 0.0,
-            most_dead,
-        ),
-    )
 
 
 class _Point(NamedTuple):
@@ -114,8 +94,7 @@ def _widened(valve: StemLaw, step: float) -> StemLaw:
     """The valve with a stickband wider by a step, its jump share kept."""
     stickband = valve.breakaway + valve.sliding
     share = (valve.breakaway - valve.sliding) / stickband if stickband > 0 else 0.0
-    wider = stickband + step
-    return StemLaw(0.5 * wider * (1 + share), 0.5 * wider * (1 - share), valve.tolerance)
+    return sticking(stickband + step, share, valve.tolerance)  # type: ignore[no-any-return]
 
 
 @njit(cache=True)
@@ -203,15 +182,16 @@ def _descend(b: _Bench, theta: Floats, valve: StemLaw, rule: Descent) -> _Point:
     return down(b, _point(b, theta, valve), _curved, _stepped, rule)  # type: ignore[no-any-return]
 
 
-def _theta(fit: Fit) -> Floats:
-    head = [math.log(fit.time_constant_s), fit.dead_time_s, fit.valve.stickband, fit.gain]
-    return np.concatenate((head, fit.base, fit.ar))
-
-
 def _at(fit: Fit, free_width: bool = False) -> tuple[_Bench, Floats, StemLaw]:
     """Where a fit stands: what its descent shares, its constants and its valve, in the kernels' own types."""
-    bench = _bench(fit.window, fit.ar.size, free_width)
-    return bench, _theta(fit), StemLaw(*(float(x) for x in fit.valve))
+    window, (most_t, most_dead) = fit.window, fit.window.bounds
+    factor, least_dead = (window.factor, -window.half_block_s) if window.fine else (1, 0.0)
+    ranges = math.log(0.05 * window.dt_s), math.log(most_t), least_dead, most_dead
+    at = np.flatnonzero(judged(window.usable, fit.ar.size))
+    y, extra = window.centred, window.extra
+    bench = _Bench(y, window.stems, extra, at, free_width, window.dt_s, factor, ranges)
+    head = [math.log(fit.time_constant_s), fit.dead_time_s, fit.valve.stickband, fit.gain]
+    return bench, np.concatenate((head, fit.base, fit.ar)), StemLaw(*(float(x) for x in fit.valve))
 
 
 def innovations(fit: Fit) -> Floats:
@@ -234,8 +214,7 @@ def residual(fit: Fit) -> Floats:
 
 def slow_terms(fit: Fit) -> Floats:
     """Mean, trend, decay and step of PV by a fit [% PV], shape (n,)."""
-    point = _point(*_at(fit))
-    return np.asarray(fit.window.centred - fit.gain * point.x - point.r)
+    return residual(fit) - disturbance(fit)
 
 
 def covariance(fit: Fit, free_width: bool = False) -> Floats:
@@ -264,15 +243,7 @@ def descend(fit: Fit, free_width: bool = False) -> Fit:
     steps = FIT.iterations
     rule = Descent(steps, steps, b.at.size, FIT.settled, 10.0, 5.0, steps)
     best = _descend(b, theta, valve, rule)
-    theta = best.theta
-    return Fit(
-        float(theta[3]),
-        float(math.exp(theta[0])),
-        float(theta[1]),
-        StemLaw(*best.valve),
-        max(best.loss, 1e-14),
-        int(best.e.size),
-        theta[BASE:].copy(),
-        theta[4:BASE].copy(),
-        fit.window,
-    )
+    head, base, ar = np.split(best.theta, (4, BASE))
+    gain, t, dead = float(head[3]), math.exp(head[0]), float(head[1])
+    valve, sigma2 = StemLaw(*best.valve), max(best.loss, 1e-14)
+    return Fit(gain, t, dead, valve, sigma2, int(best.e.size), ar.copy(), base.copy(), fit.window)

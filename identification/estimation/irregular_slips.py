@@ -11,10 +11,9 @@ import numpy as np
 from identification.estimation.descent import compass
 from identification.estimation.evidence import evidence
 from identification.estimation.gauss_newton import descend, disturbance, residual, slow_terms
-from identification.estimation.hammerstein import Fit
 from identification.estimation.noise import every_lag, judged, whitened
 from identification.estimation.slip_beam import Noise, Response, SlipDistances, decoded, log_chance
-from identification.estimation.window import Window
+from identification.estimation.window import Fit
 from identification.limits import SLIPS
 from identification.record import Floats
 from identification.simulation.lag import unit_lag
@@ -62,22 +61,18 @@ class _Trial:
     stem: Floats = field(compare=False)
 
 
-def _response(fit: Fit, mean: float) -> Response:
-    """How PV follows a stem whose mean is known [% OP], by a fit."""
-    step_s = fit.window.dt_s / fit.window.factor
-    lag = unit_lag(fit.time_constant_s, fit.process.dead_time_s, step_s)
-    return Response(lag, fit.gain, slow_terms(fit) - fit.gain * mean)
-
-
-def _friction(band: float, share: float, rest: int) -> SlipDistances:
-    return SlipDistances(0.5 * band * (1.0 + share), 0.5 * band * (1.0 - share), rest)
-
-
 def _decoded(
-    window: Window, r: Response, noise: Noise, f: SlipDistances, most: int, least: float = -math.inf
+    fit: Fit, mean: float, law: StemLaw, rest: int, noise: Noise, most: int, least: float = -math.inf
 ) -> tuple[Floats, float]:
-    """The most probable stem of a window, and its log probability; none where that is under `least`."""
-    return decoded(window.op, window.centred, judged(window.usable, noise.ar.size), r, noise, f, most, least)
+    """The most probable stem under a fit, and its log probability; none where that is under `least`.
+
+    mean : of the stem [% OP]; law, rest : of its friction, and its longest rest [samples]; most : paths side by side.
+    """
+    window = fit.window
+    lag = unit_lag(fit.time_constant_s, fit.process.dead_time_s, window.dt_s / window.factor)
+    r = Response(lag, fit.gain, slow_terms(fit) - fit.gain * mean)
+    f, counts = SlipDistances(law.breakaway, law.sliding, rest), judged(window.usable, noise.ar.size)
+    return decoded(window.op, window.centred, counts, r, noise, f, most, least)
 
 
 def _slips(stem: Floats) -> int:
@@ -109,9 +104,8 @@ def _screened(play: Fit, noise: Floats, rest: int, gains: Gains) -> list[_Trial]
             if gain:
                 band = width * play.valve.stickband
                 fit = replace(play, dead_time_s=play.dead_time_s + later * window.dt_s, gain=gain)
-                r, f = _response(fit, mean), _friction(band, share, rest)
-                least = _bound(out, band, share)
-                path, score = _decoded(window, r, Noise(noise, sigma2), f, SLIPS.screened, least)
+                law, least = sticking(band, share), _bound(out, band, share)
+                path, score = _decoded(fit, mean, law, rest, Noise(noise, sigma2), SLIPS.screened, least)
                 out = _chosen([*out, _Trial(score, _slips(path), band, share, later, gain, path)])
         if not out:  # a gain under which no friction slips at the play's own dead time lets none slip later
             break
@@ -147,21 +141,21 @@ def _path(fit: Fit, valve: StemLaw, stem: Floats) -> SlipPath:
     )
 
 
-def _decoded_by(fit: Fit, mean: float, f: SlipDistances, hot: float) -> Floats:
-    return _decoded(fit.window, _response(fit, mean), Noise(fit.ar, hot * fit.sigma2), f, SLIPS.carried)[0]
+def _decoded_anew(path: SlipPath, fit: Fit, law: StemLaw, rest: int, hot: float) -> Floats:
+    """The most probable stem under a fit near a path, shape of OP; hot : factor of the innovations' variance."""
+    return _decoded(fit, path.mean, law, rest, Noise(fit.ar, hot * fit.sigma2), SLIPS.carried)[0]
 
 
 def _followed(play: Fit, begun: _Trial, rest: int) -> SlipPath:
     """Process and stem found in turns from a trial; the most probable of them."""
     valve, stem = sticking(begun.band, begun.share), begun.stem
-    window = play.window
-    later_s = begun.later * window.dt_s
+    later_s = begun.later * play.window.dt_s
     fit = replace(play, dead_time_s=play.dead_time_s + later_s, gain=begun.gain)
     best = path = _path(fit, valve, stem)
     hopeless = play.log_likelihood - SLIPS.hopeless * play.count
     for k in range(1, SLIPS.rounds):
-        f = _friction(begun.band, begun.share, rest if k == 1 else window.op.size)
-        stem = _decoded_by(path.fit, path.mean, f, SLIPS.hot[min(k - 1, len(SLIPS.hot) - 1)])
+        longest, hot = rest if k == 1 else stem.size, SLIPS.hot[min(k - 1, len(SLIPS.hot) - 1)]
+        stem = _decoded_anew(path, path.fit, valve, longest, hot)
         if _slips(stem) < SLIPS.fewest:
             break
         path = _path(path.fit, valve, stem)
@@ -187,11 +181,11 @@ def _moved(_: None, best: SlipPath, move: tuple[int, int, int], step: float) -> 
     if not 0.0 < share <= 1.0 or dead_s < 0.0:
         return best, math.inf
     gain = best.fit.gain * v.slip_jump / (band * share)  # a slip moves PV by gain times jump
-    fit, f = replace(best.fit, dead_time_s=dead_s, gain=gain), _friction(band, share, window.op.size)
-    stem = _decoded_by(fit, best.mean, f, 1.0)
+    fit, law = replace(best.fit, dead_time_s=dead_s, gain=gain), sticking(band, share)
+    stem = _decoded_anew(best, fit, law, window.op.size, 1.0)
     if _slips(stem) < SLIPS.fewest:
         return best, math.inf
-    path = _path(fit, sticking(band, share), stem)
+    path = _path(fit, law, stem)
     return path, -path.worth
 
 

@@ -123,3 +123,10 @@ def arx_noise(y: Floats, u: Floats, usable: Mask, order: int, lags: int) -> Floa
     gram = weighted @ x.T
     ridge = 1e-8 * np.diag(gram).mean() * np.eye(len(past))
     return np.linalg.solve(gram + ridge, weighted @ y[top:])[:order]
+
+
+def generic_noise() -> Floats:
+    """The noise model that knows nothing, shape (FIT.ar_order,)."""
+    out = np.zeros(FIT.ar_order)
+    out[0] = FIT.generic
+    return out

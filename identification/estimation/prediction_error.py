@@ -227,8 +227,9 @@ def moved(p: Problem, model: Model, step: Floats) -> Model:
     return replace(model, c=c)
 
 
-def curvature(p: Problem, found: Residual) -> tuple[Floats, Floats]:
-    """Gauss-Newton matrix of the constants with the noise model eliminated, and the slope."""
+def curvature(p: Problem, found: Residual) -> tuple[Floats, Floats, Floats]:
+    """Gauss-Newton matrix of the constants with the noise model eliminated, the slope, and what they are made of:
+    derivatives of the innovations, shape (m, n), weighted."""
     model = found.model
     moves = sensitivities(p, model, found.ar, found.simulated) * np.sqrt(p.weight)
     own, groups = found.columns, found.ar.size
@@ -247,7 +248,7 @@ def curvature(p: Problem, found: Residual) -> tuple[Floats, Floats]:
             held = found.loss / scatter**2
             gram[i, i] += held
             slope[i] += held * (aim - model.c[param.slot])
-    return gram, slope
+    return gram, slope, moves
 
 
 def is_out_of_reach(p: Problem, found: Residual, gram: Floats, slope: Floats, aim: float) -> bool:
@@ -289,7 +290,7 @@ def _descend(p: Problem, model: Model, steps: int, aim: float) -> Fitted:
     """Follow a model to the least innovations by damped Gauss-Newton steps."""
 
     def curved(p: Problem, found: Residual, taken: int) -> tuple[bool, Floats, Floats]:
-        gram, slope = curvature(p, found)
+        gram, slope, _ = curvature(p, found)
         return taken == 0 or not is_out_of_reach(p, found, gram, slope, aim), gram, slope
 
     def stepped(p: Problem, found: Residual, step: Floats) -> Residual:
@@ -314,10 +315,9 @@ def innovations_of(p: Problem, found: Residual) -> Floats:
 def deviations(p: Problem, fit: Fitted) -> Floats:
     """Standard deviations of the free constants (of logarithms where so searched), shape (m,); see covariance.py."""
     found = residual_fit(p, fit.model)
-    gram, _ = curvature(p, found)
+    gram, _, moves = curvature(p, found)
     if not np.isfinite(gram).all():
         return np.full(gram.shape[0], np.inf)
-    moves = sensitivities(p, fit.model, found.ar, found.simulated) * np.sqrt(p.weight)
     follow = np.linalg.lstsq(found.gram, found.columns @ moves.T, rcond=1e-13)[0]
     scores = (moves - follow.T @ found.columns) * found.white
     return np.sqrt(np.maximum(np.diag(scattered(inverse(gram), scores.T, fit.loss)), 0.0))

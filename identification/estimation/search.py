@@ -1,6 +1,7 @@
 """Where a fit begins: time constant and dead time searched, and many valves tried, under a given noise model.
 
 The search knows blocks alone and solves gain and slow terms linearly; the descent ends at the record's own interval.
+So do the starts of `explain`'s plain loop, whose descent is another.
 """
 
 from __future__ import annotations
@@ -13,14 +14,14 @@ from numba import njit
 from numba.extending import register_jitable
 
 from identification.estimation.descent import compass
-from identification.estimation.hammerstein import stem_of
-from identification.estimation.noise import every_lag, judged, whitened
-from identification.estimation.window import Stems, Window
+from identification.estimation.noise import arx_noise, every_lag, generic_noise, judged, whitened
+from identification.estimation.window import Stems, Window, stem_of
 from identification.limits import FIT
+from identification.models import Fopdt
 from identification.record import Floats, Mask
 from identification.signals.filters import notch
 from identification.simulation.lag import Lag, stepped, unit_lag
-from identification.simulation.valve import StemLaw
+from identification.simulation.valve import IDEAL, StemLaw, sticking
 
 FADED = 1e-17
 """A decay under this share of its start is over; numbers have sixteen digits."""
@@ -30,6 +31,8 @@ COMPASS = (0.02, 0.007, 0.0025)
 """Relative steps of the search within a pit of stickband and jump."""
 PIT_MOVES = ((1, 0), (-1, 0), (0, 1), (0, -1))
 """Steps of stickband and jump that are tried in a pit."""
+NO_WHITENING = np.zeros(1)
+"""The noise model of a simulation judged by its own errors: none."""
 
 
 @njit(cache=True)
@@ -143,14 +146,13 @@ class Prepared(NamedTuple):
     """The same with the stem behind one valve, whitened for many dynamics: a lag and A(q) commute."""
 
     pv: WhitePv
-    valve: StemLaw
     stem: Floats
 
 
 @njit(cache=True)
 def behind(pv: WhitePv, valve: StemLaw) -> Prepared:
     """Whitened PV with the whitened stem behind a valve."""
-    return Prepared(pv, valve, whitened_stem(stem_of(pv.stems, valve), pv.ar))
+    return Prepared(pv, whitened_stem(stem_of(pv.stems, valve), pv.ar))
 
 
 @njit(cache=True)
@@ -180,19 +182,16 @@ def whitened_stem(x: Floats, ar: Floats) -> Floats:
 
 def white_pv(window: Window, ar: Floats, notch_period: float = 0.0) -> WhitePv:
     """Whiten PV with one noise model; notch_period in blocks, 0: none."""
-    y = _notched(whitened_stem(window.centred, ar), notch_period)
+    white = whitened_stem(window.centred, ar)
+    y = white if notch_period <= 0 else notch(white, notch_period, FIT.notch_width)
     rows, sums = _known(y, judged(window.usable, ar.size), ar.size + int(notch_period))
     return WhitePv(window.stems_in_blocks, rows, sums, ar, window.dt_s, window.bounds)
 
 
-def prepare(window: Window, valve: StemLaw, ar: Floats, notch_period: float = 0.0) -> Prepared:
-    """Whiten PV and the stem with one noise model; notch_period in blocks, 0: none."""
+def prepare(window: Window, valve: StemLaw, ar: Floats, notch_period: float) -> Prepared:
+    """Whiten PV and the stem with one noise model, a period [blocks] left out of both."""
     whole = behind(white_pv(window, ar, notch_period), valve)
-    return whole._replace(stem=_notched(whole.stem, notch_period))  # type: ignore[no-any-return]
-
-
-def _notched(x: Floats, period: float) -> Floats:
-    return x if period <= 0 else notch(x, period, FIT.notch_width)
+    return whole._replace(stem=notch(whole.stem, notch_period, FIT.notch_width))  # type: ignore[no-any-return]
 
 
 @register_jitable  # type: ignore[untyped-decorator]
@@ -216,11 +215,13 @@ def _least(p: Prepared, begins: Floats, halvings: int) -> Dynamics:
     return math.exp(t), dead_s
 
 
-def search(prepared: Prepared, begins: list[Dynamics], halvings: int = 3) -> Dynamics:
-    """Time constant and dead time [s] of least innovations variance: the best start, then compass search."""
+def search(prepared: Prepared, begins: list[Dynamics], halvings: int) -> tuple[Dynamics, float, int, Floats]:
+    """Time constant and dead time [s] of least innovations variance, and their score: the best start, then compass
+    search."""
     (most_t, most_dead), dt_s = prepared.pv.most, prepared.pv.dt_s
     first = [[math.log(min(max(t, 0.06 * dt_s), 0.95 * most_t)), min(d, most_dead)] for t, d in begins]
-    return _least(prepared, np.array(first), halvings)  # type: ignore[no-any-return]
+    found = _least(prepared, np.array(first), halvings)
+    return found, *score(prepared, *found)
 
 
 @register_jitable  # type: ignore[untyped-decorator]
@@ -231,7 +232,7 @@ def _valve_tried(
     pv, (time_constant_s, dead_time_s) = at
     width = (valve.breakaway + valve.sliding) * (1 + move[0] * step)
     share = min((valve.breakaway - valve.sliding) * (1 + 2 * move[1] * step), width) / width
-    other = StemLaw(0.5 * width * (1 + share), 0.5 * width * (1 - share), valve.tolerance)
+    other = sticking(width, share, valve.tolerance)
     return other, score(behind(pv, other), time_constant_s, dead_time_s)[0]
 
 
@@ -248,3 +249,39 @@ def starts(window: Window, period_s: float) -> list[Dynamics]:
     deads = [period_s * s for s in (0.0, 0.06, 0.15, 0.33)]
     most_t, most_dead = window.bounds
     return sorted({(min(t, 0.7 * most_t), min(d, most_dead)) for t in times for d in deads})
+
+
+def record_starts(samples: int, dt_s: float) -> list[Dynamics]:
+    """Time constants and dead times [s] from which the search begins, over all time scales of the record."""
+    count = 1 + math.ceil(math.log(max(samples / FIT.shortest, FIT.apart)) / math.log(FIT.apart))
+    times = FIT.shortest * FIT.apart ** np.arange(count)
+    pairs = {(t, min(round(t * d, 1), FIT.longest_delay * samples)) for t in times for d in FIT.delays}
+    return [(t * dt_s, d * dt_s) for t, d in sorted(pairs)]
+
+
+def _plain(window: Window, ar: Floats) -> Fopdt:
+    """The process behind an ideal valve that explains a window best under one noise model."""
+    prepared = behind(white_pv(window, np.ascontiguousarray(ar)), IDEAL)
+    dynamics, _, _, beta = search(prepared, record_starts(window.y.size, window.dt_s), 2)
+    return Fopdt(float(beta[0]), *dynamics)
+
+
+def simulated_best(y: Floats, op: Floats, usable: Mask, dt_s: float) -> Fopdt:
+    """The plain loop whose simulation leaves least of PV, a straight line of load taken out; see plain_processes."""
+    return _plain(Window(y, op, usable, dt_s), NO_WHITENING)
+
+
+def learnt_noise(window: Window) -> Floats:
+    """A first noise model of a window, shape (FIT.ar_order,), learnt without a process."""
+    stem = window.stems_in_blocks.ideal
+    return arx_noise(window.centred, stem, window.usable, FIT.ar_order, FIT.input_lags)
+
+
+def plain_processes(y: Floats, op: Floats, usable: Mask, dt_s: float) -> list[Fopdt]:
+    """Plain loops that explain PV from OP best: one step ahead under each of two first noise models, and simulated.
+
+    y, op : shape (n,), PV and OP [% of span]; usable : bool, shape (n,), False where a sample must not be used; dt_s
+    : sample interval [s]. Returns starts for a descent, one for each; the last is the simulated one.
+    """
+    window = Window(y, op, usable, dt_s)
+    return [_plain(window, ar) for ar in (learnt_noise(window), generic_noise(), NO_WHITENING)]

@@ -19,12 +19,10 @@ WIDTHS = tuple(float(w) for w in np.geomspace(0.03, 1.2, 60))
 
 @dataclass(frozen=True, slots=True)
 class Seen:
-    """A valve as its position shows it: its play, the stick-slip where it has one, and the share of the stem's way
-    that its slips make."""
+    """A valve as its position shows it: its play, and the stick-slip where it has one."""
 
     play: StemLaw
     jumping: StemLaw | None
-    by_slips: float
 
 
 def left(op: Floats, position: Floats, law: StemLaw) -> float:
@@ -91,5 +89,5 @@ def seen(op: Floats, position: Floats) -> Seen | None:
     if len(large) >= STEM.slips and by_slips > STEM.by_slips:
         go, rest = float(np.median(large[:, 0])), float(np.median(large[:, 1]))
         if go > max(rest, 0.0):
-            return Seen(play, sticking(go + rest, (go - rest) / (go + rest)), by_slips)
-    return Seen(play, None, by_slips) if left(op, position, play) < (1.0 - STEM.least_share) * apart else None
+            return Seen(play, sticking(go + rest, (go - rest) / (go + rest)))
+    return Seen(play, None) if left(op, position, play) < (1.0 - STEM.least_share) * apart else None

@@ -7,13 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from identification.estimation.backlash_stiction import generic_noise
-from identification.estimation.hammerstein import Fit
-from identification.estimation.search import Dynamics, WhitePv, behind, score, search, white_pv
-from identification.estimation.window import Window
+from identification.estimation.noise import generic_noise
+from identification.estimation.search import Dynamics, WhitePv, behind, search, white_pv
+from identification.estimation.window import Fit, Window
 from identification.limits import FIT
 from identification.record import Floats
-from identification.simulation.valve import IDEAL, StemLaw, sticking
+from identification.simulation.valve import IDEAL, sticking
 
 WIDTHS = np.geomspace(0.1, 60.0, 29)
 """Widths of a play that records are asked of [% OP], a quarter apart: from the least dead band of a positioner
@@ -45,7 +44,8 @@ def width_profile(linear: Fit, play: Fit) -> Floats:
 
 def _ideal(window: Window, linear: Fit, play: Fit, ar: Floats) -> float:
     """Innovations variance behind an ideal valve under one noise model."""
-    return _left(white_pv(window, ar), IDEAL, [_dynamics(linear), _dynamics(play)])[0]
+    begins = [_dynamics(linear), _dynamics(play)]
+    return search(behind(white_pv(window, ar), IDEAL), begins, FIT.profile_halvings)[1]
 
 
 def _dynamics(fit: Fit) -> Dynamics:
@@ -59,12 +59,6 @@ def _swept(pv: WhitePv, widths: Floats, play: Fit) -> Floats:
     for way in (range(first, widths.size), range(first - 1, -1, -1)):
         near = _dynamics(play)
         for k in way:
-            out[k], near = _left(pv, sticking(widths[k], 0.0), [near, _dynamics(play)])
+            prepared = behind(pv, sticking(widths[k], 0.0))
+            near, out[k], _, _ = search(prepared, [near, _dynamics(play)], FIT.profile_halvings)
     return out
-
-
-def _left(pv: WhitePv, valve: StemLaw, begins: list[Dynamics]) -> tuple[float, Dynamics]:
-    """Least innovations variance behind a valve, and the dynamics that leave it."""
-    prepared = behind(pv, valve)
-    found = search(prepared, begins, FIT.profile_halvings)
-    return float(score(prepared, *found)[0]), found

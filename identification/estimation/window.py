@@ -1,16 +1,27 @@
-"""A stretch of a record prepared for fitting: PV in blocks, OP as recorded."""
+"""A stretch of a record prepared for fitting, PV in blocks, OP as recorded; the stem behind any valve, and a fit.
+
+The model of a fit is y = c0 + c1 t + c2 decay + K x + noise with A(q) noise = innovation: the stem is a valve
+operator on the recorded OP, x the response of a unit-gain lag with dead time, A(q) = 1 - ar1 q^-1 - ... an
+autoregression that makes the residual white. An integrator is the lag whose time constant outlasts the window; then
+only gain over time constant is known. Gain and the c are solved linearly, time constant and dead time are searched,
+the valve is scanned.
+"""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 
+from identification.estimation.descent import nats
 from identification.limits import FIT
+from identification.models import Fopdt
 from identification.record import Floats, Mask
+from identification.simulation.valve import RESTS, StemLaw, first_slip, stem_step
 
 
 class Stems(NamedTuple):
@@ -78,19 +89,19 @@ class Window:
     @cached_property
     def stems_in_blocks(self) -> Stems:
         """Stems that are known beforehand, in blocks."""
-        recorded = np.empty(0) if self.position is None else block_means(self.position, self.factor)
-        n = self.op.size // self.factor
-        blocks = self.op[: n * self.factor].reshape(n, self.factor)
-        low, high = blocks.min(axis=1), blocks.max(axis=1)
-        return Stems(self.op, low, high, less_mean(self.op_blocks), less_mean(recorded), self.factor)
+        return self._stems(self.factor)
 
     @cached_property
     def stems(self) -> Stems:
         """The same at the interval at which responses are stepped."""
-        if not self.fine:
-            return self.stems_in_blocks
+        return self._stems(1) if self.fine else self.stems_in_blocks
+
+    def _stems(self, factor: int) -> Stems:
         recorded = np.empty(0) if self.position is None else self.position
-        return Stems(self.op, self.op, self.op, less_mean(self.op), less_mean(recorded), 1)
+        blocks = self.op[: self.op.size // factor * factor].reshape(-1, factor)
+        low, high = blocks.min(axis=1), blocks.max(axis=1)
+        ideal, known = (less_mean(block_means(x, factor)) for x in (self.op, recorded))
+        return Stems(self.op, low, high, ideal, known, factor)
 
     @cached_property
     def bounds(self) -> tuple[float, float]:
@@ -121,3 +132,92 @@ def block_means(x: Floats, factor: int) -> Floats:
     """Means of consecutive blocks, shape (n // factor,)."""
     n = x.size // factor
     return x[: n * factor].reshape(n, factor).mean(axis=1)
+
+
+@dataclass(frozen=True, slots=True)
+class Fit:
+    """A fitted model.
+
+    gain [% PV/% OP], time_constant_s and dead_time_s [s], valve, sigma2 the innovations variance
+    [% PV squared], count the samples judged, ar the noise model of single lags (noise.py), shape (p,), base
+    the coefficients of 1, t, decay and the load's step, shape (4,), window what it is fitted to.
+    """
+
+    gain: float
+    time_constant_s: float
+    dead_time_s: float
+    valve: StemLaw
+    sigma2: float
+    count: int
+    ar: Floats
+    base: Floats
+    window: Window = field(repr=False)
+
+    @property
+    def process(self) -> Fopdt:
+        """The process, its dead time in the record's own samples."""
+        return Fopdt(self.gain, self.time_constant_s, self.dead_time_s + self.window.half_block_s)
+
+    @property
+    def log_likelihood(self) -> float:
+        """Gaussian log likelihood of the innovations, up to a constant."""
+        return -nats(self.count, self.sigma2, 1.0)
+
+    @property
+    def slope(self) -> float:
+        """Gain over time constant [% PV / (% OP s)]."""
+        return self.gain / self.time_constant_s
+
+
+@njit(cache=True)
+def _resting_blocks(s: Stems, law: StemLaw) -> Floats:
+    """`stem_blocks` of a stem that rests after each move, where the direction of motion need not be remembered."""
+    out = np.empty(s.low.size)
+    stem = first_slip(s.op, law)
+    for k in range(s.low.size):
+        if s.high[k] - stem <= law.breakaway and stem - s.low[k] <= law.breakaway:
+            out[k] = stem
+            continue
+        total = 0.0
+        for i in range(k * s.factor, (k + 1) * s.factor):
+            gap = s.op[i] - stem
+            if gap > law.breakaway:
+                stem = s.op[i] - law.sliding
+            elif gap < -law.breakaway:
+                stem = s.op[i] + law.sliding
+            total += stem
+        out[k] = total / s.factor
+    return out
+
+
+@njit(cache=True)
+def stem_blocks(s: Stems, law: StemLaw) -> Floats:
+    """Stem behind OP as means of blocks, shape (n // factor,), of a valve with breakaway > 0.
+
+    A stem at rest within reach of OP's extremes in a block rests on.
+    """
+    if law.tolerance == RESTS:
+        return _resting_blocks(s, law)  # type: ignore[no-any-return]
+    out = np.empty(s.low.size)
+    stem = (first_slip(s.op, law), 0.0, s.op[0])
+    for k in range(s.low.size):
+        if stem[1] == 0.0 and s.high[k] - stem[0] <= law.breakaway and stem[0] - s.low[k] <= law.breakaway:
+            out[k] = stem[0]
+            continue
+        total = 0.0
+        for i in range(k * s.factor, (k + 1) * s.factor):
+            stem = stem_step(stem, s.op[i], law)
+            total += stem[0]
+        out[k] = total / s.factor
+    return out
+
+
+@njit(cache=True)
+def stem_of(s: Stems, law: StemLaw) -> Floats:
+    """Stem less its mean [% OP], shape (m,), behind a valve: the recorded one where there is one."""
+    if law.breakaway <= 0.0:
+        return s.ideal
+    if s.recorded.size:
+        return s.recorded
+    stem = stem_blocks(s, law)
+    return stem - stem.mean()

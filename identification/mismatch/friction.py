@@ -15,11 +15,11 @@ from itertools import product
 import numpy as np
 from numba import njit
 
-from identification.estimation.backlash_stiction import generic_noise, pits
+from identification.estimation.backlash_stiction import pits
 from identification.estimation.descent import compass
-from identification.estimation.hammerstein import Fit
+from identification.estimation.noise import generic_noise
 from identification.estimation.prediction_error import Fitted, Model, Problem, descended, residual_fit
-from identification.estimation.window import Window
+from identification.estimation.window import Fit, Window
 from identification.mismatch.effect import Friction
 from identification.mismatch.outside import about
 from identification.mismatch.recording import SeenInCycles

@@ -15,7 +15,7 @@ from identification.estimation.prediction_error import (
     descended,
     problem,
 )
-from identification.estimation.start_values import plain_processes
+from identification.estimation.search import plain_processes
 from identification.limits import LIMITS, ExplainLimits, RecorderLimits
 from identification.mismatch.recording import Recording
 from identification.mismatch.reference import left_freely

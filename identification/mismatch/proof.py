@@ -15,7 +15,7 @@ import numpy as np
 
 from identification.estimation.noise import NO_NOISE, whitened
 from identification.estimation.prediction_error import Fitted, Model, Problem, bounds, descended, gain
-from identification.estimation.start_values import simulated_best
+from identification.estimation.search import simulated_best
 from identification.limits import LIMITS, ExplainLimits
 from identification.mismatch.effect import Effect
 from identification.mismatch.friction import WEARS, simulated_anew

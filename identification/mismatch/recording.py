@@ -9,7 +9,7 @@ import numpy as np
 
 from identification.controller.check import StatedSettings
 from identification.controller.pi_regression import fed_back
-from identification.estimation.start_values import plain_processes
+from identification.estimation.search import plain_processes
 from identification.limits import LIMITS, ExplainLimits, RecorderLimits
 from identification.models import Backlash, Estimate, Fopdt, Stiction
 from identification.record import Floats, Mask

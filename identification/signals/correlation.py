@@ -43,14 +43,13 @@ def correlated(e: Floats) -> float:
 class Rhythm:
     """What an autocorrelation says about one period.
 
-    period_s : lag of the first peak [s]; first, second, third : heights of the peaks [-]; trough : depth of the
+    period_s : lag of the first peak [s]; first, third : heights of these peaks [-]; trough : depth of the
     first trough [-]; regularity : mean over three standard deviations of the zero crossings' intervals [-]
     (Thornhill, Huang, Zhang 2003).
     """
 
     period_s: float
     first: float
-    second: float
     third: float
     trough: float
     regularity: float
@@ -87,11 +86,10 @@ def rhythm(x: Floats, dt_s: float, period_s: float) -> Rhythm:
     r = autocorrelation(x, min(x.size - 2, int(6 * lag) + 2))
     at, first = _peak(r, 0.6 * lag, 1.45 * lag)
     if not math.isfinite(at):
-        return Rhythm(period_s, 0.0, 0.0, 0.0, 0.0, 0.0)
+        return Rhythm(period_s, 0.0, 0.0, 0.0, 0.0)
     trough = -float(r[int(0.25 * at) : int(0.75 * at) + 2].min())
-    second = _peak(r, 1.75 * at, 2.25 * at)[1]
     third = _peak(r, 2.75 * at, 3.25 * at)[1]
-    return Rhythm(at * dt_s, first, second, third, trough, _regularity(r))
+    return Rhythm(at * dt_s, first, third, trough, _regularity(r))
 
 
 def _averaged(error: Floats, good: Mask, blocks: int, width: int) -> tuple[Floats, Mask]:

@@ -27,6 +27,8 @@ DRIFT_BLOCKS = 64
 """Parts of a record whose phases are compared for a drift."""
 DRIFTS = np.arange(-60, 61) / 20.0
 """Drifts tried [turns over the record]."""
+TURNS = np.exp(2j * np.pi * DRIFTS[:, None] * ((np.arange(DRIFT_BLOCKS) + 0.5) / DRIFT_BLOCKS))
+"""What turns each block's phase back by each drift, shape (drifts, blocks)."""
 Whole = NDArray[np.int64]
 
 
@@ -116,14 +118,7 @@ def drift(x: Complex, y: Complex) -> float:
     product = ifft(x, size) * np.conj(ifft(y, size))
     edges = np.arange(DRIFT_BLOCKS) * size // DRIFT_BLOCKS
     blocks = np.add.reduceat(product, edges)
-    return float(DRIFTS[int(np.argmax(np.abs(_turns() @ blocks)))])
-
-
-@cache
-def _turns() -> Complex:
-    """What turns each block's phase back by each drift, shape (drifts, blocks)."""
-    middle = (np.arange(DRIFT_BLOCKS) + 0.5) / DRIFT_BLOCKS
-    return np.exp(2j * np.pi * DRIFTS[:, None] * middle)
+    return float(DRIFTS[int(np.argmax(np.abs(TURNS @ blocks)))])
 
 
 @dataclass(frozen=True, slots=True)

@@ -37,9 +37,8 @@ def _second_order(x: Floats, cosine: float, radius: float, level: float) -> Floa
 def stretch_ends(n: int, window: int) -> NDArray[np.int64]:
     """First sample of each of n // window stretches of nearly the same length, and the end of the last."""
     parts = max(n // max(window, 1), 1)
-    length = np.full(parts, n // parts)
-    length[: n % parts] += 1
-    return np.concatenate(([0], np.cumsum(length)))
+    k = np.arange(parts + 1)
+    return k * (n // parts) + np.minimum(k, n % parts)
 
 
 def without_lines(x: Floats, window: int) -> Floats:

@@ -15,39 +15,16 @@ from scipy.fft import ifft, next_fast_len
 from identification.limits import SIGNALS
 from identification.record import Floats
 from identification.signals.correlation import rhythm
-from identification.signals.robust import robust_deviation
 from identification.signals.spectrum import Spectrum, band_signal
 
 
-@dataclass(frozen=True, slots=True)
-class HalfCycles:
-    """Half-cycles of a band's signal.
-
-    duration_s, size : length [s] and largest value [% of PV span] of each, shape (h,).
-    """
-
-    duration_s: Floats
-    size: Floats
-
-    @property
-    def scatter(self) -> float:
-        """Spread of whole cycles' lengths [-]: 1.48 median absolute deviations of their logarithm."""
-        if self.duration_s.size < 3:
-            return 0.0
-        whole = np.log(self.duration_s[1:] + self.duration_s[:-1])
-        return robust_deviation(whole - np.median(whole))
-
-
-def half_cycles(x: Floats, dt_s: float, turn: float = SIGNALS.turn) -> HalfCycles:
-    """Half-cycles of a signal without drift, shape (n,), at interval dt_s [s]; those at the ends left out."""
-    beyond = turn * math.sqrt(float(x @ x) / max(x.size, 1))
+def half_cycles(x: Floats, dt_s: float) -> Floats:
+    """Lengths [s], shape (h,), of the half-cycles of a signal without drift, shape (n,), at interval dt_s [s]; those
+    at the ends left out."""
+    beyond = SIGNALS.turn * math.sqrt(float(x @ x) / max(x.size, 1))
     side = np.where(x > beyond, 1, np.where(x < -beyond, -1, 0))
     outside = np.flatnonzero(side)
-    turns = outside[np.flatnonzero(np.diff(side[outside])) + 1]
-    if turns.size < 2:
-        return HalfCycles(np.zeros(0), np.zeros(0))
-    size = np.maximum.reduceat(np.abs(x), turns)[:-1]
-    return HalfCycles(np.diff(turns) * dt_s, size)
+    return np.diff(outside[np.flatnonzero(np.diff(side[outside])) + 1]) * dt_s
 
 
 def levelled_correlation(x: Floats, dt_s: float, period_s: float) -> float:
@@ -116,6 +93,6 @@ def shape(s: Spectrum, line: float) -> Shape:
     power = float(x @ x) / x.size
     if power <= 0.0:
         return Shape(3.0, 0.0, 0.0)
-    halves = half_cycles(x, dt_s, SIGNALS.firm_turn).duration_s
+    halves = half_cycles(x, dt_s)
     spread = float(np.log(halves).std()) if halves.size > 2 else math.inf
     return Shape(float(np.mean(x**4)) / power**2, spread, power / s.variance)

@@ -1,4 +1,4 @@
-"""What follows each turn of OP: half-cycles laid over one another, with the part in which the stem stands."""
+"""Where OP turns, and what follows: half-cycles laid over one another, with the part in which the stem stands."""
 
 from __future__ import annotations
 
@@ -6,13 +6,50 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from numba import njit
 
+from identification.limits import FIT
 from identification.record import Floats, Mask
 
 POINTS = 40
 """Points of a half-cycle of usual length; ours: enough to see a corner."""
 LONGEST = 2.0
 """Half-cycles are cut at this many usual lengths [-]; ours."""
+
+
+@njit(cache=True)
+def turning_points(x: Floats, size: float) -> np.ndarray:
+    """Samples at which a signal, shape (n,), turns by more than a size, shape (t,)."""
+    out = np.empty(x.size, dtype=np.int64)
+    count, high, low, way = 0, 0, 0, 0
+    for k in range(x.size):
+        if way >= 0 and x[k] > x[high]:
+            high = k
+        if way <= 0 and x[k] < x[low]:
+            low = k
+        if way >= 0 and x[high] - x[k] >= size:
+            out[count] = high
+            count, way, low = count + 1, -1, k
+        elif way <= 0 and x[k] - x[low] >= size:
+            out[count] = low
+            count, way, high = count + 1, 1, k
+    return out[:count]
+
+
+def _usual_range(x: Floats, length: int) -> float:
+    """Median range within stretches of a length [samples]."""
+    rows = x.size // length
+    if rows < 2:
+        return float(np.ptp(x))
+    return float(np.median(np.ptp(x[: rows * length].reshape(rows, length), axis=1)))
+
+
+def turns_of(op: Floats, period: float) -> np.ndarray:
+    """Samples at which OP, shape (n,), turns in a cycle of that period [samples], shape (t,)."""
+    half = max(int(period / (2 * FIT.smoothed)), 1)
+    kernel = np.full(2 * half + 1, 1.0 / (2 * half + 1))
+    smooth = np.convolve(np.pad(op, half, mode="edge"), kernel, mode="valid")
+    return turning_points(smooth, max(FIT.turn * _usual_range(smooth, max(round(period), 2)), 1e-12))
 
 
 @dataclass(frozen=True, slots=True)

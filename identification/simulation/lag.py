@@ -117,10 +117,8 @@ def held(lag_s: float, h: float) -> tuple[float, float]:
 
 
 @njit(cache=True)
-def lagged(x: Floats, lag_s: float, dt_s: float) -> Floats:
-    """Mean over each sample, shape (n,), of a first-order lag of a held signal, at rest at first."""
-    out = np.empty_like(x)
-    at, (left, mean) = x[0], held(lag_s, dt_s)
+def _followed(x: Floats, left: float, mean: float) -> Floats:
+    out, at = np.empty_like(x), x[0]
     for k in range(x.size):
         out[k] = x[k] + (at - x[k]) * mean
         at = x[k] + (at - x[k]) * left
@@ -128,14 +126,12 @@ def lagged(x: Floats, lag_s: float, dt_s: float) -> Floats:
 
 
 @njit(cache=True)
-def _smoothed(x: Floats, left: float) -> Floats:
-    out = np.empty_like(x)
-    at = x[0]
-    for k in range(x.size):
-        out[k] = at = x[k] + (at - x[k]) * left
-    return out
+def lagged(x: Floats, lag_s: float, dt_s: float) -> Floats:
+    """Mean over each sample, shape (n,), of a first-order lag of a held signal, at rest at first."""
+    return _followed(x, *held(lag_s, dt_s))  # type: ignore[no-any-return]
 
 
 def first_order(x: Floats, samples: float) -> Floats:
     """A signal, shape (n,), behind a first-order filter of a time constant in samples (0: none), at rest at first."""
-    return x if samples <= 0 else _smoothed(x, math.exp(-1.0 / samples))  # type: ignore[no-any-return]
+    left = math.exp(-1.0 / samples) if samples > 0 else 0.0
+    return x if samples <= 0 else _followed(x, left, left)  # type: ignore[no-any-return]

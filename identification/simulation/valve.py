@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
+from numba.extending import register_jitable
 
 from identification.models import Backlash, Motion, Stiction, Valve
 from identification.record import Floats
@@ -58,6 +59,7 @@ class StemLaw(NamedTuple):
 IDEAL = StemLaw()
 
 
+@register_jitable  # type: ignore[untyped-decorator]
 def sticking(stickband: float, jump_share: float, tolerance: float = RESTS) -> StemLaw:
     """Valve of stickband S [% OP] and slip jump J = jump_share S."""
     return StemLaw(0.5 * stickband * (1 + jump_share), 0.5 * stickband * (1 - jump_share), tolerance)
@@ -104,17 +106,6 @@ def stem_step(stem: Stem, op: float, law: StemLaw) -> Stem:
     return at, moving, turned
 
 
-@njit(cache=True)
-def walk(op: Floats, law: StemLaw, first: float) -> Floats:
-    """Stem positions [% OP], shape (n,), of a valve whose stem rests at `first` before the first sample."""
-    out = np.empty_like(op)
-    stem = (first, 0.0, op[0])
-    for k in range(op.size):
-        stem = stem_step(stem, op[k], law)
-        out[k] = stem[0]
-    return out
-
-
 STILL = 0.01
 """Speed of a stem with mass, in breakaway over its natural time, under which static friction holds it again; ours."""
 MOST_PIECES = 4
@@ -159,12 +150,15 @@ def moved_stem(stem: Stem, op: float, law: StemLaw, time_s: float, dt_s: float) 
 
 
 @njit(cache=True)
-def heavy_walk(op: Floats, law: StemLaw, first: float, time_s: float, dt_s: float) -> Floats:
-    """Mean positions over the samples [% OP], shape (n,), of a stem with mass that rests at `first` before them."""
+def walk(op: Floats, law: StemLaw, first: float, time_s: float = 0.0, dt_s: float = 1.0) -> Floats:
+    """Stem positions [% OP], shape (n,), of a valve whose stem rests at `first` before the first sample.
+
+    time_s, dt_s : as of `moved_stem`; with mass, the mean positions over the samples.
+    """
     out = np.empty_like(op)
     stem = (first, 0.0, op[0])
     for k in range(op.size):
-        out[k], stem = heavy_step(stem, op[k], law, time_s, dt_s)
+        out[k], stem = moved_stem(stem, op[k], law, time_s, dt_s)
     return out
 
 

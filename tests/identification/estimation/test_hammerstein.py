@@ -10,8 +10,7 @@ import pytest
 from identification.estimation.backlash_stiction import better_linear, fit_linear, fit_play, fit_stick_slip
 from identification.estimation.evidence import evidence
 from identification.estimation.gauss_newton import descend, innovations
-from identification.estimation.hammerstein import stem_blocks
-from identification.estimation.window import Stems, Window, block_means
+from identification.estimation.window import Stems, Window, block_means, stem_blocks
 from identification.models import Backlash, Fopdt, Loop, Pid
 from identification.simulation.closed_loop import closed_loop
 from identification.simulation.lag import respond, unit_lag

@@ -7,13 +7,12 @@ import math
 import numpy as np
 import pytest
 
-from identification.estimation.backlash_stiction import generic_noise
 from identification.estimation.gauss_newton import covariance, residual
 from identification.estimation.gauss_newton import descend as descend_lag
-from identification.estimation.hammerstein import Fit
+from identification.estimation.noise import generic_noise
 from identification.estimation.prediction_error import Model, deviations, problem
 from identification.estimation.prediction_error import descended as descend_any
-from identification.estimation.window import Window
+from identification.estimation.window import Fit, Window
 from identification.mismatch.catalogue import EFFECTS
 from identification.mismatch.model_file import constants, to_data
 from identification.record import Floats

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from identification.estimation.backlash_stiction import fit_linear, fit_play, generic_noise
+from identification.estimation.backlash_stiction import fit_linear, fit_play
 from identification.estimation.irregular_slips import fit_irregular
+from identification.estimation.noise import generic_noise
 from identification.estimation.slip_beam import (
     SCATTER,
     STUCK,

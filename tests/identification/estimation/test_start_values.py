@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from identification.estimation.start_values import plain_processes
+from identification.estimation.search import plain_processes
 from identification.mismatch.plain_loop import prepared
 from identification.models import Fopdt, Loop, Pid
 from identification.record import LoopRecord

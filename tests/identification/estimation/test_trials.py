@@ -13,11 +13,10 @@ from identification.estimation.evidence import (
     gains,
     trials,
     trials_between_moves,
-    turning_points,
-    turns_of,
 )
 from identification.estimation.window import Window
 from identification.models import Backlash, Fopdt
+from identification.signals.turns import turning_points, turns_of
 from identification.simulation.valve import RESTS, StemLaw
 from tests.identification.responses import pv_of
 

@@ -9,7 +9,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from identification.record import Floats
-from identification.simulation.valve import RESTS, SLIDES, StemLaw, heavy_walk, walk
+from identification.simulation.valve import RESTS, SLIDES, StemLaw, walk
 
 LAW = StemLaw(1.5, 0.5, SLIDES)
 
@@ -49,7 +49,7 @@ def test_it_goes_as_its_equation_says(time_s: float) -> None:
     """Solved piece by piece the stem goes where a solver of m z'' + c z' + k z = u - friction takes it."""
     rng = np.random.default_rng(4)
     op = 50.0 + 4.0 * np.sin(np.arange(300) / 20.0) + rng.normal(0.0, 0.3, 300)
-    found = heavy_walk(op, LAW, op[0], time_s, 1.0)
+    found = walk(op, LAW, op[0], time_s, 1.0)
     assert np.abs(found - slowly(op, LAW, time_s, 1.0)).max() < 0.05
     assert np.ptp(found) > 3.0
 
@@ -57,15 +57,15 @@ def test_it_goes_as_its_equation_says(time_s: float) -> None:
 def test_it_holds_within_the_breakaway_and_then_comes_to_the_sliding_distance() -> None:
     """An OP within the breakaway moves nothing; a step beyond brings the stem to where spring and friction agree."""
     still = 50.0 + 1.4 * np.sign(np.sin(np.arange(100) / 5.0))
-    assert (heavy_walk(still, LAW, 50.0, 0.3, 1.0) == 50.0).all()
+    assert (walk(still, LAW, 50.0, 0.3, 1.0) == 50.0).all()
     step = np.r_[np.full(10, 50.0), np.full(40, 53.0)]
     for way in (1.0, -1.0):
-        end = heavy_walk(50.0 + way * (step - 50.0), LAW, 50.0, 0.3, 1.0)[-1]
+        end = walk(50.0 + way * (step - 50.0), LAW, 50.0, 0.3, 1.0)[-1]
         assert end == pytest.approx(50.0 + way * 2.5, abs=0.02)
 
 
 def test_a_stem_that_hardly_weighs_anything_rests_after_each_slip() -> None:
     """With a natural time far under the sample, over which OP stands, it is the stem that rests (He 2007)."""
     op = 50.0 + 5.0 * np.sin(np.arange(400) / 15.0)
-    light = heavy_walk(np.repeat(op, 3), LAW, op[0], 1e-3, 1.0)[2::3]
+    light = walk(np.repeat(op, 3), LAW, op[0], 1e-3, 1.0)[2::3]
     assert np.abs(light - walk(op, StemLaw(1.5, 0.5, RESTS), op[0])).max() < 0.02
