@@ -90,6 +90,9 @@ def closed_loop(
     return LoopRecord(tag, start_s, h, np.asarray(sp, dtype=np.float64), pv, op, bad, position=stem)
 
 
+CLIP_HI, CLIP_LO, SHARE = int(Slot.CLIP_HI), int(Slot.CLIP_LO), int(Slot.SHARE)
+
+
 @njit(cache=True, error_model="numpy")
 def _closed_model(
     sp: Floats,
@@ -109,8 +112,8 @@ def _closed_model(
     flow[0] = flow_step(op, m.copy(), c, friction, dt_s, middle)
     vessel = at_start(flow[0], c, middle)
     for k in range(n):
-        x = (1.0 - c[Slot.SHARE]) * vessel[0] + c[Slot.SHARE] * vessel[1]
-        pv[k] = min(max(level + x, c[Slot.CLIP_LO]), c[Slot.CLIP_HI])
+        x = (1.0 - c[SHARE]) * vessel[0] + c[SHARE] * vessel[1]
+        pv[k] = min(max(level + x, c[CLIP_LO]), c[CLIP_HI])
         e = sp[k] - pv[k]
         op = next_op(op, law, e, e1, 0.0)
         e1 = e

@@ -30,6 +30,10 @@ COASTS = {Motion.RESTS: -1.0, Motion.HALTS: -0.5, Motion.SLIDES: 0.0}
 BEHAVIOUR = {coast: TOLERANCES[motion] for motion, coast in COASTS.items()}
 SERVO_STEPS = 5
 """Steps of a positioner within one sample; ours: its period is never under four samples."""
+RATE, SERVO, DAMPING, DEADBAND = (int(s) for s in (Slot.RATE, Slot.SERVO, Slot.DAMPING, Slot.DEADBAND))
+STOP_HI, STOP_LO, BEND, SPLIT = (int(s) for s in (Slot.STOP_HI, Slot.STOP_LO, Slot.BEND, Slot.SPLIT))
+RATIO, SPLIT_DEAD, SPLIT_LAG = (int(s) for s in (Slot.RATIO, Slot.SPLIT_DEAD, Slot.SPLIT_LAG))
+STEM_T = int(Slot.STEM_T)
 STRAIGHT = 1e-9
 """A bend under this is none."""
 SLEWED, SERVED, SPEED, STEM, MOVING, TURNED, SECOND = range(7)
@@ -48,11 +52,13 @@ def slew_step(at: float, op: float, most: float) -> tuple[float, float]:
 
 
 @njit(cache=True)
-def servo_step(at: float, speed: float, op: float, c: Floats, dt_s: float) -> tuple[float, float, float]:
+def servo_step(
+    at: float, speed: float, op: float, lag_s: float, damping: float, band: float, dt_s: float
+) -> tuple[float, float, float]:
     """Mean position over a sample, position and speed after it, of a position loop with a dead band [%]."""
     h = dt_s / SERVO_STEPS
-    w = min(1.0 / c[Slot.SERVO], 0.7 / h)
-    damping, band, total = c[Slot.DAMPING], c[Slot.DEADBAND], 0.0
+    w = min(1.0 / lag_s, 0.7 / h)
+    total = 0.0
     for _ in range(SERVO_STEPS):
         gap = op - at
         gap -= min(max(gap, -0.5 * band), 0.5 * band)
@@ -65,8 +71,8 @@ def servo_step(at: float, speed: float, op: float, c: Floats, dt_s: float) -> tu
 @njit(cache=True)
 def second_valve(x: float, c: Floats) -> float:
     """What a second valve adds to the flow at rest [% OP]: it takes over above the split point after a dead zone."""
-    above = max(x - c[Slot.SPLIT], 0.0)
-    return c[Slot.RATIO] * max(above - c[Slot.SPLIT_DEAD], 0.0) - above
+    above = max(x - c[SPLIT], 0.0)
+    return c[RATIO] * max(above - c[SPLIT_DEAD], 0.0) - above
 
 
 @njit(cache=True)
@@ -79,53 +85,53 @@ def curved(x: float, bend: float, middle: float) -> float:
 def flow_step(op: float, m: Floats, c: Floats, friction: StemLaw, dt_s: float, middle: float) -> float:
     """Mean flow over a sample [% OP]; the valve's memory `m` is moved on."""
     x = op
-    if not math.isinf(c[Slot.RATE]):
-        x, m[SLEWED] = slew_step(m[SLEWED], x, c[Slot.RATE] * dt_s)
-    if c[Slot.SERVO] > 0.0:
-        x, m[SERVED], m[SPEED] = servo_step(m[SERVED], m[SPEED], x, c, dt_s)
+    if not math.isinf(c[RATE]):
+        x, m[SLEWED] = slew_step(m[SLEWED], x, c[RATE] * dt_s)
+    if c[SERVO] > 0.0:
+        x, m[SERVED], m[SPEED] = servo_step(m[SERVED], m[SPEED], x, c[SERVO], c[DAMPING], c[DEADBAND], dt_s)
     if friction.breakaway > 0.0:
         stem = (m[STEM], m[MOVING], m[TURNED])
-        x, (m[STEM], m[MOVING], m[TURNED]) = moved_stem(stem, x, friction, c[Slot.STEM_T], dt_s)
-    x = min(max(x, c[Slot.STOP_LO]), c[Slot.STOP_HI])
-    if not math.isinf(c[Slot.SPLIT]):
+        x, (m[STEM], m[MOVING], m[TURNED]) = moved_stem(stem, x, friction, c[STEM_T], dt_s)
+    x = min(max(x, c[STOP_LO]), c[STOP_HI])
+    if not math.isinf(c[SPLIT]):
         extra = second_valve(x, c)
-        if c[Slot.SPLIT_LAG] > 0.0:
+        if c[SPLIT_LAG] > 0.0:
             at = extra if math.isnan(m[SECOND]) else m[SECOND]
-            left, mean = held(c[Slot.SPLIT_LAG], dt_s)
+            left, mean = held(c[SPLIT_LAG], dt_s)
             extra, m[SECOND] = extra + (at - extra) * mean, extra + (at - extra) * left
         x += extra
-    return x if abs(c[Slot.BEND]) < STRAIGHT else curved(x, c[Slot.BEND], middle)
+    return x if abs(c[BEND]) < STRAIGHT else curved(x, c[BEND], middle)
 
 
 @njit(cache=True)
 def before_stem(op: Floats, c: Floats, dt_s: float) -> Floats:
     """The same steps over a whole recording, shape (n,), as far as slew and positioner."""
     x = op.copy()
-    if not math.isinf(c[Slot.RATE]):
-        at, most = op[0], c[Slot.RATE] * dt_s
+    if not math.isinf(c[RATE]):
+        at, most = op[0], c[RATE] * dt_s
         for k in range(x.size):
             x[k], at = slew_step(at, x[k], most)
-    if c[Slot.SERVO] > 0.0:
+    if c[SERVO] > 0.0:
         at, speed = op[0], 0.0
         for k in range(x.size):
-            x[k], at, speed = servo_step(at, speed, x[k], c, dt_s)
+            x[k], at, speed = servo_step(at, speed, x[k], c[SERVO], c[DAMPING], c[DEADBAND], dt_s)
     return x
 
 
 @njit(cache=True)
 def behind_stem(x: Floats, c: Floats, dt_s: float, middle: float) -> Floats:
     """And from the stem on: stops, second valve, trim."""
-    if not (math.isinf(c[Slot.STOP_HI]) and math.isinf(c[Slot.STOP_LO])):
-        x = np.minimum(np.maximum(x, c[Slot.STOP_LO]), c[Slot.STOP_HI])
-    if not math.isinf(c[Slot.SPLIT]):
+    if not (math.isinf(c[STOP_HI]) and math.isinf(c[STOP_LO])):
+        x = np.minimum(np.maximum(x, c[STOP_LO]), c[STOP_HI])
+    if not math.isinf(c[SPLIT]):
         extra = np.empty_like(x)
         for k in range(x.size):
             extra[k] = second_valve(x[k], c)
-        x = x + (lagged(extra, c[Slot.SPLIT_LAG], dt_s) if c[Slot.SPLIT_LAG] > 0.0 else extra)
-    if abs(c[Slot.BEND]) >= STRAIGHT:
+        x = x + (lagged(extra, c[SPLIT_LAG], dt_s) if c[SPLIT_LAG] > 0.0 else extra)
+    if abs(c[BEND]) >= STRAIGHT:
         out = np.empty_like(x)
         for k in range(x.size):
-            out[k] = curved(x[k], c[Slot.BEND], middle)
+            out[k] = curved(x[k], c[BEND], middle)
         return out
     return x
 

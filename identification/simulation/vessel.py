@@ -12,6 +12,13 @@ from identification.record import Floats
 from identification.simulation.lag import held, stepped, unit_lag
 from identification.simulation.parameters import Slot
 
+T, L, K, BIAS, START = (int(s) for s in (Slot.T, Slot.L, Slot.K, Slot.BIAS, Slot.START))
+T2, T3, SHARE, MODE_T, ASYM = (int(s) for s in (Slot.T2, Slot.T3, Slot.SHARE, Slot.MODE_T, Slot.ASYMMETRY))
+SLOPE, ROOT, CAP, SPILL, SPILL_T = (
+    int(s) for s in (Slot.SLOPE, Slot.ROOT, Slot.CAP, Slot.SPILL, Slot.SPILL_T)
+)
+LEAK, PIPE, GAIN_SLOPE, SPEED = (int(s) for s in (Slot.LEAK, Slot.PIPE, Slot.GAIN_SLOPE, Slot.SPEED))
+UPPER_CAP, PASSED, BEGUN = (int(s) for s in (Slot.UPPER_CAP, Slot.PASSED, Slot.BEGUN))
 Memory = tuple[float, float, float, float, float]
 """What a vessel remembers: level, second mode, spilled liquid, second and third lag."""
 SHORT = 0.03
@@ -74,16 +81,16 @@ class Outflow(NamedTuple):
 @njit(cache=True, error_model="numpy")
 def outflow_of(c: Floats, head: float) -> Outflow:
     """The outflow that the constants say."""
-    pace = math.exp(0.5 * c[Slot.ASYMMETRY])
+    pace = math.exp(0.5 * c[ASYM])
     return Outflow(
-        c[Slot.SLOPE] / 50.0,
-        c[Slot.LEAK],
-        c[Slot.ROOT],
+        c[SLOPE] / 50.0,
+        c[LEAK],
+        c[ROOT],
         head,
-        c[Slot.CAP],
-        c[Slot.SPILL],
-        c[Slot.GAIN_SLOPE] / 50.0,
-        c[Slot.SPEED],
+        c[CAP],
+        c[SPILL],
+        c[GAIN_SLOPE] / 50.0,
+        c[SPEED],
         pace,
         1.0 / pace,
     )
@@ -160,7 +167,7 @@ def kept(c: Floats, parts: tuple[float, float]) -> tuple[Floats, Floats]:
     """held() of second and third lag, second mode and spilled liquid, by part of a sample, shape (2, 4) each."""
     left, mean = np.empty((2, 4)), np.empty((2, 4))
     for half in range(2):
-        for i, lag_s in enumerate((c[Slot.T2], c[Slot.T3], c[Slot.MODE_T], c[Slot.SPILL_T])):
+        for i, lag_s in enumerate((c[T2], c[T3], c[MODE_T], c[SPILL_T])):
             left[half, i], mean[half, i] = held(lag_s, parts[half])
     return left, mean
 
@@ -184,10 +191,10 @@ def poured(
 @njit(cache=True, error_model="numpy")
 def parted(c: Floats, dt_s: float) -> tuple[int, tuple[float, float]]:
     """The dead time's whole samples, and the two parts of a sample that its fraction makes [s]."""
-    if c[Slot.PIPE] != 0.0:
+    if c[PIPE] != 0.0:
         return 0, (0.0, dt_s)
-    delay = int(c[Slot.L] / dt_s)
-    part = c[Slot.L] - delay * dt_s
+    delay = int(c[L] / dt_s)
+    part = c[L] - delay * dt_s
     return delay, (part, dt_s - part)
 
 
@@ -207,18 +214,12 @@ def vessel_span(
     flow, act, gain = drive
     x, mode, basin, z2, z3 = m
     delay, parts = parted(c, dt_s)
-    linear = c[Slot.SLOPE] == 0.0 and c[Slot.ROOT] == 0.0 and c[Slot.GAIN_SLOPE] == 0.0
-    times, o = (parts[0] / c[Slot.T], parts[1] / c[Slot.T]), outflow_of(c, head)
+    linear = c[SLOPE] == 0.0 and c[ROOT] == 0.0 and c[GAIN_SLOPE] == 0.0
+    times, o = (parts[0] / c[T], parts[1] / c[T]), outflow_of(c, head)
     rises = shares_filled(o, times)
     left, mean = kept(c, parts)
-    k_gain, bias, share, second, third = (
-        c[Slot.K],
-        c[Slot.BIAS],
-        c[Slot.SHARE],
-        c[Slot.T2] > 0.0,
-        c[Slot.T3] > 0.0,
-    )
-    upper = (c[Slot.UPPER_CAP], c[Slot.PASSED])
+    k_gain, bias, share, second, third = c[K], c[BIAS], c[SHARE], c[T2] > 0.0, c[T3] > 0.0
+    upper = (c[UPPER_CAP], c[PASSED])
     pours = math.isfinite(upper[0])
     for k in range(*span):
         out[k] = (1.0 - share) * x + share * mode
@@ -231,7 +232,7 @@ def vessel_span(
                 feed *= scheduled(x, o.gain_slope)
             feed += added
             if second and pours:
-                z2, feed = poured(z2, feed, left[half, 0], mean[half, 0], upper, c[Slot.T2] / parts[half])
+                z2, feed = poured(z2, feed, left[half, 0], mean[half, 0], upper, c[T2] / parts[half])
             elif second:
                 z2, feed = feed + (z2 - feed) * left[half, 0], feed + (z2 - feed) * mean[half, 0]
             if third:
@@ -250,8 +251,8 @@ def vessel_span(
 @njit(cache=True, error_model="numpy")
 def at_start(first: float, c: Floats, base: float) -> Memory:
     """The vessel's memory before the first sample: at the first flow [% OP], but for what is begun elsewhere."""
-    feed = c[Slot.K] * (first - base) + c[Slot.BIAS]
-    return c[Slot.START], c[Slot.START], 0.0, min(feed + c[Slot.BEGUN], c[Slot.UPPER_CAP]), feed
+    feed = c[K] * (first - base) + c[BIAS]
+    return c[START], c[START], 0.0, min(feed + c[BEGUN], c[UPPER_CAP]), feed
 
 
 @njit(cache=True, error_model="numpy")
@@ -268,10 +269,10 @@ def vessel(
 @njit(cache=True, error_model="numpy")
 def plain_vessel(flow: Floats, act: Floats, c: Floats, dt_s: float, base: float) -> Floats:
     """The same, shape (n,), where nothing but K, T, L, bias and start is set: exact and several times faster."""
-    n, lag = flow.size, unit_lag(c[Slot.T], c[Slot.L], dt_s)
-    gain, bias = c[Slot.K], c[Slot.BIAS]
+    n, lag = flow.size, unit_lag(c[T], c[L], dt_s)
+    gain, bias = c[K], c[BIAS]
     out = np.empty(n)
-    x = c[Slot.START]
+    x = c[START]
     for k in range(n):
         out[k] = x
         later, late = flow[max(k - lag.delay - 1, 0)] - base, flow[max(k - lag.delay, 0)] - base
