@@ -31,22 +31,9 @@ from identification.record import Floats, LoopRecord, Mask
 
 RECORDED_RANGE = (0.005, 0.995)
 """Quantiles of PV that stand for its span where none is stated; contract of loops.csv."""
-MANUAL_TEXTS = ["man", "iman", "lo", "manual", "hand", "local", "rout", "0", "off", "oos", "init"]
+MANUAL_TEXTS = "man iman lo manual hand local rout 0 off oos init".split()
 """Mode texts, lower case, that mean that the controller does not move OP."""
-AUTOMATIC_TEXTS = [
-    "aut",
-    "auto",
-    "automatic",
-    "cas",
-    "casc",
-    "cascade",
-    "rcas",
-    "rsp",
-    "remote",
-    "spc",
-    "1",
-    "on",
-]
+AUTOMATIC_TEXTS = "aut auto automatic cas casc cascade rcas rsp remote spc 1 on".split()
 """Mode texts, lower case, that mean that it does."""
 
 
