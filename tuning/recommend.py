@@ -70,15 +70,9 @@ def recommend(
 ) -> Proposal:
     """The proposal for one loop: identified process and valve with the present controller.
 
-    Parameters
-    ----------
-    cause : str
-        Why the loop is in trouble, one of tuning.Cause; ValueError for any other.
-    uncertainty : sequence of Loop
-        Other loops that the data allow.
-    load : ndarray of shape (n,) or None
-        Load and noise as they add to PV, on the controller's clock [% PV]; ValueError where it is not finite.
-        None, or one too short to tell (tuning.limits): steps at the valve.
+    cause, why the loop is in trouble, one of tuning.Cause, ValueError for any other; uncertainty, other loops that
+    the data allow; load, load and noise as they add to PV, on the controller's clock, shape (n,) [% PV], ValueError
+    where it is not finite; None, or one too short to tell (tuning.limits): steps at the valve.
     """
     _check(cause, load)
     if cause in reasons.LEFT_ALONE:

@@ -75,17 +75,8 @@ def advise(
 ) -> Advice:
     """The advice on one assessed loop.
 
-    Parameters
-    ----------
-    found : Assessment
-    spec : LoopSpec
-    controller : Pid or None
-        The stated settings in percent and seconds.
-    pv_span : float
-        Span of PV in its own unit, for settings in engineering units.
-    config : Config
-    held : Pid or None
-        Settings that nights before have told, in percent and seconds: those are compared with the present ones.
+    controller, its stated settings in percent and seconds; pv_span, span of PV in its own unit, for settings in
+    engineering units; held, settings that nights before have told, which are then compared with the present ones.
     """
     kept = withheld(found, spec, controller, pv_span, config)
     if not found.op_scaled and found.for_settings is not None:

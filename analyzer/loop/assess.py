@@ -130,18 +130,8 @@ def cause_of(
 def convicted(
     prepared: Prepared, found: Oscillations, controller: Pid | None, config: Config, kind: str
 ) -> tuple[Oscillations, Verdict]:
-    """What oscillates, and why: a cycle that alone is not regular enough to count does so where PV convicts the valve
-    of making it, for noise of no spectrum fits a valve's model.
-
-    Parameters
-    ----------
-    prepared : Prepared
-    found : Oscillations
-        What counts by itself.
-    controller : Pid or None
-    config : Config
-    kind : str
-    """
+    """What oscillates, of `found` what counts by itself, and why: a cycle that alone is not regular enough to count
+    does so where PV convicts the valve of making it, for noise of no spectrum fits a valve's model."""
     verdict = cause_of(prepared, found, controller, config, kind)
     quiet = verdict.measured
     if counting(found) is not None or not prepared.op_known or quiet is None:
@@ -240,26 +230,11 @@ def assess(
     kind: str = "",
     earlier: Sequence[Earlier] = (),
 ) -> Assessment:
-    """Assess one loop.
+    """Assess one loop. Raises LacksError, a NotAssessedError, where the record cannot support it.
 
     Figures, hours, waves and trend are of the whole record; oscillations and verdict of the stretch that is judged.
-
-    Parameters
-    ----------
-    prepared : Prepared
-        The record on one clock, with masks.
-    controller : Pid or None
-        The stated settings in percent and seconds, those in force at the record's end.
-    config : Config
-    kind : str
-        The loop's type (flow, level, ...), empty where not stated.
-    earlier : sequence of Earlier
-        Settings that were in force in the record before, oldest first.
-
-    Raises
-    ------
-    NotAssessedError
-        Where the record cannot support it.
+    The controller has the stated settings [%, s], those in force at the record's end; kind is the loop's type (flow,
+    level, ...), empty where not stated; earlier, what was in force in the record before, oldest first.
     """
     lacking = unassessable(prepared.record, config)
     if lacking is not None:

@@ -59,19 +59,8 @@ class Lost:
 def concluded(
     a: Assessment, advice: Advice, spec: LoopSpec, night: str, limits: AdviceLimits, **known: Cell
 ) -> Finding:
-    """What is known of a loop that was assessed.
-
-    Parameters
-    ----------
-    a : Assessment
-    advice : Advice
-    spec : LoopSpec
-        The settings in force at the night's end.
-    night : str
-    limits : AdviceLimits
-    **known : number or str
-        Further columns.
-    """
+    """What is known of a loop that was assessed: spec, with the settings in force at the night's end; known, further
+    columns."""
     v = a.verdict
     lacks = a.needs or v.needs
     shown = a.needs is None  # the record can show whether the loop oscillates

@@ -142,13 +142,8 @@ def measure(
     error: Spectrum | None = None,
     kind: str = "",
 ) -> Measured:
-    """Fit the candidates and read what the signs need; see Measured.
-
-    Raises
-    ------
-    NotAssessedError
-        Good samples are too scattered for a model of how one follows from those before it.
-    """
+    """Fit the candidates and read what the signs need; see Measured. Raises NotAssessedError where good samples are
+    too scattered for a model of how one follows from those before it."""
     scale, calm = time_scale(record, oscillation, controller), oscillation is None
     window = window_of(record, scale, limits, kind, calm)
     _check_judged(window, limits)

@@ -43,16 +43,8 @@ class Shared:
 
 
 def selected(record: LoopRecord, other: Floats, other_bad: Mask, limits: QualityLimits) -> Shared | None:
-    """A loop beside the output of the controller with which it shares a valve by a select; None where none is seen.
-
-    Parameters
-    ----------
-    record : LoopRecord
-    other : ndarray of shape (n,)
-        The other controller's output [% of the valve].
-    other_bad : ndarray of bool, shape (n,)
-    limits : QualityLimits
-    """
+    """A loop beside the output of the controller with which it shares a valve by a select, shape (n,) [% of the
+    valve]; None where none is seen."""
     good = record.usable & ~other_bad
     lower = record.op < other
     share, least = float(lower[good].mean() if good.any() else 0.0), limits.shared_share
@@ -92,17 +84,8 @@ def _takeover_s(record: LoopRecord, idle: Mask, good: Mask) -> float | None:
 
 
 def half(record: LoopRecord, whole: Floats, whole_bad: Mask, limits: QualityLimits) -> Shared | None:
-    """A half of a split range beside the output of its controller; None where it never rests.
-
-    Parameters
-    ----------
-    record : LoopRecord
-        Its OP is the half's own.
-    whole : ndarray of shape (n,)
-        The output of the controller of both halves [%].
-    whole_bad : ndarray of bool, shape (n,)
-    limits : QualityLimits
-    """
+    """A half of a split range, OP its own, beside the output of the controller of both halves, shape (n,) [%]; None
+    where it never rests."""
     good = record.usable & ~whole_bad
     ends = record.op <= limits.limit_pct, record.op >= 100.0 - limits.limit_pct
     rest = max(ends, key=lambda end: int((end & good).sum()))

@@ -86,13 +86,8 @@ def _model(verdict: Verdict, controller: Pid, limits: AdviceLimits) -> tuple[Loo
 
 
 def identified(found: Assessment, limits: AdviceLimits) -> tuple[Process, Valve, dict[str, Estimate]]:
-    """Process, valve and their parameters with 90 % intervals, as one assessed loop's verdict has them.
-
-    Raises
-    ------
-    NotAssessedError
-        Where the loop's trends give no model.
-    """
+    """Process, valve and their parameters with 90 % intervals, as one assessed loop's verdict has them. Raises
+    NotAssessedError where the loop's trends give no model."""
     verdict = found.verdict
     fit, at_fault = verdict.fit, verdict.cause is Cause.VALVE
     valve = fit.valve.valve if at_fault else None
@@ -100,22 +95,8 @@ def identified(found: Assessment, limits: AdviceLimits) -> tuple[Process, Valve,
 
 
 def tune(found: Assessment, controller: Pid, config: Config, kept: Advice | None = None) -> Tuning:
-    """Propose settings for one assessed loop.
-
-    Parameters
-    ----------
-    found : Assessment
-    controller : Pid
-        The stated settings in percent and seconds.
-    config : Config
-    kept : Advice or None
-        Why none are to be proposed (analyzer.loop.advice.withheld).
-
-    Raises
-    ------
-    NotAssessedError
-        Where the loop's trends give no model.
-    """
+    """Propose settings for one assessed loop whose stated ones are `controller` [%, s]; `kept`, why none are to be
+    proposed (advice.withheld). Raises NotAssessedError where the loop's trends give no model."""
     verdict = found.verdict
     first = found.oscillations.first
     period = first.period_s if first else None
@@ -254,13 +235,8 @@ def _unfit(prepared: Prepared, config: Config) -> Needs | None:
 
 
 def proposal(asked: Asked, loop: str, drawn: bool) -> tuple[list[str], dict[str, bytes]]:
-    """Lines of text and, if wanted, pictures by file name for the last night of one loop.
-
-    Raises
-    ------
-    InputError, NotAssessedError
-        Where the loop or its settings are not known, or its trends give no model.
-    """
+    """Lines of text and, if wanted, pictures by file name for the last night of one loop. Raises InputError where the
+    loop or its settings are not known, NotAssessedError where its trends give no model."""
     export, specs, _ = asked.opened()
     row, config = spec_of(specs, loop), asked.config
     night = nights_of(export, [row], config.nights, (asked.since_s, asked.until_s), asked.zone)[-1]

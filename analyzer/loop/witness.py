@@ -30,16 +30,8 @@ Known = tuple[float, float]
 def witness(verdict: Verdict, oscillates: bool, prepared: Prepared, config: Config) -> str | None:
     """What a record says, as the store keeps it (JSON): the profile of widths and the evidence that it takes to
     tell a fault [nat], the evidence for a slip jump and what it takes [nat], and constants with the deviation
-    of their logarithms; None where nothing was fitted.
-
-    Parameters
-    ----------
-    verdict : Verdict
-    oscillates : bool
-    prepared : Prepared
-        PV's grid may hold PV still as a valve would, and compression cuts turns so that they look like slips.
-    config : Config
-    """
+    of their logarithms; None where nothing was fitted, or PV's grid may hold PV still as a valve would. Compression
+    cuts turns so that they look like slips: nothing is said of a jump then."""
     m, limits = verdict.for_settings.measured, config.cause
     if m is None or hidden_by_grid(m, prepared.pv_step, oscillates, limits):
         return None
