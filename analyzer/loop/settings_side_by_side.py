@@ -20,8 +20,8 @@ from tuning.frequency_response import integral_s
 from tuning.harmonic_balance import TravelMap, travel_map
 from tuning.limits import TuningLimits
 from tuning.rules import simc
-from tuning.search import Candidate, bench, rejection
-from tuning.trade import Trade, trade, worst
+from tuning.search import Candidate, bench, rejection, try_out
+from tuning.trade import Trade, trade
 
 MAP_POINTS, SPREAD = 24, 12.0
 """Points of the travel map along each axis, and how far it reaches about the present settings; ours."""
@@ -121,7 +121,7 @@ def compared(
     moves = table.travel[0] > 0.0  # of a stem that rests no settings are calmer, and a ratio says nothing
     found = trade(table) if moves else Trade((), {})
     settings = alternatives(loop, new, {name: c.controller for name, c in found.chosen.items()})
-    everywhere = worst(table, settings) if moves else {}
+    everywhere = {name: try_out(table, pid) for name, pid in settings.items()} if moves else {}
     settings = {k: pid for k, pid in settings.items() if k not in found.chosen or not _beaten(k, everywhere)}
     now, each = rejection(loop.process, loop.controller), tried(loop, load, settings)
     free = None if loop.valve is None or not moves else replace(loop, valve=None)
