@@ -50,6 +50,11 @@ class Proposal:
     ms: float | None = None
     candidates: tuple[Candidate, ...] = ()
 
+    @property
+    def new(self) -> Pid | None:
+        """The settings proposed, or those until a repair; None where there are none."""
+        return self.controller or self.meanwhile
+
 
 def _check(cause: str, load: Floats | None) -> None:
     """Raise ValueError for what `recommend` cannot take."""
@@ -171,15 +176,12 @@ def _is_short_and_sticks(loop: Loop, limits: TuningLimits) -> bool:
 
 
 def _worth(candidate: Candidate, now: Pid, limits: TuningLimits) -> bool:
-    """Whether a candidate cuts travel by enough for a change; by more where it is nearly the present settings."""
-    cut = limits.worth_near if _is_near(candidate.controller, now, limits) else limits.worth_travel
-    return candidate.travel <= 1.0 - cut
-
-
-def _is_near(new: Pid, now: Pid, limits: TuningLimits) -> bool:
-    """Whether new settings differ from the present ones by no more than one night's advice from another's."""
+    """Whether a candidate cuts travel by enough for a change; by more where it differs from the present settings by
+    no more than one night's advice from another's."""
+    new = candidate.controller
     gain, time = abs(math.log(new.kp / now.kp)), abs(math.log(integral_s(new) / integral_s(now)))
-    return gain <= math.log(limits.near_gain) and time <= math.log(limits.near_time)
+    near = gain <= math.log(limits.near_gain) and time <= math.log(limits.near_time)
+    return candidate.travel <= 1.0 - (limits.worth_near if near else limits.worth_travel)
 
 
 def _smaller(after: Confirmed, before: Confirmed, most_growth: float) -> bool:

@@ -10,13 +10,7 @@ from typing import Any
 import numpy as np
 
 from analyzer.config import CauseLimits, Config
-from analyzer.loop.assessments import (
-    HOUR_S,
-    Assessments,
-    Hour,
-    assess_span,
-    hourly,
-)
+from analyzer.loop.assessments import HOUR_S, Assessments, Hour, assess_span, hourly
 from analyzer.loop.cause import (
     NO_CAUSE,
     Verdict,
@@ -110,20 +104,18 @@ def cause_of(
 ) -> Verdict:
     """The verdict on one loop by itself; abstains where the trends cannot tell."""
     record, oscillation = prepared.record, counting(found)
+    needs, measured = unfit_for_cause(prepared, oscillation, config), None
+    if needs is None and float(np.ptp(record.pv)) > 0.0:
+        try:
+            measured = measure(record, oscillation, controller, config.cause, found.spectrum, kind)
+        except NotAssessedError as error:
+            needs = Needs(Lack.UNBROKEN, Need.AS_TOLD, (str(error),))
+    verdict = NO_CAUSE if oscillation is None else not_assessed(needs)
+    if measured is not None:
+        verdict = verdict_by_measures(measured, prepared, oscillation, config)
+        if oscillation is not None:
+            verdict = told_slip_by_slip(verdict, oscillation.period_s, config.cause)
     dead = dead_valve(record, config.cause) if prepared.op_known else None
-    needs = unfit_for_cause(prepared, oscillation, config)
-    if needs or float(np.ptp(record.pv)) == 0.0:
-        verdict = not_assessed(needs) if oscillation is not None else NO_CAUSE
-        return with_dead_valve(verdict, dead) if dead else verdict
-    try:
-        measured = measure(record, oscillation, controller, config.cause, found.spectrum, kind)
-    except NotAssessedError as error:
-        needs = Needs(Lack.UNBROKEN, Need.AS_TOLD, (str(error),))
-        verdict = not_assessed(needs) if oscillation is not None else NO_CAUSE
-        return with_dead_valve(verdict, dead) if dead else verdict
-    verdict = verdict_by_measures(measured, prepared, oscillation, config)
-    if oscillation is not None:
-        verdict = told_slip_by_slip(verdict, oscillation.period_s, config.cause)
     return with_dead_valve(verdict, dead) if dead and verdict.cause is not Cause.VALVE else verdict
 
 
@@ -182,11 +174,6 @@ def hidden(record: LoopRecord, found: Oscillations, controller: Pid | None, conf
     if period is None:
         return None
     return Needs(Lack.FASTER, Need.OF_A_CYCLE, (period / samples, record.dt_s, period))
-
-
-def _dead_time_of(verdict: Verdict) -> float | None:
-    m = verdict.measured
-    return None if m is None else (m.play if verdict.cause is Cause.VALVE else m.linear).dead_time_s
 
 
 @dataclass(frozen=True, slots=True)
@@ -251,7 +238,8 @@ def _assessment(prepared: Prepared, stretch: Stretch, judged: _Judged, config: C
     in_percent = prepared.op_known and prepared.op_scaled
     night = _known_without_op(assess_span(record, config.figures), in_percent)
     hours = hourly(record, judged.of_all, config.figures, night.noise_band_pct)
-    dead_time = _dead_time_of(judged.verdict)
+    m, at_fault = judged.verdict.measured, judged.verdict.cause is Cause.VALVE
+    dead_time = None if m is None else (m.play if at_fault else m.linear).dead_time_s
     close = close_view(judged.part.record, found, stretch.first)
     end_s = record.start_s + record.duration_s
     return Assessment(

@@ -71,11 +71,6 @@ class Tuning:
     load: Floats
     others: tuple[Loop, ...] = ()
 
-    @property
-    def new(self) -> Pid | None:
-        """The settings proposed, or those until a repair; None where there are none."""
-        return self.proposal.controller or self.proposal.meanwhile
-
 
 def _model(verdict: Verdict, controller: Pid, limits: AdviceLimits) -> tuple[Loop, Fit, tuple[Loop, ...]]:
     """The loop that the forecast runs on, its fit, and what else it may be."""
@@ -106,7 +101,7 @@ def tune(found: Assessment, controller: Pid, config: Config, kept: Advice | None
     else:
         proposal = propose(verdict, controller, period, config).proposal
     load = load_of(fit, controller)
-    new = proposal.controller or proposal.meanwhile
+    new = proposal.new
     is_long = load.size >= config.tuning.least_steps
     forecast = predict(model, new, load, others) if new and is_long else None
     return Tuning(
@@ -170,7 +165,7 @@ def pictures(t: Tuning, title: str) -> tuple[Picture, ...]:
     out: tuple[Picture, ...] = ()
     if t.model.valve is not None:
         out = (_curves(t, title), _map_field(t, title))
-    return out if t.new is None else (*out, _trend_panels(t, t.new, title))
+    return out if t.proposal.new is None else (*out, _trend_panels(t, t.proposal.new, title))
 
 
 def _curves(t: Tuning, title: str) -> Plot:
@@ -269,9 +264,10 @@ def _with_settings_beside(
     from reports.pictures import as_file
 
     period_s = t.period_s or 10.0 * slowest_s(t.model)
-    bounded = t.new is not None or is_stable(t.model)  # else what is identified is no loop to try settings on
-    known = t.model, t.load, t.new, period_s, spec, pv_span, config.tuning, t.others
-    sought = t.new is not None or t.proposal.before is not None
+    new = t.proposal.new
+    bounded = new is not None or is_stable(t.model)  # else what is identified is no loop to try settings on
+    known = t.model, t.load, new, period_s, spec, pv_span, config.tuning, t.others
+    sought = new is not None or t.proposal.before is not None
     found = compared(*known) if bounded and (sought or drawn) else None
     if found is not None and sought:
         text = [*text, *choices(found, spec)]
