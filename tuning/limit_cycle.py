@@ -52,15 +52,11 @@ class Confirmed:
     predicted: Balance | None
 
 
-def _rising(x: Floats) -> Floats:
-    """Instants [samples] at which x crosses zero upwards, interpolated; shape (k,)."""
-    k = np.flatnonzero((x[:-1] < 0) & (x[1:] >= 0))
-    return k + x[k] / (x[k] - x[k + 1])
-
-
 def _measured(r: LoopRecord) -> Cycle | None:
     """The cycle in a stretch of a settled loop; None where the stem rests or fewer than two periods are seen."""
-    at = _rising(r.pv - 0.5 * (r.pv.max() + r.pv.min()))
+    x = r.pv - 0.5 * (r.pv.max() + r.pv.min())
+    k = np.flatnonzero((x[:-1] < 0) & (x[1:] >= 0))
+    at = k + x[k] / (x[k] - x[k + 1])  # crosses its middle upwards, between samples
     if at.size < 3 or np.ptp(r.stem) == 0.0:
         return None
     whole = slice(math.ceil(at[0]), math.floor(at[-1]) + 1)

@@ -146,10 +146,7 @@ def quiet_signs(m: Measured, limits: CauseLimits) -> tuple[Sign, ...]:
 
 def combined(signs: Iterable[Sign]) -> float:
     """Confidence [%]: the signs taken as independent, none of them certain by itself (0.9 at most)."""
-    doubt = 1.0
-    for sign in signs:
-        doubt *= 1.0 - 0.9 * sign.strength
-    return 100.0 * (1.0 - doubt)
+    return 100.0 * (1.0 - math.prod(1.0 - 0.9 * sign.strength for sign in signs))
 
 
 def fault_of(m: Measured, limits: CauseLimits) -> Fault:

@@ -143,28 +143,22 @@ def measures(m: Measured, o: Oscillation) -> Floats:
     return np.array(found, dtype=np.float64)
 
 
-def _evidence_figures(m: Measured, o: Oscillation) -> Figures:
-    t = m.trials
-    return (m.evidence,) if t is None else (m.evidence, t.agreeing, t.count)
-
-
 def _amplification_figures(m: Measured, o: Oscillation) -> Figures:
     return (m.amplification,) if m.stable else ()
-
-
-def _loop_gain_figures(m: Measured, o: Oscillation) -> Figures:
-    return () if m.controller is None else (abs(m.linear.gain * m.controller.kp),)
 
 
 GROUPS: Mapping[SignKind, tuple[tuple[str, ...], Callable[[Measured, Oscillation], Figures]]] = {
     SignKind.EVIDENCE: (
         ("evidence", "evidence_per_cycle", "agreeing", "steadiness", "jump"),
-        _evidence_figures,
+        lambda m, o: (m.evidence, *(() if m.trials is None else (m.trials.agreeing, m.trials.count))),
     ),
     SignKind.WIDTH: (("size",), lambda m, o: (m.evidence, m.size)),
     SignKind.LOAD_LEFT: (("line_linear", "line_valve"), lambda m, o: (m.line_linear, m.line_valve)),
     SignKind.AMPLIFICATION: (("amplification",), _amplification_figures),
-    SignKind.LOOP_GAIN: (("loop_gain",), _loop_gain_figures),
+    SignKind.LOOP_GAIN: (
+        ("loop_gain",),
+        lambda m, o: () if m.controller is None else (abs(m.linear.gain * m.controller.kp),),
+    ),
     SignKind.PROCESS: (("consistency",), lambda m, o: (m.consistency,)),
     SignKind.HARMONIC: (("harmonic",), lambda m, o: (m.harmonic,)),
     SignKind.WAVE_LEFT: (

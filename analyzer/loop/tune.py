@@ -15,7 +15,7 @@ from analyzer.loop.decisions import Action, Cause, Need, Needs
 from analyzer.loop.fitness import at_limits, unfit_for_cause
 from analyzer.loop.identified import intervals, load_of, tuned, uncertain
 from analyzer.loop.judged_stretch import controller_of, earlier_settings
-from analyzer.loop.quality import Prepared, prepare
+from analyzer.loop.quality import prepare
 from analyzer.loop.settings_side_by_side import middle_ti
 from analyzer.loops.changes import in_force
 from analyzer.loops.spec import LoopSpec, spec_of
@@ -117,10 +117,6 @@ def tune(found: Assessment, controller: Pid, config: Config, kept: Advice | None
     )
 
 
-def _between(e: Estimate) -> str:
-    return f"{e.value:.3g} ({e.low:.3g} to {e.high:.3g}) {e.unit}"
-
-
 def _cycle_lines(t: Tuning) -> list[str]:
     recorded = "none"
     if t.period_s is not None and t.amplitude_pct is not None:
@@ -149,7 +145,7 @@ def _forecast_lines(t: Tuning) -> list[str]:
 
 def proposal_lines(t: Tuning, spec: LoopSpec, pv_span: float) -> list[str]:
     """The proposal in words and figures."""
-    out = [f"{name}: {_between(e)}" for name, e in t.estimates.items()]
+    out = [f"{k}: {e.value:.3g} ({e.low:.3g} to {e.high:.3g}) {e.unit}" for k, e in t.estimates.items()]
     if "gain" not in t.estimates:
         out.append("gain and time constant: only their ratio is known from this record")
     out += [*_cycle_lines(t), f"action: {t.proposal.action}"]
@@ -223,12 +219,6 @@ def _trend_panels(t: Tuning, new: Pid, title: str) -> Panels:
     return Panels("forecast", f"{title}: both tunings on the same load", plots)
 
 
-def _unfit(prepared: Prepared, config: Config) -> Needs | None:
-    """What the trends lack for a model, the nearest first; None where nothing is known."""
-    limited = at_limits(prepared.record, config.quality) if prepared.op_known else None
-    return limited or unfit_for_cause(prepared, None, config)
-
-
 def proposal(asked: Asked, loop: str, drawn: bool) -> tuple[list[str], dict[str, bytes]]:
     """Lines of text and, if wanted, pictures by file name for the last night of one loop. Raises InputError where the
     loop or its settings are not known, NotAssessedError where its trends give no model."""
@@ -245,7 +235,8 @@ def proposal(asked: Asked, loop: str, drawn: bool) -> tuple[list[str], dict[str,
     head = [f"{loop}, night {night.name}: cause {found.verdict.cause}"]
     text = head + [f"sign of {s.points_to}: {sign_in_full(s)}" for s in found.verdict.signs]
     if found.verdict.measured is None:
-        needs = _unfit(prepared, config)
+        limited = at_limits(prepared.record, config.quality) if prepared.op_known else None
+        needs = limited or unfit_for_cause(prepared, None, config)  # the nearest first
         if found.verdict.cause is not Cause.VALVE:
             raise NotAssessedError(f"{loop}: {needs or found.verdict.needs or NO_MOVES}")
         return [*text, f"action: {Action.REPAIR_VALVE}", f"no settings: {needs or NO_MOVES}"], {}

@@ -17,7 +17,6 @@ from analyzer.loop.identified import slope_deviation
 from analyzer.loop.measure import Measured
 from analyzer.loop.quality import Prepared
 from identification.estimation.gauss_newton import covariance
-from identification.estimation.hammerstein import Fit
 from identification.estimation.width_profile import WIDTHS, width_profile
 from identification.limits import INTERVALS
 from identification.record import Floats
@@ -78,7 +77,13 @@ def _constants_of_fit(
     assert fit is not None
     spread, found = covariance(fit, free_width=worn), {}
     if np.isfinite(spread).all() and fit.gain != 0.0:
-        found = _process_of_fit(fit, spread)
+        dead_s = fit.process.dead_time_s
+        found = {
+            "slope": (fit.slope, slope_deviation(fit, spread)),
+            "time_constant_s": (fit.time_constant_s, math.sqrt(spread[0, 0])),
+            "gain": (fit.gain, math.sqrt(spread[3, 3]) / abs(fit.gain)),
+            "dead_time_s": (dead_s, math.sqrt(spread[1, 1]) / max(dead_s, 1e-9)),
+        }
         if worn:
             relative = math.sqrt(spread[2, 2]) / max(fit.valve.stickband, 1e-9)
             found |= {"width": (fit.valve.stickband, relative), "slip_jump": (fit.valve.slip_jump, relative)}
@@ -87,14 +92,3 @@ def _constants_of_fit(
         found["width"] = valve.stickband, INTERVALS.decoded
         found["slip_jump"] = valve.slip_jump, math.log(INTERVALS.least_jump)
     return found
-
-
-def _process_of_fit(fit: Fit, spread: Floats) -> dict[str, Known]:
-    """Slope, time constant, gain and dead time of a fit, by its covariance of (log T, L, stickband, gain)."""
-    dead_s = fit.process.dead_time_s
-    return {
-        "slope": (fit.slope, slope_deviation(fit, spread)),
-        "time_constant_s": (fit.time_constant_s, math.sqrt(spread[0, 0])),
-        "gain": (fit.gain, math.sqrt(spread[3, 3]) / abs(fit.gain)),
-        "dead_time_s": (dead_s, math.sqrt(spread[1, 1]) / max(dead_s, 1e-9)),
-    }
