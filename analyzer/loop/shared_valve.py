@@ -7,7 +7,7 @@ valve tells which. A half of a split range rests at an end of its valve while th
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
@@ -56,20 +56,19 @@ def selected(record: LoopRecord, other: Floats, other_bad: Mask, limits: Quality
         return None
     idle = good & (lower != low)
     far = record.op >= 100.0 - limits.limit_pct if low else record.op <= limits.limit_pct
-    return Shared(
-        idle,
-        100.0 * float(1.0 - idle[good].mean()),
-        _changes_per_h(idle, good, record.dt_s),
-        100.0 * float(far[idle].mean()),
-        _takeover_s(record, idle, good),
+    return replace(
+        _in_turn(idle, good, record.dt_s),
+        winds_up_pct=100.0 * float(far[idle].mean()),
+        takeover_s=_takeover_s(record, idle, good),
         valve=np.where(idle, other, record.op),
     )
 
 
-def _changes_per_h(idle: Mask, good: Mask, dt_s: float) -> float:
-    """How often a valve passes from one to the other, in an hour of good time."""
+def _in_turn(idle: Mask, good: Mask, dt_s: float) -> Shared:
+    """What the two have in turn: how long, and how often it passes in an hour of good time."""
     passed = int(np.count_nonzero(np.diff(idle[good].astype(np.int8))))
-    return passed / max(float(good.sum()) * dt_s / 3600.0, 1e-9)
+    hours = max(float(good.sum()) * dt_s / 3600.0, 1e-9)
+    return Shared(idle, 100.0 * float(1.0 - idle[good].mean()), passed / hours)
 
 
 def _takeover_s(record: LoopRecord, idle: Mask, good: Mask) -> float | None:
@@ -94,9 +93,7 @@ def half(record: LoopRecord, whole: Floats, whole_bad: Mask, limits: QualityLimi
         return None
     working, end = good & ~ends[0] & ~ends[1], 0.0 if rest is ends[0] else 100.0
     slope, begin = _part_of(record.op, whole, working, end, limits.half_samples)
-    valve_pct = 100.0 * float(1.0 - idle[good].mean())
-    changes = _changes_per_h(idle, good, record.dt_s)
-    return Shared(idle, valve_pct, changes, split_at_pct=begin, split_slope=slope)
+    return replace(_in_turn(idle, good, record.dt_s), split_at_pct=begin, split_slope=slope)
 
 
 def _part_of(

@@ -42,13 +42,8 @@ MAP_POINTS = 36
 NO_MOVES = Needs(None, Need.MOVING_PV)
 SPREAD = 20.0
 """The map reaches this factor below and above the present settings."""
-FORECAST = {
-    "average_absolute_error": "average absolute error",
-    "stem_travel": "stem travel",
-    "oscillation": "oscillation",
-    "variability": "variability",
-}
-"""Figures of a forecast as they are called."""
+FORECAST = ("average_absolute_error", "stem_travel", "oscillation", "variability")
+"""Figures of a forecast that are told."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,12 +130,12 @@ def _cycle_lines(t: Tuning) -> list[str]:
 def _forecast_lines(t: Tuning) -> list[str]:
     if t.forecast is None:
         return []
-    proposal_lines = ["forecast on the reconstructed load (90 % intervals):"]
-    for key, name in FORECAST.items():
+    lines = ["forecast on the reconstructed load (90 % intervals):"]
+    for key in FORECAST:
         b, a, c = t.forecast.before[key], t.forecast.after[key], t.forecast.change[key]
         change = f"{100 * c.value:+.0f} % ({100 * c.low:+.0f} to {100 * c.high:+.0f})"
-        proposal_lines.append(f"  {name}: {b.value:.3g} to {a.value:.3g} {b.unit}, {change}")
-    return proposal_lines
+        lines.append(f"  {key.replace('_', ' ')}: {b.value:.3g} to {a.value:.3g} {b.unit}, {change}")
+    return lines
 
 
 def proposal_lines(t: Tuning, spec: LoopSpec, pv_span: float) -> list[str]:
