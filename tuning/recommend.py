@@ -16,6 +16,7 @@ from tuning.describing import band, is_play
 from tuning.frequency_response import integral_s, maximum_sensitivity
 from tuning.limit_cycle import Confirmed, confirm
 from tuning.limits import LIMITS, METHOD, TuningLimits
+from tuning.reasons import WHY
 from tuning.rules import effective_delay, simc
 from tuning.search import (
     Bench,
@@ -80,11 +81,11 @@ def recommend(
     where it is not finite; None, or one too short to tell (tuning.limits): steps at the valve.
     """
     _check(cause, load)
-    if cause in reasons.LEFT_ALONE:
-        action = Action.UNDECIDED if cause == Cause.UNDECIDED else Action.NONE
-        return Proposal(action, reasons.LEFT_ALONE[Cause(cause)])
-    if loop.controller.kp * loop.process.slope <= 0.0:
-        return Proposal(Action.CHECK_SETTINGS, reasons.wrong_sign(loop))
+    if cause not in (Cause.VALVE, Cause.TUNING):
+        return Proposal(Action.UNDECIDED if cause == Cause.UNDECIDED else Action.NONE, WHY[cause])
+    kp, slope = loop.controller.kp, loop.process.slope
+    if kp * slope <= 0.0:
+        return Proposal(Action.CHECK_SETTINGS, WHY["wrong_sign"].format(kp=kp, slope=slope))
     load = None if load is None or load.size < limits.least_steps else load
     return (_tight if cause == Cause.TUNING else _valve)(loop, uncertainty, load, limits)
 
@@ -96,7 +97,8 @@ def _tight(loop: Loop, others: Sequence[Loop], load: Floats | None, limits: Tuni
         return Proposal(Action.UNDECIDED, reasons.not_tight(now), ms_before=now)
     found = _simc_settings(loop, others, -limits.faster_most if load is not None else 0, limits)
     if not found:
-        return Proposal(Action.UNDECIDED, reasons.too_uncertain(limits), ms_before=now)
+        why = WHY["too_uncertain"].format(ms=limits.ms_most_sample)
+        return Proposal(Action.UNDECIDED, why, ms_before=now)
     new, ms = found[0]
     if load is not None:
         load = in_digits(load)
@@ -137,16 +139,18 @@ def _simc_settings(
 def _valve(loop: Loop, others: Sequence[Loop], load: Floats | None, limits: TuningLimits) -> Proposal:
     """The least travel and error that the limits allow, for a loop with play or stick-slip."""
     if band(loop.valve) <= 0.0:
-        return Proposal(Action.UNDECIDED, reasons.NO_SIZE)
-    before = confirm(loop)
+        return Proposal(Action.UNDECIDED, WHY["no_size"])
+    before, fault = confirm(loop), reasons.fault(loop)
     if _is_short_and_sticks(loop, limits):
-        return Proposal(Action.REPAIR_VALVE, reasons.sticks_on_short_lag(loop, before, limits), before=before)
+        known = {"fault": fault, "cycle": reasons.swings(before.cycle), "ratio": limits.stick_ratio}
+        return Proposal(Action.REPAIR_VALVE, WHY["sticks_on_short_lag"].format(**known), before=before)
     if load is None:
         load = standard_load(loop, limits.most_steps)
     table = bench(loop, others, load, limits)
     now = maximum_sensitivity(loop)
     if table.travel[0] <= 0.0:
-        return Proposal(Action.UNDECIDED, reasons.no_travel(loop), before=before, ms_before=now)
+        why = WHY["no_travel"].format(fault=fault)
+        return Proposal(Action.UNDECIDED, why, before=before, ms_before=now)
     candidates = search(table)
     chosen = _confirmed(table, candidates, before)
     if chosen is None:
@@ -157,7 +161,7 @@ def _valve(loop: Loop, others: Sequence[Loop], load: Floats | None, limits: Tuni
     beyond = band(loop.valve) >= limits.band_beyond
     return Proposal(
         Action.REPAIR_VALVE if beyond else Action.RETUNE,
-        reasons.beyond(loop, limits) + why if beyond else why,
+        WHY["beyond"].format(fault=fault, limit=limits.band_beyond) + why if beyond else why,
         controller=None if beyond else best.controller,
         meanwhile=best.controller if beyond else None,
         before=before,
