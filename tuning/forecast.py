@@ -208,19 +208,11 @@ def alternatives(loop: Loop, new: Pid | None, chosen: Mapping[str, Pid] | None =
 
 def tried(loop: Loop, load: Floats, settings: Mapping[str, Pid]) -> tuple[Tried, ...]:
     """Settings one by one, in their order, on a loop under a load on the controller's clock [% PV], shape (n,)."""
-    return tuple(_tried(name, replace(loop, controller=pid), load) for name, pid in settings.items())
-
-
-def _tried(name: str, loop: Loop, load: Floats) -> Tried:
-    record, c = settled(run(loop, load)), loop.controller
-    figures = assess(record)
-    return Tried(
-        name,
-        c,
-        maximum_sensitivity(loop),
-        figures.stem_travel,
-        figures.average_absolute_error,
-        peak=float(np.max(np.abs(record.error), initial=0.0)),
-        integral_s=integral_s(c) / abs(c.kp),
-        record=record,
-    )
+    found = []
+    for name, pid in settings.items():
+        one = replace(loop, controller=pid)
+        record = settled(run(one, load))
+        did, peak = assess(record), float(np.max(np.abs(record.error), initial=0.0))
+        known = maximum_sensitivity(one), did.stem_travel, did.average_absolute_error, peak
+        found.append(Tried(name, pid, *known, integral_s(pid) / abs(pid.kp), record))
+    return tuple(found)

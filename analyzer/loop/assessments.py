@@ -11,12 +11,13 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 
 import numpy as np
-from numba import njit
 
 from analyzer.config import FigureLimits
 from analyzer.loop.oscillation import Oscillations
+from identification.models import Backlash
 from identification.record import Floats, LoopRecord, Mask
 from identification.signals.robust import robust_deviation
+from identification.simulation.valve import law_of, walk
 
 HOUR_S = 3600.0
 ROUNDING = 1e-9
@@ -74,28 +75,19 @@ def crossings_of(e: Floats, use: Mask, band: float) -> int:
     return int(np.count_nonzero(sides[1:] != sides[:-1]))
 
 
-@njit(cache=True)
 def travel_of(signal: Floats, use: Mask, step: int, deadband: float) -> tuple[float, int]:
     """Travel and reversals of every `step`-th sample of a signal beyond a deadband, shape (n,).
 
-    Moves between usable neighbours make one path: what a signal moved during a gap is not known.
+    Moves between usable neighbours make one path, and what lies beyond the deadband is what a stem behind such a play
+    moves: what a signal moved during a gap is not known.
     """
-    half, x, stem = 0.5 * deadband, 0.0, 0.0
-    path, way, turns = 0.0, 0.0, 0
-    for k in range(step, signal.size, step):
-        if use[k] and use[k - step]:
-            x += signal[k] - signal[k - step]
-        if abs(x - stem) <= half:
-            continue
-        new = x - half if x > stem else x + half
-        moved = new - stem
-        stem = new
-        path += abs(moved)
-        if abs(moved) > ROUNDING:
-            now = 1.0 if moved > 0 else -1.0
-            turns += way == -now
-            way = now
-    return path, turns
+    signal, use = signal[::step], use[::step]
+    if signal.size < 2:
+        return 0.0, 0
+    path = np.cumsum(np.where(use[1:] & use[:-1], np.diff(signal), 0.0))
+    moved = np.diff(walk(path, law_of(Backlash(deadband)), 0.0), prepend=0.0)
+    ways = np.sign(moved[np.abs(moved) > ROUNDING])
+    return summed(np.abs(moved)), int(np.count_nonzero(ways[1:] != ways[:-1]))
 
 
 def summed(x: Floats) -> float:
