@@ -93,7 +93,7 @@ def advise(
         return _lacking(Needs(Lack.LONGER, Need.LONGER, (proposal.reason,)))
     beside = None
     if proposed.loop is not None and proposed.load is not None:
-        known = proposed.loop, proposed.load, held or proposal.new, oscillation.period_s, spec, pv_span
+        known = proposed.loop, proposed.load, held or proposal.new, oscillation.period_s, pv_span
         beside = compared(*known, config.tuning, proposed.others)
     return replace(_as_advice(proposal, spec, pv_span), compared=beside)
 

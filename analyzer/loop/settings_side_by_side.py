@@ -10,8 +10,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analyzer.limits import LOOP
-from analyzer.loops.spec import LoopSpec
-from analyzer.loops.tags import as_stated
 from identification.models import Loop, Pid
 from identification.record import Floats, LoopRecord
 from reports.pages import as_held
@@ -45,7 +43,7 @@ class Comparison:
 
     loop, the identified one with its present controller; load [% PV] on the controller's clock, shape (n,); tried, in
     the order in which they are told; shown, a piece of each simulation by name; travel, the map of the limit cycle's
-    travel, None where the valve is free; stated, Kp and Ti by name in the plant's units; peaks, largest error after a
+    travel, None where the valve is free; pv_span, that of PV in its own unit; peaks, largest error after a
     unit step of load at the valve, over the present one, by name [-]; everywhere, each on all
     loops that the data allow, by name; curve, what no other settings beat in travel and in error, the calmest first;
     repaired, the present settings behind a free valve, None where it is free or rests.
@@ -56,7 +54,6 @@ class Comparison:
     tried: tuple[Tried, ...]
     shown: Mapping[str, Shown]
     travel: TravelMap | None
-    stated: Mapping[str, tuple[float, float]]
     pv_span: float
     peaks: Mapping[str, float]
     everywhere: Mapping[str, Candidate]
@@ -104,7 +101,6 @@ def compared(
     load: Floats,
     new: Pid | None,
     period_s: float,
-    spec: LoopSpec,
     pv_span: float,
     limits: TuningLimits,
     others: Sequence[Loop] = (),
@@ -131,7 +127,6 @@ def compared(
         each,
         {t.name: _piece(t.record, period_s) for t in each},
         _map_of_settings(loop, tuple(settings.values())),
-        {name: as_stated(pid, spec, pv_span) for name, pid in settings.items()},
         pv_span,
         {name: rejection(loop.process, pid).peak / now.peak for name, pid in settings.items()},
         everywhere,

@@ -252,7 +252,7 @@ def _with_settings_beside(
     period_s = t.period_s or 10.0 * slowest_s(t.model)
     new = t.proposal.new
     bounded = new is not None or is_stable(t.model)  # else what is identified is no loop to try settings on
-    known = t.model, t.load, new, period_s, spec, pv_span, config.tuning, t.others
+    known = t.model, t.load, new, period_s, pv_span, config.tuning, t.others
     sought = new is not None or t.proposal.before is not None
     found = compared(*known) if bounded and (sought or drawn) else None
     if found is not None and sought:
