@@ -43,10 +43,10 @@ class Comparison:
 
     loop, the identified one with its present controller; load [% PV] on the controller's clock, shape (n,); tried, in
     the order in which they are told; shown, a piece of each simulation by name; travel, the map of the limit cycle's
-    travel, None where the valve is free; pv_span, that of PV in its own unit; peaks, largest error after a
-    unit step of load at the valve, over the present one, by name [-]; everywhere, each on all
-    loops that the data allow, by name; curve, what no other settings beat in travel and in error, the calmest first;
-    repaired, the present settings behind a free valve, None where it is free or rests.
+    travel, None where the valve is free; pv_span, that of PV in its own unit; peaks, largest error after a unit step
+    of load at the valve, over the present one, by name [-]; everywhere, each on all loops that the data allow, by
+    name; curve, what no other settings beat in travel and in error, the calmest first; repaired, the present settings
+    behind a free valve, None where it is free or rests.
     """
 
     loop: Loop

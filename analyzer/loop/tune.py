@@ -84,7 +84,7 @@ def identified(found: Assessment, limits: AdviceLimits) -> tuple[Process, Valve,
     return tuned(fit, at_fault, limits), valve, intervals(fit, at_fault, limits)
 
 
-def tune(found: Assessment, controller: Pid, config: Config, kept: Advice | None = None) -> Tuning:
+def tune(found: Assessment, controller: Pid, config: Config, kept: Advice | None) -> Tuning:
     """Propose settings for one assessed loop whose stated ones are `controller` [%, s]; `kept`, why none are to be
     proposed (advice.withheld). Raises NotAssessedError where the loop's trends give no model."""
     verdict = found.verdict
