@@ -18,8 +18,9 @@ from tuning.limits import METHOD
 
 Complexes = NDArray[np.complex128]
 
-TABLE_SIZE = 4000
-"""Points of each part of a branch's table; interpolation is then better than 1e-5 in amplitude and gain."""
+TABLE_SIZE, CURVE_POINTS = 4000, 400
+"""Points of each part of a branch's table, whose interpolation is then better than 1e-5 in amplitude and gain; and of
+a curve that is drawn."""
 
 
 def backlash(amplitude: ArrayLike, width: float) -> Complexes:
@@ -121,13 +122,13 @@ def describe(valve: Valve, amplitude: float) -> complex:
     return complex(describing_function(valve, amplitude, jumps)) if jumps else 0j
 
 
-def curve(valve: Valve, points: int = 400) -> tuple[Floats, Complexes]:
-    """Amplitudes [% OP] and N(A), shape (points,), up to 100 half widths, or of stick-slip with one jump."""
+def curve(valve: Valve) -> tuple[Floats, Complexes]:
+    """Amplitudes [% OP] and N(A), shape (CURVE_POINTS,), up to 100 half widths, or of stick-slip with one jump."""
     if valve is None or band(valve) <= 0.0:
         return np.ones(1), np.ones(1, dtype=np.complex128)
-    amplitude = 0.5 * band(valve) * (1.0 + np.geomspace(1e-4, 100.0, points))
+    amplitude = 0.5 * band(valve) * (1.0 + np.geomspace(1e-4, 100.0, CURVE_POINTS))
     if isinstance(valve, Stiction) and moves_by_jumps(valve):
-        amplitude = np.linspace(*jump_range(valve, 1), points)
+        amplitude = np.linspace(*jump_range(valve, 1), CURVE_POINTS)
     return amplitude, describing_function(valve, amplitude)
 
 

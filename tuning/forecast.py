@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -29,8 +30,7 @@ CALMER, SMALLER, DERIVATIVE, REPAIRED = (
 """Names of the settings compared; the last is what a repair would bring."""
 
 
-@dataclass(frozen=True, slots=True)
-class Assessed:
+class Assessed(NamedTuple):
     """Assessments of one simulated stretch.
 
     average_absolute_error [% PV], stem_travel and op_travel [%/h], variability [% PV] (2 sigma of the error),
@@ -46,7 +46,7 @@ class Assessed:
 
 
 UNITS = {"stem_travel": "%/h", "op_travel": "%/h"}
-NAMES = tuple(f.name for f in fields(Assessed))
+NAMES = Assessed._fields
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,21 +115,15 @@ def assess(record: LoopRecord) -> Assessed:
     )
 
 
-def warm(record: LoopRecord) -> int:
-    """First sample of a simulated record behind its warm-up."""
-    return int(METHOD.warm_up * len(record))
-
-
 def settled(record: LoopRecord) -> LoopRecord:
-    """The record without its warm-up."""
-    return record.span(warm(record), len(record))
+    """A simulated record without its warm-up."""
+    return record.span(int(METHOD.warm_up * len(record)), len(record))
 
 
 def _blocks(record: LoopRecord) -> Floats:
     """Assessments of each block, shape (blocks, number of assessments)."""
     edges = np.linspace(0, len(record), METHOD.blocks + 1).astype(int)
-    found = [assess(record.span(int(a), int(b))) for a, b in pairwise(edges)]
-    return np.array([[getattr(a, n) for n in NAMES] for a in found])
+    return np.array([assess(record.span(int(a), int(b))) for a, b in pairwise(edges)])
 
 
 def _estimates(value: Floats, draws: Floats, units: bool = True) -> dict[str, Estimate]:
@@ -214,19 +208,11 @@ def alternatives(loop: Loop, new: Pid | None, chosen: Mapping[str, Pid] | None =
 
 def tried(loop: Loop, load: Floats, settings: Mapping[str, Pid]) -> tuple[Tried, ...]:
     """Settings one by one, in their order, on a loop under a load on the controller's clock [% PV], shape (n,)."""
-    return tuple(_tried(name, replace(loop, controller=pid), load) for name, pid in settings.items())
-
-
-def _tried(name: str, loop: Loop, load: Floats) -> Tried:
-    record, c = settled(run(loop, load)), loop.controller
-    figures = assess(record)
-    return Tried(
-        name,
-        c,
-        maximum_sensitivity(loop),
-        figures.stem_travel,
-        figures.average_absolute_error,
-        peak=float(np.max(np.abs(record.error), initial=0.0)),
-        integral_s=integral_s(c) / abs(c.kp),
-        record=record,
-    )
+    found = []
+    for name, pid in settings.items():
+        one = replace(loop, controller=pid)
+        record = settled(run(one, load))
+        did, peak = assess(record), float(np.max(np.abs(record.error), initial=0.0))
+        known = maximum_sensitivity(one), did.stem_travel, did.average_absolute_error, peak
+        found.append(Tried(name, pid, *known, integral_s(pid) / abs(pid.kp), record))
+    return tuple(found)

@@ -101,7 +101,7 @@ def _polish(loop: Loop, branch: Branch, low: float, high: float) -> float:
     for _ in range(POLISH_STEPS):
         inner = np.linspace(low, high, 9)
         sign = np.sign(_excess(loop, branch, inner))
-        k = int(np.flatnonzero(sign[:-1] * sign[1:] <= 0)[0]) if np.any(sign[:-1] * sign[1:] <= 0) else 0
+        k = int(np.argmax(sign[:-1] * sign[1:] <= 0))
         low, high = float(inner[k]), float(inner[k + 1])
     return 0.5 * (low + high)
 
@@ -219,17 +219,15 @@ def _largest(loop: Loop, kp: Floats) -> tuple[Floats, Floats]:
     return best_w, best_a
 
 
-def _with(loop: Loop, kp: float, ti_s: float) -> Loop:
-    return replace(loop, controller=replace(loop.controller, kp=kp, ti_s=ti_s))
-
-
 def travel_map(loop: Loop, kp: Floats, ti_s: Floats) -> TravelMap:
     """Valve travel over gains kp, shape (n,), all of the controller's sign, and integral times ti_s > 0, shape (m,).
 
     The loop's own Kp and Ti do not count. For stick-slip no solution of the balance does not mean rest: with
     integral action OP ramps until the stem slips; `rests` is then False and simulation must tell.
     """
-    rows = [_with(loop, float(kp[0]), float(ti)) for ti in ti_s]
+    rows = [
+        replace(loop, controller=replace(loop.controller, kp=float(kp[0]), ti_s=float(ti))) for ti in ti_s
+    ]
     omega, amplitude = (np.array(v) for v in zip(*(_largest(r, kp) for r in rows), strict=True))
     stable = np.array([stable_gains(r, kp) for r in rows])
     cycles = np.isfinite(omega)

@@ -20,8 +20,8 @@ from tuning.limits import METHOD
 
 KICK = 1.0 + math.sqrt(5.0)
 """Kick in widths of the play, seen at OP; irrational, lest the stem's travel meet it exactly."""
-OTHER_KICKS = (1.37, 1.83)
-"""Further kicks, over the first, for a stem that moves by jumps and rests on the set point by chance."""
+KICKS = (1.0, 1.37, 1.83)
+"""Kicks over the first; further ones are for a stem that moves by jumps and rests on the set point by chance."""
 NO_LIMIT = 1e9
 """Output limits [% OP] put out of the way: a cycle scales with the play and must not meet a limit."""
 
@@ -52,15 +52,11 @@ class Confirmed:
     predicted: Balance | None
 
 
-def _rising(x: Floats) -> Floats:
-    """Instants [samples] at which x crosses zero upwards, interpolated; shape (k,)."""
-    k = np.flatnonzero((x[:-1] < 0) & (x[1:] >= 0))
-    return k + x[k] / (x[k] - x[k + 1])
-
-
 def _measured(r: LoopRecord) -> Cycle | None:
     """The cycle in a stretch of a settled loop; None where the stem rests or fewer than two periods are seen."""
-    at = _rising(r.pv - 0.5 * (r.pv.max() + r.pv.min()))
+    x = r.pv - 0.5 * (r.pv.max() + r.pv.min())
+    k = np.flatnonzero((x[:-1] < 0) & (x[1:] >= 0))
+    at = k + x[k] / (x[k] - x[k + 1])  # crosses its middle upwards, between samples
     if at.size < 3 or np.ptp(r.stem) == 0.0:
         return None
     whole = slice(math.ceil(at[0]), math.floor(at[-1]) + 1)
@@ -114,19 +110,13 @@ def confirm(loop: Loop) -> Confirmed:
     if predicted is not None:
         kick, scale = max(kick, 3.0 * predicted.pv_amplitude), predicted.period_s
     steps = int(min(max(METHOD.cycle_periods * scale / h, 2000), METHOD.cycle_steps))
-    found = _settle(loop, steps, kick, width, predicted)
-    for factor in OTHER_KICKS if _jumps(loop) else ():
+    valve = loop.valve
+    jumps = isinstance(valve, Stiction) and valve.motion is Motion.RESTS and valve.slip_jump > 0.0
+    for factor in KICKS if jumps else KICKS[:1]:
+        found = _settle(loop, steps, factor * kick, width, predicted)
         if found.cycle is not None:
             break
-        found = _settle(loop, steps, factor * kick, width, predicted)
     return found
-
-
-def _jumps(loop: Loop) -> bool:
-    """Whether the stem moves by whole jumps only, so that integral action never finds a place to rest."""
-    return (
-        isinstance(loop.valve, Stiction) and loop.valve.motion is Motion.RESTS and loop.valve.slip_jump > 0.0
-    )
 
 
 def _ramp_s(loop: Loop) -> float:

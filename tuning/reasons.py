@@ -1,31 +1,20 @@
-"""The words of a proposal: why, with figures and units."""
+"""The words of a proposal: why, with figures and units; sentences that need no rule stand in reasons.toml."""
 
 from __future__ import annotations
 
 import math
+import tomllib
+from collections.abc import Mapping
+from importlib.resources import files
 
 from identification.models import Backlash, Integrator, Loop, Pid
-from tuning import Cause
 from tuning.describing import band, is_play
 from tuning.frequency_response import integral_s
 from tuning.limit_cycle import Confirmed, Cycle
-from tuning.limits import TuningLimits
 from tuning.search import Bench, Candidate, rejection
 
-LEFT_ALONE = {
-    Cause.LOAD: "The load oscillates, not this loop; new settings here would not end it. Look upstream.",
-    Cause.NONE: "The loop is not in trouble; nothing to change.",
-    Cause.UNDECIDED: "The cause is not decided; no settings are proposed on a guess.",
-}
-"""Why a loop in no trouble of its own, or of an unknown one, is left alone."""
-
-
-def wrong_sign(loop: Loop) -> str:
-    """Why a loop whose controller acts the wrong way gets no settings."""
-    return (
-        f"Kp {loop.controller.kp:.3g} %/% and the process's slope {loop.process.slope:.3g} % PV/(% OP s) have no "
-        "common sign: the controller would act the wrong way. Check the action and the identified gain."
-    )
+WHY: Mapping[str, str] = tomllib.loads((files("tuning") / "reasons.toml").read_text("utf-8"))
+"""Why a loop gets no settings, by its cause or by what decided it."""
 
 
 def robustness(ms: float) -> str:
@@ -43,13 +32,6 @@ def _seconds(x: float) -> str:
     return f"{x:.3g}" if x < 1000 else f"{x:.0f}"
 
 
-def too_uncertain(limits: TuningLimits) -> str:
-    """Why no SIMC settings could be found."""
-    return (
-        f"The process is too uncertain: no settings keep Ms below {limits.ms_most_sample:g} on all it may be."
-    )
-
-
 def little_less_error(left: float, now: float) -> str:
     """Why a tight loop gets no settings: on its own load calmer ones might win nothing."""
     way, size = ("raise", left - 1.0) if left > 1.0 else ("lower", 1.0 - left)
@@ -57,17 +39,6 @@ def little_less_error(left: float, now: float) -> str:
         f"Too tight ({robustness(now)}), but on a process that the data allow robust settings would {way} the "
         f"average absolute error by {100 * size:.0f} %{' alone' * (way == 'lower')}: a record with set point moves "
         "would tell more."
-    )
-
-
-NO_SIZE = "The valve is at fault, but neither play nor stickband is known; a size is needed for settings."
-"""Why a valve without a size gets no settings."""
-
-
-def no_travel(loop: Loop) -> str:
-    """Why a valve fault that the model does not show gets no settings."""
-    return (
-        f"With {_fault(loop)} the identified loop rests at its present settings; the model does not show it."
     )
 
 
@@ -86,14 +57,16 @@ def tight(loop: Loop, new: Pid, before: float, ms: float) -> str:
     )
 
 
-def _fault(loop: Loop) -> str:
+def fault(loop: Loop) -> str:
+    """A valve's fault with its size."""
     width = band(loop.valve)
     return (
         f"play of {width:.2g} %" if is_play(loop.valve) else f"stick-slip with a stickband of {width:.2g} %"
     )
 
 
-def _cycle(cycle: Cycle | None) -> str:
+def swings(cycle: Cycle | None) -> str:
+    """A limit cycle with its period and amplitude."""
     if cycle is None:
         return "no limit cycle"
     return f"a cycle of {_seconds(cycle.period_s)} s and ±{cycle.pv_amplitude:.2g} % PV"
@@ -109,8 +82,8 @@ def valve(
     """Why settings for a loop with a faulty valve are proposed."""
     old, new = rejection(loop.process, loop.controller), rejection(loop.process, best.controller)
     return (
-        f"The valve has {_fault(loop)}: simulated, {_cycle(before.cycle)} at {settings(loop.controller)} "
-        f"({robustness(ms_before)}) and {_cycle(after.cycle)} at {settings(best.controller)} "
+        f"The valve has {fault(loop)}: simulated, {swings(before.cycle)} at {settings(loop.controller)} "
+        f"({robustness(ms_before)}) and {swings(after.cycle)} at {settings(best.controller)} "
         f"({robustness(best.ms)}). On the load, mean over {len(table.loops)} models: "
         f"stem travel {_percent(best.travel)}, average absolute error {_percent(best.error)}. "
         f"A load step at the valve peaks {new.peak / old.peak:.2g} times as high as now.{_outlook(loop, after)}"
@@ -125,26 +98,11 @@ def _outlook(loop: Loop, after: Confirmed) -> str:
     return "" if after.cycle is None else " Only a smaller play ends the rest."
 
 
-def beyond(loop: Loop, limits: TuningLimits) -> str:
-    """Why the valve comes first."""
-    return (
-        f"The valve is beyond tuning ({_fault(loop)}, limit {limits.band_beyond:g} %): repair it. Meanwhile: "
-    )
-
-
-def sticks_on_short_lag(loop: Loop, before: Confirmed, limits: TuningLimits) -> str:
-    """Why a stem that sticks before a short lag gets no settings."""
-    return (
-        f"The valve has {_fault(loop)} and gives {_cycle(before.cycle)}. On a process whose lag is under "
-        f"{limits.stick_ratio:g} dead times no settings calm it without more error: repair the valve."
-    )
-
-
 def nothing_better(loop: Loop, before: Confirmed, considered: bool) -> str:
     """Why a faulty valve's loop gets no settings."""
     what = "is worth a change" if considered else "keeps robustness, load rejection and error"
     kind = "play" if isinstance(loop.valve, Backlash) else "stick-slip"
     return (
-        f"The valve has {_fault(loop)} and gives {_cycle(before.cycle)}; no pair of Kp and Ti {what}. "
+        f"The valve has {fault(loop)} and gives {swings(before.cycle)}; no pair of Kp and Ti {what}. "
         f"Only less {kind} helps without a price: repair the valve."
     )

@@ -16,6 +16,7 @@ from tuning.describing import band, is_play
 from tuning.frequency_response import integral_s, maximum_sensitivity
 from tuning.limit_cycle import Confirmed, confirm
 from tuning.limits import LIMITS, METHOD, TuningLimits
+from tuning.reasons import WHY
 from tuning.rules import effective_delay, simc
 from tuning.search import (
     Bench,
@@ -50,6 +51,11 @@ class Proposal:
     ms: float | None = None
     candidates: tuple[Candidate, ...] = ()
 
+    @property
+    def new(self) -> Pid | None:
+        """The settings proposed, or those until a repair; None where there are none."""
+        return self.controller or self.meanwhile
+
 
 def _check(cause: str, load: Floats | None) -> None:
     """Raise ValueError for what `recommend` cannot take."""
@@ -70,22 +76,16 @@ def recommend(
 ) -> Proposal:
     """The proposal for one loop: identified process and valve with the present controller.
 
-    Parameters
-    ----------
-    cause : str
-        Why the loop is in trouble, one of tuning.Cause; ValueError for any other.
-    uncertainty : sequence of Loop
-        Other loops that the data allow.
-    load : ndarray of shape (n,) or None
-        Load and noise as they add to PV, on the controller's clock [% PV]; ValueError where it is not finite.
-        None, or one too short to tell (tuning.limits): steps at the valve.
+    cause, why the loop is in trouble, one of tuning.Cause, ValueError for any other; uncertainty, other loops that
+    the data allow; load, load and noise as they add to PV, on the controller's clock, shape (n,) [% PV], ValueError
+    where it is not finite; None, or one too short to tell (tuning.limits): steps at the valve.
     """
     _check(cause, load)
-    if cause in reasons.LEFT_ALONE:
-        action = Action.UNDECIDED if cause == Cause.UNDECIDED else Action.NONE
-        return Proposal(action, reasons.LEFT_ALONE[Cause(cause)])
-    if loop.controller.kp * loop.process.slope <= 0.0:
-        return Proposal(Action.CHECK_SETTINGS, reasons.wrong_sign(loop))
+    if cause not in (Cause.VALVE, Cause.TUNING):
+        return Proposal(Action.UNDECIDED if cause == Cause.UNDECIDED else Action.NONE, WHY[cause])
+    kp, slope = loop.controller.kp, loop.process.slope
+    if kp * slope <= 0.0:
+        return Proposal(Action.CHECK_SETTINGS, WHY["wrong_sign"].format(kp=kp, slope=slope))
     load = None if load is None or load.size < limits.least_steps else load
     return (_tight if cause == Cause.TUNING else _valve)(loop, uncertainty, load, limits)
 
@@ -97,7 +97,8 @@ def _tight(loop: Loop, others: Sequence[Loop], load: Floats | None, limits: Tuni
         return Proposal(Action.UNDECIDED, reasons.not_tight(now), ms_before=now)
     found = _simc_settings(loop, others, -limits.faster_most if load is not None else 0, limits)
     if not found:
-        return Proposal(Action.UNDECIDED, reasons.too_uncertain(limits), ms_before=now)
+        why = WHY["too_uncertain"].format(ms=limits.ms_most_sample)
+        return Proposal(Action.UNDECIDED, why, ms_before=now)
     new, ms = found[0]
     if load is not None:
         load = in_digits(load)
@@ -138,16 +139,18 @@ def _simc_settings(
 def _valve(loop: Loop, others: Sequence[Loop], load: Floats | None, limits: TuningLimits) -> Proposal:
     """The least travel and error that the limits allow, for a loop with play or stick-slip."""
     if band(loop.valve) <= 0.0:
-        return Proposal(Action.UNDECIDED, reasons.NO_SIZE)
-    before = confirm(loop)
+        return Proposal(Action.UNDECIDED, WHY["no_size"])
+    before, fault = confirm(loop), reasons.fault(loop)
     if _is_short_and_sticks(loop, limits):
-        return Proposal(Action.REPAIR_VALVE, reasons.sticks_on_short_lag(loop, before, limits), before=before)
+        known = {"fault": fault, "cycle": reasons.swings(before.cycle), "ratio": limits.stick_ratio}
+        return Proposal(Action.REPAIR_VALVE, WHY["sticks_on_short_lag"].format(**known), before=before)
     if load is None:
         load = standard_load(loop, limits.most_steps)
     table = bench(loop, others, load, limits)
     now = maximum_sensitivity(loop)
     if table.travel[0] <= 0.0:
-        return Proposal(Action.UNDECIDED, reasons.no_travel(loop), before=before, ms_before=now)
+        why = WHY["no_travel"].format(fault=fault)
+        return Proposal(Action.UNDECIDED, why, before=before, ms_before=now)
     candidates = search(table)
     chosen = _confirmed(table, candidates, before)
     if chosen is None:
@@ -158,7 +161,7 @@ def _valve(loop: Loop, others: Sequence[Loop], load: Floats | None, limits: Tuni
     beyond = band(loop.valve) >= limits.band_beyond
     return Proposal(
         Action.REPAIR_VALVE if beyond else Action.RETUNE,
-        reasons.beyond(loop, limits) + why if beyond else why,
+        WHY["beyond"].format(fault=fault, limit=limits.band_beyond) + why if beyond else why,
         controller=None if beyond else best.controller,
         meanwhile=best.controller if beyond else None,
         before=before,
@@ -177,15 +180,12 @@ def _is_short_and_sticks(loop: Loop, limits: TuningLimits) -> bool:
 
 
 def _worth(candidate: Candidate, now: Pid, limits: TuningLimits) -> bool:
-    """Whether a candidate cuts travel by enough for a change; by more where it is nearly the present settings."""
-    cut = limits.worth_near if _is_near(candidate.controller, now, limits) else limits.worth_travel
-    return candidate.travel <= 1.0 - cut
-
-
-def _is_near(new: Pid, now: Pid, limits: TuningLimits) -> bool:
-    """Whether new settings differ from the present ones by no more than one night's advice from another's."""
+    """Whether a candidate cuts travel by enough for a change; by more where it differs from the present settings by
+    no more than one night's advice from another's."""
+    new = candidate.controller
     gain, time = abs(math.log(new.kp / now.kp)), abs(math.log(integral_s(new) / integral_s(now)))
-    return gain <= math.log(limits.near_gain) and time <= math.log(limits.near_time)
+    near = gain <= math.log(limits.near_gain) and time <= math.log(limits.near_time)
+    return candidate.travel <= 1.0 - (limits.worth_near if near else limits.worth_travel)
 
 
 def _smaller(after: Confirmed, before: Confirmed, most_growth: float) -> bool:

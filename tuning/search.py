@@ -17,7 +17,7 @@ from identification.record import Floats
 from identification.simulation.closed_loop import closed_loop, scan_step
 from identification.simulation.lag import discretize, respond
 from tuning.describing import band, is_play
-from tuning.forecast import run, warm
+from tuning.forecast import run, settled
 from tuning.frequency_response import integral_s, maximum_sensitivity, slowest_s
 from tuning.limits import TuningLimits
 from tuning.rules import effective_delay, simc
@@ -56,13 +56,14 @@ class Bench:
     Every other loop gets the load backwards: a second record of the same kind, for a sticking stem's fate
     hangs on the load's very course.
 
-    travel [%/h] and error [% PV] of shape (number of loops,).
+    travel [%/h] and error [% PV] of shape (number of loops,); most_ms, the Ms that each loop may have [-].
     """
 
     loops: tuple[Loop, ...]
     loads: tuple[Floats, ...]
     travel: Floats
     error: Floats
+    most_ms: tuple[float, ...]
     limits: TuningLimits
 
 
@@ -104,10 +105,9 @@ def _as_simulated(loop: Loop) -> Loop:
 
 def _figures(loop: Loop, load: Floats) -> tuple[float, float]:
     """Stem travel [%/h] and average absolute error [% PV] on a load in DIGITS, without the warm-up."""
-    r = run(_as_simulated(loop), load)
-    first = warm(r)
-    travel = float(np.abs(np.diff(r.stem[first:])).sum())
-    return travel / ((len(r) - first) * r.dt_s) * 3600.0, float(np.mean(np.abs(r.pv[first:])))
+    r = settled(run(_as_simulated(loop), load))
+    travel = float(np.abs(np.diff(r.stem)).sum())
+    return travel / r.duration_s * 3600.0, float(np.mean(np.abs(r.pv)))
 
 
 def in_digits(load: Floats) -> Floats:
@@ -126,11 +126,13 @@ def bench(loop: Loop, others: Sequence[Loop], load: Floats, limits: TuningLimits
     loops = tuple(replace(one, controller=loop.controller) for one in (loop, *others))
     loads = tuple(cut if k % 2 == 0 else np.ascontiguousarray(cut[::-1]) for k in range(len(loops)))
     figures = np.array([_figures(*case) for case in zip(loops, loads, strict=True)])
-    return Bench(loops, loads, figures[:, 0], figures[:, 1], limits)
+    return Bench(loops, loads, figures[:, 0], figures[:, 1], most_ms(loops, limits), limits)
 
 
-def try_out(table: Bench, controller: Pid, ms: float, loops: int | None = None) -> Candidate:
-    """Score a candidate on the first `loops` loops of the bench (None: all)."""
+def try_out(table: Bench, controller: Pid, ms: float | None = None, loops: int | None = None) -> Candidate:
+    """Score a candidate, whose Ms on the first loop may be known, on the first `loops` of the bench (None: all)."""
+    if ms is None:
+        ms = maximum_sensitivity(replace(table.loops[0], controller=controller))
     some = table.loops[:loops]
     cases = zip(some, table.loads, strict=False)
     figures = np.array([_figures(replace(one, controller=controller), load) for one, load in cases])
@@ -232,7 +234,7 @@ def robust(loops: Sequence[Loop], controller: Pid, most: Sequence[float]) -> flo
     return first
 
 
-def bounds_now(loops: Sequence[Loop], limits: TuningLimits) -> list[float]:
+def most_ms(loops: Sequence[Loop], limits: TuningLimits) -> tuple[float, ...]:
     """The limits of Ms, or the present tuning's own where that is larger, the first loop's up to the samples' limit.
 
     A loop that has run for years at its present Ms is not made less robust by settings with no more; a valve model
@@ -241,17 +243,16 @@ def bounds_now(loops: Sequence[Loop], limits: TuningLimits) -> list[float]:
     most = limits.ms_most_sample
     now = [maximum_sensitivity(one) for one in loops]
     own = max(limits.ms_most, min(now[0], most))
-    return [own, *(max(most, ms if math.isfinite(ms) else most) for ms in now[1:])]
+    return (own, *(max(most, ms if math.isfinite(ms) else most) for ms in now[1:]))
 
 
 def _kept(table: Bench, most: Rejection, settings: list[Pid]) -> list[Candidate]:
     """Those of some settings that keep robustness, load rejection and error, tried on every loop."""
-    process, bounds = table.loops[0].process, bounds_now(table.loops, table.limits)
-    found = []
+    process, found = table.loops[0].process, []
     for pid in settings:
         if pid.ti_s / abs(pid.kp) > most.integral:
             continue
-        ms = robust(table.loops, pid, bounds)
+        ms = robust(table.loops, pid, table.most_ms)
         if ms is None or rejection(process, pid).peak > most.peak:
             continue
         if try_out(table, pid, ms, 1).error <= table.limits.error_growth:

@@ -8,13 +8,13 @@ from itertools import product
 
 import numpy as np
 
-from identification.models import Fopdt, Pid
+from identification.models import Fopdt
 from identification.record import Floats
 from identification.simulation.closed_loop import scan_step
 from tuning.forecast import CALMER, DERIVATIVE, SMALLER
-from tuning.frequency_response import integral_s, maximum_sensitivity
+from tuning.frequency_response import integral_s
 from tuning.rules import effective_delay, simc
-from tuning.search import Bench, Candidate, bounds_now, pairs, robust, rounded, try_out
+from tuning.search import Bench, Candidate, pairs, robust, rounded, try_out
 
 POINTS = 11
 """Gains and integral times of the curve's grid."""
@@ -62,11 +62,10 @@ def _with_derivative(table: Bench, curve: Sequence[Candidate], without: Candidat
     if loop.controller.td_s > 0.0:
         return None
     most = (1.0 - limits.worth_error) * (1.0 if without is None else min(without.worst_error, 1.0))
-    delay_s, bounds = effective_delay(loop.process, scan_step(loop)), bounds_now(table.loops, limits)
-    found = []
+    delay_s, found = effective_delay(loop.process, scan_step(loop)), []
     for c, share, gain in product(curve, SHARES, MORE):
         pid = replace(c.controller, kp=rounded(gain * c.controller.kp), td_s=rounded(share * delay_s))
-        ms = robust(table.loops, pid, bounds)
+        ms = robust(table.loops, pid, table.most_ms)
         first = None if ms is None else try_out(table, pid, ms, 1)
         if first is not None and first.error <= most and first.travel <= 1.0:
             found.append(first)
@@ -76,23 +75,10 @@ def _with_derivative(table: Bench, curve: Sequence[Candidate], without: Candidat
     return next(fit, None)
 
 
-def worst(table: Bench, settings: Mapping[str, Pid]) -> dict[str, Candidate]:
-    """What settings do on every loop of the bench, by name."""
-    first = table.loops[0]
-    return {
-        name: try_out(table, pid, maximum_sensitivity(replace(first, controller=pid)))
-        for name, pid in settings.items()
-    }
-
-
 def _front(table: Bench) -> tuple[Candidate, ...]:
     """Robust settings of a wide grid that no others beat in travel and in error, the calmest first."""
-    bounds = bounds_now(table.loops, table.limits)
-    found = []
-    for pid in pairs(table.loops[0], *_grid(table)):
-        ms = robust(table.loops, pid, bounds)
-        if ms is not None:
-            found.append(try_out(table, pid, ms, 1))
+    tried = ((pid, robust(table.loops, pid, table.most_ms)) for pid in pairs(table.loops[0], *_grid(table)))
+    found = [try_out(table, pid, ms, 1) for pid, ms in tried if ms is not None]
     front: list[Candidate] = []
     for c in sorted(found, key=lambda c: (c.travel, c.error)):
         if not front or c.error < front[-1].error:

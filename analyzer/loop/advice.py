@@ -75,25 +75,27 @@ def advise(
 ) -> Advice:
     """The advice on one assessed loop.
 
-    Parameters
-    ----------
-    found : Assessment
-    spec : LoopSpec
-    controller : Pid or None
-        The stated settings in percent and seconds.
-    pv_span : float
-        Span of PV in its own unit, for settings in engineering units.
-    config : Config
-    held : Pid or None
-        Settings that nights before have told, in percent and seconds: those are compared with the present ones.
+    controller, its stated settings in percent and seconds; pv_span, span of PV in its own unit, for settings in
+    engineering units; held, settings that nights before have told, which are then compared with the present ones.
     """
-    kept = withheld(found, spec, controller, pv_span, config)
+    kept, oscillation = withheld(found, spec, controller, pv_span, config), counting(found.oscillations)
     if not found.op_scaled and found.for_settings is not None:
         return _unscaled(kept, found.for_settings)
-    oscillation = counting(found.oscillations)
-    if kept is not None or controller is None or oscillation is None:
-        return kept or _without_settings(found.verdict)
-    return _sought(found, spec, controller, oscillation.period_s, pv_span, config, held)
+    if kept is not None:
+        return kept
+    assert controller is not None  # of others it is told why none are sought
+    assert oscillation is not None
+    proposed = propose(found.verdict, controller, oscillation.period_s, config)
+    proposal = proposed.proposal
+    if proposal.action is Action.UNDECIDED and found.verdict.cause is Cause.VALVE:
+        proposal = replace(proposal, action=Action.REPAIR_VALVE)
+    elif proposal.action is Action.UNDECIDED:
+        return _lacking(Needs(Lack.LONGER, Need.LONGER, (proposal.reason,)))
+    beside = None
+    if proposed.loop is not None and proposed.load is not None:
+        known = proposed.loop, proposed.load, held or proposal.new, oscillation.period_s, pv_span
+        beside = compared(*known, config.tuning, proposed.others)
+    return replace(_as_advice(proposal, spec, pv_span), compared=beside)
 
 
 def _unscaled(kept: Advice | None, needs: Needs) -> Advice:
@@ -103,38 +105,9 @@ def _unscaled(kept: Advice | None, needs: Needs) -> Advice:
     return _lacking(needs)
 
 
-def _sought(
-    found: Assessment,
-    spec: LoopSpec,
-    controller: Pid,
-    period_s: float,
-    pv_span: float,
-    config: Config,
-    held: Pid | None,
-) -> Advice:
-    """The settings that the tuning package proposes for a loop that oscillates, or what to do instead."""
-    proposed = propose(found.verdict, controller, period_s, config)
-    proposal = proposed.proposal
-    if proposal.action is Action.UNDECIDED and found.verdict.cause is Cause.VALVE:
-        proposal = replace(proposal, action=Action.REPAIR_VALVE)
-    elif proposal.action is Action.UNDECIDED:
-        return _lacking(Needs(Lack.LONGER, Need.LONGER, (proposal.reason,)))
-    beside = None
-    if proposed.loop is not None and proposed.load is not None:
-        new = held or proposal.controller or proposal.meanwhile
-        known = proposed.loop, proposed.load, new, period_s, spec, pv_span, config.tuning
-        beside = compared(*known, proposed.others)
-    return replace(_as_advice(proposal, spec, pv_span), compared=beside)
-
-
 def _or_repair(verdict: Verdict, other: Advice) -> Advice:
     """What is left to do where new settings lack something: a valve at fault is one all the same."""
     return Advice(Action.REPAIR_VALVE, other.reason) if verdict.cause is Cause.VALVE else other
-
-
-def _without_settings(verdict: Verdict) -> Advice:
-    """What is left to do where none are stated."""
-    return _or_repair(verdict, Advice(Action.CHECK_SETTINGS, words.NOT_STATED))
 
 
 def _lacking(needs: Needs) -> Advice:
@@ -176,7 +149,7 @@ def _unsupported(found: Assessment, controller: Pid | None, config: Config) -> A
     if found.for_settings is not None:
         return _lacking(found.for_settings)
     if controller is None:
-        return _without_settings(found.verdict)
+        return _or_repair(found.verdict, Advice(Action.CHECK_SETTINGS, words.NOT_STATED))
     if found.judged_h < config.advice.least_h:
         return _lacking(Needs(Lack.LONGER, Need.HOURS, (config.advice.least_h, found.judged_h)))
     return _too_thin(found, controller, config)

@@ -10,13 +10,7 @@ from typing import Any
 import numpy as np
 
 from analyzer.config import CauseLimits, Config
-from analyzer.loop.assessments import (
-    HOUR_S,
-    Assessments,
-    Hour,
-    assess_span,
-    hourly,
-)
+from analyzer.loop.assessments import HOUR_S, Assessments, Hour, assess_span, hourly
 from analyzer.loop.cause import (
     NO_CAUSE,
     Verdict,
@@ -110,38 +104,26 @@ def cause_of(
 ) -> Verdict:
     """The verdict on one loop by itself; abstains where the trends cannot tell."""
     record, oscillation = prepared.record, counting(found)
+    needs, measured = unfit_for_cause(prepared, oscillation, config), None
+    if needs is None and float(np.ptp(record.pv)) > 0.0:
+        try:
+            measured = measure(record, oscillation, controller, config.cause, found.spectrum, kind)
+        except NotAssessedError as error:
+            needs = Needs(Lack.UNBROKEN, Need.AS_TOLD, (str(error),))
+    verdict = NO_CAUSE if oscillation is None else not_assessed(needs)
+    if measured is not None:
+        verdict = verdict_by_measures(measured, prepared, oscillation, config)
+        if oscillation is not None:
+            verdict = told_slip_by_slip(verdict, oscillation.period_s, config.cause)
     dead = dead_valve(record, config.cause) if prepared.op_known else None
-    needs = unfit_for_cause(prepared, oscillation, config)
-    if needs or float(np.ptp(record.pv)) == 0.0:
-        verdict = not_assessed(needs) if oscillation is not None else NO_CAUSE
-        return with_dead_valve(verdict, dead) if dead else verdict
-    try:
-        measured = measure(record, oscillation, controller, config.cause, found.spectrum, kind)
-    except NotAssessedError as error:
-        needs = Needs(Lack.UNBROKEN, Need.AS_TOLD, (str(error),))
-        verdict = not_assessed(needs) if oscillation is not None else NO_CAUSE
-        return with_dead_valve(verdict, dead) if dead else verdict
-    verdict = verdict_by_measures(measured, prepared, oscillation, config)
-    if oscillation is not None:
-        verdict = told_slip_by_slip(verdict, oscillation.period_s, config.cause)
     return with_dead_valve(verdict, dead) if dead and verdict.cause is not Cause.VALVE else verdict
 
 
 def convicted(
     prepared: Prepared, found: Oscillations, controller: Pid | None, config: Config, kind: str
 ) -> tuple[Oscillations, Verdict]:
-    """What oscillates, and why: a cycle that alone is not regular enough to count does so where PV convicts the valve
-    of making it, for noise of no spectrum fits a valve's model.
-
-    Parameters
-    ----------
-    prepared : Prepared
-    found : Oscillations
-        What counts by itself.
-    controller : Pid or None
-    config : Config
-    kind : str
-    """
+    """What oscillates, of `found` what counts by itself, and why: a cycle that alone is not regular enough to count
+    does so where PV convicts the valve of making it, for noise of no spectrum fits a valve's model."""
     verdict = cause_of(prepared, found, controller, config, kind)
     quiet = verdict.measured
     if counting(found) is not None or not prepared.op_known or quiet is None:
@@ -194,11 +176,6 @@ def hidden(record: LoopRecord, found: Oscillations, controller: Pid | None, conf
     return Needs(Lack.FASTER, Need.OF_A_CYCLE, (period / samples, record.dt_s, period))
 
 
-def _dead_time_of(verdict: Verdict) -> float | None:
-    m = verdict.measured
-    return None if m is None else (m.play if verdict.cause is Cause.VALVE else m.linear).dead_time_s
-
-
 @dataclass(frozen=True, slots=True)
 class _Judged:
     """What a stretch of a record comes to: what oscillates in all of the record and in the stretch, why, and where
@@ -240,26 +217,11 @@ def assess(
     kind: str = "",
     earlier: Sequence[Earlier] = (),
 ) -> Assessment:
-    """Assess one loop.
+    """Assess one loop. Raises LacksError, a NotAssessedError, where the record cannot support it.
 
     Figures, hours, waves and trend are of the whole record; oscillations and verdict of the stretch that is judged.
-
-    Parameters
-    ----------
-    prepared : Prepared
-        The record on one clock, with masks.
-    controller : Pid or None
-        The stated settings in percent and seconds, those in force at the record's end.
-    config : Config
-    kind : str
-        The loop's type (flow, level, ...), empty where not stated.
-    earlier : sequence of Earlier
-        Settings that were in force in the record before, oldest first.
-
-    Raises
-    ------
-    NotAssessedError
-        Where the record cannot support it.
+    The controller has the stated settings [%, s], those in force at the record's end; kind is the loop's type (flow,
+    level, ...), empty where not stated; earlier, what was in force in the record before, oldest first.
     """
     lacking = unassessable(prepared.record, config)
     if lacking is not None:
@@ -276,7 +238,8 @@ def _assessment(prepared: Prepared, stretch: Stretch, judged: _Judged, config: C
     in_percent = prepared.op_known and prepared.op_scaled
     night = _known_without_op(assess_span(record, config.figures), in_percent)
     hours = hourly(record, judged.of_all, config.figures, night.noise_band_pct)
-    dead_time = _dead_time_of(judged.verdict)
+    m, at_fault = judged.verdict.measured, judged.verdict.cause is Cause.VALVE
+    dead_time = None if m is None else (m.play if at_fault else m.linear).dead_time_s
     close = close_view(judged.part.record, found, stretch.first)
     end_s = record.start_s + record.duration_s
     return Assessment(

@@ -146,10 +146,7 @@ def quiet_signs(m: Measured, limits: CauseLimits) -> tuple[Sign, ...]:
 
 def combined(signs: Iterable[Sign]) -> float:
     """Confidence [%]: the signs taken as independent, none of them certain by itself (0.9 at most)."""
-    doubt = 1.0
-    for sign in signs:
-        doubt *= 1.0 - 0.9 * sign.strength
-    return 100.0 * (1.0 - doubt)
+    return 100.0 * (1.0 - math.prod(1.0 - 0.9 * sign.strength for sign in signs))
 
 
 def fault_of(m: Measured, limits: CauseLimits) -> Fault:
@@ -234,12 +231,7 @@ def as_hint(verdict: Verdict, most_pct: float) -> Verdict:
 
 
 def dead_valve(record: LoopRecord, limits: CauseLimits) -> Sign | None:
-    """A valve that no longer moves PV: OP winds over much of its range, the error stays on one side, PV is still.
-
-    Returns
-    -------
-    Sign or None
-    """
+    """A valve that no longer moves PV: OP winds over much of its range, the error stays on one side, PV is still."""
     good = ~(record.mask("gap") | record.mask("manual"))
     if record.sp_estimated or good.sum() < 100:
         return None
@@ -322,14 +314,7 @@ def told_slip_by_slip(verdict: Verdict, period_s: float, limits: CauseLimits) ->
     by slip, the window has it as if it had been recorded. Settings are sought on the verdict before: sought on this
     one, whose stem takes up part of what the load did, they left 7 of 24 sticking loops of proofs/retuning.py
     (seeds 21, 22, 81, 82) with no smaller error, one with a larger by 47 %. Sought on the verdict before, they left
-    none of 14 (81, 82).
-
-    Parameters
-    ----------
-    verdict : Verdict
-    period_s : float
-        Of the cycle [s].
-    limits : CauseLimits
+    none of 14 (81, 82). The cycle has a period of period_s [s].
     """
     m = verdict.measured
     if (

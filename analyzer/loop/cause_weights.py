@@ -32,13 +32,13 @@ class Weights:
     """Weights of all measures.
 
     knots by measure, shape (k,) each; pieces, slopes of its line below, between and above them [nat per unit], shape
-    (1 + k, 3) each, causes as in CAUSES; usual, what a measure adds on average [nat], shape (3,) each; base
+    (1 + k, 3) each, causes as in CAUSES; usual, what a measure adds on average [nat], shape (len(NAMES), 3); base
     [nat], shape (3,).
     """
 
     knots: Mapping[str, Floats]
     pieces: Mapping[str, Floats]
-    usual: Mapping[str, Floats]
+    usual: Floats
     base: Floats
 
 
@@ -58,7 +58,7 @@ def weights() -> Weights:
     table = kept["measures"]
     knots = {n: np.array(table[n]["knots"], dtype=np.float64) for n in NAMES}
     pieces = {n: np.array([table[n][c] for c in order], dtype=np.float64).T for n in NAMES}
-    usual = {n: np.array(table[n]["usual"], dtype=np.float64) for n in NAMES}
+    usual = np.array([table[n]["usual"] for n in NAMES], dtype=np.float64)
     return Weights(knots, pieces, usual, np.array([kept["base"][c] for c in order], dtype=np.float64))
 
 
@@ -73,7 +73,7 @@ def contributions(found: Floats) -> Floats:
 def pushes(found: Floats) -> dict[str, Floats]:
     """How far each measure moves the odds of each cause, beyond what it usually does and beyond their mean [nat], of
     shape (3,) each, by its name."""
-    added = contributions(found) - np.array([weights().usual[n] for n in NAMES])
+    added = contributions(found) - weights().usual
     return dict(zip(NAMES, added - added.mean(axis=1, keepdims=True), strict=True))
 
 
@@ -143,28 +143,22 @@ def measures(m: Measured, o: Oscillation) -> Floats:
     return np.array(found, dtype=np.float64)
 
 
-def _evidence_figures(m: Measured, o: Oscillation) -> Figures:
-    t = m.trials
-    return (m.evidence,) if t is None else (m.evidence, t.agreeing, t.count)
-
-
 def _amplification_figures(m: Measured, o: Oscillation) -> Figures:
     return (m.amplification,) if m.stable else ()
-
-
-def _loop_gain_figures(m: Measured, o: Oscillation) -> Figures:
-    return () if m.controller is None else (abs(m.linear.gain * m.controller.kp),)
 
 
 GROUPS: Mapping[SignKind, tuple[tuple[str, ...], Callable[[Measured, Oscillation], Figures]]] = {
     SignKind.EVIDENCE: (
         ("evidence", "evidence_per_cycle", "agreeing", "steadiness", "jump"),
-        _evidence_figures,
+        lambda m, o: (m.evidence, *(() if m.trials is None else (m.trials.agreeing, m.trials.count))),
     ),
     SignKind.WIDTH: (("size",), lambda m, o: (m.evidence, m.size)),
     SignKind.LOAD_LEFT: (("line_linear", "line_valve"), lambda m, o: (m.line_linear, m.line_valve)),
     SignKind.AMPLIFICATION: (("amplification",), _amplification_figures),
-    SignKind.LOOP_GAIN: (("loop_gain",), _loop_gain_figures),
+    SignKind.LOOP_GAIN: (
+        ("loop_gain",),
+        lambda m, o: () if m.controller is None else (abs(m.linear.gain * m.controller.kp),),
+    ),
     SignKind.PROCESS: (("consistency",), lambda m, o: (m.consistency,)),
     SignKind.HARMONIC: (("harmonic",), lambda m, o: (m.harmonic,)),
     SignKind.WAVE_LEFT: (

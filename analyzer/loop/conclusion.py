@@ -20,7 +20,6 @@ from analyzer.loop.identified import gain_room, intervals, is_known
 from analyzer.loop.oscillation import Oscillations
 from analyzer.loop.setpoint_moves import as_row
 from analyzer.loops.spec import LoopSpec
-from identification.estimation.window import Fit
 
 Known = dict[str, Cell]
 AS_STATED = (
@@ -59,21 +58,11 @@ class Lost:
 def concluded(
     a: Assessment, advice: Advice, spec: LoopSpec, night: str, limits: AdviceLimits, **known: Cell
 ) -> Finding:
-    """What is known of a loop that was assessed.
-
-    Parameters
-    ----------
-    a : Assessment
-    advice : Advice
-    spec : LoopSpec
-        The settings in force at the night's end.
-    night : str
-    limits : AdviceLimits
-    **known : number or str
-        Further columns.
-    """
+    """What is known of a loop that was assessed: spec, with the settings in force at the night's end; known, further
+    columns."""
     v = a.verdict
     lacks = a.needs or v.needs
+    due = advice.due if advice.action is Action.REPAIR_VALVE else None
     shown = a.needs is None  # the record can show whether the loop oscillates
     return Finding(
         spec.loop,
@@ -86,7 +75,7 @@ def concluded(
         fault=v.fault if shown else Fault.UNDECIDED,
         confidence={c: pct for c, pct in v.confidence.items() if math.isfinite(pct)} if shown else {},
         signs=tuple(replace(s, strength=round(s.strength, 3)) for s in v.signs),
-        remedy=remedy(advice),
+        remedy=Remedy(advice.action, advice.reason, advice.kp_new, advice.ti_new, due),
         known={
             **stated(spec),
             **a.night.as_row(),
@@ -99,12 +88,6 @@ def concluded(
             **known,
         },
     )
-
-
-def remedy(advice: Advice) -> Remedy:
-    """What an advice comes to."""
-    due = advice.due if advice.action is Action.REPAIR_VALVE else None
-    return Remedy(advice.action, advice.reason, advice.kp_new, advice.ti_new, due)
 
 
 def _swing(found: Oscillations) -> Swing:
@@ -161,13 +144,21 @@ def _measured(a: Assessment, limits: AdviceLimits) -> Known:
 
 
 def _model_known(verdict: Verdict, limits: AdviceLimits) -> Mapping[str, float | None]:
+    """The constants told; gain and time constant apart only where the latter is well inside the window."""
     m = verdict.measured
     if m is None or verdict.cause not in (Cause.VALVE, Cause.TUNING):
         return {}
-    process, valve = _process_known(verdict.fit, limits), verdict.fit.valve
+    fit = verdict.fit
+    apart, valve = is_known(fit, limits), fit.valve
+    process = {
+        "gain": fit.gain if apart else None,
+        "time_constant_s": fit.time_constant_s if apart else None,
+        "slope_pct_per_s": fit.slope,
+        "dead_time_s": fit.process.dead_time_s,
+    }
     if verdict.cause is Cause.TUNING:
         return process
-    if verdict.fit is m.stick_slip:
+    if fit is m.stick_slip:
         return {**process, "stickband_pct": valve.stickband, "slip_jump_pct": valve.slip_jump}
     return {**process, "backlash_pct": valve.stickband}
 
@@ -182,17 +173,6 @@ def _of_half(verdict: Verdict, limits: AdviceLimits) -> Known:
     least, most = sorted((abs(slope.low), abs(slope.high)))
     one_way = slope.low * slope.high > 0.0
     return {"half_slope": slope.value} if one_way and most < limits.half_within * least else {}
-
-
-def _process_known(fit: Fit, limits: AdviceLimits) -> dict[str, float | None]:
-    """Process constants; gain and time constant apart only where the time constant is well inside the window."""
-    known = is_known(fit, limits)
-    return {
-        "gain": fit.gain if known else None,
-        "time_constant_s": fit.time_constant_s if known else None,
-        "slope_pct_per_s": fit.slope,
-        "dead_time_s": fit.process.dead_time_s,
-    }
 
 
 def _cycles_of(advice: Advice) -> Known:

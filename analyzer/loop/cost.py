@@ -29,7 +29,7 @@ def mark(row: Row, column: str) -> str:
     return "" if not row[column] or compares(row, column) else MARK
 
 
-def loss(error_pct: float | None, importance: float | None, stated: bool = True) -> float | None:
+def loss(error_pct: float | None, importance: float | None, stated: bool) -> float | None:
     """Average absolute error [% of span] times importance, 1 where none is stated; None without an error, or where
     no span is `stated`: percent of what was recorded compares with no other loop."""
     if error_pct is None or not stated:

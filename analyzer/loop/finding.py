@@ -143,17 +143,8 @@ def following(
 ) -> Finding:
     """A loop that follows another one: a load from outside moves it, and its own valve and settings are left alone.
 
-    Parameters
-    ----------
-    own : Finding
-        Of the loop alone.
-    root : Root
-    swing : Swing or None
-        What oscillates, its part in what is shared where that is no oscillation by itself.
-    confidence : mapping
-        Of each cause [%].
-    sign : Sign
-        That it follows.
+    own, of the loop alone; swing, its part in what is shared where that is no oscillation by itself; confidence of
+    each cause [%]; sign, that it follows.
     """
     return replace(
         own,

@@ -17,6 +17,7 @@ from identification.models import Estimate, Fopdt, Integrator, Loop, Pid, Proces
 from identification.record import Floats
 from identification.signals.robust import robust_deviation
 from identification.simulation.valve import StemLaw
+from tuning.forecast import SEED
 from tuning.frequency_response import maximum_sensitivity
 from tuning.rules import simc
 from tuning.search import scaled_valve
@@ -74,7 +75,7 @@ def gain_room(m: Measured) -> float | None:
     return abs(simc(process, scan_s=controller.scan_s).kp / controller.kp)
 
 
-def load_of(fit: Fit, controller: Pid, seed: int = 0) -> Floats:
+def load_of(fit: Fit, controller: Pid) -> Floats:
     """Load and noise [% PV] that the model leaves, on the scan's clock, the latest scans, shape (m,).
 
     The window's blocks have lost the noise from scan to scan. OP still has it, times the gain, and it dithers the
@@ -86,7 +87,7 @@ def load_of(fit: Fit, controller: Pid, seed: int = 0) -> Floats:
     clock = np.arange(int(window.duration_s / scan_s)) * scan_s
     load = np.interp(clock, np.arange(left.size) * window.dt_s, left)[-LOOP.load_scans :]
     if window.factor > 1:
-        load += scan_noise(window, controller) * np.random.default_rng(seed).normal(size=load.size)
+        load += scan_noise(window, controller) * np.random.default_rng(SEED).normal(size=load.size)
     return np.asarray(load, dtype=np.float64)
 
 
@@ -101,7 +102,7 @@ def scan_noise(window: Window, controller: Pid) -> float:
     return robust_deviation(jumps) / math.sqrt(6.0) / abs(controller.kp)
 
 
-def uncertain(fit: Fit, loop: Loop, samples: int = 6, seed: int = 0) -> tuple[Loop, ...]:
+def uncertain(fit: Fit, loop: Loop, samples: int = 6) -> tuple[Loop, ...]:
     """Loops drawn from the fit's covariance, of the same controller and the same kind of process."""
     lag, gain = math.log(fit.time_constant_s), math.log(abs(fit.gain))
     mean = np.array([lag, fit.process.dead_time_s, fit.valve.stickband, gain])
@@ -111,7 +112,7 @@ def uncertain(fit: Fit, loop: Loop, samples: int = 6, seed: int = 0) -> tuple[Lo
     unit = spread / np.outer(scale, scale) + 1e-9 * np.eye(mean.size)
     # not by singular vectors, whose signs are a matter of rounding
     root = scale[:, None] * np.linalg.cholesky(unit)
-    draws = mean + np.random.default_rng(seed).normal(size=(samples, mean.size)) @ root.T
+    draws = mean + np.random.default_rng(SEED).normal(size=(samples, mean.size)) @ root.T
     return tuple(_drawn(draw, fit, loop) for draw in draws)
 
 

@@ -13,12 +13,7 @@ from analyzer.loop.assessments import at_limits_share, noise_band
 from analyzer.loop.oscillation import Oscillation
 from identification.controller.pid_regression import fit_pi
 from identification.errors import NotAssessedError
-from identification.estimation.backlash_stiction import (
-    better_linear,
-    fit_linear,
-    fit_play,
-    fit_stick_slip,
-)
+from identification.estimation.backlash_stiction import better_linear, fit_linear, fit_play, fit_stick_slip
 from identification.estimation.evidence import (
     Trials,
     evidence,
@@ -141,13 +136,8 @@ def measure(
     error: Spectrum | None = None,
     kind: str = "",
 ) -> Measured:
-    """Fit the candidates and read what the signs need; see Measured.
-
-    Raises
-    ------
-    NotAssessedError
-        Good samples are too scattered for a model of how one follows from those before it.
-    """
+    """Fit the candidates and read what the signs need; see Measured. Raises NotAssessedError where good samples are
+    too scattered for a model of how one follows from those before it."""
     scale, calm = time_scale(record, oscillation, controller), oscillation is None
     window = window_of(record, scale, limits, kind, calm)
     _check_judged(window, limits)
@@ -235,13 +225,10 @@ def _refined(fits: tuple[Fit, Fit, Fit | None], best: Fit, hopeless: bool) -> tu
     fine = replace(window, fine=True)
     linear, play = (replace(fit, window=fine) for fit in fits[:2])
     stick = None if fits[2] is None else replace(fits[2], window=fine)
-    if hopeless:
-        return descend(linear), play, stick
-    return (
-        descend(linear),
-        descend(play, free_width=window.position is None),
-        None if stick is None else descend(stick),
-    )
+    if not hopeless:
+        play = descend(play, free_width=window.position is None)
+        stick = None if stick is None else descend(stick)
+    return descend(linear), play, stick
 
 
 def _hopeful(window: Window, due: Mask, limits: CauseLimits) -> float:

@@ -26,28 +26,13 @@ from analyzer.loop.sample_clock import (
     without_stray_ends,
 )
 from analyzer.loop.shared_valve import Shared, half, selected
-from analyzer.loops.spec import LoopSpec
+from analyzer.loops.spec import STATED, LoopSpec
 from identification.record import Floats, LoopRecord, Mask
 
 RECORDED_RANGE = (0.005, 0.995)
 """Quantiles of PV that stand for its span where none is stated; contract of loops.csv."""
-MANUAL_TEXTS = ["man", "iman", "lo", "manual", "hand", "local", "rout", "0", "off", "oos", "init"]
-"""Mode texts, lower case, that mean that the controller does not move OP."""
-AUTOMATIC_TEXTS = [
-    "aut",
-    "auto",
-    "automatic",
-    "cas",
-    "casc",
-    "cascade",
-    "rcas",
-    "rsp",
-    "remote",
-    "spc",
-    "1",
-    "on",
-]
-"""Mode texts, lower case, that mean that it does."""
+MODES: Mapping[str, list[str]] = STATED["modes"]
+"""Mode texts, lower case, that mean that the controller does not move OP, or that it does."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,13 +107,8 @@ def _trimmed(pv: Series | None, spec: LoopSpec, limits: QualityLimits) -> tuple[
 
 
 def prepare(spec: LoopSpec, series: Mapping[str, Series], limits: QualityLimits) -> Prepared:
-    """One loop's raw samples on one clock, with masks; the spec has the tags that the export has.
-
-    Raises
-    ------
-    LacksError
-        Where there is no PV, or too little of it; the text says what is needed and what there is.
-    """
+    """One loop's raw samples on one clock, with masks; the spec has the tags that the export has. Raises LacksError
+    where there is no PV, or too little of it; the text says what is needed and what there is."""
     series = _numeric(spec, series, limits)
     trimmed, dt = _trimmed(series.get(spec.pv or ""), spec, limits)
     clock = clock_of(trimmed, dt, limits)
@@ -178,13 +158,8 @@ def _shared(
 
 
 def _numeric(spec: LoopSpec, series: Mapping[str, Series], limits: QualityLimits) -> dict[str, Series]:
-    """The samples of a loop, what is no number in SP, PV, OP or position bad.
-
-    Raises
-    ------
-    LacksError
-        Where many values of one of them were not understood: what is left would be another trend.
-    """
+    """The samples of a loop, what is no number in SP, PV, OP or position bad. Raises LacksError where many values of
+    one of them were not understood: what is left would be another trend."""
     out = dict(series)
     for role in ("pv", "sp", "op", "position"):
         tag = getattr(spec, role)
@@ -256,8 +231,8 @@ def _mode_mask(mode: Series, clock: Floats) -> Mask | None:
     at = np.clip(np.searchsorted(mode.stamp_s, clock, side="right") - 1, 0, None)
     if mode.text is not None:
         texts = np.array([str(t).strip().lower() for t in mode.text], dtype=object)
-        known = np.isin(texts, MANUAL_TEXTS) | np.isin(texts, AUTOMATIC_TEXTS)
-        return np.isin(texts, MANUAL_TEXTS)[at] if known.any() else None
+        manual = np.isin(texts, MODES["manual"])
+        return manual[at] if (manual | np.isin(texts, MODES["automatic"])).any() else None
     if mode.bad.all():
         return None
     return (mode.value == 0)[at] & ~mode.bad[at]

@@ -165,23 +165,23 @@ def phases(found: Sequence[Move]) -> tuple[Phase, ...]:
         if not same:
             kinds.append([])
         (same[0] if same else kinds[-1]).append(m)
-    return tuple(_phase(k) for k in kinds if len(k) >= LOOP.alike_least)
+    return tuple(
+        Phase(
+            float(np.median([m.begin for m in k])),
+            float(np.median([m.begin + m.size for m in k])),
+            tuple(m.start_s for m in k),
+            tuple(round(100.0 * m.overshoot, 2) for m in k),
+            tuple(m.settled_s for m in k),
+        )
+        for k in kinds
+        if len(k) >= LOOP.alike_least
+    )
 
 
 def alike(one: tuple[float, float], other: tuple[float, float]) -> bool:
     """Whether moves from one level to another are of one kind [% of span]."""
     most = LOOP.alike_level * abs(one[1] - one[0])
     return all(abs(a - b) <= most for a, b in zip(one, other, strict=True))
-
-
-def _phase(of: Sequence[Move]) -> Phase:
-    return Phase(
-        float(np.median([m.begin for m in of])),
-        float(np.median([m.begin + m.size for m in of])),
-        tuple(m.start_s for m in of),
-        tuple(round(100.0 * m.overshoot, 2) for m in of),
-        tuple(m.settled_s for m in of),
-    )
 
 
 def as_row(found: Sequence[Move]) -> dict[str, float | str | None]:

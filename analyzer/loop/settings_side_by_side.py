@@ -10,8 +10,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analyzer.limits import LOOP
-from analyzer.loops.spec import LoopSpec
-from analyzer.loops.tags import as_stated
 from identification.models import Loop, Pid
 from identification.record import Floats, LoopRecord
 from reports.pages import as_held
@@ -20,8 +18,8 @@ from tuning.frequency_response import integral_s
 from tuning.harmonic_balance import TravelMap, travel_map
 from tuning.limits import TuningLimits
 from tuning.rules import simc
-from tuning.search import Candidate, bench, rejection
-from tuning.trade import Trade, trade, worst
+from tuning.search import Candidate, bench, rejection, try_out
+from tuning.trade import Trade, trade
 
 MAP_POINTS, SPREAD = 24, 12.0
 """Points of the travel map along each axis, and how far it reaches about the present settings; ours."""
@@ -45,10 +43,10 @@ class Comparison:
 
     loop, the identified one with its present controller; load [% PV] on the controller's clock, shape (n,); tried, in
     the order in which they are told; shown, a piece of each simulation by name; travel, the map of the limit cycle's
-    travel, None where the valve is free; stated, Kp and Ti by name in the plant's units; peaks, largest error after a
-    unit step of load at the valve, over the present one, by name [-]; everywhere, each on all
-    loops that the data allow, by name; curve, what no other settings beat in travel and in error, the calmest first;
-    repaired, the present settings behind a free valve, None where it is free or rests.
+    travel, None where the valve is free; pv_span, that of PV in its own unit; peaks, largest error after a unit step
+    of load at the valve, over the present one, by name [-]; everywhere, each on all loops that the data allow, by
+    name; curve, what no other settings beat in travel and in error, the calmest first; repaired, the present settings
+    behind a free valve, None where it is free or rests.
     """
 
     loop: Loop
@@ -56,7 +54,6 @@ class Comparison:
     tried: tuple[Tried, ...]
     shown: Mapping[str, Shown]
     travel: TravelMap | None
-    stated: Mapping[str, tuple[float, float]]
     pv_span: float
     peaks: Mapping[str, float]
     everywhere: Mapping[str, Candidate]
@@ -104,7 +101,6 @@ def compared(
     load: Floats,
     new: Pid | None,
     period_s: float,
-    spec: LoopSpec,
     pv_span: float,
     limits: TuningLimits,
     others: Sequence[Loop] = (),
@@ -121,7 +117,7 @@ def compared(
     moves = table.travel[0] > 0.0  # of a stem that rests no settings are calmer, and a ratio says nothing
     found = trade(table) if moves else Trade((), {})
     settings = alternatives(loop, new, {name: c.controller for name, c in found.chosen.items()})
-    everywhere = worst(table, settings) if moves else {}
+    everywhere = {name: try_out(table, pid) for name, pid in settings.items()} if moves else {}
     settings = {k: pid for k, pid in settings.items() if k not in found.chosen or not _beaten(k, everywhere)}
     now, each = rejection(loop.process, loop.controller), tried(loop, load, settings)
     free = None if loop.valve is None or not moves else replace(loop, valve=None)
@@ -131,7 +127,6 @@ def compared(
         each,
         {t.name: _piece(t.record, period_s) for t in each},
         _map_of_settings(loop, tuple(settings.values())),
-        {name: as_stated(pid, spec, pv_span) for name, pid in settings.items()},
         pv_span,
         {name: rejection(loop.process, pid).peak / now.peak for name, pid in settings.items()},
         everywhere,

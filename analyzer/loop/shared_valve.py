@@ -7,7 +7,7 @@ valve tells which. A half of a split range rests at an end of its valve while th
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
@@ -43,16 +43,8 @@ class Shared:
 
 
 def selected(record: LoopRecord, other: Floats, other_bad: Mask, limits: QualityLimits) -> Shared | None:
-    """A loop beside the output of the controller with which it shares a valve by a select; None where none is seen.
-
-    Parameters
-    ----------
-    record : LoopRecord
-    other : ndarray of shape (n,)
-        The other controller's output [% of the valve].
-    other_bad : ndarray of bool, shape (n,)
-    limits : QualityLimits
-    """
+    """A loop beside the output of the controller with which it shares a valve by a select, shape (n,) [% of the
+    valve]; None where none is seen."""
     good = record.usable & ~other_bad
     lower = record.op < other
     share, least = float(lower[good].mean() if good.any() else 0.0), limits.shared_share
@@ -64,20 +56,19 @@ def selected(record: LoopRecord, other: Floats, other_bad: Mask, limits: Quality
         return None
     idle = good & (lower != low)
     far = record.op >= 100.0 - limits.limit_pct if low else record.op <= limits.limit_pct
-    return Shared(
-        idle,
-        100.0 * float(1.0 - idle[good].mean()),
-        _changes_per_h(idle, good, record.dt_s),
-        100.0 * float(far[idle].mean()),
-        _takeover_s(record, idle, good),
+    return replace(
+        _in_turn(idle, good, record.dt_s),
+        winds_up_pct=100.0 * float(far[idle].mean()),
+        takeover_s=_takeover_s(record, idle, good),
         valve=np.where(idle, other, record.op),
     )
 
 
-def _changes_per_h(idle: Mask, good: Mask, dt_s: float) -> float:
-    """How often a valve passes from one to the other, in an hour of good time."""
+def _in_turn(idle: Mask, good: Mask, dt_s: float) -> Shared:
+    """What the two have in turn: how long, and how often it passes in an hour of good time."""
     passed = int(np.count_nonzero(np.diff(idle[good].astype(np.int8))))
-    return passed / max(float(good.sum()) * dt_s / 3600.0, 1e-9)
+    hours = max(float(good.sum()) * dt_s / 3600.0, 1e-9)
+    return Shared(idle, 100.0 * float(1.0 - idle[good].mean()), passed / hours)
 
 
 def _takeover_s(record: LoopRecord, idle: Mask, good: Mask) -> float | None:
@@ -92,17 +83,8 @@ def _takeover_s(record: LoopRecord, idle: Mask, good: Mask) -> float | None:
 
 
 def half(record: LoopRecord, whole: Floats, whole_bad: Mask, limits: QualityLimits) -> Shared | None:
-    """A half of a split range beside the output of its controller; None where it never rests.
-
-    Parameters
-    ----------
-    record : LoopRecord
-        Its OP is the half's own.
-    whole : ndarray of shape (n,)
-        The output of the controller of both halves [%].
-    whole_bad : ndarray of bool, shape (n,)
-    limits : QualityLimits
-    """
+    """A half of a split range, OP its own, beside the output of the controller of both halves, shape (n,) [%]; None
+    where it never rests."""
     good = record.usable & ~whole_bad
     ends = record.op <= limits.limit_pct, record.op >= 100.0 - limits.limit_pct
     rest = max(ends, key=lambda end: int((end & good).sum()))
@@ -111,9 +93,7 @@ def half(record: LoopRecord, whole: Floats, whole_bad: Mask, limits: QualityLimi
         return None
     working, end = good & ~ends[0] & ~ends[1], 0.0 if rest is ends[0] else 100.0
     slope, begin = _part_of(record.op, whole, working, end, limits.half_samples)
-    valve_pct = 100.0 * float(1.0 - idle[good].mean())
-    changes = _changes_per_h(idle, good, record.dt_s)
-    return Shared(idle, valve_pct, changes, split_at_pct=begin, split_slope=slope)
+    return replace(_in_turn(idle, good, record.dt_s), split_at_pct=begin, split_slope=slope)
 
 
 def _part_of(

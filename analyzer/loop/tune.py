@@ -15,7 +15,7 @@ from analyzer.loop.decisions import Action, Cause, Need, Needs
 from analyzer.loop.fitness import at_limits, unfit_for_cause
 from analyzer.loop.identified import intervals, load_of, tuned, uncertain
 from analyzer.loop.judged_stretch import controller_of, earlier_settings
-from analyzer.loop.quality import Prepared, prepare
+from analyzer.loop.quality import prepare
 from analyzer.loop.settings_side_by_side import middle_ti
 from analyzer.loops.changes import in_force
 from analyzer.loops.spec import LoopSpec, spec_of
@@ -42,13 +42,8 @@ MAP_POINTS = 36
 NO_MOVES = Needs(None, Need.MOVING_PV)
 SPREAD = 20.0
 """The map reaches this factor below and above the present settings."""
-FORECAST = {
-    "average_absolute_error": "average absolute error",
-    "stem_travel": "stem travel",
-    "oscillation": "oscillation",
-    "variability": "variability",
-}
-"""Figures of a forecast as they are called."""
+FORECAST = ("average_absolute_error", "stem_travel", "oscillation", "variability")
+"""Figures of a forecast that are told."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,11 +66,6 @@ class Tuning:
     load: Floats
     others: tuple[Loop, ...] = ()
 
-    @property
-    def new(self) -> Pid | None:
-        """The settings proposed, or those until a repair; None where there are none."""
-        return self.proposal.controller or self.proposal.meanwhile
-
 
 def _model(verdict: Verdict, controller: Pid, limits: AdviceLimits) -> tuple[Loop, Fit, tuple[Loop, ...]]:
     """The loop that the forecast runs on, its fit, and what else it may be."""
@@ -86,36 +76,17 @@ def _model(verdict: Verdict, controller: Pid, limits: AdviceLimits) -> tuple[Loo
 
 
 def identified(found: Assessment, limits: AdviceLimits) -> tuple[Process, Valve, dict[str, Estimate]]:
-    """Process, valve and their parameters with 90 % intervals, as one assessed loop's verdict has them.
-
-    Raises
-    ------
-    NotAssessedError
-        Where the loop's trends give no model.
-    """
+    """Process, valve and their parameters with 90 % intervals, as one assessed loop's verdict has them. Raises
+    NotAssessedError where the loop's trends give no model."""
     verdict = found.verdict
     fit, at_fault = verdict.fit, verdict.cause is Cause.VALVE
     valve = fit.valve.valve if at_fault else None
     return tuned(fit, at_fault, limits), valve, intervals(fit, at_fault, limits)
 
 
-def tune(found: Assessment, controller: Pid, config: Config, kept: Advice | None = None) -> Tuning:
-    """Propose settings for one assessed loop.
-
-    Parameters
-    ----------
-    found : Assessment
-    controller : Pid
-        The stated settings in percent and seconds.
-    config : Config
-    kept : Advice or None
-        Why none are to be proposed (analyzer.loop.advice.withheld).
-
-    Raises
-    ------
-    NotAssessedError
-        Where the loop's trends give no model.
-    """
+def tune(found: Assessment, controller: Pid, config: Config, kept: Advice | None) -> Tuning:
+    """Propose settings for one assessed loop whose stated ones are `controller` [%, s]; `kept`, why none are to be
+    proposed (advice.withheld). Raises NotAssessedError where the loop's trends give no model."""
     verdict = found.verdict
     first = found.oscillations.first
     period = first.period_s if first else None
@@ -125,7 +96,7 @@ def tune(found: Assessment, controller: Pid, config: Config, kept: Advice | None
     else:
         proposal = propose(verdict, controller, period, config).proposal
     load = load_of(fit, controller)
-    new = proposal.controller or proposal.meanwhile
+    new = proposal.new
     is_long = load.size >= config.tuning.least_steps
     forecast = predict(model, new, load, others) if new and is_long else None
     return Tuning(
@@ -139,10 +110,6 @@ def tune(found: Assessment, controller: Pid, config: Config, kept: Advice | None
         load,
         others,
     )
-
-
-def _between(e: Estimate) -> str:
-    return f"{e.value:.3g} ({e.low:.3g} to {e.high:.3g}) {e.unit}"
 
 
 def _cycle_lines(t: Tuning) -> list[str]:
@@ -163,17 +130,17 @@ def _cycle_lines(t: Tuning) -> list[str]:
 def _forecast_lines(t: Tuning) -> list[str]:
     if t.forecast is None:
         return []
-    proposal_lines = ["forecast on the reconstructed load (90 % intervals):"]
-    for key, name in FORECAST.items():
+    lines = ["forecast on the reconstructed load (90 % intervals):"]
+    for key in FORECAST:
         b, a, c = t.forecast.before[key], t.forecast.after[key], t.forecast.change[key]
         change = f"{100 * c.value:+.0f} % ({100 * c.low:+.0f} to {100 * c.high:+.0f})"
-        proposal_lines.append(f"  {name}: {b.value:.3g} to {a.value:.3g} {b.unit}, {change}")
-    return proposal_lines
+        lines.append(f"  {key.replace('_', ' ')}: {b.value:.3g} to {a.value:.3g} {b.unit}, {change}")
+    return lines
 
 
 def proposal_lines(t: Tuning, spec: LoopSpec, pv_span: float) -> list[str]:
     """The proposal in words and figures."""
-    out = [f"{name}: {_between(e)}" for name, e in t.estimates.items()]
+    out = [f"{k}: {e.value:.3g} ({e.low:.3g} to {e.high:.3g}) {e.unit}" for k, e in t.estimates.items()]
     if "gain" not in t.estimates:
         out.append("gain and time constant: only their ratio is known from this record")
     out += [*_cycle_lines(t), f"action: {t.proposal.action}"]
@@ -189,7 +156,7 @@ def pictures(t: Tuning, title: str) -> tuple[Picture, ...]:
     out: tuple[Picture, ...] = ()
     if t.model.valve is not None:
         out = (_curves(t, title), _map_field(t, title))
-    return out if t.new is None else (*out, _trend_panels(t, t.new, title))
+    return out if t.proposal.new is None else (*out, _trend_panels(t, t.proposal.new, title))
 
 
 def _curves(t: Tuning, title: str) -> Plot:
@@ -247,20 +214,9 @@ def _trend_panels(t: Tuning, new: Pid, title: str) -> Panels:
     return Panels("forecast", f"{title}: both tunings on the same load", plots)
 
 
-def _unfit(prepared: Prepared, config: Config) -> Needs | None:
-    """What the trends lack for a model, the nearest first; None where nothing is known."""
-    limited = at_limits(prepared.record, config.quality) if prepared.op_known else None
-    return limited or unfit_for_cause(prepared, None, config)
-
-
 def proposal(asked: Asked, loop: str, drawn: bool) -> tuple[list[str], dict[str, bytes]]:
-    """Lines of text and, if wanted, pictures by file name for the last night of one loop.
-
-    Raises
-    ------
-    InputError, NotAssessedError
-        Where the loop or its settings are not known, or its trends give no model.
-    """
+    """Lines of text and, if wanted, pictures by file name for the last night of one loop. Raises InputError where the
+    loop or its settings are not known, NotAssessedError where its trends give no model."""
     export, specs, _ = asked.opened()
     row, config = spec_of(specs, loop), asked.config
     night = nights_of(export, [row], config.nights, (asked.since_s, asked.until_s), asked.zone)[-1]
@@ -274,7 +230,8 @@ def proposal(asked: Asked, loop: str, drawn: bool) -> tuple[list[str], dict[str,
     head = [f"{loop}, night {night.name}: cause {found.verdict.cause}"]
     text = head + [f"sign of {s.points_to}: {sign_in_full(s)}" for s in found.verdict.signs]
     if found.verdict.measured is None:
-        needs = _unfit(prepared, config)
+        limited = at_limits(prepared.record, config.quality) if prepared.op_known else None
+        needs = limited or unfit_for_cause(prepared, None, config)  # the nearest first
         if found.verdict.cause is not Cause.VALVE:
             raise NotAssessedError(f"{loop}: {needs or found.verdict.needs or NO_MOVES}")
         return [*text, f"action: {Action.REPAIR_VALVE}", f"no settings: {needs or NO_MOVES}"], {}
@@ -293,9 +250,10 @@ def _with_settings_beside(
     from reports.pictures import as_file
 
     period_s = t.period_s or 10.0 * slowest_s(t.model)
-    bounded = t.new is not None or is_stable(t.model)  # else what is identified is no loop to try settings on
-    known = t.model, t.load, t.new, period_s, spec, pv_span, config.tuning, t.others
-    sought = t.new is not None or t.proposal.before is not None
+    new = t.proposal.new
+    bounded = new is not None or is_stable(t.model)  # else what is identified is no loop to try settings on
+    known = t.model, t.load, new, period_s, pv_span, config.tuning, t.others
+    sought = new is not None or t.proposal.before is not None
     found = compared(*known) if bounded and (sought or drawn) else None
     if found is not None and sought:
         text = [*text, *choices(found, spec)]

@@ -18,7 +18,6 @@ from analyzer.loop.measure import Measured
 from analyzer.loop.quality import Prepared
 from identification.estimation.gauss_newton import covariance
 from identification.estimation.width_profile import WIDTHS, width_profile
-from identification.estimation.window import Fit
 from identification.limits import INTERVALS
 from identification.record import Floats
 from identification.signals.robust import robust_deviation
@@ -30,16 +29,8 @@ Known = tuple[float, float]
 def witness(verdict: Verdict, oscillates: bool, prepared: Prepared, config: Config) -> str | None:
     """What a record says, as the store keeps it (JSON): the profile of widths and the evidence that it takes to
     tell a fault [nat], the evidence for a slip jump and what it takes [nat], and constants with the deviation
-    of their logarithms; None where nothing was fitted.
-
-    Parameters
-    ----------
-    verdict : Verdict
-    oscillates : bool
-    prepared : Prepared
-        PV's grid may hold PV still as a valve would, and compression cuts turns so that they look like slips.
-    config : Config
-    """
+    of their logarithms; None where nothing was fitted, or PV's grid may hold PV still as a valve would. Compression
+    cuts turns so that they look like slips: nothing is said of a jump then."""
     m, limits = verdict.for_settings.measured, config.cause
     if m is None or hidden_by_grid(m, prepared.pv_step, oscillates, limits):
         return None
@@ -86,7 +77,13 @@ def _constants_of_fit(
     assert fit is not None
     spread, found = covariance(fit, free_width=worn), {}
     if np.isfinite(spread).all() and fit.gain != 0.0:
-        found = _process_of_fit(fit, spread)
+        dead_s = fit.process.dead_time_s
+        found = {
+            "slope": (fit.slope, slope_deviation(fit, spread)),
+            "time_constant_s": (fit.time_constant_s, math.sqrt(spread[0, 0])),
+            "gain": (fit.gain, math.sqrt(spread[3, 3]) / abs(fit.gain)),
+            "dead_time_s": (dead_s, math.sqrt(spread[1, 1]) / max(dead_s, 1e-9)),
+        }
         if worn:
             relative = math.sqrt(spread[2, 2]) / max(fit.valve.stickband, 1e-9)
             found |= {"width": (fit.valve.stickband, relative), "slip_jump": (fit.valve.slip_jump, relative)}
@@ -95,14 +92,3 @@ def _constants_of_fit(
         found["width"] = valve.stickband, INTERVALS.decoded
         found["slip_jump"] = valve.slip_jump, math.log(INTERVALS.least_jump)
     return found
-
-
-def _process_of_fit(fit: Fit, spread: Floats) -> dict[str, Known]:
-    """Slope, time constant, gain and dead time of a fit, by its covariance of (log T, L, stickband, gain)."""
-    dead_s = fit.process.dead_time_s
-    return {
-        "slope": (fit.slope, slope_deviation(fit, spread)),
-        "time_constant_s": (fit.time_constant_s, math.sqrt(spread[0, 0])),
-        "gain": (fit.gain, math.sqrt(spread[3, 3]) / abs(fit.gain)),
-        "dead_time_s": (dead_s, math.sqrt(spread[1, 1]) / max(dead_s, 1e-9)),
-    }

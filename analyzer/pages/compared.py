@@ -13,10 +13,10 @@ import numpy as np
 from analyzer.limits import PAGES
 from analyzer.loop.settings_side_by_side import SPREAD, Comparison
 from analyzer.loops.spec import LoopSpec
-from analyzer.loops.tags import derivative_as_stated, unit_ratio
+from analyzer.loops.tags import as_stated, derivative_as_stated, unit_ratio
 from analyzer.pages.words import number, page_table, signed, texts
 from analyzer.words.units import duration, gain_unit
-from identification.models import Integrator
+from identification.models import Integrator, Pid
 from identification.simulation.closed_loop import scan_step
 from identification.simulation.lag import discretize
 from identification.simulation.valve import law_of
@@ -83,15 +83,16 @@ def _offers(c: Comparison, settings: list[str], repair: str) -> list[str]:
 
 def _typed(c: Comparison, name: str, spec: LoopSpec) -> str:
     """Settings as they are typed in."""
-    kp, ti = c.stated[name]
+    pid = next(t.controller for t in c.tried if t.name == name)
+    kp, ti = as_stated(pid, spec, c.pv_span)
     gain = gain_unit(spec.gain_unit, spec.pv_unit, spec.op_unit)
-    derivative = "" if name != DERIVATIVE else f" and {_td(c, name, spec)}"
+    derivative = "" if name != DERIVATIVE else f" and {_td(c, pid, spec)}"
     return f"Kp {number(kp)} {gain} and Ti {number(ti)} {spec.ti_unit}{derivative}"
 
 
-def _td(c: Comparison, name: str, spec: LoopSpec) -> str:
+def _td(c: Comparison, pid: Pid, spec: LoopSpec) -> str:
     """A derivative time as it is typed in."""
-    td = derivative_as_stated(next(t.controller for t in c.tried if t.name == name), spec, c.pv_span)
+    td = derivative_as_stated(pid, spec, c.pv_span)
     return f"Td {number(td)} {'s' if spec.ti_unit == 's' else 'min'}"
 
 
@@ -128,11 +129,11 @@ def table(c: Comparison, spec: LoopSpec, unit: str) -> parts.Table:
 
 
 def _tried_row(t: Tried, c: Comparison, spec: LoopSpec, unit: str) -> tuple[parts.Cell, ...]:
-    scale, now, (kp, ti) = c.pv_span / 100.0, c.tried[0], c.stated.get(t.name, c.stated[NOW])
+    scale, now, (kp, ti) = c.pv_span / 100.0, c.tried[0], as_stated(t.controller, spec, c.pv_span)
     found = c.everywhere.get(t.name) if t is not now else None
     worst = "" if found is None else ", ".join(map(_against_now_pct, (found.worst_travel, found.worst_error)))
     ms = "unstable" if math.isinf(t.ms) else f"{t.ms:.2f}"
-    derivative = f", {_td(c, t.name, spec)}" if t.name == DERIVATIVE else ""
+    derivative = f", {_td(c, t.controller, spec)}" if t.name == DERIVATIVE else ""
     rejected = (c.peaks.get(t.name, 1.0), _times(t, now))
     return (
         parts.Cell(t.name, kind="strong" if t.name == RECOMMENDED else ""),

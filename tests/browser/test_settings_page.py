@@ -64,7 +64,7 @@ def settings(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("settings")
     for name, (spec, _) in CASES.items():
         new = replace(loop_of(name).controller, kp=0.4, ti_s=60.0)
-        found = compared(loop_of(name), load(), new, 120.0, spec, SPAN, Config().tuning)
+        found = compared(loop_of(name), load(), new, 120.0, SPAN, Config().tuning)
         assert found is not None
         write_html(
             [replace(settings_page(spec.loop, "2026-03-08", found, spec), name=name)], out, single_file=True

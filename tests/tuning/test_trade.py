@@ -94,7 +94,7 @@ def test_a_derivative_that_stays_is_said_to(td_s):
     spec = LoopSpec("L", kp=0.4, ti=60.0, td=td_s, pv_lo=0.0, pv_hi=100.0)
     loop = Loop(Fopdt(1.2, 30.0, 3.0), Pid(0.4, 60.0, td_s), Backlash(3.0))
     load = 0.3 * np.sin(np.arange(4000) / 300.0)
-    found = compared(loop, load, Pid(0.3, 90.0, td_s), 120.0, spec, 100.0, LIMITS)
+    found = compared(loop, load, Pid(0.3, 90.0, td_s), 120.0, 100.0, LIMITS)
     assert {t.controller.td_s for t in found.tried} == {td_s}
     assert ("derivative" in page.table(found, spec, "%").note) == (td_s > 0.0)
 
@@ -103,7 +103,7 @@ def test_a_stem_that_rests_has_nothing_to_trade():
     """Of a loop whose stem rests under its load the page is drawn, with no choice, no price and no repair."""
     spec = LoopSpec("L", kp=0.4, ti=60.0, pv_lo=0.0, pv_hi=100.0)
     loop = Loop(Fopdt(1.2, 30.0, 3.0), Pid(0.4, 60.0), Stiction(40.0, 20.0))
-    found = compared(loop, 0.01 * np.sin(np.arange(4000) / 300.0), None, 120.0, spec, 100.0, LIMITS)
+    found = compared(loop, 0.01 * np.sin(np.arange(4000) / 300.0), None, 120.0, 100.0, LIMITS)
     assert found.tried[0].stem_travel == 0.0
     assert (found.curve, dict(found.everywhere), found.repaired) == ((), {}, None)
     assert page.price(found, "%") is None
