@@ -9,15 +9,15 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
+from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 
 from analyzer.config import FigureLimits
 from analyzer.loop.oscillation import Oscillations
-from identification.models import Backlash
 from identification.record import Floats, LoopRecord, Mask
 from identification.signals.robust import robust_deviation
-from identification.simulation.valve import law_of, walk
 
 HOUR_S = 3600.0
 ROUNDING = 1e-9
@@ -69,36 +69,96 @@ class Hour:
     oscillating_pct: float
 
 
+class Trends(NamedTuple):
+    """Set point, PV and OP of a span [% of span], and where OP is at a limit, shape (n,) each."""
+
+    sp: Floats
+    pv: Floats
+    op: Floats
+    saturated: Mask
+
+
+class Sums(NamedTuple):
+    """Over the samples that are good and in automatic: means of |e|, SP, PV and OP, standard deviations of e and PV
+    [% of span], shares of time at limits and in good service [-], and how often e crosses the noise band; the set
+    point's travel over the whole span."""
+
+    absolute_error: float
+    sp: float
+    pv: float
+    op: float
+    error_deviation: float
+    pv_deviation: float
+    at_limits: float
+    service: float
+    crossings: int
+    sp_travel: float
+
+
+@njit(cache=True)
 def crossings_of(e: Floats, use: Mask, band: float) -> int:
     """How often an error, where it may be used, goes from beyond one side of a band to beyond the other."""
-    sides = e[use & (np.abs(e) > band)] > 0
-    return int(np.count_nonzero(sides[1:] != sides[:-1]))
+    side, count = 0, 0
+    for k in range(e.size):
+        if not use[k] or abs(e[k]) <= band:
+            continue
+        now = 1 if e[k] > 0 else -1
+        count += side == -now
+        side = now
+    return count
 
 
+@njit(cache=True)
 def travel_of(signal: Floats, use: Mask, step: int, deadband: float) -> tuple[float, int]:
     """Travel and reversals of every `step`-th sample of a signal beyond a deadband, shape (n,).
 
-    Moves between usable neighbours make one path, and what lies beyond the deadband is what a stem behind such a play
-    moves: what a signal moved during a gap is not known.
+    Moves between usable neighbours make one path: what a signal moved during a gap is not known.
     """
-    signal, use = signal[::step], use[::step]
-    if signal.size < 2:
-        return 0.0, 0
-    path = np.cumsum(np.where(use[1:] & use[:-1], np.diff(signal), 0.0))
-    moved = np.diff(walk(path, law_of(Backlash(deadband)), 0.0), prepend=0.0)
-    ways = np.sign(moved[np.abs(moved) > ROUNDING])
-    return summed(np.abs(moved)), int(np.count_nonzero(ways[1:] != ways[:-1]))
+    half, x, stem = 0.5 * deadband, 0.0, 0.0
+    path, way, turns = 0.0, 0.0, 0
+    for k in range(step, signal.size, step):
+        if use[k] and use[k - step]:
+            x += signal[k] - signal[k - step]
+        if abs(x - stem) <= half:
+            continue
+        new = x - half if x > stem else x + half
+        moved = new - stem
+        stem = new
+        path += abs(moved)
+        if abs(moved) > ROUNDING:
+            now = 1.0 if moved > 0 else -1.0
+            turns += way == -now
+            way = now
+    return path, turns
 
 
-def summed(x: Floats) -> float:
-    """The sum of values of shape (n,), n > 0, added one after the other: its last bit is then no matter of the
-    machine's registers, and nights compare."""
-    return float(np.cumsum(x)[-1])
+@njit(cache=True)
+def sums_of(x: Trends, use: Mask, small_error: float, band: float) -> Sums:
+    """Sums over the samples that may be used, at least one.
 
-
-def deviation(x: Floats) -> float:
-    """Standard deviation of values of shape (n,), n > 0, in their unit."""
-    return math.sqrt(summed((x - summed(x) / x.size) ** 2) / x.size)
+    small_error : under which a loop is in good service; band : beyond which the error has a side [% of span].
+    """
+    count, size, e, pv, op, sp, limits, service = 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0, 0
+    for k in range(x.pv.size):
+        if use[k]:
+            error = x.sp[k] - x.pv[k]
+            count += 1
+            size, e, pv = size + abs(error), e + error, pv + x.pv[k]
+            op, sp = op + x.op[k], sp + x.sp[k]
+            limits += x.saturated[k]
+            service += abs(error) < small_error and not x.saturated[k]
+    e, pv, ee, vv = e / count, pv / count, 0.0, 0.0
+    for k in range(x.pv.size):
+        if use[k]:
+            ee += (x.sp[k] - x.pv[k] - e) ** 2
+            vv += (x.pv[k] - pv) ** 2
+    sides = crossings_of(x.sp - x.pv, use, band)
+    moved = np.abs(np.diff(x.sp)).sum()
+    spread = math.sqrt(ee / count), math.sqrt(vv / count)
+    shares = limits / count, service / count
+    return Sums(
+        size / count, sp / count, pv, op / count, spread[0], spread[1], shares[0], shares[1], sides, moved
+    )
 
 
 def at_limits_share(record: LoopRecord) -> float:
@@ -125,27 +185,27 @@ def assess_span(record: LoopRecord, limits: FigureLimits, noise: float | None = 
     step = max(round(limits.travel_grid_s / record.dt_s), 1)
     path, turns = travel_of(record.stem, use, step, limits.travel_deadband_pct)
     band = noise_band(record.pv[use]) if noise is None else noise
-    error, pv, saturated = record.error[use], record.pv[use], record.mask("saturated")[use]
-    pv_mean, spread = summed(pv) / count, 2 * deviation(pv)
-    in_service = (np.abs(error) < limits.small_error_pct) & ~saturated
+    trends = Trends(record.sp, record.pv, record.op, record.mask("saturated"))
+    sums = sums_of(trends, use, limits.small_error_pct, 2 * band)
+    spread = 2 * sums.pv_deviation
     good = ~record.bad
     automatic = 100 * float((good & ~record.mask("manual")).sum()) / max(float(good.sum()), 1.0)
     return Assessments(
         usable_h=hours,
-        average_absolute_error_pct=summed(np.abs(error)) / count,
+        average_absolute_error_pct=sums.absolute_error,
         valve_travel_pct_per_h=path / hours,
         reversals_per_h=turns / hours,
-        variability_pct=2 * deviation(error),
-        pv_variability_pct=100 * spread / abs(pv_mean) if abs(pv_mean) > spread else None,
-        crossings_per_h=crossings_of(record.error, use, 2 * band) / hours,
+        variability_pct=2 * sums.error_deviation,
+        pv_variability_pct=100 * spread / abs(sums.pv) if abs(sums.pv) > spread else None,
+        crossings_per_h=sums.crossings / hours,
         noise_band_pct=band,
         normal_pct=automatic,
-        at_limits_pct=100 * (int(saturated.sum()) / count),
-        service_pct=automatic * (int(in_service.sum()) / count),
-        sp_mean_pct=summed(record.sp[use]) / count,
-        pv_mean_pct=pv_mean,
-        op_mean_pct=summed(record.op[use]) / count,
-        sp_travel_pct=summed(np.abs(np.diff(record.sp))),
+        at_limits_pct=100 * sums.at_limits,
+        service_pct=automatic * sums.service,
+        sp_mean_pct=sums.sp,
+        pv_mean_pct=sums.pv,
+        op_mean_pct=sums.op,
+        sp_travel_pct=sums.sp_travel,
     )
 
 

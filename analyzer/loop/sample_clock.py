@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numba import njit
 
 from analyzer.config import QualityLimits
 from analyzer.history.series import Series, main_span
@@ -23,8 +24,14 @@ def interval(stamp_s: Floats) -> float:
 
 
 def onto_clock(series: Series, clock: Floats, dt_s: float, limits: QualityLimits) -> tuple[Floats, Mask]:
-    """Values held on a clock, shape (n,): the last good one at or before each tick, the next one where there is none;
-    and True where it is a gap, shape (n,): older than gap_factor intervals of the tag, or not good."""
+    """Values held on a clock, and where there is nothing to hold.
+
+    Returns
+    -------
+    ndarray of shape (n,), ndarray of bool, shape (n,)
+        The last good value at or before each tick (the next one where there is none), and True where it is a
+        gap: older than gap_factor intervals of the tag, or not good.
+    """
     good = ~series.bad
     if not good.any():
         return np.zeros(clock.size), np.ones(clock.size, dtype=bool)
@@ -34,8 +41,9 @@ def onto_clock(series: Series, clock: Floats, dt_s: float, limits: QualityLimits
     at = np.searchsorted(stamp, clock + 0.01 * dt_s, side="right") - 1
     own = max(interval(stamp), dt_s) if stamp.size > 1 else dt_s
     age = clock - stamp[np.maximum(at, 0)]
+    lost = np.zeros(clock.size, dtype=bool)
     raw = np.clip(np.searchsorted(series.stamp_s, clock + 0.01 * dt_s, side="right") - 1, 0, None)
-    lost = ~good[raw] & (np.abs(clock - series.stamp_s[raw]) < 0.5 * dt_s)
+    lost |= ~good[raw] & (np.abs(clock - series.stamp_s[raw]) < 0.5 * dt_s)
     return value[np.maximum(at, 0)], (at < 0) | (age > limits.gap_factor * own) | lost
 
 
@@ -46,13 +54,26 @@ def _last_good_held(value: Floats, good: Mask) -> tuple[Floats, Mask]:
     return value[np.where(at < 0, int(np.argmax(good)), at)], ~good
 
 
+@njit(cache=True)
+def constant_for(value: Floats, samples: float) -> Mask:
+    """True where a value stands unchanged for at least so many samples, shape (n,)."""
+    out = np.zeros(value.size, dtype=np.bool_)
+    first = 0
+    for k in range(1, value.size + 1):
+        if k < value.size and value[k] == value[k - 1]:
+            continue
+        if k - first >= samples:
+            out[first:k] = True
+        first = k
+    return out
+
+
 def constant_stretches(value: Floats, dt_s: float, seconds: float, samples: int) -> Mask:
     """True where a value stands unchanged for so long [s] and so many samples, shape (n,)."""
-    edges = np.flatnonzero(np.concatenate(([True], value[1:] != value[:-1], [True])))
-    lasts = np.diff(edges)
-    return np.repeat(lasts >= max(samples, seconds / dt_s), lasts)
+    return constant_for(value, max(samples, seconds / dt_s))  # type: ignore[no-any-return]
 
 
+@njit(cache=True)
 def straight(value: Floats) -> Mask:
     """True where a sample lies on the line between its neighbours while the trend moves, shape (n,).
 
@@ -60,10 +81,12 @@ def straight(value: Floats) -> Mask:
     are straight too, but level.
     """
     out = np.zeros(value.size, dtype=np.bool_)
-    step = np.diff(value)
-    size, before = np.abs(step), step[:-1]
-    near = np.maximum(1e-4 * size.max(initial=0.0), 1e-3 * size[:-1])
-    out[1:-1] = (before != 0) & (np.abs(np.diff(step)) <= near)
+    largest = 0.0
+    for k in range(1, value.size):
+        largest = max(largest, abs(value[k] - value[k - 1]))
+    for k in range(1, value.size - 1):
+        before, after = value[k] - value[k - 1], value[k + 1] - value[k]
+        out[k] = before != 0 and abs(after - before) <= max(1e-4 * largest, 1e-3 * abs(before))
     return out
 
 
@@ -89,8 +112,13 @@ def resolution(value: Floats) -> float:
 
 
 def clock_of(pv: Series, dt_s: float, limits: QualityLimits) -> Floats:
-    """PV's own stamps where they are uniform, else a uniform clock over them, shape (n,). Raises LacksError where the
-    samples are spread so thinly that most of that clock would be gaps."""
+    """PV's own stamps where they are uniform, else a uniform clock over them.
+
+    Raises
+    ------
+    LacksError
+        The samples are spread so thinly that most of that clock would be gaps.
+    """
     spacing = np.diff(pv.stamp_s)
     if spacing.size and float(np.max(np.abs(spacing - dt_s))) <= 0.01 * dt_s:
         return pv.stamp_s
@@ -107,6 +135,10 @@ def without_stray_ends(pv: Series) -> Series:
     stamp = pv.stamp_s[~pv.bad]
     span = main_span(stamp)
     if span.stray:
-        pv = pv.taken(slice(*np.searchsorted(pv.stamp_s, [span.first_s, np.nextafter(span.last_s, np.inf)])))
+        inside = slice(*np.searchsorted(pv.stamp_s, [span.first_s, np.nextafter(span.last_s, np.inf)]))
+        pv = Series(pv.stamp_s[inside], pv.value[inside], pv.bad[inside])
     good = np.flatnonzero(~pv.bad)
-    return pv.taken(slice(good[0], good[-1] + 1))
+    if good[0] == 0 and good[-1] == pv.bad.size - 1:
+        return pv
+    cut = slice(int(good[0]), int(good[-1]) + 1)
+    return Series(pv.stamp_s[cut], pv.value[cut], pv.bad[cut])
