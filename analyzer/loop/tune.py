@@ -22,6 +22,7 @@ from analyzer.loops.spec import LoopSpec, spec_of
 from analyzer.loops.tags import as_stated
 from analyzer.night.nights import cut, nights_of
 from analyzer.words.signs import sign_in_full
+from analyzer.words.units import number
 from identification.errors import InputError, NotAssessedError
 from identification.estimation.window import Fit
 from identification.models import Estimate, Loop, Pid, Process, Valve
@@ -115,11 +116,11 @@ def tune(found: Assessment, controller: Pid, config: Config, kept: Advice | None
 def _cycle_lines(t: Tuning) -> list[str]:
     recorded = "none"
     if t.period_s is not None and t.amplitude_pct is not None:
-        recorded = f"{t.period_s:.3g} s, ±{t.amplitude_pct:.3g} % of PV span"
+        recorded = f"{number(t.period_s)} s, ±{t.amplitude_pct:.3g} % of PV span"
     c = t.cycle.cycle
-    simulated = f"{c.period_s:.3g} s, ±{c.pv_amplitude:.3g} %" if c else "none"
+    simulated = f"{number(c.period_s)} s, ±{c.pv_amplitude:.3g} %" if c else "none"
     p = t.cycle.predicted
-    predicted = f"{p.period_s:.3g} s, ±{p.pv_amplitude:.3g} %" if p else "none"
+    predicted = f"{number(p.period_s)} s, ±{p.pv_amplitude:.3g} %" if p else "none"
     return [
         f"limit cycle recorded: {recorded}",
         f"  simulated: {simulated}",
@@ -140,14 +141,19 @@ def _forecast_lines(t: Tuning) -> list[str]:
 
 def proposal_lines(t: Tuning, spec: LoopSpec, pv_span: float) -> list[str]:
     """The proposal in words and figures."""
-    out = [f"{k}: {e.value:.3g} ({e.low:.3g} to {e.high:.3g}) {e.unit}" for k, e in t.estimates.items()]
+    out = [
+        f"{k}: {number(e.value)} ({number(e.low)} to {number(e.high)}) {e.unit}"
+        for k, e in t.estimates.items()
+    ]
     if "gain" not in t.estimates:
         out.append("gain and time constant: only their ratio is known from this record")
     out += [*_cycle_lines(t), f"action: {t.proposal.action}"]
     for title, pid in (("new settings", t.proposal.controller), ("until the repair", t.proposal.meanwhile)):
         if pid is not None:
             kp, ti = as_stated(pid, spec, pv_span)
-            out.append(f"{title}: kp {kp:.3g}, ti {ti:.3g} {spec.ti_unit} ({spec.gain_unit}, {spec.form})")
+            out.append(
+                f"{title}: kp {number(kp)}, ti {number(ti)} {spec.ti_unit} ({spec.gain_unit}, {spec.form})"
+            )
     return [*out, t.proposal.reason, *_forecast_lines(t)]
 
 
