@@ -160,7 +160,7 @@ def _followed(play: Fit, begun: _Trial, rest: int) -> SlipPath:
             break
         path = _path(path.fit, valve, stem)
         best = max(best, path, key=lambda p: p.worth)
-        if path.worth < hopeless:
+        if k > 1 and path.worth < hopeless:
             break
     return best
 
