@@ -214,7 +214,8 @@ def residual(fit: Fit) -> Floats:
 
 def slow_terms(fit: Fit) -> Floats:
     """Mean, trend, decay and step of PV by a fit [% PV], shape (n,)."""
-    return residual(fit) - disturbance(fit)
+    point = _point(*_at(fit))
+    return np.asarray(fit.window.centred - fit.gain * point.x - point.r)
 
 
 def covariance(fit: Fit, free_width: bool = False) -> Floats:
