@@ -49,7 +49,7 @@ HISTORY = Effect(
     block=Block.PROCESS,
     sentence="the process gain goes with where PV has been over the last {recall_s}, by {recall} of it per 10 % PV",
     check="Ask what PV changes slowly in the process: coating, wetting, scale, a catalyst, a bed that fills.",
-    curve=lambda d: pictures.gain_over_record(d, gain_over_record),
+    curve=lambda d: pictures.gain_course(d, gain_over_record),
     variants=(
         Variant(
             (

@@ -249,7 +249,7 @@ def course_picture(
     return beside_plain(d, "course", (TIME, axis), time, lambda c: values(d.inputs, c)[at], rest, places)
 
 
-def gain_over_record(d: Drawing, change: Callable[[ModelInputs, Floats], Floats]) -> Picture:
+def gain_course(d: Drawing, change: Callable[[ModelInputs, Floats], Floats]) -> Picture:
     """The process gain over the recording, which goes as `change` says."""
     return course_picture(d, GAIN, lambda x, c: c[Slot.K] * change(x, c), float(d.plain[Slot.K]))
 

@@ -36,7 +36,7 @@ FINER = 8
 
 
 @dataclass(frozen=True, slots=True)
-class Loop:
+class LoopSignals:
     """What a way may act by: flow behind the valve [% OP] and PV as known before [% PV], shape (n,) each, about
     their means, the time constant [s], and the response of PV to a load."""
 
@@ -66,8 +66,8 @@ def response(x: Floats, c: Floats, dt_s: float) -> Floats:
     return plain_vessel(x - x[0], np.zeros(x.size), unit, dt_s, 0.0)
 
 
-def loop_of(p: Problem, c: Floats) -> Loop:
-    """A loop as a model, shape (SIZE,), has it.
+def signals_of(p: Problem, c: Floats) -> LoopSignals:
+    """What acts in a loop as a model, shape (SIZE,), has it.
 
     An experiment's errors are those of its simulation and go on from sample to sample, so that recorded PV tells them
     whatever makes them: there PV is the simulation's.
@@ -77,7 +77,7 @@ def loop_of(p: Problem, c: Floats) -> Loop:
     lag_s = min(max(float(c[Slot.T]), dt_s), p.limits.search.settles * flow.size * dt_s)
     unit = c.copy()
     unit[Slot.T] = lag_s
-    return Loop(flow - flow.mean(), pv - pv.mean(), lag_s, dt_s, partial(response, c=unit, dt_s=dt_s))
+    return LoopSignals(flow - flow.mean(), pv - pv.mean(), lag_s, dt_s, partial(response, c=unit, dt_s=dt_s))
 
 
 def switched(x: Floats, at: float, band: float) -> Floats:
@@ -88,14 +88,14 @@ def switched(x: Floats, at: float, band: float) -> Floats:
     return told[last]  # type: ignore[no-any-return]
 
 
-def by_level(o: Loop) -> list[Floats]:
+def by_level(o: LoopSignals) -> list[Floats]:
     """Gain and load that go with PV's level, and what PV switches."""
     out = [o.response(o.flow * o.pv), o.response(o.flow * o.pv**2), o.pv**2, o.pv**3]
     edges, span = np.quantile(o.pv, LEVELS[:3]), float(np.ptp(o.pv))
     return out + [o.response(switched(o.pv, at, band * span)) for at in edges for band in BANDS[:2]]
 
 
-def by_switch(o: Loop) -> list[Floats]:
+def by_switch(o: LoopSignals) -> list[Floats]:
     """Load and gain that another regime of the flow has, which ends elsewhere than it began."""
     span = float(np.subtract(*np.quantile(o.flow, (0.99, 0.01))))
     out = []
@@ -106,7 +106,7 @@ def by_switch(o: Loop) -> list[Floats]:
     return out
 
 
-def by_history(o: Loop) -> list[Floats]:
+def by_history(o: LoopSignals) -> list[Floats]:
     """Load and gain that go with where PV has been, and with what the valve has travelled."""
     travel = np.abs(np.diff(o.flow, prepend=o.flow[0]))
     longest_s = REFERENCE.of_record * o.flow.size * o.dt_s
@@ -117,7 +117,7 @@ def by_history(o: Loop) -> list[Floats]:
     return out
 
 
-def by_direction(o: Loop) -> list[Floats]:
+def by_direction(o: LoopSignals) -> list[Floats]:
     """Gain, load and reading that go with the direction and the speed of flow and of PV."""
     flow, pv = o.ahead(o.flow), o.ahead(o.pv)
     way, rise = (np.tanh(3.0 * x / (float(np.std(x)) + 1e-9)) for x in (flow, pv))
@@ -156,7 +156,7 @@ def bent_moves(p: Problem, c: Floats, through: Floats) -> list[Floats]:
 
 def ways(p: Problem, fit: Fitted) -> Iterator[tuple[str, list[Floats]]]:
     """The ways in which anything may act, each with its signals in the innovations' place, shape (n,) each."""
-    c, loop, through = fit.model.c, loop_of(p, fit.model.c), through_valve(p.inputs, fit.model.c)
+    c, loop, through = fit.model.c, signals_of(p, fit.model.c), through_valve(p.inputs, fit.model.c)
 
     def white(signals: list[Floats]) -> list[Floats]:
         return [whitened(x, fit.ar, p.edges) for x in signals]

@@ -1,7 +1,7 @@
 """A process gain that changes over the recording: fouling, wear."""
 
 from identification.mismatch.effect import Block, Effect, Param, Slot, Variant, each
-from identification.mismatch.pictures import gain_over_record
+from identification.mismatch.pictures import gain_course
 
 DRIFT = Param(Slot.DRIFT, "gain_drift", "per record", -1.9, 1.9, title="Gain drift")
 
@@ -12,6 +12,6 @@ EFFECT = Effect(
     sentence="The process gain changed by {gain_drift} over the recording.",
     check="Ask what fouled, wore or changed over the recording.",
     timed=True,
-    curve=lambda d: gain_over_record(d, lambda x, c: 1.0 + c[Slot.DRIFT] * x.clock),
+    curve=lambda d: gain_course(d, lambda x, c: 1.0 + c[Slot.DRIFT] * x.clock),
     variants=(Variant((DRIFT,), each(Slot.DRIFT, -0.2, 0.2)),),
 )
