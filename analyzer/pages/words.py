@@ -2,23 +2,24 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
-from importlib.resources import files
 from typing import Any
 
 from analyzer.columns import BY_NAME, GROUPS
 from analyzer.history.plant_clock import stamp
 from analyzer.loop.cost import mark
 from analyzer.loop.decisions import CAUSES
+from analyzer.words import toml_of
 from analyzer.words.reason import in_short
 from analyzer.words.units import Row, duration, number
 from reports.pages import Cell, Column, Facts, Floats, Listing, Table, Text
 
 __all__ = ["Row", "duration", "number", "stamp"]  # of the words that are not chosen here
 
+ROOM = "analyzer.pages"
+"""Where the tables and texts of pages stand."""
 ALL_LOOPS = ("All loops", "index.html")
 """The link from a page to the morning page."""
 OF_GROUPS = {c.name: c for c in GROUPS if c.name not in BY_NAME}
@@ -43,15 +44,10 @@ def enumerated(names: list[str]) -> str:
     return " and ".join(filter(None, (", ".join(names[:-1]), *names[-1:])))
 
 
-@cache
 def texts(subject: str) -> dict[str, Any]:
     """What texts.toml says of a subject."""
-    return _toml_of("texts.toml")[subject]
-
-
-@cache
-def _toml_of(name: str) -> dict[str, Any]:
-    return tomllib.loads((files("analyzer.pages") / name).read_text("utf-8"))
+    found: dict[str, Any] = toml_of(ROOM, "texts.toml")[subject]
+    return found
 
 
 def heading(name: str, **more: bool) -> Column:
@@ -64,7 +60,7 @@ def heading(name: str, **more: bool) -> Column:
 @cache
 def page_columns(table: str) -> tuple[Column, ...]:
     """The columns of a table of a page, as tables.toml declares them."""
-    return tuple(map(_column, _toml_of("tables.toml")[table]["columns"]))
+    return tuple(map(_column, toml_of(ROOM, "tables.toml")[table]["columns"]))
 
 
 def _column(stated: str | dict[str, Any]) -> Column:
@@ -81,7 +77,9 @@ def keys(*tables: str) -> tuple[str, ...]:
 
 def page_table(declared: str, rows: Iterable[tuple[Cell, ...]], **own: Any) -> Table:
     """A table of a page with its rows: as tables.toml declares it, but for what is its `own`."""
-    stated = {k: tuple(v) if isinstance(v, list) else v for k, v in _toml_of("tables.toml")[declared].items()}
+    stated = {
+        k: tuple(v) if isinstance(v, list) else v for k, v in toml_of(ROOM, "tables.toml")[declared].items()
+    }
     whole = {"name": declared, "title": "", **stated, "columns": page_columns(declared), "rows": tuple(rows)}
     return Table(**whole | own)
 

@@ -5,12 +5,16 @@ from __future__ import annotations
 import tomllib
 from functools import cache
 from importlib.resources import files
+from typing import Any
 
 
 @cache
-def texts(subject: str) -> dict[str, str]:
+def toml_of(room: str, name: str) -> dict[str, Any]:
+    """A TOML file of a room of the analyzer."""
+    return tomllib.loads((files(room) / name).read_text("utf-8"))
+
+
+def sentences(subject: str) -> dict[str, str]:
     """What texts.toml says of a subject."""
-    found: dict[str, str] = tomllib.loads((files("analyzer.words") / "texts.toml").read_text("utf-8"))[
-        subject
-    ]
+    found: dict[str, str] = toml_of("analyzer.words", "texts.toml")[subject]
     return found

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from analyzer.loop.decisions import Needs
-from analyzer.words import texts
+from analyzer.words import sentences
 
-SAYS = texts("needs")
+SAYS = sentences("needs")
 """What is said of each need, of its figures."""
 
 

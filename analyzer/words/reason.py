@@ -9,7 +9,7 @@ from analyzer.lanes.lanes import SAID
 from analyzer.limits import PAGES
 from analyzer.loop.decisions import OF_LOAD, Action, Cause, Due, Lack, Lane, SignKind, Status
 from analyzer.loop.finding import Finding
-from analyzer.words import texts
+from analyzer.words import sentences
 from analyzer.words.signs import later, of_below, sign_text
 from analyzer.words.units import duration
 
@@ -87,17 +87,17 @@ def to_stroke(found: Finding) -> str:
     width = found.width_pct
     if found.remedy.action is not Action.REPAIR_VALVE or width is None:
         return ""
-    return texts("by_hand")[found.remedy.due or Due.NOW].format(step=width / PAGES.stroke_steps)
+    return sentences("by_hand")[found.remedy.due or Due.NOW].format(step=width / PAGES.stroke_steps)
 
 
 def valve_text(found: Finding) -> str:
     """What is wrong with the valve, in figures where there are any."""
     size, width, fault = found.known.get("valve_size"), found.width_pct, found.fault
-    if fault not in texts("width") or not isinstance(size, float):
+    if fault not in sentences("width") or not isinstance(size, float):
         return f"the valve is at fault; {_strongest(found, 2)}"
     if width is None:
-        return texts("share")[fault].format(share=100 * size)
-    return f"{texts('width')[fault].format(width=width)}; its width is {100 * size:.0f} % of OP's range"
+        return sentences("share")[fault].format(share=100 * size)
+    return f"{sentences('width')[fault].format(width=width)}; its width is {100 * size:.0f} % of OP's range"
 
 
 def _strongest(found: Finding, most: int, *first: SignKind) -> str:
