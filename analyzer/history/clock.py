@@ -145,9 +145,9 @@ class Clock:
         parts = stamps.fields(texts, self.timezone)
         if parts is None:
             return np.full(len(texts), np.nan), True
-        order = self.order or (
-            shown_order(parts) if parts.open.any() else None
-        )  # where the head left nothing open
+        order = self.order
+        if order is None and parts.open.any():  # the head left nothing open
+            order = shown_order(parts)
         second = stamps.stamp_seconds(parts, "month" if order is None else order.first)
         return stamps.midnights_told(second, parts), not parts.stated.any()
 

@@ -168,9 +168,8 @@ def unpacked(path: Path, place: Path) -> list[Path]:
     with path.open("rb") as file:
         start = file.read(5)
     members = _members(path) if start.startswith(ZIP) else []
-    named = (
-        start.startswith(ZIP) and path.suffix.lower() in WORKBOOK_ENDINGS
-    )  # text that is only called one is none
+    # text that is only called a workbook is none
+    named = start.startswith(ZIP) and path.suffix.lower() in WORKBOOK_ENDINGS
     if start.startswith(OLD) or named or any(info.filename.startswith("xl/") for info in members):
         _check_size(path, sum(info.file_size for info in members), 0, place)
         return sheets_as_text(path, Path(tempfile.mkdtemp(prefix="workbook-", dir=place)))

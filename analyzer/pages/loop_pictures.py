@@ -98,9 +98,8 @@ def rhythm_plots(thin: Thinned, period_s: float | None) -> tuple[Plot | Text, ..
     if period_s is not None and period_s < LEAST_BUCKETS * step:
         text = f"The stored trend, a bucket each {step:.0f} s, cannot show a period of {duration(period_s)}."
         return (Text((text,), "note"),)
-    grid = np.arange(
-        thin.time_s[0], thin.time_s[-1] + 0.5 * step, step
-    )  # drawn straight where nothing is known
+    # drawn straight where nothing is known
+    grid = np.arange(thin.time_s[0], thin.time_s[-1] + 0.5 * step, step)
     error = np.interp(grid, thin.time_s[~thin.gap], (thin.middle("sp") - thin.middle("pv"))[~thin.gap])
     error -= error.mean()
     return _correlation(error, step, period_s), _spectrum_plot(error, step, period_s)

@@ -97,9 +97,8 @@ def dated_pages(store: Store, name: str | None, written: Callable[[str], bool]) 
     sums = read_sums(store, last)
     for night in nights:
         if night in nights[-2:] or not written(night):
-            shown = replace(
-                read_night(store, night, PAGES.dated_loops), paged=()
-            )  # loops' pages are the latest night's
+            # loops' pages are the latest night's
+            shown = replace(read_night(store, night, PAGES.dated_loops), paged=())
             own = [s for s in sums if s.name <= night]
             found = morning.morning_page(shown, read_groups(store, night), own)
             links, choices = (*nights_around(nights, night), LATEST), nights_to_choose(nights, night)
