@@ -10,13 +10,14 @@ KERNELS = "NUMBA_CACHE_DIR"
 
 
 def _keep_kernels_by_source() -> None:
-    """Keep the compiled kernels of each state of these sources apart.
+    """Keep the compiled kernels of each state of these sources, and of their limits, apart.
 
     numba keeps a kernel until its own file changes, though another kernel that it calls may have changed or gone:
     after an update in place every loop would fail, or be told by old code.
     """
     here = Path(__file__).parent
-    stats = [(str(p.relative_to(here)), p.stat()) for p in sorted(here.rglob("*.py"))]
+    sources = sorted(p for p in here.rglob("*") if p.suffix in (".py", ".toml"))
+    stats = [(str(p.relative_to(here)), p.stat()) for p in sources]
     stamps = [(name, s.st_mtime_ns, s.st_size) for name, s in stats]
     kept = here / "__pycache__" / f"kernels-{hashlib.sha256(repr(stamps).encode()).hexdigest()[:12]}"
     os.environ[KERNELS] = str(kept)

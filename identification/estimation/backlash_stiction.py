@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 from numba import njit
@@ -29,12 +30,6 @@ from identification.limits import FIT
 from identification.record import Floats
 from identification.simulation.lag import Lag, respond, unit_lag
 from identification.simulation.valve import HALTS, IDEAL, RESTS, SLIDES, StemLaw, sticking
-
-FINE_WIDTHS = tuple(float(w) for w in np.arange(0.88, 1.34, 0.012))
-"""Stickbands tried about a play, in its width; ours: on simulated stick-slip from 0.94 to 1.3 times the play that
-fits best, in pits about 1 % wide where OP is recorded finely."""
-FINE_JUMPS = tuple(float(j) for j in np.arange(0.1, 1.01, 0.06))
-"""Slip jumps tried about a play, as shares of the stickband."""
 
 
 def fit_linear(window: Window, period_s: float) -> Fit:
@@ -135,7 +130,8 @@ def pits(play: Fit, tolerances: tuple[float, ...]) -> list[Fit]:
     A slip more or less changes the stem until the next one, so likelihood has many narrow pits in S and J.
     """
     window = play.window
-    pairs = np.array([(w * play.valve.stickband, j) for w in FINE_WIDTHS for j in FINE_JUMPS])
+    widths = play.valve.stickband * np.arange(*FIT.fine_widths)
+    pairs = np.array(list(product(widths, np.arange(*FIT.fine_jumps))))
     t, deads = play.time_constant_s, play.dead_time_s + np.array(FIT.later) * window.dt_s
     out, pv, begins = [], white_pv(window, generic_noise()), [(t, float(dead)) for dead in deads]
     for tolerance in tolerances:

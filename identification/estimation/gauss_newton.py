@@ -24,8 +24,8 @@ from identification.record import Floats
 from identification.simulation.lag import respond, respond_together, unit_lag
 from identification.simulation.valve import StemLaw, sticking
 
-NARROWEST = 0.2
-"""Stickband after a step, in terms of that before, that is tried no more."""
+NARROWEST = FIT.narrowest
+"""Stickband after a step, in terms of that before, that is tried no more, as kernels take it."""
 BASE = 8
 """Constants before the noise model."""
 STEP_T = 1.01

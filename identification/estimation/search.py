@@ -27,8 +27,8 @@ FADED = 1e-17
 """A decay under this share of its start is over; numbers have sixteen digits."""
 MOVES = ((1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0), (1.0, -1.0))
 """Steps of log time constant and dead time that are tried."""
-COMPASS = (0.02, 0.007, 0.0025)
-"""Relative steps of the search within a pit of stickband and jump."""
+PIT_STEPS = FIT.pit_steps
+"""Steps of the search within a pit of stickband and jump, as kernels take them."""
 PIT_MOVES = ((1, 0), (-1, 0), (0, 1), (0, -1))
 """Steps of stickband and jump that are tried in a pit."""
 NO_WHITENING = np.zeros(1)
@@ -240,7 +240,7 @@ def _valve_tried(
 def settled(pv: WhitePv, valve: StemLaw, least: float, dynamics: Dynamics) -> StemLaw:
     """The bottom of a pit: stickband and jump moved by ever smaller steps to the least innovations variance, `least`
     at first, under given dynamics."""
-    return compass((pv, dynamics), valve, least, _valve_tried, PIT_MOVES, COMPASS, 1e-7)[0]  # type: ignore[no-any-return]
+    return compass((pv, dynamics), valve, least, _valve_tried, PIT_MOVES, PIT_STEPS, 1e-7)[0]  # type: ignore[no-any-return]
 
 
 def starts(window: Window, period_s: float) -> list[Dynamics]:

@@ -9,14 +9,14 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from identification.limits import SLIPS
 from identification.record import Floats, Mask
 from identification.simulation.lag import Lag, stepped
 
-SCATTER = 0.05
-"""Standard deviation of the distance at which a stem lets go, in that distance; ours, the one
-value tried: on six simulated stems of dry friction OP, which comes in samples, goes 2 to 5 % beyond it (median)."""
-FAR = 3.5
-"""Standard deviations below the mean distance from which a slip is thought of at all; ours: about RARE."""
+SCATTER, FAR, RARE, STUCK = SLIPS.scatter, SLIPS.far, SLIPS.rare, SLIPS.stuck
+WAITING, MOST_EVENTS = SLIPS.waiting, SLIPS.most_events
+PLACES, SAME, LOOKED = SLIPS.places, SLIPS.same, SLIPS.looked
+"""What limits.toml says of paths, as kernels take it."""
 
 
 class Response(NamedTuple):
@@ -72,15 +72,6 @@ def log_chance(op: Floats, stem: Floats, breakaway: float) -> float:
 
 
 Indices = NDArray[np.int64]
-RARE = 1e-4
-"""Chance of a slip under which no path is begun for it; ours: 9 nat, what an outlier costs."""
-STUCK = 100.0
-"""Log probability that a stem costs which rests for longer than is asked; ours: on simulated stems parking for good
-cost less than the wrong dead time did at first, and cost three of six their slips."""
-WAITING = 12
-"""Slips of a path that PV does not answer yet, at most; ours: a dead time of six cycles is no dead time."""
-MOST_EVENTS = 60_000
-"""Slips of all paths that are remembered; beyond it no path divides any more; ours: 8,400 were seen."""
 STEM, X, TOTAL, SCORE, LATE, FAR_LOW, FAR_HIGH, PLACED = 0, 1, 2, 3, 4, 5, 6, 7
 """Columns of a path's numbers: stem, response, its sum over the block, score, stem that PV answers now, farthest
 distance below and above since the last slip; then places of the stem that PV does not answer yet, and residuals."""
@@ -278,14 +269,6 @@ def judge_block(
                 e -= n.ar[i] * numbers[h, past + (now - 1 - i if now > i else now - 1 - i + order)]
             numbers[h, SCORE] -= 0.5 * e * e / n.sigma2
         numbers[h, past + now] = residual
-
-
-PLACES = 13
-"""Places of the stem that a path may begin at, across what it may be behind OP; ours."""
-SAME = 0.01
-"""Distance of two stems, in the mean distance at which they let go, under which their paths are one; ours."""
-LOOKED = 8
-"""Blocks after which paths are compared, if they do not become too many before; ours: bounds the time."""
 
 
 @njit(cache=True)

@@ -20,8 +20,8 @@ def kept(at: Path) -> str:
 
 
 def test_kernels_of_old_sources_are_not_used(tmp_path: Path) -> None:
-    """After any source has changed or gone, kernels are kept elsewhere and the old ones are forgotten; else they stay
-    where they were."""
+    """After any source or limit has changed or gone, kernels are kept elsewhere and the old ones are forgotten; else
+    they stay where they were."""
     ours = tmp_path / "identification"
     shutil.copytree(ROOT / "identification", ours, ignore=shutil.ignore_patterns("__pycache__"))
     first = Path(kept(tmp_path))
@@ -32,5 +32,8 @@ def test_kernels_of_old_sources_are_not_used(tmp_path: Path) -> None:
     second = Path(kept(tmp_path))
     assert second != first
     assert not first.exists()
+    (ours / "limits.toml").write_text((ours / "limits.toml").read_text() + "\n# changed\n")
+    third = Path(kept(tmp_path))
+    assert third != second
     (ours / "errors.py").unlink()
-    assert Path(kept(tmp_path)) not in (first, second)
+    assert Path(kept(tmp_path)) not in (first, second, third)
