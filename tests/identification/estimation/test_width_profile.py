@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.stats import chi2
 
 from analyzer.loop.measure import Measured, measure
 from analyzer.loop.oscillation import counting, detect
@@ -32,12 +33,12 @@ def test_it_peaks_at_the_play_that_is_there(seed: int) -> None:
     assert found[WIDTHS > 1.1].max() < 0.0
 
 
-@pytest.mark.parametrize(("sketch", "seed"), [(QUIET, 1), (QUIET, 3), (MOVED, 1), (MOVED, 2)])
-def test_it_speaks_for_no_play_of_a_sound_valve(sketch: Sketch, seed: int) -> None:
-    """Noise, drift and a sinusoidal load bring less than 3 nat for any width."""
-    m = measured(sketch, seed)
-    found = width_profile(m.linear, m.play)
-    assert found.max() < 3.0
+def test_it_speaks_for_no_play_of_a_sound_valve() -> None:
+    """Noise, drift and a sinusoidal load bring no width of sixteen records more than chance brings one needless
+    constant of so many, one time in twenty (Wilks 1938, Bonferroni 1936)."""
+    found = [measured(sketch, seed) for sketch in (QUIET, MOVED) for seed in range(1, 9)]
+    most = [width_profile(m.linear, m.play).max() for m in found]
+    assert max(most) < 0.5 * chi2.isf(0.05 / (len(found) * WIDTHS.size), 1)
 
 
 def test_widths_that_cannot_show_are_not_told_apart_from_none() -> None:
