@@ -29,6 +29,8 @@ T = TypeVar("T")
 R = TypeVar("R")
 Began = Callable[[int], None]
 """Told by a worker's function: the number of the item of its task that it begins with."""
+PRELOADED = "analyzer.night.chunk"
+"""What workers need, imported once for all of them."""
 POLL_S = 0.5
 """How often the clocks of the items in hand are looked at [s]."""
 MEGABYTE = 2**20
@@ -94,7 +96,7 @@ class _Worker:
 class Workers(Executor[T, R]):
     """Some processes of this machine, so many at most.
 
-    The function, of a task and of `Began`, is importable by name, for the processes are started afresh.
+    The function, of a task and of `Began`, is importable by name, for the processes share no memory with this one.
     """
 
     def __init__(self, count: int, function: Callable[[T, Began], R], limits: WorkerLimits) -> None:
@@ -133,10 +135,8 @@ class Workers(Executor[T, R]):
                 worker.pipe.send(worker.task)
 
     def _started(self) -> _Worker:
-        context = multiprocessing.get_context("spawn")
-        ours, theirs = context.Pipe()
-        process = context.Process(target=_serve, args=(theirs, self._function, self.limits), daemon=True)
-        process.start()
+        ours, theirs = multiprocessing.Pipe()
+        process = _process(theirs, self._function, self.limits)
         theirs.close()
         worker = _Worker(process, ours)
         self._workers.append(worker)
@@ -185,6 +185,20 @@ def executor(
 
         return Cluster(scheduler, function)
     return Workers(min(jobs, max(tasks, 1)), function, limits) if jobs else Executor(function)
+
+
+def _process(pipe: Connection, *given: Any) -> Any:
+    """A worker's process, started: forked from a server that has imported what all need; afresh where the system has
+    no such server, or no room for its socket."""
+    with contextlib.suppress(ValueError, OSError):
+        forked = multiprocessing.get_context("forkserver")
+        forked.set_forkserver_preload([PRELOADED])
+        process: Any = forked.Process(target=_serve, args=(pipe, *given), daemon=True)
+        process.start()
+        return process
+    process = multiprocessing.get_context("spawn").Process(target=_serve, args=(pipe, *given), daemon=True)
+    process.start()
+    return process
 
 
 def _cause_of_death(status: int | None, limits: WorkerLimits) -> str:

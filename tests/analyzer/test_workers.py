@@ -149,3 +149,14 @@ def test_workers_end_with_their_parent(tmp_path):
             break
         time.sleep(0.05)
     assert [pid for pid in workers if alive(pid)] == []
+
+
+@posix
+def test_workers_are_started_where_temporary_files_have_long_names(tmp_path: Path):
+    """A socket's name has some hundred letters at most; a folder of temporary files with more costs no worker."""
+    far = tmp_path / ("a" * 100)
+    far.mkdir()
+    said = "from tests.analyzer.test_workers import carried_out; print(carried_out(('a', 'b')))"
+    env = os.environ | {"TMPDIR": str(far)}
+    done = subprocess.run([sys.executable, "-c", said], env=env, capture_output=True, text=True, timeout=120)
+    assert done.stdout.strip() == "[('a', 'b')]", done.stderr
