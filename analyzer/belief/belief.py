@@ -25,7 +25,7 @@ from analyzer.belief.valve import ValveBelief, Witness
 from analyzer.belief.wear import PhaseKnown, Width, forgotten, with_repetitions
 from analyzer.config import BeliefLimits, Config
 from analyzer.loop.decisions import CAUSES, Action, Cause, Due, Fault, Status, counts
-from identification.estimation.width_profile import WIDTHS
+from identification.estimation.backlash_stiction import WIDTHS
 
 Row = Mapping[str, Any]
 NEEDED, EARLIER = 10.0, 0.1

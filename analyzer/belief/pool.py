@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import asdict, dataclass
 
-from identification.estimation.covariance import NINETY
+from identification.estimation.descent import NINETY
 from identification.limits import INTERVALS
 
 

@@ -19,7 +19,7 @@ import numpy as np
 
 from analyzer.config import BeliefLimits, Config
 from analyzer.loop.decisions import Cause, Fault
-from identification.estimation.width_profile import WIDTHS
+from identification.estimation.backlash_stiction import WIDTHS
 from identification.record import Floats
 
 Witness = Mapping[str, Any]

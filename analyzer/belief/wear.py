@@ -20,7 +20,7 @@ import numpy as np
 
 from analyzer.config import WearLimits
 from analyzer.loop.setpoint_moves import alike
-from identification.estimation.covariance import NINETY
+from identification.estimation.descent import NINETY
 from identification.record import Floats
 
 Width = tuple[str, float, float]

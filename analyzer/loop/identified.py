@@ -9,7 +9,7 @@ import numpy as np
 from analyzer.config import AdviceLimits
 from analyzer.limits import LOOP
 from analyzer.loop.measure import Measured
-from identification.estimation.covariance import NINETY, half_width, reaching
+from identification.estimation.descent import NINETY, half_width, reaching
 from identification.estimation.gauss_newton import covariance, disturbance
 from identification.estimation.window import Fit, Window
 from identification.limits import INTERVALS

@@ -16,8 +16,8 @@ from analyzer.loop.decisions import Cause, Fault
 from analyzer.loop.identified import slope_deviation
 from analyzer.loop.measure import Measured
 from analyzer.loop.quality import Prepared
+from identification.estimation.backlash_stiction import WIDTHS, width_profile
 from identification.estimation.gauss_newton import covariance
-from identification.estimation.width_profile import WIDTHS, width_profile
 from identification.limits import INTERVALS
 from identification.record import Floats
 from identification.signals.robust import robust_deviation

@@ -15,8 +15,7 @@ from numba import njit
 from numba.extending import register_jitable
 from numpy.typing import NDArray
 
-from identification.estimation.covariance import inverse, scattered
-from identification.estimation.descent import Descent, down
+from identification.estimation.descent import Descent, down, inverse, scattered
 from identification.estimation.noise import every_lag, judged, whitened
 from identification.estimation.window import Fit, Stems, stem_of
 from identification.limits import FIT
@@ -221,7 +220,7 @@ def slow_terms(fit: Fit) -> Floats:
 def covariance(fit: Fit, free_width: bool = False) -> Floats:
     """Covariance of (log T, L, stickband, gain) at a fit, shape (4, 4); zero for what was held.
 
-    The noise model's and the slow terms' share is in it (covariance.py).
+    The noise model's and the slow terms' share is in it (descent.py).
     """
     b, theta, valve = _at(fit, free_width)
     found = _point(b, theta, valve)

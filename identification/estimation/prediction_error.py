@@ -7,8 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from identification.estimation.covariance import inverse, scattered
-from identification.estimation.descent import Descent, damped_step, down, nats
+from identification.estimation.descent import Descent, damped_step, down, inverse, nats, scattered
 from identification.estimation.noise import Edges, edges_for, fitted, judged, lag_means, whitened
 from identification.limits import FIT, LIMITS, ExplainLimits
 from identification.record import Floats, Mask
@@ -313,7 +312,7 @@ def innovations_of(p: Problem, found: Residual) -> Floats:
 
 
 def deviations(p: Problem, fit: Fitted) -> Floats:
-    """Standard deviations of the free constants (of logarithms where so searched), shape (m,); see covariance.py."""
+    """Standard deviations of the free constants (of logarithms where so searched), shape (m,); see descent.py."""
     found = residual_fit(p, fit.model)
     gram, _, moves = curvature(p, found)
     if not np.isfinite(gram).all():

@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from identification.estimation.covariance import half_width
-from identification.estimation.descent import nats
+from identification.estimation.descent import half_width, nats
 from identification.estimation.prediction_error import Fitted, Problem, deviations, residual_fit
 from identification.mismatch import words
 from identification.mismatch.catalogue import EFFECTS, fault
@@ -179,7 +178,7 @@ def effects_of(found: Explanation, s: Recording) -> tuple[EffectFound, ...]:
 
 
 def parameters_of(p: Problem, fit: Fitted, row: Variant) -> dict[str, Estimate]:
-    """A row's constants with 90 % intervals (covariance.py)."""
+    """A row's constants with 90 % intervals (descent.py)."""
     wide = dict(zip((q.slot for q in fit.model.params), deviations(p, fit), strict=True))
     out = {}
     for q in row.params:

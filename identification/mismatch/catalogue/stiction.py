@@ -1,6 +1,6 @@
 """Stiction: the stem holds through the stickband, then jumps; behind the jump it rests, halts, slides or swings."""
 
-from identification.estimation.covariance import reaching
+from identification.estimation.descent import reaching
 from identification.limits import INTERVALS
 from identification.mismatch.effect import Block, Effect, Estimate, Friction, Param, Parameters, Slot, Variant
 from identification.mismatch.pictures import stem_over_op

@@ -11,7 +11,7 @@ import numpy as np
 from analyzer.belief.belief import Belief, step
 from analyzer.belief.nights import READ
 from analyzer.config import Config
-from identification.estimation.width_profile import WIDTHS
+from identification.estimation.backlash_stiction import WIDTHS
 
 CONFIG = Config()
 LIMITS = CONFIG.belief

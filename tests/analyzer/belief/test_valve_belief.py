@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from analyzer.words.belief import news
-from identification.estimation.width_profile import WIDTHS
+from identification.estimation.backlash_stiction import WIDTHS
 from tests.analyzer.belief.nights_of_a_loop import (
     CALM,
     DAY_S,

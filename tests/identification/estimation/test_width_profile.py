@@ -8,7 +8,7 @@ from scipy.stats import chi2
 
 from analyzer.loop.measure import Measured, measure
 from analyzer.loop.oscillation import counting, detect
-from identification.estimation.width_profile import WIDTHS, width_profile
+from identification.estimation.backlash_stiction import WIDTHS, width_profile
 from proofs.plant import CONFIG, Sketch, prepared, simulate
 
 LEVEL = Sketch("backlash", (40.0, 1500.0, 8.0), 0.8, 100.0, backlash=0.62)
