@@ -66,8 +66,8 @@ OUTSIDE = (
     *(Slot.SPLIT, Slot.RATIO, Slot.SPLIT_DEAD, Slot.SPLIT_LAG, Slot.CLIP_HI, Slot.CLIP_LO),
     *(Slot.SINE, Slot.COSINE, Slot.OMEGA, Slot.NEIGHBOUR, Slot.NEIGHBOUR_T),
     *(int(Slot.STEP) + i for i in range(STEPS)),
-    *(Slot.MODE_T, Slot.SPILL, Slot.SPILL_T, Slot.SPEED, Slot.HEAD_BIAS),
-    *(Slot.RECALL_T, Slot.SWITCH, Slot.SWITCH_AT, Slot.SWITCH_BAND, Slot.RETURNED, Slot.RETURNS_S),
+    *(Slot.MODE_T, Slot.SPEED, Slot.HEAD_BIAS, Slot.RECALL_T),
+    *(Slot.SWITCH, Slot.SWITCH_AT, Slot.SWITCH_BAND, Slot.RETURNED, Slot.RETURNS_S),
 )
 """Parameters that a vessel of first order with constant gain, and what stands before and behind it, take care of, and
 those that do nothing by themselves. Any other at work asks for the whole vessel, a new one too."""
