@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
-from identification.estimation.prediction_error import Fitted, Problem, descended, gain
+from identification.estimation.prediction_error import descended, gain
 from identification.mismatch.catalogue import CANDIDATES, EFFECTS
 from identification.mismatch.effect import Friction
 from identification.mismatch.explanation import Explanation
@@ -20,7 +21,6 @@ from identification.mismatch.selection import (
     integrating_or_first_order,
     penalised,
     penalty,
-    without,
 )
 from identification.mismatch.starts import Round, round_of
 from identification.models import Stiction
@@ -49,10 +49,10 @@ def one_by_one(found: Explanation, tell: Progress, s: Recording) -> tuple[Explan
         x = round_of(found.p, found.best, s)
         candidates = compete(x, (*CANDIDATES, *RIVALS) if has_rivals else CANDIDATES, tell)
         if s.cycles is not None and not found.accepted:
-            candidates = with_cycles(x.p, found.best, s.cycles, candidates)
+            candidates = with_cycles(x, s.cycles, candidates)
         if not found.first:
             found = replace(found, first=tuple(c for c in candidates if c.name in EFFECTS))
-        winner = chosen(x.p, found, s, candidates)
+        winner = chosen(x, found, candidates)
         if winner is None:
             break
         if winner.name in OUTSIDE:
@@ -62,30 +62,30 @@ def one_by_one(found: Explanation, tell: Progress, s: Recording) -> tuple[Explan
     return found, candidates
 
 
-def chosen(p: Problem, found: Explanation, s: Recording, candidates: list[Candidate]) -> Candidate | None:
+def chosen(x: Round, found: Explanation, candidates: list[Candidate]) -> Candidate | None:
     """What is taken of a round's candidates; physics of no name, which is handed PV as recorded, only where it does
     far better than what is taken so far, and than what has a name."""
-    winner = None if found.accepted else shown_by_cycles(s, candidates)
-    winner = winner or proven(p, found.best, candidates)
+    winner = None if found.accepted else shown_by_cycles(x.s, candidates)
+    winner = winner or proven(x, candidates)
     if winner is None or winner.name not in OUTSIDE:
         return winner
-    named = proven(p, found.best, [c for c in candidates if c.name in EFFECTS])
-    limits = p.limits.search
+    named = proven(x, [c for c in candidates if c.name in EFFECTS])
+    limits = x.p.limits.search
     little = winner.penalised <= limits.outside_share * gain(found.best, found.plain)
     near = named is not None and named.penalised >= limits.outside_near * winner.penalised
     return named if little or near else winner
 
 
-def with_cycles(p: Problem, near: Fitted, seen: SeenInCycles, candidates: list[Candidate]) -> list[Candidate]:
+def with_cycles(x: Round, seen: SeenInCycles, candidates: list[Candidate]) -> list[Candidate]:
     """The candidates and those begun where the cycles show a valve, best first; of each name the better."""
-    begun = [penalised(p, near, fit) for fit in from_cycles(p, near, seen, CANDIDATES)]
+    begun = [penalised(x, fit) for fit in from_cycles(x, seen, CANDIDATES)]
     best: dict[tuple[str, str], Candidate] = {}
     for c in sorted([*candidates, *begun], key=lambda c: -c.penalised):
         best.setdefault((c.name, c.row.label), c)
     return list(best.values())
 
 
-def shown_by_cycles(s: Recording, candidates: list[Candidate]) -> Candidate | None:
+def shown_by_cycles(s: Recording, candidates: Sequence[Candidate]) -> Candidate | None:
     """The best play or stick-slip, where the loop's cycles show a faulty valve; None where they do not.
 
     What shows a jump is believed: a slip now and then late hides it from one constant friction. A play is not, where
@@ -99,73 +99,66 @@ def shown_by_cycles(s: Recording, candidates: list[Candidate]) -> Candidate | No
     return rubs[0] if rubs else None
 
 
-def proven(p: Problem, near: Fitted, candidates: list[Candidate]) -> Candidate | None:
+def proven(x: Round, candidates: list[Candidate]) -> Candidate | None:
     """The best candidate with a gain left after its penalty that passes the proof.
 
     In an experiment one that is bound to a time is taken where none that lasts does anything: a course of the load
     can be drawn through whatever the model lacks, and no data can be held out from it.
     """
     gains = [c for c in candidates if c.penalised > 0]
-    if p.by_simulation:
-        lasts = any(not about(name).timed for name in near.names)
+    if x.p.by_simulation:
+        lasts = any(not about(name).timed for name in x.near.names)
         gains = [c for c in gains if not (lasts and about(c.name).timed)]
         gains.sort(key=lambda c: about(c.name).timed)
-    tried = gains[: p.limits.proof.proven]
-    return next((c for c in tried if passes(p, near, c.fit, about(c.name))), None)
+    tried = gains[: x.p.limits.proof.proven]
+    return next((c for c in tried if passes(x, c.fit, about(c.name))), None)
 
 
 def as_a_set(found: Explanation, tell: Progress, s: Recording) -> Explanation:
     """Several effects looked at again: one in another's place, one that the others have made idle; a valve that the
     cycles show stays."""
-    p, best, accepted = found.p, found.best, list(found.accepted)
-    told = shown_by_cycles(s, accepted[:1]) is not None
+    told = shown_by_cycles(s, found.accepted[:1]) is not None
     if not told:
         tell("other sets of effects")
-        best, accepted = replacement_step(round_of(p, best, s), accepted, tell)
-    best, accepted = without_the_idle(p, best, accepted, int(told))
-    return replace(found, best=best, accepted=tuple(accepted))
+        found = replacement_step(found, tell, s)
+    return without_the_idle(found, int(told))
 
 
-def replacement_step(x: Round, accepted: list[Candidate], tell: Progress) -> tuple[Fitted, list[Candidate]]:
-    """The accepted effects, each given up once for whatever does better beside the others: another, or another way
-    of the same.
+def replacement_step(found: Explanation, tell: Progress, s: Recording) -> Explanation:
+    """The explanation with each effect given up once for whatever does better beside the others: another, or another
+    way of the same.
 
     Effects are added one at a time, so the first may have been taken in the place of two that act together. In an
     experiment none bound to a time takes the place of one that lasts, for through whatever a model lacks a course can
     be drawn.
     """
-    limits, best = x.p.limits.search, x.near
-    for i, old in enumerate(accepted):
+    x, limits = round_of(found.p, found.best, s), found.p.limits.search
+    for i, old in enumerate(found.accepted):
         lasts = x.p.by_simulation and not EFFECTS[old.name].timed
-        near = descended(x.p, without(best.model, [old.row]), limits.full_steps)
-        least = max(gain(best, near) - penalty(x.p, old.row) + limits.tie, 0.0)
+        beside = replace(x, near=found.less([old]).best)
+        least = max(gain(found.best, beside.near) - penalty(x.p, old.row) + limits.tie, 0.0)
         others = (
             c
-            for c in compete(replace(x, near=near), CANDIDATES, tell, least)
+            for c in compete(beside, CANDIDATES, tell, least)
             if (c.name, c.row.label) != (old.name, old.row.label) and not (lasts and EFFECTS[c.name].timed)
         )
         first = next(others, None)
-        if first is None or first.penalised <= least or not passes(x.p, near, first.fit, EFFECTS[first.name]):
-            continue
-        best = descended(x.p, first.fit.model, limits.full_steps)
-        accepted = [*accepted[:i], first, *accepted[i + 1 :]]
-    return best, accepted
+        if first is not None and first.penalised > least and passes(beside, first.fit, EFFECTS[first.name]):
+            best = descended(x.p, first.fit.model, limits.full_steps)
+            found = replace(found, best=best, accepted=(*found.accepted[:i], first, *found.accepted[i + 1 :]))
+    return found
 
 
-def without_the_idle(
-    p: Problem, best: Fitted, accepted: list[Candidate], kept: int
-) -> tuple[Fitted, list[Candidate]]:
-    """The accepted effects less those that the others have made idle, the first `kept` of them left alone.
+def without_the_idle(found: Explanation, kept: int) -> Explanation:
+    """The explanation less effects that the others have made idle, the first `kept` of them left alone.
 
     An effect may have been taken in the place of one that came after it.
     """
-    for old in accepted[kept:]:
-        if len(accepted) == 1:
-            break
-        near = descended(p, without(best.model, [old.row]), p.limits.search.full_steps)
-        if gain(best, near) < penalty(p, old.row):
-            best, accepted = near, [c for c in accepted if c.name != old.name]
-    return best, accepted
+    for old in found.accepted[kept:]:
+        rest = found.less([old])
+        if rest.accepted and gain(found.best, rest.best) < penalty(found.p, old.row):
+            found = rest
+    return found
 
 
 def left_over(found: Explanation, candidates: list[Candidate]) -> Foretold:

@@ -101,15 +101,15 @@ def penalty(p: Problem, row: Variant) -> float:
     return limits.search_penalty + (free or limits.parameter_penalty) + row.penalty
 
 
-def penalised(p: Problem, near: Fitted, fit: Fitted) -> Candidate:
+def penalised(x: Round, fit: Fitted) -> Candidate:
     """A fit as a candidate beside the fit before."""
-    won = gain(fit, near)
-    return Candidate(fit, won, won - penalty(p, fit.model.added[-1]))
+    won = gain(fit, x.near)
+    return Candidate(fit, won, won - penalty(x.p, fit.model.added[-1]))
 
 
 def best_of(x: Round, models: list[Model], steps: int, aim: float = math.inf) -> Candidate:
     """The best of some starts, followed for some steps, as far as they come under `aim`."""
-    return penalised(x.p, x.near, min((descended(x.p, m, steps, aim) for m in models), key=lambda f: f.loss))
+    return penalised(x, min((descended(x.p, m, steps, aim) for m in models), key=lambda f: f.loss))
 
 
 def worth_following(p: Problem, least: float) -> float:
@@ -150,9 +150,7 @@ def counted_alike(x: Round, found: list[Candidate]) -> list[Candidate]:
     most = max((c.fit.count for c in found if c.row.opponent is None), default=0)
     if not x.p.by_simulation:
         return found
-    return [
-        c if c.row.opponent is not None else penalised(x.p, x.near, replace(c.fit, count=most)) for c in found
-    ]
+    return [c if c.row.opponent is not None else penalised(x, replace(c.fit, count=most)) for c in found]
 
 
 def outdoing(x: Round, first: Candidate) -> Candidate:
@@ -166,7 +164,7 @@ def outdoing(x: Round, first: Candidate) -> Candidate:
     added, own = descended(p, model, steps), descended(p, first.fit.model, steps)
     limits, moves = p.limits.proof, float(p.weight @ p.y**2 / p.weight.sum())
     if own.loss < limits.course_leaves * near.loss and near.loss > limits.course_from**2 * moves:
-        return penalised(p, near, own)
+        return penalised(x, own)
     won = gain(own, added)
     return Candidate(own, won, won - penalty(p, first.row) + first.row.penalty)
 
@@ -184,7 +182,7 @@ def sticking_candidates(
         if about(row.name).friction is Friction.STICKS:
             tell(row.name)
             fit = fit_sticking(x.p, plays[0].fit, row, x.near.model.added)
-            out.append(penalised(x.p, x.near, fit))
+            out.append(penalised(x, fit))
     return out
 
 

@@ -208,8 +208,8 @@ def test_idle_effect_goes_again() -> None:
         c[rows[name].params[0].slot] = value
         fit = descended(p, Model((*fit.model.added, rows[name]), c), 20)
         taken.append(Candidate(fit, 0.0, 0.0))
-    best, left = without_the_idle(p, fit, taken, 0)
-    assert [c.name for c in left] == ["backlash"] == list(best.names)
+    left = without_the_idle(Explanation(p, fit, fit, tuple(taken)), 0)
+    assert [c.name for c in left.accepted] == ["backlash"] == list(left.best.names)
 
 
 @pytest.mark.parametrize(
