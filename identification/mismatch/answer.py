@@ -197,7 +197,7 @@ def alternatives(found: Explanation) -> tuple[str, ...]:
     """Names that the data cannot tell from the first effect: as good, or of the same mark by their nature."""
     if not found.accepted:
         return ()
-    winner = found.accepted[0]
+    winner = next(c for c in found.accepted if c.name == found.best.names[0])
     least = max(winner.penalised - found.p.limits.search.tie, 0.0)
     close = [c.name for c in found.first if c.penalised > least]
     names = dict.fromkeys((*close, *EFFECTS[winner.name].indistinguishable))
