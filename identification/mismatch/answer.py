@@ -20,8 +20,7 @@ from identification.mismatch.recording import Recording
 from identification.mismatch.where import Located, located_in, where_of
 from identification.models import Estimate
 from identification.record import Floats
-from identification.simulation.effect import Variant
-from identification.simulation.parameters import Slot
+from identification.simulation.parameters import Slot, Variant
 
 LIVES = {
     "op_level": "valve",

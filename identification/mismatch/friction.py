@@ -27,9 +27,8 @@ from identification.mismatch.starts import Round
 from identification.models import Backlash, Stiction, Valve
 from identification.record import Floats
 from identification.signals.filters import stretch_ends
-from identification.simulation.effect import Signal, Variant, acted
 from identification.simulation.open_loop import as_parameters, from_flow, simulate
-from identification.simulation.parameters import Slot, alone
+from identification.simulation.parameters import Signal, Slot, Variant, acted, alone
 from identification.simulation.valve import StemLaw, moved_stem, sticking
 from identification.simulation.valve_chain import before_stem, behind_stem, friction_of
 

@@ -15,8 +15,7 @@ from identification.mismatch.outside import about
 from identification.mismatch.proof import is_one_move
 from identification.mismatch.recording import Recording
 from identification.mismatch.starts import Round, mode_starts, screened, start_models
-from identification.simulation.effect import Variant
-from identification.simulation.parameters import Slot, neutral
+from identification.simulation.parameters import Slot, Variant, neutral
 
 Progress = Callable[[str], None]
 KNOWN_TYPES = ("flow", "pressure", "temperature", "level")
@@ -82,7 +81,7 @@ def applies(x: Round, row: Variant) -> bool:
     taken = {p.slot for r in near.model.added for p in r.params}
     if row.name in near.names or taken & {p.slot for p in row.params}:
         return False
-    if row.types and x.s.kind in KNOWN_TYPES and x.s.kind not in row.types:
+    if effect.types and x.s.kind in KNOWN_TYPES and x.s.kind not in effect.types:
         return False
     if row.needs in NEEDS and not NEEDS[row.needs](x):
         return False

@@ -24,9 +24,8 @@ from identification.estimation.prediction_error import (
 )
 from identification.mismatch.recording import Recording
 from identification.record import Floats, Mask
-from identification.simulation.effect import Variant
 from identification.simulation.open_loop import simulate, through_valve
-from identification.simulation.parameters import STEPS, Slot, neutral
+from identification.simulation.parameters import STEPS, Slot, Variant, neutral
 from identification.simulation.vessel import plain_vessel
 
 LEAD = 200

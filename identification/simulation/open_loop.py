@@ -10,9 +10,8 @@ from numba import njit
 
 from identification.models import Backlash, Integrator, Process, Valve
 from identification.record import Floats
-from identification.simulation.effect import Signal, acted
 from identification.simulation.lag import lagged
-from identification.simulation.parameters import KNOTS, SIZE, STEPS, Slot, neutral
+from identification.simulation.parameters import KNOTS, SIZE, STEPS, Signal, Slot, acted, neutral
 from identification.simulation.valve_chain import COASTS, flow
 from identification.simulation.vessel import outflow, outflow_of, plain_vessel, transported, vessel
 
