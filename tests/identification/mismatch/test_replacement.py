@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from identification.estimation.prediction_error import Model, descended, residual_fit
-from identification.mismatch import rounds
+from identification.mismatch import diagnosis
 from identification.mismatch.answer import alternatives
 from identification.mismatch.catalogue import EFFECTS
+from identification.mismatch.diagnosis import replacement_step
 from identification.mismatch.explanation import Explanation
 from identification.mismatch.plain_loop import inputs_of, prepared
 from identification.mismatch.recording import Recording
-from identification.mismatch.rounds import replacement_step
 from identification.mismatch.selection import Candidate, silent
 
 N = 900
@@ -45,7 +45,7 @@ def replaced() -> Explanation:
         fit = descended(p, Model((*fit.model.added, row), c), 10)
         taken.append(Candidate(fit, 1.0, 1.0))
     with pytest.MonkeyPatch.context() as only:
-        only.setattr(rounds, "CANDIDATES", EFFECTS["load-step"].candidates[:1])
+        only.setattr(diagnosis, "CANDIDATES", EFFECTS["load-step"].candidates[:1])
         return replacement_step(Explanation(p, plain, fit, tuple(taken)), silent, s)
 
 
