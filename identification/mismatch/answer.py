@@ -71,9 +71,8 @@ class Answer:
 def answer(found: Explanation, s: Recording) -> Answer:
     """The answer of an explanation of a recording."""
     effects, outside, note, caution = effects_of(found, s), None, words.note(found), ""
-    asked = not found_first(found) and not by_cycles(found)
-    silent = unanswered(found) if asked else ""
-    lacking = silent or (too_short(found, s) if asked else "")
+    silent = unanswered(found) if is_by_fit(found) else ""
+    lacking = silent or (too_short(found, s) if is_by_fit(found) else "")
     at = located_in(found.p, found.best if found.left > 0 else found.plain, s)
     verdict, block = verdict_of(found, effects, lacking, bool(silent), at)
     if lacking and (verdict, block) == ("unexplained", "none"):
@@ -103,9 +102,9 @@ def verdict_of(
     found: Explanation, effects: tuple[EffectFound, ...], lacking: str, insensitive: bool, at: Located
 ) -> tuple[str, str]:
     """The verdict and its block; what is left over, and what a record cannot tell, has no name."""
-    if found.refuted and not found.accepted and not found_first(found):
+    if found.refuted and not found.accepted and is_by_fit(found):
         return "unexplained", "none"
-    if (found.left > 0 or is_stack(found)) and not found_first(found) and not by_cycles(found):
+    if (found.left > 0 or is_stack(found)) and is_by_fit(found):
         if found.outside is not None:
             return "unexplained", found.outside.row.block
         return "unexplained", LIVES.get(at.carrying[0].name, "process") if at.carrying else "process"
@@ -114,9 +113,10 @@ def verdict_of(
     return ("unexplained", "none") if lacking else ("none", "none")
 
 
-def found_first(found: Explanation) -> bool:
-    """Whether recorder or controller have an answer of their own, which nothing left over takes away."""
-    return found.recorder is not None or found.controller is not None
+def is_by_fit(found: Explanation) -> bool:
+    """Whether the answer rests on fits alone: recorder, controller and the loop's cycles have answers of their own,
+    which nothing left over takes away."""
+    return found.recorder is None and found.controller is None and not by_cycles(found)
 
 
 def brings(p: Problem, fit: Fitted) -> float:

@@ -273,7 +273,8 @@ class Criterion:
 
 def held_out(p: Problem, worse: Fitted, better: Fitted, cycle: int = 0) -> HeldOut:
     """Both models fitted anew to the first part of the record and compared on the rest: over the whole of it, and
-    where load drowns the difference there, over windows of some time constants of the plain loop.
+    where load drowns the difference there, over windows of some time constants of the plain loop; a plain loop beside
+    itself over the whole alone.
 
     cycle : samples of a cycle of a loop whose cycles show a valve with friction, 0 for any other; they are compared
     over such windows too, the stem placed anew in each.
@@ -284,7 +285,7 @@ def held_out(p: Problem, worse: Fitted, better: Fitted, cycle: int = 0) -> HeldO
     early = pair_of(p, fits, p.usable & (np.arange(p.y.size) < cut))
     told = early, pair_of(p, (worse, better), p.usable), held_out_gain(p, fits)
     whole = Criterion(p).compared(*told)
-    if whole.carries:
+    if whole.carries or better is worse:
         return whole
     c, limits = early.plain.c, p.limits.proof
     memory = limits.window_times * float(c[Slot.T] + c[Slot.L]) / p.inputs.dt_s

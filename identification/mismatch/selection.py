@@ -60,14 +60,9 @@ def compete(
     tell : is told each row's name before it is tried; least : what a candidate has to come to, penalty taken off, to
     be of any use [nat].
     """
-    starts, firsts = [], []
-    for row in rows:
-        if applies(x, row):
-            tell(row.name)
-            models, first = first_try(x, row, least)
-            starts.append(models)
-            firsts.append(first)
-    tried = sorted(zip(counted_alike(x, firsts), starts, strict=True), key=lambda t: -t[0].penalised)
+    begun = [first_try(x, row, least, tell) for row in rows if applies(x, row)]
+    firsts = counted_alike(x, [first for first, _ in begun])
+    tried = sorted(zip(firsts, (models for _, models in begun), strict=True), key=lambda t: -t[0].penalised)
     most = x.p.limits.search.followed
     ended = [outdoing(x, followed(x, first, models, least)) for first, models in tried[:most]]
     sticking = sticking_candidates(x, [first for first, _ in tried], rows, tell)
@@ -118,9 +113,10 @@ def worth_following(p: Problem, least: float) -> float:
     return min(limits.may_come_to * least, least + limits.worth_following)
 
 
-def first_try(x: Round, row: Variant, least: float) -> tuple[list[Model], Candidate]:
-    """A row's starts, the best first, and the candidate that a few steps make of the first; a start that will not
-    come to anything worth following is left."""
+def first_try(x: Round, row: Variant, least: float, tell: Progress) -> tuple[Candidate, list[Model]]:
+    """The candidate that a few steps make of a row's best start, and all its starts, the best first; a start that
+    will not come to anything worth following is left."""
+    tell(row.name)
     p, near, limits = x.p, x.near, x.p.limits.search
     first = models = start_models(x, row)
     if row.needs != "line":
@@ -130,7 +126,7 @@ def first_try(x: Round, row: Variant, least: float) -> tuple[list[Model], Candid
         first = first + mode_starts(p, near, row)
     worth = penalty(p, row) + worth_following(p, least)
     aim = near.loss * math.exp(-2.0 * worth / p.count)
-    return models, best_of(x, first, limits.screen_steps, aim)
+    return best_of(x, first, limits.screen_steps, aim), models
 
 
 def followed(x: Round, first: Candidate, models: list[Model], least: float) -> Candidate:
