@@ -22,14 +22,6 @@ from identification.models import Estimate
 from identification.record import Floats
 from identification.simulation.parameters import Slot, Variant
 
-LIVES = {
-    "op_level": "valve",
-    "after_reversals": "valve",
-    "at_limits": "valve",
-    "time_in_record": "load",
-    "pv_level": "process",
-}
-"""Block in which a misfit without a name is looked for first, by the feature that carries it; else the process."""
 AT_REST = "flow_at_rest_pct"
 """Parameter of a supply: the flow that goes with it while OP is at its middle."""
 INTEGRATING = ("level",)
@@ -107,7 +99,9 @@ def verdict_of(
     if (found.left > 0 or is_stack(found)) and is_by_fit(found):
         if found.outside is not None:
             return "unexplained", found.outside.row.block
-        return "unexplained", LIVES.get(at.carrying[0].name, "process") if at.carrying else "process"
+        return "unexplained", words.TOLD["features"][at.carrying[0].name][
+            "lives"
+        ] if at.carrying else "process"
     if effects and not (insensitive and effects[0].block in (Block.VALVE, Block.PROCESS)):
         return effects[0].name, effects[0].block
     return ("unexplained", "none") if lacking else ("none", "none")
