@@ -78,18 +78,8 @@ class Outflow(NamedTuple):
 @njit(cache=True, error_model="numpy")
 def outflow_of(c: Floats, head: float) -> Outflow:
     """The outflow that the constants say."""
-    pace = math.exp(0.5 * c[ASYM])
-    return Outflow(
-        c[SLOPE] / 50.0,
-        c[LEAK],
-        c[ROOT],
-        head,
-        c[CAP],
-        c[GAIN_SLOPE] / 50.0,
-        c[SPEED],
-        pace,
-        1.0 / pace,
-    )
+    slope, gain_slope, pace = c[SLOPE] / 50.0, c[GAIN_SLOPE] / 50.0, math.exp(0.5 * c[ASYM])
+    return Outflow(slope, c[LEAK], c[ROOT], head, c[CAP], gain_slope, c[SPEED], pace, 1.0 / pace)
 
 
 @njit(cache=True, error_model="numpy")
