@@ -215,7 +215,8 @@ def replacement_step(found: Explanation, tell: Progress, s: Recording) -> Explan
     be drawn.
     """
     x, limits = round_of(found.p, found.best, s), found.p.limits.search
-    found = replace(found, p=x.p)  # a load step taken here is at the places of this round
+    # a load step taken here is at the places of this round
+    found = replace(found, p=x.p)
     for i, old in enumerate(found.accepted):
         lasts = x.p.by_simulation and not EFFECTS[old.name].timed
         beside = replace(x, near=found.less([old]).best)
