@@ -12,7 +12,7 @@ from analyzer.explain.explained import Explained
 from analyzer.explain.words import NOTES, number_text, places, rms, share, title
 from analyzer.history.plant_clock import UTC_NAME
 from analyzer.pages.words import duration, number, stamp
-from identification.mismatch.words import check, located_sentence, seen_ahead, two_plain_loops
+from identification.mismatch.words import check, located_sentence, remarks
 from reports.pages import Block, Facts, Page, Section, Table, Text, Tiles
 from reports.texts import slug
 
@@ -115,7 +115,7 @@ def _fit_note(e: Explained) -> str:
     held = NOTES["other_recordings" if e.found.others else "last_part"].format(share=share_held)
     horizon = fit["horizon_s"] and duration(fit["horizon_s"])
     anew = NOTES["anew"].format(horizon=horizon) if horizon else ""
-    return " ".join(filter(None, (held, NOTES["fit"], anew, seen_ahead(fit), two_plain_loops(fit))))
+    return " ".join(filter(None, (held, NOTES["fit"], anew, *remarks(fit))))
 
 
 def _controller_blocks(e: Explained) -> tuple[Block, ...]:

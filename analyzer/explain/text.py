@@ -9,7 +9,7 @@ from typing import Any
 from analyzer.explain import words
 from analyzer.explain.words import places, share, title
 from analyzer.pages.words import number
-from identification.mismatch.words import check, seen_ahead, two_plain_loops
+from identification.mismatch.words import check, remarks
 from reports.pages import Table
 
 WIDTH = 110
@@ -36,7 +36,7 @@ def answer_lines(data: Mapping[str, Any]) -> list[str]:
         if first["held_out_share"] is not None
     ]
     brought = fit.get("brought", {}).get("note", "")
-    for sentence in filter(None, (seen_ahead(fit), two_plain_loops(fit), brought, *removed)):
+    for sentence in filter(None, (*remarks(fit), brought, *removed)):
         out += ["", *wrap(sentence, WIDTH)]
     out += _part("Where", _where_rows(data))
     moved = [(name, before, "→", after, unit) for name, before, after, _, unit in _texts(words.moved(data))]

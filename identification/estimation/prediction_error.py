@@ -13,9 +13,8 @@ from identification.limits import FIT, LIMITS, ExplainLimits
 from identification.record import Floats, Mask
 from identification.signals.correlation import correlated
 from identification.signals.filters import without_lines
-from identification.simulation.effect import Param, Variant
 from identification.simulation.open_loop import ModelInputs, simulate
-from identification.simulation.parameters import Slot
+from identification.simulation.parameters import Param, Slot, Variant
 
 BASE = (
     Param(Slot.T, "time_constant_s", "s", 0.3, 1e9, "dt", True),

@@ -19,17 +19,8 @@ from identification.mismatch.recording import Recording
 from identification.mismatch.where import Located, located_in, where_of
 from identification.models import Estimate
 from identification.record import Floats
-from identification.simulation.effect import Variant
-from identification.simulation.parameters import Slot
+from identification.simulation.parameters import Slot, Variant
 
-LIVES = {
-    "op_level": "valve",
-    "after_reversals": "valve",
-    "at_limits": "valve",
-    "time_in_record": "load",
-    "pv_level": "process",
-}
-"""Block in which a misfit without a name is looked for first, by the feature that carries it; else the process."""
 AT_REST = "flow_at_rest_pct"
 """Parameter of a supply: the flow that goes with it while OP is at its middle."""
 INTEGRATING = ("level",)
@@ -71,9 +62,8 @@ class Answer:
 def answer(found: Explanation, s: Recording) -> Answer:
     """The answer of an explanation of a recording."""
     effects, outside, note, caution = effects_of(found, s), None, words.note(found), ""
-    asked = not found_first(found) and not by_cycles(found)
-    silent = unanswered(found) if asked else ""
-    lacking = silent or (too_short(found, s) if asked else "")
+    silent = unanswered(found) if is_by_fit(found) else ""
+    lacking = silent or (too_short(found, s) if is_by_fit(found) else "")
     at = located_in(found.p, found.best if found.left > 0 else found.plain, s)
     verdict, block = verdict_of(found, effects, lacking, bool(silent), at)
     if lacking and (verdict, block) == ("unexplained", "none"):
@@ -103,20 +93,23 @@ def verdict_of(
     found: Explanation, effects: tuple[EffectFound, ...], lacking: str, insensitive: bool, at: Located
 ) -> tuple[str, str]:
     """The verdict and its block; what is left over, and what a record cannot tell, has no name."""
-    if found.refuted and not found.accepted and not found_first(found):
+    if found.refuted and not found.accepted and is_by_fit(found):
         return "unexplained", "none"
-    if (found.left > 0 or is_stack(found)) and not found_first(found) and not by_cycles(found):
+    if (found.left > 0 or is_stack(found)) and is_by_fit(found):
         if found.outside is not None:
             return "unexplained", found.outside.row.block
-        return "unexplained", LIVES.get(at.carrying[0].name, "process") if at.carrying else "process"
+        return "unexplained", words.TOLD["features"][at.carrying[0].name][
+            "lives"
+        ] if at.carrying else "process"
     if effects and not (insensitive and effects[0].block in (Block.VALVE, Block.PROCESS)):
         return effects[0].name, effects[0].block
     return ("unexplained", "none") if lacking else ("none", "none")
 
 
-def found_first(found: Explanation) -> bool:
-    """Whether recorder or controller have an answer of their own, which nothing left over takes away."""
-    return found.recorder is not None or found.controller is not None
+def is_by_fit(found: Explanation) -> bool:
+    """Whether the answer rests on fits alone: recorder, controller and the loop's cycles have answers of their own,
+    which nothing left over takes away."""
+    return found.recorder is None and found.controller is None and not by_cycles(found)
 
 
 def brings(p: Problem, fit: Fitted) -> float:
@@ -196,7 +189,7 @@ def alternatives(found: Explanation) -> tuple[str, ...]:
     """Names that the data cannot tell from the first effect: as good, or of the same mark by their nature."""
     if not found.accepted:
         return ()
-    winner = found.accepted[0]
+    winner = next(c for c in found.accepted if c.name == found.best.names[0])
     least = max(winner.penalised - found.p.limits.search.tie, 0.0)
     close = [c.name for c in found.first if c.penalised > least]
     names = dict.fromkeys((*close, *EFFECTS[winner.name].indistinguishable))

@@ -1,11 +1,14 @@
-"""From one recording to its explanation: recorder, controller, plain loop, then effects until nothing passes.
+"""From one recording to its explanation: recorder, controller, plain loop, then effects one by one until none passes.
 
-Read on in the order of the walk: recording, the faults of catalogue/, plain_loop, rounds, selection (with starts and
+Effects are then looked at again as a set, and what explains the recording beyond them is owned up to.
+
+Read on in the order of the walk: recording, the faults of catalogue/, plain_loop, selection (with starts and
 friction), proof, explanation; then answer, with where and location, and words.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -13,13 +16,27 @@ import numpy as np
 
 from identification.controller.check import LATE_SAMPLES, Finding, judge
 from identification.controller.pi_regression import ControlLaw, Trends, shifted, unstated_law
-from identification.mismatch.catalogue import RECORDER_FAULTS, fault
-from identification.mismatch.effect import Ends
+from identification.estimation.prediction_error import descended, gain
+from identification.mismatch.catalogue import CANDIDATES, EFFECTS, RECORDER_FAULTS, fault
+from identification.mismatch.effect import Ends, Friction
 from identification.mismatch.explanation import Explanation, agreed, beyond_the_grid, carried_over, ends
+from identification.mismatch.friction import from_cycles, is_friction
+from identification.mismatch.outside import OUTSIDE, RIVALS, about
 from identification.mismatch.plain_loop import Clip, inputs_of, prepared, without_spikes
-from identification.mismatch.recording import Recording, is_experiment, straightened, unlogged
-from identification.mismatch.rounds import physics
-from identification.mismatch.selection import Progress, silent
+from identification.mismatch.proof import passes
+from identification.mismatch.recording import Recording, SeenInCycles, is_experiment, straightened, unlogged
+from identification.mismatch.reference import Foretold, foretold
+from identification.mismatch.selection import (
+    Candidate,
+    Progress,
+    compete,
+    integrating_or_first_order,
+    penalised,
+    penalty,
+    silent,
+)
+from identification.mismatch.starts import Round, round_of
+from identification.models import Stiction
 from identification.record import Floats
 from identification.simulation.parameters import Slot
 
@@ -89,3 +106,161 @@ def transmitter_end(recorder: Finding | None, pv: Floats) -> Clip | None:
     (value,) = recorder.values.values()
     upper = value > float(np.median(pv))
     return Clip(value, Slot.CLIP_HI if upper else Slot.CLIP_LO, recorder.where)
+
+
+def physics(found: Explanation, tell: Progress, s: Recording) -> Explanation:
+    """The explanation with the effects of the catalogue that pass, and the gain [nat] of what is left beyond them."""
+    p, best = integrating_or_first_order(found.p, found.plain, s)
+    found, last = one_by_one(replace(found, p=p, plain=best, best=best), tell, s)
+    if len(found.accepted) > 1:
+        found = as_a_set(found, tell, s)
+    left = left_over(found, last)
+    return replace(found, left=left.gain, left_by=left.way)
+
+
+def one_by_one(found: Explanation, tell: Progress, s: Recording) -> tuple[Explanation, list[Candidate]]:
+    """Effects added as long as one passes, first a valve that the cycles show, and the last round's candidates.
+
+    Physics of no name, which goes with PV as recorded, competes neither in a loop that cycles, where PV of any while
+    ago tells PV, whatever makes it cycle, nor in an experiment, which is judged by its simulation: what is fed with
+    recorded PV is none.
+    """
+    limits, candidates = found.p.limits.search, list[Candidate]()
+    has_rivals = s.cycles is None and not s.free_valve and not is_experiment(s)
+    for _ in range(limits.rounds):
+        x = round_of(found.p, found.best, s)
+        candidates = compete(x, (*CANDIDATES, *RIVALS) if has_rivals else CANDIDATES, tell)
+        if s.cycles is not None and not found.accepted:
+            candidates = with_cycles(x, s.cycles, candidates)
+        if not found.first:
+            found = replace(found, first=tuple(c for c in candidates if c.name in EFFECTS))
+        winner = chosen(x, found, candidates)
+        if winner is None:
+            break
+        if winner.name in OUTSIDE:
+            return replace(found, outside=winner), candidates
+        best = descended(x.p, winner.fit.model, limits.full_steps)
+        found = replace(found, p=x.p, best=best, accepted=(*found.accepted, winner))
+    return found, candidates
+
+
+def chosen(x: Round, found: Explanation, candidates: list[Candidate]) -> Candidate | None:
+    """What is taken of a round's candidates; physics of no name, which is handed PV as recorded, only where it does
+    far better than what is taken so far, and than what has a name."""
+    winner = None if found.accepted else shown_by_cycles(x.s, candidates)
+    winner = winner or proven(x, candidates)
+    if winner is None or winner.name not in OUTSIDE:
+        return winner
+    named = proven(x, [c for c in candidates if c.name in EFFECTS])
+    limits = x.p.limits.search
+    little = winner.penalised <= limits.outside_share * gain(found.best, found.plain)
+    near = named is not None and named.penalised >= limits.outside_near * winner.penalised
+    return named if little or near else winner
+
+
+def with_cycles(x: Round, seen: SeenInCycles, candidates: list[Candidate]) -> list[Candidate]:
+    """The candidates and those begun where the cycles show a valve, best first; of each name the better."""
+    begun = [penalised(x, fit) for fit in from_cycles(x, seen, CANDIDATES)]
+    best: dict[tuple[str, str], Candidate] = {}
+    for c in sorted([*candidates, *begun], key=lambda c: -c.penalised):
+        best.setdefault((c.name, c.row.label), c)
+    return list(best.values())
+
+
+def shown_by_cycles(s: Recording, candidates: Sequence[Candidate]) -> Candidate | None:
+    """The best play or stick-slip, where the loop's cycles show a faulty valve; None where they do not.
+
+    What shows a jump is believed: a slip now and then late hides it from one constant friction. A play is not, where
+    a stem that sticks leaves less.
+    """
+    if s.cycles is None:
+        return None
+    rubs = [c for c in candidates if is_friction(c.name)]
+    if isinstance(s.cycles.valve, Stiction):
+        rubs = [*(c for c in rubs if about(c.name).friction is Friction.STICKS), *rubs]
+    return rubs[0] if rubs else None
+
+
+def proven(x: Round, candidates: list[Candidate]) -> Candidate | None:
+    """The best candidate with a gain left after its penalty that passes the proof.
+
+    In an experiment one that is bound to a time is taken where none that lasts does anything: a course of the load
+    can be drawn through whatever the model lacks, and no data can be held out from it.
+    """
+    gains = [c for c in candidates if c.penalised > 0]
+    if x.p.by_simulation:
+        lasts = any(not about(name).timed for name in x.near.names)
+        gains = [c for c in gains if not (lasts and about(c.name).timed)]
+        gains.sort(key=lambda c: about(c.name).timed)
+    tried = gains[: x.p.limits.proof.proven]
+    return next((c for c in tried if passes(x, c.fit, about(c.name))), None)
+
+
+def as_a_set(found: Explanation, tell: Progress, s: Recording) -> Explanation:
+    """Several effects looked at again: one in another's place, one that the others have made idle; a valve that the
+    cycles show stays."""
+    told = shown_by_cycles(s, found.accepted[:1]) is not None
+    if not told:
+        tell("other sets of effects")
+        found = replacement_step(found, tell, s)
+    return without_the_idle(found, int(told))
+
+
+def replacement_step(found: Explanation, tell: Progress, s: Recording) -> Explanation:
+    """The explanation with each effect given up once for whatever does better beside the others: another, or another
+    way of the same.
+
+    Effects are added one at a time, so the first may have been taken in the place of two that act together. In an
+    experiment none bound to a time takes the place of one that lasts, for through whatever a model lacks a course can
+    be drawn.
+    """
+    x, limits = round_of(found.p, found.best, s), found.p.limits.search
+    # a load step taken here is at the places of this round
+    found = replace(found, p=x.p)
+    for i, old in enumerate(found.accepted):
+        lasts = x.p.by_simulation and not EFFECTS[old.name].timed
+        beside = replace(x, near=found.less([old]).best)
+        least = max(gain(found.best, beside.near) - penalty(x.p, old.row) + limits.tie, 0.0)
+        others = (
+            c
+            for c in compete(beside, CANDIDATES, tell, least)
+            if (c.name, c.row.label) != (old.name, old.row.label) and not (lasts and EFFECTS[c.name].timed)
+        )
+        first = next(others, None)
+        if first is not None and first.penalised > least and passes(beside, first.fit, EFFECTS[first.name]):
+            best = descended(x.p, first.fit.model, limits.full_steps)
+            found = replace(found, best=best, accepted=(*found.accepted[:i], first, *found.accepted[i + 1 :]))
+    return found
+
+
+def without_the_idle(found: Explanation, kept: int) -> Explanation:
+    """The explanation less effects that the others have made idle, the first `kept` of them left alone.
+
+    An effect may have been taken in the place of one that came after it.
+    """
+    for old in found.accepted[kept:]:
+        rest = found.less([old])
+        if rest.accepted and gain(found.best, rest.best) < penalty(found.p, old.row):
+            found = rest
+    return found
+
+
+def left_over(found: Explanation, candidates: list[Candidate]) -> Foretold:
+    """What explains the recording beyond the effects taken and has no name among them; nothing where nothing does.
+
+    What a reference without a name foretells of the innovations is left; so is what it foretells of the plain loop's
+    on data held out, where effects bound to a time gain hardly more with all of the data: such a course can be drawn
+    through whatever the model lacks, and what time does not bind is not bound to time.
+    """
+    limits, won = found.p.limits.search, gain(found.best, found.plain)
+    left = foretold(found.p, found.best)
+    if left.gain <= max(limits.left_over, limits.left_share * won):
+        left = Foretold()
+    if found.accepted and all(about(c.name).timed for c in found.accepted):
+        rival = foretold(found.p, found.plain, clock=False)
+        left = rival if rival.gain > max(limits.rival_share * won, limits.left_over) else left
+    if not found.accepted and any(c.row.needs == "steps" and c.penalised > 0 for c in candidates):
+        left = Foretold(left.way, max(left.gain, candidates[0].penalised))
+    if found.outside is not None:
+        left = Foretold(left.way, max(left.gain, found.outside.penalised))
+    return left

@@ -14,8 +14,7 @@ from identification.mismatch.pictures import Drawing, Picture
 from identification.mismatch.recording import Recording
 from identification.models import Estimate
 from identification.record import Floats
-from identification.simulation.effect import Act, Param, Signal, Start, Variant, each
-from identification.simulation.parameters import Slot, own_slot
+from identification.simulation.parameters import Act, Param, Signal, Slot, Start, Variant, each, own_slot
 
 __all__ = ["Act", "Block", "Effect", "Ends", "Estimate", "Fault", "Finding", "Floats", "Friction"]
 __all__ += ["Param", "Parameters", "Recording", "Signal", "Slot", "Start", "Variant"]
@@ -64,12 +63,12 @@ class Effect:
     name, block : as answered, contract; sentence : what a shift supervisor reads, with the parameters in braces;
     check : what to look at; caption : what its picture shows, where the picture's kind does not say it; tests : for
     each name that it can be taken for, the experiment or signal that tells the two apart; indistinguishable : names
-    that the same data would bear as well; types : loop types that can have it; needs : see Variant; variants : how it
-    may act; timed : bound to a time, so that nothing follows for data held out; local : its gain may lie in one part
-    of the recording; friction : see Friction; derived : further numbers from its parameters; spoken : names in the
-    sentence that stand for the first of several parameters; titles : what pages call numbers that no Param has;
-    acts : what it does to a signal of the loop in its own file, where the simulator has no lines for it; curve : its
-    picture.
+    that the same data would bear as well; types : loop types that can have it, any where empty or the type is not
+    known; needs : see Variant; variants : how it may act; timed : bound to a time, so that nothing follows for data
+    held out; local : its gain may lie in one part of the recording; friction : see Friction; derived : further
+    numbers from its parameters; spoken : names in the sentence that stand for the first of several parameters; titles
+    : what pages call numbers that no Param has; acts : what it does to a signal of the loop in its own file, where
+    the simulator has no lines for it; curve : its picture.
     """
 
     name: str
@@ -94,8 +93,8 @@ class Effect:
     @property
     def candidates(self) -> tuple[Variant, ...]:
         """Its variants, each with the effect's name, block and needs."""
-        own = {"name": self.name, "block": str(self.block), "types": self.types}
-        return tuple(replace(v, needs=v.needs or self.needs, **own) for v in self.variants)  # type: ignore[arg-type]
+        name, block = self.name, str(self.block)
+        return tuple(replace(v, needs=v.needs or self.needs, name=name, block=block) for v in self.variants)
 
     @property
     def called(self) -> dict[str, str]:

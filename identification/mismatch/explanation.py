@@ -81,6 +81,13 @@ class Explanation:
             raise ValueError("an explanation that was not put to the proof")
         return self.proof
 
+    def less(self, given_up: Sequence[Candidate]) -> Explanation:
+        """The explanation without some of its effects, the others fitted anew."""
+        model = without(self.best.model, (c.row for c in given_up))
+        best = descended(self.p, model, self.p.limits.search.full_steps)
+        gone = {c.name for c in given_up}
+        return replace(self, best=best, accepted=tuple(c for c in self.accepted if c.name not in gone))
+
     @property
     def finding(self) -> Finding | None:
         """The finding about recorder or controller that is named first; None where an effect stands before it, as one
@@ -149,9 +156,7 @@ def carried_over(found: Explanation) -> Explanation:
 
 def first_effects(found: Explanation, count: int) -> Explanation:
     """The explanation with its first effects alone; the others, and what was found beside all, are given up."""
-    model = without(found.best.model, (c.row for c in found.accepted[count:]))
-    best = descended(found.p, model, found.p.limits.search.full_steps)
-    return replace(found, best=best, accepted=found.accepted[:count], outside=None)
+    return replace(found.less(found.accepted[count:]), outside=None)
 
 
 def agreed(told: Explanation, by_misfit: Explanation) -> Explanation:
@@ -172,14 +177,12 @@ def agreed(told: Explanation, by_misfit: Explanation) -> Explanation:
 
 def most_telling_first(found: Explanation) -> Explanation:
     """The explanation with its effects in the order of what the simulation would miss without each."""
-    full = found.p.limits.search.full_steps
-    model = found.best.model
-    if len(model.added) < 2:
+    if len(found.accepted) < 2:
         return found
-    missed = {row.name: descended(found.p, without(model, [row]), full).loss for row in model.added}
-    ordered = tuple(sorted(model.added, key=lambda row: -missed[row.name]))
+    missed, model = {c.name: found.less([c]).best.loss for c in found.accepted}, found.best.model
+    added = tuple(sorted(model.added, key=lambda row: -missed[row.name]))
     accepted = tuple(sorted(found.accepted, key=lambda c: -missed[c.name]))
-    return replace(found, best=replace(found.best, model=replace(model, added=ordered)), accepted=accepted)
+    return replace(found, best=replace(found.best, model=replace(model, added=added)), accepted=accepted)
 
 
 def nearer(one: Explanation, other: Explanation) -> Explanation:

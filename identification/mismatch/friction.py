@@ -23,12 +23,12 @@ from identification.estimation.window import Fit, Window
 from identification.mismatch.effect import Friction
 from identification.mismatch.outside import about
 from identification.mismatch.recording import SeenInCycles
+from identification.mismatch.starts import Round
 from identification.models import Backlash, Stiction, Valve
 from identification.record import Floats
 from identification.signals.filters import stretch_ends
-from identification.simulation.effect import Signal, Variant, acted
 from identification.simulation.open_loop import as_parameters, from_flow, simulate
-from identification.simulation.parameters import Slot, alone
+from identification.simulation.parameters import Signal, Slot, Variant, acted, alone
 from identification.simulation.valve import StemLaw, moved_stem, sticking
 from identification.simulation.valve_chain import before_stem, behind_stem, friction_of
 
@@ -131,9 +131,9 @@ def _window_behind(p: Problem, c: Floats) -> Window:
     return Window(y, op, p.usable, inputs.dt_s)
 
 
-def from_cycles(p: Problem, near: Fitted, seen: SeenInCycles, rows: tuple[Variant, ...]) -> list[Fitted]:
+def from_cycles(x: Round, seen: SeenInCycles, rows: tuple[Variant, ...]) -> list[Fitted]:
     """Those of some rows that are of friction added to a fit, each followed to the end from what the cycles told."""
-    out = []
+    out, p, near = [], x.p, x.near
     for row in rows:
         valve = _valve_for(row, seen.valve) if is_friction(row.name) else None
         if valve is not None:

@@ -227,11 +227,8 @@ def chances(bases: list[Floats], y: Floats, blocks: int) -> tuple[Floats, Floats
 def block_products(flat: Floats, y: Floats, blocks: int) -> Floats:
     """Products of each block of the columns with each block of the responses, shape (blocks, blocks, k, 2)."""
     length = y.shape[0] // blocks
-    n = blocks * length
-    left = flat[:n].reshape(blocks, length, -1).transpose(0, 2, 1).reshape(-1, length)
-    right = y[:n].reshape(blocks, length, -1).transpose(1, 0, 2).reshape(length, -1)
-    product = left @ right
-    return product.reshape(blocks, flat.shape[1], blocks, y.shape[1]).transpose(0, 2, 1, 3)
+    left, right = (x[: blocks * length].reshape(blocks, length, -1) for x in (flat, y))
+    return np.tensordot(left, right, axes=(1, 1)).transpose(0, 2, 1, 3)
 
 
 def _scores(products: Floats, ends: np.ndarray) -> Floats:

@@ -11,9 +11,9 @@ from identification.mismatch import pictures
 from identification.mismatch.catalogue import EFFECTS
 from identification.mismatch.effect import Act, Block, Effect, Floats, Param, Signal, Slot, Variant, own_slot
 from identification.mismatch.pictures import Axis, Drawing, Picture
-from identification.simulation.effect import bring
 from identification.simulation.lag import lagged
 from identification.simulation.open_loop import gain_over_record, load
+from identification.simulation.parameters import bring
 
 HURRY, HURRY_T = own_slot("HURRY"), own_slot("HURRY_T", 1.0)
 CHANGES, MEMORIES = (-0.1, 0.1), (8.0, 25.0)

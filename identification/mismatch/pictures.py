@@ -16,9 +16,8 @@ from identification.controller.check import StatedSettings, runs
 from identification.mismatch.recording import Recording
 from identification.models import Estimate
 from identification.record import Floats, Mask
-from identification.simulation.effect import Variant
 from identification.simulation.open_loop import ModelInputs, load, simulate
-from identification.simulation.parameters import Slot, alone
+from identification.simulation.parameters import Slot, Variant, alone
 from identification.simulation.pi import free_path
 from identification.simulation.valve_chain import flow
 

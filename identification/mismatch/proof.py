@@ -19,7 +19,7 @@ from identification.estimation.search import simulated_best
 from identification.limits import LIMITS, ExplainLimits
 from identification.mismatch.effect import Effect
 from identification.mismatch.friction import WEARS, simulated_anew
-from identification.mismatch.starts import at_inlet
+from identification.mismatch.starts import Round, at_inlet, early_part, fitted_early
 from identification.record import Floats, Mask
 from identification.signals.filters import without_lines
 from identification.simulation.open_loop import simulate
@@ -29,13 +29,13 @@ ENDS_OF_SIGNAL = ("opspan", "pvspan")
 """Scales of constants that are places in a signal's range."""
 
 
-def passes(p: Problem, worse: Fitted, better: Fitted, effect: Effect) -> bool:
-    """Whether the effect added last stands: its constants within their range, no valve in good order, spread over the
-    record and, where it is bound to no time, on held-out spans.
+def passes(x: Round, better: Fitted, effect: Effect) -> bool:
+    """Whether the effect that a candidate adds to a round's fit stands: its constants within their range, no valve in
+    good order, spread over the record and, where it is bound to no time, on held-out spans.
 
     What an effect that is bound to a time will do later does not follow from what it did, so no span is held out.
     """
-    limits = p.limits.proof
+    p, worse, limits = x.p, x.near, x.p.limits.proof
     sound = effect.friction in WEARS and better.model.c[Slot.STICKBAND] < limits.sound_valve
     if sound or runs_out(p, better):
         return False
@@ -46,7 +46,7 @@ def passes(p: Problem, worse: Fitted, better: Fitted, effect: Effect) -> bool:
     if not effect.local and not is_spread(p, better, worse):
         return False
     least = limits.held_out_loss - limits.held_out_share * gain(better, worse)
-    return held_out_gain(p, fitted_early(p, worse, better)) > least
+    return held_out_gain(p, (x.early, fitted_early(p, better))) > least
 
 
 def runs_out(p: Problem, fit: Fitted) -> bool:
@@ -82,19 +82,6 @@ def is_spread(p: Problem, better: Fitted, worse: Fitted) -> bool:
     won = 0.5 * p.weight * (worse.e**2 - better.e**2) / max(better.loss, 1e-30)
     parts = np.sort([part.sum() for part in np.array_split(won, p.limits.proof.parts)])
     return float(parts[:-2].sum()) > p.limits.proof.spread * float(parts.sum())
-
-
-def early_part(p: Problem) -> tuple[Problem, int]:
-    """The problem with the first part of the record alone to be fitted, and the first sample held out."""
-    cut = int((1.0 - p.limits.proof.held_out) * p.y.size)
-    return replace(p, weight=np.where(np.arange(p.y.size) < cut, p.weight, 0.0)), cut
-
-
-def fitted_early(p: Problem, worse: Fitted, better: Fitted) -> tuple[Fitted, Fitted]:
-    """Both models fitted anew to the first part of the record; a model's START is of its first sample."""
-    early, steps = early_part(p)[0], p.limits.search.screen_steps
-    first = descended(early, worse.model, steps)
-    return first, first if better is worse else descended(early, better.model, steps)
 
 
 def held_out_gain(p: Problem, fits: tuple[Fitted, Fitted]) -> float:
@@ -286,17 +273,19 @@ class Criterion:
 
 def held_out(p: Problem, worse: Fitted, better: Fitted, cycle: int = 0) -> HeldOut:
     """Both models fitted anew to the first part of the record and compared on the rest: over the whole of it, and
-    where load drowns the difference there, over windows of some time constants of the plain loop.
+    where load drowns the difference there, over windows of some time constants of the plain loop; a plain loop beside
+    itself over the whole alone.
 
     cycle : samples of a cycle of a loop whose cycles show a valve with friction, 0 for any other; they are compared
     over such windows too, the stem placed anew in each.
     """
-    fits = fitted_early(p, worse, better)
+    first = fitted_early(p, worse)
+    fits = first, first if better is worse else fitted_early(p, better)
     _, cut = early_part(p)
     early = pair_of(p, fits, p.usable & (np.arange(p.y.size) < cut))
     told = early, pair_of(p, (worse, better), p.usable), held_out_gain(p, fits)
     whole = Criterion(p).compared(*told)
-    if whole.carries:
+    if whole.carries or better is worse:
         return whole
     c, limits = early.plain.c, p.limits.proof
     memory = limits.window_times * float(c[Slot.T] + c[Slot.L]) / p.inputs.dt_s

@@ -8,9 +8,8 @@ on data that no weight was fitted to, so what a way foretells there is physics t
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -36,22 +35,6 @@ FINER = 8
 
 
 @dataclass(frozen=True, slots=True)
-class LoopSignals:
-    """What a way may act by: flow behind the valve [% OP] and PV as known before [% PV], shape (n,) each, about
-    their means, the time constant [s], and the response of PV to a load."""
-
-    flow: Floats
-    pv: Floats
-    lag_s: float
-    dt_s: float
-    response: Callable[[Floats], Floats]
-
-    def ahead(self, x: Floats) -> Floats:
-        """What a signal, shape (n,), is ahead of its own lag."""
-        return x - lagged(x, REFERENCE.fast * self.lag_s, self.dt_s)
-
-
-@dataclass(frozen=True, slots=True)
 class Foretold:
     """The way that foretells most, and how much [nat]."""
 
@@ -66,18 +49,29 @@ def response(x: Floats, c: Floats, dt_s: float) -> Floats:
     return plain_vessel(x - x[0], np.zeros(x.size), unit, dt_s, 0.0)
 
 
-def signals_of(p: Problem, c: Floats) -> LoopSignals:
-    """What acts in a loop as a model, shape (SIZE,), has it.
+class LoopSignals:
+    """What a way may act by, as a model of constants c, shape (SIZE,), has it: what is `through` the valve [% OP],
+    the same and PV as known before [% PV] about their means, shape (n,) each, and the time constant [s].
 
-    An experiment's errors are those of its simulation and go on from sample to sample, so that recorded PV tells them
-    whatever makes them: there PV is the simulation's.
+    In an experiment, where no controller moves the valve, nothing goes from sample to sample, so that recorded PV
+    tells them whatever makes them: there PV is the simulation's.
     """
-    flow, dt_s = through_valve(p.inputs, c), p.inputs.dt_s
-    pv = simulate(p.inputs, c) if p.by_simulation else np.concatenate((p.y[:1], p.y[:-1]))
-    lag_s = min(max(float(c[Slot.T]), dt_s), p.limits.search.settles * flow.size * dt_s)
-    unit = c.copy()
-    unit[Slot.T] = lag_s
-    return LoopSignals(flow - flow.mean(), pv - pv.mean(), lag_s, dt_s, partial(response, c=unit, dt_s=dt_s))
+
+    def __init__(self, p: Problem, c: Floats) -> None:
+        self.through, self.dt_s = through_valve(p.inputs, c), p.inputs.dt_s
+        pv = simulate(p.inputs, c) if p.by_simulation else np.concatenate((p.y[:1], p.y[:-1]))
+        self.flow, self.pv = self.through - self.through.mean(), pv - pv.mean()
+        self.lag_s = min(max(float(c[Slot.T]), self.dt_s), p.limits.search.settles * pv.size * self.dt_s)
+        self.c, self.lagging = c, c.copy()
+        self.lagging[Slot.T] = self.lag_s
+
+    def response(self, x: Floats) -> Floats:
+        """The response of PV to a load, shape (n,), its time constant kept within the record."""
+        return response(x, self.lagging, self.dt_s)
+
+    def ahead(self, x: Floats) -> Floats:
+        """What a signal, shape (n,), is ahead of its own lag."""
+        return x - lagged(x, REFERENCE.fast * self.lag_s, self.dt_s)
 
 
 def switched(x: Floats, at: float, band: float) -> Floats:
@@ -133,40 +127,41 @@ def by_sensor(p: Problem, fit: Fitted) -> list[Floats]:
     return [stands, move * stands, move * np.abs(move), np.maximum(move, 0.0), np.abs(move)]
 
 
-def past_moves(p: Problem, c: Floats, through: Floats) -> list[Floats]:
+def past_moves(o: LoopSignals) -> list[Floats]:
     """Means of OP behind the valve over past stretches, each shape (n,)."""
-    n, dt_s = through.size, p.inputs.dt_s
-    length_s = min(REFERENCE.reach * float(c[Slot.T] + c[Slot.L]), REFERENCE.most_reach * n * dt_s)
+    n, dt_s = o.flow.size, o.dt_s
+    length_s = min(REFERENCE.reach * float(o.c[Slot.T] + o.c[Slot.L]), REFERENCE.most_reach * n * dt_s)
     width = max(round(length_s / REFERENCE.boxes / dt_s), REFERENCE.least_box)
-    total = np.concatenate(([0.0], np.cumsum(through - through.mean())))
+    total = np.concatenate(([0.0], np.cumsum(o.flow)))
     at = [np.maximum(np.arange(n) - i * width, 0) for i in range(REFERENCE.boxes + 1)]
     return [(total[at[i]] - total[at[i + 1]]) / width for i in range(REFERENCE.boxes)]
 
 
-def bent_moves(p: Problem, c: Floats, through: Floats) -> list[Floats]:
+def bent_moves(o: LoopSignals) -> list[Floats]:
     """Responses to OP's fast part by size, to its square and to its cube, each shape (n,)."""
-    dt_s, moves = p.inputs.dt_s, []
+    moves = []
     for share in (0.1, 0.5):
-        fast = through - lagged(through, max(share * float(c[Slot.T]), dt_s), dt_s)
+        fast = o.through - lagged(o.through, max(share * float(o.c[Slot.T]), o.dt_s), o.dt_s)
         moves += [fast * np.abs(fast), np.abs(fast)]
-    level = through - through.mean()
-    moves += [level**2, level**3]
-    return [response(x, c, dt_s) for x in moves]
+    return [response(x, o.c, o.dt_s) for x in (*moves, o.flow**2, o.flow**3)]
+
+
+WAYS: Mapping[str, Callable[[LoopSignals], list[Floats]]] = {
+    "past": past_moves,
+    "size": bent_moves,
+    "level": by_level,
+    "switch": by_switch,
+    "history": by_history,
+    "direction": by_direction,
+}
+"""The ways in which anything may act on PV, each with its signals, shape (n,) each."""
 
 
 def ways(p: Problem, fit: Fitted) -> Iterator[tuple[str, list[Floats]]]:
-    """The ways in which anything may act, each with its signals in the innovations' place, shape (n,) each."""
-    c, loop, through = fit.model.c, signals_of(p, fit.model.c), through_valve(p.inputs, fit.model.c)
-
-    def white(signals: list[Floats]) -> list[Floats]:
-        return [whitened(x, fit.ar, p.edges) for x in signals]
-
-    yield "past", white(past_moves(p, c, through))
-    yield "size", white(bent_moves(p, c, through))
-    yield "level", white(by_level(loop))
-    yield "switch", white(by_switch(loop))
-    yield "history", white(by_history(loop))
-    yield "direction", white(by_direction(loop))
+    """All ways with their signals in the innovations' place, shape (n,) each."""
+    o = LoopSignals(p, fit.model.c)
+    for name, way in WAYS.items():
+        yield name, [whitened(x, fit.ar, p.edges) for x in way(o)]
     if not p.by_simulation:
         yield "sensor", by_sensor(p, fit)
 
@@ -182,9 +177,8 @@ def unfollowed(p: Problem, fit: Fitted) -> Callable[[Floats], Floats]:
 
 def left_freely(p: Problem, fit: Fitted) -> Floats:
     """What the flexible model leaves of a fit's weighted innovations, shape (n,)."""
-    c, root, rest = fit.model.c, np.sqrt(p.weight), unfollowed(p, fit)
-    through = through_valve(p.inputs, c)
-    free = past_moves(p, c, through) + bent_moves(p, c, through)
+    root, rest, o = np.sqrt(p.weight), unfollowed(p, fit), LoopSignals(p, fit.model.c)
+    free = past_moves(o) + bent_moves(o)
     e = rest(fit.e * root)
     more = rest((np.stack([whitened(x, fit.ar, p.edges) for x in free]) * root).T)
     q, scale = np.linalg.qr(more)

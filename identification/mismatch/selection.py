@@ -15,8 +15,7 @@ from identification.mismatch.outside import about
 from identification.mismatch.proof import is_one_move
 from identification.mismatch.recording import Recording
 from identification.mismatch.starts import Round, mode_starts, screened, start_models
-from identification.simulation.effect import Variant
-from identification.simulation.parameters import Slot, neutral
+from identification.simulation.parameters import Slot, Variant, neutral
 
 Progress = Callable[[str], None]
 KNOWN_TYPES = ("flow", "pressure", "temperature", "level")
@@ -61,14 +60,9 @@ def compete(
     tell : is told each row's name before it is tried; least : what a candidate has to come to, penalty taken off, to
     be of any use [nat].
     """
-    starts, firsts = [], []
-    for row in rows:
-        if applies(x, row):
-            tell(row.name)
-            models, first = first_try(x, row, least)
-            starts.append(models)
-            firsts.append(first)
-    tried = sorted(zip(counted_alike(x, firsts), starts, strict=True), key=lambda t: -t[0].penalised)
+    begun = [first_try(x, row, least, tell) for row in rows if applies(x, row)]
+    firsts = counted_alike(x, [first for first, _ in begun])
+    tried = sorted(zip(firsts, (models for _, models in begun), strict=True), key=lambda t: -t[0].penalised)
     most = x.p.limits.search.followed
     ended = [outdoing(x, followed(x, first, models, least)) for first, models in tried[:most]]
     sticking = sticking_candidates(x, [first for first, _ in tried], rows, tell)
@@ -82,7 +76,7 @@ def applies(x: Round, row: Variant) -> bool:
     taken = {p.slot for r in near.model.added for p in r.params}
     if row.name in near.names or taken & {p.slot for p in row.params}:
         return False
-    if row.types and x.s.kind in KNOWN_TYPES and x.s.kind not in row.types:
+    if effect.types and x.s.kind in KNOWN_TYPES and x.s.kind not in effect.types:
         return False
     if row.needs in NEEDS and not NEEDS[row.needs](x):
         return False
@@ -101,15 +95,15 @@ def penalty(p: Problem, row: Variant) -> float:
     return limits.search_penalty + (free or limits.parameter_penalty) + row.penalty
 
 
-def penalised(p: Problem, near: Fitted, fit: Fitted) -> Candidate:
+def penalised(x: Round, fit: Fitted) -> Candidate:
     """A fit as a candidate beside the fit before."""
-    won = gain(fit, near)
-    return Candidate(fit, won, won - penalty(p, fit.model.added[-1]))
+    won = gain(fit, x.near)
+    return Candidate(fit, won, won - penalty(x.p, fit.model.added[-1]))
 
 
 def best_of(x: Round, models: list[Model], steps: int, aim: float = math.inf) -> Candidate:
     """The best of some starts, followed for some steps, as far as they come under `aim`."""
-    return penalised(x.p, x.near, min((descended(x.p, m, steps, aim) for m in models), key=lambda f: f.loss))
+    return penalised(x, min((descended(x.p, m, steps, aim) for m in models), key=lambda f: f.loss))
 
 
 def worth_following(p: Problem, least: float) -> float:
@@ -119,9 +113,10 @@ def worth_following(p: Problem, least: float) -> float:
     return min(limits.may_come_to * least, least + limits.worth_following)
 
 
-def first_try(x: Round, row: Variant, least: float) -> tuple[list[Model], Candidate]:
-    """A row's starts, the best first, and the candidate that a few steps make of the first; a start that will not
-    come to anything worth following is left."""
+def first_try(x: Round, row: Variant, least: float, tell: Progress) -> tuple[Candidate, list[Model]]:
+    """The candidate that a few steps make of a row's best start, and all its starts, the best first; a start that
+    will not come to anything worth following is left."""
+    tell(row.name)
     p, near, limits = x.p, x.near, x.p.limits.search
     first = models = start_models(x, row)
     if row.needs != "line":
@@ -131,7 +126,7 @@ def first_try(x: Round, row: Variant, least: float) -> tuple[list[Model], Candid
         first = first + mode_starts(p, near, row)
     worth = penalty(p, row) + worth_following(p, least)
     aim = near.loss * math.exp(-2.0 * worth / p.count)
-    return models, best_of(x, first, limits.screen_steps, aim)
+    return best_of(x, first, limits.screen_steps, aim), models
 
 
 def followed(x: Round, first: Candidate, models: list[Model], least: float) -> Candidate:
@@ -150,9 +145,7 @@ def counted_alike(x: Round, found: list[Candidate]) -> list[Candidate]:
     most = max((c.fit.count for c in found if c.row.opponent is None), default=0)
     if not x.p.by_simulation:
         return found
-    return [
-        c if c.row.opponent is not None else penalised(x.p, x.near, replace(c.fit, count=most)) for c in found
-    ]
+    return [c if c.row.opponent is not None else penalised(x, replace(c.fit, count=most)) for c in found]
 
 
 def outdoing(x: Round, first: Candidate) -> Candidate:
@@ -166,7 +159,7 @@ def outdoing(x: Round, first: Candidate) -> Candidate:
     added, own = descended(p, model, steps), descended(p, first.fit.model, steps)
     limits, moves = p.limits.proof, float(p.weight @ p.y**2 / p.weight.sum())
     if own.loss < limits.course_leaves * near.loss and near.loss > limits.course_from**2 * moves:
-        return penalised(p, near, own)
+        return penalised(x, own)
     won = gain(own, added)
     return Candidate(own, won, won - penalty(p, first.row) + first.row.penalty)
 
@@ -184,7 +177,7 @@ def sticking_candidates(
         if about(row.name).friction is Friction.STICKS:
             tell(row.name)
             fit = fit_sticking(x.p, plays[0].fit, row, x.near.model.added)
-            out.append(penalised(x.p, x.near, fit))
+            out.append(penalised(x, fit))
     return out
 
 

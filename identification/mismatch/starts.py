@@ -14,12 +14,18 @@ from scipy.ndimage import median_filter
 
 from identification.controller.check import runs
 from identification.estimation.noise import whitened
-from identification.estimation.prediction_error import Fitted, Model, Problem, scales, sensitivities
+from identification.estimation.prediction_error import (
+    Fitted,
+    Model,
+    Problem,
+    descended,
+    scales,
+    sensitivities,
+)
 from identification.mismatch.recording import Recording
 from identification.record import Floats, Mask
-from identification.simulation.effect import Variant
 from identification.simulation.open_loop import simulate, through_valve
-from identification.simulation.parameters import STEPS, Slot, neutral
+from identification.simulation.parameters import STEPS, Slot, Variant, neutral
 from identification.simulation.vessel import plain_vessel
 
 LEAD = 200
@@ -31,6 +37,17 @@ LONGER = (0.7, 1.0, 1.4, 2.0)
 """Time constants tried for the first mode, in that of the plain loop."""
 LEADING = 0.95
 """First coefficient of the noise model that knows nothing: nearly a difference."""
+
+
+def early_part(p: Problem) -> tuple[Problem, int]:
+    """The problem with the first part of the record alone to be fitted, and the first sample held out."""
+    cut = int((1.0 - p.limits.proof.held_out) * p.y.size)
+    return replace(p, weight=np.where(np.arange(p.y.size) < cut, p.weight, 0.0)), cut
+
+
+def fitted_early(p: Problem, fit: Fitted) -> Fitted:
+    """A fit's model fitted anew to the first part of the record; a model's START is of its first sample."""
+    return descended(early_part(p)[0], fit.model, p.limits.search.screen_steps)
 
 
 @dataclass(frozen=True)
@@ -48,6 +65,11 @@ class Round:
         """Orthonormal directions in which the fit's own constants move its weighted innovations, shape (n, m)."""
         moves = sensitivities(self.p, self.near.model, self.near.ar) * np.sqrt(self.p.weight)
         return np.linalg.qr(moves.T)[0]
+
+    @cached_property
+    def early(self) -> Fitted:
+        """The fit anew to the first part of the record, which every candidate has to outdo on the rest."""
+        return fitted_early(self.p, self.near)
 
     def free(self, x: Floats) -> Floats:
         """Weighted innovations of what is left, shape (n,), that the fit's own constants cannot lessen, linearly."""

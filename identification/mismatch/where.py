@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from itertools import pairwise
 from typing import Any
 
@@ -12,6 +11,7 @@ from identification.controller.check import runs
 from identification.estimation.noise import whitened
 from identification.estimation.prediction_error import Fitted, Problem
 from identification.limits import LOCATION
+from identification.mismatch import words
 from identification.mismatch.explanation import Explanation
 from identification.mismatch.location import Located, located
 from identification.mismatch.recording import Recording
@@ -19,12 +19,6 @@ from identification.record import Floats
 from identification.simulation.open_loop import simulate
 from identification.simulation.parameters import Slot
 
-SIGNALS: Mapping[str, list[str]] = {
-    "recorder": ["PV", "OP"],
-    "sensor": ["PV"],
-    "controller": ["SP", "PV", "OP"],
-    "load": ["PV"],
-}
 TOLD = ("name", "p", "carries", "share", "by", "range")
 """What is told of a feature."""
 
@@ -93,7 +87,7 @@ def where_of(found: Explanation, s: Recording, block: str, at: Located) -> dict[
 
     block : of the verdict; at : of the plain loop's innovations, of the last model's where something is left over.
     """
-    p, marked, signals = found.p, found.finding, SIGNALS.get(block, ["OP", "PV"])
+    p, marked, signals = found.p, found.finding, words.TOLD["signals"][block]
     features = [{key: getattr(f, key) for key in TOLD} for f in at.features]
     after = any(f.name == "after_reversals" for f in at.carrying)
     told: dict[str, Any] = {"features": features, "after_reversals": after}

@@ -42,18 +42,15 @@ def discriminating_test(one: str, other: str) -> str:
     return next(filter(None, tests), TOLD["longer"])
 
 
-def two_plain_loops(fit: Mapping[str, Any]) -> str:
-    """That the plain loop which simulates best is another than the one that foretells best; empty where it is not."""
+def remarks(fit: Mapping[str, Any]) -> list[str]:
+    """What is to be said of a fit: that what was found shows one step ahead and in no simulation, and that the plain
+    loop which simulates best is another than the one that foretells best."""
+    ahead = [] if fit.get("ahead_nat") is None else [TOLD["seen_ahead"]]
     loops = {
         name: f"gain {x['gain']:.3g}, time constant {_number(x['time_constant_s'], 's')}"
         for name, x in fit.get("plain_loops", {}).items()
     }
-    return TOLD["two_plain_loops"].format(**loops) if loops else ""
-
-
-def seen_ahead(fit: Mapping[str, Any]) -> str:
-    """That what was found shows one step ahead and not in a simulation; empty where it shows in both."""
-    return "" if fit.get("ahead_nat") is None else TOLD["seen_ahead"]
+    return [*ahead, TOLD["two_plain_loops"].format(**loops)] if loops else ahead
 
 
 def note(found: Explanation) -> str:

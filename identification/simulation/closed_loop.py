@@ -8,7 +8,6 @@ from numba import njit
 from identification.errors import NotAssessedError
 from identification.models import Fopdt, Loop
 from identification.record import Floats, LoopRecord
-from identification.simulation.effect import acting
 from identification.simulation.lag import Lag, discretize, stepped
 from identification.simulation.open_loop import (
     ModelInputs,
@@ -17,7 +16,7 @@ from identification.simulation.open_loop import (
     load_over_record,
     outflow_head,
 )
-from identification.simulation.parameters import Slot
+from identification.simulation.parameters import Slot, acting
 from identification.simulation.pi import Law, next_op, per_scan
 from identification.simulation.valve import StemLaw, law_of, stem_step
 from identification.simulation.valve_chain import flow_step, friction_of, memory

@@ -10,9 +10,8 @@ from numba import njit
 
 from identification.models import Backlash, Integrator, Process, Valve
 from identification.record import Floats
-from identification.simulation.effect import Signal, acted
 from identification.simulation.lag import lagged
-from identification.simulation.parameters import KNOTS, SIZE, STEPS, Slot, neutral
+from identification.simulation.parameters import KNOTS, SIZE, STEPS, Signal, Slot, acted, neutral
 from identification.simulation.valve_chain import COASTS, flow
 from identification.simulation.vessel import outflow, outflow_of, plain_vessel, transported, vessel
 
@@ -66,8 +65,8 @@ OUTSIDE = (
     *(Slot.SPLIT, Slot.RATIO, Slot.SPLIT_DEAD, Slot.SPLIT_LAG, Slot.CLIP_HI, Slot.CLIP_LO),
     *(Slot.SINE, Slot.COSINE, Slot.OMEGA, Slot.NEIGHBOUR, Slot.NEIGHBOUR_T),
     *(int(Slot.STEP) + i for i in range(STEPS)),
-    *(Slot.MODE_T, Slot.SPILL, Slot.SPILL_T, Slot.SPEED, Slot.HEAD_BIAS),
-    *(Slot.RECALL_T, Slot.SWITCH, Slot.SWITCH_AT, Slot.SWITCH_BAND, Slot.RETURNED, Slot.RETURNS_S),
+    *(Slot.MODE_T, Slot.SPEED, Slot.HEAD_BIAS, Slot.RECALL_T),
+    *(Slot.SWITCH, Slot.SWITCH_AT, Slot.SWITCH_BAND, Slot.RETURNED, Slot.RETURNS_S),
 )
 """Parameters that a vessel of first order with constant gain, and what stands before and behind it, take care of, and
 those that do nothing by themselves. Any other at work asks for the whole vessel, a new one too."""
@@ -168,11 +167,18 @@ def simulate(inputs: ModelInputs, c: Floats) -> Floats:
 
 def from_flow(inputs: ModelInputs, c: Floats, through: Floats) -> Floats:
     """The same for a flow through the valve during each sample, shape (n,) [% OP]."""
-    dt = inputs.dt_s
+    dt, middle = inputs.dt_s, inputs.middle
     if (c[WITHIN] != NEUTRAL[WITHIN]).any():
-        out = _rich(inputs, c, through)
+        if c[Slot.PIPE] != 0:
+            through = transported(through, c[Slot.L], c[Slot.PIPE], max(middle, 1e-3), dt)
+        act, gain, full = (
+            load_over_record(inputs, c),
+            gain_over_record(inputs, c),
+            counted_from_level(inputs, c),
+        )
+        out = vessel(through, act, gain, full, dt, middle, outflow_head(inputs, c))
     else:
-        out = plain_vessel(through, load(inputs, c), c, dt, inputs.middle)
+        out = plain_vessel(through, load(inputs, c), c, dt, middle)
     out = acted(Signal.PV, out, c, dt)
     if math.isfinite(c[Slot.CLIP_HI]) or math.isfinite(c[Slot.CLIP_LO]):
         out = np.clip(out, c[Slot.CLIP_LO] - inputs.level, c[Slot.CLIP_HI] - inputs.level)
@@ -213,11 +219,3 @@ def counted_from_level(inputs: ModelInputs, c: Floats) -> Floats:
     out[Slot.CAP] -= inputs.level
     out[Slot.UPPER_CAP] -= inputs.level
     return out
-
-
-def _rich(inputs: ModelInputs, c: Floats, through: Floats) -> Floats:
-    if c[Slot.PIPE] != 0:
-        through = transported(through, c[Slot.L], c[Slot.PIPE], max(inputs.middle, 1e-3), inputs.dt_s)
-    full = counted_from_level(inputs, c)
-    act, gain = load_over_record(inputs, c), gain_over_record(inputs, c)
-    return vessel(through, act, gain, full, inputs.dt_s, inputs.middle, outflow_head(inputs, c))

@@ -1,15 +1,18 @@
-"""The parameters of the loop model that every candidate shares: one place each, neutral unless freed."""
+"""What a loop model is made of: parameters, one place each and neutral unless freed, and what an effect adds to it:
+those that it frees, where their search begins, and acts of its own."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
-from enum import IntEnum
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from enum import IntEnum, StrEnum
 
 import numpy as np
 
 from identification.record import Floats
 
+Start = Mapping[int, float]
 KNOTS = 12
 """Knots of a slow supply; ours: a wander of a twelfth of the record is followed, loop dynamics are not."""
 STEPS = 3
@@ -45,36 +48,34 @@ class Slot(IntEnum):
     SLOPE = 23
     ROOT = 24
     CAP = 25
-    SPILL = 26
-    LEAK = 27
-    PIPE = 28
-    DRIFT = 29
-    CLIP_HI = 30
-    CLIP_LO = 31
-    SINE = 32
-    COSINE = 33
-    OMEGA = 34
-    NEIGHBOUR = 35
-    NEIGHBOUR_T = 36
-    HEAD_BIAS = 37
-    SPILL_T = 38
-    T3 = 39
-    STEP = 40
-    GAIN_SLOPE = 43
-    SPEED = 44
-    PLACE = 45
-    UPPER_CAP = 46
-    PASSED = 47
-    BEGUN = 48
-    RECALL = 49
-    RECALL_T = 50
-    SWITCH = 51
-    SWITCH_AT = 52
-    SWITCH_BAND = 53
-    RETURNED = 54
-    RETURNS_S = 55
-    STEM_T = 56
-    HEAD = 57
+    LEAK = 26
+    PIPE = 27
+    DRIFT = 28
+    CLIP_HI = 29
+    CLIP_LO = 30
+    SINE = 31
+    COSINE = 32
+    OMEGA = 33
+    NEIGHBOUR = 34
+    NEIGHBOUR_T = 35
+    HEAD_BIAS = 36
+    T3 = 37
+    STEP = 38
+    GAIN_SLOPE = 41
+    SPEED = 42
+    PLACE = 43
+    UPPER_CAP = 44
+    PASSED = 45
+    BEGUN = 46
+    RECALL = 47
+    RECALL_T = 48
+    SWITCH = 49
+    SWITCH_AT = 50
+    SWITCH_BAND = 51
+    RETURNED = 52
+    RETURNS_S = 53
+    STEM_T = 54
+    HEAD = 55
 
 
 SIZE = int(Slot.HEAD) + KNOTS
@@ -104,8 +105,7 @@ def neutral() -> Floats:
     c = np.concatenate((np.zeros(SIZE), np.fromiter(_OWN.values(), dtype=np.float64)))
     c[Slot.T], c[Slot.K], c[Slot.LEAK], c[Slot.RATIO] = 1.0, 1.0, 1.0, 1.0
     c[Slot.COAST] = -1.0
-    c[Slot.MODE_T], c[Slot.NEIGHBOUR_T], c[Slot.OMEGA], c[Slot.SPILL_T] = 1.0, 1.0, 1.0, 1.0
-    c[Slot.RECALL_T] = 1.0
+    c[Slot.MODE_T], c[Slot.NEIGHBOUR_T], c[Slot.OMEGA], c[Slot.RECALL_T] = 1.0, 1.0, 1.0, 1.0
     c[Slot.DAMPING] = 0.5
     for slot in (Slot.RATE, Slot.STOP_HI, Slot.SPLIT, Slot.CAP, Slot.UPPER_CAP, Slot.CLIP_HI):
         c[slot] = math.inf
@@ -119,3 +119,110 @@ def alone(c: Floats, slots: Iterable[int]) -> Floats:
     out, kept = neutral(), list(slots)
     out[kept] = c[kept]
     return out
+
+
+@dataclass(frozen=True, slots=True)
+class Param:
+    """A parameter that an effect frees.
+
+    slot : its place among the model's parameters; name, unit : as answered; low, high : bounds in its own unit, times
+    the scale named by `scale` (scales() in prediction_error.py); log : searched by its logarithm; title : what pages
+    call it, its name where empty; hidden : whether another number, derived from it, is shown in its place.
+    """
+
+    slot: int
+    name: str
+    unit: str
+    low: float
+    high: float
+    scale: str = "1"
+    log: bool = False
+    title: str = ""
+    hidden: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Variant:
+    """One way in which an effect may act, as a candidate: its parameters, and starts in units of their scales.
+
+    delays : parameters whose start is taken off the dead time, which stood for them in the plain loop; replaces :
+    parameters of the plain loop that the effect makes meaningless; fixed : parameters set, not searched; needs : what
+    has to be in the recording, or in the model, before it can be tried (steps, line, neighbour, every scan of the
+    controller, experiment, moves); modes : time constants tried for a second mode, in that of the plain loop, and the
+    share that its gain may have; label : told apart by; penalty : added to that of the parameters; enter : turns the
+    plain loop's parameters, in place, where they change their meaning; opponent : what it has to do better than in an
+    experiment, of no name and a part of the plain loop's load; linear : the parameter that PV goes with in a straight
+    line, None of most: its start follows from those of the others.
+    """
+
+    params: tuple[Param, ...]
+    starts: tuple[Start, ...]
+    fixed: Start = field(default_factory=dict)
+    label: str = ""
+    delays: tuple[int, ...] = ()
+    replaces: tuple[int, ...] = ()
+    modes: tuple[float, ...] = ()
+    mode_share: tuple[float, float] = (0.0, 0.0)
+    penalty: float = 0.0
+    enter: Callable[[Floats], None] | None = None
+    opponent: Variant | None = None
+    linear: int | None = None
+    name: str = ""
+    block: str = ""
+    needs: str = ""
+
+    def set_in(self, c: Floats) -> Floats:
+        """A model's parameters, shape (SIZE + own,), with those set that are not searched."""
+        out = c.copy()
+        for slot, value in self.fixed.items():
+            out[slot] = value
+        return out
+
+
+def each(slot: int, *values: float) -> tuple[Start, ...]:
+    """Starts that differ in one parameter."""
+    return tuple({int(slot): v} for v in values)
+
+
+class Signal(StrEnum):
+    """The signal that an act changes, in the order of the loop."""
+
+    OP = "op"
+    FLOW = "flow"
+    PV = "pv"
+
+
+@dataclass(frozen=True, slots=True)
+class Act:
+    """A step of the simulation that an effect brings along.
+
+    slot : the parameter without which it does nothing; neutral : its value then; signal : what it changes; work :
+    that signal, shape (n,) [% of span], from the signal, the model's parameters and the sample interval [s]. PV is
+    given as its deviation from the level that counts as zero.
+    """
+
+    slot: int
+    neutral: float
+    signal: Signal
+    work: Callable[[Floats, Floats, float], Floats]
+
+
+_ACTS: list[Act] = []
+
+
+def bring(acts: tuple[Act, ...]) -> None:
+    """Take acts into the simulator; the catalogue does so as it is read."""
+    _ACTS.extend(acts)
+
+
+def acting(c: Floats) -> bool:
+    """Whether any act is at work in a model."""
+    return any(act.slot < c.size and c[act.slot] != act.neutral for act in _ACTS)
+
+
+def acted(signal: Signal, x: Floats, c: Floats, dt_s: float) -> Floats:
+    """The signal, shape (n,), after every act on it whose parameter is not neutral."""
+    for act in _ACTS:
+        if act.signal is signal and act.slot < c.size and c[act.slot] != act.neutral:
+            x = act.work(x, c, dt_s)
+    return x

@@ -14,13 +14,11 @@ from identification.simulation.parameters import Slot
 
 T, L, K, BIAS, START = (int(s) for s in (Slot.T, Slot.L, Slot.K, Slot.BIAS, Slot.START))
 T2, T3, SHARE, MODE_T, ASYM = (int(s) for s in (Slot.T2, Slot.T3, Slot.SHARE, Slot.MODE_T, Slot.ASYMMETRY))
-SLOPE, ROOT, CAP, SPILL, SPILL_T = (
-    int(s) for s in (Slot.SLOPE, Slot.ROOT, Slot.CAP, Slot.SPILL, Slot.SPILL_T)
-)
+SLOPE, ROOT, CAP = (int(s) for s in (Slot.SLOPE, Slot.ROOT, Slot.CAP))
 LEAK, PIPE, GAIN_SLOPE, SPEED = (int(s) for s in (Slot.LEAK, Slot.PIPE, Slot.GAIN_SLOPE, Slot.SPEED))
 UPPER_CAP, PASSED, BEGUN = (int(s) for s in (Slot.UPPER_CAP, Slot.PASSED, Slot.BEGUN))
-Memory = tuple[float, float, float, float, float]
-"""What a vessel remembers: level, second mode, spilled liquid, second and third lag."""
+Memory = tuple[float, float, float, float]
+"""What a vessel remembers: level, second mode, second and third lag."""
 SHORT = 0.03
 """Step, in terms of an outflow's own time, below which the exponential step is summed: the next term is 5e-16."""
 C1, C2, C3, C4, C5, C6 = ((-1.0) ** k / math.factorial(k + 1) for k in range(1, 7))
@@ -62,8 +60,8 @@ class Outflow(NamedTuple):
 
     slope : bend of the outflow [per % PV]; leak : outflow per level of a linear vessel [-]; root : nonzero where
     the outflow goes with the root of the level; head : level deviation at which a rooted vessel would be empty, with
-    its sign turned [% PV]; cap [% PV] and spill [-] : overflow; gain_slope [per % PV], speed : gain that goes with
-    the level, and its power in the time constant; up, down : pace of a rising and of a falling level [-].
+    its sign turned [% PV]; cap : level over which it spills [% PV]; gain_slope [per % PV], speed : gain that goes
+    with the level, and its power in the time constant; up, down : pace of a rising and of a falling level [-].
     """
 
     slope: float
@@ -71,7 +69,6 @@ class Outflow(NamedTuple):
     root: float
     head: float
     cap: float
-    spill: float
     gain_slope: float
     speed: float
     up: float
@@ -81,19 +78,8 @@ class Outflow(NamedTuple):
 @njit(cache=True, error_model="numpy")
 def outflow_of(c: Floats, head: float) -> Outflow:
     """The outflow that the constants say."""
-    pace = math.exp(0.5 * c[ASYM])
-    return Outflow(
-        c[SLOPE] / 50.0,
-        c[LEAK],
-        c[ROOT],
-        head,
-        c[CAP],
-        c[SPILL],
-        c[GAIN_SLOPE] / 50.0,
-        c[SPEED],
-        pace,
-        1.0 / pace,
-    )
+    slope, gain_slope, pace = c[SLOPE] / 50.0, c[GAIN_SLOPE] / 50.0, math.exp(0.5 * c[ASYM])
+    return Outflow(slope, c[LEAK], c[ROOT], head, c[CAP], gain_slope, c[SPEED], pace, 1.0 / pace)
 
 
 @njit(cache=True, error_model="numpy")
@@ -125,17 +111,16 @@ def share_filled(rise: float, time: float) -> float:
 
 
 @njit(cache=True, error_model="numpy")
-def filled(x: float, feed: float, basin: float, time: float, o: Outflow) -> tuple[float, float]:
-    """Level after some time [time constants] of constant feed, and the spill meanwhile (exact where the vessel is
-    linear)."""
+def filled(x: float, feed: float, time: float, o: Outflow) -> float:
+    """Level after some time [time constants] of constant feed (exact where the vessel is linear)."""
     out, rise = outflow(x, o)
     over = max(x - o.cap, 0.0)
     if over > 0.0:
         rise += WEIR
-    net = feed + o.spill * basin - out - WEIR * over
+    net = feed - out - WEIR * over
     if o.gain_slope != 0.0 and o.speed != 0.0:
         time /= scheduled(x, o.gain_slope) ** o.speed
-    return x + net * share_filled(rise, time * (o.up if net > 0.0 else o.down)), WEIR * over
+    return x + net * share_filled(rise, time * (o.up if net > 0.0 else o.down))
 
 
 @njit(cache=True, error_model="numpy")
@@ -152,22 +137,20 @@ def shares_filled(o: Outflow, times: tuple[float, float]) -> Floats:
 
 
 @njit(cache=True, error_model="numpy")
-def risen(x: float, feed: float, basin: float, o: Outflow, rises: Floats, half: int) -> tuple[float, float]:
+def risen(x: float, feed: float, o: Outflow, rises: Floats, half: int) -> float:
     """What `filled` gives of a linear outflow, by its shares (`shares_filled`)."""
-    net = feed + o.spill * basin - o.leak * x
+    net, over = feed - o.leak * x, 0
     if x > o.cap:
-        spill = WEIR * (x - o.cap)
-        net -= spill
-        return x + net * rises[half, 0 if net > 0.0 else 1, 1], spill
-    return x + net * rises[half, 0 if net > 0.0 else 1, 0], 0.0
+        net, over = net - WEIR * (x - o.cap), 1
+    return x + net * rises[half, 0 if net > 0.0 else 1, over]
 
 
 @njit(cache=True, error_model="numpy")
 def kept(c: Floats, parts: tuple[float, float]) -> tuple[Floats, Floats]:
-    """held() of second and third lag, second mode and spilled liquid, by part of a sample, shape (2, 4) each."""
-    left, mean = np.empty((2, 4)), np.empty((2, 4))
+    """held() of second and third lag and second mode, by part of a sample, shape (2, 3) each."""
+    left, mean = np.empty((2, 3)), np.empty((2, 3))
     for half in range(2):
-        for i, lag_s in enumerate((c[T2], c[T3], c[MODE_T], c[SPILL_T])):
+        for i, lag_s in enumerate((c[T2], c[T3], c[MODE_T])):
             left[half, i], mean[half, i] = held(lag_s, parts[half])
     return left, mean
 
@@ -212,7 +195,7 @@ def vessel_span(
     zero; head : level deviation at which a rooted vessel would be empty, with its sign turned.
     """
     flow, act, gain = drive
-    x, mode, basin, z2, z3 = m
+    x, mode, z2, z3 = m
     delay, parts = parted(c, dt_s)
     linear = c[SLOPE] == 0.0 and c[ROOT] == 0.0 and c[GAIN_SLOPE] == 0.0
     times, o = (parts[0] / c[T], parts[1] / c[T]), outflow_of(c, head)
@@ -237,22 +220,17 @@ def vessel_span(
                 z2, feed = feed + (z2 - feed) * left[half, 0], feed + (z2 - feed) * mean[half, 0]
             if third:
                 z3, feed = feed + (z3 - feed) * left[half, 1], feed + (z3 - feed) * mean[half, 1]
-            if linear:
-                x, spill = risen(x, feed, basin, o, rises, half)
-            else:
-                x, spill = filled(x, feed, basin, times[half], o)
-            if o.spill > 0.0:
-                basin += (spill - basin) * (1.0 - left[half, 3])
+            x = risen(x, feed, o, rises, half) if linear else filled(x, feed, times[half], o)
             if share != 0.0:
                 mode += (feed - mode) * (1.0 - left[half, 2])
-    return x, mode, basin, z2, z3
+    return x, mode, z2, z3
 
 
 @njit(cache=True, error_model="numpy")
 def at_start(first: float, c: Floats, base: float) -> Memory:
     """The vessel's memory before the first sample: at the first flow [% OP], but for what is begun elsewhere."""
     feed = c[K] * (first - base) + c[BIAS]
-    return c[START], c[START], 0.0, min(feed + c[BEGUN], c[UPPER_CAP]), feed
+    return c[START], c[START], min(feed + c[BEGUN], c[UPPER_CAP]), feed
 
 
 @njit(cache=True, error_model="numpy")

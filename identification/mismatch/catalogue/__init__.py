@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from importlib import import_module
 
 from identification.mismatch.effect import Block, Effect, Fault
-from identification.simulation.effect import Variant, bring
+from identification.simulation.parameters import Variant, bring
 
 
 def _read() -> dict[str, Effect]:

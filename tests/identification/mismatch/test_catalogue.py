@@ -10,9 +10,8 @@ from identification.mismatch.catalogue import CANDIDATES, EFFECTS, RECORDER_FAUL
 from identification.mismatch.effect import Fault
 from identification.mismatch.outside import OUTSIDE, RIVALS
 from identification.record import Floats
-from identification.simulation.effect import Param, Variant
 from identification.simulation.open_loop import ModelInputs, simulate
-from identification.simulation.parameters import Slot, neutral
+from identification.simulation.parameters import Param, Slot, Variant, neutral
 
 N = 1500
 NAMED_IN_CONTRACT, NEVER_FOUND = 30, 1

@@ -14,9 +14,8 @@ from identification.mismatch.catalogue.quantization import grid
 from identification.mismatch.pictures import Drawing, Picture, around, banded, biggest_move, busiest, rebuilt
 from identification.mismatch.recording import Recording
 from identification.models import Estimate
-from identification.simulation.effect import Param, Variant
 from identification.simulation.open_loop import ModelInputs
-from identification.simulation.parameters import Slot, neutral
+from identification.simulation.parameters import Param, Slot, Variant, neutral
 from identification.simulation.valve import play
 
 N = 2000

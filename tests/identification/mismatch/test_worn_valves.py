@@ -11,13 +11,12 @@ from identification.controller.check import Finding, StatedSettings
 from identification.estimation.prediction_error import Fitted, Model, Problem, descended, problem
 from identification.mismatch.answer import Answer, answer
 from identification.mismatch.catalogue import EFFECTS
-from identification.mismatch.diagnosis import explain
+from identification.mismatch.diagnosis import explain, without_the_idle
 from identification.mismatch.explanation import Explanation
 from identification.mismatch.friction import simulated_anew
 from identification.mismatch.plain_loop import inputs_of
 from identification.mismatch.proof import HeldOut, Misfit, runs_out
 from identification.mismatch.recording import Recording, SeenInCycles
-from identification.mismatch.rounds import without_the_idle
 from identification.mismatch.selection import Candidate, applies
 from identification.mismatch.starts import Round
 from identification.models import Fopdt, Stiction
@@ -208,8 +207,8 @@ def test_idle_effect_goes_again() -> None:
         c[rows[name].params[0].slot] = value
         fit = descended(p, Model((*fit.model.added, rows[name]), c), 20)
         taken.append(Candidate(fit, 0.0, 0.0))
-    best, left = without_the_idle(p, fit, taken, 0)
-    assert [c.name for c in left] == ["backlash"] == list(best.names)
+    left = without_the_idle(Explanation(p, fit, fit, tuple(taken)), 0)
+    assert [c.name for c in left.accepted] == ["backlash"] == list(left.best.names)
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,64 @@
+"""An effect in another's place: what is told of the set is what was fitted."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from identification.estimation.prediction_error import Model, descended, residual_fit
+from identification.mismatch import diagnosis
+from identification.mismatch.answer import alternatives
+from identification.mismatch.catalogue import EFFECTS
+from identification.mismatch.diagnosis import replacement_step
+from identification.mismatch.explanation import Explanation
+from identification.mismatch.plain_loop import inputs_of, prepared
+from identification.mismatch.recording import Recording
+from identification.mismatch.selection import Candidate, silent
+
+N = 900
+
+
+def stepped_into() -> Recording:
+    """A lag under moves of OP by hand, into which a load steps: a difference equation, not the simulator."""
+    rng = np.random.default_rng(3)
+    op = 50 + np.repeat(rng.uniform(-6, 6, N // 60), 60)
+    y, pv = 0.0, []
+    for k in range(N):
+        y += (1.2 * (op[max(k - 3, 0)] - 50 + (5.0 if k >= 500 else 0.0)) - y) / 12.0
+        pv.append(50 + y + rng.normal(0, 0.05))
+    return Recording(None, np.array(pv), op, np.ones(N, dtype=bool), 1.0, np.arange(N, dtype=float))
+
+
+@cache
+def replaced() -> Explanation:
+    """The loop explained by two wrong effects, of which a load step takes the first one's place."""
+    s = stepped_into()
+    inputs = inputs_of(s)
+    p, plain = prepared(inputs, s.pv - inputs.level, s.usable)
+    fit, taken = plain, []
+    for name, value in (("gain-drift", 0.2), ("valve-characteristic", 0.1)):
+        row = EFFECTS[name].candidates[0]
+        c = fit.model.c.copy()
+        c[row.params[0].slot] = value
+        fit = descended(p, Model((*fit.model.added, row), c), 10)
+        taken.append(Candidate(fit, 1.0, 1.0))
+    with pytest.MonkeyPatch.context() as only:
+        only.setattr(diagnosis, "CANDIDATES", EFFECTS["load-step"].candidates[:1])
+        return replacement_step(Explanation(p, plain, fit, tuple(taken)), silent, s)
+
+
+def test_load_step_in_anothers_place_stays_where_it_was_found() -> None:
+    """Simulated anew the set leaves what it left as it was fitted: its load steps where this round has located it."""
+    found = replaced()
+    assert set(found.best.names) == {"load-step", "valve-characteristic"}
+    assert residual_fit(found.p, found.best.model).loss == pytest.approx(found.best.loss, rel=1e-9)
+
+
+def test_what_is_told_first_is_no_alternative_of_itself() -> None:
+    """Alternatives are those of the effect that is told first, in whosever place the others were taken."""
+    found = replaced()
+    told = found.best.names[0]
+    first = tuple(Candidate(c.fit, 9e9, 9e9) for c in found.accepted)
+    assert told not in alternatives(Explanation(found.p, found.plain, found.best, found.accepted, first))
