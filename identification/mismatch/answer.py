@@ -98,9 +98,8 @@ def verdict_of(
     if (found.left > 0 or is_stack(found)) and is_by_fit(found):
         if found.outside is not None:
             return "unexplained", found.outside.row.block
-        return "unexplained", words.TOLD["features"][at.carrying[0].name][
-            "lives"
-        ] if at.carrying else "process"
+        features = words.TOLD["features"]
+        return "unexplained", features[at.carrying[0].name]["lives"] if at.carrying else "process"
     if effects and not (insensitive and effects[0].block in (Block.VALVE, Block.PROCESS)):
         return effects[0].name, effects[0].block
     return ("unexplained", "none") if lacking else ("none", "none")

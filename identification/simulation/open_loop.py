@@ -171,12 +171,9 @@ def from_flow(inputs: ModelInputs, c: Floats, through: Floats) -> Floats:
     if (c[WITHIN] != NEUTRAL[WITHIN]).any():
         if c[Slot.PIPE] != 0:
             through = transported(through, c[Slot.L], c[Slot.PIPE], max(middle, 1e-3), dt)
-        act, gain, full = (
-            load_over_record(inputs, c),
-            gain_over_record(inputs, c),
-            counted_from_level(inputs, c),
-        )
-        out = vessel(through, act, gain, full, dt, middle, outflow_head(inputs, c))
+        act, gain = load_over_record(inputs, c), gain_over_record(inputs, c)
+        full, head_at = counted_from_level(inputs, c), outflow_head(inputs, c)
+        out = vessel(through, act, gain, full, dt, middle, head_at)
     else:
         out = plain_vessel(through, load(inputs, c), c, dt, middle)
     out = acted(Signal.PV, out, c, dt)
