@@ -31,8 +31,7 @@ import numpy as np
 
 from analyzer.config import CauseLimits, Config
 from analyzer.loop.cause_weights import chances, measures, signs_of
-from analyzer.loop.decisions import CAUSES, Cause, Fault, Lack, Need, Needs, SignKind
-from analyzer.loop.finding import Sign
+from analyzer.loop.decisions import CAUSES, Cause, Fault, Lack, Need, Needs, Sign, SignKind
 from analyzer.loop.fitness import compressed
 from analyzer.loop.identified import sensitivity
 from analyzer.loop.measure import Measured

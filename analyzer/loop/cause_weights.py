@@ -18,8 +18,7 @@ from importlib.resources import files
 import numpy as np
 
 from analyzer.limits import LOOP
-from analyzer.loop.decisions import CAUSES, Cause, Figures, SignKind
-from analyzer.loop.finding import Sign
+from analyzer.loop.decisions import CAUSES, Cause, Figures, Sign, SignKind
 from analyzer.loop.measure import Measured
 from analyzer.loop.oscillation import Oscillation
 from identification.record import Floats

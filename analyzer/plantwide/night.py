@@ -11,8 +11,21 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from analyzer.config import PlantLimits
-from analyzer.loop.decisions import Cause, GroupRole, SignKind, Status
-from analyzer.loop.finding import Finding, Root, Sign, Swing, following
+from analyzer.loop.decisions import (
+    CAUSES,
+    Action,
+    Cause,
+    Fault,
+    Figures,
+    Finding,
+    GroupRole,
+    Remedy,
+    Root,
+    Sign,
+    SignKind,
+    Status,
+    Swing,
+)
 from analyzer.plantwide.groups import Group, groups_of
 from analyzer.plantwide.source import Candidate, Lags, Peer, candidates_of
 from analyzer.plantwide.wave import Wave
@@ -39,18 +52,39 @@ def traced_night(
         lead = done[source.loop]
         done[source.loop] = replace(lead, moves=tuple(sorted((*lead.moves, loop))))
     for loop, (source, wave) in found.items():
-        done[loop] = _follower(loops[loop], done[loop], source, wave, limits)
+        done[loop] = _follower(done[loop], source, wave, limits)
     own = own_groups(groups)
     return {k: replace(f, group=own.get(k)) for k, f in done.items()}, groups
 
 
-def _follower(alone: Finding, known: Finding, root: Root, wave: Wave, limits: PlantLimits) -> Finding:
+def following(
+    own: Finding, root: Root, swing: Swing | None, seen: tuple[SignKind, Figures], limits: PlantLimits
+) -> Finding:
+    """A loop that follows another one: a load from outside moves it, and its own valve and settings are left alone.
+
+    own, of the loop alone; swing, its part in what is shared where that is no oscillation by itself; seen, what says
+    that it follows, with its figures. The load is at least as sure as the coherence; what else the loop shows comes
+    from its source.
+    """
+    confidence = {c: min(own.confidence.get(c, 0.0), limits.follower_most_pct) for c in CAUSES}
+    confidence[Cause.LOAD] = max(own.confidence.get(Cause.LOAD, 0.0), 100.0 * root.coherence)
+    return replace(
+        own,
+        swing=swing,
+        cause=Cause.LOAD,
+        fault=Fault.NONE,
+        confidence=confidence,
+        signs=(Sign(Cause.LOAD, limits.follower_sign, *seen), *own.signs),
+        remedy=Remedy(Action.SEE_SOURCE_LOOP, f"Look at {root.loop} first."),
+        follows=root,
+    )
+
+
+def _follower(own: Finding, root: Root, wave: Wave, limits: PlantLimits) -> Finding:
     """A loop as a follower; as it was where it does not oscillate, not even with its part in what is shared."""
-    confidence = follower_confidence(alone.confidence, root, limits)
-    seen = root.loop, root.lag_s, root.coherence
-    sign = Sign(Cause.LOAD, limits.follower_sign, SignKind.FOLLOWS, seen)
-    told = following(known, root, swing_of(alone, root, wave, limits), confidence, sign)
-    return told if told.oscillates else known
+    seen = SignKind.FOLLOWS, (root.loop, root.lag_s, root.coherence)
+    told = following(own, root, swing_of(own, root, wave, limits), seen, limits)
+    return told if told.oscillates else own
 
 
 def swing_of(own: Finding, root: Root, wave: Wave, limits: PlantLimits) -> Swing | None:
@@ -151,14 +185,6 @@ class Traced:
     def source(self) -> str:
         """The likeliest source."""
         return self.candidates[0].loop
-
-
-def follower_confidence(own: Mapping[Cause, float], root: Root, limits: PlantLimits) -> dict[Cause, float]:
-    """The confidences of a follower [%], from its own and its source: the load is at least as sure as the coherence;
-    what else the loop shows comes from the source."""
-    load = max(own.get(Cause.LOAD, 0.0), 100.0 * root.coherence)
-    rest = {c: min(own.get(c, 0.0), limits.follower_most_pct) for c in (Cause.VALVE, Cause.TUNING)}
-    return {Cause.LOAD: load, **rest}
 
 
 def may_follow(own: Peer, other: Peer, level: float, limits: PlantLimits) -> bool:

@@ -7,8 +7,7 @@ from __future__ import annotations
 
 from analyzer.lanes.lanes import SAID
 from analyzer.limits import PAGES
-from analyzer.loop.decisions import OF_LOAD, Action, Cause, Due, Lack, Lane, SignKind, Status
-from analyzer.loop.finding import Finding
+from analyzer.loop.decisions import OF_LOAD, Action, Cause, Due, Finding, Lack, Lane, SignKind, Status
 from analyzer.words import sentences
 from analyzer.words.signs import later, of_below, sign_text
 from analyzer.words.units import duration

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from analyzer.loop.decisions import Cause, SignKind
-from analyzer.loop.finding import Sign
+from analyzer.loop.decisions import Cause, Sign, SignKind
 from analyzer.words.units import duration
 
 Told = tuple[str, str]

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import json
 
-from analyzer.loop.decisions import Cause, Lack, Need, Needs, SignKind, Status
-from analyzer.loop.finding import Finding, Sign, Swing
+from analyzer.loop.decisions import Cause, Finding, Lack, Need, Needs, Sign, SignKind, Status, Swing
 from analyzer.store.rows import finding_of, night_row, piece_row
-from analyzer.words import needs, signs
+from analyzer.words import sentences, signs
 
 SIGNS = (
     Sign(Cause.VALVE, 0.9, SignKind.EVIDENCE, (41.3, 0.75, 12)),
@@ -54,7 +53,7 @@ FOUND = Finding(
 def test_each_kind_has_its_words() -> None:
     """There is no sign, and nothing that is needed, that words do not tell."""
     assert set(signs.SAYS) == set(SignKind)
-    assert set(needs.SAYS) == set(Need)
+    assert set(sentences("needs")) == set(Need)
 
 
 def test_the_store_keeps_words_as_ever() -> None:
