@@ -21,7 +21,8 @@ from analyzer.loop.decisions import (
 )
 from analyzer.plantwide.night import following
 from analyzer.plantwide.structure import Link, Tie
-from analyzer.words.reason import below_first, halves_apart
+from analyzer.words import sentences
+from analyzer.words.reason import below_first
 
 COLUMN = {Tie.MASTER: "master", Tie.SPLIT: "split_of", Tie.RATIO: "ratio_of"}
 """The column that names the loop that another one hangs on."""
@@ -64,7 +65,9 @@ def _with_halves(own: Finding, halves: Sequence[Finding], limits: PlantLimits) -
     if not all(size) or max(size) < limits.halves_apart * min(size):
         return own
     stronger, weaker = (halves[k] for k in sorted((0, 1), key=lambda k: -size[k]))
-    text = halves_apart(stronger.loop, weaker.loop, max(size) / min(size))
+    times = max(size) / min(size)
+    apart = stronger.loop, weaker.loop, times, 100.0 * times / (1.0 + times)
+    text = sentences("settings")["halves_apart"].format(*apart)
     return replace(own, remedy=Remedy(Action.UNDECIDED, text))
 
 

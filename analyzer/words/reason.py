@@ -111,15 +111,6 @@ def below_first(below: Finding, tie: str = "master") -> str:
     return f"{of_below(below.loop, below.cause, tie)}: mend that first, then look again."
 
 
-def halves_apart(stronger: str, weaker: str, times: float) -> str:
-    """Why a split range gets no settings: one gain cannot suit halves that differ so much."""
-    share = 100.0 * times / (1.0 + times)
-    return (
-        f"PV answers {stronger} {times:.1f} times as much as {weaker}: give {stronger} {share:.0f} % of the output's "
-        "range, then look again."
-    )
-
-
 def joined(*clauses: str | None) -> str:
     """Clauses with a semicolon between, those that say nothing left out; a full stop at the end of one goes."""
     said = ((clause or "").strip() for clause in clauses)
