@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from analyzer.lanes.lanes import SAID
 from analyzer.limits import PAGES
-from analyzer.loop.decisions import OF_LOAD, Action, Cause, Due, Finding, Lack, Lane, SignKind, Status
+from analyzer.loop.decisions import OF_LOAD, Action, Cause, Due, Finding, Lack, Lane, Sign, SignKind, Status
 from analyzer.words import sentences
-from analyzer.words.signs import later, of_below, sign_text
+from analyzer.words.signs import later, sign_text
 from analyzer.words.units import duration
 
 MOST_NAMES = 5
@@ -108,7 +108,8 @@ def _strongest(found: Finding, most: int, *first: SignKind) -> str:
 
 def below_first(below: Finding, tie: str = "master") -> str:
     """Why a master gets no advice of its own."""
-    return f"{of_below(below.loop, below.cause, tie)}: mend that first, then look again."
+    sign = Sign(Cause.LOAD, 1.0, SignKind.OF_BELOW, (below.loop, below.cause, tie))
+    return f"{sign_text(sign)}: mend that first, then look again."
 
 
 def joined(*clauses: str | None) -> str:

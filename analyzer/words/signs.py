@@ -1,4 +1,5 @@
-"""What a sign of a cause says: words for everybody, and figures for an expert."""
+"""What a sign of a cause says: words for everybody, and figures for an expert; texts.toml has the sentences, and here
+is which of them a sign's figures ask for."""
 
 from __future__ import annotations
 
@@ -6,16 +7,20 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from analyzer.loop.decisions import Cause, Sign, SignKind
+from analyzer.words import sentences
 from analyzer.words.units import duration
 
 Told = tuple[str, str]
 """Words for everybody, and figures for an expert, '' where the words hold them."""
+Chosen = tuple[Any, ...]
+"""A sentence of texts.toml by its name, and the figures that it is filled with."""
 
 
 def sign_parts(sign: Sign) -> Told:
     """A sign in words and figures."""
-    said = SAYS[sign.kind](*sign.figures)
-    return (said, "") if isinstance(said, str) else said
+    which, *figures = SAYS[sign.kind](*sign.figures)
+    said, shown = sentences("signs")[which], sentences("figures_of_signs").get(which, "")
+    return said.format(*figures), shown.format(*figures)
 
 
 def sign_text(sign: Sign) -> str:
@@ -37,75 +42,29 @@ def as_stored(sign: Sign) -> dict[str, Any]:
     return told | {"text": text, "name": name, "figures": figures}
 
 
-def _evidence_says(evidence: float, agreeing: float = 0.0, count: int | None = None) -> Told:
+def _evidence(nat: float, agreeing: float = 0.0, count: int | None = None) -> Chosen:
     """How a faulty valve explains PV against an ideal one."""
-    if evidence <= 0:
-        return "play or stick-slip explains PV no better than an ideal valve", ""
-    where = "" if count is None else f", in {100 * agreeing:.0f} % of {count} stretches between turns of OP"
-    return (
-        f"play or stick-slip explains PV better than an ideal valve{where}",
-        f"log likelihood +{evidence:.0f}",
-    )
+    if nat <= 0:
+        return ("no_evidence",)
+    return "evidence" if count is None else "evidence_in_stretches", nat, 100 * agreeing, count
 
 
-def _width_says(evidence: float, size: float) -> str:
-    if evidence <= 0:
-        return "no play or stick-slip is seen in PV"
-    return f"the fault that fits best is {100 * size:.0f} % of OP's range wide"
-
-
-def _load_left_says(linear: float, valve: float) -> Told:
-    plain = f"the load that is left has {'a' if linear >= 1.0 else 'no'} peak at the period"
-    return plain, f"prominence {linear:.1f}, behind a faulty valve {valve:.1f}"
-
-
-def _amplification_says(*known: float | None) -> str:
+def _amplification(*known: float | None) -> Chosen:
     if not known:
-        return "the identified loop is unstable"
+        return ("unstable",)
     (s,) = known
     if s is None:
-        return "how the loop amplifies at the period is not known, for want of its settings"
-    verb, times = ("amplifies", s) if s > 1.0 else ("weakens", 1.0 / max(s, 1e-3))
-    return f"at the period the loop {verb} load {times:.1f} times"
+        return ("no_amplification",)
+    return ("amplifies", s) if s > 1.0 else ("weakens", 1.0 / max(s, 1e-3))
 
 
-def _loop_gain_says(gain: float | None = None) -> str:
-    if gain is None:
-        return "the gain of process and controller together is not known, for want of settings"
-    return f"process and controller together have a gain of {gain:.2g}"
-
-
-def _process_says(consistency: float) -> Told:
-    figures = f"{consistency:.1f} times its gain"
-    if consistency >= 0.5:
-        return "outside the period's band the same process is seen", figures
-    return "away from the period another process is seen", figures
-
-
-def _wave_left_says(left: float) -> str:
-    if not left:
-        return "a faulty valve leaves few harmonics of the cycle unexplained"
-    return f"a faulty valve leaves harmonics of {100 * left:.0f} % of the cycle unexplained"
-
-
-def _regularity_says(kurtosis: float, third: float) -> Told:
+def _regularity(kurtosis: float, third: float) -> Chosen:
     size, rhythm = kurtosis < 2.0, third >= 0.5
-    figures = f"kurtosis {kurtosis:.1f}, noise has 3; rhythm {third:.1f}"
     if size == rhythm:
-        return f"the cycle {'keeps' if size else 'changes'} its size and its rhythm", figures
-    kept, changed = ("size", "rhythm") if size else ("rhythm", "size")
-    return f"the cycle keeps its {kept} and changes its {changed}", figures
-
-
-def _limits_says(saturated: float) -> str:
-    share = 100 * saturated
-    return f"OP is at a limit {share:.0f} % of the time" if share >= 1 else "OP stays off its limits"
-
-
-def _dead_time_says(period_s: float, dead_time_s: float) -> str:
-    if period_s > 50 * dead_time_s:
-        return "the period is long against the dead time"
-    return f"the period is {period_s / dead_time_s:.0f} dead times"
+        how = f"{'keeps' if size else 'changes'} its size and its rhythm"
+    else:
+        how = "keeps its size and changes its rhythm" if size else "keeps its rhythm and changes its size"
+    return "regularity", kurtosis, third, how
 
 
 def later(lag_s: float | None) -> str:
@@ -113,49 +72,35 @@ def later(lag_s: float | None) -> str:
     return f" {duration(abs(lag_s))} later" if lag_s is not None and lag_s > 0 else ""
 
 
-def _follows_says(loop: str, lag_s: float | None, coherence: float) -> str:
-    start = f"where the oscillation seems to start (coherence {coherence:.2f})"
-    return f"moves with {loop}{later(lag_s)}, {start}"
-
-
-def of_below(loop: str, cause: str | None, tie: str) -> str:
+def _of_below(loop: str, cause: str | None, tie: str) -> Chosen:
     """What a loop's output hangs on: one that has a fault, or answers as a faulty valve would."""
-    what = {Cause.VALVE: "valve is at fault", Cause.TUNING: "tuning is too tight"}.get(
-        Cause(cause or Cause.NONE)
-    )
-    told = f"whose {what}" if what else "which answers as a faulty valve would"
-    moves = "moves" if tie == "split" else "is the set point of"
-    return f"its output {moves} {loop}, {told}"
+    own = cause if cause in (Cause.VALVE, Cause.TUNING) else "no"
+    return f"below_of_{own}_fault", "moves" if tie == "split" else "is the set point of", loop
 
 
-def _of_above_says(loop: str, tie: str) -> str:
-    brings = {"master": "its set point is the output", "split": "it is moved by the output"}.get(
-        tie, "its set point is in a ratio to the PV"
-    )
-    return f"{brings} of {loop}, which cycles"
-
-
-SAYS: Mapping[SignKind, Callable[..., Told | str]] = {
-    SignKind.EVIDENCE: _evidence_says,
-    SignKind.WIDTH: _width_says,
-    SignKind.LOAD_LEFT: _load_left_says,
-    SignKind.AMPLIFICATION: _amplification_says,
-    SignKind.LOOP_GAIN: _loop_gain_says,
-    SignKind.PROCESS: _process_says,
-    SignKind.HARMONIC: lambda third: f"the wave has a phase-locked third harmonic of {100 * third:.0f} %",
-    SignKind.WAVE_LEFT: _wave_left_says,
-    SignKind.REGULARITY: _regularity_says,
-    SignKind.LIMITS: _limits_says,
-    SignKind.DEAD_TIME: _dead_time_says,
-    SignKind.CALM_EVIDENCE: _evidence_says,
-    SignKind.CALM_WIDTH: lambda size: f"its width is {100 * size:.0f} % of OP's range",
-    SignKind.AGAIN: lambda: "stretch after stretch between moves of the stem says so",
-    SignKind.DEAD_VALVE: lambda wound: f"OP winds over {wound:.0f} % while PV stands still off the set point",
-    SignKind.FOLLOWS: _follows_says,
-    SignKind.OF_BELOW: of_below,
-    SignKind.OF_ABOVE: _of_above_says,
+SAYS: Mapping[SignKind, Callable[..., Chosen]] = {
+    SignKind.EVIDENCE: _evidence,
+    SignKind.WIDTH: lambda nat, size: ("no_width" if nat <= 0 else "width", 100 * size),
+    SignKind.LOAD_LEFT: lambda plain, valve: ("load_left" if plain >= 1.0 else "no_load_left", plain, valve),
+    SignKind.AMPLIFICATION: _amplification,
+    SignKind.LOOP_GAIN: lambda gain=None: ("no_loop_gain" if gain is None else "loop_gain", gain),
+    SignKind.PROCESS: lambda share: ("same_process" if share >= 0.5 else "another_process", share),
+    SignKind.HARMONIC: lambda third: ("harmonic", 100 * third),
+    SignKind.WAVE_LEFT: lambda left: ("wave_left" if left else "no_wave_left", 100 * left),
+    SignKind.REGULARITY: _regularity,
+    SignKind.LIMITS: lambda share: ("at_limits" if 100 * share >= 1 else "off_limits", 100 * share),
+    SignKind.DEAD_TIME: lambda period_s, dead_s: (
+        ("long_period",) if period_s > 50 * dead_s else ("dead_times", period_s / dead_s)
+    ),
+    SignKind.CALM_EVIDENCE: _evidence,
+    SignKind.CALM_WIDTH: lambda size: ("calm_width", 100 * size),
+    SignKind.AGAIN: lambda: ("again",),
+    SignKind.DEAD_VALVE: lambda wound: ("dead_valve", wound),
+    SignKind.FOLLOWS: lambda loop, lag_s, coherence: ("follows", loop, later(lag_s), coherence),
+    SignKind.OF_BELOW: _of_below,
+    SignKind.OF_ABOVE: lambda loop, tie: (f"above_by_{tie}", loop),
 }
-"""What each sign says, of its figures."""
+"""Which sentence a sign takes, by its figures, and what is filled into it."""
 UNNAMED = (
     *(SignKind.CALM_EVIDENCE, SignKind.CALM_WIDTH, SignKind.AGAIN, SignKind.DEAD_VALVE),
     *(SignKind.FOLLOWS, SignKind.OF_BELOW, SignKind.OF_ABOVE),
