@@ -27,7 +27,7 @@ from analyzer.loop.decisions import (
     Swing,
 )
 from analyzer.plantwide.groups import Group, groups_of
-from analyzer.plantwide.source import Candidate, Lags, Peer, candidates_of
+from analyzer.plantwide.source import Candidate, Lags, candidates_of
 from analyzer.plantwide.wave import Wave
 
 Row = Mapping[str, Any]
@@ -42,7 +42,8 @@ def traced_night(
 
     loops : by name, each with its own verdict; waves : of all loops; first : number of the first group.
     """
-    traced = trace(waves, _peers(loops), limits)
+    assessed = {k: f for k, f in loops.items() if f.status is Status.OK}
+    traced = trace(waves, assessed, limits)
     told = [t for t in traced if any(k in loops and loops[k].oscillates for k in t.group.loops)]
     found = followers_of(told)
     sources = {loop: source for loop, (source, _) in found.items()}
@@ -94,15 +95,6 @@ def swing_of(own: Finding, root: Root, wave: Wave, limits: PlantLimits) -> Swing
     share, amplitude = wave.oscillating_pct, wave.amplitude_pct
     hours = own.number("usable_h") * share / 100.0
     return Swing(amplitude * root.coherence * hours, share, wave.period_s, amplitude)
-
-
-def _peers(loops: Loops) -> dict[str, Peer]:
-    """The verdicts of the loops that were assessed."""
-    return {
-        k: Peer(f.cause or Cause.NONE, f.number("evidence"), f.confidence.get(Cause.TUNING, 0.0))
-        for k, f in loops.items()
-        if f.status is Status.OK
-    }
 
 
 def likely(found: Traced, limits: PlantLimits) -> list[str]:
@@ -187,7 +179,7 @@ class Traced:
         return self.candidates[0].loop
 
 
-def may_follow(own: Peer, other: Peer, level: float, limits: PlantLimits) -> bool:
+def may_follow(own: Finding, other: Finding, level: float, limits: PlantLimits) -> bool:
     """Whether a loop can follow another at this coherence.
 
     Two loops that each cycle by themselves do not keep step over a night, so one of the two moves the other; what
@@ -198,10 +190,10 @@ def may_follow(own: Peer, other: Peer, level: float, limits: PlantLimits) -> boo
         return False
     if own.cause is not Cause.VALVE:
         return True
-    return other.cause is Cause.VALVE and other.evidence >= own.evidence
+    return other.cause is Cause.VALVE and other.number("evidence") >= own.number("evidence")
 
 
-def _traced(group: Group, peers: Mapping[str, Peer], limits: PlantLimits) -> Traced | None:
+def _traced(group: Group, peers: Loops, limits: PlantLimits) -> Traced | None:
     """A group with its candidates and followers; None where no verdict of its loops is known."""
     lags = Lags(group.waves)
     candidates = candidates_of(lags, peers, limits)
@@ -246,7 +238,7 @@ def _parents(source: str, lags: Lags, limits: PlantLimits) -> dict[str, str]:
     return out
 
 
-def trace(waves: Sequence[Wave], peers: Mapping[str, Peer], limits: PlantLimits) -> list[Traced]:
+def trace(waves: Sequence[Wave], peers: Loops, limits: PlantLimits) -> list[Traced]:
     """The groups of a night, traced to their sources, those of more loops first."""
     found = (_traced(g, peers, limits) for g in groups_of(waves, limits))
     return [t for t in found if t is not None]
