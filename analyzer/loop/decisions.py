@@ -185,7 +185,7 @@ def counts(oscillating_pct: float | None) -> bool:
 @dataclass(frozen=True, slots=True)
 class Sign:
     """One sign: which cause it points to, how strongly (0 to 1), what it shows, and the figures and loops that say
-    so, as words/signs.py takes them."""
+    so, as words/reason.py takes them."""
 
     points_to: Cause
     strength: float

@@ -21,7 +21,7 @@ from analyzer.loops.changes import in_force
 from analyzer.loops.spec import LoopSpec, spec_of
 from analyzer.loops.tags import as_stated
 from analyzer.night.nights import cut, nights_of
-from analyzer.words.signs import sign_in_full
+from analyzer.words.reason import sign_in_full
 from analyzer.words.units import number
 from identification.errors import InputError, NotAssessedError
 from identification.estimation.window import Fit

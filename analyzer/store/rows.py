@@ -32,8 +32,7 @@ from analyzer.loop.decisions import (
     Status,
     Swing,
 )
-from analyzer.words.reason import reason
-from analyzer.words.signs import as_stored
+from analyzer.words.reason import as_stored, reason
 
 if TYPE_CHECKING:
     from analyzer.loop.assess import Assessment

@@ -13,7 +13,7 @@ from analyzer.loop.cause import Verdict, dead_valve, judge
 from analyzer.loop.decisions import Lack
 from analyzer.loop.quality import prepare
 from analyzer.plantwide.night import followers_of, trace
-from analyzer.words.signs import sign_text
+from analyzer.words.reason import sign_text
 from identification.errors import NotAssessedError
 from proofs.plant import CONFIG, START_S, Sketch, Trends, peer, prepared, record, series, simulate, spec
 from proofs.untidy.recorder import swinging_door

@@ -6,7 +6,8 @@ import json
 
 from analyzer.loop.decisions import Cause, Finding, Lack, Need, Needs, Sign, SignKind, Status, Swing
 from analyzer.store.rows import finding_of, night_row, piece_row
-from analyzer.words import sentences, signs
+from analyzer.words import sentences
+from analyzer.words.reason import SAYS
 
 SIGNS = (
     Sign(Cause.VALVE, 0.9, SignKind.EVIDENCE, (41.3, 0.75, 12)),
@@ -52,7 +53,7 @@ FOUND = Finding(
 
 def test_each_kind_has_its_words() -> None:
     """There is no sign, and nothing that is needed, that words do not tell."""
-    assert set(signs.SAYS) == set(SignKind)
+    assert set(SAYS) == set(SignKind)
     assert set(sentences("needs")) == set(Need)
 
 
