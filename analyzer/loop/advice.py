@@ -169,13 +169,16 @@ def _too_thin(found: Assessment, controller: Pid | None, config: Config) -> Advi
 
 
 def sought_for(verdict: Verdict, controller: Pid, limits: AdviceLimits) -> tuple[Loop, Fit, tuple[Loop, ...]]:
-    """The loop that settings are sought for, its fit, and what else it may be, for a valve at fault.
+    """The loop that settings are sought for, its fit, and what else it may be.
 
-    Where the loop with its play does not cycle, and with the stick-slip that was tried beside it does, the stem
-    sticks: something must move it.
+    Where the loop of a valve at fault does not cycle with its play, and does with the stick-slip that was tried
+    beside it, the stem sticks: something must move it.
     """
     verdict = verdict.for_settings
     fit, sticks = verdict.fit, verdict.rests_on.stick_slip
+    if verdict.cause is not Cause.VALVE:
+        model = model_of(verdict, controller)
+        return model, fit, uncertain(fit, model)
 
     def of(fit: Fit) -> Loop:
         return Loop(tuned(fit, True, limits), controller, fit.valve.valve)

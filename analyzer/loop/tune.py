@@ -8,12 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from analyzer.config import AdviceLimits, Config
-from analyzer.loop.advice import Advice, model_of, propose, sought_for, withheld
+from analyzer.loop.advice import Advice, propose, sought_for, withheld
 from analyzer.loop.assess import Assessment, assess
-from analyzer.loop.cause import Verdict
 from analyzer.loop.decisions import Action, Cause, Need, Needs
 from analyzer.loop.fitness import at_limits, unfit_for_cause
-from analyzer.loop.identified import intervals, load_of, tuned, uncertain
+from analyzer.loop.identified import intervals, load_of, tuned
 from analyzer.loop.judged_stretch import controller_of, earlier_settings
 from analyzer.loop.quality import prepare
 from analyzer.loop.settings_side_by_side import compared, middle_ti
@@ -24,7 +23,6 @@ from analyzer.night.nights import cut, nights_of
 from analyzer.words.reason import sign_in_full
 from analyzer.words.units import number
 from identification.errors import InputError, NotAssessedError
-from identification.estimation.window import Fit
 from identification.models import Estimate, Loop, Pid, Process, Valve
 from identification.record import Floats
 from reports.pages import Field, Line, Panels, Picture, Place, Plot
@@ -68,14 +66,6 @@ class Tuning:
     others: tuple[Loop, ...] = ()
 
 
-def _model(verdict: Verdict, controller: Pid, limits: AdviceLimits) -> tuple[Loop, Fit, tuple[Loop, ...]]:
-    """The loop that the forecast runs on, its fit, and what else it may be."""
-    if verdict.cause is Cause.VALVE:
-        return sought_for(verdict, controller, limits)
-    model = model_of(verdict, controller)
-    return model, verdict.fit, uncertain(verdict.fit, model)
-
-
 def identified(found: Assessment, limits: AdviceLimits) -> tuple[Process, Valve, dict[str, Estimate]]:
     """Process, valve and their parameters with 90 % intervals, as one assessed loop's verdict has them. Raises
     NotAssessedError where the loop's trends give no model."""
@@ -91,7 +81,7 @@ def tune(found: Assessment, controller: Pid, config: Config, kept: Advice | None
     verdict = found.verdict
     first = found.oscillations.first
     period = first.period_s if first else None
-    model, fit, others = _model(verdict, controller, config.advice)
+    model, fit, others = sought_for(verdict, controller, config.advice)
     if kept is not None and kept.reason and kept.action is not None:
         proposal = Proposal(kept.action, kept.reason)
     else:
