@@ -184,7 +184,7 @@ def judge(m: Measured, oscillation: Oscillation | None, limits: CauseLimits) -> 
         confidence[first] = min(confidence[first], 0.9 * limits.named_pct)
     cause = first if confidence[first] >= _least(first, m, limits) else Cause.UNDECIDED
     fault = fault_of(m, limits) if cause is Cause.VALVE else Fault.NONE
-    return Verdict(cause, confidence, fault, signs_of(m, oscillation), measured=m)
+    return Verdict(cause, confidence, fault, signs_of(m, oscillation, seen), measured=m)
 
 
 def _least(cause: Cause, m: Measured, limits: CauseLimits) -> float:

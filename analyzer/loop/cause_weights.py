@@ -171,10 +171,10 @@ GROUPS: Mapping[SignKind, tuple[tuple[str, ...], Callable[[Measured, Oscillation
 """Measures that are one sign together, and the figures it is told by."""
 
 
-def signs_of(m: Measured, o: Oscillation) -> tuple[Sign, ...]:
-    """The signs of one oscillating loop; strength is one less the share to which a sign brings the odds against its
-    cause."""
-    moved = pushes(measures(m, o))
+def signs_of(m: Measured, o: Oscillation, found: Floats) -> tuple[Sign, ...]:
+    """The signs of one oscillating loop, by its `measures`; strength is one less the share to which a sign brings the
+    odds against its cause."""
+    moved = pushes(found)
     out = []
     for kind, (names, figures) in GROUPS.items():
         push = np.sum([moved[n] for n in names], axis=0)
