@@ -20,9 +20,8 @@ import pyarrow.parquet as pq
 
 from analyzer.config import PlantLimits
 from analyzer.limits import WAVES
-from analyzer.loop.decisions import Cause
+from analyzer.loop.decisions import Cause, Finding, Status
 from analyzer.plantwide.night import trace
-from analyzer.plantwide.source import Peer
 from analyzer.plantwide.wave import BESIDE, Wave, waves_in, waves_table
 from proofs.common import command, parser_of, publish, table
 
@@ -89,7 +88,8 @@ def measured(path: Path) -> tuple[float, float, float, int, int]:
     count, names = table.num_rows, set(table.column("loop").to_pylist())
     del table, lines
     begun = time.perf_counter()
-    found = trace(waves_in(pq.read_table(path)), {name: Peer(Cause.LOAD) for name in names}, PlantLimits())
+    alone = {name: Finding(name, "", Status.OK, cause=Cause.LOAD) for name in names}
+    found = trace(waves_in(pq.read_table(path)), alone, PlantLimits())
     took = time.perf_counter() - begun
     return floor, took, peak_mb(), count, len(found)
 

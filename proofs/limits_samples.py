@@ -12,20 +12,19 @@ import numpy as np
 from analyzer.config import Config
 from analyzer.history.series import Series
 from analyzer.loop.assess import Assessment, assess
-from analyzer.loop.decisions import Cause
+from analyzer.loop.decisions import Cause, Finding
 from analyzer.loop.fitness import unfit_for_cause
 from analyzer.loop.measure import Measured, measure
 from analyzer.loop.oscillation import Oscillations, counting, detect
 from analyzer.loop.quality import Prepared, prepare
 from analyzer.loops.spec import LoopSpec
-from analyzer.plantwide.source import Peer
 from identification.errors import TriageError
 from identification.models import Pid
 from identification.record import LoopRecord
 from proofs.coupled.draw import draw as draw_plant
 from proofs.nulls import FAMILIES
 from proofs.nulls import record as null
-from proofs.plant import Sketch, prepared, record, simulate
+from proofs.plant import Sketch, peer, prepared, record, simulate
 from proofs.untidy.draw import draw
 
 LOOPS, MOST = 240, 12_000
@@ -116,7 +115,7 @@ class Coupled:
     name: str
     found: Oscillations
     end_s: float
-    peer: Peer
+    peer: Finding
     confidence: Mapping[Cause, float]
 
 
@@ -228,9 +227,9 @@ def plants() -> tuple[tuple[Coupled, ...], ...]:
             )
             if isinstance(a, Assessment):
                 m = a.verdict.measured
-                peer = Peer(a.verdict.cause, m.evidence if m else 0.0, a.verdict.confidence[Cause.TUNING])
+                alone = peer(a.verdict.cause, m.evidence if m else 0.0, a.verdict.confidence[Cause.TUNING])
                 end_s, own_pct = a.start_s + a.duration_s, a.verdict.confidence
-                loops.append(Coupled(x.name, a.oscillations, end_s, peer, own_pct))
+                loops.append(Coupled(x.name, a.oscillations, end_s, alone, own_pct))
         out.append(tuple(loops))
     return (*out, *pairs())
 
@@ -241,19 +240,19 @@ def pairs() -> list[tuple[Coupled, ...]]:
     phase = 2 * np.pi * np.arange(n) / 300.0 + np.cumsum(0.005 * rng.standard_normal(n))
     for size in (0.03, 0.04, 0.055, 0.08, 0.11, 0.2):
         errors = (np.sin(phase) + size * np.sin(3 * phase), np.sin(3 * phase))
-        out.append(tuple(_sharing(k, e, Peer(Cause.LOAD)) for k, e in enumerate(errors)))
+        out.append(tuple(_sharing(k, e, peer(Cause.LOAD)) for k, e in enumerate(errors)))
     for ratio in (1.0, 2.0, 3.5, 4.5, 8.0):
         errors = (np.sin(phase), np.sin(phase - 0.5))
-        blamed = (Peer(Cause.VALVE, 4000.0), Peer(Cause.VALVE, 4000.0 / ratio))
+        blamed = (peer(Cause.VALVE, 4000.0), peer(Cause.VALVE, 4000.0 / ratio))
         out.append(tuple(_sharing(k, e, p) for k, (e, p) in enumerate(zip(errors, blamed, strict=True))))
     return out
 
 
-def _sharing(k: int, error: np.ndarray, peer: Peer) -> Coupled:
+def _sharing(k: int, error: np.ndarray, alone: Finding) -> Coupled:
     """A loop with an error [%] of one sample a second under a little noise."""
     own = record(50.0 - error + 0.1 * np.random.default_rng(k).standard_normal(error.size))
-    pct = {cause: 100.0 * (cause is peer.cause) for cause in (Cause.VALVE, Cause.TUNING, Cause.LOAD)}
-    return Coupled(f"L{k}", detect(own, DEFAULT.oscillation), own.start_s + own.duration_s, peer, pct)
+    pct = {cause: 100.0 * (cause is alone.cause) for cause in (Cause.VALVE, Cause.TUNING, Cause.LOAD)}
+    return Coupled(f"L{k}", detect(own, DEFAULT.oscillation), own.start_s + own.duration_s, alone, pct)
 
 
 @cache

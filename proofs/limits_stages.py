@@ -15,14 +15,13 @@ from analyzer.loop.advice import advise
 from analyzer.loop.assess import assess, cause_of, verdict_by_measures
 from analyzer.loop.assessments import assess_span
 from analyzer.loop.cause import dead_valve
-from analyzer.loop.decisions import Status
-from analyzer.loop.finding import Finding, Swing
+from analyzer.loop.decisions import Finding, SignKind, Status, Swing
 from analyzer.loop.fitness import at_limits
 from analyzer.loop.judged_stretch import differing
 from analyzer.loop.oscillation import barely_seen, counting, detect
 from analyzer.loop.quality import prepare
 from analyzer.loops.changes import behaviour_change
-from analyzer.plantwide.night import follower_confidence, followers_of, likely, swing_of, trace
+from analyzer.plantwide.night import followers_of, following, likely, swing_of, trace
 from analyzer.plantwide.wave import waves_of
 from identification.models import Backlash, Fopdt, Loop, Pid, Stiction
 from identification.record import LoopRecord
@@ -152,8 +151,9 @@ def of_plant(c: Config) -> list[Any]:
         for loop, (source, wave) in sorted(followers_of(traced).items()):
             first = counting(by_name[loop].found)
             swing = Swing(0.0, first.oscillating_pct) if first else Swing()
-            alone = Finding(loop, "", Status.OK, swing=swing, known={"usable_h": 8.0})
-            sure = follower_confidence(by_name[loop].confidence, source, c.plant)
+            own, known = by_name[loop].confidence, {"usable_h": 8.0}
+            alone = Finding(loop, "", Status.OK, swing=swing, confidence=own, known=known)
+            sure = following(alone, source, swing, (SignKind.FOLLOWS, ()), c.plant).confidence
             shown = swing_of(alone, source, wave, c.plant) != swing
             told = {k: round(v) for k, v in sure.items()}
             out.append((loop, source.loop, told, c.plant.follower_sign, shown))

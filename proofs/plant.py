@@ -16,6 +16,7 @@ import pyarrow.parquet as pq
 from analyzer.config import Config, QualityLimits
 from analyzer.history.export import open_export
 from analyzer.history.series import Series
+from analyzer.loop.decisions import Cause, Finding, Status
 from analyzer.loop.quality import Prepared, prepare
 from analyzer.loops.spec import LoopSpec
 from analyzer.night import batch
@@ -114,6 +115,13 @@ def record(pv: Floats, sp: Floats | float = 50.0, op: Floats | None = None, dt_s
     fixed = np.broadcast_to(np.asarray(sp, dtype=float), (n,)).copy()
     still = np.full(n, 50.0) if op is None else op
     return LoopRecord("L", START_S, dt_s, fixed, pv, still, np.zeros(n, dtype=bool))
+
+
+def peer(cause: Cause, evidence: float = 0.0, tuning_pct: float = 0.0) -> Finding:
+    """A loop with a verdict of its own, as the plant-wide pass takes it: evidence of its valve's fault [nat],
+    confidence in its tuning [%]."""
+    known = {"evidence": evidence}
+    return Finding("", "", Status.OK, cause=cause, confidence={Cause.TUNING: tuning_pct}, known=known)
 
 
 def write_export(path: Path, loops: dict[str, Trends], start_s: float = START_S, dt_s: float = 1.0) -> Path:

@@ -20,8 +20,7 @@ from analyzer.config import Config
 from analyzer.history.series import Series
 from analyzer.loop.advice import Advice
 from analyzer.loop.conclusion import concluded
-from analyzer.loop.decisions import Action, Cause, counts
-from analyzer.loop.finding import Finding
+from analyzer.loop.decisions import Action, Cause, Finding, counts
 from analyzer.loop.quality import prepare
 from analyzer.loops.spec import LoopSpec
 from analyzer.night.chunk import assess_loop

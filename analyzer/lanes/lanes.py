@@ -8,15 +8,14 @@ A loop may stand in several. Nothing of the analysis is imported, so that a list
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from analyzer.loop.decisions import Action, Cause, Lane, Status
+from analyzer.loop.decisions import Action, Cause, Finding, Lane, Status
 from analyzer.words.units import duration
 
 if TYPE_CHECKING:
     from analyzer.config import LaneLimits
-    from analyzer.loop.finding import Finding
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,18 +113,21 @@ NOTHING_SURER = (None, Action.NONE, Action.NEEDS_DATA, Action.CHECK_SETTINGS)
 """Actions in whose place a doubtful measurement is looked at first: what rests on it is doubtful too."""
 
 
-def lanes_of(found: Finding, limits: LaneLimits) -> tuple[Lane, ...]:
-    """The lanes that a loop's figures put it into."""
+def in_lanes(found: Finding, limits: LaneLimits) -> Finding:
+    """A loop with the lanes that its figures put it into."""
     standing = {r.lane for r in RULES if r.stands(found, limits)}
-    return tuple(r.lane for r in RULES if r.lane in standing and not r.hidden_by & standing)
+    return replace(
+        found, lanes=tuple(r.lane for r in RULES if r.lane in standing and not r.hidden_by & standing)
+    )
 
 
-def action_of(status: Status, action: Action | None, lanes: tuple[Lane, ...]) -> Action | None:
-    """The action, or the one that a lane asks for where nothing else is to be done; what holds OP at its limit has to
-    be found out first, and an output that winds up is no matter of gain and integral time."""
-    if status is Status.NOT_ASSESSED and action is None:
+def action_of(found: Finding) -> Action | None:
+    """What to do, or what a lane asks for where nothing else is to be done; what holds OP at its limit has to be
+    found out first, and an output that winds up is no matter of gain and integral time."""
+    action, lanes = found.remedy.action, found.lanes
+    if found.status is Status.NOT_ASSESSED and action is None:
         action = Action.NEEDS_DATA
-    if action in NOTHING_SURER and status is not Status.FAILED:
+    if action in NOTHING_SURER and found.status is not Status.FAILED:
         asks = [r.lane for r in RULES if r.of_measurement and r.lane in lanes]
         if asks and not (asks == [Lane.LASTING_ERROR] and Lane.AT_LIMIT in lanes):
             return Action.CHECK_MEASUREMENT

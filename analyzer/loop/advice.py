@@ -15,7 +15,8 @@ from analyzer.loop.oscillation import counting
 from analyzer.loop.settings_side_by_side import Comparison, compared
 from analyzer.loops.spec import LoopSpec
 from analyzer.loops.tags import as_stated
-from analyzer.words import units as words
+from analyzer.words import sentences
+from analyzer.words.units import number, of_controller
 from identification.estimation.window import Fit
 from identification.limits import FIT
 from identification.models import Loop, Pid
@@ -24,6 +25,9 @@ from tuning.frequency_response import integral_s, is_stable
 from tuning.limit_cycle import Cycle, confirm
 from tuning.recommend import Proposal, recommend
 from tuning.search import rounded
+
+SAID = sentences("settings")
+"""What is said of settings that are given, or that are not."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,17 +128,19 @@ def withheld(
     if verdict.dead:
         return Advice(Action.REPAIR_VALVE)
     if found.outdated:
-        return Advice(Action.NONE, words.JUST_CHANGED)
+        return Advice(Action.NONE, SAID["just_changed"])
     if found.settings is not None and controller is not None:
-        differ = words.settings_differ(controller, found.settings, spec, pv_span)
-        return Advice(Action.CHECK_SETTINGS, differ)
+        listed, followed = (of_controller(pid, spec, pv_span) for pid in (controller, found.settings))
+        return Advice(Action.CHECK_SETTINGS, SAID["differ"].format(listed, followed))
     if found.needs is not None:
         return _lacking(found.needs)
     if verdict.cause in (Cause.NONE, Cause.LOAD):
         return Advice(Action.NONE)
     if counting(found.oscillations) is None:
         at_fault = verdict.cause is Cause.VALVE
-        return Advice(Action.REPAIR_VALVE, words.CALM, due=Due.SHUTDOWN) if at_fault else Advice(Action.NONE)
+        return (
+            Advice(Action.REPAIR_VALVE, SAID["calm"], due=Due.SHUTDOWN) if at_fault else Advice(Action.NONE)
+        )
     if verdict.needs is not None:
         return _lacking(verdict.needs)
     if verdict.cause is Cause.UNDECIDED:
@@ -149,7 +155,7 @@ def _unsupported(found: Assessment, controller: Pid | None, config: Config) -> A
     if found.for_settings is not None:
         return _lacking(found.for_settings)
     if controller is None:
-        return _or_repair(found.verdict, Advice(Action.CHECK_SETTINGS, words.NOT_STATED))
+        return _or_repair(found.verdict, Advice(Action.CHECK_SETTINGS, SAID["not_stated"]))
     if found.judged_h < config.advice.least_h:
         return _lacking(Needs(Lack.LONGER, Need.HOURS, (config.advice.least_h, found.judged_h)))
     return _too_thin(found, controller, config)
@@ -163,13 +169,16 @@ def _too_thin(found: Assessment, controller: Pid | None, config: Config) -> Advi
 
 
 def sought_for(verdict: Verdict, controller: Pid, limits: AdviceLimits) -> tuple[Loop, Fit, tuple[Loop, ...]]:
-    """The loop that settings are sought for, its fit, and what else it may be, for a valve at fault.
+    """The loop that settings are sought for, its fit, and what else it may be.
 
-    Where the loop with its play does not cycle, and with the stick-slip that was tried beside it does, the stem
-    sticks: something must move it.
+    Where the loop of a valve at fault does not cycle with its play, and does with the stick-slip that was tried
+    beside it, the stem sticks: something must move it.
     """
     verdict = verdict.for_settings
     fit, sticks = verdict.fit, verdict.rests_on.stick_slip
+    if verdict.cause is not Cause.VALVE:
+        model = model_of(verdict, controller)
+        return model, fit, uncertain(fit, model)
 
     def of(fit: Fit) -> Loop:
         return Loop(tuned(fit, True, limits), controller, fit.valve.valve)
@@ -189,7 +198,7 @@ def propose(verdict: Verdict, controller: Pid, period_s: float | None, config: C
     found = _proposed(sought_on, controller, period_s, config)
     if sought_on is verdict or not found.proposal.reason:
         return found
-    reason = f"{words.ONE_FRICTION} {found.proposal.reason}"
+    reason = f"{SAID['one_friction']} {found.proposal.reason}"
     return replace(found, proposal=replace(found.proposal, reason=reason))
 
 
@@ -201,11 +210,12 @@ def _proposed(verdict: Verdict, controller: Pid, period_s: float | None, config:
         return Proposed(recommend(loop, verdict.cause, limits=config.tuning))
     duration_s, dead_time_s = verdict.fit.window.duration_s, loop.process.dead_time_s
     if dead_time_s > FIT.longest_dead_time * duration_s:
-        return Proposed(Proposal(Action.UNDECIDED, words.beyond_record(dead_time_s, duration_s)))
+        shown = SAID["beyond_record"].format(number(dead_time_s), duration_s / 3600.0)
+        return Proposed(Proposal(Action.UNDECIDED, shown))
     if verdict.cause is Cause.TUNING:
         return _for_tuning(verdict, loop, period_s, config)
     if not is_stable(loop):
-        return Proposed(Proposal(Action.UNDECIDED, words.UNSTABLE))
+        return Proposed(Proposal(Action.UNDECIDED, SAID["unstable"]))
     return _for_valve(verdict, loop, period_s, config)
 
 
@@ -221,9 +231,9 @@ def _for_valve(verdict: Verdict, loop: Loop, period_s: float | None, config: Con
     sought, fit, others = sought_for(verdict, loop.controller, config.advice)
     rests = confirm(sought).cycle is None
     if rests and period_s is None:
-        return Proposed(Proposal(Action.REPAIR_VALVE, words.CALM))
+        return Proposed(Proposal(Action.REPAIR_VALVE, SAID["calm"]))
     if rests and math.isinf(integral_s(loop.controller)):
-        return Proposed(Proposal(Action.CHECK_SETTINGS, words.NO_INTEGRAL))
+        return Proposed(Proposal(Action.CHECK_SETTINGS, SAID["no_integral"]))
     load = load_of(fit, loop.controller)
     return Proposed(recommend(sought, verdict.cause, others, load, config.tuning), sought, load, others)
 

@@ -31,8 +31,7 @@ import numpy as np
 
 from analyzer.config import CauseLimits, Config
 from analyzer.loop.cause_weights import chances, measures, signs_of
-from analyzer.loop.decisions import CAUSES, Cause, Fault, Lack, Need, Needs, SignKind
-from analyzer.loop.finding import Sign
+from analyzer.loop.decisions import CAUSES, Cause, Fault, Lack, Need, Needs, Sign, SignKind
 from analyzer.loop.fitness import compressed
 from analyzer.loop.identified import sensitivity
 from analyzer.loop.measure import Measured
@@ -185,7 +184,7 @@ def judge(m: Measured, oscillation: Oscillation | None, limits: CauseLimits) -> 
         confidence[first] = min(confidence[first], 0.9 * limits.named_pct)
     cause = first if confidence[first] >= _least(first, m, limits) else Cause.UNDECIDED
     fault = fault_of(m, limits) if cause is Cause.VALVE else Fault.NONE
-    return Verdict(cause, confidence, fault, signs_of(m, oscillation), measured=m)
+    return Verdict(cause, confidence, fault, signs_of(m, oscillation, seen), measured=m)
 
 
 def _least(cause: Cause, m: Measured, limits: CauseLimits) -> float:

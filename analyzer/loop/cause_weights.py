@@ -18,8 +18,7 @@ from importlib.resources import files
 import numpy as np
 
 from analyzer.limits import LOOP
-from analyzer.loop.decisions import CAUSES, Cause, Figures, SignKind
-from analyzer.loop.finding import Sign
+from analyzer.loop.decisions import CAUSES, Cause, Figures, Sign, SignKind
 from analyzer.loop.measure import Measured
 from analyzer.loop.oscillation import Oscillation
 from identification.record import Floats
@@ -172,10 +171,10 @@ GROUPS: Mapping[SignKind, tuple[tuple[str, ...], Callable[[Measured, Oscillation
 """Measures that are one sign together, and the figures it is told by."""
 
 
-def signs_of(m: Measured, o: Oscillation) -> tuple[Sign, ...]:
-    """The signs of one oscillating loop; strength is one less the share to which a sign brings the odds against its
-    cause."""
-    moved = pushes(measures(m, o))
+def signs_of(m: Measured, o: Oscillation, found: Floats) -> tuple[Sign, ...]:
+    """The signs of one oscillating loop, by its `measures`; strength is one less the share to which a sign brings the
+    odds against its cause."""
+    moved = pushes(found)
     out = []
     for kind, (names, figures) in GROUPS.items():
         push = np.sum([moved[n] for n in names], axis=0)

@@ -14,8 +14,7 @@ from analyzer.loop.advice import Advice
 from analyzer.loop.assess import Assessment
 from analyzer.loop.cause import Verdict
 from analyzer.loop.cost import RECORDED, STATED, loss
-from analyzer.loop.decisions import Action, Cause, Fault, Needs, Status
-from analyzer.loop.finding import Cell, Finding, Remedy, Swing
+from analyzer.loop.decisions import Action, Cause, Cell, Fault, Finding, Needs, Remedy, Status, Swing
 from analyzer.loop.identified import gain_room, intervals, is_known
 from analyzer.loop.oscillation import Oscillations
 from analyzer.loop.setpoint_moves import as_row

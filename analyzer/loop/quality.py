@@ -18,11 +18,11 @@ from analyzer.loop.decisions import Lack, LacksError, Need, Needs
 from analyzer.loop.sample_clock import (
     archived_share,
     clock_of,
+    collinear,
     constant_stretches,
     interval,
     onto_clock,
     resolution,
-    straight,
     without_stray_ends,
 )
 from analyzer.loop.shared_valve import Shared, half, selected
@@ -209,7 +209,7 @@ def _masked(
     masks = {
         "gap": gap,
         "stale": stale,
-        "compressed": straight(record.pv),
+        "compressed": collinear(record.pv),
         "quantized": none if pv_step == 0 else np.ones(clock.size, dtype=bool),
         "saturated": saturated,
         "manual": manual & ~saturated if mode is None else manual,

@@ -74,7 +74,7 @@ def constant_stretches(value: Floats, dt_s: float, seconds: float, samples: int)
 
 
 @njit(cache=True)
-def straight(value: Floats) -> Mask:
+def collinear(value: Floats) -> Mask:
     """True where a sample lies on the line between its neighbours while the trend moves, shape (n,).
 
     Swinging-door compression leaves straight, sloping segments; steps of a coarse resolution and constants
@@ -94,7 +94,7 @@ def archived_share(value: Floats) -> float:
     """Share of samples that a line through their neighbours does not give [-]: those that compression kept."""
     level = np.zeros(value.size, dtype=np.bool_)
     level[1:-1] = (value[1:-1] == value[:-2]) & (value[1:-1] == value[2:])
-    return float((~(straight(value) | level)).mean())
+    return float((~(collinear(value) | level)).mean())
 
 
 def resolution(value: Floats) -> float:

@@ -8,25 +8,24 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from analyzer.config import AdviceLimits, Config
-from analyzer.loop.advice import Advice, model_of, propose, sought_for, withheld
+from analyzer.loop.advice import Advice, propose, sought_for, withheld
 from analyzer.loop.assess import Assessment, assess
-from analyzer.loop.cause import Verdict
 from analyzer.loop.decisions import Action, Cause, Need, Needs
 from analyzer.loop.fitness import at_limits, unfit_for_cause
-from analyzer.loop.identified import intervals, load_of, tuned, uncertain
+from analyzer.loop.identified import intervals, load_of, tuned
 from analyzer.loop.judged_stretch import controller_of, earlier_settings
 from analyzer.loop.quality import prepare
-from analyzer.loop.settings_side_by_side import middle_ti
+from analyzer.loop.settings_side_by_side import compared, middle_ti
 from analyzer.loops.changes import in_force
 from analyzer.loops.spec import LoopSpec, spec_of
 from analyzer.loops.tags import as_stated
 from analyzer.night.nights import cut, nights_of
-from analyzer.words.signs import sign_in_full
+from analyzer.words.reason import sign_in_full
 from analyzer.words.units import number
 from identification.errors import InputError, NotAssessedError
-from identification.estimation.window import Fit
 from identification.models import Estimate, Loop, Pid, Process, Valve
 from identification.record import Floats
+from reports.pages import Field, Line, Panels, Picture, Place, Plot
 from tuning.describing import describe
 from tuning.forecast import Forecast, predict, run
 from tuning.frequency_response import is_stable, slowest_s
@@ -36,7 +35,6 @@ from tuning.recommend import Proposal
 
 if TYPE_CHECKING:
     from analyzer.night.asked import Asked
-    from reports.pages import Field, Panels, Picture, Plot
 
 MAP_POINTS = 36
 """Points of the map along each axis."""
@@ -68,14 +66,6 @@ class Tuning:
     others: tuple[Loop, ...] = ()
 
 
-def _model(verdict: Verdict, controller: Pid, limits: AdviceLimits) -> tuple[Loop, Fit, tuple[Loop, ...]]:
-    """The loop that the forecast runs on, its fit, and what else it may be."""
-    if verdict.cause is Cause.VALVE:
-        return sought_for(verdict, controller, limits)
-    model = model_of(verdict, controller)
-    return model, verdict.fit, uncertain(verdict.fit, model)
-
-
 def identified(found: Assessment, limits: AdviceLimits) -> tuple[Process, Valve, dict[str, Estimate]]:
     """Process, valve and their parameters with 90 % intervals, as one assessed loop's verdict has them. Raises
     NotAssessedError where the loop's trends give no model."""
@@ -91,7 +81,7 @@ def tune(found: Assessment, controller: Pid, config: Config, kept: Advice | None
     verdict = found.verdict
     first = found.oscillations.first
     period = first.period_s if first else None
-    model, fit, others = _model(verdict, controller, config.advice)
+    model, fit, others = sought_for(verdict, controller, config.advice)
     if kept is not None and kept.reason and kept.action is not None:
         proposal = Proposal(kept.action, kept.reason)
     else:
@@ -167,8 +157,6 @@ def pictures(t: Tuning, title: str) -> tuple[Picture, ...]:
 
 def _curves(t: Tuning, title: str) -> Plot:
     """Where the describing function meets the loop: a limit cycle."""
-    from reports.pages import Line, Place, Plot
-
     c = curves(t.model)
     reach = 1.4 * float(np.abs(c.valve).max(initial=1.0))
     re, im = c.linear.real, c.linear.imag
@@ -188,7 +176,6 @@ def _curves(t: Tuning, title: str) -> Plot:
 def _map_field(t: Tuning, title: str) -> Field:
     """Valve travel of each pair of settings, where the loop comes to rest, and where it is unstable."""
     from analyzer.pages.compared import travel_field
-    from reports.pages import Place
 
     c, new = t.model.controller, t.proposal.controller
     kp = c.kp * np.geomspace(1 / SPREAD, SPREAD, MAP_POINTS)
@@ -202,8 +189,6 @@ def _map_field(t: Tuning, title: str) -> Field:
 
 def _trend_panels(t: Tuning, new: Pid, title: str) -> Panels:
     """Both tunings on the same reconstructed load."""
-    from reports.pages import Line, Panels, Plot
-
     pv: list[Line] = []
     op: list[Line] = []
     for name, kind, c in (("now", "pv", t.model.controller), ("proposed", "brought", new)):
@@ -250,7 +235,6 @@ def _with_settings_beside(
     t: Tuning, spec: LoopSpec, pv_span: float, config: Config, night: str, text: list[str], drawn: bool
 ) -> tuple[list[str], dict[str, bytes]]:
     """Text with the settings to choose between; pictures by file name and, among them, the page of settings."""
-    from analyzer.loop.settings_side_by_side import compared
     from analyzer.pages.compared import choices, settings_page
     from reports.html import render
     from reports.pictures import as_file

@@ -22,8 +22,7 @@ from analyzer.lanes.standing import standing
 from analyzer.loop.advice import Advice, advise
 from analyzer.loop.assess import Assessment, assess
 from analyzer.loop.conclusion import Lost, concluded
-from analyzer.loop.decisions import Action, Cause, Lack, LacksError, Need, Needs, Status
-from analyzer.loop.finding import Cell, Finding
+from analyzer.loop.decisions import Action, Cause, Cell, Finding, Lack, LacksError, Need, Needs, Status
 from analyzer.loop.judged_stretch import Earlier, controller_of, earlier_settings
 from analyzer.loop.oscillation import counting
 from analyzer.loop.page_trends import turn_events

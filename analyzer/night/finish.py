@@ -14,8 +14,8 @@ import pyarrow as pa
 from analyzer.belief.nights import settle
 from analyzer.columns import GROUPS, NIGHTS, Column, names
 from analyzer.config import Config, NightLimits
+from analyzer.lanes.lanes import in_lanes
 from analyzer.loop.decisions import Status
-from analyzer.loop.finding import in_lanes
 from analyzer.plantwide.cascade import led_anew, linked
 from analyzer.plantwide.night import traced_night
 from analyzer.plantwide.structure import links_of, moves_in

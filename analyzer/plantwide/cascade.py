@@ -8,11 +8,21 @@ from dataclasses import replace
 from typing import Any
 
 from analyzer.config import PlantLimits
-from analyzer.loop.decisions import Action, Cause, Due, GroupRole, SignKind, Status
-from analyzer.loop.finding import Finding, Remedy, Root, Sign, following
-from analyzer.plantwide.night import follower_confidence
+from analyzer.loop.decisions import (
+    Action,
+    Cause,
+    Due,
+    Finding,
+    GroupRole,
+    Remedy,
+    Root,
+    SignKind,
+    Status,
+)
+from analyzer.plantwide.night import following
 from analyzer.plantwide.structure import Link, Tie
-from analyzer.words.reason import below_first, halves_apart
+from analyzer.words import sentences
+from analyzer.words.reason import below_first
 
 COLUMN = {Tie.MASTER: "master", Tie.SPLIT: "split_of", Tie.RATIO: "ratio_of"}
 """The column that names the loop that another one hangs on."""
@@ -55,7 +65,9 @@ def _with_halves(own: Finding, halves: Sequence[Finding], limits: PlantLimits) -
     if not all(size) or max(size) < limits.halves_apart * min(size):
         return own
     stronger, weaker = (halves[k] for k in sorted((0, 1), key=lambda k: -size[k]))
-    text = halves_apart(stronger.loop, weaker.loop, max(size) / min(size))
+    times = max(size) / min(size)
+    apart = stronger.loop, weaker.loop, times, 100.0 * times / (1.0 + times)
+    text = sentences("settings")["halves_apart"].format(*apart)
     return replace(own, remedy=Remedy(Action.UNDECIDED, text))
 
 
@@ -112,24 +124,20 @@ def _judged_together(
         root = Root(below.loop, level, None, max(f.confidence.get(cause, 0.0) for f in (above, below)))
         if above.cause is Cause.VALVE or _alike(above, below, limits) or not below.oscillates:
             seen = SignKind.OF_BELOW, (below.loop, below.cause, tie)
-            sign = Sign(Cause.LOAD, limits.follower_sign, *seen)
             # a repair that could wait if the loop were alone: its master cycles for it
             waits = below.remedy.due is Due.SHUTDOWN
             remedy = Remedy(below.remedy.action, due=Due.NOW) if waits else below.remedy
             moved = replace(below, moves=_moves_with(below, above.loop), remedy=remedy)
-            return _as_follower(above, root, sign, limits), moved
+            return following(above, root, above.swing, seen, limits), moved
         if above.remedy.action in ACTING:
             return replace(above, remedy=Remedy(Action.UNDECIDED, below_first(below, tie))), below
         return above, below
     if not faulty and below.oscillates and above.oscillates and _alike(above, below, limits):
         root = Root(above.loop, level, None, max(above.confidence.values(), default=0.0))
-        sign = Sign(Cause.LOAD, limits.follower_sign, SignKind.OF_ABOVE, (above.loop, tie))
-        return replace(above, moves=_moves_with(above, below.loop)), _as_follower(below, root, sign, limits)
+        hangs = SignKind.OF_ABOVE, (above.loop, tie)
+        leads = replace(above, moves=_moves_with(above, below.loop))
+        return leads, following(below, root, below.swing, hangs, limits)
     return above, below
-
-
-def _as_follower(own: Finding, root: Root, sign: Sign, limits: PlantLimits) -> Finding:
-    return following(own, root, own.swing, follower_confidence(own.confidence, root, limits), sign)
 
 
 def _moves_with(own: Finding, *loops: str) -> tuple[str, ...]:

@@ -11,10 +11,23 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from analyzer.config import PlantLimits
-from analyzer.loop.decisions import Cause, GroupRole, SignKind, Status
-from analyzer.loop.finding import Finding, Root, Sign, Swing, following
+from analyzer.loop.decisions import (
+    CAUSES,
+    Action,
+    Cause,
+    Fault,
+    Figures,
+    Finding,
+    GroupRole,
+    Remedy,
+    Root,
+    Sign,
+    SignKind,
+    Status,
+    Swing,
+)
 from analyzer.plantwide.groups import Group, groups_of
-from analyzer.plantwide.source import Candidate, Lags, Peer, candidates_of
+from analyzer.plantwide.source import Candidate, Lags, candidates_of
 from analyzer.plantwide.wave import Wave
 
 Row = Mapping[str, Any]
@@ -29,7 +42,8 @@ def traced_night(
 
     loops : by name, each with its own verdict; waves : of all loops; first : number of the first group.
     """
-    traced = trace(waves, _peers(loops), limits)
+    assessed = {k: f for k, f in loops.items() if f.status is Status.OK}
+    traced = trace(waves, assessed, limits)
     told = [t for t in traced if any(k in loops and loops[k].oscillates for k in t.group.loops)]
     found = followers_of(told)
     sources = {loop: source for loop, (source, _) in found.items()}
@@ -39,18 +53,39 @@ def traced_night(
         lead = done[source.loop]
         done[source.loop] = replace(lead, moves=tuple(sorted((*lead.moves, loop))))
     for loop, (source, wave) in found.items():
-        done[loop] = _follower(loops[loop], done[loop], source, wave, limits)
+        done[loop] = _follower(done[loop], source, wave, limits)
     own = own_groups(groups)
     return {k: replace(f, group=own.get(k)) for k, f in done.items()}, groups
 
 
-def _follower(alone: Finding, known: Finding, root: Root, wave: Wave, limits: PlantLimits) -> Finding:
+def following(
+    own: Finding, root: Root, swing: Swing | None, seen: tuple[SignKind, Figures], limits: PlantLimits
+) -> Finding:
+    """A loop that follows another one: a load from outside moves it, and its own valve and settings are left alone.
+
+    own, of the loop alone; swing, its part in what is shared where that is no oscillation by itself; seen, what says
+    that it follows, with its figures. The load is at least as sure as the coherence; what else the loop shows comes
+    from its source.
+    """
+    confidence = {c: min(own.confidence.get(c, 0.0), limits.follower_most_pct) for c in CAUSES}
+    confidence[Cause.LOAD] = max(own.confidence.get(Cause.LOAD, 0.0), 100.0 * root.coherence)
+    return replace(
+        own,
+        swing=swing,
+        cause=Cause.LOAD,
+        fault=Fault.NONE,
+        confidence=confidence,
+        signs=(Sign(Cause.LOAD, limits.follower_sign, *seen), *own.signs),
+        remedy=Remedy(Action.SEE_SOURCE_LOOP, f"Look at {root.loop} first."),
+        follows=root,
+    )
+
+
+def _follower(own: Finding, root: Root, wave: Wave, limits: PlantLimits) -> Finding:
     """A loop as a follower; as it was where it does not oscillate, not even with its part in what is shared."""
-    confidence = follower_confidence(alone.confidence, root, limits)
-    seen = root.loop, root.lag_s, root.coherence
-    sign = Sign(Cause.LOAD, limits.follower_sign, SignKind.FOLLOWS, seen)
-    told = following(known, root, swing_of(alone, root, wave, limits), confidence, sign)
-    return told if told.oscillates else known
+    seen = SignKind.FOLLOWS, (root.loop, root.lag_s, root.coherence)
+    told = following(own, root, swing_of(own, root, wave, limits), seen, limits)
+    return told if told.oscillates else own
 
 
 def swing_of(own: Finding, root: Root, wave: Wave, limits: PlantLimits) -> Swing | None:
@@ -60,15 +95,6 @@ def swing_of(own: Finding, root: Root, wave: Wave, limits: PlantLimits) -> Swing
     share, amplitude = wave.oscillating_pct, wave.amplitude_pct
     hours = own.number("usable_h") * share / 100.0
     return Swing(amplitude * root.coherence * hours, share, wave.period_s, amplitude)
-
-
-def _peers(loops: Loops) -> dict[str, Peer]:
-    """The verdicts of the loops that were assessed."""
-    return {
-        k: Peer(f.cause or Cause.NONE, f.number("evidence"), f.confidence.get(Cause.TUNING, 0.0))
-        for k, f in loops.items()
-        if f.status is Status.OK
-    }
 
 
 def likely(found: Traced, limits: PlantLimits) -> list[str]:
@@ -153,15 +179,7 @@ class Traced:
         return self.candidates[0].loop
 
 
-def follower_confidence(own: Mapping[Cause, float], root: Root, limits: PlantLimits) -> dict[Cause, float]:
-    """The confidences of a follower [%], from its own and its source: the load is at least as sure as the coherence;
-    what else the loop shows comes from the source."""
-    load = max(own.get(Cause.LOAD, 0.0), 100.0 * root.coherence)
-    rest = {c: min(own.get(c, 0.0), limits.follower_most_pct) for c in (Cause.VALVE, Cause.TUNING)}
-    return {Cause.LOAD: load, **rest}
-
-
-def may_follow(own: Peer, other: Peer, level: float, limits: PlantLimits) -> bool:
+def may_follow(own: Finding, other: Finding, level: float, limits: PlantLimits) -> bool:
     """Whether a loop can follow another at this coherence.
 
     Two loops that each cycle by themselves do not keep step over a night, so one of the two moves the other; what
@@ -172,10 +190,10 @@ def may_follow(own: Peer, other: Peer, level: float, limits: PlantLimits) -> boo
         return False
     if own.cause is not Cause.VALVE:
         return True
-    return other.cause is Cause.VALVE and other.evidence >= own.evidence
+    return other.cause is Cause.VALVE and other.number("evidence") >= own.number("evidence")
 
 
-def _traced(group: Group, peers: Mapping[str, Peer], limits: PlantLimits) -> Traced | None:
+def _traced(group: Group, peers: Loops, limits: PlantLimits) -> Traced | None:
     """A group with its candidates and followers; None where no verdict of its loops is known."""
     lags = Lags(group.waves)
     candidates = candidates_of(lags, peers, limits)
@@ -220,7 +238,7 @@ def _parents(source: str, lags: Lags, limits: PlantLimits) -> dict[str, str]:
     return out
 
 
-def trace(waves: Sequence[Wave], peers: Mapping[str, Peer], limits: PlantLimits) -> list[Traced]:
+def trace(waves: Sequence[Wave], peers: Loops, limits: PlantLimits) -> list[Traced]:
     """The groups of a night, traced to their sources, those of more loops first."""
     found = (_traced(g, peers, limits) for g in groups_of(waves, limits))
     return [t for t in found if t is not None]

@@ -17,22 +17,10 @@ import numpy as np
 
 from analyzer.config import PlantLimits
 from analyzer.limits import WAVES
-from analyzer.loop.decisions import Cause
+from analyzer.loop.decisions import Cause, Finding
 from analyzer.plantwide.wave import Wave, in_steps
 from identification.record import Floats
 from identification.signals.cross_spectrum import Delay, band, granger_f, lag, tapered
-
-
-@dataclass(frozen=True, slots=True)
-class Peer:
-    """What a loop's own verdict says when sources are looked for.
-
-    cause; evidence [nat] of its valve fault; tuning_pct, confidence of its tuning [%].
-    """
-
-    cause: Cause
-    evidence: float = 0.0
-    tuning_pct: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,17 +32,23 @@ class Candidate:
     confidence_pct: float
 
 
-def _first_guess(waves: Sequence[Wave], peers: Mapping[str, Peer], most: int) -> list[Wave]:
+def _first_guess(waves: Sequence[Wave], peers: Mapping[str, Finding], most: int) -> list[Wave]:
     """The waves of the likeliest candidates, so many at most."""
 
     def rank(w: Wave) -> tuple[float, float]:
-        peer = peers[w.loop]
-        return -(peer.evidence if peer.cause is Cause.VALVE else peer.tuning_pct / 100), -w.prominence
+        own = peers[w.loop]
+        valve = own.cause is Cause.VALVE
+        return -(own.number("evidence") if valve else _tuning_share(own)), -w.prominence
 
     known = [w for w in waves if w.loop in peers]
     by_verdict, by_clearness = sorted(known, key=rank), sorted(known, key=lambda w: -w.prominence)
     chosen = {w.loop: w for w in (*by_verdict[: most // 2], *by_clearness)}
     return list(chosen.values())[:most]
+
+
+def _tuning_share(own: Finding) -> float:
+    """Confidence in a tuning that is too tight [-]."""
+    return own.confidence.get(Cause.TUNING, 0.0) / 100.0
 
 
 def _leads(loops: Sequence[str], lags: Lags, limits: PlantLimits) -> tuple[Floats, Floats]:
@@ -76,7 +70,7 @@ def _relative(x: Floats) -> Floats:
     return x / top if top > 0 else np.zeros(x.size)
 
 
-def candidates_of(lags: Lags, peers: Mapping[str, Peer], limits: PlantLimits) -> tuple[Candidate, ...]:
+def candidates_of(lags: Lags, peers: Mapping[str, Finding], limits: PlantLimits) -> tuple[Candidate, ...]:
     """The candidates of a group with their confidences, the likeliest first; what is left to 100 % is a source
     unseen.
 
@@ -96,16 +90,16 @@ def candidates_of(lags: Lags, peers: Mapping[str, Peer], limits: PlantLimits) ->
 
 
 def _signs_by_name(
-    waves: Sequence[Wave], peers: Sequence[Peer], lags: Lags, limits: PlantLimits
+    waves: Sequence[Wave], peers: Sequence[Finding], lags: Lags, limits: PlantLimits
 ) -> list[dict[str, float]]:
     """The signs of each candidate by name."""
     first, shared = _leads([w.loop for w in waves], lags, limits)
-    own = [p.evidence if p.cause is Cause.VALVE else 0.0 for p in peers]
+    own = [p.number("evidence") if p.cause is Cause.VALVE else 0.0 for p in peers]
     most = math.log1p(limits.much_evidence)
     columns: dict[str, Sequence[float] | Floats] = {
         "valve": [min(math.log1p(max(x, 0.0)) / most, 1.0) for x in own],
         "best_valve": _relative(np.array(own)),
-        "tuning": [(p.cause is Cause.TUNING) * p.tuning_pct / 100.0 for p in peers],
+        "tuning": [(p.cause is Cause.TUNING) * _tuning_share(p) for p in peers],
         "oscillates": [w.own and w.harmonic == 1 for w in waves],
         "first": first,
         "foresees": foresees(waves),

@@ -13,22 +13,26 @@ from dataclasses import asdict, astuple
 from typing import TYPE_CHECKING, Any
 
 from analyzer.columns import row_of
+from analyzer.lanes.lanes import action_of
 from analyzer.loop.decisions import (
     CAUSES,
     Action,
     Cause,
+    Cell,
     Due,
     Fault,
+    Finding,
     Lack,
     Lane,
     Need,
     Needs,
+    Remedy,
+    Sign,
     SignKind,
     Status,
+    Swing,
 )
-from analyzer.loop.finding import Cell, Finding, Remedy, Sign, Swing
-from analyzer.words.reason import reason
-from analyzer.words.signs import as_stored
+from analyzer.words.reason import as_stored, reason
 
 if TYPE_CHECKING:
     from analyzer.loop.assess import Assessment
@@ -72,7 +76,7 @@ def piece_row(found: Finding) -> dict[str, Any]:
         "source_loop": found.follows.loop if found.follows else None,
         "lanes": ", ".join(found.lanes) or None,
         "group": found.group,
-        "action": found.action,
+        "action": action_of(found),
         "advice": found.remedy.text if ok else None,
         "kp_new": found.remedy.kp_new,
         "ti_new": found.remedy.ti_new,

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from analyzer.history.plant_clock import local
 from analyzer.loop.decisions import CAUSES, Action, Cause, Fault, counts
+from analyzer.words import sentences
 from analyzer.words.reason import joined
 from analyzer.words.units import Row, duration, number
 
@@ -24,13 +25,6 @@ NOT_YET = re.compile(
 )
 """Words that say it is not yet done."""
 IS = {Fault.BACKLASH: "plays by", Fault.STICTION: "sticks over"}
-WAS = {
-    Cause.VALVE: "the valve",
-    Cause.TUNING: "the tuning",
-    Cause.LOAD: "a load",
-    Cause.NONE: "nothing",
-    Cause.UNDECIDED: "undecided",
-}
 
 
 def says_repaired(text: str) -> bool:
@@ -86,7 +80,7 @@ def _advice(now: Belief, row: Row) -> str | None:
     night's own where it is told."""
     t, pairs = now.told, now.remedy.pairs
     if t.calmed:
-        return CALMED
+        return sentences("settings")["calmed"]
     if t.action is not Action.RETUNE or t.pair is None:
         return row["advice"] if row["action"] == t.action else ""
     spread = ""
@@ -121,16 +115,10 @@ def belief_reason(now: Belief, row: Row) -> str:
     sure = f"certain by {nights} nights" if worn else None
     over = f"{nights} nights say {width_text(now)}, certain since {now.valve.certain}" if worn else None
     differs = not (t.own or t.calmed) and row["cause"] != t.cause
-    alone = f"this night alone: {WAS[Cause(row['cause'])]}" if differs else None
+    alone = f"this night alone: {sentences('alone')[row['cause']]}" if differs else None
     text = _calmed(now) if t.calmed else row["reason"] if t.own else _together(now, row)
     first, *others = (text or "").split("; ")
     return joined(first, sure, *others, over, alone)
-
-
-CALMED = (
-    "The last change of settings took most of the cycle away; what is left is small beside what nights differ by, so "
-    "no further settings are advised. The valve is still worn: at the next shutdown."
-)
 
 
 def _calmed(now: Belief) -> str:

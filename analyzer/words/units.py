@@ -1,6 +1,4 @@
-"""Times and controller settings in words, with their units; no settings stand anywhere without them.
-
-What is said of settings that are given, or that are not, stands at the end."""
+"""Times and controller settings in words, with their units; no settings stand anywhere without them."""
 
 from __future__ import annotations
 
@@ -84,20 +82,6 @@ def arrow(old: float | None, new: float | None) -> str:
     return f"{number(old) or 'none'} \u2192 {number(new) or 'none'}"
 
 
-NOT_STATED = "no new settings: loops.csv states no kp and ti of this loop; add them"
-UNSTABLE = (
-    "The identified loop would be unstable at the present settings, which the bounded cycle contradicts: the process "
-    "is not known well enough for new settings."
-)
-NO_INTEGRAL = (
-    "Without integral action, as loops.csv states, the identified loop would come to rest, but the record cycles: "
-    "check kp and ti before new settings are sought."
-)
-ONE_FRICTION = "Settings are sought with one friction for all slips of the valve, not slip by slip."
-JUST_CHANGED = "The settings were changed too late in the night to judge them: the next night tells."
-CALM = "At the settings in force the valve's fault makes no cycle: its repair can wait for the next shutdown."
-
-
 def of_controller(pid: Pid, spec: LoopSpec, pv_span: float) -> str:
     """A controller's settings as they are typed into it."""
     from analyzer.loops.tags import as_stated, derivative_as_stated
@@ -118,20 +102,3 @@ def settings_changed(old: LoopSpec, new: LoopSpec, clock: str) -> str:
     ]
     what = ", ".join(parts) or "settings changed"
     return f"{what} at {clock}"
-
-
-def settings_differ(stated: Pid, recorded: Pid, spec: LoopSpec, pv_span: float) -> str:
-    """What loops.csv states beside what OP follows."""
-    listed, followed = (of_controller(pid, spec, pv_span) for pid in (stated, recorded))
-    return (
-        f"settings in loops.csv are not those of the controller: stated {listed}; recorded about {followed}. Correct "
-        "loops.csv (or find out who changed them) before anything is typed in"
-    )
-
-
-def beyond_record(dead_time_s: float, duration_s: float) -> str:
-    """Why a model gets no advice."""
-    return (
-        f"No settings: the model found has a dead time of {number(dead_time_s)} s, more than a record of "
-        f"{duration_s / 3600:.2g} h can show."
-    )

@@ -13,10 +13,9 @@ from analyzer.loop.cause import Verdict, dead_valve, judge
 from analyzer.loop.decisions import Lack
 from analyzer.loop.quality import prepare
 from analyzer.plantwide.night import followers_of, trace
-from analyzer.plantwide.source import Peer
-from analyzer.words.signs import sign_text
+from analyzer.words.reason import sign_text
 from identification.errors import NotAssessedError
-from proofs.plant import CONFIG, START_S, Sketch, Trends, prepared, record, series, simulate, spec
+from proofs.plant import CONFIG, START_S, Sketch, Trends, peer, prepared, record, series, simulate, spec
 from proofs.untidy.recorder import swinging_door
 
 SKETCHES = {
@@ -270,7 +269,7 @@ def traced(*found: Assessment) -> dict[str, str]:
     peers = {}
     for a in found:
         m = a.verdict.measured
-        peers[a.loop] = Peer(a.verdict.cause, m.evidence if m else 0.0, a.verdict.confidence["tuning"])
+        peers[a.loop] = peer(a.verdict.cause, m.evidence if m else 0.0, a.verdict.confidence["tuning"])
     waves = [w for a in found for w in a.waves]
     followers = followers_of(trace(waves, peers, CONFIG.plant))
     return {loop: source.loop for loop, (source, _) in followers.items()}

@@ -15,18 +15,20 @@ from analyzer.loop.decisions import (
     Action,
     Cause,
     Fault,
+    Finding,
     Lack,
     LacksError,
     Need,
     Needs,
+    Remedy,
+    Root,
     SignKind,
     Status,
     counts,
 )
-from analyzer.loop.finding import Finding, Remedy, Root, Sign, following
 from analyzer.night import chunk
 from analyzer.night.nights import Night
-from analyzer.plantwide.night import follower_confidence
+from analyzer.plantwide.night import following
 from analyzer.store.rows import night_row
 from proofs.plant import CONFIG, START_S, series, spec
 
@@ -56,13 +58,13 @@ def test_a_loop_counts_as_oscillating_from_half_of_the_time_on(share, expected):
 def test_a_follower_is_under_load_whatever_its_own_signs(own):
     """The load is at least as sure as the coherence and ahead of valve and tuning, and nothing is to be done here."""
     root = Root("FIC101", 0.9, None, 96.0)
-    confidence = follower_confidence(dict(zip(CAUSES, own, strict=True)), root, PlantLimits())
-    alone = Finding("L", "2026-03-02", Status.OK, remedy=Remedy(Action.RETUNE, kp_new=1.0))
-    told = following(alone, root, None, confidence, Sign(Cause.LOAD, 1.0, SignKind.FOLLOWS))
-    assert (told.cause, told.fault, told.action) == (Cause.LOAD, Fault.NONE, Action.SEE_SOURCE_LOOP)
+    confidence, remedy = dict(zip(CAUSES, own, strict=True)), Remedy(Action.RETUNE, kp_new=1.0)
+    alone = Finding("L", "2026-03-02", Status.OK, confidence=confidence, remedy=remedy)
+    told = following(alone, root, None, (SignKind.FOLLOWS, ()), PlantLimits())
+    assert (told.cause, told.fault, told.remedy.action) == (Cause.LOAD, Fault.NONE, Action.SEE_SOURCE_LOOP)
     assert told.remedy.kp_new is None
-    assert confidence[Cause.LOAD] >= max(90.0, own[2])
-    assert max(confidence[Cause.VALVE], confidence[Cause.TUNING]) <= 25.0
+    assert told.confidence[Cause.LOAD] >= max(90.0, own[2])
+    assert max(told.confidence[Cause.VALVE], told.confidence[Cause.TUNING]) <= 25.0
 
 
 def test_what_a_record_lacks_travels_between_processes():

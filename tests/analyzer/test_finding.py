@@ -6,8 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from analyzer.loop.decisions import Action, Cause, Due, Fault, Status
-from analyzer.loop.finding import Finding, Remedy, Root, Swing
+from analyzer.loop.decisions import Action, Cause, Due, Fault, Finding, Remedy, Root, Status, Swing
 
 NOW = Finding(
     "L",

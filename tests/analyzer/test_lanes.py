@@ -7,9 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analyzer.lanes.lanes import FIGURE, action_of
-from analyzer.loop.decisions import Action, Lane, Need, Needs, Status
-from analyzer.loop.finding import Finding, in_lanes
+from analyzer.lanes.lanes import FIGURE, action_of, in_lanes
+from analyzer.loop.decisions import Action, Finding, Lane, Need, Needs, Remedy, Status
 from analyzer.loops.spec import LoopSpec
 from analyzer.night import chunk
 from analyzer.night.nights import Night
@@ -198,8 +197,9 @@ def test_an_op_that_rests_at_its_limit_is_not_nothing_to_do():
     """A loop that the first lines say to look at has no action 'none', and its page says what to look for."""
     row = {"status": "ok", "action": "none", "cause": "none", "loop": "TIC1", "lanes": "at limit"}
     lanes = (Lane.AT_LIMIT, Lane.LASTING_ERROR)
-    assert action_of(Status.OK, Action.NONE, lanes) is Action.UNDECIDED
-    assert action_of(Status.OK, Action.NONE, ()) is Action.NONE
+    idle = Finding("TIC1", "2026-03-02", Status.OK, remedy=Remedy(Action.NONE))
+    assert action_of(replace(idle, lanes=lanes)) is Action.UNDECIDED
+    assert action_of(idle) is Action.NONE
     (_, do), (_, look), _ = work_order({**row, "action": "undecided"})
     assert "limit" in do
     assert "valve's size" in look

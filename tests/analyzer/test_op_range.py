@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from analyzer.config import QualityLimits
-from analyzer.loop.finding import in_lanes
+from analyzer.lanes.lanes import in_lanes
 from analyzer.loop.quality import op_in_range
 from analyzer.night import chunk
 from analyzer.night.nights import Night

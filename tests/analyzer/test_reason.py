@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from analyzer.loop.decisions import Cause, SignKind, Status
-from analyzer.loop.finding import Finding, Sign, Swing
+from analyzer.loop.decisions import Cause, Finding, Sign, SignKind, Status, Swing
 from analyzer.words.reason import in_short, reason
 
 

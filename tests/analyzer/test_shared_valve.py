@@ -10,10 +10,9 @@ import pytest
 
 from analyzer.config import AdviceLimits, Config, QualityLimits
 from analyzer.explain.case import as_given
-from analyzer.lanes.lanes import lanes_of
+from analyzer.lanes.lanes import action_of, in_lanes
 from analyzer.loop import conclusion
-from analyzer.loop.decisions import CAUSES, Action, Cause, Lane, Status
-from analyzer.loop.finding import Finding
+from analyzer.loop.decisions import CAUSES, Action, Cause, Finding, Lane, Remedy, Status
 from analyzer.loop.oscillation import counting, detect
 from analyzer.loop.quality import Prepared, Scale
 from analyzer.loop.shared_valve import half, selected
@@ -123,12 +122,11 @@ def test_a_loop_that_winds_up_is_to_be_set_right() -> None:
     found = Finding(
         "FIC1", "n", Status.OK, cause=Cause.NONE, confidence=dict.fromkeys(CAUSES, 0.0), known=known
     )
-    lanes = lanes_of(found, Config().lanes)
-    assert lanes == (Lane.WINDUP,)
+    told = in_lanes(replace(found, remedy=Remedy(Action.NONE)), Config().lanes)
+    assert told.lanes == (Lane.WINDUP,)
     from analyzer.words.reason import reason
 
-    told = replace(found, lanes=lanes, remedy=replace(found.remedy, action=Action.NONE))
-    assert told.action is Action.UNDECIDED
+    assert action_of(told) is Action.UNDECIDED
     assert "winds up while PIC1 has the valve, takes it back 75 s late" in reason(told)
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from analyzer.loop.advice import propose
 from analyzer.loop.cause import Verdict
-from analyzer.words import units as words
+from analyzer.words import sentences
 from identification.models import Pid
 from proofs.coverage import FAMILIES, Made, assessed, made
 from proofs.plant import CONFIG
@@ -48,6 +48,6 @@ def test_advice_says_on_which_friction_it_rests():
     for (loop, verdict), says in ((seen(STICKS, 60_700_009), True), (seen(PLAY, 60_800_004), False)):
         pid = Pid(loop.pi.kp, loop.pi.ti, scan_s=loop.scan_s)
         found = propose(verdict, pid, 200.0, CONFIG).proposal
-        assert found.reason.startswith(words.ONE_FRICTION) == says
+        assert found.reason.startswith(sentences("settings")["one_friction"]) == says
         before = propose(verdict.for_settings, pid, 200.0, CONFIG).proposal
         assert replace(found, reason=before.reason) == before

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import json
 
-from analyzer.loop.decisions import Cause, Lack, Need, Needs, SignKind, Status
-from analyzer.loop.finding import Finding, Sign, Swing
+from analyzer.loop.decisions import Cause, Finding, Lack, Need, Needs, Sign, SignKind, Status, Swing
+from analyzer.plantwide.structure import Tie
 from analyzer.store.rows import finding_of, night_row, piece_row
-from analyzer.words import needs, signs
+from analyzer.words import sentences
+from analyzer.words.reason import SAYS, sign_in_full
 
 SIGNS = (
     Sign(Cause.VALVE, 0.9, SignKind.EVIDENCE, (41.3, 0.75, 12)),
@@ -53,8 +54,41 @@ FOUND = Finding(
 
 def test_each_kind_has_its_words() -> None:
     """There is no sign, and nothing that is needed, that words do not tell."""
-    assert set(signs.SAYS) == set(SignKind)
-    assert set(needs.SAYS) == set(Need)
+    assert set(SAYS) == set(SignKind)
+    assert set(sentences("needs")) == set(Need)
+
+
+BOTH_WAYS = {
+    SignKind.EVIDENCE: ((0.0,), (9.0,), (9.0, 0.5, 4)),
+    SignKind.WIDTH: ((0.0, 0.3), (9.0, 0.3)),
+    SignKind.LOAD_LEFT: ((2.0, 0.5), (0.5, 0.5)),
+    SignKind.AMPLIFICATION: ((), (None,), (2.0,), (0.5,)),
+    SignKind.LOOP_GAIN: ((), (1.2,)),
+    SignKind.PROCESS: ((0.9,), (0.1,)),
+    SignKind.HARMONIC: ((0.1,),),
+    SignKind.WAVE_LEFT: ((0.0,), (0.2,)),
+    SignKind.REGULARITY: ((1.5, 0.9), (1.5, 0.1), (2.9, 0.9), (2.9, 0.1)),
+    SignKind.LIMITS: ((0.0,), (0.2,)),
+    SignKind.DEAD_TIME: ((300.0, 0.0), (300.0, 100.0)),
+    SignKind.CALM_EVIDENCE: ((9.0,),),
+    SignKind.CALM_WIDTH: ((0.4,),),
+    SignKind.AGAIN: ((),),
+    SignKind.DEAD_VALVE: ((40.0,),),
+    SignKind.FOLLOWS: (("F1", None, 0.9), ("F1", 30.0, 0.9)),
+    SignKind.OF_BELOW: tuple(("F1", cause, tie) for cause in (*Cause, None) for tie in Tie),
+    SignKind.OF_ABOVE: tuple(("F1", tie) for tie in Tie),
+}
+"""Figures that ask for each sentence of a sign."""
+
+
+def test_every_sentence_of_a_sign_is_there_and_is_asked_for() -> None:
+    """Figures of either size find a sentence without a brace left in it, and no sentence is there for nothing."""
+    assert set(BOTH_WAYS) == set(SignKind)
+    signs = [Sign(Cause.LOAD, 0.5, kind, each) for kind, figures in BOTH_WAYS.items() for each in figures]
+    assert not [text for text in map(sign_in_full, signs) if not text or "{" in text]
+    asked = {SAYS[s.kind](*s.figures)[0] for s in signs}
+    assert asked == set(sentences("signs"))
+    assert asked > set(sentences("figures_of_signs"))
 
 
 def test_the_store_keeps_words_as_ever() -> None:

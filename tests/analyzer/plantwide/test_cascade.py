@@ -6,13 +6,24 @@ from dataclasses import replace
 from typing import Any
 
 from analyzer.config import Config
-from analyzer.loop.decisions import CAUSES, Action, Cause, Due, Fault, GroupRole, SignKind, Status
-from analyzer.loop.finding import Finding, Remedy, Root, Sign, Swing, following
+from analyzer.loop.decisions import (
+    CAUSES,
+    Action,
+    Cause,
+    Due,
+    Fault,
+    Finding,
+    GroupRole,
+    Remedy,
+    Root,
+    SignKind,
+    Status,
+    Swing,
+)
 from analyzer.plantwide.cascade import led_anew, linked
+from analyzer.plantwide.night import following
 from analyzer.plantwide.structure import Link, Tie
 from analyzer.words.reason import reason
-
-FOLLOWS = Sign(Cause.LOAD, 0.9, SignKind.FOLLOWS)
 
 LIMITS = Config().plant
 HANGS = {"FIC1": Link("TIC1", Tie.MASTER, 0.98)}
@@ -44,7 +55,11 @@ def test_a_master_that_a_stuck_slave_swings_follows_it() -> None:
     master, below = night(found("TIC1", Cause.TUNING, 360.0, Action.RETUNE), slave)
     assert master.follows is not None
     assert master.follows.loop == "FIC1"
-    assert (master.cause, master.action, master.remedy.kp_new) == (Cause.LOAD, Action.SEE_SOURCE_LOOP, None)
+    assert (master.cause, master.remedy.action, master.remedy.kp_new) == (
+        Cause.LOAD,
+        Action.SEE_SOURCE_LOOP,
+        None,
+    )
     assert (below.cause, below.moves) == (Cause.VALVE, ("TIC1",))
     assert "follows FIC1" in reason(master)
 
@@ -52,7 +67,11 @@ def test_a_master_that_a_stuck_slave_swings_follows_it() -> None:
 def test_no_master_is_told_a_valve_fault() -> None:
     """What looks like a valve in a master is its slave, also where the slave shows nothing."""
     master, below = night(found("TIC1", Cause.VALVE, 360.0), found("FIC1", Cause.NONE, None))
-    assert (master.cause, master.fault, master.action) == (Cause.LOAD, Fault.NONE, Action.SEE_SOURCE_LOOP)
+    assert (master.cause, master.fault, master.remedy.action) == (
+        Cause.LOAD,
+        Fault.NONE,
+        Action.SEE_SOURCE_LOOP,
+    )
     assert below.cause is Cause.NONE
 
 
@@ -61,8 +80,8 @@ def test_a_slave_that_its_tight_master_swings_follows_it() -> None:
     one of its own."""
     tight = found("TIC1", Cause.TUNING, 240.0, Action.RETUNE)
     master, below = night(tight, found("FIC1", Cause.UNDECIDED, 80.0, Action.UNDECIDED))
-    assert (below.cause, below.action) == (Cause.LOAD, Action.SEE_SOURCE_LOOP)
-    assert (master.cause, master.action, master.moves) == (Cause.TUNING, Action.RETUNE, ("FIC1",))
+    assert (below.cause, below.remedy.action) == (Cause.LOAD, Action.SEE_SOURCE_LOOP)
+    assert (master.cause, master.remedy.action, master.moves) == (Cause.TUNING, Action.RETUNE, ("FIC1",))
     _, apart = night(tight, found("FIC1", Cause.UNDECIDED, 17.0, Action.UNDECIDED))
     assert apart.follows is None
 
@@ -74,7 +93,7 @@ def test_a_slaves_repair_does_not_wait_while_its_master_cycles() -> None:
         remedy=Remedy(Action.REPAIR_VALVE, "its repair can wait", due=Due.SHUTDOWN),
     )
     master, slave = night(found("TIC1", Cause.VALVE, 240.0, Action.RETUNE), waits)
-    assert master.action is Action.SEE_SOURCE_LOOP
+    assert master.remedy.action is Action.SEE_SOURCE_LOOP
     assert (slave.remedy.action, slave.remedy.due, slave.moves) == (Action.REPAIR_VALVE, Due.NOW, ("TIC1",))
     assert reason(slave).startswith("moves with TIC1")
 
@@ -83,7 +102,7 @@ def test_a_master_gets_no_settings_while_its_slave_has_a_fault() -> None:
     """Cycles of other periods are each loop's own, yet the master waits for its slave."""
     slave = found("FIC1", Cause.VALVE, 60.0, Action.REPAIR_VALVE)
     master, _ = night(found("TIC1", Cause.TUNING, 1000.0, Action.RETUNE), slave)
-    assert (master.follows, master.cause, master.action) == (None, Cause.TUNING, Action.UNDECIDED)
+    assert (master.follows, master.cause, master.remedy.action) == (None, Cause.TUNING, Action.UNDECIDED)
     assert "FIC1" in master.remedy.text
 
 
@@ -109,8 +128,8 @@ def test_those_that_a_master_moves_follow_its_slave_where_the_slave_is_the_root(
         found("PIC7", Cause.LOAD, 360.0),
         root,
         Swing(),
-        dict.fromkeys(CAUSES, 0.0),
-        Sign(Cause.LOAD, 0.9, SignKind.FOLLOWS),
+        (SignKind.FOLLOWS, ()),
+        LIMITS,
     )
     master = replace(found("TIC1", Cause.TUNING, 360.0, Action.RETUNE), moves=("PIC7",))
     slave = found("FIC1", Cause.VALVE, 360.0, Action.REPAIR_VALVE)
@@ -131,8 +150,8 @@ def test_a_loop_that_leads_one_group_and_follows_in_another_leads_as_before() ->
         found("FIC2", Cause.LOAD, 360.0),
         root,
         Swing(),
-        dict.fromkeys(CAUSES, 0.0),
-        Sign(Cause.LOAD, 0.9, SignKind.FOLLOWS),
+        (SignKind.FOLLOWS, ()),
+        LIMITS,
     )
     rows = [{"loop": "FIC2", "group": "1", "role": GroupRole.SOURCE, "source_pct": 90.0}]
     assert led_anew(rows, {"FIC2": leads, "PIC9": found("PIC9", Cause.VALVE, 360.0)}) == rows

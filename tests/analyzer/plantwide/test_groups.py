@@ -9,13 +9,12 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from analyzer.loop.decisions import Cause
+from analyzer.loop.decisions import Cause, Finding
 from analyzer.loop.oscillation import detect
 from analyzer.plantwide.groups import Group, groups_of
 from analyzer.plantwide.night import Traced, followers_of, may_follow, trace
-from analyzer.plantwide.source import Peer
 from analyzer.plantwide.wave import Wave, waves_in, waves_of, waves_table
-from proofs.plant import CONFIG, START_S, record
+from proofs.plant import CONFIG, START_S, peer, record
 
 HOURS_8 = 28_800
 LIMITS = CONFIG.plant
@@ -60,7 +59,7 @@ def names(groups: Sequence[Group]) -> list[set[str]]:
     return [set(g.loops) for g in groups]
 
 
-def traced(peers: dict[str, Peer], *loops: Sequence[Wave]) -> list[Traced]:
+def traced(peers: dict[str, Finding], *loops: Sequence[Wave]) -> list[Traced]:
     """Groups with their sources."""
     return trace([w for waves in loops for w in waves], peers, LIMITS)
 
@@ -114,7 +113,7 @@ def test_copies_of_one_tag_are_one_group_without_a_source():
     """Ten loops with the same trends are one group in which no loop is told as the source."""
     x = wave(4)
     loops = [loop(f"L{k}", x, seed=1) for k in range(10)]
-    peers = {f"L{k}": Peer(Cause.LOAD) for k in range(10)}
+    peers = {f"L{k}": peer(Cause.LOAD) for k in range(10)}
     (found,) = traced(peers, *loops)
     assert len(found.group.loops) == 10
     assert found.candidates[0].confidence_pct < LIMITS.source_pct
@@ -124,7 +123,7 @@ def test_copies_of_one_tag_are_one_group_without_a_source():
 def test_two_loops_alone_are_told():
     """Of two loops with one wave, the one with a valve at fault leads and the other follows it later."""
     x = wave(5, walk=0.03, square=True)
-    peers = {"valve": Peer(Cause.VALVE, 500.0), "fed": Peer(Cause.LOAD)}
+    peers = {"valve": peer(Cause.VALVE, 500.0), "fed": peer(Cause.LOAD)}
     found = traced(peers, loop("valve", x), loop("fed", late(x, 60.0, 120), seed=2))
     assert {k: s.loop for k, (s, _) in followers_of(found).items()} == {"fed": "valve"}
     slope = 60.0 / (1 + (2 * np.pi * 60.0 / 200.0) ** 2)  # group delay of the lag at the period
@@ -144,7 +143,7 @@ def test_clocks_that_differ_by_minutes_do_not_part_a_group(off_s):
     """A loop whose historian is minutes off is in the group, and the lag told is that between the clocks."""
     x = wave(7, walk=0.02)
     found = traced(
-        {"A": Peer(Cause.VALVE, 100.0), "off": Peer(Cause.LOAD)},
+        {"A": peer(Cause.VALVE, 100.0), "off": peer(Cause.LOAD)},
         loop("A", x),
         loop("off", late(x, 20.0), 0.05, start_s=START_S + off_s),
     )
@@ -165,9 +164,9 @@ def test_the_valve_with_more_evidence_moves_the_other(own, follows):
     """Of two valves in step the one with more evidence is the source, and the other loop follows it, whatever the
     ratio."""
     limits = CONFIG.plant
-    valve = Peer(Cause.VALVE, own)
-    assert may_follow(valve, Peer(Cause.VALVE, 1000.0), 0.95, limits) is follows
-    assert not may_follow(valve, Peer(Cause.LOAD, 0.0), 0.95, limits)
+    valve = peer(Cause.VALVE, own)
+    assert may_follow(valve, peer(Cause.VALVE, 1000.0), 0.95, limits) is follows
+    assert not may_follow(valve, peer(Cause.LOAD, 0.0), 0.95, limits)
 
 
 def test_a_loop_may_follow_in_two_groups():
@@ -204,7 +203,7 @@ def test_a_source_without_a_rhythm_is_found_by_foresight():
     mine = x + lfilter([0.25], [1, -0.97], rng.standard_normal(HOURS_8))
     passed = late(late(mine, 40.0, 20), 40.0)
     found = traced(
-        {"A": Peer(Cause.LOAD), "B": Peer(Cause.LOAD), "C": Peer(Cause.LOAD)},
+        {"A": peer(Cause.LOAD), "B": peer(Cause.LOAD), "C": peer(Cause.LOAD)},
         loop("A", mine, 0.05),
         loop("B", late(passed, 30.0), 0.02, seed=2),
         loop("C", late(passed, 50.0, 30), 0.02, seed=3),
