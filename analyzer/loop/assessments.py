@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -68,6 +69,32 @@ class Hour:
     oscillating_pct: float
 
 
+class Trends(NamedTuple):
+    """Set point, PV and OP of a span [% of span], and where OP is at a limit, shape (n,) each."""
+
+    sp: Floats
+    pv: Floats
+    op: Floats
+    saturated: Mask
+
+
+class Sums(NamedTuple):
+    """Over the samples that are good and in automatic: means of |e|, SP, PV and OP, standard deviations of e and PV
+    [% of span], shares of time at limits and in good service [-], and how often e crosses the noise band; the set
+    point's travel over the whole span."""
+
+    absolute_error: float
+    sp: float
+    pv: float
+    op: float
+    error_deviation: float
+    pv_deviation: float
+    at_limits: float
+    service: float
+    crossings: int
+    sp_travel: float
+
+
 @njit(cache=True)
 def crossings_of(e: Floats, use: Mask, band: float) -> int:
     """How often an error, where it may be used, goes from beyond one side of a band to beyond the other."""
@@ -106,36 +133,32 @@ def travel_of(signal: Floats, use: Mask, step: int, deadband: float) -> tuple[fl
 
 
 @njit(cache=True)
-def sums_of(
-    trends: tuple[Floats, Floats, Floats], saturated: Mask, use: Mask, small_error: float, band: float
-) -> tuple[float, float, float, float, float, float, float, float, int, float]:
-    """Means of |e|, SP, PV and OP, standard deviations of e and PV [% of span], shares of time at limits and in good
-    service [-], and how often e crosses the band, of the samples that may be used, at least one; travel of the set
-    point over all.
+def sums_of(x: Trends, use: Mask, small_error: float, band: float) -> Sums:
+    """Sums over the samples that may be used, at least one.
 
-    trends : SP, PV and OP [% of span]; saturated : OP at a limit, shape (n,) each; small_error : under which a loop
-    is in good service; band : beyond which the error has a side [% of span].
+    small_error : under which a loop is in good service; band : beyond which the error has a side [% of span].
     """
-    sps, pvs, ops = trends
     count, size, e, pv, op, sp, limits, service = 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0, 0
-    for k in range(pvs.size):
+    for k in range(x.pv.size):
         if use[k]:
-            error = sps[k] - pvs[k]
+            error = x.sp[k] - x.pv[k]
             count += 1
-            size, e, pv = size + abs(error), e + error, pv + pvs[k]
-            op, sp = op + ops[k], sp + sps[k]
-            limits += saturated[k]
-            service += abs(error) < small_error and not saturated[k]
+            size, e, pv = size + abs(error), e + error, pv + x.pv[k]
+            op, sp = op + x.op[k], sp + x.sp[k]
+            limits += x.saturated[k]
+            service += abs(error) < small_error and not x.saturated[k]
     e, pv, ee, vv = e / count, pv / count, 0.0, 0.0
-    for k in range(pvs.size):
+    for k in range(x.pv.size):
         if use[k]:
-            ee += (sps[k] - pvs[k] - e) ** 2
-            vv += (pvs[k] - pv) ** 2
-    sides = crossings_of(sps - pvs, use, band)
-    moved = np.abs(np.diff(sps)).sum()
+            ee += (x.sp[k] - x.pv[k] - e) ** 2
+            vv += (x.pv[k] - pv) ** 2
+    sides = crossings_of(x.sp - x.pv, use, band)
+    moved = np.abs(np.diff(x.sp)).sum()
     spread = math.sqrt(ee / count), math.sqrt(vv / count)
     shares = limits / count, service / count
-    return size / count, sp / count, pv, op / count, spread[0], spread[1], shares[0], shares[1], sides, moved
+    return Sums(
+        size / count, sp / count, pv, op / count, spread[0], spread[1], shares[0], shares[1], sides, moved
+    )
 
 
 def at_limits_share(record: LoopRecord) -> float:
@@ -162,28 +185,27 @@ def assess_span(record: LoopRecord, limits: FigureLimits, noise: float | None = 
     step = max(round(limits.travel_grid_s / record.dt_s), 1)
     path, turns = travel_of(record.stem, use, step, limits.travel_deadband_pct)
     band = noise_band(record.pv[use]) if noise is None else noise
-    saturated, trends = record.mask("saturated"), (record.sp, record.pv, record.op)
-    error, sp, pv, op, e_spread, pv_spread, at_limits, service, crossings, sp_travel = sums_of(
-        trends, saturated, use, limits.small_error_pct, 2 * band
-    )
+    trends = Trends(record.sp, record.pv, record.op, record.mask("saturated"))
+    sums = sums_of(trends, use, limits.small_error_pct, 2 * band)
+    spread = 2 * sums.pv_deviation
     good = ~record.bad
     automatic = 100 * float((good & ~record.mask("manual")).sum()) / max(float(good.sum()), 1.0)
     return Assessments(
         usable_h=hours,
-        average_absolute_error_pct=error,
+        average_absolute_error_pct=sums.absolute_error,
         valve_travel_pct_per_h=path / hours,
         reversals_per_h=turns / hours,
-        variability_pct=2 * e_spread,
-        pv_variability_pct=100 * (2 * pv_spread) / abs(pv) if abs(pv) > 2 * pv_spread else None,
-        crossings_per_h=crossings / hours,
+        variability_pct=2 * sums.error_deviation,
+        pv_variability_pct=100 * spread / abs(sums.pv) if abs(sums.pv) > spread else None,
+        crossings_per_h=sums.crossings / hours,
         noise_band_pct=band,
         normal_pct=automatic,
-        at_limits_pct=100 * at_limits,
-        service_pct=automatic * service,
-        sp_mean_pct=sp,
-        pv_mean_pct=pv,
-        op_mean_pct=op,
-        sp_travel_pct=sp_travel,
+        at_limits_pct=100 * sums.at_limits,
+        service_pct=automatic * sums.service,
+        sp_mean_pct=sums.sp,
+        pv_mean_pct=sums.pv,
+        op_mean_pct=sums.op,
+        sp_travel_pct=sums.sp_travel,
     )
 
 
