@@ -176,12 +176,33 @@ def hidden(record: LoopRecord, found: Oscillations, controller: Pid | None, conf
     return Needs(Lack.FASTER, Need.OF_A_CYCLE, (period / samples, record.dt_s, period))
 
 
-def _settings_followed(part: Prepared, stretch: Stretch, seen: Oscillations, config: Config) -> Pid | None:
-    """The settings that OP follows in the stretch that is judged; None where they are the stated ones."""
-    stated = stretch.controller
-    if stated is None or not part.op_known or stretch.outdated:
-        return None
-    return differing(part.record, stated, time_scale(part.record, counting(seen), stated), config.settings)
+@dataclass(frozen=True, slots=True)
+class _Judged:
+    """What a stretch of a record comes to: what oscillates in all of the record and in the stretch, why, and where
+    the settings are not the stated ones."""
+
+    part: Prepared
+    of_all: Oscillations
+    found: Oscillations
+    verdict: Verdict
+    settings: Pid | None
+
+
+def _judge_stretch(prepared: Prepared, stretch: Stretch, config: Config, kind: str) -> _Judged:
+    """The verdict on the stretch that is judged; one that rests on little is a hint."""
+    record = prepared.record
+    part = replace(prepared, record=record.span(stretch.first, stretch.last))
+    of_all = detect(record, config.oscillation)
+    whole = len(part.record) == len(record)
+    found = of_all if whole else detect(part.record, config.oscillation)
+    stated, settings = stretch.controller, None
+    if stated is not None and part.op_known and not stretch.outdated:
+        scale = time_scale(part.record, counting(found), stated)
+        settings = differing(part.record, stated, scale, config.settings)
+    found, verdict = convicted(part, found, settings or stated, config, kind)
+    if _hours_in(part.record) < config.advice.least_h or too_thin(record.dt_s, stated, config):
+        verdict = as_hint(verdict, config.advice.hint_pct)
+    return _Judged(part, found if whole else of_all, found, verdict, settings)
 
 
 def _hours_in(record: LoopRecord) -> float:
@@ -207,48 +228,44 @@ def assess(
         raise LacksError(lacking)
     if not prepared.op_scaled:  # settings in percent mean nothing beside such an OP
         controller, earlier = None, [replace(e, controller=None) for e in earlier]
-    record, stretch = prepared.record, judged_stretch(prepared.record, controller, earlier, config)
-    part = replace(prepared, record=record.span(stretch.first, stretch.last))
-    of_all, whole = detect(record, config.oscillation), len(part.record) == len(record)
-    seen = of_all if whole else detect(part.record, config.oscillation)
-    settings = _settings_followed(part, stretch, seen, config)
-    found, verdict = convicted(part, seen, settings or stretch.controller, config, kind)
-    hours = _hours_in(part.record)
-    if hours < config.advice.least_h or too_thin(record.dt_s, stretch.controller, config):
-        verdict = as_hint(verdict, config.advice.hint_pct)  # it rests on little
-    close = close_view(part.record, found, stretch.first)
-    close_s = [record.start_s + k * record.dt_s for k in close or ()]
+    stretch = judged_stretch(prepared.record, controller, earlier, config)
+    return _assessment(prepared, stretch, _judge_stretch(prepared, stretch, config, kind), config)
+
+
+def _assessment(prepared: Prepared, stretch: Stretch, judged: _Judged, config: Config) -> Assessment:
+    """The figures of the whole record beside what was judged."""
+    record, found = prepared.record, judged.found
+    in_percent = prepared.op_known and prepared.op_scaled
+    night = _known_without_op(assess_span(record, config.figures), in_percent)
+    hours = hourly(record, judged.of_all, config.figures, night.noise_band_pct)
+    m, at_fault = judged.verdict.measured, judged.verdict.cause is Cause.VALVE
+    dead_time = None if m is None else (m.play if at_fault else m.linear).dead_time_s
+    close = close_view(judged.part.record, found, stretch.first)
+    end_s = record.start_s + record.duration_s
     return Assessment(
         loop=record.tag,
         start_s=record.start_s,
         duration_s=record.duration_s,
-        **_of_all(prepared, found if whole else of_all, verdict, config),
+        night=night,
+        hours=tuple(replace(h, figures=_known_without_op(h.figures, in_percent)) for h in hours),
         oscillations=found,
-        verdict=verdict,
-        settings=settings,
+        verdict=judged.verdict,
+        settings=judged.settings,
+        harris=harris_index(record.error, record.usable, record.dt_s, dead_time) if dead_time else None,
+        moves=moves(record, night.noise_band_pct or 0.0, config.figures),
+        waves=waves_of(record.tag, judged.of_all, end_s, config.plant),
         trend=thinned(record, FINE_BUCKETS if counting(found) else BUCKETS, close),
         notes=prepared.notes,
-        needs=hidden(part.record, found, stretch.controller, config),
-        close_s=(close_s[0], close_s[1]) if close_s else None,
+        needs=hidden(judged.part.record, found, stretch.controller, config),
+        close_s=None if close is None else (_at(record, close[0]), _at(record, close[1])),
         for_settings=unfit_for_settings(prepared, config),
-        judged_h=hours,
+        judged_h=_hours_in(judged.part.record),
         outdated=stretch.outdated,
         op_scaled=prepared.op_scaled,
         shared=prepared.shared,
     )
 
 
-def _of_all(prepared: Prepared, found: Oscillations, verdict: Verdict, config: Config) -> dict[str, Any]:
-    """What is known of the whole record: its figures, hour by hour too, moves of the set point, and waves."""
-    record, in_percent = prepared.record, prepared.op_known and prepared.op_scaled
-    night = _known_without_op(assess_span(record, config.figures), in_percent)
-    hours = hourly(record, found, config.figures, night.noise_band_pct)
-    m, at_fault = verdict.measured, verdict.cause is Cause.VALVE
-    dead_time = None if m is None else (m.play if at_fault else m.linear).dead_time_s
-    return {
-        "night": night,
-        "hours": tuple(replace(h, figures=_known_without_op(h.figures, in_percent)) for h in hours),
-        "harris": harris_index(record.error, record.usable, record.dt_s, dead_time) if dead_time else None,
-        "moves": moves(record, night.noise_band_pct or 0.0, config.figures),
-        "waves": waves_of(record.tag, found, record.start_s + record.duration_s, config.plant),
-    }
+def _at(record: LoopRecord, sample: int) -> float:
+    """The time of a sample [s]."""
+    return record.start_s + sample * record.dt_s
