@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -12,9 +13,9 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
-from analyzer.history import stamps, zones
+from analyzer.history import plant_clock
 from analyzer.history.names import WORDS
-from analyzer.history.stamps import DateOrder, shown_order
+from analyzer.history.stamps import Fields, fields, midnights_told, stamp_seconds
 from analyzer.history.table import as_text, is_text, numbers
 from analyzer.limits import HISTORY
 
@@ -48,8 +49,90 @@ SINCE_START = {unit: TimeScale(**scale) for unit, scale in WORDS["since_start"].
 """Clocks that count from the start, by the unit that the column's name states."""
 ELAPSED = TimeScale("hours, minutes and seconds since the start", 0, 0, 1.0)
 """A clock in text that counts from the start, such as 25:10:03."""
+DAY_FIRST_ZONES = ("Europe/", "Africa/", "Australia/", "Asia/")
+"""Zones in which dates have the day first where figures alone would read either way."""
+WITHOUT_LEAP = "so read, the stamps run without a leap"
 MIDNIGHT = r"[ T]0?0:00:00(?:\.0+)?$"
 COUNTED = r"^\s*(?P<h>\d{1,5}):(?P<m>[0-5]\d):(?P<s>[0-5]\d(?:[.,]\d+)?)\s*$"
+
+
+@dataclass(frozen=True, slots=True)
+class DateOrder:
+    """What stands first ('day', 'month' or 'year'), what decided it, and whether that is sure: else another file may
+    decide."""
+
+    first: str
+    why: str
+    sure: bool = True
+
+
+def date_order(parts: Fields, example: str, timezone: str | None) -> DateOrder:
+    """The order of all dates of a file, one of which is `example`, in a stated zone.
+
+    Where nothing in them tells, the month first may lie ahead of us, or the day first be usual in the zone.
+    """
+    date = example.split(" ")[0]
+    pointed = "." in date
+    by_year = _with_short_year(parts, pointed and "-" not in date and "/" not in date)
+    if by_year is not None:
+        return by_year
+    shown = shown_order(parts)
+    if shown is not None:
+        return shown
+    if pointed:
+        return DateOrder("day", "dates with points; no day above 12 occurs")
+    limit = time.time() + HISTORY.ahead_s
+    ahead = [bool((stamp_seconds(parts, first) > limit).any()) for first in ("day", "month")]
+    usual = timezone is not None and timezone.startswith(DAY_FIRST_ZONES)
+    day = ahead[1] if ahead[0] != ahead[1] else usual
+    first, other = ("day", "month") if day else ("month", "day")
+    return DateOrder(first, f"every date fits both orders; state --{other}-first if so", sure=False)
+
+
+def shown_order(parts: Fields) -> DateOrder | None:
+    """The order that a number above 12 shows, or else that in which alone the stamps run without a leap; or None."""
+    first, second = ((part[parts.open] > 12).any() for part in (parts.a, parts.b))
+    if first != second:
+        return DateOrder(
+            "day" if first else "month", f"the {'first' if first else 'second'} number exceeds 12"
+        )
+    known = (np.unique(stamp_seconds(parts, order)) for order in ("day", "month"))
+    day, month = (np.max(np.diff(second[np.isfinite(second)]), initial=0.0) for second in known)
+    return None if day == month else DateOrder("day" if day < month else "month", WITHOUT_LEAP)
+
+
+def _with_short_year(parts: Fields, pointed: bool) -> DateOrder | None:
+    """What is decided of dates with years of two digits that may stand in front; None where they do not.
+
+    Dates with points have the year in front only where no other reading fits as well; of others that read several
+    ways the latest counts, for exports are of late.
+    """
+    if not parts.open.any() or not parts.short.all() or (parts.open & ~parts.year_may_begin).any():
+        return None
+    limit = time.time() + HISTORY.ahead_s
+    readings = {first: stamp_seconds(parts, first) for first in ("year", "day", "month")}
+    possible = {
+        k: found for k, found in readings.items() if np.isfinite(found).all() and found.max() <= limit
+    }
+    if "year" not in possible:
+        return None
+    if len(possible) == 1:
+        return DateOrder("year", "else the stamps would lie ahead of us")
+    leaps = {first: float(np.max(np.abs(np.diff(found)), initial=0.0)) for first, found in possible.items()}
+    if leaps["year"] < min(leap for first, leap in leaps.items() if first != "year"):
+        return DateOrder("year", WITHOUT_LEAP)
+    latest = {first: found.max() for first, found in possible.items() if leaps[first] == min(leaps.values())}
+    year = latest.pop("year", None)
+    if year is None:
+        return None
+    if not pointed and max(latest.values()) <= year:
+        first = "year"
+    elif len(latest) == 1:
+        first = next(iter(latest))
+    else:
+        return None
+    why = "the year may stand in front or behind; state --date-format if it is not so"
+    return DateOrder(first, why, sure=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,7 +203,7 @@ class Clock:
             return second - fixed_s, Counter()
         if not local or self.timezone is None:
             return second, Counter()
-        return zones.to_utc(second, self.timezone)
+        return plant_clock.to_utc(second, self.timezone)
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -142,14 +225,14 @@ class Clock:
     def _from_texts(self, texts: pa.Array) -> tuple[NDArray[np.float64], bool]:
         if self.date_format is not None:
             return _formatted(texts, self.date_format)
-        parts = stamps.fields(texts, self.timezone)
+        parts = fields(texts, self.timezone)
         if parts is None:
             return np.full(len(texts), np.nan), True
         order = self.order
         if order is None and parts.open.any():  # the head left nothing open
             order = shown_order(parts)
-        second = stamps.stamp_seconds(parts, "month" if order is None else order.first)
-        return stamps.midnights_told(second, parts), not parts.stated.any()
+        second = stamp_seconds(parts, "month" if order is None else order.first)
+        return midnights_told(second, parts), not parts.stated.any()
 
 
 def time_scale_of(column: pa.Array, unit: str = "") -> TimeScale | None:

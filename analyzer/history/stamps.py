@@ -1,26 +1,26 @@
-"""Written dates to seconds: one pattern for ISO, either order of day and month, month names, offsets.
+"""Written dates to seconds: one pattern for ISO, either order of day and month, month names, offsets and zones.
 
-Dates of exports, of which a whole file tells what stands first where the writing leaves it open; and a time that a
-person wrote in changes.csv, in loops.csv or on the command line.
+Dates of exports, and a time that a person wrote in changes.csv, in loops.csv or on the command line.
 """
 
 from __future__ import annotations
 
-import time
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta
+from functools import lru_cache
 from typing import Any
+from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
-from analyzer.history.names import WORDS
+from analyzer.history.names import WORDS, plain
 from analyzer.history.plant_clock import UTC_NAME
 from analyzer.history.plant_clock import utc_seconds as utc_s
-from analyzer.history.zones import offsets_h
 from analyzer.limits import HISTORY
 from identification.errors import InputError
 
@@ -61,10 +61,57 @@ OPEN = 3
 """The order of a date whose writing leaves it open, for two numbers stand in front."""
 SHOWN = 40
 """Characters of a time that an error shows."""
-DAY_FIRST_ZONES = ("Europe/", "Africa/", "Australia/", "Asia/")
-"""Zones in which dates have the day first where figures alone would read either way."""
-WITHOUT_LEAP = "so read, the stamps run without a leap"
 EXAMPLE = "a time such as 2026-03-09 08:00 or 2026-03-09T08:00:00Z"
+HEADER_ZONE = re.compile(
+    r"(?:^|[\s(\[_])(?P<name>(?i:UTC|GMT|Z|CEST|CET|EEST|EET)|[A-Z]{3,5})?"
+    r"\s*(?P<offset>[+-]\d{1,2}(?::?\d\d)?)?[)\]]?\s*$"
+)
+NAMED_ZONE = re.compile(r"(?P<zone>[A-Z][A-Za-z]+/[A-Za-z_]+(?:/[A-Za-z_]+)?)[)\]]?\s*$")
+"""A zone of the database of time zones at the end of a stamp or a column's name."""
+OFFSETS_H = {name: float(hours) for hours, names in WORDS["zone_letters"]["hours"].items() for name in names}
+SEVERAL = frozenset(WORDS["zone_letters"]["several"])
+
+
+@lru_cache
+def offsets_h(timezone: str | None) -> Mapping[str, float]:
+    """Hours east of Greenwich by letters, those of a stated zone among them as it means them."""
+    return {**OFFSETS_H, **own_letters(timezone)}
+
+
+@lru_cache
+def own_letters(timezone: str | None) -> Mapping[str, float]:
+    """What a zone's clock calls itself in winter and summer, and its hours east of Greenwich then."""
+    if timezone is None:
+        return {}
+    days = [datetime(datetime.now().year, month, 1, tzinfo=ZoneInfo(timezone)) for month in (1, 7)]
+    known = [(day.strftime("%Z").lower(), day.utcoffset()) for day in days]
+    return {name: at.total_seconds() / 3600.0 for name, at in known if at is not None and name.isalpha()}
+
+
+def named_zone(text: str) -> str | None:
+    """The zone at the end of a stamp or a column's name, as in '[Europe/Berlin]'; None where none is known there."""
+    found = NAMED_ZONE.search(text[-60:])
+    try:
+        return None if found is None else ZoneInfo(found["zone"]).key
+    except (ZoneInfoNotFoundError, ValueError, OSError):
+        return None
+
+
+def header_zone(name: str, timezone: str | None = None) -> tuple[float | None, str]:
+    """The offset from UTC that a time column's name states, as in 'Time (UTC+01:00)' [s]; None where none, or where
+    it is what the stated zone calls itself, which may change within the export. And letters there that mean several
+    zones; '' where there are none, or a zone is stated."""
+    if plain(name) in ("utc", "timeutc", "utctime"):
+        return 0.0, ""
+    found = HEADER_ZONE.search(name[-40:])
+    letters = "" if found is None else found["name"] or ""
+    several = letters if timezone is None and letters.lower() in SEVERAL else ""
+    if found is None or found["offset"] is None:
+        own = letters.lower() in own_letters(timezone)
+        hours = None if own else OFFSETS_H.get(letters.lower())
+        return None if hours is None else 3600.0 * hours, several
+    sign, digits = (-1.0 if found["offset"][0] == "-" else 1.0), found["offset"][1:].replace(":", "")
+    return sign * (3600.0 * float(digits[:2]) + 60.0 * float(digits[2:] or 0)), several
 
 
 @dataclass(frozen=True, slots=True)
@@ -220,85 +267,6 @@ def _offset(zone: pa.Array, known: Mapping[str, float]) -> NDArray[np.float64]:
     hour, minute = (_whole_numbers(pc.utf8_slice_codeunits(digits, k, k + 2)) for k in (0, 2))
     west = _numpy(pc.starts_with(zone, "-"))
     return 3600.0 * named + np.where(west, -1.0, 1.0) * (3600 * hour + 60 * minute)
-
-
-@dataclass(frozen=True, slots=True)
-class DateOrder:
-    """What stands first ('day', 'month' or 'year'), what decided it, and whether that is sure: else another file may
-    decide."""
-
-    first: str
-    why: str
-    sure: bool = True
-
-
-def date_order(parts: Fields, example: str, timezone: str | None) -> DateOrder:
-    """The order of all dates of a file, one of which is `example`, in a stated zone.
-
-    Where nothing in them tells, the month first may lie ahead of us, or the day first be usual in the zone.
-    """
-    date = example.split(" ")[0]
-    pointed = "." in date
-    by_year = _with_short_year(parts, pointed and "-" not in date and "/" not in date)
-    if by_year is not None:
-        return by_year
-    shown = shown_order(parts)
-    if shown is not None:
-        return shown
-    if pointed:
-        return DateOrder("day", "dates with points; no day above 12 occurs")
-    limit = time.time() + HISTORY.ahead_s
-    ahead = [bool((stamp_seconds(parts, first) > limit).any()) for first in ("day", "month")]
-    usual = timezone is not None and timezone.startswith(DAY_FIRST_ZONES)
-    day = ahead[1] if ahead[0] != ahead[1] else usual
-    first, other = ("day", "month") if day else ("month", "day")
-    return DateOrder(first, f"every date fits both orders; state --{other}-first if so", sure=False)
-
-
-def shown_order(parts: Fields) -> DateOrder | None:
-    """The order that a number above 12 shows, or else that in which alone the stamps run without a leap; or None."""
-    first, second = ((part[parts.open] > 12).any() for part in (parts.a, parts.b))
-    if first != second:
-        return DateOrder(
-            "day" if first else "month", f"the {'first' if first else 'second'} number exceeds 12"
-        )
-    known = (np.unique(stamp_seconds(parts, order)) for order in ("day", "month"))
-    day, month = (np.max(np.diff(second[np.isfinite(second)]), initial=0.0) for second in known)
-    return None if day == month else DateOrder("day" if day < month else "month", WITHOUT_LEAP)
-
-
-def _with_short_year(parts: Fields, pointed: bool) -> DateOrder | None:
-    """What is decided of dates with years of two digits that may stand in front; None where they do not.
-
-    Dates with points have the year in front only where no other reading fits as well; of others that read several
-    ways the latest counts, for exports are of late.
-    """
-    if not parts.open.any() or not parts.short.all() or (parts.open & ~parts.year_may_begin).any():
-        return None
-    limit = time.time() + HISTORY.ahead_s
-    readings = {first: stamp_seconds(parts, first) for first in ("year", "day", "month")}
-    possible = {
-        k: found for k, found in readings.items() if np.isfinite(found).all() and found.max() <= limit
-    }
-    if "year" not in possible:
-        return None
-    if len(possible) == 1:
-        return DateOrder("year", "else the stamps would lie ahead of us")
-    leaps = {first: float(np.max(np.abs(np.diff(found)), initial=0.0)) for first, found in possible.items()}
-    if leaps["year"] < min(leap for first, leap in leaps.items() if first != "year"):
-        return DateOrder("year", WITHOUT_LEAP)
-    latest = {first: found.max() for first, found in possible.items() if leaps[first] == min(leaps.values())}
-    year = latest.pop("year", None)
-    if year is None:
-        return None
-    if not pointed and max(latest.values()) <= year:
-        first = "year"
-    elif len(latest) == 1:
-        first = next(iter(latest))
-    else:
-        return None
-    why = "the year may stand in front or behind; state --date-format if it is not so"
-    return DateOrder(first, why, sure=False)
 
 
 def parse_time(text: str, where: str, zone: str = UTC_NAME, day_first: bool | None = None) -> float:

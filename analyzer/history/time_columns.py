@@ -10,14 +10,16 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from analyzer.history import stamps, zones
+from analyzer.history import plant_clock, stamps
 from analyzer.history.clock import (
     ELAPSED,
     SINCE_START,
     Clock,
+    DateOrder,
     TimeScale,
     counted_s,
     date_and_time,
+    date_order,
     time_scale_of,
 )
 from analyzer.history.names import (
@@ -29,7 +31,6 @@ from analyzer.history.names import (
     time_unit,
     without_unit,
 )
-from analyzer.history.stamps import DateOrder, date_order
 from analyzer.history.table import ReadOptions, Table, as_text, is_number, is_text, numbers
 from analyzer.limits import HISTORY
 from identification.errors import InputError
@@ -138,8 +139,8 @@ def _with_zone(table: Table, clock: Clock) -> Clock:
     """The clock with the zone that the column's name or its stamps state, where these are local."""
     name, head = table.names[clock.columns[0]], table.head(clock.columns[:1])[0].drop_null()
     text = str(head[0].as_py()) if clock.local and is_text(head.type) and len(head) else ""
-    zone = zones.named_zone(name) or zones.named_zone(text) or clock.timezone
-    offset_s, several = zones.header_zone(name, zone)
+    zone = stamps.named_zone(name) or stamps.named_zone(text) or clock.timezone
+    offset_s, several = stamps.header_zone(name, zone)
     doubt = f", for '{several}' means several zones; state --timezone" if several else ""
     return replace(clock, offset_s=offset_s, timezone=zone, doubt=doubt)
 
@@ -147,10 +148,10 @@ def _with_zone(table: Table, clock: Clock) -> Clock:
 def _with_winter_time(table: Table, clock: Clock) -> Clock:
     """The clock, marked where its stamps show that it keeps the stated zone's winter time all the year."""
     zone = clock.timezone
-    if not clock.local or clock.offset_s is not None or zone is None or zones.is_fixed(zone):
+    if not clock.local or clock.offset_s is not None or zone is None or plant_clock.is_fixed(zone):
         return clock
     second = clock.seconds(table.read(clock.columns))[0]
-    return replace(clock, winter_s=zones.winter_offset_s(second, zone))
+    return replace(clock, winter_s=plant_clock.winter_offset_s(second, zone))
 
 
 def _is_doubtful(
@@ -252,7 +253,7 @@ def _unreadable(table: Table, column: int) -> InputError:
     place = f"{table.path}: column '{table.names[column]}'{row}"
     seen = f"{place}: '{text[:SHOWN]}' is no time stamp that is known"
     letters = LETTERS_BEHIND.search(text)
-    if letters is not None and letters[1].lower() in zones.SEVERAL:
+    if letters is not None and letters[1].lower() in stamps.SEVERAL:
         return InputError(seen, f"one zone, but '{letters[1]}' means several", "state --timezone")
     remedy = "state the date format, such as --date-format '%y%m%d %H%M%S'"
     return InputError(seen, "stamps such as 2024-11-21 08:00:00 or 21.11.2024 08:00:00", remedy)
