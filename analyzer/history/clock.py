@@ -14,9 +14,8 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from analyzer.history import plant_clock
-from analyzer.history.names import WORDS
 from analyzer.history.stamps import Fields, fields, midnights_told, stamp_seconds
-from analyzer.history.table import as_text, is_text, numbers
+from analyzer.history.table import WORDS, as_text, is_text, numbers
 from analyzer.limits import HISTORY
 
 TICKS_PER_S = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}

@@ -16,10 +16,20 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from analyzer.history.clock import Clock
-from analyzer.history.names import COLUMNS, check_once, first_named, plain, stated_column, with_loop
 from analyzer.history.quality import Scheme, mostly_one, not_good, quality_columns, scheme_of
 from analyzer.history.series import MainSpan, NoStampError, Series, main_span
-from analyzer.history.table import ReadOptions, Table, as_text, is_number, is_text
+from analyzer.history.table import (
+    COLUMNS,
+    ReadOptions,
+    Table,
+    as_text,
+    check_once,
+    first_named,
+    is_number,
+    is_text,
+    plain,
+    stated_column,
+)
 from analyzer.history.time_columns import check_seconds, find_clock, holds_stamps, stamps_clock
 from analyzer.history.values import parsed, values
 from analyzer.limits import HISTORY
@@ -189,7 +199,7 @@ def open_wide(table: Table, options: ReadOptions) -> Source:
         raise InputError(seen, "a column of values for each tag, named as the tag", "export the tags' values")
     names = [table.names[i] for i in values_in]
     check_once(table.path, names)
-    tags = with_loop(names, table.path.stem)
+    tags = _with_loop(names, table.path.stem)
     ones = mostly_one(table.head(sorted({*partner.values()})))
     columns = tuple(TagColumn(clock, i, partner.get(i, -1)) for i in values_in)
     layout = [f"wide table, {len(tags)} tags", *said]
@@ -199,6 +209,16 @@ def open_wide(table: Table, options: ReadOptions) -> Source:
     if ones and Scheme.ONE_GOOD in {scheme_of(name, table.head([i])[0], ones) for name, i in used.items()}:
         layout.append(f"quality is read as {Scheme.ONE_GOOD.value}")
     return Source(table, tags, columns, options.good_quality, tuple(layout), ones=ones)
+
+
+def _with_loop(names: Sequence[str], stem: str) -> tuple[str, ...]:
+    """Full tags: bare columns such as 'PV' and 'OP' belong to the loop that the file is named for, and a lone column
+    of values to the tag that it is named for."""
+    if len(names) == 1 and plain(names[0]) in COLUMNS["value"]:
+        return (stem,)
+    if not names or not all(plain(name) in COLUMNS["bare_ending"] for name in names):
+        return tuple(names)
+    return tuple(f"{stem}.{plain(name).upper()}" for name in names)
 
 
 def _any_number(table: Table, columns: Sequence[int]) -> bool:

@@ -32,9 +32,8 @@ import pyarrow.parquet as pq
 from pyarrow import csv
 
 from analyzer.history.files import ends_of
-from analyzer.history.names import check_once
 from analyzer.history.sheet import Sheet, read_through, reading
-from analyzer.history.table import HEAD_ROWS, Table, one_array, trimmed
+from analyzer.history.table import HEAD_ROWS, Table, check_once, one_array, trimmed
 from analyzer.limits import HISTORY
 from identification.errors import InputError
 

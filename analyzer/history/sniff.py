@@ -18,10 +18,10 @@ import pyarrow as pa
 from analyzer.history import stamps
 from analyzer.history.clock import SINCE_START, time_scale_of
 from analyzer.history.files import detect_encoding
-from analyzer.history.names import WORDS, is_stamp, without_unit
 from analyzer.history.rewritten import rewritten
 from analyzer.history.sheet import Sheet, types_of
-from analyzer.history.table import ReadOptions
+from analyzer.history.table import WORDS, ReadOptions
+from analyzer.history.time_columns import is_stamp, without_unit
 from analyzer.limits import HISTORY
 from identification.errors import InputError
 

@@ -18,9 +18,9 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
-from analyzer.history.names import WORDS, plain
 from analyzer.history.plant_clock import UTC_NAME
 from analyzer.history.plant_clock import utc_seconds as utc_s
+from analyzer.history.table import WORDS, plain
 from analyzer.limits import HISTORY
 from identification.errors import InputError
 

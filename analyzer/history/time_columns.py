@@ -22,16 +22,18 @@ from analyzer.history.clock import (
     date_order,
     time_scale_of,
 )
-from analyzer.history.names import (
-    BELOW_SECOND,
+from analyzer.history.table import (
     COLUMNS,
-    is_stamp,
+    WORDS,
+    ReadOptions,
+    Table,
+    as_text,
+    is_number,
+    is_text,
+    numbers,
     plain,
     stated_column,
-    time_unit,
-    without_unit,
 )
-from analyzer.history.table import ReadOptions, Table, as_text, is_number, is_text, numbers
 from analyzer.limits import HISTORY
 from identification.errors import InputError
 
@@ -44,7 +46,37 @@ SHOWN = 60
 """Characters of a cell that an error shows."""
 FINER = "timems"
 """Column of WinCC that holds its text's stamp to the microsecond, in millions of Excel days."""
+BELOW_SECOND = {
+    name: unit_s
+    for kind, unit_s in (("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9))
+    for name in WORDS["below_second"][kind]
+}
+"""Columns that hold the rest of a stamp below the second, and their unit [s]."""
+UNIT_IN_NAME = re.compile(
+    r"(?:^|[\s_(\[.,-]+)(?:(?P<ms>ms|msec)|(?P<s>s|secs?|seconds?|sek|sekunden)|(?P<min>mins?|minutes?|minuten)"
+    r"|(?P<h>h|hrs?|hours?|std|stunden)|(?P<d>d|days?|tage))[)\].]*$",
+    re.IGNORECASE,
+)
 RANK = {name: i for i, name in enumerate((*COLUMNS["stamp"], *COLUMNS["time_of_day"]))}
+
+
+def time_unit(name: str) -> str:
+    """The unit that a time column's name states, as in 'Time (min)' or 't_h': ms, s, min, h or d; '' where none."""
+    found = UNIT_IN_NAME.search(name[: HISTORY.name_length])
+    return "" if found is None else str(found.lastgroup)
+
+
+def without_unit(name: str) -> str:
+    """A time column's name without the unit that stands behind it."""
+    return UNIT_IN_NAME.sub("", name[: HISTORY.name_length])
+
+
+def is_stamp(name: str) -> bool:
+    """Whether a column is named as stamps are, with or without a unit behind the name."""
+    if not plain(name):
+        return False
+    bare = plain(without_unit(name))
+    return plain(name) in COLUMNS["stamp"] or bare in COLUMNS["stamp"] or bare in COLUMNS["elapsed"]
 
 
 def find_clock(table: Table, options: ReadOptions) -> Clock:
