@@ -22,6 +22,7 @@ from analyzer.history.table import (
     COLUMNS,
     ReadOptions,
     Table,
+    any_of,
     as_text,
     check_once,
     first_named,
@@ -35,13 +36,9 @@ from analyzer.history.values import parsed, values
 from analyzer.limits import HISTORY
 from identification.errors import InputError
 
-TIME_WORDS = re.compile(
-    r"[ ._:/-]*\(?(?:time ?stamp|date ?time|time|date|zeitstempel|zeit|ts)\)?(?:[ ._]\d+)?$", re.IGNORECASE
-)
-TIME_FIRST = re.compile(
-    r"^(?:time ?stamp|date ?time|time|zeitstempel|zeit|aika|heure|czas|tijd)[ ._:/-]+", re.IGNORECASE
-)
-VALUE_WORDS = re.compile(r"(?:^|[ ._:/-])\(?(?:value|val|wert)\)?(?:[ ._]\d+)?$", re.IGNORECASE)
+TIME_WORDS = re.compile(rf"[ ._:/-]*\(?(?:{any_of('time')})\)?(?:[ ._]\d+)?$", re.IGNORECASE)
+TIME_FIRST = re.compile(rf"^(?:{any_of('time_first')})[ ._:/-]+", re.IGNORECASE)
+VALUE_WORDS = re.compile(rf"(?:^|[ ._:/-])\(?(?:{any_of('value')})\)?(?:[ ._]\d+)?$", re.IGNORECASE)
 NUMBERED = re.compile(r"[ ._]\d+$")
 Stamps = tuple[NDArray[np.float64], Counter[str]]
 """Stamps of rows [s since 1970-01-01 UTC], and what was met in them."""

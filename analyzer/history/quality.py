@@ -18,17 +18,12 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
-from analyzer.history.table import COLUMNS, WORDS, Table, distinct, plain
+from analyzer.history.table import COLUMNS, WORDS, Table, any_of, distinct, plain
 from analyzer.limits import HISTORY
 
-_QUALITIES = (
-    r"(?:data|opc)? ?quality(?:[ _]?code|[ _]?detail)?|qstatus|status(?:[ _]?code)?|confidence|qual|q|validity"
-    r"|(?:is[ _]?)?(?:good|valid|bad|error|fault|invalid)|err|questionable"
-    r"|qualität|qualitaet|qualité|qualita|calidad|güte|gueltig|gültig|laatu|kvalitet|kwaliteit|jakość"
-)
 QUALITY_OF = (
-    re.compile(rf"^(?P<tag>.+?)[ ._:/|#-]?\(?(?:{_QUALITIES})\)?$", re.IGNORECASE),
-    re.compile(rf"^(?:{_QUALITIES})(?: of)?[ ._:/|#-]*[(\[]?(?P<tag>.+?)[)\]]?$", re.IGNORECASE),
+    re.compile(rf"^(?P<tag>.+?)[ ._:/|#-]?\(?(?:{any_of('quality')})\)?$", re.IGNORECASE),
+    re.compile(rf"^(?:{any_of('quality')})(?: of)?[ ._:/|#-]*[(\[]?(?P<tag>.+?)[)\]]?$", re.IGNORECASE),
 )
 """Names of quality columns that hold the tag's, in front or behind."""
 GOOD, BAD, NOT_BAD, IS_BAD = (

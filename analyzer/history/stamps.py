@@ -36,21 +36,7 @@ PATTERN = (
     r"\s*[(\[]?(?:UTC|GMT)?\s*(?P<z>[A-Z]{1,5}|[+-]\d\d(?::?\d\d)?)?[)\]]?"
     r"(?:\s*[(\[]?(?P<n>[A-Z][A-Za-z]+/[A-Za-z_/]+|[A-Z][A-Za-z]+(?: [A-Za-z]+)+)[)\]]?)?\s*$"
 )
-REARRANGED = (
-    (r"^(\d{4})(\d\d)(\d\d)[T ]?(\d\d):?(\d\d):?(\d\d)", r"\1-\2-\3 \4:\5:\6"),  # ISO without marks
-    (rf"^{LETTER}{{2,12}}\.?,? +({LETTER}|\d+[-/.]|\d+ {LETTER})", r"\1"),  # a day of the week
-    (  # ctime
-        rf"^({LETTER}{{3,12}}\.?) +(\d{{1,2}}) +(\d{{1,2}}:\d\d:\d\d(?:[.,]\d+)?) +([A-Z]+ |[+-]\d{{4}} )?(\d{{4}})$",
-        r"\1 \2 \5 \3 \4",
-    ),
-    (r"^(\d{1,2}:\d\d(?::\d\d)?(?:[.,]\d+)?),? +(\S.*\d{4})$", r"\2 \1"),  # the time of day first
-    (r"[年月년월] ?(\d)", r"-\1"),
-    (r"[일日]", ""),
-    (r" (\d{1,2})[时時시] ?(\d\d)[分분] ?(?:(\d\d)[秒초])?$", r" \1:\2:\3"),
-    (r"(\d)(?:st|nd|rd|th)\b", r"\1"),
-    (r" (?:de|del) ", " "),
-    (r",? (?:at|um|à|kl\.?) (\d{1,2}[:.])", r" \1"),
-)
+REARRANGED = [(way["written"].replace("LETTER", LETTER), way["meant"]) for way in WORDS["rearranged"]]
 """Writings that are brought into the form of the pattern, and what they become."""
 MONTHS = {begins: int(month) for month, words in WORDS["months"].items() for begins in words}
 LONGEST_MONTH = max(map(len, MONTHS))

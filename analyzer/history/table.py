@@ -102,6 +102,11 @@ class Table(ABC):
         yield self.read(columns)
 
 
+def any_of(kind: str) -> str:
+    """A pattern of any word of a kind in the name of a column, between the marks of a group."""
+    return "|".join(WORDS["in_names"][kind])
+
+
 def plain(name: str) -> str:
     """Name without case, units in brackets, blanks and underscores: ' Time_Stamp (UTC)' is 'timestamp'."""
     return re.sub(r"\([^()]*\)|\[[^\[\]]*\]|[\s_\-\"']", "", name[: HISTORY.name_length]).lower()

@@ -27,6 +27,7 @@ from analyzer.history.table import (
     WORDS,
     ReadOptions,
     Table,
+    any_of,
     as_text,
     is_number,
     is_text,
@@ -46,15 +47,10 @@ SHOWN = 60
 """Characters of a cell that an error shows."""
 FINER = "timems"
 """Column of WinCC that holds its text's stamp to the microsecond, in millions of Excel days."""
-BELOW_SECOND = {
-    name: unit_s
-    for kind, unit_s in (("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9))
-    for name in WORDS["below_second"][kind]
-}
+BELOW_SECOND = {name: float(unit_s) for unit_s, names in WORDS["below_second"].items() for name in names}
 """Columns that hold the rest of a stamp below the second, and their unit [s]."""
 UNIT_IN_NAME = re.compile(
-    r"(?:^|[\s_(\[.,-]+)(?:(?P<ms>ms|msec)|(?P<s>s|secs?|seconds?|sek|sekunden)|(?P<min>mins?|minutes?|minuten)"
-    r"|(?P<h>h|hrs?|hours?|std|stunden)|(?P<d>d|days?|tage))[)\].]*$",
+    rf"(?:^|[\s_(\[.,-]+)(?:{'|'.join(f'(?P<{unit}>{any_of(unit)})' for unit in SINCE_START)})[)\].]*$",
     re.IGNORECASE,
 )
 RANK = {name: i for i, name in enumerate((*COLUMNS["stamp"], *COLUMNS["time_of_day"]))}
