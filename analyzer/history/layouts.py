@@ -291,7 +291,10 @@ def _paired(table: Table, time: int, beside: Sequence[int], options: ReadOptions
     """The tags that share one clock: those behind it that hold values, with their quality."""
     quality = [i for i in beside if plain(NUMBERED.sub("", table.names[i])) in COLUMNS["quality"]]
     held = [i for i in beside if i not in quality]
-    clock = stamps_clock(table, time, options)
+    above = NUMBERED.sub(
+        "", table.names[time]
+    )  # a tag, of which letters behind say nothing, or the time's name
+    clock = stamps_clock(table, time, options, above if plain(above) in COLUMNS["stamp"] else "")
     single = quality[0] if len(quality) == 1 and len(held) == 1 else -1
     return [TagColumn(clock, i, single) for i in held]
 

@@ -93,15 +93,15 @@ def find_clock(table: Table, options: ReadOptions) -> Clock:
     second, local = clock.seconds(table.head(clock.columns))
     if np.isnan(second).all():
         raise _unreadable(table, clock.columns[0])
-    return _with_winter_time(table, _with_zone(table, replace(clock, local=local)))
+    return _in_zone(table, replace(clock, local=local), table.names[clock.columns[0]])
 
 
-def stamps_clock(table: Table, column: int, options: ReadOptions) -> Clock:
-    """The clock of one column that is known to hold stamps."""
+def stamps_clock(table: Table, column: int, options: ReadOptions, name: str) -> Clock:
+    """The clock of one column that is known to hold stamps, under a name that may state their zone."""
     head = table.head([column])[0]
     scale = time_scale_of(head, time_unit(table.names[column])) if is_number(head.type) else None
     clock = _with_order(table, Clock((column,), timezone=options.timezone, scale=scale), options)
-    return _with_winter_time(table, replace(clock, local=clock.seconds([head])[1]))
+    return _in_zone(table, replace(clock, local=clock.seconds([head])[1]), name)
 
 
 def check_seconds(table: Table, clock: Clock, tag: int = -1) -> None:
@@ -163,20 +163,16 @@ def _with_fraction(table: Table, clock: Clock) -> Clock:
     return clock
 
 
-def _with_zone(table: Table, clock: Clock) -> Clock:
-    """The clock with the zone that the column's name or its stamps state, where these are local."""
-    name, head = table.names[clock.columns[0]], table.head(clock.columns[:1])[0].drop_null()
+def _in_zone(table: Table, clock: Clock, name: str) -> Clock:
+    """The clock with the zone that a name or its stamps state, where these are local, marked where they show that it
+    keeps the zone's winter time all the year."""
+    head = table.head(clock.columns[:1])[0].drop_null()
     text = str(head[0].as_py()) if clock.local and is_text(head.type) and len(head) else ""
     zone = stamps.named_zone(name) or stamps.named_zone(text) or clock.timezone
     offset_s, several = stamps.header_zone(name, zone)
     doubt = f", for '{several}' means several zones; state --timezone" if several else ""
-    return replace(clock, offset_s=offset_s, timezone=zone, doubt=doubt)
-
-
-def _with_winter_time(table: Table, clock: Clock) -> Clock:
-    """The clock, marked where its stamps show that it keeps the stated zone's winter time all the year."""
-    zone = clock.timezone
-    if not clock.local or clock.offset_s is not None or zone is None or plant_clock.is_fixed(zone):
+    clock = replace(clock, offset_s=offset_s, timezone=zone, doubt=doubt)
+    if not clock.local or offset_s is not None or zone is None or plant_clock.is_fixed(zone):
         return clock
     second = clock.seconds(table.read(clock.columns))[0]
     return replace(clock, winter_s=plant_clock.winter_offset_s(second, zone))
