@@ -118,12 +118,12 @@ def _with_short_year(parts: Fields, pointed: bool) -> DateOrder | None:
     if len(possible) == 1:
         return DateOrder("year", "else the stamps would lie ahead of us")
     leaps = {first: float(np.max(np.abs(np.diff(found)), initial=0.0)) for first, found in possible.items()}
-    if leaps["year"] < min(leap for first, leap in leaps.items() if first != "year"):
-        return DateOrder("year", WITHOUT_LEAP)
     latest = {first: found.max() for first, found in possible.items() if leaps[first] == min(leaps.values())}
     year = latest.pop("year", None)
     if year is None:
         return None
+    if not latest:
+        return DateOrder("year", WITHOUT_LEAP)
     if not pointed and max(latest.values()) <= year:
         first = "year"
     elif len(latest) == 1:

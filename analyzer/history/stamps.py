@@ -280,37 +280,26 @@ def parse_time(text: str, where: str, zone: str = UTC_NAME, day_first: bool | No
 def parse_times(
     texts: Sequence[str], where: Sequence[str], zone: str = UTC_NAME, day_first: bool | None = None
 ) -> NDArray[np.float64]:
-    """The same of many times at once, shape (n,); the first that is none, or reads two ways, is refused."""
+    """The same of one or more times at once, shape (n,); the first that is none, or reads two ways, is refused."""
     trimmed = [text.strip() for text in texts]
     parts = fields(pa.array(trimmed, pa.string()))
-    readable = np.zeros(len(texts), dtype=bool) if parts is None else parts.readable
-    for at in np.flatnonzero(~readable)[:1]:
-        raise InputError(f"{where[at]}: time {trimmed[at][:SHOWN]!r}", EXAMPLE, "correct the time")
-    if parts is None:
-        return np.empty(0)
-    day, sure = _stated_order(parts, trimmed, day_first)
+
+    def refused(at: int, why: str = "", remedy: str = "correct the time") -> InputError:
+        return InputError(f"{where[at]}: time {trimmed[at][:SHOWN]!r}{why}", EXAMPLE, remedy)
+
+    if parts is None or not parts.readable.all():
+        raise refused(0 if parts is None else int(np.argmin(parts.readable)))
+    either, above = parts.order == OPEN, (parts.a > 12) != (parts.b > 12)
+    pointed = np.array(["." in text.split(" ")[0] for text in trimmed]) | (parts.a == parts.b)
+    day = either & (np.where(above, parts.a > 12, pointed) if day_first is None else day_first)
+    unsure = either & (day_first is None) & (parts.year_may_begin | ~(above | pointed))
     local_s = np.where(day, stamp_seconds(parts, "day"), stamp_seconds(parts, "month"))
     with np.errstate(invalid="ignore"):
         of_our_time = (local_s >= HISTORY.stated_from_s) & (local_s < HISTORY.stated_to_s)
-    for at in np.flatnonzero(~sure | ~of_our_time)[:1]:
-        seen = f"{where[at]}: time {trimmed[at][:SHOWN]!r}"
-        if not sure[at]:
-            raise InputError(f"{seen} reads two ways", EXAMPLE, "write the year first, with four digits")
-        raise InputError(f"{seen} is no such day", EXAMPLE, "correct the time")
+    for at in np.flatnonzero(unsure | ~of_our_time)[:1].tolist():
+        if unsure[at]:
+            raise refused(at, " reads two ways", "write the year first, with four digits")
+        raise refused(at, " is no such day")
     at_s = zip(local_s.tolist(), parts.stated.tolist(), strict=True)
     epoch = datetime(1970, 1, 1)
     return np.array([s if stated else utc_s(epoch + timedelta(seconds=s), zone) for s, stated in at_s])
-
-
-def _stated_order(
-    parts: Fields, texts: Sequence[str], stated: bool | None
-) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Whether the day stands first in each date, shape (n,), and whether that is sure."""
-    either = parts.order == OPEN
-    if stated is not None:
-        return either & stated, np.ones(len(texts), dtype=bool)
-    above = (parts.a > 12) != (parts.b > 12)
-    pointed = np.array(["." in text.split(" ")[0] for text in texts]) | (parts.a == parts.b)
-    return either & np.where(above, parts.a > 12, pointed), ~either | (
-        ~parts.year_may_begin & (above | pointed)
-    )
