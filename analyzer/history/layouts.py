@@ -7,6 +7,7 @@ import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -258,13 +259,14 @@ def open_pairs(table: Table, options: ReadOptions) -> Source | None:
 
 def _groups(table: Table) -> list[tuple[int, list[int]]]:
     """Each column of stamps with the columns behind it up to the next; none where a column has nothing behind it."""
-    likely = [
-        i
-        for i, kind in enumerate(table.types)
-        if is_text(kind) or pa.types.is_temporal(kind) or _time_name(table, i)
-    ]
+    timed = [_is_time(name) for name in table.names]
+    above = [
+        NUMBERED.sub("", a) != "" and b == "" for a, b in pairwise((*table.names, "."))
+    ]  # a tag, of both
+    texts = [is_text(kind) or pa.types.is_temporal(kind) for kind in table.types]
+    likely = [i for i, may in enumerate(zip(texts, timed, above, strict=True)) if any(may)]
     heads = dict(zip(likely, table.head(likely), strict=True))
-    times = [i for i in likely if holds_stamps(_time_name(table, i), heads[i], _is_time(table.names[i]))]
+    times = [i for i in likely if holds_stamps(heads[i], timed[i], above[i])]
     if len(times) < 2 or times[0] != 0:
         return []
     groups = [
@@ -278,13 +280,6 @@ def _is_time(name: str) -> bool:
     """Whether a column's own name is that of stamps."""
     bare = NUMBERED.sub("", name[: HISTORY.name_length])
     return plain(bare) in COLUMNS["stamp"] or any((TIME_WORDS.search(bare), TIME_FIRST.match(bare)))
-
-
-def _time_name(table: Table, i: int) -> str:
-    """A name under which numbers of a column may count as stamps: its own, or 'time' before a column without one."""
-    name = NUMBERED.sub("", table.names[i][: HISTORY.name_length])
-    unnamed = i + 1 < len(table.names) and table.names[i + 1] == "" and name != ""
-    return "time" if unnamed or _is_time(table.names[i]) else ""
 
 
 def _paired(table: Table, time: int, beside: Sequence[int], options: ReadOptions) -> list[TagColumn]:

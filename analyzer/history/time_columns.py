@@ -122,18 +122,14 @@ def check_seconds(table: Table, clock: Clock, tag: int = -1) -> None:
         raise InputError(seen, "a stamp of its own for each sample", remedy)
 
 
-def holds_stamps(name: str, head: pa.Array, since_start: bool = True) -> bool:
-    """Whether the first rows of a column are stamps; numbers only where the column is named as stamps are.
-
-    With `since_start` numbers may count from the start of the export; else they must lie in our time.
-    """
+def holds_stamps(head: pa.Array, timed: bool, above: bool) -> bool:
+    """Whether the first rows of a column are stamps; numbers only where the column is named as stamps are, or where a
+    tag stands above them: then they must lie in our time, else they may count from the start of the export."""
     filled = head.drop_null()
-    if len(filled) == 0 or pa.types.is_boolean(head.type):
-        return False
+    kind = _kind_of_time("", filled) if len(filled) else ""
     if is_number(head.type):
-        scale = time_scale_of(filled)
-        return name != "" and scale is not None and (since_start or scale not in SINCE_START.values())
-    return _kind_of_time(name, filled) == "full"
+        return isinstance(kind, TimeScale) and (timed or (above and kind not in SINCE_START.values()))
+    return kind == "full"
 
 
 def _with_order(table: Table, clock: Clock, options: ReadOptions) -> Clock:
