@@ -32,7 +32,7 @@ from analyzer.history.table import (
     plain,
     stated_column,
 )
-from analyzer.history.time_columns import check_seconds, find_clock, holds_stamps, stamps_clock
+from analyzer.history.time_columns import find_clock, holds_stamps, stamps_clock
 from analyzer.history.values import parsed, values
 from analyzer.limits import HISTORY
 from identification.errors import InputError
@@ -188,7 +188,6 @@ def _taken(column: pa.Array, rows: Rows) -> pa.Array:
 def open_wide(table: Table, options: ReadOptions) -> Source:
     """Take a table as wide: one time column, and a column for each tag."""
     clock = find_clock(table, options)
-    check_seconds(table, clock)
     free = [i for i in range(len(table.names)) if i not in clock.columns and _holds_values(table, i)]
     partner, said = quality_columns(table, free)
     values_in = [i for i in free if i not in partner.values()]
@@ -313,8 +312,7 @@ def open_long(table: Table, options: ReadOptions) -> Source | None:
     tag, value = tag_column(table), _value_column(table)
     if tag < 0 or value is None:
         return None
-    clock = find_clock(table, options)
-    check_seconds(table, clock, tag)
+    clock = find_clock(table, options, tag)
     met = table.tags or _kinds(table, tag).to_pylist()
     tags = tuple(str(name) for name in met if name not in (None, ""))
     quality, scheme = first_named(table.names, COLUMNS["quality"]), None

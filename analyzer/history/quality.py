@@ -188,10 +188,9 @@ def _numbers(codes: pa.Array) -> NDArray[np.float64]:
 
 
 def _good(kinds: pa.Array, scheme: Scheme) -> NDArray[np.bool_]:
-    if scheme is Scheme.TEXT:
-        return np.array([_good_text(str(text)) for text in kinds.to_pylist()])
-    if scheme is Scheme.BAD_FLAG:
-        return np.array([_code_text(code) in NOT_BAD for code in kinds.to_pylist()])
+    if scheme in (Scheme.TEXT, Scheme.BAD_FLAG):
+        texts = map(_code_text, kinds.to_pylist())
+        return np.array([_good_text(t) if scheme is Scheme.TEXT else t in NOT_BAD for t in texts])
     number = _numbers(kinds)
     return np.isfinite(number) & IS_GOOD[scheme](np.nan_to_num(number, nan=-1).astype(np.int64))
 

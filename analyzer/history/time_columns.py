@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
+from numpy.typing import NDArray
 
 from analyzer.history import plant_clock, stamps
 from analyzer.history.clock import (
@@ -75,13 +76,13 @@ def is_stamp(name: str) -> bool:
     return plain(name) in COLUMNS["stamp"] or bare in COLUMNS["stamp"] or bare in COLUMNS["elapsed"]
 
 
-def find_clock(table: Table, options: ReadOptions) -> Clock:
-    """The time columns of a table, and how they are written.
+def find_clock(table: Table, options: ReadOptions, tag: int = -1) -> Clock:
+    """The time columns of a table, and how they are written; `tag` is the column of the tags of a long table.
 
     Raises
     ------
     InputError
-        No column holds a time, or the one that is named so cannot be read.
+        No column holds a time, or the one that is named so cannot be read, or its stamps have lost their seconds.
     """
     columns = _time_candidates(table, options)
     heads = dict(zip(columns, table.head(columns), strict=True))
@@ -93,6 +94,7 @@ def find_clock(table: Table, options: ReadOptions) -> Clock:
     second, local = clock.seconds(table.head(clock.columns))
     if np.isnan(second).all():
         raise _unreadable(table, clock.columns[0])
+    _check_seconds(table, second, tag)
     return _in_zone(table, replace(clock, local=local), table.names[clock.columns[0]])
 
 
@@ -104,10 +106,9 @@ def stamps_clock(table: Table, column: int, options: ReadOptions, name: str) -> 
     return _in_zone(table, replace(clock, local=clock.seconds([head])[1]), name)
 
 
-def check_seconds(table: Table, clock: Clock, tag: int = -1) -> None:
-    """Raise InputError where stamps have lost their seconds, so that the samples of a minute share one; `tag` is the
-    column of the tags of a long table, -1 of a wide one."""
-    second = clock.seconds(table.head(clock.columns))[0]
+def _check_seconds(table: Table, second: NDArray[np.float64], tag: int) -> None:
+    """Raise InputError where the first stamps [s] have lost their seconds, so that the samples of a minute share one;
+    `tag` is the column of the tags of a long table, -1 of a wide one."""
     known = np.isfinite(second)
     if known.sum() < HISTORY.minutes_rows or (second[known] % 60.0 != 0).any():
         return
